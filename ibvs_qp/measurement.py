@@ -1,0 +1,167 @@
+"""What goes in: sensor frames for the pilot, measurements and references for a controller.
+
+All are frozen keyword-only dataclasses in float64 and SI units; stamps are integer nanoseconds of one monotonic
+clock. They are plain carriers: a controller checks them itself, because in flight nothing may raise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+HORIZONTAL, VERTICAL = "horizontal", "vertical"
+
+
+@dataclass(frozen=True, kw_only=True)
+class LineFeature:
+    """One line seen in the image, x cos(theta) + y sin(theta) = rho in normalised coordinates.
+
+    Attributes:
+        rho: Signed distance of the line from the image centre [-].
+        theta: Angle of the line's normal [rad].
+        covariance: Of (rho, theta), shape (2, 2).
+        role: "horizontal" or "vertical".
+        weight: 0 (fading out) to 1 (trusted).
+        stamp_ns: Time at which the line was as described.
+        track_id: Identity kept from frame to frame.
+        segment: Visible end points [[x1, y1], [x2, y2]], normalised, or None.
+        surface_side: +1 if the working surface lies on the side the normal (cos, sin) points to, -1 if on the
+            other, 0 if unknown.
+        kind: "board" for an edge of the working surface, "paint" for an edge of fresh paint on it, "" if unknown.
+    """
+
+    rho: float
+    theta: float
+    covariance: np.ndarray
+    role: str
+    weight: float = 1.0
+    stamp_ns: int = 0
+    track_id: int = 0
+    segment: np.ndarray | None = None
+    surface_side: int = 0
+    kind: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LineReference:
+    """Where a line shall be: rho [-], theta [rad] and role, at the nominal tip image point."""
+
+    rho: float
+    theta: float
+    role: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Measurement:
+    """Everything a controller knows at one tick.
+
+    Attributes:
+        stamp_ns: Time of the tick.
+        attitude: Quaternion (w, x, y, z) of B in I; its yaw is arbitrary.
+        angular_velocity: Omega in B [rad/s], (3,).
+        specific_force: Accelerometer in B [m/s^2], (3,), or None.
+        contact_wrench: Tared wrench ON the vehicle at the centre of mass, FRD [N, N m], (6,).
+        wrench_stamp_ns: Time at which the contact wrench was measured.
+        lines: Lines, each with its own stamp.
+        plane: (A, B, C, D) of the wall in C with D = -1, or None.
+        plane_stamp_ns: Time at which the plane was measured.
+        velocity: Linear velocity in B [m/s], (3,), or None.
+        velocity_covariance: Of the velocity, (3, 3), or None.
+        thrust_min: Lower thrust limits [N], (n,), or None for the configured ones.
+        thrust_max: Upper thrust limits [N], (n,), or None for the configured ones.
+    """
+
+    stamp_ns: int
+    attitude: np.ndarray
+    angular_velocity: np.ndarray
+    contact_wrench: np.ndarray
+    wrench_stamp_ns: int
+    specific_force: np.ndarray | None = None
+    lines: tuple[LineFeature, ...] = ()
+    plane: tuple[float, float, float, float] | None = None
+    plane_stamp_ns: int = 0
+    velocity: np.ndarray | None = None
+    velocity_covariance: np.ndarray | None = None
+    thrust_min: np.ndarray | None = None
+    thrust_max: np.ndarray | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reference:
+    """What a controller shall do.
+
+    Attributes:
+        push_force: Wanted push on the wall [N], >= 0.
+        standoff: Wanted distance from tip to wall while not in contact [m].
+        lines: Wanted lines; they pair with the measured ones by role, then order.
+        velocity: Wanted velocity in the wall plane (right, down) [m/s], (2,).
+        contact: Press the wall (True) or keep the stand-off (False: lambda = 0).
+    """
+
+    push_force: float = 0.0
+    standoff: float = 0.3
+    lines: tuple[LineReference, ...] = ()
+    velocity: np.ndarray = field(default_factory=lambda: np.zeros(2))
+    contact: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class RgbdFrame:
+    """One registered colour and depth picture.
+
+    Attributes:
+        rgb: uint8 (H, W, 3).
+        depth: float32 (H, W) [m], 0 where invalid.
+        intrinsics: (fx, fy, cx, cy) [px], pixel centres at integers.
+        stamp_ns: Time of capture.
+    """
+
+    rgb: np.ndarray
+    depth: np.ndarray
+    intrinsics: tuple[float, float, float, float]
+    stamp_ns: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class FeatureFrame:
+    """What perception saw in one picture.
+
+    Attributes:
+        lines: Lines at the time of capture.
+        plane: (A, B, C, D) of the wall in C with D = -1, or None.
+        stamp_ns: Time of capture.
+        velocity: Linear velocity of the centre of mass in B at capture [m/s], (3,), or None.
+        velocity_covariance: Its covariance, (3, 3); directions nobody observed have a large variance.
+    """
+
+    lines: tuple[LineFeature, ...]
+    plane: tuple[float, float, float, float] | None
+    stamp_ns: int
+    velocity: np.ndarray | None = None
+    velocity_covariance: np.ndarray | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class SensorFrame:
+    """Raw sensors at one control tick, as a vehicle delivers them.
+
+    Attributes:
+        stamp_ns: Time of the tick.
+        attitude: Quaternion (w, x, y, z) of B in I; its yaw is arbitrary.
+        angular_velocity: Gyro in B [rad/s], (3,).
+        specific_force: Accelerometer in B [m/s^2], (3,).
+        wrench: Raw F/T sample at the sensor, FRD axes, vehicle on tool [N, N m], (6,).
+        wrench_stamp_ns: Time at which that sample was taken.
+        image: A new picture, or None.
+        features: What perception saw, instead of an image, or None.
+    """
+
+    stamp_ns: int
+    attitude: np.ndarray
+    angular_velocity: np.ndarray
+    specific_force: np.ndarray
+    wrench: np.ndarray
+    wrench_stamp_ns: int
+    image: RgbdFrame | None = None
+    features: FeatureFrame | None = None
