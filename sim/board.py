@@ -1,0 +1,62 @@
+"""Where the board and the nominal strokes lie in the world (truth; the controller never sees it).
+
+World NED with the wall to the north: x points into the wall, y to the right as the vehicle sees it, z down. The
+board's face is the plane x = 0, its bottom left corner the point y = 0, z = -bottom_m; the wall's face lies at
+x = gap_m. Points on the board are given as (along, up) metres from that corner, turned with the board's slope.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from sim.scene import Scene
+
+
+@dataclass(frozen=True)
+class BoardGeometry:
+    """Geometry of board and paint job derived from a scene."""
+
+    scene: Scene
+
+    @property
+    def along(self) -> np.ndarray:
+        """Unit vector along the bottom edge to the right, in world (y, z), (2,)."""
+        slope = math.radians(self.scene.board.slope_deg)
+        return np.array([math.cos(slope), math.sin(slope)])
+
+    @property
+    def up(self) -> np.ndarray:
+        """Unit vector up along the left edge, in world (y, z), (2,)."""
+        slope = math.radians(self.scene.board.slope_deg)
+        return np.array([math.sin(slope), -math.cos(slope)])
+
+    def point(self, along_m: float | np.ndarray, up_m: float | np.ndarray) -> np.ndarray:
+        """World (y, z) of board coordinates [m], (..., 2)."""
+        corner = np.array([0.0, -self.scene.board.bottom_m])
+        along_m, up_m = np.asarray(along_m, float), np.asarray(up_m, float)
+        return corner + along_m[..., None] * self.along + up_m[..., None] * self.up
+
+    def board_coordinates(self, yz: np.ndarray) -> np.ndarray:
+        """Inverse of `point`: (along, up) [m] of world (y, z), (..., 2)."""
+        offset = np.asarray(yz, float) - np.array([0.0, -self.scene.board.bottom_m])
+        return np.stack((offset @ self.along, offset @ self.up), axis=-1)
+
+    @property
+    def row_ends(self) -> tuple[float, float]:
+        """Left and right end of every row, along the board [m]."""
+        paint = self.scene.paint
+        return paint.edge_margin_m, paint.edge_margin_m + paint.stroke_m
+
+    def row_height(self, row: int) -> float:
+        """Nominal height of row 1, 2, ... above the bottom edge [m]."""
+        return self.scene.paint.edge_margin_m + (row - 1) * self.scene.paint.pitch_m
+
+    @property
+    def start_tip(self) -> np.ndarray:
+        """World position of the tip at the start of a flight without seed variation [m], (3,)."""
+        start, (_, right) = self.scene.start, self.row_ends
+        y, z = self.point(right, self.row_height(1))
+        return np.array([-start.distance_m, y + start.right_m, z + start.down_m])
