@@ -133,6 +133,7 @@ class FeatureFrame:
         stamp_ns: Time of capture.
         velocity: Linear velocity of the centre of mass in B at capture [m/s], (3,), or None.
         velocity_covariance: Its covariance, (3, 3); directions nobody observed have a large variance.
+        velocity_stamp_ns: Time for which the velocity holds; 0 means at capture (flow: half a frame earlier).
     """
 
     lines: tuple[LineFeature, ...]
@@ -140,6 +141,7 @@ class FeatureFrame:
     stamp_ns: int
     velocity: np.ndarray | None = None
     velocity_covariance: np.ndarray | None = None
+    velocity_stamp_ns: int = 0
 
 
 @dataclass(frozen=True, kw_only=True)
