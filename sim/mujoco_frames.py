@@ -1,0 +1,18 @@
+"""Conversion between the project's frames (NED, FRD) and MuJoCo's (z up, front-left-up).
+
+Both pairs differ by the same half turn about x, S = diag(1, -1, -1), which is its own inverse and a rotation:
+it maps forces and moments alike.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+#: Diagonal of S; multiply a vector (..., 3) by it to change sides.
+FLIP = np.array([1.0, -1.0, -1.0])
+
+#: The same for a wrench or twist (..., 6).
+FLIP6 = np.concatenate((FLIP, FLIP))
+
+#: The same for a quaternion (w, x, y, z).
+FLIP_QUATERNION = np.array([1.0, 1.0, -1.0, -1.0])

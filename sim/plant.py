@@ -1,0 +1,205 @@
+"""The truth: vehicle, air and contact, advanced one control tick at a time; NED and FRD on every face."""
+
+from __future__ import annotations
+
+import math
+
+import mujoco
+import numpy as np
+
+from ibvs_qp.frames import rotation_from_quaternion
+from ibvs_qp.vehicle import VehicleParams
+from sim.board import BoardGeometry
+from sim.clearance import PropellerClearance
+from sim.model import build_model
+from sim.mujoco_frames import FLIP, FLIP_QUATERNION
+from sim.scene import Scene
+from sim.streams import stream
+from sim.trim import hover_thrusts, start_pose, true_limits
+from sim.wind import Wind
+
+#: Physics steps of 1 ms in one control tick, and the tick in nanoseconds.
+STEPS_PER_TICK = 4
+TICK_NS = 4_000_000
+
+#: A vehicle whose origin is lower than this has hit the ground [m]: legs and half a tilted frame.
+GROUND_CLEARANCE_M = 0.15
+
+#: Tilt at which a vehicle counts as flipped [deg].
+FLIP_DEG = 60.0
+
+
+class Plant:
+    """The simulated vehicle in its scene.
+
+    The body frame has its origin at the ASSUMED centre of mass (positions of `VehicleParams`); the true one lies
+    ``scene.vehicle.com_offset_m`` away. Starts level and at rest with the rotors at hover, at the scene's start pose
+    varied by the seed. Same scene, seed and thrusts: same bits.
+
+    Attributes:
+        time_ns: Simulated time since the start [ns].
+        crashed: Why the flight is over (propeller strike, ground, flip, non-finite state), or None.
+        contact_1khz: Normal contact force at the four physics steps of the last tick [N], (4,).
+
+    Args:
+        scene: The truth.
+        vehicle: Geometry and nominal parameters.
+        seed: Varies start pose and gusts.
+    """
+
+    def __init__(self, scene: Scene, vehicle: VehicleParams | None = None, seed: int = 0) -> None:
+        self.scene, self.vehicle = scene, vehicle or VehicleParams()
+        self.model, self._ids = build_model(scene, self.vehicle)
+        self.data = mujoco.MjData(self.model)
+        self._lower, self._upper = true_limits(scene, self.vehicle)
+        self._lags = scene.vehicle.motor_lag_up_s, scene.vehicle.motor_lag_down_s
+        self._centre = np.array(scene.vehicle.com_offset_m)
+        self._tip = np.array(self.vehicle.tip_position_m)
+        self._clearance = PropellerClearance(BoardGeometry(scene), self.vehicle)
+        drag = self.vehicle.linear_drag_n_s_m
+        self._wind = Wind(scene.wind, drag, TICK_NS * 1e-9, stream(seed, "wind"))
+        # Moment arm from the bare vehicle's centre of mass, where MuJoCo applies forces, to the whole one's.
+        self._drag_arm = FLIP * self._centre - self.model.body_ipos[self._ids.vehicle]
+        self.time_ns = 0
+        self.crashed: str | None = None
+        self.contact_1khz = np.zeros(STEPS_PER_TICK)
+        self._sensors = np.zeros((STEPS_PER_TICK, self.model.nsensordata))
+        self._start(*start_pose(scene, self.vehicle, seed), hover_thrusts(scene, self.vehicle))
+
+    def _start(self, position: np.ndarray, yaw: float, thrusts: np.ndarray) -> None:
+        self.data.qpos[:3] = FLIP * position
+        self.data.qpos[3:7] = FLIP_QUATERNION * (math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw))
+        self.data.act[:] = self.data.ctrl[:] = thrusts
+        mujoco.mj_forward(self.model, self.data)
+        self._sensors[:] = self.data.sensordata
+        self._refresh()
+
+    def _refresh(self) -> None:
+        """Convert the state once per tick."""
+        qpos, qvel = self.data.qpos, self.data.qvel
+        self._position = FLIP * qpos[:3]
+        self._quaternion = FLIP_QUATERNION * qpos[3:7] / math.sqrt(float(qpos[3:7] @ qpos[3:7]))
+        self._rotation = rotation_from_quaternion(self._quaternion)
+        self._world_velocity = FLIP * qvel[:3]
+        self._angular_velocity = FLIP * qvel[3:]
+
+    def step(self, thrusts: np.ndarray) -> None:
+        """Advance one control tick of 4 ms under constant commanded thrusts.
+
+        Args:
+            thrusts: Commanded thrusts [N], (n,); clipped to the true limits.
+        """
+        model, data, sensors = self.model, self.data, self._sensors
+        command = np.clip(thrusts, self._lower, self._upper)
+        data.ctrl[:] = command
+        # Under a constant command a first-order lag never crosses it, so one choice holds for the tick.
+        model.actuator_dynprm[:, 0] = np.where(command >= data.act, *self._lags)
+        self._apply_air()
+        for k in range(STEPS_PER_TICK):
+            mujoco.mj_step(model, data)
+            sensors[k] = data.sensordata
+        self.time_ns += TICK_NS
+        contact = sensors[:, self._ids.contact]
+        self.contact_1khz = contact[:, 0].clip(0.0, 1.0) * contact[:, 1]
+        self._refresh()
+        self.crashed = self.crashed or self._crash()
+
+    def _apply_air(self) -> None:
+        velocity = self._world_velocity + self._rotation @ np.cross(self._angular_velocity, self._centre)
+        force = FLIP * self._wind.force(velocity)
+        arm = FLIP * (self._rotation @ (FLIP * self._drag_arm))
+        self.data.xfrc_applied[self._ids.vehicle, :3] = force
+        self.data.xfrc_applied[self._ids.vehicle, 3:] = np.cross(arm, force)
+
+    def _crash(self) -> str | None:
+        if not (np.isfinite(self.data.qpos).all() and np.isfinite(self.data.qvel).all()):
+            return "non-finite state"
+        if self._rotation[2, 2] < math.cos(math.radians(FLIP_DEG)):
+            return f"flip: tilted by more than {FLIP_DEG:g} deg"
+        if self._position[2] > -GROUND_CLEARANCE_M:
+            return "hit the ground"
+        if self._clearance.foremost(self._position, self._rotation) > 0.0 and self.propeller_clearance <= 0.0:
+            return "propeller strike"
+        return None
+
+    @property
+    def position(self) -> np.ndarray:
+        """Body origin (assumed centre of mass), world NED [m], (3,)."""
+        return self._position
+
+    @property
+    def centre_of_mass(self) -> np.ndarray:
+        """True centre of mass, world NED [m], (3,)."""
+        return self._position + self._rotation @ self._centre
+
+    @property
+    def quaternion(self) -> np.ndarray:
+        """Attitude (w, x, y, z) of B in I, (4,)."""
+        return self._quaternion
+
+    @property
+    def rotation(self) -> np.ndarray:
+        """Rotation B to I, (3, 3)."""
+        return self._rotation
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """Velocity of the body origin in B [m/s], (3,)."""
+        return self._rotation.T @ self._world_velocity
+
+    @property
+    def angular_velocity(self) -> np.ndarray:
+        """Angular velocity in B [rad/s], (3,)."""
+        return self._angular_velocity
+
+    @property
+    def euler(self) -> np.ndarray:
+        """Roll, pitch, yaw [rad], (3,); yaw 0 faces the wall, + to the right."""
+        r = self._rotation
+        pitch = math.asin(max(-1.0, min(1.0, -r[2, 0])))
+        return np.array([math.atan2(r[2, 1], r[2, 2]), pitch, math.atan2(r[1, 0], r[0, 0])])
+
+    @property
+    def tip(self) -> np.ndarray:
+        """Undeformed tip, world NED [m], (3,); x > 0 is the penetration."""
+        return self._position + self._rotation @ self._tip
+
+    @property
+    def tip_velocity(self) -> np.ndarray:
+        """Velocity of the tip, world NED [m/s], (3,)."""
+        return self._world_velocity + self._rotation @ np.cross(self._angular_velocity, self._tip)
+
+    @property
+    def thrusts_actual(self) -> np.ndarray:
+        """Thrusts after the motor lag [N], (n,)."""
+        return self.data.act.copy()
+
+    @property
+    def specific_force(self) -> np.ndarray:
+        """What a perfect accelerometer at the body origin reads, mean over the last tick, FRD [m/s^2], (3,)."""
+        return FLIP * self._sensors[:, self._ids.accelerometer].mean(axis=0)
+
+    @property
+    def ft_wrench(self) -> np.ndarray:
+        """Perfect force/torque sensor: vehicle on tool, at the sensor, FRD, at the last physics step [N, N m], (6,)."""
+        last = self._sensors[-1]
+        return np.concatenate((FLIP * last[self._ids.force], FLIP * last[self._ids.torque]))
+
+    @property
+    def contact_normal_force(self) -> float:
+        """Normal contact force now [N], >= 0; pushing is positive."""
+        return float(self.contact_1khz[-1])
+
+    @property
+    def contact_friction(self) -> np.ndarray:
+        """Force of the board on the tip along the board, world NED (y, z) [N], (2,)."""
+        found, force, normal, tangent = np.split(self._sensors[-1, self._ids.contact], (1, 4, 7))
+        if found[0] < 1.0:
+            return np.zeros(2)
+        on_board = force[1] * tangent + force[2] * np.cross(normal, tangent)
+        return -(FLIP * on_board)[1:]
+
+    @property
+    def propeller_clearance(self) -> float:
+        """Smallest distance of any propeller disc to the board's face or, beside the board, to the wall [m]."""
+        return self._clearance.distance(self._position, self._rotation)
