@@ -23,12 +23,14 @@ class PropellerClearance:
 
     def __init__(self, board: BoardGeometry, vehicle: VehicleParams) -> None:
         geometry = vehicle.geometry
-        self._board = board
         self._size = np.array([board.scene.board.width_m, board.scene.board.height_m])
         self._gap = board.scene.board.gap_m
         self._radius = vehicle.propeller_radius_m
         self._positions, self._axes = geometry.positions, geometry.axes
-        self._rims = np.vstack([self._rim(p, t) for p, t in zip(self._positions, self._axes, strict=True)])
+        self._rims = np.stack([self._rim(p, t) for p, t in zip(self._positions, self._axes, strict=True)])
+        # World (y, z) to (along, up) of the board, as one affine map.
+        self._outline = np.column_stack((board.along, board.up))
+        self._corner = board.point(0.0, 0.0)
 
     def _rim(self, position: np.ndarray, axis: np.ndarray) -> np.ndarray:
         first = np.cross(axis, [1.0, 0.0, 0.0])
@@ -36,11 +38,14 @@ class PropellerClearance:
         angle = np.arange(RIM_POINTS)[:, None] * (2.0 * math.pi / RIM_POINTS)
         return position + self._radius * (np.cos(angle) * first + np.sin(angle) * np.cross(axis, first))
 
+    def _fronts(self, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
+        """World x of the foremost point of every disc [m], (n,)."""
+        axis = self._axes @ rotation[0]
+        return position[0] + self._positions @ rotation[0] + self._radius * np.sqrt(np.maximum(1.0 - axis * axis, 0.0))
+
     def foremost(self, position: np.ndarray, rotation: np.ndarray) -> float:
         """Largest world x that any disc reaches [m], exact and quick; negative: clear of board and wall."""
-        axis = self._axes @ rotation[0]
-        reach = self._positions @ rotation[0] + self._radius * np.sqrt(np.maximum(1.0 - axis * axis, 0.0))
-        return float(position[0] + reach.max())
+        return float(self._fronts(position, rotation).max())
 
     def distance(self, position: np.ndarray, rotation: np.ndarray) -> float:
         """Smallest distance of any disc to the surface straight ahead of it [m]; negative inside a surface.
@@ -49,10 +54,11 @@ class PropellerClearance:
             position: Body origin, world NED [m], (3,).
             rotation: Rotation B to I, (3, 3).
         """
-        rim = position + self._rims @ rotation.T
-        on_board = self._board.board_coordinates(rim[:, 1:])
-        inside = np.all((on_board >= 0.0) & (on_board <= self._size), axis=1)
-        nearest = self._gap - self.foremost(position, rotation)
-        if inside.any():
-            nearest = min(nearest, float(-rim[inside, 0].max()))
-        return nearest
+        fronts = self._fronts(position, rotation)
+        foremost = float(fronts.max())
+        # The board stands gap_m before the wall, so only discs that reach that far can be nearest.
+        rim = position + self._rims[fronts >= foremost - self._gap].reshape(-1, 3) @ rotation.T
+        on_board = (rim[:, 1:] - self._corner) @ self._outline
+        inside = ((on_board >= 0.0) & (on_board <= self._size)).all(axis=1)
+        ahead = rim[inside, 0]
+        return min(self._gap - foremost, -float(ahead.max())) if ahead.size else self._gap - foremost

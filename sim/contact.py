@@ -31,7 +31,9 @@ def pair_xml(tip: str, board: str, name: str = "brush") -> str:
     return f'<contact><pair name="{name}" geom1="{tip}" geom2="{board}" condim="3"/></contact>'
 
 
-def set_contact(model: mujoco.MjModel, *, stiffness: float, damping: float, friction: float, name: str = "brush") -> None:
+def set_contact(
+    model: mujoco.MjModel, *, stiffness: float, damping: float, friction: float, name: str = "brush"
+) -> None:
     """Give a compiled model's contact pair the wanted physical stiffness, damping and friction.
 
     Args:

@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from ibvs_qp.errors import ConfigError
 from ibvs_qp.frames import GRAVITY
 from ibvs_qp.vehicle import VehicleParams
 from sim.contact import OPTION_XML, pair_xml, set_contact
-from sim.mujoco_frames import FLIP
+from sim.mujoco_frames import FLIP, quaternion_of_axes
+from sim.rigid_body import RigidBody, bare_body, principal_axes, tool_body
 from sim.scene import Scene
 
 #: Radius of the tip's contact sphere [m]; its foremost point is the tip. Small: the contact point stays at the tip.
@@ -49,66 +49,12 @@ class ModelIds:
     contact: slice
 
 
-@dataclass(frozen=True)
-class RigidBody:
-    """Mass [kg], centre of mass [m] (3,) and inertia about it [kg m^2] (3, 3), all FRD from the body origin."""
-
-    mass: float
-    centre: np.ndarray
-    inertia: np.ndarray
-
-
-def _steiner(mass: float, offset: np.ndarray) -> np.ndarray:
-    """Inertia of a point mass at an offset."""
-    return mass * (float(offset @ offset) * np.eye(3) - np.outer(offset, offset))
-
-
-def tool_body(vehicle: VehicleParams) -> RigidBody:
-    """The tool: a slender rod from the force/torque sensor to the tip, mass centred where the parameters say."""
-    rod = np.asarray(vehicle.tip_position_m) - np.asarray(vehicle.force_torque_position_m)
-    return RigidBody(vehicle.tool_mass_kg, np.array(vehicle.tool_position_m), _steiner(vehicle.tool_mass_kg / 12.0, rod))
-
-
-def bare_body(scene: Scene, vehicle: VehicleParams) -> RigidBody:
-    """The vehicle without its tool: what is missing to the scene's mass, centre of mass and inertia.
-
-    Raises:
-        ConfigError: When the tool alone has more mass or inertia than the whole vehicle.
-    """
-    truth, tool = scene.vehicle, tool_body(vehicle)
-    whole = np.array(truth.com_offset_m)
-    mass = truth.mass_kg - tool.mass
-    if mass <= 0.0:
-        raise ConfigError(f"vehicle.mass_kg = {truth.mass_kg:g} kg is refused: the tool alone weighs {tool.mass:g} kg")
-    centre = (truth.mass_kg * whole - tool.mass * tool.centre) / mass
-    inertia = np.diag(truth.inertia_kg_m2) - tool.inertia
-    inertia -= _steiner(tool.mass, tool.centre - whole) + _steiner(mass, centre - whole)
-    if np.linalg.eigvalsh(inertia)[0] <= 0.0:
-        raise ConfigError(
-            f"vehicle.inertia_kg_m2 = {truth.inertia_kg_m2} kg m^2 is refused: the tool of {tool.mass:g} kg at "
-            f"{vehicle.tool_position_m} m alone has more"
-        )
-    return RigidBody(mass, centre, inertia)
-
-
 def _numbers(*values: float | np.ndarray) -> str:
     return " ".join(f"{float(entry):.17g}" for value in values for entry in np.atleast_1d(value))
 
 
-def _axes_quaternion(columns: np.ndarray) -> np.ndarray:
-    quaternion = np.zeros(4)
-    mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(columns).ravel())
-    return quaternion
-
-
-def _principal(body: RigidBody) -> tuple[np.ndarray, np.ndarray]:
-    """Principal moments (3,) and principal axes as quaternion (4,), front-left-up."""
-    moments, axes = np.linalg.eigh(FLIP[:, None] * body.inertia * FLIP)
-    return moments, _axes_quaternion(axes * np.linalg.det(axes))
-
-
 def _inertial_xml(body: RigidBody) -> str:
-    moments, quaternion = _principal(body)
+    moments, quaternion = principal_axes(body)
     return (
         f'<inertial mass="{_numbers(body.mass)}" pos="{_numbers(FLIP * body.centre)}" quat="{_numbers(quaternion)}" '
         f'diaginertia="{_numbers(np.maximum(moments, 1e-9))}"/>'
@@ -119,14 +65,19 @@ def _rotors_xml(vehicle: VehicleParams) -> tuple[str, str]:
     """Rotor sites (z = thrust axis) and their actuators: force along z, drag torque against the spin."""
     geometry = vehicle.geometry
     sites, actuators = [], []
-    for name, position, axis, spin in zip(geometry.names, geometry.positions, geometry.axes, geometry.spins, strict=True):
+    for name, position, axis, spin in zip(
+        geometry.names, geometry.positions, geometry.axes, geometry.spins, strict=True
+    ):
         up, place = FLIP * axis, FLIP * position
         side = np.cross(up, [1.0, 0.0, 0.0])
         side /= np.linalg.norm(side)
-        frame = f'pos="{_numbers(place)}" quat="{_numbers(_axes_quaternion(np.column_stack((np.cross(side, up), side, up))))}"'
+        quaternion = quaternion_of_axes(np.column_stack((np.cross(side, up), side, up)))
+        frame = f'pos="{_numbers(place)}" quat="{_numbers(quaternion)}"'
         sites.append(f'<site name="{name}" {frame} size="0.01"/>')
         size = _numbers(vehicle.propeller_radius_m, 0.004)
-        sites.append(f'<geom type="cylinder" size="{size}" {frame} contype="0" conaffinity="0" rgba=".2 .2 .2 .4" mass="0"/>')
+        sites.append(
+            f'<geom type="cylinder" size="{size}" {frame} contype="0" conaffinity="0" rgba=".2 .2 .2 .4" mass="0"/>'
+        )
         actuators.append(
             f'<general name="{name}" site="{name}" dyntype="filterexact" dynprm="{_numbers(vehicle.motor_lag_up_s)}" '
             f'gainprm="1" gear="0 0 1 0 0 {_numbers(-spin * geometry.torque_ratio_m)}"/>'
@@ -141,7 +92,9 @@ def _surroundings_xml(scene: Scene) -> str:
     """
     board, slope = scene.board, math.radians(scene.board.slope_deg)
     along, up = np.array([0, -math.cos(slope), -math.sin(slope)]), np.array([0, -math.sin(slope), math.cos(slope)])
-    centre = np.array([0.5 * BOARD_THICKNESS_M, 0, board.bottom_m]) + 0.5 * (board.width_m * along + board.height_m * up)
+    centre = np.array([0.5 * BOARD_THICKNESS_M, 0, board.bottom_m]) + 0.5 * (
+        board.width_m * along + board.height_m * up
+    )
     half = _numbers(0.5 * board.width_m, 0.5 * board.height_m, 0.5 * BOARD_THICKNESS_M)
     board_colour = _numbers(np.array(board.color) / 255.0, 1.0)
     wall_colour = _numbers(np.array(scene.wall.color) / 255.0, 1.0)
@@ -199,7 +152,7 @@ def build_model(scene: Scene, vehicle: VehicleParams) -> tuple[mujoco.MjModel, M
     model = mujoco.MjModel.from_xml_string(build_xml(scene, vehicle))
     ids = {name: mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name) for name in ("vehicle", "tool")}
     # The compiler evens out moments that break the triangle inequality; the scene's numbers are meant literally.
-    model.body_inertia[ids["vehicle"]] = _principal(bare_body(scene, vehicle))[0]
+    model.body_inertia[ids["vehicle"]] = principal_axes(bare_body(scene, vehicle))[0]
     mujoco.mj_setConst(model, mujoco.MjData(model))
     wall = scene.wall
     set_contact(model, stiffness=wall.stiffness_n_m, damping=wall.damping_n_s_m, friction=wall.friction)

@@ -6,6 +6,7 @@ it maps forces and moments alike.
 
 from __future__ import annotations
 
+import mujoco
 import numpy as np
 
 #: Diagonal of S; multiply a vector (..., 3) by it to change sides.
@@ -16,3 +17,10 @@ FLIP6 = np.concatenate((FLIP, FLIP))
 
 #: The same for a quaternion (w, x, y, z).
 FLIP_QUATERNION = np.array([1.0, 1.0, -1.0, -1.0])
+
+
+def quaternion_of_axes(columns: np.ndarray) -> np.ndarray:
+    """Quaternion (w, x, y, z) of the frame whose axes are the columns of a rotation matrix (3, 3)."""
+    quaternion = np.zeros(4)
+    mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(columns).ravel())
+    return quaternion

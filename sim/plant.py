@@ -7,7 +7,7 @@ import math
 import mujoco
 import numpy as np
 
-from ibvs_qp.frames import rotation_from_quaternion
+from ibvs_qp.frames import rotation_from_quaternion, skew
 from ibvs_qp.vehicle import VehicleParams
 from sim.board import BoardGeometry
 from sim.clearance import PropellerClearance
@@ -53,13 +53,15 @@ class Plant:
         self.data = mujoco.MjData(self.model)
         self._lower, self._upper = true_limits(scene, self.vehicle)
         self._lags = scene.vehicle.motor_lag_up_s, scene.vehicle.motor_lag_down_s
-        self._centre = np.array(scene.vehicle.com_offset_m)
-        self._tip = np.array(self.vehicle.tip_position_m)
+        self._centre, self._tip = np.array(scene.vehicle.com_offset_m), np.array(self.vehicle.tip_position_m)
+        self._skew_centre, self._skew_tip = skew(self._centre), skew(self._tip)
         self._clearance = PropellerClearance(BoardGeometry(scene), self.vehicle)
         drag = self.vehicle.linear_drag_n_s_m
         self._wind = Wind(scene.wind, drag, TICK_NS * 1e-9, stream(seed, "wind"))
         # Moment arm from the bare vehicle's centre of mass, where MuJoCo applies forces, to the whole one's.
-        self._drag_arm = FLIP * self._centre - self.model.body_ipos[self._ids.vehicle]
+        self._skew_drag_arm = skew(self._centre - FLIP * self.model.body_ipos[self._ids.vehicle])
+        self._state = self.data.qpos, self.data.qvel, self.data.act  # views; fetching them each time costs more
+        self._sensordata, self._applied = self.data.sensordata, self.data.xfrc_applied[self._ids.vehicle]
         self.time_ns = 0
         self.crashed: str | None = None
         self.contact_1khz = np.zeros(STEPS_PER_TICK)
@@ -76,9 +78,9 @@ class Plant:
 
     def _refresh(self) -> None:
         """Convert the state once per tick."""
-        qpos, qvel = self.data.qpos, self.data.qvel
+        qpos, qvel, _ = self._state
         self._position = FLIP * qpos[:3]
-        self._quaternion = FLIP_QUATERNION * qpos[3:7] / math.sqrt(float(qpos[3:7] @ qpos[3:7]))
+        self._quaternion = FLIP_QUATERNION * qpos[3:7]
         self._rotation = rotation_from_quaternion(self._quaternion)
         self._world_velocity = FLIP * qvel[:3]
         self._angular_velocity = FLIP * qvel[3:]
@@ -89,30 +91,30 @@ class Plant:
         Args:
             thrusts: Commanded thrusts [N], (n,); clipped to the true limits.
         """
-        model, data, sensors = self.model, self.data, self._sensors
-        command = np.clip(thrusts, self._lower, self._upper)
+        model, data, sensors, sensordata = self.model, self.data, self._sensors, self._sensordata
+        command = np.minimum(np.maximum(thrusts, self._lower), self._upper)
         data.ctrl[:] = command
         # Under a constant command a first-order lag never crosses it, so one choice holds for the tick.
-        model.actuator_dynprm[:, 0] = np.where(command >= data.act, *self._lags)
+        model.actuator_dynprm[:, 0] = np.where(command >= self._state[2], *self._lags)
         self._apply_air()
         for k in range(STEPS_PER_TICK):
             mujoco.mj_step(model, data)
-            sensors[k] = data.sensordata
+            sensors[k] = sensordata
         self.time_ns += TICK_NS
         contact = sensors[:, self._ids.contact]
-        self.contact_1khz = contact[:, 0].clip(0.0, 1.0) * contact[:, 1]
+        self.contact_1khz = np.where(contact[:, 0] > 0.0, contact[:, 1], 0.0)
         self._refresh()
         self.crashed = self.crashed or self._crash()
 
     def _apply_air(self) -> None:
-        velocity = self._world_velocity + self._rotation @ np.cross(self._angular_velocity, self._centre)
-        force = FLIP * self._wind.force(velocity)
-        arm = FLIP * (self._rotation @ (FLIP * self._drag_arm))
-        self.data.xfrc_applied[self._ids.vehicle, :3] = force
-        self.data.xfrc_applied[self._ids.vehicle, 3:] = np.cross(arm, force)
+        rotation = self._rotation
+        velocity = self._world_velocity - rotation @ (self._skew_centre @ self._angular_velocity)
+        force = self._wind.force(velocity)
+        self._applied[:3] = FLIP * force
+        self._applied[3:] = FLIP * (rotation @ (self._skew_drag_arm @ (force @ rotation)))
 
     def _crash(self) -> str | None:
-        if not (np.isfinite(self.data.qpos).all() and np.isfinite(self.data.qvel).all()):
+        if not math.isfinite(float(self._state[0] @ self._state[0] + self._state[1] @ self._state[1])):
             return "non-finite state"
         if self._rotation[2, 2] < math.cos(math.radians(FLIP_DEG)):
             return f"flip: tilted by more than {FLIP_DEG:g} deg"
@@ -167,12 +169,12 @@ class Plant:
     @property
     def tip_velocity(self) -> np.ndarray:
         """Velocity of the tip, world NED [m/s], (3,)."""
-        return self._world_velocity + self._rotation @ np.cross(self._angular_velocity, self._tip)
+        return self._world_velocity - self._rotation @ (self._skew_tip @ self._angular_velocity)
 
     @property
     def thrusts_actual(self) -> np.ndarray:
         """Thrusts after the motor lag [N], (n,)."""
-        return self.data.act.copy()
+        return self._state[2].copy()
 
     @property
     def specific_force(self) -> np.ndarray:
