@@ -1,0 +1,6 @@
+"""Camera back ends behind one protocol, and the late stream of their pictures."""
+
+from sim.cameras.plane import PlaneCamera
+from sim.cameras.protocol import Camera, CameraStream, camera_intrinsics
+
+__all__ = ["Camera", "CameraStream", "PlaneCamera", "camera_intrinsics"]

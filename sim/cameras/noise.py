@@ -1,0 +1,63 @@
+"""Noise made once and read from random places: a fresh draw for every pixel would cost more than the picture."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+#: Colour noise of the sensor [grey levels] (design, section 5: two grey levels).
+RGB_SIGMA = 2.0
+#: Length over which the correlated part of the depth noise holds together [px], and its common mode [m].
+DEPTH_CORRELATION_PX, DEPTH_COMMON_SIGMA_M = 20.0, 0.001
+#: Rows added to the banks; a frame starts at a random place within them.
+_SPARE_ROWS = 128
+
+
+class NoiseBank:
+    """Colour and depth noise of one camera.
+
+    Args:
+        shape: (height, width) of the picture [px].
+        depth_relative: Standard deviation of the white, and again of the correlated, depth noise per depth.
+        rng: Source of the banks and of the places read from.
+    """
+
+    def __init__(self, shape: tuple[int, int], depth_relative: float, rng: np.random.Generator) -> None:
+        self._shape, self._rng = shape, rng
+        height, width = shape
+        rows = height + _SPARE_ROWS
+        grey = np.rint(RGB_SIGMA * rng.standard_normal(rows * width * 3, np.float32)).astype(np.int8)
+        # Unsigned saturating arithmetic is the fast path, so the two signs live apart.
+        self._brighter, self._darker = np.maximum(grey, 0).astype(np.uint8), np.maximum(-grey, 0).astype(np.uint8)
+        self._white = rng.standard_normal(rows * width, np.float32) * np.float32(depth_relative)
+        # White noise blurred with this Gaussian is correlated over DEPTH_CORRELATION_PX (1/e at 2 sigma).
+        blurred = cv2.GaussianBlur(
+            rng.standard_normal((rows, 2 * width), np.float32), (0, 0), 0.5 * DEPTH_CORRELATION_PX
+        )
+        self._correlated = np.float32(1.0) + blurred * np.float32(depth_relative / float(blurred.std()))
+        self._mixed = np.empty(shape, np.float32)
+        self._lifted = np.empty((height, width * 3), np.uint8)
+
+    def add_color(self, picture: np.ndarray) -> np.ndarray:
+        """A new picture with noise added, uint8 (H, W, 3)."""
+        height, width = self._shape
+        size = height * width * 3
+        start = int(self._rng.integers(len(self._brighter) - size))
+        noisy = np.empty((height, width, 3), np.uint8)
+        flat = noisy.reshape(height, -1)
+        cv2.add(picture.reshape(height, -1), self._brighter[start : start + size].reshape(height, -1), self._lifted)
+        cv2.subtract(self._lifted, self._darker[start : start + size].reshape(height, -1), flat)
+        return noisy
+
+    def depth_factor(self) -> np.ndarray:
+        """Factor 1 + white + correlated noise of one frame, float32 (H, W), valid until the next call."""
+        height, width = self._shape
+        start = int(self._rng.integers(len(self._white) - height * width))
+        row, column = int(self._rng.integers(_SPARE_ROWS)), int(self._rng.integers(width))
+        white = self._white[start : start + height * width].reshape(height, width)
+        cv2.add(white, self._correlated[row : row + height, column : column + width], self._mixed)
+        return self._mixed
+
+    def depth_common(self) -> float:
+        """Common-mode depth error of one frame [m]."""
+        return float(self._rng.normal(0.0, DEPTH_COMMON_SIGMA_M))

@@ -1,0 +1,163 @@
+"""The default camera: board and wall are planes, so one homography each makes the picture; no GL anywhere.
+
+The board is drawn as a sheet at the wall's gap in front of it (its thin side faces are left out). Its outline cuts
+the picture along straight lines: `_cut` replaces what lies beyond one of them by the wall, with an antialiased rim.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from ibvs_qp.measurement import RgbdFrame
+from ibvs_qp.vehicle import VehicleParams
+from sim.cameras.arm import clip_near, shade_propellers, vehicle_layer
+from sim.cameras.noise import NoiseBank
+from sim.cameras.outline import CutLine, cut_lines
+from sim.cameras.protocol import camera_intrinsics
+from sim.cameras.view import View, board_corners, board_steps
+from sim.canvas import Canvas
+from sim.scene import Scene
+
+_WARP = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+#: Nearest depth at which the board's outline is projected, and farthest that a reading exists [m].
+_NEAR_M, _FAR_M = 0.05, 20.0
+
+Box = tuple[int, int, int, int]
+
+
+class PlaneCamera:
+    """RGB-D camera by homography of the painted board and the wall, with analytic depth.
+
+    Args:
+        scene: Board, wall and camera.
+        vehicle: Where camera, arm and propellers are.
+        canvas: The board's and the wall's pictures; read at every capture.
+        seed: Seed of the noise.
+        noise: Whether to add colour and depth noise and depth holes.
+    """
+
+    def __init__(self, scene: Scene, vehicle: VehicleParams, canvas: Canvas, seed: int, noise: bool = True) -> None:
+        self.scene, self.vehicle, self.canvas = scene, vehicle, canvas
+        self.intrinsics = camera_intrinsics(scene.camera)
+        bank, ragged = np.random.SeedSequence([seed, 0xCA3E]).spawn(2)
+        self._rng = np.random.default_rng(ragged)
+        shape = (scene.camera.height, scene.camera.width)
+        self._noise = NoiseBank(shape, scene.camera.depth_noise_relative, np.random.default_rng(bank)) if noise else None
+        self._layer = vehicle_layer(scene, vehicle, self.intrinsics, self._rng)
+        self._arm_box = _bounding_box(self._layer.mask | self._layer.holes)
+        self._propeller_box = _bounding_box(self._layer.propellers)
+        self._corners = board_corners(canvas.geometry)
+        self._picture, self._behind = np.empty((*shape, 4), np.uint8), np.empty((*shape, 4), np.uint8)
+        self._mask = np.zeros(shape, np.uint8)
+        self._inverse, self._inverse_behind = np.empty(shape, np.float32), np.empty(shape, np.float32)
+        self._rgb, self._soft = np.empty((*shape, 3), np.uint8), np.empty((*shape, 3), np.uint8)
+        self._ones = np.ones(shape, np.float32)
+        self._columns = np.arange(shape[1], dtype=np.float32)
+        self._rows = np.arange(shape[0], dtype=np.float32)[:, None]
+
+    def capture(self, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, stamp_ns: int) -> RgbdFrame:
+        """Take a picture, see `sim.cameras.protocol.Camera`; the frame owns its arrays."""
+        view = View.of_vehicle(position_ned, quaternion_b_in_i, self.vehicle.camera_position_m, self.intrinsics)
+        cuts = self._compose(view)
+        rgb = self._finish_color()
+        depth = self._finish_depth(cuts)
+        return RgbdFrame(rgb=rgb, depth=depth, intrinsics=self.intrinsics, stamp_ns=stamp_ns)
+
+    def _compose(self, view: View) -> list[CutLine]:
+        """Colours and inverse depths of board, wall and vehicle; returns the outline lines in view."""
+        height, width = self._mask.shape
+        polygon = clip_near(view.to_camera(self._corners), _NEAR_M)
+        fx, fy, cx, cy = self.intrinsics
+        polygon = polygon[:, :2] / polygon[:, 2:] * (fx, fy) + (cx, cy)
+        cuts, board_box = cut_lines(polygon, width, height)
+        common = self._noise.depth_common() * (view.plane(0.0)[2]) if self._noise else 0.0
+        if board_box is not None:
+            texture = self.canvas.flush()
+            homography = view.from_texture(*board_steps(self.canvas.geometry, self.canvas.pixels_per_m))
+            self._warp(texture, homography, board_box, self._picture)
+            self._plane(view, 0.0, common, board_box, self._inverse)
+        wall = self._wall_homography(view)
+        for cut in cuts:
+            self._cut(view, wall, cut, common)
+        if self._propeller_box is not None:
+            r0, r1, c0, c1 = self._propeller_box
+            shade_propellers(self._picture[r0:r1, c0:c1], self._layer.propellers[r0:r1, c0:c1])
+        if self._arm_box is not None:
+            r0, r1, c0, c1 = self._arm_box
+            mask = self._layer.mask[r0:r1, c0:c1]
+            cv2.copyTo(self._layer.picture[r0:r1, c0:c1], mask, self._picture[r0:r1, c0:c1])
+            cv2.copyTo(self._layer.inverse_depth[r0:r1, c0:c1], mask, self._inverse[r0:r1, c0:c1])
+        return cuts
+
+    def _wall_homography(self, view: View) -> np.ndarray:
+        step = 1.0 / self.canvas.wall_pixels_per_m
+        corner = np.append(self.scene.board.gap_m, self.canvas.wall_origin + 0.5 * step)
+        return view.from_texture(corner, np.array([0.0, step, 0.0]), np.array([0.0, 0.0, step]))
+
+    def _warp(self, texture: np.ndarray, homography: np.ndarray, box: Box, target: np.ndarray) -> None:
+        r0, r1, c0, c1 = box
+        back = np.linalg.inv(homography)
+        back[:, 2] += back[:, 0] * c0 + back[:, 1] * r0
+        size = (c1 - c0, r1 - r0)
+        cv2.warpPerspective(texture, back, size, target[r0:r1, c0:c1], _WARP, cv2.BORDER_REPLICATE)
+
+    def _plane(self, view: View, x_m: float, common: float, box: Box, target: np.ndarray) -> None:
+        # The common-mode error is applied as a scale, which equals the offset at the picture's centre.
+        r0, r1, c0, c1 = box
+        along_u, along_v, constant = (entry / (1.0 + common) for entry in view.pixel_plane(x_m))
+        across = self._columns[c0:c1] * np.float32(along_u) + np.float32(constant)
+        np.add(across, self._rows[r0:r1] * np.float32(along_v), out=target[r0:r1, c0:c1])
+
+    def _cut(self, view: View, wall: np.ndarray, cut: CutLine, common: float) -> None:
+        """Replace what lies beyond one line of the board's outline by the wall."""
+        r0, r1, c0, c1 = cut.box
+        self._warp(self.canvas.wall, wall, cut.box, self._behind)
+        self._plane(view, self.scene.board.gap_m, common, cut.box, self._inverse_behind)
+        rows, columns, share = cut.rim()
+        front = self._picture[rows, columns].astype(np.float32)
+        behind = self._behind[rows, columns].astype(np.float32)
+        mask = self._mask[r0:r1, c0:c1]
+        mask[:] = 0
+        if len(cut.beyond):
+            cv2.fillConvexPoly(mask, np.rint(cut.beyond - (c0, r0)).astype(np.int32), 255.0)
+        cv2.copyTo(self._behind[r0:r1, c0:c1], mask, self._picture[r0:r1, c0:c1])
+        cv2.copyTo(self._inverse_behind[r0:r1, c0:c1], mask, self._inverse[r0:r1, c0:c1])
+        self._picture[rows, columns] = (behind + share[:, None] * (front - behind) + 0.5).astype(np.uint8)
+
+    def _finish_color(self) -> np.ndarray:
+        """Lens blur and sensor noise."""
+        cv2.cvtColor(self._picture, cv2.COLOR_RGBA2RGB, self._rgb)
+        cv2.GaussianBlur(self._rgb, (3, 3), 0.0, self._soft)  # binomial kernel: sigma 0.71 px
+        return self._noise.add_color(self._soft) if self._noise else self._soft.copy()
+
+    def _finish_depth(self, cuts: list[CutLine]) -> np.ndarray:
+        """Depth with noise, and holes along its steps."""
+        depth = np.empty(self._mask.shape, np.float32)
+        farthest = 1.0 / _FAR_M
+        corners = self._inverse[:: len(self._inverse) - 1, :: self._inverse.shape[1] - 1]
+        if corners.min() < farthest:  # only when the plane's horizon comes near the picture
+            np.maximum(self._inverse, np.float32(farthest), out=self._inverse)
+        factor = self._noise.depth_factor() if self._noise else self._ones
+        cv2.divide(factor, self._inverse, depth)
+        if self._noise is None:
+            return depth
+        for cut in cuts:
+            rows, columns = cut.holes(self._rng)
+            depth[rows, columns] = 0.0
+        if self._arm_box is not None:
+            r0, r1, c0, c1 = self._arm_box
+            depth[r0:r1, c0:c1][self._layer.holes[r0:r1, c0:c1] > 0] = 0.0
+        if self._propeller_box is not None:
+            r0, r1, c0, c1 = self._propeller_box
+            depth[r0:r1, c0:c1][self._layer.propellers[r0:r1, c0:c1] > 0] = 0.0
+        return depth
+
+
+def _bounding_box(mask: np.ndarray) -> Box | None:
+    if not mask.any():
+        return None
+    left, top, width, height = cv2.boundingRect(mask)
+    return top, top + height, left, left + width
+
+

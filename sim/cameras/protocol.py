@@ -1,0 +1,104 @@
+"""What a camera back end offers, and the stream that delivers its pictures late."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from typing import Protocol
+
+import numpy as np
+
+from ibvs_qp.measurement import RgbdFrame
+from sim.scene import CameraScene
+
+NS_PER_S = 1_000_000_000
+
+
+def camera_intrinsics(camera: CameraScene) -> tuple[float, float, float, float]:
+    """Square-pixel intrinsics (fx, fy, cx, cy) [px] with pixel centres at integers: f = (H / 2) / tan(fov / 2)."""
+    focal = 0.5 * camera.height / math.tan(0.5 * math.radians(camera.vertical_fov_deg))
+    return focal, focal, 0.5 * (camera.width - 1), 0.5 * (camera.height - 1)
+
+
+class Camera(Protocol):
+    """An RGB-D camera on the vehicle.
+
+    Attributes:
+        intrinsics: (fx, fy, cx, cy) [px], pixel centres at integers.
+    """
+
+    intrinsics: tuple[float, float, float, float]
+
+    def capture(self, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, stamp_ns: int) -> RgbdFrame:
+        """Take a picture.
+
+        Args:
+            position_ned: World position of the body frame's origin [m], (3,).
+            quaternion_b_in_i: Attitude (w, x, y, z), (4,).
+            stamp_ns: Time of capture.
+        """
+        ...
+
+
+class Schedule:
+    """When to capture and when to deliver: a fixed rate and a fixed latency in integer nanoseconds.
+
+    Args:
+        rate_hz: Captures per second.
+        latency_s: Capture to delivery [s].
+    """
+
+    def __init__(self, rate_hz: float, latency_s: float) -> None:
+        self._rate_hz, self._latency_ns = rate_hz, round(latency_s * NS_PER_S)
+        self._start_ns: int | None = None
+        self._captures = 0
+        self._queue: deque[tuple[int, object]] = deque()
+
+    def due(self, now_ns: int) -> bool:
+        """Whether a capture is due now; counts it. The first call starts the clock and captures."""
+        if self._start_ns is None:
+            self._start_ns = now_ns
+        if now_ns < self._start_ns + round(self._captures * NS_PER_S / self._rate_hz):
+            return False
+        # Slots that a slow caller missed are lost, as in a camera; their pictures do not pile up.
+        self._captures = math.floor((now_ns - self._start_ns) * self._rate_hz / NS_PER_S + 1e-6) + 1
+        return True
+
+    def push(self, stamp_ns: int, item: object) -> None:
+        """Send off what was captured at ``stamp_ns``."""
+        self._queue.append((stamp_ns + self._latency_ns, item))
+
+    def pop(self, now_ns: int) -> object | None:
+        """The newest item that has arrived since the last call, or None."""
+        item = None
+        while self._queue and self._queue[0][0] <= now_ns:
+            item = self._queue.popleft()[1]
+        return item
+
+
+class CameraStream:
+    """A camera that captures at its rate and delivers late; stamps say when a picture was taken.
+
+    Args:
+        camera: The back end.
+        rate_hz: Frame rate [Hz].
+        latency_s: Capture to delivery [s].
+    """
+
+    def __init__(self, camera: Camera, rate_hz: float, latency_s: float) -> None:
+        self.camera = camera
+        self._schedule = Schedule(rate_hz, latency_s)
+
+    def tick(self, now_ns: int, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray) -> RgbdFrame | None:
+        """Advance to ``now_ns``: capture if due, and return the newest picture that has just become due.
+
+        Args:
+            now_ns: Present time.
+            position_ned: World position of the body frame's origin [m], (3,).
+            quaternion_b_in_i: Attitude (w, x, y, z), (4,).
+        """
+        if self._schedule.due(now_ns):
+            self._schedule.push(now_ns, self.camera.capture(position_ned, quaternion_b_in_i, now_ns))
+        frame = self._schedule.pop(now_ns)
+        assert frame is None or isinstance(frame, RgbdFrame)
+        return frame

@@ -1,0 +1,142 @@
+"""The board's face as a picture that a round brush paints on, and the picture of the wall behind it.
+
+Board coordinates are (along, up) metres from the bottom left corner (`sim.board`). Pixel (row, column) of the
+board picture covers the square whose centre is along = (column + 0.5) / p, up = height - (row + 0.5) / p with
+p = `Canvas.pixels_per_m`: row 0 is the top edge, column 0 the left edge.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from sim import textures
+from sim.board import BoardGeometry
+from sim.clutter import clutter_board, clutter_wall
+from sim.scene import Scene
+
+#: Wall picture: resolution [px/m] and extent beyond the board's outline [m].
+WALL_PIXELS_PER_M, WALL_EXTENT_M = 500.0, 1.3
+#: Largest texture [px]; bigger boards get a coarser picture rather than fill the memory.
+_MAX_PIXELS = 12e6
+_RIM_M = 0.006
+#: Sub-pixel positions of the brush stamp per axis, and distance between stamps [px]: 2^2 / (8 r) = 0.01 px of scallop.
+_PHASES, _STAMP_STEP_PX = 16, 2.0
+
+
+class Canvas:
+    """Board and wall pictures of one flight.
+
+    Args:
+        scene: The scene.
+        seed: Seed of the flight; with the scene's texture seeds it decides grain and clutter.
+        pixels_per_m: Resolution of the board picture [px/m].
+    """
+
+    def __init__(self, scene: Scene, seed: int, pixels_per_m: float = 1000.0) -> None:
+        board, paint = scene.board, scene.paint
+        self.scene, self.geometry = scene, BoardGeometry(scene)
+        self.pixels_per_m = min(pixels_per_m, math.sqrt(_MAX_PIXELS / (board.width_m * board.height_m)))
+        board_seed, wall_seed, paint_seed = (
+            np.random.SeedSequence([part, board.texture_seed, scene.wall.texture_seed, seed]) for part in range(3)
+        )
+        shape = (math.ceil(board.height_m * self.pixels_per_m - 1e-6), math.ceil(board.width_m * self.pixels_per_m - 1e-6))
+        rng = np.random.default_rng(board_seed)
+        on_board = int(rng.binomial(board.clutter, 0.5))
+        rim = max(1, round(_RIM_M * self.pixels_per_m))
+        self.texture = textures.board_surface(rng, shape, board.color, rim)
+        clutter_board(rng, self.texture, on_board, self.pixels_per_m)
+        self._blank = self.texture.copy()
+        self._fresh = textures.paint_surface(np.random.default_rng(paint_seed), shape, paint.color)
+        self._coverage = np.zeros(shape, np.uint8)
+        self._stamps = _brush_stamps(0.5 * paint.brush_width_m * self.pixels_per_m)
+        self._dirty: tuple[int, int, int, int] | None = None
+        self._make_wall(np.random.default_rng(wall_seed), board.clutter - on_board)
+
+    def _make_wall(self, rng: np.random.Generator, clutter: int) -> None:
+        board = self.scene.board
+        corners = self.geometry.point(np.array([0, 1, 1, 0]) * board.width_m, np.array([0, 0, 1, 1]) * board.height_m)
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        size = high - low + 2.0 * WALL_EXTENT_M
+        px_m = self.wall_pixels_per_m = min(WALL_PIXELS_PER_M, math.sqrt(_MAX_PIXELS / float(np.prod(size))))
+        self.wall_origin = low - WALL_EXTENT_M
+        width, height = (math.ceil(entry * px_m) for entry in size)
+        self.wall = textures.wall_surface(rng, (height, width), self.scene.wall.color, px_m)
+        left, top = (low - self.wall_origin) * px_m
+        right, bottom = (high - self.wall_origin) * px_m
+        clutter_wall(rng, self.wall, clutter, px_m, (left, top, right, bottom))
+
+    @property
+    def rgb(self) -> np.ndarray:
+        """The painted board, uint8 RGB (height, width, 3), a copy."""
+        return np.ascontiguousarray(self.flush()[..., :3])
+
+    @property
+    def coverage(self) -> np.ndarray:
+        """Share of every pixel that is painted, float32 0..1, (height, width)."""
+        return self._coverage.astype(np.float32) / 255.0
+
+    def stroke(self, previous: tuple[float, float] | np.ndarray | None, current: tuple[float, float] | np.ndarray) -> None:
+        """Move the pressed round brush from ``previous`` to ``current``, or dab it down where ``previous`` is None.
+
+        Stamps of an antialiased disc two pixels apart leave a straight edge; lines drawn segment by segment with
+        whole-pixel thickness would not.
+
+        Args:
+            previous: Board coordinates (along, up) of the last stroke's end [m], or None.
+            current: Board coordinates (along, up) of the brush centre now [m].
+        """
+        scale, height = self.pixels_per_m, self.scene.board.height_m
+        column, row = float(current[0]) * scale - 0.5, (height - float(current[1])) * scale - 0.5
+        if previous is None:
+            self._stamp(column, row)
+            return
+        from_column, from_row = float(previous[0]) * scale - 0.5, (height - float(previous[1])) * scale - 0.5
+        steps = max(1, math.ceil(math.hypot(column - from_column, row - from_row) / _STAMP_STEP_PX))
+        for k in range(1, steps + 1):
+            part = k / steps
+            self._stamp(from_column + part * (column - from_column), from_row + part * (row - from_row))
+
+    def _stamp(self, column: float, row: float) -> None:
+        phase_column, phase_row = round(column * _PHASES), round(row * _PHASES)
+        stamp = self._stamps[phase_row % _PHASES][phase_column % _PHASES]
+        half = len(stamp) // 2
+        left, top = phase_column // _PHASES - half, phase_row // _PHASES - half
+        height, width = self._coverage.shape
+        c0, c1, r0, r1 = max(left, 0), min(left + len(stamp), width), max(top, 0), min(top + len(stamp), height)
+        if c0 >= c1 or r0 >= r1:
+            return
+        patch = self._coverage[r0:r1, c0:c1]
+        np.maximum(patch, stamp[r0 - top : r1 - top, c0 - left : c1 - left], out=patch)
+        old = self._dirty
+        self._dirty = (
+            (r0, r1, c0, c1)
+            if old is None
+            else (min(old[0], r0), max(old[1], r1), min(old[2], c0), max(old[3], c1))
+        )
+
+    def flush(self) -> np.ndarray:
+        """Bring the picture up to date with all strokes and return it, uint8 (height, width, 4), shared."""
+        if self._dirty is not None:
+            r0, r1, c0, c1 = self._dirty
+            share = self._coverage[r0:r1, c0:c1, None].astype(np.uint16)
+            mixed = self._fresh[r0:r1, c0:c1] * share + self._blank[r0:r1, c0:c1] * (255 - share) + 127
+            self.texture[r0:r1, c0:c1] = mixed // 255
+            self._dirty = None
+        return self.texture
+
+
+def _brush_stamps(radius_px: float) -> list[list[np.ndarray]]:
+    """Antialiased discs at every sub-pixel position, uint8, indexed [row phase][column phase]."""
+    half = math.ceil(radius_px) + 2
+    grid = np.arange(-half, half + 1, dtype=np.float32)
+    offsets = np.arange(_PHASES, dtype=np.float32) / _PHASES
+    stamps = []
+    for row in offsets:
+        line = []
+        for column in offsets:
+            distance = np.sqrt((grid[:, None] - row) ** 2 + (grid[None, :] - column) ** 2)
+            line.append(np.rint(255.0 * np.clip(radius_px + 0.5 - distance, 0.0, 1.0)).astype(np.uint8))
+        stamps.append(line)
+    return stamps
