@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -67,7 +68,9 @@ def _row(trace: Trace, path: PathError, row: int) -> dict[str, Any]:
     }
 
 
-def _window(trace: Trace, path: PathError, ticks: np.ndarray, segments: Any, band: PaintPlan) -> dict[str, Any]:
+def _window(
+    trace: Trace, path: PathError, ticks: np.ndarray, segments: Sequence[Segment], band: PaintPlan
+) -> dict[str, Any]:
     """Every figure that can be taken over a part of a flight.
 
     Args:

@@ -6,6 +6,7 @@ first climb parallel to the left edge, and row k follows the upper edge of row k
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -88,7 +89,7 @@ def plan_as_painted(scene: Scene, painted: dict[int, np.ndarray]) -> PaintPlan:
             if not to_left and row - 1 in painted:
                 right = _extreme(painted, row - 1, right)
             edge = _upper_edge(painted.get(row - 1), height, paint.brush_width_m)
-            height = edge + [0.0, paint.pitch_m - 0.5 * paint.brush_width_m]
+            height = edge + np.array([0.0, paint.pitch_m - 0.5 * paint.brush_width_m])
             target = [begin[0], float(np.interp(begin[0], *height.T))]
             segments.append(Segment(kind="climb", row=row, points=np.array([begin, target])))
         segments.append(Segment(kind="row", row=row, points=_row_points(height, left, right, to_left)))
@@ -133,7 +134,7 @@ def distance_to_polyline(points: np.ndarray, polyline: np.ndarray) -> np.ndarray
         (N,) [m].
     """
     best = np.full(len(points), np.inf)
-    for begin, end in zip(polyline[:-1], polyline[1:], strict=True):
+    for begin, end in itertools.pairwise(polyline):
         leg = end - begin
         share = np.clip((points - begin) @ leg / max(float(leg @ leg), 1e-18), 0.0, 1.0)
         best = np.minimum(best, np.hypot(*(points - begin - share[:, None] * leg).T))

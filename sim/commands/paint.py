@@ -1,0 +1,148 @@
+"""``ibvs-qp paint``: fly the paint job of a scene under one or both laws and report it."""
+
+from __future__ import annotations
+
+import dataclasses
+import shlex
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import tyro
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from sim.flights import Flight
+    from sim.rundir import RunFolder
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Paint:
+    """Fly a paint job from the vehicle's own camera, the QP law beside the analytic law, and write a report.
+
+    Example: ibvs-qp paint --seed 3 --image-size 424x240 --out runs/seed3
+    """
+
+    scene: Path | None = None
+    """Scene file (TOML); default: the built-in scene, a C of two rows."""
+    preset: Path | None = None
+    """Controller preset (TOML): vehicle model, gains, weights, limits; default: the built-in one."""
+    features: Literal["rendered", "geometric"] = "rendered"
+    """Perception: rendered pictures through the whole vision, or a sensor model of lines."""
+    vision: Literal["own"] = "own"
+    """Vision pipeline."""
+    image_size: Literal["640x480", "424x240"] | None = None
+    """Picture size; default: the scene's."""
+    camera: Literal["plane"] = "plane"
+    """Camera back end; plane needs no GL library."""
+    law: Literal["qp", "paper", "both"] = "both"
+    """Which law flies."""
+    seed: int = 0
+    """Varies start pose, textures, clutter, noise and biases; the same seed flies the same flight."""
+    out: Path | None = None
+    """Run folder; default: runs/<UTC stamp>."""
+    json: bool = False
+    """Print summary.json as one line on standard output, and nothing else."""
+    no_video: Annotated[bool, tyro.conf.arg(name="no-video")] = False
+    """Write no video."""
+
+    def run(self, words: list[str]) -> int:
+        """Fly, write the run folder, print the figures.
+
+        Args:
+            words: The command line, for the record.
+
+        Returns:
+            0, or 130 after Ctrl-C.
+
+        Raises:
+            IbvsQpError: When scene, preset, seed or run folder is refused; nothing was flown then.
+        """
+        from rich.console import Console
+
+        from sim.checks import check_preset, check_seed
+        from sim.closed_loop import FlightOptions
+        from sim.flights import fly_laws
+        from sim.progress import flight_progress
+        from sim.rundir import RunFolder
+        from sim.scene import Scene, load_scene
+
+        started = time.perf_counter()
+        check_seed(self.seed)
+        scene = load_scene(self.scene) if self.scene else Scene()
+        if self.preset:
+            check_preset(self.preset)
+        size = _size(self.image_size)
+        options = FlightOptions(
+            seed=self.seed,
+            features=self.features,
+            vision=self.vision,
+            camera=self.camera,
+            image_size=size,
+            preset=str(self.preset) if self.preset else None,
+            video=not self.no_video,
+        )
+        laws = ("qp", "paper") if self.law == "both" else (self.law,)
+        folder = RunFolder.create(self.out)
+        notes = Console(stderr=True, quiet=self.json)
+        try:
+            with flight_progress(notes, scene, laws) as progress:
+                flights = fly_laws(scene, options, laws, progress)
+        except BaseException:
+            folder.discard_if_empty()
+            raise
+        facts = {
+            "command": shlex.join(["ibvs-qp", *words]),
+            "seed": self.seed,
+            "scene": str(self.scene) if self.scene else "default",
+            "preset": str(self.preset) if self.preset else None,
+            "camera": self.camera,
+            "image_size": list(size or (scene.camera.width, scene.camera.height)),
+            "features": self.features,
+            "vision": self.vision,
+        }
+        return self._report(folder, flights, facts, started, notes)
+
+    def _report(
+        self, folder: RunFolder, flights: dict[str, Flight], facts: dict, started: float, notes: Console
+    ) -> int:
+        from rich.console import Console
+
+        from sim.metrics import compute_metrics
+        from sim.rundir import as_json, peak_memory, summary
+        from sim.table import figure_table
+
+        traces = {law: flight.trace for law, flight in flights.items()}
+        metrics = {law: compute_metrics(trace) for law, trace in traces.items()}
+        interrupted = any(trace.reason == "interrupted" for trace in traces.values()) or not traces
+
+        def current() -> dict:
+            elapsed = time.perf_counter() - started
+            return summary(facts, folder, metrics, interrupted, elapsed, peak_memory(flights.values()))
+
+        folder.write_record(traces, current())
+        try:
+            with notes.status("Drawing the report ..."):
+                folder.write_report(traces, current(), video=not self.no_video)
+        except KeyboardInterrupt:
+            interrupted = True
+        final = current()
+        folder.write_summary(final)
+        if self.json:
+            print(as_json(final))
+        else:
+            Console().print(figure_table(metrics))
+            if folder.report.exists():
+                Console().print(f"Report: {folder.report}", soft_wrap=True, highlight=False)
+        if interrupted:
+            print(f"ibvs-qp: interrupted; what was flown is in {folder.path}", file=sys.stderr)
+        return 130 if interrupted else 0
+
+
+def _size(text: str | None) -> tuple[int, int] | None:
+    if text is None:
+        return None
+    width, height = text.split("x")
+    return int(width), int(height)

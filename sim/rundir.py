@@ -1,0 +1,239 @@
+"""The run folder: what a flight leaves on disk, and how it is read back."""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+from collections.abc import Iterable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ibvs_qp.errors import IbvsQpError
+from ibvs_qp.settings import dump_toml
+from sim.flights import Flight, own_peak_memory
+from sim.scene import load_scene
+from sim.trace import FIELDS, Trace
+
+SCHEMA = 1
+_README = """One run of ibvs-qp.
+
+report.html   everything at a glance; open it in a browser, it needs nothing else
+summary.json  all figures (docs/metrics.md of the project defines them)
+figures/      the report's figures as PNG
+video.mp4     camera view, phase and force
+scene.toml    the scene flown; fly it again with: ibvs-qp paint --scene scene.toml --seed {seed}
+log.npz       every array, named <law>/<array>; load it with
+
+    import numpy as np
+    log = np.load("log.npz")
+    t, push = log["qp/t"], log["qp/push_true"]
+    phase = log["qp/phases"][log["qp/phase"]]   # the name of the phase at every tick
+
+  or as traces, ready for sim.metrics and sim.figures, with
+
+    from sim.rundir import load_run
+    traces = load_run("{path}")
+    traces["qp"].push_true
+
+  N control ticks, M physics steps at 1 kHz, F pictures, n rotors, L limits; SI units:
+
+{fields}
+"""
+
+
+class RunFolderError(IbvsQpError):
+    """The run folder cannot be written."""
+
+
+@dataclass(frozen=True)
+class RunFolder:
+    """Paths of one run."""
+
+    path: Path
+
+    @property
+    def report(self) -> Path:
+        """The report for people."""
+        return self.path / "report.html"
+
+    @classmethod
+    def create(cls, out: Path | None) -> RunFolder:
+        """Make the folder, ``runs/<UTC stamp>`` by default, and prove that it can be written.
+
+        Raises:
+            RunFolderError: When it cannot.
+        """
+        path = _stamped(Path("runs")) if out is None else out
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+            probe = path / ".write-test"
+            probe.write_bytes(b"")
+            probe.unlink()
+        except OSError as error:
+            reason = error.strerror or str(error)
+            raise RunFolderError(
+                f"cannot write run folder {path}: {reason}; give a writable folder with --out"
+            ) from None
+        return cls(path)
+
+    def discard_if_empty(self) -> None:
+        """Remove the folder if nothing was written into it."""
+        if self.path.exists() and not any(self.path.iterdir()):
+            self.path.rmdir()
+
+    def write_record(self, traces: dict[str, Trace], summary_table: dict[str, Any]) -> None:
+        """Write what must not be lost: log, scene, summary and the text that explains them."""
+        for trace in traces.values():
+            (self.path / "scene.toml").write_text(dump_toml(trace.scene), encoding="utf-8")
+        save_log(self.path / "log.npz", traces)
+        fields = "\n".join(f"  {name:<20} {text}" for name, text in FIELDS.items())
+        text = _README.format(seed=summary_table["seed"], path=self.path, fields=fields)
+        (self.path / "README.txt").write_text(text, encoding="utf-8")
+        self.write_summary(summary_table)
+
+    def write_summary(self, summary_table: dict[str, Any]) -> None:
+        """Write summary.json."""
+        (self.path / "summary.json").write_text(as_json(summary_table, indent=1) + "\n", encoding="utf-8")
+
+    def write_report(self, traces: dict[str, Trace], summary_table: dict[str, Any], video: bool) -> None:
+        """Draw the figures, the video and the report."""
+        from sim.figures import draw_all
+        from sim.report import write_report
+        from sim.video import write_video
+
+        flown = {law: trace for law, trace in traces.items() if len(trace.t)}
+        figures = draw_all(flown, self.path / "figures") if flown else {}
+        film = self.path / "video.mp4"
+        if video and any(trace.pictures for trace in flown.values()):
+            write_video(flown, film)
+        write_report(self.report, flown, summary_table, figures, film if film.exists() else None)
+
+    def remove(self) -> None:
+        """Remove the folder with everything in it."""
+        shutil.rmtree(self.path)
+
+
+def _stamped(parent: Path) -> Path:
+    stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
+    path, number = parent / stamp, 1
+    while path.exists():
+        number += 1
+        path = parent / f"{stamp}-{number}"
+    return path
+
+
+def summary(
+    facts: dict[str, Any],
+    folder: RunFolder,
+    metrics: dict[str, dict[str, Any]],
+    interrupted: bool,
+    wall_time_s: float,
+    peak_memory_bytes: int,
+) -> dict[str, Any]:
+    """Assemble summary.json.
+
+    Args:
+        facts: command, seed, scene, preset, camera, image_size, features, vision.
+        folder: Where the run is written.
+        metrics: M of every law flown.
+        interrupted: Whether Ctrl-C ended the run.
+        wall_time_s: Time since the command began [s].
+        peak_memory_bytes: Of all processes together.
+    """
+    return {
+        "schema": SCHEMA,
+        "command": facts["command"],
+        "version": version("ibvs-qp"),
+        **{key: facts[key] for key in ("seed", "scene", "preset")},
+        "run_dir": str(folder.path),
+        **{key: facts[key] for key in ("camera", "image_size", "features", "vision")},
+        "interrupted": interrupted,
+        "wall_time_s": wall_time_s,
+        "peak_memory_bytes": peak_memory_bytes,
+        "laws": metrics,
+    }
+
+
+def peak_memory(flights: Iterable[Flight]) -> int:
+    """Peak resident memory of this process and of those that flew [bytes]: an upper bound of the common peak."""
+    return own_peak_memory() + sum(flight.process_memory_bytes for flight in flights)
+
+
+def as_json(value: Any, indent: int | None = None) -> str:
+    """JSON text; numbers that are not finite become null."""
+    return json.dumps(_finite(value), indent=indent, allow_nan=False)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(entry) for entry in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def save_log(file: Path, traces: dict[str, Trace]) -> None:
+    """Write every array of every law into one npz file, named ``<law>/<array>``."""
+    content: dict[str, Any] = {}
+    for law, trace in traces.items():
+        arrays = dict(trace.arrays)
+        for name in ("phases", "outcomes", "limits"):
+            arrays[name] = np.array(getattr(trace, name), dtype=str)
+        arrays["event_t"] = np.array([event.t for event in trace.events])
+        arrays["event_text"] = np.array([[event.kind, event.text] for event in trace.events], dtype=str)
+        if trace.canvas is not None and trace.coverage_mask is not None:
+            arrays["canvas"] = trace.canvas
+            arrays["coverage_percent"] = np.round(100 * trace.coverage_mask).astype(np.uint8)
+            arrays["canvas_px_per_m"] = np.array(trace.canvas_px_per_m)
+        arrays["outcome_of_flight"] = np.array([str(trace.completed), trace.reason], dtype=str)
+        arrays["seed"], arrays["wall_time_s"] = np.array(trace.seed), np.array(trace.wall_time_s)
+        content.update({f"{law}/{name}": values for name, values in arrays.items()})
+    np.savez_compressed(file, **content)
+
+
+def load_run(path: str | Path) -> dict[str, Trace]:
+    """Read the traces of a run folder back, without pictures.
+
+    Args:
+        path: The run folder.
+
+    Returns:
+        One trace per law, in the order flown.
+    """
+    from sim.trace import Event
+
+    path = Path(path)
+    scene = load_scene(path / "scene.toml")
+    traces: dict[str, Trace] = {}
+    with np.load(path / "log.npz") as log:
+        for law in dict.fromkeys(name.split("/")[0] for name in log.files):
+            arrays = {name.split("/", 1)[1]: log[name] for name in log.files if name.startswith(law + "/")}
+            completed, reason = arrays.pop("outcome_of_flight")
+            words = {name: tuple(map(str, arrays.pop(name))) for name in ("phases", "outcomes", "limits")}
+            event_t, event_text = arrays.pop("event_t"), arrays.pop("event_text").reshape(-1, 2)
+            coverage = arrays.pop("coverage_percent", None)
+            traces[law] = Trace(
+                scene=scene,
+                seed=int(arrays.pop("seed")),
+                law=law,
+                **words,
+                events=[
+                    Event(t=float(t), kind=str(k), text=str(x)) for t, (k, x) in zip(event_t, event_text, strict=True)
+                ],
+                completed=str(completed) == "True",
+                reason=str(reason),
+                wall_time_s=float(arrays.pop("wall_time_s")),
+                canvas=arrays.pop("canvas", None),
+                canvas_px_per_m=float(arrays.pop("canvas_px_per_m", 0.0)),
+                coverage_mask=None if coverage is None else coverage.astype(np.float32) / 100,
+                arrays=arrays,
+            )
+    return traces
