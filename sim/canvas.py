@@ -14,6 +14,7 @@ import numpy as np
 from sim import textures
 from sim.board import BoardGeometry
 from sim.clutter import clutter_board, clutter_wall
+from sim.painted_edges import PaintedEdges
 from sim.scene import Scene
 
 #: Wall picture: resolution [px/m] and extent beyond the board's outline [m].
@@ -52,6 +53,7 @@ class Canvas:
         self._coverage = np.zeros(shape, np.uint8)
         self._stamps = _brush_stamps(0.5 * paint.brush_width_m * self.pixels_per_m)
         self._dirty: tuple[int, int, int, int] | None = None
+        self.edges = PaintedEdges(scene)
         self._make_wall(np.random.default_rng(wall_seed), board.clutter - on_board)
 
     def _make_wall(self, rng: np.random.Generator, clutter: int) -> None:
@@ -87,6 +89,7 @@ class Canvas:
             previous: Board coordinates (along, up) of the last stroke's end [m], or None.
             current: Board coordinates (along, up) of the brush centre now [m].
         """
+        self.edges.stroke(previous, current)
         scale, height = self.pixels_per_m, self.scene.board.height_m
         column, row = float(current[0]) * scale - 0.5, (height - float(current[1])) * scale - 0.5
         if previous is None:

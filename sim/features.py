@@ -1,0 +1,244 @@
+"""A perfect eye with honest noise: true lines projected and clipped, late like the camera's pictures.
+
+It stands in for perception where the controller alone is studied (``--features geometric``).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+
+from ibvs_qp.frames import align_line
+from ibvs_qp.measurement import HORIZONTAL, VERTICAL, FeatureFrame, LineFeature
+from ibvs_qp.vehicle import VehicleParams
+from sim.board import BoardGeometry
+from sim.cameras.arm import vehicle_layer
+from sim.cameras.protocol import Schedule, camera_intrinsics
+from sim.cameras.view import View
+from sim.canvas import Canvas
+from sim.painted_edges import BIN_M, PaintedEdges
+from sim.scene import Scene
+
+#: Noise of rho [-] and theta [rad] of one line: a good sub-pixel fit (0.1 px, 0.06 deg) at 640x480.
+SIGMA_RHO, SIGMA_THETA = 2e-4, 1e-3
+#: Noise of the plane: distance [m] and direction of the normal [rad].
+SIGMA_DISTANCE_M, SIGMA_NORMAL = 0.001, math.radians(0.1)
+#: Noise of the velocity per axis [m/s].
+SIGMA_VELOCITY_M_S = 0.003
+#: Shortest visible piece that counts as a line, normalised (31 px at 640x480), and nearest depth drawn [m].
+_SHORTEST, _NEAR_M = 0.05, 0.05
+#: Track identities: board edges by name, rows from `_FIRST_ROW_TRACK`.
+BOARD_TRACKS = {"bottom": 1, "right": 2, "top": 3, "left": 4}
+_FIRST_ROW_TRACK = 10
+#: How far above an edge a point lies for certain on its upper side [m].
+_ABOVE_M = 0.02
+
+
+class GeometricFeatures:
+    """Sensor model of line perception: rate, latency, field of view and noise of a camera, but no pictures.
+
+    Lines: the board's edges (kind "board") and the upper edges of the painted rows where no later row and no brush
+    covers them (kind "paint"; their surface side is the unpainted board).
+
+    Args:
+        scene: Board, paint job, camera, and ``features.sigma_vs``.
+        vehicle: Where camera, arm and brush are.
+        painted: The canvas, or the painted edges alone.
+        seed: Seed of the noise.
+        noise: Whether to add any noise at all.
+    """
+
+    def __init__(
+        self, scene: Scene, vehicle: VehicleParams, painted: Canvas | PaintedEdges, seed: int, noise: bool = True
+    ) -> None:
+        self.scene, self.vehicle, self._noise = scene, vehicle, noise
+        self._edges = painted.edges if isinstance(painted, Canvas) else painted
+        self._geometry = BoardGeometry(scene)
+        self.intrinsics = camera_intrinsics(scene.camera)
+        own, extra = np.random.SeedSequence([seed, 0xFEA7]).spawn(2)
+        self._rng, self._extra = np.random.default_rng(own), np.random.default_rng(extra)
+        self._hidden = vehicle_layer(scene, vehicle, self.intrinsics, np.random.default_rng(0)).mask
+        self._schedule = Schedule(scene.camera.rate_hz, scene.camera.latency_s)
+        fx, fy, _, _ = self.intrinsics
+        self._half_view = np.array([0.5 * scene.camera.width / fx, 0.5 * scene.camera.height / fy])
+
+    def tick(
+        self, now_ns: int, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, velocity_body: np.ndarray
+    ) -> FeatureFrame | None:
+        """Advance to ``now_ns``; the newest frame that has just become due, or None.
+
+        Args:
+            now_ns: Present time.
+            position_ned: World position of the body frame's origin [m], (3,).
+            quaternion_b_in_i: Attitude (w, x, y, z), (4,).
+            velocity_body: True velocity of the centre of mass in B [m/s], (3,).
+        """
+        if self._schedule.due(now_ns):
+            self._schedule.push(now_ns, self.capture(position_ned, quaternion_b_in_i, velocity_body, now_ns))
+        frame = self._schedule.pop(now_ns)
+        assert frame is None or isinstance(frame, FeatureFrame)
+        return frame
+
+    def capture(
+        self, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, velocity_body: np.ndarray, stamp_ns: int
+    ) -> FeatureFrame:
+        """What perception would report about a picture taken now; arguments as for `tick`."""
+        camera = self.vehicle.camera_position_m
+        view = View.of_vehicle(position_ned, quaternion_b_in_i, camera, self.intrinsics)
+        lines = [line for line in (*self._board_lines(view, stamp_ns), *self._paint_lines(view, stamp_ns)) if line]
+        a, b, c = self._plane(view)
+        velocity = np.array(velocity_body, float)
+        if self._noise:
+            lines = [self._blurred(line) for line in lines]
+            velocity += SIGMA_VELOCITY_M_S * self._rng.standard_normal(3)
+        frame = FeatureFrame(
+            lines=tuple(lines),
+            plane=(a, b, c, -1.0),
+            stamp_ns=stamp_ns,
+            velocity=velocity,
+            velocity_covariance=SIGMA_VELOCITY_M_S**2 * np.eye(3),
+            velocity_stamp_ns=stamp_ns,
+        )
+        return add_sigma_vs(frame, self.scene.features.sigma_vs, self._extra) if self._noise else frame
+
+    def _world(self, along: np.ndarray, up: np.ndarray) -> np.ndarray:
+        yz = self._geometry.point(along, up)
+        return np.concatenate((np.zeros((*yz.shape[:-1], 1)), yz), axis=-1)
+
+    def _board_lines(self, view: View, stamp_ns: int) -> list[LineFeature | None]:
+        width, height = self.scene.board.width_m, self.scene.board.height_m
+        ends = {
+            "bottom": ((0.0, width), (0.0, 0.0)),
+            "right": ((width, width), (0.0, height)),
+            "top": ((0.0, width), (height, height)),
+            "left": ((0.0, 0.0), (0.0, height)),
+        }
+        surface = self._world(np.array(0.5 * width), np.array(0.5 * height))
+        lines = []
+        for name, (along, up) in ends.items():
+            piece = self._visible(view.to_camera(self._world(np.array(along), np.array(up))))
+            role = HORIZONTAL if name in ("bottom", "top") else VERTICAL
+            side = view.to_camera(surface)
+            lines.append(self._line(piece, side, role, "board", BOARD_TRACKS[name], stamp_ns))
+        return lines
+
+    def _paint_lines(self, view: View, stamp_ns: int) -> list[LineFeature | None]:
+        lines = []
+        for row in range(1, self.scene.paint.rows + 1):
+            points = self._edges.exposed(row)
+            if len(points) < 2:
+                continue
+            spots = view.to_camera(self._world(points[:, 0], points[:, 1]))
+            seen = self._unhidden(spots)
+            # The longest piece without a gap; a gap is where a later row, the brush or the picture's border lies.
+            breaks = np.flatnonzero(np.diff(points[seen, 0]) > 1.5 * BIN_M) + 1
+            piece = max(np.split(np.flatnonzero(seen), breaks), key=len)
+            if len(piece) < 2:
+                continue
+            slope, level = np.polyfit(points[piece, 0], points[piece, 1], 1)
+            along = points[[piece[0], piece[-1]], 0]
+            ends = view.to_camera(self._world(along, level + slope * along))
+            above = view.to_camera(self._world(along, level + slope * along + _ABOVE_M)).mean(axis=0)
+            visible = self._visible(ends)
+            lines.append(self._line(visible, above, HORIZONTAL, "paint", _FIRST_ROW_TRACK + row, stamp_ns))
+        return lines
+
+    def _unhidden(self, spots: np.ndarray) -> np.ndarray:
+        """Which points in camera coordinates are in the picture and not behind arm or brush, bool (n,)."""
+        fx, fy, cx, cy = self.intrinsics
+        height, width = self._hidden.shape
+        with np.errstate(divide="ignore", invalid="ignore"):
+            u, v = fx * spots[:, 0] / spots[:, 2] + cx, fy * spots[:, 1] / spots[:, 2] + cy
+        good = (spots[:, 2] > _NEAR_M) & (u >= 0) & (u <= width - 1) & (v >= 0) & (v <= height - 1)
+        good[good] = self._hidden[np.rint(v[good]).astype(int), np.rint(u[good]).astype(int)] == 0
+        return good
+
+    def _visible(self, ends: np.ndarray) -> np.ndarray | None:
+        """The part of a straight edge, end points in C, (2, 3), inside the field of view: normalised (2, 2) or None."""
+        low, high, step = 0.0, 1.0, ends[1] - ends[0]
+        x, y = self._half_view
+        for normal, least in (
+            ((0.0, 0.0, 1.0), _NEAR_M),
+            ((1.0, 0.0, x), 0.0),
+            ((-1.0, 0.0, x), 0.0),
+            ((0.0, 1.0, y), 0.0),
+            ((0.0, -1.0, y), 0.0),
+        ):
+            value, rate = float(np.dot(normal, ends[0])) - least, float(np.dot(normal, step))
+            if abs(rate) < 1e-12:
+                if value < 0.0:
+                    return None
+            elif rate > 0.0:
+                low = max(low, -value / rate)
+            else:
+                high = min(high, -value / rate)
+        if low >= high:
+            return None
+        points = ends[0] + np.array([[low], [high]]) * step
+        segment = points[:, :2] / points[:, 2:]
+        return segment if np.linalg.norm(segment[1] - segment[0]) >= _SHORTEST else None
+
+    def _line(
+        self, segment: np.ndarray | None, surface: np.ndarray, role: str, kind: str, track: int, stamp_ns: int
+    ) -> LineFeature | None:
+        if segment is None:
+            return None
+        (x1, y1), (x2, y2) = segment
+        theta = math.atan2(x1 - x2, y2 - y1)
+        rho, theta = align_line(
+            x1 * math.cos(theta) + y1 * math.sin(theta), theta, 0.5 * math.pi if role == HORIZONTAL else 0.0
+        )
+        side = np.dot((math.cos(theta), math.sin(theta), -rho), surface)  # times depth, so that its sign is kept
+        return LineFeature(
+            rho=rho,
+            theta=theta,
+            covariance=np.diag([SIGMA_RHO**2, SIGMA_THETA**2]),
+            role=role,
+            stamp_ns=stamp_ns,
+            track_id=track,
+            segment=segment,
+            surface_side=1 if side > 0.0 else -1,
+            kind=kind,
+        )
+
+    def _blurred(self, line: LineFeature) -> LineFeature:
+        rho, theta = self._rng.standard_normal(2) * (SIGMA_RHO, SIGMA_THETA)
+        return _moved(line, rho, theta)
+
+    def _plane(self, view: View) -> tuple[float, float, float]:
+        inverse = view.plane(0.0)
+        size = float(np.linalg.norm(inverse))
+        normal, distance = inverse / size, 1.0 / size
+        if self._noise:
+            tilt = SIGMA_NORMAL * self._rng.standard_normal(3)
+            normal = normal + tilt - normal * float(normal @ tilt)
+            normal /= np.linalg.norm(normal)
+            distance += SIGMA_DISTANCE_M * self._rng.standard_normal()
+        a, b, c = (float(entry) for entry in normal / distance)
+        return a, b, c
+
+
+def _moved(line: LineFeature, rho: float, theta: float) -> LineFeature:
+    """The line with rho and theta changed, its end points moved onto it."""
+    rho, theta = line.rho + rho, line.theta + theta
+    segment = line.segment
+    if segment is not None:
+        normal = np.array([math.cos(theta), math.sin(theta)])
+        segment = segment - np.outer(segment @ normal - rho, normal)
+    return dataclasses.replace(line, rho=rho, theta=theta, segment=segment)
+
+
+def add_sigma_vs(frame: FeatureFrame, sigma: float, rng: np.random.Generator) -> FeatureFrame:
+    """Add noise to rho [-] and theta [rad] of each line, told to nobody: the covariances stay as they are.
+
+    Args:
+        frame: What perception saw.
+        sigma: Standard deviation, the paper's sigma_vs.
+        rng: Source of the noise.
+    """
+    if sigma <= 0.0:
+        return frame
+    lines = (_moved(line, *(sigma * rng.standard_normal(2))) for line in frame.lines)
+    return dataclasses.replace(frame, lines=tuple(lines))

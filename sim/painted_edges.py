@@ -1,0 +1,56 @@
+"""Where the upper edge of every painted row really runs, recorded from the strokes themselves."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from sim.board import BoardGeometry
+from sim.scene import Scene
+
+#: Length of a bin along the board [m].
+BIN_M = 0.005
+#: A stroke that moves less along the board than this multiple of its rise is a climb, not part of a row.
+_FLATNESS = 1.0
+
+
+class PaintedEdges:
+    """Highest painted point along the board for every row (round brush: its centre plus its radius).
+
+    Args:
+        scene: Board and paint job.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self._geometry = BoardGeometry(scene)
+        self._radius, self._rows = 0.5 * scene.paint.brush_width_m, scene.paint.rows
+        self._bins = math.ceil(scene.board.width_m / BIN_M)
+        self._top = np.full((self._rows + 1, self._bins), -math.inf)
+
+    def stroke(self, previous: tuple[float, float] | np.ndarray | None, current: tuple[float, float] | np.ndarray) -> None:
+        """Record a stroke between two tip positions (along, up) [m]; see `sim.canvas.Canvas.stroke`."""
+        if previous is None:
+            return
+        a0, u0, a1, u1 = float(previous[0]), float(previous[1]), float(current[0]), float(current[1])
+        if abs(a1 - a0) <= _FLATNESS * abs(u1 - u0):
+            return
+        if a0 > a1:
+            a0, u0, a1, u1 = a1, u1, a0, u0
+        first, last = max(0, math.floor(a0 / BIN_M)), min(self._bins - 1, math.floor(a1 / BIN_M))
+        places = np.clip((np.arange(first, last + 1) + 0.5) * BIN_M, a0, a1)
+        heights = u0 + (places - a0) / (a1 - a0) * (u1 - u0)
+        paint = self._geometry.scene.paint
+        row = round((0.5 * (u0 + u1) - self._geometry.row_height(1)) / paint.pitch_m) + 1
+        row = min(max(row, 1), self._rows)
+        bins = self._top[row, first : last + 1]
+        np.maximum(bins, heights + self._radius, out=bins)
+
+    def exposed(self, row: int) -> np.ndarray:
+        """Points (along, up) [m] of a row's upper edge that no later row covers, in order along the board, (n, 2)."""
+        painted = np.isfinite(self._top[row])
+        reach = math.ceil(self._radius / BIN_M)
+        later = np.isfinite(self._top[row + 1 :]).any(axis=0)
+        covered = np.convolve(later, np.ones(2 * reach + 1), mode="same") > 0.5
+        bins = np.flatnonzero(painted & ~covered)
+        return np.column_stack(((bins + 0.5) * BIN_M, self._top[row, bins]))
