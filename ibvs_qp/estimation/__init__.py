@@ -1,0 +1,1 @@
+"""Estimation: from late, noisy samples to what is true now."""

@@ -1,0 +1,155 @@
+"""Configuration of a controller: frozen, validated, with a TOML round trip.
+
+Every number states its unit, allowed range and reason. The switches at the end of `ControllerConfig` are the
+ablations of the experiments. Gains and switches are shared by both laws; weights, limits and solver belong to the
+quadratic program.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ibvs_qp.settings import dump_toml, load_toml, setting, validate
+from ibvs_qp.vehicle import VehicleParams
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gains:
+    """Feedback gains, the same object for both laws."""
+
+    line_kp: float = setting(6.0, "line error to image acceleration", unit="1/s^2", low=0.0, high=200.0)
+    line_kd: float = setting(4.5, "line error rate", unit="1/s", low=0.0, high=100.0)
+    line_ki: float = setting(1.5, "integral of the line error", unit="1/s^3", low=0.0, high=100.0)
+    theta_kp: float = setting(25.0, "line angle error", unit="1/s^2", low=0.0, high=400.0)
+    theta_kd: float = setting(10.0, "line angle rate", unit="1/s", low=0.0, high=100.0)
+    velocity_kp: float = setting(3.0, "velocity error along free directions", unit="1/s", low=0.0, high=50.0)
+    velocity_ki: float = setting(1.5, "integral of that error", unit="1/s^2", low=0.0, high=50.0)
+    attitude_kp: float = setting(36.0, "roll and pitch", unit="1/s^2", low=0.0, high=400.0)
+    attitude_kd: float = setting(11.0, "roll and pitch rate", unit="1/s", low=0.0, high=100.0)
+    yaw_kp: float = setting(16.0, "yaw to the wall normal", unit="1/s^2", low=0.0, high=400.0)
+    yaw_kd: float = setting(8.0, "yaw rate", unit="1/s", low=0.0, high=100.0)
+    standoff_kp: float = setting(2.0, "distance error to approach speed", unit="1/s", low=0.0, high=20.0)
+    standoff_kd: float = setting(5.0, "approach speed error to acceleration", unit="1/s", low=0.0, high=50.0)
+    force_ksp: float = setting(60.0, "impedance stiffness K_sp", unit="N/m", low=0.0, high=5000.0)
+    force_ksd: float = setting(90.0, "impedance damping K_sd", unit="N s/m", low=0.0, high=1000.0)
+    force_kfp: float = setting(0.3, "force error K_fp at 1.5 kN/m and softer", low=0.0, high=10.0)
+    force_kfi: float = setting(1.5, "integral of the force error K_fi", unit="1/s", low=0.0, high=50.0)
+
+    def __post_init__(self) -> None:
+        """Validate."""
+        validate(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContactSettings:
+    """Approach, touch and release (section 4.2 of the design)."""
+
+    approach_speed_m_s: float = setting(0.10, "approach speed far from the wall", unit="m/s", low=0.005, high=0.5)
+    close_speed_m_s: float = setting(0.05, "approach speed within close_distance", unit="m/s", low=0.002, high=0.3)
+    close_distance_m: float = setting(0.10, "where the approach slows down", unit="m", low=0.01, high=1.0)
+    touch_speed_m_s: float = setting(0.02, "speed of the last centimetres while the stiffness is unknown", unit="m/s", low=0.001, high=0.2)
+    touch_distance_m: float = setting(0.02, "where the last centimetres begin", unit="m", low=0.005, high=0.2)
+    retreat_speed_m_s: float = setting(0.15, "speed away from the wall", unit="m/s", low=0.01, high=0.5)
+    depth_min_m: float = setting(0.53, "camera to wall, lambda = 1 below", unit="m", low=0.1, high=3.0)
+    depth_max_m: float = setting(0.63, "camera to wall, lambda = 0 above", unit="m", low=0.1, high=3.0)
+    ramp_s: float = setting(1.0, "lambda and the force reference rise over this time after touch", unit="s", low=0.05, high=10.0)
+    touch_force_n: float = setting(0.5, "least filtered force that counts as touch", unit="N", low=0.05, high=10.0)
+    touch_sigmas: float = setting(3.0, "touch threshold over the free-flight noise", low=1.0, high=10.0)
+    touch_samples: int = setting(3, "force samples above threshold in a row", low=1, high=50)
+    contact_distance_m: float = setting(0.01, "touch only nearer, loss when farther", unit="m", low=0.002, high=0.1)
+    loss_force_n: float = setting(0.3, "force below which contact is doubted", unit="N", low=0.01, high=10.0)
+    loss_time_s: float = setting(0.10, "doubt this long is a loss", unit="s", low=0.01, high=2.0)
+    force_filter_hz: float = setting(8.0, "first-order filter of the measured push", unit="Hz", low=0.5, high=100.0)
+    moment_gain: float = setting(0.9, "share of the measured contact moment fed forward", low=0.0, high=1.0)
+    friction_gain: float = setting(0.9, "share of the friction along travel fed forward", low=0.0, high=1.0)
+    friction_slew_n_s: float = setting(6.0, "fastest change of that force", unit="N/s", low=0.1, high=100.0)
+    stuck_speed_m_s: float = setting(0.005, "slower than this in contact counts as stuck", unit="m/s", low=0.0, high=0.1)
+
+    def __post_init__(self) -> None:
+        """Validate."""
+        validate(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Weights:
+    """Weights of the least-squares tasks, each the inverse square of an error one would accept in its unit."""
+
+    line: float = setting(100.0, "line rows; 0.1 image units/s^2 = 5 cm/s^2 at half a metre", low=0.0, high=1e6)
+    line_angle: float = setting(0.05, "angle rows; yield to level flight by four orders", low=0.0, high=1e6)
+    push: float = setting(4.0, "push row; 0.5 N; below yaw and level: an unreachable push is given up first", low=0.0, high=1e6)
+    level: float = setting(400.0, "roll and pitch rows; 0.05 rad/s^2", low=0.0, high=1e6)
+    yaw: float = setting(100.0, "yaw row; 0.1 rad/s^2", low=0.0, high=1e6)
+    velocity: float = setting(100.0, "free velocity rows; 0.1 m/s^2", low=0.0, high=1e6)
+    effort: float = setting(1e-3, "thrust away from the last one; 30 N", low=1e-9, high=1e3)
+    smoothness: float = setting(1e-3, "change of the thrust step; 30 N", low=0.0, high=1e3)
+    line_sigma: float = setting(2e-3, "line deviation at which a row's weight halves", low=1e-6, high=1.0)
+
+    def __post_init__(self) -> None:
+        """Validate."""
+        validate(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LimitSettings:
+    """Soft limits of the program and their prices (per squared unit of slack)."""
+
+    tilt_deg: float = setting(1.0, "zero-tilt bound on roll and pitch", unit="deg", low=0.05, high=45.0)
+    tilt_price: float = setting(4000.0, "slack price of the tilt barriers", low=1e-3, high=1e8)
+    tilt_rate_1_s: float = setting(8.0, "how fast the tilt barriers may be approached", unit="1/s", low=0.1, high=100.0)
+    yaw_deg: float = setting(10.0, "yaw bound; the propellers strike the wall at 19 deg", unit="deg", low=0.5, high=45.0)
+    yaw_price: float = setting(1000.0, "slack price of the yaw barrier", low=1e-3, high=1e8)
+    yaw_rate_1_s: float = setting(5.0, "how fast the yaw barrier may be approached", unit="1/s", low=0.1, high=100.0)
+
+    def __post_init__(self) -> None:
+        """Validate."""
+        validate(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SolverSettings:
+    """OSQP and the acceptance test."""
+
+    max_iterations: int = setting(200, "deterministic deadline", low=1, high=100000)
+    tolerance: float = setting(1e-5, "eps_abs and eps_rel", low=1e-10, high=1e-1)
+    check_interval: int = setting(5, "iterations between termination checks", low=1, high=1000)
+    adaptive_rho_interval: int = setting(25, "iterations between step-size updates", low=1, high=10000)
+    scaling: int = setting(10, "Ruiz equilibration passes", low=0, high=100)
+    polishing: bool = setting(True, "solve the active set exactly at the end")
+    accept_residual: float = setting(5e-2, "largest violation of a capped solution", unit="N", low=1e-9, high=10.0)
+
+    def __post_init__(self) -> None:
+        """Validate."""
+        validate(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ControllerConfig:
+    """Everything a controller needs; the default flies the Tarot T960."""
+
+    vehicle: VehicleParams = field(default_factory=VehicleParams)
+    gains: Gains = field(default_factory=Gains)
+    contact: ContactSettings = field(default_factory=ContactSettings)
+    weights: Weights = field(default_factory=Weights)
+    limits: LimitSettings = field(default_factory=LimitSettings)
+    solver: SolverSettings = field(default_factory=SolverSettings)
+    line_slots: int = setting(4, "lines the fixed program has room for", low=1, high=16)
+    tick_s: float = setting(0.004, "control period", unit="s", low=0.0005, high=0.05)
+    impedance: bool = setting(True, "impedance terms of the force law (False: direct force control)")
+    contact_feedforward: bool = setting(True, "feed the measured contact moment and expected friction forward")
+    touch_ramp: bool = setting(True, "ramp lambda and the force reference after touch")
+    reach_check: bool = setting(True, "reduce a push that the vehicle cannot hold")
+    barriers: bool = setting(True, "tilt and yaw barriers")
+
+    def __post_init__(self) -> None:
+        """Validate."""
+        validate(self)
+
+    @classmethod
+    def from_toml(cls, file: str | Path) -> ControllerConfig:
+        """Read a preset; raises ConfigError naming field, value, unit and allowed range."""
+        return load_toml(cls, file)
+
+    def to_toml(self) -> str:
+        """Write the configuration as TOML text."""
+        return dump_toml(self)

@@ -1,0 +1,186 @@
+"""Distance to the wall, its inertial rate, touch and loss: the part that decides whether contact works.
+
+Differentiated depth is 60-100 ms late and takes the damping out of the contact; the rate here comes from the
+accelerometer and is only corrected by depth (design section 4.2).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ibvs_qp.config import ControllerConfig
+from ibvs_qp.estimation.delayed import HISTORY, DelayedKalman
+from ibvs_qp.estimation.surface import StiffnessEstimator
+from ibvs_qp.frames import GRAVITY, R_BODY_CAMERA
+from ibvs_qp.measurement import Measurement
+
+#: Accelerometer and unmodelled-gravity noise density along the normal [m/s^2/sqrt(Hz)] (IMU 4e-3, attitude noise).
+ACCELERATION_NOISE = 6e-3
+#: Drift of the accelerometer bias that gravity leaks through the attitude bias [m/s^3/sqrt(Hz)].
+BIAS_NOISE = 2e-3
+#: Deviation of the distance of one fitted plane [m]: common mode of the depth camera.
+DISTANCE_STD = 1.2e-3
+#: Share of a frame's normal innovation that is believed; the normal averages over about six frames.
+NORMAL_GAIN = 0.15
+#: Free-flight noise of the push is averaged over this time [s].
+NOISE_TIME = 1.0
+
+
+class ContactEstimator:
+    """Wall normal, tip distance and rate, push, contact state and lambda; one instance per controller."""
+
+    def __init__(self, config: ControllerConfig) -> None:
+        """Prepare for the geometry and settings of a controller."""
+        self._config = config
+        vehicle = config.vehicle
+        self._tip = np.array(vehicle.tip_position_m)
+        self._camera = np.array(vehicle.camera_position_m)
+        chain = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [0.0, 0.0, 0.0]])
+        noise = np.array([1e-10, ACCELERATION_NOISE**2, BIAS_NOISE**2])
+        self._filter = DelayedKalman(chain, noise, np.array([0.05, 0.05, 0.1]), config.tick_s)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything, as before the first measurement."""
+        self._filter.reset()
+        self._normal_history = np.zeros((HISTORY, 3))
+        self._ticks = 0
+        self._plane_stamp = self._wrench_stamp = self._stamp = -1
+        self.normal = np.array([1.0, 0.0, 0.0])
+        self.known = False
+        self.distance, self.rate, self._lever_speed = math.inf, 0.0, 0.0
+        self.push = self.push_raw = 0.0
+        self._push_mean, self._push_variance = 0.0, 0.02
+        self.in_contact, self.touch_ns, self._touch_count, self._doubt_ns = False, -1, 0, -1
+        self.stiffness = StiffnessEstimator()
+        self.plane_age_s = math.inf
+
+    def update(self, measurement: Measurement, down: np.ndarray) -> None:
+        """Take in one measurement; ``down`` is the unit gravity direction in B."""
+        stamp = measurement.stamp_ns
+        dt = self._config.tick_s if self._stamp < 0 else min(max((stamp - self._stamp) * 1e-9, 0.0), 0.02)
+        self._stamp = stamp
+        omega = measurement.angular_velocity
+        self._predict(measurement, down, omega, dt)
+        if measurement.plane is not None and measurement.plane_stamp_ns > self._plane_stamp:
+            self._correct_plane(measurement.plane, measurement.plane_stamp_ns)
+        self.plane_age_s = (stamp - self._plane_stamp) * 1e-9 if self._plane_stamp >= 0 else math.inf
+        if self.known:
+            self.distance = float(self._filter.state[0])
+            self.rate = -float(self._filter.state[1]) - self._lever_speed
+        self._update_push(measurement)
+        self._update_contact(stamp)
+
+    def _predict(self, measurement: Measurement, down: np.ndarray, omega: np.ndarray, dt: float) -> None:
+        """Turn the normal with the gyro and integrate the accelerometer along it."""
+        normal = self.normal
+        turned = normal + dt * np.array(
+            [
+                normal[1] * omega[2] - normal[2] * omega[1],
+                normal[2] * omega[0] - normal[0] * omega[2],
+                normal[0] * omega[1] - normal[1] * omega[0],
+            ]
+        )
+        self.normal = turned / math.sqrt(turned @ turned)
+        self._ticks += 1
+        self._normal_history[self._ticks % HISTORY] = self.normal
+        increment = np.zeros(3)
+        if measurement.specific_force is not None:
+            increment[1] = dt * float(self.normal @ (measurement.specific_force + GRAVITY * down))
+        # The tip moves with the body's turn as well; the chain integrates only the centre of mass.
+        x, y, z = self._tip
+        self._lever_speed = float(
+            self.normal[0] * (omega[1] * z - omega[2] * y)
+            + self.normal[1] * (omega[2] * x - omega[0] * z)
+            + self.normal[2] * (omega[0] * y - omega[1] * x)
+        )
+        increment[0] = -dt * self._lever_speed
+        self._filter.predict(measurement.stamp_ns, increment, dt)
+
+    def _correct_plane(self, plane: tuple[float, float, float, float], stamp: int) -> None:
+        abcd = np.asarray(plane, float)
+        vector = R_BODY_CAMERA @ abcd[:3] * (-1.0 / abcd[3])
+        length = math.sqrt(vector @ vector)
+        normal = vector / length
+        tip_camera = self._tip - self._camera
+        distance = 1.0 / length - float(normal @ tip_camera)
+        self._plane_stamp = stamp
+        if not self.known:
+            self.normal = normal
+            self._normal_history[:] = normal
+            self._filter.set_entry(0, distance, 0.01)
+            self.known = True
+            return
+        age = min(max(round((self._stamp - stamp) * 1e-9 / self._config.tick_s), 0), min(HISTORY, self._ticks) - 1)
+        slots = (self._ticks - np.arange(age + 1)) % HISTORY
+        correction = NORMAL_GAIN * (normal - self._normal_history[slots[-1]])
+        self._normal_history[slots] += correction
+        self.normal = self.normal + correction
+        self.normal /= math.sqrt(self.normal @ self.normal)
+        row = np.array([[1.0, 0.0, 0.0]])
+        if not self._filter.correct(stamp, row, np.array([distance]), np.array([[DISTANCE_STD**2]])):
+            past = self._filter.at(stamp)
+            if past is not None and abs(distance - past[0]) < 0.05:  # a jump is believed slowly, a leap not at all
+                self._filter.correct(stamp, row, np.array([distance]), np.array([[0.02**2]]), gate=1e3)
+
+    def _update_push(self, measurement: Measurement) -> None:
+        if measurement.wrench_stamp_ns <= self._wrench_stamp:
+            return
+        settings = self._config.contact
+        dt = 0.01 if self._wrench_stamp < 0 else min((measurement.wrench_stamp_ns - self._wrench_stamp) * 1e-9, 0.1)
+        self._wrench_stamp = measurement.wrench_stamp_ns
+        self.push_raw = -float(measurement.contact_wrench[:3] @ self.normal)
+        self.push += (1.0 - math.exp(-2.0 * math.pi * settings.force_filter_hz * dt)) * (self.push_raw - self.push)
+        if not self.in_contact and self.distance > 2.0 * settings.contact_distance_m:
+            share = min(1.0, dt / NOISE_TIME)
+            self._push_mean += share * (self.push - self._push_mean)
+            self._push_variance += share * ((self.push - self._push_mean) ** 2 - self._push_variance)
+        self._touch_count = self._touch_count + 1 if self.push > self.touch_threshold else 0
+        if self.in_contact:
+            self.stiffness.add(self.push, -self.distance, dt)
+
+    @property
+    def touch_threshold(self) -> float:
+        """Filtered push that counts as touch [N]."""
+        settings = self._config.contact
+        return max(settings.touch_force_n, settings.touch_sigmas * math.sqrt(self._push_variance))
+
+    def _update_contact(self, stamp: int) -> None:
+        settings = self._config.contact
+        if not self.in_contact:
+            if self._touch_count >= settings.touch_samples and self.distance < settings.contact_distance_m:
+                self.in_contact, self.touch_ns, self._doubt_ns = True, stamp, -1
+                self.stiffness.start()
+            return
+        self._doubt_ns = -1 if self.push >= settings.loss_force_n else (self._doubt_ns if self._doubt_ns >= 0 else stamp)
+        doubted = self._doubt_ns >= 0 and (stamp - self._doubt_ns) * 1e-9 >= settings.loss_time_s
+        if doubted or self.distance > settings.contact_distance_m:
+            self.in_contact, self.touch_ns, self._touch_count = False, -1, 0
+
+    @property
+    def time_since_touch(self) -> float:
+        """Seconds since touch, 0 while free."""
+        return (self._stamp - self.touch_ns) * 1e-9 if self.in_contact else 0.0
+
+    @property
+    def depth(self) -> float:
+        """Camera to wall along the normal [m]."""
+        return self.distance + float(self.normal @ (self._tip - self._camera)) if self.known else math.inf
+
+    @property
+    def ramp(self) -> float:
+        """0 at touch to 1 after the ramp time; 0 while free."""
+        if not self._config.touch_ramp:
+            return 1.0
+        return min(1.0, self.time_since_touch / self._config.contact.ramp_s) if self.in_contact else 0.0
+
+    @property
+    def contact_weight(self) -> float:
+        r"""Lambda: :math:`\tfrac12(1+\cos(\pi (d-d_{min})/(d_{max}-d_{min})))` times the ramp (paper, corrected)."""
+        settings = self._config.contact
+        share = (self.depth - settings.depth_min_m) / (settings.depth_max_m - settings.depth_min_m)
+        if share >= 1.0:
+            return 0.0
+        return self.ramp * (1.0 if share <= 0.0 else 0.5 * (1.0 + math.cos(math.pi * share)))

@@ -1,0 +1,232 @@
+"""Motion in the wall plane and the lines on it, filtered in metres and predicted from late pictures to now."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ibvs_qp.estimation.delayed import DelayedKalman
+from ibvs_qp.estimation.wall_lines import WallAxes, image_line, wall_line
+from ibvs_qp.frames import GRAVITY
+from ibvs_qp.measurement import FeatureFrame, LineFeature
+
+#: Accelerometer noise in the wall plane with what the attitude noise adds [m/s^2/sqrt(Hz)].
+ACCELERATION_NOISE = 8e-3
+#: Drift of the accelerometer bias that gravity leaks through the attitude bias [m/s^3/sqrt(Hz)].
+BIAS_NOISE = 3e-3
+#: Random walk of line offsets [m/sqrt(s)]: edges are not perfectly straight and fits wander along them.
+LINE_NOISE = 1e-3
+#: Least deviation of one line offset [m] and one flow velocity [m/s], whatever the fit claims.
+LINE_STD, VELOCITY_STD = 3e-4, 2e-3
+#: Lines followed at once.
+SLOTS = 8
+#: A line unseen this long starts to fade, and is forgotten after the second time [s].
+FADE_START, FADE_END = 0.10, 0.45
+#: Frames until a new line has full weight.
+FRAMES_TO_TRUST = 4
+#: Share of a frame's line angle that is believed.
+ANGLE_GAIN = 0.15
+
+_VELOCITY, _BIAS, _ODOMETER, _LINES = slice(0, 2), slice(2, 4), slice(4, 6), 6
+
+
+@dataclass(slots=True)
+class TrackedLine:
+    """One line on the wall, in metres from the tip's wall point.
+
+    Attributes:
+        offset: Signed distance from the tip to the line along its normal [m]; normals point down (horizontal lines)
+            or right (vertical lines), so > 0 is below or right of the tip.
+        angle: Angle of the normal in (right, down) [rad]; pi/2 for a level line.
+        ends: Visible ends along the line in odometer coordinates (right, down) [m], (2, 2), or None.
+        open_ends: Whether each end is the line's own end, and not the border of the view.
+    """
+
+    track_id: int
+    role: str
+    slot: int
+    angle: float
+    deviation: float
+    seen_ns: int
+    frames: int = 1
+    offset: float = 0.0
+    weight: float = 0.0
+    surface_side: int = 0
+    kind: str = ""
+    source_weight: float = 1.0
+    ends: np.ndarray | None = None
+    theta_variance: float = 1e-4
+    extra: dict[str, float] = field(default_factory=dict)
+
+
+class WallMotion:
+    """Velocity right and down, a tip odometer, and the tracked lines' offsets; corrected at the time of capture."""
+
+    def __init__(self, tip: np.ndarray, camera: np.ndarray, tick_s: float) -> None:
+        self._tip, self._camera = np.asarray(tip, float), np.asarray(camera, float)
+        size = _LINES + SLOTS
+        chain = np.zeros((size, size))
+        chain[0, 2] = chain[1, 3] = -1.0
+        chain[4, 0] = chain[5, 1] = 1.0
+        noise = np.full(size, LINE_NOISE**2)
+        noise[_VELOCITY], noise[_BIAS], noise[_ODOMETER] = ACCELERATION_NOISE**2, BIAS_NOISE**2, 1e-10
+        deviation = np.full(size, 0.05)
+        deviation[_BIAS], deviation[_ODOMETER] = 0.1, 1e-6
+        self._filter = DelayedKalman(chain, noise, deviation, tick_s)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything."""
+        self._filter.reset()
+        self.lines: dict[int, TrackedLine] = {}
+        self._stamp = -1
+        self._frame_stamp = -1
+        self.velocity_age_s = math.inf
+        self._velocity_stamp = -1
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """Velocity of the centre of mass (right, down) [m/s], (2,)."""
+        return self._filter.state[_VELOCITY]
+
+    @property
+    def velocity_covariance(self) -> np.ndarray:
+        """Covariance of the velocity, (2, 2)."""
+        return self._filter.covariance[_VELOCITY, _VELOCITY]
+
+    @property
+    def odometer(self) -> np.ndarray:
+        """Path of the tip's wall point since the start (right, down) [m], (2,)."""
+        return self._filter.state[_ODOMETER]
+
+    def predict(self, stamp_ns: int, axes: WallAxes, specific_force: np.ndarray, omega: np.ndarray, dt: float) -> None:
+        """Integrate the accelerometer in the wall plane; the tip moves with the body's turn as well."""
+        acceleration = specific_force + GRAVITY * axes.gravity
+        x, y, z = self._tip
+        lever = np.array([omega[1] * z - omega[2] * y, omega[2] * x - omega[0] * z, omega[0] * y - omega[1] * x])
+        turn_right, turn_down = dt * float(axes.right @ lever), dt * float(axes.down @ lever)
+        increment = np.zeros(_LINES + SLOTS)
+        increment[0], increment[1] = dt * float(axes.right @ acceleration), dt * float(axes.down @ acceleration)
+        increment[4], increment[5] = turn_right, turn_down
+        for line in self.lines.values():
+            c, s = math.cos(line.angle), math.sin(line.angle)
+            increment[_LINES + line.slot] = -(c * turn_right + s * turn_down)
+        self._filter.predict(stamp_ns, increment, dt)
+        self._stamp = stamp_ns
+        self._refresh(stamp_ns)
+
+    def _refresh(self, stamp_ns: int) -> None:
+        for key in list(self.lines):
+            line = self.lines[key]
+            age = (stamp_ns - line.seen_ns) * 1e-9
+            if age > FADE_END:
+                self._drop(key)
+                continue
+            fade = min(1.0, max(0.0, (FADE_END - age) / (FADE_END - FADE_START)))
+            line.weight = fade * min(1.0, line.frames / FRAMES_TO_TRUST) * line.source_weight
+            line.offset = float(self._filter.state[_LINES + line.slot])
+        self.velocity_age_s = (stamp_ns - self._velocity_stamp) * 1e-9 if self._velocity_stamp >= 0 else math.inf
+
+    def _drop(self, key: int) -> None:
+        slot = _LINES + self.lines.pop(key).slot
+        self._filter.chain[slot, :] = 0.0
+        self._filter.set_entry(slot, 0.0, 0.05)
+
+    def correct(self, frame: FeatureFrame, axes: WallAxes, foot_distance: float) -> None:
+        """Take in what perception saw.
+
+        Args:
+            frame: Features at capture.
+            axes: Wall axes in B at capture.
+            foot_distance: Tip to wall along the normal at capture [m].
+        """
+        if frame.stamp_ns <= self._frame_stamp:
+            return
+        self._frame_stamp = frame.stamp_ns
+        self._correct_velocity(frame, axes)
+        for line in frame.lines:
+            seen = wall_line(line, axes, self._tip - self._camera, foot_distance)
+            if seen is not None:
+                self._correct_line(line, *seen, frame.stamp_ns)
+
+    def _correct_velocity(self, frame: FeatureFrame, axes: WallAxes) -> None:
+        if frame.velocity is None or frame.velocity_covariance is None or not np.isfinite(frame.velocity).all():
+            return
+        plane = np.vstack((axes.right, axes.down))
+        covariance = plane @ frame.velocity_covariance @ plane.T + np.eye(2) * VELOCITY_STD**2
+        rows = np.zeros((2, _LINES + SLOTS))
+        rows[0, 0] = rows[1, 1] = 1.0
+        stamp = frame.velocity_stamp_ns or frame.stamp_ns
+        if self._filter.correct(stamp, rows, plane @ frame.velocity, covariance):
+            self._velocity_stamp = frame.stamp_ns
+
+    def _correct_line(
+        self, line: LineFeature, offset: float, angle: float, side: int, scale: float, ends: np.ndarray | None, stamp: int
+    ) -> None:
+        deviation = math.hypot(LINE_STD, math.sqrt(max(float(line.covariance[0, 0]), 0.0)) * scale)
+        tracked = self.lines.get(line.track_id)
+        if tracked is None:
+            tracked = self._admit(line, offset, angle, deviation, stamp)
+            if tracked is None:
+                return
+        row = np.zeros((1, _LINES + SLOTS))
+        row[0, _LINES + tracked.slot] = 1.0
+        if tracked.seen_ns != stamp and not self._filter.correct(
+            stamp, row, np.array([offset]), np.array([[deviation**2]])
+        ):
+            tracked.extra["refused"] = tracked.extra.get("refused", 0.0) + 1.0
+            if tracked.extra["refused"] >= 3:  # three frames agree with each other, not with the prediction
+                self._drop(line.track_id)
+            return
+        tracked.extra.pop("refused", None)
+        tracked.angle += ANGLE_GAIN * (angle - tracked.angle)
+        tracked.frames += tracked.seen_ns != stamp
+        tracked.seen_ns, tracked.deviation, tracked.source_weight = stamp, deviation, line.weight
+        tracked.theta_variance = float(line.covariance[1, 1])
+        tracked.surface_side, tracked.kind = side, line.kind or tracked.kind
+        self._filter.chain[_LINES + tracked.slot, _VELOCITY] = -math.cos(tracked.angle), -math.sin(tracked.angle)
+        if ends is not None:
+            past = self._filter.at(stamp)
+            if past is not None:
+                tracked.ends = past[_ODOMETER] + ends
+
+    def _admit(
+        self, line: LineFeature, offset: float, angle: float, deviation: float, stamp: int
+    ) -> TrackedLine | None:
+        taken = {entry.slot for entry in self.lines.values()}
+        free = [slot for slot in range(SLOTS) if slot not in taken]
+        if not free:
+            return None
+        tracked = TrackedLine(
+            track_id=line.track_id, role=line.role, slot=free[0], angle=angle, deviation=deviation, seen_ns=stamp
+        )
+        self.lines[line.track_id] = tracked
+        slot = _LINES + tracked.slot
+        self._filter.chain[slot, _VELOCITY] = -math.cos(angle), -math.sin(angle)
+        past = self._filter.at(stamp)
+        moved = 0.0
+        if past is not None:  # what the line did between capture and now
+            step = self._filter.state[_ODOMETER] - past[_ODOMETER]
+            moved = -(math.cos(angle) * step[0] + math.sin(angle) * step[1])
+        self._filter.set_entry(slot, offset + float(moved), deviation + abs(float(moved)) * 0.1)
+        tracked.offset = offset + float(moved)
+        return tracked
+
+    def feature(self, line: TrackedLine, axes: WallAxes, foot_distance: float, stamp_ns: int) -> LineFeature:
+        """The line as the camera would see it now: rho, theta at the tick's own time."""
+        rho, theta, scale = image_line(line.offset, line.angle, axes, self._tip - self._camera, foot_distance)
+        slot = _LINES + line.slot
+        variance = max(float(self._filter.covariance[slot, slot]), 1e-10) / (scale * scale)
+        return LineFeature(
+            rho=rho,
+            theta=theta,
+            covariance=np.diag([variance, line.theta_variance]),
+            role=line.role,
+            weight=line.weight,
+            stamp_ns=stamp_ns,
+            track_id=line.track_id,
+            surface_side=line.surface_side,
+            kind=line.kind,
+        )

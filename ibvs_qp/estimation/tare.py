@@ -1,0 +1,63 @@
+"""Raw force/torque samples to the contact wrench at the centre of mass: tool weight, inertia and bias removed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ibvs_qp.vehicle import VehicleParams
+
+#: The bias is averaged over this time in free flight before it is trusted [s], then followed this slowly [s].
+TARE_TIME, FOLLOW_TIME = 0.5, 20.0
+
+
+class WrenchTare:
+    r"""Contact wrench ON the vehicle from what the vehicle exerts on the tool.
+
+    The tool obeys :math:`m_t f_t = F_{raw} + F_c` with its specific force f_t, so
+    :math:`F_c = m_t f_t - F_{raw}`, and likewise for moments about the sensor; the mean in free flight is the bias.
+    """
+
+    def __init__(self, vehicle: VehicleParams) -> None:
+        self._mass = vehicle.tool_mass_kg
+        self._sensor = np.array(vehicle.force_torque_position_m)
+        self._lever = np.array(vehicle.tool_position_m) - self._sensor
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the bias."""
+        self._bias, self._time, self._stamp = np.zeros(6), 0.0, -1
+        self._wrench = np.zeros(6)
+        self._force = np.array([0.0, 0.0, -9.81])
+
+    @property
+    def ready(self) -> bool:
+        """Whether the bias has been averaged long enough."""
+        return self._time >= TARE_TIME
+
+    def update(self, raw: np.ndarray, stamp_ns: int, specific_force: np.ndarray, free: bool) -> np.ndarray:
+        """Tared contact wrench at the centre of mass [N, N m], (6,).
+
+        Args:
+            raw: Sensor sample, FRD axes, vehicle on tool, (6,).
+            stamp_ns: Its time.
+            specific_force: Accelerometer in B [m/s^2], (3,).
+            free: Whether the tip is known to be away from the wall, so that the mean is bias.
+        """
+        # The accelerometer is noisier than the force sensor needs; average it about as long as a force sample lasts.
+        self._force = self._force + 0.3 * (specific_force - self._force)
+        if stamp_ns <= self._stamp or not np.isfinite(raw).all():
+            return self._wrench
+        dt = 0.01 if self._stamp < 0 else min((stamp_ns - self._stamp) * 1e-9, 0.1)
+        self._stamp = stamp_ns
+        load = self._mass * self._force
+        x, y, z = self._lever
+        moment = np.array([y * load[2] - z * load[1], z * load[0] - x * load[2], x * load[1] - y * load[0]])
+        contact = np.concatenate((load, moment)) - raw
+        if free:
+            self._time += dt
+            self._bias = self._bias + min(1.0, dt / min(max(self._time, dt), FOLLOW_TIME)) * (contact - self._bias)
+        contact = contact - self._bias
+        force, (x, y, z) = contact[:3], self._sensor
+        contact[3:] += np.array([y * force[2] - z * force[1], z * force[0] - x * force[2], x * force[1] - y * force[0]])
+        self._wrench = contact
+        return contact

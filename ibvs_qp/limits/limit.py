@@ -1,0 +1,19 @@
+"""What a limit is: a named set of two-sided rows, hard or soft with a price."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+from ibvs_qp.qp.model import LimitRow, SymbolicModel
+
+
+class Limit(ABC):
+    """A bound the program keeps: hard, or soft with a price per squared unit of slack.
+
+    Only thrust and thrust rate are hard and their intersection is never empty, so the program is feasible by
+    construction. Row types never change from tick to tick.
+    """
+
+    @abstractmethod
+    def rows(self, model: SymbolicModel) -> list[LimitRow]:
+        """Rows of the limit, affine in ``model.thrust``."""

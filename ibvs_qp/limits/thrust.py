@@ -1,0 +1,48 @@
+"""Thrust box and thrust rate of every rotor, hard."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ibvs_qp.limits.limit import Limit
+from ibvs_qp.qp.model import LimitRow, SymbolicModel
+
+#: Least distance between lower and upper bound [N]: OSQP takes a row for an equality below 1e-4 and refactorises.
+LEAST_GAP = 1e-3
+
+
+class ThrustLimit(Limit):
+    """Each thrust within its box and within reach of the last one at the rate limit."""
+
+    def rows(self, model: SymbolicModel) -> list[LimitRow]:
+        """One hard row per rotor in newtons."""
+        lower = model.parameter("thrust_lower", model.rotors)
+        upper = model.parameter("thrust_upper", model.rotors)
+        names = model.config.vehicle.geometry.names
+        return [
+            LimitRow(name=f"thrust_{names[i]}", unit="N", expression=model.thrust[i], lower=lower[i], upper=upper[i])
+            for i in range(model.rotors)
+        ]
+
+
+def thrust_window(
+    last: np.ndarray, lower: np.ndarray, upper: np.ndarray, step: float, floor: np.ndarray, ceiling: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Box and rate limit of one tick, never empty: a limit lowered in flight is approached at the rate limit.
+
+    Args:
+        last: Last thrusts [N], (n,).
+        lower: Lower limits now in force [N], (n,).
+        upper: Upper limits now in force [N], (n,).
+        step: Largest change in one tick [N].
+        floor: Absolute lower limits that hold whatever happens [N], (n,).
+        ceiling: Absolute upper limits [N], (n,).
+
+    Returns:
+        Lower and upper bounds [N], (n,) each, at least `LEAST_GAP` apart.
+    """
+    reach_low, reach_high = last - step, last + step
+    low = np.clip(lower, reach_low, reach_high - LEAST_GAP)
+    high = np.clip(upper, np.maximum(reach_low, low) + LEAST_GAP, np.maximum(reach_high, low + LEAST_GAP))
+    low = np.clip(low, floor, ceiling - LEAST_GAP)
+    return low, np.clip(high, low + LEAST_GAP, ceiling)

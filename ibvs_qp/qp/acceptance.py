@@ -1,0 +1,96 @@
+"""Which solution may fly: status first, then finiteness, then bounds and residuals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ibvs_qp.command import Outcome
+from ibvs_qp.config import SolverSettings
+from ibvs_qp.qp.assembly import QpTemplate
+from ibvs_qp.qp.evaluator import Evaluator
+from ibvs_qp.qp.exact_solver import ExactSolver
+from ibvs_qp.qp.osqp_solver import MAX_ITERATIONS, SOLVED, SOLVED_INACCURATE, OsqpSolver
+
+#: Largest thrust-bound violation that clipping may hide in a solved program [N].
+BOUND_SLIP = 1e-2
+
+
+@dataclass(slots=True)
+class AcceptedSolution:
+    """Thrusts within their bounds, the full primal and dual vectors, and how they were found."""
+
+    thrusts: np.ndarray
+    x: np.ndarray
+    y: np.ndarray
+    outcome: Outcome
+    iterations: int
+    seconds: float
+
+
+class QpEngine:
+    """OSQP behind an acceptance test, DAQP behind OSQP.
+
+    An infeasible solve of OSQP returns x = 2143289344.0, a finite number: only the status tells. A capped solve is
+    accepted when its residuals are small enough to fly; otherwise the exact solver answers in the same tick.
+    """
+
+    def __init__(self, template: QpTemplate, settings: SolverSettings) -> None:
+        self.template, self.settings = template, settings
+        self.evaluator = Evaluator(template)
+        self.osqp = OsqpSolver(template, settings)
+        self.exact = ExactSolver(template)
+        self._matrix = template.a_pattern.copy()
+        self._rotors = template.model.rotors
+
+    def reset(self) -> None:
+        """As after construction."""
+        self.osqp.reset()
+
+    def solve(self) -> AcceptedSolution | None:
+        """Solve the program of the evaluator's present parameters; None when nobody found a solution."""
+        data = self.evaluator
+        data.evaluate()
+        raw = self.osqp.solve(data.p, data.q, data.a, data.lower, data.upper)
+        if raw is None:
+            return None
+        outcome = self._judge(raw.status, raw.x, raw.y)
+        if outcome is not None:
+            return self._accept(raw.x, raw.y, outcome, raw.iterations, raw.seconds)
+        exact = self.exact.solve(data.p, data.q, data.a, data.lower, data.upper)
+        if exact is None:
+            self.osqp.reset()
+            return None
+        self.osqp.warm_start(*exact)
+        return self._accept(*exact, Outcome.EXACT_FALLBACK, raw.iterations, raw.seconds)
+
+    def _judge(self, status: int, x: np.ndarray, y: np.ndarray) -> Outcome | None:
+        if status not in (SOLVED, SOLVED_INACCURATE, MAX_ITERATIONS) or not np.isfinite(x.sum() + y.sum()):
+            return None
+        n, data = self._rotors, self.evaluator
+        thrusts = x[:n]
+        slip = max(float((data.lower[:n] - thrusts).max()), float((thrusts - data.upper[:n]).max()))
+        if status == SOLVED:
+            return Outcome.SOLVED if slip <= BOUND_SLIP else None
+        if slip > self.settings.accept_residual or self.dual_residual(x, y) > self.settings.accept_residual:
+            return None
+        return Outcome.INACCURATE_ACCEPTED if status == SOLVED_INACCURATE else Outcome.CAPPED_ACCEPTED
+
+    def dual_residual(self, x: np.ndarray, y: np.ndarray) -> float:
+        """Largest entry of P x + q + A' y, each row divided by its diagonal of P: the thrust error it stands for."""
+        data = self.evaluator
+        upper = self.template.p_pattern.copy()
+        upper.data = data.p.copy()
+        full = upper + upper.T
+        diagonal = upper.diagonal()
+        self._matrix.data[:] = data.a
+        gradient = full @ x - diagonal * x + data.q + self._matrix.T @ y
+        return float(np.max(np.abs(gradient) / np.maximum(diagonal, 1e-9)))
+
+    def _accept(
+        self, x: np.ndarray, y: np.ndarray, outcome: Outcome, iterations: int, seconds: float
+    ) -> AcceptedSolution:
+        n, data = self._rotors, self.evaluator
+        thrusts = np.minimum(np.maximum(x[:n], data.lower[:n]), data.upper[:n])
+        return AcceptedSolution(thrusts, x, y, outcome, iterations, seconds)

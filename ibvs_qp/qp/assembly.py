@@ -1,0 +1,86 @@
+"""Tasks and limits to one program of fixed sparsity, condensed to thrusts and slacks, every row named."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import casadi as ca
+import numpy as np
+from scipy import sparse
+
+from ibvs_qp.limits.limit import Limit
+from ibvs_qp.qp.model import LimitRow, SymbolicModel, TaskRow
+from ibvs_qp.tasks.task import Task
+
+
+class QpTemplate:
+    r"""The program :math:`\min \tfrac12 x^T P x + q^T x,\; l \le A x \le u` with x = (thrusts, slacks).
+
+    Accelerations are eliminated, soft equalities live in P: small, dense, well scaled (the form that keeps the
+    tail of ADMM iterations short). P and A keep one sparsity for every phase, line count and fault.
+
+    Attributes:
+        variable_names: Names of the entries of x.
+        row_names: Names of the rows of A.
+        values: CasADi function of the stacked parameters giving (P, q, A, l, u) non-zeros, P as upper triangle.
+        report: CasADi function (parameters, thrusts) giving achieved and asked of every task row, and weights.
+    """
+
+    def __init__(self, model: SymbolicModel, tasks: Sequence[Task], limits: Sequence[Limit]) -> None:
+        self.model = model
+        self.task_rows: list[TaskRow] = [row for task in tasks for row in task.rows(model)]
+        self.limit_rows: list[LimitRow] = [row for limit in limits for row in limit.rows(model)]
+        soft = [row for row in self.limit_rows if row.price is not None]
+        n, m = model.rotors, len(soft)
+        u = model.thrust
+        achieved = ca.vertcat(*(row.expression for row in self.task_rows))
+        asked = ca.vertcat(*(row.target for row in self.task_rows))
+        weights = ca.vertcat(*(row.weight for row in self.task_rows))
+        jacobian = ca.jacobian(achieved, u)
+        offset = ca.substitute(achieved, u, ca.DM.zeros(n)) - asked
+        weighted = ca.diag(weights) @ jacobian
+        hessian = ca.densify(jacobian.T @ weighted)
+        prices = ca.DM([float(row.price) for row in soft if row.price is not None]) if m else ca.DM(0, 1)
+        p_full = ca.diagcat(hessian, ca.SX(ca.diag(prices))) if m else hessian
+        q = ca.vertcat(weighted.T @ offset, ca.DM.zeros(m))
+        rows = ca.vertcat(*(row.expression for row in self.limit_rows))
+        constant = ca.substitute(rows, u, ca.DM.zeros(n))
+        slack = ca.DM.zeros(len(self.limit_rows), m)
+        for column, row in enumerate(soft):
+            slack[self.limit_rows.index(row), column] = -1.0
+        a = ca.horzcat(ca.jacobian(rows, u), ca.sparsify(slack))
+        lower = ca.vertcat(*(row.lower for row in self.limit_rows)) - constant
+        upper = ca.vertcat(*(row.upper for row in self.limit_rows)) - constant
+        p_upper = ca.triu(p_full)
+        stacked = ca.vertcat(*model.parameters.values())
+        self.values = ca.Function(
+            "qp_values", [stacked], [p_upper.nz[:], ca.densify(q), a.nz[:], ca.densify(lower), ca.densify(upper)]
+        )
+        self.report = ca.Function("task_report", [stacked, u], [achieved, asked, weights])
+        self.p_pattern, self.a_pattern = _pattern(p_upper.sparsity()), _pattern(a.sparsity())
+        names = model.config.vehicle.geometry.names
+        self.variable_names = tuple(f"thrust_{name}" for name in names) + tuple(f"slack_{row.name}" for row in soft)
+        self.row_names = tuple(row.name for row in self.limit_rows)
+        self.row_units = tuple(row.unit for row in self.limit_rows)
+        self.row_slack = np.full(len(self.limit_rows), -1)
+        for column, row in enumerate(soft):
+            self.row_slack[self.limit_rows.index(row)] = n + column
+        self.layout = self._layout()
+
+    def _layout(self) -> dict[str, slice]:
+        layout, start = {}, 0
+        for name, symbol in self.model.parameters.items():
+            layout[name] = slice(start, start + symbol.numel())
+            start += symbol.numel()
+        return layout
+
+    @property
+    def parameter_count(self) -> int:
+        """Length of the stacked parameter vector."""
+        return sum(symbol.numel() for symbol in self.model.parameters.values())
+
+
+def _pattern(sparsity: ca.Sparsity) -> sparse.csc_matrix:
+    column, row = sparsity.get_ccs()
+    data = np.ones(sparsity.nnz())
+    return sparse.csc_matrix((data, row, column), shape=sparsity.shape)

@@ -1,0 +1,51 @@
+"""DAQP through CasADi: the exact fallback in flight and the oracle of the tests."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+
+from ibvs_qp.qp.assembly import QpTemplate
+
+
+class ExactSolver:
+    """Dual active-set solver of the same program; exact to rounding, called only when OSQP is not accepted."""
+
+    def __init__(self, template: QpTemplate) -> None:
+        self._template = template
+        p_sparsity = _casadi_sparsity(template.p_pattern + template.p_pattern.T)
+        self._p_sparsity, self._a_sparsity = p_sparsity, _casadi_sparsity(template.a_pattern)
+        self._solver = ca.conic("exact", "daqp", {"h": p_sparsity, "a": self._a_sparsity}, {"error_on_fail": False})
+
+    def solve(
+        self, p: np.ndarray, q: np.ndarray, a: np.ndarray, lower: np.ndarray, upper: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray] | None:
+        """Solution and multipliers (y > 0 at an upper bound), or None when the solver reports no success."""
+        upper_triangle = self._template.p_pattern.copy()
+        upper_triangle.data = p.copy()
+        full = upper_triangle.toarray()
+        full = full + np.triu(full, 1).T
+        matrix = self._template.a_pattern.copy()
+        matrix.data = a.copy()
+        arguments = {
+            "h": ca.project(ca.DM(full), self._p_sparsity),
+            "g": q,
+            "a": ca.project(ca.DM(matrix.toarray()), self._a_sparsity),
+            "lba": lower,
+            "uba": upper,
+        }
+        try:
+            result = self._solver(**arguments)
+        except RuntimeError:
+            return None
+        x = np.array(result["x"]).ravel()
+        y = np.array(result["lam_a"]).ravel()
+        if not self._solver.stats().get("success", False) or not np.all(np.isfinite(x)):
+            return None
+        return x, y
+
+
+def _casadi_sparsity(pattern: object) -> ca.Sparsity:
+    matrix = pattern.tocsc()  # type: ignore[attr-defined]
+    matrix.sort_indices()
+    return ca.Sparsity(*matrix.shape, matrix.indptr.tolist(), matrix.indices.tolist())

@@ -1,0 +1,96 @@
+"""OSQP with one persistent workspace: values updated in place, warm started, every trap guarded."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+import osqp
+
+from ibvs_qp.config import SolverSettings
+from ibvs_qp.qp.assembly import QpTemplate
+
+#: Status values of OSQP 1.x whose iterate means something.
+SOLVED, SOLVED_INACCURATE, MAX_ITERATIONS = 1, 2, 7
+
+
+@dataclass(slots=True)
+class RawSolution:
+    """What a solver returned, before anybody believes it."""
+
+    x: np.ndarray
+    y: np.ndarray
+    status: int
+    iterations: int
+    seconds: float
+
+
+class OsqpSolver:
+    """The per-tick solver.
+
+    Guards (each reproduced on OSQP 1.1): non-finite data never reaches the workspace, because one NaN poisons the
+    warm start for good; l <= u is enforced, because an update with l > u is dropped silently; arrays are owned,
+    contiguous and of fixed length, because strides and lengths are not checked; the matrices handed to set-up are
+    private copies, because updates write into them; a reset sets up anew, because the adapted rho survives.
+    """
+
+    def __init__(self, template: QpTemplate, settings: SolverSettings) -> None:
+        self._template, self._settings = template, settings
+        self._reset_pending = True
+
+    def reset(self) -> None:
+        """Forget the iterate and the adapted step size: the next solve is as after construction."""
+        self._reset_pending = True
+
+    def _setup(self, p: np.ndarray, q: np.ndarray, a: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> None:
+        settings, p_matrix, a_matrix = (
+            self._settings,
+            self._template.p_pattern.copy(),
+            self._template.a_pattern.copy(),
+        )
+        p_matrix.data, a_matrix.data = p.copy(), a.copy()
+        self._solver = osqp.OSQP()
+        self._solver.setup(
+            p_matrix,
+            q.copy(),
+            a_matrix,
+            lower.copy(),
+            upper.copy(),
+            verbose=False,
+            eps_abs=settings.tolerance,
+            eps_rel=settings.tolerance,
+            max_iter=settings.max_iterations,
+            check_termination=settings.check_interval,
+            adaptive_rho_interval=settings.adaptive_rho_interval,
+            scaling=settings.scaling,
+            polishing=settings.polishing,
+            warm_starting=True,
+        )
+        self._reset_pending = False
+
+    def solve(
+        self, p: np.ndarray, q: np.ndarray, a: np.ndarray, lower: np.ndarray, upper: np.ndarray
+    ) -> RawSolution | None:
+        """Solve with new values; None when the data is not finite or a bound pair is crossed."""
+        start = time.perf_counter()
+        finite = np.isfinite(q.sum() + p.sum() + a.sum() + lower.sum() + upper.sum())
+        if not finite or np.any(lower > upper):
+            return None
+        if self._reset_pending:
+            self._setup(p, q, a, lower, upper)
+        else:
+            self._solver.update(q=q, l=lower, u=upper, Px=p, Ax=a)
+        result = self._solver.solve(raise_error=False)
+        return RawSolution(
+            x=result.x,
+            y=result.y,
+            status=int(result.info.status_val),
+            iterations=int(result.info.iter),
+            seconds=time.perf_counter() - start,
+        )
+
+    def warm_start(self, x: np.ndarray, y: np.ndarray) -> None:
+        """Replace the iterate, after a solve that was not accepted."""
+        if not self._reset_pending:
+            self._solver.warm_start(x=np.ascontiguousarray(x, float), y=np.ascontiguousarray(y, float))
