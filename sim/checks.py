@@ -18,15 +18,34 @@ def check_seed(seed: int) -> None:
         raise out_of_range("--seed", seed, "", "allowed are 0, 1, 2, ...")
 
 
-def check_preset(file: Path) -> None:
-    """Refuse a preset that cannot be read or is no TOML; its keys are checked where they are used.
+def check_readable(option: str, file: Path | None) -> None:
+    """Refuse a file that cannot be read.
+
+    Args:
+        option: Name of the option, for the message.
+        file: The file, or None if the option was not given.
 
     Raises:
-        ConfigError: When the file is missing or no TOML.
+        ConfigError: When it is given and cannot be read.
     """
+    if file is None:
+        return
+    try:
+        file.open("rb").close()
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise ConfigError(f"cannot read {file}: {reason}; give an existing file with {option}") from None
+
+
+def check_preset(file: Path | None) -> None:
+    """Refuse a preset that is no TOML; its keys are checked where they are used.
+
+    Raises:
+        ConfigError: When the file is given and no TOML.
+    """
+    if file is None:
+        return
     try:
         tomllib.loads(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ConfigError(f"cannot read preset {file}: {error.strerror or error}; give an existing file") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ConfigError(f"preset {file} is not valid TOML: {error}") from None
+        raise ConfigError(f"{file} is not valid TOML: {error}") from None

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import itertools
 import os
 import re
 import sys
@@ -76,8 +77,11 @@ def _parse(words: list[str]):
 def _one_line(text: str) -> str:
     """Strip frames and colours from the parser's message and keep what it says, as one line."""
     lines = [_BOXES.sub("", line).strip() for line in text.splitlines()]
-    end = next((index for index, line in enumerate(lines) if line.startswith("For full helptext")), len(lines))
-    return " ".join(" ".join(line for line in lines[1:end] if line).split())
+    # The first line is a title; rulers, by now empty, part the complaint from advice that repeats the help.
+    body = list(itertools.takewhile(bool, lines[1:]))
+    near = next((lines[i + 1 :] for i, line in enumerate(lines) if line.startswith("Perhaps you meant")), [])
+    option = next((line.split()[0] for line in near if line), None)
+    return " ".join(body) + (f"; did you mean {option}?" if option else "")
 
 
 def _refuse(message: str, words: list[str] | None = None) -> int:

@@ -123,9 +123,7 @@ def _interrupt_passed_on(processes: list[BaseProcess]) -> Iterator[None]:
         signal.signal(signal.SIGINT, previous)
 
 
-def _receive(
-    pipe: Connection, pipes: dict[Connection, str], flights: dict[str, Flight], progress: LawProgress
-) -> None:
+def _receive(pipe: Connection, pipes: dict[Connection, str], flights: dict[str, Flight], progress: LawProgress) -> None:
     law = pipes[pipe]
     try:
         kind, content = pipe.recv()

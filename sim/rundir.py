@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import shutil
 from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -21,6 +20,8 @@ from sim.scene import load_scene
 from sim.trace import FIELDS, Trace
 
 SCHEMA = 1
+#: Files of a run, beside its figures.
+_FILES = ("report.html", "summary.json", "video.mp4", "scene.toml", "log.npz", "README.txt")
 _README = """One run of ibvs-qp.
 
 report.html   everything at a glance; open it in a browser, it needs nothing else
@@ -77,9 +78,8 @@ class RunFolder:
             probe.unlink()
         except OSError as error:
             reason = error.strerror or str(error)
-            raise RunFolderError(
-                f"cannot write run folder {path}: {reason}; give a writable folder with --out"
-            ) from None
+            mend = "give a writable folder with --out"
+            raise RunFolderError(f"cannot write run folder {path}: {reason}; {mend}") from None
         return cls(path)
 
     def discard_if_empty(self) -> None:
@@ -88,7 +88,12 @@ class RunFolder:
             self.path.rmdir()
 
     def write_record(self, traces: dict[str, Trace], summary_table: dict[str, Any]) -> None:
-        """Write what must not be lost: log, scene, summary and the text that explains them."""
+        """Write what must not be lost: log, scene, summary and the text that explains them.
+
+        What an earlier run left in the same folder goes first, so that nothing stale is taken for this run's.
+        """
+        for name in _FILES:
+            (self.path / name).unlink(missing_ok=True)
         for trace in traces.values():
             (self.path / "scene.toml").write_text(dump_toml(trace.scene), encoding="utf-8")
         save_log(self.path / "log.npz", traces)
@@ -113,10 +118,6 @@ class RunFolder:
         if video and any(trace.pictures for trace in flown.values()):
             write_video(flown, film)
         write_report(self.report, flown, summary_table, figures, film if film.exists() else None)
-
-    def remove(self) -> None:
-        """Remove the folder with everything in it."""
-        shutil.rmtree(self.path)
 
 
 def _stamped(parent: Path) -> Path:
@@ -217,14 +218,15 @@ def load_run(path: str | Path) -> dict[str, Trace]:
         for law in dict.fromkeys(name.split("/")[0] for name in log.files):
             arrays = {name.split("/", 1)[1]: log[name] for name in log.files if name.startswith(law + "/")}
             completed, reason = arrays.pop("outcome_of_flight")
-            words = {name: tuple(map(str, arrays.pop(name))) for name in ("phases", "outcomes", "limits")}
             event_t, event_text = arrays.pop("event_t"), arrays.pop("event_text").reshape(-1, 2)
             coverage = arrays.pop("coverage_percent", None)
             traces[law] = Trace(
                 scene=scene,
                 seed=int(arrays.pop("seed")),
                 law=law,
-                **words,
+                phases=tuple(map(str, arrays.pop("phases"))),
+                outcomes=tuple(map(str, arrays.pop("outcomes"))),
+                limits=tuple(map(str, arrays.pop("limits"))),
                 events=[
                     Event(t=float(t), kind=str(k), text=str(x)) for t, (k, x) in zip(event_t, event_text, strict=True)
                 ],

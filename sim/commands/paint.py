@@ -7,7 +7,7 @@ import shlex
 import sys
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
@@ -18,6 +18,14 @@ if TYPE_CHECKING:
     from sim.rundir import RunFolder
 
 
+def _optional(metavar: str) -> Any:
+    """Help text of an option whose default is worded in its description."""
+    return tyro.conf.arg(metavar=metavar, help_behavior_hint="")
+
+
+_flag = tyro.conf.arg(help_behavior_hint="")
+
+
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Paint:
     """Fly a paint job from the vehicle's own camera, the QP law beside the analytic law, and write a report.
@@ -25,15 +33,15 @@ class Paint:
     Example: ibvs-qp paint --seed 3 --image-size 424x240 --out runs/seed3
     """
 
-    scene: Path | None = None
+    scene: Annotated[Path | None, _optional("FILE")] = None
     """Scene file (TOML); default: the built-in scene, a C of two rows."""
-    preset: Path | None = None
+    preset: Annotated[Path | None, _optional("FILE")] = None
     """Controller preset (TOML): vehicle model, gains, weights, limits; default: the built-in one."""
     features: Literal["rendered", "geometric"] = "rendered"
     """Perception: rendered pictures through the whole vision, or a sensor model of lines."""
     vision: Literal["own"] = "own"
     """Vision pipeline."""
-    image_size: Literal["640x480", "424x240"] | None = None
+    image_size: Annotated[Literal["640x480", "424x240"] | None, _optional("640x480|424x240")] = None
     """Picture size; default: the scene's."""
     camera: Literal["plane"] = "plane"
     """Camera back end; plane needs no GL library."""
@@ -41,11 +49,11 @@ class Paint:
     """Which law flies."""
     seed: int = 0
     """Varies start pose, textures, clutter, noise and biases; the same seed flies the same flight."""
-    out: Path | None = None
+    out: Annotated[Path | None, _optional("DIR")] = None
     """Run folder; default: runs/<UTC stamp>."""
-    json: bool = False
+    json: Annotated[bool, _flag] = False
     """Print summary.json as one line on standard output, and nothing else."""
-    no_video: Annotated[bool, tyro.conf.arg(name="no-video")] = False
+    no_video: Annotated[bool, _flag] = False
     """Write no video."""
 
     def run(self, words: list[str]) -> int:
@@ -62,7 +70,7 @@ class Paint:
         """
         from rich.console import Console
 
-        from sim.checks import check_preset, check_seed
+        from sim.checks import check_preset, check_readable, check_seed
         from sim.closed_loop import FlightOptions
         from sim.flights import fly_laws
         from sim.progress import flight_progress
@@ -71,9 +79,10 @@ class Paint:
 
         started = time.perf_counter()
         check_seed(self.seed)
+        for option, file in (("--scene", self.scene), ("--preset", self.preset)):
+            check_readable(option, file)
         scene = load_scene(self.scene) if self.scene else Scene()
-        if self.preset:
-            check_preset(self.preset)
+        check_preset(self.preset)
         size = _size(self.image_size)
         options = FlightOptions(
             seed=self.seed,

@@ -1,0 +1,46 @@
+"""Figures of a run, drawn from traces alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from sim.figures.board import draw_board
+from sim.figures.force import draw_force
+from sim.figures.image_error import draw_image_error
+from sim.figures.motion import draw_attitude, draw_velocity
+from sim.figures.overview import draw_overview
+from sim.figures.path import draw_path
+from sim.figures.style import save, styled
+from sim.figures.thrusts import draw_thrusts
+from sim.trace import Trace
+
+#: Every figure of a run: file name, caption, function.
+FIGURES = {
+    "overview": ("What was flown: camera view, painted board, push force", draw_overview),
+    "force": ("Push force: reference, measured and true", draw_force),
+    "image_error": ("Error of the guiding edges in the picture, at the brush tip", draw_image_error),
+    "path": ("Path of the brush tip and its distance to the nominal polyline", draw_path),
+    "velocity": ("Velocity in the body frame: estimated against true", draw_velocity),
+    "attitude": ("True attitude; yaw 0 faces the wall", draw_attitude),
+    "thrusts": ("Commanded rotor thrusts and their limits", draw_thrusts),
+    "board": ("The painted board; dashed: the intended band", draw_board),
+}
+
+__all__ = ["FIGURES", "draw_all"]
+
+
+def draw_all(traces: dict[str, Trace], folder: Path) -> dict[str, tuple[str, Path]]:
+    """Draw every figure into a folder.
+
+    Args:
+        traces: One flight per law; each must have flown at least a tick.
+        folder: Where the PNG files go.
+
+    Returns:
+        Caption and file of every figure, by name.
+    """
+    drawn = {}
+    with styled():
+        for name, (caption, draw) in FIGURES.items():
+            drawn[name] = (caption, save(draw(traces), folder / f"{name}.png"))
+    return drawn

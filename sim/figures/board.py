@@ -1,0 +1,45 @@
+"""The painted board with the outline of the intended band."""
+
+from __future__ import annotations
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
+
+from sim.board import BoardGeometry
+from sim.figures.style import REFERENCE, law_name, new_figure, thin
+from sim.metrics import coverage
+from sim.paint_plan import band_mask, nominal_plan
+from sim.trace import Trace
+
+
+def draw_board(traces: dict[str, Trace]) -> Figure:
+    """One panel per law: the board as painted, the path of the tip, the intended band's outline."""
+    board = next(iter(traces.values())).scene.board
+    each = 7.4 * board.height_m / board.width_m + 0.45
+    figure = new_figure(min(each, 2.9) * len(traces))
+    panels = figure.subplots(len(traces), 1, squeeze=False)[:, 0]
+    for axes, (law, trace) in zip(panels, traces.items(), strict=True):
+        draw_canvas(axes, trace)
+        axes.set_title(f"{law_name(law)}: {100 * coverage(trace):.1f} % of the intended band covered")
+    return figure
+
+
+def draw_canvas(axes: Axes, trace: Trace) -> None:
+    """The board in its own coordinates [m]."""
+    scene = trace.scene
+    extent = (0.0, scene.board.width_m, 0.0, scene.board.height_m)
+    if trace.canvas is not None:
+        axes.imshow(trace.canvas, extent=extent, interpolation="bilinear", zorder=0)
+        shape = trace.canvas.shape[:2]
+        band = band_mask(scene, nominal_plan(scene), shape, trace.canvas_px_per_m)
+        axes.contour(band[::-1], levels=[0.5], extent=extent, colors=[REFERENCE["color"]],
+                     linewidths=0.7, linestyles="dashed")  # fmt: skip
+    path = BoardGeometry(scene).board_coordinates(trace.tip[:, 1:])
+    along, up = thin(*path[trace.row > 0].T)
+    axes.plot(along, up, color="white", linewidth=0.7, path_effects=[withStroke(linewidth=1.5, foreground="#444444")])
+    axes.set(xlabel="along the board [m]", ylabel="up [m]", xlim=extent[:2], ylim=extent[2:])
+    axes.set_aspect("equal")
+    axes.grid(False)
+    for spine in axes.spines.values():
+        spine.set_visible(True)

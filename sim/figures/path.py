@@ -1,0 +1,69 @@
+"""Path of the brush tip: in space over the board, and its error along the job."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+from sim.board import BoardGeometry
+from sim.figures.style import REFERENCE, law_colour, law_name, new_figure, thin
+from sim.paint_plan import nominal_plan
+from sim.path_error import CORNER_M, path_error
+from sim.trace import Trace
+
+
+def draw_path(traces: dict[str, Trace]) -> Figure:
+    """Tip path in space with board and nominal polyline, above the path error over the distance painted."""
+    figure = new_figure(5.6)
+    upper, lower = figure.subfigures(2, 1, height_ratios=[2.1, 1])
+    _draw_space(upper, traces)
+    _draw_error(lower.subplots(), traces)
+    return figure
+
+
+def _draw_space(figure, traces: dict[str, Trace]) -> None:
+    """Seen from behind the vehicle: right, into the wall, up [m]."""
+    scene = next(iter(traces.values())).scene
+    board = BoardGeometry(scene)
+    axes = figure.add_subplot(projection="3d")
+    width, height = scene.board.width_m, scene.board.height_m
+    corners = board.point(np.array([0.0, width, width, 0.0]), np.array([0.0, 0.0, height, height]))
+    face = [(y, 0.0, -z) for y, z in corners]
+    axes.add_collection3d(Poly3DCollection([face], facecolor="#f4f2ea", edgecolor="#a9a492", linewidth=0.8))
+    nominal = board.point(*nominal_plan(scene).polyline.T)
+    axes.plot(nominal[:, 0], 0 * nominal[:, 0], -nominal[:, 1], **REFERENCE, label="nominal polyline", zorder=5)
+    for law, trace in traces.items():
+        (tip,) = thin(trace.tip)
+        colour, name = law_colour(law), law_name(law)
+        axes.plot(tip[:, 1], tip[:, 0], -tip[:, 2], color=colour, linewidth=0.9, label=name, zorder=6)
+        axes.scatter(*tip[0, [1]], tip[0, 0], -tip[0, 2], color=colour, s=12, depthshade=False)
+    depth = max(float(np.max(-trace.tip[:, 0])) for trace in traces.values())
+    axes.set_box_aspect((width, max(depth, 0.3), height), zoom=1.25)
+    axes.set_xlabel("right [m]", labelpad=6)
+    axes.set_ylabel("into the wall [m]", labelpad=6)
+    axes.set_zlabel("up [m]", labelpad=2)
+    axes.set_yticks(np.round(np.linspace(-max(depth, 0.3), 0.0, 3), 1))
+    axes.view_init(elev=20, azim=-62)
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
+    axes.legend(loc="upper left", bbox_to_anchor=(0.0, 0.98))
+
+
+def _draw_error(axes, traces: dict[str, Trace]) -> None:
+    greatest = 1.0
+    for law, trace in traces.items():
+        path = path_error(trace)
+        index = np.flatnonzero(path.painting)
+        if not len(index):
+            continue
+        steps = np.linalg.norm(np.diff(path.tip[index], axis=0), axis=1)
+        travelled = np.concatenate(([0.0], np.cumsum(steps)))
+        error = 1e3 * path.distance[index]
+        greatest = max(greatest, float(error.max()))
+        axes.plot(*thin(travelled, error), color=law_colour(law), label=law_name(law))
+        axes.fill_between(travelled, 0, 1, where=path.corner[index], transform=axes.get_xaxis_transform(),
+                          color="#efefef", linewidth=0, zorder=0)  # fmt: skip
+    axes.set(xlabel="distance painted [m]", ylabel="path error [mm]", ylim=(0.0, 1.15 * greatest))
+    axes.set_title(f"distance of the tip to the nominal polyline (grey: within {CORNER_M:.2f} m of a vertex)")
+    axes.margins(x=0.0)
