@@ -115,7 +115,7 @@ class SolverSettings:
     check_interval: int = setting(5, "iterations between termination checks", low=1, high=1000)
     adaptive_rho_interval: int = setting(25, "iterations between step-size updates", low=1, high=10000)
     scaling: int = setting(10, "Ruiz equilibration passes", low=0, high=100)
-    polishing: bool = setting(True, "solve the active set exactly at the end")
+    polishing: bool = setting(False, "solve the active set exactly at the end; OSQP 1.1 prints a line per tick with it")
     accept_residual: float = setting(5e-2, "largest violation of a capped solution", unit="N", low=1e-9, high=10.0)
 
     def __post_init__(self) -> None:

@@ -1,0 +1,422 @@
+"""Painting strategy: from what is seen and felt to the reference of the controller, row by row.
+
+Everything is in metres around the tip's wall point (see `TrackedLine`). Guides are chosen by association: distance
+to where they must be, the side on which the surface lies, and the direction of travel; never by "topmost" or
+"first vertical" (design, section 4.4).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ibvs_qp.estimation.motion import TrackedLine
+from ibvs_qp.measurement import HORIZONTAL, VERTICAL
+from ibvs_qp.settings import setting, validate
+
+
+@dataclass(frozen=True, kw_only=True)
+class PaintingConfig:
+    """The paint job and the manners of doing it."""
+
+    brush_width_m: float = setting(0.08, "diameter of the brush", unit="m", low=0.02, high=0.3)
+    edge_margin_m: float = setting(0.05, "brush centre to the guiding or stopping edge", unit="m", low=0.01, high=0.5)
+    rows: int = setting(2, "number of rows", low=1, high=20)
+    stroke_m: float = setting(1.30, "length of a row", unit="m", low=0.1, high=20.0)
+    overlap_m: float = setting(0.008, "overlap of rows", unit="m", low=0.0, high=0.1)
+    speed_m_s: float = setting(0.10, "painting speed", unit="m/s", low=0.01, high=0.5)
+    push_n: float = setting(5.0, "push", unit="N", low=0.5, high=40.0)
+    climb_speed_m_s: float = setting(0.05, "speed of a climb", unit="m/s", low=0.005, high=0.3)
+    acceleration_m_s2: float = setting(0.12, "along a stroke", unit="m/s^2", low=0.01, high=2.0)
+    standoff_m: float = setting(0.06, "tip to wall while aligning", unit="m", low=0.02, high=0.5)
+    retreat_m: float = setting(0.35, "tip to wall at the end", unit="m", low=0.1, high=2.0)
+    align_error_m: float = setting(0.003, "line error that counts as aligned", unit="m", low=0.0005, high=0.05)
+    align_speed_m_s: float = setting(0.005, "speed that counts as still", unit="m/s", low=0.001, high=0.1)
+    align_time_s: float = setting(0.3, "aligned this long", unit="s", low=0.0, high=10.0)
+    timeout_s: float = setting(15.0, "longest start, approach, align, press, climb or retreat", unit="s", low=1.0, high=300.0)
+
+    def __post_init__(self) -> None:
+        """Validate."""
+        validate(self)
+
+    @property
+    def pitch_m(self) -> float:
+        """Distance between rows [m]."""
+        return self.brush_width_m - self.overlap_m
+
+    @property
+    def fresh_edge_m(self) -> float:
+        """Upper edge of the last row below the brush centre of the present row [m]."""
+        return self.pitch_m - 0.5 * self.brush_width_m
+
+
+@dataclass(slots=True)
+class Scenery:
+    """What the strategy knows at one tick, all of it estimated."""
+
+    time_s: float
+    lines: dict[int, TrackedLine]
+    odometer: np.ndarray
+    velocity: np.ndarray
+    distance: float
+    wall_known: bool
+    in_contact: bool
+    time_since_touch: float
+    push: float
+    push_wanted: float
+    tared: bool
+
+
+@dataclass(slots=True)
+class Wish:
+    """What the strategy wants: guides with the offsets they shall have, velocity, stand-off or push."""
+
+    contact: bool
+    standoff: float
+    velocity: np.ndarray
+    guides: list[tuple[TrackedLine, float]]
+    push: float
+
+
+#: A guide may differ from where it must be by this much [m]: at the start, and from row to row.
+START_GATE, ROW_GATE = 0.15, 0.018
+#: The right board edge is trusted as start mark only this near to its expected place [m].
+RIGHT_EDGE_GATE = 0.06
+#: A guide's reference slides to its nominal offset at this speed [m/s].
+SLIDE_SPEED = 0.01
+#: Share of a stroke after which its end may come.
+LEAST_STROKE = 0.5
+#: How far past the expected end a row may run before it ends all the same [m].
+OVERRUN = 0.02
+#: Stiction may keep the tip from the last millimetres; a stop settles for this long at most [s].
+SETTLE_TIME = 0.8
+#: Position hold along the wall by the odometer [1/s], speed-limited [m/s].
+HOLD_GAIN, HOLD_SPEED = 0.8, 0.03
+
+
+class Painter:
+    """Phase machine of the paint job; `step` returns the wish of the tick."""
+
+    def __init__(self, config: PaintingConfig) -> None:
+        self.config = config
+        self.reset()
+
+    def reset(self) -> None:
+        """Back to the start."""
+        self.phase, self.row, self.entered = "start", 0, 0.0
+        self.log: list[tuple[float, str, str]] = []
+        self.finished = self.failed = False
+        self.reason = ""
+        self._guide_id = self._edge_id = -1
+        self._guide_target = self.config.edge_margin_m
+        self._edge_target: float | None = None
+        self._speed = 0.0
+        self._since = self._anchor = math.nan
+        self._stroke_start = math.nan
+        self._right_edge: float | None = None
+        self._last_time = math.nan
+        self._paused = False
+        self._climbed = 0.0
+
+    # ------------------------------------------------------------------ phases
+
+    def step(self, seen: Scenery) -> Wish:
+        """Advance the phase machine by one tick."""
+        dt = 0.0 if math.isnan(self._last_time) else seen.time_s - self._last_time
+        self._last_time = seen.time_s
+        if self.phase in ("start", "approach", "align", "press", "climb", "retreat"):
+            if seen.time_s - self.entered > self.config.timeout_s:
+                self._time_out(seen)
+        return getattr(self, f"_{self.phase}")(seen, dt)
+
+    def _enter(self, seen: Scenery, phase: str, reason: str) -> None:
+        self.log.append((seen.time_s, phase, reason))
+        self.phase, self.entered, self._since = phase, seen.time_s, math.nan
+
+    def _time_out(self, seen: Scenery) -> None:
+        if self.phase == "retreat":
+            self._end(seen, f"time-out after {self.config.timeout_s:g} s in retreat", failed=True)
+            return
+        self._fail(seen, f"time-out after {self.config.timeout_s:g} s in {self.phase}")
+
+    def _fail(self, seen: Scenery, reason: str) -> None:
+        self.failed, self.reason = True, self.reason or reason
+        self._speed = 0.0
+        self._enter(seen, "retreat", reason)
+
+    def _end(self, seen: Scenery, reason: str, failed: bool = False) -> None:
+        self.failed = self.failed or failed
+        self.reason = self.reason or reason
+        self.finished = True
+        self._enter(seen, "done", reason)
+
+    def _start(self, seen: Scenery, dt: float) -> Wish:
+        guide = self._bottom_edge(seen)
+        if guide is not None and seen.wall_known and seen.tared and guide.weight > 0.9:
+            self._guide_id, self._guide_target = guide.track_id, self.config.edge_margin_m
+            self._enter(seen, "approach", f"guide {guide.offset * 1e3:+.0f} mm below the tip, wall known, wrench tared")
+            self._anchor = float(seen.odometer[0])
+        distance = seen.distance if seen.wall_known else self.config.retreat_m
+        return self._wish(seen, contact=False, standoff=max(distance, self.config.standoff_m), guided=False)
+
+    def _approach(self, seen: Scenery, dt: float) -> Wish:
+        self._keep_guide(seen, self._bottom_edge)
+        if abs(seen.distance - self.config.standoff_m) < 0.01:
+            self._enter(seen, "align", f"stand-off {seen.distance * 1e3:.0f} mm reached")
+        return self._wish(seen, contact=False, standoff=self.config.standoff_m, hold=True, mark=True)
+
+    def _align(self, seen: Scenery, dt: float) -> Wish:
+        self._keep_guide(seen, self._bottom_edge)
+        error = self._guide_error(seen)
+        mark = self._start_mark(seen)
+        if mark is not None:
+            error = max(error, abs(mark.offset - self.config.edge_margin_m))
+        still = float(np.linalg.norm(seen.velocity)) < self.config.align_speed_m_s
+        if error < self.config.align_error_m and still:
+            self._since = seen.time_s if math.isnan(self._since) else self._since
+            if seen.time_s - self._since >= self.config.align_time_s:
+                self._right_edge = mark.offset if mark is not None else None
+                self._anchor = float(seen.odometer[0])
+                self._enter(seen, "press", f"aligned within {error * 1e3:.1f} mm")
+        else:
+            self._since = math.nan
+        return self._wish(seen, contact=False, standoff=self.config.standoff_m, hold=True, mark=True)
+
+    def _press(self, seen: Scenery, dt: float) -> Wish:
+        self._keep_guide(seen, self._bottom_edge)
+        settled = seen.in_contact and seen.time_since_touch > 1.2
+        if settled and abs(seen.push - seen.push_wanted) < 0.15 * max(seen.push_wanted, 1.0):
+            self.row = 1
+            self._stroke_start = float(seen.odometer[0])
+            self._begin_row(seen, f"push {seen.push:.1f} N held")
+        return self._wish(seen, contact=True, hold=True, mark=True)
+
+    def _begin_row(self, seen: Scenery, reason: str) -> None:
+        self._speed, self._edge_id, self._edge_target = 0.0, -1, None
+        self._enter(seen, "paint", f"row {self.row}: {reason}")
+
+    def _paint(self, seen: Scenery, dt: float) -> Wish:
+        config = self.config
+        if seen.time_s - self.entered > config.timeout_s + 2.0 * config.stroke_m / config.speed_m_s:
+            self._fail(seen, f"time-out in row {self.row}")
+        chooser = self._bottom_edge if self.row == 1 else self._fresh_edge
+        self._keep_guide(seen, chooser)
+        nominal = config.edge_margin_m if self.row == 1 else config.fresh_edge_m
+        self._slide_guide(nominal if self._follows_nominal(seen) else self._guide_target, dt)
+        travel = -1.0 if self.row % 2 == 1 else 1.0
+        remaining, edge = self._remaining(seen, travel)
+        self._check_contact(seen)
+        speed = min(config.speed_m_s, math.sqrt(2.0 * config.acceleration_m_s2 * max(remaining, 0.0)))
+        speed = 0.0 if self._paused else min(speed, 2.0 * max(remaining, 0.0) + 0.005)
+        step = config.acceleration_m_s2 * dt
+        self._speed += min(max(speed - self._speed, -2.0 * step), step)
+        if remaining <= 0.004:
+            self._speed = 0.0
+            self._since = seen.time_s if math.isnan(self._since) else self._since
+            still = abs(seen.velocity[0]) < 2.0 * config.align_speed_m_s
+            waited = seen.time_s - self._since
+            if (waited > 0.15 and still and remaining < 0.003) or waited > SETTLE_TIME:
+                self._end_row(seen, edge)
+        return self._wish(seen, contact=True, along=travel * self._speed, edge=edge, edge_rate=-travel * self._speed * dt)
+
+    def _end_row(self, seen: Scenery, edge: TrackedLine | None) -> None:
+        how = f"at {edge.kind or 'unknown'} edge {edge.offset * 1e3:+.0f} mm" if edge is not None else "by the odometer"
+        if self.row >= self.config.rows:
+            self._enter(seen, "retreat", f"row {self.row} ended {how}; all rows done")
+            return
+        self.row += 1
+        self._climbed, self._speed = 0.0, 0.0
+        self._anchor = float(seen.odometer[0])
+        self._enter(seen, "climb", f"row {self.row - 1} ended {how}")
+
+    def _climb(self, seen: Scenery, dt: float) -> Wish:
+        config = self.config
+        self._check_contact(seen)
+        left = config.pitch_m - self._climbed
+        speed = min(config.climb_speed_m_s, math.sqrt(2.0 * config.acceleration_m_s2 * max(left, 0.0)) + 0.002)
+        speed = 0.0 if self._paused else speed
+        step = config.acceleration_m_s2 * dt
+        self._speed += min(max(speed - self._speed, -2.0 * step), step)
+        move = min(self._speed * dt, max(left, 0.0))
+        self._climbed += move
+        self._guide_target += move
+        if left <= 0.0:
+            self._speed = 0.0
+            self._since = seen.time_s if math.isnan(self._since) else self._since
+            waited = seen.time_s - self._since
+            fresh = self._fresh_edge(seen)
+            good = fresh is not None and fresh.weight > 0.9
+            if waited > 0.3 and (good or waited > 2.0) and (self._guide_error(seen) < 0.004 or waited > 1.0):
+                why = "fresh edge found" if good else "no fresh edge; the old guide stays"
+                if good and fresh is not None:
+                    self._guide_id, self._guide_target = fresh.track_id, fresh.offset
+                self._begin_row(seen, f"climbed {self._climbed * 1e3:.0f} mm, {why}")
+        edge = seen.lines.get(self._edge_id)
+        return self._wish(seen, contact=True, climb=self._speed if left > 0.0 else 0.0, edge=edge, hold=edge is None)
+
+    def _retreat(self, seen: Scenery, dt: float) -> Wish:
+        if seen.distance > self.config.retreat_m - 0.02 and not seen.in_contact:
+            self._end(seen, "all rows painted, retreated" if not self.failed else self.reason)
+        return self._wish(seen, contact=False, standoff=self.config.retreat_m, hold=True)
+
+    def _done(self, seen: Scenery, dt: float) -> Wish:
+        return self._wish(seen, contact=False, standoff=self.config.retreat_m, guided=False)
+
+    # ------------------------------------------------------------- association
+
+    def _bottom_edge(self, seen: Scenery) -> TrackedLine | None:
+        """The horizontal line below the tip with the surface above it, nearest to where the guide must be."""
+        expected = self._guide_target if self.phase != "start" else self.config.edge_margin_m
+        gate = START_GATE if self.phase in ("start", "approach") else ROW_GATE
+        return _nearest(
+            seen.lines.values(),
+            lambda line: line.role == HORIZONTAL and line.kind != "paint" and line.surface_side <= 0,
+            expected,
+            gate,
+        )
+
+    def _fresh_edge(self, seen: Scenery) -> TrackedLine | None:
+        """The upper edge of the last row: paint below, bare surface above, where this row expects it."""
+        return _nearest(
+            seen.lines.values(),
+            lambda line: line.role == HORIZONTAL and line.kind != "board" and line.surface_side <= 0,
+            self.config.fresh_edge_m,
+            ROW_GATE,
+        )
+
+    def _start_mark(self, seen: Scenery) -> TrackedLine | None:
+        """The right board edge, if it is where a row that starts one margin inside would have it."""
+        return _nearest(
+            seen.lines.values(),
+            lambda line: line.role == VERTICAL and line.kind != "paint" and line.surface_side <= 0 and line.weight > 0.3,
+            self.config.edge_margin_m,
+            RIGHT_EDGE_GATE,
+        )
+
+    def _keep_guide(self, seen: Scenery, chooser) -> None:  # noqa: ANN001
+        """Stay with the guide while it lives; when it is gone, look for it where it must be."""
+        line = seen.lines.get(self._guide_id)
+        if line is not None and line.weight > 0.05:
+            return
+        found = chooser(seen)
+        if found is not None:
+            self.log.append((seen.time_s, "guide", f"track {found.track_id} at {found.offset * 1e3:+.1f} mm"))
+            self._guide_id = found.track_id
+
+    def _follows_nominal(self, seen: Scenery) -> bool:
+        """Whether the present guide is the row's own (row 1: bottom edge; later rows: the fresh edge)."""
+        line = seen.lines.get(self._guide_id)
+        if self.row == 1 or line is None:
+            return self.row == 1
+        return abs(self._guide_target - self.config.fresh_edge_m) < 2.0 * ROW_GATE
+
+    def _slide_guide(self, nominal: float, dt: float) -> None:
+        gap = nominal - self._guide_target
+        self._guide_target += min(max(gap, -SLIDE_SPEED * dt), SLIDE_SPEED * dt)
+
+    def _guide_error(self, seen: Scenery) -> float:
+        line = seen.lines.get(self._guide_id)
+        return math.inf if line is None else abs(line.offset - self._guide_target)
+
+    def _remaining(self, seen: Scenery, travel: float) -> tuple[float, TrackedLine | None]:
+        """Way left in this row [m] and the vertical edge that ends it, once accepted."""
+        config = self.config
+        travelled = abs(float(seen.odometer[0]) - self._stroke_start)
+        ahead = config.stroke_m - travelled if self.row == 1 else travelled
+        if self.row % 2 == 0:
+            ahead = float(self._stroke_start - seen.odometer[0])
+        side = 1 if travel < 0 else -1
+        wanted = travel * (config.edge_margin_m if travel < 0 else (self._right_edge or config.edge_margin_m))
+        edge = seen.lines.get(self._edge_id)
+        if (edge is None or edge.weight < 0.05) and travelled > LEAST_STROKE * config.stroke_m * (self.row == 1):
+            edge = self._stop_edge(seen, travel, side, ahead, wanted)
+        if edge is not None:
+            self._edge_id = edge.track_id
+            return travel * (edge.offset - wanted), edge
+        self._edge_id, self._edge_target = -1, None
+        if self.row == 1:
+            return ahead + config.stroke_m, None  # the stroke ends at the edge, however long it is
+        return ahead, None
+
+    def _stop_edge(
+        self, seen: Scenery, travel: float, side: int, ahead: float, wanted: float
+    ) -> TrackedLine | None:
+        """The vertical edge ahead whose surface lies on the side we come from, near where the stroke must end."""
+        if travel > 0 and self._right_edge is None:
+            return None
+        gate = 0.25 if self.row == 1 else 0.06
+        best = _nearest(
+            seen.lines.values(),
+            lambda line: line.role == VERTICAL
+            and line.kind != "paint"
+            and line.surface_side == side
+            and line.weight > 0.9
+            and travel * line.offset > 0.0,
+            wanted + travel * max(ahead, 0.0),
+            gate,
+        )
+        return best
+
+    def _check_contact(self, seen: Scenery) -> None:
+        if not seen.in_contact and not self._paused:
+            self._paused = True
+            self.log.append((seen.time_s, "contact lost", f"in {self.phase}, waiting for it"))
+        elif self._paused and seen.in_contact and seen.time_since_touch > 0.5:
+            self._paused = False
+            self.log.append((seen.time_s, "contact back", "going on"))
+
+    # ------------------------------------------------------------------ wishes
+
+    def _wish(
+        self,
+        seen: Scenery,
+        *,
+        contact: bool,
+        standoff: float = 0.0,
+        guided: bool = True,
+        hold: bool = False,
+        mark: bool = False,
+        along: float = 0.0,
+        climb: float = 0.0,
+        edge: TrackedLine | None = None,
+        edge_rate: float = 0.0,
+    ) -> Wish:
+        guides: list[tuple[TrackedLine, float]] = []
+        velocity = np.zeros(2)
+        line = seen.lines.get(self._guide_id) if guided else None
+        slope = 0.0
+        if line is not None:
+            guides.append((line, self._guide_target))
+            slope = line.angle - 0.5 * math.pi
+        if mark:
+            start = self._start_mark(seen)
+            if start is not None:
+                guides.append((start, self.config.edge_margin_m))
+        if edge is not None and edge.weight > 0.0:
+            guides.append((edge, self._edge_reference(edge, edge_rate)))
+        if hold and not any(entry.role == VERTICAL for entry, _ in guides):
+            back = HOLD_GAIN * (self._anchor - float(seen.odometer[0]))
+            velocity[0] = min(max(back, -HOLD_SPEED), HOLD_SPEED)
+        velocity += along * np.array([math.cos(slope), math.sin(slope)])
+        velocity += climb * np.array([math.sin(slope), -math.cos(slope)])
+        return Wish(
+            contact=contact, standoff=standoff, velocity=velocity, guides=guides, push=self.config.push_n
+        )
+
+    def _edge_reference(self, edge: TrackedLine, edge_rate: float) -> float:
+        """The stop edge's wanted offset: from where it was first seen to the margin, at the stroke's own speed."""
+        travel = -1.0 if self.row % 2 == 1 or self.phase == "climb" and self.row % 2 == 0 else 1.0
+        margin = travel * (self.config.edge_margin_m if travel < 0 else (self._right_edge or self.config.edge_margin_m))
+        if self._edge_target is None:
+            self._edge_target = edge.offset
+        self._edge_target += edge_rate
+        if self.phase == "climb" or travel * (self._edge_target - margin) < 0.0:
+            self._edge_target = margin
+        return self._edge_target
+
+
+def _nearest(lines, accept, expected: float, gate: float) -> TrackedLine | None:  # noqa: ANN001
+    good = [line for line in lines if line.weight > 0.0 and accept(line) and abs(line.offset - expected) <= gate]
+    return min(good, key=lambda line: abs(line.offset - expected), default=None)

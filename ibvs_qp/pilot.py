@@ -1,0 +1,248 @@
+"""Pilot: raw sensor frames in, commands out; vision, estimation, strategy and one of the two laws in a row."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from ibvs_qp.analytic import PaperController
+from ibvs_qp.command import Command
+from ibvs_qp.config import ControllerConfig
+from ibvs_qp.controller import HybridController
+from ibvs_qp.estimation.motion import WallMotion
+from ibvs_qp.estimation.tare import WrenchTare
+from ibvs_qp.estimation.wall_lines import WallAxes
+from ibvs_qp.frames import R_BODY_CAMERA, down_in_body, to_camera
+from ibvs_qp.measurement import (
+    HORIZONTAL,
+    FeatureFrame,
+    LineReference,
+    Measurement,
+    Reference,
+    SensorFrame,
+)
+from ibvs_qp.painting import Painter, PaintingConfig, Scenery, Wish
+from ibvs_qp.settings import choice, dump_toml, load_toml, validate
+from ibvs_qp.vision.config import VisionConfig
+
+#: Velocity older than this is not passed on [s].
+VELOCITY_LIFE = 0.6
+#: The tip counts as free for the tare beyond this distance [m].
+TARE_DISTANCE = 0.04
+#: Ticks of inertial history kept for late pictures.
+HISTORY = 128
+
+
+@dataclass(frozen=True, kw_only=True)
+class PilotConfig:
+    """Everything a flight needs beside the vehicle itself."""
+
+    controller: ControllerConfig = field(default_factory=ControllerConfig)
+    vision: VisionConfig = field(default_factory=VisionConfig)
+    painting: PaintingConfig = field(default_factory=PaintingConfig)
+    law: str = choice("qp", "control law", ("qp", "paper"))
+
+    def __post_init__(self) -> None:
+        """Validate."""
+        validate(self)
+
+    @classmethod
+    def from_toml(cls, file: str | Path) -> PilotConfig:
+        """Read a preset."""
+        return load_toml(cls, file)
+
+    def to_toml(self) -> str:
+        """Write the preset as TOML text."""
+        return dump_toml(self)
+
+
+class Pilot:
+    """The whole pilot; `step` turns one sensor frame into one command and knows no simulator."""
+
+    def __init__(self, config: PilotConfig | None = None) -> None:
+        self.config = config or PilotConfig()
+        controller, vehicle = self.config.controller, self.config.controller.vehicle
+        self.controller = HybridController(controller) if self.config.law == "qp" else PaperController(controller)
+        self.motion = WallMotion(
+            np.array(vehicle.tip_position_m), np.array(vehicle.camera_position_m), controller.tick_s
+        )
+        self.tare = WrenchTare(vehicle)
+        self.painter = Painter(self.config.painting)
+        self._tip = np.array(vehicle.tip_position_m)
+        self._camera = np.array(vehicle.camera_position_m)
+        self._tip_camera = to_camera(self._tip, self._camera)
+        self._perception = None
+        self.reset()
+
+    def reset(self) -> None:
+        """As after construction."""
+        self.controller.reset()
+        self.motion.reset()
+        self.tare.reset()
+        self.painter.reset()
+        if self._perception is not None:
+            self._perception.reset()
+        self._first = self._stamp = -1
+        self._ticks = 0
+        self._history_stamp = np.zeros(HISTORY, dtype=np.int64)
+        self._history_attitude = np.zeros((HISTORY, 4))
+        self._history_turn = np.zeros((HISTORY, 3))
+        self._turn = np.zeros(3)
+        self._last_capture = -1
+        self.percept = None
+        self.measurement: Measurement | None = None
+        self.reference = Reference()
+        self.wish: Wish | None = None
+        self._plane: tuple[float, float, float, float] | None = None
+        self._plane_stamp = 0
+
+    @property
+    def terms(self):  # noqa: ANN201
+        """The controller's shared set-points, for logs."""
+        return self.controller.setpoints
+
+    def step(self, frame: SensorFrame) -> Command:
+        """One control tick.
+
+        Args:
+            frame: Raw sensors; image or features only when there is a new picture.
+
+        Returns:
+            The controller's command.
+        """
+        if self._first < 0:
+            self._first = frame.stamp_ns
+        tick = self.config.controller.tick_s
+        dt = tick if self._stamp < 0 else min(max((frame.stamp_ns - self._stamp) * 1e-9, 0.0), 0.02)
+        self._stamp = frame.stamp_ns
+        self._remember(frame, dt)
+        contact = self.terms.contact
+        free = not contact.in_contact and contact.distance > TARE_DISTANCE
+        wrench = self.tare.update(frame.wrench, frame.wrench_stamp_ns, frame.specific_force, free)
+        gravity = np.array(down_in_body(frame.attitude))
+        axes = WallAxes.of(contact.normal, gravity)
+        self.motion.predict(frame.stamp_ns, axes, frame.specific_force, frame.angular_velocity, dt)
+        features = frame.features if frame.image is None else self._see(frame)
+        if features is not None:
+            self._take(features)
+        self.measurement = self._measure(frame, wrench, axes)
+        wish = self.painter.step(self._scenery(frame, axes))
+        self.wish = wish
+        self.reference = self._refer(wish)
+        self.measurement = self._with_guides(self.measurement, wish, axes, frame.stamp_ns)
+        return self.controller.step(self.measurement, self.reference)
+
+    def _remember(self, frame: SensorFrame, dt: float) -> None:
+        self._turn = self._turn + dt * frame.angular_velocity
+        self._ticks += 1
+        slot = self._ticks % HISTORY
+        self._history_stamp[slot] = frame.stamp_ns
+        self._history_attitude[slot] = frame.attitude
+        self._history_turn[slot] = self._turn
+
+    def _slot(self, stamp_ns: int) -> int:
+        age = round((self._stamp - stamp_ns) * 1e-9 / self.config.controller.tick_s)
+        return (self._ticks - min(max(age, 0), min(HISTORY, self._ticks) - 1)) % HISTORY
+
+    def _see(self, frame: SensorFrame) -> FeatureFrame | None:
+        """Run perception on a picture, with the gyro's turn since the last one."""
+        if self._perception is None:
+            from ibvs_qp.vision.perception import Perception
+
+            self._perception = Perception(self.config.vision, self.config.controller.vehicle)
+        image = frame.image
+        assert image is not None
+        slot = self._slot(image.stamp_ns)
+        last = self._slot(self._last_capture) if self._last_capture >= 0 else slot
+        rotation = self._history_turn[slot] - self._history_turn[last]
+        self._last_capture = image.stamp_ns
+        self.percept = self._perception.process(
+            image,
+            attitude=self._history_attitude[slot],
+            rotation=rotation,
+            velocity=self.measurement.velocity if self.measurement is not None else None,
+        )
+        return self.percept.features
+
+    def _take(self, features: FeatureFrame) -> None:
+        """Correct motion and lines at the time of capture."""
+        contact = self.terms.contact
+        plane = features.plane
+        if plane is not None:
+            self._plane, self._plane_stamp = plane, features.stamp_ns
+            vector = R_BODY_CAMERA @ np.asarray(plane[:3]) * (-1.0 / plane[3])
+            length = float(np.linalg.norm(vector))
+            normal, distance = vector / length, 1.0 / length - float(vector / length @ (self._tip - self._camera))
+        elif contact.known:
+            normal, distance = contact.normal, contact.distance
+        else:
+            return
+        gravity = np.array(down_in_body(self._history_attitude[self._slot(features.stamp_ns)]))
+        self.motion.correct(features, WallAxes.of(normal, gravity), distance)
+
+    def _measure(self, frame: SensorFrame, wrench: np.ndarray, axes: WallAxes) -> Measurement:
+        velocity = covariance = None
+        if self.motion.velocity_age_s < VELOCITY_LIFE:
+            contact = self.terms.contact
+            right, down = self.motion.velocity
+            velocity = axes.right * right + axes.down * down - axes.normal * contact.rate
+            covariance = np.eye(3) * float(self.motion.velocity_covariance.trace())
+        return Measurement(
+            stamp_ns=frame.stamp_ns,
+            attitude=frame.attitude,
+            angular_velocity=frame.angular_velocity,
+            specific_force=frame.specific_force,
+            contact_wrench=wrench,
+            wrench_stamp_ns=frame.wrench_stamp_ns,
+            plane=self._plane,
+            plane_stamp_ns=self._plane_stamp,
+            velocity=velocity,
+            velocity_covariance=covariance,
+        )
+
+    def _scenery(self, frame: SensorFrame, axes: WallAxes) -> Scenery:
+        contact = self.terms.contact
+        return Scenery(
+            time_s=(frame.stamp_ns - self._first) * 1e-9,
+            lines=self.motion.lines,
+            odometer=self.motion.odometer,
+            velocity=self.motion.velocity,
+            distance=contact.distance,
+            wall_known=contact.known,
+            in_contact=contact.in_contact,
+            time_since_touch=contact.time_since_touch,
+            push=contact.push,
+            push_wanted=self.terms.push_reference,
+            tared=self.tare.ready,
+        )
+
+    def _refer(self, wish: Wish) -> Reference:
+        """Offsets in metres to line references: rho = l / d at the measured distance."""
+        contact = self.terms.contact
+        depth = float(self._tip_camera[2]) + (contact.distance if contact.known else 0.5)
+        references = []
+        for line, offset in wish.guides:
+            if line.role == HORIZONTAL:
+                references.append(
+                    LineReference(rho=(offset + self._tip_camera[1]) / depth, theta=0.5 * math.pi, role=line.role)
+                )
+            else:
+                references.append(LineReference(rho=offset / depth, theta=0.0, role=line.role))
+        return Reference(
+            push_force=wish.push,
+            standoff=wish.standoff,
+            lines=tuple(references),
+            velocity=wish.velocity,
+            contact=wish.contact,
+        )
+
+    def _with_guides(self, measurement: Measurement, wish: Wish, axes: WallAxes, stamp_ns: int) -> Measurement:
+        import dataclasses
+
+        contact = self.terms.contact
+        distance = contact.distance if contact.known else 0.5
+        lines = tuple(self.motion.feature(line, axes, distance, stamp_ns) for line, _ in wish.guides)
+        return dataclasses.replace(measurement, lines=lines)

@@ -1,0 +1,155 @@
+"""One flight: plant, sensors, camera and pilot in one deterministic loop."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ibvs_qp.measurement import SensorFrame
+from ibvs_qp.painting import PaintingConfig
+from ibvs_qp.pilot import Pilot, PilotConfig
+from sim.board import BoardGeometry
+from sim.cameras import CameraStream, PlaneCamera
+from sim.canvas import Canvas
+from sim.features import GeometricFeatures
+from sim.plant import TICK_NS, Plant
+from sim.recorder import Recorder
+from sim.scene import Scene
+from sim.sensors import SensorSuite
+from sim.trace import Event, Trace
+
+#: Called now and then with simulated time [s], phase name and real-time factor.
+Progress = Callable[[float, str, float], None]
+
+#: Normal force above which the brush leaves paint [N].
+PAINTING_FORCE = 0.05
+#: Control ticks between calls of the progress function.
+PROGRESS_TICKS = 125
+#: A flight that is not done by then is ended [s]: start and corners, plus the strokes at half speed.
+BASE_TIME, STROKE_FACTOR = 90.0, 2.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class FlightOptions:
+    """How to fly a scene; the defaults are the main job."""
+
+    law: str = "qp"
+    seed: int = 0
+    features: str = "rendered"
+    vision: str = "own"
+    camera: str = "plane"
+    image_size: tuple[int, int] | None = None
+    preset: str | None = None
+    video: bool = True
+
+
+def pilot_config(scene: Scene, options: FlightOptions) -> PilotConfig:
+    """The pilot's configuration: preset, law, and the paint job, which the strategy is told (and nothing else)."""
+    config = PilotConfig.from_toml(options.preset) if options.preset else PilotConfig()
+    paint = scene.paint
+    painting = dataclasses.replace(
+        config.painting,
+        brush_width_m=paint.brush_width_m,
+        edge_margin_m=paint.edge_margin_m,
+        rows=paint.rows,
+        stroke_m=paint.stroke_m,
+        overlap_m=paint.overlap_m,
+        speed_m_s=paint.speed_m_s,
+        push_n=paint.push_n,
+    )
+    vision = dataclasses.replace(
+        config.vision, paint_color=paint.color, brush_width_m=paint.brush_width_m
+    )
+    return dataclasses.replace(config, painting=painting, vision=vision, law=options.law)
+
+
+class World:
+    """Plant, sensors, canvas and camera: everything that is not the pilot."""
+
+    def __init__(self, scene: Scene, options: FlightOptions, config: PilotConfig) -> None:
+        if options.image_size is not None:
+            width, height = options.image_size
+            scene = dataclasses.replace(scene, camera=dataclasses.replace(scene.camera, width=width, height=height))
+        self.scene, self.geometry = scene, BoardGeometry(scene)
+        vehicle = config.controller.vehicle
+        self.plant = Plant(scene, vehicle, options.seed)
+        self.sensors = SensorSuite(scene, vehicle, options.seed)
+        self.canvas = Canvas(scene, options.seed)
+        self._rendered = options.features == "rendered"
+        if self._rendered:
+            camera = PlaneCamera(scene, vehicle, self.canvas, options.seed)
+            self._stream = CameraStream(camera, scene.camera.rate_hz, scene.camera.latency_s)
+        else:
+            self._features = GeometricFeatures(scene, vehicle, self.canvas, options.seed)
+        self._brush: np.ndarray | None = None
+
+    def sense(self) -> SensorFrame:
+        """Sensor frame of the present tick."""
+        plant = self.plant
+        frame = self.sensors.sample(plant)
+        if self._rendered:
+            image = self._stream.tick(plant.time_ns, plant.position, plant.quaternion)
+            return frame if image is None else dataclasses.replace(frame, image=image)
+        features = self._features.tick(plant.time_ns, plant.position, plant.quaternion, plant.velocity)
+        return frame if features is None else dataclasses.replace(frame, features=features)
+
+    def act(self, thrusts: np.ndarray) -> None:
+        """Advance one control tick and paint where the brush presses."""
+        self.plant.step(thrusts)
+        if self.plant.contact_normal_force > PAINTING_FORCE:
+            point = self.geometry.board_coordinates(self.plant.tip[1:])
+            self.canvas.stroke(self._brush, point)
+            self._brush = point
+        else:
+            self._brush = None
+
+
+def fly(scene: Scene, options: FlightOptions, progress: Progress | None = None) -> Trace:
+    """Fly one scene under one law; Ctrl-C ends the flight and keeps what was flown.
+
+    Args:
+        scene: The truth.
+        options: Law, seed, features, picture size and so on.
+        progress: Told about time, phase and real-time factor now and then.
+
+    Returns:
+        The trace; incomplete with a reason when the flight crashed, timed out or was interrupted.
+    """
+    config = pilot_config(scene, options)
+    pilot, world = Pilot(config), World(scene, options, config)
+    recorder = Recorder(scene, options, world, pilot)
+    limit = BASE_TIME + STROKE_FACTOR * scene.paint.rows * scene.paint.stroke_m / scene.paint.speed_m_s
+    start, reason, tick = time.perf_counter(), "", 0
+    try:
+        while not pilot.painter.finished:
+            frame = world.sense()
+            begin = time.perf_counter()
+            command = pilot.step(frame)
+            elapsed = time.perf_counter() - begin
+            world.act(command.thrusts)
+            recorder.tick(frame, command, elapsed)
+            tick += 1
+            if world.plant.crashed:
+                reason = f"crash: {world.plant.crashed}"
+                break
+            if tick * TICK_NS * 1e-9 > limit:
+                reason = f"time-out after {limit:.0f} s of flight"
+                break
+            if progress is not None and tick % PROGRESS_TICKS == 0:
+                flown = tick * TICK_NS * 1e-9
+                progress(flown, pilot.painter.phase, flown / max(time.perf_counter() - start, 1e-9))
+    except KeyboardInterrupt:
+        reason = "interrupted"
+    trace = recorder.trace(time.perf_counter() - start)
+    trace.completed = not reason and pilot.painter.finished and not pilot.painter.failed
+    trace.reason = reason or pilot.painter.reason
+    if reason:
+        trace.events.append(Event(t=tick * TICK_NS * 1e-9, kind="end", text=reason))
+    if math.isnan(trace.wall_time_s):
+        trace.wall_time_s = 0.0
+    return trace
