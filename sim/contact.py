@@ -9,6 +9,8 @@ push make a sliding tip chatter. A small d makes both terms vanish: the contact 
 and the no-slip pass, which works without regularisation, alone decides the friction.
 """
 
+# MuJoCo's bindings carry no types.
+# pyright: reportAttributeAccessIssue=false
 from __future__ import annotations
 
 import mujoco

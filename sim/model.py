@@ -6,6 +6,8 @@ they have the scene's mass, centre of mass and inertia. World: x into the wall, 
 the plane x = 0, its bottom left corner lies at y = 0 (see `sim.board`).
 """
 
+# MuJoCo's bindings carry no types.
+# pyright: reportAttributeAccessIssue=false
 from __future__ import annotations
 
 import math

@@ -4,6 +4,8 @@ Both pairs differ by the same half turn about x, S = diag(1, -1, -1), which is i
 it maps forces and moments alike.
 """
 
+# MuJoCo's bindings carry no types.
+# pyright: reportAttributeAccessIssue=false
 from __future__ import annotations
 
 import mujoco

@@ -1,5 +1,7 @@
 """The truth: vehicle, air and contact, advanced one control tick at a time; NED and FRD on every face."""
 
+# MuJoCo's bindings carry no types.
+# pyright: reportAttributeAccessIssue=false
 from __future__ import annotations
 
 import math
@@ -11,6 +13,7 @@ from ibvs_qp.frames import rotation_from_quaternion, skew
 from ibvs_qp.vehicle import VehicleParams
 from sim.board import BoardGeometry
 from sim.clearance import PropellerClearance
+from sim.crash import crash_reason
 from sim.model import build_model
 from sim.mujoco_frames import FLIP, FLIP_QUATERNION
 from sim.scene import Scene
@@ -22,11 +25,8 @@ from sim.wind import Wind
 STEPS_PER_TICK = 4
 TICK_NS = 4_000_000
 
-#: A vehicle whose origin is lower than this has hit the ground [m]: legs and half a tilted frame.
-GROUND_CLEARANCE_M = 0.15
-
-#: Tilt at which a vehicle counts as flipped [deg].
-FLIP_DEG = 60.0
+#: End of a flight whose controller commands something that is no number; physics stands still from then on.
+NOT_FINITE = "non-finite thrust command"
 
 
 class Plant:
@@ -89,8 +89,11 @@ class Plant:
         """Advance one control tick of 4 ms under constant commanded thrusts.
 
         Args:
-            thrusts: Commanded thrusts [N], (n,); clipped to the true limits.
+            thrusts: Commanded thrusts [N], (n,); clipped to the true limits. One that is no number ends the flight.
         """
+        if self.crashed == NOT_FINITE or not np.isfinite(thrusts).all():
+            self.crashed, self.time_ns = self.crashed or NOT_FINITE, self.time_ns + TICK_NS
+            return
         model, data, sensors, sensordata = self.model, self.data, self._sensors, self._sensordata
         command = np.minimum(np.maximum(thrusts, self._lower), self._upper)
         data.ctrl[:] = command
@@ -104,7 +107,7 @@ class Plant:
         contact = sensors[:, self._ids.contact]
         self.contact_1khz = np.where(contact[:, 0] > 0.0, contact[:, 1], 0.0)
         self._refresh()
-        self.crashed = self.crashed or self._crash()
+        self.crashed = self.crashed or crash_reason(self._position, self._rotation, self._clearance)
 
     def _apply_air(self) -> None:
         rotation = self._rotation
@@ -112,17 +115,6 @@ class Plant:
         force = self._wind.force(velocity)
         self._applied[:3] = FLIP * force
         self._applied[3:] = FLIP * (rotation @ (self._skew_drag_arm @ (force @ rotation)))
-
-    def _crash(self) -> str | None:
-        if not math.isfinite(float(self._state[0] @ self._state[0] + self._state[1] @ self._state[1])):
-            return "non-finite state"
-        if self._rotation[2, 2] < math.cos(math.radians(FLIP_DEG)):
-            return f"flip: tilted by more than {FLIP_DEG:g} deg"
-        if self._position[2] > -GROUND_CLEARANCE_M:
-            return "hit the ground"
-        if self._clearance.foremost(self._position, self._rotation) > 0.0 and self.propeller_clearance <= 0.0:
-            return "propeller strike"
-        return None
 
     @property
     def position(self) -> np.ndarray:
