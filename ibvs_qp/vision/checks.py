@@ -1,0 +1,29 @@
+"""Refusal of pictures that cannot be used, each with its reason."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ibvs_qp.measurement import RgbdFrame
+
+#: Smallest picture that can be used [px].
+_SMALLEST = 64
+
+
+def frame_problem(frame: RgbdFrame) -> str | None:
+    """Why a picture cannot be used at all, or None if it can."""
+    rgb, depth = frame.rgb, frame.depth
+    if not isinstance(rgb, np.ndarray) or rgb.ndim != 3 or rgb.shape[2] != 3:
+        return f"colour picture of shape {getattr(rgb, 'shape', None)}, (H, W, 3) is needed"
+    if rgb.dtype != np.uint8:
+        return f"colour picture of type {rgb.dtype}, uint8 is needed"
+    if not isinstance(depth, np.ndarray) or depth.shape != rgb.shape[:2]:
+        return f"depth picture of shape {getattr(depth, 'shape', None)}, {rgb.shape[:2]} is needed"
+    if not np.issubdtype(depth.dtype, np.floating):
+        return f"depth picture of type {depth.dtype}, metres in floating point are needed"
+    if min(rgb.shape[:2]) < _SMALLEST:
+        return f"picture of {rgb.shape[1]} x {rgb.shape[0]} px is too small"
+    intrinsics = np.asarray(frame.intrinsics, float)
+    if intrinsics.shape != (4,) or not np.isfinite(intrinsics).all() or min(intrinsics[:2]) <= 1.0:
+        return f"intrinsics {frame.intrinsics} are not (fx, fy, cx, cy) in pixels"
+    return None

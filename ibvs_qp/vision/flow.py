@@ -1,0 +1,280 @@
+"""Velocity from sparse optical flow, depth and gyro, with a covariance that admits what was not seen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from ibvs_qp.frames import R_BODY_CAMERA
+from ibvs_qp.vision.config import FlowConfig
+from ibvs_qp.vision.mask import Intrinsics
+from ibvs_qp.vision.motion import CameraMotion
+from ibvs_qp.vision.plane import PlaneEstimate
+
+#: A point within this many residual sigmas of the surface takes the surface's depth, which is far less noisy.
+_ON_PLANE_SIGMAS = 4.0
+#: Rounds of reweighting, and pyramid levels beyond the first.
+_ROUNDS, _LEVELS = 5, 2
+_MAD = 1.4826
+#: Sum of squares of a 3x3 Sobel kernel over 8^2: variance of its answer per variance of the picture.
+_SOBEL_NOISE = 12.0 / 64.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class FlowVelocity:
+    """Velocity of the centre of mass.
+
+    Attributes:
+        velocity: In B, at the middle of the two captures [m/s], (3,).
+        covariance: (3, 3); large in directions that nothing showed.
+        stamp_ns: Time for which it holds.
+        points: Points that agreed.
+    """
+
+    velocity: np.ndarray
+    covariance: np.ndarray
+    stamp_ns: int
+    points: int
+
+
+class SparseFlow:
+    """Follows points from picture to picture at half resolution."""
+
+    def __init__(self, config: FlowConfig) -> None:
+        """Take the settings; no picture yet."""
+        self._config = config
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the last picture and its points."""
+        self._pyramid: tuple[np.ndarray, ...] | None = None
+        self._points = np.zeros((0, 2), np.float32)
+        self._information = np.zeros((0, 2, 2))
+        self._inverse = np.zeros(0)
+        self._frames = 0
+        self._stamp_ns = 0
+
+    def update(
+        self,
+        rgb: np.ndarray,
+        depth: np.ndarray,
+        excluded: np.ndarray,
+        intrinsics: Intrinsics,
+        stamp_ns: int,
+        rotation: np.ndarray,
+        plane: PlaneEstimate | None,
+        camera_position: np.ndarray,
+    ) -> FlowVelocity | str:
+        """Take the next picture.
+
+        Args:
+            rgb: Colour, uint8 (H, W, 3).
+            depth: Depth [m], (H, W).
+            excluded: uint8 (H/2, W/2), non-zero where no points may lie.
+            intrinsics: Of the full picture [px].
+            stamp_ns: Capture time.
+            rotation: Turn of the body since the picture before, in B [rad], (3,).
+            plane: The surface in this picture, or None.
+            camera_position: Camera centre in B [m], (3,).
+
+        Returns:
+            The velocity, or the reason why there is none.
+        """
+        config = self._config
+        grey = cv2.cvtColor(
+            cv2.resize(rgb, (rgb.shape[1] // 2, rgb.shape[0] // 2), interpolation=cv2.INTER_AREA), cv2.COLOR_RGB2GRAY
+        )
+        window = (config.window_px, config.window_px)
+        _, pyramid = cv2.buildOpticalFlowPyramid(grey, window, _LEVELS)
+        interval = (stamp_ns - self._stamp_ns) * 1e-9
+        result: FlowVelocity | str = "first picture"
+        if self._pyramid is not None and pyramid[0].shape == self._pyramid[0].shape:
+            if not 0.0 < interval <= config.interval_max_s:
+                self._points = self._points[:0]
+                result = f"{interval:.3f} s between pictures"
+            elif len(self._points) < config.min_points:
+                result = "too few points: nothing to follow"
+            else:
+                result = self._follow(pyramid, excluded, intrinsics, interval, rotation, camera_position)
+        if isinstance(result, FlowVelocity):
+            middle = self._stamp_ns + (stamp_ns - self._stamp_ns) // 2
+            result = FlowVelocity(
+                velocity=result.velocity, covariance=result.covariance, stamp_ns=middle, points=result.points
+            )
+        self._frames += 1
+        if len(self._points) < config.points_low or self._frames >= config.redetect:
+            self._find(grey, excluded)
+        self._inverse = _inverse_depths(self._points, depth, intrinsics, plane)
+        self._pyramid, self._stamp_ns = tuple(pyramid), stamp_ns
+        return result
+
+    def _find(self, grey: np.ndarray, excluded: np.ndarray) -> None:
+        """New points where the picture has structure, with the information each carries."""
+        config, self._frames = self._config, 0
+        allowed = np.where(excluded == 0, np.uint8(255), np.uint8(0))
+        corners = cv2.goodFeaturesToTrack(
+            grey, config.points, config.quality, config.spacing_px, mask=allowed, blockSize=5
+        )
+        self._points = np.zeros((0, 2), np.float32) if corners is None else corners.reshape(-1, 2)
+        self._information = _structure(grey, self._points, config.window_px, config.grey_sigma)
+
+    def _follow(
+        self,
+        pyramid: tuple[np.ndarray, ...],
+        excluded: np.ndarray,
+        intrinsics: Intrinsics,
+        interval: float,
+        rotation: np.ndarray,
+        camera_position: np.ndarray,
+    ) -> FlowVelocity | str:
+        config = self._config
+        window = (config.window_px, config.window_px)
+        assert self._pyramid is not None
+        criteria = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 15, 0.01)
+        moved, status, _ = cv2.calcOpticalFlowPyrLK(
+            self._pyramid[0],
+            pyramid[0],
+            self._points,
+            None,
+            winSize=window,
+            maxLevel=_LEVELS,
+            criteria=criteria,  # type: ignore[call-overload]
+        )
+        height, width = pyramid[0].shape
+        place = np.round(moved).astype(np.intp)
+        alive = (
+            (status.ravel() == 1)
+            & (place[:, 0] >= 0)
+            & (place[:, 0] < width)
+            & (place[:, 1] >= 0)
+            & (place[:, 1] < height)
+        )
+        alive[alive] &= excluded[place[alive, 1], place[alive, 0]] == 0
+        before, now, inverse, information = (
+            self._points[alive],
+            moved[alive],
+            self._inverse[alive],
+            self._information[alive],
+        )
+        self._points, self._information = now, information
+        known = inverse > 0
+        if int(known.sum()) < config.min_points:
+            return "too few points with depth"
+        half = _half(intrinsics)
+        return _solve(
+            before[known],
+            now[known],
+            inverse[known],
+            information[known],
+            half,
+            interval,
+            rotation,
+            camera_position,
+            config,
+        )
+
+
+def _half(intrinsics: Intrinsics) -> Intrinsics:
+    """Camera of the picture at half resolution (2x2 means: pixel centres shift by half a pixel)."""
+    fx, fy, cx, cy = intrinsics
+    return 0.5 * fx, 0.5 * fy, 0.5 * (cx - 0.5), 0.5 * (cy - 0.5)
+
+
+def _structure(grey: np.ndarray, points: np.ndarray, window: int, sigma: float) -> np.ndarray:
+    """Structure tensors over the tracking window, noise removed, per noise variance: information [1/px^2], (n, 2, 2)."""
+    if len(points) == 0:
+        return np.zeros((0, 2, 2))
+    gx = cv2.Sobel(grey, cv2.CV_32F, 1, 0, ksize=3, scale=0.125)
+    gy = cv2.Sobel(grey, cv2.CV_32F, 0, 1, ksize=3, scale=0.125)
+    reach = window // 2
+    steps = np.arange(-reach, reach + 1)
+    rows = np.clip(np.round(points[:, 1]).astype(np.intp)[:, None] + steps, 0, grey.shape[0] - 1)[:, :, None]
+    columns = np.clip(np.round(points[:, 0]).astype(np.intp)[:, None] + steps, 0, grey.shape[1] - 1)[:, None, :]
+    patch = np.stack((gx[rows, columns], gy[rows, columns]), axis=-1).reshape(len(points), -1, 2).astype(float)
+    tensor = np.einsum("nki,nkj->nij", patch, patch)
+    values, vectors = np.linalg.eigh(tensor)
+    values = np.maximum(values - 2.0 * window * window * _SOBEL_NOISE * sigma**2, 0.0) / sigma**2
+    return np.einsum("nij,nj,nkj->nik", vectors, values, vectors)
+
+
+def _inverse_depths(
+    points: np.ndarray, depth: np.ndarray, intrinsics: Intrinsics, plane: PlaneEstimate | None
+) -> np.ndarray:
+    """1/Z of points at half resolution: the surface's where they lie on it, else their own, 0 if unknown, (n,)."""
+    if len(points) == 0:
+        return np.zeros(0)
+    full = 2.0 * points.astype(float) + 0.5
+    place = np.round(full).astype(np.intp)
+    rows = np.clip(place[:, 1, None] + np.array([-2, 0, 0, 0, 2]), 0, depth.shape[0] - 1)
+    columns = np.clip(place[:, 0, None] + np.array([0, -2, 0, 2, 0]), 0, depth.shape[1] - 1)
+    z = depth[rows, columns].astype(float)
+    z = np.where((z > 0) & np.isfinite(z), z, np.nan)
+    count = np.isfinite(z).sum(axis=1)
+    middle = np.full(len(points), np.nan)
+    middle[count >= 3] = np.nanmedian(z[count >= 3], axis=1)
+    inverse = np.where(count >= 3, 1.0 / middle, 0.0)
+    if plane is not None:
+        fx, fy, cx, cy = intrinsics
+        a, b, c = plane.inverse_depth
+        surface = a * (full[:, 0] - cx) / fx + b * (full[:, 1] - cy) / fy + c
+        gate = max(_ON_PLANE_SIGMAS * plane.residual_sigma, 0.01)
+        inverse = np.where((inverse > 0) & (np.abs(inverse - surface) < gate * np.abs(surface)), surface, inverse)
+    return inverse
+
+
+def _solve(
+    before: np.ndarray,
+    now: np.ndarray,
+    inverse: np.ndarray,
+    information: np.ndarray,
+    intrinsics: Intrinsics,
+    interval: float,
+    rotation: np.ndarray,
+    camera_position: np.ndarray,
+    config: FlowConfig,
+) -> FlowVelocity | str:
+    """Robust weighted least squares for the camera's velocity after the full rotational flow is taken out."""
+    fx, fy, cx, cy = intrinsics
+    focal, center = np.array([fx, fy]), np.array([cx, cy])
+    start, end = (before.astype(float) - center) / focal, (now.astype(float) - center) / focal
+    motion = CameraMotion.of_body(rotation, None, interval, np.zeros(3))
+    turned = np.column_stack((start, np.ones(len(start)))) @ motion.rotation
+    still = turned[:, :2] / turned[:, 2:]
+    flow = (end - still) / interval
+    x, y = (0.5 * (end + still)).T
+    zero = np.zeros_like(x)
+    rows = inverse[:, None, None] * np.stack(
+        (np.stack((-np.ones_like(x), zero, x), -1), np.stack((zero, -np.ones_like(x), y), -1)), axis=1
+    )
+    # information of a followed point per (m/s): its structure, with a floor on the error that structure cannot lower
+    values, vectors = np.linalg.eigh(information)
+    values = values / (1.0 + values * config.pixel_sigma**2)
+    matrix = np.einsum("nij,nj,nkj->nik", vectors, values * (fx * interval) ** 2, vectors)
+    weight = np.ones(len(x))
+    prior = np.eye(3) / config.prior_m_s**2
+    velocity, normal, weighted = np.zeros(3), prior, matrix
+    size = np.zeros(len(x))
+    for _ in range(_ROUNDS):
+        weighted = matrix * weight[:, None, None]
+        normal = np.einsum("nia,nij,njb->ab", rows, weighted, rows) + prior
+        velocity = np.linalg.solve(normal, np.einsum("nia,nij,nj->a", rows, weighted, flow))
+        residual = flow - rows @ velocity
+        size = np.sqrt(np.maximum(np.einsum("ni,nij,nj->n", residual, matrix, residual), 0.0))
+        scale = max(_MAD * float(np.median(size)), 0.5)
+        weight = np.maximum(0.0, 1.0 - (size / (config.gate_sigmas * scale)) ** 2) ** 2
+    agreeing = int((weight > 0.1).sum())
+    if agreeing < config.min_points:
+        return "too few points agree"
+    if float(np.linalg.norm(velocity)) > config.speed_max_m_s:
+        return "faster than possible"
+    spread = float(weight @ size**2) / max(2.0 * float(weight.sum()) - 3.0, 1.0)
+    covariance = np.linalg.inv(normal - prior * (1.0 - 1.0 / max(spread, 1.0))) * max(spread, 1.0)
+    turning = np.stack((np.stack((x * y, -(1 + x * x), y), -1), np.stack((1 + y * y, -x * y, -x), -1)), axis=1)
+    leak = np.linalg.solve(normal, np.einsum("nia,nij,njb->ab", rows, weighted, turning)) * (
+        config.rotation_sigma_rad / interval
+    )
+    covariance = R_BODY_CAMERA @ (covariance + leak @ leak.T) @ R_BODY_CAMERA.T
+    body = R_BODY_CAMERA @ velocity - np.cross(np.asarray(rotation, float) / interval, camera_position)
+    return FlowVelocity(velocity=body, covariance=0.5 * (covariance + covariance.T), stamp_ns=0, points=agreeing)

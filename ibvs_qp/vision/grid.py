@@ -1,0 +1,53 @@
+"""The coarse grid on which depth and colour are read: a few thousand samples stand for the whole picture."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ibvs_qp.vision.mask import Intrinsics
+
+
+class CoarseGrid:
+    """Sample places of one picture size and camera.
+
+    Attributes:
+        stride: Distance of samples [px].
+        shape: (rows, columns) of the grid.
+        free: Samples the vehicle does not hide, bool (rows, columns).
+        design: Columns x, y, 1 in normalised coordinates, (rows * columns, 3).
+    """
+
+    def __init__(self, shape: tuple[int, int], intrinsics: Intrinsics, mask: np.ndarray, columns: int) -> None:
+        """Lay the grid over a picture of (height, width) [px] with its vehicle mask."""
+        height, width = shape
+        self.stride = max(1, round(width / columns))
+        self.offset = self.stride // 2
+        self.intrinsics = intrinsics
+        fx, fy, cx, cy = intrinsics
+        u, v = np.arange(self.offset, width, self.stride), np.arange(self.offset, height, self.stride)
+        self.shape = (len(v), len(u))
+        x, y = np.meshgrid((u - cx) / fx, (v - cy) / fy)
+        self.design = np.column_stack((x.ravel(), y.ravel(), np.ones(x.size)))
+        self.free = self.sample(mask) == 0
+
+    def sample(self, picture: np.ndarray) -> np.ndarray:
+        """Values of a picture at the samples, (rows, columns, ...)."""
+        return picture[self.offset :: self.stride, self.offset :: self.stride]
+
+    def inverse_depth(self, depth: np.ndarray, nearest: float, farthest: float) -> np.ndarray:
+        """1/Z at the samples [1/m], 0 where the depth is absent, not finite or out of range, (rows, columns)."""
+        z = self.sample(depth).astype(np.float64)
+        good = (z > nearest) & (z < farthest)  # false for NaN too
+        return np.divide(1.0, z, out=np.zeros_like(z), where=good)
+
+    def cell(self, x: float, y: float) -> tuple[int, int]:
+        """Row and column of the sample nearest to a normalised point (may lie outside the grid)."""
+        fx, fy, cx, cy = self.intrinsics
+        return round((fy * y + cy - self.offset) / self.stride), round((fx * x + cx - self.offset) / self.stride)
+
+    def window(self, cell: tuple[int, int], radius: int) -> tuple[slice, slice]:
+        """Slices of the square window around a cell, cut at the border of the grid."""
+        row, column = cell
+        return slice(max(row - radius, 0), max(row + radius + 1, 0)), slice(
+            max(column - radius, 0), max(column + radius + 1, 0)
+        )

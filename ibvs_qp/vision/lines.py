@@ -1,0 +1,242 @@
+"""Sub-pixel fit of one line around a prediction, with covariance and visible segment."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ibvs_qp.frames import align_line
+from ibvs_qp.vision.colors import SurfaceColors
+from ibvs_qp.vision.config import LineConfig
+from ibvs_qp.vision.picture import Picture, normalise, normalised_line, pixel_line
+from ibvs_qp.vision.profiles import Expected, Strip
+from ibvs_qp.vision.robust import consensus_line, longest_run, robust_line
+
+#: A profile's gradient must reach this share of the line's whole step (a sharp edge reaches 0.4).
+_STEP_SHARE = 0.12
+#: The same of the smallest allowed contrast, for faint lines.
+_FAINT_SHARE = 0.3
+#: Colour steps smaller than this have no direction [grey levels].
+_STEP_MIN = 1e-3
+
+
+@dataclass(frozen=True, kw_only=True)
+class RefinedLine:
+    """A line fitted to the picture.
+
+    Attributes:
+        rho: Distance from the image centre, normalised.
+        theta: Angle of the normal, within pi/2 of the prediction's [rad].
+        covariance: Of (rho, theta), (2, 2).
+        segment: Visible end points, normalised, (2, 2), along growing u (level lines) or v (upright ones).
+        ends: Why the segment ends there: "picture", "mask", "span" or "end" (it really ends).
+        inlier_share: Share of the visible profiles within the segment that agree.
+        rms_px: Residual of the agreeing profiles [px].
+        length_px: Length of the segment [px].
+        step: Colour behind the line minus colour before it, along the normal, (3,).
+        sides: Colours at the agreeing profiles before and behind the line, along the normal, (2, n, 3).
+        pixels: Places of the agreeing profiles, (n, 2) [px].
+    """
+
+    rho: float
+    theta: float
+    covariance: np.ndarray
+    segment: np.ndarray
+    ends: tuple[str, str]
+    inlier_share: float
+    rms_px: float
+    length_px: float
+    step: np.ndarray
+    sides: np.ndarray
+    pixels: np.ndarray
+
+
+def refine_line(
+    picture: Picture,
+    rho: float,
+    theta: float,
+    *,
+    half_width_px: float,
+    config: LineConfig,
+    colors: SurfaceColors,
+    step: np.ndarray | None = None,
+    polarity: int = 0,
+    span: tuple[float, float] | None = None,
+    kind: str = "",
+    surface_side: int = 0,
+) -> RefinedLine | None:
+    """Fit the line near a prediction.
+
+    Args:
+        picture: Colour and mask.
+        rho: Predicted distance, normalised.
+        theta: Predicted angle [rad].
+        half_width_px: Half width of the search strip [px].
+        config: Settings.
+        colors: What board and paint look like.
+        step: Colour step across the line, along the normal, (3,); None for a new line.
+        polarity: +1 or -1 if a new line's colours rise or fall along the normal, 0 if unknown.
+        span: Normalised range along x (level lines) or y (upright ones) to look at, or None for the whole picture.
+        kind: "board", "paint" or "": what the two sides must look like.
+        surface_side: Side of the working surface along the normal.
+
+    Returns:
+        The line, or None when nothing there supports it.
+    """
+    upright = abs(math.cos(theta)) > abs(math.sin(theta))
+    view = picture.transposed if upright else picture
+    angle = 0.5 * math.pi - theta if upright else theta
+    sign = 1.0 if math.sin(angle) > 0.0 else -1.0  # the fit runs along +v, the normal may point along -v
+    p, q, r = pixel_line(rho, angle, view.intrinsics)
+    width = view.mask.shape[1]
+    columns = (0.0, width - 1.0)
+    if span is not None:
+        fx, _, cx, _ = view.intrinsics
+        columns = (fx * span[0] + cx, fx * span[1] + cx)
+    strip = Strip.gather(view, (p, q, r), columns, config.profiles, max(2, round(half_width_px)))
+    if strip is None:
+        return None
+    admissible = strip.admissible(Expected(kind=kind, side=int(sign) * surface_side), colors)
+    direction = None if step is None else sign * np.asarray(step, np.float32)
+    fit = _fit(strip, admissible, direction, int(sign) * polarity, config, view.scale)
+    if fit is None:
+        return None
+    return _finish(fit, strip, view, columns, upright, sign, theta, config)
+
+
+@dataclass
+class _Fit:
+    """Result of the fit in the (possibly transposed) view: v = level + slope (u - center)."""
+
+    level: float
+    slope: float
+    center: float
+    covariance: np.ndarray
+    support: np.ndarray
+    visible: np.ndarray
+    run: tuple[int, int]
+    rms: float
+    step: np.ndarray
+
+
+def _fit(
+    strip: Strip, admissible: np.ndarray, direction: np.ndarray | None, polarity: int, config: LineConfig, scale: float
+) -> _Fit | None:
+    gradient = strip.gradient()
+    if direction is None:
+        direction = _best_direction(gradient, admissible, polarity)
+    norm = float(np.linalg.norm(direction))
+    if norm < _STEP_MIN:
+        return None
+    response = gradient @ (direction / np.float32(norm))
+    response *= admissible
+    rows, good = strip.peaks(response, max(_STEP_SHARE * norm, _FAINT_SHARE * config.contrast_min))
+    if int(good.sum()) < config.min_profiles:
+        return None
+    u = strip.u.astype(float)
+    gate = config.inlier_px * scale
+    start = consensus_line(u[good], rows[good], gate)
+    if start is None:
+        return None
+    support = good & (np.abs(rows - start[0] - start[1] * u) < gate)
+    visible = strip.visible
+    run = longest_run(support, visible, config.bridge)
+    inside = np.zeros_like(support)
+    inside[run[0] : run[1] + 1] = True
+    support &= inside
+    if int(support.sum()) < config.min_profiles:
+        return None
+    result = robust_line(u[support], rows[support])
+    before, behind = strip.sides(rows)
+    step = np.median(behind[support] - before[support], axis=0)
+    if float(np.linalg.norm(step)) < config.contrast_min:
+        return None
+    return _Fit(*result[:4], support, visible, run, result[4], step)
+
+
+def _best_direction(gradient: np.ndarray, admissible: np.ndarray, polarity: int) -> np.ndarray:
+    """Mix of channels that shows a new line: mean gradient at the strongest place of every profile."""
+    rising = gradient.max(axis=2)
+    falling = -gradient.min(axis=2)
+    strength = {1: rising, -1: falling}.get(polarity, np.maximum(rising, falling)) * admissible
+    index = np.argmax(strength, axis=1)
+    found = gradient[np.arange(len(index)), index]
+    weight = strength[np.arange(len(index)), index]
+    used = weight > 0.5 * np.median(weight)
+    # 2.5 turns a gradient's peak into the size of the step: a blur of 0.7 px leaves 0.4 of it
+    return 2.5 * np.median(found[used], axis=0) if used.any() else np.zeros(3, np.float32)
+
+
+def _finish(
+    fit: _Fit,
+    strip: Strip,
+    view: Picture,
+    columns: tuple[float, float],
+    upright: bool,
+    sign: float,
+    theta: float,
+    config: LineConfig,
+) -> RefinedLine | None:
+    """Turn a pixel fit into a normalised line with covariance and segment."""
+
+    def polar(level: float, slope: float) -> tuple[float, float]:
+        rho, angle = normalised_line(-slope, 1.0, slope * fit.center - level, view.intrinsics)
+        return align_line(rho, 0.5 * math.pi - angle if upright else angle, theta)
+
+    rho, angle = polar(fit.level, fit.slope)
+    if abs(rho) > config.rho_max:
+        return None
+    small = 1e-4
+    jacobian = (
+        np.array(
+            [
+                np.subtract(polar(fit.level + small, fit.slope), (rho, angle)),
+                np.subtract(polar(fit.level, fit.slope + small), (rho, angle)),
+            ]
+        ).T
+        / small
+    )
+    covariance = fit.covariance.copy()
+    covariance[0, 0] += (config.bias_px * view.scale) ** 2
+    ends_u = strip.u[list(fit.run)].astype(float)
+    ends = np.column_stack((ends_u, fit.level + fit.slope * (ends_u - fit.center)))
+    u = strip.u[fit.support].astype(float)
+    pixels = np.column_stack((u, fit.level + fit.slope * (u - fit.center)))
+    segment = normalise(ends, view.intrinsics)
+    before, behind = strip.sides(fit.level + fit.slope * (strip.u - fit.center))
+    sides = np.stack((before[fit.support], behind[fit.support]))
+    seen = fit.visible[fit.run[0] : fit.run[1] + 1]
+    return RefinedLine(
+        rho=rho,
+        theta=angle,
+        covariance=jacobian @ covariance @ jacobian.T,
+        segment=segment[:, ::-1].copy() if upright else segment,
+        ends=_end_reasons(fit, strip, columns, view.mask.shape),
+        inlier_share=float(fit.support.sum())
+        / max(int(np.count_nonzero(seen | fit.support[fit.run[0] : fit.run[1] + 1])), 1),
+        rms_px=fit.rms,
+        length_px=float(np.hypot(*(ends[1] - ends[0]))),
+        step=sign * fit.step,
+        sides=sides if sign > 0 else sides[::-1],
+        pixels=pixels[:, ::-1].copy() if upright else pixels,
+    )
+
+
+def _end_reasons(fit: _Fit, strip: Strip, columns: tuple[float, float], shape: tuple[int, ...]) -> tuple[str, str]:
+    """Why the segment ends at either end."""
+    width = shape[1]
+    last = len(strip.u) - 1
+    reasons = []
+    for index, neighbour, cut in (
+        (fit.run[0], fit.run[0] - 1, columns[0] > 0.0),
+        (fit.run[1], fit.run[1] + 1, columns[1] < width - 1.0),
+    ):
+        if neighbour < 0 or neighbour > last:
+            reasons.append("span" if cut else "picture")
+        else:
+            beyond = fit.level + fit.slope * (strip.u[neighbour] - fit.center)
+            outside = not 0.0 <= beyond <= shape[0] - 1.0
+            reasons.append("picture" if outside else ("end" if fit.visible[neighbour] else "mask"))
+    return reasons[0], reasons[1]

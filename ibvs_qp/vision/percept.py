@@ -1,0 +1,106 @@
+"""What perception hands out: features for the controller, and everything a strategy or a picture needs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ibvs_qp.measurement import FeatureFrame
+from ibvs_qp.vision.detect import Candidate
+from ibvs_qp.vision.plane import PlaneEstimate
+
+
+@dataclass(frozen=True, kw_only=True)
+class LineHint:
+    """A line that the caller expects; a track starts there, or is steered there, as soon as the picture shows it.
+
+    Attributes:
+        name: Caller's name, found again in `TrackState.hint`.
+        rho: Expected distance, normalised.
+        theta: Expected angle [rad].
+        kind: "board", "paint" or "" for any.
+        surface_side: Side of the (unpainted) surface along the normal, 0 for any.
+        gate_px: Half width of the search [px at 640].
+        span: Normalised range along x (level lines) or y (upright ones) in which it exists, or None.
+    """
+
+    name: str
+    rho: float
+    theta: float
+    kind: str = ""
+    surface_side: int = 0
+    gate_px: float = 14.0
+    span: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrackState:
+    """One tracked line at the time of capture.
+
+    Attributes:
+        track_id: Identity.
+        role: "horizontal" or "vertical" relative to gravity.
+        kind: "board", "paint" or "".
+        surface_side: Side of the (unpainted) surface along the normal (cos, sin).
+        rho: Distance, normalised.
+        theta: Angle [rad].
+        covariance: Of (rho, theta), (2, 2).
+        segment: Visible end points, normalised, (2, 2).
+        ends: Why it ends there: "picture", "mask", "span" or "end" (it really ends).
+        weight: 0..1.
+        confirmed: Whether it was seen often enough.
+        seen: Whether it was seen in this very picture.
+        age: Frames since its start.
+        inlier_share: Share of profiles that agree.
+        rms_px: Residual [px].
+        length_px: Length of the segment [px].
+        score: Score of the detection it started from, or 1 for a hint.
+        borders_plane: Whether depth said that the surface ends there.
+        hint: Name of the hint it answers, or "".
+    """
+
+    track_id: int
+    role: str
+    kind: str
+    surface_side: int
+    rho: float
+    theta: float
+    covariance: np.ndarray
+    segment: np.ndarray
+    ends: tuple[str, str]
+    weight: float
+    confirmed: bool
+    seen: bool
+    age: int
+    inlier_share: float
+    rms_px: float
+    length_px: float
+    score: float
+    borders_plane: bool
+    hint: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Percept:
+    """Result of one picture.
+
+    Attributes:
+        features: Lines, plane and velocity for an estimator or a controller.
+        plane: The surface, or None.
+        tracks: All tracks, tentative ones included.
+        candidates: Lines found by a detection in this picture (empty where none ran).
+        refused: Why there is no plane or nothing at all, or None.
+        velocity_refused: Why there is no velocity, or None.
+        mask: Vehicle's mask of this picture, uint8 (H, W), or None.
+        time_ms: Wall-clock time per stage [ms].
+    """
+
+    features: FeatureFrame
+    plane: PlaneEstimate | None = None
+    tracks: tuple[TrackState, ...] = ()
+    candidates: tuple[Candidate, ...] = ()
+    refused: str | None = None
+    velocity_refused: str | None = None
+    mask: np.ndarray | None = None
+    time_ms: dict[str, float] = field(default_factory=dict)

@@ -1,0 +1,229 @@
+"""The working surface as a plane in inverse depth, 1/Z = a x + b y + c, fitted robustly through a seed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from ibvs_qp.vision.config import PlaneConfig
+from ibvs_qp.vision.grid import CoarseGrid
+
+#: Side of the blocks over which residuals are averaged to measure their correlation [cells].
+_BLOCK = 8
+#: Samples used to judge hypotheses; more cost time and change nothing.
+_JUDGED = 1000
+#: Radius that counts around the seed when hypotheses are judged, normalised.
+_NEAR = 0.25
+#: Share of the coarse gate within which a sample votes for a hypothesis.
+_VOTE = 0.6
+#: Turns a median absolute deviation into a standard deviation of a normal distribution.
+_MAD = 1.4826
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlaneEstimate:
+    """A fitted surface in the camera frame.
+
+    Attributes:
+        inverse_depth: (a, b, c) of 1/Z = a x + b y + c [1/m], (3,).
+        covariance: Of (a, b, c), correlated noise and the frame's common mode included, (3, 3).
+        normal: Outward unit normal (towards the camera) in C, (3,).
+        distance_m: Distance of the camera centre from the plane [m].
+        inlier_share: Share of the valid samples of the whole picture that belong to the surface.
+        residual_sigma: Standard deviation of the residuals, share of depth.
+        component: Samples of the surface, bool (rows, columns) of the coarse grid.
+    """
+
+    inverse_depth: np.ndarray
+    covariance: np.ndarray
+    normal: np.ndarray
+    distance_m: float
+    inlier_share: float
+    residual_sigma: float
+    component: np.ndarray
+
+    @property
+    def abcd(self) -> tuple[float, float, float, float]:
+        """Plane (A, B, C, D) with D = -1."""
+        a, b, c = (float(entry) for entry in self.inverse_depth)
+        return a, b, c, -1.0
+
+
+class PlaneFitter:
+    """Finds the surface through a seed and follows it from frame to frame."""
+
+    def __init__(self, config: PlaneConfig) -> None:
+        """Take the settings and start its own random generator."""
+        self._config = config
+        self.reset()
+
+    def reset(self) -> None:
+        """Start again as new: same pictures, same bits."""
+        self._random = np.random.default_rng(np.random.SeedSequence(self._config.random_seed))
+
+    def search(
+        self,
+        grid: CoarseGrid,
+        inverse: np.ndarray,
+        seeds: list[tuple[int, int]],
+        down: np.ndarray | None,
+        prefer: np.ndarray | None,
+    ) -> PlaneEstimate | str:
+        """Find the surface without a prediction.
+
+        Args:
+            grid: Where the samples lie.
+            inverse: 1/Z of the samples [1/m], 0 where absent, (rows, columns).
+            seeds: Cells on which the surface may lie; the nearest valid one is taken: a brush meets it first.
+            down: Gravity's direction in C, unit, (3,), or None if unknown.
+            prefer: Samples of the surface's colour, bool (rows, columns), or None.
+
+        Returns:
+            The surface, or the reason why there is none.
+        """
+        values = [self._seed_value(grid, inverse, seed) for seed in seeds]
+        order = sorted((index for index, value in enumerate(values) if value > 0), key=lambda index: -values[index])
+        reason = "no valid depth around the seed"
+        for index in order:
+            start = self._hypothesis(grid, inverse, seeds[index], values[index], down)
+            if start is None:
+                reason = "no plane through the seed stands upright and faces the camera"
+                continue
+            result = self._refine(grid, inverse, start, seeds[index], down, prefer)
+            if isinstance(result, PlaneEstimate):
+                return result
+            reason = result
+        return reason
+
+    def track(
+        self,
+        grid: CoarseGrid,
+        inverse: np.ndarray,
+        predicted: np.ndarray,
+        down: np.ndarray | None,
+        prefer: np.ndarray | None,
+    ) -> PlaneEstimate | str:
+        """Follow the surface from predicted (a, b, c), without random search."""
+        return self._refine(grid, inverse, predicted, None, down, prefer)
+
+    def _seed_value(self, grid: CoarseGrid, inverse: np.ndarray, seed: tuple[int, int]) -> float:
+        rows, columns = grid.window(seed, self._config.seed_radius)
+        window = inverse[rows, columns][grid.free[rows, columns]]
+        window = window[window > 0]
+        return float(np.median(window)) if len(window) >= 2 * self._config.seed_radius + 1 else 0.0
+
+    def _hypothesis(
+        self, grid: CoarseGrid, inverse: np.ndarray, seed: tuple[int, int], value: float, down: np.ndarray | None
+    ) -> np.ndarray | None:
+        """Best of many planes through the seed and two random samples near it."""
+        config, design, flat = self._config, grid.design, inverse.ravel()
+        origin = design[seed[0] * grid.shape[1] + seed[1]]
+        square = (design[:, 0] - origin[0]) ** 2 + (design[:, 1] - origin[1]) ** 2
+        near = np.flatnonzero((flat > 0) & grid.free.ravel() & (square < config.seed_reach**2))
+        if len(near) < config.min_samples:
+            return None
+        judged = near[:: max(1, len(near) // _JUDGED)]
+        first, second = self._random.choice(near, (2, config.hypotheses))
+        arm_1, arm_2 = design[first, :2] - origin[:2], design[second, :2] - origin[:2]
+        rise_1, rise_2 = flat[first] - value, flat[second] - value
+        cross = arm_1[:, 0] * arm_2[:, 1] - arm_1[:, 1] * arm_2[:, 0]
+        safe = np.where(np.abs(cross) > 1e-4, cross, np.inf)
+        a = (rise_1 * arm_2[:, 1] - rise_2 * arm_1[:, 1]) / safe
+        b = (rise_2 * arm_1[:, 0] - rise_1 * arm_2[:, 0]) / safe
+        planes = np.column_stack((a, b, value - a * origin[0] - b * origin[1]))
+        allowed = self._upright(planes, down)
+        residual = np.abs(planes @ design[judged].T - flat[judged])
+        weight = np.exp(-square[judged] / _NEAR**2)
+        score = ((residual < _VOTE * config.coarse_gate * flat[judged]) * weight).sum(axis=1) * allowed
+        best = int(np.argmax(score))
+        return planes[best] if score[best] > 0 else None
+
+    def _upright(self, planes: np.ndarray, down: np.ndarray | None) -> np.ndarray:
+        """Whether planes (n, 3) face the camera and, if gravity is known, stand upright."""
+        length = np.linalg.norm(planes, axis=1)
+        good = planes[:, 2] > math.cos(math.radians(self._config.max_oblique_deg)) * length
+        if down is not None:
+            good &= np.abs(planes @ down) < math.sin(math.radians(self._config.max_lean_deg)) * length
+        return good
+
+    def _refine(
+        self,
+        grid: CoarseGrid,
+        inverse: np.ndarray,
+        start: np.ndarray,
+        seed: tuple[int, int] | None,
+        down: np.ndarray | None,
+        prefer: np.ndarray | None,
+    ) -> PlaneEstimate | str:
+        config, design, flat = self._config, grid.design, inverse.ravel()
+        usable = (flat > 0) & grid.free.ravel()
+        if int(usable.sum()) < config.min_samples:
+            return "too few valid depth samples"
+        plane, gate, component, sigma = start, config.coarse_gate, np.zeros(0, bool), 0.0
+        for _ in range(2):
+            predicted = design @ plane
+            relative = (flat - predicted) / np.maximum(predicted, 1e-3)
+            inlier = usable & (np.abs(relative) < gate)
+            if prefer is not None:
+                colored = inlier & prefer.ravel()
+                inlier = colored if int(colored.sum()) >= config.min_samples else inlier
+            component = _component(inlier.reshape(grid.shape), grid, seed).ravel()
+            if int(component.sum()) < config.min_samples:
+                return "too few samples on the surface"
+            spread = relative[component]
+            sigma = _MAD * float(np.median(np.abs(spread - np.median(spread))))
+            gate = min(max(config.fine_gate_sigmas * sigma, config.fine_gate_low), config.fine_gate_high)
+            chosen = design[component]
+            normal_matrix = chosen.T @ chosen
+            if np.linalg.cond(normal_matrix) > 1e8:
+                return "samples on the surface lie on one line"
+            plane = np.linalg.solve(normal_matrix, chosen.T @ flat[component])
+        if not bool(self._upright(plane[None], down)[0]):
+            return "the surface does not stand upright or does not face the camera"
+        length = float(np.linalg.norm(plane))
+        if not config.distance_min_m <= 1.0 / length <= config.distance_max_m:
+            return f"the surface lies {1.0 / length:.2f} m away, out of range"
+        residual = np.where(component, flat - design @ plane, 0.0)
+        return PlaneEstimate(
+            inverse_depth=plane,
+            covariance=_covariance(residual, component, grid, plane, config.common_mode_m),
+            normal=-plane / length,
+            distance_m=1.0 / length,
+            inlier_share=float(component.sum()) / max(int(usable.sum()), 1),
+            residual_sigma=sigma,
+            component=component.reshape(grid.shape),
+        )
+
+
+def _component(inlier: np.ndarray, grid: CoarseGrid, seed: tuple[int, int] | None) -> np.ndarray:
+    """Connected inliers around the seed (the largest, without one); hidden samples connect."""
+    _, labels = cv2.connectedComponents((inlier | ~grid.free).astype(np.uint8), connectivity=4, ltype=cv2.CV_16U)
+    if seed is not None:
+        rows, columns = grid.window(seed, 2)
+        around = labels[rows, columns][inlier[rows, columns]]
+        counts = np.bincount(around) if len(around) else np.zeros(1)
+    else:
+        counts = np.bincount(labels[inlier]) if inlier.any() else np.zeros(1)
+    label = int(np.argmax(counts))
+    return inlier & (labels == label) if counts[label] > 0 else np.zeros_like(inlier)
+
+
+def _covariance(
+    residual: np.ndarray, component: np.ndarray, grid: CoarseGrid, plane: np.ndarray, common_mode: float
+) -> np.ndarray:
+    """Least-squares covariance, inflated by the correlation of the residuals over blocks, plus the common mode."""
+    rows, columns = (size // _BLOCK * _BLOCK for size in grid.shape)
+    square = residual.reshape(grid.shape)[:rows, :columns]
+    sums = square.reshape(rows // _BLOCK, _BLOCK, columns // _BLOCK, _BLOCK).sum(axis=(1, 3))
+    total = float((square**2).sum())
+    inflation = max(1.0, float((sums**2).sum()) / total) if total > 0 else 1.0
+    chosen = grid.design[component]
+    variance = float(residual @ residual) / max(len(chosen) - 3, 1)
+    inverse_length = float(np.linalg.norm(plane))
+    return (
+        np.linalg.inv(chosen.T @ chosen) * variance * inflation
+        + np.outer(plane, plane) * (common_mode * inverse_length) ** 2
+    )

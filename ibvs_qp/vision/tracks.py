@@ -1,0 +1,261 @@
+"""Lines with an identity: predicted, searched in a narrow strip, confirmed, faded out, merged."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ibvs_qp.vision.colors import SurfaceColors
+from ibvs_qp.vision.config import VisionConfig
+from ibvs_qp.vision.detect import Candidate, role_of
+from ibvs_qp.vision.lines import RefinedLine, refine_line
+from ibvs_qp.vision.motion import CameraMotion
+from ibvs_qp.vision.percept import LineHint, TrackState
+from ibvs_qp.vision.picture import Picture
+
+#: Share of the new step in a track's running colour step.
+_STEP_BLEND = 0.2
+#: Uncertainty added per frame on prediction alone: rho and theta, standard deviations.
+_DRIFT = np.diag([2e-3**2, 2e-3**2])
+
+
+@dataclass
+class Track:
+    """One line followed over time."""
+
+    track_id: int
+    line: RefinedLine
+    role: str
+    kind: str
+    surface_side: int
+    score: float
+    borders_plane: bool
+    hint: str = ""
+    weight: float = 0.0
+    age: int = 1
+    hits: list[bool] = field(default_factory=lambda: [True])
+    confirmed: bool = False
+    lost_s: float = 0.0
+    rho: float = 0.0
+    theta: float = 0.0
+    covariance: np.ndarray = field(default_factory=lambda: np.zeros((2, 2)))
+    step: np.ndarray = field(default_factory=lambda: np.zeros(3))
+
+    def adopt(self, line: RefinedLine) -> None:
+        """Take a fresh fit."""
+        self.line, self.rho, self.theta, self.covariance = line, line.rho, line.theta, line.covariance
+        self.step = line.step if not self.step.any() else self.step + _STEP_BLEND * (line.step - self.step)
+
+    def state(self) -> TrackState:
+        """Frozen copy for the outside."""
+        return TrackState(
+            track_id=self.track_id,
+            role=self.role,
+            kind=self.kind,
+            surface_side=self.surface_side,
+            rho=self.rho,
+            theta=self.theta,
+            covariance=self.covariance,
+            segment=self.line.segment,
+            ends=self.line.ends,
+            weight=self.weight,
+            confirmed=self.confirmed,
+            seen=self.lost_s == 0.0,
+            age=self.age,
+            inlier_share=self.line.inlier_share,
+            rms_px=self.line.rms_px,
+            length_px=self.line.length_px,
+            score=self.score,
+            borders_plane=self.borders_plane,
+            hint=self.hint,
+        )
+
+
+class LineTracker:
+    """All tracks of one camera."""
+
+    def __init__(self, config: VisionConfig) -> None:
+        """Take the settings; no tracks yet."""
+        self._config = config
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget all tracks; identities start at 1 again."""
+        self.tracks: list[Track] = []
+        self._next_id = 1
+
+    def advance(
+        self,
+        picture: Picture,
+        motion: CameraMotion,
+        plane: np.ndarray | None,
+        interval_s: float,
+        colors: SurfaceColors,
+        tilt: float,
+    ) -> None:
+        """Predict every track into this picture and refine it there."""
+        for track in self.tracks:
+            track.rho, track.theta = motion.line(track.rho, track.theta, plane)
+            track.role = role_of(track.theta, tilt)
+            track.age += 1
+            self._update(track, self._refined(track, picture, colors), interval_s)
+        self._drop()
+
+    def hints(self, hints: tuple[LineHint, ...], picture: Picture, colors: SurfaceColors, tilt: float) -> None:
+        """Name the tracks that answer a hint and look where an expected line has no track yet."""
+        for track in self.tracks:
+            track.hint = ""
+        for hint in hints:
+            match = min(self.tracks, key=lambda track: self._distance_px(track, hint, picture), default=None)
+            if match is not None and self._distance_px(match, hint, picture) <= hint.gate_px:
+                match.hint = hint.name
+                continue
+            line = refine_line(
+                picture,
+                hint.rho,
+                hint.theta,
+                half_width_px=hint.gate_px * picture.scale,
+                config=self._config.line,
+                colors=colors,
+                span=hint.span,
+                kind=hint.kind,
+                surface_side=hint.surface_side,
+            )
+            least = self._config.detect.min_length * picture.mask.shape[1]
+            if line is None or line.length_px < least or not self._healthy(line, picture):
+                continue
+            self._start(line, role_of(line.theta, tilt), hint.kind, hint.surface_side, 1.0, False, hint.name)
+        self._merge(picture)
+
+    def offer(self, candidates: list[Candidate], picture: Picture) -> None:
+        """Start tracks from detected lines that nothing follows yet; refresh what is known of the others."""
+        for candidate in candidates:
+            if not candidate.identity.kind or candidate.score < self._config.detect.min_score:
+                continue
+            fresh = Track(
+                0,
+                candidate.line,
+                candidate.role,
+                candidate.identity.kind,
+                candidate.identity.surface_side,
+                candidate.score,
+                False,
+            )
+            fresh.adopt(candidate.line)
+            same = next((track for track in self.tracks if self._same(track, fresh, picture)), None)
+            if same is not None:
+                same.borders_plane = same.borders_plane or candidate.identity.borders_plane
+                same.score = max(same.score, candidate.score)
+            elif len(self.tracks) < self._config.track.capacity:
+                identity = candidate.identity
+                self._start(
+                    candidate.line,
+                    candidate.role,
+                    identity.kind,
+                    identity.surface_side,
+                    candidate.score,
+                    identity.borders_plane,
+                    "",
+                )
+
+    def _start(
+        self, line: RefinedLine, role: str, kind: str, side: int, score: float, borders: bool, hint: str
+    ) -> None:
+        if len(self.tracks) >= self._config.track.capacity:
+            return
+        track = Track(self._next_id, line, role, kind, side, score, borders, hint)
+        track.adopt(line)
+        self._next_id += 1
+        self.tracks.append(track)
+
+    def _refined(self, track: Track, picture: Picture, colors: SurfaceColors) -> RefinedLine | None:
+        config = self._config
+        line = refine_line(
+            picture,
+            track.rho,
+            track.theta,
+            half_width_px=config.line.strip_px * picture.scale,
+            config=config.line,
+            colors=colors,
+            step=track.step,
+            kind=track.kind,
+            surface_side=track.surface_side,
+        )
+        return line if line is not None and self._healthy(line, picture) else None
+
+    def _healthy(self, line: RefinedLine, picture: Picture) -> bool:
+        track = self._config.track
+        return line.inlier_share >= track.inlier_share_min and line.rms_px <= track.rms_max_px * max(picture.scale, 0.5)
+
+    def _update(self, track: Track, line: RefinedLine | None, interval_s: float) -> None:
+        config = self._config.track
+        track.hits = [*track.hits, line is not None][-config.confirm_window :]
+        if line is None:
+            track.lost_s += interval_s
+            track.weight = max(0.0, track.weight - interval_s / max(config.hold_s, 1e-3))
+            track.covariance = track.covariance + _DRIFT
+            return
+        track.adopt(line)
+        track.lost_s = 0.0
+        track.confirmed = track.confirmed or sum(track.hits) >= config.confirm_hits
+        if track.confirmed:
+            track.weight = min(1.0, track.weight + config.rise)
+
+    def _drop(self) -> None:
+        config = self._config.track
+        self.tracks = [
+            track
+            for track in self.tracks
+            if (
+                track.lost_s < config.hold_s
+                if track.confirmed
+                else sum(track.hits) + config.confirm_window - len(track.hits) >= config.confirm_hits
+            )
+        ]
+
+    def _merge(self, picture: Picture) -> None:
+        """Of two tracks on one edge the older stays."""
+        kept: list[Track] = []
+        for track in self.tracks:
+            twin = next((other for other in kept if self._same(other, track, picture)), None)
+            if twin is None:
+                kept.append(track)
+            elif track.hint and not twin.hint:
+                twin.hint = track.hint
+        self.tracks = kept
+
+    def _same(self, one: Track, two: Track, picture: Picture) -> bool:
+        """Whether two tracks follow one edge: near at the middle of both segments, overlapping, same colour step."""
+        if float(one.step @ two.step) * math.cos(one.theta - two.theta) <= 0.0:
+            return False
+        limit = self._config.track.duplicate_px * picture.scale / picture.intrinsics[0]
+        ends = two.line.segment
+        normal, along = (
+            np.array([math.cos(one.theta), math.sin(one.theta)]),
+            np.array([-math.sin(one.theta), math.cos(one.theta)]),
+        )
+        if float(np.abs(ends @ normal - one.rho).max()) > limit:
+            return False
+        range_one, range_two = one.line.segment @ along, ends @ along
+        return bool(min(range_one.max(), range_two.max()) > max(range_one.min(), range_two.min()))
+
+    def _distance_px(self, track: Track, hint: LineHint, picture: Picture) -> float:
+        """Distance of a track from a hint at the middle of its segment [px at 640]; infinite if it is something else."""
+        if hint.kind and track.kind != hint.kind:
+            return math.inf
+        agreement = math.cos(track.theta - hint.theta)
+        if agreement**2 < 0.9:
+            return math.inf
+        if hint.surface_side and track.surface_side * math.copysign(1.0, agreement) != hint.surface_side:
+            return math.inf
+        points = track.line.segment
+        if hint.span is not None:
+            axis = 0 if abs(math.sin(hint.theta)) > abs(math.cos(hint.theta)) else 1
+            low, high = sorted((points[0, axis], points[1, axis]))
+            if high < hint.span[0] or low > hint.span[1]:
+                return math.inf
+        middle = points.mean(axis=0)
+        distance = abs(middle[0] * math.cos(hint.theta) + middle[1] * math.sin(hint.theta) - hint.rho)
+        return distance * picture.intrinsics[0] / picture.scale
