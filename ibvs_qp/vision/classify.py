@@ -4,27 +4,31 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import math
+
 import numpy as np
 
 from ibvs_qp.vision.colors import BOARD, PAINT, SurfaceColors
 from ibvs_qp.vision.config import LineConfig
 from ibvs_qp.vision.grid import CoarseGrid
 from ibvs_qp.vision.lines import RefinedLine
-from ibvs_qp.vision.picture import Picture, denormalise
+from ibvs_qp.vision.picture import Picture
 from ibvs_qp.vision.plane import PlaneEstimate
+from ibvs_qp.vision.robust import median
 
-#: Distance from the line at which depth is read [px at 640]: beyond the holes along an edge.
-_DEPTH_PX = (9.0, 13.0)
+#: Distances from the line at which depth is read, nearest first [px at 640]: beyond the holes along an edge, yet
+#: not so far that an edge parallel to the border is taken for the border.
+_DEPTH_PX = (5.0, 8.0, 12.0)
 #: Depth steps below this share of depth are warps of the camera, not edges.
 _STEP_MIN = 0.008
 #: Share of profiles that must show a colour for a side to have it, and below which it has not.
 _HAS, _HAS_NOT = 0.6, 0.35
 #: Samples of the surface allowed beyond its border.
 _BEYOND = 0.06
-#: Profiles over which depth noise is correlated: 20 px at 9 px per profile, two readings each.
-_CORRELATED = 5.0
+#: Profiles over which depth noise is correlated: 20 px at 9 px per profile.
+_CORRELATED = 3.0
 #: Least share of valid depth readings on a side.
-_VALID = 0.2
+_VALID = 0.4
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,7 +66,7 @@ def identify(
     known = [value is not None for value, _ in steps]
     for index, side in enumerate((-1, 1)):
         other = 1 - index
-        if paint[other] >= _HAS and board[index] >= _HAS and not off[0] and not off[1]:
+        if paint[other] >= _HAS and board[index] >= _HAS and not off[other]:
             return LineIdentity(kind="paint", surface_side=side, quality=1.0)
     colored = [colors.board is None or board[k] + paint[k] >= _HAS for k in (0, 1)]
     on = [colored[k] and not off[k] for k in (0, 1)]
@@ -89,21 +93,21 @@ def _depth_step(
         return None, 1.0
     height, width = depth.shape
     normal = side * np.array([np.cos(line.theta), np.sin(line.theta)])
-    values = []
     for distance in _DEPTH_PX:
         place = np.round(line.pixels + distance * picture.scale * normal).astype(np.intp)
         inside = (place[:, 0] >= 0) & (place[:, 0] < width) & (place[:, 1] >= 0) & (place[:, 1] < height)
         place = place[inside]
         z = depth[place[:, 1], place[:, 0]].astype(float)
         seen = (z > 0) & np.isfinite(z) & (picture.mask[place[:, 1], place[:, 0]] == 0)
+        count = int(np.count_nonzero(seen))
+        if count < max(_VALID * len(line.pixels), 5):
+            continue
         fx, fy, cx, cy = picture.intrinsics
         x, y = (place[seen, 0] - cx) / fx, (place[seen, 1] - cy) / fy
         a, b, c = plane.inverse_depth
-        values.append(z[seen] * (a * x + b * y + c) - 1.0)
-    together = np.concatenate(values)
-    if len(together) < _VALID * 2 * len(line.pixels) or len(together) < 6:
-        return None, 1.0
-    return float(np.median(together)), plane.residual_sigma * np.sqrt(_CORRELATED / len(together))
+        value = median(z[seen] * (a * x + b * y + c)) - 1.0
+        return value, plane.residual_sigma * math.sqrt(_CORRELATED / count)
+    return None, 1.0
 
 
 def _share_beyond(line: RefinedLine, plane: PlaneEstimate | None, grid: CoarseGrid, side: int) -> float:
@@ -119,8 +123,3 @@ def _share_beyond(line: RefinedLine, plane: PlaneEstimate | None, grid: CoarseGr
     margin = 1.5 * grid.stride / grid.intrinsics[0]
     beyond, within = int((abreast & (across < -margin)).sum()), int((abreast & (across > margin)).sum())
     return beyond / max(beyond + within, 1)
-
-
-def segment_pixels(line: RefinedLine, picture: Picture) -> np.ndarray:
-    """End points of a line's segment [px], (2, 2)."""
-    return denormalise(line.segment, picture.intrinsics)

@@ -12,6 +12,7 @@ from ibvs_qp.vision.config import FlowConfig
 from ibvs_qp.vision.mask import Intrinsics
 from ibvs_qp.vision.motion import CameraMotion
 from ibvs_qp.vision.plane import PlaneEstimate
+from ibvs_qp.vision.robust import median
 
 #: A point within this many residual sigmas of the surface takes the surface's depth, which is far less noisy.
 _ON_PLANE_SIGMAS = 4.0
@@ -262,7 +263,7 @@ def _solve(
         velocity = np.linalg.solve(normal, np.einsum("nia,nij,nj->a", rows, weighted, flow))
         residual = flow - rows @ velocity
         size = np.sqrt(np.maximum(np.einsum("ni,nij,nj->n", residual, matrix, residual), 0.0))
-        scale = max(_MAD * float(np.median(size)), 0.5)
+        scale = max(_MAD * median(size), 0.5)
         weight = np.maximum(0.0, 1.0 - (size / (config.gate_sigmas * scale)) ** 2) ** 2
     agreeing = int((weight > 0.1).sum())
     if agreeing < config.min_points:

@@ -93,6 +93,7 @@ class Percept:
         refused: Why there is no plane or nothing at all, or None.
         velocity_refused: Why there is no velocity, or None.
         mask: Vehicle's mask of this picture, uint8 (H, W), or None.
+        intrinsics: (fx, fy, cx, cy) of this picture [px], or None.
         time_ms: Wall-clock time per stage [ms].
     """
 
@@ -103,4 +104,10 @@ class Percept:
     refused: str | None = None
     velocity_refused: str | None = None
     mask: np.ndarray | None = None
+    intrinsics: tuple[float, float, float, float] | None = None
     time_ms: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def total_ms(self) -> float:
+        """Wall-clock time of the whole picture [ms]."""
+        return sum(self.time_ms.values())

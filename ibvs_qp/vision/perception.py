@@ -261,6 +261,7 @@ class Perception:
             refused=refused,
             velocity_refused=None if moving is not None else str(flow),
             mask=self._mask,
+            intrinsics=frame.intrinsics,
             time_ms=times,
         )
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from ibvs_qp.vision.config import PlaneConfig
 from ibvs_qp.vision.grid import CoarseGrid
+from ibvs_qp.vision.robust import median
 
 #: Side of the blocks over which residuals are averaged to measure their correlation [cells].
 _BLOCK = 8
@@ -113,7 +114,7 @@ class PlaneFitter:
         rows, columns = grid.window(seed, self._config.seed_radius)
         window = inverse[rows, columns][grid.free[rows, columns]]
         window = window[window > 0]
-        return float(np.median(window)) if len(window) >= 2 * self._config.seed_radius + 1 else 0.0
+        return median(window) if len(window) >= 2 * self._config.seed_radius + 1 else 0.0
 
     def _hypothesis(
         self, grid: CoarseGrid, inverse: np.ndarray, seed: tuple[int, int], value: float, down: np.ndarray | None
@@ -174,7 +175,7 @@ class PlaneFitter:
             if int(component.sum()) < config.min_samples:
                 return "too few samples on the surface"
             spread = relative[component]
-            sigma = _MAD * float(np.median(np.abs(spread - np.median(spread))))
+            sigma = _MAD * median(np.abs(spread - median(spread)))
             gate = min(max(config.fine_gate_sigmas * sigma, config.fine_gate_low), config.fine_gate_high)
             chosen = design[component]
             normal_matrix = chosen.T @ chosen

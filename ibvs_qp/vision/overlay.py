@@ -1,0 +1,73 @@
+"""A picture with what perception saw, for videos and for people."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from ibvs_qp.vision.percept import Percept, TrackState
+from ibvs_qp.vision.picture import denormalise
+
+#: RGB colours: surface tint, mask tint, tracks by kind, tentative or lost tracks, text backing.
+_SURFACE, _MASK = (60, 220, 90), (200, 60, 60)
+_KINDS = {"board": (255, 160, 0), "paint": (255, 0, 200), "": (120, 120, 120)}
+_FAINT, _BACKING = (150, 150, 150), (20, 20, 20)
+#: Share of a tint in the picture; length of the tick towards the surface [px]; size of the text.
+_TINT, _TICK_PX, _TEXT = 0.22, 14, 0.42
+
+
+def draw_overlay(rgb: np.ndarray, percept: Percept) -> np.ndarray:
+    """Draw surface, mask, tracks and velocity into a copy of the picture.
+
+    Args:
+        rgb: The picture, uint8 (H, W, 3).
+        percept: What was seen in it.
+
+    Returns:
+        uint8 (H, W, 3).
+    """
+    result = np.ascontiguousarray(rgb).copy()
+    height, width = result.shape[:2]
+    if percept.plane is not None:
+        region = cv2.resize(percept.plane.component.astype(np.uint8), (width, height), interpolation=cv2.INTER_NEAREST)
+        _tint(result, region > 0, _SURFACE)
+    if percept.mask is not None and percept.mask.shape == (height, width):
+        _tint(result, percept.mask > 0, _MASK)
+    if percept.intrinsics is not None:
+        for track in percept.tracks:
+            _draw_track(result, track, denormalise(track.segment, percept.intrinsics))
+    _write(result, _caption(percept), (6, height - 8))
+    return result
+
+
+def _tint(picture: np.ndarray, where: np.ndarray, color: tuple[int, int, int]) -> None:
+    picture[where] = (picture[where] * (1.0 - _TINT) + np.array(color) * _TINT).astype(np.uint8)
+
+
+def _draw_track(picture: np.ndarray, track: TrackState, ends: np.ndarray) -> None:
+    color = _KINDS.get(track.kind, _FAINT) if track.confirmed and track.seen else _FAINT
+    first, second = (tuple(int(value) for value in np.round(end)) for end in ends)
+    cv2.line(picture, first, second, color, 2, cv2.LINE_AA)
+    for end, reason in zip((first, second), track.ends, strict=True):
+        if reason == "end":
+            cv2.circle(picture, end, 4, color, -1, cv2.LINE_AA)
+    middle = ends.mean(axis=0)
+    side = track.surface_side * np.array([np.cos(track.theta), np.sin(track.theta)])
+    tip = middle + _TICK_PX * side
+    cv2.line(picture, tuple(np.round(middle).astype(int).tolist()), tuple(np.round(tip).astype(int).tolist()), color, 2, cv2.LINE_AA)
+    name = f" {track.hint}" if track.hint else ""
+    _write(picture, f"{track.track_id} {track.kind} {track.weight:.1f}{name}", (int(middle[0]) + 6, int(middle[1]) - 6))
+
+
+def _caption(percept: Percept) -> str:
+    if percept.plane is None:
+        return percept.refused or "no surface"
+    parts = [f"{percept.plane.distance_m:.3f} m"]
+    if percept.features.velocity is not None:
+        parts.append("v " + " ".join(f"{1e3 * value:+.0f}" for value in percept.features.velocity) + " mm/s")
+    return "  ".join(parts)
+
+
+def _write(picture: np.ndarray, text: str, place: tuple[int, int]) -> None:
+    for color, thickness in ((_BACKING, 3), ((255, 255, 255), 1)):
+        cv2.putText(picture, text, place, cv2.FONT_HERSHEY_SIMPLEX, _TEXT, color, thickness, cv2.LINE_AA)
