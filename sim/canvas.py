@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import math
 
+import cv2
 import numpy as np
 
 from sim import textures
 from sim.board import BoardGeometry
 from sim.clutter import clutter_board, clutter_wall
-from sim.painted_edges import PaintedEdges
+from sim.painted_edges import BoardPoint, PaintedEdges
 from sim.scene import Scene
 
 #: Wall picture: resolution [px/m] and extent beyond the board's outline [m].
@@ -22,6 +23,8 @@ WALL_PIXELS_PER_M, WALL_EXTENT_M = 500.0, 1.3
 #: Largest texture [px]; bigger boards get a coarser picture rather than fill the memory.
 _MAX_PIXELS = 12e6
 _RIM_M = 0.006
+#: The texture goes on beyond the outline by this much, so that its rim can be drawn without samples from outside [px].
+TEXTURE_PAD_PX = 8
 #: Sub-pixel positions of the brush stamp per axis, and distance between stamps [px]: 2^2 / (8 r) = 0.01 px of scallop.
 _PHASES, _STAMP_STEP_PX = 16, 2.0
 
@@ -42,15 +45,18 @@ class Canvas:
         board_seed, wall_seed, paint_seed = (
             np.random.SeedSequence([part, board.texture_seed, scene.wall.texture_seed, seed]) for part in range(3)
         )
-        shape = (math.ceil(board.height_m * self.pixels_per_m - 1e-6), math.ceil(board.width_m * self.pixels_per_m - 1e-6))
+        shape = (_whole(board.height_m * self.pixels_per_m), _whole(board.width_m * self.pixels_per_m))
         rng = np.random.default_rng(board_seed)
         on_board = int(rng.binomial(board.clutter, 0.5))
         rim = max(1, round(_RIM_M * self.pixels_per_m))
-        self.texture = textures.board_surface(rng, shape, board.color, rim)
-        clutter_board(rng, self.texture, on_board, self.pixels_per_m)
-        self._blank = self.texture.copy()
-        self._fresh = textures.paint_surface(np.random.default_rng(paint_seed), shape, paint.color)
-        self._coverage = np.zeros(shape, np.uint8)
+        face = textures.board_surface(rng, shape, board.color, rim)
+        clutter_board(rng, face, on_board, self.pixels_per_m)
+        pad = TEXTURE_PAD_PX
+        self._blank = cv2.copyMakeBorder(face, pad, pad, pad, pad, cv2.BORDER_REPLICATE)
+        self._texture = self._blank.copy()
+        padded = (shape[0] + 2 * pad, shape[1] + 2 * pad)
+        self._fresh = textures.paint_surface(np.random.default_rng(paint_seed), padded, paint.color)
+        self._coverage = np.zeros(padded, np.uint8)
         self._stamps = _brush_stamps(0.5 * paint.brush_width_m * self.pixels_per_m)
         self._dirty: tuple[int, int, int, int] | None = None
         self.edges = PaintedEdges(scene)
@@ -72,14 +78,14 @@ class Canvas:
     @property
     def rgb(self) -> np.ndarray:
         """The painted board, uint8 RGB (height, width, 3), a copy."""
-        return np.ascontiguousarray(self.flush()[..., :3])
+        return np.ascontiguousarray(_inner(self.flush())[..., :3])
 
     @property
     def coverage(self) -> np.ndarray:
         """Share of every pixel that is painted, float32 0..1, (height, width)."""
-        return self._coverage.astype(np.float32) / 255.0
+        return _inner(self._coverage).astype(np.float32) / np.float32(255.0)
 
-    def stroke(self, previous: tuple[float, float] | np.ndarray | None, current: tuple[float, float] | np.ndarray) -> None:
+    def stroke(self, previous: BoardPoint | None, current: BoardPoint) -> None:
         """Move the pressed round brush from ``previous`` to ``current``, or dab it down where ``previous`` is None.
 
         Stamps of an antialiased disc two pixels apart leave a straight edge; lines drawn segment by segment with
@@ -91,11 +97,12 @@ class Canvas:
         """
         self.edges.stroke(previous, current)
         scale, height = self.pixels_per_m, self.scene.board.height_m
-        column, row = float(current[0]) * scale - 0.5, (height - float(current[1])) * scale - 0.5
+        shift = TEXTURE_PAD_PX - 0.5
+        column, row = float(current[0]) * scale + shift, (height - float(current[1])) * scale + shift
         if previous is None:
             self._stamp(column, row)
             return
-        from_column, from_row = float(previous[0]) * scale - 0.5, (height - float(previous[1])) * scale - 0.5
+        from_column, from_row = float(previous[0]) * scale + shift, (height - float(previous[1])) * scale + shift
         steps = max(1, math.ceil(math.hypot(column - from_column, row - from_row) / _STAMP_STEP_PX))
         for k in range(1, steps + 1):
             part = k / steps
@@ -120,14 +127,27 @@ class Canvas:
         )
 
     def flush(self) -> np.ndarray:
-        """Bring the picture up to date with all strokes and return it, uint8 (height, width, 4), shared."""
+        """Bring the texture up to date with all strokes and return it.
+
+        Returns:
+            The board with `TEXTURE_PAD_PX` pixels more on every side, uint8 (h, w, 4); shared, not to be written.
+        """
         if self._dirty is not None:
             r0, r1, c0, c1 = self._dirty
             share = self._coverage[r0:r1, c0:c1, None].astype(np.uint16)
             mixed = self._fresh[r0:r1, c0:c1] * share + self._blank[r0:r1, c0:c1] * (255 - share) + 127
-            self.texture[r0:r1, c0:c1] = mixed // 255
+            self._texture[r0:r1, c0:c1] = mixed // 255
             self._dirty = None
-        return self.texture
+        return self._texture
+
+
+def _whole(size: float) -> int:
+    """Pixels needed for a size, forgiving rounding errors of the product."""
+    return math.ceil(size - 1e-6)
+
+
+def _inner(padded: np.ndarray) -> np.ndarray:
+    return padded[TEXTURE_PAD_PX:-TEXTURE_PAD_PX, TEXTURE_PAD_PX:-TEXTURE_PAD_PX]
 
 
 def _brush_stamps(radius_px: float) -> list[list[np.ndarray]]:

@@ -38,14 +38,16 @@ def _sticker(rng: np.random.Generator, picture: np.ndarray, center: np.ndarray, 
     cv2.fillConvexPoly(picture, _points(_box(center, size, angle)), color, cv2.LINE_AA, _SHIFT)
     for k in range(3):
         row = center + np.array([-np.sin(angle), np.cos(angle)]) * size[1] * (0.22 * k - 0.22)
-        cv2.fillConvexPoly(picture, _points(_box(row, (0.7 * size[0], 0.07 * size[1]), angle)), ink, cv2.LINE_AA, _SHIFT)
+        bar = _box(row, (0.7 * size[0], 0.07 * size[1]), angle)
+        cv2.fillConvexPoly(picture, _points(bar), ink, cv2.LINE_AA, _SHIFT)
 
 
 def _mark(rng: np.random.Generator, picture: np.ndarray, center: np.ndarray, px_m: float) -> None:
     color, thick = _color(rng), max(1, round(0.002 * px_m))
     words = ("A3", "No 7", "48-B", "UP", "x12", "QC")
     origin = (int(center[0] - 0.02 * px_m), int(center[1]))
-    cv2.putText(picture, str(rng.choice(words)), origin, cv2.FONT_HERSHEY_SIMPLEX, 0.001 * px_m, color, thick, cv2.LINE_AA)
+    word, size = str(rng.choice(words)), 0.001 * px_m
+    cv2.putText(picture, word, origin, cv2.FONT_HERSHEY_SIMPLEX, size, color, thick, cv2.LINE_AA)
 
 
 def _short_line(rng: np.random.Generator, picture: np.ndarray, center: np.ndarray, px_m: float) -> None:

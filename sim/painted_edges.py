@@ -9,6 +9,8 @@ import numpy as np
 from sim.board import BoardGeometry
 from sim.scene import Scene
 
+BoardPoint = tuple[float, float] | np.ndarray
+
 #: Length of a bin along the board [m].
 BIN_M = 0.005
 #: A stroke that moves less along the board than this multiple of its rise is a climb, not part of a row.
@@ -28,7 +30,7 @@ class PaintedEdges:
         self._bins = math.ceil(scene.board.width_m / BIN_M)
         self._top = np.full((self._rows + 1, self._bins), -math.inf)
 
-    def stroke(self, previous: tuple[float, float] | np.ndarray | None, current: tuple[float, float] | np.ndarray) -> None:
+    def stroke(self, previous: BoardPoint | None, current: BoardPoint) -> None:
         """Record a stroke between two tip positions (along, up) [m]; see `sim.canvas.Canvas.stroke`."""
         if previous is None:
             return

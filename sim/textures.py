@@ -52,7 +52,8 @@ def board_surface(
         Texture uint8 (height, width, 4).
     """
     picture = flat(*shape, color)
-    grain = 1.5 * smooth_noise(rng, shape, 1.0) + 1.2 * smooth_noise(rng, shape, 6.0) + 2.0 * smooth_noise(rng, shape, 150)
+    grain = 1.5 * smooth_noise(rng, shape, 1.0) + 1.2 * smooth_noise(rng, shape, 6.0)
+    grain += 2.0 * smooth_noise(rng, shape, 150.0)
     rim = np.zeros(shape, bool)
     rim[:rim_px], rim[-rim_px:], rim[:, :rim_px], rim[:, -rim_px:] = True, True, True, True
     grain[rim] -= 7.0
@@ -68,7 +69,9 @@ def paint_surface(rng: np.random.Generator, shape: tuple[int, int], color: tuple
     return picture
 
 
-def wall_surface(rng: np.random.Generator, shape: tuple[int, int], color: tuple[int, int, int], px_m: float) -> np.ndarray:
+def wall_surface(
+    rng: np.random.Generator, shape: tuple[int, int], color: tuple[int, int, int], px_m: float
+) -> np.ndarray:
     """Brick or plaster wall with visible texture; the seed decides which, uint8 (height, width, 4)."""
     picture = flat(*shape, color)
     fine = 3.0 * smooth_noise(rng, shape, 1.5) + 3.0 * smooth_noise(rng, shape, 0.01 * px_m)
@@ -95,8 +98,7 @@ def _lay_bricks(rng: np.random.Generator, picture: np.ndarray, px_m: float) -> N
             left = shift + k * _BRICK_LENGTH * px_m
             tone = np.clip(base + rng.normal(0.0, 9.0) + rng.normal(0.0, 3.0, 3), 0, 255)
             wobble = rng.normal(0.0, 0.0012 * px_m, 4)
-            corners = (
-                (round(left + joint + wobble[0]), round(top + joint + wobble[1])),
-                (round(left + _BRICK_LENGTH * px_m - joint + wobble[2]), round(top + _BRICK_HEIGHT * px_m - joint + wobble[3])),
-            )
-            cv2.rectangle(picture, corners[0], corners[1], (*tone.tolist(), 255.0), -1)
+            right, bottom = left + _BRICK_LENGTH * px_m, top + _BRICK_HEIGHT * px_m
+            start = (round(left + joint + wobble[0]), round(top + joint + wobble[1]))
+            stop = (round(right - joint + wobble[2]), round(bottom - joint + wobble[3]))
+            cv2.rectangle(picture, start, stop, (*tone.tolist(), 255.0), -1)

@@ -9,6 +9,8 @@ import numpy as np
 
 #: Half width of the band in which the rim is antialiased, and widest depth hole beyond the rim [px].
 _BAND_PX, _HOLE_PX = 2, 4
+#: How near to a line a pixel counts as touched by it [px].
+_SLACK_PX = 3.0
 #: More than any picture measures [px].
 _ALL_ALONG_PX = 1e5
 #: Length over which the width of the depth holes changes [px].
@@ -25,7 +27,7 @@ class CutLine:
         start: First end of the edge [px], (2,).
         stop: Other end [px], (2,).
         beyond: Part of the picture beyond the line, polygon (n, 2) [px].
-        box: (row, row end, column, column end) around that part and the rim.
+        box: (row, row end, column, column end) around what of it no earlier line has cut away, and the rim.
         shape: (height, width) of the picture.
     """
 
@@ -37,35 +39,47 @@ class CutLine:
     box: tuple[int, int, int, int]
     shape: tuple[int, int]
 
-    def _band(self, low: int, high: int, margin: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Pixels from ``low`` to ``high`` steps across the edge, and the steps; along it up to ``margin`` further."""
-        across = int(abs(self.normal[1]) >= abs(self.normal[0]))  # 1: a flat edge, walk along the columns
+    def _band(self, low: int, high: int, margin: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Rows and columns from ``low`` to ``high`` steps across the edge, its steps, and places along it.
+
+        The edge is walked pixel by pixel along its longer direction, up to ``margin`` past its ends.
+        """
+        across = int(self.flat)
         along = 1 - across
         first, last = sorted((self.start[along], self.stop[along]))
         limit = self.shape[1] if across else self.shape[0]
         places = np.arange(max(0, math.ceil(first - margin)), min(limit, math.floor(last + margin) + 1))
         middle = -(self.normal[along] * places + self.offset) / self.normal[across]
-        sign = 1 if self.normal[across] > 0 else -1
-        steps = np.arange(low, high + 1)
-        other = np.floor(middle).astype(np.intp)[:, None] + sign * steps
-        places = np.broadcast_to(places[:, None], other.shape)
-        inside = (other >= 0) & (other < (self.shape[0] if across else self.shape[1]))
+        steps = np.arange(low, high + 1)[:, None]
+        other = np.floor(middle).astype(np.intp) + (steps if self.normal[across] > 0 else -steps)
         rows, columns = (other, places) if across else (places, other)
-        return rows[inside], columns[inside], np.broadcast_to(steps, other.shape)[inside]
+        return rows, columns, steps, places
 
-    def rim(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Rows and columns of the pixels near the line, and the share of each that the board covers, (n,)."""
-        rows, columns, _ = self._band(-_BAND_PX, _BAND_PX + 1, _ALL_ALONG_PX)
-        distance = self.normal[0] * columns + self.normal[1] * rows + self.offset
-        return rows, columns, np.clip(distance + 0.5, 0.0, 1.0).astype(np.float32)
+    @property
+    def flat(self) -> bool:
+        """Whether the edge runs more across the picture than up it."""
+        return abs(self.normal[1]) >= abs(self.normal[0])
+
+    def rim(self) -> tuple[np.ndarray, np.ndarray]:
+        """Flat indices of the pixels near the line, and the share of each that the board covers in 256ths, (n,).
+
+        Places outside the picture are moved to its border: the share is computed for where they then are.
+        """
+        rows, columns, _, _ = self._band(-_BAND_PX, _BAND_PX + 1, _ALL_ALONG_PX)
+        rows = np.clip(rows, 0, self.shape[0] - 1)
+        columns = np.clip(columns, 0, self.shape[1] - 1)
+        distance = self.normal[0] * columns + self.normal[1] * rows + (self.offset + 0.5)
+        share = (np.clip(distance, 0.0, 1.0) * 256.0 + 0.5).astype(np.uint16)
+        return (rows * self.shape[1] + columns).ravel(), share.ravel()
 
     def holes(self, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
         """Rows and columns of pixels beyond the edge that give no depth, ragged at random."""
-        rows, columns, steps = self._band(-_HOLE_PX, 1, 0.0)
-        along = columns if abs(self.normal[1]) >= abs(self.normal[0]) else rows
+        rows, columns, steps, places = self._band(-_HOLE_PX, 1, 0.0)
         widths = rng.integers(1, _HOLE_PX + 1, max(self.shape) // _HOLE_STEP_PX + 1)
-        taken = -steps <= widths[along // _HOLE_STEP_PX]
-        return rows[taken], columns[taken]
+        other, limit = (rows, self.shape[0]) if self.flat else (columns, self.shape[1])
+        taken = (-steps <= widths[places // _HOLE_STEP_PX]) & (other >= 0) & (other < limit)
+        chosen, place = other[taken], np.broadcast_to(places, taken.shape)[taken]
+        return (chosen, place) if self.flat else (place, chosen)
 
 
 def clip_rectangle(polygon: np.ndarray, normal: np.ndarray, offset: float) -> np.ndarray:
@@ -102,7 +116,7 @@ def cut_lines(
         out of view is cut away by one of its lines.
     """
     picture = np.array([[-1.0, -1.0], [width, -1.0], [width, height], [-1.0, height]])
-    board, cuts = picture, []
+    board, left, cuts = picture, picture, []
     middle = polygon.mean(axis=0)
     for start, stop in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
         edge = stop - start
@@ -110,11 +124,13 @@ def cut_lines(
         if normal @ (middle - start) < 0.0:
             normal = -normal
         offset = -float(normal @ start)
-        beyond = clip_rectangle(picture, -normal, -offset)
         board = clip_rectangle(board, normal, offset) if len(board) else board
-        if len(clip_rectangle(picture, -normal, 1.0 - offset)) == 0:
+        # What an earlier line has cut away needs no second wall; the slack keeps its rim.
+        area = clip_rectangle(left, -normal, _SLACK_PX - offset) if len(left) else left
+        if len(area) == 0:
             continue
-        area = beyond if len(beyond) else clip_rectangle(picture, -normal, 1.0 - offset)
+        left = clip_rectangle(left, normal, offset + _SLACK_PX)
+        beyond = clip_rectangle(picture, -normal, -offset)
         box = _box(area, width, height, _BAND_PX + 1)
         cuts.append(CutLine(normal, offset, start, stop, beyond, box, (height, width)))
     return cuts, _box(board, width, height, _BAND_PX + 1) if len(board) >= 3 else None

@@ -79,9 +79,18 @@ def board_corners(geometry: BoardGeometry) -> np.ndarray:
     return np.column_stack((np.zeros(4), yz))
 
 
-def board_steps(geometry: BoardGeometry, pixels_per_m: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """World (corner, column step, row step) of the board texture, see `View.from_texture`."""
+def board_steps(
+    geometry: BoardGeometry, pixels_per_m: float, pad_px: int = 0
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """World (corner, column step, row step) of the board texture, see `View.from_texture`.
+
+    Args:
+        geometry: The board.
+        pixels_per_m: Resolution of the texture [px/m].
+        pad_px: By how much the texture exceeds the board on every side [px].
+    """
     step = 1.0 / pixels_per_m
-    corner = geometry.point(0.5 * step, geometry.scene.board.height_m - 0.5 * step)
+    beyond = (0.5 - pad_px) * step
+    corner = geometry.point(beyond, geometry.scene.board.height_m - beyond)
     column, row = geometry.along * step, -geometry.up * step
     return np.append(0.0, corner), np.append(0.0, column), np.append(0.0, row)
