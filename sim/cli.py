@@ -13,6 +13,7 @@ import os
 import re
 import sys
 import traceback
+from typing import Any
 
 from ibvs_qp.errors import IbvsQpError
 
@@ -51,14 +52,14 @@ def main(arguments: list[str] | None = None) -> int:
         return EXIT_INTERNAL
 
 
-def _parse(words: list[str]):
+def _parse(words: list[str]) -> Any:
     """Turn words into the options of a command; the parser's own complaint becomes one line."""
     import tyro
 
     from sim.commands.paint import Paint
 
     app = tyro.extras.SubcommandApp()
-    app.command(Paint, name="paint")
+    app.command(name="paint")(Paint)
     complaint = io.StringIO()
     try:
         with contextlib.redirect_stderr(complaint):

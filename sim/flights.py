@@ -26,6 +26,8 @@ from sim.video import pack_pictures
 
 #: Called with law, simulated time [s], phase and real-time factor.
 LawProgress = Callable[[str, float, str, float], None]
+#: Reason of a trace that Ctrl-C ended.
+INTERRUPTED = "interrupted"
 _SIGINT = {signal.SIGINT}
 
 
@@ -66,9 +68,16 @@ def fly_laws(
     for law, job in jobs.items():
         trace = fly(scene, job, functools.partial(progress, law))
         flights[law] = Flight(trace=pack_pictures(trace))
-        if trace.reason == "interrupted":
+        _tell_end(law, trace, progress)
+        if trace.reason == INTERRUPTED:
             break
     return flights
+
+
+def _tell_end(law: str, trace: Trace, progress: LawProgress) -> None:
+    duration = float(trace.t[-1]) if len(trace.t) else 0.0
+    phase = INTERRUPTED if trace.reason == INTERRUPTED else "done"
+    progress(law, duration, phase, duration / trace.wall_time_s if trace.wall_time_s > 0 else 0.0)
 
 
 def _fly_apart(scene: Scene, jobs: dict[str, FlightOptions], progress: LawProgress) -> dict[str, Flight]:
@@ -135,6 +144,7 @@ def _receive(pipe: Connection, pipes: dict[Connection, str], flights: dict[str, 
     del pipes[pipe]
     if kind == "done":
         flights[law] = content
+        _tell_end(law, content.trace, progress)
     elif kind == "refused":
         raise content
     elif kind == "failed":

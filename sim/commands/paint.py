@@ -119,13 +119,14 @@ class Paint:
     ) -> int:
         from rich.console import Console
 
+        from sim.flights import INTERRUPTED
         from sim.metrics import compute_metrics
         from sim.rundir import as_json, peak_memory, summary
         from sim.table import figure_table
 
         traces = {law: flight.trace for law, flight in flights.items()}
         metrics = {law: compute_metrics(trace) for law, trace in traces.items()}
-        interrupted = any(trace.reason == "interrupted" for trace in traces.values()) or not traces
+        interrupted = any(trace.reason == INTERRUPTED for trace in traces.values()) or not traces
 
         def current() -> dict:
             elapsed = time.perf_counter() - started

@@ -16,9 +16,9 @@ from sim.trace import Trace
 def draw_path(traces: dict[str, Trace]) -> Figure:
     """Tip path in space with board and nominal polyline, above the path error over the distance painted."""
     figure = new_figure(5.6)
-    upper, lower = figure.subfigures(2, 1, height_ratios=[2.1, 1])
-    _draw_space(upper, traces)
-    _draw_error(lower.subplots(), traces)
+    parts = figure.subfigures(2, 1, squeeze=False, height_ratios=[2.1, 1])
+    _draw_space(parts[0, 0], traces)
+    _draw_error(parts[1, 0].subplots(), traces)
     return figure
 
 
@@ -26,7 +26,7 @@ def _draw_space(figure, traces: dict[str, Trace]) -> None:
     """Seen from behind the vehicle: right, into the wall, up [m]."""
     scene = next(iter(traces.values())).scene
     board = BoardGeometry(scene)
-    axes = figure.add_subplot(projection="3d")
+    axes = figure.add_axes((0.0, -0.02, 1.0, 1.04), projection="3d")
     width, height = scene.board.width_m, scene.board.height_m
     corners = board.point(np.array([0.0, width, width, 0.0]), np.array([0.0, 0.0, height, height]))
     face = [(y, 0.0, -z) for y, z in corners]
@@ -39,15 +39,18 @@ def _draw_space(figure, traces: dict[str, Trace]) -> None:
         axes.plot(tip[:, 1], tip[:, 0], -tip[:, 2], color=colour, linewidth=0.9, label=name, zorder=6)
         axes.scatter(*tip[0, [1]], tip[0, 0], -tip[0, 2], color=colour, s=12, depthshade=False)
     depth = max(float(np.max(-trace.tip[:, 0])) for trace in traces.values())
-    axes.set_box_aspect((width, max(depth, 0.3), height), zoom=1.25)
+    axes.set_box_aspect((width, max(depth, 0.3), height), zoom=1.3)
     axes.set_xlabel("right [m]", labelpad=6)
-    axes.set_ylabel("into the wall [m]", labelpad=6)
+    axes.set_ylabel("into the wall [m]", labelpad=2)
     axes.set_zlabel("up [m]", labelpad=2)
     axes.set_yticks(np.round(np.linspace(-max(depth, 0.3), 0.0, 3), 1))
     axes.view_init(elev=20, azim=-62)
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
-    axes.legend(loc="upper left", bbox_to_anchor=(0.0, 0.98))
+    for artist in (*axes.lines, *axes.collections):
+        artist.set_in_layout(False)
+        artist.set_clip_on(False)  # the frame of a 3-D axes is narrower than what it shows
+    axes.legend(loc="upper left", bbox_to_anchor=(0.02, 0.97), bbox_transform=figure.transSubfigure)
 
 
 def _draw_error(axes, traces: dict[str, Trace]) -> None:
