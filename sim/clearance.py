@@ -9,8 +9,9 @@ import numpy as np
 from ibvs_qp.vehicle import VehicleParams
 from sim.board import BoardGeometry
 
-#: Points on the rim of every disc; between two of them the rim departs by radius * (1 - cos(7.5 deg)) = 1.6 mm.
-RIM_POINTS = 24
+#: Points on the rim of every disc, 17 mm apart: so exactly is known where a disc crosses the board's outline; its
+#: foremost point is exact.
+RIM_POINTS = 72
 
 
 class PropellerClearance:
@@ -28,7 +29,7 @@ class PropellerClearance:
         self._radius = vehicle.propeller_radius_m
         self._positions, self._axes = geometry.positions, geometry.axes
         self._rims = np.stack([self._rim(p, t) for p, t in zip(self._positions, self._axes, strict=True)])
-        # World (y, z) to (along, up) of the board, as one affine map.
+        # World (y, z) from the corner to (along, up) of the board.
         self._outline = np.column_stack((board.along, board.up))
         self._corner = board.point(0.0, 0.0)
 
