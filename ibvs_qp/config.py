@@ -23,6 +23,9 @@ class Gains:
     line_ki: float = setting(1.5, "integral of the line error", unit="1/s^3", low=0.0, high=100.0)
     theta_kp: float = setting(25.0, "line angle error", unit="1/s^2", low=0.0, high=400.0)
     theta_kd: float = setting(10.0, "line angle rate", unit="1/s", low=0.0, high=100.0)
+    line_turn_share: float = setting(
+        0.5, "share of the body's turn that line rows count on in contact, where friction may hold the tip", low=0.0, high=1.0
+    )
     velocity_kp: float = setting(3.0, "velocity error along free directions", unit="1/s", low=0.0, high=50.0)
     velocity_ki: float = setting(1.5, "integral of that error", unit="1/s^2", low=0.0, high=50.0)
     attitude_kp: float = setting(36.0, "roll and pitch", unit="1/s^2", low=0.0, high=400.0)
@@ -61,7 +64,7 @@ class ContactSettings:
     loss_force_n: float = setting(0.3, "force below which contact is doubted", unit="N", low=0.01, high=10.0)
     loss_time_s: float = setting(0.10, "doubt this long is a loss", unit="s", low=0.01, high=2.0)
     force_filter_hz: float = setting(8.0, "first-order filter of the measured push", unit="Hz", low=0.5, high=100.0)
-    moment_gain: float = setting(0.9, "share of the measured contact moment fed forward", low=0.0, high=1.0)
+    moment_gain: float = setting(1.0, "share of the measured contact moment fed forward; a stuck tip returns 0.9 of it", low=0.0, high=1.0)
     friction_gain: float = setting(0.9, "share of the friction along travel fed forward", low=0.0, high=1.0)
     friction_slew_n_s: float = setting(6.0, "fastest change of that force", unit="N/s", low=0.1, high=100.0)
     stuck_speed_m_s: float = setting(0.005, "slower than this in contact counts as stuck", unit="m/s", low=0.0, high=0.1)

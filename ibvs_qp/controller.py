@@ -114,6 +114,7 @@ class HybridController:
         values["thrust_lower"][:] = lower
         values["thrust_upper"][:] = upper
         share = terms.contact_weight
+        values["turn_share"][:] = 1.0 - share * (1.0 - gains.line_turn_share)
         values["push"][:] = terms.push_command, weights.push * share
         values["standoff"][:] = terms.standoff_command, weights.push * (1.0 - share)
         values["level"][:] = terms.angular[0], terms.angular[1], weights.level

@@ -12,7 +12,7 @@ from ibvs_qp.estimation.contact import ContactEstimator
 from ibvs_qp.estimation.external_wrench import ExternalWrench
 from ibvs_qp.estimation.surface import FrictionEstimator
 from ibvs_qp.feedforward import ContactFeedforward
-from ibvs_qp.frames import GRAVITY, R_BODY_CAMERA, down_in_body, roll_pitch
+from ibvs_qp.frames import GRAVITY, R_BODY_CAMERA, cross, down_in_body, roll_pitch
 from ibvs_qp.lines import LineErrors, LineTerm
 from ibvs_qp.measurement import Measurement, Reference
 
@@ -91,11 +91,9 @@ class Setpoints:
 
     def _wall_axes(self, down_body: np.ndarray) -> None:
         self.normal = self.contact.normal
-        n, g = self.normal, down_body
-        right = np.array([g[1] * n[2] - g[2] * n[1], g[2] * n[0] - g[0] * n[2], g[0] * n[1] - g[1] * n[0]])
+        right = cross(down_body, self.normal)
         self.right = right / max(math.sqrt(float(right @ right)), 1e-6)
-        r = self.right
-        self.down = np.array([n[1] * r[2] - n[2] * r[1], n[2] * r[0] - n[0] * r[2], n[0] * r[1] - n[1] * r[0]])
+        self.down = cross(self.normal, self.right)
 
     def _feed_forward(self, measurement: Measurement, reference: Reference, down_body: np.ndarray, dt: float) -> None:
         config, omega, contact = self.config, measurement.angular_velocity, self.contact
@@ -120,14 +118,7 @@ class Setpoints:
             direction = travel / speed
             moving = float(direction @ measurement.velocity)
             self.friction.add(contact.push, -float(direction @ measurement.contact_wrench[:3]), moving, dt)
-        momentum = self._inertia * omega
-        gyroscopic = np.array(
-            [
-                omega[1] * momentum[2] - omega[2] * momentum[1],
-                omega[2] * momentum[0] - omega[0] * momentum[2],
-                omega[0] * momentum[1] - omega[1] * momentum[0],
-            ]
-        )
+        gyroscopic = cross(omega, self._inertia * omega)
         gravity = config.vehicle.mass_kg * GRAVITY * down_body
         self._static_wrench = np.concatenate((gravity, -gyroscopic)) + self.external.wrench
         self.bias_wrench = self._static_wrench + expected
@@ -189,7 +180,7 @@ class Setpoints:
         travel = self._travel
         speed = math.sqrt(float(travel @ travel))
         direction = self.normal if speed < 1e-3 else self.normal + self.friction.value * travel / speed
-        moment = np.cross(self._tip, direction)
+        moment = cross(self._tip, direction)
         slope = self.inverse @ np.concatenate((direction, moment))
         base = -(self.inverse @ self._static_wrench)
         low, high = self.config.vehicle.thrust_min, self.config.vehicle.thrust_max
@@ -209,7 +200,7 @@ class Setpoints:
             in_plane = velocity - self.normal * float(self.normal @ velocity)
             speed = math.sqrt(float(in_plane @ in_plane))
             twist = np.concatenate((in_plane, measurement.angular_velocity))
-        stuck = contact.in_contact and speed < config.contact.stuck_speed_m_s and not np.any(reference.velocity)
+        stuck = contact.in_contact and speed < config.contact.stuck_speed_m_s
         integrate = not stuck and self._given_up < WINDUP_FORCE
         self.lines = []
         if contact.known:

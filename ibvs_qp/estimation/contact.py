@@ -13,7 +13,7 @@ import numpy as np
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.estimation.delayed import HISTORY, DelayedKalman
 from ibvs_qp.estimation.surface import StiffnessEstimator
-from ibvs_qp.frames import GRAVITY, R_BODY_CAMERA
+from ibvs_qp.frames import GRAVITY, R_BODY_CAMERA, cross
 from ibvs_qp.measurement import Measurement
 
 #: Accelerometer and unmodelled-gravity noise density along the normal [m/s^2/sqrt(Hz)] (IMU 4e-3, attitude noise).
@@ -76,13 +76,7 @@ class ContactEstimator:
     def _predict(self, measurement: Measurement, down: np.ndarray, omega: np.ndarray, dt: float) -> None:
         """Turn the normal with the gyro and integrate the accelerometer along it."""
         normal = self.normal
-        turned = normal + dt * np.array(
-            [
-                normal[1] * omega[2] - normal[2] * omega[1],
-                normal[2] * omega[0] - normal[0] * omega[2],
-                normal[0] * omega[1] - normal[1] * omega[0],
-            ]
-        )
+        turned = normal + dt * cross(normal, omega)
         self.normal = turned / math.sqrt(turned @ turned)
         self._ticks += 1
         self._normal_history[self._ticks % HISTORY] = self.normal
@@ -90,12 +84,7 @@ class ContactEstimator:
         if measurement.specific_force is not None:
             increment[1] = dt * float(self.normal @ (measurement.specific_force + GRAVITY * down))
         # The tip moves with the body's turn as well; the chain integrates only the centre of mass.
-        x, y, z = self._tip
-        self._lever_speed = float(
-            self.normal[0] * (omega[1] * z - omega[2] * y)
-            + self.normal[1] * (omega[2] * x - omega[0] * z)
-            + self.normal[2] * (omega[0] * y - omega[1] * x)
-        )
+        self._lever_speed = float(self.normal @ cross(omega, self._tip))
         increment[0] = -dt * self._lever_speed
         self._filter.predict(measurement.stamp_ns, increment, dt)
 

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from ibvs_qp.frames import cross
 from ibvs_qp.vehicle import VehicleParams
 
 #: Bandwidth of the force observer in free flight and in contact [rad/s].
@@ -81,13 +82,7 @@ class ExternalWrench:
 
     def _update_moment(self, omega: np.ndarray, known_moment: np.ndarray, dt: float) -> None:
         momentum = self._inertia * omega
-        gyroscopic = np.array(
-            [
-                omega[1] * momentum[2] - omega[2] * momentum[1],
-                omega[2] * momentum[0] - omega[0] * momentum[2],
-                omega[0] * momentum[1] - omega[1] * momentum[0],
-            ]
-        )
+        gyroscopic = cross(omega, momentum)
         if self._integral is None:
             self._integral = momentum - self.moment / MOMENT_BANDWIDTH
         self._integral = self._integral + dt * (known_moment - gyroscopic + self.moment)

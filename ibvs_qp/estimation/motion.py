@@ -9,7 +9,7 @@ import numpy as np
 
 from ibvs_qp.estimation.delayed import DelayedKalman
 from ibvs_qp.estimation.wall_lines import WallAxes, image_line, wall_line
-from ibvs_qp.frames import GRAVITY
+from ibvs_qp.frames import GRAVITY, cross
 from ibvs_qp.measurement import FeatureFrame, LineFeature
 
 #: Accelerometer noise in the wall plane with what the attitude noise adds [m/s^2/sqrt(Hz)].
@@ -104,8 +104,7 @@ class WallMotion:
     def predict(self, stamp_ns: int, axes: WallAxes, specific_force: np.ndarray, omega: np.ndarray, dt: float) -> None:
         """Integrate the accelerometer in the wall plane; the tip moves with the body's turn as well."""
         acceleration = specific_force + GRAVITY * axes.gravity
-        x, y, z = self._tip
-        lever = np.array([omega[1] * z - omega[2] * y, omega[2] * x - omega[0] * z, omega[0] * y - omega[1] * x])
+        lever = cross(omega, self._tip)
         turn_right, turn_down = dt * float(axes.right @ lever), dt * float(axes.down @ lever)
         increment = np.zeros(_LINES + SLOTS)
         increment[0], increment[1] = dt * float(axes.right @ acceleration), dt * float(axes.down @ acceleration)

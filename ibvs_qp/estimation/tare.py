@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ibvs_qp.frames import cross
 from ibvs_qp.vehicle import VehicleParams
 
 #: The bias is averaged over this time in free flight before it is trusted [s], then followed this slowly [s].
@@ -50,14 +51,11 @@ class WrenchTare:
         dt = 0.01 if self._stamp < 0 else min((stamp_ns - self._stamp) * 1e-9, 0.1)
         self._stamp = stamp_ns
         load = self._mass * self._force
-        x, y, z = self._lever
-        moment = np.array([y * load[2] - z * load[1], z * load[0] - x * load[2], x * load[1] - y * load[0]])
-        contact = np.concatenate((load, moment)) - raw
+        contact = np.concatenate((load, cross(self._lever, load))) - raw
         if free:
             self._time += dt
             self._bias = self._bias + min(1.0, dt / min(max(self._time, dt), FOLLOW_TIME)) * (contact - self._bias)
         contact = contact - self._bias
-        force, (x, y, z) = contact[:3], self._sensor
-        contact[3:] += np.array([y * force[2] - z * force[1], z * force[0] - x * force[2], x * force[1] - y * force[0]])
+        contact[3:] += cross(self._sensor, contact[:3])
         self._wrench = contact
         return contact

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ibvs_qp.frames import R_BODY_CAMERA
+from ibvs_qp.frames import R_BODY_CAMERA, cross
 from ibvs_qp.measurement import HORIZONTAL, LineFeature
 
 
@@ -23,9 +23,9 @@ class WallAxes:
     @classmethod
     def of(cls, normal: np.ndarray, gravity: np.ndarray) -> WallAxes:
         """Axes of a wall with a given normal, under a given direction of gravity."""
-        right = np.cross(gravity, normal)
+        right = cross(gravity, normal)
         right = right / max(float(np.linalg.norm(right)), 1e-6)
-        return cls(normal=normal, right=right, down=np.cross(normal, right), gravity=gravity)
+        return cls(normal=normal, right=right, down=cross(normal, right), gravity=gravity)
 
 
 def wall_line(
@@ -73,7 +73,7 @@ def image_line(
     foot = tip_from_camera + distance * axes.normal
     normal = math.cos(angle) * axes.right + math.sin(angle) * axes.down
     point = foot + offset * normal
-    h = R_BODY_CAMERA.T @ np.cross(point, np.cross(axes.normal, normal))
+    h = R_BODY_CAMERA.T @ cross(point, cross(axes.normal, normal))
     length = math.hypot(h[0], h[1])
     h = h / length
     if float(h[:2] @ (R_BODY_CAMERA.T @ normal)[:2]) < 0.0:
