@@ -8,6 +8,7 @@ import numpy as np
 
 from allocation.effectiveness import control_effectiveness
 from allocation.least_squares import allocate_least_squares
+from ibvs_qp.errors import out_of_range
 from ibvs_qp.frames import GRAVITY
 from ibvs_qp.vehicle import VehicleParams
 from sim.board import BoardGeometry
@@ -19,10 +20,20 @@ START_RIGHT_M, START_DOWN_M, START_DISTANCE_M, START_YAW_DEG = 0.02, 0.03, 0.05,
 
 
 def true_limits(scene: Scene, vehicle: VehicleParams) -> tuple[np.ndarray, np.ndarray]:
-    """Lower and upper thrust limits of the real rotors [N], (n,) each."""
-    shape = (vehicle.geometry.count,)
-    lower = np.broadcast_to(np.asarray(scene.vehicle.thrust_min_n, float), shape).copy()
-    return lower, np.broadcast_to(np.asarray(scene.vehicle.thrust_max_n, float), shape).copy()
+    """Lower and upper thrust limits of the real rotors [N], (n,) each.
+
+    Raises:
+        ConfigError: When a list has not one entry per rotor, or a lower limit is not below the upper one.
+    """
+    truth, count, limits = scene.vehicle, vehicle.geometry.count, []
+    for name in ("thrust_min_n", "thrust_max_n"):
+        value = getattr(truth, name)
+        if isinstance(value, tuple) and len(value) != count:
+            raise out_of_range(f"vehicle.{name}", value, "N", f"one number or a list of {count} (one per rotor)")
+        limits.append(np.broadcast_to(np.asarray(value, float), (count,)).copy())
+    if np.any(limits[0] >= limits[1]):
+        raise out_of_range("vehicle.thrust_min_n", truth.thrust_min_n, "N", "must lie below thrust_max_n")
+    return limits[0], limits[1]
 
 
 def hover_thrusts(scene: Scene, vehicle: VehicleParams) -> np.ndarray:

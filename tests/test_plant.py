@@ -94,11 +94,15 @@ def test_mass_centre_and_inertia_are_the_scenes(mass, inertia, offset):
     assert np.abs(plant.velocity).max() < 1e-3 and np.abs(plant.angular_velocity).max() < 1e-3, "trimmed hover"
 
 
-def test_impossible_masses_are_refused():
+def test_impossible_vehicles_are_refused():
     with pytest.raises(ConfigError, match=r"inertia_kg_m2 .* tool"):
         Plant(Scene(vehicle=VehicleScene(inertia_kg_m2=(0.22, 0.05, 0.48))))
     with pytest.raises(ConfigError, match="mass_kg"):
         Plant(Scene(vehicle=VehicleScene(mass_kg=4.0)), VehicleParams(tool_mass_kg=5.0))
+    with pytest.raises(ConfigError, match=r"thrust_max_n .* list of 6"):
+        Plant(Scene(vehicle=VehicleScene(thrust_max_n=(52.0, 52.0))))
+    with pytest.raises(ConfigError, match="thrust_min_n"):
+        Plant(Scene(vehicle=VehicleScene(thrust_min_n=30.0, thrust_max_n=20.0)))
 
 
 def test_motor_lag_rises_and_falls_with_its_own_time_constant():

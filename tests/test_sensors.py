@@ -90,6 +90,8 @@ def test_noise_has_the_stated_size():
     np.testing.assert_allclose(wrench.std(axis=0), [0.1] * 3 + [0.005] * 3, rtol=0.05)
     assert np.linalg.norm(wrench[:, :3].mean(axis=0)) == pytest.approx(0.05, abs=0.006)
     np.testing.assert_allclose(tilt.std(axis=0), 0.05, rtol=0.05)
+    correlation = np.corrcoef(np.hstack((gyro, accel, wrench, tilt)), rowvar=False)
+    assert np.abs(correlation - np.eye(len(correlation))).max() < 0.08, "no two channels share their noise"
     assert np.linalg.norm(tilt.mean(axis=0)) == pytest.approx(0.1, abs=0.005)
 
 
