@@ -14,9 +14,7 @@ from sim.board import BoardGeometry
 from sim.mujoco_frames import FLIP, FLIP6
 from sim.plant import TICK_NS, Plant
 from sim.scene import Scene, StartScene, VehicleScene, WindScene
-from sim.streams import stream
 from sim.trim import START_DISTANCE_M, START_DOWN_M, START_RIGHT_M, START_YAW_DEG
-from sim.wind import Wind
 
 VEHICLE = VehicleParams()
 B = control_effectiveness(VEHICLE.geometry)
@@ -160,33 +158,6 @@ def test_tool_weight_and_inertia_at_the_sensor():
     fly(plant, plant.thrusts_actual + 2.0 * B[0], 5)
     # Speeding up ahead, the vehicle drags the tool along.
     assert plant.ft_wrench[0] == pytest.approx(0.35 * plant.specific_force[0], rel=0.1)
-
-
-def test_drag_and_mean_wind_reach_the_air_speed():
-    scene = Scene(wind=WindScene(mean_m_s=(0.0, 3.0, 0.0)), start=StartScene(distance_m=2.0))
-    plant = Plant(scene)
-    thrusts = plant.thrusts_actual
-    fly(plant, thrusts, 250)
-    # No moment about the centre of mass: v = 3 (1 - exp(-0.9 t / 6)).
-    world = plant.rotation @ plant.velocity
-    assert world[1] == pytest.approx(-3.0 * math.expm1(-0.9 / 6.0), rel=1e-3)
-    assert np.abs(plant.angular_velocity).max() < 1e-9
-
-
-def test_air_acts_at_the_true_centre_of_mass():
-    truth = VehicleScene(com_offset_m=(0.03, 0.02, -0.03))
-    plant = Plant(Scene(wind=WindScene(mean_m_s=(0.0, 8.0, 0.0)), vehicle=truth, start=StartScene(distance_m=2.0)))
-    fly(plant, plant.thrusts_actual, 25)
-    assert np.abs(plant.angular_velocity).max() < 1e-9
-
-
-def test_gusts_have_their_rms_and_time_constant():
-    wind = Wind(WindScene(gust_n_rms=2.0), 0.9, 0.004, stream(1, "wind"))
-    gusts = np.array([wind.force(np.zeros(3)) for _ in range(100_000)])
-    np.testing.assert_allclose(gusts.std(), 2.0, rtol=0.1)  # 400 s hold 200 independent gusts per axis
-    lag = 250
-    correlation = (gusts[lag:] * gusts[:-lag]).mean(axis=0) / gusts.var(axis=0)
-    np.testing.assert_allclose(correlation, math.exp(-1.0), atol=0.15)
 
 
 def test_start_pose_varies_within_its_bounds():
