@@ -157,6 +157,7 @@ def _child(scene: Scene, options: FlightOptions, pipe: Connection) -> None:
 
     os.setpgrp()  # the terminal's Ctrl-C goes to the parent, which decides
     try:
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # a parent started in the background ignores it
         signal.pthread_sigmask(signal.SIG_UNBLOCK, _SIGINT)
         trace = pack_pictures(fly(scene, options, tell))
         signal.pthread_sigmask(signal.SIG_BLOCK, _SIGINT)

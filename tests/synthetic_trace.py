@@ -157,7 +157,7 @@ def synthetic_trace(
         canvas_px_per_m=px_per_m,
         coverage_mask=mask,
         pictures=[
-            (float(time), rng.integers(0, 255, (120, 160, 3), dtype=np.uint8), "paint")
+            (float(time), np.tile(rng.integers(0, 255, (1, 160, 3), dtype=np.uint8), (120, 1, 1)), "paint")
             for time in np.linspace(0, end, pictures)
         ],
     )

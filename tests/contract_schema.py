@@ -1,0 +1,59 @@
+"""What summary.json must look like, as a checker that names the first thing that is wrong."""
+
+from __future__ import annotations
+
+from typing import Any
+
+NUMBER = (int, float, type(None))  # non-finite numbers are null
+M_NUMBERS = (
+    "duration_s real_time_factor stroke_m path_rms_straight_m path_rms_corner_m path_max_m force_rms_straight_n "
+    "force_rms_corner_n force_peak_n contact_share tilt_rms_deg tilt_peak_deg yaw_rms_deg yaw_peak_deg "
+    "height_error_rms_m coverage velocity_rms_m_s propeller_clearance_min_m first_touch_s settle_s bounces"
+).split()
+OUTCOMES = {"solved", "inaccurate_accepted", "capped_accepted", "exact_fallback", "analytic_fallback", "hold"}
+
+
+def check_metrics(metrics: dict[str, Any], row: bool = False) -> None:
+    """Assert that M, or a row of it, has every key of the contract with the right type."""
+    assert isinstance(metrics["completed"], bool)
+    assert isinstance(metrics["reason"], str)
+    for name in M_NUMBERS:
+        assert isinstance(metrics[name], NUMBER) and not isinstance(metrics[name], bool), name
+    assert set(metrics["outcomes"]) <= OUTCOMES
+    assert all(isinstance(ticks, int) for ticks in metrics["outcomes"].values())
+    assert all(isinstance(share, NUMBER) for share in metrics["limits"].values())
+    assert set(metrics["step_us"]) == {"p50", "p99", "max"}
+    assert set(metrics["vision_ms"]) == {"p50", "p99"}
+    if row:
+        assert isinstance(metrics["row"], int)
+    else:
+        for entry in metrics["rows"]:
+            check_metrics(entry, row=True)
+
+
+def check_summary(summary: dict[str, Any], laws: set[str]) -> None:
+    """Assert that summary.json follows the contract."""
+    assert summary["schema"] == 1
+    kinds = {
+        "command": str,
+        "version": str,
+        "seed": int,
+        "scene": str,
+        "preset": (str, type(None)),
+        "run_dir": str,
+        "camera": str,
+        "image_size": list,
+        "features": str,
+        "vision": str,
+        "interrupted": bool,
+        "wall_time_s": float,
+        "peak_memory_bytes": int,
+        "laws": dict,
+    }
+    assert set(summary) == {"schema", *kinds}
+    for key, kind in kinds.items():
+        assert isinstance(summary[key], kind), key
+    assert len(summary["image_size"]) == 2 and all(isinstance(size, int) for size in summary["image_size"])
+    assert set(summary["laws"]) == laws
+    for metrics in summary["laws"].values():
+        check_metrics(metrics)
