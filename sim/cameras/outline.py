@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-#: Half width of the band in which the rim is antialiased, and widest depth hole beyond the rim [px].
-_BAND_PX, _HOLE_PX = 2, 4
+#: Pixels on either side of the rim that are drawn with their exact share, and widest depth hole beyond it [px].
+_BAND_PX, _HOLE_PX = 1, 4
 #: How near to a line a pixel counts as touched by it [px].
 _SLACK_PX = 3.0
 #: More than any picture measures [px].
@@ -82,16 +82,19 @@ class CutLine:
         return (chosen, place) if self.flat else (place, chosen)
 
 
-def clip_rectangle(polygon: np.ndarray, normal: np.ndarray, offset: float) -> np.ndarray:
-    """The part of a convex polygon (n, 2) where normal . p + offset >= 0."""
-    value = polygon @ normal + offset
-    kept = []
-    for k in range(len(polygon)):
-        j = (k + 1) % len(polygon)
-        if value[k] >= 0.0:
-            kept.append(polygon[k])
-        if (value[k] >= 0.0) != (value[j] >= 0.0):
-            kept.append(polygon[k] + value[k] / (value[k] - value[j]) * (polygon[j] - polygon[k]))
+def clip_polygon(polygon: np.ndarray, normal: np.ndarray, offset: float) -> np.ndarray:
+    """The part of a convex polygon (n, 2) where normal . p + offset >= 0; plain floats, as there are four corners."""
+    nx, ny = float(normal[0]), float(normal[1])
+    points = polygon.tolist()
+    kept: list[tuple[float, float]] = []
+    for k, (x1, y1) in enumerate(points):
+        x0, y0 = points[k - 1]
+        before, value = nx * x0 + ny * y0 + offset, nx * x1 + ny * y1 + offset
+        if (before >= 0.0) != (value >= 0.0):
+            part = before / (before - value)
+            kept.append((x0 + part * (x1 - x0), y0 + part * (y1 - y0)))
+        if value >= 0.0:
+            kept.append((x1, y1))
     return np.array(kept).reshape(-1, 2)
 
 
@@ -107,7 +110,8 @@ def cut_lines(
     """Lines of a convex outline that cut the picture, and the box of the board in view.
 
     Args:
-        polygon: Outline in the picture [px], (n, 2), any orientation; empty if the board is behind the camera.
+        polygon: Outline in the picture [px], (n, 2), any orientation; empty if the board is behind the camera, and
+            then one line cuts everything away.
         width: Picture width [px].
         height: Picture height [px].
 
@@ -116,21 +120,27 @@ def cut_lines(
         out of view is cut away by one of its lines.
     """
     picture = np.array([[-1.0, -1.0], [width, -1.0], [width, height], [-1.0, height]])
+    if len(polygon) < 3:
+        everything = (0, height, 0, width)
+        far, start = np.array([0.0, 1.0]), picture[0]
+        return [CutLine(far, -2.0 * height, start, start, picture, everything, (height, width))], None
     board, left, cuts = picture, picture, []
-    middle = polygon.mean(axis=0)
-    for start, stop in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
-        edge = stop - start
-        normal = np.array([-edge[1], edge[0]]) / math.hypot(*edge)
-        if normal @ (middle - start) < 0.0:
-            normal = -normal
-        offset = -float(normal @ start)
-        board = clip_rectangle(board, normal, offset) if len(board) else board
+    edges = np.roll(polygon, -1, axis=0) - polygon
+    normals = np.column_stack((-edges[:, 1], edges[:, 0])) / np.hypot(edges[:, 0], edges[:, 1])[:, None]
+    offsets = -np.einsum("ij,ij->i", normals, polygon)
+    turned = normals @ polygon.mean(axis=0) + offsets < 0.0
+    normals[turned], offsets[turned] = -normals[turned], -offsets[turned]
+    touching = (picture @ normals.T + offsets).min(axis=0) < _SLACK_PX
+    for k in np.flatnonzero(touching):
+        normal, offset = normals[k], float(offsets[k])
+        board = clip_polygon(board, normal, offset)
         # What an earlier line has cut away needs no second wall; the slack keeps its rim.
-        area = clip_rectangle(left, -normal, _SLACK_PX - offset) if len(left) else left
+        area = clip_polygon(left, -normal, _SLACK_PX - offset)
         if len(area) == 0:
             continue
-        left = clip_rectangle(left, normal, offset + _SLACK_PX)
-        beyond = clip_rectangle(picture, -normal, -offset)
+        left = clip_polygon(left, normal, offset + _SLACK_PX)
+        beyond = clip_polygon(picture, -normal, -offset)
         box = _box(area, width, height, _BAND_PX + 1)
-        cuts.append(CutLine(normal, offset, start, stop, beyond, box, (height, width)))
+        stop = polygon[(k + 1) % len(polygon)]
+        cuts.append(CutLine(normal, offset, polygon[k], stop, beyond, box, (height, width)))
     return cuts, _box(board, width, height, _BAND_PX + 1) if len(board) >= 3 else None

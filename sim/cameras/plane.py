@@ -19,6 +19,7 @@ from sim.cameras.view import View, board_corners, board_steps
 from sim.canvas import TEXTURE_PAD_PX, Canvas
 from sim.scene import Scene
 
+_SHIFT = 6  # sub-pixel bits of polygon corners
 _WARP = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
 #: Nearest depth at which the board's outline is projected, and farthest that a reading exists [m].
 _NEAR_M, _FAR_M = 0.05, 20.0
@@ -46,9 +47,14 @@ class PlaneCamera:
         relative = scene.camera.depth_noise_relative
         self._noise = NoiseBank(shape, relative, np.random.default_rng(bank)) if noise else None
         self._layer = vehicle_layer(scene, vehicle, self.intrinsics, self._rng)
-        self._arm_box = _bounding_box(self._layer.mask | self._layer.holes)
+        self._arm_box = _bounding_box(self._layer.mask)
+        self._no_depth = np.flatnonzero((self._layer.holes | self._layer.propellers) & ~self._layer.mask)
         self._propeller_box = _bounding_box(self._layer.propellers)
         self._corners = board_corners(canvas.geometry)
+        self._board_steps = board_steps(canvas.geometry, canvas.pixels_per_m, TEXTURE_PAD_PX)
+        step = 1.0 / canvas.wall_pixels_per_m
+        corner = np.append(scene.board.gap_m, canvas.wall_origin + 0.5 * step)
+        self._wall_steps = corner, np.array([0.0, step, 0.0]), np.array([0.0, 0.0, step])
         self._plain_wall = (*(float(entry) for entry in scene.wall.color), 255.0)
         self._picture, self._behind = np.empty((*shape, 4), np.uint8), np.empty((*shape, 4), np.uint8)
         self._mask = np.zeros(shape, np.uint8)
@@ -69,17 +75,19 @@ class PlaneCamera:
     def _compose(self, view: View) -> list[CutLine]:
         """Colours and inverse depths of board, wall and vehicle; returns the outline lines in view."""
         height, width = self._mask.shape
-        polygon = clip_near(view.to_camera(self._corners), _NEAR_M)
+        polygon = view.to_camera(self._corners)
+        if polygon[:, 2].min() < _NEAR_M:
+            polygon = clip_near(polygon, _NEAR_M)
         fx, fy, cx, cy = self.intrinsics
         polygon = polygon[:, :2] / polygon[:, 2:] * (fx, fy) + (cx, cy)
         cuts, board_box = cut_lines(polygon, width, height)
         common = self._noise.depth_common() * (view.plane(0.0)[2]) if self._noise else 0.0
         if board_box is not None:
             texture = self.canvas.flush()
-            homography = view.from_texture(*board_steps(self.canvas.geometry, self.canvas.pixels_per_m, TEXTURE_PAD_PX))
+            homography = view.from_texture(*self._board_steps)
             self._warp(texture, homography, board_box, self._picture)
             self._plane(view, 0.0, common, board_box, self._inverse)
-        wall = self._wall_homography(view)
+        wall = view.from_texture(*self._wall_steps)
         for cut in cuts:
             self._cut(view, wall, cut, common)
         if self._propeller_box is not None:
@@ -91,11 +99,6 @@ class PlaneCamera:
             cv2.copyTo(self._layer.picture[r0:r1, c0:c1], mask, self._picture[r0:r1, c0:c1])
             cv2.copyTo(self._layer.inverse_depth[r0:r1, c0:c1], mask, self._inverse[r0:r1, c0:c1])
         return cuts
-
-    def _wall_homography(self, view: View) -> np.ndarray:
-        step = 1.0 / self.canvas.wall_pixels_per_m
-        corner = np.append(self.scene.board.gap_m, self.canvas.wall_origin + 0.5 * step)
-        return view.from_texture(corner, np.array([0.0, step, 0.0]), np.array([0.0, 0.0, step]))
 
     def _warp(self, texture: np.ndarray, homography: np.ndarray, box: Box, target: np.ndarray) -> None:
         r0, r1, c0, c1 = box
@@ -127,7 +130,8 @@ class PlaneCamera:
         mask = self._mask[r0:r1, c0:c1]
         mask[:] = 0
         if len(cut.beyond):
-            cv2.fillConvexPoly(mask, np.rint(cut.beyond - (c0, r0)).astype(np.int32), 255.0)
+            corners = np.rint((cut.beyond - (c0, r0)) * (1 << _SHIFT)).astype(np.int32)
+            cv2.fillConvexPoly(mask, corners, 255.0, cv2.LINE_8, _SHIFT)
         cv2.copyTo(self._behind[r0:r1, c0:c1], mask, self._picture[r0:r1, c0:c1])
         cv2.copyTo(self._inverse_behind[r0:r1, c0:c1], mask, self._inverse[r0:r1, c0:c1])
         self._picture.view(np.uint32).reshape(-1)[places] = mixed.view(np.uint32).ravel()
@@ -151,13 +155,8 @@ class PlaneCamera:
             return depth
         for cut in cuts:
             rows, columns = cut.holes(self._rng)
-            depth[rows, columns] *= self._layer.mask[rows, columns] == 0  # arm and brush hide the step
-        if self._arm_box is not None:
-            r0, r1, c0, c1 = self._arm_box
-            depth[r0:r1, c0:c1][self._layer.holes[r0:r1, c0:c1] > 0] = 0.0
-        if self._propeller_box is not None:
-            r0, r1, c0, c1 = self._propeller_box
-            depth[r0:r1, c0:c1][self._layer.propellers[r0:r1, c0:c1] > 0] = 0.0
+            depth[rows, columns] *= self._layer.mask[rows, columns] != 0  # arm and brush hide the step
+        depth.reshape(-1)[self._no_depth] = 0.0
         return depth
 
 
