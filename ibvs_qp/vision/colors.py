@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from ibvs_qp.vision.grid import CoarseGrid
+
 #: Share of a new sample in the board's running colour.
 _BLEND = 0.2
+#: Bits per channel of the label table, the shift that leaves them, and the board's drift that renews it.
+_TABLE_BITS, _TABLE_SHIFT, _TABLE_DRIFT = 5, 3, 1.5
 #: Labels of `SurfaceColors.label`.
 OTHER, BOARD, PAINT = 0, 1, 2
 #: Colours nearer to each other than this share of the gate cannot be told apart.
@@ -25,6 +29,8 @@ class SurfaceColors:
     def reset(self) -> None:
         """Forget the sampled colour of the board."""
         self.board = None if self._given is None else self._given.copy()
+        self._table: np.ndarray | None = None
+        self._table_board = np.zeros(3, np.float32)
 
     def learn(self, samples: np.ndarray) -> None:
         """Sample the board: median of the unpainted colours among (n, 3) samples; few samples change nothing."""
@@ -42,17 +48,32 @@ class SurfaceColors:
         self.board = median if self.board is None else self.board + _BLEND * (median - self.board)
 
     def label(self, colors: np.ndarray) -> np.ndarray:
-        """OTHER, BOARD or PAINT for colours (..., 3); all OTHER while the board is unknown."""
-        colors = colors.astype(np.float32, copy=False)
-        result = np.zeros(colors.shape[:-1], np.uint8)
+        """OTHER, BOARD or PAINT for colours uint8 (..., 3); all OTHER while the board is unknown."""
         if self.board is None:
-            return result
-        to_board = self._distance(colors, self.board)
-        result[to_board < self._gate**2] = BOARD
+            return np.zeros(colors.shape[:-1], np.uint8)
+        if self._table is None or np.abs(self.board - self._table_board).max() > _TABLE_DRIFT:
+            self._make_table(self.board)
+        coarse = (colors >> _TABLE_SHIFT).astype(np.intp)
+        return self._table.take((coarse[..., 0] << 2 * _TABLE_BITS) + (coarse[..., 1] << _TABLE_BITS) + coarse[..., 2])
+
+    def _make_table(self, board: np.ndarray) -> None:
+        """Labels of all colours in steps of eight grey levels: thousands of colours are looked up per picture."""
+        level = (np.arange(1 << _TABLE_BITS) + 0.5) * (1 << _TABLE_SHIFT)
+        colors = np.stack(np.meshgrid(level, level, level, indexing="ij"), axis=-1).reshape(-1, 3).astype(np.float32)
+        to_board = self._distance(colors, board)
+        table = np.where(to_board < self._gate**2, np.uint8(BOARD), np.uint8(OTHER))
         if self.paint_distinct and self.paint is not None:
             to_paint = self._distance(colors, self.paint)
-            result[(to_paint < self._gate**2) & (to_paint < to_board)] = PAINT
-        return result
+            table[(to_paint < self._gate**2) & (to_paint < to_board)] = PAINT
+        self._table, self._table_board = table, board.copy()
+
+    def like_around(self, grid: CoarseGrid, colors: np.ndarray, seed: tuple[int, int], radius: int) -> np.ndarray:
+        """Samples that look like those around a seed, bool (rows, columns)."""
+        rows, columns = grid.window(seed, radius)
+        window = colors[rows, columns][grid.free[rows, columns]].astype(np.float32)
+        if len(window) == 0:
+            return np.ones(grid.shape, bool)
+        return self._distance(colors.astype(np.float32), np.median(window, axis=0)) < self._gate**2
 
     @property
     def paint_distinct(self) -> bool:

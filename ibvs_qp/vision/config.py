@@ -95,7 +95,9 @@ class LineConfig(_Checked):
     strip_px: float = setting(
         14.0, "half width of the search strip (wider jumps to parallel lines)", unit="px", low=3.0, high=60.0
     )
-    contrast_min: float = setting(16.0, "weakest colour step across a line (RGB norm)", unit="grey levels", low=1.0, high=200.0)
+    contrast_min: float = setting(
+        16.0, "weakest colour step across a line (RGB norm)", unit="grey levels", low=1.0, high=200.0
+    )
     inlier_px: float = setting(
         1.5, "a profile whose peak lies within this supports the line", unit="px", low=0.2, high=10.0
     )

@@ -14,7 +14,7 @@ from ibvs_qp.vision.colors import SurfaceColors
 from ibvs_qp.vision.config import VisionConfig
 from ibvs_qp.vision.grid import CoarseGrid
 from ibvs_qp.vision.lines import RefinedLine, refine_line
-from ibvs_qp.vision.picture import Picture, normalised_line
+from ibvs_qp.vision.picture import Picture, denormalise, normalised_line
 from ibvs_qp.vision.plane import PlaneEstimate
 
 #: Half width of the strip in which a voted line is refined [px at 640]: two half-resolution bins.
@@ -25,6 +25,8 @@ _VOTED, _KEPT = 40, 5
 _SAME_PX = 4.0
 #: Distance from a line at which the coarse labels of its two sides are compared [cells].
 _LABEL_CELLS = 1.5
+#: Share of a line along which its sides must differ to be looked at: neither border nor paint edge otherwise.
+_DIFFERENT = 0.04
 #: Refined lines nearer than this at both ends of the picture are one [px at 640].
 _DUPLICATE_PX = 3.0
 #: Length that earns the full score, share of the picture's width.
@@ -88,7 +90,13 @@ def detect_lines(
     voted = _vote(picture, plane, grid, labels, config, tilt)
     voted.sort(key=lambda entry: -entry.rank)
     found: list[Candidate] = []
-    for entry in voted[: config.detect.candidates]:
+    tried = 0
+    for entry in voted:
+        if tried == config.detect.candidates:
+            break
+        if any(_covered(entry, other.line, picture) for other in found):
+            continue
+        tried += 1
         candidate = _refined(entry, picture, depth, plane, grid, colors, config, tilt)
         if candidate is not None and not any(_same(candidate.line, other.line, picture) for other in found):
             found.append(candidate)
@@ -111,7 +119,7 @@ def _refined(
     tilt: float,
 ) -> Candidate | None:
     view = picture.transposed if entry.upright else picture
-    width = view.mask.shape[1]
+    width = view.width
     slope = (entry.right - entry.left) / (width - 1.0)
     rho, angle = normalised_line(-slope, 1.0, -entry.left, view.intrinsics)
     theta = 0.5 * math.pi - angle if entry.upright else angle
@@ -204,6 +212,8 @@ def _hough(
     differing = _label_difference(left[kept], right[kept], labels.T if upright else labels, grid)
     result = []
     for index, difference in zip(kept, differing, strict=True):
+        if difference < _DIFFERENT:
+            continue
         slope = (right[index] - left[index]) / (width - 1.0)
         at_zero = 2.0 * left[index] + 0.5 - slope * 0.5
         full_width = 2.0 * width - 1.0
@@ -223,6 +233,16 @@ def _label_difference(left: np.ndarray, right: np.ndarray, labels: np.ndarray, g
     k = np.arange(columns)
     different = labels[np.clip(above, 0, rows - 1), k] != labels[np.clip(below, 0, rows - 1), k]
     return (different & inside).mean(axis=1)
+
+
+def _covered(entry: _Voted, line: RefinedLine, picture: Picture) -> bool:
+    """Whether a voted line is an edge already fitted: within the vote's resolution at both ends of its segment."""
+    ends = denormalise(line.segment, picture.intrinsics)
+    if entry.upright:
+        ends = ends[:, ::-1]
+    across = picture.height if entry.upright else picture.width
+    voted = entry.left + (entry.right - entry.left) * ends[:, 0] / (across - 1.0)
+    return bool(np.abs(voted - ends[:, 1]).max() < 2.0 * _SAME_PX)
 
 
 def _same(one: RefinedLine, two: RefinedLine, picture: Picture) -> bool:

@@ -17,7 +17,7 @@ from ibvs_qp.vision.robust import median
 #: A point within this many residual sigmas of the surface takes the surface's depth, which is far less noisy.
 _ON_PLANE_SIGMAS = 4.0
 #: Rounds of reweighting, and pyramid levels beyond the first.
-_ROUNDS, _LEVELS = 5, 2
+_ROUNDS, _LEVELS = 4, 2
 _MAD = 1.4826
 #: Sum of squares of a 3x3 Sobel kernel over 8^2: variance of its answer per variance of the picture.
 _SOBEL_NOISE = 12.0 / 64.0
@@ -52,7 +52,7 @@ class SparseFlow:
         """Forget the last picture and its points."""
         self._pyramid: tuple[np.ndarray, ...] | None = None
         self._points = np.zeros((0, 2), np.float32)
-        self._information = np.zeros((0, 2, 2))
+        self._root = np.zeros((0, 2, 2))
         self._inverse = np.zeros(0)
         self._frames = 0
         self._stamp_ns = 0
@@ -119,7 +119,7 @@ class SparseFlow:
             grey, config.points, config.quality, config.spacing_px, mask=allowed, blockSize=5
         )
         self._points = np.zeros((0, 2), np.float32) if corners is None else corners.reshape(-1, 2)
-        self._information = _structure(grey, self._points, config.window_px, config.grey_sigma)
+        self._root = _information_root(grey, self._points, config)
 
     def _follow(
         self,
@@ -153,13 +153,13 @@ class SparseFlow:
             & (place[:, 1] < height)
         )
         alive[alive] &= excluded[place[alive, 1], place[alive, 0]] == 0
-        before, now, inverse, information = (
+        before, now, inverse, root = (
             self._points[alive],
             moved[alive],
             self._inverse[alive],
-            self._information[alive],
+            self._root[alive],
         )
-        self._points, self._information = now, information
+        self._points, self._root = now, root
         known = inverse > 0
         if int(known.sum()) < config.min_points:
             return "too few points with depth"
@@ -168,7 +168,7 @@ class SparseFlow:
             before[known],
             now[known],
             inverse[known],
-            information[known],
+            root[known],
             half,
             interval,
             rotation,
@@ -183,21 +183,26 @@ def _half(intrinsics: Intrinsics) -> Intrinsics:
     return 0.5 * fx, 0.5 * fy, 0.5 * (cx - 0.5), 0.5 * (cy - 0.5)
 
 
-def _structure(grey: np.ndarray, points: np.ndarray, window: int, sigma: float) -> np.ndarray:
-    """Structure tensors over the tracking window, noise removed, per noise variance: information [1/px^2], (n, 2, 2)."""
+def _information_root(grey: np.ndarray, points: np.ndarray, config: FlowConfig) -> np.ndarray:
+    """Square roots of the information that following each point carries [1/px], symmetric, (n, 2, 2).
+
+    Information is the structure tensor over the window, noise removed, per noise variance, with a floor on the
+    error that structure cannot lower: along a lone edge it vanishes (aperture).
+    """
     if len(points) == 0:
         return np.zeros((0, 2, 2))
     gx = cv2.Sobel(grey, cv2.CV_32F, 1, 0, ksize=3, scale=0.125)
     gy = cv2.Sobel(grey, cv2.CV_32F, 0, 1, ksize=3, scale=0.125)
-    reach = window // 2
+    reach = config.window_px // 2
     steps = np.arange(-reach, reach + 1)
     rows = np.clip(np.round(points[:, 1]).astype(np.intp)[:, None] + steps, 0, grey.shape[0] - 1)[:, :, None]
     columns = np.clip(np.round(points[:, 0]).astype(np.intp)[:, None] + steps, 0, grey.shape[1] - 1)[:, None, :]
     patch = np.stack((gx[rows, columns], gy[rows, columns]), axis=-1).reshape(len(points), -1, 2).astype(float)
-    tensor = np.einsum("nki,nkj->nij", patch, patch)
-    values, vectors = np.linalg.eigh(tensor)
-    values = np.maximum(values - 2.0 * window * window * _SOBEL_NOISE * sigma**2, 0.0) / sigma**2
-    return np.einsum("nij,nj,nkj->nik", vectors, values, vectors)
+    values, vectors = np.linalg.eigh(patch.transpose(0, 2, 1) @ patch)
+    variance = config.grey_sigma**2
+    values = np.maximum(values - 2.0 * config.window_px**2 * _SOBEL_NOISE * variance, 0.0) / variance
+    values = np.sqrt(values / (1.0 + values * config.pixel_sigma**2))
+    return (vectors * values[:, None, :]) @ vectors.transpose(0, 2, 1)
 
 
 def _inverse_depths(
@@ -211,10 +216,10 @@ def _inverse_depths(
     rows = np.clip(place[:, 1, None] + np.array([-2, 0, 0, 0, 2]), 0, depth.shape[0] - 1)
     columns = np.clip(place[:, 0, None] + np.array([0, -2, 0, 2, 0]), 0, depth.shape[1] - 1)
     z = depth[rows, columns].astype(float)
-    z = np.where((z > 0) & np.isfinite(z), z, np.nan)
-    count = np.isfinite(z).sum(axis=1)
-    middle = np.full(len(points), np.nan)
-    middle[count >= 3] = np.nanmedian(z[count >= 3], axis=1)
+    good = (z > 0) & np.isfinite(z)
+    count = good.sum(axis=1)
+    ordered = np.sort(np.where(good, z, np.inf), axis=1)  # the median of the valid ones is at half their count
+    middle = ordered[np.arange(len(points)), np.minimum(count // 2, 4)]
     inverse = np.where(count >= 3, 1.0 / middle, 0.0)
     if plane is not None:
         fx, fy, cx, cy = intrinsics
@@ -229,7 +234,7 @@ def _solve(
     before: np.ndarray,
     now: np.ndarray,
     inverse: np.ndarray,
-    information: np.ndarray,
+    root: np.ndarray,
     intrinsics: Intrinsics,
     interval: float,
     rotation: np.ndarray,
@@ -245,24 +250,19 @@ def _solve(
     still = turned[:, :2] / turned[:, 2:]
     flow = (end - still) / interval
     x, y = (0.5 * (end + still)).T
-    zero = np.zeros_like(x)
-    rows = inverse[:, None, None] * np.stack(
-        (np.stack((-np.ones_like(x), zero, x), -1), np.stack((zero, -np.ones_like(x), y), -1)), axis=1
-    )
-    # information of a followed point per (m/s): its structure, with a floor on the error that structure cannot lower
-    values, vectors = np.linalg.eigh(information)
-    values = values / (1.0 + values * config.pixel_sigma**2)
-    matrix = np.einsum("nij,nj,nkj->nik", vectors, values * (fx * interval) ** 2, vectors)
-    weight = np.ones(len(x))
+    zero, one = np.zeros_like(x), np.ones_like(x)
+    translating = inverse[:, None, None] * np.stack((-one, zero, x, zero, -one, y), axis=-1).reshape(-1, 2, 3)
+    whiten = root * (fx * interval)
+    rows, wanted = whiten @ translating, (whiten @ flow[:, :, None])[:, :, 0]
     prior = np.eye(3) / config.prior_m_s**2
-    velocity, normal, weighted = np.zeros(3), prior, matrix
-    size = np.zeros(len(x))
+    velocity, normal = np.zeros(3), prior
+    weight, size = one, zero
+    weighted = rows
     for _ in range(_ROUNDS):
-        weighted = matrix * weight[:, None, None]
-        normal = np.einsum("nia,nij,njb->ab", rows, weighted, rows) + prior
-        velocity = np.linalg.solve(normal, np.einsum("nia,nij,nj->a", rows, weighted, flow))
-        residual = flow - rows @ velocity
-        size = np.sqrt(np.maximum(np.einsum("ni,nij,nj->n", residual, matrix, residual), 0.0))
+        weighted = (rows * weight[:, None, None]).reshape(-1, 3)
+        normal = weighted.T @ rows.reshape(-1, 3) + prior
+        velocity = np.linalg.solve(normal, weighted.T @ wanted.ravel())
+        size = np.linalg.norm(wanted - rows @ velocity, axis=1)
         scale = max(_MAD * median(size), 0.5)
         weight = np.maximum(0.0, 1.0 - (size / (config.gate_sigmas * scale)) ** 2) ** 2
     agreeing = int((weight > 0.1).sum())
@@ -272,8 +272,8 @@ def _solve(
         return "faster than possible"
     spread = float(weight @ size**2) / max(2.0 * float(weight.sum()) - 3.0, 1.0)
     covariance = np.linalg.inv(normal - prior * (1.0 - 1.0 / max(spread, 1.0))) * max(spread, 1.0)
-    turning = np.stack((np.stack((x * y, -(1 + x * x), y), -1), np.stack((1 + y * y, -x * y, -x), -1)), axis=1)
-    leak = np.linalg.solve(normal, np.einsum("nia,nij,njb->ab", rows, weighted, turning)) * (
+    turning = np.stack((x * y, -(1 + x * x), y, 1 + y * y, -x * y, -x), axis=-1).reshape(-1, 2, 3)
+    leak = np.linalg.solve(normal, weighted.T @ (whiten @ turning).reshape(-1, 3)) * (
         config.rotation_sigma_rad / interval
     )
     covariance = R_BODY_CAMERA @ (covariance + leak @ leak.T) @ R_BODY_CAMERA.T

@@ -12,7 +12,7 @@ from ibvs_qp.vision.colors import SurfaceColors
 from ibvs_qp.vision.config import LineConfig
 from ibvs_qp.vision.picture import Picture, normalise, normalised_line, pixel_line
 from ibvs_qp.vision.profiles import Expected, Strip
-from ibvs_qp.vision.robust import consensus_line, longest_run, robust_line
+from ibvs_qp.vision.robust import column_median, consensus_line, longest_run, median, robust_line
 
 #: A profile's gradient must reach this share of the line's whole step (a sharp edge reaches 0.4).
 _STEP_SHARE = 0.12
@@ -90,7 +90,7 @@ def refine_line(
     angle = 0.5 * math.pi - theta if upright else theta
     sign = 1.0 if math.sin(angle) > 0.0 else -1.0  # the fit runs along +v, the normal may point along -v
     p, q, r = pixel_line(rho, angle, view.intrinsics)
-    width = view.mask.shape[1]
+    width = view.width
     columns = (0.0, width - 1.0)
     if span is not None:
         fx, _, cx, _ = view.intrinsics
@@ -124,13 +124,12 @@ class _Fit:
 def _fit(
     strip: Strip, admissible: np.ndarray, direction: np.ndarray | None, polarity: int, config: LineConfig, scale: float
 ) -> _Fit | None:
-    gradient = strip.gradient()
     if direction is None:
-        direction = _best_direction(gradient, admissible, polarity)
+        direction = _best_direction(strip.gradient(), admissible, polarity)
     norm = float(np.linalg.norm(direction))
     if norm < _STEP_MIN:
         return None
-    response = gradient @ (direction / np.float32(norm))
+    response = strip.response((direction / norm).astype(np.float32))
     response *= admissible
     rows, good = strip.peaks(response, max(_STEP_SHARE * norm, _FAINT_SHARE * config.contrast_min))
     if int(good.sum()) < config.min_profiles:
@@ -150,7 +149,7 @@ def _fit(
         return None
     result = robust_line(u[support], rows[support])
     before, behind = strip.sides(rows)
-    step = np.median(behind[support] - before[support], axis=0)
+    step = column_median(behind[support].astype(np.float32) - before[support])
     if float(np.linalg.norm(step)) < config.contrast_min:
         return None
     return _Fit(*result[:4], support, visible, run, result[4], step)
@@ -164,9 +163,9 @@ def _best_direction(gradient: np.ndarray, admissible: np.ndarray, polarity: int)
     index = np.argmax(strength, axis=1)
     found = gradient[np.arange(len(index)), index]
     weight = strength[np.arange(len(index)), index]
-    used = weight > 0.5 * np.median(weight)
+    used = weight > 0.5 * median(weight)
     # 2.5 turns a gradient's peak into the size of the step: a blur of 0.7 px leaves 0.4 of it
-    return 2.5 * np.median(found[used], axis=0) if used.any() else np.zeros(3, np.float32)
+    return 2.5 * column_median(found[used]) if used.any() else np.zeros(3, np.float32)
 
 
 def _finish(
@@ -213,7 +212,7 @@ def _finish(
         theta=angle,
         covariance=jacobian @ covariance @ jacobian.T,
         segment=segment[:, ::-1].copy() if upright else segment,
-        ends=_end_reasons(fit, strip, columns, view.mask.shape),
+        ends=_end_reasons(fit, strip, columns, (view.height, view.width)),
         inlier_share=float(fit.support.sum())
         / max(int(np.count_nonzero(seen | fit.support[fit.run[0] : fit.run[1] + 1])), 1),
         rms_px=fit.rms,
@@ -229,14 +228,12 @@ def _end_reasons(fit: _Fit, strip: Strip, columns: tuple[float, float], shape: t
     width = shape[1]
     last = len(strip.u) - 1
     reasons = []
-    for index, neighbour, cut in (
-        (fit.run[0], fit.run[0] - 1, columns[0] > 0.0),
-        (fit.run[1], fit.run[1] + 1, columns[1] < width - 1.0),
-    ):
+    for neighbour, cut in ((fit.run[0] - 1, columns[0] > 0.0), (fit.run[1] + 1, columns[1] < width - 1.0)):
         if neighbour < 0 or neighbour > last:
             reasons.append("span" if cut else "picture")
-        else:
-            beyond = fit.level + fit.slope * (strip.u[neighbour] - fit.center)
-            outside = not 0.0 <= beyond <= shape[0] - 1.0
-            reasons.append("picture" if outside else ("end" if fit.visible[neighbour] else "mask"))
+            continue
+        beyond = fit.level + fit.slope * (strip.u[neighbour] - fit.center)
+        margin = strip.side + 2
+        outside = not margin <= beyond <= shape[0] - 1.0 - margin
+        reasons.append("picture" if outside else ("end" if fit.visible[neighbour] else "mask"))
     return reasons[0], reasons[1]

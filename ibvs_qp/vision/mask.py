@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import cv2
 import numpy as np
 
@@ -37,7 +39,7 @@ def vehicle_mask(
     mask = np.zeros(shape, np.uint8)
     tip = np.asarray(vehicle.tip_position_m, float)
     axis = np.array([1.0, 0.0, 0.0])
-    _fill_rod(mask, vehicle, intrinsics, np.zeros(3) + [0.0, tip[1], tip[2]], tip, vehicle.arm_radius_m)
+    _fill_rod(mask, vehicle, intrinsics, np.array([0.0, tip[1], tip[2]]), tip, vehicle.arm_radius_m)
     _fill_rod(mask, vehicle, intrinsics, tip - config.brush_length_m * axis, tip, 0.5 * brush_width_m)
     for hub, thrust_axis in zip(vehicle.geometry.positions, vehicle.geometry.axes, strict=True):
         disc = _circle(hub, thrust_axis, vehicle.propeller_radius_m)
@@ -82,7 +84,7 @@ def _fill_rod(
         _project(_circle(start + share * (end - start), axis, radius), vehicle, intrinsics)
         for share in np.linspace(0.0, 1.0, _STATIONS)
     ]
-    for one, two in zip(sections[:-1], sections[1:], strict=True):
+    for one, two in itertools.pairwise(sections):
         _fill_hull(mask, np.vstack((one, two)))
 
 

@@ -54,7 +54,14 @@ def _draw_track(picture: np.ndarray, track: TrackState, ends: np.ndarray) -> Non
     middle = ends.mean(axis=0)
     side = track.surface_side * np.array([np.cos(track.theta), np.sin(track.theta)])
     tip = middle + _TICK_PX * side
-    cv2.line(picture, tuple(np.round(middle).astype(int).tolist()), tuple(np.round(tip).astype(int).tolist()), color, 2, cv2.LINE_AA)
+    cv2.line(
+        picture,
+        tuple(np.round(middle).astype(int).tolist()),
+        tuple(np.round(tip).astype(int).tolist()),
+        color,
+        2,
+        cv2.LINE_AA,
+    )
     name = f" {track.hint}" if track.hint else ""
     _write(picture, f"{track.track_id} {track.kind} {track.weight:.1f}{name}", (int(middle[0]) + 6, int(middle[1]) - 6))
 

@@ -24,6 +24,8 @@ from ibvs_qp.vision.plane import PlaneEstimate, PlaneFitter
 from ibvs_qp.vision.seeds import seed_cells
 from ibvs_qp.vision.tracks import LineTracker
 
+#: Pictures after a start in which lines are searched often: colours are learned in the first one.
+_WARM_UP = 8
 _CvError = cv2.error
 
 
@@ -53,7 +55,7 @@ class Perception:
             part.reset()
         self._plane: PlaneEstimate | None = None
         self._stamp_ns: int | None = None
-        self._since_detection = self._config.detect.period
+        self._since_detection, self._frames = self._config.detect.period, 0
 
     def process(
         self,
@@ -116,7 +118,7 @@ class Perception:
         before = None if self._plane is None else self._plane.inverse_depth
         coarse = self._grid.sample(frame.rgb)
         labels = self._colors.label(coarse)
-        refused = self._fit_plane(frame, motion, labels, down, seed_pixel)
+        refused = self._fit_plane(frame, motion, labels, coarse, down, seed_pixel)
         if self._plane is not None:
             labels = np.where(self._plane.component, np.maximum(labels, 1), 0)
         clock.lap("plane")
@@ -161,6 +163,7 @@ class Perception:
         frame: RgbdFrame,
         motion: CameraMotion,
         labels: np.ndarray,
+        coarse: np.ndarray,
         down: np.ndarray | None,
         seed_pixel: tuple[float, float] | None,
     ) -> str | None:
@@ -188,7 +191,13 @@ class Perception:
                 self._plane = None
                 return f"seed pixel ({u:g}, {v:g}) lies outside the picture"
             seeds = [cell]
-        found = self._fitter.search(self._grid, inverse, seeds, down, prefer)
+        # a wall a few centimetres behind differs in colour, hardly in depth: before the board is known, the colour
+        # around each seed stands for it
+        wanted = [
+            self._colors.like_around(self._grid, coarse, seed, config.seed_radius) if prefer is None else prefer
+            for seed in seeds
+        ]
+        found = self._fitter.search(self._grid, inverse, seeds, down, wanted)
         self._plane = found if isinstance(found, PlaneEstimate) else None
         return None if isinstance(found, PlaneEstimate) else found
 
@@ -203,9 +212,12 @@ class Perception:
     ) -> list[Candidate]:
         """Search for lines when it is time to, or when asked."""
         self._since_detection += 1
+        self._frames += 1
         settings = self._config.detect
         confirmed = any(track.confirmed for track in self._tracker.tracks)
-        due = self._since_detection >= (settings.period if confirmed else settings.lost_period)
+        due = self._since_detection >= (
+            settings.period if confirmed and self._frames > _WARM_UP else settings.lost_period
+        )
         if self._plane is None or not (due or wanted):
             return []
         self._since_detection = 0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,30 +13,61 @@ from ibvs_qp.vision.mask import Intrinsics
 
 @dataclass(frozen=True, kw_only=True)
 class Picture:
-    """A colour picture with the vehicle's mask.
+    """A colour picture with the vehicle's mask, addressed by flat index so that a transposed view costs nothing.
 
     Attributes:
-        rgb: uint8 (H, W, 3).
-        mask: uint8 (H, W), non-zero where the vehicle hides the view.
-        intrinsics: (fx, fy, cx, cy) [px].
+        colors: RGB of every pixel, uint8 (H W, 3).
+        hidden: Non-zero where the vehicle hides the view, uint8 (H W,).
+        rgb: The picture itself, uint8 (H, W, 3).
+        mask: The mask itself, uint8 (H, W).
+        height: Rows of this view.
+        width: Columns of this view.
+        row_step: Flat distance of rows of this view.
+        column_step: Flat distance of columns of this view.
+        intrinsics: (fx, fy, cx, cy) of this view [px].
         scale: Factor for settings in pixels of a 640 wide picture.
     """
 
+    colors: np.ndarray
+    hidden: np.ndarray
     rgb: np.ndarray
     mask: np.ndarray
+    height: int
+    width: int
+    row_step: int
+    column_step: int
     intrinsics: Intrinsics
     scale: float
 
     @classmethod
     def of(cls, rgb: np.ndarray, mask: np.ndarray, intrinsics: Intrinsics) -> Picture:
         """Wrap a picture, its scale taken from its width."""
-        return cls(rgb=rgb, mask=mask, intrinsics=intrinsics, scale=max(rgb.shape[:2]) / REFERENCE_WIDTH)
+        height, width = mask.shape
+        return cls(
+            colors=np.ascontiguousarray(rgb).reshape(-1, 3),
+            hidden=np.ascontiguousarray(mask).ravel(),
+            rgb=rgb,
+            mask=mask,
+            height=height,
+            width=width,
+            row_step=width,
+            column_step=1,
+            intrinsics=intrinsics,
+            scale=max(height, width) / REFERENCE_WIDTH,
+        )
 
     @property
     def transposed(self) -> Picture:
-        """View with rows and columns swapped (no copy): upright lines become level."""
+        """View with rows and columns swapped: upright lines become level."""
         fx, fy, cx, cy = self.intrinsics
-        return Picture(rgb=self.rgb.transpose(1, 0, 2), mask=self.mask.T, intrinsics=(fy, fx, cy, cx), scale=self.scale)
+        return replace(
+            self,
+            height=self.width,
+            width=self.height,
+            row_step=self.column_step,
+            column_step=self.row_step,
+            intrinsics=(fy, fx, cy, cx),
+        )
 
 
 def pixel_line(rho: float, theta: float, intrinsics: Intrinsics) -> tuple[float, float, float]:

@@ -20,6 +20,8 @@ _JUDGED = 1000
 _NEAR = 0.25
 #: Share of the coarse gate within which a sample votes for a hypothesis.
 _VOTE = 0.6
+#: Smallest determinant of the normal matrix, share of the product of its diagonal.
+_FLAT = 1e-6
 #: Turns a median absolute deviation into a standard deviation of a normal distribution.
 _MAD = 1.4826
 
@@ -71,7 +73,7 @@ class PlaneFitter:
         inverse: np.ndarray,
         seeds: list[tuple[int, int]],
         down: np.ndarray | None,
-        prefer: np.ndarray | None,
+        prefer: list[np.ndarray] | None,
     ) -> PlaneEstimate | str:
         """Find the surface without a prediction.
 
@@ -80,7 +82,7 @@ class PlaneFitter:
             inverse: 1/Z of the samples [1/m], 0 where absent, (rows, columns).
             seeds: Cells on which the surface may lie; the nearest valid one is taken: a brush meets it first.
             down: Gravity's direction in C, unit, (3,), or None if unknown.
-            prefer: Samples of the surface's colour, bool (rows, columns), or None.
+            prefer: Samples of the surface's colour for each seed, bool (rows, columns) each, or None.
 
         Returns:
             The surface, or the reason why there is none.
@@ -89,11 +91,12 @@ class PlaneFitter:
         order = sorted((index for index, value in enumerate(values) if value > 0), key=lambda index: -values[index])
         reason = "no valid depth around the seed"
         for index in order:
-            start = self._hypothesis(grid, inverse, seeds[index], values[index], down)
+            wanted = None if prefer is None else prefer[index]
+            start = self._hypothesis(grid, inverse, seeds[index], values[index], down, wanted)
             if start is None:
                 reason = "no plane through the seed stands upright and faces the camera"
                 continue
-            result = self._refine(grid, inverse, start, seeds[index], down, prefer)
+            result = self._refine(grid, inverse, start, seeds[index], down, wanted)
             if isinstance(result, PlaneEstimate):
                 return result
             reason = result
@@ -117,13 +120,22 @@ class PlaneFitter:
         return median(window) if len(window) >= 2 * self._config.seed_radius + 1 else 0.0
 
     def _hypothesis(
-        self, grid: CoarseGrid, inverse: np.ndarray, seed: tuple[int, int], value: float, down: np.ndarray | None
+        self,
+        grid: CoarseGrid,
+        inverse: np.ndarray,
+        seed: tuple[int, int],
+        value: float,
+        down: np.ndarray | None,
+        prefer: np.ndarray | None,
     ) -> np.ndarray | None:
         """Best of many planes through the seed and two random samples near it."""
         config, design, flat = self._config, grid.design, inverse.ravel()
         origin = design[seed[0] * grid.shape[1] + seed[1]]
         square = (design[:, 0] - origin[0]) ** 2 + (design[:, 1] - origin[1]) ** 2
-        near = np.flatnonzero((flat > 0) & grid.free.ravel() & (square < config.seed_reach**2))
+        usable = (flat > 0) & grid.free.ravel() & (square < config.seed_reach**2)
+        if prefer is not None and int((usable & prefer.ravel()).sum()) >= config.min_samples:
+            usable &= prefer.ravel()
+        near = np.flatnonzero(usable)
         if len(near) < config.min_samples:
             return None
         judged = near[:: max(1, len(near) // _JUDGED)]
@@ -179,7 +191,7 @@ class PlaneFitter:
             gate = min(max(config.fine_gate_sigmas * sigma, config.fine_gate_low), config.fine_gate_high)
             chosen = design[component]
             normal_matrix = chosen.T @ chosen
-            if np.linalg.cond(normal_matrix) > 1e8:
+            if np.linalg.det(normal_matrix) < _FLAT * np.prod(np.diag(normal_matrix)):
                 return "samples on the surface lie on one line"
             plane = np.linalg.solve(normal_matrix, chosen.T @ flat[component])
         if not bool(self._upright(plane[None], down)[0]):

@@ -51,7 +51,7 @@ class Strip:
         reach: int,
     ) -> Strip | None:
         """Read the strip within `reach` rows of the line between two columns; None if it misses the picture."""
-        height, width = picture.mask.shape
+        height, width = picture.height, picture.width
         first, last = max(span[0], 0.0), min(span[1], width - 1.0)
         if last - first < profiles // 8:
             return None
@@ -61,9 +61,10 @@ class Strip:
         base = np.round(-(p * u + r) / q).astype(np.intp)
         rows = base[:, None] + np.arange(-reach - side, reach + side + 1)
         outside = (rows < 0) | (rows >= height)
-        np.clip(rows, 0, height - 1, out=rows)
-        colors = picture.rgb[rows, u[:, None]].astype(np.float32)
-        hidden = (picture.mask[rows, u[:, None]] != 0) | outside
+        np.minimum(np.maximum(rows, 0, out=rows), height - 1, out=rows)
+        place = rows * picture.row_step + (u * picture.column_step)[:, None]
+        colors = picture.colors.take(place, axis=0)
+        hidden = (picture.hidden.take(place) != 0) | outside
         return cls(u=u, base=base, colors=colors, hidden=hidden, reach=reach, side=side)
 
     @property
@@ -75,8 +76,14 @@ class Strip:
     def gradient(self) -> np.ndarray:
         """Central differences along +v of the three channels, (K, 2 reach + 1, 3) [grey levels per px]."""
         cut = self.side - 1
-        inner = self.colors[:, cut : self.colors.shape[1] - cut]
+        inner = self.colors[:, cut : self.colors.shape[1] - cut].astype(np.float32)
         return 0.5 * (inner[:, 2:] - inner[:, :-2])
+
+    def response(self, direction: np.ndarray) -> np.ndarray:
+        """Central differences along +v of the colours' projection on a unit direction, (K, 2 reach + 1)."""
+        cut = self.side - 1
+        mixed = self.colors[:, cut : self.colors.shape[1] - cut].astype(np.float32) @ (0.5 * direction)
+        return mixed[:, 2:] - mixed[:, :-2]
 
     def admissible(self, expected: Expected, colors: SurfaceColors) -> np.ndarray:
         """Places whose two sides look as expected and are not hidden, bool (K, 2 reach + 1)."""
@@ -89,7 +96,7 @@ class Strip:
         surface, other = (behind, before) if expected.side > 0 else (before, behind)
         if expected.kind == "paint":
             return allowed & (surface == BOARD) & (other == PAINT) if colors.paint_distinct else allowed
-        return allowed & (surface != 0) & ((other == 0) | (other == surface))
+        return np.asarray(allowed & (surface != 0) & ((other == 0) | (other == surface)))
 
     def peaks(self, response: np.ndarray, threshold: float) -> tuple[np.ndarray, np.ndarray]:
         """Sub-pixel row of the strongest answer of every profile and whether it is strong enough, (K,), (K,).
@@ -101,7 +108,7 @@ class Strip:
         offset = np.arange(-reach, reach + 1)
         preference = np.exp(-0.5 * (offset / max(_PREFERENCE * reach, 1.0)) ** 2)
         index = np.argmax(response * preference, axis=1)
-        inner = np.clip(index, 1, 2 * reach - 1)
+        inner = np.minimum(np.maximum(index, 1), 2 * reach - 1)
         k = np.arange(len(index))
         peak = response[k, inner]
         good = (index == inner) & (peak > threshold)
@@ -109,11 +116,13 @@ class Strip:
         before, middle, behind = (np.log(np.maximum(response[k, inner + step], floor)) for step in (-1, 0, 1))
         curvature = before - 2.0 * middle + behind
         shift = np.where(curvature < -1e-6, 0.5 * (before - behind) / np.minimum(curvature, -1e-6), 0.0)
-        return self.base + offset[inner] + np.clip(shift, -0.7, 0.7), good
+        return self.base + offset[inner] + np.minimum(np.maximum(shift, -0.7), 0.7), good
 
     def sides(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Colours before and behind given rows, each (K, 3)."""
         middle = self.reach + self.side
         index = np.round(rows).astype(np.intp) - self.base + middle
         k, last = np.arange(len(index)), self.colors.shape[1] - 1
-        return self.colors[k, np.clip(index - self.side, 0, last)], self.colors[k, np.clip(index + self.side, 0, last)]
+        before = np.minimum(np.maximum(index - self.side, 0), last)
+        behind = np.minimum(np.maximum(index + self.side, 0), last)
+        return self.colors[k, before], self.colors[k, behind]

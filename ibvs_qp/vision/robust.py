@@ -21,6 +21,12 @@ def median(values: np.ndarray) -> float:
     return float(np.partition(values, middle)[middle])
 
 
+def column_median(values: np.ndarray) -> np.ndarray:
+    """Upper median of every column of (n, m)."""
+    middle = len(values) // 2
+    return np.partition(values, middle, axis=0)[middle]
+
+
 def consensus_line(u: np.ndarray, v: np.ndarray, gate: float) -> tuple[float, float] | None:
     """Line v = level + slope u that most points agree with, from fixed pairs half the points apart.
 

@@ -242,7 +242,7 @@ class LineTracker:
         return bool(min(range_one.max(), range_two.max()) > max(range_one.min(), range_two.min()))
 
     def _distance_px(self, track: Track, hint: LineHint, picture: Picture) -> float:
-        """Distance of a track from a hint at the middle of its segment [px at 640]; infinite if it is something else."""
+        """Distance of a track from a hint at the middle of its segment [px at 640]; infinite for another thing."""
         if hint.kind and track.kind != hint.kind:
             return math.inf
         agreement = math.cos(track.theta - hint.theta)
