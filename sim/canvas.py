@@ -121,9 +121,7 @@ class Canvas:
         np.maximum(patch, stamp[r0 - top : r1 - top, c0 - left : c1 - left], out=patch)
         old = self._dirty
         self._dirty = (
-            (r0, r1, c0, c1)
-            if old is None
-            else (min(old[0], r0), max(old[1], r1), min(old[2], c0), max(old[3], c1))
+            (r0, r1, c0, c1) if old is None else (min(old[0], r0), max(old[1], r1), min(old[2], c0), max(old[3], c1))
         )
 
     def flush(self) -> np.ndarray:

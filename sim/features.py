@@ -137,10 +137,9 @@ class GeometricFeatures:
             piece = max(np.split(np.flatnonzero(seen), breaks), key=len)
             if len(piece) < 2:
                 continue
-            slope, level = np.polyfit(points[piece, 0], points[piece, 1], 1)
-            along = points[[piece[0], piece[-1]], 0]
-            ends = view.to_camera(self._world(along, level + slope * along))
-            above = view.to_camera(self._world(along, level + slope * along + _ABOVE_M)).mean(axis=0)
+            along, height = _fitted_ends(points[piece])
+            ends = view.to_camera(self._world(along, height))
+            above = view.to_camera(self._world(along, height + _ABOVE_M)).mean(axis=0)
             visible = self._visible(ends)
             lines.append(self._line(visible, above, HORIZONTAL, "paint", _FIRST_ROW_TRACK + row, stamp_ns))
         return lines
@@ -218,6 +217,15 @@ class GeometricFeatures:
             distance += SIGMA_DISTANCE_M * self._rng.standard_normal()
         a, b, c = (float(entry) for entry in normal / distance)
         return a, b, c
+
+
+def _fitted_ends(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Least-squares line up(along) through points (n, 2), as (along, up) of its two ends, (2,) each."""
+    middle, height = points.mean(axis=0)
+    away = points[:, 0] - middle
+    slope = float(away @ points[:, 1]) / float(away @ away)
+    along = points[[0, -1], 0]
+    return along, height + slope * (along - middle)
 
 
 def _moved(line: LineFeature, rho: float, theta: float) -> LineFeature:

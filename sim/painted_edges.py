@@ -26,6 +26,7 @@ class PaintedEdges:
 
     def __init__(self, scene: Scene) -> None:
         self._geometry = BoardGeometry(scene)
+        self._first_height = self._geometry.row_height(1)
         self._radius, self._rows = 0.5 * scene.paint.brush_width_m, scene.paint.rows
         self._bins = math.ceil(scene.board.width_m / BIN_M)
         self._top = np.full((self._rows + 1, self._bins), -math.inf)
@@ -39,20 +40,21 @@ class PaintedEdges:
             return
         if a0 > a1:
             a0, u0, a1, u1 = a1, u1, a0, u0
-        first, last = max(0, math.floor(a0 / BIN_M)), min(self._bins - 1, math.floor(a1 / BIN_M))
-        places = np.clip((np.arange(first, last + 1) + 0.5) * BIN_M, a0, a1)
-        heights = u0 + (places - a0) / (a1 - a0) * (u1 - u0)
         paint = self._geometry.scene.paint
-        row = round((0.5 * (u0 + u1) - self._geometry.row_height(1)) / paint.pitch_m) + 1
-        row = min(max(row, 1), self._rows)
-        bins = self._top[row, first : last + 1]
-        np.maximum(bins, heights + self._radius, out=bins)
+        row = round((0.5 * (u0 + u1) - self._first_height) / paint.pitch_m) + 1
+        top = self._top[min(max(row, 1), self._rows)]
+        first, last = max(0, math.floor(a0 / BIN_M)), min(self._bins - 1, math.floor(a1 / BIN_M))
+        for k in range(first, last + 1):  # mostly a single bin: plain floats beat arrays
+            place = min(max((k + 0.5) * BIN_M, a0), a1)
+            height = u0 + (place - a0) / (a1 - a0) * (u1 - u0) + self._radius
+            if height > top[k]:
+                top[k] = height
 
     def exposed(self, row: int) -> np.ndarray:
         """Points (along, up) [m] of a row's upper edge that no later row covers, in order along the board, (n, 2)."""
-        painted = np.isfinite(self._top[row])
+        painted = self._top[row] > -math.inf
         reach = math.ceil(self._radius / BIN_M)
-        later = np.isfinite(self._top[row + 1 :]).any(axis=0)
+        later = (self._top[row + 1 :] > -math.inf).any(axis=0)
         covered = np.convolve(later, np.ones(2 * reach + 1), mode="same") > 0.5
         bins = np.flatnonzero(painted & ~covered)
         return np.column_stack(((bins + 0.5) * BIN_M, self._top[row, bins]))

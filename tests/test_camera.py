@@ -89,7 +89,8 @@ def test_bottom_edge_lies_where_geometry_puts_it(slope: float, pose: Pose) -> No
 
 
 @pytest.mark.parametrize(
-    ("slope", "angles"), [(0.0, (0.0, 0.0, 0.0)), (0.0, (2.0, 1.0, 6.0)), (0.0, (-4.0, 0.0, -7.0)), (-3.0, (1.0, 0.0, 2.0))]
+    ("slope", "angles"),
+    [(0.0, (0.0, 0.0, 0.0)), (0.0, (2.0, 1.0, 6.0)), (0.0, (-4.0, 0.0, -7.0)), (-3.0, (1.0, 0.0, 2.0))],
 )
 def test_left_edge_lies_where_geometry_puts_it(slope: float, angles: tuple[float, float, float]) -> None:
     scene = sloped(PLAIN, slope)

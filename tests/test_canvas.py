@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 
 import numpy as np
 import pytest
@@ -30,7 +31,7 @@ def canvas() -> Canvas:
 def test_stroke_width_and_edges_to_a_tenth_of_a_pixel(canvas: Canvas, up: float) -> None:
     along = np.linspace(0.1, 0.5, 1001)  # 0.4 mm a step: 0.1 m/s at 250 Hz
     canvas.stroke(None, (along[0], up))
-    for start, stop in zip(along[:-1], along[1:], strict=True):
+    for start, stop in itertools.pairwise(along):
         canvas.stroke((start, up), (stop, up))
     middle = canvas.coverage[:, 200:400]  # clear of both caps
     width = middle.sum(axis=0)  # summed coverage is the width in pixels

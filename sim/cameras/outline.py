@@ -104,9 +104,7 @@ def _box(polygon: np.ndarray, width: int, height: int, margin: int) -> tuple[int
     return max(0, int(low[1])), min(height, int(high[1])), max(0, int(low[0])), min(width, int(high[0]))
 
 
-def cut_lines(
-    polygon: np.ndarray, width: int, height: int
-) -> tuple[list[CutLine], tuple[int, int, int, int] | None]:
+def cut_lines(polygon: np.ndarray, width: int, height: int) -> tuple[list[CutLine], tuple[int, int, int, int] | None]:
     """Lines of a convex outline that cut the picture, and the box of the board in view.
 
     Args:

@@ -106,9 +106,7 @@ class PlaneCamera:
         back[:, 2] += back[:, 0] * c0 + back[:, 1] * r0
         size = (c1 - c0, r1 - r0)
         # A constant border is the only fast one: the others cost five times as much wherever they are needed.
-        cv2.warpPerspective(
-            texture, back, size, target[r0:r1, c0:c1], _WARP, cv2.BORDER_CONSTANT, self._plain_wall
-        )
+        cv2.warpPerspective(texture, back, size, target[r0:r1, c0:c1], _WARP, cv2.BORDER_CONSTANT, self._plain_wall)
 
     def _plane(self, view: View, x_m: float, common: float, box: Box, target: np.ndarray) -> None:
         # The common-mode error is applied as a scale, which equals the offset at the picture's centre.
@@ -165,5 +163,3 @@ def _bounding_box(mask: np.ndarray) -> Box | None:
         return None
     left, top, width, height = cv2.boundingRect(mask)
     return top, top + height, left, left + width
-
-
