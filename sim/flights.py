@@ -82,10 +82,28 @@ def _tell_end(law: str, trace: Trace, progress: LawProgress) -> None:
 
 def _fly_apart(scene: Scene, jobs: dict[str, FlightOptions], progress: LawProgress) -> dict[str, Flight]:
     """One process per law. Ctrl-C reaches this process alone, which passes it on once and collects what was flown."""
-    context = multiprocessing.get_context("spawn")
     pipes: dict[Connection, str] = {}
     processes: list[BaseProcess] = []
-    # Blocked while the children start, so that they inherit a mask under which no signal can hit their imports.
+    flights: dict[str, Flight] = {}
+    try:
+        with _interrupt_passed_on(processes):
+            _start(scene, jobs, pipes, processes)
+            while pipes:
+                for pipe in wait(list(pipes)):
+                    _receive(pipe, pipes, flights, progress)  # type: ignore[arg-type]
+    finally:
+        for process in processes:
+            if pipes:
+                process.terminate()
+            process.join()
+    return {law: flights[law] for law in jobs if law in flights}
+
+
+def _start(
+    scene: Scene, jobs: dict[str, FlightOptions], pipes: dict[Connection, str], processes: list[BaseProcess]
+) -> None:
+    """Start a process per job; Ctrl-C is blocked so that it cannot hit their imports."""
+    context = multiprocessing.get_context("spawn")
     signal.pthread_sigmask(signal.SIG_BLOCK, _SIGINT)
     try:
         for law, job in jobs.items():
@@ -97,18 +115,6 @@ def _fly_apart(scene: Scene, jobs: dict[str, FlightOptions], progress: LawProgre
             processes.append(process)
     finally:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, _SIGINT)
-    flights: dict[str, Flight] = {}
-    try:
-        with _interrupt_passed_on(processes):
-            while pipes:
-                for pipe in wait(list(pipes)):
-                    _receive(pipe, pipes, flights, progress)  # type: ignore[arg-type]
-    finally:
-        for process in processes:
-            if pipes:
-                process.terminate()
-            process.join()
-    return {law: flights[law] for law in jobs if law in flights}
 
 
 @contextlib.contextmanager

@@ -203,7 +203,9 @@ def _paint(out: Path, *words: str) -> list[str]:
 def test_ctrl_c_ends_both_processes_with_a_partial_run(tmp_path):
     """The signal goes to the parent alone, as a terminal's does once the children have their own group."""
     process = subprocess.Popen(_paint(tmp_path / "run", "--no-video"), stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-    time.sleep(6.0)
+    while not (tmp_path / "run").exists() and process.poll() is None:
+        time.sleep(0.1)
+    time.sleep(4.0)
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=120)
     assert process.returncode == 130, err.decode()

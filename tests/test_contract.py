@@ -35,7 +35,8 @@ FIELDS = {
     "SensorFrame": "stamp_ns attitude angular_velocity specific_force wrench wrench_stamp_ns image features",
     "RgbdFrame": "rgb depth intrinsics stamp_ns",
     "FeatureFrame": "lines plane stamp_ns",
-    "ControllerConfig": "vehicle gains weights limits solver impedance contact_feedforward touch_ramp reach_check barriers",
+    "ControllerConfig": "vehicle gains weights limits solver impedance contact_feedforward touch_ramp reach_check "
+    "barriers",
     "PilotConfig": "controller camera vision estimation painting law",
 }
 
