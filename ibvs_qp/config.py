@@ -18,9 +18,9 @@ from ibvs_qp.vehicle import VehicleParams
 class Gains:
     """Feedback gains, the same object for both laws."""
 
-    line_kp: float = setting(6.0, "line error to image acceleration", unit="1/s^2", low=0.0, high=200.0)
-    line_kd: float = setting(4.5, "line error rate", unit="1/s", low=0.0, high=100.0)
-    line_ki: float = setting(1.5, "integral of the line error", unit="1/s^3", low=0.0, high=100.0)
+    line_kp: float = setting(12.0, "line error to image acceleration", unit="1/s^2", low=0.0, high=200.0)
+    line_kd: float = setting(6.0, "line error rate", unit="1/s", low=0.0, high=100.0)
+    line_ki: float = setting(3.0, "integral of the line error", unit="1/s^3", low=0.0, high=100.0)
     theta_kp: float = setting(25.0, "line angle error", unit="1/s^2", low=0.0, high=400.0)
     theta_kd: float = setting(10.0, "line angle rate", unit="1/s", low=0.0, high=100.0)
     line_turn_share: float = setting(

@@ -88,8 +88,8 @@ RIGHT_EDGE_GATE = 0.06
 SLIDE_SPEED = 0.01
 #: Share of a stroke after which its end may come.
 LEAST_STROKE = 0.5
-#: How far past the expected end a row may run before it ends all the same [m].
-OVERRUN = 0.02
+#: How far past its nominal length row 1 may run in search of its end [m].
+OVERRUN = 0.10
 #: Stiction may keep the tip from the last millimetres; a stop settles for this long at most [s].
 SETTLE_TIME = 0.8
 #: Position hold along the wall by the odometer [1/s], speed-limited [m/s].
@@ -337,7 +337,7 @@ class Painter:
             return travel * (edge.offset - wanted), edge
         self._edge_id, self._edge_target = -1, None
         if self.row == 1:
-            return ahead + config.stroke_m, None  # the stroke ends at the edge, however long it is
+            return ahead + OVERRUN, None  # the stroke ends at the edge, which may come a little late
         return ahead, None
 
     def _stop_edge(

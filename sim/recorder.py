@@ -81,7 +81,7 @@ class Recorder:
         )
         self._note_events(time_s, command)
         if frame.image is not None and pilot.percept is not None:
-            self._vision.append(pilot.percept.time_ms)
+            self._vision.append(sum(pilot.percept.time_ms.values()))
             if self._options.video and time_s >= self._next_picture:
                 from ibvs_qp.vision.overlay import draw_overlay
 

@@ -58,6 +58,22 @@ class DelayedKalman:
         self.covariance[:, index] = 0.0
         self.covariance[index, index] = std * std
 
+    def set_path(self, index: int, value: float, stamp_ns: int, rates: np.ndarray, std: float) -> None:
+        """Set one entry at a past stamp and, where it differs, along the remembered motion of the other entries.
+
+        Args:
+            index: The entry.
+            value: Its value at the stamp.
+            stamp_ns: Time of capture.
+            rates: Entry per unit of the others, (n,): it moved by ``rates @ (x(t) - x(stamp))``.
+            std: Standard deviation.
+        """
+        past = self.at(stamp_ns)
+        path = np.zeros(HISTORY) if past is None else (self._history - past) @ rates
+        now = 0.0 if past is None else float((self.state - past) @ rates)
+        self.set_entry(index, value + now, std)
+        self._history[:, index] = value + path
+
     def at(self, stamp_ns: int) -> np.ndarray | None:
         """State remembered for a stamp (the nearest tick), None if it is not in the history."""
         age = self._age(stamp_ns)

@@ -22,7 +22,7 @@ LINE_NOISE = 1e-3
 LINE_STD, VELOCITY_STD = 3e-4, 2e-3
 #: Lines followed at once.
 SLOTS = 8
-#: A line unseen this long starts to fade, and is forgotten after the second time [s].
+#: A line this long without news starts to fade, and is forgotten after the second time [s]; counted from delivery.
 FADE_START, FADE_END = 0.10, 0.45
 #: Frames until a new line has full weight.
 FRAMES_TO_TRUST = 4
@@ -50,6 +50,7 @@ class TrackedLine:
     angle: float
     deviation: float
     seen_ns: int
+    news_ns: int = 0
     frames: int = 1
     offset: float = 0.0
     weight: float = 0.0
@@ -119,7 +120,7 @@ class WallMotion:
     def _refresh(self, stamp_ns: int) -> None:
         for key in list(self.lines):
             line = self.lines[key]
-            age = (stamp_ns - line.seen_ns) * 1e-9
+            age = (stamp_ns - line.news_ns) * 1e-9
             if age > FADE_END:
                 self._drop(key)
                 continue
@@ -183,6 +184,7 @@ class WallMotion:
         tracked.angle += ANGLE_GAIN * (angle - tracked.angle)
         tracked.frames += tracked.seen_ns != stamp
         tracked.seen_ns, tracked.deviation, tracked.source_weight = stamp, deviation, line.weight
+        tracked.news_ns = self._stamp
         tracked.theta_variance = float(line.covariance[1, 1])
         tracked.surface_side, tracked.kind = side, line.kind or tracked.kind
         self._filter.chain[_LINES + tracked.slot, _VELOCITY] = -math.cos(tracked.angle), -math.sin(tracked.angle)
@@ -201,16 +203,14 @@ class WallMotion:
         tracked = TrackedLine(
             track_id=line.track_id, role=line.role, slot=free[0], angle=angle, deviation=deviation, seen_ns=stamp
         )
+        tracked.news_ns = self._stamp
         self.lines[line.track_id] = tracked
         slot = _LINES + tracked.slot
         self._filter.chain[slot, _VELOCITY] = -math.cos(angle), -math.sin(angle)
-        past = self._filter.at(stamp)
-        moved = 0.0
-        if past is not None:  # what the line did between capture and now
-            step = self._filter.state[_ODOMETER] - past[_ODOMETER]
-            moved = -(math.cos(angle) * step[0] + math.sin(angle) * step[1])
-        self._filter.set_entry(slot, offset + float(moved), deviation + abs(float(moved)) * 0.1)
-        tracked.offset = offset + float(moved)
+        rates = np.zeros(_LINES + SLOTS)
+        rates[_ODOMETER] = -math.cos(angle), -math.sin(angle)
+        self._filter.set_path(slot, offset, stamp, rates, deviation)
+        tracked.offset = float(self._filter.state[slot])
         return tracked
 
     def feature(self, line: TrackedLine, axes: WallAxes, foot_distance: float, stamp_ns: int) -> LineFeature:
