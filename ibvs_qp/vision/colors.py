@@ -29,7 +29,7 @@ class SurfaceColors:
     def reset(self) -> None:
         """Forget the sampled colour of the board."""
         self.board = None if self._given is None else self._given.copy()
-        self._table: np.ndarray | None = None
+        self._table = np.zeros(0, np.uint8)
         self._table_board = np.zeros(3, np.float32)
 
     def learn(self, samples: np.ndarray) -> None:
@@ -51,7 +51,7 @@ class SurfaceColors:
         """OTHER, BOARD or PAINT for colours uint8 (..., 3); all OTHER while the board is unknown."""
         if self.board is None:
             return np.zeros(colors.shape[:-1], np.uint8)
-        if self._table is None or np.abs(self.board - self._table_board).max() > _TABLE_DRIFT:
+        if len(self._table) == 0 or np.abs(self.board - self._table_board).max() > _TABLE_DRIFT:
             self._make_table(self.board)
         coarse = (colors >> _TABLE_SHIFT).astype(np.intp)
         return self._table.take((coarse[..., 0] << 2 * _TABLE_BITS) + (coarse[..., 1] << _TABLE_BITS) + coarse[..., 2])

@@ -98,7 +98,7 @@ class SparseFlow:
             elif len(self._points) < config.min_points:
                 result = "too few points: nothing to follow"
             else:
-                result = self._follow(pyramid, excluded, intrinsics, interval, rotation, camera_position)
+                result = self._follow(tuple(pyramid), excluded, intrinsics, interval, rotation, camera_position)
         if isinstance(result, FlowVelocity):
             middle = self._stamp_ns + (stamp_ns - self._stamp_ns) // 2
             result = FlowVelocity(
@@ -138,10 +138,10 @@ class SparseFlow:
             self._pyramid[0],
             pyramid[0],
             self._points,
-            None,
+            self._points.copy(),
             winSize=window,
             maxLevel=_LEVELS,
-            criteria=criteria,  # type: ignore[call-overload]
+            criteria=criteria,
         )
         height, width = pyramid[0].shape
         place = np.round(moved).astype(np.intp)

@@ -100,7 +100,7 @@ def refine_line(
         return None
     admissible = strip.admissible(Expected(kind=kind, side=int(sign) * surface_side), colors)
     direction = None if step is None else sign * np.asarray(step, np.float32)
-    fit = _fit(strip, admissible, direction, int(sign) * polarity, config, view.scale)
+    fit = _fit(strip, admissible, direction, int(sign) * polarity, config, view.scale, kind)
     if fit is None:
         return None
     return _finish(fit, strip, view, columns, upright, sign, theta, config)
@@ -122,16 +122,26 @@ class _Fit:
 
 
 def _fit(
-    strip: Strip, admissible: np.ndarray, direction: np.ndarray | None, polarity: int, config: LineConfig, scale: float
+    strip: Strip,
+    admissible: np.ndarray,
+    direction: np.ndarray | None,
+    polarity: int,
+    config: LineConfig,
+    scale: float,
+    kind: str,
 ) -> _Fit | None:
     if direction is None:
         direction = _best_direction(strip.gradient(), admissible, polarity)
     norm = float(np.linalg.norm(direction))
     if norm < _STEP_MIN:
         return None
-    response = strip.response((direction / norm).astype(np.float32))
+    # the border of the surface is known by its two sides; beyond it the wall may change its colour from brick to joint
+    bordering = strip.off is not None and kind == "board"
+    response = strip.strength() if bordering else strip.response((direction / norm).astype(np.float32))
     response *= admissible
-    rows, good = strip.peaks(response, max(_STEP_SHARE * norm, _FAINT_SHARE * config.contrast_min))
+    rows, good = strip.peaks(
+        response, max(0.0 if bordering else _STEP_SHARE * norm, _FAINT_SHARE * config.contrast_min)
+    )
     if int(good.sum()) < config.min_profiles:
         return None
     u = strip.u.astype(float)

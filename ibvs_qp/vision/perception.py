@@ -122,7 +122,8 @@ class Perception:
         if self._plane is not None:
             labels = np.where(self._plane.component, np.maximum(labels, 1), 0)
         clock.lap("plane")
-        picture = Picture.of(frame.rgb, self._mask, frame.intrinsics)
+        surface = None if self._plane is None else self._plane.inverse_depth
+        picture = Picture.of(frame.rgb, self._mask, frame.intrinsics, frame.depth, surface)
         self._tracker.advance(picture, motion, before, interval, self._colors, tilt)
         self._tracker.hints(hints, picture, self._colors, tilt)
         clock.lap("tracks")

@@ -26,6 +26,8 @@ class Picture:
         column_step: Flat distance of columns of this view.
         intrinsics: (fx, fy, cx, cy) of this view [px].
         scale: Factor for settings in pixels of a 640 wide picture.
+        depth: Depth of every pixel [m], (H W,), or None.
+        plane: (a, b, c) of the working surface in this view, or None.
     """
 
     colors: np.ndarray
@@ -38,9 +40,18 @@ class Picture:
     column_step: int
     intrinsics: Intrinsics
     scale: float
+    depth: np.ndarray | None = None
+    plane: tuple[float, float, float] | None = None
 
     @classmethod
-    def of(cls, rgb: np.ndarray, mask: np.ndarray, intrinsics: Intrinsics) -> Picture:
+    def of(
+        cls,
+        rgb: np.ndarray,
+        mask: np.ndarray,
+        intrinsics: Intrinsics,
+        depth: np.ndarray | None = None,
+        plane: np.ndarray | None = None,
+    ) -> Picture:
         """Wrap a picture, its scale taken from its width."""
         height, width = mask.shape
         return cls(
@@ -54,6 +65,8 @@ class Picture:
             column_step=1,
             intrinsics=intrinsics,
             scale=max(height, width) / REFERENCE_WIDTH,
+            depth=None if depth is None else np.ascontiguousarray(depth).ravel(),
+            plane=None if plane is None else (float(plane[0]), float(plane[1]), float(plane[2])),
         )
 
     @property
@@ -67,6 +80,7 @@ class Picture:
             row_step=self.column_step,
             column_step=self.row_step,
             intrinsics=(fy, fx, cy, cx),
+            plane=None if self.plane is None else (self.plane[1], self.plane[0], self.plane[2]),
         )
 
 

@@ -13,6 +13,8 @@ from ibvs_qp.vision.picture import Picture
 SIDE_PX = 4.0
 #: Width of the preference for the predicted place, share of the strip.
 _PREFERENCE = 0.6
+#: A reading farther from the surface than this share of depth is not on it (2.6 sigma of 0.5 % + 0.5 % noise).
+_OFF_PLANE = 0.018
 #: A neighbour's gradient counts at least this share of the peak, so that the logarithm stays tame.
 _FLOOR = 0.05
 
@@ -40,6 +42,7 @@ class Strip:
     hidden: np.ndarray
     reach: int
     side: int
+    off: np.ndarray | None
 
     @classmethod
     def gather(
@@ -65,13 +68,23 @@ class Strip:
         place = rows * picture.row_step + (u * picture.column_step)[:, None]
         colors = picture.colors.take(place, axis=0)
         hidden = (picture.hidden.take(place) != 0) | outside
-        return cls(u=u, base=base, colors=colors, hidden=hidden, reach=reach, side=side)
+        off = None
+        if picture.depth is not None and picture.plane is not None:
+            a, b, c = picture.plane
+            fx, fy, cx, cy = picture.intrinsics
+            relative = picture.depth.take(place) * (
+                rows * (b / fy) + (u * (a / fx) + (c - a * cx / fx - b * cy / fy))[:, None]
+            )
+            off = np.where(
+                relative > 0.0, np.abs(relative - 1.0) > _OFF_PLANE, False
+            )  # no reading: not known to be off
+        return cls(u=u, base=base, colors=colors, hidden=hidden, reach=reach, side=side, off=off)
 
     @property
     def visible(self) -> np.ndarray:
         """Profiles whose middle is neither hidden nor outside, bool (K,)."""
         middle = self.reach + self.side
-        return ~self.hidden[:, middle - 2 : middle + 3].any(axis=1)
+        return np.logical_not(self.hidden[:, middle - 2 : middle + 3].any(axis=1))
 
     def gradient(self) -> np.ndarray:
         """Central differences along +v of the three channels, (K, 2 reach + 1, 3) [grey levels per px]."""
@@ -96,7 +109,19 @@ class Strip:
         surface, other = (behind, before) if expected.side > 0 else (before, behind)
         if expected.kind == "paint":
             return allowed & (surface == BOARD) & (other == PAINT) if colors.paint_distinct else allowed
-        return np.asarray(allowed & (surface != 0) & ((other == 0) | (other == surface)))
+        same = other == surface
+        if self.off is not None:
+            before_off, behind_off = self.off[:, :-far], self.off[:, far:]
+            surface_off, other_off = (behind_off, before_off) if expected.side > 0 else (before_off, behind_off)
+            # joints of a wall may have the board's colour, but not its depth; lines on the board have both
+            allowed = allowed & ~surface_off
+            same &= other_off
+        return np.asarray(allowed & (surface != 0) & ((other == 0) | same))
+
+    def strength(self) -> np.ndarray:
+        """Size of the colour gradient along v, whatever its direction, (K, 2 reach + 1)."""
+        gradient = self.gradient()
+        return np.sqrt(np.einsum("kmi,kmi->km", gradient, gradient))
 
     def peaks(self, response: np.ndarray, threshold: float) -> tuple[np.ndarray, np.ndarray]:
         """Sub-pixel row of the strongest answer of every profile and whether it is strong enough, (K,), (K,).
