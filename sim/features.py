@@ -10,7 +10,6 @@ import math
 
 import numpy as np
 
-from ibvs_qp.frames import align_line
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL, FeatureFrame, LineFeature
 from ibvs_qp.vehicle import VehicleParams
 from sim.board import BoardGeometry
@@ -18,17 +17,22 @@ from sim.cameras.arm import vehicle_layer
 from sim.cameras.protocol import Schedule, camera_intrinsics
 from sim.cameras.view import View
 from sim.canvas import Canvas
+from sim.line_projection import (
+    NEAR_M,
+    SIGMA_RHO,
+    SIGMA_THETA,
+    fitted_ends,
+    moved_line,
+    projected_line,
+    visible_segment,
+)
 from sim.painted_edges import BIN_M, PaintedEdges
 from sim.scene import Scene
 
-#: Noise of rho [-] and theta [rad] of one line: a good sub-pixel fit (0.1 px, 0.06 deg) at 640x480.
-SIGMA_RHO, SIGMA_THETA = 2e-4, 1e-3
 #: Noise of the plane: distance [m] and direction of the normal [rad].
 SIGMA_DISTANCE_M, SIGMA_NORMAL = 0.001, math.radians(0.1)
 #: Noise of the velocity per axis [m/s].
 SIGMA_VELOCITY_M_S = 0.003
-#: Shortest visible piece that counts as a line, normalised (31 px at 640x480), and nearest depth drawn [m].
-_SHORTEST, _NEAR_M = 0.05, 0.05
 #: Track identities: board edges by name, rows from `_FIRST_ROW_TRACK`.
 BOARD_TRACKS = {"bottom": 1, "right": 2, "top": 3, "left": 4}
 _FIRST_ROW_TRACK = 10
@@ -118,10 +122,10 @@ class GeometricFeatures:
         surface = self._world(np.array(0.5 * width), np.array(0.5 * height))
         lines = []
         for name, (along, up) in ends.items():
-            piece = self._visible(view.to_camera(self._world(np.array(along), np.array(up))))
+            piece = visible_segment(view.to_camera(self._world(np.array(along), np.array(up))), self._half_view)
             role = HORIZONTAL if name in ("bottom", "top") else VERTICAL
             side = view.to_camera(surface)
-            lines.append(self._line(piece, side, role, "board", BOARD_TRACKS[name], stamp_ns))
+            lines.append(projected_line(piece, side, role, "board", BOARD_TRACKS[name], stamp_ns))
         return lines
 
     def _paint_lines(self, view: View, stamp_ns: int) -> list[LineFeature | None]:
@@ -137,11 +141,11 @@ class GeometricFeatures:
             piece = max(np.split(np.flatnonzero(seen), breaks), key=len)
             if len(piece) < 2:
                 continue
-            along, height = _fitted_ends(points[piece])
+            along, height = fitted_ends(points[piece])
             ends = view.to_camera(self._world(along, height))
             above = view.to_camera(self._world(along, height + _ABOVE_M)).mean(axis=0)
-            visible = self._visible(ends)
-            lines.append(self._line(visible, above, HORIZONTAL, "paint", _FIRST_ROW_TRACK + row, stamp_ns))
+            visible = visible_segment(ends, self._half_view)
+            lines.append(projected_line(visible, above, HORIZONTAL, "paint", _FIRST_ROW_TRACK + row, stamp_ns))
         return lines
 
     def _unhidden(self, spots: np.ndarray) -> np.ndarray:
@@ -150,61 +154,13 @@ class GeometricFeatures:
         height, width = self._hidden.shape
         with np.errstate(divide="ignore", invalid="ignore"):
             u, v = fx * spots[:, 0] / spots[:, 2] + cx, fy * spots[:, 1] / spots[:, 2] + cy
-        good = (spots[:, 2] > _NEAR_M) & (u >= 0) & (u <= width - 1) & (v >= 0) & (v <= height - 1)
+        good = (spots[:, 2] > NEAR_M) & (u >= 0) & (u <= width - 1) & (v >= 0) & (v <= height - 1)
         good[good] = self._hidden[np.rint(v[good]).astype(int), np.rint(u[good]).astype(int)] == 0
         return good
 
-    def _visible(self, ends: np.ndarray) -> np.ndarray | None:
-        """The part of a straight edge, end points in C, (2, 3), inside the field of view: normalised (2, 2) or None."""
-        low, high, step = 0.0, 1.0, ends[1] - ends[0]
-        x, y = self._half_view
-        for normal, least in (
-            ((0.0, 0.0, 1.0), _NEAR_M),
-            ((1.0, 0.0, x), 0.0),
-            ((-1.0, 0.0, x), 0.0),
-            ((0.0, 1.0, y), 0.0),
-            ((0.0, -1.0, y), 0.0),
-        ):
-            value, rate = float(np.dot(normal, ends[0])) - least, float(np.dot(normal, step))
-            if abs(rate) < 1e-12:
-                if value < 0.0:
-                    return None
-            elif rate > 0.0:
-                low = max(low, -value / rate)
-            else:
-                high = min(high, -value / rate)
-        if low >= high:
-            return None
-        points = ends[0] + np.array([[low], [high]]) * step
-        segment = points[:, :2] / points[:, 2:]
-        return segment if np.linalg.norm(segment[1] - segment[0]) >= _SHORTEST else None
-
-    def _line(
-        self, segment: np.ndarray | None, surface: np.ndarray, role: str, kind: str, track: int, stamp_ns: int
-    ) -> LineFeature | None:
-        if segment is None:
-            return None
-        (x1, y1), (x2, y2) = segment
-        theta = math.atan2(x1 - x2, y2 - y1)
-        rho, theta = align_line(
-            x1 * math.cos(theta) + y1 * math.sin(theta), theta, 0.5 * math.pi if role == HORIZONTAL else 0.0
-        )
-        side = np.dot((math.cos(theta), math.sin(theta), -rho), surface)  # times depth, so that its sign is kept
-        return LineFeature(
-            rho=rho,
-            theta=theta,
-            covariance=np.diag([SIGMA_RHO**2, SIGMA_THETA**2]),
-            role=role,
-            stamp_ns=stamp_ns,
-            track_id=track,
-            segment=segment,
-            surface_side=1 if side > 0.0 else -1,
-            kind=kind,
-        )
-
     def _blurred(self, line: LineFeature) -> LineFeature:
         rho, theta = self._rng.standard_normal(2) * (SIGMA_RHO, SIGMA_THETA)
-        return _moved(line, rho, theta)
+        return moved_line(line, rho, theta)
 
     def _plane(self, view: View) -> tuple[float, float, float]:
         inverse = view.plane(0.0)
@@ -219,25 +175,6 @@ class GeometricFeatures:
         return a, b, c
 
 
-def _fitted_ends(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Least-squares line up(along) through points (n, 2), as (along, up) of its two ends, (2,) each."""
-    middle, height = points.mean(axis=0)
-    away = points[:, 0] - middle
-    slope = float(away @ points[:, 1]) / float(away @ away)
-    along = points[[0, -1], 0]
-    return along, height + slope * (along - middle)
-
-
-def _moved(line: LineFeature, rho: float, theta: float) -> LineFeature:
-    """The line with rho and theta changed, its end points moved onto it."""
-    rho, theta = line.rho + rho, line.theta + theta
-    segment = line.segment
-    if segment is not None:
-        normal = np.array([math.cos(theta), math.sin(theta)])
-        segment = segment - np.outer(segment @ normal - rho, normal)
-    return dataclasses.replace(line, rho=rho, theta=theta, segment=segment)
-
-
 def add_sigma_vs(frame: FeatureFrame, sigma: float, rng: np.random.Generator) -> FeatureFrame:
     """Add noise to rho [-] and theta [rad] of each line, told to nobody: the covariances stay as they are.
 
@@ -248,5 +185,5 @@ def add_sigma_vs(frame: FeatureFrame, sigma: float, rng: np.random.Generator) ->
     """
     if sigma <= 0.0:
         return frame
-    lines = (_moved(line, *(sigma * rng.standard_normal(2))) for line in frame.lines)
+    lines = (moved_line(line, *(sigma * rng.standard_normal(2))) for line in frame.lines)
     return dataclasses.replace(frame, lines=tuple(lines))

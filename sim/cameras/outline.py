@@ -123,14 +123,19 @@ def cut_lines(polygon: np.ndarray, width: int, height: int) -> tuple[list[CutLin
         far, start = np.array([0.0, 1.0]), picture[0]
         return [CutLine(far, -2.0 * height, start, start, picture, everything, (height, width))], None
     board, left, cuts = picture, picture, []
-    edges = np.roll(polygon, -1, axis=0) - polygon
-    normals = np.column_stack((-edges[:, 1], edges[:, 0])) / np.hypot(edges[:, 0], edges[:, 1])[:, None]
-    offsets = -np.einsum("ij,ij->i", normals, polygon)
-    turned = normals @ polygon.mean(axis=0) + offsets < 0.0
-    normals[turned], offsets[turned] = -normals[turned], -offsets[turned]
-    touching = (picture @ normals.T + offsets).min(axis=0) < _SLACK_PX
-    for k in np.flatnonzero(touching):
-        normal, offset = normals[k], float(offsets[k])
+    points = polygon.tolist()
+    middle_u, middle_v = polygon.mean(axis=0).tolist()
+    for k, (u, v) in enumerate(points):
+        next_u, next_v = points[(k + 1) % len(points)]
+        length = math.hypot(next_u - u, next_v - v)
+        nu, nv = (v - next_v) / length, (next_u - u) / length
+        if nu * (middle_u - u) + nv * (middle_v - v) < 0.0:
+            nu, nv = -nu, -nv
+        offset = -nu * u - nv * v
+        lowest = offset + min(-nu, nu * width) + min(-nv, nv * height)
+        if lowest >= _SLACK_PX:  # the whole picture lies on the board's side
+            continue
+        normal = np.array([nu, nv])
         board = clip_polygon(board, normal, offset)
         # What an earlier line has cut away needs no second wall; the slack keeps its rim.
         area = clip_polygon(left, -normal, _SLACK_PX - offset)
@@ -139,6 +144,6 @@ def cut_lines(polygon: np.ndarray, width: int, height: int) -> tuple[list[CutLin
         left = clip_polygon(left, normal, offset + _SLACK_PX)
         beyond = clip_polygon(picture, -normal, -offset)
         box = _box(area, width, height, _BAND_PX + 1)
-        stop = polygon[(k + 1) % len(polygon)]
+        stop = np.array([next_u, next_v])
         cuts.append(CutLine(normal, offset, polygon[k], stop, beyond, box, (height, width)))
     return cuts, _box(board, width, height, _BAND_PX + 1) if len(board) >= 3 else None

@@ -1,0 +1,104 @@
+"""A straight edge in the world as a line feature of the picture."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+
+from ibvs_qp.frames import align_line
+from ibvs_qp.measurement import HORIZONTAL, LineFeature
+
+#: Noise of rho [-] and theta [rad] of one line: a good sub-pixel fit (0.1 px, 0.06 deg) at 640x480.
+SIGMA_RHO, SIGMA_THETA = 2e-4, 1e-3
+#: Nearest depth that is seen [m].
+NEAR_M = 0.05
+#: Shortest visible piece that counts as a line, normalised (31 px at 640x480).
+_SHORTEST = 0.05
+
+
+def visible_segment(ends: np.ndarray, half_view: np.ndarray) -> np.ndarray | None:
+    """The part of a straight edge inside the field of view.
+
+    Args:
+        ends: Its end points in camera coordinates [m], (2, 3).
+        half_view: Half the field of view to the right and down, normalised, (2,).
+
+    Returns:
+        Normalised end points (2, 2), or None where too little of it is seen.
+    """
+    low, high = 0.0, 1.0
+    (x0, y0, z0), (dx, dy, dz) = ends[0].tolist(), (ends[1] - ends[0]).tolist()
+    right, down = half_view.tolist()
+    for value, rate in (
+        (z0 - NEAR_M, dz),
+        (right * z0 + x0, right * dz + dx),
+        (right * z0 - x0, right * dz - dx),
+        (down * z0 + y0, down * dz + dy),
+        (down * z0 - y0, down * dz - dy),
+    ):
+        if abs(rate) < 1e-12:
+            if value < 0.0:
+                return None
+        elif rate > 0.0:
+            low = max(low, -value / rate)
+        else:
+            high = min(high, -value / rate)
+    if low >= high:
+        return None
+    points = ends[0] + np.array([[low], [high]]) * (ends[1] - ends[0])
+    segment = points[:, :2] / points[:, 2:]
+    return segment if np.linalg.norm(segment[1] - segment[0]) >= _SHORTEST else None
+
+
+def projected_line(
+    segment: np.ndarray | None, surface: np.ndarray, role: str, kind: str, track: int, stamp_ns: int
+) -> LineFeature | None:
+    """The line feature through a segment, with the covariance of a good fit.
+
+    Args:
+        segment: Normalised end points (2, 2), or None: no line.
+        surface: A point on the working surface beside the edge, in camera coordinates [m], (3,).
+        role: "horizontal" or "vertical".
+        kind: "board" or "paint".
+        track: Track identity.
+        stamp_ns: Time of capture.
+    """
+    if segment is None:
+        return None
+    (x1, y1), (x2, y2) = segment.tolist()
+    theta = math.atan2(x1 - x2, y2 - y1)
+    rho = x1 * math.cos(theta) + y1 * math.sin(theta)
+    rho, theta = align_line(rho, theta, 0.5 * math.pi if role == HORIZONTAL else 0.0)
+    side = np.dot((math.cos(theta), math.sin(theta), -rho), surface)  # times the point's depth, which is positive
+    return LineFeature(
+        rho=rho,
+        theta=theta,
+        covariance=np.diag([SIGMA_RHO**2, SIGMA_THETA**2]),
+        role=role,
+        stamp_ns=stamp_ns,
+        track_id=track,
+        segment=segment,
+        surface_side=1 if side > 0.0 else -1,
+        kind=kind,
+    )
+
+
+def fitted_ends(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Least-squares line up(along) through points (n, 2), as (along, up) of its two ends, (2,) each."""
+    middle, height = points.mean(axis=0)
+    away = points[:, 0] - middle
+    slope = float(away @ points[:, 1]) / float(away @ away)
+    along = points[[0, -1], 0]
+    return along, height + slope * (along - middle)
+
+
+def moved_line(line: LineFeature, rho: float, theta: float) -> LineFeature:
+    """The line with rho and theta changed by the given amounts, its end points moved onto it."""
+    rho, theta = line.rho + rho, line.theta + theta
+    segment = line.segment
+    if segment is not None:
+        normal = np.array([math.cos(theta), math.sin(theta)])
+        segment = segment - np.outer(segment @ normal - rho, normal)
+    return dataclasses.replace(line, rho=rho, theta=theta, segment=segment)
