@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 import importlib
 import json
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -109,3 +111,12 @@ def test_metrics_follow_the_schema():
 def test_json_has_null_for_what_is_not_finite():
     value = {"a": float("nan"), "b": [np.float64("inf"), np.int64(3)], "c": np.bool_(True)}
     assert as_json(value) == '{"a": null, "b": [null, 3], "c": true}'
+
+
+def test_example_of_the_readme_runs():
+    text = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+    block = next(block for block in re.findall(r"```python\n(.*?)```", text, re.DOTALL) if "HybridController" in block)
+    names: dict = {}
+    exec(compile(block, "README.md", "exec"), names)
+    assert names["command"].outcome == "solved"
+    assert names["command"].rejected == ()

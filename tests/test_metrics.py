@@ -170,3 +170,25 @@ def test_metrics_do_not_change_the_trace():
     before = {name: values.copy() for name, values in trace.arrays.items()}
     compute_metrics(dataclasses.replace(trace))
     assert all(np.array_equal(before[name], trace.arrays[name], equal_nan=True) for name in before)
+
+
+def test_force_error_is_taken_against_what_was_commanded():
+    """A push that the reach check lowered is no error if it was kept."""
+    trace = synthetic_trace()
+    for name in ("push_true", "push_reference"):
+        trace.arrays[name] = trace.arrays[name] - 2.0 * (trace.row > 0)
+    assert compute_metrics(trace)["force_rms_straight_n"] == pytest.approx(0.2, abs=1e-9)
+
+
+def test_velocity_counts_the_components_that_are_known():
+    trace = synthetic_trace()
+    trace.arrays["velocity_estimate"][:, 1] = np.nan
+    assert compute_metrics(trace)["velocity_rms_m_s"] == pytest.approx(0.003, abs=1e-12)
+
+
+def test_canvas_has_its_top_first_and_its_left_first():
+    scene = Scene(paint=PaintScene(rows=1, stroke_m=0.5))
+    mask = band_mask(scene, nominal_plan(scene), (600, 1400), 1000.0)
+    # The row runs from 0.05 m to 0.55 m, 0.05 m above the bottom edge: rows 510..590 of 600.
+    assert mask[549, 300] and mask[511, 300] and mask[588, 300] and mask[549, 12] and mask[549, 588]
+    assert not mask[508, 300] and not mask[592, 300] and not mask[549, 592] and not mask[:500].any()
