@@ -301,7 +301,7 @@ class Painter:
         if line is not None and line.weight > 0.05:
             return
         found = chooser(seen)
-        if found is not None:
+        if found is not None and found.track_id != self._guide_id:
             self.log.append((seen.time_s, "guide", f"track {found.track_id} at {found.offset * 1e3:+.1f} mm"))
             self._guide_id = found.track_id
 

@@ -20,6 +20,8 @@ from ibvs_qp.measurement import Measurement, Reference
 VELOCITY_INTEGRAL_BOUND, FORCE_INTEGRAL_BOUND = 0.8, 8.0
 #: Peak force that a touch may reach while the stiffness is unknown [N]: v = F / sqrt(k m).
 TOUCH_FORCE_BUDGET = 4.9
+#: Integral gain of the approach speed at the wall [1/s^2] and bound of its force [N].
+SEARCH_GAIN, SEARCH_BOUND = 6.0, 6.0
 #: A wanted push below the reach keeps this much margin [N].
 REACH_MARGIN = 1.0
 #: Force or moment given up above which no integral moves [N, N m].
@@ -64,7 +66,7 @@ class Setpoints:
         self._lines.reset()
         self._stamp = -1
         self._velocity_integral = np.zeros(2)
-        self._force_integral = 0.0
+        self._force_integral = self._search_force = 0.0
         self._given_up = 0.0
         self.contact_weight = self.push_reference = self.push_command = self.standoff_command = 0.0
         self.reach = math.nan
@@ -161,7 +163,16 @@ class Setpoints:
         error = contact.distance - target
         forward = self._approach_speed(contact.distance)
         speed = min(max(gains.standoff_kp * error, -settings.retreat_speed_m_s), forward)
-        self.standoff_command = mass * gains.standoff_kd * (speed + contact.rate)
+        self._search(speed + contact.rate, reference.contact and contact.distance < settings.contact_distance_m, dt)
+        self.standoff_command = mass * gains.standoff_kd * (speed + contact.rate) + self._search_force
+
+    def _search(self, lag: float, near: bool, dt: float) -> None:
+        """Lean on harder while the tip should move in but does not: a noisy force sensor needs a firmer touch."""
+        if not near:
+            self._search_force = 0.0
+        elif not self.contact.in_contact:
+            gain = self.config.vehicle.mass_kg * SEARCH_GAIN
+            self._search_force = min(max(self._search_force + gain * lag * dt, 0.0), SEARCH_BOUND)
 
     def _approach_speed(self, distance: float) -> float:
         """Speed limit towards the wall: peak force of a touch is v sqrt(k m)."""

@@ -68,12 +68,13 @@ class SurfaceColors:
         self._table, self._table_board = table, board.copy()
 
     def like_around(self, grid: CoarseGrid, colors: np.ndarray, seed: tuple[int, int], radius: int) -> np.ndarray:
-        """Samples that look like those around a seed, bool (rows, columns)."""
+        """Labels of samples that look like those around a seed: BOARD or OTHER, uint8 (rows, columns)."""
         rows, columns = grid.window(seed, radius)
         window = colors[rows, columns][grid.free[rows, columns]].astype(np.float32)
         if len(window) == 0:
-            return np.ones(grid.shape, bool)
-        return self._distance(colors.astype(np.float32), np.median(window, axis=0)) < self._gate**2
+            return np.full(grid.shape, BOARD, np.uint8)
+        near = self._distance(colors.astype(np.float32), np.median(window, axis=0)) < self._gate**2
+        return np.where(near, np.uint8(BOARD), np.uint8(OTHER))
 
     @property
     def paint_distinct(self) -> bool:

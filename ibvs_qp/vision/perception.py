@@ -171,7 +171,7 @@ class Perception:
         """Follow the surface or search it; returns the reason when there is none."""
         config = self._config.plane
         inverse = self._grid.inverse_depth(frame.depth, config.distance_min_m, config.distance_max_m)
-        prefer = labels > 0 if self._colors.board is not None else None
+        prefer = labels if self._colors.board is not None else None
         if self._plane is not None and seed_pixel is None:
             tracked = self._fitter.track(self._grid, inverse, motion.plane(self._plane.inverse_depth), down, prefer)
             if (

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from ibvs_qp.vision.colors import BOARD, PAINT
 from ibvs_qp.vision.config import PlaneConfig
 from ibvs_qp.vision.grid import CoarseGrid
 from ibvs_qp.vision.robust import median
@@ -82,7 +83,7 @@ class PlaneFitter:
             inverse: 1/Z of the samples [1/m], 0 where absent, (rows, columns).
             seeds: Cells on which the surface may lie; the nearest valid one is taken: a brush meets it first.
             down: Gravity's direction in C, unit, (3,), or None if unknown.
-            prefer: Samples of the surface's colour for each seed, bool (rows, columns) each, or None.
+            prefer: Colour labels of the samples for each seed, uint8 (rows, columns) each, or None.
 
         Returns:
             The surface, or the reason why there is none.
@@ -133,8 +134,8 @@ class PlaneFitter:
         origin = design[seed[0] * grid.shape[1] + seed[1]]
         square = (design[:, 0] - origin[0]) ** 2 + (design[:, 1] - origin[1]) ** 2
         usable = (flat > 0) & grid.free.ravel() & (square < config.seed_reach**2)
-        if prefer is not None and int((usable & prefer.ravel()).sum()) >= config.min_samples:
-            usable &= prefer.ravel()
+        if prefer is not None and int((usable & (prefer.ravel() == BOARD)).sum()) >= config.min_samples:
+            usable &= prefer.ravel() == BOARD
         near = np.flatnonzero(usable)
         if len(near) < config.min_samples:
             return None
@@ -176,12 +177,14 @@ class PlaneFitter:
         if int(usable.sum()) < config.min_samples:
             return "too few valid depth samples"
         plane, gate, component, sigma = start, config.coarse_gate, np.zeros(0, bool), 0.0
-        for _ in range(2):
+        for last in (False, True):
             predicted = design @ plane
             relative = (flat - predicted) / np.maximum(predicted, 1e-3)
             inlier = usable & (np.abs(relative) < gate)
             if prefer is not None:
-                colored = inlier & prefer.ravel()
+                colored = inlier & (prefer.ravel() == BOARD)
+                if last:  # a wall that looks like paint must not get in: what looks like it has to fit twice as well
+                    colored |= inlier & (prefer.ravel() == PAINT) & (np.abs(relative) < 0.5 * gate)
                 inlier = colored if int(colored.sum()) >= config.min_samples else inlier
             component = _component(inlier.reshape(grid.shape), grid, seed).ravel()
             if int(component.sum()) < config.min_samples:
