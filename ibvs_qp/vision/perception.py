@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 
-import cv2
 import numpy as np
 
 from ibvs_qp.frames import R_BODY_CAMERA, down_in_body
@@ -26,7 +25,6 @@ from ibvs_qp.vision.tracks import LineTracker
 
 #: Pictures after a start in which lines are searched often: colours are learned in the first one.
 _WARM_UP = 8
-_CvError = cv2.error
 
 
 class Perception:
@@ -82,14 +80,13 @@ class Perception:
         Returns:
             Features, plane, tracks and times.
         """
-        problem = frame_problem(frame)
-        if problem is None:
-            try:
-                return self._process(
-                    frame, _vector(attitude, 4), _vector(rotation, 3), _vector(velocity, 3), hints, detect, seed_pixel
-                )
-            except (ArithmeticError, ValueError, IndexError, np.linalg.LinAlgError, _CvError) as error:
-                problem = f"picture not understood: {error}"
+        try:
+            problem = frame_problem(frame)
+            if problem is None:
+                turned, moved = _vector(rotation, 3), _vector(velocity, 3)
+                return self._process(frame, _vector(attitude, 4), turned, moved, hints, detect, seed_pixel)
+        except Exception as error:  # in flight nothing may raise; the reason is reported instead
+            problem = f"picture not understood: {type(error).__name__}: {error}"
         self._plane = None
         self._flow.reset()
         stamp = frame.stamp_ns if isinstance(frame.stamp_ns, int) else 0
