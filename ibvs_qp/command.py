@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import Any
 
 import numpy as np
 
@@ -67,9 +69,27 @@ class Command:
     outcome: Outcome
     mode: str
     rejected: tuple[str, ...] = ()
-    tasks: tuple[TaskReport, ...] = ()
+    tasks: tuple[TaskReport, ...] = field(default_factory=tuple)
     active_limits: tuple[ActiveLimit, ...] = ()
     unallocated_wrench: np.ndarray
     reach_margin: float = float("nan")
     iterations: int = 0
     solve_time_s: float = 0.0
+
+    def explained_by(self, explain: Callable[[], tuple[TaskReport, ...]]) -> Command:
+        """This command with task reports made when somebody reads them: the tick does not pay for them."""
+        del self.__dict__["tasks"]
+        self.__dict__["_explain"] = explain
+        return self
+
+    def __getattr__(self, name: str) -> Any:
+        """Make the task reports at their first reading."""
+        if name == "tasks" and "_explain" in self.__dict__:
+            self.__dict__["tasks"] = self.__dict__.pop("_explain")()
+            return self.__dict__["tasks"]
+        raise AttributeError(name)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Pickle with the reports made."""
+        self.tasks  # noqa: B018 - reading makes them
+        return self.__dict__

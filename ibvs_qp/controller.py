@@ -110,7 +110,7 @@ class HybridController:
         values["axis_right"][:] = terms.right
         values["axis_down"][:] = terms.down
         values["last_thrust"][:] = last
-        values["extrapolated_thrust"][:] = np.clip(last + self._change, lower, upper)
+        values["extrapolated_thrust"][:] = np.minimum(np.maximum(last + self._change, lower), upper)
         values["thrust_lower"][:] = lower
         values["thrust_upper"][:] = upper
         share = terms.contact_weight
@@ -151,20 +151,21 @@ class HybridController:
         # What the box of each rotor cost: its multiplier moves the free optimum by P^-1 y.
         unallocated = self._unallocated(solution.y[:n])
         self._commit(thrusts, unallocated)
-        return Command(
+        stacked = self.engine.evaluator.stacked.copy()
+        command = Command(
             stamp_ns=measurement.stamp_ns,
             thrusts=thrusts,
             wrench=self.setpoints.effectiveness @ thrusts,
             outcome=solution.outcome,
             mode=self._mode(),
             rejected=rejected,
-            tasks=self._task_reports(thrusts),
             active_limits=self._active_limits(solution),
             unallocated_wrench=unallocated,
             reach_margin=self.setpoints.reach - max(self.setpoints.contact.push, 0.0),
             iterations=solution.iterations,
             solve_time_s=solution.seconds,
         )
+        return command.explained_by(lambda: self._task_reports(stacked, thrusts))
 
     def _unallocated(self, multipliers: np.ndarray) -> np.ndarray:
         n, y = len(multipliers), multipliers
@@ -177,8 +178,8 @@ class HybridController:
         block = block + np.triu(block, 1).T
         return self.setpoints.effectiveness @ np.linalg.solve(block, y)
 
-    def _task_reports(self, thrusts: np.ndarray) -> tuple[TaskReport, ...]:
-        achieved, asked, weights = self.engine.evaluator.report(thrusts)
+    def _task_reports(self, stacked: np.ndarray, thrusts: np.ndarray) -> tuple[TaskReport, ...]:
+        achieved, asked, weights = self.engine.evaluator.report(stacked, thrusts)
         return tuple(
             TaskReport(
                 name=row.name,

@@ -10,7 +10,7 @@ import numpy as np
 
 from ibvs_qp.measurement import LineFeature, Measurement, Reference
 
-#: Largest believable body rate [rad/s], specific force [m/s^2], wrench entry [N, N m] and velocity [m/s].
+#: Largest believable norms: body rate [rad/s], specific force [m/s^2], wrench [N, N m] and velocity [m/s].
 RATE_BOUND, ACCELERATION_BOUND, WRENCH_BOUND, VELOCITY_BOUND = 35.0, 200.0, 500.0, 20.0
 
 
@@ -19,7 +19,7 @@ def _vector(value: Any, size: int, bound: float) -> bool:
         isinstance(value, np.ndarray)
         and value.shape == (size,)
         and value.dtype.kind == "f"
-        and bool(np.abs(value).max() <= bound)  # False for NaN too
+        and bool(value @ value <= bound * bound)  # False for NaN too
     )
 
 

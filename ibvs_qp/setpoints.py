@@ -22,6 +22,8 @@ VELOCITY_INTEGRAL_BOUND, FORCE_INTEGRAL_BOUND = 0.8, 8.0
 TOUCH_FORCE_BUDGET = 4.9
 #: Integral gain of the approach speed at the wall [1/s^2] and bound of its force [N].
 SEARCH_GAIN, SEARCH_BOUND = 6.0, 6.0
+#: The reach is computed once in so many ticks (50 Hz): it moves with the mass estimate and the travel only.
+REACH_TICKS = 5
 #: A wanted push below the reach keeps this much margin [N].
 REACH_MARGIN = 1.0
 #: Force or moment given up above which no integral moves [N, N m].
@@ -69,7 +71,7 @@ class Setpoints:
         self._force_integral = self._search_force = 0.0
         self._given_up = 0.0
         self.contact_weight = self.push_reference = self.push_command = self.standoff_command = 0.0
-        self.reach = math.nan
+        self.reach, self._reach_ticks = math.inf, 0
         self.lines: list[LineTerm] = []
         self.normal, self.right, self.down = np.eye(3)
 
@@ -188,6 +190,9 @@ class Setpoints:
 
     def _reachable(self, push: float) -> float:
         """Push reduced to what the rotors can hold against friction along the commanded travel."""
+        self._reach_ticks += 1
+        if self._reach_ticks % REACH_TICKS != 1:
+            return min(push, max(0.0, self.reach - REACH_MARGIN)) if self.config.reach_check else push
         travel = self._travel
         speed = math.sqrt(float(travel @ travel))
         direction = self.normal if speed < 1e-3 else self.normal + self.friction.value * travel / speed
@@ -239,5 +244,5 @@ class Setpoints:
             free = np.array([self.free_right, self.free_down])
             self._velocity_integral = free * (self._velocity_integral + dt * error)
             bound = VELOCITY_INTEGRAL_BOUND / max(gains.velocity_ki, 1e-6)
-            self._velocity_integral = np.clip(self._velocity_integral, -bound, bound)
+            self._velocity_integral = np.minimum(np.maximum(self._velocity_integral, -bound), bound)
         self.velocity_command = gains.velocity_kp * error + gains.velocity_ki * self._velocity_integral

@@ -78,7 +78,7 @@ class ExternalWrench:
             residual = residual - normal * float(normal @ residual)
             bandwidth = FORCE_BANDWIDTH_CONTACT
         share = max(1.0 - math.exp(-bandwidth * dt), dt / self._time if self._time < START_TIME else 0.0)
-        self.force = np.clip(self.force + share * residual, -FORCE_BOUND, FORCE_BOUND)
+        self.force = np.minimum(np.maximum(self.force + share * residual, -FORCE_BOUND), FORCE_BOUND)
 
     def _update_moment(self, omega: np.ndarray, known_moment: np.ndarray, dt: float) -> None:
         momentum = self._inertia * omega
@@ -86,7 +86,8 @@ class ExternalWrench:
         if self._integral is None:
             self._integral = momentum - self.moment / MOMENT_BANDWIDTH
         self._integral = self._integral + dt * (known_moment - gyroscopic + self.moment)
-        self.moment = np.clip(MOMENT_BANDWIDTH * (momentum - self._integral), -MOMENT_BOUND, MOMENT_BOUND)
+        moment = MOMENT_BANDWIDTH * (momentum - self._integral)
+        self.moment = np.minimum(np.maximum(moment, -MOMENT_BOUND), MOMENT_BOUND)
 
     @property
     def wrench(self) -> np.ndarray:

@@ -42,7 +42,7 @@ def thrust_window(
         Lower and upper bounds [N], (n,) each, at least `LEAST_GAP` apart.
     """
     reach_low, reach_high = last - step, last + step
-    low = np.clip(lower, reach_low, reach_high - LEAST_GAP)
-    high = np.clip(upper, np.maximum(reach_low, low) + LEAST_GAP, np.maximum(reach_high, low + LEAST_GAP))
-    low = np.clip(low, floor, ceiling - LEAST_GAP)
-    return low, np.clip(high, low + LEAST_GAP, ceiling)
+    low = np.minimum(np.maximum(lower, reach_low), reach_high - LEAST_GAP)
+    high = np.maximum(np.minimum(upper, np.maximum(reach_high, low + LEAST_GAP)), np.maximum(reach_low, low) + LEAST_GAP)
+    low = np.minimum(np.maximum(low, floor), ceiling - LEAST_GAP)
+    return low, np.minimum(np.maximum(high, low + LEAST_GAP), ceiling)

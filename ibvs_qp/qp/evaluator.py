@@ -45,9 +45,9 @@ class Evaluator:
         """Fill p, q, a, lower and upper from the parameters."""
         self._values()
 
-    def report(self, thrusts: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Achieved and asked values and weights of every task row at given thrusts."""
-        self._report.inputs[0][:] = self.stacked
+    def report(self, stacked: np.ndarray, thrusts: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Achieved and asked values and weights of every task row at given parameters and thrusts."""
+        self._report.inputs[0][:] = stacked
         self._report.inputs[1][:] = thrusts
         self._report()
         achieved, asked, weights = self._report.outputs

@@ -87,7 +87,8 @@ def detect_lines(
         Candidates of positive score, no two on the same edge.
     """
     tilt = 0.0 if down is None else math.atan2(-float(down[0]), float(down[1]))
-    voted = _vote(picture, plane, grid, labels, config, tilt)
+    # level and upright swap places with every quarter turn; both are searched
+    voted = _vote(picture, plane, grid, labels, config, math.remainder(tilt, 0.5 * math.pi))
     voted.sort(key=lambda entry: -entry.rank)
     found: list[Candidate] = []
     tried = 0
