@@ -162,7 +162,7 @@ class Score:
 
     def __str__(self) -> str:
         px, deg = np.percentile(self.offset, [50, 95]), np.percentile(self.angle, [50, 95])
-        return f"found {self.share:.3f} offset {px[0]:.3f}/{px[1]:.3f} px angle {deg[0]:.4f}/{deg[1]:.4f} deg ({self.frames})"
+        return f"found {self.share:.3f} offset {px[0]:.3f}/{px[1]:.3f} px angle {deg[0]:.4f}/{deg[1]:.4f} deg"
 
     def check(self, found: float = 0.99, median: float = 0.05, high: float = 0.3, angle: float = 0.02) -> None:
         """Hold the figures of the issue."""
