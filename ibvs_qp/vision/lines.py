@@ -135,13 +135,16 @@ def _fit(
     norm = float(np.linalg.norm(direction))
     if norm < _STEP_MIN:
         return None
-    # the border of the surface is known by its two sides; beyond it the wall may change its colour from brick to joint
-    bordering = strip.off is not None and kind == "board"
-    response = strip.strength() if bordering else strip.response((direction / norm).astype(np.float32))
-    response *= admissible
-    rows, good = strip.peaks(
-        response, max(0.0 if bordering else _STEP_SHARE * norm, _FAINT_SHARE * config.contrast_min)
-    )
+    response = strip.response((direction / norm).astype(np.float32)) * admissible
+    threshold = max(_STEP_SHARE * norm, _FAINT_SHARE * config.contrast_min)
+    if strip.off is not None and kind == "board":
+        # the border of the surface is known by its two sides: beyond it the wall may change from brick to joint, and
+        # where the known step fails any step counts
+        failing = response.max(axis=1) < threshold
+        if failing.any():
+            response[failing] = (strip.strength() * admissible)[failing]
+            threshold = _FAINT_SHARE * config.contrast_min
+    rows, good = strip.peaks(response, threshold)
     if int(good.sum()) < config.min_profiles:
         return None
     u = strip.u.astype(float)

@@ -92,15 +92,15 @@ class PlaneFitter:
         order = sorted((index for index, value in enumerate(values) if value > 0), key=lambda index: -values[index])
         reason = "no valid depth around the seed"
         for index in order:
-            wanted = None if prefer is None else prefer[index]
-            start = self._hypothesis(grid, inverse, seeds[index], values[index], down, wanted)
-            if start is None:
-                reason = "no plane through the seed stands upright and faces the camera"
-                continue
-            result = self._refine(grid, inverse, start, seeds[index], down, wanted)
-            if isinstance(result, PlaneEstimate):
-                return result
-            reason = result
+            for wanted in (None,) if prefer is None else (prefer[index], None):
+                start = self._hypothesis(grid, inverse, seeds[index], values[index], down, wanted)
+                if start is None:
+                    reason = "no plane through the seed stands upright and faces the camera"
+                    continue
+                result = self._refine(grid, inverse, start, seeds[index], down, wanted)
+                if isinstance(result, PlaneEstimate):
+                    return result
+                reason = result
         return reason
 
     def track(
