@@ -16,8 +16,8 @@ SHARE_OF_ROW = 0.35
 def draw_overview(traces: dict[str, Trace]) -> Figure:
     """Camera view and painted board of the first law, push force of all."""
     law, trace = next(iter(traces.items()))
-    figure = new_figure(4.6)
-    upper, lower = figure.subfigures(2, 1, squeeze=False, height_ratios=[1.55, 1])[:, 0]
+    figure = new_figure(4.35)
+    upper, lower = figure.subfigures(2, 1, squeeze=False, height_ratios=[1.42, 1])[:, 0]
     picture = _picture(trace)
     widths = [1.75] if picture is None else [1, 1.75]
     panels = upper.subplots(1, len(widths), squeeze=False, width_ratios=widths)[0]
