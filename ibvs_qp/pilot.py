@@ -12,6 +12,7 @@ from ibvs_qp.analytic import PaperController
 from ibvs_qp.command import Command
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.controller import HybridController
+from ibvs_qp.estimation.config import EstimationConfig
 from ibvs_qp.estimation.motion import WallMotion
 from ibvs_qp.estimation.tare import WrenchTare
 from ibvs_qp.estimation.wall_lines import WallAxes
@@ -25,15 +26,22 @@ from ibvs_qp.measurement import (
     SensorFrame,
 )
 from ibvs_qp.painting import Painter, PaintingConfig, Scenery, Wish
-from ibvs_qp.settings import choice, dump_toml, load_toml, validate
+from ibvs_qp.settings import choice, dump_toml, load_toml, setting, validate
 from ibvs_qp.vision.config import VisionConfig
 
-#: Velocity older than this is not passed on [s].
-VELOCITY_LIFE = 0.6
-#: The tip counts as free for the tare beyond this distance [m].
-TARE_DISTANCE = 0.04
 #: Ticks of inertial history kept for late pictures.
 HISTORY = 128
+
+
+@dataclass(frozen=True, kw_only=True)
+class CameraConfig:
+    """What the pilot expects of its camera beside the intrinsics, which come with every picture."""
+
+    latest_s: float = setting(0.30, "pictures older than this at delivery are refused", unit="s", low=0.01, high=2.0)
+
+    def __post_init__(self) -> None:
+        """Validate."""
+        validate(self)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,7 +49,9 @@ class PilotConfig:
     """Everything a flight needs beside the vehicle itself."""
 
     controller: ControllerConfig = field(default_factory=ControllerConfig)
+    camera: CameraConfig = field(default_factory=CameraConfig)
     vision: VisionConfig = field(default_factory=VisionConfig)
+    estimation: EstimationConfig = field(default_factory=EstimationConfig)
     painting: PaintingConfig = field(default_factory=PaintingConfig)
     law: str = choice("qp", "control law", ("qp", "paper"))
 
@@ -67,9 +77,12 @@ class Pilot:
         controller, vehicle = self.config.controller, self.config.controller.vehicle
         self.controller = HybridController(controller) if self.config.law == "qp" else PaperController(controller)
         self.motion = WallMotion(
-            np.array(vehicle.tip_position_m), np.array(vehicle.camera_position_m), controller.tick_s
+            np.array(vehicle.tip_position_m),
+            np.array(vehicle.camera_position_m),
+            controller.tick_s,
+            self.config.estimation,
         )
-        self.tare = WrenchTare(vehicle)
+        self.tare = WrenchTare(vehicle, self.config.estimation)
         self.painter = Painter(self.config.painting)
         self._tip = np.array(vehicle.tip_position_m)
         self._camera = np.array(vehicle.camera_position_m)
@@ -120,13 +133,13 @@ class Pilot:
         self._stamp = frame.stamp_ns
         self._remember(frame, dt)
         contact = self.terms.contact
-        free = not contact.in_contact and contact.distance > TARE_DISTANCE
+        free = not contact.in_contact and contact.distance > self.config.estimation.tare_distance_m
         wrench = self.tare.update(frame.wrench, frame.wrench_stamp_ns, frame.specific_force, free)
         gravity = np.array(down_in_body(frame.attitude))
         axes = WallAxes.of(contact.normal, gravity)
         self.motion.predict(frame.stamp_ns, axes, frame.specific_force, frame.angular_velocity, dt)
         features = frame.features if frame.image is None else self._see(frame)
-        if features is not None:
+        if features is not None and self._fresh(features.stamp_ns):
             self._take(features)
         self.measurement = self._measure(frame, wrench, axes)
         wish = self.painter.step(self._scenery(frame, axes))
@@ -142,6 +155,10 @@ class Pilot:
         self._history_stamp[slot] = frame.stamp_ns
         self._history_attitude[slot] = frame.attitude
         self._history_turn[slot] = self._turn
+
+    def _fresh(self, stamp_ns: int) -> bool:
+        """Whether a picture's stamp is believable: neither from the future nor older than the camera may be."""
+        return 0 <= self._stamp - stamp_ns <= self.config.camera.latest_s * 1e9
 
     def _slot(self, stamp_ns: int) -> int:
         age = round((self._stamp - stamp_ns) * 1e-9 / self.config.controller.tick_s)
@@ -185,7 +202,7 @@ class Pilot:
 
     def _measure(self, frame: SensorFrame, wrench: np.ndarray, axes: WallAxes) -> Measurement:
         velocity = covariance = None
-        if self.motion.velocity_age_s < VELOCITY_LIFE:
+        if self.motion.velocity_age_s < self.config.estimation.velocity_life_s:
             contact = self.terms.contact
             right, down = self.motion.velocity
             velocity = axes.right * right + axes.down * down - axes.normal * contact.rate

@@ -7,27 +7,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ibvs_qp.estimation.config import EstimationConfig
 from ibvs_qp.estimation.delayed import DelayedKalman
 from ibvs_qp.estimation.wall_lines import WallAxes, image_line, wall_line
 from ibvs_qp.frames import GRAVITY, cross
 from ibvs_qp.measurement import FeatureFrame, LineFeature
 
-#: Accelerometer noise in the wall plane with what the attitude noise adds [m/s^2/sqrt(Hz)].
-ACCELERATION_NOISE = 8e-3
-#: Drift of the accelerometer bias that gravity leaks through the attitude bias [m/s^3/sqrt(Hz)].
-BIAS_NOISE = 3e-3
-#: Random walk of line offsets [m/sqrt(s)]: edges are not perfectly straight and fits wander along them.
-LINE_NOISE = 1e-3
-#: Least deviation of one line offset [m] and one flow velocity [m/s], whatever the fit claims.
-LINE_STD, VELOCITY_STD = 3e-4, 2e-3
 #: Lines followed at once.
 SLOTS = 8
-#: A line this long without news starts to fade, and is forgotten after the second time [s]; counted from delivery.
-FADE_START, FADE_END = 0.10, 0.45
-#: Frames until a new line has full weight.
-FRAMES_TO_TRUST = 4
-#: Share of a frame's line angle that is believed.
-ANGLE_GAIN = 0.15
 
 _VELOCITY, _BIAS, _ODOMETER, _LINES = slice(0, 2), slice(2, 4), slice(4, 6), 6
 
@@ -65,14 +52,18 @@ class TrackedLine:
 class WallMotion:
     """Velocity right and down, a tip odometer, and the tracked lines' offsets; corrected at the time of capture."""
 
-    def __init__(self, tip: np.ndarray, camera: np.ndarray, tick_s: float) -> None:
+    def __init__(
+        self, tip: np.ndarray, camera: np.ndarray, tick_s: float, config: EstimationConfig | None = None
+    ) -> None:
+        self._config = config = config or EstimationConfig()
         self._tip, self._camera = np.asarray(tip, float), np.asarray(camera, float)
         size = _LINES + SLOTS
         chain = np.zeros((size, size))
         chain[0, 2] = chain[1, 3] = -1.0
         chain[4, 0] = chain[5, 1] = 1.0
-        noise = np.full(size, LINE_NOISE**2)
-        noise[_VELOCITY], noise[_BIAS], noise[_ODOMETER] = ACCELERATION_NOISE**2, BIAS_NOISE**2, 1e-10
+        noise = np.full(size, config.line_noise**2)
+        noise[_VELOCITY], noise[_BIAS] = config.acceleration_noise**2, config.bias_noise**2
+        noise[_ODOMETER] = 1e-10
         deviation = np.full(size, 0.05)
         deviation[_BIAS], deviation[_ODOMETER] = 0.1, 1e-6
         self._filter = DelayedKalman(chain, noise, deviation, tick_s)
@@ -118,14 +109,15 @@ class WallMotion:
         self._refresh(stamp_ns)
 
     def _refresh(self, stamp_ns: int) -> None:
+        config = self._config
         for key in list(self.lines):
             line = self.lines[key]
             age = (stamp_ns - line.news_ns) * 1e-9
-            if age > FADE_END:
+            if age > config.fade_end_s:
                 self._drop(key)
                 continue
-            fade = min(1.0, max(0.0, (FADE_END - age) / (FADE_END - FADE_START)))
-            line.weight = fade * min(1.0, line.frames / FRAMES_TO_TRUST) * line.source_weight
+            fade = min(1.0, max(0.0, (config.fade_end_s - age) / (config.fade_end_s - config.fade_start_s)))
+            line.weight = fade * min(1.0, line.frames / config.frames_to_trust) * line.source_weight
             line.offset = float(self._filter.state[_LINES + line.slot])
         self.velocity_age_s = (stamp_ns - self._velocity_stamp) * 1e-9 if self._velocity_stamp >= 0 else math.inf
 
@@ -155,7 +147,7 @@ class WallMotion:
         if frame.velocity is None or frame.velocity_covariance is None or not np.isfinite(frame.velocity).all():
             return
         plane = np.vstack((axes.right, axes.down))
-        covariance = plane @ frame.velocity_covariance @ plane.T + np.eye(2) * VELOCITY_STD**2
+        covariance = plane @ frame.velocity_covariance @ plane.T + np.eye(2) * self._config.velocity_std_m_s**2
         rows = np.zeros((2, _LINES + SLOTS))
         rows[0, 0] = rows[1, 1] = 1.0
         stamp = frame.velocity_stamp_ns or frame.stamp_ns
@@ -165,7 +157,7 @@ class WallMotion:
     def _correct_line(
         self, line: LineFeature, offset: float, angle: float, side: int, scale: float, ends: np.ndarray | None, stamp: int
     ) -> None:
-        deviation = math.hypot(LINE_STD, math.sqrt(max(float(line.covariance[0, 0]), 0.0)) * scale)
+        deviation = math.hypot(self._config.line_std_m, math.sqrt(max(float(line.covariance[0, 0]), 0.0)) * scale)
         tracked = self.lines.get(line.track_id)
         if tracked is None:
             tracked = self._admit(line, offset, angle, deviation, stamp)
@@ -181,7 +173,7 @@ class WallMotion:
                 self._drop(line.track_id)
             return
         tracked.extra.pop("refused", None)
-        tracked.angle += ANGLE_GAIN * (angle - tracked.angle)
+        tracked.angle += self._config.angle_gain * (angle - tracked.angle)
         tracked.frames += tracked.seen_ns != stamp
         tracked.seen_ns, tracked.deviation, tracked.source_weight = stamp, deviation, line.weight
         tracked.news_ns = self._stamp

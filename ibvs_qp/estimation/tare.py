@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ibvs_qp.estimation.config import EstimationConfig
 from ibvs_qp.frames import cross
 from ibvs_qp.vehicle import VehicleParams
-
-#: The bias is averaged over this time in free flight before it is trusted [s], then followed this slowly [s].
-TARE_TIME, FOLLOW_TIME = 0.5, 20.0
 
 
 class WrenchTare:
@@ -18,7 +16,8 @@ class WrenchTare:
     :math:`F_c = m_t f_t - F_{raw}`, and likewise for moments about the sensor; the mean in free flight is the bias.
     """
 
-    def __init__(self, vehicle: VehicleParams) -> None:
+    def __init__(self, vehicle: VehicleParams, config: EstimationConfig | None = None) -> None:
+        self._config = config or EstimationConfig()
         self._mass = vehicle.tool_mass_kg
         self._sensor = np.array(vehicle.force_torque_position_m)
         self._lever = np.array(vehicle.tool_position_m) - self._sensor
@@ -33,7 +32,7 @@ class WrenchTare:
     @property
     def ready(self) -> bool:
         """Whether the bias has been averaged long enough."""
-        return self._time >= TARE_TIME
+        return self._time >= self._config.tare_time_s
 
     def update(self, raw: np.ndarray, stamp_ns: int, specific_force: np.ndarray, free: bool) -> np.ndarray:
         """Tared contact wrench at the centre of mass [N, N m], (6,).
@@ -54,7 +53,8 @@ class WrenchTare:
         contact = np.concatenate((load, cross(self._lever, load))) - raw
         if free:
             self._time += dt
-            self._bias = self._bias + min(1.0, dt / min(max(self._time, dt), FOLLOW_TIME)) * (contact - self._bias)
+            span = min(max(self._time, dt), self._config.tare_follow_s)
+            self._bias = self._bias + min(1.0, dt / span) * (contact - self._bias)
         contact = contact - self._bias
         contact[3:] += cross(self._sensor, contact[:3])
         self._wrench = contact
