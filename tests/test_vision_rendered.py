@@ -88,7 +88,7 @@ def stroke_row(world: World, row: int, start: float, stop: float) -> None:
 def perceive(
     world: World,
     along: np.ndarray,
-    up: float,
+    up: float | np.ndarray,
     distance: np.ndarray,
     seed: int,
     paint_row: int = 0,
@@ -107,9 +107,10 @@ def perceive(
     for k in range(len(along)):
         angles = sway * np.radians([0.6, 0.6, 1.2]) * np.sin(2.0 * math.pi * 0.4 * k / 30.0 + phase)
         attitude = quaternion(*angles)
-        position = world.body_position(float(along[k]), up, float(distance[k]), attitude)
+        height = float(np.broadcast_to(up, len(along))[k])
+        position = world.body_position(float(along[k]), height, float(distance[k]), attitude)
         if paint_row:
-            point = (float(along[k]), world.geometry.row_height(paint_row))
+            point = (float(along[k]), height)
             world.canvas.stroke(previous, point)
             previous = point
         frame = world.camera.capture(position, attitude, (k + 1) * INTERVAL_NS)
@@ -329,6 +330,36 @@ def test_row_2_guide_is_never_its_own_edge(name: str) -> None:
     assert wrong == 0
     assert right_ones == frames - SETTLE
     score.check()
+
+
+def test_climb_keeps_the_bottom_edge_and_ends_on_the_guide() -> None:
+    world = World(scene_of("default"), 4)
+    left, right = world.geometry.row_ends
+    low, high = world.geometry.row_height(1), world.geometry.row_height(2)
+    stroke_row(world, 1, right, left + 0.05)
+    still, steps = 4, np.arange(1, 22) / 21.0
+    along = np.concatenate(
+        (left + 0.05 * (1.0 - np.arange(15) / 14.0), np.full(21, left), left + 0.1 / 30.0 * np.arange(30))
+    )
+    up = np.concatenate((np.full(15, low), low + (high - low) * steps, np.full(30, high)))
+    truth, bottom = row_edge(world, 1, 1), board_edge(world, "bottom")
+    told, identities, guides = (guide_hint(world),), set(), 0
+    flight = perceive(world, along, up, np.zeros(len(along)), 4, 1, 0.4, told)
+    for k, (percept, position, attitude, _) in enumerate(flight):
+        if k < still:
+            continue
+        found = nearest(percept, world.line(bottom[0], bottom[1], position, attitude), "board")
+        assert found is not None and abs(found[1]) * world.focal < 1.0
+        identities.add(found[0].track_id)
+        target = world.line(truth[0], truth[1], position, attitude)
+        for track in percept.tracks:
+            if track.hint == "guide" and k >= 38:
+                middle = track.segment.mean(axis=0)
+                offset = middle @ np.array([math.cos(target[1]), math.sin(target[1])]) - target[0]
+                assert abs(offset) * world.focal < 1.0
+                guides += track.confirmed
+    assert len(identities) == 1
+    assert guides == len(along) - 38
 
 
 def test_small_pictures() -> None:
