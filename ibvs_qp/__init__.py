@@ -1,22 +1,31 @@
-"""Aerial manipulation by one quadratic program per tick: the drop-in controller and its types."""
+"""Aerial manipulation by one quadratic program per tick: the drop-in controller and its types.
 
-from allocation import TAROT_T960, RotorGeometry, control_effectiveness
-from ibvs_qp.analytic import PaperController
-from ibvs_qp.command import ActiveLimit, Command, Outcome, TaskReport
-from ibvs_qp.config import ControllerConfig
-from ibvs_qp.controller import HybridController
-from ibvs_qp.errors import ConfigError, IbvsQpError
-from ibvs_qp.measurement import (
-    FeatureFrame,
-    LineFeature,
-    LineReference,
-    Measurement,
-    Reference,
-    RgbdFrame,
-    SensorFrame,
-)
-from ibvs_qp.pilot import Pilot, PilotConfig
-from ibvs_qp.vehicle import VehicleParams
+The names load on first use: a program that only checks its command line need not wait for solvers and OpenCV.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from allocation import TAROT_T960, RotorGeometry, control_effectiveness
+    from ibvs_qp.analytic import PaperController
+    from ibvs_qp.command import ActiveLimit, Command, Outcome, TaskReport
+    from ibvs_qp.config import ControllerConfig
+    from ibvs_qp.controller import HybridController
+    from ibvs_qp.errors import ConfigError, IbvsQpError
+    from ibvs_qp.measurement import (
+        FeatureFrame,
+        LineFeature,
+        LineReference,
+        Measurement,
+        Reference,
+        RgbdFrame,
+        SensorFrame,
+    )
+    from ibvs_qp.pilot import Pilot, PilotConfig
+    from ibvs_qp.vehicle import VehicleParams
 
 __all__ = [
     "TAROT_T960",
@@ -42,3 +51,22 @@ __all__ = [
     "VehicleParams",
     "control_effectiveness",
 ]
+
+_HOMES = {
+    "allocation": ("TAROT_T960", "RotorGeometry", "control_effectiveness"),
+    "ibvs_qp.analytic": ("PaperController",),
+    "ibvs_qp.command": ("ActiveLimit", "Command", "Outcome", "TaskReport"),
+    "ibvs_qp.config": ("ControllerConfig",),
+    "ibvs_qp.controller": ("HybridController",),
+    "ibvs_qp.errors": ("ConfigError", "IbvsQpError"),
+    "ibvs_qp.pilot": ("Pilot", "PilotConfig"),
+    "ibvs_qp.vehicle": ("VehicleParams",),
+}
+_HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name where it lives."""
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(_HOME_OF.get(name, "ibvs_qp.measurement")), name)

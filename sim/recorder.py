@@ -9,8 +9,10 @@ import numpy as np
 from ibvs_qp.command import Command, Outcome
 from ibvs_qp.measurement import HORIZONTAL, SensorFrame
 from ibvs_qp.pilot import Pilot
+from ibvs_qp.vision.overlay import draw_overlay
 from sim.plant import STEPS_PER_TICK
 from sim.trace import Event, Trace
+from sim.video import pack_picture
 
 if TYPE_CHECKING:
     from sim.closed_loop import FlightOptions, World
@@ -83,10 +85,9 @@ class Recorder:
         if frame.image is not None and pilot.percept is not None:
             self._vision.append(sum(pilot.percept.time_ms.values()))
             if self._options.video and time_s >= self._next_picture:
-                from ibvs_qp.vision.overlay import draw_overlay
-
                 self._next_picture = time_s + 1.0 / VIDEO_RATE
-                self._pictures.append((time_s, draw_overlay(frame.image.rgb, pilot.percept), painter.phase))
+                picture = pack_picture(draw_overlay(frame.image.rgb, pilot.percept))
+                self._pictures.append((time_s, picture, painter.phase))
 
     def _add(self, name: str, value: Any) -> None:
         self._rows.setdefault(name, []).append(value)
