@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import math
+import numbers
 import tomllib
 import types
 import typing
@@ -52,16 +53,17 @@ def validate(instance: Any, prefix: str = "") -> None:
             if value not in meta["options"]:
                 raise out_of_range(name, value, "", "allowed are " + ", ".join(meta["options"]))
         elif "low" in meta:
-            _check_number(name, value, meta)
+            _check_number(name, value, field.default, meta)
 
 
-def _check_number(name: str, value: Any, meta: typing.Mapping[str, Any]) -> None:
-    if value is None or isinstance(value, (bool, str)):
+def _check_number(name: str, value: Any, default: Any, meta: typing.Mapping[str, Any]) -> None:
+    if isinstance(default, (bool, str)) or (value is None and default is None):
         return
     low, high, unit = meta["low"], meta["high"], meta["unit"]
+    number = numbers.Integral if isinstance(default, int) else numbers.Real
     for entry in value if isinstance(value, tuple) else (value,):
-        good = isinstance(entry, (int, float)) and math.isfinite(entry) and low <= entry <= high
-        if not good:
+        right_type = isinstance(entry, number) and not isinstance(entry, bool)
+        if not (right_type and math.isfinite(entry) and low <= entry <= high):
             raise out_of_range(name, value, unit, f"allowed is [{low:g}, {high:g}] {unit}".rstrip())
 
 
@@ -90,6 +92,8 @@ def from_dict(kind: type[T], table: dict[str, Any], path: str = "") -> T:
         return kind(**values)
     except ConfigError as error:
         raise ConfigError(f"{path}.{error}" if path and not str(error).startswith(path + ".") else str(error)) from None
+    except (TypeError, ValueError) as error:  # a dataclass of another package, or a field without default left out
+        raise ConfigError(f"{path or 'table'}: {error}") from None
 
 
 def _convert(hint: Any, value: Any, place: str) -> Any:
