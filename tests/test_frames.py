@@ -1,0 +1,99 @@
+"""Frames and signs: rotations against scipy, twists against finite differences, lines over every seam."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from ibvs_qp.frames import (
+    R_BODY_CAMERA,
+    align_line,
+    camera_twist_matrix,
+    cross,
+    down_in_body,
+    roll_pitch,
+    rotation_from_quaternion,
+    skew,
+    to_camera,
+)
+
+angles = st.floats(-1.4, 1.4)
+any_angle = st.floats(-20.0, 20.0)
+
+
+def quaternion(yaw: float, pitch: float, roll: float) -> np.ndarray:
+    x, y, z, w = Rotation.from_euler("ZYX", [yaw, pitch, roll]).as_quat()
+    return np.array([w, x, y, z])
+
+
+def test_camera_axes_are_right_down_front_of_the_body() -> None:
+    right, down, front = R_BODY_CAMERA.T @ [0, 1, 0], R_BODY_CAMERA.T @ [0, 0, 1], R_BODY_CAMERA.T @ [1, 0, 0]
+    np.testing.assert_array_equal([right, down, front], np.eye(3))
+    assert np.linalg.det(R_BODY_CAMERA) == 1.0
+    np.testing.assert_allclose(to_camera(np.array([0.7, 0.01, 0.0]), np.array([0.2, 0.0, 0.08])), [0.01, -0.08, 0.5])
+
+
+@given(any_angle, angles, angles)
+def test_attitude_takes_body_to_world_and_w_comes_first(yaw: float, pitch: float, roll: float) -> None:
+    q = quaternion(yaw, pitch, roll)
+    expected = Rotation.from_euler("ZYX", [yaw, pitch, roll]).as_matrix()
+    np.testing.assert_allclose(rotation_from_quaternion(q), expected, atol=1e-12)
+    np.testing.assert_allclose(down_in_body(q), expected.T @ [0, 0, 1], atol=1e-12)
+    np.testing.assert_allclose(roll_pitch(q), (roll, pitch), atol=1e-9)  # whatever the yaw
+    np.testing.assert_allclose(rotation_from_quaternion(-q), expected, atol=1e-12)  # q and -q are one attitude
+
+
+def test_signs_of_roll_pitch_and_yaw_are_ned() -> None:
+    right_wing_down = rotation_from_quaternion(quaternion(0, 0, 0.1)) @ [0, 1, 0]
+    assert right_wing_down[2] > 0
+    assert (rotation_from_quaternion(quaternion(0, 0.1, 0)) @ [1, 0, 0])[2] < 0  # nose up
+    assert (rotation_from_quaternion(quaternion(0.1, 0, 0)) @ [1, 0, 0])[1] > 0  # nose to the east
+
+
+@given(st.lists(st.floats(-1e3, 1e3), min_size=6, max_size=6))
+def test_cross_and_skew_agree_with_numpy(numbers: list[float]) -> None:
+    a, b = np.array(numbers[:3]), np.array(numbers[3:])
+    np.testing.assert_allclose(cross(a, b), np.cross(a, b), rtol=1e-12, atol=1e-9)
+    np.testing.assert_allclose(skew(a) @ b, np.cross(a, b), rtol=1e-12, atol=1e-6)
+
+
+def test_camera_twist_is_the_motion_of_the_camera() -> None:
+    """A body that moves along a twist for a short time carries its camera along ``T @ twist``."""
+    rng, step = np.random.default_rng(1), 1e-6
+    for _ in range(20):
+        camera, twist = rng.normal(size=3), rng.normal(size=6)
+        turned = Rotation.from_rotvec(step * twist[3:]).as_matrix()
+        back = Rotation.from_rotvec(-step * twist[3:]).as_matrix()
+        ahead, behind = step * twist[:3] + turned @ camera, -step * twist[:3] + back @ camera
+        linear = R_BODY_CAMERA.T @ (ahead - behind) / (2 * step)
+        spin = (R_BODY_CAMERA.T @ turned @ R_BODY_CAMERA - R_BODY_CAMERA.T @ back @ R_BODY_CAMERA) / (2 * step)
+        angular = [spin[2, 1], spin[0, 2], spin[1, 0]]
+        np.testing.assert_allclose(camera_twist_matrix(camera) @ twist, [*linear, *angular], atol=1e-8)
+
+
+@given(st.floats(-1.0, 1.0), any_angle, any_angle)
+def test_aligned_line_is_the_same_line_and_agrees_with_the_reference(rho: float, theta: float, seam: float) -> None:
+    for sign in (0, 1):
+        r, t = align_line(rho if sign == 0 else -rho, theta + sign * math.pi, seam)
+        assert abs(t - seam) <= 0.5 * math.pi + 1e-9
+        np.testing.assert_allclose(
+            [r * math.cos(t), r * math.sin(t)], [rho * math.cos(theta), rho * math.sin(theta)], atol=1e-9
+        )
+
+
+@pytest.mark.parametrize("reference", [0.0, 0.5 * math.pi, math.pi, -0.5 * math.pi, 7.0])
+def test_a_line_that_turns_through_a_seam_never_jumps(reference: float) -> None:
+    last = None
+    for slope in np.linspace(-0.3, 0.3, 61):
+        for theta in (reference + slope, reference + slope + math.pi, reference + slope - 3 * math.pi):
+            sign = 1.0 if theta == reference + slope else -1.0
+            rho, aligned = align_line(sign * 0.2, theta, reference)
+            assert rho == 0.2
+            assert aligned - reference == pytest.approx(slope, abs=1e-12)
+        assert last is None or 0 < aligned - last < 0.02
+        last = aligned
