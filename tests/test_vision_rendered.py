@@ -206,7 +206,7 @@ class Flight:
         self.world, self.lines, self.settle = world, lines, settle
         self.scores = {name: Score(world.focal) for name in lines}
         self.distance, self.normal, self.velocity, self.normalised = [], [], [], []
-        self.frames = 0
+        self.frames = self.false = 0
 
     def run(self, *arguments, **keywords) -> Flight:
         """Fly and score, arguments as of `perceive`."""
@@ -219,13 +219,37 @@ class Flight:
                 error = percept.features.velocity - velocity
                 self.velocity.append(error)
                 self.normalised.append(float(error @ np.linalg.solve(percept.features.velocity_covariance, error)))
+            self._count_false(percept, position, attitude)
             if self.frames > self.settle:
                 for name, (first, second, kind) in self.lines.items():
                     self.scores[name].add(percept, self.world.line(first, second, position, attitude), kind)
         return self
 
+    def _count_false(self, percept, position: np.ndarray, attitude: np.ndarray) -> None:
+        """Live lines that are no edge of board or paint, or one of the wrong kind or surface side."""
+        rows = [row_edge(self.world, row, side) for row in (1, 2) for side in (1, -1)]
+        true = [board_edge(self.world, name) for name in ("bottom", "left", "right", "top")] + rows
+        center = np.array([0.5 * self.world.scene.board.width_m, 0.5 * self.world.scene.board.height_m])
+        for line in percept.features.lines:
+            good = False
+            for first, second, kind in true:
+                if kind != line.kind:
+                    continue
+                rho, theta = self.world.line(first, second, position, attitude)
+                rho, theta = align_line(rho, theta, line.theta)
+                across = line.segment @ np.array([math.cos(theta), math.sin(theta)]) - rho
+                good |= bool(np.abs(across).max() * self.world.focal < 4.0)
+            self.false += not good
+            if line.kind == "board":  # the board's middle must lie on the surface side
+                y, z = self.world.geometry.point(*center)
+                point = rotation_from_quaternion(attitude).T @ (np.array([0.0, y, z]) - position) - CAMERA
+                x_c, y_c, z_c = R_BODY_CAMERA.T @ point
+                side = x_c / z_c * math.cos(line.theta) + y_c / z_c * math.sin(line.theta) - line.rho
+                self.false += side * line.surface_side <= 0.0
+
     def check(self, normal_deg: float = 0.4, velocity_m_s: float = 0.005, **limits) -> None:
         """Hold the figures; the frame's common mode (1 mm) is not perception's."""
+        assert self.false == 0, f"{self.false} live lines that are no edge"
         assert abs(np.mean(self.distance)) <= 0.001
         assert np.std(self.distance) <= 0.0025
         assert np.sqrt(np.mean(np.square(self.normal))) <= normal_deg
