@@ -91,7 +91,7 @@ class DetectConfig(_Checked):
 class LineConfig(_Checked):
     """Sub-pixel refinement by profiles across the line, and what lies on its two sides."""
 
-    profiles: int = setting(72, "profiles along a line", low=16, high=400)
+    profiles: int = setting(64, "profiles along a line", low=16, high=400)
     strip_px: float = setting(
         14.0, "half width of the search strip (wider jumps to parallel lines)", unit="px", low=3.0, high=60.0
     )
@@ -135,7 +135,7 @@ class TrackConfig(_Checked):
 class FlowConfig(_Checked):
     """Velocity from sparse flow at half resolution."""
 
-    points: int = setting(60, "most points followed", low=8, high=500)
+    points: int = setting(45, "most points followed", low=8, high=500)
     redetect: int = setting(10, "frames between searches for points", low=1, high=1000)
     points_low: int = setting(25, "fewer live points start a search at once", low=4, high=500)
     quality: float = setting(0.01, "corner strength as a share of the best", low=1e-4, high=0.5)

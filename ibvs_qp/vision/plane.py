@@ -177,6 +177,7 @@ class PlaneFitter:
         if int(usable.sum()) < config.min_samples:
             return "too few valid depth samples"
         plane, gate, component, sigma = start, config.coarse_gate, np.zeros(0, bool), 0.0
+        normal_matrix = np.eye(3)
         for last in (False, True):
             predicted = design @ plane
             relative = (flat - predicted) / np.maximum(predicted, 1e-3)
@@ -205,7 +206,7 @@ class PlaneFitter:
         residual = np.where(component, flat - design @ plane, 0.0)
         return PlaneEstimate(
             inverse_depth=plane,
-            covariance=_covariance(residual, component, grid, plane, config.common_mode_m),
+            covariance=_covariance(residual, normal_matrix, int(component.sum()), grid, plane, config.common_mode_m),
             normal=-plane / length,
             distance_m=1.0 / length,
             inlier_share=float(component.sum()) / max(int(usable.sum()), 1),
@@ -228,18 +229,24 @@ def _component(inlier: np.ndarray, grid: CoarseGrid, seed: tuple[int, int] | Non
 
 
 def _covariance(
-    residual: np.ndarray, component: np.ndarray, grid: CoarseGrid, plane: np.ndarray, common_mode: float
+    residual: np.ndarray,
+    normal_matrix: np.ndarray,
+    count: int,
+    grid: CoarseGrid,
+    plane: np.ndarray,
+    common_mode: float,
 ) -> np.ndarray:
     """Least-squares covariance, inflated by the correlation of the residuals over blocks, plus the common mode."""
     rows, columns = (size // _BLOCK * _BLOCK for size in grid.shape)
     square = residual.reshape(grid.shape)[:rows, :columns]
-    sums = square.reshape(rows // _BLOCK, _BLOCK, columns // _BLOCK, _BLOCK).sum(axis=(1, 3))
-    total = float((square**2).sum())
-    inflation = max(1.0, float((sums**2).sum()) / total) if total > 0 else 1.0
-    chosen = grid.design[component]
-    variance = float(residual @ residual) / max(len(chosen) - 3, 1)
+    sums = np.add.reduceat(
+        np.add.reduceat(square, np.arange(0, rows, _BLOCK), axis=0), np.arange(0, columns, _BLOCK), axis=1
+    )
+    total = float(np.vdot(residual, residual))
+    inflation = max(1.0, float(np.vdot(sums, sums)) / total) if total > 0 else 1.0
+    variance = total / max(count - 3, 1)
     inverse_length = float(np.linalg.norm(plane))
     return (
-        np.linalg.inv(chosen.T @ chosen) * variance * inflation
+        np.linalg.inv(normal_matrix) * variance * inflation
         + np.outer(plane, plane) * (common_mode * inverse_length) ** 2
     )

@@ -10,7 +10,7 @@ _TUKEY = 4.685
 _SCALE_MIN = 0.02
 _MAD = 1.4826
 #: Pairs of points tried for the start.
-_PAIRS = 40
+_PAIRS = 20
 #: Largest correlation of neighbouring residuals accounted for.
 _CORRELATION_MAX = 0.8
 
@@ -65,7 +65,7 @@ def robust_line(u: np.ndarray, v: np.ndarray) -> tuple[float, float, float, np.n
     weight = np.ones_like(u)
     level = slope = center = 0.0
     residual, along_square = v, 1.0
-    for _ in range(4):
+    for _ in range(3):
         total = weight.sum()
         center = float(weight @ u / total)
         along = u - center
