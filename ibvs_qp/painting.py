@@ -114,7 +114,7 @@ class Painter:
         self._edge_target: float | None = None
         self._speed = 0.0
         self._since = self._anchor = math.nan
-        self._stroke_start = math.nan
+        self._stroke_start = self._stroke_end = math.nan
         self._right_edge: float | None = None
         self._last_time = math.nan
         self._paused = False
@@ -222,6 +222,8 @@ class Painter:
         return self._wish(seen, contact=True, along=travel * self._speed, edge=edge, edge_rate=-travel * self._speed * dt)
 
     def _end_row(self, seen: Scenery, edge: TrackedLine | None) -> None:
+        if self.row == 1:
+            self._stroke_end = float(seen.odometer[0])
         how = f"at {edge.kind or 'unknown'} edge {edge.offset * 1e3:+.0f} mm" if edge is not None else "by the odometer"
         if self.row >= self.config.rows:
             self._enter(seen, "retreat", f"row {self.row} ended {how}; all rows done")
@@ -323,10 +325,12 @@ class Painter:
     def _remaining(self, seen: Scenery, travel: float) -> tuple[float, TrackedLine | None]:
         """Way left in this row [m] and the vertical edge that ends it, once accepted."""
         config = self.config
-        travelled = abs(float(seen.odometer[0]) - self._stroke_start)
-        ahead = config.stroke_m - travelled if self.row == 1 else travelled
-        if self.row % 2 == 0:
-            ahead = float(self._stroke_start - seen.odometer[0])
+        place = float(seen.odometer[0])
+        travelled = abs(place - self._stroke_start)
+        if self.row == 1:
+            ahead = config.stroke_m - travelled
+        else:
+            ahead = place - self._stroke_end if travel < 0 else self._stroke_start - place
         side = 1 if travel < 0 else -1
         wanted = travel * (config.edge_margin_m if travel < 0 else (self._right_edge or config.edge_margin_m))
         edge = seen.lines.get(self._edge_id)
