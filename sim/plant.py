@@ -9,7 +9,7 @@ import math
 import mujoco
 import numpy as np
 
-from ibvs_qp.frames import rotation_from_quaternion, skew
+from ibvs_qp.frames import cross, rotation_from_quaternion, skew
 from ibvs_qp.vehicle import VehicleParams
 from sim.board import BoardGeometry
 from sim.clearance import PropellerClearance
@@ -187,10 +187,12 @@ class Plant:
     @property
     def contact_friction(self) -> np.ndarray:
         """Force of the board on the tip along the board, world NED (y, z) [N], (2,)."""
-        found, force, normal, tangent = np.split(self._sensors[-1, self._ids.contact], (1, 4, 7))
-        if found[0] < 1.0:
+        found_force_normal_tangent = self._sensors[-1, self._ids.contact]
+        if found_force_normal_tangent[0] < 1.0:
             return np.zeros(2)
-        on_board = force[1] * tangent + force[2] * np.cross(normal, tangent)
+        force = found_force_normal_tangent[1:4]
+        normal, tangent = found_force_normal_tangent[4:7], found_force_normal_tangent[7:10]
+        on_board = force[1] * tangent + force[2] * cross(normal, tangent)
         return -(FLIP * on_board)[1:]
 
     @property

@@ -1,6 +1,8 @@
-"""Refusal of pictures that cannot be used, each with its reason."""
+"""What guards a picture: refusal with its reason, tolerant reading of vectors, times of the stages."""
 
 from __future__ import annotations
+
+import time
 
 import numpy as np
 
@@ -27,3 +29,24 @@ def frame_problem(frame: RgbdFrame) -> str | None:
     if intrinsics.shape != (4,) or not np.isfinite(intrinsics).all() or min(intrinsics[:2]) <= 1.0:
         return f"intrinsics {frame.intrinsics} are not (fx, fy, cx, cy) in pixels"
     return None
+
+
+class StageClock:
+    """Wall-clock times of the stages [ms]; never enter a result."""
+
+    def __init__(self) -> None:
+        self.times: dict[str, float] = {}
+        self._last = time.perf_counter()
+
+    def lap(self, stage: str) -> None:
+        """End a stage."""
+        now = time.perf_counter()
+        self.times[stage], self._last = 1e3 * (now - self._last), now
+
+
+def finite_vector(values: np.ndarray | None, size: int) -> np.ndarray | None:
+    """The values as floats, or None if they are absent or cannot be used."""
+    if values is None:
+        return None
+    vector = np.asarray(values, float).ravel()
+    return vector if vector.shape == (size,) and bool(np.isfinite(vector).all()) else None

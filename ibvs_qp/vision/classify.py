@@ -10,9 +10,9 @@ import numpy as np
 from ibvs_qp.vision.colors import BOARD, PAINT, SurfaceColors
 from ibvs_qp.vision.config import LineConfig
 from ibvs_qp.vision.grid import CoarseGrid
-from ibvs_qp.vision.lines import RefinedLine
 from ibvs_qp.vision.picture import Picture
 from ibvs_qp.vision.plane import PlaneEstimate
+from ibvs_qp.vision.refined import RefinedLine
 from ibvs_qp.vision.robust import median
 
 #: Distances from the line at which depth is read, nearest first [px at 640]: beyond the holes along an edge, yet

@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 
 from ibvs_qp.frames import R_BODY_CAMERA, down_in_body
-from ibvs_qp.measurement import FeatureFrame, LineFeature, RgbdFrame
+from ibvs_qp.measurement import FeatureFrame, RgbdFrame
 from ibvs_qp.vehicle import VehicleParams
-from ibvs_qp.vision.checks import frame_problem
+from ibvs_qp.vision.checks import StageClock, finite_vector, frame_problem
 from ibvs_qp.vision.colors import SurfaceColors
 from ibvs_qp.vision.config import VisionConfig
 from ibvs_qp.vision.detect import Candidate, detect_lines
-from ibvs_qp.vision.flow import FlowVelocity, SparseFlow
-from ibvs_qp.vision.grid import CoarseGrid
-from ibvs_qp.vision.mask import brush_zone, vehicle_mask
+from ibvs_qp.vision.flow import SparseFlow
+from ibvs_qp.vision.layout import PictureLayout
+from ibvs_qp.vision.make_percept import make_percept
 from ibvs_qp.vision.motion import CameraMotion
 from ibvs_qp.vision.percept import LineHint, Percept
 from ibvs_qp.vision.picture import Picture
 from ibvs_qp.vision.plane import PlaneEstimate, PlaneFitter
-from ibvs_qp.vision.seeds import seed_cells
 from ibvs_qp.vision.tracks import LineTracker
 
 #: Pictures after a start in which lines are searched often: colours are learned in the first one.
@@ -44,7 +41,7 @@ class Perception:
             SparseFlow(config.flow),
         )
         self._colors = SurfaceColors(config.board_color, config.paint_color, config.line.color_gate)
-        self._layout_key: tuple[object, ...] = ()
+        self._layout: PictureLayout | None = None
         self.reset()
 
     def reset(self) -> None:
@@ -83,8 +80,8 @@ class Perception:
         try:
             problem = frame_problem(frame)
             if problem is None:
-                turned, moved = _vector(rotation, 3), _vector(velocity, 3)
-                return self._process(frame, _vector(attitude, 4), turned, moved, hints, detect, seed_pixel)
+                turned, moved = finite_vector(rotation, 3), finite_vector(velocity, 3)
+                return self._process(frame, finite_vector(attitude, 4), turned, moved, hints, detect, seed_pixel)
         except Exception as error:  # in flight nothing may raise; the reason is reported instead
             problem = f"picture not understood: {type(error).__name__}: {error}"
         self._plane = None
@@ -104,8 +101,13 @@ class Perception:
         detect: bool,
         seed_pixel: tuple[float, float] | None,
     ) -> Percept:
-        clock = _Clock()
-        self._lay_out(frame)
+        clock = StageClock()
+        if self._layout is None or not self._layout.fits(frame):
+            self._layout = PictureLayout(frame, self._config, self._vehicle)
+            self._plane = None
+            self._tracker.reset()
+            self._flow.reset()
+        self._grid = self._layout.grid
         down = None if attitude is None else R_BODY_CAMERA.T @ np.array(down_in_body(attitude))
         tilt = 0.0 if down is None else float(np.arctan2(-down[0], down[1]))
         turn = np.zeros(3) if rotation is None else rotation
@@ -120,7 +122,7 @@ class Perception:
             labels = np.where(self._plane.component, np.maximum(labels, 1), 0)
         clock.lap("plane")
         surface = None if self._plane is None else self._plane.inverse_depth
-        picture = Picture.of(frame.rgb, self._mask, frame.intrinsics, frame.depth, surface)
+        picture = Picture.of(frame.rgb, self._layout.mask, frame.intrinsics, frame.depth, surface)
         self._tracker.advance(picture, motion, before, interval, self._colors, tilt)
         self._tracker.hints(hints, picture, self._colors, tilt)
         clock.lap("tracks")
@@ -129,7 +131,7 @@ class Perception:
         flow = self._flow.update(
             frame.rgb,
             frame.depth,
-            self._excluded,
+            self._layout.excluded,
             frame.intrinsics,
             frame.stamp_ns,
             turn,
@@ -137,24 +139,9 @@ class Perception:
             self._camera_position,
         )
         clock.lap("flow")
-        return self._percept(frame, flow, candidates, refused, clock.times)
-
-    def _lay_out(self, frame: RgbdFrame) -> None:
-        """Masks and grid, made anew when size or camera change."""
-        shape = (frame.rgb.shape[0], frame.rgb.shape[1])
-        key = (shape, tuple(frame.intrinsics))
-        if key == self._layout_key:
-            return
-        config, vehicle = self._config, self._vehicle
-        self._mask = vehicle_mask(vehicle, config.brush_width_m, config.mask, frame.intrinsics, shape)
-        zone = brush_zone(vehicle, config.brush_width_m, config.mask, frame.intrinsics, shape)
-        self._excluded = np.ascontiguousarray((self._mask | zone)[: shape[0] // 2 * 2 : 2, : shape[1] // 2 * 2 : 2])
-        self._grid = CoarseGrid(shape, frame.intrinsics, self._mask, config.plane.grid_columns)
-        self._seeds = seed_cells(self._grid, vehicle, config.brush_width_m)
-        self._layout_key = key
-        self._plane = None
-        self._tracker.reset()
-        self._flow.reset()
+        return make_percept(
+            frame, self._tracker.tracks, self._plane, flow, tuple(candidates), refused, self._layout.mask, clock.times
+        )
 
     def _fit_plane(
         self,
@@ -177,7 +164,7 @@ class Perception:
             ):
                 self._plane = tracked
                 return None
-        seeds = self._seeds
+        seeds = self._layout.seeds
         if seed_pixel is not None:
             u, v = seed_pixel
             rows, columns = self._grid.shape
@@ -228,70 +215,3 @@ class Perception:
         )
         self._tracker.offer(candidates, picture)
         return candidates
-
-    def _percept(
-        self,
-        frame: RgbdFrame,
-        flow: FlowVelocity | str,
-        candidates: list[Candidate],
-        refused: str | None,
-        times: dict[str, float],
-    ) -> Percept:
-        tracks = tuple(track.state() for track in self._tracker.tracks)
-        lines = tuple(
-            LineFeature(
-                rho=track.rho,
-                theta=track.theta,
-                covariance=track.covariance,
-                role=track.role,
-                weight=track.weight,
-                stamp_ns=frame.stamp_ns,
-                track_id=track.track_id,
-                segment=track.segment,
-                surface_side=track.surface_side,
-                kind=track.kind,
-            )
-            for track in tracks
-            if track.confirmed and track.weight > 0.0
-        )
-        moving = flow if isinstance(flow, FlowVelocity) else None
-        features = FeatureFrame(
-            lines=lines,
-            plane=None if self._plane is None else self._plane.abcd,
-            stamp_ns=frame.stamp_ns,
-            velocity=None if moving is None else moving.velocity,
-            velocity_covariance=None if moving is None else moving.covariance,
-            velocity_stamp_ns=0 if moving is None else moving.stamp_ns,
-        )
-        return Percept(
-            features=features,
-            plane=self._plane,
-            tracks=tracks,
-            candidates=tuple(candidates),
-            refused=refused,
-            velocity_refused=None if moving is not None else str(flow),
-            mask=self._mask,
-            intrinsics=frame.intrinsics,
-            time_ms=times,
-        )
-
-
-class _Clock:
-    """Wall-clock times of the stages [ms]; never enter a result."""
-
-    def __init__(self) -> None:
-        self.times: dict[str, float] = {}
-        self._last = time.perf_counter()
-
-    def lap(self, stage: str) -> None:
-        """End a stage."""
-        now = time.perf_counter()
-        self.times[stage], self._last = 1e3 * (now - self._last), now
-
-
-def _vector(values: np.ndarray | None, size: int) -> np.ndarray | None:
-    """The values as floats, or None if they are absent or cannot be used."""
-    if values is None:
-        return None
-    vector = np.asarray(values, float).ravel()
-    return vector if vector.shape == (size,) and bool(np.isfinite(vector).all()) else None

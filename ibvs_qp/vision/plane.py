@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
 from ibvs_qp.vision.colors import BOARD, PAINT
 from ibvs_qp.vision.config import PlaneConfig
 from ibvs_qp.vision.grid import CoarseGrid
 from ibvs_qp.vision.robust import median
+from ibvs_qp.vision.surface import PlaneEstimate, connected_samples, plane_covariance
 
-#: Side of the blocks over which residuals are averaged to measure their correlation [cells].
-_BLOCK = 8
 #: Samples used to judge hypotheses; more cost time and change nothing.
 _JUDGED = 1000
 #: Radius that counts around the seed when hypotheses are judged, normalised.
@@ -25,35 +22,6 @@ _VOTE = 0.6
 _FLAT = 1e-6
 #: Turns a median absolute deviation into a standard deviation of a normal distribution.
 _MAD = 1.4826
-
-
-@dataclass(frozen=True, kw_only=True)
-class PlaneEstimate:
-    """A fitted surface in the camera frame.
-
-    Attributes:
-        inverse_depth: (a, b, c) of 1/Z = a x + b y + c [1/m], (3,).
-        covariance: Of (a, b, c), correlated noise and the frame's common mode included, (3, 3).
-        normal: Outward unit normal (towards the camera) in C, (3,).
-        distance_m: Distance of the camera centre from the plane [m].
-        inlier_share: Share of the valid samples of the whole picture that belong to the surface.
-        residual_sigma: Standard deviation of the residuals, share of depth.
-        component: Samples of the surface, bool (rows, columns) of the coarse grid.
-    """
-
-    inverse_depth: np.ndarray
-    covariance: np.ndarray
-    normal: np.ndarray
-    distance_m: float
-    inlier_share: float
-    residual_sigma: float
-    component: np.ndarray
-
-    @property
-    def abcd(self) -> tuple[float, float, float, float]:
-        """Plane (A, B, C, D) with D = -1."""
-        a, b, c = (float(entry) for entry in self.inverse_depth)
-        return a, b, c, -1.0
 
 
 class PlaneFitter:
@@ -187,7 +155,7 @@ class PlaneFitter:
                 if last:  # a wall that looks like paint must not get in: what looks like it has to fit twice as well
                     colored |= inlier & (prefer.ravel() == PAINT) & (np.abs(relative) < 0.5 * gate)
                 inlier = colored if int(colored.sum()) >= config.min_samples else inlier
-            component = _component(inlier.reshape(grid.shape), grid, seed).ravel()
+            component = connected_samples(inlier.reshape(grid.shape), grid, seed).ravel()
             if int(component.sum()) < config.min_samples:
                 return "too few samples on the surface"
             spread = relative[component]
@@ -206,47 +174,12 @@ class PlaneFitter:
         residual = np.where(component, flat - design @ plane, 0.0)
         return PlaneEstimate(
             inverse_depth=plane,
-            covariance=_covariance(residual, normal_matrix, int(component.sum()), grid, plane, config.common_mode_m),
+            covariance=plane_covariance(
+                residual, normal_matrix, int(component.sum()), grid, plane, config.common_mode_m
+            ),
             normal=-plane / length,
             distance_m=1.0 / length,
             inlier_share=float(component.sum()) / max(int(usable.sum()), 1),
             residual_sigma=sigma,
             component=component.reshape(grid.shape),
         )
-
-
-def _component(inlier: np.ndarray, grid: CoarseGrid, seed: tuple[int, int] | None) -> np.ndarray:
-    """Connected inliers around the seed (the largest, without one); hidden samples connect."""
-    _, labels = cv2.connectedComponents((inlier | ~grid.free).astype(np.uint8), connectivity=4, ltype=cv2.CV_16U)
-    if seed is not None:
-        rows, columns = grid.window(seed, 2)
-        around = labels[rows, columns][inlier[rows, columns]]
-        counts = np.bincount(around) if len(around) else np.zeros(1)
-    else:
-        counts = np.bincount(labels[inlier]) if inlier.any() else np.zeros(1)
-    label = int(np.argmax(counts))
-    return inlier & (labels == label) if counts[label] > 0 else np.zeros_like(inlier)
-
-
-def _covariance(
-    residual: np.ndarray,
-    normal_matrix: np.ndarray,
-    count: int,
-    grid: CoarseGrid,
-    plane: np.ndarray,
-    common_mode: float,
-) -> np.ndarray:
-    """Least-squares covariance, inflated by the correlation of the residuals over blocks, plus the common mode."""
-    rows, columns = (size // _BLOCK * _BLOCK for size in grid.shape)
-    square = residual.reshape(grid.shape)[:rows, :columns]
-    sums = np.add.reduceat(
-        np.add.reduceat(square, np.arange(0, rows, _BLOCK), axis=0), np.arange(0, columns, _BLOCK), axis=1
-    )
-    total = float(np.vdot(residual, residual))
-    inflation = max(1.0, float(np.vdot(sums, sums)) / total) if total > 0 else 1.0
-    variance = total / max(count - 3, 1)
-    inverse_length = float(np.linalg.norm(plane))
-    return (
-        np.linalg.inv(normal_matrix) * variance * inflation
-        + np.outer(plane, plane) * (common_mode * inverse_length) ** 2
-    )
