@@ -164,6 +164,7 @@ class Perception:
             ):
                 self._plane = tracked
                 return None
+        assert self._layout is not None
         seeds = self._layout.seeds
         if seed_pixel is not None:
             u, v = seed_pixel

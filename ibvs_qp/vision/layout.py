@@ -1,0 +1,37 @@
+"""Everything that depends only on picture size and camera: masks, coarse grid, seeds."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ibvs_qp.measurement import RgbdFrame
+from ibvs_qp.vehicle import VehicleParams
+from ibvs_qp.vision.config import VisionConfig
+from ibvs_qp.vision.grid import CoarseGrid
+from ibvs_qp.vision.mask import brush_zone, vehicle_mask
+from ibvs_qp.vision.seeds import seed_cells
+
+
+class PictureLayout:
+    """Masks and grid of one picture size and camera.
+
+    Attributes:
+        mask: Vehicle's mask, uint8 (H, W).
+        excluded: Where no flow points may lie, at half resolution, uint8.
+        grid: Coarse grid.
+        seeds: Cells beside the brush.
+    """
+
+    def __init__(self, frame: RgbdFrame, config: VisionConfig, vehicle: VehicleParams) -> None:
+        """Draw the masks and lay the grid for pictures like this one."""
+        shape = (frame.rgb.shape[0], frame.rgb.shape[1])
+        self._key = (shape, tuple(frame.intrinsics))
+        self.mask = vehicle_mask(vehicle, config.brush_width_m, config.mask, frame.intrinsics, shape)
+        zone = brush_zone(vehicle, config.brush_width_m, config.mask, frame.intrinsics, shape)
+        self.excluded = np.ascontiguousarray((self.mask | zone)[: shape[0] // 2 * 2 : 2, : shape[1] // 2 * 2 : 2])
+        self.grid = CoarseGrid(shape, frame.intrinsics, self.mask, config.plane.grid_columns)
+        self.seeds = seed_cells(self.grid, vehicle, config.brush_width_m)
+
+    def fits(self, frame: RgbdFrame) -> bool:
+        """Whether a picture has this size and camera."""
+        return self._key == ((frame.rgb.shape[0], frame.rgb.shape[1]), tuple(frame.intrinsics))

@@ -1,0 +1,62 @@
+"""Puts the parts of one picture's result together."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ibvs_qp.measurement import FeatureFrame, LineFeature, RgbdFrame
+from ibvs_qp.vision.detect import Candidate
+from ibvs_qp.vision.flow_solve import FlowVelocity
+from ibvs_qp.vision.percept import Percept
+from ibvs_qp.vision.surface import PlaneEstimate
+from ibvs_qp.vision.track import Track
+
+
+def make_percept(
+    frame: RgbdFrame,
+    followed: list[Track],
+    plane: PlaneEstimate | None,
+    flow: FlowVelocity | str,
+    candidates: tuple[Candidate, ...],
+    refused: str | None,
+    mask: np.ndarray,
+    times: dict[str, float],
+) -> Percept:
+    """Result of one picture; only confirmed tracks of positive weight become features."""
+    tracks = tuple(track.state() for track in followed)
+    lines = tuple(
+        LineFeature(
+            rho=track.rho,
+            theta=track.theta,
+            covariance=track.covariance,
+            role=track.role,
+            weight=track.weight,
+            stamp_ns=frame.stamp_ns,
+            track_id=track.track_id,
+            segment=track.segment,
+            surface_side=track.surface_side,
+            kind=track.kind,
+        )
+        for track in tracks
+        if track.confirmed and track.weight > 0.0
+    )
+    moving = flow if isinstance(flow, FlowVelocity) else None
+    features = FeatureFrame(
+        lines=lines,
+        plane=None if plane is None else plane.abcd,
+        stamp_ns=frame.stamp_ns,
+        velocity=None if moving is None else moving.velocity,
+        velocity_covariance=None if moving is None else moving.covariance,
+        velocity_stamp_ns=0 if moving is None else moving.stamp_ns,
+    )
+    return Percept(
+        features=features,
+        plane=plane,
+        tracks=tracks,
+        candidates=candidates,
+        refused=refused,
+        velocity_refused=None if moving is not None else str(flow),
+        mask=mask,
+        intrinsics=frame.intrinsics,
+        time_ms=times,
+    )

@@ -1,0 +1,65 @@
+"""One line followed over time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ibvs_qp.vision.percept import TrackState
+from ibvs_qp.vision.refined import RefinedLine
+
+#: Share of the new step in a track's running colour step.
+_STEP_BLEND = 0.2
+
+
+@dataclass
+class Track:
+    """One line followed over time."""
+
+    track_id: int
+    line: RefinedLine
+    role: str
+    kind: str
+    surface_side: int
+    score: float
+    borders_plane: bool
+    hint: str = ""
+    weight: float = 0.0
+    age: int = 1
+    hits: list[bool] = field(default_factory=lambda: [True])
+    confirmed: bool = False
+    lost_s: float = 0.0
+    rho: float = 0.0
+    theta: float = 0.0
+    covariance: np.ndarray = field(default_factory=lambda: np.zeros((2, 2)))
+    step: np.ndarray = field(default_factory=lambda: np.zeros(3))
+
+    def adopt(self, line: RefinedLine) -> None:
+        """Take a fresh fit."""
+        self.line, self.rho, self.theta, self.covariance = line, line.rho, line.theta, line.covariance
+        self.step = line.step if not self.step.any() else self.step + _STEP_BLEND * (line.step - self.step)
+
+    def state(self) -> TrackState:
+        """Frozen copy for the outside."""
+        return TrackState(
+            track_id=self.track_id,
+            role=self.role,
+            kind=self.kind,
+            surface_side=self.surface_side,
+            rho=self.rho,
+            theta=self.theta,
+            covariance=self.covariance,
+            segment=self.line.segment,
+            ends=self.line.ends,
+            weight=self.weight,
+            confirmed=self.confirmed,
+            seen=self.lost_s == 0.0,
+            age=self.age,
+            inlier_share=self.line.inlier_share,
+            rms_px=self.line.rms_px,
+            length_px=self.line.length_px,
+            score=self.score,
+            borders_plane=self.borders_plane,
+            hint=self.hint,
+        )
