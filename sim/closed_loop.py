@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
+
+import ibvs_qp
 
 from ibvs_qp.measurement import SensorFrame
 from ibvs_qp.painting import PaintingConfig
@@ -26,6 +28,8 @@ from sim.trace import Event, Trace
 #: Called now and then with simulated time [s], phase name and real-time factor.
 Progress = Callable[[float, str, float], None]
 
+#: Shipped presets, one per law.
+PRESETS = Path(ibvs_qp.__file__).parent / "presets"
 #: Normal force above which the brush leaves paint [N].
 PAINTING_FORCE = 0.05
 #: Control ticks between calls of the progress function.
@@ -48,9 +52,22 @@ class FlightOptions:
     video: bool = True
 
 
-def pilot_config(scene: Scene, options: FlightOptions) -> PilotConfig:
-    """The pilot's configuration: preset, law, and the paint job, which the strategy is told (and nothing else)."""
-    config = PilotConfig.from_toml(options.preset) if options.preset else PilotConfig()
+def default_preset(law: str) -> PilotConfig:
+    """The shipped preset of a law; each was tuned by the same search (`sim.tune`)."""
+    file = PRESETS / f"tarot_t960_{law}.toml"
+    return PilotConfig.from_toml(file) if file.exists() else PilotConfig(law=law)
+
+
+def pilot_config(scene: Scene, options: FlightOptions, config: PilotConfig | None = None) -> PilotConfig:
+    """The pilot's configuration: preset, law, and the paint job, which the strategy is told (and nothing else).
+
+    Args:
+        scene: Only its paint job is read.
+        options: Law and preset file.
+        config: Takes the place of the preset.
+    """
+    if config is None:
+        config = PilotConfig.from_toml(options.preset) if options.preset else default_preset(options.law)
     paint = scene.paint
     painting = dataclasses.replace(
         config.painting,
@@ -109,18 +126,21 @@ class World:
             self._brush = None
 
 
-def fly(scene: Scene, options: FlightOptions, progress: Progress | None = None) -> Trace:
+def fly(
+    scene: Scene, options: FlightOptions, progress: Progress | None = None, config: PilotConfig | None = None
+) -> Trace:
     """Fly one scene under one law; Ctrl-C ends the flight and keeps what was flown.
 
     Args:
         scene: The truth.
         options: Law, seed, features, picture size and so on.
         progress: Told about time, phase and real-time factor now and then.
+        config: Flown instead of the preset.
 
     Returns:
         The trace; incomplete with a reason when the flight crashed, timed out or was interrupted.
     """
-    config = pilot_config(scene, options)
+    config = pilot_config(scene, options, config)
     pilot, world = Pilot(config), World(scene, options, config)
     recorder = Recorder(scene, options, world, pilot)
     limit = BASE_TIME + STROKE_FACTOR * scene.paint.rows * scene.paint.stroke_m / scene.paint.speed_m_s
@@ -150,6 +170,4 @@ def fly(scene: Scene, options: FlightOptions, progress: Progress | None = None) 
     trace.reason = reason or pilot.painter.reason
     if reason:
         trace.events.append(Event(t=tick * TICK_NS * 1e-9, kind="end", text=reason))
-    if math.isnan(trace.wall_time_s):
-        trace.wall_time_s = 0.0
     return trace
