@@ -59,7 +59,7 @@ class OsqpSolver:
             upper.copy(),
             verbose=False,
             eps_abs=settings.tolerance,
-            eps_rel=settings.tolerance,
+            eps_rel=settings.relative_tolerance,
             max_iter=settings.max_iterations,
             check_termination=settings.check_interval,
             adaptive_rho_interval=settings.adaptive_rho_interval,
