@@ -297,7 +297,7 @@ class Painter:
             RIGHT_EDGE_GATE,
         )
 
-    def _keep_guide(self, seen: Scenery, chooser) -> None:  # noqa: ANN001
+    def _keep_guide(self, seen: Scenery, chooser) -> None:
         """Stay with the guide while it lives; when it is gone, look for it where it must be."""
         line = seen.lines.get(self._guide_id)
         if line is not None and line.weight > 0.05:
@@ -411,7 +411,7 @@ class Painter:
 
     def _edge_reference(self, edge: TrackedLine, edge_rate: float) -> float:
         """The stop edge's wanted offset: from where it was first seen to the margin, at the stroke's own speed."""
-        travel = -1.0 if self.row % 2 == 1 or self.phase == "climb" and self.row % 2 == 0 else 1.0
+        travel = -1.0 if self.row % 2 == 1 or (self.phase == "climb" and self.row % 2 == 0) else 1.0
         margin = travel * (self.config.edge_margin_m if travel < 0 else (self._right_edge or self.config.edge_margin_m))
         if self._edge_target is None:
             self._edge_target = edge.offset
@@ -421,6 +421,6 @@ class Painter:
         return self._edge_target
 
 
-def _nearest(lines, accept, expected: float, gate: float) -> TrackedLine | None:  # noqa: ANN001
+def _nearest(lines, accept, expected: float, gate: float) -> TrackedLine | None:
     good = [line for line in lines if line.weight > 0.0 and accept(line) and abs(line.offset - expected) <= gate]
     return min(good, key=lambda line: abs(line.offset - expected), default=None)

@@ -113,7 +113,7 @@ class Pilot:
         self._plane_stamp = 0
 
     @property
-    def terms(self):  # noqa: ANN201
+    def terms(self):
         """The controller's shared set-points, for logs."""
         return self.controller.setpoints
 

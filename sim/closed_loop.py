@@ -11,9 +11,7 @@ from pathlib import Path
 import numpy as np
 
 import ibvs_qp
-
 from ibvs_qp.measurement import SensorFrame
-from ibvs_qp.painting import PaintingConfig
 from ibvs_qp.pilot import Pilot, PilotConfig
 from sim.board import BoardGeometry
 from sim.cameras import CameraStream, PlaneCamera
