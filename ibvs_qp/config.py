@@ -24,7 +24,10 @@ class Gains:
     theta_kp: float = setting(25.0, "line angle error", unit="1/s^2", low=0.0, high=400.0)
     theta_kd: float = setting(10.0, "line angle rate", unit="1/s", low=0.0, high=100.0)
     line_turn_share: float = setting(
-        0.5, "share of the body's turn that line rows count on in contact, where friction may hold the tip", low=0.0, high=1.0
+        0.5,
+        "share of the body's turn that line rows count on in contact, where friction may hold the tip",
+        low=0.0,
+        high=1.0,
     )
     velocity_kp: float = setting(3.0, "velocity error along free directions", unit="1/s", low=0.0, high=50.0)
     velocity_ki: float = setting(1.5, "integral of that error", unit="1/s^2", low=0.0, high=50.0)
@@ -51,12 +54,16 @@ class ContactSettings:
     approach_speed_m_s: float = setting(0.10, "approach speed far from the wall", unit="m/s", low=0.005, high=0.5)
     close_speed_m_s: float = setting(0.05, "approach speed within close_distance", unit="m/s", low=0.002, high=0.3)
     close_distance_m: float = setting(0.10, "where the approach slows down", unit="m", low=0.01, high=1.0)
-    touch_speed_m_s: float = setting(0.02, "speed of the last centimetres while the stiffness is unknown", unit="m/s", low=0.001, high=0.2)
+    touch_speed_m_s: float = setting(
+        0.02, "speed of the last centimetres while the stiffness is unknown", unit="m/s", low=0.001, high=0.2
+    )
     touch_distance_m: float = setting(0.02, "where the last centimetres begin", unit="m", low=0.005, high=0.2)
     retreat_speed_m_s: float = setting(0.15, "speed away from the wall", unit="m/s", low=0.01, high=0.5)
     depth_min_m: float = setting(0.53, "camera to wall, lambda = 1 below", unit="m", low=0.1, high=3.0)
     depth_max_m: float = setting(0.63, "camera to wall, lambda = 0 above", unit="m", low=0.1, high=3.0)
-    ramp_s: float = setting(1.0, "lambda and the force reference rise over this time after touch", unit="s", low=0.05, high=10.0)
+    ramp_s: float = setting(
+        1.0, "lambda and the force reference rise over this time after touch", unit="s", low=0.05, high=10.0
+    )
     touch_force_n: float = setting(0.5, "least filtered force that counts as touch", unit="N", low=0.05, high=10.0)
     touch_sigmas: float = setting(3.0, "touch threshold over the free-flight noise", low=1.0, high=10.0)
     touch_samples: int = setting(3, "force samples above threshold in a row", low=1, high=50)
@@ -64,10 +71,14 @@ class ContactSettings:
     loss_force_n: float = setting(0.3, "force below which contact is doubted", unit="N", low=0.01, high=10.0)
     loss_time_s: float = setting(0.10, "doubt this long is a loss", unit="s", low=0.01, high=2.0)
     force_filter_hz: float = setting(8.0, "first-order filter of the measured push", unit="Hz", low=0.5, high=100.0)
-    moment_gain: float = setting(1.0, "share of the measured contact moment fed forward; a stuck tip returns 0.9 of it", low=0.0, high=1.0)
+    moment_gain: float = setting(
+        1.0, "share of the measured contact moment fed forward; a stuck tip returns 0.9 of it", low=0.0, high=1.0
+    )
     friction_gain: float = setting(0.9, "share of the friction along travel fed forward", low=0.0, high=1.0)
     friction_slew_n_s: float = setting(6.0, "fastest change of that force", unit="N/s", low=0.1, high=100.0)
-    stuck_speed_m_s: float = setting(0.005, "slower than this in contact counts as stuck", unit="m/s", low=0.0, high=0.1)
+    stuck_speed_m_s: float = setting(
+        0.005, "slower than this in contact counts as stuck", unit="m/s", low=0.0, high=0.1
+    )
 
     def __post_init__(self) -> None:
         """Validate."""
@@ -80,7 +91,9 @@ class Weights:
 
     line: float = setting(100.0, "line rows; 0.1 image units/s^2 = 5 cm/s^2 at half a metre", low=0.0, high=1e6)
     line_angle: float = setting(0.05, "angle rows; yield to level flight by four orders", low=0.0, high=1e6)
-    push: float = setting(4.0, "push row; 0.5 N; below yaw and level: an unreachable push is given up first", low=0.0, high=1e6)
+    push: float = setting(
+        4.0, "push row; 0.5 N; below yaw and level: an unreachable push is given up first", low=0.0, high=1e6
+    )
     level: float = setting(400.0, "roll and pitch rows; 0.05 rad/s^2", low=0.0, high=1e6)
     yaw: float = setting(100.0, "yaw row; 0.1 rad/s^2", low=0.0, high=1e6)
     velocity: float = setting(100.0, "free velocity rows; 0.1 m/s^2", low=0.0, high=1e6)
@@ -100,7 +113,9 @@ class LimitSettings:
     tilt_deg: float = setting(1.0, "zero-tilt bound on roll and pitch", unit="deg", low=0.05, high=45.0)
     tilt_price: float = setting(4000.0, "slack price of the tilt barriers", low=1e-3, high=1e8)
     tilt_rate_1_s: float = setting(8.0, "how fast the tilt barriers may be approached", unit="1/s", low=0.1, high=100.0)
-    yaw_deg: float = setting(10.0, "yaw bound; the propellers strike the wall at 19 deg", unit="deg", low=0.5, high=45.0)
+    yaw_deg: float = setting(
+        10.0, "yaw bound; the propellers strike the wall at 19 deg", unit="deg", low=0.5, high=45.0
+    )
     yaw_price: float = setting(1000.0, "slack price of the yaw barrier", low=1e-3, high=1e8)
     yaw_rate_1_s: float = setting(5.0, "how fast the yaw barrier may be approached", unit="1/s", low=0.1, high=100.0)
 

@@ -35,7 +35,9 @@ class PaintingConfig:
     align_error_m: float = setting(0.003, "line error that counts as aligned", unit="m", low=0.0005, high=0.05)
     align_speed_m_s: float = setting(0.005, "speed that counts as still", unit="m/s", low=0.001, high=0.1)
     align_time_s: float = setting(0.3, "aligned this long", unit="s", low=0.0, high=10.0)
-    timeout_s: float = setting(15.0, "longest start, approach, align, press, climb or retreat", unit="s", low=1.0, high=300.0)
+    timeout_s: float = setting(
+        15.0, "longest start, approach, align, press, climb or retreat", unit="s", low=1.0, high=300.0
+    )
 
     def __post_init__(self) -> None:
         """Validate."""
@@ -219,7 +221,9 @@ class Painter:
             waited = seen.time_s - self._since
             if (waited > 0.15 and still and remaining < 0.003) or waited > SETTLE_TIME:
                 self._end_row(seen, edge)
-        return self._wish(seen, contact=True, along=travel * self._speed, edge=edge, edge_rate=-travel * self._speed * dt)
+        return self._wish(
+            seen, contact=True, along=travel * self._speed, edge=edge, edge_rate=-travel * self._speed * dt
+        )
 
     def _end_row(self, seen: Scenery, edge: TrackedLine | None) -> None:
         if self.row == 1:
@@ -292,7 +296,9 @@ class Painter:
         """The right board edge, if it is where a row that starts one margin inside would have it."""
         return _nearest(
             seen.lines.values(),
-            lambda line: line.role == VERTICAL and line.kind != "paint" and line.surface_side <= 0 and line.weight > 0.3,
+            lambda line: (
+                line.role == VERTICAL and line.kind != "paint" and line.surface_side <= 0 and line.weight > 0.3
+            ),
             self.config.edge_margin_m,
             RIGHT_EDGE_GATE,
         )
@@ -344,20 +350,20 @@ class Painter:
             return ahead + OVERRUN, None  # the stroke ends at the edge, which may come a little late
         return ahead, None
 
-    def _stop_edge(
-        self, seen: Scenery, travel: float, side: int, ahead: float, wanted: float
-    ) -> TrackedLine | None:
+    def _stop_edge(self, seen: Scenery, travel: float, side: int, ahead: float, wanted: float) -> TrackedLine | None:
         """The vertical edge ahead whose surface lies on the side we come from, near where the stroke must end."""
         if travel > 0 and self._right_edge is None:
             return None
         gate = 0.25 if self.row == 1 else 0.06
         best = _nearest(
             seen.lines.values(),
-            lambda line: line.role == VERTICAL
-            and line.kind != "paint"
-            and line.surface_side == side
-            and line.weight > 0.9
-            and travel * line.offset > 0.0,
+            lambda line: (
+                line.role == VERTICAL
+                and line.kind != "paint"
+                and line.surface_side == side
+                and line.weight > 0.9
+                and travel * line.offset > 0.0
+            ),
             wanted + travel * max(ahead, 0.0),
             gate,
         )
@@ -405,9 +411,7 @@ class Painter:
             velocity[0] = min(max(back, -HOLD_SPEED), HOLD_SPEED)
         velocity += along * np.array([math.cos(slope), math.sin(slope)])
         velocity += climb * np.array([math.sin(slope), -math.cos(slope)])
-        return Wish(
-            contact=contact, standoff=standoff, velocity=velocity, guides=guides, push=self.config.push_n
-        )
+        return Wish(contact=contact, standoff=standoff, velocity=velocity, guides=guides, push=self.config.push_n)
 
     def _edge_reference(self, edge: TrackedLine, edge_rate: float) -> float:
         """The stop edge's wanted offset: from where it was first seen to the margin, at the stroke's own speed."""

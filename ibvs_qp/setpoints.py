@@ -233,7 +233,10 @@ class Setpoints:
                 integrate,
                 dt,
             )
-        fixed = {role: max((t.weight for t in self.lines if t.role == role), default=0.0) for role in ("horizontal", "vertical")}
+        fixed = {
+            role: max((t.weight for t in self.lines if t.role == role), default=0.0)
+            for role in ("horizontal", "vertical")
+        }
         self.free_right, self.free_down = 1.0 - fixed["vertical"], 1.0 - fixed["horizontal"]
         self.velocity_command = np.zeros(2)
         if velocity is None:

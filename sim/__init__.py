@@ -1,0 +1,1 @@
+"""Closed-loop simulation: plant, sensors, camera, flights, metrics, report and command line."""

@@ -77,9 +77,7 @@ def pilot_config(scene: Scene, options: FlightOptions, config: PilotConfig | Non
         speed_m_s=paint.speed_m_s,
         push_n=paint.push_n,
     )
-    vision = dataclasses.replace(
-        config.vision, paint_color=paint.color, brush_width_m=paint.brush_width_m
-    )
+    vision = dataclasses.replace(config.vision, paint_color=paint.color, brush_width_m=paint.brush_width_m)
     return dataclasses.replace(config, painting=painting, vision=vision, law=options.law)
 
 

@@ -26,7 +26,9 @@ class BoardScene(_Checked):
     width_m: float = setting(1.40, "width of the board", unit="m", low=0.2, high=20.0)
     height_m: float = setting(0.60, "height of the board", unit="m", low=0.1, high=10.0)
     bottom_m: float = setting(1.20, "height of the bottom edge above the ground", unit="m", low=0.5, high=50.0)
-    slope_deg: float = setting(0.0, "turn in its own plane, + clockwise as the camera sees it", unit="deg", low=-10.0, high=10.0)
+    slope_deg: float = setting(
+        0.0, "turn in its own plane, + clockwise as the camera sees it", unit="deg", low=-10.0, high=10.0
+    )
     gap_m: float = setting(0.05, "distance of the board's face in front of the wall", unit="m", low=0.005, high=1.0)
     color: Color = setting((236, 236, 230), "board colour", low=0, high=255)
     clutter: int = setting(4, "distracting objects on and around the board", low=0, high=100)
@@ -87,8 +89,12 @@ class VehicleScene(_Checked):
     com_offset_m: tuple[float, float, float] = setting(
         (0.0, 0.0, 0.0), "true centre of mass from the assumed one, FRD", unit="m", low=-0.1, high=0.1
     )
-    thrust_min_n: float | tuple[float, ...] = setting(_NOMINAL.thrust_min_n, "idle thrust", unit="N", low=0.0, high=100.0)
-    thrust_max_n: float | tuple[float, ...] = setting(_NOMINAL.thrust_max_n, "full thrust", unit="N", low=0.0, high=100.0)
+    thrust_min_n: float | tuple[float, ...] = setting(
+        _NOMINAL.thrust_min_n, "idle thrust", unit="N", low=0.0, high=100.0
+    )
+    thrust_max_n: float | tuple[float, ...] = setting(
+        _NOMINAL.thrust_max_n, "full thrust", unit="N", low=0.0, high=100.0
+    )
     motor_lag_up_s: float = setting(_NOMINAL.motor_lag_up_s, "lag of rising thrust", unit="s", low=0.001, high=0.5)
     motor_lag_down_s: float = setting(_NOMINAL.motor_lag_down_s, "lag of falling thrust", unit="s", low=0.001, high=0.5)
 

@@ -137,9 +137,7 @@ class Tune:
         preset = default_preset(self.law)
         best = {name: float(f"{value:.4g}") for name, value in study.best_params.items()}
         gains = dataclasses.replace(preset.controller.gains, **best)
-        tuned: PilotConfig = dataclasses.replace(
-            preset, controller=dataclasses.replace(preset.controller, gains=gains)
-        )
+        tuned: PilotConfig = dataclasses.replace(preset, controller=dataclasses.replace(preset.controller, gains=gains))
         self.out.mkdir(parents=True, exist_ok=True)
         (self.out / f"{self.law}.toml").write_text(dump_toml(tuned), encoding="utf-8")
         rows: list[dict[str, Any]] = [{"cost": trial.value, **trial.params} for trial in study.trials]

@@ -12,22 +12,36 @@ class EstimationConfig:
     """Noise models and life times; defaults from the sensors of the design, section 5."""
 
     acceleration_noise: float = setting(
-        8e-3, "accelerometer noise in the wall plane with what the attitude noise adds", unit="m/s^2/sqrt(Hz)", low=1e-5, high=1.0
+        8e-3,
+        "accelerometer noise in the wall plane with what the attitude noise adds",
+        unit="m/s^2/sqrt(Hz)",
+        low=1e-5,
+        high=1.0,
     )
     bias_noise: float = setting(
-        3e-3, "drift of the bias that gravity leaks through the attitude bias", unit="m/s^3/sqrt(Hz)", low=1e-6, high=1.0
+        3e-3,
+        "drift of the bias that gravity leaks through the attitude bias",
+        unit="m/s^3/sqrt(Hz)",
+        low=1e-6,
+        high=1.0,
     )
     line_noise: float = setting(
         1e-3, "random walk of line offsets: edges are not perfectly straight", unit="m/sqrt(s)", low=1e-6, high=0.1
     )
-    line_std_m: float = setting(3e-4, "least deviation of one line offset, whatever the fit claims", unit="m", low=1e-6, high=0.1)
+    line_std_m: float = setting(
+        3e-4, "least deviation of one line offset, whatever the fit claims", unit="m", low=1e-6, high=0.1
+    )
     velocity_std_m_s: float = setting(2e-3, "least deviation of one flow velocity", unit="m/s", low=1e-6, high=1.0)
     angle_gain: float = setting(0.15, "share of a frame's line angle that is believed", low=0.01, high=1.0)
     frames_to_trust: int = setting(4, "frames until a new line has full weight", low=1, high=100)
-    fade_start_s: float = setting(0.10, "a line this long without news fades, counted from delivery", unit="s", low=0.01, high=5.0)
+    fade_start_s: float = setting(
+        0.10, "a line this long without news fades, counted from delivery", unit="s", low=0.01, high=5.0
+    )
     fade_end_s: float = setting(0.45, "and is forgotten after this long", unit="s", low=0.05, high=10.0)
     velocity_life_s: float = setting(0.6, "a velocity older than this is not passed on", unit="s", low=0.05, high=10.0)
-    tare_time_s: float = setting(0.5, "free flight averaged before the wrench is trusted", unit="s", low=0.05, high=10.0)
+    tare_time_s: float = setting(
+        0.5, "free flight averaged before the wrench is trusted", unit="s", low=0.05, high=10.0
+    )
     tare_follow_s: float = setting(20.0, "how slowly the bias is followed after that", unit="s", low=0.5, high=1000.0)
     tare_distance_m: float = setting(0.04, "the tip counts as free beyond this distance", unit="m", low=0.005, high=1.0)
 

@@ -143,7 +143,9 @@ class ContactEstimator:
                 self.in_contact, self.touch_ns, self._doubt_ns = True, stamp, -1
                 self.stiffness.start()
             return
-        self._doubt_ns = -1 if self.push >= settings.loss_force_n else (self._doubt_ns if self._doubt_ns >= 0 else stamp)
+        self._doubt_ns = (
+            -1 if self.push >= settings.loss_force_n else (self._doubt_ns if self._doubt_ns >= 0 else stamp)
+        )
         doubted = self._doubt_ns >= 0 and (stamp - self._doubt_ns) * 1e-9 >= settings.loss_time_s
         if doubted or self.distance > settings.contact_distance_m:
             self.in_contact, self.touch_ns, self._touch_count = False, -1, 0

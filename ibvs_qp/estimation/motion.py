@@ -155,7 +155,14 @@ class WallMotion:
             self._velocity_stamp = frame.stamp_ns
 
     def _correct_line(
-        self, line: LineFeature, offset: float, angle: float, side: int, scale: float, ends: np.ndarray | None, stamp: int
+        self,
+        line: LineFeature,
+        offset: float,
+        angle: float,
+        side: int,
+        scale: float,
+        ends: np.ndarray | None,
+        stamp: int,
     ) -> None:
         deviation = math.hypot(self._config.line_std_m, math.sqrt(max(float(line.covariance[0, 0]), 0.0)) * scale)
         tracked = self.lines.get(line.track_id)

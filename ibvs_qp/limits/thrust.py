@@ -43,6 +43,8 @@ def thrust_window(
     """
     reach_low, reach_high = last - step, last + step
     low = np.minimum(np.maximum(lower, reach_low), reach_high - LEAST_GAP)
-    high = np.maximum(np.minimum(upper, np.maximum(reach_high, low + LEAST_GAP)), np.maximum(reach_low, low) + LEAST_GAP)
+    high = np.maximum(
+        np.minimum(upper, np.maximum(reach_high, low + LEAST_GAP)), np.maximum(reach_low, low) + LEAST_GAP
+    )
     low = np.minimum(np.maximum(low, floor), ceiling - LEAST_GAP)
     return low, np.minimum(np.maximum(high, low + LEAST_GAP), ceiling)

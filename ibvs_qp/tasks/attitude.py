@@ -26,6 +26,4 @@ class YawTask(Task):
     def rows(self, model: SymbolicModel) -> list[TaskRow]:
         """One row in rad/s^2."""
         yaw = model.parameter("yaw", 2)
-        return [
-            TaskRow(name="yaw", unit="rad/s^2", expression=model.acceleration[5], target=yaw[0], weight=yaw[1])
-        ]
+        return [TaskRow(name="yaw", unit="rad/s^2", expression=model.acceleration[5], target=yaw[0], weight=yaw[1])]
