@@ -98,7 +98,8 @@ class LineErrors:
             key = (reference.role, place)
             terms.append(self._term(key, line, reference, plane, foot, twist, reference_velocity, integrate, dt))
         for key in [key for key in self._last if order.get(key[0], 0) <= key[1]]:
-            self._last.pop(key), self._integrals.pop(key, None)
+            self._last.pop(key)
+            self._integrals.pop(key, None)
         return terms
 
     def _term(

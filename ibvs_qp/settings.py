@@ -63,7 +63,7 @@ def _check_number(name: str, value: Any, default: Any, meta: typing.Mapping[str,
     number = numbers.Integral if isinstance(default, int) else numbers.Real
     for entry in value if isinstance(value, tuple) else (value,):
         right_type = isinstance(entry, number) and not isinstance(entry, bool)
-        if not (right_type and math.isfinite(entry) and low <= entry <= high):
+        if not (right_type and math.isfinite(typing.cast(float, entry)) and low <= entry <= high):
             raise out_of_range(name, value, unit, f"allowed is [{low:g}, {high:g}] {unit}".rstrip())
 
 

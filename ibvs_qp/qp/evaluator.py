@@ -16,9 +16,9 @@ class BufferedFunction:
         self.inputs = [np.zeros(function.numel_in(i)) for i in range(function.n_in())]
         self.outputs = [np.zeros(function.numel_out(i)) for i in range(function.n_out())]
         for index, array in enumerate(self.inputs):
-            self._buffer.set_arg(index, memoryview(array))
+            self._buffer.set_arg(index, memoryview(array))  # type: ignore[arg-type, call-arg]
         for index, array in enumerate(self.outputs):
-            self._buffer.set_res(index, memoryview(array))
+            self._buffer.set_res(index, memoryview(array))  # type: ignore[arg-type, call-arg]
         self._function = function  # the buffer does not keep the function alive
 
     def __call__(self) -> None:

@@ -48,4 +48,5 @@ class ExactSolver:
 def _casadi_sparsity(pattern: object) -> ca.Sparsity:
     matrix = pattern.tocsc()  # type: ignore[attr-defined]
     matrix.sort_indices()
-    return ca.Sparsity(*matrix.shape, matrix.indptr.tolist(), matrix.indices.tolist())
+    rows, columns = matrix.shape
+    return ca.Sparsity(rows, columns, matrix.indptr.tolist(), matrix.indices.tolist())
