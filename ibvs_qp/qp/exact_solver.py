@@ -8,6 +8,10 @@ import numpy as np
 from ibvs_qp.qp.assembly import QpTemplate
 
 
+#: Violation of a row above which a reported success is not believed: DAQP skips rows that are all zero.
+FEASIBLE = 1e-4
+
+
 class ExactSolver:
     """Dual active-set solver of the same program; exact to rounding, called only when OSQP is not accepted."""
 
@@ -20,7 +24,7 @@ class ExactSolver:
     def solve(
         self, p: np.ndarray, q: np.ndarray, a: np.ndarray, lower: np.ndarray, upper: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray] | None:
-        """Solution and multipliers (y > 0 at an upper bound), or None when the solver reports no success."""
+        """Solution and multipliers (y > 0 at an upper bound), or None without success."""
         upper_triangle = self._template.p_pattern.copy()
         upper_triangle.data = p.copy()
         full = upper_triangle.toarray()
@@ -40,9 +44,10 @@ class ExactSolver:
             return None
         x = np.array(result["x"]).ravel()
         y = np.array(result["lam_a"]).ravel()
-        if not self._solver.stats().get("success", False) or not np.all(np.isfinite(x)):
+        if not self._solver.stats().get("success", False) or not np.isfinite(x.sum() + y.sum()):
             return None
-        return x, y
+        rows = matrix @ x
+        return (x, y) if float(np.maximum(lower - rows, rows - upper).max()) <= FEASIBLE else None
 
 
 def _casadi_sparsity(pattern: object) -> ca.Sparsity:
