@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from controller_scenes import CEILING, FLOOR, dense, exact_thrusts, line_references, measured, pack, random_tick
+from controller_scenes import CEILING, FLOOR, dense, exact_thrusts, line_references, pack, random_tick
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_vehicle import SmallVehicle
@@ -199,7 +199,7 @@ def test_solutions_that_fly_meet_the_optimality_conditions(flight: Flight) -> No
 # --------------------------------------------------------------------------------------------- what may not matter
 
 
-def thrusts_of(controller: HybridController, tick, exact: bool = True) -> np.ndarray:  # noqa: ANN001
+def thrusts_of(controller: HybridController, tick: tuple) -> np.ndarray:
     controller.reset()
     pack(controller, *tick, share=0.6, last=LAST, window=(FLOOR, CEILING))
     return exact_thrusts(controller)

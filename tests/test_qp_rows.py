@@ -114,10 +114,10 @@ def test_every_other_task_row_by_hand(controller: HybridController, share: float
     weights, gains = controller.config.weights, controller.config.gains
     for _ in range(20):
         controller.reset()
-        measurement, reference = random_tick(rng, 2)
         last = rng.uniform(8.0, 14.0, 6)
-        pack(controller, measurement, reference, share=share, last=last)
+        pack(controller, *random_tick(rng, 2), share=share, last=last)
         thrusts, terms = rng.uniform(2.0, 30.0, 6), controller.setpoints
+        right, down = weights.velocity * terms.free_right, weights.velocity * terms.free_down
         motion = accelerations(controller, thrusts)
         force = motion[:3] * controller.config.vehicle.mass_kg
         found = rows(controller, thrusts)
@@ -127,8 +127,8 @@ def test_every_other_task_row_by_hand(controller: HybridController, share: float
             "roll": (motion[3], terms.angular[0], weights.level),
             "pitch": (motion[4], terms.angular[1], weights.level),
             "yaw": (motion[5], terms.angular[2], weights.yaw),
-            "velocity_right": (terms.right @ motion[:3], terms.velocity_command[0], weights.velocity * terms.free_right),
-            "velocity_down": (terms.down @ motion[:3], terms.velocity_command[1], weights.velocity * terms.free_down),
+            "velocity_right": (terms.right @ motion[:3], terms.velocity_command[0], right),
+            "velocity_down": (terms.down @ motion[:3], terms.velocity_command[1], down),
         }
         for i, name in enumerate(controller.config.vehicle.geometry.names):
             expected[f"effort_{name}"] = (thrusts[i], last[i], weights.effort)

@@ -1,0 +1,262 @@
+"""Traps of OSQP, each shown on the bare solver first and then caught by its guard; and every named way out."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import osqp
+import pytest
+from controller_scenes import CEILING, FLOOR, line_references, measured, random_tick
+from scipy import sparse
+from small_vehicle import SmallVehicle
+
+from ibvs_qp.analytic import analytic_thrusts
+from ibvs_qp.command import Outcome
+from ibvs_qp.config import ControllerConfig, SolverSettings
+from ibvs_qp.controller import HybridController
+from ibvs_qp.measurement import Reference
+from ibvs_qp.qp.osqp_solver import SOLVED, OsqpSolver
+
+#: What OSQP 1.1 writes into x when it found no solution: its NaN pattern read as a number.
+GARBAGE = 2143289344.0
+
+
+def bare(lower: float = 0.0, upper: float = 1.0, **settings: object) -> osqp.OSQP:
+    """min 1/2 x^2 - x with lower <= x <= upper, twice: the smallest program."""
+    solver = osqp.OSQP()
+    box = (np.full(2, lower), np.full(2, upper))
+    solver.setup(sparse.eye(2, format="csc"), -np.ones(2), sparse.eye(2, format="csc"), *box, verbose=False, **settings)
+    return solver
+
+
+def flying(ticks: int = 5, config: ControllerConfig | None = None) -> HybridController:
+    """A controller in the middle of a hover with two lines."""
+    controller = HybridController(config)
+    for tick in range(ticks):
+        controller.step(measured(tick), Reference(lines=line_references(2)))
+    return controller
+
+
+def data_of(controller: HybridController) -> list[np.ndarray]:
+    data = controller.engine.evaluator
+    return [array.copy() for array in (data.p, data.q, data.a, data.lower, data.upper)]
+
+
+# ------------------------------------------------------------------------------------------ what goes wrong without
+
+
+def test_bare_osqp_answers_an_infeasible_program_with_a_finite_number() -> None:
+    solver = osqp.OSQP()
+    rows = sparse.csc_matrix(np.vstack((np.eye(2), np.ones(2))))
+    solver.setup(
+        sparse.eye(2, format="csc"), np.zeros(2), rows, np.array([0.0, 0, 5]), np.array([1.0, 1, 6]), verbose=False
+    )
+    result = solver.solve(raise_error=False)
+    assert result.info.status_val != SOLVED
+    assert np.isfinite(result.x).all()  # so a check for finiteness lets it fly
+    np.testing.assert_array_equal(result.x, GARBAGE)
+
+
+def test_bare_osqp_never_recovers_from_one_nan() -> None:
+    solver = bare(max_iter=50)
+    assert solver.solve(raise_error=False).info.status_val == SOLVED
+    solver.update(q=np.array([math.nan, -1.0]))
+    solver.solve(raise_error=False)
+    solver.update(q=-np.ones(2))
+    for _ in range(3):
+        result = solver.solve(raise_error=False)
+        assert result.info.status_val != SOLVED or not np.isfinite(result.x).all()
+
+
+def test_bare_osqp_drops_an_update_with_crossed_bounds() -> None:
+    solver = bare(0.0, 0.5)
+    solver.solve(raise_error=False)
+    solver.update(l=np.full(2, 3.0), u=np.full(2, 2.0))
+    result = solver.solve(raise_error=False)
+    assert result.info.status_val == SOLVED  # "solved", for the old bounds
+    np.testing.assert_allclose(result.x, 0.5, atol=1e-3)
+
+
+def test_bare_osqp_writes_into_matrices_that_it_was_given() -> None:
+    matrix, rows = sparse.eye(2, format="csc"), sparse.eye(2, format="csc")
+    solver = osqp.OSQP()
+    solver.setup(matrix, -np.ones(2), rows, np.zeros(2), np.ones(2), verbose=False)
+    solver.update(Px=np.array([5.0, 5.0]))
+    touched = not np.array_equal(matrix.data, [1.0, 1.0])
+    solver.update(Ax=np.array([7.0, 7.0]))
+    assert touched or not np.array_equal(rows.data, [1.0, 1.0])
+
+
+# -------------------------------------------------------------------------------------------------------- the guards
+
+
+def test_an_infeasible_program_is_never_believed() -> None:
+    controller = flying()
+    p, q, a, lower, upper = data_of(controller)
+    solver = OsqpSolver(controller.template, controller.config.solver)
+    raw = solver.solve(p, q, np.zeros_like(a), np.full_like(lower, 1.0), np.full_like(upper, 2.0))  # 0 x >= 1
+    assert raw is not None and raw.status != SOLVED
+    assert np.isfinite(raw.x).all() and np.abs(raw.x).max() == GARBAGE
+    assert controller.engine._judge(raw.status, raw.x, np.zeros(len(lower))) is None
+
+
+def test_garbage_with_a_good_status_does_not_fly_either() -> None:
+    engine = flying().engine
+    rows = len(engine.evaluator.lower)
+    for value in (GARBAGE, math.nan, math.inf, -math.inf):
+        assert engine._judge(SOLVED, np.full(9, value), np.zeros(rows)) is None
+    assert engine._judge(SOLVED, np.full(9, 20.0), np.full(rows, math.nan)) is None
+
+
+@pytest.mark.parametrize("place", range(5))
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_data_that_is_not_finite_never_reaches_the_workspace(place: int, value: float) -> None:
+    controller = flying()
+    clean, solver = (OsqpSolver(controller.template, controller.config.solver) for _ in range(2))
+    data = data_of(controller)
+    for one in (solver, clean):
+        assert one.solve(*data).status == SOLVED  # type: ignore[union-attr]
+    broken = [array.copy() for array in data]
+    broken[place][1] = value
+    assert solver.solve(*broken) is None
+    after, expected = solver.solve(*data), clean.solve(*data)
+    assert after is not None and expected is not None and after.status == SOLVED
+    np.testing.assert_array_equal(after.x, expected.x)  # as if the bad tick had never been
+
+
+def test_crossed_bounds_are_refused_and_leave_no_trace() -> None:
+    controller = flying()
+    solver = OsqpSolver(controller.template, controller.config.solver)
+    p, q, a, lower, upper = data_of(controller)
+    first = solver.solve(p, q, a, lower, upper)
+    assert solver.solve(p, q, a, upper + 1.0, upper) is None
+    again = solver.solve(p, q, a, lower, upper)
+    assert first is not None and again is not None
+    np.testing.assert_allclose(again.x, first.x, atol=1e-3)
+
+
+def test_matrices_handed_to_the_solver_are_private_copies() -> None:
+    controller = flying()
+    template = controller.template
+    patterns = template.p_pattern.data.copy(), template.a_pattern.data.copy()
+    solver = OsqpSolver(template, controller.config.solver)
+    data = data_of(controller)
+    kept = [array.copy() for array in data]
+    for _ in range(3):
+        solver.solve(*data)
+        data[1] += 1.0
+        kept[1] += 1.0
+    for array, before in zip(data, kept, strict=True):
+        np.testing.assert_array_equal(array, before)
+    np.testing.assert_array_equal(template.p_pattern.data, patterns[0])
+    np.testing.assert_array_equal(template.a_pattern.data, patterns[1])
+
+
+def test_buffers_are_contiguous_doubles_of_fixed_length() -> None:
+    controller = flying()
+    data, template = controller.engine.evaluator, controller.template
+    for array in (data.p, data.q, data.a, data.lower, data.upper, data.stacked):
+        assert array.dtype == np.float64 and array.flags.c_contiguous
+    sizes = len(data.p), len(data.a), len(data.q), len(data.lower)
+    for tick in range(5, 25):
+        controller.step(*random_tick(np.random.default_rng(tick), tick % 3, tick))
+        assert (len(data.p), len(data.a), len(data.q), len(data.lower)) == sizes
+    assert sizes[:2] == (template.p_pattern.nnz, template.a_pattern.nnz)
+
+
+def test_reset_restores_the_first_solve_to_the_bit() -> None:
+    """The adapted step size survives in OSQP; a reset has to forget it with everything else."""
+    ticks = [random_tick(np.random.default_rng(tick), tick % 3, tick) for tick in range(60)]
+    controller = HybridController()
+    first = [controller.step(*tick) for tick in ticks]
+    controller.reset()
+    second = [controller.step(*tick) for tick in ticks]
+    for one, two in zip(first, second, strict=True):
+        np.testing.assert_array_equal(one.thrusts, two.thrusts)
+        assert (one.outcome, one.iterations, one.mode) == (two.outcome, two.iterations, two.mode)
+        np.testing.assert_array_equal(one.unallocated_wrench, two.unallocated_wrench)
+    np.testing.assert_array_equal(HybridController().step(*ticks[0]).thrusts, first[0].thrusts)
+
+
+# ------------------------------------------------------------------------------------------------- every way out
+
+
+def outcomes_of(controller: HybridController, ticks: int = 40) -> list[Outcome]:
+    vehicle = SmallVehicle(controller.config)
+    found = []
+    for _ in range(ticks):
+        command = controller.step(vehicle.measure(), Reference(standoff=0.1, lines=line_references(2, 0.6)))
+        assert np.isfinite(command.thrusts).all()
+        assert (command.thrusts >= FLOOR).all() and (command.thrusts <= CEILING).all()
+        vehicle.fly(command.thrusts)
+        found.append(command.outcome)
+    assert abs(vehicle.position[2]) < 0.05 and np.linalg.norm(vehicle.attitude.as_rotvec()) < 0.05
+    return found
+
+
+def test_a_solver_cut_short_is_accepted_by_residual_or_replaced_by_the_exact_one() -> None:
+    short = outcomes_of(HybridController(ControllerConfig(solver=SolverSettings(max_iterations=1, check_interval=1))))
+    assert set(short) <= {Outcome.SOLVED, Outcome.CAPPED_ACCEPTED, Outcome.EXACT_FALLBACK}
+    assert Outcome.EXACT_FALLBACK in short
+
+
+def test_a_capped_solution_that_flies_is_as_near_as_promised() -> None:
+    settings = SolverSettings(max_iterations=10, check_interval=5)
+    controller = HybridController(ControllerConfig(solver=settings))
+    vehicle, capped = SmallVehicle(controller.config), 0
+    rng = np.random.default_rng(2)
+    for tick in range(400):
+        if tick % 40 == 0:
+            reference = Reference(velocity=rng.uniform(-0.1, 0.1, 2), standoff=0.1)
+        seen = vehicle.measure(0)
+        command = controller.step(seen, reference)
+        if command.outcome is Outcome.CAPPED_ACCEPTED:
+            capped += 1
+            data = controller.engine.evaluator
+            exact = controller.engine.exact.solve(data.p, data.q, data.a, data.lower, data.upper)
+            assert exact is not None
+            assert np.abs(command.thrusts - exact[0][:6]).max() < 10 * settings.accept_residual
+        vehicle.fly(command.thrusts)
+    assert capped > 0
+
+
+def test_without_any_solver_the_analytic_law_answers(monkeypatch: pytest.MonkeyPatch) -> None:
+    controller = flying()
+    monkeypatch.setattr(controller.engine.osqp, "solve", lambda *data: None)
+    command = controller.step(measured(6), Reference(lines=line_references(2)))
+    assert command.outcome is Outcome.ANALYTIC_FALLBACK
+    np.testing.assert_allclose(command.thrusts, analytic_thrusts(controller.setpoints), atol=1e-9)
+
+
+def test_osqp_unbelieved_and_the_exact_solver_failing_leads_to_the_analytic_law() -> None:
+    controller = HybridController(ControllerConfig(solver=SolverSettings(max_iterations=1, check_interval=1)))
+    controller.engine.exact.solve = lambda *data: None  # type: ignore[method-assign]
+    found = outcomes_of(controller)
+    assert Outcome.ANALYTIC_FALLBACK in found and Outcome.EXACT_FALLBACK not in found
+
+
+def test_everything_failing_leads_to_hold_and_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    controller = flying()
+    with monkeypatch.context() as broken:
+        broken.setattr(controller.engine, "solve", lambda: None)
+        broken.setattr("ibvs_qp.analytic.analytic_thrusts", lambda terms: np.full(6, math.nan))
+        command = controller.step(measured(6), Reference())
+    assert command.outcome is Outcome.HOLD and command.mode == "hold"
+    assert command.thrusts.sum() * math.cos(math.radians(30)) == pytest.approx(6.0 * 9.81, rel=0.02)
+    assert controller.step(measured(7), Reference()).outcome is Outcome.SOLVED
+
+
+def test_nothing_ever_measured_is_plain_hover() -> None:
+    controller = HybridController()
+    command = controller.step(replace(measured(0), attitude=np.full(4, math.nan)), Reference())
+    assert command.outcome is Outcome.HOLD and command.rejected
+    np.testing.assert_allclose(command.wrench, [0, 0, -6.0 * 9.81, 0, 0, 0], atol=1e-9)
+
+
+def test_exact_solver_reports_failure_instead_of_numbers() -> None:
+    controller = flying()
+    p, q, a, lower, upper = data_of(controller)
+    assert controller.engine.exact.solve(p, np.full_like(q, math.nan), a, lower, upper) is None
+    assert controller.engine.exact.solve(p, q, np.zeros_like(a), np.full_like(lower, 1.0), np.full_like(upper, 9.0)) is None
