@@ -272,6 +272,20 @@ class Painter:
 
     # ------------------------------------------------------------- association
 
+    def expected_fresh_edge(self, lines: dict[int, TrackedLine]) -> tuple[float, float] | None:
+        """Where the last row's upper edge must be while it is not followed: offset [m] and side it lies to (+-1).
+
+        It exists only ahead of the brush, to the side of the coming travel (+1 right, -1 left).
+        """
+        if self.row < 2 or self.phase not in ("climb", "paint"):
+            return None
+        line = lines.get(self._guide_id)
+        followed = line is not None and line.weight > 0.5 and line.kind == "paint"
+        if followed and self.phase == "paint":
+            return None
+        left = self.config.pitch_m - self._climbed if self.phase == "climb" else 0.0
+        return self.config.fresh_edge_m - left, -1.0 if self.row % 2 == 1 else 1.0
+
     def _bottom_edge(self, seen: Scenery) -> TrackedLine | None:
         """The horizontal line below the tip with the surface above it, nearest to where the guide must be."""
         expected = self._guide_target if self.phase != "start" else self.config.edge_margin_m

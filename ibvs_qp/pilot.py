@@ -15,7 +15,7 @@ from ibvs_qp.controller import HybridController
 from ibvs_qp.estimation.config import EstimationConfig
 from ibvs_qp.estimation.motion import WallMotion
 from ibvs_qp.estimation.tare import WrenchTare
-from ibvs_qp.estimation.wall_lines import WallAxes
+from ibvs_qp.estimation.wall_lines import WallAxes, image_line
 from ibvs_qp.frames import R_BODY_CAMERA, down_in_body, to_camera
 from ibvs_qp.measurement import (
     HORIZONTAL,
@@ -28,7 +28,10 @@ from ibvs_qp.measurement import (
 from ibvs_qp.painting import Painter, PaintingConfig, Scenery, Wish
 from ibvs_qp.settings import choice, dump_toml, load_toml, setting, validate
 from ibvs_qp.vision.config import VisionConfig
+from ibvs_qp.vision.percept import LineHint
 
+#: Where the fresh edge exists ahead of the brush, normalised image x from the tip's side to the border.
+HINT_SPAN = (0.10, 0.50)
 #: Ticks of inertial history kept for late pictures.
 HISTORY = 128
 
@@ -156,6 +159,18 @@ class Pilot:
         self._history_attitude[slot] = frame.attitude
         self._history_turn[slot] = self._turn
 
+    def _hints(self, stamp_ns: int) -> tuple[LineHint, ...]:
+        """Tell perception where the fresh edge must appear: at the brush, ahead of it."""
+        expected, contact = self.painter.expected_fresh_edge(self.motion.lines), self.terms.contact
+        if expected is None or not contact.known:
+            return ()
+        offset, side = expected
+        axes = WallAxes.of(contact.normal, np.array(down_in_body(self._history_attitude[self._slot(stamp_ns)])))
+        rho, theta, _ = image_line(offset, 0.5 * math.pi, axes, self._tip - self._camera, contact.distance)
+        near, far = HINT_SPAN
+        span = (near, far) if side > 0.0 else (-far, -near)
+        return (LineHint(name="fresh", rho=rho, theta=theta, kind="paint", surface_side=-1, span=span),)
+
     def _fresh(self, stamp_ns: int) -> bool:
         """Whether a picture's stamp is believable: neither from the future nor older than the camera may be."""
         return 0 <= self._stamp - stamp_ns <= self.config.camera.latest_s * 1e9
@@ -181,6 +196,7 @@ class Pilot:
             attitude=self._history_attitude[slot],
             rotation=rotation,
             velocity=self.measurement.velocity if self.measurement is not None else None,
+            hints=self._hints(image.stamp_ns),
         )
         return self.percept.features
 

@@ -259,4 +259,5 @@ def test_exact_solver_reports_failure_instead_of_numbers() -> None:
     controller = flying()
     p, q, a, lower, upper = data_of(controller)
     assert controller.engine.exact.solve(p, np.full_like(q, math.nan), a, lower, upper) is None
-    assert controller.engine.exact.solve(p, q, np.zeros_like(a), np.full_like(lower, 1.0), np.full_like(upper, 9.0)) is None
+    above = np.full_like(lower, 1.0)  # 0 x >= 1
+    assert controller.engine.exact.solve(p, q, np.zeros_like(a), above, 9.0 * above) is None

@@ -7,7 +7,6 @@ import numpy as np
 
 from ibvs_qp.qp.assembly import QpTemplate
 
-
 #: Violation of a row above which a reported success is not believed: DAQP skips rows that are all zero.
 FEASIBLE = 1e-4
 
