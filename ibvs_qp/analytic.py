@@ -8,7 +8,7 @@ import numpy as np
 
 from ibvs_qp.command import ActiveLimit, Command, Outcome
 from ibvs_qp.config import ControllerConfig
-from ibvs_qp.gate import MeasurementGate, check_reference
+from ibvs_qp.gate import MeasurementGate, answered_stamp, check_reference
 from ibvs_qp.hold import hold_thrusts
 from ibvs_qp.limits.thrust import thrust_window
 from ibvs_qp.measurement import Measurement, Reference
@@ -87,7 +87,6 @@ class PaperController:
         self._gate.reset()
         self._last: np.ndarray | None = None
         self._reference = Reference()
-        self._good: Measurement | None = None
 
     def step(self, measurement: Measurement, reference: Reference) -> Command:
         """Thrusts for one tick; never raises, clips to box and rate."""
@@ -97,9 +96,10 @@ class PaperController:
         outcome, mode = Outcome.SOLVED, "hold"
         low, high = self._floor, self._ceiling
         if checked is None:
-            free, outcome = hold_thrusts(self.config, self._good), Outcome.HOLD
+            free, outcome = hold_thrusts(self.config, self._gate.inertial), Outcome.HOLD
         else:
-            self._good = checked
+            if self._gate.restarted:
+                self.setpoints.reset()
             self.setpoints.update(checked, reference)
             free = analytic_thrusts(self.setpoints)
             mode = "contact" if self.setpoints.contact.in_contact else ("approach" if reference.contact else "free")
@@ -107,15 +107,14 @@ class PaperController:
             high = np.maximum(low, high if checked.thrust_max is None else np.minimum(checked.thrust_max, high))
             if not np.isfinite(free).all():
                 free, outcome, mode = hold_thrusts(self.config, checked), Outcome.HOLD, "hold"
-        if self._last is not None:
-            low, high = thrust_window(self._last, low, high, self._step, self._floor, self._ceiling)
+        last, step = (free, math.inf) if self._last is None else (self._last, self._step)
+        low, high = thrust_window(last, low, high, step, self._floor, self._ceiling)
         thrusts = np.clip(free, low, high)
         unallocated = self.setpoints.effectiveness @ (free - thrusts)
         self._last = thrusts
         self.setpoints.note(thrusts, unallocated)
-        stamp = measurement.stamp_ns if isinstance(measurement.stamp_ns, int) else 0
         return Command(
-            stamp_ns=stamp,
+            stamp_ns=answered_stamp(measurement),
             thrusts=thrusts,
             wrench=self.setpoints.effectiveness @ thrusts,
             outcome=outcome,

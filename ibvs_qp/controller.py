@@ -8,7 +8,7 @@ import numpy as np
 
 from ibvs_qp.command import ActiveLimit, Command, Outcome, TaskReport
 from ibvs_qp.config import ControllerConfig
-from ibvs_qp.gate import MeasurementGate, check_reference
+from ibvs_qp.gate import MeasurementGate, answered_stamp, check_reference
 from ibvs_qp.hold import hold_thrusts
 from ibvs_qp.limits import Limit, ThrustLimit, TiltLimit, YawLimit
 from ibvs_qp.limits.thrust import thrust_window
@@ -85,6 +85,8 @@ class HybridController:
         rejected += refused
         if checked is None:
             return self._hold(measurement, rejected)
+        if self._gate.restarted:
+            self.setpoints.reset()
         self._good = checked
         self.setpoints.update(checked, reference)
         last = self._last if self._last is not None else hold_thrusts(self.config, checked)
@@ -155,7 +157,7 @@ class HybridController:
         self._commit(thrusts, unallocated)
         stacked = self.engine.evaluator.stacked.copy()
         command = Command(
-            stamp_ns=measurement.stamp_ns,
+            stamp_ns=int(measurement.stamp_ns),
             thrusts=thrusts,
             wrench=self.setpoints.effectiveness @ thrusts,
             outcome=solution.outcome,
@@ -235,18 +237,17 @@ class HybridController:
         good = bool(np.isfinite(free).all())
         thrusts = np.clip(free if good else hold_thrusts(self.config, measurement), lower, upper)
         outcome = Outcome.ANALYTIC_FALLBACK if good else Outcome.HOLD
-        return self._plain(measurement.stamp_ns, thrusts, free if good else thrusts, outcome, rejected)
+        return self._plain(int(measurement.stamp_ns), thrusts, free if good else thrusts, outcome, rejected)
 
     def _hold(self, measurement: Measurement, rejected: tuple[str, ...]) -> Command:
-        wanted = hold_thrusts(self.config, self._good)
+        wanted = hold_thrusts(self.config, self._gate.inertial)
         lower, upper = (
             thrust_window(self._last, self._floor, self._ceiling, self._step, self._floor, self._ceiling)
             if self._last is not None
             else (self._floor, self._ceiling)
         )
         thrusts = np.clip(wanted, lower, upper)
-        stamp = measurement.stamp_ns if isinstance(measurement.stamp_ns, int) else 0
-        return self._plain(stamp, thrusts, wanted, Outcome.HOLD, rejected)
+        return self._plain(answered_stamp(measurement), thrusts, wanted, Outcome.HOLD, rejected)
 
     def _plain(
         self, stamp_ns: int, thrusts: np.ndarray, free: np.ndarray, outcome: Outcome, rejected: tuple[str, ...]

@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from typing import Any
 
 import numpy as np
 
-from ibvs_qp.measurement import LineFeature, Measurement, Reference
+from ibvs_qp.measurement import LineFeature, LineReference, Measurement, Reference
 
 #: Largest believable norms: body rate [rad/s], specific force [m/s^2], wrench [N, N m] and velocity [m/s].
 RATE_BOUND, ACCELERATION_BOUND, WRENCH_BOUND, VELOCITY_BOUND = 35.0, 200.0, 500.0, 20.0
+#: Largest believable line parameter (normalised, rad) and entry of a plane over D [1/m].
+LINE_BOUND, PLANE_BOUND = 1e6, 1e3
+#: A stamp this far from the last one is a fault until the next ones agree with it [ns].
+LEAP_NS = 1_000_000_000
+#: Stamps in a row that must agree until a clock that went back is believed.
+RESTART_STAMPS = 25
+#: A sensor's stamp may lead the tick's by this much [ns].
+LEAD_NS = 20_000_000
 
 
 def _vector(value: Any, size: int, bound: float) -> bool:
@@ -23,8 +30,27 @@ def _vector(value: Any, size: int, bound: float) -> bool:
     )
 
 
+def _number(value: Any, low: float, high: float) -> bool:
+    return isinstance(value, (int, float, np.integer, np.floating)) and bool(low <= value <= high)
+
+
+def is_stamp(value: Any) -> bool:
+    """Whether a value is a time stamp: a whole number of nanoseconds that fits 63 bits."""
+    return isinstance(value, (int, np.integer)) and not isinstance(value, bool) and 0 <= value < 2**62
+
+
+def answered_stamp(measurement: Any) -> int:
+    """Stamp of whatever was handed in, 0 if it has none."""
+    stamp = measurement.stamp_ns if isinstance(measurement, Measurement) else None
+    return int(stamp) if stamp is not None and is_stamp(stamp) else 0
+
+
 class MeasurementGate:
-    """Passes good measurements on untouched, mends bad ones, and says what it refused."""
+    """Passes good measurements on untouched, mends bad ones, and says what it refused.
+
+    Attributes:
+        restarted: Whether the last measurement began a new time base, behind the old one.
+    """
 
     def __init__(self, rotors: int) -> None:
         self._rotors = rotors
@@ -36,6 +62,21 @@ class MeasurementGate:
         self._omega = np.zeros(3)
         self._wrench, self._wrench_stamp = np.zeros(6), 0
         self._stamp: int | None = None
+        self._odd_stamp, self._odd_count = -1, 0
+        self.restarted = False
+
+    @property
+    def inertial(self) -> Measurement | None:
+        """Last good attitude and rate, for the last resort; None when nothing was ever measured."""
+        if self._attitude is None:
+            return None
+        return Measurement(
+            stamp_ns=self._stamp or 0,
+            attitude=self._attitude,
+            angular_velocity=self._omega,
+            contact_wrench=self._wrench,
+            wrench_stamp_ns=self._wrench_stamp,
+        )
 
     def check(self, measurement: Measurement) -> tuple[Measurement | None, tuple[str, ...]]:
         """A measurement that is safe to use, or None when not even an attitude is known, and what was refused."""
@@ -46,39 +87,65 @@ class MeasurementGate:
             rejected.append(f"{name}: {why}")
             changes[name] = value
 
-        stamp = measurement.stamp_ns
-        if not isinstance(stamp, (int, np.integer)) or (self._stamp is not None and stamp <= self._stamp):
-            rejected.append("stamp_ns: not after the last one")
-            return None, tuple(rejected)
+        self.restarted = False
+        if not isinstance(measurement, Measurement):
+            return None, ("measurement: not a Measurement",)
+        why = self._refuse_stamp(measurement.stamp_ns)
+        if why:
+            return None, (f"stamp_ns: {why}",)
+        stamp = int(measurement.stamp_ns)
         attitude = measurement.attitude
         if not _vector(attitude, 4, 1.01) or abs(float(attitude @ attitude) - 1.0) > 0.02:
             if self._attitude is None:
-                rejected.append("attitude: not a unit quaternion")
-                return None, tuple(rejected)
+                return None, ("attitude: not a unit quaternion",)
             refuse("attitude", "not a unit quaternion", self._attitude)
         else:
-            self._attitude = attitude
+            self._attitude = attitude.copy()  # the caller may fill the same array again
         if _vector(measurement.angular_velocity, 3, RATE_BOUND):
-            self._omega = measurement.angular_velocity
+            self._omega = measurement.angular_velocity.copy()
         else:
             refuse("angular_velocity", f"not 3 finite values within {RATE_BOUND} rad/s", self._omega)
         if measurement.specific_force is not None and not _vector(measurement.specific_force, 3, ACCELERATION_BOUND):
             refuse("specific_force", f"not 3 finite values within {ACCELERATION_BOUND} m/s^2", None)
-        if _vector(measurement.contact_wrench, 6, WRENCH_BOUND) and isinstance(
-            measurement.wrench_stamp_ns, (int, np.integer)
-        ):
-            self._wrench, self._wrench_stamp = measurement.contact_wrench, measurement.wrench_stamp_ns
-        else:
-            refuse("contact_wrench", f"not 6 finite values within {WRENCH_BOUND} N or N m", self._wrench)
-            changes["wrench_stamp_ns"] = self._wrench_stamp
+        changes |= self._check_wrench(measurement, stamp, refuse)
         if measurement.plane is not None and not _good_plane(measurement.plane):
             refuse("plane", "not 4 finite values with D != 0 in front of the camera", None)
+        elif measurement.plane is not None and not _past(measurement.plane_stamp_ns, stamp):
+            rejected.append("plane_stamp_ns: not a time before the tick")
+            changes |= {"plane": None, "plane_stamp_ns": 0}
         if measurement.velocity is not None and not _vector(measurement.velocity, 3, VELOCITY_BOUND):
             refuse("velocity", f"not 3 finite values within {VELOCITY_BOUND} m/s", None)
         self._check_lines(measurement, refuse)
         self._check_limits(measurement, refuse)
-        self._stamp = int(stamp)
+        self._stamp = stamp
         return (dataclasses.replace(measurement, **changes) if changes else measurement), tuple(rejected)
+
+    def _refuse_stamp(self, stamp: Any) -> str:
+        """Why a stamp is refused, empty if it is not: one leap must blind nobody, a clock set anew is followed."""
+        if not is_stamp(stamp):
+            return "not a whole number of nanoseconds"
+        if self._stamp is None or 0 < stamp - self._stamp <= LEAP_NS:
+            self._odd_count = 0
+            return ""
+        follows = self._odd_count > 0 and 0 < stamp - self._odd_stamp <= LEAP_NS
+        self._odd_stamp, self._odd_count = int(stamp), self._odd_count + 1 if follows else 1
+        ahead = stamp > self._stamp
+        if follows and (ahead or self._odd_count >= RESTART_STAMPS):
+            self._odd_count, self.restarted = 0, not ahead
+            return ""
+        return "far ahead of the last one" if ahead else "not after the last one"
+
+    def _check_wrench(self, measurement: Measurement, stamp: int, refuse: Any) -> dict[str, Any]:
+        """Both go back together: an old wrench under a new stamp would pass for news."""
+        good, past = _vector(measurement.contact_wrench, 6, WRENCH_BOUND), _past(measurement.wrench_stamp_ns, stamp)
+        if good and past:
+            self._wrench, self._wrench_stamp = measurement.contact_wrench.copy(), int(measurement.wrench_stamp_ns)
+            return {}
+        if not good:
+            refuse("contact_wrench", f"not 6 finite values within {WRENCH_BOUND} N or N m", self._wrench)
+        if not past:
+            refuse("wrench_stamp_ns", "not a time before the tick", self._wrench_stamp)
+        return {"contact_wrench": self._wrench, "wrench_stamp_ns": self._wrench_stamp}
 
     def _check_lines(self, measurement: Measurement, refuse: Any) -> None:
         if not isinstance(measurement.lines, tuple):
@@ -86,47 +153,74 @@ class MeasurementGate:
             return
         good = tuple(line for line in measurement.lines if _good_line(line))
         if len(good) != len(measurement.lines):
-            refuse("lines", f"{len(measurement.lines) - len(good)} not finite", good)
+            refuse("lines", f"{len(measurement.lines) - len(good)} not finite or malformed", good)
 
     def _check_limits(self, measurement: Measurement, refuse: Any) -> None:
+        bounds = {}
         for name in ("thrust_min", "thrust_max"):
             value = getattr(measurement, name)
-            if value is not None and not _vector(value, self._rotors, 1e4):
+            good = value is not None and _vector(value, self._rotors, 1e4)
+            bounds[name] = value if good else None
+            if value is not None and not good:
                 refuse(name, f"not {self._rotors} finite values", None)
+        low, high = bounds["thrust_min"], bounds["thrust_max"]
+        if low is not None and high is not None and (low > high).any():
+            refuse("thrust_max", "below thrust_min; raised to it", np.maximum(low, high))
+
+
+def _past(stamp: Any, tick: int) -> bool:
+    return is_stamp(stamp) and stamp <= tick + LEAD_NS
 
 
 def _good_plane(plane: Any) -> bool:
-    try:
-        a, b, c, d = (float(entry) for entry in plane)
-    except (TypeError, ValueError):
+    if not isinstance(plane, (tuple, list, np.ndarray)) or np.shape(plane) != (4,):
         return False
-    return math.isfinite(a + b + c + d) and d != 0.0 and -c / d > 0.05
+    a, b, c, d = plane
+    if not all(_number(entry, -1e12, 1e12) for entry in plane) or d == 0.0:
+        return False
+    return abs(a / d) < PLANE_BOUND and abs(b / d) < PLANE_BOUND and 0.05 < -c / d < PLANE_BOUND
 
 
 def _good_line(line: Any) -> bool:
-    if not isinstance(line, LineFeature) or line.role not in ("horizontal", "vertical"):
-        return False
-    try:
-        numbers = float(line.rho) + float(line.theta) + float(line.weight)
-        covariance = line.covariance is not None and bool(np.isfinite(line.covariance).all())
-    except (TypeError, ValueError):
-        return False
-    return math.isfinite(numbers) and covariance and np.shape(line.covariance) == (2, 2) and 0 <= line.weight <= 1
+    return (
+        isinstance(line, LineFeature)
+        and _good_role(line.role)
+        and _number(line.rho, -LINE_BOUND, LINE_BOUND)
+        and _number(line.theta, -LINE_BOUND, LINE_BOUND)
+        and _number(line.weight, 0.0, 1.0)
+        and isinstance(line.covariance, np.ndarray)
+        and line.covariance.shape == (2, 2)
+        and line.covariance.dtype.kind == "f"
+        and bool(np.isfinite(line.covariance).all())
+    )
+
+
+def _good_role(role: Any) -> bool:
+    return isinstance(role, str) and role in ("horizontal", "vertical")
 
 
 def check_reference(reference: Reference, last: Reference) -> tuple[Reference, tuple[str, ...]]:
     """The reference if it is sound, else the last sound one and the names of what was refused."""
+    if not isinstance(reference, Reference):
+        return last, ("reference: not a Reference",)
     rejected = []
-    try:
-        if not 0.0 <= float(reference.push_force) < 1e3:
-            rejected.append("reference.push_force: not within [0, 1000] N")
-        if not -1.0 < float(reference.standoff) < 10.0:
-            rejected.append("reference.standoff: not within [-1, 10] m")
-        if not _vector(reference.velocity, 2, VELOCITY_BOUND):
-            rejected.append("reference.velocity: not 2 finite values")
-        for line in reference.lines:
-            if not math.isfinite(line.rho + line.theta) or line.role not in ("horizontal", "vertical"):
-                rejected.append("reference.lines: not finite or of unknown role")
-    except (TypeError, AttributeError, ValueError):
-        rejected.append("reference: malformed")
+    if not _number(reference.push_force, 0.0, 1e3):
+        rejected.append("reference.push_force: not within [0, 1000] N")
+    if not _number(reference.standoff, -1.0, 10.0):
+        rejected.append("reference.standoff: not within [-1, 10] m")
+    if not _vector(reference.velocity, 2, VELOCITY_BOUND):
+        rejected.append("reference.velocity: not 2 finite values")
+    if not isinstance(reference.contact, (bool, np.bool_)):
+        rejected.append("reference.contact: neither True nor False")
+    if not isinstance(reference.lines, tuple) or not all(_good_reference_line(line) for line in reference.lines):
+        rejected.append("reference.lines: not a tuple of finite lines with a known role")
     return (last, tuple(rejected)) if rejected else (reference, ())
+
+
+def _good_reference_line(line: Any) -> bool:
+    return (
+        isinstance(line, LineReference)
+        and _good_role(line.role)
+        and _number(line.rho, -LINE_BOUND, LINE_BOUND)
+        and _number(line.theta, -LINE_BOUND, LINE_BOUND)
+    )

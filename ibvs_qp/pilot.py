@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -109,6 +110,7 @@ class Pilot:
         self._turn = np.zeros(3)
         self._last_capture = -1
         self.percept = None
+        self.controller_time_s = 0.0
         self.measurement: Measurement | None = None
         self.reference = Reference()
         self.wish: Wish | None = None
@@ -149,7 +151,10 @@ class Pilot:
         self.wish = wish
         self.reference = self._refer(wish)
         self.measurement = self._with_guides(self.measurement, wish, axes, frame.stamp_ns)
-        return self.controller.step(self.measurement, self.reference)
+        begin = time.perf_counter()
+        command = self.controller.step(self.measurement, self.reference)
+        self.controller_time_s = time.perf_counter() - begin
+        return command
 
     def _remember(self, frame: SensorFrame, dt: float) -> None:
         self._turn = self._turn + dt * frame.angular_velocity

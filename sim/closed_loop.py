@@ -144,11 +144,9 @@ def fly(
     try:
         while not pilot.painter.finished:
             frame = world.sense()
-            begin = time.perf_counter()
             command = pilot.step(frame)
-            elapsed = time.perf_counter() - begin
             world.act(command.thrusts)
-            recorder.tick(frame, command, elapsed)
+            recorder.tick(frame, command)
             tick += 1
             if world.plant.crashed:
                 reason = f"crash: {world.plant.crashed}"

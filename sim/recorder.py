@@ -44,7 +44,7 @@ class Recorder:
         self._logged = 0
         self._clearance = np.inf
 
-    def tick(self, frame: SensorFrame, command: Command, step_s: float) -> None:
+    def tick(self, frame: SensorFrame, command: Command) -> None:
         """Log one tick, after the plant has moved."""
         plant, pilot = self._world.plant, self._pilot
         terms, painter = pilot.terms, pilot.painter
@@ -76,7 +76,7 @@ class Recorder:
         add("row", painter.row if painter.phase in ("paint", "climb") else 0)
         add("outcome", list(Outcome).index(command.outcome))
         add("unallocated", command.unallocated_wrench)
-        add("step_us", step_s * 1e6)
+        add("step_us", pilot.controller_time_s * 1e6)
         add("iterations", command.iterations)
         if len(self._active) % CLEARANCE_TICKS == 0:
             self._clearance = plant.propeller_clearance
