@@ -39,7 +39,23 @@ class LineTerm:
     weight: float
     rho_error: float
     rho_rate: float
-    matrix: np.ndarray
+    plane: tuple[float, float, float, float]
+    twist_map: np.ndarray
+
+    @property
+    def matrix(self) -> np.ndarray:
+        """Interaction matrix in body axes, (2, 6): made when read, the program builds its own rows."""
+        return line_interaction_matrix(self.rho, self.theta, self.plane) @ self.twist_map
+
+
+@dataclass(slots=True)
+class CameraMotion:
+    """Twist of the camera as plain numbers, in C; the reference moves without turning."""
+
+    velocity: tuple[float, float, float]
+    turn: tuple[float, float, float]
+    reference: tuple[float, float, float]
+    known: bool
 
 
 class LineErrors:
@@ -49,7 +65,8 @@ class LineErrors:
         self._config = config
         vehicle = config.vehicle
         self._twist = camera_twist_matrix(np.array(vehicle.camera_position_m))
-        self._tip_camera = to_camera(np.array(vehicle.tip_position_m), np.array(vehicle.camera_position_m))
+        tip_camera = to_camera(np.array(vehicle.tip_position_m), np.array(vehicle.camera_position_m))
+        self._tip_down = float(tip_camera[1])
         self.reset()
 
     def reset(self) -> None:
@@ -61,11 +78,9 @@ class LineErrors:
         self,
         lines: tuple[LineFeature, ...],
         references: tuple[LineReference, ...],
-        plane: np.ndarray,
-        normal_camera: np.ndarray,
-        distance: float,
-        twist: np.ndarray | None,
-        reference_velocity: np.ndarray,
+        plane: tuple[float, float, float, float],
+        foot: tuple[float, float, float],
+        motion: CameraMotion,
         integrate: bool,
         dt: float,
     ) -> list[LineTerm]:
@@ -74,18 +89,15 @@ class LineErrors:
         Args:
             lines: Measured lines.
             references: Wanted lines.
-            plane: (A, B, C, D) of the wall in C, (4,).
-            normal_camera: Unit normal into the wall in C, (3,).
-            distance: Tip to wall [m].
-            twist: Body twist with the motion along the normal removed, or None when the velocity is unknown, (6,).
-            reference_velocity: Wanted velocity in B [m/s], (3,).
+            plane: (A, B, C, D) of the wall in C with D = -1.
+            foot: The tip's wall point in C [m].
+            motion: Twist of the camera without the motion along the normal, and the wanted velocity.
             integrate: Whether integrals may move.
             dt: Time since the last tick [s].
         """
         terms: list[LineTerm] = []
         order: dict[str, int] = {}
         by_role = {role: [line for line in lines if line.role == role] for role in ("horizontal", "vertical")}
-        foot = self._tip_camera + distance * normal_camera
         for reference in references[: self._config.line_slots]:
             place = order.get(reference.role, 0)
             order[reference.role] = place + 1
@@ -96,7 +108,7 @@ class LineErrors:
             if not abs(line.rho) < RHO_BOUND:
                 continue
             key = (reference.role, place)
-            terms.append(self._term(key, line, reference, plane, foot, twist, reference_velocity, integrate, dt))
+            terms.append(self._term(key, line, reference, plane, foot, motion, integrate, dt))
         for key in [key for key in self._last if order.get(key[0], 0) <= key[1]]:
             self._last.pop(key)
             self._integrals.pop(key, None)
@@ -107,25 +119,29 @@ class LineErrors:
         key: tuple[str, int],
         line: LineFeature,
         reference: LineReference,
-        plane: np.ndarray,
-        foot: np.ndarray,
-        twist: np.ndarray | None,
-        reference_velocity: np.ndarray,
+        plane: tuple[float, float, float, float],
+        foot: tuple[float, float, float],
+        motion: CameraMotion,
         integrate: bool,
         dt: float,
     ) -> LineTerm:
         rho, theta = align_line(line.rho, line.theta, reference.theta)
         c, s = math.cos(theta), math.sin(theta)
-        x_t, y_t = float(foot[0] / foot[2]), float(foot[1] / foot[2])
-        nominal = float(self._tip_camera[1]) / float(foot[2])
-        wanted = reference.rho - nominal * math.sin(reference.theta)
+        x_t, y_t = foot[0] / foot[2], foot[1] / foot[2]
+        wanted = reference.rho - self._tip_down / foot[2] * math.sin(reference.theta)
         error = rho - (x_t * c + y_t * s) - wanted
-        matrix = line_interaction_matrix(rho, theta, (plane[0], plane[1], plane[2], plane[3])) @ self._twist
-        row = matrix[0] + (x_t * s - y_t * c) * matrix[1]
-        if twist is not None:
-            rate = float(row @ twist) - float(row[:3] @ reference_velocity)
-            rho_rate = float(matrix[0] @ twist) - float(matrix[0][:3] @ reference_velocity)
-            angle_rate = float(matrix[1] @ twist)
+        if motion.known:
+            # Plain numbers: the rows of `line_interaction_matrix` times a twist, without arrays.
+            a, b, z, _ = plane
+            l_theta, l_rho = b * c - a * s, -(a * rho * c + b * rho * s + z)
+            vx, vy, vz = motion.velocity
+            wx, wy, wz = motion.turn
+            rx, ry, rz = motion.reference
+            along, wanted_along = c * vx + s * vy - rho * vz, c * rx + s * ry - rho * rz
+            rho_rate = l_rho * (along - wanted_along) + (1.0 + rho * rho) * (s * wx - c * wy)
+            turn = -rho * (c * wx + s * wy) - wz
+            angle_rate = l_theta * along + turn
+            rate = rho_rate + (x_t * s - y_t * c) * (angle_rate - l_theta * wanted_along)
         else:
             last_error, last_rate = self._last.get(key, (error, 0.0))
             rate = last_rate + min(1.0, dt / RATE_FILTER) * ((error - last_error) / max(dt, 1e-4) - last_rate)
@@ -154,5 +170,6 @@ class LineErrors:
             weight=weight,
             rho_error=min(max(rho - reference.rho, -ERROR_BOUND), ERROR_BOUND),
             rho_rate=rho_rate,
-            matrix=matrix,
+            plane=plane,
+            twist_map=self._twist,
         )

@@ -12,9 +12,9 @@ from ibvs_qp.estimation.contact import ContactEstimator
 from ibvs_qp.estimation.external_wrench import ExternalWrench
 from ibvs_qp.estimation.surface import FrictionEstimator
 from ibvs_qp.feedforward import ContactFeedforward
-from ibvs_qp.frames import GRAVITY, R_BODY_CAMERA, cross, down_in_body, roll_pitch
-from ibvs_qp.lines import LineErrors, LineTerm
-from ibvs_qp.measurement import Measurement, Reference
+from ibvs_qp.frames import GRAVITY, cross, down_in_body, roll_pitch, to_camera
+from ibvs_qp.lines import CameraMotion, LineErrors, LineTerm
+from ibvs_qp.measurement import HORIZONTAL, VERTICAL, Measurement, Reference
 
 #: Bound of the velocity integral as an acceleration [m/s^2] and of the force integral as a force [N].
 VELOCITY_INTEGRAL_BOUND, FORCE_INTEGRAL_BOUND = 0.8, 8.0
@@ -56,6 +56,8 @@ class Setpoints:
         self._feedforward = ContactFeedforward(config.contact, np.array(vehicle.tip_position_m))
         self._lines = LineErrors(config)
         self._tip = np.array(vehicle.tip_position_m)
+        self._camera = vehicle.camera_position_m
+        self._tip_camera = to_camera(self._tip, np.array(self._camera)).tolist()
         self._inertia = np.array(vehicle.inertia_kg_m2)
         self.reset()
 
@@ -67,7 +69,7 @@ class Setpoints:
         self._feedforward.reset()
         self._lines.reset()
         self._stamp = -1
-        self._velocity_integral = np.zeros(2)
+        self._velocity_integral = [0.0, 0.0]
         self._force_integral = self._search_force = 0.0
         self._given_up = 0.0
         self.contact_weight = self.push_reference = self.push_command = self.standoff_command = 0.0
@@ -126,18 +128,16 @@ class Setpoints:
         gravity = config.vehicle.mass_kg * GRAVITY * down_body
         self._static_wrench = np.concatenate((gravity, -gyroscopic)) + self.external.wrench
         self.bias_wrench = self._static_wrench + expected
-        self._travel = travel
+        self._travel, self._travel_list = travel, travel.tolist()
 
     def _attitude(self, measurement: Measurement) -> None:
         gains, omega = self.config.gains, measurement.angular_velocity
         self.roll, self.pitch = roll_pitch(measurement.attitude)
         self.yaw = -math.atan2(self.normal[1], self.normal[0]) if self.contact.known else 0.0
-        self.angular = np.array(
-            [
-                -gains.attitude_kp * self.roll - gains.attitude_kd * omega[0],
-                -gains.attitude_kp * self.pitch - gains.attitude_kd * omega[1],
-                -gains.yaw_kp * self.yaw - gains.yaw_kd * omega[2],
-            ]
+        self.angular = (
+            -gains.attitude_kp * self.roll - gains.attitude_kd * float(omega[0]),
+            -gains.attitude_kp * self.pitch - gains.attitude_kd * float(omega[1]),
+            -gains.yaw_kp * self.yaw - gains.yaw_kd * float(omega[2]),
         )
 
     def _along_normal(self, reference: Reference, dt: float) -> None:
@@ -211,41 +211,58 @@ class Setpoints:
         config, gains, contact = self.config, self.config.gains, self.contact
         velocity = measurement.velocity
         speed = 0.0
-        twist = None
+        in_plane = None
         if velocity is not None:
             in_plane = velocity - self.normal * float(self.normal @ velocity)
             speed = math.sqrt(float(in_plane @ in_plane))
-            twist = np.concatenate((in_plane, measurement.angular_velocity))
         stuck = contact.in_contact and speed < config.contact.stuck_speed_m_s
         integrate = not stuck and self._given_up < WINDUP_FORCE
         self.lines = []
         if contact.known:
-            normal_camera = R_BODY_CAMERA.T @ self.normal
-            self.plane = np.append(normal_camera / max(contact.depth, 0.05), -1.0)
-            self.lines = self._lines.update(
-                measurement.lines,
-                reference.lines,
-                self.plane,
-                normal_camera,
-                contact.distance,
-                twist,
-                self._travel,
-                integrate,
-                dt,
-            )
-        fixed = {
-            role: max((t.weight for t in self.lines if t.role == role), default=0.0)
-            for role in ("horizontal", "vertical")
-        }
-        self.free_right, self.free_down = 1.0 - fixed["vertical"], 1.0 - fixed["horizontal"]
-        self.velocity_command = np.zeros(2)
+            self._line_errors(measurement, reference, in_plane, integrate, dt)
+        right = max((line.weight for line in self.lines if line.role == VERTICAL), default=0.0)
+        down = max((line.weight for line in self.lines if line.role == HORIZONTAL), default=0.0)
+        self.free_right, self.free_down = 1.0 - right, 1.0 - down
+        self.velocity_command = (0.0, 0.0)
         if velocity is None:
             return
-        measured = np.array([float(self.right @ velocity), float(self.down @ velocity)])
-        error = reference.velocity - measured
-        if integrate:
-            free = np.array([self.free_right, self.free_down])
-            self._velocity_integral = free * (self._velocity_integral + dt * error)
-            bound = VELOCITY_INTEGRAL_BOUND / max(gains.velocity_ki, 1e-6)
-            self._velocity_integral = np.minimum(np.maximum(self._velocity_integral, -bound), bound)
-        self.velocity_command = gains.velocity_kp * error + gains.velocity_ki * self._velocity_integral
+        command = []
+        bound = VELOCITY_INTEGRAL_BOUND / max(gains.velocity_ki, 1e-6)
+        for axis, (direction, free) in enumerate(((self.right, self.free_right), (self.down, self.free_down))):
+            error = float(reference.velocity[axis]) - float(direction @ velocity)
+            integral = self._velocity_integral[axis]
+            if integrate:
+                integral = min(max(free * (integral + dt * error), -bound), bound)
+                self._velocity_integral[axis] = integral
+            command.append(gains.velocity_kp * error + gains.velocity_ki * integral)
+        self.velocity_command = (command[0], command[1])
+
+    def _line_errors(
+        self,
+        measurement: Measurement,
+        reference: Reference,
+        in_plane: np.ndarray | None,
+        integrate: bool,
+        dt: float,
+    ) -> None:
+        contact = self.contact
+        front, right, down = self.normal.tolist()
+        depth = max(contact.depth, 0.05)
+        self.plane = (right / depth, down / depth, front / depth, -1.0)
+        tip_x, tip_y, tip_z = self._tip_camera
+        distance = contact.distance
+        foot = (tip_x + distance * right, tip_y + distance * down, tip_z + distance * front)
+        known = in_plane is not None
+        vx, vy, vz = in_plane.tolist() if in_plane is not None else (0.0, 0.0, 0.0)
+        wx, wy, wz = measurement.angular_velocity.tolist()
+        px, py, pz = self._camera
+        motion = CameraMotion(
+            # body (front, right, down) to camera (right, down, front), with the lever of the camera
+            velocity=(vy + wz * px - wx * pz, vz + wx * py - wy * px, vx + wy * pz - wz * py),
+            turn=(wy, wz, wx),
+            reference=(self._travel_list[1], self._travel_list[2], self._travel_list[0]),
+            known=known,
+        )
+        self.lines = self._lines.update(
+            measurement.lines, reference.lines, self.plane, foot, motion, integrate, dt
+        )
