@@ -90,11 +90,8 @@ class HybridController:
         self._good = checked
         self.setpoints.update(checked, reference)
         last = self._last if self._last is not None else hold_thrusts(self.config, checked)
-        lower, upper = (
-            thrust_window(last, *self._limits(checked), self._step, self._floor, self._ceiling)
-            if self._last is not None
-            else (self._floor, self._ceiling)
-        )
+        step = self._step if self._last is not None else math.inf
+        lower, upper = thrust_window(last, *self._limits(checked), step, self._floor, self._ceiling)
         self._pack(last, lower, upper)
         solution = self.engine.solve()
         if solution is None:

@@ -26,7 +26,7 @@ def _vector(value: Any, size: int, bound: float) -> bool:
         isinstance(value, np.ndarray)
         and value.shape == (size,)
         and value.dtype.kind == "f"
-        and bool(value @ value <= bound * bound)  # False for NaN too
+        and bool(np.abs(value).max() <= bound and value @ value <= bound * bound)  # False for NaN too
     )
 
 
