@@ -24,6 +24,8 @@ BIAS_NOISE = 2e-3
 DISTANCE_STD = 1.2e-3
 #: Share of a frame's normal innovation that is believed; the normal averages over about six frames.
 NORMAL_GAIN = 0.15
+#: A plane this far from the expected distance is a leap [m], believed after so many frames in a row.
+LEAP, LEAP_FRAMES = 0.05, 5
 #: Free-flight noise of the push is averaged over this time [s].
 NOISE_TIME = 1.0
 
@@ -49,7 +51,7 @@ class ContactEstimator:
         self._ticks = 0
         self._plane_stamp = self._wrench_stamp = self._stamp = -1
         self.normal = np.array([1.0, 0.0, 0.0])
-        self.known = False
+        self.known, self._leaps = False, 0
         self.distance, self.rate, self._lever_speed = math.inf, 0.0, 0.0
         self.push = self.push_raw = 0.0
         self._push_mean, self._push_variance = 0.0, 0.02
@@ -102,17 +104,33 @@ class ContactEstimator:
             self._filter.set_entry(0, distance, 0.01)
             self.known = True
             return
+        if not self._believe(stamp, distance):
+            return
         age = min(max(round((self._stamp - stamp) * 1e-9 / self._config.tick_s), 0), min(HISTORY, self._ticks) - 1)
         slots = (self._ticks - np.arange(age + 1)) % HISTORY
         correction = NORMAL_GAIN * (normal - self._normal_history[slots[-1]])
         self._normal_history[slots] += correction
         self.normal = self.normal + correction
         self.normal /= math.sqrt(self.normal @ self.normal)
-        row = np.array([[1.0, 0.0, 0.0]])
-        if not self._filter.correct(stamp, row, np.array([distance]), np.array([[DISTANCE_STD**2]])):
-            past = self._filter.at(stamp)
-            if past is not None and abs(distance - past[0]) < 0.05:  # a jump is believed slowly, a leap not at all
-                self._filter.correct(stamp, row, np.array([distance]), np.array([[0.02**2]]), gate=1e3)
+
+    def _believe(self, stamp: int, distance: float) -> bool:
+        """Correct with a measured distance: a jump is believed slowly, a leap only when the next frames repeat it."""
+        row, value = np.array([[1.0, 0.0, 0.0]]), np.array([distance])
+        if self._filter.correct(stamp, row, value, np.array([[DISTANCE_STD**2]])):
+            self._leaps = 0
+            return True
+        past = self._filter.at(stamp)
+        if past is None:
+            return False
+        if abs(distance - past[0]) < LEAP:
+            self._leaps = 0
+            return self._filter.correct(stamp, row, value, np.array([[0.02**2]]), gate=1e3)
+        self._leaps += 1
+        if self._leaps < LEAP_FRAMES:
+            return False
+        self._leaps = 0
+        self._filter.set_entry(0, distance, 0.01)
+        return True
 
     def _update_push(self, measurement: Measurement) -> None:
         if measurement.wrench_stamp_ns <= self._wrench_stamp:
