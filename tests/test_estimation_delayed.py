@@ -1,0 +1,100 @@
+"""The filter for late measurements: exact propagation, the right sample in time, refusals."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ibvs_qp.estimation.delayed import HISTORY, DelayedKalman
+
+TICK = 0.004
+TICK_NS = 4_000_000
+CHAIN = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [0.0, 0.0, 0.0]])  # distance, speed, bias
+
+
+def new_filter() -> DelayedKalman:
+    return DelayedKalman(CHAIN, np.array([1e-10, 1e-6, 1e-7]), np.array([0.1, 0.1, 0.1]), TICK)
+
+
+def test_a_late_correction_equals_the_replay_of_every_input() -> None:
+    """Correcting at the capture and running all inputs again gives the same state as the one vector product."""
+    rng = np.random.default_rng(0)
+    inputs = rng.normal(0.0, 0.01, (60, 3))
+    for age in (0, 1, 7, 25):
+        late, replay = new_filter(), new_filter()
+        for k in range(60):
+            late.predict(k * TICK_NS, inputs[k], TICK)
+        for k in range(60):
+            replay.predict(k * TICK_NS, inputs[k], TICK)
+            if k == 59 - age:
+                assert replay.correct(k * TICK_NS, np.eye(3)[:1], np.array([0.02]), np.array([[1e-4]]))
+        assert late.correct((59 - age) * TICK_NS, np.eye(3)[:1], np.array([0.02]), np.array([[1e-4]]))
+        np.testing.assert_allclose(late.state, replay.state, atol=1e-12)
+        np.testing.assert_allclose(late.covariance, replay.covariance, atol=1e-12)
+        np.testing.assert_allclose(late.at(59 * TICK_NS), late.state)
+
+
+@pytest.mark.parametrize("latency", [0, 15, 25])
+def test_converges_without_lag_whatever_the_latency(latency: int) -> None:
+    """Constant acceleration with a biased accelerometer: distance, speed and bias are those of now."""
+    rng, f = np.random.default_rng(1), new_filter()
+    bias, acceleration, distances = 0.05, 0.02, []
+    distance, speed = 0.5, 0.0
+    for k in range(2500):
+        f.predict(k * TICK_NS, np.array([0.0, TICK * (acceleration + bias), 0.0]), TICK)
+        distance, speed = distance - TICK * speed, speed + TICK * acceleration
+        distances.append(distance)
+        if k % 8 == 0 and k >= latency:
+            seen = distances[k - latency] + rng.normal(0.0, 1e-3)
+            assert f.correct((k - latency) * TICK_NS, np.eye(3)[:1], np.array([seen]), np.array([[1e-6]]))
+    assert (np.abs(f.state - [distance, speed, bias]) < [1e-3, 4e-3, 4e-3]).all()
+
+
+def test_stamps_out_of_the_history_are_refused_and_change_nothing() -> None:
+    f = new_filter()
+    assert not f.correct(0, np.eye(3)[:1], np.array([1.0]), np.array([[1.0]]))  # nothing predicted yet
+    for k in range(HISTORY + 20):
+        f.predict(k * TICK_NS, np.zeros(3), TICK)
+    before = f.state.copy()
+    newest = (HISTORY + 19) * TICK_NS
+    for stamp in (newest - HISTORY * TICK_NS, newest + 10 * TICK_NS):
+        assert not f.correct(stamp, np.eye(3)[:1], np.array([1.0]), np.array([[1.0]]))
+    np.testing.assert_array_equal(f.state, before)
+    assert f.at(newest - HISTORY * TICK_NS) is None
+
+
+def test_outliers_are_refused_by_their_own_spread() -> None:
+    f = new_filter()
+    for k in range(50):
+        f.predict(k * TICK_NS, np.zeros(3), TICK)
+        f.correct(k * TICK_NS, np.eye(3)[:1], np.array([0.0]), np.array([[1e-6]]))
+    state = f.state.copy()
+    assert not f.correct(49 * TICK_NS, np.eye(3)[:1], np.array([0.1]), np.array([[1e-6]]))
+    np.testing.assert_array_equal(f.state, state)
+    assert f.correct(49 * TICK_NS, np.eye(3)[:1], np.array([0.1]), np.array([[1.0]]))  # an honest variance is heard
+
+
+def test_a_late_new_entry_follows_the_remembered_motion_of_the_others() -> None:
+    """A line seen 80 ms ago at speed enters where it is now, not where it was."""
+    chain = np.zeros((3, 3))
+    chain[1, 0] = 1.0  # odometer of a constant speed; entry 2 is the line, which the chain does not move yet
+    f = DelayedKalman(chain, np.full(3, 1e-8), np.array([0.1, 0.1, 0.1]), TICK)
+    f.state[0] = 0.1
+    for k in range(100):
+        f.predict(k * TICK_NS, np.zeros(3), TICK)
+    f.set_path(2, 0.30, 79 * TICK_NS, np.array([0.0, -1.0, 0.0]), 1e-3)
+    assert f.state[2] == pytest.approx(0.30 - 0.1 * 20 * TICK, abs=1e-12)
+    past = f.at(79 * TICK_NS)
+    assert past is not None and past[2] == pytest.approx(0.30, abs=1e-12)
+    f.chain[2, 0] = -1.0
+    assert f.correct(85 * TICK_NS, np.eye(3)[2:], np.array([0.30 - 0.1 * 6 * TICK]), np.array([[1e-8]]), gate=1.0)
+
+
+def test_covariance_stays_symmetric_and_positive() -> None:
+    rng, f = np.random.default_rng(3), new_filter()
+    for k in range(3000):
+        f.predict(k * TICK_NS, rng.normal(0.0, 0.001, 3), TICK)
+        if k % 8 == 0:
+            f.correct((k - 15) * TICK_NS, np.eye(3)[:1], np.array([rng.normal(0, 1e-3)]), np.array([[1e-6]]), 1e9)
+    np.testing.assert_array_equal(f.covariance, f.covariance.T)
+    assert np.linalg.eigvalsh(f.covariance).min() > 0
