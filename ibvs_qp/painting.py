@@ -115,7 +115,8 @@ class Painter:
         self._guide_target = self.config.edge_margin_m
         self._edge_target: float | None = None
         self._speed = 0.0
-        self._since = self._anchor = math.nan
+        self._since = math.nan
+        self._anchor = 0.0  # row 1 begins where the tip was at the start, before the vehicle turned to the wall
         self._stroke_start = self._stroke_end = math.nan
         self._right_edge: float | None = None
         self._last_time = math.nan
@@ -159,7 +160,6 @@ class Painter:
         if guide is not None and seen.wall_known and seen.tared and guide.weight > 0.9:
             self._guide_id, self._guide_target = guide.track_id, self.config.edge_margin_m
             self._enter(seen, "approach", f"guide {guide.offset * 1e3:+.0f} mm below the tip, wall known, wrench tared")
-            self._anchor = float(seen.odometer[0])
         distance = seen.distance if seen.wall_known else self.config.retreat_m
         return self._wish(seen, contact=False, standoff=max(distance, self.config.standoff_m), guided=False)
 

@@ -8,6 +8,7 @@ p = `Canvas.pixels_per_m`: row 0 is the top edge, column 0 the left edge.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -29,8 +30,24 @@ TEXTURE_PAD_PX = 8
 _PHASES, _STAMP_STEP_PX = 16, 2.0
 
 
+@dataclass(frozen=True)
+class FreshPaint:
+    """What strokes have changed since somebody last looked; a copy, so later strokes do not show in it.
+
+    Attributes:
+        box: (row, row end, column, column end) in the padded texture.
+        coverage: Painted share of every pixel of the box in 255ths, uint8.
+    """
+
+    box: tuple[int, int, int, int]
+    coverage: np.ndarray
+
+
 class Canvas:
     """Board and wall pictures of one flight.
+
+    Strokes only change the painted share of the pixels. The texture made from it may be drawn in another thread:
+    `take` what is new where the strokes are made, `draw` it where the texture is read, in the same order.
 
     Args:
         scene: The scene.
@@ -56,7 +73,7 @@ class Canvas:
         self._texture = self._blank.copy()
         padded = (shape[0] + 2 * pad, shape[1] + 2 * pad)
         self._fresh = textures.paint_surface(np.random.default_rng(paint_seed), padded, paint.color)
-        self._coverage = np.zeros(padded, np.uint8)
+        self._coverage, self._drawn = np.zeros(padded, np.uint8), np.zeros(padded, np.uint8)
         self._stamps = _brush_stamps(0.5 * paint.brush_width_m * self.pixels_per_m)
         self._dirty: tuple[int, int, int, int] | None = None
         self.edges = PaintedEdges(scene)
@@ -78,7 +95,12 @@ class Canvas:
     @property
     def rgb(self) -> np.ndarray:
         """The painted board, uint8 RGB (height, width, 3), a copy."""
-        return np.ascontiguousarray(_inner(self.flush())[..., :3])
+        # Made afresh: the texture may be in use by a thread that draws a picture.
+        coverage, fresh, blank = _inner(self._coverage), _inner(self._fresh), _inner(self._blank)
+        picture = blank[..., :3].copy()
+        painted = coverage > 0
+        picture[painted] = _mix(coverage[painted], fresh[painted], blank[painted])[:, :3]
+        return picture
 
     @property
     def coverage(self) -> np.ndarray:
@@ -124,19 +146,38 @@ class Canvas:
             (r0, r1, c0, c1) if old is None else (min(old[0], r0), max(old[1], r1), min(old[2], c0), max(old[3], c1))
         )
 
-    def flush(self) -> np.ndarray:
-        """Bring the texture up to date with all strokes and return it.
+    def take(self) -> FreshPaint | None:
+        """What strokes have changed since the last call, or None."""
+        if self._dirty is None:
+            return None
+        r0, r1, c0, c1 = box = self._dirty
+        self._dirty = None
+        return FreshPaint(box, self._coverage[r0:r1, c0:c1].copy())
+
+    def draw(self, paint: FreshPaint | None) -> np.ndarray:
+        """Bring the texture up to date with what `take` has returned, and return it.
 
         Returns:
             The board with `TEXTURE_PAD_PX` pixels more on every side, uint8 (h, w, 4); shared, not to be written.
         """
-        if self._dirty is not None:
-            r0, r1, c0, c1 = self._dirty
-            share = self._coverage[r0:r1, c0:c1, None].astype(np.uint16)
-            mixed = self._fresh[r0:r1, c0:c1] * share + self._blank[r0:r1, c0:c1] * (255 - share) + 127
-            self._texture[r0:r1, c0:c1] = mixed // 255
-            self._dirty = None
+        if paint is not None:
+            r0, r1, c0, c1 = paint.box
+            rows, columns = np.nonzero(paint.coverage != self._drawn[r0:r1, c0:c1])  # a brush's front is narrow
+            share = paint.coverage[rows, columns]
+            place = rows + r0, columns + c0
+            self._texture[place] = _mix(share, self._fresh[place], self._blank[place])
+            self._drawn[place] = share
         return self._texture
+
+    def flush(self) -> np.ndarray:
+        """Bring the texture up to date with all strokes and return it, see `draw`."""
+        return self.draw(self.take())
+
+
+def _mix(share: np.ndarray, fresh: np.ndarray, blank: np.ndarray) -> np.ndarray:
+    """Paint over ground: pixels uint8 (n, 4) by the share of the paint in 255ths, uint8 (n,)."""
+    wide = share[:, None].astype(np.uint16)
+    return ((fresh * wide + blank * (255 - wide) + 127) // 255).astype(np.uint8)
 
 
 def _whole(size: float) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -69,7 +70,7 @@ class Picture:
             plane=None if plane is None else (float(plane[0]), float(plane[1]), float(plane[2])),
         )
 
-    @property
+    @cached_property
     def transposed(self) -> Picture:
         """View with rows and columns swapped: upright lines become level."""
         fx, fy, cx, cy = self.intrinsics

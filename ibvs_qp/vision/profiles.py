@@ -1,4 +1,4 @@
-"""Strips of colour across a predicted line: where each profile has its edge, to a fraction of a pixel."""
+"""Strips of colour across predicted lines, all lines at once: where each profile has its edge, below a pixel."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ibvs_qp.vision.colors import BOARD, PAINT, SurfaceColors
+from ibvs_qp.vision.config import LineConfig
 from ibvs_qp.vision.picture import Picture
+from ibvs_qp.vision.query import LineView
 
 #: Distance from the edge at which its two sides are looked at [px at 640]: beyond blur, within a 10 mm margin.
 SIDE_PX = 4.0
@@ -19,23 +21,22 @@ _OFF_PLANE = 0.018
 _FLOOR = 0.05
 
 
-@dataclass(frozen=True, kw_only=True)
-class Expected:
-    """What lies on the two sides of a line whose identity is known (before and behind, along +v).
+@dataclass
+class Strips:
+    """Colour around L predicted level lines v = v(u): K profiles, each one column of M pixels, of every line.
 
     Attributes:
-        kind: "board", "paint" or "" for anything.
-        side: +1 if the surface lies behind (larger v), -1 before, 0 unknown.
+        views: The lines, each level in its own view, (L).
+        u: Columns of the profiles, (L, K).
+        base: Predicted rows at these columns, (L, K).
+        colors: RGB of the pixels, uint8 (L, K, M, 3).
+        hidden: Pixels that the vehicle hides or that lie outside the picture, bool (L, K, M).
+        reach: Rows searched on either side of the prediction.
+        side: Distance of the two sides from the edge [px].
+        off: Pixels whose depth is not the surface's, bool (L, K, M), looked up for lines of kind "board"; or None.
     """
 
-    kind: str = ""
-    side: int = 0
-
-
-@dataclass
-class Strip:
-    """Colour around a predicted level line v = v(u), one column of pixels per profile."""
-
+    views: list[LineView]
     u: np.ndarray
     base: np.ndarray
     colors: np.ndarray
@@ -45,109 +46,120 @@ class Strip:
     off: np.ndarray | None
 
     @classmethod
-    def gather(
-        cls,
-        picture: Picture,
-        coefficients: tuple[float, float, float],
-        span: tuple[float, float],
-        profiles: int,
-        reach: int,
-    ) -> Strip | None:
-        """Read the strip within `reach` rows of the line between two columns; None if it misses the picture."""
-        height, width = picture.height, picture.width
-        first, last = max(span[0], 0.0), min(span[1], width - 1.0)
-        if last - first < profiles // 8:
-            return None
+    def gather(cls, picture: Picture, views: list[LineView], config: LineConfig, reach: int) -> Strips:
+        """Read the pixels within `reach` rows of every line."""
+        first = np.array([view.first for view in views])
+        length = np.array([view.last for view in views]) - first
+        profiles = min(config.profiles, int(length.min()) + 1)  # no column twice
         side = max(2, round(SIDE_PX * picture.scale))
-        u = np.unique(np.round(np.linspace(first, last, profiles)).astype(np.intp))
-        p, q, r = coefficients
+        u = np.floor(first[:, None] + length[:, None] * np.linspace(0.0, 1.0, profiles) + 0.5).astype(np.intp)
+        p, q, r = np.array([view.coefficients for view in views]).T[:, :, None]
         base = np.round(-(p * u + r) / q).astype(np.intp)
-        rows = base[:, None] + np.arange(-reach - side, reach + side + 1)
-        outside = (rows < 0) | (rows >= height)
-        np.minimum(np.maximum(rows, 0, out=rows), height - 1, out=rows)
-        place = rows * picture.row_step + (u * picture.column_step)[:, None]
-        colors = picture.colors.take(place, axis=0)
-        hidden = (picture.hidden.take(place) != 0) | outside
-        off = None
-        if picture.depth is not None and picture.plane is not None:
-            a, b, c = picture.plane
-            fx, fy, cx, cy = picture.intrinsics
-            relative = picture.depth.take(place) * (
-                rows * (b / fy) + (u * (a / fx) + (c - a * cx / fx - b * cy / fy))[:, None]
-            )
-            off = np.where(
-                relative > 0.0, np.abs(relative - 1.0) > _OFF_PLANE, False
-            )  # no reading: not known to be off
-        return cls(u=u, base=base, colors=colors, hidden=hidden, reach=reach, side=side, off=off)
+        rows = base[:, :, None] + np.arange(-reach - side, reach + side + 1)
+        last_row = np.array([view.view.height - 1 for view in views])[:, None]
+        crossing = bool(((base < reach + side) | (base > last_row - reach - side)).any())
+        inside = np.minimum(np.maximum(rows, 0), last_row[:, :, None]) if crossing else rows
+        row_step, column_step = np.array([(view.view.row_step, view.view.column_step) for view in views]).T[:, :, None]
+        place = inside * row_step[:, :, None] + (u * column_step)[:, :, None]
+        hidden = picture.hidden.take(place) != 0
+        if crossing:
+            hidden |= inside != rows
+        off = _off_surface(picture, views, u, inside, place)
+        return cls(views, u, base, picture.colors.take(place, axis=0), hidden, reach, side, off)
 
     @property
     def visible(self) -> np.ndarray:
-        """Profiles whose middle is neither hidden nor outside, bool (K,)."""
+        """Profiles whose middle is neither hidden nor outside, bool (L, K)."""
         middle = self.reach + self.side
-        return np.logical_not(self.hidden[:, middle - 2 : middle + 3].any(axis=1))
+        return np.logical_not(self.hidden[:, :, middle - 2 : middle + 3].any(axis=2))
 
-    def gradient(self) -> np.ndarray:
-        """Central differences along +v of the three channels, (K, 2 reach + 1, 3) [grey levels per px]."""
+    def gradient(self, chosen: np.ndarray | slice = slice(None)) -> np.ndarray:
+        """Central differences of the channels along +v [grey levels per px], (L, K, 2 reach + 1, 3) or (n, ...)."""
         cut = self.side - 1
-        inner = self.colors[:, cut : self.colors.shape[1] - cut].astype(np.float32)
-        return 0.5 * (inner[:, 2:] - inner[:, :-2])
+        inner = self.colors[chosen][..., cut : self.colors.shape[2] - cut, :].astype(np.float32)
+        return 0.5 * (inner[..., 2:, :] - inner[..., :-2, :])
 
-    def response(self, direction: np.ndarray) -> np.ndarray:
-        """Central differences along +v of the colours' projection on a unit direction, (K, 2 reach + 1)."""
-        cut = self.side - 1
-        mixed = self.colors[:, cut : self.colors.shape[1] - cut].astype(np.float32) @ (0.5 * direction)
-        return mixed[:, 2:] - mixed[:, :-2]
+    def response(self, directions: np.ndarray) -> np.ndarray:
+        """Central differences along +v of the colours' projection on unit directions (L, 3), (L, K, 2 reach + 1)."""
+        cut, (count, profiles, pixels, _) = self.side - 1, self.colors.shape
+        flat = self.colors.reshape(count, -1, 3).astype(np.float32)
+        mixed = (flat @ (0.5 * directions[:, :, None])).reshape(count, profiles, pixels)[:, :, cut : pixels - cut]
+        return mixed[:, :, 2:] - mixed[:, :, :-2]
 
-    def admissible(self, expected: Expected, colors: SurfaceColors) -> np.ndarray:
-        """Places whose two sides look as expected and are not hidden, bool (K, 2 reach + 1)."""
+    def admissible(self, colors: SurfaceColors) -> np.ndarray:
+        """Places whose two sides look as expected and are not hidden, bool (L, K, 2 reach + 1)."""
         far = 2 * self.side
-        allowed = ~(self.hidden[:, :-far] | self.hidden[:, far:] | self.hidden[:, self.side : -self.side])
-        if not expected.kind or expected.side == 0 or colors.board is None:
+        allowed = ~(self.hidden[:, :, :-far] | self.hidden[:, :, far:] | self.hidden[:, :, self.side : -self.side])
+        known = [k for k, view in enumerate(self.views) if view.query.kind and view.side != 0]
+        if not known or colors.board is None:
             return allowed
-        labels = colors.label(self.colors)
-        before, behind = labels[:, :-far], labels[:, far:]
-        surface, other = (behind, before) if expected.side > 0 else (before, behind)
-        if expected.kind == "paint":
-            return allowed & (surface == BOARD) & (other == PAINT) if colors.paint_distinct else allowed
-        same = other == surface
-        if self.off is not None:
-            before_off, behind_off = self.off[:, :-far], self.off[:, far:]
-            surface_off, other_off = (behind_off, before_off) if expected.side > 0 else (before_off, behind_off)
-            # joints of a wall may have the board's colour, but not its depth; lines on the board have both
-            allowed = allowed & ~surface_off
-            same &= other_off
-        return np.asarray(allowed & (surface != 0) & ((other == 0) | same))
+        labels = colors.label(self.colors if len(known) == len(self.views) else self.colors[known])
+        for k, label in zip(known, labels, strict=True):
+            view, before, behind = self.views[k], label[:, :-far], label[:, far:]
+            surface, other = (behind, before) if view.side > 0 else (before, behind)
+            if view.query.kind == "paint":
+                if colors.paint_distinct:
+                    allowed[k] &= (surface == BOARD) & (other == PAINT)
+                continue
+            same = other == surface
+            if self.off is not None:
+                before_off, behind_off = self.off[k, :, :-far], self.off[k, :, far:]
+                surface_off, other_off = (behind_off, before_off) if view.side > 0 else (before_off, behind_off)
+                # joints of a wall may have the board's colour, but not its depth; lines on the board have both
+                allowed[k] &= ~surface_off
+                same &= other_off
+            allowed[k] &= (surface != 0) & ((other == 0) | same)
+        return allowed
 
-    def strength(self) -> np.ndarray:
-        """Size of the colour gradient along v, whatever its direction, (K, 2 reach + 1)."""
-        gradient = self.gradient()
-        return np.sqrt(np.einsum("kmi,kmi->km", gradient, gradient))
+    def strength(self, chosen: np.ndarray) -> np.ndarray:
+        """Size of the colour gradient along v of chosen profiles (bool (L, K)), whatever its direction, (n, ...)."""
+        gradient = self.gradient(chosen)
+        return np.sqrt(np.vecdot(gradient, gradient))
 
-    def peaks(self, response: np.ndarray, threshold: float) -> tuple[np.ndarray, np.ndarray]:
-        """Sub-pixel row of the strongest answer of every profile and whether it is strong enough, (K,), (K,).
+    def peaks(self, response: np.ndarray, threshold: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Sub-pixel row of the strongest answer of every profile and whether it is strong enough, (L, K) each.
 
         The interpolation is that of a Gaussian peak: a blurred step has a Gaussian derivative, on which a parabola
         would be off by up to 0.03 px.
         """
-        reach = self.reach
+        reach, (_, profiles, size) = self.reach, response.shape
         offset = np.arange(-reach, reach + 1)
-        preference = np.exp(-0.5 * (offset / max(_PREFERENCE * reach, 1.0)) ** 2)
-        index = np.argmax(response * preference, axis=1)
+        preference = np.exp(-0.5 * (offset / max(_PREFERENCE * reach, 1.0)) ** 2).astype(np.float32)
+        index = np.argmax(response * preference, axis=2)
         inner = np.minimum(np.maximum(index, 1), 2 * reach - 1)
-        k = np.arange(len(index))
-        peak = response[k, inner]
-        good = (index == inner) & (peak > threshold)
-        floor = np.maximum(_FLOOR * peak, 1e-6)
-        before, middle, behind = (np.log(np.maximum(response[k, inner + step], floor)) for step in (-1, 0, 1))
-        curvature = before - 2.0 * middle + behind
-        shift = np.where(curvature < -1e-6, 0.5 * (before - behind) / np.minimum(curvature, -1e-6), 0.0)
-        return self.base + offset[inner] + np.minimum(np.maximum(shift, -0.7), 0.7), good
+        place = np.arange(index.size).reshape(-1, profiles) * size + inner
+        around = response.take(place + np.array([-1, 0, 1])[:, None, None])
+        peak = around[1]
+        good = (index == inner) & (peak > threshold[:, None])
+        before, middle, behind = np.log(np.maximum(around, np.maximum(_FLOOR * peak, np.float32(1e-6))))
+        curvature = np.minimum(before - 2.0 * middle + behind, np.float32(-1e-6))
+        shift = 0.5 * (before - behind) / curvature
+        shift[curvature > -2e-6] = 0.0  # flat: no peak to interpolate
+        return self.base + offset.take(inner) + np.minimum(np.maximum(shift, -0.7), 0.7), good
 
     def sides(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Colours before and behind given rows, each (K, 3)."""
-        middle = self.reach + self.side
-        index = np.round(rows).astype(np.intp) - self.base + middle
-        k, last = np.arange(len(index)), self.colors.shape[1] - 1
+        """Colours before and behind given rows (L, K), each uint8 (L, K, 3)."""
+        last = self.colors.shape[2] - 1
+        index = np.round(rows).astype(np.intp) - (self.base - (self.reach + self.side))
+        start = np.arange(index.size).reshape(index.shape) * (last + 1)
+        flat = self.colors.reshape(-1, 3)
         before = np.minimum(np.maximum(index - self.side, 0), last)
         behind = np.minimum(np.maximum(index + self.side, 0), last)
-        return self.colors[k, before], self.colors[k, behind]
+        return flat.take(start + before, axis=0), flat.take(start + behind, axis=0)
+
+
+def _off_surface(
+    picture: Picture, views: list[LineView], u: np.ndarray, rows: np.ndarray, place: np.ndarray
+) -> np.ndarray | None:
+    """Pixels whose depth is known not to be the surface's, for lines of kind "board"."""
+    if picture.depth is None or picture.plane is None:
+        return None
+    off = np.zeros(place.shape, bool)
+    for k, view in enumerate(views):
+        if view.query.kind == "board" and view.view.plane is not None:
+            a, b, c = view.view.plane
+            fx, fy, cx, cy = view.view.intrinsics
+            surface = rows[k] * (b / fy) + (u[k] * (a / fx) + (c - a * cx / fx - b * cy / fy))[:, None]
+            relative = picture.depth.take(place[k]) * surface
+            off[k] = (relative > 0.0) & (np.abs(relative - 1.0) > _OFF_PLANE)  # no reading: not known to be off
+    return off

@@ -1,6 +1,11 @@
-"""Robust straight lines through (u, v) points: consensus start, Tukey fit, longest supported run."""
+"""Robust straight lines through (u, v) points, many lines at once: consensus start, Tukey fit, longest runs.
+
+The points of every line stand in one row of (L, K) arrays; `packed` moves those that count to the front.
+"""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -9,10 +14,39 @@ _TUKEY = 4.685
 #: Smallest residual scale [px]: below this, all residuals are rounding.
 _SCALE_MIN = 0.02
 _MAD = 1.4826
-#: Pairs of points tried for the start.
-_PAIRS = 20
+#: Rounds of reweighting.
+_ROUNDS = 3
+#: Places from which pairs of points are tried for the start.
+_STARTS = np.linspace(0.0, 1.0, 20)
+#: Shortest distance of the points of a pair [px].
+_APART = 4.0
 #: Largest correlation of neighbouring residuals accounted for.
 _CORRELATION_MAX = 0.8
+
+
+@dataclass
+class LineFits:
+    """Lines v = level + slope (u - center), (L,) each.
+
+    Attributes:
+        level: Row at the centre [px].
+        slope: Rows per column.
+        center: Weighted mean of u [px].
+        level_variance: Of the level [px^2]: sigma^2/N, inflated where neighbouring residuals agree.
+        slope_variance: Of the slope: sigma^2/N 12/L^2, inflated the same.
+        rms: Of the residuals [px].
+    """
+
+    level: np.ndarray
+    slope: np.ndarray
+    center: np.ndarray
+    level_variance: np.ndarray
+    slope_variance: np.ndarray
+    rms: np.ndarray
+
+    def rows(self, u: np.ndarray) -> np.ndarray:
+        """Rows at the columns of every line, (L, K)."""
+        return self.level[:, None] + self.slope[:, None] * (u - self.center[:, None])
 
 
 def median(values: np.ndarray) -> float:
@@ -21,87 +55,103 @@ def median(values: np.ndarray) -> float:
     return float(np.partition(values, middle)[middle])
 
 
-def column_median(values: np.ndarray) -> np.ndarray:
-    """Upper median of every column of (n, m)."""
-    middle = len(values) // 2
-    return np.partition(values, middle, axis=0)[middle]
+def masked_median(values: np.ndarray, used: np.ndarray) -> np.ndarray:
+    """Upper median along the last axis of the used ones among (L, ..., K) values, used (L, K); (L, ...)."""
+    extra = (1,) * (values.ndim - 2)
+    shown = used.reshape(used.shape[0], *extra, used.shape[1])
+    ordered = np.sort(np.where(shown, values, np.float32(np.inf)), axis=-1)
+    middle = np.minimum(np.count_nonzero(used, axis=1) // 2, used.shape[1] - 1).reshape(-1, *extra, 1)
+    return np.take_along_axis(ordered, np.broadcast_to(middle, (*ordered.shape[:-1], 1)), axis=-1)[..., 0]
 
 
-def consensus_line(u: np.ndarray, v: np.ndarray, gate: float) -> tuple[float, float] | None:
-    """Line v = level + slope u that most points agree with, from fixed pairs half the points apart.
+def packed(used: np.ndarray, *arrays: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Counts of the used points of every line, (L,), and the arrays (L, K) with these points in front, in order."""
+    lines, size = used.shape
+    order = np.argsort(~used, axis=1, kind="stable") + size * np.arange(lines)[:, None]
+    return np.count_nonzero(used, axis=1), [array.take(order) for array in arrays]
+
+
+def consensus_lines(
+    u: np.ndarray, v: np.ndarray, count: np.ndarray, gate: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Lines v = level + slope u that most points agree with, from fixed pairs a half and a third of the points apart.
 
     Args:
-        u: Positions along the line [px], growing, (n,).
-        v: Positions across it [px], (n,).
+        u: Positions along the lines [px], growing, packed (L, K).
+        v: Positions across them [px], packed (L, K).
+        count: Points of every line, (L,).
         gate: Distance within which a point agrees [px].
 
     Returns:
-        (level at u = 0, slope), or None when no pair spans anything.
+        Levels at u = 0, slopes, and whether any pair spans anything, (L,) each.
     """
-    count = len(u)
-    first = np.unique(np.linspace(0, count - 1, _PAIRS).astype(np.intp))
-    pairs_a = np.concatenate((first, first))
-    pairs_b = np.concatenate(((first + count // 2) % count, (first + count // 3) % count))
-    run = u[pairs_b] - u[pairs_a]
-    apart = np.abs(run) > 4.0
-    if not apart.any():
-        return None
-    pairs_a, pairs_b, run = pairs_a[apart], pairs_b[apart], run[apart]
-    slope = (v[pairs_b] - v[pairs_a]) / run
-    level = v[pairs_a] - slope * u[pairs_a]
-    residual = np.abs(v[None, :] - level[:, None] - slope[:, None] * u[None, :])
-    score = np.maximum(0.0, 1.0 - (residual / gate) ** 2).sum(axis=1)
-    best = int(np.argmax(score))
-    return float(level[best]), float(slope[best])
+    lines, size = u.shape
+    counts = np.maximum(count, 1)[:, None]
+    one = (_STARTS * (counts - 1)).astype(np.intp)
+    start = size * np.arange(lines)[:, None]
+    two = np.concatenate(((one + counts // 2) % counts, (one + counts // 3) % counts), axis=1) + start
+    one = np.concatenate((one, one), axis=1) + start
+    u_one, v_one = u.take(one), v.take(one)
+    run = u.take(two) - u_one
+    apart = np.abs(run) > _APART
+    slope = (v.take(two) - v_one) / np.where(apart, run, np.inf)
+    level = v_one - slope * u_one
+    residual = (v[:, None, :] - level[:, :, None] - slope[:, :, None] * u[:, None, :]) * (1.0 / gate)
+    valid = (np.arange(size) < count[:, None]).astype(float)
+    score = (np.maximum(0.0, 1.0 - residual * residual) @ valid[:, :, None])[:, :, 0]
+    best = (np.argmax(np.where(apart, score, -1.0), axis=1), apart.any(axis=1))
+    chosen = best[0] + slope.shape[1] * np.arange(lines)
+    return level.take(chosen), slope.take(chosen), best[1]
 
 
-def robust_line(u: np.ndarray, v: np.ndarray) -> tuple[float, float, float, np.ndarray, float]:
-    """Tukey-weighted least-squares line v = level + slope (u - center).
+def robust_lines(u: np.ndarray, v: np.ndarray, count: np.ndarray) -> LineFits:
+    """Tukey-weighted least-squares lines through the first `count` points of every row of packed (L, K) arrays."""
+    valid = np.arange(u.shape[1]) < count[:, None]
+    weight = valid.astype(float)
+    level = slope = center = along_square = np.zeros(len(u))
+    residual = v
+    for _ in range(_ROUNDS):
+        total = np.maximum(weight.sum(axis=1), 1e-9)
+        center = np.vecdot(weight, u) / total
+        along = u - center[:, None]
+        weighted = weight * along
+        along_square = np.maximum(np.vecdot(weighted, along), 1e-9)
+        level = np.vecdot(weight, v) / total
+        offset = v - level[:, None]
+        slope = np.vecdot(weighted, offset) / along_square
+        residual = offset - slope[:, None] * along
+        scale = np.maximum(_MAD * masked_median(np.abs(residual), valid), _SCALE_MIN)
+        scale[count == 0] = 1.0
+        weight = np.maximum(0.0, 1.0 - (residual / (_TUKEY * scale)[:, None]) ** 2) ** 2 * valid
+    total = np.maximum(weight.sum(axis=1), 1.0)
+    residual = np.where(valid, residual, 0.0)
+    weighted = weight * residual
+    square = np.vecdot(weighted, residual)
+    variance = square / np.maximum(total - 2.0, 1.0) + _SCALE_MIN**2 / 12.0
+    neighbours = np.vecdot(weighted[:, :-1], weighted[:, 1:]) / np.maximum(square, 1e-12)
+    neighbours = np.minimum(np.maximum(neighbours, 0.0), _CORRELATION_MAX)
+    variance = variance * (1.0 + neighbours) / (1.0 - neighbours)
+    rms = np.sqrt(np.vecdot(residual, residual) / np.maximum(count, 1))
+    return LineFits(level, slope, center, variance / total, variance / along_square, rms)
 
-    Returns:
-        (level, slope, center, covariance of (level, slope) (2, 2), residual rms). The covariance is that of
-        sigma^2/N [1, 12/L^2], inflated where neighbouring residuals agree.
+
+def longest_runs(support: np.ndarray, visible: np.ndarray, bridge: int) -> list[tuple[int, int]]:
+    """First and last index of each line's run with most support; up to `bridge` visible misses in a row are bridged.
+
+    Hidden places never break a run; a line without support has the run (0, 0).
     """
-    weight = np.ones_like(u)
-    level = slope = center = 0.0
-    residual, along_square = v, 1.0
-    for _ in range(3):
-        total = weight.sum()
-        center = float(weight @ u / total)
-        along = u - center
-        along_square = max(float(weight @ (along * along)), 1e-9)
-        level = float(weight @ v / total)
-        slope = float(weight @ (along * (v - level)) / along_square)
-        residual = v - level - slope * along
-        scale = max(_MAD * median(np.abs(residual)), _SCALE_MIN)
-        weight = np.maximum(0.0, 1.0 - (residual / (_TUKEY * scale)) ** 2) ** 2
-    total = max(float(weight.sum()), 1.0)
-    variance = float(weight @ residual**2) / max(total - 2.0, 1.0) + _SCALE_MIN**2 / 12.0
-    neighbours = float((weight[:-1] * weight[1:] * residual[:-1] * residual[1:]).sum()) / max(
-        float(weight @ residual**2), 1e-12
-    )
-    neighbours = min(max(neighbours, 0.0), _CORRELATION_MAX)
-    variance *= (1.0 + neighbours) / (1.0 - neighbours)
-    return (
-        level,
-        slope,
-        center,
-        np.diag([variance / total, variance / along_square]),
-        float(np.sqrt(np.mean(residual**2))),
-    )
-
-
-def longest_run(support: np.ndarray, visible: np.ndarray, bridge: int) -> tuple[int, int]:
-    """First and last index of the run with most support; hidden places never break it, `bridge` visible ones do not."""
-    best, best_count = (0, 0), 0
-    start, last, count, gap = -1, -1, 0, 0
-    for index, (held, seen) in enumerate(zip(support.tolist(), visible.tolist(), strict=True)):
-        if held:
-            if start < 0 or gap > bridge:
-                start, count = index, 0
-            last, count, gap = index, count + 1, 0
-            if count > best_count:
-                best, best_count = (start, last), count
-        elif seen:
-            gap += 1
-    return best
+    lines, size = support.shape
+    runs = [(0, 0)] * lines
+    held = np.flatnonzero(support)
+    if len(held) == 0:
+        return runs
+    missed = np.cumsum(visible & ~support).take(held)
+    breaks = np.flatnonzero((np.diff(missed) > bridge) | (np.diff(held // size) > 0)) + 1
+    starts, ends = [0, *breaks.tolist()], [*breaks.tolist(), len(held)]
+    most = [0] * lines
+    for start, end in zip(starts, ends, strict=True):
+        line = int(held[start]) // size
+        if end - start > most[line]:
+            most[line] = end - start
+            runs[line] = (int(held[start]) % size, int(held[end - 1]) % size)
+    return runs

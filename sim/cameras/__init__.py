@@ -1,6 +1,7 @@
 """Camera back ends behind one protocol, and the late stream of their pictures."""
 
 from sim.cameras.plane import PlaneCamera
-from sim.cameras.protocol import Camera, CameraStream, camera_intrinsics
+from sim.cameras.protocol import Camera, camera_intrinsics
+from sim.cameras.stream import CameraStream
 
 __all__ = ["Camera", "CameraStream", "PlaneCamera", "camera_intrinsics"]

@@ -6,6 +6,9 @@ the picture along straight lines: `_cut` replaces what lies beyond one of them b
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Callable
+
 import cv2
 import numpy as np
 
@@ -16,7 +19,7 @@ from sim.cameras.noise import NoiseBank
 from sim.cameras.outline import CutLine, cut_lines
 from sim.cameras.protocol import camera_intrinsics
 from sim.cameras.view import View, board_corners, board_steps
-from sim.canvas import TEXTURE_PAD_PX, Canvas
+from sim.canvas import TEXTURE_PAD_PX, Canvas, FreshPaint
 from sim.scene import Scene
 
 _SHIFT = 6  # sub-pixel bits of polygon corners
@@ -66,13 +69,23 @@ class PlaneCamera:
 
     def capture(self, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, stamp_ns: int) -> RgbdFrame:
         """Take a picture, see `sim.cameras.protocol.Camera`; the frame owns its arrays."""
+        return self.expose(position_ned, quaternion_b_in_i, stamp_ns)()
+
+    def expose(self, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, stamp_ns: int) -> Callable[[], RgbdFrame]:
+        """Take in pose and paint, see `sim.cameras.protocol.DeferredCamera`."""
+        pose = np.array(position_ned, float), np.array(quaternion_b_in_i, float)
+        return functools.partial(self._develop, *pose, stamp_ns, self.canvas.take())
+
+    def _develop(
+        self, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, stamp_ns: int, paint: FreshPaint | None
+    ) -> RgbdFrame:
         view = View.of_vehicle(position_ned, quaternion_b_in_i, self.vehicle.camera_position_m, self.intrinsics)
-        cuts = self._compose(view)
+        cuts = self._compose(view, self.canvas.draw(paint))
         rgb = self._finish_color()
         depth = self._finish_depth(cuts)
         return RgbdFrame(rgb=rgb, depth=depth, intrinsics=self.intrinsics, stamp_ns=stamp_ns)
 
-    def _compose(self, view: View) -> list[CutLine]:
+    def _compose(self, view: View, texture: np.ndarray) -> list[CutLine]:
         """Colours and inverse depths of board, wall and vehicle; returns the outline lines in view."""
         height, width = self._mask.shape
         polygon = view.to_camera(self._corners)
@@ -83,7 +96,6 @@ class PlaneCamera:
         cuts, board_box = cut_lines(polygon, width, height)
         common = self._noise.depth_common() * (view.plane(0.0)[2]) if self._noise else 0.0
         if board_box is not None:
-            texture = self.canvas.flush()
             homography = view.from_texture(*self._board_steps)
             self._warp(texture, homography, board_box, self._picture)
             self._plane(view, 0.0, common, board_box, self._inverse)

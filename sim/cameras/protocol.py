@@ -1,10 +1,11 @@
-"""What a camera back end offers, and the stream that delivers its pictures late."""
+"""What a camera back end offers, and when its pictures are taken and delivered."""
 
 from __future__ import annotations
 
 import math
 from collections import deque
-from typing import Protocol
+from collections.abc import Callable
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -40,6 +41,19 @@ class Camera(Protocol):
         ...
 
 
+@runtime_checkable
+class DeferredCamera(Camera, Protocol):
+    """A camera whose picture may be drawn later, in another thread, than it was taken."""
+
+    def expose(self, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, stamp_ns: int) -> Callable[[], RgbdFrame]:
+        """Take in all that the picture depends on; arguments as in `Camera.capture`.
+
+        Returns:
+            Draws the picture. Called once, from one thread at a time, in the order of exposure.
+        """
+        ...
+
+
 class Schedule:
     """When to capture and when to deliver: a fixed rate and a fixed latency in integer nanoseconds.
 
@@ -68,37 +82,14 @@ class Schedule:
         """Send off what was captured at ``stamp_ns``."""
         self._queue.append((stamp_ns + self._latency_ns, item))
 
+    def arrived(self, now_ns: int) -> list[object]:
+        """All items that have arrived since the last call, oldest first."""
+        items = []
+        while self._queue and self._queue[0][0] <= now_ns:
+            items.append(self._queue.popleft()[1])
+        return items
+
     def pop(self, now_ns: int) -> object | None:
         """The newest item that has arrived since the last call, or None."""
-        item = None
-        while self._queue and self._queue[0][0] <= now_ns:
-            item = self._queue.popleft()[1]
-        return item
-
-
-class CameraStream:
-    """A camera that captures at its rate and delivers late; stamps say when a picture was taken.
-
-    Args:
-        camera: The back end.
-        rate_hz: Frame rate [Hz].
-        latency_s: Capture to delivery [s].
-    """
-
-    def __init__(self, camera: Camera, rate_hz: float, latency_s: float) -> None:
-        self.camera = camera
-        self._schedule = Schedule(rate_hz, latency_s)
-
-    def tick(self, now_ns: int, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray) -> RgbdFrame | None:
-        """Advance to ``now_ns``: capture if due, and return the newest picture that has just become due.
-
-        Args:
-            now_ns: Present time.
-            position_ned: World position of the body frame's origin [m], (3,).
-            quaternion_b_in_i: Attitude (w, x, y, z), (4,).
-        """
-        if self._schedule.due(now_ns):
-            self._schedule.push(now_ns, self.camera.capture(position_ned, quaternion_b_in_i, now_ns))
-        frame = self._schedule.pop(now_ns)
-        assert frame is None or isinstance(frame, RgbdFrame)
-        return frame
+        items = self.arrived(now_ns)
+        return items[-1] if items else None
