@@ -72,6 +72,7 @@ class WallMotion:
     def reset(self) -> None:
         """Forget everything."""
         self._filter.reset()
+        self._filter.chain[_LINES:, :] = 0.0
         self.lines: dict[int, TrackedLine] = {}
         self._stamp = -1
         self._frame_stamp = -1
