@@ -68,7 +68,7 @@ class Wall:
         rho, theta = image_line(*rays)
         c, s = math.cos(angle), math.sin(angle)
         across = R_BODY_CAMERA.T @ (c * self.right + s * self.down)
-        if (math.cos(theta) * across[0] + math.sin(theta) * across[1] < 0.0) is not flip:
+        if bool(math.cos(theta) * across[0] + math.sin(theta) * across[1] < 0.0) != flip:
             rho, theta = -rho, theta + math.pi
         fields = {"covariance": CERTAIN} | extra
         return LineFeature(rho=rho, theta=theta, role=role, weight=weight, **fields)  # type: ignore[arg-type]
