@@ -429,7 +429,8 @@ class Painter:
 
     def _edge_reference(self, edge: TrackedLine, edge_rate: float) -> float:
         """The stop edge's wanted offset: from where it was first seen to the margin, at the stroke's own speed."""
-        travel = -1.0 if self.row % 2 == 1 or (self.phase == "climb" and self.row % 2 == 0) else 1.0
+        painted = self.row - 1 if self.phase == "climb" else self.row  # a climb keeps the edge at which its row ended
+        travel = -1.0 if painted % 2 == 1 else 1.0
         margin = travel * (self.config.edge_margin_m if travel < 0 else (self._right_edge or self.config.edge_margin_m))
         if self._edge_target is None:
             self._edge_target = edge.offset
