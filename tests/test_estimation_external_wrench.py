@@ -63,7 +63,7 @@ def test_acceleration_is_not_taken_for_a_load() -> None:
     weight = np.array([0.0, 0.0, -VEHICLE.mass_kg * 9.81, 0, 0, 0])
     for k in range(2000):
         push = 3.0 * np.sin(0.01 * k)
-        thrusts = np.linalg.solve(MATRIX, weight + [push, 0, 0, 0, 0, 0])
+        thrusts = np.linalg.solve(MATRIX, weight + push * np.eye(6)[0])
         observer.thrusts = thrusts  # rotors without lag
         force = np.array([push / VEHICLE.mass_kg, 0.0, -9.81])
         observer.update(force, np.zeros(3), np.zeros(6), np.zeros(3), FORWARD, False, True, TICK)

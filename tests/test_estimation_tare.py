@@ -29,7 +29,9 @@ def specific_force(roll: float, pitch: float) -> np.ndarray:
     return body_to_world(attitude(roll, pitch)).T @ np.array([0.0, 0.0, -9.81])
 
 
-def settle(tare: WrenchTare, seconds: float, *, contact: np.ndarray | None = None, start: int = 0, free: bool = True) -> int:
+def settle(
+    tare: WrenchTare, seconds: float, *, contact: np.ndarray | None = None, start: int = 0, free: bool = True
+) -> int:
     """Feed samples at 100 Hz while the vehicle rocks by two degrees; the number of ticks so far."""
     contact = np.zeros(3) if contact is None else contact
     for k in range(start, start + round(seconds / 0.01)):
