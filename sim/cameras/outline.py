@@ -11,10 +11,12 @@ import numpy as np
 _BAND_PX, _HOLE_PX = 1, 4
 #: How near to a line a pixel counts as touched by it [px].
 _SLACK_PX = 3.0
-#: More than any picture measures [px].
-_ALL_ALONG_PX = 1e5
+#: A pixel so far from a line is untouched by its rim and its polygon [px].
+_CLEAR_PX = 3
 #: Length over which the width of the depth holes changes [px].
 _HOLE_STEP_PX = 6
+
+Box = tuple[int, int, int, int]
 
 
 @dataclass(frozen=True)
@@ -28,7 +30,9 @@ class CutLine:
         stop: Other end [px], (2,).
         beyond: Part of the picture beyond the line, polygon (n, 2) [px].
         box: (row, row end, column, column end) around what of it no earlier line has cut away, and the rim.
+            Outside of it the line changes nothing.
         shape: (height, width) of the picture.
+        flat: Whether the edge runs more across the picture than up it.
     """
 
     normal: np.ndarray
@@ -36,50 +40,72 @@ class CutLine:
     start: np.ndarray
     stop: np.ndarray
     beyond: np.ndarray
-    box: tuple[int, int, int, int]
+    box: Box
     shape: tuple[int, int]
+    flat: bool
 
-    def _band(self, low: int, high: int, margin: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Rows and columns from ``low`` to ``high`` steps across the edge, its steps, and places along it.
-
-        The edge is walked pixel by pixel along its longer direction, up to ``margin`` past its ends.
-        """
+    def _across(self, places: np.ndarray) -> np.ndarray:
+        """Where the line runs, across its longer direction, at whole pixels along it [px]."""
         across = int(self.flat)
-        along = 1 - across
-        first, last = sorted((self.start[along], self.stop[along]))
-        limit = self.shape[1] if across else self.shape[0]
-        places = np.arange(max(0, math.ceil(first - margin)), min(limit, math.floor(last + margin) + 1))
-        middle = -(self.normal[along] * places + self.offset) / self.normal[across]
-        steps = np.arange(low, high + 1)[:, None]
-        other = np.floor(middle).astype(np.intp) + (steps if self.normal[across] > 0 else -steps)
-        rows, columns = (other, places) if across else (places, other)
-        return rows, columns, steps, places
+        return -(self.normal[1 - across] * places + self.offset) / self.normal[across]
 
-    @property
-    def flat(self) -> bool:
-        """Whether the edge runs more across the picture than up it."""
-        return abs(self.normal[1]) >= abs(self.normal[0])
+    def _band(self, low: int, high: int, first: int, end: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Pixels from ``low`` to ``high`` steps across the line, walked along its longer direction.
 
-    def rim(self) -> tuple[np.ndarray, np.ndarray]:
-        """Flat indices of the pixels near the line, and the share of each that the board covers in 256ths, (n,).
-
-        Places outside the picture are moved to its border: the share is computed for where they then are.
+        Returns:
+            Rows of a flat line or columns of a steep one, (steps, n); the steps, > 0 towards the board, (steps, 1);
+            and the places along it from ``first`` to before ``end``, (n,).
         """
-        rows, columns, _, _ = self._band(-_BAND_PX, _BAND_PX + 1, _ALL_ALONG_PX)
-        rows = np.clip(rows, 0, self.shape[0] - 1)
-        columns = np.clip(columns, 0, self.shape[1] - 1)
-        distance = self.normal[0] * columns + self.normal[1] * rows + (self.offset + 0.5)
-        share = (np.clip(distance, 0.0, 1.0) * 256.0 + 0.5).astype(np.uint16)
-        return (rows * self.shape[1] + columns).ravel(), share.ravel()
+        places = np.arange(first, end)
+        steps = np.arange(low, high + 1)[:, None]
+        forward = self.normal[int(self.flat)] > 0
+        other = np.floor(self._across(places)).astype(np.intp) + (steps if forward else -steps)
+        return other, steps, places
 
-    def holes(self, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-        """Rows and columns of pixels beyond the edge that give no depth, ragged at random."""
-        rows, columns, steps, places = self._band(-_HOLE_PX, 1, 0.0)
+    def split(self) -> tuple[Box, Box]:
+        """The box taken apart: all of the first part lies beyond the line, the second one holds the line."""
+        r0, r1, c0, c1 = self.box
+        low, high, first, last = (r0, r1, c0, c1 - 1) if self.flat else (c0, c1, r0, r1 - 1)
+        one, other = self._across(np.array([first, last])).tolist()
+        if self.normal[int(self.flat)] > 0:
+            edge = min(max(math.floor(min(one, other)) - _CLEAR_PX, low), high)
+            parts = (low, edge), (edge, high)
+        else:
+            edge = min(max(math.ceil(max(one, other)) + _CLEAR_PX, low), high)
+            parts = (edge, high), (low, edge)
+        (b0, b1), (l0, l1) = parts
+        return ((b0, b1, c0, c1), (l0, l1, c0, c1)) if self.flat else ((r0, r1, b0, b1), (r0, r1, l0, l1))
+
+    def rim(self, box: Box) -> tuple[np.ndarray, np.ndarray]:
+        """Flat indices of the pixels of a box near the line, and the board's share of each in 256ths, uint32 (n,).
+
+        Places outside the box are moved to its border: the share is computed for where they then are.
+        """
+        r0, r1, c0, c1 = box
+        low, high, first, end = (r0, r1, c0, c1) if self.flat else (c0, c1, r0, r1)
+        other, _, places = self._band(-_BAND_PX, _BAND_PX + 1, first, end)
+        np.maximum(other, low, out=other)
+        np.minimum(other, high - 1, out=other)
+        across = int(self.flat)
+        distance = other * (256.0 * self.normal[across])
+        distance += places * (256.0 * self.normal[1 - across]) + (256.0 * (self.offset + 0.5) + 0.5)
+        np.maximum(distance, 0.0, out=distance)
+        np.minimum(distance, 256.0, out=distance)
+        width = self.shape[1]
+        indices = other * width + places if self.flat else other + places * width
+        return indices.ravel(), distance.astype(np.uint32).ravel()
+
+    def holes(self, rng: np.random.Generator) -> np.ndarray:
+        """Flat indices of pixels beyond the edge that give no depth, ragged at random, (n,)."""
+        along = 1 - int(self.flat)
+        limit_along, limit = self.shape[::-1] if self.flat else self.shape
+        first, last = sorted((float(self.start[along]), float(self.stop[along])))
+        first, end = max(0, math.ceil(first)), min(limit_along, math.floor(last) + 1)
+        other, steps, places = self._band(-_HOLE_PX, 1, first, max(first, end))
         widths = rng.integers(1, _HOLE_PX + 1, max(self.shape) // _HOLE_STEP_PX + 1)
-        other, limit = (rows, self.shape[0]) if self.flat else (columns, self.shape[1])
         taken = (-steps <= widths[places // _HOLE_STEP_PX]) & (other >= 0) & (other < limit)
-        chosen, place = other[taken], np.broadcast_to(places, taken.shape)[taken]
-        return (chosen, place) if self.flat else (place, chosen)
+        width = self.shape[1]
+        return (other * width + places if self.flat else other + places * width)[taken]
 
 
 def clip_polygon(polygon: np.ndarray, normal: np.ndarray, offset: float) -> np.ndarray:
@@ -98,13 +124,13 @@ def clip_polygon(polygon: np.ndarray, normal: np.ndarray, offset: float) -> np.n
     return np.array(kept).reshape(-1, 2)
 
 
-def _box(polygon: np.ndarray, width: int, height: int, margin: int) -> tuple[int, int, int, int]:
+def _box(polygon: np.ndarray, width: int, height: int, margin: int) -> Box:
     low = np.floor(polygon.min(axis=0)).astype(int) - margin
     high = np.ceil(polygon.max(axis=0)).astype(int) + margin + 1
     return max(0, int(low[1])), min(height, int(high[1])), max(0, int(low[0])), min(width, int(high[0]))
 
 
-def cut_lines(polygon: np.ndarray, width: int, height: int) -> tuple[list[CutLine], tuple[int, int, int, int] | None]:
+def cut_lines(polygon: np.ndarray, width: int, height: int) -> tuple[list[CutLine], Box | None]:
     """Lines of a convex outline that cut the picture, and the box of the board in view.
 
     Args:
@@ -121,7 +147,7 @@ def cut_lines(polygon: np.ndarray, width: int, height: int) -> tuple[list[CutLin
     if len(polygon) < 3:
         everything = (0, height, 0, width)
         far, start = np.array([0.0, 1.0]), picture[0]
-        return [CutLine(far, -2.0 * height, start, start, picture, everything, (height, width))], None
+        return [CutLine(far, -2.0 * height, start, start, picture, everything, (height, width), True)], None
     board, left, cuts = picture, picture, []
     points = polygon.tolist()
     middle_u, middle_v = polygon.mean(axis=0).tolist()
@@ -145,5 +171,6 @@ def cut_lines(polygon: np.ndarray, width: int, height: int) -> tuple[list[CutLin
         beyond = clip_polygon(picture, -normal, -offset)
         box = _box(area, width, height, _BAND_PX + 1)
         stop = np.array([next_u, next_v])
-        cuts.append(CutLine(normal, offset, polygon[k], stop, beyond, box, (height, width)))
+        flat = abs(nv) >= abs(nu)
+        cuts.append(CutLine(normal, offset, polygon[k], stop, beyond, box, (height, width), flat))
     return cuts, _box(board, width, height, _BAND_PX + 1) if len(board) >= 3 else None

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -16,18 +17,41 @@ from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.vehicle import VehicleParams
 from sim.cameras.arm import clip_near, shade_propellers, vehicle_layer
 from sim.cameras.noise import NoiseBank
-from sim.cameras.outline import CutLine, cut_lines
+from sim.cameras.outline import Box, CutLine, cut_lines
 from sim.cameras.protocol import camera_intrinsics
 from sim.cameras.view import View, board_corners, board_steps
 from sim.canvas import TEXTURE_PAD_PX, Canvas, FreshPaint
 from sim.scene import Scene
 
 _SHIFT = 6  # sub-pixel bits of polygon corners
+_EVEN, _HALF = np.uint32(0x00FF00FF), np.uint32(0x00800080)  # every other byte of a pixel, and its rounding
 _WARP = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
 #: Nearest depth at which the board's outline is projected, and farthest that a reading exists [m].
 _NEAR_M, _FAR_M = 0.05, 20.0
 
-Box = tuple[int, int, int, int]
+
+class _Sheet(NamedTuple):
+    """Board or wall as one view sees it.
+
+    Attributes:
+        texture: Its picture, uint8 (h, w, 4).
+        back: Homography from picture to texture pixels, (3, 3).
+        plane: (p, q, r) of 1/Z = p u + q v + r as measured.
+    """
+
+    texture: np.ndarray
+    back: np.ndarray
+    plane: tuple[float, float, float]
+
+    @staticmethod
+    def seen(view: View, texture: np.ndarray, steps: tuple[np.ndarray, ...], common: float) -> _Sheet:
+        """A sheet whose texture has the (corner, column step, row step) ``steps`` in the world.
+
+        The common-mode depth error is applied as the scale 1 + ``common``, equal to the offset at the picture's centre.
+        """
+        corner, column, row = steps
+        p, q, r = (float(entry) / (1.0 + common) for entry in view.pixel_plane(float(corner[0])))
+        return _Sheet(texture, np.linalg.inv(view.from_texture(corner, column, row)), (p, q, r))
 
 
 class PlaneCamera:
@@ -64,8 +88,7 @@ class PlaneCamera:
         self._inverse, self._inverse_behind = np.empty(shape, np.float32), np.empty(shape, np.float32)
         self._rgb, self._soft = np.empty((*shape, 3), np.uint8), np.empty((*shape, 3), np.uint8)
         self._ones = np.ones(shape, np.float32)
-        self._columns = np.arange(shape[1], dtype=np.float32)
-        self._rows = np.arange(shape[0], dtype=np.float32)[:, None]
+        self._v, self._u = np.indices(shape, np.float32)
 
     def capture(self, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, stamp_ns: int) -> RgbdFrame:
         """Take a picture, see `sim.cameras.protocol.Camera`; the frame owns its arrays."""
@@ -96,12 +119,11 @@ class PlaneCamera:
         cuts, board_box = cut_lines(polygon, width, height)
         common = self._noise.depth_common() * (view.plane(0.0)[2]) if self._noise else 0.0
         if board_box is not None:
-            homography = view.from_texture(*self._board_steps)
-            self._warp(texture, homography, board_box, self._picture)
-            self._plane(view, 0.0, common, board_box, self._inverse)
-        wall = view.from_texture(*self._wall_steps)
+            board = _Sheet.seen(view, texture, self._board_steps, common)
+            self._draw(board, board_box, self._picture, self._inverse)
+        wall = _Sheet.seen(view, self.canvas.wall, self._wall_steps, common)
         for cut in cuts:
-            self._cut(view, wall, cut, common)
+            self._cut(wall, cut)
         if self._propeller_box is not None:
             r0, r1, c0, c1 = self._propeller_box
             shade_propellers(self._picture[r0:r1, c0:c1], self._layer.propellers[r0:r1, c0:c1])
@@ -112,31 +134,31 @@ class PlaneCamera:
             cv2.copyTo(self._layer.inverse_depth[r0:r1, c0:c1], mask, self._inverse[r0:r1, c0:c1])
         return cuts
 
-    def _warp(self, texture: np.ndarray, homography: np.ndarray, box: Box, target: np.ndarray) -> None:
+    def _draw(self, sheet: _Sheet, box: Box, picture: np.ndarray, inverse: np.ndarray) -> None:
+        """Colours and inverse depths of a sheet within a box."""
         r0, r1, c0, c1 = box
-        back = np.linalg.inv(homography)
+        if r0 >= r1 or c0 >= c1:
+            return
+        back = sheet.back.copy()
         back[:, 2] += back[:, 0] * c0 + back[:, 1] * r0
-        size = (c1 - c0, r1 - r0)
         # A constant border is the only fast one: the others cost five times as much wherever they are needed.
-        cv2.warpPerspective(texture, back, size, target[r0:r1, c0:c1], _WARP, cv2.BORDER_CONSTANT, self._plain_wall)
+        border, size = self._plain_wall, (c1 - c0, r1 - r0)
+        cv2.warpPerspective(sheet.texture, back, size, picture[r0:r1, c0:c1], _WARP, cv2.BORDER_CONSTANT, border)
+        along_u, along_v, constant = sheet.plane
+        u, v = self._u[r0:r1, c0:c1], self._v[r0:r1, c0:c1]
+        cv2.addWeighted(u, along_u, v, along_v, constant, inverse[r0:r1, c0:c1])
 
-    def _plane(self, view: View, x_m: float, common: float, box: Box, target: np.ndarray) -> None:
-        # The common-mode error is applied as a scale, which equals the offset at the picture's centre.
-        r0, r1, c0, c1 = box
-        along_u, along_v, constant = (entry / (1.0 + common) for entry in view.pixel_plane(x_m))
-        across = self._columns[c0:c1] * np.float32(along_u) + np.float32(constant)
-        np.add(across, self._rows[r0:r1] * np.float32(along_v), out=target[r0:r1, c0:c1])
-
-    def _cut(self, view: View, wall: np.ndarray, cut: CutLine, common: float) -> None:
+    def _cut(self, wall: _Sheet, cut: CutLine) -> None:
         """Replace what lies beyond one line of the board's outline by the wall."""
-        r0, r1, c0, c1 = cut.box
-        self._warp(self.canvas.wall, wall, cut.box, self._behind)
-        self._plane(view, self.scene.board.gap_m, common, cut.box, self._inverse_behind)
-        places, share = cut.rim()
-        front = self._picture.view(np.uint32).ravel()[places].view(np.uint8).reshape(-1, 4)
-        behind = self._behind.view(np.uint32).ravel()[places].view(np.uint8).reshape(-1, 4)
-        share = share[:, None]
-        mixed = ((front * share + behind * (256 - share) + 128) >> 8).astype(np.uint8)
+        beyond, band = cut.split()
+        self._draw(wall, beyond, self._picture, self._inverse)
+        r0, r1, c0, c1 = band
+        if r0 >= r1 or c0 >= c1:
+            return
+        self._draw(wall, band, self._behind, self._inverse_behind)
+        places, share = cut.rim(band)
+        picture = self._picture.view(np.uint32).reshape(-1)
+        mixed = _mix(picture.take(places), self._behind.view(np.uint32).reshape(-1).take(places), share)
         mask = self._mask[r0:r1, c0:c1]
         mask[:] = 0
         if len(cut.beyond):
@@ -144,7 +166,7 @@ class PlaneCamera:
             cv2.fillConvexPoly(mask, corners, 255.0, cv2.LINE_8, _SHIFT)
         cv2.copyTo(self._behind[r0:r1, c0:c1], mask, self._picture[r0:r1, c0:c1])
         cv2.copyTo(self._inverse_behind[r0:r1, c0:c1], mask, self._inverse[r0:r1, c0:c1])
-        self._picture.view(np.uint32).reshape(-1)[places] = mixed.view(np.uint32).ravel()
+        picture[places] = mixed
 
     def _finish_color(self) -> np.ndarray:
         """Lens blur and sensor noise."""
@@ -163,11 +185,20 @@ class PlaneCamera:
         cv2.divide(factor, self._inverse, depth)
         if self._noise is None:
             return depth
+        flat = depth.reshape(-1)
         for cut in cuts:
-            rows, columns = cut.holes(self._rng)
-            depth[rows, columns] *= self._layer.mask[rows, columns] != 0  # arm and brush hide the step
-        depth.reshape(-1)[self._no_depth] = 0.0
+            places = cut.holes(self._rng)
+            flat[places[self._layer.mask.reshape(-1).take(places) == 0]] = 0.0  # arm and brush hide the step
+        flat[self._no_depth] = 0.0
         return depth
+
+
+def _mix(front: np.ndarray, behind: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """Pixels, uint32 of four bytes, mixed by the share of the front one in 256ths; two bytes at a time."""
+    rest = np.uint32(256) - share
+    even = ((front & _EVEN) * share + (behind & _EVEN) * rest + _HALF) >> np.uint32(8)
+    odd = ((front >> np.uint32(8)) & _EVEN) * share + ((behind >> np.uint32(8)) & _EVEN) * rest + _HALF
+    return (even & _EVEN) | (odd & ~_EVEN)
 
 
 def _bounding_box(mask: np.ndarray) -> Box | None:
