@@ -24,11 +24,15 @@ def test_a_late_correction_equals_the_replay_of_every_input() -> None:
         late, replay = new_filter(), new_filter()
         for k in range(60):
             late.predict(k * TICK_NS, inputs[k], TICK)
+            if k in (5, 15, 25):  # so that distance, speed and bias are correlated
+                late.correct(k * TICK_NS, np.eye(3)[:1], np.array([0.01]), np.array([[1e-4]]), 1e6)
         for k in range(60):
             replay.predict(k * TICK_NS, inputs[k], TICK)
+            if k in (5, 15, 25):
+                replay.correct(k * TICK_NS, np.eye(3)[:1], np.array([0.01]), np.array([[1e-4]]), 1e6)
             if k == 59 - age:
-                assert replay.correct(k * TICK_NS, np.eye(3)[:1], np.array([0.02]), np.array([[1e-4]]))
-        assert late.correct((59 - age) * TICK_NS, np.eye(3)[:1], np.array([0.02]), np.array([[1e-4]]))
+                assert replay.correct(k * TICK_NS, np.eye(3)[:1], np.array([0.02]), np.array([[1e-4]]), 1e6)
+        assert late.correct((59 - age) * TICK_NS, np.eye(3)[:1], np.array([0.02]), np.array([[1e-4]]), 1e6)
         np.testing.assert_allclose(late.state, replay.state, atol=1e-12)
         np.testing.assert_allclose(late.covariance, replay.covariance, atol=1e-12)
         np.testing.assert_allclose(late.at(59 * TICK_NS), late.state)

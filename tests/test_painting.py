@@ -61,6 +61,7 @@ class World:
         self.wish: Wish | None = None
         self.ends: list[tuple[int, float, float]] = []
         self.extent = [0.0, 0.0]
+        self.drift = 0.0
 
     @property
     def in_contact(self) -> bool:
@@ -113,6 +114,8 @@ class World:
             self.ends.append((row, *self.tip.tolist()))
             self._leave_paint(row)
         self._move(wish)
+        if self.painter.phase == "climb":
+            self.drift = max(self.drift, abs(self.tip[0] - self.ends[-1][1]))
         self.wish = wish
         return wish
 
@@ -169,6 +172,7 @@ def test_rows_alternate_and_end_where_they_shall(rows: int) -> None:
         expected += ["paint"] + (["climb"] if row < rows else [])
     assert world.phases() == [*expected, "retreat", "done"]
     assert [row for row, _, _ in world.ends] == list(range(1, rows + 1))
+    assert world.drift < 0.006  # a climb goes straight up, beside whichever edge its row ended at
     for row, right, down in world.ends:
         assert right == pytest.approx(-world.config.stroke_m if row % 2 else 0.0, abs=0.006)
         assert down == pytest.approx(-(row - 1) * world.config.pitch_m, abs=0.004)
@@ -291,11 +295,11 @@ def test_topmost_and_nearest_decoys_are_not_taken_for_the_bottom_edge() -> None:
     """Above it a joint with the surface below, a picture edge, paint; nearer than the true edge by far."""
     decoys = [
         Edge(50, HORIZONTAL, -0.08, -1, ""),  # topmost, a joint of unknown kind
-        Edge(51, HORIZONTAL, 0.045, 1),  # nearly in place, but its surface lies below: the upper edge of another board
-        Edge(52, HORIZONTAL, 0.052, -1, "paint"),  # old paint
-        Edge(53, HORIZONTAL, 0.26, -1),
+        Edge(51, HORIZONTAL, 0.02, 1),  # just in place, but its surface lies below: the upper edge of another board
+        Edge(52, HORIZONTAL, 0.022, -1, "paint"),  # old paint
+        Edge(53, HORIZONTAL, 0.20, -1),
     ]
-    world = World(short(), extra=decoys)
+    world = World(short(), extra=decoys, tip=np.array([0.0, -0.03]))  # starts 3 cm high
     world.fly(10.0, until="approach")
     assert world.painter._guide_id == 1
     world.fly(100.0)
