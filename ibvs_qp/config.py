@@ -18,29 +18,29 @@ from ibvs_qp.vehicle import VehicleParams
 class Gains:
     """Feedback gains, the same object for both laws."""
 
-    line_kp: float = setting(12.0, "line error to image acceleration", unit="1/s^2", low=0.0, high=200.0)
-    line_kd: float = setting(6.0, "line error rate", unit="1/s", low=0.0, high=100.0)
-    line_ki: float = setting(3.0, "integral of the line error", unit="1/s^3", low=0.0, high=100.0)
-    theta_kp: float = setting(25.0, "line angle error", unit="1/s^2", low=0.0, high=400.0)
-    theta_kd: float = setting(10.0, "line angle rate", unit="1/s", low=0.0, high=100.0)
+    line_kp: float = setting(25.23, "line error to image acceleration", unit="1/s^2", low=0.0, high=200.0)
+    line_kd: float = setting(5.585, "line error rate", unit="1/s", low=0.0, high=100.0)
+    line_ki: float = setting(1.12, "integral of the line error", unit="1/s^3", low=0.0, high=100.0)
+    theta_kp: float = setting(46.51, "line angle error", unit="1/s^2", low=0.0, high=400.0)
+    theta_kd: float = setting(12.03, "line angle rate", unit="1/s", low=0.0, high=100.0)
     line_turn_share: float = setting(
-        0.5,
+        0.882,
         "share of the body's turn that line rows count on in contact, where friction may hold the tip",
         low=0.0,
         high=1.0,
     )
-    velocity_kp: float = setting(3.0, "velocity error along free directions", unit="1/s", low=0.0, high=50.0)
-    velocity_ki: float = setting(1.5, "integral of that error", unit="1/s^2", low=0.0, high=50.0)
-    attitude_kp: float = setting(36.0, "roll and pitch", unit="1/s^2", low=0.0, high=400.0)
-    attitude_kd: float = setting(11.0, "roll and pitch rate", unit="1/s", low=0.0, high=100.0)
-    yaw_kp: float = setting(16.0, "yaw to the wall normal", unit="1/s^2", low=0.0, high=400.0)
-    yaw_kd: float = setting(8.0, "yaw rate", unit="1/s", low=0.0, high=100.0)
+    velocity_kp: float = setting(1.787, "velocity error along free directions", unit="1/s", low=0.0, high=50.0)
+    velocity_ki: float = setting(3.242, "integral of that error", unit="1/s^2", low=0.0, high=50.0)
+    attitude_kp: float = setting(30.33, "roll and pitch", unit="1/s^2", low=0.0, high=400.0)
+    attitude_kd: float = setting(8.505, "roll and pitch rate", unit="1/s", low=0.0, high=100.0)
+    yaw_kp: float = setting(50.63, "yaw to the wall normal", unit="1/s^2", low=0.0, high=400.0)
+    yaw_kd: float = setting(8.054, "yaw rate", unit="1/s", low=0.0, high=100.0)
     standoff_kp: float = setting(2.0, "distance error to approach speed", unit="1/s", low=0.0, high=20.0)
     standoff_kd: float = setting(5.0, "approach speed error to acceleration", unit="1/s", low=0.0, high=50.0)
-    force_ksp: float = setting(60.0, "impedance stiffness K_sp", unit="N/m", low=0.0, high=5000.0)
-    force_ksd: float = setting(90.0, "impedance damping K_sd", unit="N s/m", low=0.0, high=1000.0)
-    force_kfp: float = setting(0.3, "force error K_fp at 1.5 kN/m and softer", low=0.0, high=10.0)
-    force_kfi: float = setting(1.5, "integral of the force error K_fi", unit="1/s", low=0.0, high=50.0)
+    force_ksp: float = setting(12.84, "impedance stiffness K_sp", unit="N/m", low=0.0, high=5000.0)
+    force_ksd: float = setting(44.53, "impedance damping K_sd", unit="N s/m", low=0.0, high=1000.0)
+    force_kfp: float = setting(0.3467, "force error K_fp at 1.5 kN/m and softer", low=0.0, high=10.0)
+    force_kfi: float = setting(0.4044, "integral of the force error K_fi", unit="1/s", low=0.0, high=50.0)
 
     def __post_init__(self) -> None:
         """Validate."""
@@ -73,6 +73,13 @@ class ContactSettings:
     force_filter_hz: float = setting(8.0, "first-order filter of the measured push", unit="Hz", low=0.5, high=100.0)
     moment_gain: float = setting(
         1.0, "share of the measured contact moment fed forward; a stuck tip returns 0.9 of it", low=0.0, high=1.0
+    )
+    moment_noise_n: float = setting(
+        1.0,
+        "filtered force noise at which that share halves: the loop through a stuck tip multiplies noise",
+        unit="N",
+        low=0.01,
+        high=100.0,
     )
     friction_gain: float = setting(0.9, "share of the friction along travel fed forward", low=0.0, high=1.0)
     friction_slew_n_s: float = setting(6.0, "fastest change of that force", unit="N/s", low=0.1, high=100.0)

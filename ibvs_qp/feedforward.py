@@ -36,6 +36,7 @@ class ContactFeedforward:
         friction: float,
         in_contact: bool,
         dt: float,
+        noise: float = 0.0,
     ) -> np.ndarray:
         """Wrench to expect [N, N m], (6,).
 
@@ -46,11 +47,13 @@ class ContactFeedforward:
             friction: Estimated Coulomb coefficient.
             in_contact: Whether the tip touches.
             dt: Time since the last tick [s].
+            noise: Deviation of the filtered push [N]; a noisy sensor's moment is trusted less.
         """
         settings = self._settings
         share = 1.0 - math.exp(-2.0 * math.pi * settings.force_filter_hz * dt)
         measured = contact_wrench[3:] if in_contact else np.zeros(3)
-        self._moment = self._moment + share * (settings.moment_gain * measured - self._moment)
+        gain = settings.moment_gain / (1.0 + (noise / settings.moment_noise_n) ** 2)
+        self._moment = self._moment + share * (gain * measured - self._moment)
         wanted = np.zeros(3)
         speed = math.sqrt(float(travel @ travel))
         if in_contact and speed > SLIDING_COMMAND:

@@ -107,7 +107,13 @@ class Setpoints:
         expected = np.zeros(6)
         if config.contact_feedforward:
             expected = self._feedforward.update(
-                measurement.contact_wrench, travel, contact.push, self.friction.value, contact.in_contact, dt
+                measurement.contact_wrench,
+                travel,
+                contact.push,
+                self.friction.value,
+                contact.in_contact,
+                dt,
+                contact.push_noise,
             )
         self.external.update(
             measurement.specific_force,
@@ -263,6 +269,4 @@ class Setpoints:
             reference=(self._travel_list[1], self._travel_list[2], self._travel_list[0]),
             known=known,
         )
-        self.lines = self._lines.update(
-            measurement.lines, reference.lines, self.plane, foot, motion, integrate, dt
-        )
+        self.lines = self._lines.update(measurement.lines, reference.lines, self.plane, foot, motion, integrate, dt)

@@ -149,6 +149,11 @@ class ContactEstimator:
             self.stiffness.add(self.push, -self.distance, dt)
 
     @property
+    def push_noise(self) -> float:
+        """Deviation of the filtered push in free flight [N]."""
+        return math.sqrt(self._push_variance)
+
+    @property
     def touch_threshold(self) -> float:
         """Filtered push that counts as touch [N]."""
         settings = self._config.contact

@@ -38,6 +38,7 @@ class ExternalWrench:
         self.force, self.moment = np.zeros(3), np.zeros(3)
         self.thrusts: np.ndarray | None = None
         self._time = 0.0
+        self._share_dt = -1.0
         self._integral: np.ndarray | None = None
 
     def follow(self, command: np.ndarray, dt: float) -> None:
@@ -45,9 +46,12 @@ class ExternalWrench:
         if self.thrusts is None:
             self.thrusts = command.copy()
             return
-        vehicle = self._vehicle
-        lag = np.where(command > self.thrusts, vehicle.motor_lag_up_s, vehicle.motor_lag_down_s)
-        self.thrusts = self.thrusts + (1.0 - np.exp(-dt / lag)) * (command - self.thrusts)
+        if dt != self._share_dt:
+            vehicle, self._share_dt = self._vehicle, dt
+            self._share_up = 1.0 - math.exp(-dt / vehicle.motor_lag_up_s)
+            self._share_down = 1.0 - math.exp(-dt / vehicle.motor_lag_down_s)
+        step = command - self.thrusts
+        self.thrusts = self.thrusts + np.where(step > 0.0, self._share_up, self._share_down) * step
 
     def update(
         self,
