@@ -12,9 +12,10 @@ from ibvs_qp.vision.classify import LineIdentity, identify
 from ibvs_qp.vision.colors import SurfaceColors
 from ibvs_qp.vision.config import VisionConfig
 from ibvs_qp.vision.grid import CoarseGrid
-from ibvs_qp.vision.lines import refine_line
-from ibvs_qp.vision.picture import Picture, denormalise, normalised_line
+from ibvs_qp.vision.lines import refine_lines
+from ibvs_qp.vision.picture import Picture, normalised_line
 from ibvs_qp.vision.plane import PlaneEstimate
+from ibvs_qp.vision.query import LineQuery
 from ibvs_qp.vision.refined import RefinedLine
 from ibvs_qp.vision.vote import SAME_PX, VotedLine, vote_lines
 
@@ -24,6 +25,8 @@ _REFINE_PX = 6.0
 _DUPLICATE_PX = 3.0
 #: Length that earns the full score, share of the picture's width.
 _FULL_LENGTH = 0.4
+#: Voted lines refined at once; those on edges found by then are left out of the next batch.
+_BATCH = 4
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,6 +55,7 @@ def detect_lines(
     colors: SurfaceColors,
     config: VisionConfig,
     down: np.ndarray | None,
+    directions: tuple[bool, ...] = (False, True),
 ) -> list[Candidate]:
     """Find level and upright lines on or around the surface, best first.
 
@@ -64,25 +68,35 @@ def detect_lines(
         colors: What board and paint look like.
         config: Settings.
         down: Gravity's direction in C, (3,), or None for upright cameras.
+        directions: Which lines of the picture are searched: False for level, True for upright ones. The number of
+            candidates is shared among both.
 
     Returns:
         Candidates of positive score, no two on the same edge.
     """
     tilt = 0.0 if down is None else math.atan2(-float(down[0]), float(down[1]))
     # level and upright swap places with every quarter turn; both are searched
-    voted = vote_lines(picture, plane, grid, labels, config, math.remainder(tilt, 0.5 * math.pi))
+    voted = vote_lines(picture, plane, grid, labels, config, math.remainder(tilt, 0.5 * math.pi), directions)
     voted.sort(key=lambda entry: -entry.rank)
     found: list[Candidate] = []
-    tried = 0
-    for entry in voted:
-        if tried == config.detect.candidates:
-            break
-        if any(_covered(entry, other.line, picture) for other in found):
-            continue
-        tried += 1
-        candidate = _refined(entry, picture, depth, plane, grid, colors, config, tilt)
-        if candidate is not None and not any(_same(candidate.line, other.line, picture) for other in found):
-            found.append(candidate)
+    left = math.ceil(config.detect.candidates * len(directions) / 2)
+    while voted and left > 0:
+        size = min(left, _BATCH)
+        batch, voted = voted[:size], voted[size:]
+        queries = [_query(entry, picture) for entry in batch]
+        width = _REFINE_PX * picture.scale
+        lines = refine_lines(picture, queries, half_width_px=width, config=config.line, colors=colors, contents=True)
+        left -= size
+        for line in lines:
+            if line is None:
+                continue
+            if any(_same(line, other.line, picture) for other in found):
+                left += 1  # seen already: does not count
+                continue
+            candidate = _candidate(line, picture, depth, plane, grid, colors, config, tilt)
+            if candidate is not None:
+                found.append(candidate)
+        voted = [entry for entry in voted if not any(_covered(entry, other.line, picture) for other in found)]
     return sorted(found, key=lambda candidate: -candidate.score)
 
 
@@ -91,8 +105,17 @@ def role_of(theta: float, tilt: float) -> str:
     return HORIZONTAL if abs(math.sin(theta - tilt)) >= abs(math.cos(theta - tilt)) else VERTICAL
 
 
-def _refined(
-    entry: VotedLine,
+def _query(entry: VotedLine, picture: Picture) -> LineQuery:
+    """A voted line as something to look for."""
+    view = picture.transposed if entry.upright else picture
+    slope = (entry.right - entry.left) / (view.width - 1.0)
+    rho, angle = normalised_line(-slope, 1.0, -entry.left, view.intrinsics)
+    theta = 0.5 * math.pi - angle if entry.upright else angle
+    return LineQuery(rho=rho, theta=theta, polarity=entry.polarity)
+
+
+def _candidate(
+    line: RefinedLine,
     picture: Picture,
     depth: np.ndarray,
     plane: PlaneEstimate | None,
@@ -101,21 +124,8 @@ def _refined(
     config: VisionConfig,
     tilt: float,
 ) -> Candidate | None:
-    view = picture.transposed if entry.upright else picture
-    width = view.width
-    slope = (entry.right - entry.left) / (width - 1.0)
-    rho, angle = normalised_line(-slope, 1.0, -entry.left, view.intrinsics)
-    theta = 0.5 * math.pi - angle if entry.upright else angle
-    line = refine_line(
-        picture,
-        rho,
-        theta,
-        half_width_px=_REFINE_PX * picture.scale,
-        config=config.line,
-        colors=colors,
-        polarity=entry.polarity,
-    )
-    if line is None or line.length_px < config.detect.min_length * picture.mask.shape[1]:
+    """A fitted line with its identity and score, or None if it is too short."""
+    if line.length_px < config.detect.min_length * picture.mask.shape[1]:
         return None
     identity = identify(line, picture, depth, plane, grid, colors, config.line)
     length = min(line.length_px / (_FULL_LENGTH * picture.mask.shape[1]), 1.0)
@@ -125,12 +135,15 @@ def _refined(
 
 def _covered(entry: VotedLine, line: RefinedLine, picture: Picture) -> bool:
     """Whether a voted line is an edge already fitted: within the vote's resolution at both ends of its segment."""
-    ends = denormalise(line.segment, picture.intrinsics)
-    if entry.upright:
-        ends = ends[:, ::-1]
+    fx, fy, cx, cy = picture.intrinsics
     across = picture.height if entry.upright else picture.width
-    voted = entry.left + (entry.right - entry.left) * ends[:, 0] / (across - 1.0)
-    return bool(np.abs(voted - ends[:, 1]).max() < 2.0 * SAME_PX)
+    slope = (entry.right - entry.left) / (across - 1.0)
+    for x, y in line.segment.tolist():
+        u, v = fx * x + cx, fy * y + cy
+        along, level = (v, u) if entry.upright else (u, v)
+        if abs(entry.left + slope * along - level) >= 2.0 * SAME_PX:
+            return False
+    return True
 
 
 def _same(one: RefinedLine, two: RefinedLine, picture: Picture) -> bool:

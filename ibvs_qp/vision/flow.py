@@ -5,13 +5,26 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
+from ibvs_qp.frames import R_BODY_CAMERA
 from ibvs_qp.vision.config import FlowConfig
-from ibvs_qp.vision.flow_solve import FlowVelocity, half_resolution, information_root, inverse_depths, solve_velocity
+from ibvs_qp.vision.flow_solve import (
+    FlowVelocity,
+    expected_points,
+    half_resolution,
+    information_root,
+    inverse_depths,
+    solve_velocity,
+    unturned,
+)
 from ibvs_qp.vision.mask import Intrinsics
 from ibvs_qp.vision.plane import PlaneEstimate
 
-#: Pyramid levels beyond the first.
-_LEVELS = 2
+#: Pyramid levels beyond the first, and those that do where the last velocity says where the points are.
+_LEVELS, _LEVELS_EXPECTED = 2, 1
+#: Points expected farther off than this share of the picture start where they were: the gyro must be wrong.
+_FAR = 0.25
+#: When following a point ends: rounds, step [px].
+_CRITERIA = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 15, 0.01)
 
 
 class SparseFlow:
@@ -24,7 +37,8 @@ class SparseFlow:
 
     def reset(self) -> None:
         """Forget the last picture and its points."""
-        self._pyramid: tuple[np.ndarray, ...] | None = None
+        self._grey: np.ndarray | None = None
+        self._velocity: np.ndarray | None = None
         self._points = np.zeros((0, 2), np.float32)
         self._root = np.zeros((0, 2, 2))
         self._inverse = np.zeros(0)
@@ -39,6 +53,7 @@ class SparseFlow:
         intrinsics: Intrinsics,
         stamp_ns: int,
         rotation: np.ndarray,
+        camera_rotation: np.ndarray,
         plane: PlaneEstimate | None,
         camera_position: np.ndarray,
     ) -> FlowVelocity | str:
@@ -51,6 +66,7 @@ class SparseFlow:
             intrinsics: Of the full picture [px].
             stamp_ns: Capture time.
             rotation: Turn of the body since the picture before, in B [rad], (3,).
+            camera_rotation: The same turn as a matrix in camera frames, now to before, (3, 3).
             plane: The surface in this picture, or None.
             camera_position: Camera centre in B [m], (3,).
 
@@ -61,19 +77,21 @@ class SparseFlow:
         grey = cv2.cvtColor(
             cv2.resize(rgb, (rgb.shape[1] // 2, rgb.shape[0] // 2), interpolation=cv2.INTER_AREA), cv2.COLOR_RGB2GRAY
         )
-        window = (config.window_px, config.window_px)
-        _, pyramid = cv2.buildOpticalFlowPyramid(grey, window, _LEVELS)
         interval = (stamp_ns - self._stamp_ns) * 1e-9
         result: FlowVelocity | str = "first picture"
-        if self._pyramid is not None and pyramid[0].shape == self._pyramid[0].shape:
+        if self._grey is not None and grey.shape == self._grey.shape:
             if not 0.0 < interval <= config.interval_max_s:
                 self._points = self._points[:0]
                 result = f"{interval:.3f} s between pictures"
             elif len(self._points) < config.min_points:
                 result = "too few points: nothing to follow"
             else:
-                result = self._follow(tuple(pyramid), excluded, intrinsics, interval, rotation, camera_position)
+                result = self._follow(
+                    self._grey, grey, excluded, intrinsics, interval, rotation, camera_rotation, camera_position
+                )
+        self._velocity = None
         if isinstance(result, FlowVelocity):
+            self._velocity = R_BODY_CAMERA.T @ result.velocity
             middle = self._stamp_ns + (stamp_ns - self._stamp_ns) // 2
             result = FlowVelocity(
                 velocity=result.velocity, covariance=result.covariance, stamp_ns=middle, points=result.points
@@ -82,13 +100,13 @@ class SparseFlow:
         if len(self._points) < config.points_low or self._frames >= config.redetect:
             self._find(grey, excluded)
         self._inverse = inverse_depths(self._points, depth, intrinsics, plane)
-        self._pyramid, self._stamp_ns = tuple(pyramid), stamp_ns
+        self._grey, self._stamp_ns = grey, stamp_ns
         return result
 
     def _find(self, grey: np.ndarray, excluded: np.ndarray) -> None:
         """New points where the picture has structure, with the information each carries."""
         config, self._frames = self._config, 0
-        allowed = np.where(excluded == 0, np.uint8(255), np.uint8(0))
+        allowed = (excluded == 0).view(np.uint8)
         corners = cv2.goodFeaturesToTrack(
             grey, config.points, config.quality, config.spacing_px, mask=allowed, blockSize=5
         )
@@ -97,27 +115,32 @@ class SparseFlow:
 
     def _follow(
         self,
-        pyramid: tuple[np.ndarray, ...],
+        last: np.ndarray,
+        grey: np.ndarray,
         excluded: np.ndarray,
         intrinsics: Intrinsics,
         interval: float,
         rotation: np.ndarray,
+        camera_rotation: np.ndarray,
         camera_position: np.ndarray,
     ) -> FlowVelocity | str:
         config = self._config
-        window = (config.window_px, config.window_px)
-        assert self._pyramid is not None
-        criteria = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 15, 0.01)
+        half = half_resolution(intrinsics)
+        still = unturned(self._points, half, camera_rotation)
+        velocity = np.zeros(3) if self._velocity is None else self._velocity
+        start = expected_points(still, self._inverse, velocity, interval, half)
+        start = np.where(np.abs(start - self._points) < _FAR * grey.shape[1], start, self._points)
         moved, status, _ = cv2.calcOpticalFlowPyrLK(
-            self._pyramid[0],
-            pyramid[0],
+            last,
+            grey,
             self._points,
-            self._points.copy(),
-            winSize=window,
-            maxLevel=_LEVELS,
-            criteria=criteria,
+            start,
+            winSize=(config.window_px, config.window_px),
+            maxLevel=_LEVELS if self._velocity is None else _LEVELS_EXPECTED,
+            criteria=_CRITERIA,
+            flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
         )
-        height, width = pyramid[0].shape
+        height, width = grey.shape
         place = np.round(moved).astype(np.intp)
         alive = (
             (status.ravel() == 1)
@@ -127,19 +150,13 @@ class SparseFlow:
             & (place[:, 1] < height)
         )
         alive[alive] &= excluded[place[alive, 1], place[alive, 0]] == 0
-        before, now, inverse, root = (
-            self._points[alive],
-            moved[alive],
-            self._inverse[alive],
-            self._root[alive],
-        )
+        now, inverse, root = moved[alive], self._inverse[alive], self._root[alive]
         self._points, self._root = now, root
         known = inverse > 0
-        if int(known.sum()) < config.min_points:
+        if int(np.count_nonzero(known)) < config.min_points:
             return "too few points with depth"
-        half = half_resolution(intrinsics)
         return solve_velocity(
-            before[known],
+            still[alive][known],
             now[known],
             inverse[known],
             root[known],

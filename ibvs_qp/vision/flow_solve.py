@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import cv2
@@ -10,7 +11,6 @@ import numpy as np
 from ibvs_qp.frames import R_BODY_CAMERA
 from ibvs_qp.vision.config import FlowConfig
 from ibvs_qp.vision.mask import Intrinsics
-from ibvs_qp.vision.motion import CameraMotion
 from ibvs_qp.vision.plane import PlaneEstimate
 from ibvs_qp.vision.robust import median
 
@@ -21,6 +21,8 @@ _ROUNDS = 4
 _MAD = 1.4826
 #: Sum of squares of a 3x3 Sobel kernel over 8^2: variance of its answer per variance of the picture.
 _SOBEL_NOISE = 12.0 / 64.0
+#: Columns and rows at which the depth of a point is read, from its place [px].
+_CROSS = np.array([[0, -2, 0, 2, 0], [-2, 0, 0, 0, 2]])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,11 +78,11 @@ def inverse_depths(
         return np.zeros(0)
     full = 2.0 * points.astype(float) + 0.5
     place = np.round(full).astype(np.intp)
-    rows = np.clip(place[:, 1, None] + np.array([-2, 0, 0, 0, 2]), 0, depth.shape[0] - 1)
-    columns = np.clip(place[:, 0, None] + np.array([0, -2, 0, 2, 0]), 0, depth.shape[1] - 1)
+    rows = np.minimum(np.maximum(place[:, 1, None] + _CROSS[1], 0), depth.shape[0] - 1)
+    columns = np.minimum(np.maximum(place[:, 0, None] + _CROSS[0], 0), depth.shape[1] - 1)
     z = depth[rows, columns].astype(float)
-    good = (z > 0) & np.isfinite(z)
-    count = good.sum(axis=1)
+    good = (z > 0) & (z < np.inf)  # false for NaN too
+    count = np.count_nonzero(good, axis=1)
     ordered = np.sort(np.where(good, z, np.inf), axis=1)  # the median of the valid ones is at half their count
     middle = ordered[np.arange(len(points)), np.minimum(count // 2, 4)]
     inverse = np.where(count >= 3, 1.0 / middle, 0.0)
@@ -93,8 +95,26 @@ def inverse_depths(
     return inverse
 
 
+def unturned(points: np.ndarray, intrinsics: Intrinsics, rotation: np.ndarray) -> np.ndarray:
+    """Where points would be now if the camera had only turned (now to before, (3, 3)): normalised, (n, 2)."""
+    fx, fy, cx, cy = intrinsics
+    a, b, c = rotation  # rows: p^T R = x a + y b + c
+    x, y = (points[:, :1] - cx) / fx, (points[:, 1:] - cy) / fy
+    turned = x * a + y * b + c
+    return turned[:, :2] / turned[:, 2:]
+
+
+def expected_points(
+    still: np.ndarray, inverse: np.ndarray, velocity: np.ndarray, interval: float, intrinsics: Intrinsics
+) -> np.ndarray:
+    """Pixels of turned points after the camera moved at a velocity in C (3,), float32 (n, 2)."""
+    fx, fy, cx, cy = intrinsics
+    moved = still + (interval * inverse)[:, None] * (still * velocity[2] - velocity[:2])
+    return (moved * (fx, fy) + (cx, cy)).astype(np.float32)
+
+
 def solve_velocity(
-    before: np.ndarray,
+    still: np.ndarray,
     now: np.ndarray,
     inverse: np.ndarray,
     root: np.ndarray,
@@ -104,41 +124,63 @@ def solve_velocity(
     camera_position: np.ndarray,
     config: FlowConfig,
 ) -> FlowVelocity | str:
-    """Robust weighted least squares for the camera's velocity after the full rotational flow is taken out."""
+    """Robust weighted least squares for the camera's velocity after the full rotational flow is taken out.
+
+    Args:
+        still: Points after the turn alone, normalised, (n, 2).
+        now: Points as found, pixels at half resolution, (n, 2).
+        inverse: 1/Z of the points [1/m], (n,).
+        root: Square roots of their information [1/px], (n, 2, 2).
+        intrinsics: Of the half-resolution picture.
+        interval: Time between the pictures [s].
+        rotation: Turn of the body in between, in B [rad], (3,).
+        camera_position: Camera centre in B [m], (3,).
+        config: Settings.
+
+    Returns:
+        The velocity, or the reason why there is none.
+    """
     fx, fy, cx, cy = intrinsics
-    focal, center = np.array([fx, fy]), np.array([cx, cy])
-    start, end = (before.astype(float) - center) / focal, (now.astype(float) - center) / focal
-    motion = CameraMotion.of_body(rotation, None, interval, np.zeros(3))
-    turned = np.column_stack((start, np.ones(len(start)))) @ motion.rotation
-    still = turned[:, :2] / turned[:, 2:]
-    flow = (end - still) / interval
+    end = (now - (cx, cy)) / (fx, fy)
     x, y = (0.5 * (end + still)).T
-    zero, one = np.zeros_like(x), np.ones_like(x)
-    translating = inverse[:, None, None] * np.stack((-one, zero, x, zero, -one, y), axis=-1).reshape(-1, 2, 3)
     whiten = root * (fx * interval)
-    rows, wanted = whiten @ translating, (whiten @ flow[:, :, None])[:, :, 0]
+    translating = np.zeros((len(x), 2, 3))
+    translating[:, 0, 0] = translating[:, 1, 1] = -inverse
+    translating[:, 0, 2], translating[:, 1, 2] = inverse * x, inverse * y
+    rows = (whiten @ translating).reshape(-1, 3)
+    wanted = (whiten @ ((end - still) / interval)[:, :, None]).ravel()
     prior = np.eye(3) / config.prior_m_s**2
     velocity, normal = np.zeros(3), prior
-    weight, size = one, zero
-    weighted = rows
+    weight = np.ones(len(x))
+    size, weighted = weight, rows
     for _ in range(_ROUNDS):
-        weighted = (rows * weight[:, None, None]).reshape(-1, 3)
-        normal = weighted.T @ rows.reshape(-1, 3) + prior
-        velocity = np.linalg.solve(normal, weighted.T @ wanted.ravel())
-        size = np.linalg.norm(wanted - rows @ velocity, axis=1)
+        weighted = rows * np.repeat(weight, 2)[:, None]
+        normal = weighted.T @ rows + prior
+        velocity = np.linalg.solve(normal, weighted.T @ wanted)
+        residual = (wanted - rows @ velocity).reshape(-1, 2)
+        size = np.sqrt(np.vecdot(residual, residual))
         scale = max(_MAD * median(size), 0.5)
-        weight = np.maximum(0.0, 1.0 - (size / (config.gate_sigmas * scale)) ** 2) ** 2
-    agreeing = int((weight > 0.1).sum())
+        weight = np.maximum(0.0, 1.0 - (size * (1.0 / (config.gate_sigmas * scale))) ** 2) ** 2
+    agreeing = int(np.count_nonzero(weight > 0.1))
     if agreeing < config.min_points:
         return "too few points agree"
-    if float(np.linalg.norm(velocity)) > config.speed_max_m_s:
+    if math.hypot(*velocity) > config.speed_max_m_s:
         return "faster than possible"
-    spread = float(weight @ size**2) / max(2.0 * float(weight.sum()) - 3.0, 1.0)
-    covariance = np.linalg.inv(normal - prior * (1.0 - 1.0 / max(spread, 1.0))) * max(spread, 1.0)
-    turning = np.stack((x * y, -(1 + x * x), y, 1 + y * y, -x * y, -x), axis=-1).reshape(-1, 2, 3)
-    leak = np.linalg.solve(normal, weighted.T @ (whiten @ turning).reshape(-1, 3)) * (
-        config.rotation_sigma_rad / interval
+    spread = max(float(weight @ (size * size)) / max(2.0 * float(weight.sum()) - 3.0, 1.0), 1.0)
+    turning = np.empty((len(x), 2, 3))
+    turning[:, 0, 0] = x * y
+    turning[:, 1, 1] = -turning[:, 0, 0]
+    turning[:, 0, 1], turning[:, 0, 2] = -(1.0 + x * x), y
+    turning[:, 1, 0], turning[:, 1, 2] = 1.0 + y * y, -x
+    leak = np.linalg.solve(normal, weighted.T @ (whiten @ turning).reshape(-1, 3))
+    leak *= config.rotation_sigma_rad / interval
+    covariance = np.linalg.inv(normal - prior * (1.0 - 1.0 / spread)) * spread + leak @ leak.T
+    covariance = R_BODY_CAMERA @ covariance @ R_BODY_CAMERA.T
+    (wx, wy, wz), (px, py, pz) = rotation / interval, camera_position
+    lever = np.array([wy * pz - wz * py, wz * px - wx * pz, wx * py - wy * px])
+    return FlowVelocity(
+        velocity=R_BODY_CAMERA @ velocity - lever,
+        covariance=0.5 * (covariance + covariance.T),
+        stamp_ns=0,
+        points=agreeing,
     )
-    covariance = R_BODY_CAMERA @ (covariance + leak @ leak.T) @ R_BODY_CAMERA.T
-    body = R_BODY_CAMERA @ velocity - np.cross(np.asarray(rotation, float) / interval, camera_position)
-    return FlowVelocity(velocity=body, covariance=0.5 * (covariance + covariance.T), stamp_ns=0, points=agreeing)

@@ -28,7 +28,8 @@ class Perception:
     """Surface, lines and velocity from RGB-D pictures, gyro and attitude.
 
     Every picture: the surface is refitted from its prediction, every track is refined in a narrow strip around its
-    prediction, points are followed. Every dozen pictures, and while nothing is tracked, lines are searched anew.
+    prediction, points are followed. Every few pictures level and upright lines are searched in turn; while nothing is
+    tracked, both at once.
     """
 
     def __init__(self, config: VisionConfig, vehicle: VehicleParams) -> None:
@@ -50,7 +51,7 @@ class Perception:
             part.reset()
         self._plane: PlaneEstimate | None = None
         self._stamp_ns: int | None = None
-        self._since_detection, self._frames = self._config.detect.period, 0
+        self._since_detection, self._frames, self._upright_next = self._config.detect.period, 0, False
 
     def process(
         self,
@@ -135,6 +136,7 @@ class Perception:
             frame.intrinsics,
             frame.stamp_ns,
             turn,
+            motion.rotation,
             self._plane,
             self._camera_position,
         )
@@ -201,18 +203,19 @@ class Perception:
         self._frames += 1
         settings = self._config.detect
         confirmed = any(track.confirmed for track in self._tracker.tracks)
-        due = self._since_detection >= (
-            settings.period if confirmed and self._frames > _WARM_UP else settings.lost_period
-        )
-        if self._plane is None or not (due or wanted):
+        calm = confirmed and self._frames > _WARM_UP and not wanted
+        period = max(1, settings.period // 2) if calm else settings.lost_period
+        if self._plane is None or not (self._since_detection >= period or wanted):
             return []
         self._since_detection = 0
+        self._upright_next = not self._upright_next
+        directions = (self._upright_next,) if calm else (False, True)
         known = self._colors.board is not None
         self._colors.learn(coarse[self._plane.component])
         if not known:
             labels = np.where(self._plane.component, np.maximum(self._colors.label(coarse), 1), 0)
         candidates = detect_lines(
-            picture, frame.depth, self._plane, self._grid, labels, self._colors, self._config, down
+            picture, frame.depth, self._plane, self._grid, labels, self._colors, self._config, down, directions
         )
         self._tracker.offer(candidates, picture)
         return candidates

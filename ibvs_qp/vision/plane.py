@@ -12,7 +12,7 @@ from ibvs_qp.vision.grid import CoarseGrid
 from ibvs_qp.vision.robust import median
 from ibvs_qp.vision.surface import PlaneEstimate, connected_samples, plane_covariance
 
-#: Samples used to judge hypotheses; more cost time and change nothing.
+#: Samples used to judge hypotheses and the spread of residuals; more cost time and change nothing.
 _JUDGED = 1000
 #: Radius that counts around the seed when hypotheses are judged, normalised.
 _NEAR = 0.25
@@ -142,44 +142,49 @@ class PlaneFitter:
     ) -> PlaneEstimate | str:
         config, design, flat = self._config, grid.design, inverse.ravel()
         usable = (flat > 0) & grid.free.ravel()
-        if int(usable.sum()) < config.min_samples:
+        seen = int(np.count_nonzero(usable))
+        if seen < config.min_samples:
             return "too few valid depth samples"
-        plane, gate, component, sigma = start, config.coarse_gate, np.zeros(0, bool), 0.0
+        board = paint = None
+        if prefer is not None:
+            board, paint = prefer.ravel() == BOARD, prefer.ravel() == PAINT
+        plane, gate, component, sigma, count = start, config.coarse_gate, np.zeros(0, bool), 0.0, 0
         normal_matrix = np.eye(3)
         for last in (False, True):
             predicted = design @ plane
-            relative = (flat - predicted) / np.maximum(predicted, 1e-3)
-            inlier = usable & (np.abs(relative) < gate)
-            if prefer is not None:
-                colored = inlier & (prefer.ravel() == BOARD)
+            relative = flat / np.maximum(predicted, 1e-3) - 1.0
+            size = np.abs(relative)
+            inlier = usable & (size < gate)
+            if board is not None and paint is not None:
+                colored = inlier & board
                 if last:  # a wall that looks like paint must not get in: what looks like it has to fit twice as well
-                    colored |= inlier & (prefer.ravel() == PAINT) & (np.abs(relative) < 0.5 * gate)
-                inlier = colored if int(colored.sum()) >= config.min_samples else inlier
+                    colored |= inlier & paint & (size < 0.5 * gate)
+                inlier = colored if int(np.count_nonzero(colored)) >= config.min_samples else inlier
             component = connected_samples(inlier.reshape(grid.shape), grid, seed).ravel()
-            if int(component.sum()) < config.min_samples:
+            chosen = np.flatnonzero(component)
+            count = len(chosen)
+            if count < config.min_samples:
                 return "too few samples on the surface"
-            spread = relative[component]
+            spread = relative.take(chosen[:: max(1, count // _JUDGED)])
             sigma = _MAD * median(np.abs(spread - median(spread)))
             gate = min(max(config.fine_gate_sigmas * sigma, config.fine_gate_low), config.fine_gate_high)
-            chosen = design[component]
-            normal_matrix = chosen.T @ chosen
-            if np.linalg.det(normal_matrix) < _FLAT * np.prod(np.diag(normal_matrix)):
+            samples = design.take(chosen, axis=0)
+            normal_matrix = samples.T @ samples
+            if np.linalg.det(normal_matrix) < _FLAT * math.prod(normal_matrix.diagonal().tolist()):
                 return "samples on the surface lie on one line"
-            plane = np.linalg.solve(normal_matrix, chosen.T @ flat[component])
+            plane = np.linalg.solve(normal_matrix, samples.T @ flat.take(chosen))
         if not bool(self._upright(plane[None], down)[0]):
             return "the surface does not stand upright or does not face the camera"
-        length = float(np.linalg.norm(plane))
+        length = math.hypot(*plane)
         if not config.distance_min_m <= 1.0 / length <= config.distance_max_m:
             return f"the surface lies {1.0 / length:.2f} m away, out of range"
         residual = np.where(component, flat - design @ plane, 0.0)
         return PlaneEstimate(
             inverse_depth=plane,
-            covariance=plane_covariance(
-                residual, normal_matrix, int(component.sum()), grid, plane, config.common_mode_m
-            ),
+            covariance=plane_covariance(residual, normal_matrix, count, grid, plane, config.common_mode_m),
             normal=-plane / length,
             distance_m=1.0 / length,
-            inlier_share=float(component.sum()) / max(int(usable.sum()), 1),
+            inlier_share=count / max(seen, 1),
             residual_sigma=sigma,
             component=component.reshape(grid.shape),
         )

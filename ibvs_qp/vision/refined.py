@@ -9,8 +9,12 @@ import numpy as np
 
 from ibvs_qp.frames import align_line
 from ibvs_qp.vision.config import LineConfig
-from ibvs_qp.vision.picture import Picture, normalise, normalised_line
-from ibvs_qp.vision.profiles import Strip
+from ibvs_qp.vision.picture import normalise
+from ibvs_qp.vision.profiles import Strips
+from ibvs_qp.vision.query import LineView
+from ibvs_qp.vision.robust import LineFits
+
+_NO_SIDES, _NO_PIXELS = np.zeros((2, 0, 3), np.uint8), np.zeros((0, 2))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,8 +31,9 @@ class RefinedLine:
         rms_px: Residual of the agreeing profiles [px].
         length_px: Length of the segment [px].
         step: Colour behind the line minus colour before it, along the normal, (3,).
-        sides: Colours at the agreeing profiles before and behind the line, along the normal, (2, n, 3).
-        pixels: Places of the agreeing profiles, (n, 2) [px].
+        sides: Colours at the agreeing profiles before and behind the line, along the normal, (2, n, 3); empty unless
+            asked for.
+        pixels: Places of the agreeing profiles, (n, 2) [px]; empty unless asked for.
     """
 
     rho: float
@@ -45,86 +50,93 @@ class RefinedLine:
 
 
 @dataclass
-class PixelFit:
-    """Result of the fit in the (possibly transposed) view: v = level + slope (u - center)."""
+class Fits:
+    """Results of a batch of L lines with K profiles, each in its own view.
 
-    level: float
-    slope: float
-    center: float
-    covariance: np.ndarray
+    Attributes:
+        lines: The fitted lines.
+        support: Profiles that agree, bool (L, K).
+        visible: Profiles that could be seen, bool (L, K).
+        runs: First and last supporting profile, (L).
+        steps: Colour behind minus colour before, along +v, (L, 3).
+        alive: Whether there is a line at all, bool (L,).
+    """
+
+    lines: LineFits
     support: np.ndarray
     visible: np.ndarray
-    run: tuple[int, int]
-    rms: float
-    step: np.ndarray
+    runs: list[tuple[int, int]]
+    steps: np.ndarray
+    alive: np.ndarray
 
 
 def finish_line(
-    fit: PixelFit,
-    strip: Strip,
-    view: Picture,
-    columns: tuple[float, float],
-    upright: bool,
-    sign: float,
-    theta: float,
-    config: LineConfig,
+    index: int, fits: Fits, strips: Strips, sides: tuple[np.ndarray, np.ndarray] | None, config: LineConfig
 ) -> RefinedLine | None:
-    """Turn a pixel fit into a normalised line with covariance and segment."""
-
-    def polar(level: float, slope: float) -> tuple[float, float]:
-        rho, angle = normalised_line(-slope, 1.0, slope * fit.center - level, view.intrinsics)
-        return align_line(rho, 0.5 * math.pi - angle if upright else angle, theta)
-
-    rho, angle = polar(fit.level, fit.slope)
+    """Turn one fit of a batch into a normalised line with covariance and segment; None if it lies too far off."""
+    view, lines, (first, last) = strips.views[index], fits.lines, fits.runs[index]
+    level, slope, center = float(lines.level[index]), float(lines.slope[index]), float(lines.center[index])
+    variance = float(lines.level_variance[index]) + (config.bias_px * view.view.scale) ** 2
+    rho, theta, covariance = _polar(view, level, slope, center, variance, float(lines.slope_variance[index]))
     if abs(rho) > config.rho_max:
         return None
-    small = 1e-4
-    jacobian = (
-        np.array(
-            [
-                np.subtract(polar(fit.level + small, fit.slope), (rho, angle)),
-                np.subtract(polar(fit.level, fit.slope + small), (rho, angle)),
-            ]
-        ).T
-        / small
-    )
-    covariance = fit.covariance.copy()
-    covariance[0, 0] += (config.bias_px * view.scale) ** 2
-    ends_u = strip.u[list(fit.run)].astype(float)
-    ends = np.column_stack((ends_u, fit.level + fit.slope * (ends_u - fit.center)))
-    u = strip.u[fit.support].astype(float)
-    pixels = np.column_stack((u, fit.level + fit.slope * (u - fit.center)))
-    segment = normalise(ends, view.intrinsics)
-    before, behind = strip.sides(fit.level + fit.slope * (strip.u - fit.center))
-    sides = np.stack((before[fit.support], behind[fit.support]))
-    seen = fit.visible[fit.run[0] : fit.run[1] + 1]
+    u_first, u_last = float(strips.u[index, first]), float(strips.u[index, last])
+    v_first, v_last = level + slope * (u_first - center), level + slope * (u_last - center)
+    segment = normalise(np.array([[u_first, v_first], [u_last, v_last]]), view.view.intrinsics)
+    support, seen = fits.support[index], fits.visible[index, first : last + 1]
+    count = int(np.count_nonzero(support))
+    beside, pixels = _NO_SIDES, _NO_PIXELS
+    if sides is not None:
+        u = strips.u[index, support].astype(float)
+        pixels = np.column_stack((u, level + slope * (u - center)))
+        pixels = pixels[:, ::-1].copy() if view.upright else pixels
+        beside = np.stack((sides[0][index, support], sides[1][index, support])[:: view.sign])
     return RefinedLine(
         rho=rho,
-        theta=angle,
-        covariance=jacobian @ covariance @ jacobian.T,
-        segment=segment[:, ::-1].copy() if upright else segment,
-        ends=_end_reasons(fit, strip, columns, (view.height, view.width)),
-        inlier_share=float(fit.support.sum())
-        / max(int(np.count_nonzero(seen | fit.support[fit.run[0] : fit.run[1] + 1])), 1),
-        rms_px=fit.rms,
-        length_px=float(np.hypot(*(ends[1] - ends[0]))),
-        step=sign * fit.step,
-        sides=sides if sign > 0 else sides[::-1],
-        pixels=pixels[:, ::-1].copy() if upright else pixels,
+        theta=theta,
+        covariance=covariance,
+        segment=segment[:, ::-1].copy() if view.upright else segment,
+        ends=_end_reasons(index, fits, strips),
+        inlier_share=count / max(int(np.count_nonzero(seen | support[first : last + 1])), 1),
+        rms_px=float(lines.rms[index]),
+        length_px=math.hypot(u_last - u_first, v_last - v_first),
+        step=view.sign * fits.steps[index],
+        sides=beside,
+        pixels=pixels,
     )
 
 
-def _end_reasons(fit: PixelFit, strip: Strip, columns: tuple[float, float], shape: tuple[int, ...]) -> tuple[str, str]:
+def _polar(
+    view: LineView, level: float, slope: float, center: float, level_variance: float, slope_variance: float
+) -> tuple[float, float, np.ndarray]:
+    """(rho, theta) of v = level + slope (u - center) and their covariance J diag(variances) J^T."""
+    fx, fy, cx, cy = view.view.intrinsics
+    a, b, c = -slope * fx, fy, -slope * cx + cy + slope * center - level
+    length = math.hypot(a, b)
+    rho, angle = -c / length, math.atan2(b, a)
+    rho_slope = (cx - center) / length - c * a * fx / length**3
+    angle_slope = b * fx / length**2
+    if view.upright:
+        angle, angle_slope = 0.5 * math.pi - angle, -angle_slope
+    aligned, theta = align_line(rho, angle, view.query.theta)
+    rho_level = 1.0 / length
+    if aligned != rho:
+        rho_level, rho_slope = -rho_level, -rho_slope
+    cross = rho_slope * angle_slope * slope_variance
+    rho_variance = rho_level**2 * level_variance + rho_slope**2 * slope_variance
+    return aligned, theta, np.array([[rho_variance, cross], [cross, angle_slope**2 * slope_variance]])
+
+
+def _end_reasons(index: int, fits: Fits, strips: Strips) -> tuple[str, str]:
     """Why the segment ends at either end."""
-    width = shape[1]
-    last = len(strip.u) - 1
+    view, lines, (first, last) = strips.views[index], fits.lines, fits.runs[index]
+    profiles, margin = strips.u.shape[1], strips.side + 2
     reasons = []
-    for neighbour, cut in ((fit.run[0] - 1, columns[0] > 0.0), (fit.run[1] + 1, columns[1] < width - 1.0)):
-        if neighbour < 0 or neighbour > last:
+    for neighbour, cut in ((first - 1, view.columns[0] > 0.0), (last + 1, view.columns[1] < view.view.width - 1.0)):
+        if not 0 <= neighbour < profiles:
             reasons.append("span" if cut else "picture")
             continue
-        beyond = fit.level + fit.slope * (strip.u[neighbour] - fit.center)
-        margin = strip.side + 2
-        outside = not margin <= beyond <= shape[0] - 1.0 - margin
-        reasons.append("picture" if outside else ("end" if fit.visible[neighbour] else "mask"))
+        beyond = lines.level[index] + lines.slope[index] * (strips.u[index, neighbour] - lines.center[index])
+        outside = not margin <= beyond <= view.view.height - 1.0 - margin
+        reasons.append("picture" if outside else ("end" if fits.visible[index, neighbour] else "mask"))
     return reasons[0], reasons[1]

@@ -56,12 +56,14 @@ def median(values: np.ndarray) -> float:
 
 
 def masked_median(values: np.ndarray, used: np.ndarray) -> np.ndarray:
-    """Upper median along the last axis of the used ones among (L, ..., K) values, used (L, K); (L, ...)."""
-    extra = (1,) * (values.ndim - 2)
-    shown = used.reshape(used.shape[0], *extra, used.shape[1])
+    """Upper median along the last axis of the used ones among values (L, K) or (L, C, K), used (L, K)."""
+    lines, size = used.shape
+    shown = used if values.ndim == 2 else used[:, None]
     ordered = np.sort(np.where(shown, values, np.float32(np.inf)), axis=-1)
-    middle = np.minimum(np.count_nonzero(used, axis=1) // 2, used.shape[1] - 1).reshape(-1, *extra, 1)
-    return np.take_along_axis(ordered, np.broadcast_to(middle, (*ordered.shape[:-1], 1)), axis=-1)[..., 0]
+    middle = np.minimum(np.count_nonzero(used, axis=1) // 2, size - 1)
+    if values.ndim == 2:
+        return ordered[np.arange(lines), middle]
+    return ordered[np.arange(lines), :, middle]
 
 
 def packed(used: np.ndarray, *arrays: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import cv2
@@ -44,13 +45,13 @@ class PlaneEstimate:
 
 def connected_samples(inlier: np.ndarray, grid: CoarseGrid, seed: tuple[int, int] | None) -> np.ndarray:
     """Connected inliers around the seed (the largest, without one); hidden samples connect."""
-    _, labels = cv2.connectedComponents((inlier | ~grid.free).astype(np.uint8), connectivity=4, ltype=cv2.CV_16U)
+    _, labels = cv2.connectedComponents((inlier | ~grid.free).view(np.uint8), connectivity=4, ltype=cv2.CV_16U)
     if seed is not None:
         rows, columns = grid.window(seed, 2)
         around = labels[rows, columns][inlier[rows, columns]]
         counts = np.bincount(around) if len(around) else np.zeros(1)
     else:
-        counts = np.bincount(labels[inlier]) if inlier.any() else np.zeros(1)
+        counts = np.bincount(labels.ravel().take(np.flatnonzero(inlier)), minlength=1)
     label = int(np.argmax(counts))
     return inlier & (labels == label) if counts[label] > 0 else np.zeros_like(inlier)
 
@@ -64,15 +65,13 @@ def plane_covariance(
     common_mode: float,
 ) -> np.ndarray:
     """Least-squares covariance, inflated by the correlation of the residuals over blocks, plus the common mode."""
-    rows, columns = (size // _BLOCK * _BLOCK for size in grid.shape)
-    square = residual.reshape(grid.shape)[:rows, :columns]
-    sums = np.add.reduceat(
-        np.add.reduceat(square, np.arange(0, rows, _BLOCK), axis=0), np.arange(0, columns, _BLOCK), axis=1
-    )
+    rows, columns = (size // _BLOCK for size in grid.shape)
+    square = residual.reshape(grid.shape)[: rows * _BLOCK, : columns * _BLOCK]
+    sums = square.reshape(rows, _BLOCK, columns, _BLOCK).sum(axis=(1, 3))
     total = float(np.vdot(residual, residual))
     inflation = max(1.0, float(np.vdot(sums, sums)) / total) if total > 0 else 1.0
     variance = total / max(count - 3, 1)
-    inverse_length = float(np.linalg.norm(plane))
+    inverse_length = math.hypot(*plane)
     return (
         np.linalg.inv(normal_matrix) * variance * inflation
         + np.outer(plane, plane) * (common_mode * inverse_length) ** 2

@@ -9,10 +9,11 @@ import numpy as np
 from ibvs_qp.vision.colors import SurfaceColors
 from ibvs_qp.vision.config import VisionConfig
 from ibvs_qp.vision.detect import Candidate, role_of
-from ibvs_qp.vision.lines import refine_line
+from ibvs_qp.vision.lines import refine_lines
 from ibvs_qp.vision.motion import CameraMotion
 from ibvs_qp.vision.percept import LineHint
 from ibvs_qp.vision.picture import Picture
+from ibvs_qp.vision.query import LineQuery
 from ibvs_qp.vision.refined import RefinedLine
 from ibvs_qp.vision.track import Track
 
@@ -47,7 +48,8 @@ class LineTracker:
             track.rho, track.theta = motion.line(track.rho, track.theta, plane)
             track.role = role_of(track.theta, tilt)
             track.age += 1
-            self._update(track, self._refined(track, picture, colors), interval_s)
+        for track, line in zip(self.tracks, self._refined(picture, colors), strict=True):
+            self._update(track, line, interval_s)
         self._drop()
 
     def hints(self, hints: tuple[LineHint, ...], picture: Picture, colors: SurfaceColors, tilt: float) -> None:
@@ -59,16 +61,15 @@ class LineTracker:
             if match is not None and self._distance_px(match, hint, picture) <= hint.gate_px:
                 match.hint = hint.name
                 continue
-            line = refine_line(
+            query = LineQuery(
+                rho=hint.rho, theta=hint.theta, span=hint.span, kind=hint.kind, surface_side=hint.surface_side
+            )
+            [line] = refine_lines(
                 picture,
-                hint.rho,
-                hint.theta,
+                [query],
                 half_width_px=hint.gate_px * picture.scale,
                 config=self._config.line,
                 colors=colors,
-                span=hint.span,
-                kind=hint.kind,
-                surface_side=hint.surface_side,
             )
             least = self._config.detect.min_length * picture.mask.shape[1]
             if line is None or line.length_px < least or not self._healthy(line, picture):
@@ -117,20 +118,18 @@ class LineTracker:
         self._next_id += 1
         self.tracks.append(track)
 
-    def _refined(self, track: Track, picture: Picture, colors: SurfaceColors) -> RefinedLine | None:
-        config = self._config
-        line = refine_line(
-            picture,
-            track.rho,
-            track.theta,
-            half_width_px=config.line.strip_px * picture.scale,
-            config=config.line,
-            colors=colors,
-            step=track.step,
-            kind=track.kind,
-            surface_side=track.surface_side,
-        )
-        return line if line is not None and self._healthy(line, picture) else None
+    def _refined(self, picture: Picture, colors: SurfaceColors) -> list[RefinedLine | None]:
+        """Healthy fits of all tracks around their predictions."""
+        queries = [
+            LineQuery(
+                rho=track.rho, theta=track.theta, step=track.step, kind=track.kind, surface_side=track.surface_side
+            )
+            for track in self.tracks
+        ]
+        config = self._config.line
+        width = config.strip_px * picture.scale
+        found = refine_lines(picture, queries, half_width_px=width, config=config, colors=colors)
+        return [line if line is not None and self._healthy(line, picture) else None for line in found]
 
     def _healthy(self, line: RefinedLine, picture: Picture) -> bool:
         track = self._config.track

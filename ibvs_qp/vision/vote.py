@@ -41,8 +41,9 @@ def vote_lines(
     labels: np.ndarray,
     config: VisionConfig,
     tilt: float,
+    directions: tuple[bool, ...],
 ) -> list[VotedLine]:
-    """Most voted lines around level and upright of both polarities, on and around the surface, unsorted."""
+    """Most voted level (False) and upright (True) lines of both polarities, on and around the surface, unsorted."""
     height, width = picture.mask.shape
     half = cv2.resize(picture.rgb, (width // 2, height // 2), interpolation=cv2.INTER_AREA)
     allowed = cv2.resize(picture.mask, (width // 2, height // 2), interpolation=cv2.INTER_NEAREST) == 0
@@ -50,7 +51,7 @@ def vote_lines(
         region = cv2.dilate(plane.component.astype(np.uint8), np.ones((5, 5), np.uint8))
         allowed &= cv2.resize(region, (width // 2, height // 2), interpolation=cv2.INTER_NEAREST) > 0
     found: list[VotedLine] = []
-    for upright in (False, True):
+    for upright in directions:
         gradient = cv2.Sobel(half, cv2.CV_16S, int(upright), int(not upright), ksize=3)
         channels = cv2.split(gradient)
         rising = cv2.max(cv2.max(channels[0], channels[1]), channels[2])
