@@ -162,16 +162,25 @@ class Canvas:
         """
         if paint is not None:
             r0, r1, c0, c1 = paint.box
-            rows, columns = np.nonzero(paint.coverage != self._drawn[r0:r1, c0:c1])  # a brush's front is narrow
-            share = paint.coverage[rows, columns]
-            place = rows + r0, columns + c0
-            self._texture[place] = _mix(share, self._fresh[place], self._blank[place])
-            self._drawn[place] = share
+            drawn = self._drawn[r0:r1, c0:c1]
+            changed = np.flatnonzero(paint.coverage != drawn)  # a brush's front is narrow
+            rows, columns = np.divmod(changed, c1 - c0)
+            place = (rows + r0) * self._drawn.shape[1] + (columns + c0)
+            fresh, blank = _pixels(self._fresh).take(place), _pixels(self._blank).take(place)
+            share = paint.coverage.reshape(-1).take(changed)
+            mixed = _mix(share, fresh.view(np.uint8).reshape(-1, 4), blank.view(np.uint8).reshape(-1, 4))
+            _pixels(self._texture)[place] = mixed.view(np.uint32).reshape(-1)
+            drawn[:] = paint.coverage
         return self._texture
 
     def flush(self) -> np.ndarray:
         """Bring the texture up to date with all strokes and return it, see `draw`."""
         return self.draw(self.take())
+
+
+def _pixels(picture: np.ndarray) -> np.ndarray:
+    """The pixels of a picture, uint8 (h, w, 4), as whole numbers, uint32 (h * w,); shared."""
+    return picture.view(np.uint32).reshape(-1)
 
 
 def _mix(share: np.ndarray, fresh: np.ndarray, blank: np.ndarray) -> np.ndarray:

@@ -7,8 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-#: Pixels on either side of the rim that are drawn with their exact share, and widest depth hole beyond it [px].
+#: Margin around what is drawn, and widest depth hole beyond the rim [px].
 _BAND_PX, _HOLE_PX = 1, 4
+#: A line touches but the two pixels between whose centres it passes: at 45 degrees half a diagonal is 0.71 px.
+_RIM_STEPS = np.array([[0], [1]])
 #: How near to a line a pixel counts as touched by it [px].
 _SLACK_PX = 3.0
 #: A pixel so far from a line is untouched by its rim and its polygon [px].
@@ -49,19 +51,6 @@ class CutLine:
         across = int(self.flat)
         return -(self.normal[1 - across] * places + self.offset) / self.normal[across]
 
-    def _band(self, low: int, high: int, first: int, end: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Pixels from ``low`` to ``high`` steps across the line, walked along its longer direction.
-
-        Returns:
-            Rows of a flat line or columns of a steep one, (steps, n); the steps, > 0 towards the board, (steps, 1);
-            and the places along it from ``first`` to before ``end``, (n,).
-        """
-        places = np.arange(first, end)
-        steps = np.arange(low, high + 1)[:, None]
-        forward = self.normal[int(self.flat)] > 0
-        other = np.floor(self._across(places)).astype(np.intp) + (steps if forward else -steps)
-        return other, steps, places
-
     def split(self) -> tuple[Box, Box]:
         """The box taken apart: all of the first part lies beyond the line, the second one holds the line."""
         r0, r1, c0, c1 = self.box
@@ -83,7 +72,8 @@ class CutLine:
         """
         r0, r1, c0, c1 = box
         low, high, first, end = (r0, r1, c0, c1) if self.flat else (c0, c1, r0, r1)
-        other, _, places = self._band(-_BAND_PX, _BAND_PX + 1, first, end)
+        places = np.arange(first, end)
+        other = np.floor(self._across(places)).astype(np.intp) + _RIM_STEPS
         np.maximum(other, low, out=other)
         np.minimum(other, high - 1, out=other)
         across = int(self.flat)
@@ -101,11 +91,18 @@ class CutLine:
         limit_along, limit = self.shape[::-1] if self.flat else self.shape
         first, last = sorted((float(self.start[along]), float(self.stop[along])))
         first, end = max(0, math.ceil(first)), min(limit_along, math.floor(last) + 1)
-        other, steps, places = self._band(-_HOLE_PX, 1, first, max(first, end))
+        places = np.arange(first, max(first, end))
+        towards = 1 if self.normal[int(self.flat)] > 0 else -1  # the board
         widths = rng.integers(1, _HOLE_PX + 1, max(self.shape) // _HOLE_STEP_PX + 1)
-        taken = (-steps <= widths[places // _HOLE_STEP_PX]) & (other >= 0) & (other < limit)
-        width = self.shape[1]
-        return (other * width + places if self.flat else other + places * width)[taken]
+        steps = np.arange(-_HOLE_PX, 2)[:, None]
+        taken = -steps <= widths[places // _HOLE_STEP_PX]
+        other = np.floor(self._across(places)).astype(np.intp) + steps * towards
+        if len(places) and (other[[0, -1]].min() < 0 or other[[0, -1]].max() >= limit):
+            taken &= (other >= 0) & (other < limit)
+        stride, step = (self.shape[1], 1) if self.flat else (1, self.shape[1])
+        other *= stride
+        other += places * step
+        return other[taken]
 
 
 def clip_polygon(polygon: np.ndarray, normal: np.ndarray, offset: float) -> np.ndarray:

@@ -69,7 +69,8 @@ class View:
             column: World step from one column to the next [m], (3,).
             row: World step from one row to the next [m], (3,).
         """
-        return self.matrix @ self.rotation @ np.column_stack((column, row, corner - self.center))
+        steps = np.array((column, row, corner - self.center)).T
+        return self.matrix @ (self.rotation @ steps)
 
 
 def board_corners(geometry: BoardGeometry) -> np.ndarray:
