@@ -8,6 +8,8 @@ from ibvs_qp.vision.grid import CoarseGrid
 
 #: Share of a new sample in the board's running colour.
 _BLEND = 0.2
+#: Samples whose median is taken; more cost time and change nothing.
+_JUDGED = 500
 #: Bits per channel of the label table, the shift that leaves them, and the board's drift that renews it.
 _TABLE_BITS, _TABLE_SHIFT, _TABLE_DRIFT = 5, 3, 1.5
 #: Labels of `SurfaceColors.label`.
@@ -44,7 +46,8 @@ class SurfaceColors:
             samples = near if len(near) > len(samples) // 4 else samples[:0]
         if len(samples) < 8:
             return
-        median = np.median(samples, axis=0)
+        ordered = np.sort(samples[:: max(1, len(samples) // _JUDGED)], axis=0)
+        median = ordered[len(ordered) // 2]
         self.board = median if self.board is None else self.board + _BLEND * (median - self.board)
 
     def label(self, colors: np.ndarray) -> np.ndarray:
@@ -53,8 +56,8 @@ class SurfaceColors:
             return np.zeros(colors.shape[:-1], np.uint8)
         if len(self._table) == 0 or np.abs(self.board - self._table_board).max() > _TABLE_DRIFT:
             self._make_table(self.board)
-        coarse = (colors >> _TABLE_SHIFT).astype(np.intp)
-        return self._table.take((coarse[..., 0] << 2 * _TABLE_BITS) + (coarse[..., 1] << _TABLE_BITS) + coarse[..., 2])
+        coarse = (colors >> _TABLE_SHIFT).astype(np.uint16)
+        return self._table.take((coarse[..., 0] << 2 * _TABLE_BITS) | (coarse[..., 1] << _TABLE_BITS) | coarse[..., 2])
 
     def _make_table(self, board: np.ndarray) -> None:
         """Labels of all colours in steps of eight grey levels: thousands of colours are looked up per picture."""

@@ -56,6 +56,7 @@ def detect_lines(
     config: VisionConfig,
     down: np.ndarray | None,
     directions: tuple[bool, ...] = (False, True),
+    known: tuple[RefinedLine, ...] = (),
 ) -> list[Candidate]:
     """Find level and upright lines on or around the surface, best first.
 
@@ -70,6 +71,7 @@ def detect_lines(
         down: Gravity's direction in C, (3,), or None for upright cameras.
         directions: Which lines of the picture are searched: False for level, True for upright ones. The number of
             candidates is shared among both.
+        known: Lines that need no search: what is voted along them is left out.
 
     Returns:
         Candidates of positive score, no two on the same edge.
@@ -77,6 +79,7 @@ def detect_lines(
     tilt = 0.0 if down is None else math.atan2(-float(down[0]), float(down[1]))
     # level and upright swap places with every quarter turn; both are searched
     voted = vote_lines(picture, plane, grid, labels, config, math.remainder(tilt, 0.5 * math.pi), directions)
+    voted = [entry for entry in voted if not any(_covered(entry, line, picture) for line in known)]
     voted.sort(key=lambda entry: -entry.rank)
     found: list[Candidate] = []
     left = math.ceil(config.detect.candidates * len(directions) / 2)

@@ -49,10 +49,9 @@ class CameraMotion:
     def line(self, rho: float, theta: float, inverse_depth: np.ndarray | None) -> tuple[float, float]:
         """The same line now; translation counts only where the line's plane is known."""
         before = np.array([math.cos(theta), math.sin(theta), -rho])
-        now = self.rotation.T @ before
+        now = before @ self.rotation
         if inverse_depth is not None:
-            now = now + float(before @ self.translation) * self.plane(inverse_depth)
-        length = math.hypot(now[0], now[1])
-        if length < 1e-9:
-            return rho, theta
-        return align_line(-float(now[2]) / length, math.atan2(float(now[1]), float(now[0])), theta)
+            now += float(before @ self.translation) * self.plane(inverse_depth)
+        a, b, c = now.tolist()
+        length = math.hypot(a, b)
+        return (rho, theta) if length < 1e-9 else align_line(-c / length, math.atan2(b, a), theta)

@@ -8,12 +8,14 @@ import numpy as np
 from ibvs_qp.vision.percept import Percept, TrackState
 from ibvs_qp.vision.picture import denormalise
 
-#: RGB colours: surface tint, mask tint, tracks by kind, tentative or lost tracks, text backing.
+#: RGB colours: surface tint, mask tint, tracks by kind, tentative or lost tracks, text and its ground.
 _SURFACE, _MASK = (60, 220, 90), (200, 60, 60)
 _KINDS = {"board": (255, 160, 0), "paint": (255, 0, 200), "": (120, 120, 120)}
-_FAINT, _BACKING = (150, 150, 150), (20, 20, 20)
+_FAINT, _INK, _GROUND = (150, 150, 150), (255, 255, 255), (20, 20, 20)
 #: Share of a tint in the picture; length of the tick towards the surface [px]; size of the text.
 _TINT, _TICK_PX, _TEXT = 0.22, 14, 0.42
+#: Font, margin of the ground around the text, and distance of a label from its line [px].
+_FONT, _PAD_PX, _CLEAR_PX = cv2.FONT_HERSHEY_SIMPLEX, 3, 10
 
 
 def draw_overlay(rgb: np.ndarray, percept: Percept) -> np.ndarray:
@@ -34,8 +36,11 @@ def draw_overlay(rgb: np.ndarray, percept: Percept) -> np.ndarray:
     if percept.mask is not None and percept.mask.shape == (height, width):
         _tint(result, percept.mask > 0, _MASK)
     if percept.intrinsics is not None:
-        for track in percept.tracks:
-            _draw_track(result, track, denormalise(track.segment, percept.intrinsics))
+        segments = [denormalise(track.segment, percept.intrinsics) for track in percept.tracks]
+        for track, ends in zip(percept.tracks, segments, strict=True):
+            _draw_track(result, track, ends)
+        for track, ends in zip(percept.tracks, segments, strict=True):  # last: no line runs through a label
+            _label_track(result, track, ends)
     _write(result, _caption(percept), (6, height - 8))
     return result
 
@@ -62,8 +67,18 @@ def _draw_track(picture: np.ndarray, track: TrackState, ends: np.ndarray) -> Non
         2,
         cv2.LINE_AA,
     )
+
+
+def _label_track(picture: np.ndarray, track: TrackState, ends: np.ndarray) -> None:
+    """Write what a track is on the side away from the surface, where no other edge of it runs."""
     name = f" {track.hint}" if track.hint else ""
-    _write(picture, f"{track.track_id} {track.kind} {track.weight:.1f}{name}", (int(middle[0]) + 6, int(middle[1]) - 6))
+    text = f"{track.track_id} {track.kind} {track.weight:.1f}{name}"
+    (width, height), _ = cv2.getTextSize(text, _FONT, _TEXT, 1)
+    away = -1.0 if track.surface_side > 0 else 1.0
+    cos, sin = away * np.cos(track.theta), away * np.sin(track.theta)
+    x, y = ends.mean(axis=0)
+    x, y = x + (0.5 * width + _CLEAR_PX) * cos, y + (0.5 * height + _CLEAR_PX) * sin
+    _write(picture, text, (round(x - 0.5 * width), round(y + 0.5 * height)))
 
 
 def _caption(percept: Percept) -> str:
@@ -76,5 +91,10 @@ def _caption(percept: Percept) -> str:
 
 
 def _write(picture: np.ndarray, text: str, place: tuple[int, int]) -> None:
-    for color, thickness in ((_BACKING, 3), ((255, 255, 255), 1)):
-        cv2.putText(picture, text, place, cv2.FONT_HERSHEY_SIMPLEX, _TEXT, color, thickness, cv2.LINE_AA)
+    """Write on a small filled ground, moved into the picture: thin strokes stay legible on brick and paint."""
+    (width, height), descent = cv2.getTextSize(text, _FONT, _TEXT, 1)
+    x = min(max(place[0], _PAD_PX), max(picture.shape[1] - width - _PAD_PX - 1, _PAD_PX))
+    y = min(max(place[1], height + _PAD_PX), max(picture.shape[0] - descent - _PAD_PX - 1, height + _PAD_PX))
+    corners = (x - _PAD_PX, y - height - _PAD_PX), (x + width + _PAD_PX, y + descent + _PAD_PX - 1)
+    cv2.rectangle(picture, *corners, _GROUND, -1)
+    cv2.putText(picture, text, (x, y), _FONT, _TEXT, _INK, 1, cv2.LINE_AA)

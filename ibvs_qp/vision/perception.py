@@ -210,12 +210,22 @@ class Perception:
         self._since_detection = 0
         self._upright_next = not self._upright_next
         directions = (self._upright_next,) if calm else (False, True)
+        followed = tuple(track.line for track in self._tracker.tracks if calm and track.settled)
         known = self._colors.board is not None
         self._colors.learn(coarse[self._plane.component])
         if not known:
             labels = np.where(self._plane.component, np.maximum(self._colors.label(coarse), 1), 0)
         candidates = detect_lines(
-            picture, frame.depth, self._plane, self._grid, labels, self._colors, self._config, down, directions
+            picture,
+            frame.depth,
+            self._plane,
+            self._grid,
+            labels,
+            self._colors,
+            self._config,
+            down,
+            directions,
+            followed,
         )
         self._tracker.offer(candidates, picture)
         return candidates

@@ -35,6 +35,11 @@ class Track:
     covariance: np.ndarray = field(default_factory=lambda: np.zeros((2, 2)))
     step: np.ndarray = field(default_factory=lambda: np.zeros(3))
 
+    @property
+    def settled(self) -> bool:
+        """Whether it is followed in this picture and a detection could add nothing to what is known of it."""
+        return self.confirmed and self.lost_s == 0.0 and (self.borders_plane or self.kind == "paint")
+
     def adopt(self, line: RefinedLine) -> None:
         """Take a fresh fit."""
         self.line, self.rho, self.theta, self.covariance = line, line.rho, line.theta, line.covariance

@@ -177,15 +177,13 @@ class LineTracker:
         if float(one.step @ two.step) * math.cos(one.theta - two.theta) <= 0.0:
             return False
         limit = self._config.track.duplicate_px * picture.scale / picture.intrinsics[0]
-        ends = two.line.segment
-        normal, along = (
-            np.array([math.cos(one.theta), math.sin(one.theta)]),
-            np.array([-math.sin(one.theta), math.cos(one.theta)]),
-        )
-        if float(np.abs(ends @ normal - one.rho).max()) > limit:
+        cos, sin = math.cos(one.theta), math.sin(one.theta)
+        ends = two.line.segment.tolist()
+        if any(abs(x * cos + y * sin - one.rho) > limit for x, y in ends):
             return False
-        range_one, range_two = one.line.segment @ along, ends @ along
-        return bool(min(range_one.max(), range_two.max()) > max(range_one.min(), range_two.min()))
+        low_one, high_one = sorted(y * cos - x * sin for x, y in one.line.segment.tolist())
+        low_two, high_two = sorted(y * cos - x * sin for x, y in ends)
+        return min(high_one, high_two) > max(low_one, low_two)
 
     def _distance_px(self, track: Track, hint: LineHint, picture: Picture) -> float:
         """Distance of a track from a hint at the middle of its segment [px at 640]; infinite for another thing."""
