@@ -21,12 +21,13 @@ RESTART_STAMPS = 25
 LEAD_NS = 20_000_000
 
 
-def _vector(value: Any, size: int, bound: float) -> bool:
+def sound_vector(value: Any, size: int, bound: float) -> bool:
+    """Whether a value is a float vector of that size with a norm within the bound."""
     return (
         isinstance(value, np.ndarray)
         and value.shape == (size,)
         and value.dtype.kind == "f"
-        and bool(np.abs(value).max() <= bound and value @ value <= bound * bound)  # False for NaN too
+        and bool(value.dot(value) <= bound * bound)  # False for NaN too; dot, unlike @, does not warn of overflow
     )
 
 
@@ -95,17 +96,19 @@ class MeasurementGate:
             return None, (f"stamp_ns: {why}",)
         stamp = int(measurement.stamp_ns)
         attitude = measurement.attitude
-        if not _vector(attitude, 4, 1.01) or abs(float(attitude @ attitude) - 1.0) > 0.02:
+        if not sound_vector(attitude, 4, 1.01) or abs(float(attitude @ attitude) - 1.0) > 0.02:
             if self._attitude is None:
                 return None, ("attitude: not a unit quaternion",)
             refuse("attitude", "not a unit quaternion", self._attitude)
         else:
             self._attitude = attitude.copy()  # the caller may fill the same array again
-        if _vector(measurement.angular_velocity, 3, RATE_BOUND):
+        if sound_vector(measurement.angular_velocity, 3, RATE_BOUND):
             self._omega = measurement.angular_velocity.copy()
         else:
             refuse("angular_velocity", f"not 3 finite values within {RATE_BOUND} rad/s", self._omega)
-        if measurement.specific_force is not None and not _vector(measurement.specific_force, 3, ACCELERATION_BOUND):
+        if measurement.specific_force is not None and not sound_vector(
+            measurement.specific_force, 3, ACCELERATION_BOUND
+        ):
             refuse("specific_force", f"not 3 finite values within {ACCELERATION_BOUND} m/s^2", None)
         changes |= self._check_wrench(measurement, stamp, refuse)
         if measurement.plane is not None and not _good_plane(measurement.plane):
@@ -113,7 +116,7 @@ class MeasurementGate:
         elif measurement.plane is not None and not _past(measurement.plane_stamp_ns, stamp):
             rejected.append("plane_stamp_ns: not a time before the tick")
             changes |= {"plane": None, "plane_stamp_ns": 0}
-        if measurement.velocity is not None and not _vector(measurement.velocity, 3, VELOCITY_BOUND):
+        if measurement.velocity is not None and not sound_vector(measurement.velocity, 3, VELOCITY_BOUND):
             refuse("velocity", f"not 3 finite values within {VELOCITY_BOUND} m/s", None)
         self._check_lines(measurement, refuse)
         self._check_limits(measurement, refuse)
@@ -137,7 +140,10 @@ class MeasurementGate:
 
     def _check_wrench(self, measurement: Measurement, stamp: int, refuse: Any) -> dict[str, Any]:
         """Both go back together: an old wrench under a new stamp would pass for news."""
-        good, past = _vector(measurement.contact_wrench, 6, WRENCH_BOUND), _past(measurement.wrench_stamp_ns, stamp)
+        good, past = (
+            sound_vector(measurement.contact_wrench, 6, WRENCH_BOUND),
+            _past(measurement.wrench_stamp_ns, stamp),
+        )
         if good and past:
             self._wrench, self._wrench_stamp = measurement.contact_wrench.copy(), int(measurement.wrench_stamp_ns)
             return {}
@@ -159,7 +165,7 @@ class MeasurementGate:
         bounds = {}
         for name in ("thrust_min", "thrust_max"):
             value = getattr(measurement, name)
-            good = value is not None and _vector(value, self._rotors, 1e4)
+            good = value is not None and sound_vector(value, self._rotors, 1e4)
             bounds[name] = value if good else None
             if value is not None and not good:
                 refuse(name, f"not {self._rotors} finite values", None)
@@ -208,7 +214,7 @@ def check_reference(reference: Reference, last: Reference) -> tuple[Reference, t
         rejected.append("reference.push_force: not within [0, 1000] N")
     if not _number(reference.standoff, -1.0, 10.0):
         rejected.append("reference.standoff: not within [-1, 10] m")
-    if not _vector(reference.velocity, 2, VELOCITY_BOUND):
+    if not sound_vector(reference.velocity, 2, VELOCITY_BOUND):
         rejected.append("reference.velocity: not 2 finite values")
     if not isinstance(reference.contact, (bool, np.bool_)):
         rejected.append("reference.contact: neither True nor False")

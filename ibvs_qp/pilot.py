@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import time
 from dataclasses import dataclass, field
@@ -27,6 +28,7 @@ from ibvs_qp.measurement import (
     SensorFrame,
 )
 from ibvs_qp.painting import Painter, PaintingConfig, Scenery, Wish
+from ibvs_qp.sensor_gate import SensorGate
 from ibvs_qp.settings import choice, dump_toml, load_toml, setting, validate
 from ibvs_qp.vision.config import VisionConfig
 from ibvs_qp.vision.percept import LineHint
@@ -88,6 +90,7 @@ class Pilot:
         )
         self.tare = WrenchTare(vehicle, self.config.estimation)
         self.painter = Painter(self.config.painting)
+        self._gate = SensorGate()
         self._tip = np.array(vehicle.tip_position_m)
         self._camera = np.array(vehicle.camera_position_m)
         self._tip_camera = to_camera(self._tip, self._camera)
@@ -100,6 +103,7 @@ class Pilot:
         self.motion.reset()
         self.tare.reset()
         self.painter.reset()
+        self._gate.reset()
         if self._perception is not None:
             self._perception.reset()
         self._first = self._stamp = -1
@@ -131,6 +135,14 @@ class Pilot:
         Returns:
             The controller's command.
         """
+        sound, refused = self._gate.check(frame)
+        if sound is None:
+            command = self.controller.step(self.measurement, self.reference)  # type: ignore[arg-type]
+        else:
+            command = self._fly(sound)
+        return command if not refused else dataclasses.replace(command, rejected=command.rejected + refused)
+
+    def _fly(self, frame: SensorFrame) -> Command:
         if self._first < 0:
             self._first = frame.stamp_ns
         tick = self.config.controller.tick_s
@@ -278,8 +290,6 @@ class Pilot:
         )
 
     def _with_guides(self, measurement: Measurement, wish: Wish, axes: WallAxes, stamp_ns: int) -> Measurement:
-        import dataclasses
-
         contact = self.terms.contact
         distance = contact.distance if contact.known else 0.5
         lines = tuple(self.motion.feature(line, axes, distance, stamp_ns) for line, _ in wish.guides)
