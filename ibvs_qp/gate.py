@@ -9,7 +9,7 @@ import numpy as np
 
 from ibvs_qp.measurement import LineFeature, LineReference, Measurement, Reference
 
-#: Largest believable norms: body rate [rad/s], specific force [m/s^2], wrench [N, N m] and velocity [m/s].
+#: Largest believable entries: body rate [rad/s], specific force [m/s^2], wrench [N, N m] and velocity [m/s].
 RATE_BOUND, ACCELERATION_BOUND, WRENCH_BOUND, VELOCITY_BOUND = 35.0, 200.0, 500.0, 20.0
 #: Largest believable line parameter (normalised, rad) and entry of a plane over D [1/m].
 LINE_BOUND, PLANE_BOUND = 1e6, 1e3
@@ -22,12 +22,12 @@ LEAD_NS = 20_000_000
 
 
 def sound_vector(value: Any, size: int, bound: float) -> bool:
-    """Whether a value is a float vector of that size with a norm within the bound."""
+    """Whether a value is a float vector of that size with every entry within the bound."""
     return (
         isinstance(value, np.ndarray)
         and value.shape == (size,)
         and value.dtype.kind == "f"
-        and bool(value.dot(value) <= bound * bound)  # False for NaN too; dot, unlike @, does not warn of overflow
+        and all(-bound <= entry <= bound for entry in value.tolist())  # False for NaN too
     )
 
 

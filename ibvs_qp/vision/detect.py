@@ -94,7 +94,7 @@ def detect_lines(
             if line is None:
                 continue
             if any(_same(line, other.line, picture) for other in found):
-                left += 1  # seen already: does not count
+                left += len(directions) - 1  # seen already: does not count in a full search
                 continue
             candidate = _candidate(line, picture, depth, plane, grid, colors, config, tilt)
             if candidate is not None:

@@ -56,6 +56,7 @@ class SparseFlow:
         camera_rotation: np.ndarray,
         plane: PlaneEstimate | None,
         camera_position: np.ndarray,
+        busy: bool = False,
     ) -> FlowVelocity | str:
         """Take the next picture.
 
@@ -69,6 +70,7 @@ class SparseFlow:
             camera_rotation: The same turn as a matrix in camera frames, now to before, (3, 3).
             plane: The surface in this picture, or None.
             camera_position: Camera centre in B [m], (3,).
+            busy: Whether the renewal of live points shall wait for the next picture: this one has cost much.
 
         Returns:
             The velocity, or the reason why there is none.
@@ -97,7 +99,7 @@ class SparseFlow:
                 velocity=result.velocity, covariance=result.covariance, stamp_ns=middle, points=result.points
             )
         self._frames += 1
-        if len(self._points) < config.points_low or self._frames >= config.redetect:
+        if len(self._points) < config.points_low or (self._frames >= config.redetect and not busy):
             self._find(grey, excluded)
         self._inverse = inverse_depths(self._points, depth, intrinsics, plane)
         self._grey, self._stamp_ns = grey, stamp_ns

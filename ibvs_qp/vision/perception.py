@@ -139,6 +139,7 @@ class Perception:
             motion.rotation,
             self._plane,
             self._camera_position,
+            busy=self._since_detection == 0,
         )
         clock.lap("flow")
         return make_percept(
