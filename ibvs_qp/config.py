@@ -144,6 +144,7 @@ class SolverSettings:
     adaptive_rho_interval: int = setting(25, "iterations between step-size updates", low=1, high=10000)
     scaling: int = setting(10, "Ruiz equilibration passes", low=0, high=100)
     polishing: bool = setting(False, "solve the active set exactly at the end; OSQP 1.1 prints a line per tick with it")
+    direct: bool = setting(True, "talk to OSQP's extension object (half the overhead) instead of its wrapper")
     accept_residual: float = setting(5e-2, "largest violation of a capped solution", unit="N", low=1e-9, high=10.0)
 
     def __post_init__(self) -> None:

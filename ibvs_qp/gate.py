@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import Any
 
 import numpy as np
@@ -197,7 +198,7 @@ def _good_line(line: Any) -> bool:
         and isinstance(line.covariance, np.ndarray)
         and line.covariance.shape == (2, 2)
         and line.covariance.dtype.kind == "f"
-        and bool(np.isfinite(line.covariance).all())
+        and all(math.isfinite(entry) for row in line.covariance.tolist() for entry in row)
     )
 
 

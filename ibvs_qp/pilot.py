@@ -158,11 +158,10 @@ class Pilot:
         features = frame.features if frame.image is None else self._see(frame)
         if features is not None and self._fresh(features.stamp_ns):
             self._take(features)
-        self.measurement = self._measure(frame, wrench, axes)
-        wish = self.painter.step(self._scenery(frame, axes))
+        wish = self.painter.step(self._scenery(frame))
         self.wish = wish
         self.reference = self._refer(wish)
-        self.measurement = self._with_guides(self.measurement, wish, axes, frame.stamp_ns)
+        self.measurement = self._measure(frame, wrench, axes, wish)
         begin = time.perf_counter()
         command = self.controller.step(self.measurement, self.reference)
         self.controller_time_s = time.perf_counter() - begin
@@ -233,10 +232,11 @@ class Pilot:
         gravity = np.array(down_in_body(self._history_attitude[self._slot(features.stamp_ns)]))
         self.motion.correct(features, WallAxes.of(normal, gravity), distance)
 
-    def _measure(self, frame: SensorFrame, wrench: np.ndarray, axes: WallAxes) -> Measurement:
+    def _measure(self, frame: SensorFrame, wrench: np.ndarray, axes: WallAxes, wish: Wish) -> Measurement:
         velocity = covariance = None
+        contact = self.terms.contact
+        distance = contact.distance if contact.known else 0.5
         if self.motion.velocity_age_s < self.config.estimation.velocity_life_s:
-            contact = self.terms.contact
             right, down = self.motion.velocity
             velocity = axes.right * right + axes.down * down - axes.normal * contact.rate
             covariance = np.eye(3) * float(self.motion.velocity_covariance.trace())
@@ -247,13 +247,14 @@ class Pilot:
             specific_force=frame.specific_force,
             contact_wrench=wrench,
             wrench_stamp_ns=frame.wrench_stamp_ns,
+            lines=tuple(self.motion.feature(line, axes, distance, frame.stamp_ns) for line, _ in wish.guides),
             plane=self._plane,
             plane_stamp_ns=self._plane_stamp,
             velocity=velocity,
             velocity_covariance=covariance,
         )
 
-    def _scenery(self, frame: SensorFrame, axes: WallAxes) -> Scenery:
+    def _scenery(self, frame: SensorFrame) -> Scenery:
         contact = self.terms.contact
         return Scenery(
             time_s=(frame.stamp_ns - self._first) * 1e-9,
@@ -288,9 +289,3 @@ class Pilot:
             velocity=wish.velocity,
             contact=wish.contact,
         )
-
-    def _with_guides(self, measurement: Measurement, wish: Wish, axes: WallAxes, stamp_ns: int) -> Measurement:
-        contact = self.terms.contact
-        distance = contact.distance if contact.known else 0.5
-        lines = tuple(self.motion.feature(line, axes, distance, stamp_ns) for line, _ in wish.guides)
-        return dataclasses.replace(measurement, lines=lines)

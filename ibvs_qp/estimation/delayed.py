@@ -106,10 +106,13 @@ class DelayedKalman:
             return False
         if self._covariance_stamp >= 0:
             dt = max(0.0, (stamp_ns - self._covariance_stamp) * 1e-9)
-            self._propagate(min(dt, 1.0))
+            if dt > 0.0:
+                self._propagate(min(dt, 1.0))
         self._covariance_stamp = max(stamp_ns, self._covariance_stamp)
         past = self._history[(self._now - age) % HISTORY]
         innovation = values - rows @ past
+        if len(innovation) == 1:
+            return self._correct_one(rows[0], float(innovation[0]), float(covariance[0, 0]), gate, age)
         spread = rows @ self.covariance @ rows.T + covariance
         gain = np.linalg.solve(spread, rows @ self.covariance).T
         if innovation @ np.linalg.solve(spread, innovation) > gate * gate * len(values):
@@ -119,9 +122,20 @@ class DelayedKalman:
         self._apply(gain @ innovation, age)
         return True
 
+    def _correct_one(self, row: np.ndarray, innovation: float, variance: float, gate: float, age: int) -> bool:
+        """The same for a single value: a division where many values need a linear system."""
+        known = self.covariance @ row
+        spread = float(row @ known) + variance
+        if innovation * innovation > gate * gate * spread:
+            return False
+        self.covariance = self.covariance - np.outer(known, known) / spread
+        self._apply(known * (innovation / spread), age)
+        return True
+
     def _propagate(self, dt: float) -> None:
         step = np.eye(len(self.noise)) + dt * self.chain + 0.5 * dt * dt * (self.chain @ self.chain)
-        self.covariance = step @ self.covariance @ step.T + np.diag(self.noise * dt)
+        moved = step @ self.covariance @ step.T + np.diag(self.noise * dt)
+        self.covariance = 0.5 * (moved + moved.T)
 
     def _apply(self, correction: np.ndarray, age: int) -> None:
         first = self.chain @ correction * self.tick

@@ -75,14 +75,19 @@ class ExternalWrench:
         self._update_moment(omega, rotor_wrench[3:] + fed_forward_moment, dt)
         if specific_force is None:
             return
-        residual = self._vehicle.mass_kg * specific_force - rotor_wrench[:3] - self.force
-        bandwidth = FORCE_BANDWIDTH_FREE
+        bandwidth, (nx, ny, nz) = FORCE_BANDWIDTH_FREE, normal.tolist()
+        mass, old = self._vehicle.mass_kg, self.force.tolist()
+        felt = zip(specific_force.tolist(), rotor_wrench.tolist(), old, strict=False)
+        x, y, z = (mass * force - rotor - known for force, rotor, known in felt)
         if in_contact:
-            residual = residual - contact_wrench[:3]
-            residual = residual - normal * float(normal @ residual)
+            cx, cy, cz, *_ = contact_wrench.tolist()
+            x, y, z = x - cx, y - cy, z - cz
+            along = nx * x + ny * y + nz * z
+            x, y, z = x - along * nx, y - along * ny, z - along * nz
             bandwidth = FORCE_BANDWIDTH_CONTACT
         share = max(1.0 - math.exp(-bandwidth * dt), dt / self._time if self._time < START_TIME else 0.0)
-        self.force = np.minimum(np.maximum(self.force + share * residual, -FORCE_BOUND), FORCE_BOUND)
+        moved = (value + share * step for value, step in zip(old, (x, y, z), strict=True))
+        self.force = np.array([min(max(value, -FORCE_BOUND), FORCE_BOUND) for value in moved])
 
     def _update_moment(self, omega: np.ndarray, known_moment: np.ndarray, dt: float) -> None:
         momentum = self._inertia * omega

@@ -24,7 +24,7 @@ class WallAxes:
     def of(cls, normal: np.ndarray, gravity: np.ndarray) -> WallAxes:
         """Axes of a wall with a given normal, under a given direction of gravity."""
         right = cross(gravity, normal)
-        right = right / max(float(np.linalg.norm(right)), 1e-6)
+        right = right / max(math.sqrt(float(right @ right)), 1e-6)
         return cls(normal=normal, right=right, down=cross(normal, right), gravity=gravity)
 
 
@@ -70,12 +70,19 @@ def image_line(
     offset: float, angle: float, axes: WallAxes, tip_from_camera: np.ndarray, distance: float
 ) -> tuple[float, float, float]:
     """Inverse of `wall_line`: (rho, theta) of a line on the wall and metres per unit of rho."""
-    foot = tip_from_camera + distance * axes.normal
-    normal = math.cos(angle) * axes.right + math.sin(angle) * axes.down
-    point = foot + offset * normal
-    h = R_BODY_CAMERA.T @ cross(point, cross(axes.normal, normal))
-    length = math.hypot(h[0], h[1])
-    h = h / length
-    if float(h[:2] @ (R_BODY_CAMERA.T @ normal)[:2]) < 0.0:
-        h = -h
-    return -float(h[2]), math.atan2(h[1], h[0]), float(foot @ axes.normal)
+    # Plain numbers, two lines a tick: normal m of the line in the wall, its direction t = n x m, a point P on it.
+    nx, ny, nz = axes.normal.tolist()
+    rx, ry, rz = axes.right.tolist()
+    dx, dy, dz = axes.down.tolist()
+    fx, fy, fz = tip_from_camera.tolist()
+    fx, fy, fz = fx + distance * nx, fy + distance * ny, fz + distance * nz
+    c, s = math.cos(angle), math.sin(angle)
+    mx, my, mz = c * rx + s * dx, c * ry + s * dy, c * rz + s * dz
+    px, py, pz = fx + offset * mx, fy + offset * my, fz + offset * mz
+    tx, ty, tz = ny * mz - nz * my, nz * mx - nx * mz, nx * my - ny * mx
+    # interpretation plane h = P x t, from body (front, right, down) to camera (right, down, front)
+    front, right, down = py * tz - pz * ty, pz * tx - px * tz, px * ty - py * tx
+    length = math.hypot(right, down)
+    if right * my + down * mz < 0.0:
+        length = -length
+    return -front / length, math.atan2(down / length, right / length), fx * nx + fy * ny + fz * nz

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -66,11 +67,11 @@ class QpEngine:
         return self._accept(*exact, Outcome.EXACT_FALLBACK, raw.iterations, raw.seconds)
 
     def _judge(self, status: int, x: np.ndarray, y: np.ndarray) -> Outcome | None:
-        if status not in (SOLVED, SOLVED_INACCURATE, MAX_ITERATIONS) or not np.isfinite(x.sum() + y.sum()):
+        if status not in (SOLVED, SOLVED_INACCURATE, MAX_ITERATIONS) or not math.isfinite(x.sum() + y.sum()):
             return None
         n, data = self._rotors, self.evaluator
-        thrusts = x[:n]
-        slip = max(float((data.lower[:n] - thrusts).max()), float((thrusts - data.upper[:n]).max()))
+        bounds = zip(x[:n].tolist(), data.lower[:n].tolist(), data.upper[:n].tolist(), strict=True)
+        slip = max(max(low - thrust, thrust - high) for thrust, low, high in bounds)
         if status == SOLVED:
             return Outcome.SOLVED if slip <= BOUND_SLIP else None
         if slip > self.settings.accept_residual or self.dual_residual(x, y) > self.settings.accept_residual:
