@@ -11,7 +11,7 @@ from ibvs_qp.config import ControllerConfig
 from ibvs_qp.estimation.contact import ContactEstimator
 from ibvs_qp.estimation.external_wrench import ExternalWrench
 from ibvs_qp.estimation.surface import FrictionEstimator
-from ibvs_qp.feedforward import ContactFeedforward
+from ibvs_qp.feedforward import SLIDING_COMMAND, ContactFeedforward
 from ibvs_qp.frames import GRAVITY, cross, down_in_body, roll_pitch, to_camera
 from ibvs_qp.lines import CameraMotion, LineErrors, LineTerm
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL, Measurement, Reference
@@ -129,6 +129,7 @@ class Setpoints:
         if contact.in_contact and speed > 0.0 and measurement.velocity is not None:
             direction = travel / speed
             moving = float(direction @ measurement.velocity)
+            self.friction.hold(speed > SLIDING_COMMAND and moving < config.contact.stuck_speed_m_s, dt)
             self.friction.add(contact.push, -float(direction @ measurement.contact_wrench[:3]), moving, dt)
         gyroscopic = cross(omega, self._inertia * omega)
         gravity = config.vehicle.mass_kg * GRAVITY * down_body

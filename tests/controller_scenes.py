@@ -130,9 +130,7 @@ def random_tick(
         velocity=rng.normal(0.0, 0.05, 3),
         lines=features[:lines],
     )
-    reference = Reference(
-        push_force=5.0, contact=True, lines=line_references(lines), velocity=rng.normal(0.0, 0.05, 2)
-    )
+    reference = Reference(push_force=5.0, contact=True, lines=line_references(lines), velocity=rng.normal(0.0, 0.05, 2))
     return measurement, reference
 
 

@@ -69,9 +69,7 @@ def test_metres_per_unit_of_rho() -> None:
     wall, step = Wall(attitude(0.05, 0.02), 0.1, 0.1), 1e-6
     axes = axes_of(wall)
     line = wall.line(0.03, 0.02, VERTICAL)
-    here, there = (
-        wall_line(replace(line, rho=line.rho + change), axes, TIP - CAMERA, 0.1) for change in (0.0, step)
-    )
+    here, there = (wall_line(replace(line, rho=line.rho + change), axes, TIP - CAMERA, 0.1) for change in (0.0, step))
     assert here is not None and there is not None
     assert (there[0] - here[0]) / step == pytest.approx(here[3], rel=0.03)
 

@@ -260,9 +260,7 @@ def test_press_waits_for_the_push() -> None:
         ("climb", lambda world: setattr(world, "contact_allowed", False)),
     ],
 )
-def test_every_phase_times_out_into_a_retreat_with_the_reason(
-    phase: str, break_it: Callable[[World], object]
-) -> None:
+def test_every_phase_times_out_into_a_retreat_with_the_reason(phase: str, break_it: Callable[[World], object]) -> None:
     world = World(short(timeout_s=8.0))
     world.fly(60.0, until=phase)
     assert world.painter.phase == phase

@@ -61,10 +61,20 @@ class FrictionEstimator:
     LEAST_PUSH, LEAST_SPEED = 1.5, 0.02
     #: Plausible range.
     RANGE = (0.02, 1.2)
+    #: A tip that does not follow the commanded travel for this long is held by more friction than believed [s],
+    #: and the belief rises at this rate until it breaks away [1/s].
+    PATIENCE, RISE = 0.4, 0.3
 
     def __init__(self) -> None:
         self.value = ASSUMED_FRICTION
         self.known = False
+        self._held = 0.0
+
+    def hold(self, held: bool, dt: float) -> None:
+        """Take note of whether the tip stays where it is although it is told to travel."""
+        self._held = self._held + dt if held else 0.0
+        if self._held > self.PATIENCE:
+            self.value = min(self.value + self.RISE * dt, self.RANGE[1])
 
     def add(self, push: float, friction_along_travel: float, speed: float, dt: float) -> None:
         """Take in the push [N], the friction opposing the travel [N] and the sliding speed [m/s]."""
