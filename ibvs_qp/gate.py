@@ -38,7 +38,7 @@ def _number(value: Any, low: float, high: float) -> bool:
 
 def is_stamp(value: Any) -> bool:
     """Whether a value is a time stamp: a whole number of nanoseconds that fits 63 bits."""
-    return isinstance(value, (int, np.integer)) and not isinstance(value, bool) and 0 <= value < 2**62
+    return isinstance(value, (int, np.integer)) and not isinstance(value, bool) and bool(0 <= value < 2**62)
 
 
 def answered_stamp(measurement: Any) -> int:

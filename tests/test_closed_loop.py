@@ -6,9 +6,9 @@ import dataclasses
 
 import numpy as np
 import pytest
+from closed_loop_rigs import fly_geometric, hold, short_scene, wall
 
 from sim.scene import CameraScene, ForceTorqueScene, VehicleScene
-from closed_loop_rigs import fly_geometric, hold, short_scene, wall
 
 
 @pytest.mark.parametrize("law", ["qp", "paper"])
