@@ -25,8 +25,8 @@ class ContactFeedforward:
 
     def reset(self) -> None:
         """Start from nothing."""
-        self._moment = np.zeros(3)
-        self._friction = np.zeros(3)
+        self._moment = [0.0, 0.0, 0.0]
+        self._friction = [0.0, 0.0, 0.0]
 
     def update(
         self,
@@ -51,15 +51,17 @@ class ContactFeedforward:
         """
         settings = self._settings
         share = 1.0 - math.exp(-2.0 * math.pi * settings.force_filter_hz * dt)
-        measured = contact_wrench[3:] if in_contact else np.zeros(3)
-        gain = settings.moment_gain / (1.0 + (noise / settings.moment_noise_n) ** 2)
-        self._moment = self._moment + share * (gain * measured - self._moment)
-        wanted = np.zeros(3)
-        speed = math.sqrt(float(travel @ travel))
-        if in_contact and speed > SLIDING_COMMAND:
-            wanted = travel * (-settings.friction_gain * friction * max(push, 0.0) / speed)
-        step = wanted - self._friction
-        length = math.sqrt(float(step @ step))
+        gain = settings.moment_gain / (1.0 + (noise / settings.moment_noise_n) ** 2) if in_contact else 0.0
+        measured = contact_wrench.tolist()[3:]
+        self._moment = [old + share * (gain * new - old) for old, new in zip(self._moment, measured, strict=True)]
+        way = travel.tolist()
+        speed = math.sqrt(way[0] * way[0] + way[1] * way[1] + way[2] * way[2])
+        size = -settings.friction_gain * friction * max(push, 0.0) / speed if speed > SLIDING_COMMAND else 0.0
+        wanted = [size * entry if in_contact else 0.0 for entry in way]
+        step = [new - old for new, old in zip(wanted, self._friction, strict=True)]
+        length = math.sqrt(step[0] * step[0] + step[1] * step[1] + step[2] * step[2])
         allowed = settings.friction_slew_n_s * dt if in_contact else math.inf
-        self._friction = wanted if length <= allowed else self._friction + step * (allowed / length)
-        return np.concatenate((self._friction, self._moment))
+        if length > allowed:
+            wanted = [old + entry * (allowed / length) for old, entry in zip(self._friction, step, strict=True)]
+        self._friction = wanted
+        return np.array(wanted + self._moment)

@@ -131,9 +131,10 @@ class Setpoints:
             moving = float(direction @ measurement.velocity)
             self.friction.hold(speed > SLIDING_COMMAND and moving < config.contact.stuck_speed_m_s, dt)
             self.friction.add(contact.push, -float(direction @ measurement.contact_wrench[:3]), moving, dt)
-        gyroscopic = cross(omega, self._inertia * omega)
-        gravity = config.vehicle.mass_kg * GRAVITY * down_body
-        self._static_wrench = np.concatenate((gravity, -gyroscopic)) + self.external.wrench
+        weight = config.vehicle.mass_kg * GRAVITY
+        gx, gy, gz = down_body.tolist()
+        mx, my, mz = (-cross(omega, self._inertia * omega)).tolist()
+        self._static_wrench = np.array((weight * gx, weight * gy, weight * gz, mx, my, mz)) + self.external.wrench
         self.bias_wrench = self._static_wrench + expected
         self._travel, self._travel_list = travel, travel.tolist()
 
