@@ -165,7 +165,6 @@ class Setpoints:
         self.push_command += gains.force_kfi * self._force_integral
         if config.impedance and contact.known:
             self.push_command += gains.force_ksp * contact.distance + gains.force_ksd * contact.rate
-        self.wanted_push = wanted
         if not contact.known:
             self.standoff_command = 0.0
             return

@@ -57,7 +57,6 @@ class ContactEstimator:
         self._push_mean, self._push_variance = 0.0, 0.02
         self.in_contact, self.touch_ns, self._touch_count, self._doubt_ns = False, -1, 0, -1
         self.stiffness = StiffnessEstimator()
-        self.plane_age_s = math.inf
 
     def update(self, measurement: Measurement, down: np.ndarray) -> None:
         """Take in one measurement; ``down`` is the unit gravity direction in B."""
@@ -68,7 +67,6 @@ class ContactEstimator:
         self._predict(measurement, down, omega, dt)
         if measurement.plane is not None and measurement.plane_stamp_ns > self._plane_stamp:
             self._correct_plane(measurement.plane, measurement.plane_stamp_ns)
-        self.plane_age_s = (stamp - self._plane_stamp) * 1e-9 if self._plane_stamp >= 0 else math.inf
         if self.known:
             self.distance = float(self._filter.state[0])
             self.rate = -float(self._filter.state[1]) - self._lever_speed

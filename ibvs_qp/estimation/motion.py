@@ -28,7 +28,6 @@ class TrackedLine:
             or right (vertical lines), so > 0 is below or right of the tip.
         angle: Angle of the normal in (right, down) [rad]; pi/2 for a level line.
         ends: Visible ends along the line in odometer coordinates (right, down) [m], (2, 2), or None.
-        open_ends: Whether each end is the line's own end, and not the border of the view.
     """
 
     track_id: int
