@@ -63,7 +63,7 @@ def closed_form(controller: HybridController, share: float, last: np.ndarray) ->
         rows.append((np.concatenate((direction, np.zeros(3))), wish, weights.velocity * fixed))
     jacobian = [math.sqrt(w) * (row @ per_thrust) for row, _, w in rows]
     target = [math.sqrt(w) * (wish - row @ drift) for row, wish, w in rows]
-    for weight, centre in ((weights.effort, last), (weights.smoothness, last + controller._change)):
+    for weight, centre in ((weights.effort, last), (weights.smoothness, last + terms.tick.inputs["thrust_change"])):
         jacobian += list(math.sqrt(weight) * np.eye(6))
         target += list(math.sqrt(weight) * centre)
     return np.linalg.lstsq(np.array(jacobian), np.array(target), rcond=None)[0]
@@ -89,7 +89,7 @@ def test_with_limits_that_do_not_bind_as_well() -> None:
         rng = np.random.default_rng(seed)
         share = float(rng.uniform())
         pack(controller, *random_tick(rng, seed % 3), share=share, last=LAST, window=(FLOOR, CEILING))
-        data = controller.engine.evaluator
+        data = controller.engine.data
         solution = controller.engine.exact.solve(data.p, data.q, data.a, data.lower, data.upper)
         assert solution is not None
         if np.abs(solution[1]).max() < 1e-9:
@@ -140,7 +140,7 @@ class Flight:
 
     def _judge(self, command: Command) -> None:
         engine = self.controller.engine
-        data = engine.evaluator
+        data = engine.data
         self.outcomes.append(command.outcome)
         self.iterations.append(command.iterations)
         self.limited += bool(command.active_limits)
@@ -259,7 +259,7 @@ def test_the_price_of_a_limit_is_the_slope_of_the_cost() -> None:
     (active,) = [entry for entry in command.active_limits if entry.name == name]
     assert active.side == "upper" and active.unit == "N" and active.slack == 0.0
     p, q, _, lower, upper = dense(controller)
-    data, cost = controller.engine.evaluator, []
+    data, cost = controller.engine.data, []
     for change in (-1e-3, 1e-3):
         moved = upper.copy()
         moved[3] += change

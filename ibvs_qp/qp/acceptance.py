@@ -10,7 +10,7 @@ import numpy as np
 from ibvs_qp.command import Outcome
 from ibvs_qp.config import SolverSettings
 from ibvs_qp.qp.assembly import QpTemplate
-from ibvs_qp.qp.evaluator import Evaluator
+from ibvs_qp.qp.evaluator import ProgramData
 from ibvs_qp.qp.exact_solver import ExactSolver
 from ibvs_qp.qp.osqp_solver import MAX_ITERATIONS, SOLVED, SOLVED_INACCURATE, OsqpSolver
 
@@ -37,9 +37,8 @@ class QpEngine:
     accepted when its residuals are small enough to fly; otherwise the exact solver answers in the same tick.
     """
 
-    def __init__(self, template: QpTemplate, settings: SolverSettings) -> None:
-        self.template, self.settings = template, settings
-        self.evaluator = Evaluator(template)
+    def __init__(self, template: QpTemplate, settings: SolverSettings, data: ProgramData) -> None:
+        self.template, self.settings, self.data = template, settings, data
         self.osqp = OsqpSolver(template, settings)
         self.exact = ExactSolver(template)
         self._matrix = template.a_pattern.copy()
@@ -50,9 +49,8 @@ class QpEngine:
         self.osqp.reset()
 
     def solve(self) -> AcceptedSolution | None:
-        """Solve the program of the evaluator's present parameters; None when nobody found a solution."""
-        data = self.evaluator
-        data.evaluate()
+        """Solve the program as its data stands; None when nobody found a solution."""
+        data = self.data
         raw = self.osqp.solve(data.p, data.q, data.a, data.lower, data.upper)
         if raw is None:
             return None
@@ -69,7 +67,7 @@ class QpEngine:
     def _judge(self, status: int, x: np.ndarray, y: np.ndarray) -> Outcome | None:
         if status not in (SOLVED, SOLVED_INACCURATE, MAX_ITERATIONS) or not math.isfinite(x.sum() + y.sum()):
             return None
-        n, data = self._rotors, self.evaluator
+        n, data = self._rotors, self.data
         bounds = zip(x[:n].tolist(), data.lower[:n].tolist(), data.upper[:n].tolist(), strict=True)
         slip = max(max(low - thrust, thrust - high) for thrust, low, high in bounds)
         if status == SOLVED:
@@ -83,17 +81,13 @@ class QpEngine:
 
         Dividing by the diagonal of P instead would hide errors along weak directions, thousands of times softer.
         """
-        data = self.evaluator
-        upper = self.template.p_pattern.copy()
-        upper.data = data.p.copy()
-        full = upper.toarray()
-        full = full + np.triu(full, 1).T
+        data = self.data
         self._matrix.data[:] = data.a
-        return float(np.abs(x + np.linalg.solve(full, data.q + self._matrix.T @ y)).max())
+        return float(np.abs(x + np.linalg.solve(data.hessian(), data.q + self._matrix.T @ y)).max())
 
     def _accept(
         self, x: np.ndarray, y: np.ndarray, outcome: Outcome, iterations: int, seconds: float
     ) -> AcceptedSolution:
-        n, data = self._rotors, self.evaluator
+        n, data = self._rotors, self.data
         thrusts = np.minimum(np.maximum(x[:n], data.lower[:n]), data.upper[:n])
         return AcceptedSolution(thrusts, x, y, outcome, iterations, seconds)
