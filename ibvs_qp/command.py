@@ -94,5 +94,5 @@ class Command:
 
     def __getstate__(self) -> dict[str, Any]:
         """Pickle with the reports made."""
-        self.tasks, self.active_limits  # noqa: B018 - reading makes them
-        return {name: value for name, value in self.__dict__.items() if name != "_explain"}
+        made = {"tasks": self.tasks, "active_limits": self.active_limits}
+        return {name: value for name, value in self.__dict__.items() if name != "_explain"} | made

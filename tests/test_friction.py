@@ -27,16 +27,16 @@ def slide(block: Block, push: float, force: float, speed: float, ticks: int) -> 
     block.touch(push=push)
     wrench = np.array([-push, -force, 0.0, 0.0, 0.0, 0.0])
     for _ in range(ticks):
-        value = block(contact_wrench=wrench, velocity=(0.0, speed, 0.0))
-    return float(value[0])
+        block(contact_wrench=wrench, velocity=(0.0, speed, 0.0))
+    return float(block.tick.outputs["value"][0])
 
 
 @pytest.mark.parametrize("friction", [0.1, 0.3, 0.8])
 def test_friction_while_sliding(friction: float) -> None:
     rng, block = np.random.default_rng(1), estimator()
     for _ in range(1500):
-        found = slide(block, 5.0 + rng.normal(0.0, 0.3), friction * 5.0 + rng.normal(0.0, 0.3), 0.1, 1)
-    assert found == pytest.approx(friction, abs=0.03)
+        slide(block, 5.0 + rng.normal(0.0, 0.3), friction * 5.0 + rng.normal(0.0, 0.3), 0.1, 1)
+    assert float(block.tick.outputs["value"][0]) == pytest.approx(friction, abs=0.03)
 
 
 def test_nothing_is_learnt_while_slow_or_barely_touching_or_free() -> None:

@@ -43,7 +43,7 @@ class ProgramData:
         self._rotors = template.model.rotors
         pattern = template.p_pattern.tocoo()
         self._rows, self._columns = pattern.row, pattern.col
-        self._size = template.p_pattern.shape[0]
+        self._size = len(template.variable_names)
 
     def hessian(self) -> np.ndarray:
         """P in full, (variables, variables)."""

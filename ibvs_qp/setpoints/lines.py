@@ -23,6 +23,8 @@ ERROR_BOUND = 0.10
 LEAST_DEPTH = 0.05
 #: Entries of a slot's input: present, rho, theta, its reference's rho and theta, weight, variance of rho.
 SLOT_INPUTS = 7
+#: Entries of a slot's output "line_k_terms", in this order.
+LINE_TERMS = "error error_rate angle_error angle_rate integral weight rho_error rho_rate".split()
 
 
 @dataclass(frozen=True, kw_only=True)

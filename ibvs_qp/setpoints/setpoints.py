@@ -13,6 +13,7 @@ from ibvs_qp.hold import hold_thrusts
 from ibvs_qp.limits.thrust import thrust_window
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL, Measurement, Reference
 from ibvs_qp.qp.assembly import QpTemplate
+from ibvs_qp.setpoints.lines import LINE_TERMS
 from ibvs_qp.setpoints.model import setpoint_model
 from ibvs_qp.setpoints.pairing import LinePairing, LineTerm
 from ibvs_qp.setpoints.program import program_parameters
@@ -184,9 +185,10 @@ class Setpoints:
     free_down = _number("free", 1, "Share of the direction down that no line fixes.")
 
     @property
-    def plane(self) -> tuple[float, ...]:
+    def plane(self) -> tuple[float, float, float, float]:
         """Wall plane (A, B, C, D) in C, D = -1."""
-        return (*self.tick.outputs["plane"].tolist(), -1.0)
+        a, b, c = self.tick.outputs["plane"].tolist()
+        return a, b, c, -1.0
 
     @property
     def contact_weight(self) -> float:
@@ -204,9 +206,9 @@ class Setpoints:
         terms = []
         for slot, role in self._present:
             rho, theta, tip_x, tip_y, *_ = out[f"line_{slot}"].tolist()
-            terms.append(
-                LineTerm(role, rho, theta, tip_x, tip_y, *out[f"line_{slot}_terms"].tolist(), plane, self._twist)
-            )
+            errors = dict(zip(LINE_TERMS, out[f"line_{slot}_terms"].tolist(), strict=True))
+            place = {"rho": rho, "theta": theta, "tip_x": tip_x, "tip_y": tip_y}
+            terms.append(LineTerm(role=role, plane=plane, twist_map=self._twist, **place, **errors))
         return terms
 
 
