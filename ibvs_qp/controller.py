@@ -8,7 +8,7 @@ from ibvs_qp.command import ActiveLimit, Command, Outcome, TaskReport
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.gate import MeasurementGate, answered_stamp, check_reference
 from ibvs_qp.hold import hold_thrusts
-from ibvs_qp.limits import Limit, ThrustLimit, TiltLimit, YawLimit
+from ibvs_qp.limits import ApproachLimit, Limit, PushCeiling, ThrustLimit, TiltLimit, ViewLimit, YawLimit
 from ibvs_qp.measurement import Measurement, Reference
 from ibvs_qp.qp.acceptance import AcceptedSolution, QpEngine
 from ibvs_qp.qp.assembly import QpTemplate
@@ -40,7 +40,15 @@ def default_tasks(config: ControllerConfig) -> list[Task]:
 
 def default_limits(config: ControllerConfig) -> list[Limit]:
     """The limits of the program; thrust first, its rows are the thrusts themselves."""
-    return [ThrustLimit(), *([TiltLimit(), YawLimit()] if config.barriers else [])]
+    settings = config.limits
+    barriers: list[tuple[bool, Limit]] = [
+        (settings.tilt_barrier, TiltLimit()),
+        (settings.yaw_barrier, YawLimit()),
+        (settings.view_barrier, ViewLimit()),
+        (settings.push_barrier, PushCeiling()),
+        (settings.approach_barrier, ApproachLimit()),
+    ]
+    return [ThrustLimit(), *(limit for wanted, limit in barriers if config.barriers and wanted)]
 
 
 class HybridController:
@@ -144,6 +152,8 @@ class HybridController:
 
         free, outcome = analytic_thrusts(self.setpoints), Outcome.ANALYTIC_FALLBACK
         mode = contact_mode(self.setpoints, self._reference)
+        if self.engine.conflict:
+            rejected += (f"limits: no solution keeps all of {', '.join(self.engine.conflict)}",)
         if not np.isfinite(free).all():
             free, outcome, mode = hold_thrusts(self.config, measurement), Outcome.HOLD, "hold"
         return clipped_command(self.setpoints, int(measurement.stamp_ns), free, outcome, mode, rejected)

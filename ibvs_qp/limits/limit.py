@@ -6,6 +6,9 @@ from abc import ABC, abstractmethod
 
 from ibvs_qp.qp.model import LimitRow, SymbolicModel
 
+#: Bound of a row that does not limit now: finite, so that OSQP never sees the row change its type.
+WIDE = 1e4
+
 
 class Limit(ABC):
     """A bound the program keeps: hard, or soft with a price per squared unit of slack.
@@ -17,3 +20,8 @@ class Limit(ABC):
     @abstractmethod
     def rows(self, model: SymbolicModel) -> list[LimitRow]:
         """Rows of the limit, affine in ``model.thrust``."""
+
+    @staticmethod
+    def price(model: SymbolicModel, price: float) -> float | None:
+        """Price of the slack, None where the user wants barriers without slack."""
+        return None if model.config.limits.hard_barriers else price

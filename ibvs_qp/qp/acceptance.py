@@ -14,6 +14,8 @@ from ibvs_qp.qp.evaluator import ProgramData
 from ibvs_qp.qp.exact_solver import ExactSolver
 from ibvs_qp.qp.osqp_solver import MAX_ITERATIONS, SOLVED, SOLVED_INACCURATE, OsqpSolver
 
+#: Share of the largest entry of an infeasibility certificate above which a row belongs to the conflict.
+CONFLICT_SHARE = 1e-2
 #: Largest thrust-bound violation that clipping may hide in a solved program [N].
 BOUND_SLIP = 1e-2
 
@@ -35,6 +37,9 @@ class QpEngine:
 
     An infeasible solve of OSQP returns x = 2143289344.0, a finite number: only the status tells. A capped solve is
     accepted when its residuals are small enough to fly; otherwise the exact solver answers in the same tick.
+
+    Attributes:
+        conflict: Names of the rows that contradict each other, after a solve that found no feasible point.
     """
 
     def __init__(self, template: QpTemplate, settings: SolverSettings, data: ProgramData) -> None:
@@ -43,6 +48,7 @@ class QpEngine:
         self.exact = ExactSolver(template)
         self._matrix = template.a_pattern.copy()
         self._rotors = template.model.rotors
+        self.conflict: tuple[str, ...] = ()
 
     def reset(self) -> None:
         """As after construction."""
@@ -50,7 +56,7 @@ class QpEngine:
 
     def solve(self) -> AcceptedSolution | None:
         """Solve the program as its data stands; None when nobody found a solution."""
-        data = self.data
+        data, self.conflict = self.data, ()
         raw = self.osqp.solve(data.p, data.q, data.a, data.lower, data.upper)
         if raw is None:
             return None
@@ -59,10 +65,22 @@ class QpEngine:
             return self._accept(raw.x, raw.y, outcome, raw.iterations, raw.seconds)
         exact = self.exact.solve(data.p, data.q, data.a, data.lower, data.upper)
         if exact is None:
+            self.conflict = self._conflicting_rows(raw.certificate)
             self.osqp.reset()
             return None
         self.osqp.warm_start(*exact)
         return self._accept(*exact, Outcome.EXACT_FALLBACK, raw.iterations, raw.seconds)
+
+    def _conflicting_rows(self, certificate: np.ndarray | None) -> tuple[str, ...]:
+        """Names of the rows that no point satisfies together: the non-zeros of OSQP's certificate A' v = 0."""
+        if certificate is None or not np.isfinite(certificate).all():
+            return ()
+        size = np.abs(certificate)
+        return tuple(
+            name
+            for name, entry in zip(self.template.row_names, size, strict=True)
+            if entry > CONFLICT_SHARE * size.max()
+        )
 
     def _judge(self, status: int, x: np.ndarray, y: np.ndarray) -> Outcome | None:
         if status not in (SOLVED, SOLVED_INACCURATE, MAX_ITERATIONS) or not math.isfinite(x.sum() + y.sum()):
