@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ibvs_qp.command import ActiveLimit, Command, Outcome, TaskReport
+from ibvs_qp.command import Command, Outcome
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.gate import MeasurementGate, answered_stamp, check_reference
 from ibvs_qp.hold import hold_thrusts
@@ -14,6 +14,7 @@ from ibvs_qp.qp.acceptance import AcceptedSolution, QpEngine
 from ibvs_qp.qp.assembly import QpTemplate
 from ibvs_qp.qp.evaluator import ProgramData
 from ibvs_qp.qp.model import SymbolicModel
+from ibvs_qp.qp.replay import ACTIVE_PRICE, active_limits, task_reports
 from ibvs_qp.reporting import clipped_command, contact_mode, reach_margin, reach_note
 from ibvs_qp.setpoints import Setpoints
 from ibvs_qp.tasks import (
@@ -27,9 +28,6 @@ from ibvs_qp.tasks import (
     VelocityTask,
     YawTask,
 )
-
-#: A multiplier above this price counts as an active limit [cost per unit].
-ACTIVE_PRICE = 1e-3
 
 
 def default_tasks(config: ControllerConfig) -> list[Task]:
@@ -51,13 +49,17 @@ def default_limits(config: ControllerConfig) -> list[Limit]:
     return [ThrustLimit(), *(limit for wanted, limit in barriers if config.barriers and wanted)]
 
 
+def program_template(config: ControllerConfig) -> QpTemplate:
+    """The program of a configuration: shipped tasks and limits, assembled."""
+    return QpTemplate(SymbolicModel(config), default_tasks(config), default_limits(config))
+
+
 class HybridController:
     """The drop-in controller: measurement and reference in, rotor thrusts and their explanation out."""
 
     def __init__(self, config: ControllerConfig | None = None) -> None:
         self.config = config or ControllerConfig()
-        model = SymbolicModel(self.config)
-        self.template = QpTemplate(model, default_tasks(self.config), default_limits(self.config))
+        self.template = program_template(self.config)
         self.setpoints = Setpoints(self.config, self.template)
         self.engine = QpEngine(self.template, self.config.solver, ProgramData(self.template, self.setpoints.tick.extra))
         self._gate = MeasurementGate(self.config.vehicle.geometry.count)
@@ -114,37 +116,10 @@ class HybridController:
             iterations=solution.iterations,
             solve_time_s=solution.seconds,
         )
-        return command.explained_by(lambda: self._task_reports(stacked, thrusts), lambda: self._active_limits(solution))
-
-    def _task_reports(self, stacked: np.ndarray, thrusts: np.ndarray) -> tuple[TaskReport, ...]:
-        achieved, asked, weights = self.engine.data.report(stacked, thrusts)
-        return tuple(
-            TaskReport(
-                name=row.name,
-                unit=row.unit,
-                weight=float(weights[i]),
-                asked=float(asked[i]),
-                achieved=float(achieved[i]),
-                residual=float(achieved[i] - asked[i]),
-            )
-            for i, row in enumerate(self.template.task_rows)
-            if weights[i] > 0.0
+        return command.explained_by(
+            lambda: task_reports(self.template, self.engine.data, stacked, thrusts),
+            lambda: active_limits(self.template, solution.x, solution.y),
         )
-
-    def _active_limits(self, solution: AcceptedSolution) -> tuple[ActiveLimit, ...]:
-        active = []
-        for i in np.flatnonzero(np.abs(solution.y) > ACTIVE_PRICE):
-            slot = self.template.row_slack[i]
-            active.append(
-                ActiveLimit(
-                    name=self.template.row_names[i],
-                    side="upper" if solution.y[i] > 0 else "lower",
-                    price=abs(float(solution.y[i])),
-                    slack=abs(float(solution.x[slot])) if slot >= 0 else 0.0,
-                    unit=self.template.row_units[i],
-                )
-            )
-        return tuple(active)
 
     def _fallback(self, measurement: Measurement, rejected: tuple[str, ...]) -> Command:
         """The analytic law answers when no solver did."""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ibvs_qp.command import Command, Outcome
+from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import HORIZONTAL, SensorFrame
 from ibvs_qp.pilot import Pilot
 from ibvs_qp.vision.overlay import draw_overlay
@@ -34,6 +35,9 @@ class Recorder:
         self._rows: dict[str, list[Any]] = {}
         self._limits: dict[str, int] = {}
         self._active: list[tuple[int, ...]] = []
+        # Single precision: 1e-7 of a parameter is nothing that a person reads, and half the log.
+        self._program = pilot.controller.engine.data.stacked if isinstance(pilot.controller, HybridController) else None
+        self._programs: list[np.ndarray] = []
         self._contact: list[np.ndarray] = []
         self._painting: list[bool] = []
         self._vision: list[float] = []
@@ -78,6 +82,8 @@ class Recorder:
         add("unallocated", command.unallocated_wrench)
         add("step_us", pilot.controller_time_s * 1e6)
         add("iterations", command.iterations)
+        if self._program is not None:
+            self._programs.append(self._program.astype(np.float32))
         if len(self._active) % CLEARANCE_TICKS == 0:
             self._clearance = plant.propeller_clearance
         add("propeller_clearance", self._clearance)
@@ -103,8 +109,9 @@ class Recorder:
             self._events.append(Event(t=when, kind=kind, text=text))
         self._logged = len(log)
         for name in command.rejected:
-            if name not in self._rejected:
-                self._rejected.add(name)
+            kind = name.split(":")[0]  # its numbers may change from tick to tick
+            if kind not in self._rejected:
+                self._rejected.add(kind)
                 self._events.append(Event(t=time_s, kind="rejected", text=name))
 
     def trace(self, wall_time_s: float) -> Trace:
@@ -117,6 +124,8 @@ class Recorder:
         for tick, columns in enumerate(self._active):
             active[tick, list(columns)] = True
         arrays["active"] = active
+        if self._programs:
+            arrays["program"] = np.array(self._programs)
         vehicle = self._pilot.config.controller.vehicle
         arrays["thrust_min"], arrays["thrust_max"] = vehicle.thrust_min, vehicle.thrust_max
         arrays["vision_ms"] = np.array(self._vision, float)
@@ -137,4 +146,5 @@ class Recorder:
             canvas_px_per_m=canvas.pixels_per_m,
             coverage_mask=canvas.coverage,
             pictures=self._pictures,
+            preset=self._pilot.config.to_toml(),
         )
