@@ -3,8 +3,15 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from ibvs_qp.qp.model import LimitRow, SymbolicModel
+
+if TYPE_CHECKING:
+    from ibvs_qp.setpoints import Setpoints
 
 
 class Limit(ABC):
@@ -17,3 +24,11 @@ class Limit(ABC):
     @abstractmethod
     def rows(self, model: SymbolicModel) -> list[LimitRow]:
         """Rows of the limit, affine in ``model.thrust``."""
+
+    def pack(self, values: Mapping[str, np.ndarray], terms: Setpoints) -> None:  # noqa: B027 - optional
+        """Write this tick's values of the limit's own parameters, as `Task.pack` does.
+
+        Args:
+            values: Parameters of the program by name.
+            terms: What is measured and wanted at this tick.
+        """
