@@ -159,7 +159,7 @@ class PushReachTable:
     """The same question for one vehicle and tip, fast enough for every tick: load, direction and limits may change.
 
     One matrix product gives the room between every pair of planes and how fast the push uses it up; plain numbers do
-    the rest (about 6 us for six rotors).
+    the rest: a few microseconds, for six rotors and for eight.
 
     Args:
         rotors: The rotors.
