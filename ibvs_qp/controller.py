@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ibvs_qp.command import Command, Outcome
@@ -49,17 +51,29 @@ def default_limits(config: ControllerConfig) -> list[Limit]:
     return [ThrustLimit(), *(limit for wanted, limit in barriers if config.barriers and wanted)]
 
 
-def program_template(config: ControllerConfig) -> QpTemplate:
-    """The program of a configuration: shipped tasks and limits, assembled."""
-    return QpTemplate(SymbolicModel(config), default_tasks(config), default_limits(config))
+def program_template(config: ControllerConfig, tasks: Sequence[Task] = (), limits: Sequence[Limit] = ()) -> QpTemplate:
+    """The program of a configuration: shipped tasks and limits and further ones, assembled."""
+    return QpTemplate(SymbolicModel(config), [*default_tasks(config), *tasks], [*default_limits(config), *limits])
 
 
 class HybridController:
-    """The drop-in controller: measurement and reference in, rotor thrusts and their explanation out."""
+    """The drop-in controller: measurement and reference in, rotor thrusts and their explanation out.
 
-    def __init__(self, config: ControllerConfig | None = None) -> None:
+    Args:
+        config: Everything it needs; the default flies the Tarot T960.
+        tasks: Further tasks beside the shipped ones (docs/extending.md).
+        limits: Further limits.
+
+    Raises:
+        ConfigError: When a row is not affine in the thrusts, or the configuration is refused.
+    """
+
+    def __init__(
+        self, config: ControllerConfig | None = None, *, tasks: Sequence[Task] = (), limits: Sequence[Limit] = ()
+    ) -> None:
         self.config = config or ControllerConfig()
-        self.template = program_template(self.config)
+        self._further = (*tasks, *limits)
+        self.template = program_template(self.config, tasks, limits)
         self.setpoints = Setpoints(self.config, self.template)
         self.engine = QpEngine(self.template, self.config.solver, ProgramData(self.template, self.setpoints.tick.extra))
         self._gate = MeasurementGate(self.config.vehicle.geometry.count)
@@ -90,6 +104,8 @@ class HybridController:
             return self._hold(measurement, rejected)
         if self._gate.restarted:
             self.setpoints.restart()
+        for part in self._further:
+            part.pack(self.setpoints.tick.inputs, self.setpoints)
         self.setpoints.update(checked, reference)
         solution = self.engine.solve()
         if solution is None:

@@ -10,7 +10,7 @@ import numpy as np
 from ibvs_qp.command import Outcome
 from ibvs_qp.config import SolverSettings
 from ibvs_qp.qp.assembly import QpTemplate
-from ibvs_qp.qp.evaluator import ProgramData
+from ibvs_qp.qp.evaluator import Evaluator, ProgramData
 from ibvs_qp.qp.exact_solver import ExactSolver
 from ibvs_qp.qp.osqp_solver import MAX_ITERATIONS, SOLVED, SOLVED_INACCURATE, OsqpSolver
 
@@ -39,11 +39,12 @@ class QpEngine:
     accepted when its residuals are small enough to fly; otherwise the exact solver answers in the same tick.
 
     Attributes:
+        data: Data of the program; on its own an `Evaluator` whose parameters are yours to write.
         conflict: Names of the rows that contradict each other, after a solve that found no feasible point.
     """
 
-    def __init__(self, template: QpTemplate, settings: SolverSettings, data: ProgramData) -> None:
-        self.template, self.settings, self.data = template, settings, data
+    def __init__(self, template: QpTemplate, settings: SolverSettings, data: ProgramData | None = None) -> None:
+        self.template, self.settings, self.data = template, settings, data or Evaluator(template)
         self.osqp = OsqpSolver(template, settings)
         self.exact = ExactSolver(template)
         self._matrix = template.a_pattern.copy()
@@ -57,6 +58,7 @@ class QpEngine:
     def solve(self) -> AcceptedSolution | None:
         """Solve the program as its data stands; None when nobody found a solution."""
         data, self.conflict = self.data, ()
+        data.evaluate()
         raw = self.osqp.solve(data.p, data.q, data.a, data.lower, data.upper)
         if raw is None:
             return None

@@ -8,7 +8,7 @@ import numpy as np
 
 from ibvs_qp.command import ActiveLimit, TaskReport
 from ibvs_qp.qp.assembly import QpTemplate
-from ibvs_qp.qp.evaluator import BufferedFunction, ProgramData
+from ibvs_qp.qp.evaluator import Evaluator, ProgramData
 from ibvs_qp.qp.exact_solver import ExactSolver
 
 #: A multiplier above this price counts as an active limit [cost per unit].
@@ -74,8 +74,7 @@ class TickReplay:
 
     def __init__(self, template: QpTemplate) -> None:
         self._template = template
-        self._values = BufferedFunction(template.values)
-        self._data = ProgramData(template, [*self._values.outputs, self._values.inputs[0]])
+        self._data = Evaluator(template)
         self._exact = ExactSolver(template)
 
     def explain(self, stacked: np.ndarray) -> Explanation | None:
@@ -86,7 +85,7 @@ class TickReplay:
         """
         data, template = self._data, self._template
         data.stacked[:] = stacked
-        self._values()
+        data.evaluate()
         solution = self._exact.solve(data.p, data.q, data.a, data.lower, data.upper)
         if solution is None:
             return None
