@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from ibvs_qp.loop_margin import BrushSettings, require_margin
 from ibvs_qp.settings import choice, dump_toml, load_toml, setting, validate
 from ibvs_qp.vehicle import VehicleParams
 
@@ -99,10 +100,10 @@ class Weights:
     line: float = setting(100.0, "line rows; 0.1 image units/s^2 = 5 cm/s^2 at half a metre", low=0.0, high=1e6)
     line_angle: float = setting(0.05, "angle rows; yield to level flight by four orders", low=0.0, high=1e6)
     push: float = setting(
-        4.0, "push row; 0.5 N; below yaw and level: an unreachable push is given up first", low=0.0, high=1e6
+        0.1, "push row; 3 N: far below all others, so that an unreachable push is given up first", low=0.0, high=1e6
     )
     level: float = setting(400.0, "roll and pitch rows; 0.05 rad/s^2", low=0.0, high=1e6)
-    yaw: float = setting(100.0, "yaw row; 0.1 rad/s^2", low=0.0, high=1e6)
+    yaw: float = setting(1000.0, "yaw row; 0.03 rad/s^2", low=0.0, high=1e6)
     velocity: float = setting(100.0, "free velocity rows; 0.1 m/s^2", low=0.0, high=1e6)
     height: float = setting(
         1e4, "height row; 0.01 m/s^2 = 0.06 N: what cannot be pushed must not lift the vehicle", low=0.0, high=1e6
@@ -135,7 +136,7 @@ class LimitSettings:
     view_price: float = setting(4000.0, "slack price of the line-in-view barriers", low=1e-3, high=1e8)
     view_rate_1_s: float = setting(2.0, "how fast the border may be approached", unit="1/s", low=0.1, high=100.0)
     push_share: float = setting(1.5, "push ceiling over the push reference", low=1.0, high=100.0)
-    push_price: float = setting(40.0, "slack price of the push ceiling; ten times the push row", low=1e-3, high=1e8)
+    push_price: float = setting(40.0, "slack price of the push ceiling; far above the push row", low=1e-3, high=1e8)
     approach_share: float = setting(1.5, "closing speed over that of the approach", low=1.0, high=100.0)
     approach_rate_1_s: float = setting(
         10.0, "how fast the closing speed may reach its bound", unit="1/s", low=0.1, high=100.0
@@ -186,6 +187,7 @@ class ControllerConfig:
     weights: Weights = field(default_factory=Weights)
     limits: LimitSettings = field(default_factory=LimitSettings)
     solver: SolverSettings = field(default_factory=SolverSettings)
+    brush: BrushSettings = field(default_factory=BrushSettings)
     line_profile: str = choice(
         "tip",
         "error of the line rows: at the point where the tip meets the wall, or the paper's, rho at the image centre",
@@ -205,8 +207,10 @@ class ControllerConfig:
 
     @classmethod
     def from_toml(cls, file: str | Path) -> ControllerConfig:
-        """Read a preset; raises ConfigError naming field, value, unit and allowed range."""
-        return load_toml(cls, file)
+        """Read a preset; ConfigError names field, value, unit and allowed range, also where the contact would ring."""
+        config = load_toml(cls, file)
+        require_margin(config, config.brush)
+        return config
 
     def to_toml(self) -> str:
         """Write the configuration as TOML text."""

@@ -21,6 +21,7 @@ from ibvs_qp.reporting import clipped_command, contact_mode, reach_margin, reach
 from ibvs_qp.setpoints import Setpoints
 from ibvs_qp.tasks import (
     EffortTask,
+    HeightTask,
     LevelTask,
     LineTask,
     PushTask,
@@ -35,7 +36,9 @@ from ibvs_qp.tasks import (
 def default_tasks(config: ControllerConfig) -> list[Task]:
     """The tasks of the program, in the order of their rows."""
     lines: list[Task] = [LineTask(slot) for slot in range(config.line_slots)]
-    return [*lines, PushTask(), StandoffTask(), LevelTask(), YawTask(), VelocityTask(), EffortTask(), SmoothnessTask()]
+    along: list[Task] = [PushTask(), StandoffTask()]
+    height: list[Task] = [] if config.line_profile == "paper" else [HeightTask()]
+    return [*lines, *along, LevelTask(), YawTask(), VelocityTask(), *height, EffortTask(), SmoothnessTask()]
 
 
 def default_limits(config: ControllerConfig) -> list[Limit]:

@@ -29,6 +29,7 @@ def program_parameters(signals: Signals, config: ControllerConfig) -> dict[str, 
         "yaw": ca.vertcat(out["angular"][2], weights.yaw),
         "velocity_right": ca.vertcat(out["velocity_command"][0], weights.velocity * free[0]),
         "velocity_down": ca.vertcat(out["velocity_command"][1], weights.velocity * free[1]),
+        "height": ca.vertcat(out["height_command"], weights.height),
         "tilt_state": ca.vertcat(roll, pitch, rate[0], rate[1]),
         "yaw_state": ca.vertcat(yaw, rate[2]),
     }
