@@ -46,7 +46,7 @@ class QuietRotors(Task):
 class ClimbLimit(Limit):
     """Upward acceleration stays below a bound [m/s^2]; soft, so that it can never make the program infeasible."""
 
-    def __init__(self, bound: float, price: float = 4000.0) -> None:
+    def __init__(self, bound: float, price: float = 4e4) -> None:
         self.bound, self.price_of_slack = bound, price
 
     def rows(self, model: SymbolicModel) -> list[LimitRow]:

@@ -105,7 +105,7 @@ class Weights:
     yaw: float = setting(100.0, "yaw row; 0.1 rad/s^2", low=0.0, high=1e6)
     velocity: float = setting(100.0, "free velocity rows; 0.1 m/s^2", low=0.0, high=1e6)
     height: float = setting(
-        1e4, "height row; 0.01 m/s^2 = 0.06 N: what cannot be pushed must not lift the vehicle", low=0.0, high=1e6
+        1.6e3, "height row; 0.025 m/s^2 = 0.15 N: what cannot be pushed must not lift the vehicle", low=0.0, high=1e6
     )
     effort: float = setting(1e-3, "thrust away from the last one; 30 N", low=1e-9, high=1e3)
     smoothness: float = setting(1e-3, "change of the thrust step; 30 N", low=0.0, high=1e3)
