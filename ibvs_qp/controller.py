@@ -75,7 +75,6 @@ class HybridController:
         self, config: ControllerConfig | None = None, *, tasks: Sequence[Task] = (), limits: Sequence[Limit] = ()
     ) -> None:
         self.config = config or ControllerConfig()
-        self._further = (*tasks, *limits)
         self.template = program_template(self.config, tasks, limits)
         self.setpoints = Setpoints(self.config, self.template)
         self.engine = QpEngine(self.template, self.config.solver, ProgramData(self.template, self.setpoints.tick.extra))
@@ -107,8 +106,6 @@ class HybridController:
             return self._hold(measurement, rejected)
         if self._gate.restarted:
             self.setpoints.restart()
-        for part in self._further:
-            part.pack(self.setpoints.tick.inputs, self.setpoints)
         self.setpoints.update(checked, reference)
         solution = self.engine.solve()
         if solution is None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import casadi as ca
 
 from ibvs_qp.config import ControllerConfig
-from ibvs_qp.frames import R_BODY_CAMERA
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL
 from ibvs_qp.setpoints.lines import SlotLine, camera_view, line_slot
 from ibvs_qp.setpoints.push import WINDUP_FORCE
@@ -15,8 +14,6 @@ from ibvs_qp.setpoints.wall import Wall
 
 #: Bound of the velocity integral as an acceleration [m/s^2].
 VELOCITY_INTEGRAL_BOUND = 0.8
-#: Least change of a level line's error per metre of height [1/m]; a line of 60 degrees has lost half of it.
-LEAST_SLOPE = 0.5
 #: Farther from the image centre than any line that is let in [normalised].
 FAR = 1e3
 
@@ -46,8 +43,6 @@ def motion_in_plane(
         for axis, direction in enumerate((wall.right, wall.down))
     ]
     signals.output("velocity_command", ca.vertcat(*commands))
-    level = [1.0 - vertical[slot] for slot in range(config.line_slots)]
-    _height_wish(signals, config, lines, level, wall, commands)
 
 
 def _velocity_command(
@@ -92,31 +87,3 @@ def _one_angle_row(signals: Signals, config: ControllerConfig, lines: list[SlotL
         chosen = line.present * (ca.fabs(line.rho) <= nearest) * (1.0 - taken)
         taken = taken + chosen
         signals.output(f"line_{slot}", ca.vertcat(row[:7], chosen * config.weights.line * line.weight))
-
-
-def _height_wish(
-    signals: Signals,
-    config: ControllerConfig,
-    lines: list[SlotLine],
-    belongs: list[ca.SX],
-    wall: Wall,
-    velocity: list[ca.SX],
-) -> None:
-    r"""Acceleration down the wall that the level line (or the velocity law) asks for already [m/s^2].
-
-    The line asks :math:`L_v R^T \dot V + L_\omega(\dot\Omega) = \ddot e`; what the wanted turn and the wanted motion
-    to the right take of it goes off first, so that on a tick without limits nothing new is asked.
-    """
-    share = signals.input("contact_weight")
-    into, position = ca.DM(R_BODY_CAMERA.T), ca.DM(config.vehicle.camera_position_m)
-    turn = signals.outputs["angular"] * (1.0 - share * (1.0 - config.gains.line_turn_share))
-    wish = velocity[1]
-    for line, level in zip(lines, belongs, strict=True):
-        linear, angular = line.row[:3], line.row[3:]
-        per_down = ca.dot(linear, into @ wall.down)
-        others = ca.dot(linear, into @ (wall.right * velocity[0] + ca.cross(turn, position)))
-        others = others + ca.dot(angular, into @ turn)
-        sound = ca.logic_and(level, ca.fabs(per_down) > LEAST_SLOPE)
-        wanted = (line.wanted - others) / ca.if_else(sound, per_down, 1.0)
-        wish = wish + ca.if_else(sound, line.weight, 0.0) * (wanted - velocity[1])
-    signals.output("height_command", wish)

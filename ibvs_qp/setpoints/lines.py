@@ -12,7 +12,6 @@ from ibvs_qp.frames import R_BODY_CAMERA, to_camera
 from ibvs_qp.setpoints.sensed import Body, Touch, clamp
 from ibvs_qp.setpoints.signals import Signals
 from ibvs_qp.setpoints.wall import Wall
-from ibvs_qp.tasks.line import symbolic_line_rows
 
 #: Bound of the integral of a line error, as the image acceleration it commands [1/s^2].
 INTEGRAL_BOUND = 0.6
@@ -74,18 +73,13 @@ def camera_view(
 
 @dataclass(frozen=True, kw_only=True)
 class SlotLine:
-    """What the line of a slot means to the others: 1 if present, its weight, place, own rate, wish and row.
-
-    The row is that of the error at the tip, on the camera's twist, (6,).
-    """
+    """What the line of a slot means to the others: 1 if present, its weight, place and own rate."""
 
     present: ca.SX
     weight: ca.SX
     rho: ca.SX
     theta: ca.SX
     rate: ca.SX
-    wanted: ca.SX
-    row: ca.SX
 
 
 def line_slot(
@@ -125,9 +119,7 @@ def line_slot(
     signals.output(name, ca.vertcat(*row))
     terms = (bounded, rate, angle_error, angle_rate, integral, weight, rho_error, rho_rate)
     signals.output(f"{name}_terms", ca.vertcat(*terms))
-    row_rho, row_theta = symbolic_line_rows(rho, theta, view.plane)
-    at_tip = row_rho + (view.x * s - view.y * c) * row_theta
-    return SlotLine(present=present, weight=weight, rho=rho, theta=theta, rate=own_rate, wanted=wanted, row=at_tip.T)
+    return SlotLine(present=present, weight=weight, rho=rho, theta=theta, rate=own_rate)
 
 
 def _rates(
