@@ -12,11 +12,11 @@ from ibvs_qp.gate import MeasurementGate, answered_stamp, check_reference
 from ibvs_qp.hold import hold_thrusts
 from ibvs_qp.limits import ApproachLimit, Limit, PushCeiling, ThrustLimit, TiltLimit, ViewLimit, YawLimit
 from ibvs_qp.measurement import Measurement, Reference
-from ibvs_qp.qp.acceptance import AcceptedSolution, QpEngine
+from ibvs_qp.qp.acceptance import ACTIVE_PRICE, AcceptedSolution, QpEngine
 from ibvs_qp.qp.assembly import QpTemplate
 from ibvs_qp.qp.evaluator import ProgramData
 from ibvs_qp.qp.model import SymbolicModel
-from ibvs_qp.qp.replay import ACTIVE_PRICE, active_limits, task_reports
+from ibvs_qp.qp.replay import active_limits, task_reports
 from ibvs_qp.reporting import clipped_command, contact_mode, reach_margin, reach_note
 from ibvs_qp.setpoints import Setpoints
 from ibvs_qp.tasks import (

@@ -46,7 +46,7 @@ def test_recorded_ticks_solve_to_the_thrusts_that_flew(run: tuple[Path, Trace]) 
 
 def test_for_a_person_and_as_json(run: tuple[Path, Trace], capsys: pytest.CaptureFixture[str]) -> None:
     folder, trace = run
-    at = float(trace.t[len(trace.t) // 2])
+    at = float(trace.t[np.flatnonzero(trace.contact_weight > 0.9)[0]])
     assert main(["explain", str(folder), "--at", f"{at:.3f}"]) == 0
     told = capsys.readouterr().out
     for word in ("push", "line_0", "pitch", "mid_right", "Thrusts", "damping ratio"):

@@ -6,11 +6,21 @@ import math
 
 import numpy as np
 import pytest
-from controller_scenes import Wall, attitude, dense, image_line, line_references, measured, pack, random_tick
+from controller_scenes import (
+    Wall,
+    attitude,
+    dense,
+    exact_thrusts,
+    image_line,
+    line_references,
+    measured,
+    pack,
+    random_tick,
+)
 from scipy.spatial.transform import Rotation
 
 from allocation import control_effectiveness
-from ibvs_qp.config import ControllerConfig
+from ibvs_qp.config import ControllerConfig, Weights
 from ibvs_qp.controller import HybridController
 from ibvs_qp.frames import R_BODY_CAMERA, align_line
 from ibvs_qp.limits.barrier import barrier_bounds
@@ -131,6 +141,8 @@ def test_every_other_task_row_by_hand(controller: HybridController, share: float
             "velocity_right": (terms.right @ motion[:3], terms.velocity_command[0], right),
             "velocity_down": (terms.down @ motion[:3], terms.velocity_command[1], down),
         }
+        height = float(controller.engine.data.parameters["height"][0])
+        expected["height"] = (terms.down @ motion[:3], height, weights.height)
         for i, name in enumerate(controller.config.vehicle.geometry.names):
             expected[f"effort_{name}"] = (thrusts[i], last[i], weights.effort)
             expected[f"smooth_{name}"] = (thrusts[i], last[i], weights.smoothness)
@@ -144,6 +156,20 @@ def test_every_other_task_row_by_hand(controller: HybridController, share: float
         assert set(found) == set(expected) | {
             f"line_{slot}{end}" for slot in range(controller.config.line_slots) for end in ("", "_angle")
         }
+
+
+@pytest.mark.parametrize("lines", [0, 1, 2])
+def test_height_row_asks_for_nothing_new_where_nothing_is_limited(lines: int) -> None:
+    wide = {"barriers": False}
+    with_it = HybridController(ControllerConfig(**wide))
+    without = HybridController(ControllerConfig(weights=Weights(height=0.0), **wide))
+    for seed in range(10):
+        thrusts = []
+        for controller in (with_it, without):
+            controller.reset()
+            pack(controller, *random_tick(np.random.default_rng(seed), lines))
+            thrusts.append(exact_thrusts(controller))
+        np.testing.assert_allclose(thrusts[0], thrusts[1], atol=0.05)  # of 11 N
 
 
 def test_signs_of_the_wishes(controller: HybridController) -> None:

@@ -12,8 +12,13 @@ from ibvs_qp.config import SolverSettings
 from ibvs_qp.qp.assembly import QpTemplate
 from ibvs_qp.qp.evaluator import Evaluator, ProgramData
 from ibvs_qp.qp.exact_solver import ExactSolver
-from ibvs_qp.qp.osqp_solver import MAX_ITERATIONS, SOLVED, SOLVED_INACCURATE, OsqpSolver
+from ibvs_qp.qp.osqp_solver import MAX_ITERATIONS, SOLVED, SOLVED_INACCURATE, OsqpSolver, RawSolution
+from ibvs_qp.qp.polish import polished
 
+#: A multiplier above this price counts as an active limit [cost per unit].
+ACTIVE_PRICE = 1e-3
+#: Gradient that unlimited thrusts may keep [cost per N]: the softest direction has a curvature of 0.1, so 2 mN.
+COARSE_GRADIENT = 2e-4
 #: Share of the largest entry of an infeasibility certificate above which a row belongs to the conflict.
 CONFLICT_SHARE = 1e-2
 #: Largest thrust-bound violation that clipping may hide in a solved program [N].
@@ -33,7 +38,7 @@ class AcceptedSolution:
 
 
 class QpEngine:
-    """OSQP behind an acceptance test, DAQP behind OSQP.
+    """OSQP behind an acceptance test, its active rows solved exactly, DAQP behind OSQP.
 
     An infeasible solve of OSQP returns x = 2143289344.0, a finite number: only the status tells. A capped solve is
     accepted when its residuals are small enough to fly; otherwise the exact solver answers in the same tick.
@@ -63,6 +68,10 @@ class QpEngine:
         if raw is None:
             return None
         outcome = self._judge(raw.status, raw.x, raw.y)
+        if outcome is not None and self.settings.polish and self._coarse(raw, outcome):
+            exact = polished(data, raw.x, raw.y)
+            if exact is not None:
+                return self._accept(*exact, Outcome.SOLVED, raw.iterations, raw.seconds)
         if outcome is not None:
             return self._accept(raw.x, raw.y, outcome, raw.iterations, raw.seconds)
         exact = self.exact.solve(data.p, data.q, data.a, data.lower, data.upper)
@@ -72,6 +81,12 @@ class QpEngine:
             return None
         self.osqp.warm_start(*exact)
         return self._accept(*exact, Outcome.EXACT_FALLBACK, raw.iterations, raw.seconds)
+
+    def _coarse(self, raw: RawSolution, outcome: Outcome) -> bool:
+        """Whether the iterate may be wrong in the third decimal: rows bind, OSQP stopped early, or P x + q is left."""
+        if outcome is not Outcome.SOLVED or float(np.abs(raw.y).max()) > ACTIVE_PRICE:
+            return True
+        return float(np.abs(self.data.hessian() @ raw.x + self.data.q).max()) > COARSE_GRADIENT
 
     def _conflicting_rows(self, certificate: np.ndarray | None) -> tuple[str, ...]:
         """Names of the rows that no point satisfies together: the non-zeros of OSQP's certificate A' v = 0."""

@@ -43,6 +43,8 @@ class ProgramData:
         self._rotors = template.model.rotors
         pattern = template.p_pattern.tocoo()
         self._rows, self._columns = pattern.row, pattern.col
+        pattern = template.a_pattern.tocoo()
+        self._row_of, self._column_of = pattern.row, pattern.col
         self._size = len(template.variable_names)
 
     def evaluate(self) -> None:
@@ -53,6 +55,12 @@ class ProgramData:
         full = np.zeros((self._size, self._size))
         full[self._rows, self._columns] = self.p
         full[self._columns, self._rows] = self.p
+        return full
+
+    def rows(self) -> np.ndarray:
+        """A in full, (rows, variables)."""
+        full = np.zeros((len(self.lower), self._size))
+        full[self._row_of, self._column_of] = self.a
         return full
 
     def unlimited_thrusts(self) -> np.ndarray:

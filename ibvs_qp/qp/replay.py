@@ -7,12 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ibvs_qp.command import ActiveLimit, TaskReport
+from ibvs_qp.qp.acceptance import ACTIVE_PRICE
 from ibvs_qp.qp.assembly import QpTemplate
 from ibvs_qp.qp.evaluator import Evaluator, ProgramData
 from ibvs_qp.qp.exact_solver import ExactSolver
-
-#: A multiplier above this price counts as an active limit [cost per unit].
-ACTIVE_PRICE = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,7 +96,7 @@ class TickReplay:
         return Explanation(
             thrusts=thrusts,
             tasks=tasks,
-            cost=tuple((cost / max(float(cost.sum()), 1e-12)).tolist()),
+            cost=tuple((cost / (float(cost.sum()) or 1.0)).tolist()),
             active_limits=tuple(limits),
             unallocated_wrench=effectiveness @ (data.unlimited_thrusts() - thrusts) if limits else np.zeros(6),
         )
