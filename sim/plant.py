@@ -56,7 +56,7 @@ class Plant(PlantReadings):
         self._lags = scene.vehicle.motor_lag_up_s, scene.vehicle.motor_lag_down_s
         self._centre, self._tip = np.array(scene.vehicle.com_offset_m), np.array(self.vehicle.tip_position_m)
         self._centre_list = self._centre.tolist()
-        self._clearance = PropellerClearance(BoardGeometry(scene), self.vehicle)
+        self.clearance = PropellerClearance(BoardGeometry(scene), self.vehicle)
         drag = self.vehicle.linear_drag_n_s_m
         self.wind = Wind(scene.wind, drag, TICK_NS * 1e-9, stream(seed, "wind"))
         # Moment arm from the bare vehicle's centre of mass, where MuJoCo applies forces, to the whole one's.
@@ -110,7 +110,7 @@ class Plant(PlantReadings):
         found = self._ids.contact.start
         self._pushes = [row[found + 1] if row[found] > 0.0 else 0.0 for row in sensors]
         self._refresh()
-        self.crashed = self.crashed or crash_reason(self._position, self._rotation, self._clearance)
+        self.crashed = self.crashed or crash_reason(self._position, self._rotation, self.clearance)
 
     def _apply_air(self) -> None:
         """Drag and gusts at the true centre of mass, as force and moment at the bare vehicle's."""

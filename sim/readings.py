@@ -29,7 +29,7 @@ class PlantReadings:
     _centre: np.ndarray
     _tip: np.ndarray
     _ids: ModelIds
-    _clearance: PropellerClearance
+    clearance: PropellerClearance
 
     @property
     def motion(self) -> tuple[float, ...]:
@@ -89,6 +89,11 @@ class PlantReadings:
         return self._act.copy()
 
     @property
+    def motor_thrusts(self) -> np.ndarray:
+        """`thrusts_actual` as MuJoCo holds it: not to be kept nor written."""
+        return self._act
+
+    @property
     def specific_force(self) -> np.ndarray:
         """What a perfect accelerometer at the body origin reads, mean over the last tick, FRD [m/s^2], (3,)."""
         return np.array(self.felt)
@@ -142,9 +147,12 @@ class PlantReadings:
     @property
     def propeller_clearance(self) -> float:
         """Smallest distance of any propeller disc to the board's face or, beside the board, to the wall [m]."""
-        return self._clearance.distance(self.position, self.rotation)
+        return self.clearance.distance(self.position, self.rotation)
 
     def _velocity_of(self, point: Sequence[float]) -> Row:
         """Velocity of a point of the body, world NED [m/s]."""
-        (vx, vy, vz), (tx, ty, tz) = self._world_velocity, turned(self._rotation, cross_product(self._angular_velocity, point))
+        (vx, vy, vz), (tx, ty, tz) = (
+            self._world_velocity,
+            turned(self._rotation, cross_product(self._angular_velocity, point)),
+        )
         return vx + tx, vy + ty, vz + tz
