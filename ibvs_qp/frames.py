@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 
-from ibvs_qp.vectors import rotation_rows
+from ibvs_qp.vectors import down_row, rotation_rows
 
 #: Standard gravity [m/s^2].
 GRAVITY = 9.81
@@ -50,8 +50,7 @@ def rotation_from_quaternion(quaternion: np.ndarray) -> np.ndarray:
 
 def down_in_body(quaternion: np.ndarray) -> tuple[float, float, float]:
     """Unit vector of gravity (world down) in the body frame: the third row of the rotation B to I."""
-    w, x, y, z = quaternion.tolist()
-    return 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)
+    return down_row(*quaternion.tolist())
 
 
 def roll_pitch(quaternion: np.ndarray) -> tuple[float, float]:

@@ -16,6 +16,11 @@ def rotation_rows(w: float, x: float, y: float, z: float) -> tuple[Row, Row, Row
     )
 
 
+def down_row(w: float, x: float, y: float, z: float) -> Row:
+    """Unit vector of gravity in the body for an attitude B to I: the last of its rotation's rows."""
+    return 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)
+
+
 def cross_product(a: Sequence[float], b: Sequence[float]) -> Row:
     """Cross product a x b."""
     (ax, ay, az), (bx, by, bz) = a, b

@@ -89,9 +89,8 @@ class Recorder:
             plant.motor_thrusts,
             plant.friction,
         )
-        measurement = pilot.measurement
-        known = measurement is not None and measurement.velocity is not None
-        row[velocity] = measurement.velocity if known else math.nan
+        known = pilot.measurement.velocity if pilot.measurement is not None else None
+        row[velocity] = known if known is not None else math.nan
         row[unallocated], row[pushes] = command.unallocated_wrench, plant.pushes
         self._painting.append(painting)
         self._active.append(
