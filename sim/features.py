@@ -28,14 +28,19 @@ from sim.line_projection import (
 )
 from sim.painted_edges import BIN_M, PaintedEdges
 from sim.scene import Scene
+from sim.streams import Normals
 
 #: Noise of the plane: distance [m] and direction of the normal [rad].
 SIGMA_DISTANCE_M, SIGMA_NORMAL = 0.001, math.radians(0.1)
 #: Noise of the velocity per axis [m/s].
 SIGMA_VELOCITY_M_S = 0.003
+_VELOCITY_COVARIANCE = SIGMA_VELOCITY_M_S**2 * np.eye(3)
+_VELOCITY_COVARIANCE.flags.writeable = False  # shared by all frames
 #: Track identities: board edges by name, rows from `_FIRST_ROW_TRACK`.
 BOARD_TRACKS = {"bottom": 1, "right": 2, "top": 3, "left": 4}
 _FIRST_ROW_TRACK = 10
+#: Corners at the ends of every edge: bottom left 0, bottom right 1, top right 2, top left 3.
+_EDGES = {"bottom": [0, 1], "right": [1, 2], "top": [3, 2], "left": [0, 3]}
 #: How far above an edge a point lies for certain on its upper side [m].
 _ABOVE_M = 0.02
 
@@ -62,11 +67,14 @@ class GeometricFeatures:
         self._geometry = BoardGeometry(scene)
         self.intrinsics = camera_intrinsics(scene.camera)
         own, extra = np.random.SeedSequence([seed, 0xFEA7]).spawn(2)
-        self._rng, self._extra = np.random.default_rng(own), np.random.default_rng(extra)
+        self._normals, self._extra = Normals(np.random.default_rng(own)), np.random.default_rng(extra)
         self._hidden = vehicle_layer(scene, vehicle, self.intrinsics, np.random.default_rng(0)).mask
         self._schedule = Schedule(scene.camera.rate_hz, scene.camera.latency_s)
         fx, fy, _, _ = self.intrinsics
-        self._half_view = np.array([0.5 * scene.camera.width / fx, 0.5 * scene.camera.height / fy])
+        self._half_view = 0.5 * scene.camera.width / fx, 0.5 * scene.camera.height / fy
+        width, height = scene.board.width_m, scene.board.height_m
+        corners = np.array([(0.0, 0.0), (width, 0.0), (width, height), (0.0, height), (0.5 * width, 0.5 * height)])
+        self._outline = self._world(corners[:, 0], corners[:, 1])
 
     def tick(
         self, now_ns: int, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, velocity_body: np.ndarray
@@ -96,13 +104,13 @@ class GeometricFeatures:
         velocity = np.array(velocity_body, float)
         if self._noise:
             lines = [self._blurred(line) for line in lines]
-            velocity += SIGMA_VELOCITY_M_S * self._rng.standard_normal(3)
+            velocity += SIGMA_VELOCITY_M_S * np.array(self._normals.take(3))
         frame = FeatureFrame(
             lines=tuple(lines),
             plane=(a, b, c, -1.0),
             stamp_ns=stamp_ns,
             velocity=velocity,
-            velocity_covariance=SIGMA_VELOCITY_M_S**2 * np.eye(3),
+            velocity_covariance=_VELOCITY_COVARIANCE,
             velocity_stamp_ns=stamp_ns,
         )
         return add_sigma_vs(frame, self.scene.features.sigma_vs, self._extra) if self._noise else frame
@@ -112,20 +120,12 @@ class GeometricFeatures:
         return np.concatenate((np.zeros((*yz.shape[:-1], 1)), yz), axis=-1)
 
     def _board_lines(self, view: View, stamp_ns: int) -> list[LineFeature | None]:
-        width, height = self.scene.board.width_m, self.scene.board.height_m
-        ends = {
-            "bottom": ((0.0, width), (0.0, 0.0)),
-            "right": ((width, width), (0.0, height)),
-            "top": ((0.0, width), (height, height)),
-            "left": ((0.0, 0.0), (0.0, height)),
-        }
-        surface = self._world(np.array(0.5 * width), np.array(0.5 * height))
+        spots = view.to_camera(self._outline)
         lines = []
-        for name, (along, up) in ends.items():
-            piece = visible_segment(view.to_camera(self._world(np.array(along), np.array(up))), self._half_view)
+        for name, ends in _EDGES.items():
+            piece = visible_segment(spots[ends], self._half_view)
             role = HORIZONTAL if name in ("bottom", "top") else VERTICAL
-            side = view.to_camera(surface)
-            lines.append(projected_line(piece, side, role, "board", BOARD_TRACKS[name], stamp_ns))
+            lines.append(projected_line(piece, spots[4], role, "board", BOARD_TRACKS[name], stamp_ns))
         return lines
 
     def _paint_lines(self, view: View, stamp_ns: int) -> list[LineFeature | None]:
@@ -137,14 +137,13 @@ class GeometricFeatures:
             spots = view.to_camera(self._world(points[:, 0], points[:, 1]))
             seen = self._unhidden(spots)
             # The longest piece without a gap; a gap is where a later row, the brush or the picture's border lies.
-            breaks = np.flatnonzero(np.diff(points[seen, 0]) > 1.5 * BIN_M) + 1
-            piece = max(np.split(np.flatnonzero(seen), breaks), key=len)
+            piece = _longest_run(np.flatnonzero(seen), points[:, 0])
             if len(piece) < 2:
                 continue
             along, height = fitted_ends(points[piece])
-            ends = view.to_camera(self._world(along, height))
-            above = view.to_camera(self._world(along, height + _ABOVE_M)).mean(axis=0)
-            visible = visible_segment(ends, self._half_view)
+            middle = 0.5 * (along[0] + along[1]), 0.5 * (height[0] + height[1]) + _ABOVE_M
+            ends = view.to_camera(self._world(np.append(along, middle[0]), np.append(height, middle[1])))
+            visible, above = visible_segment(ends[:2], self._half_view), ends[2]
             lines.append(projected_line(visible, above, HORIZONTAL, "paint", _FIRST_ROW_TRACK + row, stamp_ns))
         return lines
 
@@ -152,27 +151,34 @@ class GeometricFeatures:
         """Which points in camera coordinates are in the picture and not behind arm or brush, bool (n,)."""
         fx, fy, cx, cy = self.intrinsics
         height, width = self._hidden.shape
-        with np.errstate(divide="ignore", invalid="ignore"):
-            u, v = fx * spots[:, 0] / spots[:, 2] + cx, fy * spots[:, 1] / spots[:, 2] + cy
-        good = (spots[:, 2] > NEAR_M) & (u >= 0) & (u <= width - 1) & (v >= 0) & (v <= height - 1)
+        x, y, z = spots.T
+        depth = np.maximum(z, NEAR_M)  # nearer ones are refused below
+        u, v = fx * x / depth + cx, fy * y / depth + cy
+        good = (z > NEAR_M) & (u >= 0) & (u <= width - 1) & (v >= 0) & (v <= height - 1)
         good[good] = self._hidden[np.rint(v[good]).astype(int), np.rint(u[good]).astype(int)] == 0
         return good
 
     def _blurred(self, line: LineFeature) -> LineFeature:
-        rho, theta = self._rng.standard_normal(2) * (SIGMA_RHO, SIGMA_THETA)
-        return moved_line(line, rho, theta)
+        rho, theta = self._normals.take(2)
+        return moved_line(line, SIGMA_RHO * rho, SIGMA_THETA * theta)
 
     def _plane(self, view: View) -> tuple[float, float, float]:
-        inverse = view.plane(0.0)
-        size = float(np.linalg.norm(inverse))
-        normal, distance = inverse / size, 1.0 / size
-        if self._noise:
-            tilt = SIGMA_NORMAL * self._rng.standard_normal(3)
-            normal = normal + tilt - normal * float(normal @ tilt)
-            normal /= np.linalg.norm(normal)
-            distance += SIGMA_DISTANCE_M * self._rng.standard_normal()
-        a, b, c = (float(entry) for entry in normal / distance)
-        return a, b, c
+        a, b, c = view.plane(0.0).tolist()
+        if not self._noise:
+            return a, b, c
+        size = math.sqrt(a * a + b * b + c * c)
+        x, y, z, distance = a / size, b / size, c / size, 1.0 / size
+        i, j, k, far = self._normals.take(4)
+        along = x * i + y * j + z * k  # a tilt leaves the length of the normal
+        x, y, z = (n + SIGMA_NORMAL * (tilt - n * along) for n, tilt in ((x, i), (y, j), (z, k)))
+        scale = math.sqrt(x * x + y * y + z * z) * (distance + SIGMA_DISTANCE_M * far)
+        return x / scale, y / scale, z / scale
+
+
+def _longest_run(seen: np.ndarray, along: np.ndarray) -> np.ndarray:
+    """The longest run of indices whose points follow one another without a gap along the board."""
+    breaks = np.flatnonzero(np.diff(along[seen]) > 1.5 * BIN_M) + 1
+    return max(np.split(seen, breaks), key=len) if breaks.size else seen
 
 
 def add_sigma_vs(frame: FeatureFrame, sigma: float, rng: np.random.Generator) -> FeatureFrame:

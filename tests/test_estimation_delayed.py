@@ -125,6 +125,8 @@ def test_measured_entries_correct_like_the_rows_they_stand_for(entries: tuple[in
             assert short.correct_pair(stamp, 0, (a, b), (4e-5, 1e-5, 2e-5)) == taken
         np.testing.assert_allclose(short.state, general.state, atol=1e-13)
         np.testing.assert_allclose(short.covariance, general.covariance, atol=1e-13)
-    far = (k * TICK_NS, 0, 9.0, 1e-5) if len(entries) == 1 else (k * TICK_NS, 0, (9.0, 9.0), (4e-5, 1e-5, 2e-5))
-    refused = short.correct_entry(*far) if len(entries) == 1 else short.correct_pair(*far)
-    assert not refused
+    newest = (HISTORY + 9) * TICK_NS
+    if len(entries) == 1:
+        assert not short.correct_entry(newest, 0, 9.0, 1e-5)
+    else:
+        assert not short.correct_pair(newest, 0, (9.0, 9.0), (4e-5, 1e-5, 2e-5))
