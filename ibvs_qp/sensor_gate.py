@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from typing import Any
 
 import numpy as np
@@ -50,7 +49,7 @@ class SensorGate:
         last = self.last
         for name, size, bound in _VECTORS:
             numbers = _sound(getattr(frame, name), size, bound)
-            if numbers is None or (name == "attitude" and abs(sum([x * x for x in numbers]) - 1.0) > 0.02):
+            if numbers is None or (size == 4 and not _unit(*numbers)):
                 changes[name] = np.array(last[name])
             else:
                 last[name] = numbers
@@ -71,6 +70,11 @@ def _sound(value: Any, size: int, bound: float) -> list[float] | None:
     if not isinstance(value, np.ndarray) or value.shape != (size,) or value.dtype.kind != "f":
         return None
     numbers = value.tolist()
-    # min and max of a list may step over NaN
-    good = -bound <= min(numbers) and max(numbers) <= bound and math.isfinite(sum(numbers))
-    return numbers if good else None
+    for number in numbers:
+        if not -bound <= number <= bound:  # so written that NaN fails
+            return None
+    return numbers
+
+
+def _unit(w: float, x: float, y: float, z: float) -> bool:
+    return abs(w * w + x * x + y * y + z * z - 1.0) <= 0.02

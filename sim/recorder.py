@@ -29,7 +29,7 @@ PHASES = ("start", "approach", "align", "press", "paint", "climb", "retreat", "d
 CLEARANCE_TICKS = 5
 #: Pictures kept for the video per second.
 VIDEO_RATE = 10.0
-#: Columns that are one number a tick, in the order in which `Recorder.tick` fills them in.
+#: Columns that are one number a tick; vectors follow, in the order in which `Recorder.tick` fills them in.
 NUMBERS = """t push_true push_measured push_reference standoff_estimate horizontal_error vertical_error
 contact_weight phase row outcome step_us iterations""".split()
 #: Columns of integers.
@@ -45,10 +45,11 @@ class Recorder:
     def __init__(self, scene: Scene, options: FlightOptions, world: World, pilot: Pilot) -> None:
         self._scene, self._options, self._world, self._pilot = scene, options, world, pilot
         rotors = pilot.config.controller.vehicle.geometry.count
-        vectors = {"motion": len(world.plant.motion), "thrusts": rotors, "thrusts_actual": rotors, "friction_true": 2}
-        vectors |= {"velocity_estimate": 3, "unallocated": 6, "contact_1khz": STEPS_PER_TICK}
-        self._log = Columns({name: 1 for name in NUMBERS} | vectors)
-        self._places = tuple(self._log.places[name] for name in vectors)
+        numbers = {name: 1 for name in NUMBERS}
+        numbers |= {"motion": len(world.plant.motion), "friction_true": 2, "contact_1khz": STEPS_PER_TICK}
+        vectors = {"thrusts": rotors, "thrusts_actual": rotors, "unallocated": 6, "velocity_estimate": 3}
+        self._log = Columns(numbers | vectors)
+        self._numbers, self._places = sum(numbers.values()), tuple(self._log.places[name] for name in vectors)
         self._focal = camera_intrinsics(scene.camera)[0]
         tick, slots = pilot.terms.tick, range(pilot.config.controller.line_slots)
         self._lines = [(tick.inputs[f"line_{slot}"], slot, tick.outputs[f"line_{slot}_terms"]) for slot in slots]
@@ -68,7 +69,7 @@ class Recorder:
         terms, painter = pilot.terms, pilot.painter
         contact, time_s, painting = terms.contact, frame.stamp_ns * 1e-9, painter.phase in ("paint", "climb")
         row = self._log.row()
-        row[: len(NUMBERS)] = (
+        row[: self._numbers] = (
             time_s,
             plant.contact_normal_force,
             contact.push,
@@ -81,21 +82,17 @@ class Recorder:
             _OUTCOME_INDEX[command.outcome],
             pilot.controller_time_s * 1e6,
             command.iterations,
+            *plant.motion,
+            *plant.friction,
+            *plant.pushes,
         )
-        motion, thrusts, actual, friction, velocity, unallocated, pushes = self._places
-        row[motion], row[thrusts], row[actual], row[friction] = (
-            plant.motion,
-            command.thrusts,
-            plant.motor_thrusts,
-            plant.friction,
-        )
+        thrusts, actual, unallocated, velocity = self._places
+        row[thrusts], row[actual], row[unallocated] = command.thrusts, plant.motor_thrusts, command.unallocated_wrench
         known = pilot.measurement.velocity if pilot.measurement is not None else None
         row[velocity] = known if known is not None else math.nan
-        row[unallocated], row[pushes] = command.unallocated_wrench, plant.pushes
         self._painting.append(painting)
-        self._active.append(
-            tuple([self._limits.setdefault(limit.name, len(self._limits)) for limit in command.active_limits])
-        )
+        active = command.active_limits
+        self._active.append(tuple([self._limits.setdefault(limit.name, len(self._limits)) for limit in active]))
         self._note_events(time_s, command)
         if frame.image is not None and pilot.percept is not None:
             self._vision.append(sum(pilot.percept.time_ms.values()))

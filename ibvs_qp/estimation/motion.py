@@ -139,8 +139,10 @@ class WallMotion:
             if age > config.fade_end_s:
                 old.append(key)
                 continue
-            fade = min(1.0, max(0.0, (config.fade_end_s - age) / (config.fade_end_s - config.fade_start_s)))
-            line.weight = fade * min(1.0, line.frames / config.frames_to_trust) * line.source_weight
+            weight = min(1.0, line.frames / config.frames_to_trust) * line.source_weight
+            if age > config.fade_start_s:
+                weight *= (config.fade_end_s - age) / (config.fade_end_s - config.fade_start_s)
+            line.weight = weight
             line.offset = self.state[_LINES + line.slot]
         for key in old:
             self._drop(key)
