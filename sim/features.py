@@ -6,6 +6,7 @@ It stands in for perception where the controller alone is studied (``--features 
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 
 import numpy as np
@@ -40,7 +41,7 @@ _VELOCITY_COVARIANCE.flags.writeable = False  # shared by all frames
 BOARD_TRACKS = {"bottom": 1, "right": 2, "top": 3, "left": 4}
 _FIRST_ROW_TRACK = 10
 #: Corners at the ends of every edge: bottom left 0, bottom right 1, top right 2, top left 3.
-_EDGES = {"bottom": [0, 1], "right": [1, 2], "top": [3, 2], "left": [0, 3]}
+_EDGES = {"bottom": (0, 1), "right": (1, 2), "top": (3, 2), "left": (0, 3)}
 #: How far above an edge a point lies for certain on its upper side [m].
 _ABOVE_M = 0.02
 
@@ -75,6 +76,8 @@ class GeometricFeatures:
         width, height = scene.board.width_m, scene.board.height_m
         corners = np.array([(0.0, 0.0), (width, 0.0), (width, height), (0.0, height), (0.5 * width, 0.5 * height)])
         self._outline = self._world(corners[:, 0], corners[:, 1])
+        self._unit = self._world(np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0]))
+        self._last_pixel = scene.camera.width - 1, scene.camera.height - 1
 
     def tick(
         self, now_ns: int, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, velocity_body: np.ndarray
@@ -120,42 +123,49 @@ class GeometricFeatures:
         return np.concatenate((np.zeros((*yz.shape[:-1], 1)), yz), axis=-1)
 
     def _board_lines(self, view: View, stamp_ns: int) -> list[LineFeature | None]:
-        spots = view.to_camera(self._outline)
+        spots = view.to_camera(self._outline).tolist()
         lines = []
-        for name, ends in _EDGES.items():
-            piece = visible_segment(spots[ends], self._half_view)
+        for name, (start, end) in _EDGES.items():
+            piece = visible_segment((spots[start], spots[end]), self._half_view)
             role = HORIZONTAL if name in ("bottom", "top") else VERTICAL
             lines.append(projected_line(piece, spots[4], role, "board", BOARD_TRACKS[name], stamp_ns))
         return lines
 
     def _paint_lines(self, view: View, stamp_ns: int) -> list[LineFeature | None]:
         lines = []
+        corner, per_metre = self._board_in_camera(view)
         for row in range(1, self.scene.paint.rows + 1):
             points = self._edges.exposed(row)
             if len(points) < 2:
                 continue
-            spots = view.to_camera(self._world(points[:, 0], points[:, 1]))
-            seen = self._unhidden(spots)
+            seen = np.flatnonzero(self._unhidden(corner + points @ per_metre))
             # The longest piece without a gap; a gap is where a later row, the brush or the picture's border lies.
-            piece = _longest_run(np.flatnonzero(seen), points[:, 0])
+            piece = _longest_run(seen, points[:, 0])
             if len(piece) < 2:
                 continue
-            along, height = fitted_ends(points[piece])
-            middle = 0.5 * (along[0] + along[1]), 0.5 * (height[0] + height[1]) + _ABOVE_M
-            ends = view.to_camera(self._world(np.append(along, middle[0]), np.append(height, middle[1])))
-            visible, above = visible_segment(ends[:2], self._half_view), ends[2]
+            (left, right), (low, high) = fitted_ends(points[piece])
+            middle = 0.5 * (left + right), 0.5 * (low + high) + _ABOVE_M
+            *ends, above = (corner + np.array(((left, low), (right, high), middle)) @ per_metre).tolist()
+            visible = visible_segment(ends, self._half_view)
             lines.append(projected_line(visible, above, HORIZONTAL, "paint", _FIRST_ROW_TRACK + row, stamp_ns))
         return lines
+
+    def _board_in_camera(self, view: View) -> tuple[np.ndarray, np.ndarray]:
+        """Camera coordinates of the board's corner [m], (3,), and per metre along and up, (2, 3)."""
+        spots = view.to_camera(self._unit)
+        return spots[0], spots[1:] - spots[0]
 
     def _unhidden(self, spots: np.ndarray) -> np.ndarray:
         """Which points in camera coordinates are in the picture and not behind arm or brush, bool (n,)."""
         fx, fy, cx, cy = self.intrinsics
-        height, width = self._hidden.shape
+        last_column, last_row = self._last_pixel
         x, y, z = spots.T
         depth = np.maximum(z, NEAR_M)  # nearer ones are refused below
-        u, v = fx * x / depth + cx, fy * y / depth + cy
-        good = (z > NEAR_M) & (u >= 0) & (u <= width - 1) & (v >= 0) & (v <= height - 1)
-        good[good] = self._hidden[np.rint(v[good]).astype(int), np.rint(u[good]).astype(int)] == 0
+        u, v = x * fx / depth + cx, y * fy / depth + cy
+        good = (z > NEAR_M) & (u >= 0.0) & (u <= last_column) & (v >= 0.0) & (v <= last_row)
+        places = np.flatnonzero(good)
+        row, column = np.rint(v[places]).astype(int), np.rint(u[places]).astype(int)
+        good[places] = self._hidden[row, column] == 0
         return good
 
     def _blurred(self, line: LineFeature) -> LineFeature:
@@ -177,8 +187,13 @@ class GeometricFeatures:
 
 def _longest_run(seen: np.ndarray, along: np.ndarray) -> np.ndarray:
     """The longest run of indices whose points follow one another without a gap along the board."""
-    breaks = np.flatnonzero(np.diff(along[seen]) > 1.5 * BIN_M) + 1
-    return max(np.split(seen, breaks), key=len) if breaks.size else seen
+    if len(seen) == 0 or along[seen[-1]] - along[seen[0]] < (len(seen) - 0.5) * BIN_M:
+        return seen
+    where = along[seen]
+    breaks = np.flatnonzero(where[1:] - where[:-1] > 1.5 * BIN_M) + 1
+    bounds = [0, *breaks.tolist(), len(seen)]
+    start, end = max(itertools.pairwise(bounds), key=lambda run: run[1] - run[0])
+    return seen[start:end]
 
 
 def add_sigma_vs(frame: FeatureFrame, sigma: float, rng: np.random.Generator) -> FeatureFrame:

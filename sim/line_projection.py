@@ -21,7 +21,7 @@ NEAR_M = 0.05
 _SHORTEST = 0.05
 
 
-def visible_segment(ends: np.ndarray, half_view: Sequence[float]) -> np.ndarray | None:
+def visible_segment(ends: Sequence[Sequence[float]], half_view: Sequence[float]) -> np.ndarray | None:
     """The part of a straight edge inside the field of view.
 
     Args:
@@ -32,7 +32,7 @@ def visible_segment(ends: np.ndarray, half_view: Sequence[float]) -> np.ndarray 
         Normalised end points (2, 2), or None where too little of it is seen.
     """
     low, high = 0.0, 1.0
-    (x0, y0, z0), (x1, y1, z1) = ends.tolist()
+    (x0, y0, z0), (x1, y1, z1) = ends
     dx, dy, dz = x1 - x0, y1 - y0, z1 - z0
     right, down = half_view
     for value, rate in (
@@ -57,7 +57,7 @@ def visible_segment(ends: np.ndarray, half_view: Sequence[float]) -> np.ndarray 
 
 
 def projected_line(
-    segment: np.ndarray | None, surface: np.ndarray, role: str, kind: str, track: int, stamp_ns: int
+    segment: np.ndarray | None, surface: Sequence[float], role: str, kind: str, track: int, stamp_ns: int
 ) -> LineFeature | None:
     """The line feature through a segment, with the covariance of a good fit.
 
@@ -75,7 +75,7 @@ def projected_line(
     theta = math.atan2(x1 - x2, y2 - y1)
     rho = x1 * math.cos(theta) + y1 * math.sin(theta)
     rho, theta = align_line(rho, theta, 0.5 * math.pi if role == HORIZONTAL else 0.0)
-    x, y, z = surface.tolist()
+    x, y, z = surface
     side = x * math.cos(theta) + y * math.sin(theta) - rho * z  # times the point's depth, which is positive
     return LineFeature(
         rho=rho,
@@ -90,14 +90,14 @@ def projected_line(
     )
 
 
-def fitted_ends(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Least-squares line up(along) through points (n, 2), as (along, up) of its two ends, (2,) each."""
+def fitted_ends(points: np.ndarray) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Least-squares line up(along) through points (n, 2), as (along, up) of its two ends."""
     along, up = points.T
-    middle, height = along.sum() / len(along), up.sum() / len(up)
+    middle, height = float(np.add.reduce(along)) / len(along), float(np.add.reduce(up)) / len(up)
     away = along - middle
-    slope = (away @ up) / (away @ away)
-    ends = points[[0, -1], 0]
-    return ends, height + slope * (ends - middle)
+    slope = float(away @ up) / float(away @ away)
+    first, last = along.item(0), along.item(-1)
+    return (first, last), (height + slope * (first - middle), height + slope * (last - middle))
 
 
 def moved_line(line: LineFeature, rho: float, theta: float) -> LineFeature:

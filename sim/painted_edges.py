@@ -25,8 +25,7 @@ class PaintedEdges:
     """
 
     def __init__(self, scene: Scene) -> None:
-        self._geometry = BoardGeometry(scene)
-        self._first_height = self._geometry.row_height(1)
+        self._first_height, self._pitch = BoardGeometry(scene).row_height(1), scene.paint.pitch_m
         self._radius, self._rows = 0.5 * scene.paint.brush_width_m, scene.paint.rows
         self._bins = math.ceil(scene.board.width_m / BIN_M)
         self._top = np.full((self._rows + 1, self._bins), -math.inf)
@@ -43,8 +42,7 @@ class PaintedEdges:
             return
         if a0 > a1:
             a0, u0, a1, u1 = a1, u1, a0, u0
-        paint = self._geometry.scene.paint
-        row = round((0.5 * (u0 + u1) - self._first_height) / paint.pitch_m) + 1
+        row = round((0.5 * (u0 + u1) - self._first_height) / self._pitch) + 1
         row = min(max(row, 1), self._rows)
         top = self._top[row]
         first, last = max(0, math.floor(a0 / BIN_M)), min(self._bins - 1, math.floor(a1 / BIN_M))
@@ -60,4 +58,6 @@ class PaintedEdges:
         """Points (along, up) [m] of a row's upper edge that no later row covers, in order along the board, (n, 2)."""
         top = self._top[row]
         bins = np.flatnonzero((top > -math.inf) & ~self._covered[row])
-        return np.column_stack(((bins + 0.5) * BIN_M, top[bins]))
+        points = np.empty((len(bins), 2))
+        points[:, 0], points[:, 1] = (bins + 0.5) * BIN_M, top[bins]
+        return points
