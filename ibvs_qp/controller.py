@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from ibvs_qp.command import ActiveLimit, Command, Outcome, TaskReport
+from ibvs_qp.command import Command, Outcome
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.gate import MeasurementGate, answered_stamp, check_reference
 from ibvs_qp.hold import hold_thrusts
-from ibvs_qp.limits import Limit, ThrustLimit, TiltLimit, YawLimit
+from ibvs_qp.limits import ApproachLimit, Limit, PushCeiling, ThrustLimit, TiltLimit, ViewLimit, YawLimit
 from ibvs_qp.measurement import Measurement, Reference
 from ibvs_qp.qp.acceptance import AcceptedSolution, QpEngine
 from ibvs_qp.qp.assembly import QpTemplate
 from ibvs_qp.qp.evaluator import ProgramData
 from ibvs_qp.qp.model import SymbolicModel
+from ibvs_qp.qp.replay import ACTIVE_PRICE, active_limits, task_reports
 from ibvs_qp.reporting import clipped_command, contact_mode, reach_margin, reach_note
 from ibvs_qp.setpoints import Setpoints
 from ibvs_qp.tasks import (
@@ -28,9 +31,6 @@ from ibvs_qp.tasks import (
     YawTask,
 )
 
-#: A multiplier above this price counts as an active limit [cost per unit].
-ACTIVE_PRICE = 1e-3
-
 
 def default_tasks(config: ControllerConfig) -> list[Task]:
     """The tasks of the program, in the order of their rows."""
@@ -40,16 +40,40 @@ def default_tasks(config: ControllerConfig) -> list[Task]:
 
 def default_limits(config: ControllerConfig) -> list[Limit]:
     """The limits of the program; thrust first, its rows are the thrusts themselves."""
-    return [ThrustLimit(), *([TiltLimit(), YawLimit()] if config.barriers else [])]
+    settings = config.limits
+    barriers: list[tuple[bool, Limit]] = [
+        (settings.tilt_barrier, TiltLimit()),
+        (settings.yaw_barrier, YawLimit()),
+        (settings.view_barrier, ViewLimit()),
+        (settings.push_barrier, PushCeiling()),
+        (settings.approach_barrier, ApproachLimit()),
+    ]
+    return [ThrustLimit(), *(limit for wanted, limit in barriers if config.barriers and wanted)]
+
+
+def program_template(config: ControllerConfig, tasks: Sequence[Task] = (), limits: Sequence[Limit] = ()) -> QpTemplate:
+    """The program of a configuration: shipped tasks and limits and further ones, assembled."""
+    return QpTemplate(SymbolicModel(config), [*default_tasks(config), *tasks], [*default_limits(config), *limits])
 
 
 class HybridController:
-    """The drop-in controller: measurement and reference in, rotor thrusts and their explanation out."""
+    """The drop-in controller: measurement and reference in, rotor thrusts and their explanation out.
 
-    def __init__(self, config: ControllerConfig | None = None) -> None:
+    Args:
+        config: Everything it needs; the default flies the Tarot T960.
+        tasks: Further tasks beside the shipped ones (docs/extending.md).
+        limits: Further limits.
+
+    Raises:
+        ConfigError: When a row is not affine in the thrusts, or the configuration is refused.
+    """
+
+    def __init__(
+        self, config: ControllerConfig | None = None, *, tasks: Sequence[Task] = (), limits: Sequence[Limit] = ()
+    ) -> None:
         self.config = config or ControllerConfig()
-        model = SymbolicModel(self.config)
-        self.template = QpTemplate(model, default_tasks(self.config), default_limits(self.config))
+        self._further = (*tasks, *limits)
+        self.template = program_template(self.config, tasks, limits)
         self.setpoints = Setpoints(self.config, self.template)
         self.engine = QpEngine(self.template, self.config.solver, ProgramData(self.template, self.setpoints.tick.extra))
         self._gate = MeasurementGate(self.config.vehicle.geometry.count)
@@ -80,6 +104,8 @@ class HybridController:
             return self._hold(measurement, rejected)
         if self._gate.restarted:
             self.setpoints.restart()
+        for part in self._further:
+            part.pack(self.setpoints.tick.inputs, self.setpoints)
         self.setpoints.update(checked, reference)
         solution = self.engine.solve()
         if solution is None:
@@ -106,37 +132,10 @@ class HybridController:
             iterations=solution.iterations,
             solve_time_s=solution.seconds,
         )
-        return command.explained_by(lambda: self._task_reports(stacked, thrusts), lambda: self._active_limits(solution))
-
-    def _task_reports(self, stacked: np.ndarray, thrusts: np.ndarray) -> tuple[TaskReport, ...]:
-        achieved, asked, weights = self.engine.data.report(stacked, thrusts)
-        return tuple(
-            TaskReport(
-                name=row.name,
-                unit=row.unit,
-                weight=float(weights[i]),
-                asked=float(asked[i]),
-                achieved=float(achieved[i]),
-                residual=float(achieved[i] - asked[i]),
-            )
-            for i, row in enumerate(self.template.task_rows)
-            if weights[i] > 0.0
+        return command.explained_by(
+            lambda: task_reports(self.template, self.engine.data, stacked, thrusts),
+            lambda: active_limits(self.template, solution.x, solution.y),
         )
-
-    def _active_limits(self, solution: AcceptedSolution) -> tuple[ActiveLimit, ...]:
-        active = []
-        for i in np.flatnonzero(np.abs(solution.y) > ACTIVE_PRICE):
-            slot = self.template.row_slack[i]
-            active.append(
-                ActiveLimit(
-                    name=self.template.row_names[i],
-                    side="upper" if solution.y[i] > 0 else "lower",
-                    price=abs(float(solution.y[i])),
-                    slack=abs(float(solution.x[slot])) if slot >= 0 else 0.0,
-                    unit=self.template.row_units[i],
-                )
-            )
-        return tuple(active)
 
     def _fallback(self, measurement: Measurement, rejected: tuple[str, ...]) -> Command:
         """The analytic law answers when no solver did."""
@@ -144,6 +143,8 @@ class HybridController:
 
         free, outcome = analytic_thrusts(self.setpoints), Outcome.ANALYTIC_FALLBACK
         mode = contact_mode(self.setpoints, self._reference)
+        if self.engine.conflict:
+            rejected += (f"limits: no solution keeps all of {', '.join(self.engine.conflict)}",)
         if not np.isfinite(free).all():
             free, outcome, mode = hold_thrusts(self.config, measurement), Outcome.HOLD, "hold"
         return clipped_command(self.setpoints, int(measurement.stamp_ns), free, outcome, mode, rejected)

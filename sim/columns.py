@@ -16,9 +16,11 @@ class Columns:
 
     Args:
         widths: Numbers per row of each column.
+        dtype: Of all of them.
     """
 
-    def __init__(self, widths: dict[str, int]) -> None:
+    def __init__(self, widths: dict[str, int], dtype: type = np.float64) -> None:
+        self._dtype = dtype
         self.places: dict[str, slice] = {}
         self._width = 0
         for name, width in widths.items():
@@ -35,13 +37,13 @@ class Columns:
         """The next row, to be filled in, (numbers per row,)."""
         place = self._count % BLOCK_ROWS
         if place == 0:
-            self._blocks.append(np.zeros((BLOCK_ROWS, self._width)))
+            self._blocks.append(np.zeros((BLOCK_ROWS, self._width), self._dtype))
         self._count += 1
         return self._blocks[-1][place]
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Every column so far, (N,) or (N, width)."""
-        table = np.concatenate([np.zeros((0, self._width)), *self._blocks])[: self._count]
+        table = np.concatenate([np.zeros((0, self._width), self._dtype), *self._blocks])[: self._count]
         columns = {name: table[:, place] for name, place in self.places.items()}
         return {
             name: np.ascontiguousarray(column[:, 0] if column.shape[1] == 1 else column)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ibvs_qp.command import Command, Outcome
+from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import SensorFrame
 from ibvs_qp.pilot import Pilot
 from ibvs_qp.setpoints.lines import LINE_TERMS
@@ -55,6 +56,9 @@ class Recorder:
         self._lines = [(tick.inputs[f"line_{slot}"], slot, tick.outputs[f"line_{slot}_terms"]) for slot in slots]
         self._limits: dict[str, int] = {}
         self._active: list[tuple[int, ...]] = []
+        # Single precision: 1e-7 of a parameter is nothing that a person reads, and half the log.
+        self._program = pilot.controller.engine.data.stacked if isinstance(pilot.controller, HybridController) else None
+        self._programs = Columns({"program": 0 if self._program is None else len(self._program)}, np.float32)
         self._painting: list[bool] = []
         self._vision: list[float] = []
         self._events: list[Event] = []
@@ -90,6 +94,8 @@ class Recorder:
         row[thrusts], row[actual], row[unallocated] = command.thrusts, plant.motor_thrusts, command.unallocated_wrench
         known = pilot.measurement.velocity if pilot.measurement is not None else None
         row[velocity] = known if known is not None else math.nan
+        if self._program is not None:
+            self._programs.row()[:] = self._program
         self._painting.append(painting)
         active = command.active_limits
         self._active.append(tuple([self._limits.setdefault(limit.name, len(self._limits)) for limit in active]))
@@ -117,8 +123,9 @@ class Recorder:
             self._events.append(Event(t=when, kind=kind, text=text))
         self._logged = len(log)
         for name in command.rejected:
-            if name not in self._rejected:
-                self._rejected.add(name)
+            kind = name.split(":")[0]  # its numbers may change from tick to tick
+            if kind not in self._rejected:
+                self._rejected.add(kind)
                 self._events.append(Event(t=time_s, kind="rejected", text=name))
 
     def trace(self) -> Trace:
@@ -132,6 +139,8 @@ class Recorder:
         for tick, columns in enumerate(self._active):
             active[tick, list(columns)] = True
         arrays["active"] = active
+        if len(self._programs):
+            arrays |= self._programs.arrays()
         vehicle = self._pilot.config.controller.vehicle
         arrays["thrust_min"], arrays["thrust_max"] = vehicle.thrust_min, vehicle.thrust_max
         arrays["vision_ms"] = np.array(self._vision, float)
@@ -150,6 +159,7 @@ class Recorder:
             canvas_px_per_m=canvas.pixels_per_m,
             coverage_mask=canvas.coverage,
             pictures=self._pictures,
+            preset=self._pilot.config.to_toml(),
         )
 
     def _truth(self, motion: np.ndarray) -> dict[str, np.ndarray]:

@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 from small_vehicle import SmallVehicle
 
 from allocation import control_effectiveness
+from ibvs_qp.analytic import analytic_thrusts
 from ibvs_qp.command import Command, Outcome
-from ibvs_qp.config import ControllerConfig
+from ibvs_qp.config import ControllerConfig, Weights
 from ibvs_qp.controller import HybridController
 from ibvs_qp.frames import R_BODY_CAMERA, camera_twist_matrix
 from ibvs_qp.limits.thrust import LEAST_GAP, thrust_window
@@ -96,6 +97,27 @@ def test_with_limits_that_do_not_bind_as_well() -> None:
             compared += 1
             assert np.abs(solution[0][:6] - closed_form(controller, share, LAST)).max() < 1e-6
     assert compared >= 20
+
+
+@pytest.mark.parametrize("lines", [1, 2])
+def test_in_the_paper_profile_the_program_converges_to_the_paper_law(lines: int) -> None:
+    """Free air, line weight growing against one weight of all null-space wishes: 1e-4 N at the end."""
+    mass, null = ControllerConfig().vehicle.mass_kg, 1.0
+    wishes = {"level": null, "yaw": null, "velocity": null, "push": null / mass**2}
+    errors = []
+    for weight in (1e2, 1e3, 1e4, 1e6):
+        weights = Weights(line=weight, effort=1e-9, smoothness=0.0, line_sigma=1.0, **wishes)
+        config = ControllerConfig(weights=weights, line_profile="paper", barriers=False)
+        controller, worst = HybridController(config), 0.0
+        for seed in range(5):
+            controller.reset()
+            pack(controller, *random_tick(np.random.default_rng(seed), lines), share=0.0)
+            law = analytic_thrusts(controller.setpoints)
+            worst = max(worst, float(np.abs(exact_thrusts(controller) - law).max()))
+        errors.append(worst)
+    print(f"{lines} lines: largest difference {errors} N")
+    assert errors == sorted(errors, reverse=True)
+    assert errors[-1] < 1e-4
 
 
 # --------------------------------------------------------------------------------- OSQP against the exact solver

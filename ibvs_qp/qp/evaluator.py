@@ -45,6 +45,9 @@ class ProgramData:
         self._rows, self._columns = pattern.row, pattern.col
         self._size = len(template.variable_names)
 
+    def evaluate(self) -> None:
+        """Bring the data up to date with the parameters; the compiled tick has done so already."""
+
     def hessian(self) -> np.ndarray:
         """P in full, (variables, variables)."""
         full = np.zeros((self._size, self._size))
@@ -64,3 +67,15 @@ class ProgramData:
         self._report()
         achieved, asked, weights = self._report.outputs
         return achieved, asked, weights
+
+
+class Evaluator(ProgramData):
+    """A program on its own: write `parameters` with ``[name][:] =``, evaluate, read the data."""
+
+    def __init__(self, template: QpTemplate) -> None:
+        self._values = BufferedFunction(template.values)
+        super().__init__(template, [*self._values.outputs, self._values.inputs[0]])
+
+    def evaluate(self) -> None:
+        """Fill p, q, a, lower and upper from the parameters."""
+        self._values()

@@ -76,11 +76,13 @@ class SymbolicModel:
 
     @property
     def motion_acceleration(self) -> ca.SX:
-        r"""S nu_dot with S = blockdiag(I - n n^T, r I): the image never uses the pushing direction.
+        r"""S nu_dot with S = blockdiag(I - s n n^T, r I) and s = 1: the image never uses the pushing direction.
 
+        The paper's profile takes s = lambda and r = 1.
         r is 1 in free flight and falls to 0 in contact: a tip that friction holds does not follow the body's turn,
         and a line row that counts on it trades the vertical force for pitch.
         """
         linear = self.acceleration[:3]
         turn = self.parameter("turn_share") * self.acceleration[3:]
-        return ca.vertcat(linear - self.normal * ca.dot(self.normal, linear), turn)
+        along = self.parameter("normal_share") * ca.dot(self.normal, linear)
+        return ca.vertcat(linear - self.normal * along, turn)

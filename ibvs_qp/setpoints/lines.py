@@ -71,8 +71,21 @@ def camera_view(
     )
 
 
-def line_slot(signals: Signals, config: ControllerConfig, slot: int, body: Body, view: View, integrate: ca.SX) -> ca.SX:
-    r"""Error of one line at the tip and what is wanted of it; returns the weight it counts with.
+@dataclass(frozen=True, kw_only=True)
+class SlotLine:
+    """What the line of a slot means to the others: 1 if present, its weight, place and own rate."""
+
+    present: ca.SX
+    weight: ca.SX
+    rho: ca.SX
+    theta: ca.SX
+    rate: ca.SX
+
+
+def line_slot(
+    signals: Signals, config: ControllerConfig, slot: int, body: Body, view: View, integrate: ca.SX
+) -> SlotLine:
+    r"""Error of one line at the tip and what is wanted of it.
 
     .. math:: e = \rho - (x_t\cos\theta + y_t\sin\theta) - (\rho_{ref} - y_0 \sin\theta_{ref}), \qquad
               \ddot e = -(K_p e + K_d \dot e + K_i \textstyle\int e)
@@ -88,7 +101,7 @@ def line_slot(signals: Signals, config: ControllerConfig, slot: int, body: Body,
     tip_down = float(to_camera(np.array(vehicle.tip_position_m), np.array(vehicle.camera_position_m))[1])
     c, s = ca.cos(theta), ca.sin(theta)
     error = rho - (view.x * c + view.y * s) - (rho_ref - tip_down / view.depth * ca.sin(theta_ref))
-    rate, rho_rate, angle_rate = _rates(signals, name, body, view, rho, c, s, error, present)
+    rate, rho_rate, angle_rate, own_rate = _rates(signals, name, body, view, rho, c, s, error, present)
     bounded, rho_error = clamp(error, -ERROR_BOUND, ERROR_BOUND), clamp(rho - rho_ref, -ERROR_BOUND, ERROR_BOUND)
     integral = signals.state(f"{name}_integral")
     if gains.line_ki > 0.0:
@@ -100,10 +113,13 @@ def line_slot(signals: Signals, config: ControllerConfig, slot: int, body: Body,
     wanted = -(gains.line_kp * bounded + gains.line_kd * rate + gains.line_ki * integral)
     turn = -(gains.theta_kp * angle_error + gains.theta_kd * angle_rate)
     row = (rho, theta, view.x, view.y, wanted, turn, weights.line * weight, weights.line_angle * weight)
+    if config.line_profile == "paper":
+        wanted = -(gains.line_kp * rho_error + gains.line_kd * rho_rate + gains.line_ki * integral)
+        row = (rho, theta, ca.SX(0.0), ca.SX(0.0), wanted, turn, weights.line * weight, ca.SX(0.0))
     signals.output(name, ca.vertcat(*row))
     terms = (bounded, rate, angle_error, angle_rate, integral, weight, rho_error, rho_rate)
     signals.output(f"{name}_terms", ca.vertcat(*terms))
-    return weight
+    return SlotLine(present=present, weight=weight, rho=rho, theta=theta, rate=own_rate)
 
 
 def _rates(
@@ -116,8 +132,8 @@ def _rates(
     s: ca.SX,
     error: ca.SX,
     present: ca.SX,
-) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """Rates of the error, of rho and of the angle error, the reference's own motion taken off."""
+) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
+    """Rates of the error, of rho and of the angle error, the reference's own motion taken off, and rho's own."""
     along = ca.vertcat(c, s, -rho)
     a, b, z = ca.vertsplit(view.plane)
     l_theta, l_rho = b * c - a * s, -(a * rho * c + b * rho * s + z)
@@ -131,4 +147,5 @@ def _rates(
     rate = ca.if_else(body.moving, rate, filtered)
     kept = ca.if_else(present, ca.vertcat(error, rate, 1.0), ca.vertcat(last_error, last_rate, known))
     signals.remember(f"{name}_last", kept)
-    return rate, ca.if_else(body.moving, rho_rate, filtered), ca.if_else(body.moving, angle_rate, 0.0)
+    own_rate = ca.if_else(body.moving, rho_rate + l_rho * wanted, filtered)
+    return rate, ca.if_else(body.moving, rho_rate, filtered), ca.if_else(body.moving, angle_rate, 0.0), own_rate

@@ -34,6 +34,8 @@ def push_force(signals: Signals, config: ControllerConfig, body: Body, touch: To
     gains = config.gains
     allowed = ca.fmin(wish.push, ca.fmax(reach - REACH_MARGIN, 0.0)) if config.reach_check else wish.push
     reference = signals.output("push_reference", ca.if_else(wish.press, allowed, 0.0))
+    ceiling = config.limits.push_share * reference
+    signals.output("push_state", ca.vertcat(ceiling, touch.stiffness, touch.rate, touch.touching * wish.press))
     wanted = reference * touch.ramp
     old, bound = signals.state("force_integral"), FORCE_INTEGRAL_BOUND / max(gains.force_kfi, 1e-6)
     free = signals.input("given_up") < WINDUP_FORCE
@@ -51,11 +53,12 @@ def standoff_force(signals: Signals, config: ControllerConfig, body: Body, touch
     """Wanted force along n in free air [N]: a speed-limited motion to the stand-off, or until the tip touches."""
     gains, settings, mass = config.gains, config.contact, config.vehicle.mass_kg
     error = touch.distance - ca.if_else(wish.press, TOUCH_TARGET, wish.standoff)
-    speed = ca.fmin(
-        ca.fmax(gains.standoff_kp * error, -settings.retreat_speed_m_s), approach_speed(settings, mass, touch)
-    )
+    allowed = approach_speed(settings, mass, touch)
+    free = ca.logic_and(touch.known, ca.logic_not(touch.touching))
+    speed = ca.fmin(ca.fmax(gains.standoff_kp * error, -settings.retreat_speed_m_s), allowed)
     lag = speed + touch.rate
     search = _search(signals, config, body, touch, wish, lag)
+    signals.output("approach_state", ca.vertcat(allowed, touch.rate, search / mass, free))
     force = mass * gains.standoff_kd * lag + search
     return signals.output("standoff_command", ca.if_else(touch.known, force, 0.0))
 
