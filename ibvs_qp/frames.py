@@ -15,6 +15,8 @@ import math
 
 import numpy as np
 
+from ibvs_qp.vectors import down_row, rotation_rows
+
 #: Standard gravity [m/s^2].
 GRAVITY = 9.81
 
@@ -43,20 +45,12 @@ def rotation_from_quaternion(quaternion: np.ndarray) -> np.ndarray:
 
     Written out because it runs every tick: scipy's Rotation object costs ten times as much for one quaternion.
     """
-    w, x, y, z = (float(entry) for entry in quaternion)
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+    return np.array(rotation_rows(*(float(entry) for entry in quaternion)))
 
 
 def down_in_body(quaternion: np.ndarray) -> tuple[float, float, float]:
     """Unit vector of gravity (world down) in the body frame: the third row of the rotation B to I."""
-    w, x, y, z = (float(entry) for entry in quaternion)
-    return 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)
+    return down_row(*quaternion.tolist())
 
 
 def roll_pitch(quaternion: np.ndarray) -> tuple[float, float]:

@@ -108,7 +108,7 @@ class Painter:
         mark = self._start_mark(seen)
         if mark is not None:
             error = max(error, abs(mark.offset - self.config.edge_margin_m))
-        still = float(np.linalg.norm(seen.velocity)) < self.config.align_speed_m_s
+        still = math.hypot(*seen.velocity) < self.config.align_speed_m_s
         if error < self.config.align_error_m and still:
             self._since = seen.time_s if math.isnan(self._since) else self._since
             if seen.time_s - self._since >= self.config.align_time_s:
@@ -341,7 +341,7 @@ class Painter:
         edge_rate: float = 0.0,
     ) -> Wish:
         guides: list[tuple[TrackedLine, float]] = []
-        velocity = np.zeros(2)
+        right = 0.0
         line = seen.lines.get(self._guide_id) if guided else None
         slope = 0.0
         if line is not None:
@@ -355,9 +355,9 @@ class Painter:
             guides.append((edge, self._edge_reference(edge, edge_rate)))
         if hold and not any(entry.role == VERTICAL for entry, _ in guides):
             back = HOLD_GAIN * (self._anchor - float(seen.odometer[0]))
-            velocity[0] = min(max(back, -HOLD_SPEED), HOLD_SPEED)
-        velocity += along * np.array([math.cos(slope), math.sin(slope)])
-        velocity += climb * np.array([math.sin(slope), -math.cos(slope)])
+            right = min(max(back, -HOLD_SPEED), HOLD_SPEED)
+        c, s = math.cos(slope), math.sin(slope)
+        velocity = np.array((right + along * c + climb * s, along * s - climb * c))
         return Wish(contact=contact, standoff=standoff, velocity=velocity, guides=guides, push=self.config.push_n)
 
     def _edge_reference(self, edge: TrackedLine, edge_rate: float) -> float:

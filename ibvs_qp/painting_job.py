@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,8 +54,8 @@ class Scenery:
 
     time_s: float
     lines: dict[int, TrackedLine]
-    odometer: np.ndarray
-    velocity: np.ndarray
+    odometer: Sequence[float]
+    velocity: Sequence[float]
     distance: float
     wall_known: bool
     in_contact: bool

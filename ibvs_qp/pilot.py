@@ -18,7 +18,7 @@ from ibvs_qp.estimation.config import EstimationConfig
 from ibvs_qp.estimation.motion import WallMotion
 from ibvs_qp.estimation.tare import WrenchTare
 from ibvs_qp.estimation.wall_lines import WallAxes, image_line
-from ibvs_qp.frames import R_BODY_CAMERA, down_in_body, to_camera
+from ibvs_qp.frames import to_camera
 from ibvs_qp.loop_margin import require_margin
 from ibvs_qp.measurement import (
     HORIZONTAL,
@@ -31,6 +31,7 @@ from ibvs_qp.measurement import (
 from ibvs_qp.painting import Painter, PaintingConfig, Scenery, Wish
 from ibvs_qp.sensor_gate import SensorGate
 from ibvs_qp.settings import choice, dump_toml, load_toml, setting, validate
+from ibvs_qp.vectors import Row, down_row
 from ibvs_qp.vision.config import VisionConfig
 from ibvs_qp.vision.percept import LineHint
 
@@ -96,7 +97,8 @@ class Pilot:
         self._gate = SensorGate()
         self._tip = np.array(vehicle.tip_position_m)
         self._camera = np.array(vehicle.camera_position_m)
-        self._tip_camera = to_camera(self._tip, self._camera)
+        self._tip_camera = to_camera(self._tip, self._camera).tolist()
+        self._tip_from_camera = (self._tip - self._camera).tolist()
         self._perception = None
         self.reset()
 
@@ -111,10 +113,10 @@ class Pilot:
             self._perception.reset()
         self._first = self._stamp = -1
         self._ticks = 0
-        self._history_stamp = np.zeros(HISTORY, dtype=np.int64)
-        self._history_attitude = np.zeros((HISTORY, 4))
-        self._history_turn = np.zeros((HISTORY, 3))
-        self._turn = np.zeros(3)
+        self._history_attitude = [[1.0, 0.0, 0.0, 0.0]] * HISTORY
+        self._turn: Row = (0.0, 0.0, 0.0)
+        self._history_turn = [self._turn] * HISTORY
+        self._spread, self._covariance = -1.0, np.zeros((3, 3))
         self._last_capture = -1
         self.percept = None
         self.controller_time_s = 0.0
@@ -151,13 +153,14 @@ class Pilot:
         tick = self.config.controller.tick_s
         dt = tick if self._stamp < 0 else min(max((frame.stamp_ns - self._stamp) * 1e-9, 0.0), 0.02)
         self._stamp = frame.stamp_ns
-        self._remember(frame, dt)
+        now = self._gate.last
+        force, rate = now["specific_force"], now["angular_velocity"]
+        self._remember(now["attitude"], rate, dt)
         contact = self.terms.contact
         free = not contact.in_contact and contact.distance > self.config.estimation.tare_distance_m
-        wrench = self.tare.update(frame.wrench, frame.wrench_stamp_ns, frame.specific_force, free)
-        gravity = np.array(down_in_body(frame.attitude))
-        axes = WallAxes.of(contact.normal, gravity)
-        self.motion.predict(frame.stamp_ns, axes, frame.specific_force, frame.angular_velocity, dt)
+        wrench = self.tare.update(frame.wrench, frame.wrench_stamp_ns, force, free)
+        axes = WallAxes.of(contact.normal.tolist(), down_row(*now["attitude"]))
+        self.motion.predict(frame.stamp_ns, axes, force, rate, dt)
         features = frame.features if frame.image is None else self._see(frame)
         if features is not None and self._fresh(features.stamp_ns):
             self._take(features)
@@ -170,12 +173,12 @@ class Pilot:
         self.controller_time_s = time.perf_counter() - begin
         return command
 
-    def _remember(self, frame: SensorFrame, dt: float) -> None:
-        self._turn = self._turn + dt * frame.angular_velocity
+    def _remember(self, attitude: list[float], rate: list[float], dt: float) -> None:
+        (x, y, z), (wx, wy, wz) = self._turn, rate
+        self._turn = x + dt * wx, y + dt * wy, z + dt * wz
         self._ticks += 1
         slot = self._ticks % HISTORY
-        self._history_stamp[slot] = frame.stamp_ns
-        self._history_attitude[slot] = frame.attitude
+        self._history_attitude[slot] = attitude
         self._history_turn[slot] = self._turn
 
     def _hints(self, stamp_ns: int) -> tuple[LineHint, ...]:
@@ -184,8 +187,8 @@ class Pilot:
         if expected is None or not contact.known:
             return ()
         offset, side = expected
-        axes = WallAxes.of(contact.normal, np.array(down_in_body(self._history_attitude[self._slot(stamp_ns)])))
-        rho, theta, _ = image_line(offset, 0.5 * math.pi, axes, self._tip - self._camera, contact.distance)
+        axes = WallAxes.of(contact.normal.tolist(), down_row(*self._history_attitude[self._slot(stamp_ns)]))
+        rho, theta, _ = image_line(offset, 0.5 * math.pi, axes, self._tip_from_camera, contact.distance)
         near, far = HINT_SPAN
         span = (near, far) if side > 0.0 else (-far, -near)
         return (LineHint(name="fresh", rho=rho, theta=theta, kind="paint", surface_side=-1, span=span),)
@@ -208,11 +211,11 @@ class Pilot:
         assert image is not None
         slot = self._slot(image.stamp_ns)
         last = self._slot(self._last_capture) if self._last_capture >= 0 else slot
-        rotation = self._history_turn[slot] - self._history_turn[last]
+        rotation = np.subtract(self._history_turn[slot], self._history_turn[last])
         self._last_capture = image.stamp_ns
         self.percept = self._perception.process(
             image,
-            attitude=self._history_attitude[slot],
+            attitude=np.array(self._history_attitude[slot]),
             rotation=rotation,
             velocity=self.measurement.velocity if self.measurement is not None else None,
             hints=self._hints(image.stamp_ns),
@@ -225,14 +228,16 @@ class Pilot:
         plane = features.plane
         if plane is not None:
             self._plane, self._plane_stamp = plane, features.stamp_ns
-            vector = R_BODY_CAMERA @ np.asarray(plane[:3]) * (-1.0 / plane[3])
-            length = float(np.linalg.norm(vector))
-            normal, distance = vector / length, 1.0 / length - float(vector / length @ (self._tip - self._camera))
+            x, y, z = (entry * (-1.0 / plane[3]) for entry in (plane[2], plane[0], plane[1]))  # camera to body axes
+            length = math.sqrt(x * x + y * y + z * z)
+            tip_x, tip_y, tip_z = self._tip_from_camera
+            normal = x / length, y / length, z / length
+            distance = (1.0 - x * tip_x - y * tip_y - z * tip_z) / length
         elif contact.known:
-            normal, distance = contact.normal, contact.distance
+            normal, distance = contact.normal.tolist(), contact.distance
         else:
             return
-        gravity = np.array(down_in_body(self._history_attitude[self._slot(features.stamp_ns)]))
+        gravity = down_row(*self._history_attitude[self._slot(features.stamp_ns)])
         self.motion.correct(features, WallAxes.of(normal, gravity), distance)
 
     def _measure(self, frame: SensorFrame, wrench: np.ndarray, axes: WallAxes, wish: Wish) -> Measurement:
@@ -240,9 +245,16 @@ class Pilot:
         contact = self.terms.contact
         distance = contact.distance if contact.known else 0.5
         if self.motion.velocity_age_s < self.config.estimation.velocity_life_s:
-            right, down = self.motion.velocity
-            velocity = axes.right * right + axes.down * down - axes.normal * contact.rate
-            covariance = np.eye(3) * float(self.motion.velocity_covariance.trace())
+            right, down, *_ = self.motion.state
+            (nx, ny, nz), (rx, ry, rz), (dx, dy, dz), rate = axes.normal, axes.right, axes.down, contact.rate
+            velocity = np.array(
+                (
+                    rx * right + dx * down - nx * rate,
+                    ry * right + dy * down - ny * rate,
+                    rz * right + dz * down - nz * rate,
+                )
+            )
+            covariance = self._velocity_covariance()
         return Measurement(
             stamp_ns=frame.stamp_ns,
             attitude=frame.attitude,
@@ -257,13 +269,20 @@ class Pilot:
             velocity_covariance=covariance,
         )
 
+    def _velocity_covariance(self) -> np.ndarray:
+        """Made anew only when a picture has changed it."""
+        spread = self.motion.velocity_variance
+        if spread != self._spread:
+            self._spread, self._covariance = spread, spread * np.eye(3)
+        return self._covariance
+
     def _scenery(self, frame: SensorFrame) -> Scenery:
-        contact = self.terms.contact
+        contact, motion = self.terms.contact, self.motion.state
         return Scenery(
             time_s=(frame.stamp_ns - self._first) * 1e-9,
             lines=self.motion.lines,
-            odometer=self.motion.odometer,
-            velocity=self.motion.velocity,
+            odometer=motion[4:6],
+            velocity=motion[:2],
             distance=contact.distance,
             wall_known=contact.known,
             in_contact=contact.in_contact,
@@ -276,7 +295,7 @@ class Pilot:
     def _refer(self, wish: Wish) -> Reference:
         """Offsets in metres to line references: rho = l / d at the measured distance."""
         contact = self.terms.contact
-        depth = float(self._tip_camera[2]) + (contact.distance if contact.known else 0.5)
+        depth = self._tip_camera[2] + (contact.distance if contact.known else 0.5)
         references = []
         for line, offset in wish.guides:
             if line.role == HORIZONTAL:

@@ -7,30 +7,35 @@ from typing import Any
 
 import numpy as np
 
-from ibvs_qp.gate import ACCELERATION_BOUND, RATE_BOUND, WRENCH_BOUND, is_stamp, sound_vector
+from ibvs_qp.gate import ACCELERATION_BOUND, RATE_BOUND, WRENCH_BOUND, is_stamp
 from ibvs_qp.measurement import SensorFrame
 
-#: Size and largest believable norm of every raw vector.
-_VECTORS = {
-    "angular_velocity": (3, RATE_BOUND),
-    "specific_force": (3, ACCELERATION_BOUND),
-    "wrench": (6, WRENCH_BOUND),
-}
+#: Name, size and largest believable entry of every raw vector.
+_VECTORS = (
+    ("attitude", 4, 1.01),
+    ("angular_velocity", 3, RATE_BOUND),
+    ("specific_force", 3, ACCELERATION_BOUND),
+    ("wrench", 6, WRENCH_BOUND),
+)
 
 
 class SensorGate:
-    """Passes sound frames on untouched; one NaN in a filter would stay there for the rest of the flight."""
+    """Passes sound frames on untouched; one NaN in a filter would stay there for the rest of the flight.
+
+    Attributes:
+        last: Last good numbers of every raw vector by name, the present ones where they are sound.
+    """
 
     def __init__(self) -> None:
         self.reset()
 
     def reset(self) -> None:
         """Forget the last good values; level and still stands in for what was never seen."""
-        self._last: dict[str, np.ndarray] = {
-            "attitude": np.array([1.0, 0.0, 0.0, 0.0]),
-            "angular_velocity": np.zeros(3),
-            "specific_force": np.array([0.0, 0.0, -9.81]),
-            "wrench": np.zeros(6),
+        self.last: dict[str, list[float]] = {
+            "attitude": [1.0, 0.0, 0.0, 0.0],
+            "angular_velocity": [0.0] * 3,
+            "specific_force": [0.0, 0.0, -9.81],
+            "wrench": [0.0] * 6,
         }
         self._stamp = -1
         self._wrench_stamp = 0
@@ -41,25 +46,35 @@ class SensorGate:
             return None, ("sensor frame: stamp_ns not after the last one",)
         self._stamp = frame.stamp_ns
         changes: dict[str, Any] = {}
-        attitude = frame.attitude
-        if sound_vector(attitude, 4, 1.01) and abs(float(attitude @ attitude) - 1.0) <= 0.02:
-            self._last["attitude"] = attitude.copy()
-        else:
-            changes["attitude"] = self._last["attitude"]
-        for name, (size, bound) in _VECTORS.items():
-            value = getattr(frame, name)
-            if sound_vector(value, size, bound):
-                self._last[name] = value.copy()
+        last = self.last
+        for name, size, bound in _VECTORS:
+            numbers = _sound(getattr(frame, name), size, bound)
+            if numbers is None or (size == 4 and not _unit(*numbers)):
+                changes[name] = np.array(last[name])
             else:
-                changes[name] = self._last[name]
+                last[name] = numbers
         if not is_stamp(frame.wrench_stamp_ns) or frame.wrench_stamp_ns > frame.stamp_ns or "wrench" in changes:
             changes["wrench_stamp_ns"] = self._wrench_stamp
         else:
             self._wrench_stamp = frame.wrench_stamp_ns
-        for name in ("image", "features"):
-            part = getattr(frame, name)
+        for name, part in (("image", frame.image), ("features", frame.features)):
             if part is not None and not is_stamp(getattr(part, "stamp_ns", None)):
                 changes[name] = None
         if not changes:
             return frame, ()
         return dataclasses.replace(frame, **changes), tuple(f"sensor {name}: not sound" for name in changes)
+
+
+def _sound(value: Any, size: int, bound: float) -> list[float] | None:
+    """The numbers of a float vector of that size with every entry within the bound, else None."""
+    if not isinstance(value, np.ndarray) or value.shape != (size,) or value.dtype.kind != "f":
+        return None
+    numbers = value.tolist()
+    for number in numbers:
+        if not -bound <= number <= bound:  # so written that NaN fails
+            return None
+    return numbers
+
+
+def _unit(w: float, x: float, y: float, z: float) -> bool:
+    return abs(w * w + x * x + y * y + z * z - 1.0) <= 0.02

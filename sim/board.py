@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -21,13 +22,13 @@ class BoardGeometry:
 
     scene: Scene
 
-    @property
+    @cached_property
     def along(self) -> np.ndarray:
         """Unit vector along the bottom edge to the right, in world (y, z), (2,)."""
         slope = math.radians(self.scene.board.slope_deg)
         return np.array([math.cos(slope), math.sin(slope)])
 
-    @property
+    @cached_property
     def up(self) -> np.ndarray:
         """Unit vector up along the left edge, in world (y, z), (2,)."""
         slope = math.radians(self.scene.board.slope_deg)
@@ -35,14 +36,22 @@ class BoardGeometry:
 
     def point(self, along_m: float | np.ndarray, up_m: float | np.ndarray) -> np.ndarray:
         """World (y, z) of board coordinates [m], (..., 2)."""
-        corner = np.array([0.0, -self.scene.board.bottom_m])
         along_m, up_m = np.asarray(along_m, float), np.asarray(up_m, float)
-        return corner + along_m[..., None] * self.along + up_m[..., None] * self.up
+        return self._corner + along_m[..., None] * self.along + up_m[..., None] * self.up
 
     def board_coordinates(self, yz: np.ndarray) -> np.ndarray:
         """Inverse of `point`: (along, up) [m] of world (y, z), (..., 2)."""
-        offset = np.asarray(yz, float) - np.array([0.0, -self.scene.board.bottom_m])
-        return np.stack((offset @ self.along, offset @ self.up), axis=-1)
+        return (np.asarray(yz, float) - self._corner) @ self._axes
+
+    @cached_property
+    def _corner(self) -> np.ndarray:
+        """World (y, z) of the bottom left corner [m], (2,)."""
+        return np.array([0.0, -self.scene.board.bottom_m])
+
+    @cached_property
+    def _axes(self) -> np.ndarray:
+        """Columns along and up, (2, 2)."""
+        return np.column_stack((self.along, self.up))
 
     @property
     def row_ends(self) -> tuple[float, float]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -12,6 +13,8 @@ from sim.board import BoardGeometry
 #: Points on the rim of every disc, 17 mm apart: so exactly is known where a disc crosses the board's outline; its
 #: foremost point is exact.
 RIM_POINTS = 72
+#: Poses taken at once [-]: their rims fill a few megabytes.
+BLOCK = 256
 
 
 class PropellerClearance:
@@ -32,6 +35,7 @@ class PropellerClearance:
         # World (y, z) from the corner to (along, up) of the board.
         self._outline = np.column_stack((board.along, board.up))
         self._corner = board.point(0.0, 0.0)
+        self._reach = float(np.linalg.norm(self._positions, axis=1).max()) + self._radius
 
     def _rim(self, position: np.ndarray, axis: np.ndarray) -> np.ndarray:
         first = np.cross(axis, [1.0, 0.0, 0.0])
@@ -47,6 +51,35 @@ class PropellerClearance:
     def foremost(self, position: np.ndarray, rotation: np.ndarray) -> float:
         """Largest world x that any disc reaches [m], exact and quick; negative: clear of board and wall."""
         return float(self._fronts(position, rotation).max())
+
+    def strikes(self, position: Sequence[float], rotation: Sequence[Sequence[float]]) -> bool:
+        """Whether any disc touches board or wall; costs next to nothing while the body keeps its distance."""
+        if position[0] + self._reach <= 0.0:
+            return False
+        where, turn = np.array(position), np.array(rotation)
+        return self.foremost(where, turn) > 0.0 and self.distance(where, turn) <= 0.0
+
+    def distances(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
+        """`distance` of many poses at once [m], (N,); the numbers of one pose by itself are the same to rounding.
+
+        Args:
+            positions: (N, 3).
+            rotations: (N, 3, 3).
+        """
+        blocks = [slice(start, start + BLOCK) for start in range(0, len(positions), BLOCK)]
+        return np.concatenate([np.zeros(0), *(self._block(positions[block], rotations[block]) for block in blocks)])
+
+    def _block(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
+        axes, hubs = self._axes @ rotations[:, 0].T, self._positions @ rotations[:, 0].T
+        fronts = positions[:, 0] + hubs + self._radius * np.sqrt(np.maximum(1.0 - axes * axes, 0.0))
+        to_board = np.zeros((3, 3))  # from the world to (x, along, up) of the board
+        to_board[0, 0], to_board[1:, 1:] = 1.0, self._outline.T
+        start = (positions - np.append(0.0, self._corner)) @ to_board.T
+        x, along, up = self._rims.reshape(-1, 3) @ np.moveaxis(to_board @ rotations, 0, 2) + start.T[:, None, :]
+        width, height = self._size
+        inside = (along >= 0.0) & (along <= width) & (up >= 0.0) & (up <= height)
+        ahead = np.where(inside, x, -math.inf).max(axis=0)
+        return np.minimum(self._gap - fronts.max(axis=0), -ahead)
 
     def distance(self, position: np.ndarray, rotation: np.ndarray) -> float:
         """Smallest distance of any disc to the surface straight ahead of it [m]; negative inside a surface.

@@ -167,7 +167,8 @@ def fly(
                 progress(flown, pilot.painter.phase, flown / max(time.perf_counter() - start, 1e-9))
     except KeyboardInterrupt:
         reason = "interrupted"
-    trace = recorder.trace(time.perf_counter() - start)
+    trace = recorder.trace()
+    trace.wall_time_s = time.perf_counter() - start
     trace.completed = not reason and pilot.painter.finished and not pilot.painter.failed
     trace.reason = reason or pilot.painter.reason
     if reason:

@@ -21,10 +21,11 @@ IMPEDANCE = 0.002
 #: Rate at which a sticking tip loses its slip velocity [1/s]; a Coulomb contact stops within 10 ms.
 STICK_RATE = 100.0
 
-#: Solver options under which the recipe holds. The no-slip pass removes the creep of a sticking tip.
+#: Solver options under which the recipe holds. The no-slip pass removes the creep of a sticking tip. No force here is
+#: implicit in the velocity and there is one contact: Euler steps without a search for islands cost a seventh less.
 OPTION_XML = (
-    '<option timestep="0.001" gravity="0 0 -{gravity}" integrator="implicitfast" cone="elliptic" impratio="10" '
-    'solver="Newton" jacobian="dense" noslip_iterations="3"><flag autoreset="disable"/></option>'
+    '<option timestep="0.001" gravity="0 0 -{gravity}" integrator="Euler" cone="elliptic" impratio="10" '
+    'solver="Newton" jacobian="dense" noslip_iterations="3"><flag autoreset="disable" island="disable"/></option>'
 )
 
 

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-
-import numpy as np
+from collections.abc import Sequence
 
 from sim.clearance import PropellerClearance
 
@@ -17,20 +16,20 @@ FLIP_DEG = 60.0
 _FLIP_COSINE = math.cos(math.radians(FLIP_DEG))
 
 
-def crash_reason(position: np.ndarray, rotation: np.ndarray, clearance: PropellerClearance) -> str | None:
-    """Why a vehicle at this pose has crashed, or None.
+def crash_reason(
+    position: Sequence[float], rotation: Sequence[Sequence[float]], clearance: PropellerClearance
+) -> str | None:
+    """Why a vehicle at this pose has crashed, or None; plain floats, it is asked every tick.
 
     Args:
         position: Body origin, world NED [m], (3,).
-        rotation: Rotation B to I, (3, 3).
+        rotation: Rows of the rotation B to I, (3, 3).
         clearance: Its propeller discs before board and wall.
     """
-    if not math.isfinite(float(position.sum() + rotation.sum())):
+    if not math.isfinite(sum(position) + sum(map(sum, rotation))):
         return "non-finite state"
-    if rotation[2, 2] < _FLIP_COSINE:
+    if rotation[2][2] < _FLIP_COSINE:
         return f"flip: tilted by more than {FLIP_DEG:g} deg"
     if position[2] > -GROUND_CLEARANCE_M:
         return "hit the ground"
-    if clearance.foremost(position, rotation) > 0.0 and clearance.distance(position, rotation) <= 0.0:
-        return "propeller strike"
-    return None
+    return "propeller strike" if clearance.strikes(position, rotation) else None

@@ -6,6 +6,7 @@ It stands in for perception where the controller alone is studied (``--features 
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 
 import numpy as np
@@ -28,14 +29,19 @@ from sim.line_projection import (
 )
 from sim.painted_edges import BIN_M, PaintedEdges
 from sim.scene import Scene
+from sim.streams import Normals
 
 #: Noise of the plane: distance [m] and direction of the normal [rad].
 SIGMA_DISTANCE_M, SIGMA_NORMAL = 0.001, math.radians(0.1)
 #: Noise of the velocity per axis [m/s].
 SIGMA_VELOCITY_M_S = 0.003
+_VELOCITY_COVARIANCE = SIGMA_VELOCITY_M_S**2 * np.eye(3)
+_VELOCITY_COVARIANCE.flags.writeable = False  # shared by all frames
 #: Track identities: board edges by name, rows from `_FIRST_ROW_TRACK`.
 BOARD_TRACKS = {"bottom": 1, "right": 2, "top": 3, "left": 4}
 _FIRST_ROW_TRACK = 10
+#: Corners at the ends of every edge: bottom left 0, bottom right 1, top right 2, top left 3.
+_EDGES = {"bottom": (0, 1), "right": (1, 2), "top": (3, 2), "left": (0, 3)}
 #: How far above an edge a point lies for certain on its upper side [m].
 _ABOVE_M = 0.02
 
@@ -62,11 +68,16 @@ class GeometricFeatures:
         self._geometry = BoardGeometry(scene)
         self.intrinsics = camera_intrinsics(scene.camera)
         own, extra = np.random.SeedSequence([seed, 0xFEA7]).spawn(2)
-        self._rng, self._extra = np.random.default_rng(own), np.random.default_rng(extra)
+        self._normals, self._extra = Normals(np.random.default_rng(own)), np.random.default_rng(extra)
         self._hidden = vehicle_layer(scene, vehicle, self.intrinsics, np.random.default_rng(0)).mask
         self._schedule = Schedule(scene.camera.rate_hz, scene.camera.latency_s)
         fx, fy, _, _ = self.intrinsics
-        self._half_view = np.array([0.5 * scene.camera.width / fx, 0.5 * scene.camera.height / fy])
+        self._half_view = 0.5 * scene.camera.width / fx, 0.5 * scene.camera.height / fy
+        width, height = scene.board.width_m, scene.board.height_m
+        corners = np.array([(0.0, 0.0), (width, 0.0), (width, height), (0.0, height), (0.5 * width, 0.5 * height)])
+        self._outline = self._world(corners[:, 0], corners[:, 1])
+        self._unit = self._world(np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0]))
+        self._last_pixel = scene.camera.width - 1, scene.camera.height - 1
 
     def tick(
         self, now_ns: int, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, velocity_body: np.ndarray
@@ -96,13 +107,13 @@ class GeometricFeatures:
         velocity = np.array(velocity_body, float)
         if self._noise:
             lines = [self._blurred(line) for line in lines]
-            velocity += SIGMA_VELOCITY_M_S * self._rng.standard_normal(3)
+            velocity += SIGMA_VELOCITY_M_S * np.array(self._normals.take(3))
         frame = FeatureFrame(
             lines=tuple(lines),
             plane=(a, b, c, -1.0),
             stamp_ns=stamp_ns,
             velocity=velocity,
-            velocity_covariance=SIGMA_VELOCITY_M_S**2 * np.eye(3),
+            velocity_covariance=_VELOCITY_COVARIANCE,
             velocity_stamp_ns=stamp_ns,
         )
         return add_sigma_vs(frame, self.scene.features.sigma_vs, self._extra) if self._noise else frame
@@ -112,67 +123,77 @@ class GeometricFeatures:
         return np.concatenate((np.zeros((*yz.shape[:-1], 1)), yz), axis=-1)
 
     def _board_lines(self, view: View, stamp_ns: int) -> list[LineFeature | None]:
-        width, height = self.scene.board.width_m, self.scene.board.height_m
-        ends = {
-            "bottom": ((0.0, width), (0.0, 0.0)),
-            "right": ((width, width), (0.0, height)),
-            "top": ((0.0, width), (height, height)),
-            "left": ((0.0, 0.0), (0.0, height)),
-        }
-        surface = self._world(np.array(0.5 * width), np.array(0.5 * height))
+        spots = view.to_camera(self._outline).tolist()
         lines = []
-        for name, (along, up) in ends.items():
-            piece = visible_segment(view.to_camera(self._world(np.array(along), np.array(up))), self._half_view)
+        for name, (start, end) in _EDGES.items():
+            piece = visible_segment((spots[start], spots[end]), self._half_view)
             role = HORIZONTAL if name in ("bottom", "top") else VERTICAL
-            side = view.to_camera(surface)
-            lines.append(projected_line(piece, side, role, "board", BOARD_TRACKS[name], stamp_ns))
+            lines.append(projected_line(piece, spots[4], role, "board", BOARD_TRACKS[name], stamp_ns))
         return lines
 
     def _paint_lines(self, view: View, stamp_ns: int) -> list[LineFeature | None]:
         lines = []
+        corner, per_metre = self._board_in_camera(view)
         for row in range(1, self.scene.paint.rows + 1):
             points = self._edges.exposed(row)
             if len(points) < 2:
                 continue
-            spots = view.to_camera(self._world(points[:, 0], points[:, 1]))
-            seen = self._unhidden(spots)
+            seen = np.flatnonzero(self._unhidden(corner + points @ per_metre))
             # The longest piece without a gap; a gap is where a later row, the brush or the picture's border lies.
-            breaks = np.flatnonzero(np.diff(points[seen, 0]) > 1.5 * BIN_M) + 1
-            piece = max(np.split(np.flatnonzero(seen), breaks), key=len)
+            piece = _longest_run(seen, points[:, 0])
             if len(piece) < 2:
                 continue
-            along, height = fitted_ends(points[piece])
-            ends = view.to_camera(self._world(along, height))
-            above = view.to_camera(self._world(along, height + _ABOVE_M)).mean(axis=0)
+            (left, right), (low, high) = fitted_ends(points[piece])
+            middle = 0.5 * (left + right), 0.5 * (low + high) + _ABOVE_M
+            *ends, above = (corner + np.array(((left, low), (right, high), middle)) @ per_metre).tolist()
             visible = visible_segment(ends, self._half_view)
             lines.append(projected_line(visible, above, HORIZONTAL, "paint", _FIRST_ROW_TRACK + row, stamp_ns))
         return lines
 
+    def _board_in_camera(self, view: View) -> tuple[np.ndarray, np.ndarray]:
+        """Camera coordinates of the board's corner [m], (3,), and per metre along and up, (2, 3)."""
+        spots = view.to_camera(self._unit)
+        return spots[0], spots[1:] - spots[0]
+
     def _unhidden(self, spots: np.ndarray) -> np.ndarray:
         """Which points in camera coordinates are in the picture and not behind arm or brush, bool (n,)."""
         fx, fy, cx, cy = self.intrinsics
-        height, width = self._hidden.shape
-        with np.errstate(divide="ignore", invalid="ignore"):
-            u, v = fx * spots[:, 0] / spots[:, 2] + cx, fy * spots[:, 1] / spots[:, 2] + cy
-        good = (spots[:, 2] > NEAR_M) & (u >= 0) & (u <= width - 1) & (v >= 0) & (v <= height - 1)
-        good[good] = self._hidden[np.rint(v[good]).astype(int), np.rint(u[good]).astype(int)] == 0
+        last_column, last_row = self._last_pixel
+        x, y, z = spots.T
+        depth = np.maximum(z, NEAR_M)  # nearer ones are refused below
+        u, v = x * fx / depth + cx, y * fy / depth + cy
+        good = (z > NEAR_M) & (u >= 0.0) & (u <= last_column) & (v >= 0.0) & (v <= last_row)
+        places = np.flatnonzero(good)
+        row, column = np.rint(v[places]).astype(int), np.rint(u[places]).astype(int)
+        good[places] = self._hidden[row, column] == 0
         return good
 
     def _blurred(self, line: LineFeature) -> LineFeature:
-        rho, theta = self._rng.standard_normal(2) * (SIGMA_RHO, SIGMA_THETA)
-        return moved_line(line, rho, theta)
+        rho, theta = self._normals.take(2)
+        return moved_line(line, SIGMA_RHO * rho, SIGMA_THETA * theta)
 
     def _plane(self, view: View) -> tuple[float, float, float]:
-        inverse = view.plane(0.0)
-        size = float(np.linalg.norm(inverse))
-        normal, distance = inverse / size, 1.0 / size
-        if self._noise:
-            tilt = SIGMA_NORMAL * self._rng.standard_normal(3)
-            normal = normal + tilt - normal * float(normal @ tilt)
-            normal /= np.linalg.norm(normal)
-            distance += SIGMA_DISTANCE_M * self._rng.standard_normal()
-        a, b, c = (float(entry) for entry in normal / distance)
-        return a, b, c
+        a, b, c = view.plane(0.0).tolist()
+        if not self._noise:
+            return a, b, c
+        size = math.sqrt(a * a + b * b + c * c)
+        x, y, z, distance = a / size, b / size, c / size, 1.0 / size
+        i, j, k, far = self._normals.take(4)
+        along = x * i + y * j + z * k  # a tilt leaves the length of the normal
+        x, y, z = (n + SIGMA_NORMAL * (tilt - n * along) for n, tilt in ((x, i), (y, j), (z, k)))
+        scale = math.sqrt(x * x + y * y + z * z) * (distance + SIGMA_DISTANCE_M * far)
+        return x / scale, y / scale, z / scale
+
+
+def _longest_run(seen: np.ndarray, along: np.ndarray) -> np.ndarray:
+    """The longest run of indices whose points follow one another without a gap along the board."""
+    if len(seen) == 0 or along[seen[-1]] - along[seen[0]] < (len(seen) - 0.5) * BIN_M:
+        return seen
+    where = along[seen]
+    breaks = np.flatnonzero(where[1:] - where[:-1] > 1.5 * BIN_M) + 1
+    bounds = [0, *breaks.tolist(), len(seen)]
+    start, end = max(itertools.pairwise(bounds), key=lambda run: run[1] - run[0])
+    return seen[start:end]
 
 
 def add_sigma_vs(frame: FeatureFrame, sigma: float, rng: np.random.Generator) -> FeatureFrame:

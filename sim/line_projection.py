@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -12,13 +13,15 @@ from ibvs_qp.measurement import HORIZONTAL, LineFeature
 
 #: Noise of rho [-] and theta [rad] of one line: a good sub-pixel fit (0.1 px, 0.06 deg) at 640x480.
 SIGMA_RHO, SIGMA_THETA = 2e-4, 1e-3
+_COVARIANCE = np.diag([SIGMA_RHO**2, SIGMA_THETA**2])
+_COVARIANCE.flags.writeable = False  # shared by all lines
 #: Nearest depth that is seen [m].
 NEAR_M = 0.05
 #: Shortest visible piece that counts as a line, normalised (31 px at 640x480).
 _SHORTEST = 0.05
 
 
-def visible_segment(ends: np.ndarray, half_view: np.ndarray) -> np.ndarray | None:
+def visible_segment(ends: Sequence[Sequence[float]], half_view: Sequence[float]) -> np.ndarray | None:
     """The part of a straight edge inside the field of view.
 
     Args:
@@ -29,8 +32,9 @@ def visible_segment(ends: np.ndarray, half_view: np.ndarray) -> np.ndarray | Non
         Normalised end points (2, 2), or None where too little of it is seen.
     """
     low, high = 0.0, 1.0
-    (x0, y0, z0), (dx, dy, dz) = ends[0].tolist(), (ends[1] - ends[0]).tolist()
-    right, down = half_view.tolist()
+    (x0, y0, z0), (x1, y1, z1) = ends
+    dx, dy, dz = x1 - x0, y1 - y0, z1 - z0
+    right, down = half_view
     for value, rate in (
         (z0 - NEAR_M, dz),
         (right * z0 + x0, right * dz + dx),
@@ -47,13 +51,13 @@ def visible_segment(ends: np.ndarray, half_view: np.ndarray) -> np.ndarray | Non
             high = min(high, -value / rate)
     if low >= high:
         return None
-    points = ends[0] + np.array([[low], [high]]) * (ends[1] - ends[0])
-    segment = points[:, :2] / points[:, 2:]
-    return segment if np.linalg.norm(segment[1] - segment[0]) >= _SHORTEST else None
+    near, far = z0 + low * dz, z0 + high * dz
+    x1, y1, x2, y2 = (x0 + low * dx) / near, (y0 + low * dy) / near, (x0 + high * dx) / far, (y0 + high * dy) / far
+    return np.array(((x1, y1), (x2, y2))) if math.hypot(x2 - x1, y2 - y1) >= _SHORTEST else None
 
 
 def projected_line(
-    segment: np.ndarray | None, surface: np.ndarray, role: str, kind: str, track: int, stamp_ns: int
+    segment: np.ndarray | None, surface: Sequence[float], role: str, kind: str, track: int, stamp_ns: int
 ) -> LineFeature | None:
     """The line feature through a segment, with the covariance of a good fit.
 
@@ -71,11 +75,12 @@ def projected_line(
     theta = math.atan2(x1 - x2, y2 - y1)
     rho = x1 * math.cos(theta) + y1 * math.sin(theta)
     rho, theta = align_line(rho, theta, 0.5 * math.pi if role == HORIZONTAL else 0.0)
-    side = np.dot((math.cos(theta), math.sin(theta), -rho), surface)  # times the point's depth, which is positive
+    x, y, z = surface
+    side = x * math.cos(theta) + y * math.sin(theta) - rho * z  # times the point's depth, which is positive
     return LineFeature(
         rho=rho,
         theta=theta,
-        covariance=np.diag([SIGMA_RHO**2, SIGMA_THETA**2]),
+        covariance=_COVARIANCE,
         role=role,
         stamp_ns=stamp_ns,
         track_id=track,
@@ -85,13 +90,14 @@ def projected_line(
     )
 
 
-def fitted_ends(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Least-squares line up(along) through points (n, 2), as (along, up) of its two ends, (2,) each."""
-    middle, height = points.mean(axis=0)
-    away = points[:, 0] - middle
-    slope = float(away @ points[:, 1]) / float(away @ away)
-    along = points[[0, -1], 0]
-    return along, height + slope * (along - middle)
+def fitted_ends(points: np.ndarray) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Least-squares line up(along) through points (n, 2), as (along, up) of its two ends."""
+    along, up = points.T
+    middle, height = float(np.add.reduce(along)) / len(along), float(np.add.reduce(up)) / len(up)
+    away = along - middle
+    slope = float(away @ up) / float(away @ away)
+    first, last = along.item(0), along.item(-1)
+    return (first, last), (height + slope * (first - middle), height + slope * (last - middle))
 
 
 def moved_line(line: LineFeature, rho: float, theta: float) -> LineFeature:
@@ -99,6 +105,7 @@ def moved_line(line: LineFeature, rho: float, theta: float) -> LineFeature:
     rho, theta = line.rho + rho, line.theta + theta
     segment = line.segment
     if segment is not None:
-        normal = np.array([math.cos(theta), math.sin(theta)])
-        segment = segment - np.outer(segment @ normal - rho, normal)
+        c, s = math.cos(theta), math.sin(theta)
+        away = [(x, y, x * c + y * s - rho) for x, y in segment.tolist()]
+        segment = np.array([(x - gap * c, y - gap * s) for x, y, gap in away])
     return dataclasses.replace(line, rho=rho, theta=theta, segment=segment)

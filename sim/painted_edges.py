@@ -25,11 +25,13 @@ class PaintedEdges:
     """
 
     def __init__(self, scene: Scene) -> None:
-        self._geometry = BoardGeometry(scene)
-        self._first_height = self._geometry.row_height(1)
+        self._first_height, self._pitch = BoardGeometry(scene).row_height(1), scene.paint.pitch_m
         self._radius, self._rows = 0.5 * scene.paint.brush_width_m, scene.paint.rows
         self._bins = math.ceil(scene.board.width_m / BIN_M)
         self._top = np.full((self._rows + 1, self._bins), -math.inf)
+        # Bins of a row that some later row lies over, kept up to date as paint comes: they are asked for all the time.
+        self._covered = np.zeros((self._rows + 1, self._bins), dtype=bool)
+        self._reach = math.ceil(self._radius / BIN_M)
 
     def stroke(self, previous: BoardPoint | None, current: BoardPoint) -> None:
         """Record a stroke between two tip positions (along, up) [m]; see `sim.canvas.Canvas.stroke`."""
@@ -40,21 +42,22 @@ class PaintedEdges:
             return
         if a0 > a1:
             a0, u0, a1, u1 = a1, u1, a0, u0
-        paint = self._geometry.scene.paint
-        row = round((0.5 * (u0 + u1) - self._first_height) / paint.pitch_m) + 1
-        top = self._top[min(max(row, 1), self._rows)]
+        row = round((0.5 * (u0 + u1) - self._first_height) / self._pitch) + 1
+        row = min(max(row, 1), self._rows)
+        top = self._top[row]
         first, last = max(0, math.floor(a0 / BIN_M)), min(self._bins - 1, math.floor(a1 / BIN_M))
         for k in range(first, last + 1):  # mostly a single bin: plain floats beat arrays
             place = min(max((k + 0.5) * BIN_M, a0), a1)
             height = u0 + (place - a0) / (a1 - a0) * (u1 - u0) + self._radius
             if height > top[k]:
+                if top[k] == -math.inf:
+                    self._covered[:row, max(0, k - self._reach) : k + self._reach + 1] = True
                 top[k] = height
 
     def exposed(self, row: int) -> np.ndarray:
         """Points (along, up) [m] of a row's upper edge that no later row covers, in order along the board, (n, 2)."""
-        painted = self._top[row] > -math.inf
-        reach = math.ceil(self._radius / BIN_M)
-        later = (self._top[row + 1 :] > -math.inf).any(axis=0)
-        covered = np.convolve(later, np.ones(2 * reach + 1), mode="same") > 0.5
-        bins = np.flatnonzero(painted & ~covered)
-        return np.column_stack(((bins + 0.5) * BIN_M, self._top[row, bins]))
+        top = self._top[row]
+        bins = np.flatnonzero((top > -math.inf) & ~self._covered[row])
+        points = np.empty((len(bins), 2))
+        points[:, 0], points[:, 1] = (bins + 0.5) * BIN_M, top[bins]
+        return points

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ibvs_qp.command import Command, Outcome
 from ibvs_qp.controller import HybridController
-from ibvs_qp.measurement import HORIZONTAL, SensorFrame
+from ibvs_qp.measurement import SensorFrame
 from ibvs_qp.pilot import Pilot
+from ibvs_qp.setpoints.lines import LINE_TERMS
 from ibvs_qp.vision.overlay import draw_overlay
+from sim.cameras.protocol import camera_intrinsics
+from sim.columns import Columns
 from sim.plant import STEPS_PER_TICK
 from sim.trace import Event, Trace
+from sim.truth import euler_angles, in_body, rotations
 from sim.video import pack_picture
 
 if TYPE_CHECKING:
@@ -25,6 +30,14 @@ PHASES = ("start", "approach", "align", "press", "paint", "climb", "retreat", "d
 CLEARANCE_TICKS = 5
 #: Pictures kept for the video per second.
 VIDEO_RATE = 10.0
+#: Columns that are one number a tick; vectors follow, in the order in which `Recorder.tick` fills them in.
+NUMBERS = """t push_true push_measured push_reference standoff_estimate horizontal_error vertical_error
+contact_weight phase row outcome step_us iterations""".split()
+#: Columns of integers.
+INTEGERS = ("phase", "row", "outcome", "iterations")
+_ERROR = LINE_TERMS.index("error")
+_PHASE_INDEX = {phase: index for index, phase in enumerate(PHASES)}
+_OUTCOME_INDEX = {outcome: float(index) for index, outcome in enumerate(Outcome)}
 
 
 class Recorder:
@@ -32,13 +45,20 @@ class Recorder:
 
     def __init__(self, scene: Scene, options: FlightOptions, world: World, pilot: Pilot) -> None:
         self._scene, self._options, self._world, self._pilot = scene, options, world, pilot
-        self._rows: dict[str, list[Any]] = {}
+        rotors = pilot.config.controller.vehicle.geometry.count
+        numbers = {name: 1 for name in NUMBERS}
+        numbers |= {"motion": len(world.plant.motion), "friction_true": 2, "contact_1khz": STEPS_PER_TICK}
+        vectors = {"thrusts": rotors, "thrusts_actual": rotors, "unallocated": 6, "velocity_estimate": 3}
+        self._log = Columns(numbers | vectors)
+        self._numbers, self._places = sum(numbers.values()), tuple(self._log.places[name] for name in vectors)
+        self._focal = camera_intrinsics(scene.camera)[0]
+        tick, slots = pilot.terms.tick, range(pilot.config.controller.line_slots)
+        self._lines = [(tick.inputs[f"line_{slot}"], slot, tick.outputs[f"line_{slot}_terms"]) for slot in slots]
         self._limits: dict[str, int] = {}
         self._active: list[tuple[int, ...]] = []
         # Single precision: 1e-7 of a parameter is nothing that a person reads, and half the log.
         self._program = pilot.controller.engine.data.stacked if isinstance(pilot.controller, HybridController) else None
-        self._programs: list[np.ndarray] = []
-        self._contact: list[np.ndarray] = []
+        self._programs = Columns({"program": 0 if self._program is None else len(self._program)}, np.float32)
         self._painting: list[bool] = []
         self._vision: list[float] = []
         self._events: list[Event] = []
@@ -46,52 +66,39 @@ class Recorder:
         self._next_picture = 0.0
         self._rejected: set[str] = set()
         self._logged = 0
-        self._clearance = np.inf
 
     def tick(self, frame: SensorFrame, command: Command) -> None:
         """Log one tick, after the plant has moved."""
         plant, pilot = self._world.plant, self._pilot
         terms, painter = pilot.terms, pilot.painter
-        time_s = frame.stamp_ns * 1e-9
-        measurement = pilot.measurement
-        velocity = measurement.velocity if measurement is not None and measurement.velocity is not None else None
-        fx = self._scene.camera.height / 2.0 / np.tan(np.radians(self._scene.camera.vertical_fov_deg) / 2.0)
-        errors = [np.nan, np.nan]
-        for line in terms.lines:
-            errors[0 if line.role == HORIZONTAL else 1] = line.error * fx
-        add = self._add
-        add("t", time_s)
-        add("position", plant.position)
-        add("velocity", plant.velocity)
-        add("attitude", plant.quaternion)
-        add("euler", plant.euler)
-        add("tip", plant.tip)
-        add("thrusts", command.thrusts)
-        add("thrusts_actual", plant.thrusts_actual)
-        add("push_true", plant.contact_normal_force)
-        add("push_measured", terms.contact.push)
-        add("push_reference", terms.push_reference * terms.contact.ramp)
-        add("friction_true", plant.contact_friction)
-        add("velocity_estimate", velocity if velocity is not None else np.full(3, np.nan))
-        add("standoff_estimate", terms.contact.distance)
-        add("line_error_px", errors)
-        add("contact_weight", terms.contact_weight)
-        add("phase", PHASES.index(painter.phase))
-        add("row", painter.row if painter.phase in ("paint", "climb") else 0)
-        add("outcome", list(Outcome).index(command.outcome))
-        add("unallocated", command.unallocated_wrench)
-        add("step_us", pilot.controller_time_s * 1e6)
-        add("iterations", command.iterations)
-        if self._program is not None:
-            self._programs.append(self._program.astype(np.float32))
-        if len(self._active) % CLEARANCE_TICKS == 0:
-            self._clearance = plant.propeller_clearance
-        add("propeller_clearance", self._clearance)
-        self._contact.append(np.array(plant.contact_1khz))
-        self._painting.append(painter.phase in ("paint", "climb"))
-        self._active.append(
-            tuple(self._limits.setdefault(limit.name, len(self._limits)) for limit in command.active_limits)
+        contact, time_s, painting = terms.contact, frame.stamp_ns * 1e-9, painter.phase in ("paint", "climb")
+        row = self._log.row()
+        row[: self._numbers] = (
+            time_s,
+            plant.contact_normal_force,
+            contact.push,
+            terms.push_reference * contact.ramp,
+            contact.distance,
+            *self._line_errors(),
+            terms.contact_weight,
+            _PHASE_INDEX[painter.phase],
+            painter.row if painting else 0,
+            _OUTCOME_INDEX[command.outcome],
+            pilot.controller_time_s * 1e6,
+            command.iterations,
+            *plant.motion,
+            *plant.friction,
+            *plant.pushes,
         )
+        thrusts, actual, unallocated, velocity = self._places
+        row[thrusts], row[actual], row[unallocated] = command.thrusts, plant.motor_thrusts, command.unallocated_wrench
+        known = pilot.measurement.velocity if pilot.measurement is not None else None
+        row[velocity] = known if known is not None else math.nan
+        if self._program is not None:
+            self._programs.row()[:] = self._program
+        self._painting.append(painting)
+        active = command.active_limits
+        self._active.append(tuple([self._limits.setdefault(limit.name, len(self._limits)) for limit in active]))
         self._note_events(time_s, command)
         if frame.image is not None and pilot.percept is not None:
             self._vision.append(sum(pilot.percept.time_ms.values()))
@@ -100,11 +107,18 @@ class Recorder:
                 picture = pack_picture(draw_overlay(frame.image.rgb, pilot.percept))
                 self._pictures.append((time_s, picture, painter.phase))
 
-    def _add(self, name: str, value: Any) -> None:
-        self._rows.setdefault(name, []).append(value)
+    def _line_errors(self) -> list[float]:
+        """Error of the horizontal and the vertical guide at the tip [px], NaN where absent."""
+        errors, vertical = [math.nan, math.nan], self._pilot.terms.tick.inputs["vertical"]
+        for given, slot, terms in self._lines:
+            if given.item(0) > 0.0:
+                errors[vertical.item(slot) > 0.0] = self._focal * terms.item(_ERROR)
+        return errors
 
     def _note_events(self, time_s: float, command: Command) -> None:
         log = self._pilot.painter.log
+        if not command.rejected and len(log) == self._logged:
+            return
         for when, kind, text in log[self._logged :]:
             self._events.append(Event(t=when, kind=kind, text=text))
         self._logged = len(log)
@@ -114,22 +128,22 @@ class Recorder:
                 self._rejected.add(kind)
                 self._events.append(Event(t=time_s, kind="rejected", text=name))
 
-    def trace(self, wall_time_s: float) -> Trace:
+    def trace(self) -> Trace:
         """Everything logged so far as a trace."""
-        arrays = {name: np.array(values, float) for name, values in self._rows.items()}
-        for name in ("phase", "row", "outcome", "iterations"):
-            if name in arrays:
-                arrays[name] = arrays[name].astype(np.int32)
+        arrays = self._log.arrays()
+        arrays |= {name: arrays[name].astype(np.int32) for name in INTEGERS}
+        arrays["line_error_px"] = np.column_stack((arrays.pop("horizontal_error"), arrays.pop("vertical_error")))
+        arrays |= self._truth(arrays.pop("motion"))
+        arrays["contact_1khz"] = arrays["contact_1khz"].reshape(-1)
         active = np.zeros((len(self._active), len(self._limits)), dtype=bool)
         for tick, columns in enumerate(self._active):
             active[tick, list(columns)] = True
         arrays["active"] = active
-        if self._programs:
-            arrays["program"] = np.array(self._programs)
+        if len(self._programs):
+            arrays |= self._programs.arrays()
         vehicle = self._pilot.config.controller.vehicle
         arrays["thrust_min"], arrays["thrust_max"] = vehicle.thrust_min, vehicle.thrust_max
         arrays["vision_ms"] = np.array(self._vision, float)
-        arrays["contact_1khz"] = np.concatenate(self._contact) if self._contact else np.zeros(0)
         arrays["painting_1khz"] = np.repeat(np.array(self._painting, bool), STEPS_PER_TICK)
         canvas = self._world.canvas
         return Trace(
@@ -141,10 +155,24 @@ class Recorder:
             outcomes=tuple(str(outcome) for outcome in Outcome),
             limits=tuple(self._limits),
             events=self._events,
-            wall_time_s=wall_time_s,
             canvas=canvas.rgb,
             canvas_px_per_m=canvas.pixels_per_m,
             coverage_mask=canvas.coverage,
             pictures=self._pictures,
             preset=self._pilot.config.to_toml(),
         )
+
+    def _truth(self, motion: np.ndarray) -> dict[str, np.ndarray]:
+        """Truth that follows from the motion of every tick, (N, 13), see `sim.readings.PlantReadings.motion`."""
+        plant, position, attitude = self._world.plant, motion[:, :3], motion[:, 6:10]
+        rotation = rotations(attitude)
+        rare = slice(None, None, CLEARANCE_TICKS)
+        clearance = plant.clearance.distances(position[rare], rotation[rare])
+        return {
+            "position": position.copy(),
+            "attitude": attitude.copy(),
+            "velocity": in_body(rotation, motion[:, 3:6]),
+            "euler": euler_angles(rotation),
+            "tip": position + rotation @ np.array(plant.vehicle.tip_position_m),
+            "propeller_clearance": np.repeat(clearance, CLEARANCE_TICKS)[: len(motion)],
+        }

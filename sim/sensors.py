@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from ibvs_qp.measurement import SensorFrame
 from ibvs_qp.vehicle import VehicleParams
 from sim.plant import Plant
 from sim.scene import ForceTorqueScene, ImuScene, Scene
-from sim.streams import stream
+from sim.streams import Normals, stream
 
 NS = 1_000_000_000
 
@@ -24,38 +25,35 @@ class SampleClock:
 
     def __init__(self, rate_hz: float) -> None:
         self._rate = rate_hz
-        self._count = 0
+        self._count = self._next = 0
 
     def due(self, now_ns: int) -> bool:
         """Whether a sample is due at this tick."""
-        if now_ns < self._time(self._count):
+        if now_ns < self._next:
             return False
-        while self._time(self._count) <= now_ns:
+        while self._next <= now_ns:
             self._count += 1
+            self._next = round(self._count * NS / self._rate)
         return True
 
-    def _time(self, count: int) -> int:
-        return round(count * NS / self._rate)
 
-
-def multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Product of two quaternions (w, x, y, z), (4,)."""
-    aw, ax, ay, az = a.tolist()
-    bw, bx, by, bz = b.tolist()
-    return np.array(
-        (
-            aw * bw - ax * bx - ay * by - az * bz,
-            aw * bx + ax * bw + ay * bz - az * by,
-            aw * by - ax * bz + ay * bw + az * bx,
-            aw * bz + ax * by - ay * bx + az * bw,
-        )
+def multiply(a: Sequence[float], b: Sequence[float]) -> tuple[float, float, float, float]:
+    """Product of two quaternions (w, x, y, z)."""
+    (aw, ax, ay, az), (bw, bx, by, bz) = a, b
+    return (
+        aw * bw - ax * bx - ay * by - az * bz,
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
     )
 
 
-def small_turn(vector: np.ndarray) -> np.ndarray:
-    """Unit quaternion of a rotation vector of a few degrees [rad], (4,)."""
-    quaternion = np.concatenate(([1.0], 0.5 * vector))
-    return quaternion / math.sqrt(float(quaternion @ quaternion))
+def small_turn(vector: Sequence[float]) -> tuple[float, float, float, float]:
+    """Unit quaternion of a rotation vector of a few degrees [rad]."""
+    x, y, z = vector
+    x, y, z = 0.5 * x, 0.5 * y, 0.5 * z
+    length = math.sqrt(1.0 + x * x + y * y + z * z)
+    return 1.0 / length, x / length, y / length, z / length
 
 
 class Imu:
@@ -70,22 +68,27 @@ class Imu:
         root = math.sqrt(scene.rate_hz)
         self._gyro_sigma, self._accel_sigma = scene.gyro_density * root, scene.accel_density * root
         self._attitude_sigma = math.radians(scene.attitude_noise_deg)
-        self._gyro, self._accel = stream(seed, "gyro"), stream(seed, "accelerometer")
-        self._attitude = stream(seed, "attitude")
-        direction, yaw = self._attitude.uniform(-math.pi, math.pi, 2)
+        self._gyro, self._accel = Normals(stream(seed, "gyro")), Normals(stream(seed, "accelerometer"))
+        attitude = stream(seed, "attitude")
+        direction, yaw = attitude.uniform(-math.pi, math.pi, 2).tolist()
+        self._attitude = Normals(attitude)
         size = math.radians(scene.attitude_bias_deg)
-        self._tilt = size * np.array([math.cos(direction), math.sin(direction), 0.0])
-        self._yaw = np.array([math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw)])
+        self._tilt = size * math.cos(direction), size * math.sin(direction)
+        self._yaw = math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw)
         self.attitude = self.angular_velocity = self.specific_force = np.zeros(0)
 
     def sample(self, plant: Plant) -> None:
         """Take a sample if one is due."""
         if not self._clock.due(plant.time_ns):
             return
-        turn = self._tilt + self._attitude_sigma * self._attitude.standard_normal(3)
-        self.attitude = multiply(self._yaw, multiply(plant.quaternion, small_turn(turn)))
-        self.angular_velocity = plant.angular_velocity + self._gyro_sigma * self._gyro.standard_normal(3)
-        self.specific_force = plant.specific_force + self._accel_sigma * self._accel.standard_normal(3)
+        (i, j, k), sigma, (tilt_x, tilt_y) = self._attitude.take(3), self._attitude_sigma, self._tilt
+        turn = small_turn((tilt_x + sigma * i, tilt_y + sigma * j, sigma * k))
+        motion = plant.motion
+        self.attitude = np.array(multiply(self._yaw, multiply(motion[6:10], turn)))
+        (i, j, k), sigma, (x, y, z) = self._gyro.take(3), self._gyro_sigma, motion[10:]
+        self.angular_velocity = np.array((x + sigma * i, y + sigma * j, z + sigma * k))
+        (i, j, k), sigma, (x, y, z) = self._accel.take(3), self._accel_sigma, plant.felt
+        self.specific_force = np.array((x + sigma * i, y + sigma * j, z + sigma * k))
 
 
 class ForceTorque:
@@ -98,8 +101,8 @@ class ForceTorque:
         self._clock = SampleClock(scene.rate_hz)
         self._latency_ns = round(scene.latency_s * NS)
         self._sigma = np.array([scene.sigma_n] * 3 + [scene.sigma_nm] * 3)
-        self._noise = stream(seed, "force_torque")
-        direction = self._noise.standard_normal(3)
+        self._noise = Normals(stream(seed, "force_torque"))
+        direction = np.array(self._noise.take(3))
         self.bias = np.concatenate((scene.bias_n * direction / np.linalg.norm(direction), np.zeros(3)))
         self._line: deque[tuple[int, np.ndarray]] = deque()
         self.wrench, self.stamp_ns = np.zeros(0), 0
@@ -108,7 +111,7 @@ class ForceTorque:
         """Take a sample if one is due, and deliver those whose delay is over."""
         now = plant.time_ns
         if self._clock.due(now):
-            self._line.append((now, plant.ft_wrench + self.bias + self._sigma * self._noise.standard_normal(6)))
+            self._line.append((now, plant.ft_wrench + self.bias + self._sigma * self._noise.take(6)))
         while self._line and (self._line[0][0] + self._latency_ns <= now or not self.wrench.size):
             self.stamp_ns, self.wrench = self._line.popleft()
 

@@ -102,3 +102,31 @@ def test_covariance_stays_symmetric_and_positive() -> None:
             f.correct((k - 15) * TICK_NS, np.eye(3)[:1], np.array([rng.normal(0, 1e-3)]), np.array([[1e-6]]), 1e9)
     np.testing.assert_array_equal(f.covariance, f.covariance.T)
     assert np.linalg.eigvalsh(f.covariance).min() > 0
+
+
+@pytest.mark.parametrize("entries", [(1,), (0, 1)])
+def test_measured_entries_correct_like_the_rows_they_stand_for(entries: tuple[int, ...]) -> None:
+    """The scalar and the paired form against the linear system, with correlated noise and across the ring's seam."""
+    rng = np.random.default_rng(4)
+    short, general = new_filter(), new_filter()
+    for k in range(HISTORY + 10):
+        inputs = rng.normal(0.0, 0.01, 3)
+        for f in (short, general):
+            f.predict(k * TICK_NS, inputs, TICK)
+        if k % 8 or k < 20:
+            continue
+        stamp, values = (k - 15) * TICK_NS, rng.normal(0.0, 0.02, len(entries))
+        covariance = np.array([[4e-5, 1e-5], [1e-5, 2e-5]])[: len(entries), : len(entries)]
+        taken = general.correct(stamp, np.eye(3)[list(entries)], values, covariance)
+        if len(entries) == 1:
+            assert short.correct_entry(stamp, entries[0], values[0], covariance[0, 0]) == taken
+        else:
+            a, b = values.tolist()
+            assert short.correct_pair(stamp, 0, (a, b), (4e-5, 1e-5, 2e-5)) == taken
+        np.testing.assert_allclose(short.state, general.state, atol=1e-13)
+        np.testing.assert_allclose(short.covariance, general.covariance, atol=1e-13)
+    newest = (HISTORY + 9) * TICK_NS
+    if len(entries) == 1:
+        assert not short.correct_entry(newest, 0, 9.0, 1e-5)
+    else:
+        assert not short.correct_pair(newest, 0, (9.0, 9.0), (4e-5, 1e-5, 2e-5))

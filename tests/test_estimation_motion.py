@@ -56,15 +56,6 @@ def test_signs_below_and_right_are_positive() -> None:
     assert below.rho == pytest.approx((0.05 - 0.08) / depth) and left.rho == pytest.approx(-0.05 / depth)
 
 
-def test_ends_of_a_segment_in_metres_from_the_tip() -> None:
-    wall = Wall(LEVEL, 0.0)
-    segment = np.array([[-0.2, -0.06], [0.3, -0.06]])  # at half a metre: 10 cm left to 15 cm right, 3 cm up
-    line = replace(wall.line(0.05, 0.5 * math.pi, HORIZONTAL), segment=segment)
-    found = wall_line(line, axes_of(wall), TIP - CAMERA, 0.0)
-    assert found is not None and found[4] is not None
-    np.testing.assert_allclose(found[4], [[-0.1, 0.05], [0.15, 0.05]], atol=1e-9)
-
-
 def test_metres_per_unit_of_rho() -> None:
     wall, step = Wall(attitude(0.05, 0.02), 0.1, 0.1), 1e-6
     axes = axes_of(wall)
@@ -116,7 +107,7 @@ class Stroke:
             covariance = np.eye(2) * 1e-8
             found.append(self.wall.line(offset, tilt, role, covariance=covariance, track_id=identity + 1))
         right, down = self.speed_at(then) + self.rng.normal(0.0, 3e-3, 2)
-        velocity = self.axes.right * right + self.axes.down * down
+        velocity = np.array(self.axes.right) * right + np.array(self.axes.down) * down
         return FeatureFrame(
             lines=tuple(found),
             plane=self.wall.plane,

@@ -13,7 +13,7 @@ import numpy as np
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.estimation.delayed import HISTORY, DelayedKalman
 from ibvs_qp.estimation.surface import StiffnessEstimator
-from ibvs_qp.frames import GRAVITY, R_BODY_CAMERA
+from ibvs_qp.frames import GRAVITY
 from ibvs_qp.measurement import Measurement
 
 #: Accelerometer and unmodelled-gravity noise density along the normal [m/s^2/sqrt(Hz)] (IMU 4e-3, attitude noise).
@@ -39,8 +39,7 @@ class ContactEstimator:
         vehicle = config.vehicle
         self._tip = np.array(vehicle.tip_position_m)
         self._tip_list = self._tip.tolist()
-        self._camera = np.array(vehicle.camera_position_m)
-        self._tip_from_camera = (self._tip - self._camera).tolist()
+        self._tip_from_camera = (self._tip - np.array(vehicle.camera_position_m)).tolist()
         chain = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [0.0, 0.0, 0.0]])
         noise = np.array([1e-10, ACCELERATION_NOISE**2, BIAS_NOISE**2])
         self._filter = DelayedKalman(chain, noise, np.array([0.05, 0.05, 0.1]), config.tick_s)
@@ -101,15 +100,15 @@ class ContactEstimator:
             acceleration = nx * (fx + GRAVITY * gx) + ny * (fy + GRAVITY * gy) + nz * (fz + GRAVITY * gz)
         distance, speed, bias = self._filter.state.tolist()
         state = (distance - dt * (speed + lever), speed + dt * (acceleration - bias), bias)
-        self._filter.remember(measurement.stamp_ns, np.array(state))
+        self._filter.remember(measurement.stamp_ns, state)
 
     def _correct_plane(self, plane: tuple[float, float, float, float], stamp: int) -> None:
-        abcd = np.asarray(plane, float)
-        vector = R_BODY_CAMERA @ abcd[:3] * (-1.0 / abcd[3])
-        length = math.sqrt(vector @ vector)
-        normal = vector / length
-        tip_camera = self._tip - self._camera
-        distance = 1.0 / length - float(normal @ tip_camera)
+        a, b, c, d = plane
+        x, y, z = -c / d, -a / d, -b / d  # from camera to body axes
+        length = math.sqrt(x * x + y * y + z * z)
+        tip_x, tip_y, tip_z = self._tip_from_camera
+        normal = np.array((x, y, z)) / length
+        distance = (1.0 - x * tip_x - y * tip_y - z * tip_z) / length
         self._plane_stamp = stamp
         if not self.known:
             self.normal = normal
@@ -120,16 +119,16 @@ class ContactEstimator:
         if not self._believe(stamp, distance):
             return
         age = min(max(round((self._stamp - stamp) * 1e-9 / self._config.tick_s), 0), min(HISTORY, self._ticks) - 1)
-        slots = (self._ticks - np.arange(age + 1)) % HISTORY
-        correction = NORMAL_GAIN * (normal - self._normal_history[slots[-1]])
-        self._normal_history[slots] += correction
+        history, start, end = self._normal_history, (self._ticks - age) % HISTORY, self._ticks % HISTORY + 1
+        correction = NORMAL_GAIN * (normal - history[start])
+        for part in (slice(start, end),) if start < end else (slice(start, None), slice(0, end)):
+            history[part] += correction
         self.normal = self.normal + correction
         self.normal /= math.sqrt(self.normal @ self.normal)
 
     def _believe(self, stamp: int, distance: float) -> bool:
         """Correct with a measured distance: a jump is believed slowly, a leap only when the next frames repeat it."""
-        row, value = np.array([[1.0, 0.0, 0.0]]), np.array([distance])
-        if self._filter.correct(stamp, row, value, np.array([[DISTANCE_STD**2]])):
+        if self._filter.correct_entry(stamp, 0, distance, DISTANCE_STD**2):
             self._leaps = 0
             return True
         past = self._filter.at(stamp)
@@ -137,7 +136,7 @@ class ContactEstimator:
             return False
         if abs(distance - past[0]) < LEAP:
             self._leaps = 0
-            return self._filter.correct(stamp, row, value, np.array([[0.02**2]]), gate=1e3)
+            return self._filter.correct_entry(stamp, 0, distance, 0.02**2, gate=1e3)
         self._leaps += 1
         if self._leaps < LEAP_FRAMES:
             return False

@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 #: Ticks of history kept; at 250 Hz half a second, far beyond any camera's latency.
 HISTORY = 128
+#: Innovations beyond this many standard deviations are refused.
+GATE = 6.0
+#: Rows (1, j, j (j - 1) / 2): what a correction, its first and its second integral have become j ticks later.
+_PATHS = np.array([(1.0, j, 0.5 * j * (j - 1.0)) for j in range(HISTORY)])
 
 
 class DelayedKalman:
@@ -35,28 +41,30 @@ class DelayedKalman:
     def reset(self) -> None:
         """Forget everything."""
         size = len(self.noise)
-        self.state = np.zeros(size)
         self.covariance = np.diag(self.initial_std**2)
         self._history = np.zeros((HISTORY, size))
-        self._stamps = np.full(HISTORY, -1, dtype=np.int64)
+        self._stamps = [-1] * HISTORY
         self._now = 0
         self._covariance_stamp = -1
+
+    @property
+    def state(self) -> np.ndarray:
+        """The state now, (n,): the newest entry of the history itself."""
+        return self._history[self._now % HISTORY]
 
     def predict(self, stamp_ns: int, increment: np.ndarray, dt: float) -> None:
         """Advance the state by one tick: x += dt G x + increment, and remember it."""
         self.remember(stamp_ns, self.state + dt * (self.chain @ self.state) + increment)
 
-    def remember(self, stamp_ns: int, state: np.ndarray) -> None:
+    def remember(self, stamp_ns: int, state: Sequence[float] | np.ndarray) -> None:
         """Take a state that was advanced by one tick elsewhere."""
-        self.state = state
         self._now += 1
         slot = self._now % HISTORY
-        self._history[slot] = self.state
+        self._history[slot] = state
         self._stamps[slot] = stamp_ns
 
     def set_entry(self, index: int, value: float, std: float) -> None:
         """Set one state entry now and in the past, uncorrelated with the rest (a new line, a first distance)."""
-        self.state[index] = value
         self._history[:, index] = value
         self.covariance[index, :] = 0.0
         self.covariance[:, index] = 0.0
@@ -74,14 +82,13 @@ class DelayedKalman:
         """
         past = self.at(stamp_ns)
         path = np.zeros(HISTORY) if past is None else (self._history - past) @ rates
-        now = 0.0 if past is None else float((self.state - past) @ rates)
-        self.set_entry(index, value + now, std)
-        self._history[:, index] = value + path
+        self.set_entry(index, value, std)
+        self._history[:, index] += path
 
     def at(self, stamp_ns: int) -> np.ndarray | None:
         """State remembered for a stamp (the nearest tick), None if it is not in the history."""
         age = self._age(stamp_ns)
-        return None if age is None else self._history[(self._now - age) % HISTORY]
+        return None if age is None else self._past(age)
 
     def _age(self, stamp_ns: int) -> int | None:
         newest = self._stamps[self._now % HISTORY]
@@ -91,7 +98,7 @@ class DelayedKalman:
         return max(0, age)
 
     def correct(
-        self, stamp_ns: int, rows: np.ndarray, values: np.ndarray, covariance: np.ndarray, gate: float = 6.0
+        self, stamp_ns: int, rows: np.ndarray, values: np.ndarray, covariance: np.ndarray, gate: float = GATE
     ) -> bool:
         """Correct with measurements ``values = rows @ x(stamp) + noise``.
 
@@ -105,18 +112,13 @@ class DelayedKalman:
         Returns:
             False if the stamp is not in the history or the innovation is beyond the gate.
         """
-        age = self._age(stamp_ns)
+        age = self._go_to(stamp_ns)
         if age is None:
             return False
-        if self._covariance_stamp >= 0:
-            dt = max(0.0, (stamp_ns - self._covariance_stamp) * 1e-9)
-            if dt > 0.0:
-                self._propagate(min(dt, 1.0))
-        self._covariance_stamp = max(stamp_ns, self._covariance_stamp)
-        past = self._history[(self._now - age) % HISTORY]
+        past = self._past(age)
         innovation = values - rows @ past
         if len(innovation) == 1:
-            return self._correct_one(rows[0], float(innovation[0]), float(covariance[0, 0]), gate, age)
+            return self._take(age, self.covariance @ rows[0], rows[0], innovation.item(), covariance.item(0), gate)
         spread = rows @ self.covariance @ rows.T + covariance
         gain = np.linalg.solve(spread, rows @ self.covariance).T
         if innovation @ np.linalg.solve(spread, innovation) > gate * gate * len(values):
@@ -126,26 +128,93 @@ class DelayedKalman:
         self._apply(gain @ innovation, age)
         return True
 
-    def _correct_one(self, row: np.ndarray, innovation: float, variance: float, gate: float, age: int) -> bool:
-        """The same for a single value: a division where many values need a linear system."""
-        known = self.covariance @ row
-        spread = float(row @ known) + variance
+    def correct_entry(self, stamp_ns: int, index: int, value: float, variance: float, gate: float = GATE) -> bool:
+        """The same for one measured entry of the state, a scalar: divisions where many values need linear systems."""
+        age = self._go_to(stamp_ns)
+        if age is None:
+            return False
+        past = self._past(age)
+        known = self.covariance[:, index].copy()
+        return self._take(age, known, index, value - past.item(index), variance, gate)
+
+    def correct_pair(
+        self, stamp_ns: int, first: int, values: tuple[float, float], covariance: tuple[float, float, float]
+    ) -> bool:
+        """The same for two neighbouring entries at once, with the covariance's entries (1,1), (1,2), (2,2)."""
+        age = self._go_to(stamp_ns)
+        if age is None:
+            return False
+        past = self._past(age)
+        p = self.covariance
+        da, db = values[0] - past.item(first), values[1] - past.item(first + 1)
+        aa = p.item(first, first) + covariance[0]
+        ab = p.item(first, first + 1) + covariance[1]
+        bb = p.item(first + 1, first + 1) + covariance[2]
+        determinant = aa * bb - ab * ab
+        wa, wb = (bb * da - ab * db) / determinant, (aa * db - ab * da) / determinant
+        if da * wa + db * wb > 2.0 * GATE * GATE:
+            return False
+        a, b = p[:, first].copy(), p[:, first + 1] - (ab / aa) * p[:, first]
+        # One after the other, made independent first: P - a a' / aa - b b' / (bb - ab^2 / aa).
+        self._shrink(a, aa)
+        self._shrink(b, determinant / aa)
+        rest = (db - ab / aa * da) * aa / determinant
+        self._apply(a * (da / aa) + b * rest, age)
+        return True
+
+    def _past(self, age: int) -> np.ndarray:
+        return self._history[(self._now - age) % HISTORY]
+
+    def _go_to(self, stamp_ns: int) -> int | None:
+        """Bring the covariance to a stamp; its age in ticks, None if it is forgotten."""
+        age = self._age(stamp_ns)
+        if age is None:
+            return None
+        if self._covariance_stamp >= 0:
+            dt = max(0.0, (stamp_ns - self._covariance_stamp) * 1e-9)
+            if dt > 0.0:
+                self._propagate(min(dt, 1.0))
+        self._covariance_stamp = max(stamp_ns, self._covariance_stamp)
+        return age
+
+    def _take(
+        self, age: int, known: np.ndarray, row: np.ndarray | int, innovation: float, variance: float, gate: float
+    ) -> bool:
+        """One scalar measurement: ``known`` = P h, where h is the row, or the row of one entry given by its index."""
+        spread = (known.item(row) if isinstance(row, int) else float(row @ known)) + variance
         if innovation * innovation > gate * gate * spread:
             return False
-        self.covariance = self.covariance - np.outer(known, known) / spread
+        self._shrink(known, spread)
         self._apply(known * (innovation / spread), age)
         return True
 
+    def _shrink(self, known: np.ndarray, spread: float) -> None:
+        """P - known known' / spread, symmetric to the bit."""
+        product = known[:, None] * known
+        product /= spread
+        self.covariance -= product
+
     def _propagate(self, dt: float) -> None:
-        step = np.eye(len(self.noise)) + dt * self.chain + 0.5 * dt * dt * (self.chain @ self.chain)
-        moved = step @ self.covariance @ step.T + np.diag(self.noise * dt)
-        self.covariance = 0.5 * (moved + moved.T)
+        step = dt * self.chain + (0.5 * dt * dt) * (self.chain @ self.chain)
+        _diagonal(step)[:] += 1.0
+        moved = step @ self.covariance @ step.T
+        _diagonal(moved)[:] += self.noise * dt
+        moved += moved.T.copy()
+        moved *= 0.5
+        self.covariance = moved
 
     def _apply(self, correction: np.ndarray, age: int) -> None:
+        """Add a correction at a past tick and what has become of it since."""
         first = self.chain @ correction * self.tick
-        second = self.chain @ first * self.tick
-        steps = np.arange(age + 1.0)[:, None]
-        path = correction + steps * first + 0.5 * steps * (steps - 1.0) * second
-        slots = (self._now - age + np.arange(age + 1)) % HISTORY
-        self._history[slots] += path
-        self.state = self._history[self._now % HISTORY].copy()
+        path = _PATHS[: age + 1] @ np.array((correction, first, self.chain @ first * self.tick))
+        start, end = (self._now - age) % HISTORY, self._now % HISTORY + 1
+        if start < end:
+            self._history[start:end] += path
+        else:
+            self._history[start:] += path[: HISTORY - start]
+            self._history[:end] += path[HISTORY - start :]
+
+
+def _diagonal(matrix: np.ndarray) -> np.ndarray:
+    """The diagonal of a contiguous square matrix as a view that can be written."""
+    return matrix.reshape(-1)[:: len(matrix) + 1]

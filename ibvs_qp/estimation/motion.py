@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,8 +11,9 @@ import numpy as np
 from ibvs_qp.estimation.config import EstimationConfig
 from ibvs_qp.estimation.delayed import DelayedKalman
 from ibvs_qp.estimation.wall_lines import WallAxes, image_line, wall_line
-from ibvs_qp.frames import GRAVITY, cross
+from ibvs_qp.frames import GRAVITY
 from ibvs_qp.measurement import FeatureFrame, LineFeature
+from ibvs_qp.vectors import cross_product
 
 #: Lines followed at once.
 SLOTS = 8
@@ -27,7 +29,7 @@ class TrackedLine:
         offset: Signed distance from the tip to the line along its normal [m]; normals point down (horizontal lines)
             or right (vertical lines), so > 0 is below or right of the tip.
         angle: Angle of the normal in (right, down) [rad]; pi/2 for a level line.
-        ends: Visible ends along the line in odometer coordinates (right, down) [m], (2, 2), or None.
+        rates: Offset per unit of the tip's motion (right, down).
     """
 
     track_id: int
@@ -43,19 +45,25 @@ class TrackedLine:
     surface_side: int = 0
     kind: str = ""
     source_weight: float = 1.0
-    ends: np.ndarray | None = None
     theta_variance: float = 1e-4
+    rates: tuple[float, float] = (0.0, 0.0)
     extra: dict[str, float] = field(default_factory=dict)
 
 
 class WallMotion:
-    """Velocity right and down, a tip odometer, and the tracked lines' offsets; corrected at the time of capture."""
+    """Velocity right and down, a tip odometer, and the tracked lines' offsets; corrected at the time of capture.
+
+    Attributes:
+        state: Velocity (2), accelerometer bias (2), odometer (2), offset of every line slot, as plain numbers.
+        lines: The tracked lines by identity.
+    """
 
     def __init__(
         self, tip: np.ndarray, camera: np.ndarray, tick_s: float, config: EstimationConfig | None = None
     ) -> None:
         self._config = config = config or EstimationConfig()
-        self._tip, self._camera = np.asarray(tip, float), np.asarray(camera, float)
+        self._tip = np.asarray(tip, float).tolist()
+        self._tip_from_camera = (np.asarray(tip, float) - np.asarray(camera, float)).tolist()
         size = _LINES + SLOTS
         chain = np.zeros((size, size))
         chain[0, 2] = chain[1, 3] = -1.0
@@ -72,6 +80,7 @@ class WallMotion:
         """Forget everything."""
         self._filter.reset()
         self._filter.chain[_LINES:, :] = 0.0
+        self.state: list[float] = self._filter.state.tolist()
         self.lines: dict[int, TrackedLine] = {}
         self._stamp = -1
         self._frame_stamp = -1
@@ -81,7 +90,7 @@ class WallMotion:
     @property
     def velocity(self) -> np.ndarray:
         """Velocity of the centre of mass (right, down) [m/s], (2,)."""
-        return self._filter.state[_VELOCITY]
+        return np.array(self.state[_VELOCITY])
 
     @property
     def velocity_covariance(self) -> np.ndarray:
@@ -89,42 +98,61 @@ class WallMotion:
         return self._filter.covariance[_VELOCITY, _VELOCITY]
 
     @property
+    def velocity_variance(self) -> float:
+        """Trace of `velocity_covariance` [m^2/s^2]."""
+        covariance = self._filter.covariance
+        return covariance.item(0, 0) + covariance.item(1, 1)
+
+    @property
     def odometer(self) -> np.ndarray:
         """Path of the tip's wall point since the start (right, down) [m], (2,)."""
-        return self._filter.state[_ODOMETER]
+        return np.array(self.state[_ODOMETER])
 
-    def predict(self, stamp_ns: int, axes: WallAxes, specific_force: np.ndarray, omega: np.ndarray, dt: float) -> None:
+    def predict(
+        self, stamp_ns: int, axes: WallAxes, specific_force: Sequence[float], omega: Sequence[float], dt: float
+    ) -> None:
         """Integrate the accelerometer in the wall plane; the tip moves with the body's turn as well."""
-        acceleration = specific_force + GRAVITY * axes.gravity
-        lever = cross(omega, self._tip)
-        turn_right, turn_down = dt * float(axes.right @ lever), dt * float(axes.down @ lever)
-        increment = np.zeros(_LINES + SLOTS)
-        increment[0], increment[1] = dt * float(axes.right @ acceleration), dt * float(axes.down @ acceleration)
-        increment[4], increment[5] = turn_right, turn_down
+        # Plain numbers: the chain is sparse, and this runs every tick.
+        (rx, ry, rz), (dx, dy, dz), (gx, gy, gz) = axes.right, axes.down, axes.gravity
+        fx, fy, fz = specific_force
+        ax, ay, az = fx + GRAVITY * gx, fy + GRAVITY * gy, fz + GRAVITY * gz
+        lx, ly, lz = cross_product(omega, self._tip)
+        right, down = dt * (rx * lx + ry * ly + rz * lz), dt * (dx * lx + dy * ly + dz * lz)
+        state = self.state.copy()
+        vr, vd, br, bd, *_ = state
+        state[0] = vr + dt * (rx * ax + ry * ay + rz * az - br)
+        state[1] = vd + dt * (dx * ax + dy * ay + dz * az - bd)
+        state[4] += dt * vr + right
+        state[5] += dt * vd + down
+        right, down = right + dt * vr, down + dt * vd
         for line in self.lines.values():
-            c, s = math.cos(line.angle), math.sin(line.angle)
-            increment[_LINES + line.slot] = -(c * turn_right + s * turn_down)
-        self._filter.predict(stamp_ns, increment, dt)
-        self._stamp = stamp_ns
+            c, s = line.rates
+            state[_LINES + line.slot] += c * right + s * down
+        self._filter.remember(stamp_ns, state)
+        self.state, self._stamp = state, stamp_ns
         self._refresh(stamp_ns)
 
     def _refresh(self, stamp_ns: int) -> None:
-        config = self._config
-        for key in list(self.lines):
-            line = self.lines[key]
+        config, old = self._config, []
+        for key, line in self.lines.items():
             age = (stamp_ns - line.news_ns) * 1e-9
             if age > config.fade_end_s:
-                self._drop(key)
+                old.append(key)
                 continue
-            fade = min(1.0, max(0.0, (config.fade_end_s - age) / (config.fade_end_s - config.fade_start_s)))
-            line.weight = fade * min(1.0, line.frames / config.frames_to_trust) * line.source_weight
-            line.offset = float(self._filter.state[_LINES + line.slot])
+            weight = min(1.0, line.frames / config.frames_to_trust) * line.source_weight
+            if age > config.fade_start_s:
+                weight *= (config.fade_end_s - age) / (config.fade_end_s - config.fade_start_s)
+            line.weight = weight
+            line.offset = self.state[_LINES + line.slot]
+        for key in old:
+            self._drop(key)
         self.velocity_age_s = (stamp_ns - self._velocity_stamp) * 1e-9 if self._velocity_stamp >= 0 else math.inf
 
     def _drop(self, key: int) -> None:
         slot = _LINES + self.lines.pop(key).slot
         self._filter.chain[slot, :] = 0.0
         self._filter.set_entry(slot, 0.0, 0.05)
+        self.state[slot] = 0.0
 
     def correct(self, frame: FeatureFrame, axes: WallAxes, foot_distance: float) -> None:
         """Take in what perception saw.
@@ -139,30 +167,24 @@ class WallMotion:
         self._frame_stamp = frame.stamp_ns
         self._correct_velocity(frame, axes)
         for line in frame.lines:
-            seen = wall_line(line, axes, self._tip - self._camera, foot_distance)
+            seen = wall_line(line, axes, self._tip_from_camera, foot_distance)
             if seen is not None:
                 self._correct_line(line, *seen, frame.stamp_ns)
+        self.state = self._filter.state.tolist()
 
     def _correct_velocity(self, frame: FeatureFrame, axes: WallAxes) -> None:
         if frame.velocity is None or frame.velocity_covariance is None or not np.isfinite(frame.velocity).all():
             return
-        plane = np.vstack((axes.right, axes.down))
-        covariance = plane @ frame.velocity_covariance @ plane.T + np.eye(2) * self._config.velocity_std_m_s**2
-        rows = np.zeros((2, _LINES + SLOTS))
-        rows[0, 0] = rows[1, 1] = 1.0
+        plane = np.array((axes.right, axes.down))
+        (aa, ab), (_, bb) = (plane @ frame.velocity_covariance @ plane.T).tolist()
+        right, down = (plane @ frame.velocity).tolist()
+        floor = self._config.velocity_std_m_s**2
         stamp = frame.velocity_stamp_ns or frame.stamp_ns
-        if self._filter.correct(stamp, rows, plane @ frame.velocity, covariance):
+        if self._filter.correct_pair(stamp, 0, (right, down), (aa + floor, ab, bb + floor)):
             self._velocity_stamp = frame.stamp_ns
 
     def _correct_line(
-        self,
-        line: LineFeature,
-        offset: float,
-        angle: float,
-        side: int,
-        scale: float,
-        ends: np.ndarray | None,
-        stamp: int,
+        self, line: LineFeature, offset: float, angle: float, side: int, scale: float, stamp: int
     ) -> None:
         deviation = math.hypot(self._config.line_std_m, math.sqrt(max(float(line.covariance[0, 0]), 0.0)) * scale)
         tracked = self.lines.get(line.track_id)
@@ -170,11 +192,8 @@ class WallMotion:
             tracked = self._admit(line, offset, angle, deviation, stamp)
             if tracked is None:
                 return
-        row = np.zeros((1, _LINES + SLOTS))
-        row[0, _LINES + tracked.slot] = 1.0
-        if tracked.seen_ns != stamp and not self._filter.correct(
-            stamp, row, np.array([offset]), np.array([[deviation**2]])
-        ):
+        slot = _LINES + tracked.slot
+        if tracked.seen_ns != stamp and not self._filter.correct_entry(stamp, slot, offset, deviation**2):
             tracked.extra["refused"] = tracked.extra.get("refused", 0.0) + 1.0
             if tracked.extra["refused"] >= 3:  # three frames agree with each other, not with the prediction
                 self._drop(line.track_id)
@@ -186,11 +205,7 @@ class WallMotion:
         tracked.news_ns = self._stamp
         tracked.theta_variance = float(line.covariance[1, 1])
         tracked.surface_side, tracked.kind = side, line.kind or tracked.kind
-        self._filter.chain[_LINES + tracked.slot, _VELOCITY] = -math.cos(tracked.angle), -math.sin(tracked.angle)
-        if ends is not None:
-            past = self._filter.at(stamp)
-            if past is not None:
-                tracked.ends = past[_ODOMETER] + ends
+        self._point(tracked)
 
     def _admit(
         self, line: LineFeature, offset: float, angle: float, deviation: float, stamp: int
@@ -205,22 +220,27 @@ class WallMotion:
         tracked.news_ns = self._stamp
         self.lines[line.track_id] = tracked
         slot = _LINES + tracked.slot
-        self._filter.chain[slot, _VELOCITY] = -math.cos(angle), -math.sin(angle)
         rates = np.zeros(_LINES + SLOTS)
         rates[_ODOMETER] = -math.cos(angle), -math.sin(angle)
         self._filter.set_path(slot, offset, stamp, rates, deviation)
+        self._point(tracked)
         tracked.offset = float(self._filter.state[slot])
         return tracked
 
+    def _point(self, line: TrackedLine) -> None:
+        """Let the filter know how a line's offset follows the velocity: against its normal."""
+        line.rates = -math.cos(line.angle), -math.sin(line.angle)
+        self._filter.chain[_LINES + line.slot, _VELOCITY] = line.rates
+
     def feature(self, line: TrackedLine, axes: WallAxes, foot_distance: float, stamp_ns: int) -> LineFeature:
         """The line as the camera would see it now: rho, theta at the tick's own time."""
-        rho, theta, scale = image_line(line.offset, line.angle, axes, self._tip - self._camera, foot_distance)
+        rho, theta, scale = image_line(line.offset, line.angle, axes, self._tip_from_camera, foot_distance)
         slot = _LINES + line.slot
-        variance = max(float(self._filter.covariance[slot, slot]), 1e-10) / (scale * scale)
+        variance = max(self._filter.covariance.item(slot, slot), 1e-10) / (scale * scale)
         return LineFeature(
             rho=rho,
             theta=theta,
-            covariance=np.diag([variance, line.theta_variance]),
+            covariance=np.array(((variance, 0.0), (0.0, line.theta_variance))),
             role=line.role,
             weight=line.weight,
             stamp_ns=stamp_ns,

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ibvs_qp.estimation.config import EstimationConfig
 from ibvs_qp.frames import cross
+from ibvs_qp.vectors import cross_product
 from ibvs_qp.vehicle import VehicleParams
 
 
@@ -20,21 +23,21 @@ class WrenchTare:
         self._config = config or EstimationConfig()
         self._mass = vehicle.tool_mass_kg
         self._sensor = np.array(vehicle.force_torque_position_m)
-        self._lever = np.array(vehicle.tool_position_m) - self._sensor
+        self._lever = (np.array(vehicle.tool_position_m) - self._sensor).tolist()
         self.reset()
 
     def reset(self) -> None:
         """Forget the bias."""
         self._bias, self._time, self._stamp = np.zeros(6), 0.0, -1
         self._wrench = np.zeros(6)
-        self._force = np.array([0.0, 0.0, -9.81])
+        self._force = (0.0, 0.0, -9.81)
 
     @property
     def ready(self) -> bool:
         """Whether the bias has been averaged long enough."""
         return self._time >= self._config.tare_time_s
 
-    def update(self, raw: np.ndarray, stamp_ns: int, specific_force: np.ndarray, free: bool) -> np.ndarray:
+    def update(self, raw: np.ndarray, stamp_ns: int, specific_force: Sequence[float], free: bool) -> np.ndarray:
         """Tared contact wrench at the centre of mass [N, N m], (6,).
 
         Args:
@@ -44,13 +47,15 @@ class WrenchTare:
             free: Whether the tip is known to be away from the wall, so that the mean is bias.
         """
         # The accelerometer is noisier than the force sensor needs; average it about as long as a force sample lasts.
-        self._force = self._force + 0.3 * (specific_force - self._force)
+        (x, y, z), (fx, fy, fz) = self._force, specific_force
+        self._force = x + 0.3 * (fx - x), y + 0.3 * (fy - y), z + 0.3 * (fz - z)
         if stamp_ns <= self._stamp or not np.isfinite(raw).all():
             return self._wrench
         dt = 0.01 if self._stamp < 0 else min((stamp_ns - self._stamp) * 1e-9, 0.1)
         self._stamp = stamp_ns
-        load = self._mass * self._force
-        contact = np.concatenate((load, cross(self._lever, load))) - raw
+        x, y, z = self._force
+        load = self._mass * x, self._mass * y, self._mass * z
+        contact = np.array((*load, *cross_product(self._lever, load))) - raw
         if free:
             self._time += dt
             span = min(max(self._time, dt), self._config.tare_follow_s)

@@ -1,0 +1,28 @@
+"""What follows from the logged motion of the vehicle, for all ticks at once: attitude angles, tip, body velocity."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def rotations(attitude: np.ndarray) -> np.ndarray:
+    """Rotation matrices of unit quaternions (w, x, y, z): (N, 4) to (N, 3, 3)."""
+    w, x, y, z = attitude.T
+    rows = (
+        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
+    )
+    return np.moveaxis(np.array(rows), 2, 0)
+
+
+def euler_angles(rotation: np.ndarray) -> np.ndarray:
+    """Roll, pitch, yaw [rad] of rotations B to I: (N, 3, 3) to (N, 3)."""
+    roll = np.arctan2(rotation[:, 2, 1], rotation[:, 2, 2])
+    pitch = np.arcsin(np.clip(-rotation[:, 2, 0], -1.0, 1.0))
+    return np.column_stack((roll, pitch, np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])))
+
+
+def in_body(rotation: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """World vectors in the body frame, R' v: (N, 3)."""
+    return np.einsum("nji,nj->ni", rotation, vectors)
