@@ -39,6 +39,7 @@ class Plant:
     Attributes:
         time_ns: Simulated time since the start [ns].
         crashed: Why the flight is over (propeller strike, ground, flip, non-finite state), or None.
+        wind: The air; its mean may be changed in flight.
         contact_1khz: Normal contact force at the four physics steps of the last tick [N], (4,).
 
     Args:
@@ -57,7 +58,7 @@ class Plant:
         self._skew_centre, self._skew_tip = skew(self._centre), skew(self._tip)
         self._clearance = PropellerClearance(BoardGeometry(scene), self.vehicle)
         drag = self.vehicle.linear_drag_n_s_m
-        self._wind = Wind(scene.wind, drag, TICK_NS * 1e-9, stream(seed, "wind"))
+        self.wind = Wind(scene.wind, drag, TICK_NS * 1e-9, stream(seed, "wind"))
         # Moment arm from the bare vehicle's centre of mass, where MuJoCo applies forces, to the whole one's.
         self._skew_drag_arm = skew(self._centre - FLIP * self.model.body_ipos[self._ids.vehicle])
         self._state = self.data.qpos, self.data.qvel, self.data.act  # views; fetching them each time costs more
@@ -112,9 +113,18 @@ class Plant:
     def _apply_air(self) -> None:
         rotation = self._rotation
         velocity = self._world_velocity - rotation @ (self._skew_centre @ self._angular_velocity)
-        force = self._wind.force(velocity)
+        force = self.wind.force(velocity)
         self._applied[:3] = FLIP * force
         self._applied[3:] = FLIP * (rotation @ (self._skew_drag_arm @ (force @ rotation)))
+
+    @property
+    def thrust_limits(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper limits of the real rotors now [N], (n,) each; a fault may set new ones."""
+        return self._lower, self._upper
+
+    @thrust_limits.setter
+    def thrust_limits(self, limits: tuple[np.ndarray, np.ndarray]) -> None:
+        self._lower, self._upper = (np.array(limit, float) for limit in limits)
 
     @property
     def position(self) -> np.ndarray:

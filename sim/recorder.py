@@ -107,6 +107,10 @@ class Recorder:
                 self._rejected.add(name)
                 self._events.append(Event(t=time_s, kind="rejected", text=name))
 
+    def note(self, time_s: float, kind: str, text: str) -> None:
+        """Log an event that the pilot does not know of."""
+        self._events.append(Event(t=time_s, kind=kind, text=text))
+
     def trace(self, wall_time_s: float) -> Trace:
         """Everything logged so far as a trace."""
         arrays = {name: np.array(values, float) for name, values in self._rows.items()}

@@ -16,7 +16,7 @@ class Wind:
     r"""Drag in a mean wind plus a first-order Gauss-Markov gust force per world axis.
 
     The gust is :math:`g_{k+1} = a g_k + \sigma \sqrt{1 - a^2}\, n_k`, a = exp(-dt / tau); it starts in its
-    stationary distribution.
+    stationary distribution. Attribute ``mean`` (world NED [m/s]) may be changed at any time.
 
     Args:
         scene: Mean wind [m/s] (NED) and gust force [N rms per axis].
@@ -26,7 +26,7 @@ class Wind:
     """
 
     def __init__(self, scene: WindScene, linear_drag: float, tick_s: float, generator: np.random.Generator) -> None:
-        self._mean = np.array(scene.mean_m_s)
+        self.mean = np.array(scene.mean_m_s)
         self._drag = linear_drag
         self._rms = scene.gust_n_rms
         self._decay = math.exp(-tick_s / GUST_TIME_CONSTANT_S)
@@ -41,4 +41,4 @@ class Wind:
             velocity: Velocity of the centre of mass, world NED [m/s], (3,).
         """
         self.gust = self._decay * self.gust + self._kick * self._generator.standard_normal(3)
-        return self.gust + self._drag * (self._mean - velocity)
+        return self.gust + self._drag * (self.mean - velocity)
