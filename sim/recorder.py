@@ -123,6 +123,7 @@ class Recorder:
         arrays["active"] = active
         vehicle = self._pilot.config.controller.vehicle
         arrays["thrust_min"], arrays["thrust_max"] = vehicle.thrust_min, vehicle.thrust_max
+        arrays["true_thrust_min"], arrays["true_thrust_max"] = self._world.plant.thrust_limits
         arrays["vision_ms"] = np.array(self._vision, float)
         arrays["contact_1khz"] = np.concatenate(self._contact) if self._contact else np.zeros(0)
         arrays["painting_1khz"] = np.repeat(np.array(self._painting, bool), STEPS_PER_TICK)

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from sim.measures.reach import push_reach
 from sim.measures.window import (
     CONTACT_N,
     PHYSICS_RATE_HZ,
@@ -27,6 +28,8 @@ SETTLE_BAND_N, SETTLE_HOLD_S = 0.5, 0.5
 BOUNCE_WINDOW_S = 3.0
 #: Steady figures begin this long after the touch, or after a fault [s]: ramp and transients are over.
 STEADY_AFTER_S = 4.0
+#: Arrays of the true limits.
+LIMITS = ("true_thrust_min", "true_thrust_max")
 #: A disturbed hold has recovered when push and path stay within these bands for `SETTLE_HOLD_S` [N, m].
 RECOVERY_BAND_N, RECOVERY_BAND_M = 0.5, 0.005
 
@@ -67,6 +70,7 @@ def press_figures(trace: Trace) -> dict[str, float]:
         "force_rms_n": rms(push - commanded),
         "force_std_n": float(np.std(push)) if len(push) else math.nan,
         "delivered_share": mean(push) / asked,
+        **_reach(trace, mean(push)),
         "approach_speed_m_s": _touch_speed(trace, touch),
         **_attitude(trace, touch, end),
         **_place(trace, touch, end, late),
@@ -87,6 +91,12 @@ def _touch(contact: np.ndarray, trace: Trace, touch: float) -> dict[str, float]:
         "bounces": float(np.count_nonzero(window[:-1] & ~window[1:])),
         "touch_peak_n": peak(contact[: round(BOUNCE_WINDOW_S * PHYSICS_RATE_HZ)]),
     }
+
+
+def _reach(trace: Trace, push: float) -> dict[str, float]:
+    """Push that the true limits allow at the end of the flight, and the delivered share of it or of what was asked."""
+    reach = push_reach(trace.scene.vehicle.mass_kg, *(tuple(map(float, trace.arrays[name])) for name in LIMITS))
+    return {"reach_n": reach, "reach_share": push / max(min(reach, trace.scene.paint.push_n), 1e-9)}
 
 
 def _touch_speed(trace: Trace, touch: float) -> float:

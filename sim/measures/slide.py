@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from sim.measures.press import press_figures
+from sim.measures.press import LIMITS, press_figures
+from sim.measures.reach import push_reach
 from sim.measures.window import board_tip, mean, peak, phase_window, rms, tilt_deg
 from sim.path_error import CONTACT_N
 from sim.trace import Trace
@@ -36,6 +37,8 @@ def slide_figures(trace: Trace) -> dict[str, float]:
     last, first = np.flatnonzero(after)[[-1, 0]]
     speed = float((tip[first, 0] - tip[last, 0]) / (t[last] - t[first])) if last > first else math.nan
     height = tip[:, 1] - trace.scene.paint.edge_margin_m
+    limits = (tuple(map(float, trace.arrays[name])) for name in LIMITS)
+    reach = push_reach(trace.scene.vehicle.mass_kg, *limits, trace.scene.wall.friction)
     stuck = -np.gradient(tip[after, 0], t[after]) < 0.2 * wanted
     return hold | {
         "yaw_rms_deg": rms(yaw[after]),
@@ -50,6 +53,10 @@ def slide_figures(trace: Trace) -> dict[str, float]:
         "force_rms_n": rms(push[after] - trace.push_reference[after]),
         "force_error_rms_n": rms(push[after] - asked),
         "delivered_share": mean(push[after]) / asked,
+        "reach_n": reach,
+        "reach_share": mean(push[after]) / max(min(reach, asked), 1e-9),
+        "force_std_n": float(np.std(push[after])),
+        "height_error_peak_m": peak(height[after]),
         "contact_share": float(np.mean(push[after] > CONTACT_N)),
         "friction_mean_n": mean(np.linalg.norm(trace.friction_true[after], axis=1)),
         "limited_share": float(np.mean(trace.active[after].any(axis=1))) if trace.active.size else 0.0,
