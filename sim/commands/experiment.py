@@ -103,7 +103,9 @@ class ExperimentCommand:
         content = summarise(self.name, experiments, table, folder, facts)
         page = None
         if table.height and not result.interrupted:
-            lead = f"{table.height} flights, {self.features} features, first seed {self.seed}, version {facts['version']}."
+            lead = (
+                f"{table.height} flights, {self.features} features, first seed {self.seed}, version {facts['version']}."
+            )
             with notes.status("Drawing the figures ..."):
                 page = write_page(folder, experiments, table, lead, facts["command"])
         content["wall_time_s"] = time.perf_counter() - started
@@ -151,9 +153,10 @@ def _print_verdicts(console: Console, content: dict[str, Any]) -> None:
     for heading in ("experiment", "QP law held to", "cell", "bound", "median", "flights within", "met"):
         table.add_column(heading)
     for entry in content["verdicts"]:
-        cell = ", ".join(f"{key} {value:g}" if isinstance(value, float) else str(value) for key, value in entry["params"].items())
+        words = [f"{key} {value:g}" if isinstance(value, float) else str(value) for key, value in entry["cell"].items()]
+        cell = ", ".join([*words, *([entry["variant"]] if entry["variant"] != "standard" else [])])
         table.add_row(
             entry["experiment"], entry["figure"], cell, f"{entry['bound']:.4g} {entry['unit']}",
-            f"{entry['median']:.3g}", f"{entry['held']} of {entry['n']}", "yes" if entry["met"] else "NO",
+            f"{entry['median']:.3g} {entry['unit']}", f"{entry['held']} of {entry['n']}", "yes" if entry["met"] else "NO",
         )  # fmt: skip
     console.print(table)

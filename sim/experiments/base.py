@@ -61,6 +61,7 @@ class Criterion:
         variant: Variant it holds for.
         scale: Factor into `unit`.
         unit: Unit in which it is shown.
+        failed_too: Whether flights that did not end as planned count with their figures.
     """
 
     text: str
@@ -71,6 +72,7 @@ class Criterion:
     variant: str = "standard"
     scale: float = 1.0
     unit: str = ""
+    failed_too: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)

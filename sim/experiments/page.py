@@ -11,12 +11,11 @@ import polars as pl
 
 from sim.experiments.base import Column, Experiment
 from sim.experiments.variants import VARIANTS
-from sim.experiments.verdict import Verdict, verdicts
+from sim.experiments.verdict import Verdict, telling, verdicts
 from sim.figures.style import law_name
-from sim.sweep.parts import PARAM
-from sim.sweep.statistics import cells, paired_differences
+from sim.sweep.statistics import cells, paired_differences, parameters
 
-#: Differences whose interval excludes zero are set in bold.
+#: Top of the page.
 _HEAD = """# Results of the experiments
 
 Generated from data by `{command}`; do not edit. {lead}
@@ -51,17 +50,17 @@ def results_page(
 
 
 def _summary(flown: Sequence[tuple[Experiment, pl.DataFrame, dict[str, tuple[str, Path]]]]) -> str:
-    lines = ["| experiment | figure | cell | bound | median | worst flight | flights within | met |", "|---|---|---|---|---|---|---|---|"]
+    heads = ("experiment", "figure", "cell", "bound", "median", "worst flight", "flights within", "met")
+    lines = ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
     for experiment, table, _ in flown:
-        for verdict in verdicts(experiment, table):
-            lines.append(_verdict_line(experiment, verdict))
+        listed = verdicts(experiment, table)
+        lines += [_verdict_line(experiment, verdict, telling(listed, verdict)) for verdict in listed]
     return "\n".join(lines) + "\n"
 
 
-def _verdict_line(experiment: Experiment, verdict: Verdict) -> str:
+def _verdict_line(experiment: Experiment, verdict: Verdict, shown: dict[str, Any]) -> str:
     criterion = verdict.criterion
     sign, unit = (">=" if criterion.least else "<="), f" {criterion.unit}" if criterion.unit else ""
-    shown = {key: value for key, value in verdict.params.items() if key in experiment.params and key not in criterion.params}
     cell = _words(experiment, shown) or "all"
     if criterion.variant != "standard":
         cell += f", {criterion.variant}"
@@ -132,6 +131,6 @@ def _failures(table: pl.DataFrame) -> str:
         return ""
     lines = ["Flights that did not end as planned:", ""]
     for row in failed.iter_rows(named=True):
-        params = ", ".join(f"{name.removeprefix(PARAM)} {_param(value)}" for name, value in row.items() if name.startswith(PARAM) and value is not None)
+        params = ", ".join(f"{name} {_param(value)}" for name, value in parameters(row).items())
         lines.append(f"- {law_name(row['law'])}, {row['variant']}, {params}, seed {row['seed']}: {row['reason']}")
     return "\n".join(lines) + "\n\n"

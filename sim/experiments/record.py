@@ -11,7 +11,7 @@ import polars as pl
 from sim.experiments import ALL
 from sim.experiments.base import Experiment, Results
 from sim.experiments.page import results_page
-from sim.experiments.verdict import verdicts
+from sim.experiments.verdict import telling, verdicts
 from sim.figures.style import save, styled
 from sim.rundir import as_json
 from sim.sweep.parts import write_table
@@ -60,6 +60,7 @@ def summary(
                 "metric": verdict.criterion.metric,
                 "variant": verdict.criterion.variant,
                 "params": verdict.params,
+                "cell": telling(listed, verdict),
                 "bound": verdict.bound,
                 "unit": verdict.criterion.unit,
                 "median": verdict.median,
@@ -69,7 +70,8 @@ def summary(
                 "met": verdict.met,
             }
             for each in experiments
-            for verdict in verdicts(each, rows_of(table, each))
+            for listed in [verdicts(each, rows_of(table, each))]
+            for verdict in listed
         ],
     }
 
@@ -92,9 +94,7 @@ def write_summary(folder: Path, content: dict[str, Any]) -> None:
     (folder / f"{content['name']}.json").write_text(as_json(content, indent=1) + "\n", encoding="utf-8")
 
 
-def write_page(
-    folder: Path, experiments: Sequence[Experiment], table: pl.DataFrame, lead: str, command: str
-) -> Path:
+def write_page(folder: Path, experiments: Sequence[Experiment], table: pl.DataFrame, lead: str, command: str) -> Path:
     """Draw every figure and write the results page; returns its file."""
     flown = []
     with styled():

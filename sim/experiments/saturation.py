@@ -14,7 +14,7 @@ from sim.sweep.design import Run
 
 NAME = "saturation"
 #: Time of a static press, and of hold and slide of a sliding one [s].
-PRESS_S, HOLD_S, SLIDE_S = 9.0, 4.0, 6.0
+PRESS_S, HOLD_S, SLIDE_S = 9.0, 3.0, 5.0
 #: Asked pushes [N]: standing still, sliding, and with every rotor limited to `DERATED_N` [N] (reach 13.0 N).
 STATIC_N, SLIDING_N, DERATED_PUSH_N = (15.0, 20.0, 25.0, 27.5, 30.0, 35.0), (5.0, 10.0, 15.0, 20.0), (10.0, 13.0, 20.0)
 DERATED_N = 20.0
@@ -29,7 +29,7 @@ def with_thrust_max(config: PilotConfig, limit_n: float) -> PilotConfig:
 
 def design(choice: Choice) -> list[Run]:
     """Static pushes with and without the reach check, then sliding, then derated."""
-    seeds = 1 if choice.quick else 3
+    seeds = 1 if choice.quick else 2
     flights = []
     for variant, friction in (("standard", FRICTION), ("no-reach-check", FRICTION), ("no-reach-check", SLIPPERY)):
         pushes = STATIC_N

@@ -22,7 +22,8 @@ class Verdict:
         median: Median over its flights, in the criterion's unit; NaN without data.
         worst: Its worst flight.
         held: Flights that hold the bound.
-        n: Flights; one without the figure does not hold.
+        known: Flights that have the figure; one that failed counts only where the criterion says so.
+        n: Flights.
     """
 
     criterion: Criterion
@@ -30,13 +31,14 @@ class Verdict:
     median: float
     worst: float
     held: int
+    known: int
     n: int
 
     @property
     def met(self) -> bool:
-        """Whether the median holds the bound and no flight lacks the figure."""
+        """Whether the median holds the bound and every flight has the figure."""
         good = self.median >= self.bound if self.criterion.least else self.median <= self.bound
-        return bool(np.isfinite(self.median) and good)
+        return bool(np.isfinite(self.median) and good and self.known == self.n)
 
     @property
     def bound(self) -> float:
@@ -56,15 +58,23 @@ def verdicts(experiment: Experiment, table: pl.DataFrame) -> list[Verdict]:
     return result
 
 
+def telling(listed: list[Verdict], verdict: Verdict) -> dict:
+    """Parameters that tell a verdict's cell from others of the same criterion."""
+    alike = [other.params for other in listed if other.criterion == verdict.criterion]
+    return {key: value for key, value in verdict.params.items() if len({str(params.get(key)) for params in alike}) > 1}
+
+
 def _judge(criterion: Criterion, params: dict, cell: pl.DataFrame) -> Verdict:
     values = np.full(cell.height, np.nan)
     if criterion.metric in cell.columns:
-        values = criterion.scale * cell[criterion.metric].cast(pl.Float64).fill_null(np.nan).to_numpy()
+        values = criterion.scale * cell[criterion.metric].cast(pl.Float64).fill_null(np.nan).to_numpy().copy()
+    if not criterion.failed_too:
+        values[~cell["completed"].to_numpy().astype(bool)] = np.nan  # what a crash cut short measures nothing
     good = values[np.isfinite(values)]
     bound = criterion.scale * criterion.bound
     held = np.count_nonzero(good >= bound if criterion.least else good <= bound)
     if not len(good):
-        return Verdict(criterion=criterion, params=params, median=np.nan, worst=np.nan, held=0, n=len(values))
+        return Verdict(criterion=criterion, params=params, median=np.nan, worst=np.nan, held=0, known=0, n=len(values))
     worst = good.min() if criterion.least else good.max()
     return Verdict(
         criterion=criterion,
@@ -72,5 +82,6 @@ def _judge(criterion: Criterion, params: dict, cell: pl.DataFrame) -> Verdict:
         median=float(np.median(good)),
         worst=float(worst),
         held=int(held),
+        known=len(good),
         n=len(values),
     )

@@ -55,9 +55,7 @@ def figure_names(table: pl.DataFrame) -> list[str]:
 def parameters(row: dict[str, Any]) -> dict[str, Any]:
     """Parameters of a row, without those that its cell does not have."""
     return {
-        name.removeprefix(PARAM): value
-        for name, value in row.items()
-        if name.startswith(PARAM) and value is not None
+        name.removeprefix(PARAM): value for name, value in row.items() if name.startswith(PARAM) and value is not None
     }
 
 
@@ -72,9 +70,7 @@ def cells(table: pl.DataFrame) -> list[dict[str, Any]]:
     """Cells of the contract: law, variant, params, n, completed, and every figure with its interval."""
     names, result = figure_names(table), []
     for key, rows in split(table, ("experiment", "law", "variant")):
-        metrics = {
-            name: median_interval(rows[name].to_numpy()) for name in names if rows[name].drop_nulls().len()
-        }
+        metrics = {name: median_interval(rows[name].to_numpy()) for name in names if rows[name].drop_nulls().len()}
         result.append(
             {
                 "experiment": key["experiment"],

@@ -70,5 +70,10 @@ def plot_medians(
     order = np.argsort(places)
     take = [np.array(column, float)[order] for column in (places, middles, low, high)]
     axes.errorbar(
-        take[0], take[1], yerr=np.vstack(take[2:]), color=colour, capsize=2, **{"marker": "o", "markersize": 3.5, **style}
+        take[0],
+        take[1],
+        yerr=np.vstack(take[2:]),
+        color=colour,
+        capsize=2,
+        **{"marker": "o", "markersize": 3.5, **style},
     )
