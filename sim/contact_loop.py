@@ -59,4 +59,4 @@ def damping_ratio(law: str, gain: float, stiffness: float, delay_s: float, imped
     """Least damping ratio of the push loop; below zero it oscillates ever more. Arguments as for `loop_poles`."""
     poles = loop_poles(law, gain, stiffness, delay_s, impedance)
     poles = poles[np.abs(poles) > 1e-9]
-    return float(np.min(-poles.real / np.abs(poles)))
+    return float(np.min(-np.real(poles) / np.abs(poles)))

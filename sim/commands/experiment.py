@@ -20,9 +20,18 @@ if TYPE_CHECKING:
 
 _flag = tyro.conf.arg(help_behavior_hint="")
 Name = Literal[
-    "force-hold", "paint", "noise-sweep", "saturation", "sloped-edge", "friction", "gust", "rotor-derate", "approach",
-    "payload", "all",
-]  # fmt: skip
+    "force-hold",
+    "paint",
+    "noise-sweep",
+    "saturation",
+    "sloped-edge",
+    "friction",
+    "gust",
+    "rotor-derate",
+    "approach",
+    "payload",
+    "all",
+]
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -156,7 +165,12 @@ def _print_verdicts(console: Console, content: dict[str, Any]) -> None:
         words = [f"{key} {value:g}" if isinstance(value, float) else str(value) for key, value in entry["cell"].items()]
         cell = ", ".join([*words, *([entry["variant"]] if entry["variant"] != "standard" else [])])
         table.add_row(
-            entry["experiment"], entry["figure"], cell, f"{entry['bound']:.4g} {entry['unit']}",
-            f"{entry['median']:.3g} {entry['unit']}", f"{entry['held']} of {entry['n']}", "yes" if entry["met"] else "NO",
-        )  # fmt: skip
+            entry["experiment"],
+            entry["figure"],
+            cell,
+            f"{entry['bound']:.4g} {entry['unit']}",
+            f"{entry['median']:.3g} {entry['unit']}",
+            f"{entry['held']} of {entry['n']}",
+            "yes" if entry["met"] else "NO",
+        )
     console.print(table)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -68,7 +68,7 @@ class Criterion:
     metric: str
     bound: float
     least: bool = False
-    params: dict[str, Parameter] = field(default_factory=dict)
+    params: Mapping[str, Parameter] = field(default_factory=dict)
     variant: str = "standard"
     scale: float = 1.0
     unit: str = ""
@@ -125,7 +125,7 @@ def runs(
     *,
     scene: Scene,
     measure: Measure,
-    params: dict[str, Parameter],
+    params: Mapping[str, Parameter],
     seeds: int,
     job: Job | None = None,
     variant: str = "standard",
@@ -166,7 +166,7 @@ def runs(
                 Run(
                     experiment=experiment,
                     variant=variant,
-                    params=params,
+                    params=dict(params),
                     plan=FlightPlan(scene=scene, config=config, options=options, job=work, faults=faults),
                     measure=measure,
                     keep=keep and index == 0,

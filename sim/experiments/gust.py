@@ -72,12 +72,25 @@ EXPERIMENT = Experiment(
         Column(metric="fault_path_peak_m", label="tip after the step, peak", unit="mm", scale=1e3, digits=1),
     ),
     criteria=(
-        Criterion(text="gust 1 N: path, rms", metric="path_rms_m", bound=0.015, params=_gust(1.0), scale=1e3, unit="mm"),
+        Criterion(
+            text="gust 1 N: path, rms", metric="path_rms_m", bound=0.015, params=_gust(1.0), scale=1e3, unit="mm"
+        ),
         Criterion(text="gust 1 N: push error, rms", metric="force_rms_n", bound=0.6, params=_gust(1.0), unit="N"),
-        Criterion(text="gust 2 N: path, rms", metric="path_rms_m", bound=0.025, params=_gust(2.0), scale=1e3, unit="mm"),
+        Criterion(
+            text="gust 2 N: path, rms", metric="path_rms_m", bound=0.025, params=_gust(2.0), scale=1e3, unit="mm"
+        ),
         Criterion(text="gust 2 N: push error, rms", metric="force_rms_n", bound=1.1, params=_gust(2.0), unit="N"),
-        Criterion(text="gust 3 N: completed", metric="completed", bound=1.0, least=True, failed_too=True, params=_gust(3.0)),
-        Criterion(text="wind step: completed", metric="completed", bound=1.0, least=True, failed_too=True, params={"kind": "step"}),
+        Criterion(
+            text="gust 3 N: completed", metric="completed", bound=1.0, least=True, failed_too=True, params=_gust(3.0)
+        ),
+        Criterion(
+            text="wind step: completed",
+            metric="completed",
+            bound=1.0,
+            least=True,
+            failed_too=True,
+            params={"kind": "step"},
+        ),
     ),
     draw=curves(
         "gust",
@@ -87,8 +100,13 @@ EXPERIMENT = Experiment(
         (
             Panel(metric="path_rms_m", label="path error, rms [mm]", scale=1e3, where={"kind": "gust"}),
             Panel(metric="force_rms_n", label="push error, rms [N]", where={"kind": "gust"}),
-            Panel(metric="fault_path_peak_m", label="tip after the step, peak [mm]", scale=1e3,
-                  where={"kind": "step", "direction": "along the wall"}, xlabel="wind step [m/s]"),
+            Panel(
+                metric="fault_path_peak_m",
+                label="tip after the step, peak [mm]",
+                scale=1e3,
+                where={"kind": "step", "direction": "along the wall"},
+                xlabel="wind step [m/s]",
+            ),
         ),
     ),
-)  # fmt: skip
+)

@@ -52,15 +52,26 @@ EXPERIMENT = Experiment(
     criteria=(
         Criterion(text="completed", metric="completed", bound=1.0, least=True, failed_too=True),
         *(
-            Criterion(text=f"push error, rms, sigma_f {sigma:g} N", metric="force_rms_n", bound=bound,
-                      params={"sigma_f_n": sigma}, unit="N")
+            Criterion(
+                text=f"push error, rms, sigma_f {sigma:g} N",
+                metric="force_rms_n",
+                bound=bound,
+                params={"sigma_f_n": sigma},
+                unit="N",
+            )
             for sigma, bound in zip(SIGMA_F, FORCE_N, strict=True)
         ),
         *(
-            Criterion(text=f"path, rms, sigma_vs {sigma:g}", metric="path_rms_m", bound=bound,
-                      params={"sigma_vs": sigma}, scale=1e3, unit="mm")
+            Criterion(
+                text=f"path, rms, sigma_vs {sigma:g}",
+                metric="path_rms_m",
+                bound=bound,
+                params={"sigma_vs": sigma},
+                scale=1e3,
+                unit="mm",
+            )
             for sigma, bound in zip(SIGMA_VS, PATH_M, strict=True)
         ),
     ),
     draw=draw_noise_sweep,
-)  # fmt: skip
+)

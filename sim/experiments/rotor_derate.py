@@ -71,13 +71,32 @@ EXPERIMENT = Experiment(
         Column(metric="descent_peak_m_s", label="descent, fastest", unit="m/s"),
     ),
     criteria=(
-        Criterion(text="derated: delivered over reach", metric="reach_share", bound=0.95, least=True, params=_DERATE,
-                  scale=100.0, unit="%"),
+        Criterion(
+            text="derated: delivered over reach",
+            metric="reach_share",
+            bound=0.95,
+            least=True,
+            params=_DERATE,
+            scale=100.0,
+            unit="%",
+        ),
         Criterion(text="derated: tilt, peak", metric="tilt_peak_deg", bound=2.0, params=_DERATE, unit="deg"),
-        Criterion(text="loss: flies on", metric="survived_s", bound=DESCEND_S, least=True, params=_LOSS, failed_too=True, unit="s"),
-        Criterion(text="loss: tilt, peak", metric="tilt_peak_deg", bound=25.0, params=_LOSS, failed_too=True, unit="deg"),
+        Criterion(
+            text="loss: flies on",
+            metric="survived_s",
+            bound=DESCEND_S,
+            least=True,
+            params=_LOSS,
+            failed_too=True,
+            unit="s",
+        ),
+        Criterion(
+            text="loss: tilt, peak", metric="tilt_peak_deg", bound=25.0, params=_LOSS, failed_too=True, unit="deg"
+        ),
         Criterion(text="loss: detached", metric="detached", bound=1.0, least=True, params=_LOSS, failed_too=True),
-        Criterion(text="loss: descent", metric="descent_peak_m_s", bound=1.5, params=_LOSS, failed_too=True, unit="m/s"),
+        Criterion(
+            text="loss: descent", metric="descent_peak_m_s", bound=1.5, params=_LOSS, failed_too=True, unit="m/s"
+        ),
     ),
     draw=draw_derate,
-)  # fmt: skip
+)

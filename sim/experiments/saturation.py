@@ -109,26 +109,67 @@ EXPERIMENT = Experiment(
     ),
     criteria=(
         *(
-            Criterion(text=f"{push:g} N: delivered over asked", metric="delivered_share", bound=0.95, least=True,
-                      params=_asked(push), scale=100.0, unit="%")
+            Criterion(
+                text=f"{push:g} N: delivered over asked",
+                metric="delivered_share",
+                bound=0.95,
+                least=True,
+                params=_asked(push),
+                scale=100.0,
+                unit="%",
+            )
             for push in STATIC_N[:-1]
         ),
         *(
             criterion
             for variant in ("standard", "no-reach-check")
             for criterion in (
-                Criterion(text="35 N: delivered over reach", metric="reach_share", bound=0.95, least=True,
-                          params=_asked(35.0), variant=variant, scale=100.0, unit="%"),
-                Criterion(text="35 N: height error, peak", metric="height_error_peak_m", bound=0.05,
-                          params=_asked(35.0), variant=variant, scale=1e3, unit="mm"),
-                Criterion(text="35 N: tilt, rms", metric="tilt_rms_deg", bound=1.0, params=_asked(35.0),
-                          variant=variant, unit="deg"),
-                Criterion(text="35 N: tilt, peak", metric="tilt_peak_deg", bound=2.0, params=_asked(35.0),
-                          variant=variant, unit="deg"),
+                Criterion(
+                    text="35 N: delivered over reach",
+                    metric="reach_share",
+                    bound=0.95,
+                    least=True,
+                    params=_asked(35.0),
+                    variant=variant,
+                    scale=100.0,
+                    unit="%",
+                ),
+                Criterion(
+                    text="35 N: height error, peak",
+                    metric="height_error_peak_m",
+                    bound=0.05,
+                    params=_asked(35.0),
+                    variant=variant,
+                    scale=1e3,
+                    unit="mm",
+                ),
+                Criterion(
+                    text="35 N: tilt, rms",
+                    metric="tilt_rms_deg",
+                    bound=1.0,
+                    params=_asked(35.0),
+                    variant=variant,
+                    unit="deg",
+                ),
+                Criterion(
+                    text="35 N: tilt, peak",
+                    metric="tilt_peak_deg",
+                    bound=2.0,
+                    params=_asked(35.0),
+                    variant=variant,
+                    unit="deg",
+                ),
             )
         ),
-        Criterion(text="derated to 20 N, 20 N asked: delivered over reach", metric="reach_share", bound=0.95,
-                  least=True, params={"kind": "derated", "push_n": 20.0}, scale=100.0, unit="%"),
+        Criterion(
+            text="derated to 20 N, 20 N asked: delivered over reach",
+            metric="reach_share",
+            bound=0.95,
+            least=True,
+            params={"kind": "derated", "push_n": 20.0},
+            scale=100.0,
+            unit="%",
+        ),
     ),
     draw=draw_saturation,
-)  # fmt: skip
+)

@@ -79,10 +79,12 @@ def _fly(blocks: Sequence[tuple[Sequence[Run], str]], folder: Path, workers: int
     import joblib
     from joblib.externals.loky import get_reusable_executor
 
-    parallel = joblib.Parallel(n_jobs=workers, return_as="generator_unordered", batch_size=1)
+    parallel = joblib.Parallel(n_jobs=workers, return_as="generator_unordered", batch_size=1)  # type: ignore[arg-type]
     with joblib.parallel_config(backend="loky", inner_max_num_threads=1):
         try:
-            yield from parallel(joblib.delayed(fly_block)(block, name, folder, worker=True) for block, name in blocks)
+            calls = (joblib.delayed(fly_block)(block, name, folder, worker=True) for block, name in blocks)
+            for flown in parallel(calls):
+                yield int(flown or 0)
         except KeyboardInterrupt:
             # What is in the air is lost: its part is not written, and a run that starts again flies it anew.
             get_reusable_executor().shutdown(wait=False, kill_workers=True)

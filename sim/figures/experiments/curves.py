@@ -54,9 +54,17 @@ def curves(
                 for variant, dash in zip(variants, _DASHES, strict=False):
                     label = law_name(law) + (f", {variant}" if len(variants) > 1 else "")
                     plot_medians(
-                        axes, select(table, law=law, variant=variant), x, panel.metric, law, scale=panel.scale,
-                        shift=shift if law == "paper" else -shift, linestyle=dash, label=label, linewidth=1.0,
-                    )  # fmt: skip
+                        axes,
+                        select(table, law=law, variant=variant),
+                        x,
+                        panel.metric,
+                        law,
+                        scale=panel.scale,
+                        shift=shift if law == "paper" else -shift,
+                        linestyle=dash,
+                        label=label,
+                        linewidth=1.0,
+                    )
             axes.set(xlabel=panel.xlabel or xlabel, ylabel=panel.label)
             axes.set_ylim(bottom=0.0)
         handles, labels = figure.axes[0].get_legend_handles_labels()

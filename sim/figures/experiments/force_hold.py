@@ -18,7 +18,9 @@ if TYPE_CHECKING:
     from sim.experiments.base import Results
 
 #: Shown before and after the first touch [s].
-BEFORE_S, AFTER_S = 3.0, 10.0
+BEFORE_S, AFTER_S = 3.0, 9.0
+#: A hold whose steady part has less contact than this has lost the wall.
+KEPT_SHARE = 0.995
 _VARIANTS = {"standard": "impedance", "direct": "direct force control"}
 
 
@@ -78,7 +80,7 @@ def _map(results: Results) -> Figure:
                     if cell.height:
                         share = cell["contact_share"].fill_null(0.0)
                         values[i, j] = cell["force_std_n"].fill_null(np.nan).median()
-                        lost[i, j] = float(share.median() or 0.0) < 0.995
+                        lost[i, j] = bool(np.median(share.to_numpy()) < KEPT_SHARE)
                     margin[i, j] = damping_ratio(law, gain, wall, delay, impedance=variant == "standard")
             image = axes.imshow(values, origin="lower", aspect="auto", norm=LogNorm(0.03, 3.0), cmap="viridis")
             for i, j in zip(*np.nonzero(lost == 1.0), strict=True):

@@ -60,9 +60,14 @@ def _law_boxes(
         if not len(values):
             continue
         boxes = axes.boxplot(
-            [values], positions=[place + side * (_BOX + 0.04)], widths=_BOX, patch_artist=True, manage_ticks=False,
-            medianprops={"color": "#222222"}, flierprops={"markersize": 3, "marker": "."},
-        )  # fmt: skip
+            [values],
+            positions=[place + side * (_BOX + 0.04)],
+            widths=_BOX,
+            patch_artist=True,
+            manage_ticks=False,
+            medianprops={"color": "#222222"},
+            flierprops={"markersize": 3, "marker": "."},
+        )
         boxes["boxes"][0].set(facecolor=law_colour(law), alpha=0.5, linewidth=0.6)
 
 
@@ -80,8 +85,14 @@ def _along(results: Results) -> Figure:
             path = path_error(trace)
             step = np.linalg.norm(np.diff(path.tip[path.painting], axis=0), axis=1)
             way = np.concatenate(([0.0], np.cumsum(step)))
-            axes.plot(way, 1e3 * path.distance[path.painting], color=law_colour("qp"), alpha=float(shade),
-                      linewidth=0.8, label=f"$\\sigma_f$ {force:g} N")  # fmt: skip
+            axes.plot(
+                way,
+                1e3 * path.distance[path.painting],
+                color=law_colour("qp"),
+                alpha=float(shade),
+                linewidth=0.8,
+                label=f"$\\sigma_f$ {force:g} N",
+            )
         axes.axhline(0.0, color=FAINT, linewidth=0.8)
         axes.set_ylabel("path error [mm]")
         axes.set_title(f"$\\sigma_{{vs}}$ = {sigma:g}")

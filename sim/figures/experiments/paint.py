@@ -89,7 +89,7 @@ def _trajectory(figure: Figure, axes: Axes, trace: Trace) -> None:
     space.set(xlabel="right [m]", ylabel="to wall [m]", zlabel="height [m]")
     space.set_title("(b) path of the tip")
     space.view_init(elev=22, azim=-70)
-    space.set_box_aspect((2.2, 1.0, 1.0), zoom=1.25)
+    space.set_box_aspect((2.2, 1.0, 1.0), zoom=1.25)  # type: ignore[arg-type]
     space.tick_params(labelsize=6, pad=-2)
 
 
@@ -99,8 +99,15 @@ def _spread(results: Results) -> Figure:
         for place, law in enumerate(("qp", "paper")):
             rows = select(results.table, law=law, variant="standard")
             values = scale * rows[name].drop_nulls().to_numpy()
-            boxes = axes.boxplot([values], positions=[place], widths=0.6, patch_artist=True, manage_ticks=False,
-                                 medianprops={"color": "#222222"}, flierprops={"markersize": 3, "marker": "."})  # fmt: skip
+            boxes = axes.boxplot(
+                [values],
+                positions=[place],
+                widths=0.6,
+                patch_artist=True,
+                manage_ticks=False,
+                medianprops={"color": "#222222"},
+                flierprops={"markersize": 3, "marker": "."},
+            )
             boxes["boxes"][0].set(facecolor=law_colour(law), alpha=0.5, linewidth=0.6)
         axes.set(title=label, ylim=(0.0, None))
         axes.set_xticks([0, 1], ["QP", "analytic"])

@@ -47,8 +47,18 @@ def _static(results: Results) -> Figure:
         for law in ("qp", "paper"):
             for variant, friction, dash, words in _STYLES:
                 rows = select(table, law=law, variant=variant, friction=friction)
-                plot_medians(panel, rows, "push_n", name, law, scale=scale, shift=_SHIFT[law], linestyle=dash,
-                             label=f"{law_name(law)}, {words}", linewidth=1.0)  # fmt: skip
+                plot_medians(
+                    panel,
+                    rows,
+                    "push_n",
+                    name,
+                    law,
+                    scale=scale,
+                    shift=_SHIFT[law],
+                    linestyle=dash,
+                    label=f"{law_name(law)}, {words}",
+                    linewidth=1.0,
+                )
         panel.set(xlabel="asked push [N]", ylabel=label)
     asked = np.array([table["param.push_n"].min(), table["param.push_n"].max()], float)
     axes[0].plot(asked, asked, **REFERENCE)
@@ -72,8 +82,17 @@ def _sliding(results: Results) -> Figure:
         for law in ("qp", "paper"):
             for friction, dash in ((0.3, "-"), (0.8, "--")):
                 rows = select(table, law=law, friction=friction)
-                plot_medians(panel, rows, "push_n", name, law, shift=_SHIFT[law], linestyle=dash,
-                             label=f"{law_name(law)}, friction {friction:g}", linewidth=1.0)  # fmt: skip
+                plot_medians(
+                    panel,
+                    rows,
+                    "push_n",
+                    name,
+                    law,
+                    shift=_SHIFT[law],
+                    linestyle=dash,
+                    label=f"{law_name(law)}, friction {friction:g}",
+                    linewidth=1.0,
+                )
         panel.set(xlabel="asked push [N]", ylabel=label)
     asked = np.array([table["param.push_n"].min(), table["param.push_n"].max()], float)
     axes[0].plot(asked, asked, **REFERENCE)
