@@ -63,7 +63,9 @@ def test_a_changed_setting_is_flown_anew(flown, tmp_path):
     table = run_sweep([made_up(1, friction=0.4)], tmp_path).table
     assert flown == [1, 1]
     assert table["param.friction"].to_list() == [0.4]
-    assert configuration_hash(made_up(1)) == configuration_hash(made_up(2)) != configuration_hash(made_up(1, law="paper"))
+    assert (
+        configuration_hash(made_up(1)) == configuration_hash(made_up(2)) != configuration_hash(made_up(1, law="paper"))
+    )
 
 
 def test_changed_flight_code_is_flown_anew(flown, tmp_path, monkeypatch):

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from sim.figures.experiments.common import plot_medians, select
+from sim.figures.experiments.wrench_set import draw_wrench_set
 from sim.figures.style import REFERENCE, law_name, new_figure
 
 if TYPE_CHECKING:
@@ -32,6 +33,11 @@ _SHIFT = {"qp": -0.12, "paper": 0.12}
 def draw_saturation(results: Results) -> dict[str, tuple[str, Figure]]:
     """Static presses, and sliding ones beside them if flown."""
     figures = {"saturation": ("Asked against delivered push, height and tilt, standing still", _static(results))}
+    for variant, words in (("standard", "with the reach check"), ("no-reach-check", "without the reach check")):
+        rows = select(results.table, kind="static", variant=variant, friction=0.3)
+        if rows.height:
+            caption = f"Attainable level forces and those flown while pressing, {words}"
+            figures[f"wrench-set-{variant}"] = (caption, draw_wrench_set(results, rows))
     sliding = select(results.table, kind="sliding")
     if sliding.height and sliding["param.push_n"].n_unique() > 1:
         caption = "Sliding push up to the friction-aware limit"
