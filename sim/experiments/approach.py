@@ -41,8 +41,8 @@ EXPERIMENT = Experiment(
     design=design,
     params={"stiffness_n_m": "wall [N/m]"},
     columns=(
-        Column(metric="first_touch_s", label="first touch", unit="s", digits=1),
-        Column(metric="approach_speed_m_s", label="speed at touch", unit="mm/s", scale=1e3, digits=0),
+        Column(metric="first_touch_s", label="first touch", unit="s", digits=1, better=0),
+        Column(metric="approach_speed_m_s", label="speed at touch", unit="mm/s", scale=1e3, digits=0, better=0),
         Column(metric="touch_peak_n", label="peak", unit="N"),
         Column(metric="bounces", label="bounces", digits=0),
         Column(metric="settle_s", label="settled after touch", unit="s"),

@@ -39,13 +39,23 @@ class Choice:
 
 @dataclass(frozen=True, kw_only=True)
 class Column:
-    """A figure shown in the table of an experiment: name, words, unit, scale into it, digits."""
+    """A figure shown in the table of an experiment.
+
+    Attributes:
+        metric: Column of the table of flights.
+        label: In words.
+        unit: Unit in which it is shown.
+        scale: Factor into that unit.
+        digits: Digits after the point.
+        better: +1 when more is better, -1 when less is, 0 when neither.
+    """
 
     metric: str
     label: str
     unit: str = ""
     scale: float = 1.0
     digits: int = 2
+    better: int = -1
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -91,7 +91,7 @@ EXPERIMENT = Experiment(
         Column(metric="touch_peak_n", label="peak at touch", unit="N"),
         Column(metric="bounces", label="bounces", digits=0),
         Column(metric="force_rms_n", label="push error, steady rms", unit="N", digits=3),
-        Column(metric="contact_share", label="contact, steady", unit="%", scale=100.0, digits=1),
+        Column(metric="contact_share", label="contact, steady", unit="%", scale=100.0, digits=1, better=1),
         Column(metric="tilt_rms_deg", label="tilt, rms", unit="deg"),
     ),
     criteria=(

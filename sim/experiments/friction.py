@@ -46,7 +46,7 @@ EXPERIMENT = Experiment(
         Column(metric="speed_error_share", label="speed error", unit="%", scale=100.0, digits=1),
         Column(metric="path_rms_m", label="height error, rms", unit="mm", scale=1e3),
         Column(metric="force_rms_n", label="push error, rms", unit="N", digits=3),
-        Column(metric="contact_share", label="contact", unit="%", scale=100.0, digits=1),
+        Column(metric="contact_share", label="contact", unit="%", scale=100.0, digits=1, better=1),
     ),
     criteria=(
         Criterion(text="yaw after 1 s, rms", metric="yaw_rms_deg", bound=1.0, unit="deg"),

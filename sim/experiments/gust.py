@@ -64,7 +64,7 @@ EXPERIMENT = Experiment(
     columns=(
         Column(metric="path_rms_m", label="path, rms", unit="mm", scale=1e3),
         Column(metric="force_rms_n", label="push error, rms", unit="N", digits=3),
-        Column(metric="contact_share", label="contact", unit="%", scale=100.0, digits=1),
+        Column(metric="contact_share", label="contact", unit="%", scale=100.0, digits=1, better=1),
         Column(metric="tilt_peak_deg", label="tilt, peak", unit="deg"),
         Column(metric="yaw_peak_deg", label="yaw, peak", unit="deg"),
         Column(metric="recovery_s", label="recovered after", unit="s"),

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import polars as pl
 
+from sim.experiments.balance import Paired, balance
 from sim.experiments.base import Column, Experiment
 from sim.experiments.variants import VARIANTS
 from sim.experiments.verdict import Verdict, telling, verdicts
@@ -38,6 +39,7 @@ def results_page(
     """
     text = _HEAD.format(command=command, lead=lead)
     text += "## What the QP law is held to\n\n" + _summary(flown)
+    text += "\n## Where the QP helps, and where it does not\n\n" + _balance(flown)
     for experiment, table, figures in flown:
         text += f"\n## {experiment.title}\n\n{experiment.about}\n\n"
         text += f"**Published:** {experiment.paper}\n\n"
@@ -47,6 +49,43 @@ def results_page(
         for caption, file in figures.values():
             text += f"![{caption}]({file.as_posix()})\n\n*{caption}.*\n\n"
     return text
+
+
+def _balance(flown: Sequence[tuple[Experiment, pl.DataFrame, dict[str, tuple[str, Path]]]]) -> str:
+    """Counts per experiment, then every figure in which the analytic law is surely better."""
+    heads = (
+        "experiment",
+        "flights done, QP",
+        "flights done, analytic",
+        "QP surely better",
+        "no sure difference",
+        "analytic surely better",
+    )
+    lines = ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
+    losses = []
+    for experiment, table, _ in flown:
+        paired = [entry for entry in balance(experiment, table) if entry.column.better]
+        count = {winner: sum(entry.winner == winner for entry in paired) for winner in ("qp", "", "paper")}
+        both = [table.filter(pl.col("law") == law)["completed"] for law in ("qp", "paper")]
+        done = [f"{int(column.sum())} of {column.len()}" for column in both]
+        lines.append(f"| {experiment.name} | {done[0]} | {done[1]} | {count['qp']} | {count['']} | {count['paper']} |")
+        losses += [_loss(experiment, entry) for entry in paired if entry.winner == "paper"]
+    text = "Figures of cells that both laws flew with the same seeds; surely: the interval excludes zero.\n\n"
+    text += "\n".join(lines) + "\n"
+    if losses:
+        text += (
+            "\nThe analytic law with clipping is surely better in (analytic minus QP):\n\n" + "\n".join(losses) + "\n"
+        )
+    return text
+
+
+def _loss(experiment: Experiment, entry: Paired) -> str:
+    column, cell = entry.column, _words(experiment, entry.params)
+    figures = " to ".join(f"{value:+.{column.digits}f}" for value in (entry.low, entry.high))
+    return (
+        f"- {experiment.name}, {entry.variant}, {cell}: {column.label} {entry.median:+.{column.digits}f} {column.unit} "
+        f"({figures}, {entry.pairs} pairs)"
+    )
 
 
 def _summary(flown: Sequence[tuple[Experiment, pl.DataFrame, dict[str, tuple[str, Path]]]]) -> str:

@@ -21,7 +21,7 @@ PATH_COLUMNS = (
     Column(metric="path_rms_corner_m", label="path, corners, rms", unit="mm", scale=1e3),
     Column(metric="force_rms_straight_n", label="push error, straights, rms", unit="N", digits=3),
     Column(metric="force_rms_corner_n", label="push error, corners, rms", unit="N", digits=3),
-    Column(metric="contact_share", label="contact", unit="%", scale=100.0),
+    Column(metric="contact_share", label="contact", unit="%", scale=100.0, better=1),
     Column(metric="tilt_rms_deg", label="tilt, rms", unit="deg"),
     Column(metric="tilt_peak_deg", label="tilt, peak", unit="deg"),
     Column(metric="yaw_peak_deg", label="yaw, peak", unit="deg"),
@@ -58,7 +58,7 @@ EXPERIMENT = Experiment(
     "force, rms.",
     design=design,
     params={"stroke_m": "stroke [m]"},
-    columns=(*PATH_COLUMNS, Column(metric="limited_share", label="limited ticks", unit="%", scale=100.0)),
+    columns=(*PATH_COLUMNS, Column(metric="limited_share", label="limited ticks", unit="%", scale=100.0, better=0)),
     criteria=(
         Criterion(text="path, straights, rms", metric="path_rms_straight_m", bound=0.003, scale=1e3, unit="mm"),
         Criterion(text="path, corners, rms", metric="path_rms_corner_m", bound=0.010, scale=1e3, unit="mm"),

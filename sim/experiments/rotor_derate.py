@@ -62,12 +62,12 @@ EXPERIMENT = Experiment(
     design=design,
     params={"kind": "event", "rotor": "rotor", "share": "thrust left", "told": "told"},
     columns=(
-        Column(metric="push_mean_n", label="delivered", unit="N"),
-        Column(metric="reach_n", label="reach left", unit="N"),
+        Column(metric="push_mean_n", label="delivered", unit="N", better=1),
+        Column(metric="reach_n", label="reach left", unit="N", better=0),
         Column(metric="height_error_peak_m", label="height error, peak", unit="mm", scale=1e3, digits=1),
         Column(metric="tilt_peak_deg", label="tilt, peak", unit="deg"),
         Column(metric="yaw_peak_deg", label="yaw, peak", unit="deg"),
-        Column(metric="survived_s", label="flew on for", unit="s"),
+        Column(metric="survived_s", label="flew on for", unit="s", better=1),
         Column(metric="descent_peak_m_s", label="descent, fastest", unit="m/s"),
     ),
     criteria=(

@@ -98,14 +98,15 @@ EXPERIMENT = Experiment(
     design=design,
     params={"kind": "press", "push_n": "asked [N]", "friction": "friction"},
     columns=(
-        Column(metric="push_mean_n", label="delivered", unit="N"),
-        Column(metric="reach_n", label="reach", unit="N"),
+        Column(metric="push_mean_n", label="delivered", unit="N", better=0),
+        Column(metric="force_error_rms_n", label="push minus asked, rms", unit="N"),
+        Column(metric="reach_n", label="reach", unit="N", better=0),
         Column(metric="force_std_n", label="push, deviation", unit="N"),
         Column(metric="height_error_peak_m", label="height error, peak", unit="mm", scale=1e3, digits=1),
         Column(metric="tilt_rms_deg", label="tilt, rms", unit="deg"),
         Column(metric="tilt_peak_deg", label="tilt, peak", unit="deg"),
         Column(metric="yaw_peak_deg", label="yaw, peak", unit="deg"),
-        Column(metric="limited_share", label="limited ticks", unit="%", scale=100.0, digits=0),
+        Column(metric="limited_share", label="limited ticks", unit="%", scale=100.0, digits=0, better=0),
     ),
     criteria=(
         *(

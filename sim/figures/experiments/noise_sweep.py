@@ -80,9 +80,9 @@ def _along(results: Results) -> Figure:
         forces = [force for vs, force in cells if vs == sigma]
         for force, shade in zip(forces, np.linspace(1.0, 0.35, len(forces)), strict=True):
             trace = kept_trace(results, select(results.table, law="qp", sigma_vs=sigma, sigma_f_n=force))
-            if trace is None:
+            path = path_error(trace) if trace is not None else None
+            if path is None or not path.painting.any():
                 continue
-            path = path_error(trace)
             step = np.linalg.norm(np.diff(path.tip[path.painting], axis=0), axis=1)
             way = np.concatenate(([0.0], np.cumsum(step)))
             axes.plot(
@@ -96,6 +96,9 @@ def _along(results: Results) -> Figure:
         axes.axhline(0.0, color=FAINT, linewidth=0.8)
         axes.set_ylabel("path error [mm]")
         axes.set_title(f"$\\sigma_{{vs}}$ = {sigma:g}")
-        axes.legend(loc="upper right", ncols=3)
+        if axes.lines[:-1]:
+            axes.legend(loc="upper right", ncols=3)
+        else:
+            axes.text(0.5, 0.5, "nothing was painted", transform=axes.transAxes, ha="center", color="#777777")
     grid[-1].set_xlabel("way of the tip [m]")
     return figure

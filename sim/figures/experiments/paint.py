@@ -42,8 +42,8 @@ def draw_paint(results: Results) -> dict[str, tuple[str, Figure]]:
 
 
 def _panels(trace: Trace) -> Figure:
-    figure = new_figure(6.0)
-    grid = figure.subplots(3, 2)
+    figure = new_figure(6.6)
+    grid = figure.subplots(3, 2, gridspec_kw={"height_ratios": (1.35, 1.0, 1.0)})
     _snapshot(grid[0][0], trace)
     _trajectory(figure, grid[0][1], trace)
     t, true, wanted = thin(trace.t, trace.push_true, trace.push_reference)
@@ -64,7 +64,7 @@ def _panels(trace: Trace) -> Figure:
         speed.plot(t, truth, color=FAINT, linewidth=1.6)
         speed.plot(t, estimate, color=shade, linewidth=0.8, label=f"{words}, estimated")
     speed.set(title="(e) velocity along the wall (grey: true)", ylabel="[m/s]", xlabel="time [s]")
-    speed.legend(loc="upper right", ncols=2)
+    speed.legend(loc="lower right", ncols=2)
     for axis, words, dash in ((0, "roll", "-"), (1, "pitch", "--"), (2, "yaw", ":")):
         t, angle = thin(trace.t, np.degrees(trace.euler[:, axis]))
         attitude.plot(t, angle, dash, color=colour, linewidth=0.9, label=words)
@@ -75,6 +75,7 @@ def _panels(trace: Trace) -> Figure:
 
 def _snapshot(axes: Axes, trace: Trace) -> None:
     axes.imshow(final_view(trace))
+    axes.set_anchor("W")
     axes.set(title="(a) the board afterwards, seen by the camera")
     axes.set_axis_off()
 
@@ -86,11 +87,13 @@ def _trajectory(figure: Figure, axes: Axes, trace: Trace) -> None:
     x, y, z = (column[::10] for column in trace.tip.T)
     space.plot(y, x, -z, color=law_colour(trace.law), linewidth=0.9)
     space.scatter([y[0]], [x[0]], [-z[0]], color="#333333", s=8)  # type: ignore[arg-type]
-    space.set(xlabel="right [m]", ylabel="to wall [m]", zlabel="height [m]")
-    space.set_title("(b) path of the tip")
+    for label, words in ((space.set_xlabel, "right"), (space.set_ylabel, "to wall"), (space.set_zlabel, "height")):
+        label(f"{words} [m]", fontsize=6.5, labelpad=-9)  # type: ignore[call-arg]
+    space.set_title("(b) path of the tip", x=0.0)
     space.view_init(elev=22, azim=-70)
-    space.set_box_aspect((2.2, 1.0, 1.0), zoom=1.25)  # type: ignore[arg-type]
-    space.tick_params(labelsize=6, pad=-2)
+    space.set_box_aspect((2.2, 1.0, 1.0), zoom=1.0)  # type: ignore[arg-type]
+    space.tick_params(labelsize=5.5, pad=-4)
+    space.locator_params(nbins=4)
 
 
 def _spread(results: Results) -> Figure:

@@ -23,8 +23,8 @@ from sim.trace import Trace
 MOMENTS = (0.05, 0.5, 0.92)
 #: Pictures perceived before each moment, so that tracks live; and their spacing in ticks.
 LEAD_FRAMES, FRAME_TICKS = 12, 8
-#: Depth cells over which a normal is taken [px].
-CELL_PX = 8
+#: Cells over which a normal is taken, and width of the box's line [px].
+CELL_PX, BOX_PX = 15, 3
 #: Distance from the fitted plane, relative, within which a pixel belongs to it.
 PLANE_GATE = 0.03
 
@@ -74,28 +74,38 @@ def draw_snapshots(trace: Trace) -> Figure:
             percept = perception.process(frame, attitude=trace.attitude[at], rotation=np.zeros(3), velocity=None)
         assert frame is not None and percept is not None
         above.imshow(draw_overlay(frame.rgb, percept))
-        below.imshow(normal_picture(frame))
+        below.imshow(normal_picture(frame, percept.features.plane if percept.features else None))
         above.set_title(f"{trace.t[tick]:.1f} s")
         for axes in (above, below):
             axes.set_axis_off()
     return figure
 
 
-def normal_picture(frame: RgbdFrame) -> np.ndarray:
-    """Surface normals as colours, with the box around what lies on the main plane, uint8 (H, W, 3)."""
-    depth, (fx, fy, cx, cy) = cv2.GaussianBlur(frame.depth, (0, 0), 0.5 * CELL_PX), frame.intrinsics
+def normal_picture(frame: RgbdFrame, plane: tuple[float, float, float, float] | None) -> np.ndarray:
+    """Surface normals as colours (right red, up green, to the camera blue), with the box around the working surface.
+
+    Args:
+        frame: Colour and depth.
+        plane: (A, B, C, D) of the surface in C that perception found, D = -1, or None for no box.
+
+    Returns:
+        uint8 (H, W, 3).
+    """
+    fx, fy, cx, cy = frame.intrinsics
+    height, width = frame.depth.shape
     good = frame.depth > 0.0
-    height, width = depth.shape
     x, y = np.meshgrid((np.arange(width) - cx) / fx, (np.arange(height) - cy) / fy)
-    inverse = np.where(depth > 0.0, 1.0 / np.maximum(depth, 1e-3), 0.0)
-    a = np.gradient(cv2.blur(inverse, (CELL_PX, CELL_PX)), axis=1) * fx
-    b = np.gradient(cv2.blur(inverse, (CELL_PX, CELL_PX)), axis=0) * fy
-    normal = -np.stack((a, b, inverse - a * x - b * y), axis=2)
+    inverse = np.where(good, 1.0 / np.maximum(frame.depth, 1e-3), 0.0)
+    share = np.maximum(cv2.blur(good.astype(float), (CELL_PX, CELL_PX)), 1e-6)
+    smooth = cv2.blur(inverse, (CELL_PX, CELL_PX)) / share  # holes count for nothing
+    a, b = np.gradient(smooth, axis=1) * fx, np.gradient(smooth, axis=0) * fy
+    normal = np.stack((-a, b, smooth - a * x - b * y), axis=2)
     normal /= np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-9)
     picture = np.where(good[..., None], 127.5 * (normal + 1.0), 0.0).astype(np.uint8)
-    design = np.column_stack((x[good], y[good], np.ones(np.count_nonzero(good))))
-    middle = np.abs(inverse[good] - np.median(inverse[good])) < PLANE_GATE * np.median(inverse[good])
-    plane, *_ = np.linalg.lstsq(design[middle], inverse[good][middle], rcond=None)
-    on = good & (np.abs(inverse / np.maximum(np.stack((x, y, np.ones_like(x)), 2) @ plane, 1e-6) - 1.0) < PLANE_GATE)
-    box = cv2.boundingRect(cv2.morphologyEx(on.astype(np.uint8), cv2.MORPH_OPEN, np.ones((9, 9), np.uint8)))
-    return cv2.rectangle(picture, box, (255, 255, 255), 2)
+    if plane is None:
+        return picture
+    nominal = plane[0] * x + plane[1] * y + plane[2]
+    on = good & (np.abs(inverse / np.maximum(nominal, 1e-6) - 1.0) < PLANE_GATE)
+    kernel = np.ones((CELL_PX, CELL_PX), np.uint8)
+    box = cv2.boundingRect(cv2.morphologyEx(on.astype(np.uint8), cv2.MORPH_OPEN, kernel))
+    return cv2.rectangle(picture, box, (255, 255, 255), BOX_PX)
