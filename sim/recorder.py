@@ -113,20 +113,22 @@ class Recorder:
 
     def trace(self, wall_time_s: float) -> Trace:
         """Everything logged so far as a trace."""
-        arrays = {name: np.array(values, float) for name, values in self._rows.items()}
+        # Ctrl-C may strike in the middle of a tick: its half-written row is dropped.
+        ticks = min(map(len, (self._active, self._contact, self._painting, *self._rows.values())))
+        arrays = {name: np.array(values[:ticks], float) for name, values in self._rows.items()}
         for name in ("phase", "row", "outcome", "iterations"):
             if name in arrays:
                 arrays[name] = arrays[name].astype(np.int32)
-        active = np.zeros((len(self._active), len(self._limits)), dtype=bool)
-        for tick, columns in enumerate(self._active):
+        active = np.zeros((ticks, len(self._limits)), dtype=bool)
+        for tick, columns in enumerate(self._active[:ticks]):
             active[tick, list(columns)] = True
         arrays["active"] = active
         vehicle = self._pilot.config.controller.vehicle
         arrays["thrust_min"], arrays["thrust_max"] = vehicle.thrust_min, vehicle.thrust_max
         arrays["true_thrust_min"], arrays["true_thrust_max"] = self._world.plant.thrust_limits
         arrays["vision_ms"] = np.array(self._vision, float)
-        arrays["contact_1khz"] = np.concatenate(self._contact) if self._contact else np.zeros(0)
-        arrays["painting_1khz"] = np.repeat(np.array(self._painting, bool), STEPS_PER_TICK)
+        arrays["contact_1khz"] = np.concatenate(self._contact[:ticks]) if ticks else np.zeros(0)
+        arrays["painting_1khz"] = np.repeat(np.array(self._painting[:ticks], bool), STEPS_PER_TICK)
         canvas = self._world.canvas
         return Trace(
             scene=self._world.scene,

@@ -110,6 +110,7 @@ class ExperimentCommand:
         experiments, table = chosen(self.name), result.table
         write_tables(folder, self.name, experiments, table)
         content = summarise(self.name, experiments, table, folder, facts)
+        write_summary(folder, content)  # before the figures, so that no figure can cost the record
         page = None
         if table.height and not result.interrupted:
             lead = (
