@@ -105,13 +105,13 @@ def _verdict_line(experiment: Experiment, verdict: Verdict, shown: dict[str, Any
         cell += f", {criterion.variant}"
     return (
         f"| {experiment.name} | {criterion.text} | {cell} | {sign} {verdict.bound:.4g}{unit} | "
-        f"{_number(verdict.median)}{unit} | {_number(verdict.worst)}{unit} | {verdict.held} of {verdict.n} | "
+        f"{_number(verdict.median, unit)} | {_number(verdict.worst, unit)} | {verdict.held} of {verdict.n} | "
         f"{'yes' if verdict.met else '**no**'} |"
     )
 
 
-def _number(value: float) -> str:
-    return f"{value:.3g}" if np.isfinite(value) else "–"
+def _number(value: float, unit: str) -> str:
+    return f"{value:.3g}{unit}" if np.isfinite(value) else "–"
 
 
 def _words(experiment: Experiment, params: dict[str, Any]) -> str:
