@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 BEFORE_S, AFTER_S = 3.0, 9.0
 #: A hold whose steady part has less contact than this has lost the wall.
 KEPT_SHARE = 0.995
+#: Cells with a smaller deviation are dark on the colour scale [N].
+DARK_BELOW_N = 0.6
 _VARIANTS = {"standard": "impedance", "direct": "direct force control"}
 
 
@@ -84,7 +86,8 @@ def _map(results: Results) -> Figure:
                     margin[i, j] = damping_ratio(law, gain, wall, delay, impedance=variant == "standard")
             image = axes.imshow(values, origin="lower", aspect="auto", norm=LogNorm(0.03, 3.0), cmap="viridis")
             for i, j in zip(*np.nonzero(lost == 1.0), strict=True):
-                axes.text(j, i, "lost", ha="center", va="center", color="white", fontsize=6.5)
+                ink = "black" if values[i, j] > DARK_BELOW_N else "white"
+                axes.text(j, i, "lost", ha="center", va="center", color=ink, fontsize=6.5)
             if min(margin.shape) > 1 and np.ptp(margin) > 0 and margin.min() < 0.0 < margin.max():
                 axes.contour(margin, levels=[0.0], colors="#ff5a36", linewidths=1.4)
             axes.set_xticks(range(len(walls)), [f"{wall / 1000:g}" for wall in walls])
