@@ -129,3 +129,15 @@ def test_parameters_of_all_kinds_share_a_table(flown, tmp_path):
     assert table["param.push"].to_list() == [5.0, None]
     assert table["param.told"].to_list() == [None, True]
     assert table.schema["param.name"] == pl.String
+
+
+def test_a_part_appears_whole_or_not_at_all(flown, tmp_path, monkeypatch):
+    def half(self, file):
+        file.write_bytes(b"PAR1 half of a fi")
+        raise OSError("disk full")
+
+    monkeypatch.setattr(pl.DataFrame, "write_parquet", half)
+    with pytest.raises(OSError, match="disk full"):
+        run_sweep([made_up(0)], tmp_path)
+    monkeypatch.undo()
+    assert not list(tmp_path.glob("part-*.parquet"))

@@ -89,8 +89,8 @@ def test_a_bound_is_held_by_the_median_and_counted_per_flight():
 
 
 def test_a_crash_is_no_good_figure():
-    verdict = judged([0.1, 0.1], [True, False], bound=0.5)
-    assert not verdict.met and verdict.held == 1
+    verdict = judged([0.1, 0.2], [True, False], bound=0.5)
+    assert not verdict.met and (verdict.held, verdict.median, verdict.known) == (1, 0.1, 1)
     assert judged([0.1, 0.1], [True, False], bound=0.5, failed_too=True).met
 
 
