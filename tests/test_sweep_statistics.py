@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import math
 
 import numpy as np
 import polars as pl
 import pytest
 
+from ibvs_qp.errors import ConfigError
 from sim.comparison import compare, read_run
 from sim.experiments import experiment
 from sim.experiments.base import Criterion
@@ -101,6 +103,24 @@ def test_two_tables_compare_flight_by_flight(tmp_path):
     difference = cell["differences"][0]
     assert (cell["n"], difference.a, difference.b, difference.median) == (3, 5.0, 6.0, 1.0)
     assert difference.sure
+
+
+def test_two_paint_runs_compare_law_by_law_whatever_their_seeds(tmp_path):
+    for name, seed, path in (("a", 0, 0.001), ("b", 7, 0.003)):
+        metrics = {"completed": True, "reason": "done", "path_rms_straight_m": path, "outcomes": {}, "rows": []}
+        content = {"seed": seed, "version": "1", "laws": {"qp": metrics, "paper": metrics}}
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "summary.json").write_text(json.dumps(content))
+    compared = compare(read_run(tmp_path / "a"), read_run(tmp_path / "b"))
+    assert [cell["law"] for cell in compared] == ["qp", "paper"]
+    assert compared[0]["differences"][0].median == pytest.approx(0.002)
+
+
+def test_runs_that_share_nothing_are_refused(tmp_path):
+    for name, push in (("a", 5.0), ("b", 6.0)):
+        write_table(tmp_path / name / "x.parquet", table({"qp": [1.0]}, push=push))
+    with pytest.raises(ConfigError, match="share no flight"):
+        compare(read_run(tmp_path / "a"), read_run(tmp_path / "b"))
 
 
 @pytest.mark.parametrize(

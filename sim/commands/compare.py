@@ -137,7 +137,7 @@ def _print(cells: list[dict[str, Any]], a: Path, b: Path) -> None:
         title = f"{cell['experiment']}, {cell['law']}, {cell['variant']}{', ' + params if params else ''}: done {done}"
         table = Table(box=box.SIMPLE_HEAD, pad_edge=False, title=title, title_justify="left")
         for heading in ("figure", f"A: {a.name}", f"B: {b.name}", "B - A", "95 % interval"):
-            table.add_column(heading, justify="left" if heading == "figure" else "right")
+            table.add_column(heading, justify="left" if heading == "figure" else "right", no_wrap=heading == "figure")
         shown = {each.figure: each for each in cell["differences"]}
         for name in (name for name in SHOWN if name in shown):
             each = shown[name]
