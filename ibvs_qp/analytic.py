@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
-from ibvs_qp.command import ActiveLimit, Command, Outcome
+from ibvs_qp.command import Command, Outcome
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.gate import MeasurementGate, answered_stamp, check_reference
 from ibvs_qp.hold import hold_thrusts
-from ibvs_qp.limits.thrust import thrust_window
 from ibvs_qp.measurement import Measurement, Reference
+from ibvs_qp.reporting import clipped_command, contact_mode, reach_note
 from ibvs_qp.setpoints import Setpoints
 
 #: Singular values below this share of the largest are dropped in the pseudo-inverse of L.
@@ -75,65 +73,30 @@ class PaperController:
     def __init__(self, config: ControllerConfig | None = None) -> None:
         self.config = config or ControllerConfig()
         self.setpoints = Setpoints(self.config)
-        vehicle = self.config.vehicle
-        self._gate = MeasurementGate(vehicle.geometry.count)
-        self._floor, self._ceiling = vehicle.thrust_min, vehicle.thrust_max
-        self._step = vehicle.thrust_rate_n_s * self.config.tick_s
+        self._gate = MeasurementGate(self.config.vehicle.geometry.count)
         self.reset()
 
     def reset(self) -> None:
         """As after construction."""
         self.setpoints.reset()
         self._gate.reset()
-        self._last: np.ndarray | None = None
         self._reference = Reference()
 
     def step(self, measurement: Measurement, reference: Reference) -> Command:
         """Thrusts for one tick; never raises, clips to box and rate."""
         checked, rejected = self._gate.check(measurement)
         reference, refused = check_reference(reference, self._reference)
-        self._reference = reference
-        outcome, mode = Outcome.SOLVED, "hold"
-        low, high = self._floor, self._ceiling
+        self._reference, rejected, terms = reference, rejected + refused, self.setpoints
+        stamp = answered_stamp(measurement)
         if checked is None:
-            free, outcome = hold_thrusts(self.config, self._gate.inertial), Outcome.HOLD
-        else:
-            if self._gate.restarted:
-                self.setpoints.reset()
-            self.setpoints.update(checked, reference)
-            free = analytic_thrusts(self.setpoints)
-            mode = "contact" if self.setpoints.contact.in_contact else ("approach" if reference.contact else "free")
-            low = low if checked.thrust_min is None else np.maximum(checked.thrust_min, low)
-            high = np.maximum(low, high if checked.thrust_max is None else np.minimum(checked.thrust_max, high))
-            if not np.isfinite(free).all():
-                free, outcome, mode = hold_thrusts(self.config, checked), Outcome.HOLD, "hold"
-        last, step = (free, math.inf) if self._last is None else (self._last, self._step)
-        low, high = thrust_window(last, low, high, step, self._floor, self._ceiling)
-        thrusts = np.clip(free, low, high)
-        unallocated = self.setpoints.effectiveness @ (free - thrusts)
-        self._last = thrusts
-        self.setpoints.note(thrusts, unallocated)
-        return Command(
-            stamp_ns=answered_stamp(measurement),
-            thrusts=thrusts,
-            wrench=self.setpoints.effectiveness @ thrusts,
-            outcome=outcome,
-            mode=mode,
-            rejected=rejected + refused,
-            active_limits=self._clipped(free, thrusts),
-            unallocated_wrench=unallocated,
-            reach_margin=self.setpoints.reach - max(self.setpoints.contact.push, 0.0) if checked else math.nan,
-        )
-
-    def _clipped(self, free: np.ndarray, thrusts: np.ndarray) -> tuple[ActiveLimit, ...]:
-        names = self.config.vehicle.geometry.names
-        return tuple(
-            ActiveLimit(
-                name=f"thrust_{names[i]}",
-                side="upper" if free[i] > thrusts[i] else "lower",
-                price=math.nan,
-                slack=abs(float(free[i] - thrusts[i])),
-                unit="N",
+            terms.pause()
+            return clipped_command(
+                terms, stamp, hold_thrusts(self.config, self._gate.inertial), Outcome.HOLD, "hold", rejected
             )
-            for i in np.flatnonzero(np.abs(free - thrusts) > 1e-9)
-        )
+        if self._gate.restarted:
+            terms.restart()
+        terms.update(checked, reference)
+        free, outcome, mode = analytic_thrusts(terms), Outcome.SOLVED, contact_mode(terms, reference)
+        if not np.isfinite(free).all():
+            free, outcome, mode = hold_thrusts(self.config, checked), Outcome.HOLD, "hold"
+        return clipped_command(terms, stamp, free, outcome, mode, rejected + reach_note(terms, reference))

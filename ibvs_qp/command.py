@@ -70,26 +70,29 @@ class Command:
     mode: str
     rejected: tuple[str, ...] = ()
     tasks: tuple[TaskReport, ...] = field(default_factory=tuple)
-    active_limits: tuple[ActiveLimit, ...] = ()
+    active_limits: tuple[ActiveLimit, ...] = field(default_factory=tuple)
     unallocated_wrench: np.ndarray
     reach_margin: float = float("nan")
     iterations: int = 0
     solve_time_s: float = 0.0
 
-    def explained_by(self, explain: Callable[[], tuple[TaskReport, ...]]) -> Command:
-        """This command with task reports made when somebody reads them: the tick does not pay for them."""
-        del self.__dict__["tasks"]
-        self.__dict__["_explain"] = explain
+    def explained_by(
+        self, tasks: Callable[[], tuple[TaskReport, ...]], limits: Callable[[], tuple[ActiveLimit, ...]]
+    ) -> Command:
+        """This command with reports made when somebody reads them: the tick does not pay for them."""
+        del self.__dict__["tasks"], self.__dict__["active_limits"]
+        self.__dict__["_explain"] = {"tasks": tasks, "active_limits": limits}
         return self
 
     def __getattr__(self, name: str) -> Any:
-        """Make the task reports at their first reading."""
-        if name == "tasks" and "_explain" in self.__dict__:
-            self.__dict__["tasks"] = self.__dict__.pop("_explain")()
-            return self.__dict__["tasks"]
-        raise AttributeError(name)
+        """Make the task and limit reports at their first reading."""
+        explain = self.__dict__.get("_explain", {})
+        if name not in explain:
+            raise AttributeError(name)
+        self.__dict__[name] = explain[name]()
+        return self.__dict__[name]
 
     def __getstate__(self) -> dict[str, Any]:
         """Pickle with the reports made."""
-        self.tasks  # noqa: B018 - reading makes them
-        return self.__dict__
+        made = {"tasks": self.tasks, "active_limits": self.active_limits}
+        return {name: value for name, value in self.__dict__.items() if name != "_explain"} | made

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ibvs_qp.settings import dump_toml, load_toml, setting, validate
+from ibvs_qp.settings import choice, dump_toml, load_toml, setting, validate
 from ibvs_qp.vehicle import VehicleParams
 
 
@@ -104,6 +104,9 @@ class Weights:
     level: float = setting(400.0, "roll and pitch rows; 0.05 rad/s^2", low=0.0, high=1e6)
     yaw: float = setting(100.0, "yaw row; 0.1 rad/s^2", low=0.0, high=1e6)
     velocity: float = setting(100.0, "free velocity rows; 0.1 m/s^2", low=0.0, high=1e6)
+    height: float = setting(
+        1e4, "height row; 0.01 m/s^2 = 0.06 N: what cannot be pushed must not lift the vehicle", low=0.0, high=1e6
+    )
     effort: float = setting(1e-3, "thrust away from the last one; 30 N", low=1e-9, high=1e3)
     smoothness: float = setting(1e-3, "change of the thrust step; 30 N", low=0.0, high=1e3)
     line_sigma: float = setting(2e-3, "line deviation at which a row's weight halves", low=1e-6, high=1.0)
@@ -125,6 +128,27 @@ class LimitSettings:
     )
     yaw_price: float = setting(1000.0, "slack price of the yaw barrier", low=1e-3, high=1e8)
     yaw_rate_1_s: float = setting(5.0, "how fast the yaw barrier may be approached", unit="1/s", low=0.1, high=100.0)
+    view_down: float = setting(0.35, "largest |rho| of a level guide; the picture ends at 0.384", low=0.01, high=10.0)
+    view_right: float = setting(
+        0.48, "largest |rho| of an upright guide; the picture ends at 0.512", low=0.01, high=10.0
+    )
+    view_price: float = setting(4000.0, "slack price of the line-in-view barriers", low=1e-3, high=1e8)
+    view_rate_1_s: float = setting(2.0, "how fast the border may be approached", unit="1/s", low=0.1, high=100.0)
+    push_share: float = setting(1.5, "push ceiling over the push reference", low=1.0, high=100.0)
+    push_price: float = setting(40.0, "slack price of the push ceiling; ten times the push row", low=1e-3, high=1e8)
+    approach_share: float = setting(1.5, "closing speed over that of the approach", low=1.0, high=100.0)
+    approach_rate_1_s: float = setting(
+        10.0, "how fast the closing speed may reach its bound", unit="1/s", low=0.1, high=100.0
+    )
+    approach_price: float = setting(4000.0, "slack price of the approach-speed barrier", low=1e-3, high=1e8)
+    tilt_barrier: bool = setting(True, "zero-tilt barriers on roll and pitch")
+    yaw_barrier: bool = setting(True, "yaw barrier")
+    view_barrier: bool = setting(True, "line-in-view barriers")
+    push_barrier: bool = setting(True, "push-force ceiling")
+    approach_barrier: bool = setting(True, "approach-speed barrier")
+    hard_barriers: bool = setting(
+        False, "no slack on any barrier: the program may have no solution, and the conflicting rows are named then"
+    )
 
     def __post_init__(self) -> None:
         """Validate."""
@@ -162,13 +186,18 @@ class ControllerConfig:
     weights: Weights = field(default_factory=Weights)
     limits: LimitSettings = field(default_factory=LimitSettings)
     solver: SolverSettings = field(default_factory=SolverSettings)
+    line_profile: str = choice(
+        "tip",
+        "error of the line rows: at the point where the tip meets the wall, or the paper's, rho at the image centre",
+        ("tip", "paper"),
+    )
     line_slots: int = setting(4, "lines the fixed program has room for", low=1, high=16)
     tick_s: float = setting(0.004, "control period", unit="s", low=0.0005, high=0.05)
     impedance: bool = setting(True, "impedance terms of the force law (False: direct force control)")
     contact_feedforward: bool = setting(True, "feed the measured contact moment and expected friction forward")
     touch_ramp: bool = setting(True, "ramp lambda and the force reference after touch")
     reach_check: bool = setting(True, "reduce a push that the vehicle cannot hold")
-    barriers: bool = setting(True, "tilt and yaw barriers")
+    barriers: bool = setting(True, "all barriers; each has its own switch in limits")
 
     def __post_init__(self) -> None:
         """Validate."""

@@ -28,16 +28,22 @@ def sound_vector(value: Any, size: int, bound: float) -> bool:
         isinstance(value, np.ndarray)
         and value.shape == (size,)
         and value.dtype.kind == "f"
-        and all(-bound <= entry <= bound for entry in value.tolist())  # False for NaN too
+        and -bound <= min(entries := value.tolist())
+        and max(entries) <= bound
+        and math.isfinite(sum(entries))  # min and max of a list may step over NaN
     )
 
 
 def _number(value: Any, low: float, high: float) -> bool:
+    if type(value) is float:
+        return low <= value <= high
     return isinstance(value, (int, float, np.integer, np.floating)) and bool(low <= value <= high)
 
 
 def is_stamp(value: Any) -> bool:
     """Whether a value is a time stamp: a whole number of nanoseconds that fits 63 bits."""
+    if type(value) is int:
+        return 0 <= value < 2**62
     return isinstance(value, (int, np.integer)) and not isinstance(value, bool) and bool(0 <= value < 2**62)
 
 
@@ -61,6 +67,7 @@ class MeasurementGate:
     def reset(self) -> None:
         """Forget the last good values."""
         self._attitude: np.ndarray | None = None
+        self._plane: tuple[float, ...] | None = None
         self._omega = np.zeros(3)
         self._wrench, self._wrench_stamp = np.zeros(6), 0
         self._stamp: int | None = None
@@ -112,7 +119,7 @@ class MeasurementGate:
         ):
             refuse("specific_force", f"not 3 finite values within {ACCELERATION_BOUND} m/s^2", None)
         changes |= self._check_wrench(measurement, stamp, refuse)
-        if measurement.plane is not None and not _good_plane(measurement.plane):
+        if measurement.plane is not None and not self._known_plane(measurement.plane):
             refuse("plane", "not 4 finite values with D != 0 in front of the camera", None)
         elif measurement.plane is not None and not _past(measurement.plane_stamp_ns, stamp):
             rejected.append("plane_stamp_ns: not a time before the tick")
@@ -154,6 +161,14 @@ class MeasurementGate:
             refuse("wrench_stamp_ns", "not a time before the tick", self._wrench_stamp)
         return {"contact_wrench": self._wrench, "wrench_stamp_ns": self._wrench_stamp}
 
+    def _known_plane(self, plane: Any) -> bool:
+        """Whether a plane is sound; the tuple of the last tick, which cannot have changed, is not asked again."""
+        if plane is self._plane:
+            return True
+        good = _good_plane(plane)
+        self._plane = plane if good and type(plane) is tuple else None
+        return good
+
     def _check_lines(self, measurement: Measurement, refuse: Any) -> None:
         if not isinstance(measurement.lines, tuple):
             refuse("lines", "not a tuple", ())
@@ -163,6 +178,8 @@ class MeasurementGate:
             refuse("lines", f"{len(measurement.lines) - len(good)} not finite or malformed", good)
 
     def _check_limits(self, measurement: Measurement, refuse: Any) -> None:
+        if measurement.thrust_min is None and measurement.thrust_max is None:
+            return
         bounds = {}
         for name in ("thrust_min", "thrust_max"):
             value = getattr(measurement, name)
@@ -198,7 +215,7 @@ def _good_line(line: Any) -> bool:
         and isinstance(line.covariance, np.ndarray)
         and line.covariance.shape == (2, 2)
         and line.covariance.dtype.kind == "f"
-        and all(math.isfinite(entry) for row in line.covariance.tolist() for entry in row)
+        and math.isfinite(sum(map(sum, line.covariance.tolist())))
     )
 
 

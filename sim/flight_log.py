@@ -25,6 +25,7 @@ def save_log(file: Path, traces: dict[str, Trace]) -> None:
             arrays["coverage_percent"] = np.round(100 * trace.coverage_mask).astype(np.uint8)
             arrays["canvas_px_per_m"] = np.array(trace.canvas_px_per_m)
         arrays["outcome_of_flight"] = np.array([str(trace.completed), trace.reason], dtype=str)
+        arrays["preset"] = np.array(trace.preset)
         arrays["seed"], arrays["wall_time_s"] = np.array(trace.seed), np.array(trace.wall_time_s)
         content.update({f"{law}/{name}": values for name, values in arrays.items()})
     np.savez_compressed(file, **content)
@@ -60,6 +61,7 @@ def load_run(path: str | Path) -> dict[str, Trace]:
                 ],
                 completed=str(completed) == "True",
                 reason=str(reason),
+                preset=str(arrays.pop("preset", "")),
                 wall_time_s=float(arrays.pop("wall_time_s")),
                 canvas=arrays.pop("canvas", None),
                 canvas_px_per_m=float(arrays.pop("canvas_px_per_m", 0.0)),

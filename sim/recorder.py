@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ibvs_qp.command import Command, Outcome
+from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import HORIZONTAL, SensorFrame
 from ibvs_qp.pilot import Pilot
 from ibvs_qp.vision.overlay import draw_overlay
@@ -34,6 +35,9 @@ class Recorder:
         self._rows: dict[str, list[Any]] = {}
         self._limits: dict[str, int] = {}
         self._active: list[tuple[int, ...]] = []
+        # Single precision: 1e-7 of a parameter is nothing that a person reads, and half the log.
+        self._program = pilot.controller.engine.data.stacked if isinstance(pilot.controller, HybridController) else None
+        self._programs: list[np.ndarray] = []
         self._contact: list[np.ndarray] = []
         self._painting: list[bool] = []
         self._vision: list[float] = []
@@ -78,6 +82,8 @@ class Recorder:
         add("unallocated", command.unallocated_wrench)
         add("step_us", pilot.controller_time_s * 1e6)
         add("iterations", command.iterations)
+        if self._program is not None:
+            self._programs.append(self._program.astype(np.float32))
         if len(self._active) % CLEARANCE_TICKS == 0:
             self._clearance = plant.propeller_clearance
         add("propeller_clearance", self._clearance)
@@ -103,8 +109,9 @@ class Recorder:
             self._events.append(Event(t=when, kind=kind, text=text))
         self._logged = len(log)
         for name in command.rejected:
-            if name not in self._rejected:
-                self._rejected.add(name)
+            kind = name.split(":")[0]  # its numbers may change from tick to tick
+            if kind not in self._rejected:
+                self._rejected.add(kind)
                 self._events.append(Event(t=time_s, kind="rejected", text=name))
 
     def note(self, time_s: float, kind: str, text: str) -> None:
@@ -114,7 +121,8 @@ class Recorder:
     def trace(self, wall_time_s: float) -> Trace:
         """Everything logged so far as a trace."""
         # Ctrl-C may strike in the middle of a tick: its half-written row is dropped.
-        ticks = min(map(len, (self._active, self._contact, self._painting, *self._rows.values())))
+        rows = [self._active, self._contact, self._painting, *self._rows.values()]
+        ticks = min(map(len, [*rows, self._programs] if self._programs else rows))
         arrays = {name: np.array(values[:ticks], float) for name, values in self._rows.items()}
         for name in ("phase", "row", "outcome", "iterations"):
             if name in arrays:
@@ -123,6 +131,8 @@ class Recorder:
         for tick, columns in enumerate(self._active[:ticks]):
             active[tick, list(columns)] = True
         arrays["active"] = active
+        if self._programs:
+            arrays["program"] = np.array(self._programs[:ticks])
         vehicle = self._pilot.config.controller.vehicle
         arrays["thrust_min"], arrays["thrust_max"] = vehicle.thrust_min, vehicle.thrust_max
         arrays["true_thrust_min"], arrays["true_thrust_max"] = self._world.plant.thrust_limits
@@ -144,4 +154,5 @@ class Recorder:
             canvas_px_per_m=canvas.pixels_per_m,
             coverage_mask=canvas.coverage,
             pictures=self._pictures,
+            preset=self._pilot.config.to_toml(),
         )

@@ -29,6 +29,7 @@ summary.json  all figures (docs/metrics.md of the project defines them)
 figures/      the report's figures as PNG
 video.mp4     camera view, phase and force
 scene.toml    the scene flown; fly it again with: ibvs-qp paint --scene scene.toml --seed {seed}
+preset_*.toml the pilot's configuration under each law
 log.npz       every array, named <law>/<array>; load it with
 
     import numpy as np
@@ -96,6 +97,8 @@ class RunFolder:
             (self.path / name).unlink(missing_ok=True)
         for trace in traces.values():
             (self.path / "scene.toml").write_text(dump_toml(trace.scene), encoding="utf-8")
+        for law, trace in traces.items():
+            (self.path / f"preset_{law}.toml").write_text(trace.preset, encoding="utf-8")
         save_log(self.path / "log.npz", traces)
         fields = "\n".join(f"  {name:<20} {text}" for name, text in FIELDS.items())
         text = _README.format(seed=summary_table["seed"], path=self.path, fields=fields)

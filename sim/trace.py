@@ -41,6 +41,7 @@ FIELDS = {
     "iterations": "(N,) solver iterations",
     "vision_ms": "(F,) duration of perception of every picture [ms]",
     "propeller_clearance": "(N,) smallest distance of any propeller disc to wall or board [m]",
+    "program": "(N,P) parameters of the quadratic program (QP law), for `ibvs-qp explain`",
     "contact_1khz": "(M,) true normal contact force at every physics step [N]",
     "painting_1khz": "(M,) bool, true while a row or a climb is being painted (phase demands contact)",
 }
@@ -73,6 +74,7 @@ class Trace:
         wall_time_s: Wall-clock time of the simulation.
         canvas: Painted board as the camera would see it, uint8 RGB, with `canvas_px_per_m`.
         coverage_mask: Paint coverage of the canvas 0..1, float32, same size.
+        preset: Configuration of the pilot, TOML.
         pictures: Video material: (t, RGB picture with detections drawn, phase name), thinned out.
     """
 
@@ -92,6 +94,7 @@ class Trace:
     canvas_origin_m: tuple[float, float] = (0.0, 0.0)
     coverage_mask: np.ndarray | None = None
     pictures: list[tuple[float, np.ndarray, str]] = field(default_factory=list)
+    preset: str = ""
 
     def __getattr__(self, name: str) -> Any:
         """Arrays read as attributes: ``trace.push_true``."""

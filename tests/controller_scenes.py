@@ -144,20 +144,22 @@ def pack(
     window: tuple[float, float] = (-1e4, 1e4),
 ) -> None:
     """Fill the program of one tick, with lambda, last thrusts and thrust window as the test wants them."""
-    count = controller.config.vehicle.geometry.count
-    controller.setpoints.update(measurement, reference)
-    controller._good = measurement
-    if share is not None:
-        controller.setpoints.contact_weight = share
-    controller._pack(
-        np.full(count, 11.3) if last is None else last, np.full(count, window[0]), np.full(count, window[1])
-    )
-    controller.engine.evaluator.evaluate()
+    terms, values = controller.setpoints, controller.setpoints.tick.inputs
+    terms.last = np.full(controller.config.vehicle.geometry.count, 11.3) if last is None else last
+    values["thrust_last"][:], values["thrust_step"][0] = terms.last, 1e6
+    values["thrust_floor"][:], values["thrust_ceiling"][:] = window
+    before = {name: state.copy() for name, state in terms.tick.states.items()}
+    terms.update(measurement, reference)
+    if share is not None:  # once more with that lambda, from the same states
+        for name, state in before.items():
+            terms.tick.states[name][:] = state
+        terms.contact_weight = share
+        terms.tick()
 
 
 def exact_thrusts(controller: HybridController) -> np.ndarray:
     """Thrusts of the packed program by the exact solver."""
-    data = controller.engine.evaluator
+    data = controller.engine.data
     solution = controller.engine.exact.solve(data.p, data.q, data.a, data.lower, data.upper)
     assert solution is not None
     return solution[0][: controller.config.vehicle.geometry.count]
@@ -165,7 +167,7 @@ def exact_thrusts(controller: HybridController) -> np.ndarray:
 
 def dense(controller: HybridController) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Full P, q, A, l, u of the packed program."""
-    data, template = controller.engine.evaluator, controller.template
+    data, template = controller.engine.data, controller.template
     upper, a = template.p_pattern.copy(), template.a_pattern.copy()
     upper.data, a.data = data.p.copy(), data.a.copy()
     p = upper.toarray()

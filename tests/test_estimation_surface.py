@@ -1,4 +1,4 @@
-"""Stiffness and friction of brush and wall from synthetic presses and strokes."""
+"""Stiffness of brush and wall from synthetic presses."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from ibvs_qp.estimation.surface import ASSUMED_FRICTION, ASSUMED_STIFFNESS, FrictionEstimator, StiffnessEstimator
+from ibvs_qp.estimation.surface import ASSUMED_STIFFNESS, StiffnessEstimator
 
 
 def press(stiffness: float, seed: int = 0, peak: float = 5.0) -> StiffnessEstimator:
@@ -49,30 +49,3 @@ def test_stiffness_stays_in_its_range_and_survives_a_new_touch() -> None:
     for _ in range(1000):  # long after the touch nothing counts any more
         known.add(5.0, 0.5, 0.01)
     assert known.value == value
-
-
-@pytest.mark.parametrize("friction", [0.1, 0.3, 0.8])
-def test_friction_while_sliding(friction: float) -> None:
-    rng, estimator = np.random.default_rng(1), FrictionEstimator()
-    for _ in range(1500):
-        push = 5.0 + rng.normal(0.0, 0.3)
-        estimator.add(push, friction * 5.0 + rng.normal(0.0, 0.3), 0.1, 0.004)
-    assert estimator.known and estimator.value == pytest.approx(friction, abs=0.03)
-
-
-def test_friction_learns_nothing_while_stuck_or_barely_touching() -> None:
-    estimator = FrictionEstimator()
-    for push, speed in ((5.0, 0.0), (5.0, -0.1), (0.5, 0.1), (0.0, 0.1)):
-        for _ in range(500):
-            estimator.add(push, 4.0, speed, 0.004)
-    assert not estimator.known and estimator.value == ASSUMED_FRICTION
-
-
-def test_friction_stays_plausible() -> None:
-    estimator = FrictionEstimator()
-    for _ in range(3000):
-        estimator.add(2.0, 50.0, 0.1, 0.004)
-    assert estimator.value <= FrictionEstimator.RANGE[1]
-    for _ in range(3000):
-        estimator.add(2.0, -50.0, 0.1, 0.004)
-    assert estimator.value >= FrictionEstimator.RANGE[0]

@@ -11,7 +11,7 @@ from synthetic_trace import Errors, synthetic_trace
 
 import sim.sweep.flying
 from sim.cli import main
-from sim.contact_loop import damping_ratio, loop_poles
+from sim.figures.experiments.force_hold import predicted_damping
 from sim.jobs import PressJob
 
 
@@ -113,16 +113,11 @@ def test_compare_pairs_two_folders(flown, capsys):
     assert main(["compare", "a", "b"]) == 0
 
 
-def test_the_loop_without_control_is_the_wall_alone():
-    # k 1.5 kN/m, b 30 N s/m, 6 kg: b / (2 sqrt(k m)) = 0.158
-    poles = loop_poles("qp", 1e-9, 1500.0, 0.004, impedance=False)
-    wall = min(poles, key=lambda pole: abs(abs(pole) - (1500.0 / 6.0) ** 0.5))
-    assert -wall.real / abs(wall) == pytest.approx(0.158, abs=0.002)
-
-
 def test_gain_and_delay_take_damping_and_impedance_gives_it():
-    assert damping_ratio("qp", 3.0, 1500.0, 0.024, impedance=False) < 0.0
-    assert (
-        damping_ratio("qp", 1.0, 1500.0, 0.024, impedance=True) > damping_ratio("qp", 1.0, 1500.0, 0.024, False) > 0.0
+    assert predicted_damping("qp", "direct", 3.0, 1500.0, 0.024) < 0.0
+    assert predicted_damping("qp", "standard", 1.0, 1500.0, 0.024) > predicted_damping(
+        "qp", "direct", 1.0, 1500.0, 0.024
     )
-    assert damping_ratio("qp", 2.0, 1500.0, 0.048, True) < damping_ratio("qp", 2.0, 1500.0, 0.004, True)
+    assert predicted_damping("qp", "standard", 2.0, 1500.0, 0.048) < predicted_damping(
+        "qp", "standard", 2.0, 1500.0, 0.004
+    )

@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 from small_vehicle import SmallVehicle
 
 from allocation import control_effectiveness
+from ibvs_qp.analytic import analytic_thrusts
 from ibvs_qp.command import Command, Outcome
-from ibvs_qp.config import ControllerConfig
+from ibvs_qp.config import ControllerConfig, Weights
 from ibvs_qp.controller import HybridController
 from ibvs_qp.frames import R_BODY_CAMERA, camera_twist_matrix
 from ibvs_qp.limits.thrust import LEAST_GAP, thrust_window
@@ -63,7 +64,7 @@ def closed_form(controller: HybridController, share: float, last: np.ndarray) ->
         rows.append((np.concatenate((direction, np.zeros(3))), wish, weights.velocity * fixed))
     jacobian = [math.sqrt(w) * (row @ per_thrust) for row, _, w in rows]
     target = [math.sqrt(w) * (wish - row @ drift) for row, wish, w in rows]
-    for weight, centre in ((weights.effort, last), (weights.smoothness, last + controller._change)):
+    for weight, centre in ((weights.effort, last), (weights.smoothness, last + terms.tick.inputs["thrust_change"])):
         jacobian += list(math.sqrt(weight) * np.eye(6))
         target += list(math.sqrt(weight) * centre)
     return np.linalg.lstsq(np.array(jacobian), np.array(target), rcond=None)[0]
@@ -89,13 +90,34 @@ def test_with_limits_that_do_not_bind_as_well() -> None:
         rng = np.random.default_rng(seed)
         share = float(rng.uniform())
         pack(controller, *random_tick(rng, seed % 3), share=share, last=LAST, window=(FLOOR, CEILING))
-        data = controller.engine.evaluator
+        data = controller.engine.data
         solution = controller.engine.exact.solve(data.p, data.q, data.a, data.lower, data.upper)
         assert solution is not None
         if np.abs(solution[1]).max() < 1e-9:
             compared += 1
             assert np.abs(solution[0][:6] - closed_form(controller, share, LAST)).max() < 1e-6
     assert compared >= 20
+
+
+@pytest.mark.parametrize("lines", [1, 2])
+def test_in_the_paper_profile_the_program_converges_to_the_paper_law(lines: int) -> None:
+    """Free air, line weight growing against one weight of all null-space wishes: 1e-4 N at the end."""
+    mass, null = ControllerConfig().vehicle.mass_kg, 1.0
+    wishes = {"level": null, "yaw": null, "velocity": null, "push": null / mass**2}
+    errors = []
+    for weight in (1e2, 1e3, 1e4, 1e6):
+        weights = Weights(line=weight, effort=1e-9, smoothness=0.0, line_sigma=1.0, **wishes)
+        config = ControllerConfig(weights=weights, line_profile="paper", barriers=False)
+        controller, worst = HybridController(config), 0.0
+        for seed in range(5):
+            controller.reset()
+            pack(controller, *random_tick(np.random.default_rng(seed), lines), share=0.0)
+            law = analytic_thrusts(controller.setpoints)
+            worst = max(worst, float(np.abs(exact_thrusts(controller) - law).max()))
+        errors.append(worst)
+    print(f"{lines} lines: largest difference {errors} N")
+    assert errors == sorted(errors, reverse=True)
+    assert errors[-1] < 1e-4
 
 
 # --------------------------------------------------------------------------------- OSQP against the exact solver
@@ -140,7 +162,7 @@ class Flight:
 
     def _judge(self, command: Command) -> None:
         engine = self.controller.engine
-        data = engine.evaluator
+        data = engine.data
         self.outcomes.append(command.outcome)
         self.iterations.append(command.iterations)
         self.limited += bool(command.active_limits)
@@ -259,7 +281,7 @@ def test_the_price_of_a_limit_is_the_slope_of_the_cost() -> None:
     (active,) = [entry for entry in command.active_limits if entry.name == name]
     assert active.side == "upper" and active.unit == "N" and active.slack == 0.0
     p, q, _, lower, upper = dense(controller)
-    data, cost = controller.engine.evaluator, []
+    data, cost = controller.engine.data, []
     for change in (-1e-3, 1e-3):
         moved = upper.copy()
         moved[3] += change

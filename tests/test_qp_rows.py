@@ -15,6 +15,7 @@ from ibvs_qp.controller import HybridController
 from ibvs_qp.frames import R_BODY_CAMERA, align_line
 from ibvs_qp.limits.barrier import barrier_bounds
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL, Reference
+from ibvs_qp.setpoints.sensed import TOUCH
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +25,7 @@ def controller() -> HybridController:
 
 def rows(controller: HybridController, thrusts: np.ndarray) -> dict[str, tuple[float, float, float]]:
     """(achieved, asked, weight) of every task row of the packed program."""
-    data = controller.engine.evaluator
+    data = controller.engine.data
     achieved, asked, weights = (array.copy() for array in data.report(data.stacked.copy(), thrusts))
     names = [row.name for row in controller.template.task_rows]
     assert len(set(names)) == len(names)
@@ -77,7 +78,7 @@ def test_line_rows_are_the_motion_of_the_line_at_the_tip(
     controller.reset()
     tick = measured(0, attitude=quaternion, plane=wall.plane, lines=(seen,))
     pack(controller, tick, reference, share=share)
-    slot = 0  # errors fill the slots in the order of the lines that were found
+    slot = 0 if role == HORIZONTAL else 1  # a slot belongs to a reference, found or not
     rng = np.random.default_rng(5)
     turn_share = 1.0 - share * (1.0 - controller.config.gains.line_turn_share)
     for _ in range(3):
@@ -192,14 +193,15 @@ def test_limit_rows_by_hand(controller: HybridController) -> None:
     rng = np.random.default_rng(11)
     limits, names = controller.config.limits, controller.template.row_names
     assert names[:6] == tuple(f"thrust_{name}" for name in controller.config.vehicle.geometry.names)
-    assert names[6:] == ("tilt_roll", "tilt_pitch", "yaw")
+    assert names[6:9] == ("tilt_roll", "tilt_pitch", "yaw")
+    assert names[9:] == ("view_horizontal", "view_vertical", "push_ceiling", "approach_speed")
     for _ in range(20):
         controller.reset()
         measurement, reference = random_tick(rng, 1)
         pack(controller, measurement, reference, window=(3.0, 17.0))
         _, _, a, lower, upper = dense(controller)
         terms = controller.setpoints
-        thrusts, slack = rng.uniform(2.0, 30.0, 6), rng.normal(size=3)
+        thrusts, slack = rng.uniform(2.0, 30.0, 6), rng.normal(size=7)
         motion = accelerations(controller, thrusts)
         value = a @ np.concatenate((thrusts, slack))
         np.testing.assert_allclose(value[:6], thrusts)
@@ -220,6 +222,42 @@ def test_limit_rows_by_hand(controller: HybridController) -> None:
             room_down = value[6 + i] - lower[6 + i]
             expected = motion[3 + i] - slack[i] - (-(pole**2) * (bound + angle) - 2 * pole * rates[i])
             assert room_down == pytest.approx(expected, abs=1e-9)
+
+
+def test_rows_of_view_push_and_approach_by_hand(controller: HybridController) -> None:
+    rng, limits, mass = np.random.default_rng(12), controller.config.limits, controller.config.vehicle.mass_kg
+    for _ in range(10):
+        controller.reset()
+        pack(controller, *random_tick(rng, 2))
+        _, _, a, lower, upper = dense(controller)
+        terms, thrusts = controller.setpoints, rng.uniform(2.0, 30.0, 6)
+        motion = accelerations(controller, thrusts)
+        along = float(terms.normal @ motion[:3])
+        motion[:3] -= terms.normal * along
+        value = dict(zip(controller.template.row_names, a @ np.append(thrusts, np.zeros(7)), strict=True))
+        bounds = {name: (lower[i], upper[i]) for i, name in enumerate(controller.template.row_names)}
+        for line, bound in zip(terms.lines, (limits.view_down, limits.view_right), strict=True):
+            name, pole = f"view_{line.role}", limits.view_rate_1_s
+            drift = value[name] - bounds[name][1]  # constants of the row live in its bounds
+            travel = controller.setpoints.tick.inputs["reference"][2:4]
+            wanted = line.matrix[0] @ np.append(travel[0] * terms.right + travel[1] * terms.down, np.zeros(3))
+            room = pole**2 * (bound - line.rho) - 2.0 * pole * (line.rho_rate + wanted)
+            assert drift == pytest.approx(line.matrix[0] @ motion - room, abs=1e-8)
+        name = "approach_speed"
+        allowed, rate, leaning, free = controller.engine.data.parameters["approach_state"]
+        assert free == 1.0 and leaning >= 0.0
+        room = limits.approach_rate_1_s * (limits.approach_share * allowed + rate) + leaning
+        assert value[name] - bounds[name][1] == pytest.approx(along - room, abs=1e-9)
+        assert bounds["push_ceiling"][1] > 1e3  # in free air the ceiling is wide
+        contact = controller.setpoints.tick.inputs["touch"]
+        contact[TOUCH.index("touching")] = 1.0
+        controller.setpoints.tick()
+        _, _, a, lower, upper = dense(controller)
+        index = controller.template.row_names.index("push_ceiling")
+        stiffness, rate = contact[TOUCH.index("stiffness")], contact[TOUCH.index("rate")]
+        room = limits.push_share * terms.push_reference + 2.0 * math.sqrt(stiffness * mass) * rate
+        force = mass * (accelerations(controller, thrusts) @ np.append(terms.normal, np.zeros(3)))
+        assert a[index, :6] @ thrusts - upper[index] == pytest.approx(force - room, abs=1e-8)
 
 
 @pytest.mark.parametrize(("pole", "bound"), [(8.0, 0.0175), (5.0, 0.17)])

@@ -40,7 +40,7 @@ def flying(ticks: int = 5, config: ControllerConfig | None = None) -> HybridCont
 
 
 def data_of(controller: HybridController) -> list[np.ndarray]:
-    data = controller.engine.evaluator
+    data = controller.engine.data
     return [array.copy() for array in (data.p, data.q, data.a, data.lower, data.upper)]
 
 
@@ -104,11 +104,11 @@ def test_an_infeasible_program_is_never_believed() -> None:
 
 def test_garbage_with_a_good_status_does_not_fly_either() -> None:
     engine = flying().engine
-    rows = len(engine.evaluator.lower)
+    rows = len(engine.data.lower)
     for value in (GARBAGE, math.nan, math.inf, -math.inf):
         assert engine._judge(SOLVED, np.full(9, value), np.zeros(rows)) is None
     assert engine._judge(SOLVED, np.full(9, 20.0), np.full(rows, math.nan)) is None
-    inside = np.append(0.5 * (engine.evaluator.lower + engine.evaluator.upper)[:6], np.zeros(3))
+    inside = np.append(0.5 * (engine.data.lower + engine.data.upper)[:6], np.zeros(3))
     assert engine._judge(SOLVED, inside, np.zeros(rows)) is Outcome.SOLVED
     for status in (3, 4, 5, 6, 8, 9, 10, 11):  # infeasible, unbounded, interrupted, unsolved: the number is chance
         assert engine._judge(status, inside, np.zeros(rows)) is None
@@ -159,7 +159,7 @@ def test_matrices_handed_to_the_solver_are_private_copies() -> None:
 
 def test_buffers_are_contiguous_doubles_of_fixed_length() -> None:
     controller = flying()
-    data, template = controller.engine.evaluator, controller.template
+    data, template = controller.engine.data, controller.template
     for array in (data.p, data.q, data.a, data.lower, data.upper, data.stacked):
         assert array.dtype == np.float64 and array.flags.c_contiguous
     sizes = len(data.p), len(data.a), len(data.q), len(data.lower)
@@ -217,7 +217,7 @@ def test_a_capped_solution_that_flies_is_as_near_as_promised() -> None:
         command = controller.step(seen, reference)
         if command.outcome is Outcome.CAPPED_ACCEPTED:
             capped += 1
-            data = controller.engine.evaluator
+            data = controller.engine.data
             exact = controller.engine.exact.solve(data.p, data.q, data.a, data.lower, data.upper)
             assert exact is not None
             assert np.abs(command.thrusts - exact[0][:6]).max() < 10 * settings.accept_residual

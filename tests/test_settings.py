@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ibvs_qp.config import ContactSettings, ControllerConfig, Gains, LimitSettings, SolverSettings, Weights
@@ -35,6 +35,7 @@ def test_defaults_pass_their_own_ranges_and_survive_toml(kind: type, tmp_path: P
     assert load_toml(kind, file) == kind()
 
 
+@settings(deadline=None)
 @given(st.floats(0.0, 200.0), st.floats(0.005, 0.5), st.booleans(), st.integers(1, 16), st.floats(0.6, 50.0))
 def test_every_value_survives_toml_to_the_bit(kp: float, speed: float, flag: bool, slots: int, mass: float) -> None:
     config = ControllerConfig(

@@ -13,7 +13,7 @@ import numpy as np
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.estimation.delayed import HISTORY, DelayedKalman
 from ibvs_qp.estimation.surface import StiffnessEstimator
-from ibvs_qp.frames import GRAVITY, R_BODY_CAMERA, cross
+from ibvs_qp.frames import GRAVITY, R_BODY_CAMERA
 from ibvs_qp.measurement import Measurement
 
 #: Accelerometer and unmodelled-gravity noise density along the normal [m/s^2/sqrt(Hz)] (IMU 4e-3, attitude noise).
@@ -38,7 +38,9 @@ class ContactEstimator:
         self._config = config
         vehicle = config.vehicle
         self._tip = np.array(vehicle.tip_position_m)
+        self._tip_list = self._tip.tolist()
         self._camera = np.array(vehicle.camera_position_m)
+        self._tip_from_camera = (self._tip - self._camera).tolist()
         chain = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [0.0, 0.0, 0.0]])
         noise = np.array([1e-10, ACCELERATION_NOISE**2, BIAS_NOISE**2])
         self._filter = DelayedKalman(chain, noise, np.array([0.05, 0.05, 0.1]), config.tick_s)
@@ -53,12 +55,13 @@ class ContactEstimator:
         self.normal = np.array([1.0, 0.0, 0.0])
         self.known, self._leaps = False, 0
         self.distance, self.rate, self._lever_speed = math.inf, 0.0, 0.0
+        self.depth = math.inf
         self.push = self.push_raw = 0.0
         self._push_mean, self._push_variance = 0.0, 0.02
         self.in_contact, self.touch_ns, self._touch_count, self._doubt_ns = False, -1, 0, -1
         self.stiffness = StiffnessEstimator()
 
-    def update(self, measurement: Measurement, down: np.ndarray) -> None:
+    def update(self, measurement: Measurement, down: tuple[float, float, float]) -> None:
         """Take in one measurement; ``down`` is the unit gravity direction in B."""
         stamp = measurement.stamp_ns
         dt = self._config.tick_s if self._stamp < 0 else min(max((stamp - self._stamp) * 1e-9, 0.0), 0.02)
@@ -68,25 +71,37 @@ class ContactEstimator:
         if measurement.plane is not None and measurement.plane_stamp_ns > self._plane_stamp:
             self._correct_plane(measurement.plane, measurement.plane_stamp_ns)
         if self.known:
-            self.distance = float(self._filter.state[0])
-            self.rate = -float(self._filter.state[1]) - self._lever_speed
+            self.distance, speed, _ = self._filter.state.tolist()
+            self.rate = -speed - self._lever_speed
+            self._update_depth()
         self._update_push(measurement)
         self._update_contact(stamp)
 
-    def _predict(self, measurement: Measurement, down: np.ndarray, omega: np.ndarray, dt: float) -> None:
+    def _predict(
+        self, measurement: Measurement, down: tuple[float, float, float], omega: np.ndarray, dt: float
+    ) -> None:
         """Turn the normal with the gyro and integrate the accelerometer along it."""
-        normal = self.normal
-        turned = normal + dt * cross(normal, omega)
-        self.normal = turned / math.sqrt(turned @ turned)
+        # Plain numbers: this runs every tick, and arrays of three cost ten times their arithmetic.
+        wx, wy, wz = omega.tolist()
+        nx, ny, nz = self.normal.tolist()
+        nx, ny, nz = nx + dt * (ny * wz - nz * wy), ny + dt * (nz * wx - nx * wz), nz + dt * (nx * wy - ny * wx)
+        length = math.sqrt(nx * nx + ny * ny + nz * nz)
+        nx, ny, nz = nx / length, ny / length, nz / length
+        self.normal = np.array((nx, ny, nz))
         self._ticks += 1
         self._normal_history[self._ticks % HISTORY] = self.normal
-        increment = np.zeros(3)
-        if measurement.specific_force is not None:
-            increment[1] = dt * float(self.normal @ (measurement.specific_force + GRAVITY * down))
         # The tip moves with the body's turn as well; the chain integrates only the centre of mass.
-        self._lever_speed = float(self.normal @ cross(omega, self._tip))
-        increment[0] = -dt * self._lever_speed
-        self._filter.predict(measurement.stamp_ns, increment, dt)
+        tx, ty, tz = self._tip_list
+        lever = nx * (wy * tz - wz * ty) + ny * (wz * tx - wx * tz) + nz * (wx * ty - wy * tx)
+        self._lever_speed = lever
+        acceleration = 0.0
+        if measurement.specific_force is not None:
+            fx, fy, fz = measurement.specific_force.tolist()
+            gx, gy, gz = down
+            acceleration = nx * (fx + GRAVITY * gx) + ny * (fy + GRAVITY * gy) + nz * (fz + GRAVITY * gz)
+        distance, speed, bias = self._filter.state.tolist()
+        state = (distance - dt * (speed + lever), speed + dt * (acceleration - bias), bias)
+        self._filter.remember(measurement.stamp_ns, np.array(state))
 
     def _correct_plane(self, plane: tuple[float, float, float, float], stamp: int) -> None:
         abcd = np.asarray(plane, float)
@@ -176,10 +191,11 @@ class ContactEstimator:
         """Seconds since touch, 0 while free."""
         return (self._stamp - self.touch_ns) * 1e-9 if self.in_contact else 0.0
 
-    @property
-    def depth(self) -> float:
+    def _update_depth(self) -> None:
         """Camera to wall along the normal [m]."""
-        return self.distance + float(self.normal @ (self._tip - self._camera)) if self.known else math.inf
+        nx, ny, nz = self.normal.tolist()
+        cx, cy, cz = self._tip_from_camera
+        self.depth = self.distance + nx * cx + ny * cy + nz * cz
 
     @property
     def ramp(self) -> float:

@@ -44,7 +44,11 @@ class DelayedKalman:
 
     def predict(self, stamp_ns: int, increment: np.ndarray, dt: float) -> None:
         """Advance the state by one tick: x += dt G x + increment, and remember it."""
-        self.state = self.state + dt * (self.chain @ self.state) + increment
+        self.remember(stamp_ns, self.state + dt * (self.chain @ self.state) + increment)
+
+    def remember(self, stamp_ns: int, state: np.ndarray) -> None:
+        """Take a state that was advanced by one tick elsewhere."""
+        self.state = state
         self._now += 1
         slot = self._now % HISTORY
         self._history[slot] = self.state

@@ -1,4 +1,4 @@
-"""Stiffness and friction of brush and wall, estimated while pressing and sliding."""
+"""Stiffness of brush and wall, estimated while pressing."""
 
 from __future__ import annotations
 
@@ -6,8 +6,6 @@ import math
 
 #: Stiffness assumed while nothing is known [N/m]; stiff, because a stiff wall forgives least (design 4.2).
 ASSUMED_STIFFNESS = 10_000.0
-#: Friction assumed while nothing is known (the plant's nominal brush).
-ASSUMED_FRICTION = 0.3
 
 
 class StiffnessEstimator:
@@ -50,36 +48,3 @@ class StiffnessEstimator:
         if spread > self.NEEDED_SPREAD**2 and cross > 0.0 and count > 30:
             self.value = min(max(spread / cross, self.RANGE[0]), self.RANGE[1])
             self.known = True
-
-
-class FrictionEstimator:
-    """Coulomb friction from tangential against normal force while sliding."""
-
-    #: Averaging time [s].
-    TIME = 0.5
-    #: Push and sliding speed above which the ratio is meaningful [N], [m/s].
-    LEAST_PUSH, LEAST_SPEED = 1.5, 0.02
-    #: Plausible range.
-    RANGE = (0.02, 1.2)
-    #: A tip that does not follow the commanded travel for this long is held by more friction than believed [s],
-    #: and the belief rises at this rate until it breaks away [1/s].
-    PATIENCE, RISE = 0.4, 0.3
-
-    def __init__(self) -> None:
-        self.value = ASSUMED_FRICTION
-        self.known = False
-        self._held = 0.0
-
-    def hold(self, held: bool, dt: float) -> None:
-        """Take note of whether the tip stays where it is although it is told to travel."""
-        self._held = self._held + dt if held else 0.0
-        if self._held > self.PATIENCE:
-            self.value = min(self.value + self.RISE * dt, self.RANGE[1])
-
-    def add(self, push: float, friction_along_travel: float, speed: float, dt: float) -> None:
-        """Take in the push [N], the friction opposing the travel [N] and the sliding speed [m/s]."""
-        if push < self.LEAST_PUSH or speed < self.LEAST_SPEED:
-            return
-        ratio = min(max(friction_along_travel / push, self.RANGE[0]), self.RANGE[1])
-        self.value += min(1.0, dt / self.TIME) * (ratio - self.value)
-        self.known = True

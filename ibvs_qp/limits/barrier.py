@@ -41,7 +41,7 @@ class TiltLimit(Limit):
                     expression=model.acceleration[3 + axis],
                     lower=lower,
                     upper=upper,
-                    price=settings.tilt_price,
+                    price=self.price(model, settings.tilt_price),
                 )
             )
         return rows
@@ -62,6 +62,6 @@ class YawLimit(Limit):
                 expression=model.acceleration[5],
                 lower=lower,
                 upper=upper,
-                price=settings.yaw_price,
+                price=self.price(model, settings.yaw_price),
             )
         ]

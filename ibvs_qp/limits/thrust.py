@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+import casadi as ca
 import numpy as np
 
 from ibvs_qp.limits.limit import Limit
@@ -25,13 +28,11 @@ class ThrustLimit(Limit):
         ]
 
 
-def thrust_window(
-    last: np.ndarray, lower: np.ndarray, upper: np.ndarray, step: float, floor: np.ndarray, ceiling: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def thrust_window(last: Any, lower: Any, upper: Any, step: Any, floor: Any, ceiling: Any) -> tuple[Any, Any]:
     """Box and rate limit of one tick, never empty: a limit lowered in flight is approached at the rate limit.
 
     Args:
-        last: Last thrusts [N], (n,).
+        last: Last thrusts [N], (n,); arrays or symbols, like all that follow.
         lower: Lower limits now in force [N], (n,).
         upper: Upper limits now in force [N], (n,).
         step: Largest change in one tick [N].
@@ -41,10 +42,9 @@ def thrust_window(
     Returns:
         Lower and upper bounds [N], (n,) each, at least `LEAST_GAP` apart.
     """
+    least, most = (np.minimum, np.maximum) if isinstance(last, np.ndarray) else (ca.fmin, ca.fmax)
     reach_low, reach_high = last - step, last + step
-    low = np.minimum(np.maximum(lower, reach_low), reach_high - LEAST_GAP)
-    high = np.maximum(
-        np.minimum(upper, np.maximum(reach_high, low + LEAST_GAP)), np.maximum(reach_low, low) + LEAST_GAP
-    )
-    low = np.minimum(np.maximum(low, floor), ceiling - LEAST_GAP)
-    return low, np.minimum(np.maximum(high, low + LEAST_GAP), ceiling)
+    low = least(most(lower, reach_low), reach_high - LEAST_GAP)
+    high = most(least(upper, most(reach_high, low + LEAST_GAP)), most(reach_low, low) + LEAST_GAP)
+    low = least(most(low, floor), ceiling - LEAST_GAP)
+    return low, least(most(high, low + LEAST_GAP), ceiling)

@@ -10,10 +10,12 @@ import numpy as np
 from ibvs_qp.command import Outcome
 from ibvs_qp.config import SolverSettings
 from ibvs_qp.qp.assembly import QpTemplate
-from ibvs_qp.qp.evaluator import Evaluator
+from ibvs_qp.qp.evaluator import Evaluator, ProgramData
 from ibvs_qp.qp.exact_solver import ExactSolver
 from ibvs_qp.qp.osqp_solver import MAX_ITERATIONS, SOLVED, SOLVED_INACCURATE, OsqpSolver
 
+#: Share of the largest entry of an infeasibility certificate above which a row belongs to the conflict.
+CONFLICT_SHARE = 1e-2
 #: Largest thrust-bound violation that clipping may hide in a solved program [N].
 BOUND_SLIP = 1e-2
 
@@ -35,23 +37,27 @@ class QpEngine:
 
     An infeasible solve of OSQP returns x = 2143289344.0, a finite number: only the status tells. A capped solve is
     accepted when its residuals are small enough to fly; otherwise the exact solver answers in the same tick.
+
+    Attributes:
+        data: Data of the program; on its own an `Evaluator` whose parameters are yours to write.
+        conflict: Names of the rows that contradict each other, after a solve that found no feasible point.
     """
 
-    def __init__(self, template: QpTemplate, settings: SolverSettings) -> None:
-        self.template, self.settings = template, settings
-        self.evaluator = Evaluator(template)
+    def __init__(self, template: QpTemplate, settings: SolverSettings, data: ProgramData | None = None) -> None:
+        self.template, self.settings, self.data = template, settings, data or Evaluator(template)
         self.osqp = OsqpSolver(template, settings)
         self.exact = ExactSolver(template)
         self._matrix = template.a_pattern.copy()
         self._rotors = template.model.rotors
+        self.conflict: tuple[str, ...] = ()
 
     def reset(self) -> None:
         """As after construction."""
         self.osqp.reset()
 
     def solve(self) -> AcceptedSolution | None:
-        """Solve the program of the evaluator's present parameters; None when nobody found a solution."""
-        data = self.evaluator
+        """Solve the program as its data stands; None when nobody found a solution."""
+        data, self.conflict = self.data, ()
         data.evaluate()
         raw = self.osqp.solve(data.p, data.q, data.a, data.lower, data.upper)
         if raw is None:
@@ -61,15 +67,27 @@ class QpEngine:
             return self._accept(raw.x, raw.y, outcome, raw.iterations, raw.seconds)
         exact = self.exact.solve(data.p, data.q, data.a, data.lower, data.upper)
         if exact is None:
+            self.conflict = self._conflicting_rows(raw.certificate)
             self.osqp.reset()
             return None
         self.osqp.warm_start(*exact)
         return self._accept(*exact, Outcome.EXACT_FALLBACK, raw.iterations, raw.seconds)
 
+    def _conflicting_rows(self, certificate: np.ndarray | None) -> tuple[str, ...]:
+        """Names of the rows that no point satisfies together: the non-zeros of OSQP's certificate A' v = 0."""
+        if certificate is None or not np.isfinite(certificate).all():
+            return ()
+        size = np.abs(certificate)
+        return tuple(
+            name
+            for name, entry in zip(self.template.row_names, size, strict=True)
+            if entry > CONFLICT_SHARE * size.max()
+        )
+
     def _judge(self, status: int, x: np.ndarray, y: np.ndarray) -> Outcome | None:
         if status not in (SOLVED, SOLVED_INACCURATE, MAX_ITERATIONS) or not math.isfinite(x.sum() + y.sum()):
             return None
-        n, data = self._rotors, self.evaluator
+        n, data = self._rotors, self.data
         bounds = zip(x[:n].tolist(), data.lower[:n].tolist(), data.upper[:n].tolist(), strict=True)
         slip = max(max(low - thrust, thrust - high) for thrust, low, high in bounds)
         if status == SOLVED:
@@ -83,17 +101,13 @@ class QpEngine:
 
         Dividing by the diagonal of P instead would hide errors along weak directions, thousands of times softer.
         """
-        data = self.evaluator
-        upper = self.template.p_pattern.copy()
-        upper.data = data.p.copy()
-        full = upper.toarray()
-        full = full + np.triu(full, 1).T
+        data = self.data
         self._matrix.data[:] = data.a
-        return float(np.abs(x + np.linalg.solve(full, data.q + self._matrix.T @ y)).max())
+        return float(np.abs(x + np.linalg.solve(data.hessian(), data.q + self._matrix.T @ y)).max())
 
     def _accept(
         self, x: np.ndarray, y: np.ndarray, outcome: Outcome, iterations: int, seconds: float
     ) -> AcceptedSolution:
-        n, data = self._rotors, self.evaluator
+        n, data = self._rotors, self.data
         thrusts = np.minimum(np.maximum(x[:n], data.lower[:n]), data.upper[:n])
         return AcceptedSolution(thrusts, x, y, outcome, iterations, seconds)

@@ -13,6 +13,41 @@ from ibvs_qp.qp.model import LimitRow, SymbolicModel, TaskRow
 from ibvs_qp.tasks.task import Task
 
 
+class AffineRows:
+    r"""Rows :math:`r = J_a \dot\nu + J_u u + c` with the acceleration :math:`\dot\nu = G u + a_0` eliminated.
+
+    Products go through the six accelerations, not through every row's thrusts: a third of the arithmetic.
+    """
+
+    def __init__(self, model: SymbolicModel, rows: ca.SX) -> None:
+        u, acceleration = model.thrust, model.acceleration
+        self._model = model
+        self._by_acceleration, self._by_thrust = ca.jacobian(rows, acceleration), ca.jacobian(rows, u)
+        if ca.depends_on(ca.veccat(self._by_acceleration, self._by_thrust), ca.veccat(u, acceleration)):
+            raise ValueError("task and limit rows must be affine in the thrusts")
+        at_rest = ca.substitute(rows, ca.veccat(u, acceleration), ca.DM.zeros(model.rotors + 6))
+        self.constant = at_rest + self._by_acceleration @ model.free_acceleration
+
+    @property
+    def per_thrust(self) -> ca.SX:
+        """J = J_a G + J_u, (rows, n)."""
+        return self._by_acceleration @ self._model.acceleration_per_thrust + self._by_thrust
+
+    def at(self, thrusts: ca.SX) -> ca.SX:
+        """Values of the rows, (rows,)."""
+        return self.per_thrust @ thrusts + self.constant
+
+    def least_squares(self, weights: ca.SX, asked: ca.SX) -> tuple[ca.SX, ca.SX]:
+        """Hessian J' W J, (n, n), and gradient J' W (c - asked), (n,)."""
+        per_acceleration = self._model.acceleration_per_thrust
+        ja, ju = self._by_acceleration, self._by_thrust
+        weighted_a, weighted_u = ja.T @ ca.diag(weights), ju.T @ ca.diag(weights)
+        cross = per_acceleration.T @ (weighted_a @ ju)
+        hessian = per_acceleration.T @ (weighted_a @ ja) @ per_acceleration + cross + cross.T + weighted_u @ ju
+        offset = self.constant - asked
+        return ca.densify(hessian), per_acceleration.T @ (weighted_a @ offset) + weighted_u @ offset
+
+
 class QpTemplate:
     r"""The program :math:`\min \tfrac12 x^T P x + q^T x,\; l \le A x \le u` with x = (thrusts, slacks).
 
@@ -32,31 +67,25 @@ class QpTemplate:
         self.limit_rows: list[LimitRow] = [row for limit in limits for row in limit.rows(model)]
         soft = [row for row in self.limit_rows if row.price is not None]
         n, m = model.rotors, len(soft)
-        u = model.thrust
-        achieved = ca.vertcat(*(row.expression for row in self.task_rows))
-        asked = ca.vertcat(*(row.target for row in self.task_rows))
         weights = ca.vertcat(*(row.weight for row in self.task_rows))
-        jacobian = ca.jacobian(achieved, u)
-        offset = ca.substitute(achieved, u, ca.DM.zeros(n)) - asked
-        weighted = ca.diag(weights) @ jacobian
-        hessian = ca.densify(jacobian.T @ weighted)
+        asked = ca.vertcat(*(row.target for row in self.task_rows))
+        wishes = AffineRows(model, ca.vertcat(*(row.expression for row in self.task_rows)))
+        bounds = AffineRows(model, ca.vertcat(*(row.expression for row in self.limit_rows)))
+        hessian, gradient = wishes.least_squares(weights, asked)
         prices = ca.DM([float(row.price) for row in soft if row.price is not None]) if m else ca.DM(0, 1)
-        p_full = ca.diagcat(hessian, ca.SX(ca.diag(prices))) if m else hessian
-        q = ca.vertcat(weighted.T @ offset, ca.DM.zeros(m))
-        rows = ca.vertcat(*(row.expression for row in self.limit_rows))
-        constant = ca.substitute(rows, u, ca.DM.zeros(n))
+        p_upper = ca.triu(ca.diagcat(hessian, ca.SX(ca.diag(prices))) if m else hessian)
+        q = ca.vertcat(gradient, ca.DM.zeros(m))
         slack = ca.DM.zeros(len(self.limit_rows), m)
         for column, row in enumerate(soft):
             slack[self.limit_rows.index(row), column] = -1.0
-        a = ca.horzcat(ca.jacobian(rows, u), ca.sparsify(slack))
-        lower = ca.vertcat(*(row.lower for row in self.limit_rows)) - constant
-        upper = ca.vertcat(*(row.upper for row in self.limit_rows)) - constant
-        p_upper = ca.triu(p_full)
-        stacked = ca.vertcat(*model.parameters.values())
+        a = ca.horzcat(bounds.per_thrust, ca.sparsify(slack))
+        lower = ca.vertcat(*(row.lower for row in self.limit_rows)) - bounds.constant
+        upper = ca.vertcat(*(row.upper for row in self.limit_rows)) - bounds.constant
+        stacked, u = ca.vertcat(*model.parameters.values()), model.thrust
         self.values = ca.Function(
             "qp_values", [stacked], [p_upper.nz[:], ca.densify(q), a.nz[:], ca.densify(lower), ca.densify(upper)]
         )
-        self.report = ca.Function("task_report", [stacked, u], [achieved, asked, weights])
+        self.report = ca.Function("task_report", [stacked, u], [wishes.at(u), asked, weights])
         self.p_pattern, self.a_pattern = _pattern(p_upper.sparsity()), _pattern(a.sparsity())
         names = model.config.vehicle.geometry.names
         self.variable_names = tuple(f"thrust_{name}" for name in names) + tuple(f"slack_{row.name}" for row in soft)

@@ -1,6 +1,8 @@
-"""Parameters to program data, through CasADi's buffer interface: nothing is allocated in the loop."""
+"""Program data through CasADi's buffer interface: nothing is allocated in the loop."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import casadi as ca
 import numpy as np
@@ -26,24 +28,37 @@ class BufferedFunction:
         self._trigger()
 
 
-class Evaluator:
-    """Named parameters in, program data out.
+class ProgramData:
+    """Values of one tick's program, where the compiled tick leaves them.
 
     Attributes:
-        parameters: Views into the stacked parameter vector, by name; write values with ``[:] =``.
         p: Non-zeros of the upper triangle of P. Likewise q, a, lower, upper.
+        stacked: Parameters of the program; `parameters` are views of it by name.
     """
 
-    def __init__(self, template: QpTemplate) -> None:
-        self._values = BufferedFunction(template.values)
-        self._report = BufferedFunction(template.report)
-        self.stacked = self._values.inputs[0]
+    def __init__(self, template: QpTemplate, arrays: Sequence[np.ndarray]) -> None:
+        self.p, self.q, self.a, self.lower, self.upper, self.stacked = arrays
         self.parameters = {name: self.stacked[place] for name, place in template.layout.items()}
-        self.p, self.q, self.a, self.lower, self.upper = self._values.outputs
+        self._report = BufferedFunction(template.report)
+        self._rotors = template.model.rotors
+        pattern = template.p_pattern.tocoo()
+        self._rows, self._columns = pattern.row, pattern.col
+        self._size = len(template.variable_names)
 
     def evaluate(self) -> None:
-        """Fill p, q, a, lower and upper from the parameters."""
-        self._values()
+        """Bring the data up to date with the parameters; the compiled tick has done so already."""
+
+    def hessian(self) -> np.ndarray:
+        """P in full, (variables, variables)."""
+        full = np.zeros((self._size, self._size))
+        full[self._rows, self._columns] = self.p
+        full[self._columns, self._rows] = self.p
+        return full
+
+    def unlimited_thrusts(self) -> np.ndarray:
+        """Thrusts of the same tick without any limit [N], (n,): slacks are free then and the thrusts decouple."""
+        n = self._rotors
+        return -np.linalg.solve(self.hessian()[:n, :n], self.q[:n])
 
     def report(self, stacked: np.ndarray, thrusts: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Achieved and asked values and weights of every task row at given parameters and thrusts."""
@@ -52,3 +67,15 @@ class Evaluator:
         self._report()
         achieved, asked, weights = self._report.outputs
         return achieved, asked, weights
+
+
+class Evaluator(ProgramData):
+    """A program on its own: write `parameters` with ``[name][:] =``, evaluate, read the data."""
+
+    def __init__(self, template: QpTemplate) -> None:
+        self._values = BufferedFunction(template.values)
+        super().__init__(template, [*self._values.outputs, self._values.inputs[0]])
+
+    def evaluate(self) -> None:
+        """Fill p, q, a, lower and upper from the parameters."""
+        self._values()

@@ -37,6 +37,7 @@ class LimitRow:
 class SymbolicModel:
     r"""Thrusts u, the acceleration :math:`\dot\nu(u) = M^{-1}(B u + h)`, and the parameters of a tick.
 
+    Rows are written in `thrust` and `acceleration`, both symbols; the assembly eliminates the acceleration.
     h gathers gravity, the gyroscopic moment, the contact feed-forward and the observed external wrench. Tasks and
     limits ask for parameters by name; asking twice gives the same symbol.
     """
@@ -48,9 +49,11 @@ class SymbolicModel:
         self.rotors = vehicle.geometry.count
         self.thrust = ca.SX.sym("thrust", self.rotors)
         self._parameters: dict[str, ca.SX] = {}
+        self.acceleration = ca.SX.sym("acceleration", 6)
+        self.wrench = ca.DM(vehicle.mass_matrix.diagonal()) * self.acceleration
         inverse_mass = np.linalg.inv(vehicle.mass_matrix)
-        self.wrench = ca.DM(self.effectiveness) @ self.thrust + self.parameter("bias_wrench", 6)
-        self.acceleration = ca.DM(inverse_mass) @ self.wrench
+        self.acceleration_per_thrust = ca.DM(inverse_mass @ self.effectiveness)
+        self.free_acceleration = ca.DM(inverse_mass.diagonal()) * self.parameter("bias_wrench", 6)
 
     def parameter(self, name: str, size: int = 1) -> ca.SX:
         """The symbol of a named parameter, made at the first request."""
@@ -73,11 +76,13 @@ class SymbolicModel:
 
     @property
     def motion_acceleration(self) -> ca.SX:
-        r"""S nu_dot with S = blockdiag(I - n n^T, r I): the image never uses the pushing direction.
+        r"""S nu_dot with S = blockdiag(I - s n n^T, r I) and s = 1: the image never uses the pushing direction.
 
+        The paper's profile takes s = lambda and r = 1.
         r is 1 in free flight and falls to 0 in contact: a tip that friction holds does not follow the body's turn,
         and a line row that counts on it trades the vertical force for pitch.
         """
         linear = self.acceleration[:3]
         turn = self.parameter("turn_share") * self.acceleration[3:]
-        return ca.vertcat(linear - self.normal * ca.dot(self.normal, linear), turn)
+        along = self.parameter("normal_share") * ca.dot(self.normal, linear)
+        return ca.vertcat(linear - self.normal * along, turn)

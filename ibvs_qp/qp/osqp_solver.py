@@ -14,6 +14,8 @@ from ibvs_qp.qp.assembly import QpTemplate
 
 #: Status values of OSQP 1.x whose iterate means something.
 SOLVED, SOLVED_INACCURATE, MAX_ITERATIONS = 1, 2, 7
+#: Status values that say no point satisfies all rows, the second with less certainty.
+INFEASIBLE = (3, 4)
 
 
 @dataclass(slots=True)
@@ -25,6 +27,7 @@ class RawSolution:
     status: int
     iterations: int
     seconds: float
+    certificate: np.ndarray | None = None
 
 
 class OsqpSolver:
@@ -88,6 +91,7 @@ class OsqpSolver:
                 return None
         else:
             self._solver.update(q=q, l=lower, u=upper, Px=p, Ax=a)
+        result = None
         if self._inner is None:
             result = self._solver.solve(raise_error=False)
             x, y, info = result.x, result.y, result.info
@@ -95,10 +99,16 @@ class OsqpSolver:
             self._inner.solve()
             solution, info = self._inner.solution, self._inner.info
             x, y = np.array(solution.x), np.array(solution.y)
+        status = int(info.status_val)
+        certificate = None
+        if status in INFEASIBLE:
+            holder = result if result is not None else self._inner.solution
+            certificate = np.array(holder.prim_inf_cert)
         return RawSolution(
             x=x,
             y=y,
-            status=int(info.status_val),
+            certificate=certificate,
+            status=status,
             iterations=int(info.iter),
             seconds=time.perf_counter() - start,
         )

@@ -2,6 +2,7 @@
 
 from ibvs_qp.tasks.attitude import LevelTask, YawTask
 from ibvs_qp.tasks.effort import EffortTask, SmoothnessTask
+from ibvs_qp.tasks.height import HeightTask
 from ibvs_qp.tasks.line import LineTask
 from ibvs_qp.tasks.push import PushTask, StandoffTask
 from ibvs_qp.tasks.task import Task
@@ -9,6 +10,7 @@ from ibvs_qp.tasks.velocity import VelocityTask
 
 __all__ = [
     "EffortTask",
+    "HeightTask",
     "LevelTask",
     "LineTask",
     "PushTask",

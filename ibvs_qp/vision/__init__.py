@@ -1,10 +1,19 @@
-"""RGB-D pictures to plane, lines and velocity."""
+"""RGB-D pictures to plane, lines and velocity.
 
-from ibvs_qp.vision.config import VisionConfig
-from ibvs_qp.vision.interaction import endpoint_line_row, line_interaction_matrix
-from ibvs_qp.vision.percept import LineHint, Percept, TrackState
-from ibvs_qp.vision.perception import Perception
-from ibvs_qp.vision.plane import PlaneEstimate
+The names load on first use: a controller that is fed with lines needs the interaction matrix, but no OpenCV.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ibvs_qp.vision.config import VisionConfig
+    from ibvs_qp.vision.interaction import endpoint_line_row, line_interaction_matrix
+    from ibvs_qp.vision.percept import LineHint, Percept, TrackState
+    from ibvs_qp.vision.perception import Perception
+    from ibvs_qp.vision.plane import PlaneEstimate
 
 __all__ = [
     "LineHint",
@@ -16,3 +25,26 @@ __all__ = [
     "endpoint_line_row",
     "line_interaction_matrix",
 ]
+
+_HOMES = {
+    "ibvs_qp.vision.config": ("VisionConfig",),
+    "ibvs_qp.vision.interaction": (
+        "endpoint_line_row",
+        "line_interaction_matrix",
+    ),
+    "ibvs_qp.vision.percept": (
+        "LineHint",
+        "Percept",
+        "TrackState",
+    ),
+    "ibvs_qp.vision.perception": ("Perception",),
+    "ibvs_qp.vision.plane": ("PlaneEstimate",),
+}
+_HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name where it lives."""
+    if name not in _HOME_OF:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(_HOME_OF[name]), name)

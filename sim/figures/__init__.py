@@ -7,6 +7,7 @@ from pathlib import Path
 from sim.figures.board import draw_board
 from sim.figures.force import draw_force
 from sim.figures.image_error import draw_image_error
+from sim.figures.limits import draw_limits
 from sim.figures.motion import draw_attitude, draw_velocity
 from sim.figures.overview import draw_overview
 from sim.figures.path import draw_path
@@ -23,6 +24,7 @@ FIGURES = {
     "velocity": ("Velocity in the body frame: estimated against true", draw_velocity),
     "attitude": ("True attitude; yaw 0 faces the wall", draw_attitude),
     "thrusts": ("Commanded rotor thrusts and their limits", draw_thrusts),
+    "limits": ("Active limits over time, and the share of the flight in which each was active", draw_limits),
     "board": ("The painted board; dashed: the intended band", draw_board),
 }
 

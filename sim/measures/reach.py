@@ -1,4 +1,4 @@
-"""The push that physics allows: a linear program over the rotors' limits, the yardstick of every delivered push."""
+"""The push that physics allows: the attainable set along the push, the yardstick of every delivered push."""
 
 from __future__ import annotations
 
@@ -6,9 +6,12 @@ import functools
 
 import numpy as np
 
-from allocation import WrenchSet
+import allocation
 from ibvs_qp.frames import GRAVITY
 from ibvs_qp.vehicle import VehicleParams
+
+#: A sliding tip moves to the left.
+_LEFT = np.array([0.0, -1.0, 0.0])
 
 
 @functools.lru_cache(maxsize=256)
@@ -24,8 +27,12 @@ def push_reach(
         sliding_friction: Coulomb coefficient of a tip that slides to the left; 0 for a tip at rest.
     """
     vehicle = VehicleParams()
-    rotors = WrenchSet(vehicle.geometry, np.array(lower_n), np.array(upper_n))
-    force = np.array([1.0, -sliding_friction, 0.0])  # forwards, and along the travel against friction
-    moment = np.cross(np.array(vehicle.tip_position_m), force)
-    hover = np.array([0.0, 0.0, -mass_kg * GRAVITY, 0.0, 0.0, 0.0])
-    return rotors.reach(hover, np.concatenate((force, moment))).distance
+    return allocation.push_reach(
+        vehicle.geometry,
+        mass_kg * GRAVITY,
+        np.array(vehicle.tip_position_m),
+        np.array(lower_n),
+        np.array(upper_n),
+        friction=sliding_friction,
+        travel=_LEFT if sliding_friction > 0.0 else None,
+    ).push

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import functools
 from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from sim.contact_loop import damping_ratio
+from ibvs_qp.loop_margin import contact_mode_damping
+from sim.closed_loop import default_preset
+from sim.experiments.variants import VARIANTS
 from sim.figures.experiments.common import kept_trace, select
 from sim.figures.style import REFERENCE, law_colour, law_name, new_figure
 from sim.measures.window import CONTACT_N, PHYSICS_RATE_HZ
+from sim.scene import ForceTorqueScene, WallScene
 from sim.sweep.parts import PARAM
 
 if TYPE_CHECKING:
@@ -65,6 +69,24 @@ def _hold(results: Results, stiffness: float) -> Figure:
     return figure
 
 
+@functools.lru_cache(maxsize=4096)
+def predicted_damping(law: str, variant: str, gain: float, stiffness: float, delay_s: float) -> float:
+    """Least damping ratio of the contact that the linear loop predicts; below zero the push oscillates ever more.
+
+    Args:
+        law: Whose shipped gains.
+        variant: Key of `VARIANTS`.
+        gain: Factor on K_fp and K_fi.
+        stiffness: Of the wall [N/m].
+        delay_s: Latency of the force/torque sensor [s]; half a sample period comes on top.
+    """
+    from sim.experiments.force_hold import with_force_gain
+
+    config = VARIANTS[variant].apply(with_force_gain(default_preset(law), gain)).controller
+    age = delay_s + 0.5 / ForceTorqueScene().rate_hz
+    return contact_mode_damping(config, stiffness, WallScene().damping_n_s_m, age).least_damping_ratio
+
+
 def _map(results: Results) -> Figure:
     table = select(results.table, kind="map")
     laws = [law for law in ("qp", "paper") if select(table, law=law).height]
@@ -83,7 +105,7 @@ def _map(results: Results) -> Figure:
                         share = cell["contact_share"].fill_null(0.0)
                         values[i, j] = cell["force_std_n"].fill_null(np.nan).median()
                         lost[i, j] = bool(np.median(share.to_numpy()) < KEPT_SHARE)
-                    margin[i, j] = damping_ratio(law, gain, wall, delay, impedance=variant == "standard")
+                    margin[i, j] = predicted_damping(law, variant, gain, wall, delay)
             image = axes.imshow(values, origin="lower", aspect="auto", norm=LogNorm(0.03, 3.0), cmap="viridis")
             for i, j in zip(*np.nonzero(lost == 1.0), strict=True):
                 ink = "black" if values[i, j] > DARK_BELOW_N else "white"

@@ -1,0 +1,126 @@
+r"""Vehicle, wall, force feedback and impedance as one linear loop along the wall normal, and its poles.
+
+With x the penetration of the undeformed tip (e_s = -x), f the push and F the rotors' force along the normal:
+
+.. math::
+    m \ddot x + c \dot x = F - f, \quad f = k x + b \dot x, \quad
+    F(s) = \frac{e^{-s T_h}}{\tau s + 1} F_c(s),
+
+.. math::
+    F_c = -\Big(K + \frac{K_{fi}}{s}\Big) \frac{e^{-s T_f}}{s/\omega_f + 1} f
+          - (K_{sp} + K_{sd} s)\, e^{-s T_h} x, \quad K = K_{fp} \min(1, k_s / k).
+
+T_f is the age of the force that the controller works with, T_h half a tick: how long a command is held on average, and
+again how old the accelerometer's mean over the last tick is, from which the impedance gets its rate. The lag tau is the
+mean of the rising and the falling one, because an oscillation does both. The rotors' force needs no moment (the arm
+points at the wall through the centre of mass), so m is the whole mass; the reference and the frozen part of the
+external wrench do not move. The closed loop's poles are the zeros of
+
+.. math::
+    \Delta(s) = m s^2 + (b + c) s + k + \frac{e^{-s T_h}}{\tau s + 1} \Big[\Big(K + \frac{K_{fi}}{s}\Big)
+    \frac{e^{-s T_f}(k + b s)}{s/\omega_f + 1} + (K_{sp} + K_{sd} s)\, e^{-s T_h}\Big].
+
+Pade approximants of the delays give a polynomial whose roots start Newton's method on the exact function. Force
+feedback adds stiffness late, which is negative damping: it is what the margin is spent on.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.polynomial import Polynomial
+
+if TYPE_CHECKING:  # the configuration checks itself with this module
+    from ibvs_qp.config import ControllerConfig
+
+#: K_fp counts in full up to this stiffness k_s and falls with its inverse beyond [N/m] (`Setpoints`).
+FULL_GAIN_STIFFNESS = 1500.0
+#: Order of the Pade approximants; Newton's method removes what they leave.
+PADE_ORDER = 4
+#: Poles faster than this are those of the approximants, far above what rotors with 50 ms of lag can excite [rad/s].
+FASTEST_MODE = 250.0
+#: Newton's method stops at this relative step.
+POLE_TOLERANCE = 1e-12
+
+
+class ContactLoop:
+    """Numbers of the loop, its characteristic function and its poles.
+
+    Args:
+        config: Gains, filter, tick, mass and motor lags.
+        stiffness: Of wall and brush together, k [N/m].
+        damping: Of wall and brush together, b [N s/m].
+        force_delay_s: Mean age of the force sample in use, T_f [s].
+    """
+
+    def __init__(self, config: ControllerConfig, stiffness: float, damping: float, force_delay_s: float) -> None:
+        gains, vehicle, hold = config.gains, config.vehicle, 0.5 * config.tick_s
+        self.mass, self.lag = vehicle.mass_kg, 0.5 * (vehicle.motor_lag_up_s + vehicle.motor_lag_down_s)
+        self.filter_lag = 1.0 / (2.0 * math.pi * config.contact.force_filter_hz)
+        self.stiffness, self.damping, self.drag = stiffness, damping, vehicle.linear_drag_n_s_m
+        self.proportional = gains.force_kfp * min(1.0, FULL_GAIN_STIFFNESS / stiffness)
+        self.integral = gains.force_kfi
+        self.spring, self.damper = (gains.force_ksp, gains.force_ksd) if config.impedance else (0.0, 0.0)
+        self.force_delay, self.rate_delay = force_delay_s + hold, 2.0 * hold
+
+    def poles(self) -> list[complex]:
+        """Poles below `FASTEST_MODE`, upper half plane and real axis."""
+        s = Polynomial([0.0, 1.0])
+        force_top, force_bottom = _pade(self.force_delay)
+        rate_top, rate_bottom = _pade(self.rate_delay)
+        motor, filtered = self.lag * s + 1.0, self.filter_lag * s + 1.0
+        free = self.mass * s**2 + (self.damping + self.drag) * s + self.stiffness
+        force = (self.proportional * s + self.integral) * (self.damping * s + self.stiffness)
+        total = free * s * motor * filtered * force_bottom * rate_bottom
+        total = total + force * force_top * rate_bottom
+        total = total + (self.damper * s + self.spring) * s * filtered * rate_top * force_bottom
+        # Time in hundredths of a second keeps the coefficients within a few orders of each other.
+        scaled = Polynomial(np.asarray(total.coef, float) * 100.0 ** np.arange(total.coef.size))
+        starts = [100.0 * complex(root) for root in scaled.roots() if root.imag >= -1e-9]
+        refined = [self._refine(start) for start in starts if 1e-9 < abs(start) < FASTEST_MODE]
+        return [pole for pole in refined if pole is not None]
+
+    @property
+    def passive_damping_ratio(self) -> float:
+        """Damping ratio of vehicle and wall alone, without any feedback."""
+        return (self.damping + self.drag) / (2.0 * math.sqrt(self.stiffness * self.mass))
+
+    def characteristic(self, s: complex) -> complex:
+        r"""The module's :math:`\Delta(s)`."""
+        force = (self.proportional + self.integral / s) * cmath.exp(-s * self.force_delay)
+        force *= (self.stiffness + self.damping * s) / (self.filter_lag * s + 1.0)
+        motion = (self.spring + self.damper * s) * cmath.exp(-s * self.rate_delay)
+        free = self.mass * s * s + (self.damping + self.drag) * s + self.stiffness
+        return free + (force + motion) / (self.lag * s + 1.0)
+
+    def _refine(self, start: complex) -> complex | None:
+        """Newton's method from an approximate pole; None when it leads elsewhere."""
+        pole, step = start, 1e-6
+        for _ in range(30):
+            value = self.characteristic(pole)
+            slope = (self.characteristic(pole + step) - self.characteristic(pole - step)) / (2.0 * step)
+            if slope == 0.0:
+                return None
+            change = value / slope
+            pole -= change
+            if abs(change) < POLE_TOLERANCE * abs(pole):
+                break
+        # A real pole may have been met on the way from a pair; a far jump is another pole, found from its own start.
+        return pole if abs(pole - start) < 0.2 * abs(start) else None
+
+
+def _pade(delay: float) -> tuple[Polynomial, Polynomial]:
+    """Numerator and denominator of the Pade approximant of exp(-s T)."""
+    n = PADE_ORDER
+    terms = [
+        math.factorial(2 * n - j)
+        * math.factorial(n)
+        / (math.factorial(2 * n) * math.factorial(j))
+        / math.factorial(n - j)
+        * delay**j
+        for j in range(n + 1)
+    ]
+    return Polynomial([(-1.0) ** j * term for j, term in enumerate(terms)]), Polynomial(terms)

@@ -1,0 +1,104 @@
+"""One recorded tick again: the program from its parameters, solved exactly, with every task and limit in words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ibvs_qp.command import ActiveLimit, TaskReport
+from ibvs_qp.qp.assembly import QpTemplate
+from ibvs_qp.qp.evaluator import Evaluator, ProgramData
+from ibvs_qp.qp.exact_solver import ExactSolver
+
+#: A multiplier above this price counts as an active limit [cost per unit].
+ACTIVE_PRICE = 1e-3
+
+
+@dataclass(frozen=True, kw_only=True)
+class Explanation:
+    """What a tick wanted, got and paid.
+
+    Attributes:
+        thrusts: Of the exact solution [N], (n,).
+        tasks: Every task row with a weight; `cost` are their shares of the cost, in the same order.
+        active_limits: Limits that bind, dearest first.
+        unallocated_wrench: Wrench of the same tick without limits minus the wrench [N, N m], (6,).
+    """
+
+    thrusts: np.ndarray
+    tasks: tuple[TaskReport, ...]
+    cost: tuple[float, ...]
+    active_limits: tuple[ActiveLimit, ...]
+    unallocated_wrench: np.ndarray
+
+
+def task_reports(
+    template: QpTemplate, data: ProgramData, stacked: np.ndarray, thrusts: np.ndarray
+) -> tuple[TaskReport, ...]:
+    """Asked, achieved and residual of every task row that has a weight."""
+    achieved, asked, weights = data.report(stacked, thrusts)
+    return tuple(
+        TaskReport(
+            name=row.name,
+            unit=row.unit,
+            weight=float(weights[i]),
+            asked=float(asked[i]),
+            achieved=float(achieved[i]),
+            residual=float(achieved[i] - asked[i]),
+        )
+        for i, row in enumerate(template.task_rows)
+        if weights[i] > 0.0
+    )
+
+
+def active_limits(template: QpTemplate, x: np.ndarray, y: np.ndarray) -> tuple[ActiveLimit, ...]:
+    """Limits with a price: name, side, |dJ*/d bound| and slack taken."""
+    active = []
+    for i in np.flatnonzero(np.abs(y) > ACTIVE_PRICE):
+        slot = template.row_slack[i]
+        active.append(
+            ActiveLimit(
+                name=template.row_names[i],
+                side="upper" if y[i] > 0 else "lower",
+                price=abs(float(y[i])),
+                slack=abs(float(x[slot])) if slot >= 0 else 0.0,
+                unit=template.row_units[i],
+            )
+        )
+    return tuple(active)
+
+
+class TickReplay:
+    """Explains recorded ticks of one program."""
+
+    def __init__(self, template: QpTemplate) -> None:
+        self._template = template
+        self._data = Evaluator(template)
+        self._exact = ExactSolver(template)
+
+    def explain(self, stacked: np.ndarray) -> Explanation | None:
+        """Solve and explain the program of these parameters; None if it has no solution.
+
+        Args:
+            stacked: Parameters as `ProgramData.stacked` held them in flight, (parameters,).
+        """
+        data, template = self._data, self._template
+        data.stacked[:] = stacked
+        data.evaluate()
+        solution = self._exact.solve(data.p, data.q, data.a, data.lower, data.upper)
+        if solution is None:
+            return None
+        x, y = solution
+        thrusts = x[: template.model.rotors]
+        tasks = task_reports(template, data, stacked, thrusts)
+        cost = np.array([task.weight * task.residual**2 for task in tasks])
+        limits = sorted(active_limits(template, x, y), key=lambda limit: -limit.price)
+        effectiveness = template.model.effectiveness
+        return Explanation(
+            thrusts=thrusts,
+            tasks=tasks,
+            cost=tuple((cost / max(float(cost.sum()), 1e-12)).tolist()),
+            active_limits=tuple(limits),
+            unallocated_wrench=effectiveness @ (data.unlimited_thrusts() - thrusts) if limits else np.zeros(6),
+        )

@@ -1,0 +1,80 @@
+"""What both laws report alike: contact phase, reach, and thrusts that were clipped."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ibvs_qp.command import ActiveLimit, Command, Outcome
+from ibvs_qp.measurement import Reference
+from ibvs_qp.setpoints import Setpoints
+
+#: A thrust this far outside its window counts as clipped [N].
+CLIPPED = 1e-9
+#: A push reduced by less than this is not worth a word [N].
+REDUCED = 1e-3
+
+
+def contact_mode(terms: Setpoints, reference: Reference) -> str:
+    """Contact phase: "contact", "approach" or "free"."""
+    if terms.contact.in_contact:
+        return "contact"
+    return "approach" if reference.contact else "free"
+
+
+def reach_margin(terms: Setpoints) -> float:
+    """Further push possible at the present contact [N]; NaN while no wall is known."""
+    return terms.reach - max(terms.contact.push, 0.0) if terms.contact.known else math.nan
+
+
+def reach_note(terms: Setpoints, reference: Reference) -> tuple[str, ...]:
+    """Says that the push was reduced, and why; empty if it was not."""
+    if not reference.contact or reference.push_force - terms.push_reference < REDUCED:
+        return ()
+    sliding = float(np.abs(reference.velocity).max()) > 0.0
+    how = f"against friction {terms.friction:.2f} along the travel" if sliding else "standing still"
+    return (
+        f"reference.push_force: {reference.push_force:.1f} N reduced to {terms.push_reference:.1f} N, "
+        f"the rotors' reach {how}",
+    )
+
+
+def clipped_command(
+    terms: Setpoints, stamp_ns: int, free: np.ndarray, outcome: Outcome, mode: str, rejected: tuple[str, ...]
+) -> Command:
+    """Command of free thrusts clipped to this tick's window; names the rotors that were clipped.
+
+    Args:
+        terms: Set-points of the tick; take note of what is commanded.
+        stamp_ns: Time of the measurement answered.
+        free: Thrusts without limits [N], (n,).
+        outcome: How they were found.
+        mode: Contact phase.
+        rejected: Inputs refused.
+    """
+    thrusts = np.minimum(np.maximum(free, terms.lower), terms.upper)
+    unallocated = terms.effectiveness @ (free - thrusts)
+    terms.note(thrusts, float(np.abs(unallocated).max()))
+    names = terms.config.vehicle.geometry.names
+    clipped = tuple(
+        ActiveLimit(
+            name=f"thrust_{names[i]}",
+            side="upper" if free[i] > thrusts[i] else "lower",
+            price=math.nan,
+            slack=abs(float(free[i] - thrusts[i])),
+            unit="N",
+        )
+        for i in np.flatnonzero(np.abs(free - thrusts) > CLIPPED)
+    )
+    return Command(
+        stamp_ns=stamp_ns,
+        thrusts=thrusts,
+        wrench=terms.effectiveness @ thrusts,
+        outcome=outcome,
+        mode=mode,
+        rejected=rejected,
+        active_limits=clipped,
+        unallocated_wrench=unallocated,
+        reach_margin=math.nan if mode == "hold" else reach_margin(terms),
+    )

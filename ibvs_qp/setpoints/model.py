@@ -1,0 +1,57 @@
+"""The tick as mathematics: from what is measured to what is wanted of every direction."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+
+from allocation.effectiveness import control_effectiveness
+from ibvs_qp.config import ControllerConfig
+from ibvs_qp.frames import GRAVITY
+from ibvs_qp.setpoints.external_wrench import external_wrench
+from ibvs_qp.setpoints.feedforward import SLIDING_COMMAND, contact_feedforward
+from ibvs_qp.setpoints.friction import estimated_friction
+from ibvs_qp.setpoints.in_plane import motion_in_plane
+from ibvs_qp.setpoints.push import push_force, standoff_force
+from ibvs_qp.setpoints.reach import push_reach
+from ibvs_qp.setpoints.rotors import rotor_terms
+from ibvs_qp.setpoints.sensed import Body, Touch, Wish
+from ibvs_qp.setpoints.signals import Signals
+from ibvs_qp.setpoints.wall import wall_axes, wanted_turn
+
+
+def setpoint_model(config: ControllerConfig) -> Signals:
+    r"""All equations between estimation and the two laws.
+
+    The bias wrench h of :math:`M\dot\nu = B u + h` gathers gravity, the gyroscopic moment, the observed external
+    wrench and what the contact will put on the vehicle; friction, reach, forces along n, lines and velocities follow.
+    """
+    signals, vehicle = Signals(), config.vehicle
+    effectiveness = control_effectiveness(vehicle.geometry)
+    body, touch, wish = Body.of(signals), Touch.of(signals), Wish.of(signals)
+    wall = wall_axes(signals, body, touch)
+    wanted_turn(signals, config.gains, body, touch)
+    travel = wish.velocity[0] * wall.right + wish.velocity[1] * wall.down
+
+    before, friction = estimated_friction(signals, body, touch, travel, SLIDING_COMMAND, config.contact.stuck_speed_m_s)
+    signals.output("friction", friction)
+    expected = ca.SX.zeros(6)
+    if config.contact_feedforward:
+        expected = contact_feedforward(signals, config.contact, body, touch, travel, before)
+    near = ca.logic_or(touch.touching, touch.distance < config.contact.contact_distance_m)
+    external = external_wrench(
+        signals, vehicle, effectiveness, body, expected[3:], wall.normal, near, config.contact_feedforward
+    )
+    inertia = ca.DM(vehicle.inertia_kg_m2)
+    gyroscopic = -ca.cross(body.rate, inertia * body.rate)
+    static = signals.output("static_wrench", ca.vertcat(vehicle.mass_kg * GRAVITY * body.down, gyroscopic) + external)
+    signals.output("bias_wrench", static + expected)
+
+    inverse = np.linalg.pinv(effectiveness)
+    reach = push_reach(signals, vehicle, inverse, wall.normal, travel, friction, static)
+    push_force(signals, config, body, touch, wish, reach)
+    standoff_force(signals, config, body, touch, wish)
+    motion_in_plane(signals, config, body, touch, wish, wall, travel)
+    rotor_terms(signals, vehicle.geometry.count)
+    signals.output("contact_weight", signals.input("contact_weight"))
+    return signals

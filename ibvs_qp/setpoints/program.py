@@ -1,0 +1,35 @@
+"""Set-points into the named parameters of the quadratic program: weights, shares and states of the barriers."""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from ibvs_qp.config import ControllerConfig
+from ibvs_qp.setpoints.signals import Signals
+
+
+def program_parameters(signals: Signals, config: ControllerConfig) -> dict[str, ca.SX]:
+    """Values of the program's parameters by name, as the shipped tasks and limits ask for them.
+
+    Lambda blends linearly: the push row counts with lambda, the stand-off row with 1 - lambda, and the lines count
+    on the body's turn with 1 - lambda (1 - r). In the paper profile the lines lose the pushing direction with lambda
+    instead of always, and the velocity rows count in full beside them, as a null-space wish does.
+    """
+    out, gains, weights = signals.outputs, config.gains, config.weights
+    share, rate = signals.input("contact_weight"), signals.input("angular_velocity", 3)
+    roll, pitch, yaw = ca.vertsplit(out["angles"])
+    paper = config.line_profile == "paper"
+    free = ca.SX.ones(2) if paper else out["free"]
+    values = {
+        "turn_share": ca.SX(1.0) if paper else 1.0 - share * (1.0 - gains.line_turn_share),
+        "normal_share": share if paper else ca.SX(1.0),
+        "push": ca.vertcat(out["push_command"], weights.push * share),
+        "standoff": ca.vertcat(out["standoff_command"], weights.push * (1.0 - share)),
+        "level": ca.vertcat(out["angular"][0], out["angular"][1], weights.level),
+        "yaw": ca.vertcat(out["angular"][2], weights.yaw),
+        "velocity_right": ca.vertcat(out["velocity_command"][0], weights.velocity * free[0]),
+        "velocity_down": ca.vertcat(out["velocity_command"][1], weights.velocity * free[1]),
+        "tilt_state": ca.vertcat(roll, pitch, rate[0], rate[1]),
+        "yaw_state": ca.vertcat(yaw, rate[2]),
+    }
+    return out | values

@@ -1,0 +1,82 @@
+"""Forces along the wall normal: the impedance force law, and the speed-limited approach."""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from ibvs_qp.config import ContactSettings, ControllerConfig
+from ibvs_qp.setpoints.reach import REACH_MARGIN
+from ibvs_qp.setpoints.sensed import Body, Touch, Wish, clamp
+from ibvs_qp.setpoints.signals import Signals
+
+#: Bound of the force integral as a force [N].
+FORCE_INTEGRAL_BOUND = 8.0
+#: Stiffness up to which the force gain counts in full [N/m]; it falls with 1/k beyond (the brush's nominal k).
+SOFT_STIFFNESS = 1500.0
+#: Peak force that a touch may reach while the stiffness is unknown [N]: v = F / sqrt(k m).
+TOUCH_FORCE_BUDGET = 4.9
+#: Integral gain of the approach speed at the wall [1/s^2] and bound of its force [N].
+SEARCH_GAIN, SEARCH_BOUND = 6.0, 6.0
+#: Lowest stand-off aimed at while the tip shall touch [m]: behind the surface, so that the approach never stalls.
+TOUCH_TARGET = -0.03
+#: Force or moment given up above which no integral moves [N, N m].
+WINDUP_FORCE = 0.5
+
+
+def push_force(signals: Signals, config: ControllerConfig, body: Body, touch: Touch, wish: Wish, reach: ca.SX) -> ca.SX:
+    r"""Wanted force along n in contact [N] (paper, with the sign of the force feedback corrected).
+
+    .. math:: F = F_{ref} + K_{sp} e_s + K_{sd} \dot e_s + K_{fp} (F_{ref} - f) + K_{fi} \int (F_{ref} - f)
+
+    F_ref rises with the ramp and stays within reach; the integral is zero before touch, frozen while rotors are
+    limited, and the proportional gain falls with the measured stiffness.
+    """
+    gains = config.gains
+    allowed = ca.fmin(wish.push, ca.fmax(reach - REACH_MARGIN, 0.0)) if config.reach_check else wish.push
+    reference = signals.output("push_reference", ca.if_else(wish.press, allowed, 0.0))
+    ceiling = config.limits.push_share * reference
+    signals.output("push_state", ca.vertcat(ceiling, touch.stiffness, touch.rate, touch.touching * wish.press))
+    wanted = reference * touch.ramp
+    old, bound = signals.state("force_integral"), FORCE_INTEGRAL_BOUND / max(gains.force_kfi, 1e-6)
+    free = signals.input("given_up") < WINDUP_FORCE
+    moved = clamp(old + ca.if_else(free, body.dt, 0.0) * (wanted - touch.push), -bound, bound)
+    integral = signals.remember("force_integral", ca.if_else(ca.logic_and(touch.touching, wish.press), moved, 0.0))
+    softness = ca.fmin(1.0, SOFT_STIFFNESS / touch.stiffness)
+    force = wanted + softness * gains.force_kfp * (wanted - touch.push) + gains.force_kfi * integral
+    if config.impedance:
+        impedance = gains.force_ksp * touch.distance + gains.force_ksd * touch.rate
+        force = force + ca.if_else(touch.known, impedance, 0.0)
+    return signals.output("push_command", force)
+
+
+def standoff_force(signals: Signals, config: ControllerConfig, body: Body, touch: Touch, wish: Wish) -> ca.SX:
+    """Wanted force along n in free air [N]: a speed-limited motion to the stand-off, or until the tip touches."""
+    gains, settings, mass = config.gains, config.contact, config.vehicle.mass_kg
+    error = touch.distance - ca.if_else(wish.press, TOUCH_TARGET, wish.standoff)
+    allowed = approach_speed(settings, mass, touch)
+    free = ca.logic_and(touch.known, ca.logic_not(touch.touching))
+    speed = ca.fmin(ca.fmax(gains.standoff_kp * error, -settings.retreat_speed_m_s), allowed)
+    lag = speed + touch.rate
+    search = _search(signals, config, body, touch, wish, lag)
+    signals.output("approach_state", ca.vertcat(allowed, touch.rate, search / mass, free))
+    force = mass * gains.standoff_kd * lag + search
+    return signals.output("standoff_command", ca.if_else(touch.known, force, 0.0))
+
+
+def _search(signals: Signals, config: ControllerConfig, body: Body, touch: Touch, wish: Wish, lag: ca.SX) -> ca.SX:
+    """Lean on harder while the tip should move in but does not: a noisy force sensor needs a firmer touch."""
+    old, gain = signals.state("search_force"), config.vehicle.mass_kg * SEARCH_GAIN
+    moved = clamp(old + gain * lag * body.dt, 0.0, SEARCH_BOUND)
+    near = ca.logic_and(wish.press, touch.distance < config.contact.contact_distance_m)
+    new = ca.if_else(near, ca.if_else(touch.touching, old, moved), 0.0)
+    return signals.remember("search_force", ca.if_else(touch.known, new, old))
+
+
+def approach_speed(settings: ContactSettings, mass: float, touch: Touch) -> ca.SX:
+    r"""Speed limit towards the wall [m/s]: the peak force of a touch is :math:`v \sqrt{k m}`."""
+    far = ca.fmin(settings.approach_speed_m_s, settings.close_speed_m_s + (touch.distance - settings.close_distance_m))
+    allowed = TOUCH_FORCE_BUDGET / ca.sqrt(touch.stiffness * mass)
+    slow = ca.if_else(touch.stiffness_known, settings.close_speed_m_s, settings.touch_speed_m_s)
+    last = ca.fmin(ca.fmin(slow, allowed), settings.close_speed_m_s)
+    near = ca.if_else(touch.distance > settings.touch_distance_m, settings.close_speed_m_s, last)
+    return ca.if_else(touch.distance > settings.close_distance_m, far, near)

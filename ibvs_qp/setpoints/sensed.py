@@ -1,0 +1,104 @@
+"""What the blocks of a tick read: the body, the contact and the wish, as symbols."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+
+from ibvs_qp.setpoints.signals import Signals
+
+
+@dataclass(frozen=True, kw_only=True)
+class Body:
+    """Inertial state and forces at this tick, in B.
+
+    Attributes:
+        dt: Time since the last tick [s].
+        down: Unit gravity.
+        rate: Angular velocity [rad/s].
+        specific_force: Accelerometer [m/s^2]; felt: 1 if there is one.
+        wrench: Tared contact wrench on the vehicle [N, N m].
+        velocity: Linear velocity [m/s]; moving: 1 if it is known.
+    """
+
+    dt: ca.SX
+    down: ca.SX
+    rate: ca.SX
+    specific_force: ca.SX
+    felt: ca.SX
+    wrench: ca.SX
+    velocity: ca.SX
+    moving: ca.SX
+
+    @classmethod
+    def of(cls, signals: Signals) -> Body:
+        """Ask for the inputs."""
+        w, x, y, z = ca.vertsplit(signals.input("attitude", 4))
+        return cls(
+            dt=signals.input("dt"),
+            down=ca.vertcat(2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
+            rate=signals.input("angular_velocity", 3),
+            specific_force=signals.input("specific_force", 3),
+            felt=signals.input("felt"),
+            wrench=signals.input("contact_wrench", 6),
+            velocity=signals.input("velocity", 3),
+            moving=signals.input("moving"),
+        )
+
+
+#: Entries of the input "touch", in this order.
+TOUCH = ("known", "distance", "rate", "push", "noise", "touching", "ramp", "stiffness", "stiffness_known")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Touch:
+    """The wall and the contact as estimated (`ibvs_qp.estimation.contact`).
+
+    Attributes:
+        known: 1 once the wall was seen.
+        normal: Unit vector into the wall, in B.
+        distance: Tip to wall [m]; rate: its rate [m/s].
+        push: Filtered push [N]; noise: its deviation in free flight [N].
+        touching: 1 in contact.
+        ramp: 0 at touch to 1.
+        stiffness: [N/m]; stiffness_known: 1 once it was measured.
+    """
+
+    known: ca.SX
+    normal: ca.SX
+    distance: ca.SX
+    rate: ca.SX
+    push: ca.SX
+    noise: ca.SX
+    touching: ca.SX
+    ramp: ca.SX
+    stiffness: ca.SX
+    stiffness_known: ca.SX
+
+    @classmethod
+    def of(cls, signals: Signals) -> Touch:
+        """Ask for the inputs."""
+        symbols = ca.vertsplit(signals.input("touch", len(TOUCH)))
+        return cls(normal=signals.input("normal", 3), **dict(zip(TOUCH, symbols, strict=True)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wish:
+    """The reference: push [N], stand-off [m], velocity right and down [m/s], and whether to press."""
+
+    push: ca.SX
+    standoff: ca.SX
+    velocity: ca.SX
+    press: ca.SX
+
+    @classmethod
+    def of(cls, signals: Signals) -> Wish:
+        """Ask for the inputs."""
+        push, standoff, right, down, press = ca.vertsplit(signals.input("reference", 5))
+        return cls(push=push, standoff=standoff, velocity=ca.vertcat(right, down), press=press)
+
+
+def clamp(value: ca.SX, low: float | ca.SX, high: float | ca.SX) -> ca.SX:
+    """Value limited to [low, high], entry by entry."""
+    return ca.fmin(ca.fmax(value, low), high)

@@ -1,0 +1,223 @@
+"""From measurement and reference to what is wanted of every direction: shared word for word by both laws."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+
+from allocation.effectiveness import control_effectiveness
+from ibvs_qp.config import ControllerConfig
+from ibvs_qp.estimation.contact import ContactEstimator
+from ibvs_qp.frames import camera_twist_matrix, down_in_body
+from ibvs_qp.hold import hold_thrusts
+from ibvs_qp.limits.thrust import thrust_window
+from ibvs_qp.measurement import HORIZONTAL, VERTICAL, Measurement, Reference
+from ibvs_qp.qp.assembly import QpTemplate
+from ibvs_qp.setpoints.lines import LINE_TERMS
+from ibvs_qp.setpoints.model import setpoint_model
+from ibvs_qp.setpoints.pairing import LinePairing, LineTerm
+from ibvs_qp.setpoints.program import program_parameters
+from ibvs_qp.setpoints.reach import UNBOUNDED
+from ibvs_qp.setpoints.signals import Signals
+from ibvs_qp.setpoints.tick_function import TickFunction
+
+#: A tick is never taken to last longer than this [s]: after a pause the filters begin where they were.
+LONGEST_TICK = 0.02
+#: Thrust step that stands for "no rate limit" before the first command [N].
+ANY_STEP = 1e6
+#: Distance given to the equations while the wall is unknown [m].
+FAR_AWAY = 1e3
+
+
+def _number(name: str, index: int, text: str) -> property:
+    """Read-only result of the last tick as a plain number."""
+    return property(lambda terms: float(terms.tick.outputs[name][index]), doc=text)
+
+
+class Setpoints:
+    """Wanted forces and accelerations of one tick, and with a program given its data too: one compiled function.
+
+    Attributes:
+        contact: Contact estimator; everything else lives in the compiled tick (`ibvs_qp.setpoints.model`).
+        tick: The compiled function; with a program its `extra` arrays are P, q, A, l, u and the stacked parameters.
+    """
+
+    def __init__(self, config: ControllerConfig, template: QpTemplate | None = None) -> None:
+        self.config = config
+        vehicle = config.vehicle
+        self.effectiveness = control_effectiveness(vehicle.geometry)
+        self.inverse = np.linalg.pinv(self.effectiveness)
+        self.contact = ContactEstimator(config)
+        signals = setpoint_model(config)
+        self.tick = TickFunction(signals, _program(signals, config, template) if template else ())
+        self._pairing = LinePairing(config.line_slots)
+        self._twist = camera_twist_matrix(np.array(vehicle.camera_position_m))
+        self._values, out = self.tick.inputs, self.tick.outputs
+        self.normal, self.right, self.down = out["normal"], out["axis_right"], out["axis_down"]
+        self.bias_wrench, self.angular = out["bias_wrench"], out["angular"]
+        self.velocity_command, self.lower, self.upper = (
+            out["velocity_command"],
+            out["thrust_lower"],
+            out["thrust_upper"],
+        )
+        self._values["thrust_floor"][:], self._values["thrust_ceiling"][:] = vehicle.thrust_min, vehicle.thrust_max
+        self._lines_in = [self._values[f"line_{slot}"] for slot in range(config.line_slots)]
+        self.reset()
+
+    def reset(self) -> None:
+        """As before the first measurement."""
+        self.contact.reset()
+        self.tick.reset()
+        self._pairing.reset()
+        self._stamp, self._present = -1, []
+        values = self._values
+        values["commanded"][0] = values["given_up"][0] = values["contact_weight"][0] = 0.0
+        values["thrust_change"][:] = 0.0
+        values["thrust_step"][0] = ANY_STEP
+        values["vertical"][:] = 0.0
+        for place in self._lines_in:
+            place[:] = 0.0
+        self.last: np.ndarray | None = None
+        self.normal[:], self.right[:], self.down[:] = np.eye(3)
+        self.tick.outputs["reach"][0] = UNBOUNDED
+
+    def restart(self) -> None:
+        """As before the first measurement, but the rotors go on from where they are: the clock was set anew."""
+        last, change = self.last, self._values["thrust_change"].copy()
+        self.reset()
+        if last is not None:
+            self.note(last, 0.0)
+            self._values["thrust_change"][:] = change
+
+    def pause(self) -> None:
+        """Thrust window of a tick without a measurement."""
+        low, high, last = self._values["thrust_floor"], self._values["thrust_ceiling"], self.last
+        if last is None:
+            self.lower[:], self.upper[:] = low, high
+        else:
+            step = float(self._values["thrust_step"][0])
+            self.lower[:], self.upper[:] = thrust_window(last, low, high, step, low, high)
+
+    def update(self, measurement: Measurement, reference: Reference) -> None:
+        """Take in one checked measurement and reference."""
+        config, values = self.config, self._values
+        stamp = measurement.stamp_ns
+        dt = config.tick_s if self._stamp < 0 else min(max((stamp - self._stamp) * 1e-9, 0.0), LONGEST_TICK)
+        self._stamp = stamp
+        self.contact.update(measurement, down_in_body(measurement.attitude))
+        self._pack_body(measurement, dt)
+        self._pack_contact(reference)
+        self._pack_lines(measurement, reference)
+        if self.last is None:
+            values["thrust_last"][:] = hold_thrusts(config, measurement)
+        floor, ceiling = values["thrust_floor"], values["thrust_ceiling"]
+        low, high = measurement.thrust_min, measurement.thrust_max
+        values["thrust_low"][:] = floor if low is None else np.maximum(low, floor)
+        values["thrust_high"][:] = ceiling if high is None else np.minimum(high, ceiling)
+        if low is not None or high is not None:
+            values["thrust_high"][:] = np.maximum(values["thrust_high"], values["thrust_low"])
+        self.tick()
+
+    def _pack_body(self, measurement: Measurement, dt: float) -> None:
+        values, force, velocity = self._values, measurement.specific_force, measurement.velocity
+        values["dt"][0] = dt
+        values["attitude"][:] = measurement.attitude
+        values["angular_velocity"][:] = measurement.angular_velocity
+        values["contact_wrench"][:] = measurement.contact_wrench
+        values["felt"][0], values["moving"][0] = force is not None, velocity is not None
+        values["specific_force"][:] = 0.0 if force is None else force
+        values["velocity"][:] = 0.0 if velocity is None else velocity
+
+    def _pack_contact(self, reference: Reference) -> None:
+        contact, values = self.contact, self._values
+        stiffness, press = contact.stiffness, reference.contact
+        values["normal"][:] = contact.normal
+        values["touch"][:] = (
+            contact.known,
+            contact.distance if contact.known else FAR_AWAY,
+            contact.rate,
+            contact.push,
+            contact.push_noise,
+            contact.in_contact,
+            contact.ramp,
+            stiffness.value,
+            stiffness.known,
+        )
+        values["contact_weight"][0] = contact.contact_weight if press else 0.0
+        right, down = reference.velocity.tolist()
+        values["reference"][:] = reference.push_force, reference.standoff, right, down, press
+
+    def _pack_lines(self, measurement: Measurement, reference: Reference) -> None:
+        for slot in self._pairing.assign(reference.lines):
+            for kind in ("integral", "last"):
+                self.tick.states[f"line_{slot}_{kind}"][:] = 0.0
+        for slot, _ in self._present:
+            self._lines_in[slot][0] = 0.0
+        self._present = []
+        if not self.contact.known:
+            return
+        for slot, entry, vertical in self._pairing.pairs(measurement.lines, reference.lines):
+            self._lines_in[slot][:] = entry
+            self._values["vertical"][slot] = vertical
+            self._present.append((slot, VERTICAL if vertical else HORIZONTAL))
+
+    def note(self, thrusts: np.ndarray, given_up: float) -> None:
+        """Take note of what was commanded and of the largest force or moment given up (anti-windup)."""
+        values = self._values
+        if self.last is None:
+            values["commanded"][0] = 1.0
+            values["thrust_step"][0] = self.config.vehicle.thrust_rate_n_s * self.config.tick_s
+        else:
+            values["thrust_change"][:] = thrusts - self.last
+        values["thrust_last"][:] = thrusts
+        values["given_up"][0] = given_up
+        self.last = thrusts
+
+    roll = _number("angles", 0, "Roll [rad].")
+    pitch = _number("angles", 1, "Pitch [rad].")
+    yaw = _number("angles", 2, "Yaw away from the wall normal [rad].")
+    push_reference = _number("push_reference", 0, "Push asked for, within reach [N].")
+    push_command = _number("push_command", 0, "Force along n that the force law wants [N].")
+    standoff_command = _number("standoff_command", 0, "Force along n that the approach wants [N].")
+    friction = _number("friction", 0, "Friction coefficient believed.")
+    reach = _number("reach", 0, "Largest push that the limits in force can hold [N].")
+    free_right = _number("free", 0, "Share of the direction right that no line fixes.")
+    free_down = _number("free", 1, "Share of the direction down that no line fixes.")
+
+    @property
+    def plane(self) -> tuple[float, float, float, float]:
+        """Wall plane (A, B, C, D) in C, D = -1."""
+        a, b, c = self.tick.outputs["plane"].tolist()
+        return a, b, c, -1.0
+
+    @property
+    def contact_weight(self) -> float:
+        """Lambda: 0 in free air or when told to keep away, 1 in contact."""
+        return float(self._values["contact_weight"][0])
+
+    @contact_weight.setter
+    def contact_weight(self, value: float) -> None:
+        self._values["contact_weight"][0] = value
+
+    @property
+    def lines(self) -> list[LineTerm]:
+        """Terms of the lines that were paired, in the order of their references."""
+        out, plane = self.tick.outputs, self.plane
+        terms = []
+        for slot, role in self._present:
+            rho, theta, tip_x, tip_y, *_ = out[f"line_{slot}"].tolist()
+            errors = dict(zip(LINE_TERMS, out[f"line_{slot}_terms"].tolist(), strict=True))
+            place = {"rho": rho, "theta": theta, "tip_x": tip_x, "tip_y": tip_y}
+            terms.append(LineTerm(role=role, plane=plane, twist_map=self._twist, **place, **errors))
+        return terms
+
+
+def _program(signals: Signals, config: ControllerConfig, template: QpTemplate) -> list[ca.SX]:
+    """Data of the program at this tick's parameters, and the parameters themselves; unknown ones become inputs."""
+    values = program_parameters(signals, config)
+    parameters = [
+        values[name] if name in values else signals.input(name, symbol.numel())
+        for name, symbol in template.model.parameters.items()
+    ]
+    stacked = ca.densify(ca.vertcat(*parameters))
+    return [*template.values.call([stacked]), stacked]

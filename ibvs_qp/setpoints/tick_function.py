@@ -1,0 +1,43 @@
+"""The compiled tick: named arrays in, named arrays out, states carried from tick to tick."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import casadi as ca
+import numpy as np
+
+from ibvs_qp.qp.evaluator import BufferedFunction
+from ibvs_qp.setpoints.signals import Signals, places, stack
+
+
+class TickFunction:
+    """One CasADi function of all signals, called through owned buffers.
+
+    Attributes:
+        inputs, states, outputs: Views by name; write inputs with ``[:] =``, outputs hold after a call.
+        extra: Arrays of the additional results, in their order.
+    """
+
+    def __init__(self, signals: Signals, extra: Sequence[ca.SX] = ()) -> None:
+        results = [signals.next_states, stack(signals.outputs), *(ca.densify(result) for result in extra)]
+        function = ca.Function("tick", [stack(signals.inputs), stack(signals.states)], ca.cse(results))
+        self._call = BufferedFunction(function)
+        values, self._state = self._call.inputs
+        self._next, results_out, *self.extra = self._call.outputs
+        self.inputs = {name: values[place] for name, place in places(signals.inputs).items()}
+        self.states = {name: self._state[place] for name, place in places(signals.states).items()}
+        self.outputs = {name: results_out[place] for name, place in places(signals.outputs).items()}
+        self._start = np.concatenate([*signals.starts.values(), np.zeros(0)])
+        self.reset()
+
+    def reset(self) -> None:
+        """States as at the start."""
+        self._state[:] = self._start
+
+    def __call__(self) -> None:
+        """Evaluate; the states move on unless a result of theirs is not finite."""
+        self._call()
+        if math.isfinite(self._next.sum()):
+            self._state[:] = self._next

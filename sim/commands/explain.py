@@ -1,0 +1,103 @@
+"""``ibvs-qp explain``: one tick of a recorded flight, in words and numbers for a person."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+import tyro
+
+from ibvs_qp.errors import IbvsQpError
+
+if TYPE_CHECKING:
+    from ibvs_qp.qp.replay import Explanation
+    from sim.trace import Trace
+
+
+class ExplainError(IbvsQpError):
+    """The run or the tick cannot be explained."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Explain:
+    """Explain one tick of a flight: what every task asked and got, which limits bound and what they cost.
+
+    Example: ibvs-qp explain runs/2026-11-21T10-00-00 --at 12.3
+    """
+
+    run_dir: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="RUN")]
+    """Run folder of a flight under the QP law."""
+    at: float
+    """Time of the tick since the start [s]."""
+    seed: Annotated[int | None, tyro.conf.arg(metavar="INT", help_behavior_hint="")] = None
+    """Checked against the run's, if given."""
+    json: Annotated[bool, tyro.conf.arg(help_behavior_hint="")] = False
+    """Print one JSON line instead."""
+
+    def run(self, words: list[str]) -> int:
+        """Print the explanation.
+
+        Args:
+            words: The command line.
+
+        Returns:
+            0.
+
+        Raises:
+            IbvsQpError: Without such a run, flight or tick.
+        """
+        from rich.console import Console
+
+        from sim.explanation import explain_tick, explanation_tables, loop_margin_line
+
+        trace = self._flight()
+        tick = self._tick(trace)
+        config, explanation = explain_tick(trace, tick)
+        if explanation is None:
+            raise ExplainError(f"the program at {self.at:g} s has no solution: hard barriers contradict each other")
+        if self.json:
+            print(json.dumps(_table(trace, tick, explanation), allow_nan=False))
+            return 0
+        console = Console()
+        for part in explanation_tables(trace, tick, explanation):
+            console.print(part)
+        console.print(loop_margin_line(config))
+        return 0
+
+    def _flight(self) -> Trace:
+        from sim.flight_log import load_run
+
+        if not (self.run_dir / "log.npz").exists():
+            raise ExplainError(f"{self.run_dir} is no run folder: it has no log.npz; give the folder that paint wrote")
+        trace = load_run(self.run_dir).get("qp")
+        if trace is None or "program" not in trace.arrays:
+            raise ExplainError(f"{self.run_dir} holds no flight under the QP law; fly one with: ibvs-qp paint --law qp")
+        if self.seed is not None and self.seed != trace.seed:
+            raise ExplainError(f"--seed {self.seed}: the run was flown with seed {trace.seed}")
+        return trace
+
+    def _tick(self, trace: Trace) -> int:
+        first, last = float(trace.t[0]), float(trace.t[-1])
+        if not first - 1e-6 <= self.at <= last + 1e-6:
+            raise ExplainError(f"--at {self.at:g} s: the flight lasts from {first:g} to {last:.2f} s")
+        return int(np.argmin(np.abs(trace.t - self.at)))
+
+
+def _table(trace: Trace, tick: int, explanation: Explanation) -> dict[str, Any]:
+    from dataclasses import asdict
+
+    tasks = zip(explanation.tasks, explanation.cost, strict=True)
+    return {
+        "schema": 1,
+        "t": float(trace.t[tick]),
+        "phase": trace.phases[int(trace.phase[tick])],
+        "outcome": trace.outcomes[int(trace.outcome[tick])],
+        "thrusts": explanation.thrusts.tolist(),
+        "flown_thrusts": trace.thrusts[tick].tolist(),
+        "tasks": [asdict(task) | {"cost_share": cost} for task, cost in tasks],
+        "active_limits": [asdict(limit) for limit in explanation.active_limits],
+        "unallocated_wrench": explanation.unallocated_wrench.tolist(),
+    }
