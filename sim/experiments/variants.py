@@ -45,5 +45,10 @@ VARIANTS = {
     "no-feedforward": Variant(words="no contact feed-forward", switches={"contact_feedforward": False}),
     "no-ramp": Variant(words="no ramp after touch", switches={"touch_ramp": False}),
     "no-barriers": Variant(words="no barriers", switches={"barriers": False}, laws=("qp",)),
+    "paper-lines": Variant(
+        words="line rows of the QP at the image centre, as in the paper, instead of at the tip",
+        switches={"line_profile": "paper"},
+        laws=("qp",),
+    ),
     "no-reach-check": Variant(words="asked push not reduced to the reach", switches={"reach_check": False}),
 }

@@ -47,7 +47,7 @@ def _boxes(results: Results) -> Figure:
     labels = [f"$\\sigma_{{vs}}$ {vs:g}\n$\\sigma_f$ {force:g} N" for vs, force in cells]
     figure.axes[1].set_xticks(range(len(cells)), labels)
     handles = [Patch(facecolor=law_colour(law), alpha=0.5, label=law_name(law)) for law in ("qp", "paper")]
-    figure.axes[0].legend(handles=handles, loc="upper left", ncols=2)
+    figure.axes[0].legend(handles=handles, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
     return figure
 
 

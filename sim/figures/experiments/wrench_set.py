@@ -58,4 +58,5 @@ def draw_wrench_set(results: Results, rows: pl.DataFrame) -> Figure:
 def _dress(axes: Axes, title: str) -> None:
     axes.set(title=title, xlabel="force to the right [N]", xlim=(-40, 40), ylim=(-25, 40))
     axes.set_aspect("equal")
-    axes.legend(loc="lower right", fontsize=6.5, markerscale=3)
+    if axes.lines:
+        axes.legend(loc="lower right", fontsize=6.5, markerscale=3)
