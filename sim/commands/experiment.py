@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import os
 import shlex
 import sys
@@ -113,11 +114,10 @@ class ExperimentCommand:
         write_summary(folder, content)  # before the figures, so that no figure can cost the record
         page = None
         if table.height and not result.interrupted:
-            lead = (
-                f"{table.height} flights, {self.features} features, first seed {self.seed}, version {facts['version']}."
-            )
+            lead = f"{table.height} flights, {self.features} features, first seed {self.seed}, {facts['version']}."
+            lead = ("A quick run with few flights, not the record: " if self.quick else "") + lead
             with notes.status("Drawing the figures ..."):
-                page = write_page(folder, experiments, table, lead, facts["command"])
+                page = write_page(folder, experiments, table, lead, self._again())
         content["wall_time_s"] = time.perf_counter() - started
         write_summary(folder, content)
         if self.json:
@@ -131,6 +131,12 @@ class ExperimentCommand:
             print(f"ibvs-qp: interrupted; finished flights are in {folder}; go on with: {again}", file=sys.stderr)
             return 130
         return 0
+
+    def _again(self) -> str:
+        """The command that flies the same on any computer."""
+        words = ["ibvs-qp", "experiment", self.name, *(["--quick"] if self.quick else [])]
+        words += ["--features", self.features] if self.features != "rendered" else []
+        return shlex.join([*words, *(["--seed", str(self.seed)] if self.seed else [])])
 
 
 def _cores() -> int:
@@ -159,19 +165,20 @@ def _print_verdicts(console: Console, content: dict[str, Any]) -> None:
     from rich import box
     from rich.table import Table
 
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for heading in ("experiment", "QP law held to", "cell", "bound", "median", "flights within", "met"):
-        table.add_column(heading)
-    for entry in content["verdicts"]:
-        words = [f"{key} {value:g}" if isinstance(value, float) else str(value) for key, value in entry["cell"].items()]
-        cell = ", ".join([*words, *([entry["variant"]] if entry["variant"] != "standard" else [])])
-        table.add_row(
-            entry["experiment"],
-            entry["figure"],
-            cell,
-            f"{entry['bound']:.4g} {entry['unit']}",
-            f"{entry['median']:.3g} {entry['unit']}",
-            f"{entry['held']} of {entry['n']}",
-            "yes" if entry["met"] else "NO",
-        )
-    console.print(table)
+    for name in dict.fromkeys(entry["experiment"] for entry in content["verdicts"]):
+        table = Table(box=box.SIMPLE_HEAD, pad_edge=False, title=f"{name}: QP law held to", title_justify="left")
+        for heading in ("figure", "bound", "median", "flights", "met"):
+            table.add_column(heading, no_wrap=heading != "figure")
+        for entry in (entry for entry in content["verdicts"] if entry["experiment"] == name):
+            words = [f"{key} {_short(value)}" for key, value in entry["cell"].items()]
+            words += [entry["variant"]] if entry["variant"] != "standard" else []
+            figure = entry["figure"] + (f" ({', '.join(words)})" if words else "")
+            sign, unit = ">=" if entry["least"] else "<=", f" {entry['unit']}" if entry["unit"] else ""
+            median = f"{entry['median']:.3g}{unit}" if math.isfinite(entry["median"]) else "–"
+            held = f"{entry['held']} of {entry['n']}"
+            table.add_row(figure, f"{sign} {entry['bound']:.4g}{unit}", median, held, "yes" if entry["met"] else "NO")
+        console.print(table)
+
+
+def _short(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)

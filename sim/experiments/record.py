@@ -62,6 +62,7 @@ def summary(
                 "params": verdict.params,
                 "cell": telling(listed, verdict),
                 "bound": verdict.bound,
+                "least": verdict.criterion.least,
                 "unit": verdict.criterion.unit,
                 "median": verdict.median,
                 "worst": verdict.worst,
