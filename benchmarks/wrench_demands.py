@@ -27,6 +27,7 @@ from ibvs_qp.frames import GRAVITY
 from ibvs_qp.limits import ThrustLimit
 from ibvs_qp.qp.acceptance import QpEngine
 from ibvs_qp.qp.assembly import QpTemplate
+from ibvs_qp.qp.evaluator import BufferedFunction, ProgramData
 from ibvs_qp.qp.model import SymbolicModel
 from ibvs_qp.tasks import EffortTask, HeightTask, LevelTask, PushTask, SmoothnessTask, VelocityTask, YawTask
 
@@ -61,8 +62,11 @@ class ProgramAllocation:
 
     def __init__(self, height_weight: float | None = None) -> None:
         tasks = [PushTask(), LevelTask(), YawTask(), VelocityTask(), HeightTask(), EffortTask(), SmoothnessTask()]
-        self._engine = QpEngine(QpTemplate(SymbolicModel(CONFIG), tasks, [ThrustLimit()]), CONFIG.solver)
-        values, hover = self._engine.data.parameters, np.full(B.shape[1], WEIGHT / -B[2].sum())
+        template = QpTemplate(SymbolicModel(CONFIG), tasks, [ThrustLimit()])
+        self._evaluate = BufferedFunction(template.values)
+        self._data = ProgramData(template, [*self._evaluate.outputs, self._evaluate.inputs[0]])
+        self._engine = QpEngine(template, CONFIG.solver, self._data)
+        values, hover = self._data.parameters, np.full(B.shape[1], WEIGHT / -B[2].sum())
         fixed: dict[str, Any] = {
             "bias_wrench": (0.0, 0.0, WEIGHT, 0.0, 0.0, 0.0),
             "normal": (1.0, 0.0, 0.0),
@@ -81,7 +85,7 @@ class ProgramAllocation:
 
     def __call__(self, wrench: np.ndarray) -> np.ndarray:
         """Thrusts for one demanded rotor wrench [N], (n,)."""
-        values, weights, vehicle = self._engine.data.parameters, CONFIG.weights, CONFIG.vehicle
+        values, weights, vehicle = self._data.parameters, CONFIG.weights, CONFIG.vehicle
         net = wrench + values["bias_wrench"]
         right, down = net[1] / vehicle.mass_kg, net[2] / vehicle.mass_kg
         roll, pitch, yaw = net[3:] / np.array(vehicle.inertia_kg_m2)
@@ -91,19 +95,12 @@ class ProgramAllocation:
         values["height"][:] = down, self._height
         values["level"][:] = roll, pitch, weights.level
         values["yaw"][:] = yaw, weights.yaw
+        self._evaluate()
         solution = self._engine.solve()
         assert solution is not None
         self.outcomes[str(solution.outcome)] += 1
-        self.given_up = B @ (self._free() - solution.thrusts)
+        self.given_up = B @ (self._data.unlimited_thrusts() - solution.thrusts)
         return solution.thrusts
-
-    def _free(self) -> np.ndarray:
-        """Thrusts of the same program without limits."""
-        data = self._engine.data
-        upper = self._engine.template.p_pattern.copy()
-        upper.data = data.p.copy()
-        full = upper.toarray()
-        return -np.linalg.solve(full + np.triu(full, 1).T, data.q)
 
 
 def row(method: Callable[[np.ndarray], np.ndarray], wanted: np.ndarray) -> dict[str, float]:

@@ -1,35 +1,29 @@
-"""A task and a limit of one's own in the program, in one file; docs/extending.md explains it line by line.
+"""A task and a limit of one's own in the controller, in one file; docs/extending.md explains it line by line.
 
-The task keeps the propellers next to the brush slow while it presses, so that their wash does not reach wet paint. The
-limit bounds how fast the vehicle may be accelerated upwards. The vehicle has eight rotors, so the slow ones cost no
-force: the program finds that by itself.
+The task keeps the propellers next to the brush slow, so that their wash does not reach wet paint. The limit bounds how
+fast the vehicle is accelerated upwards. The vehicle has eight rotors, so the slow ones cost no force: the program finds
+that by itself.
 
 Run it with ``python examples/my_task.py``.
 """
-
-from types import SimpleNamespace
 
 import casadi as ca
 import numpy as np
 
 from allocation import Rotor
-from ibvs_qp import ControllerConfig, RotorGeometry, VehicleParams
-from ibvs_qp.limits import Limit, ThrustLimit
-from ibvs_qp.qp.acceptance import QpEngine
-from ibvs_qp.qp.assembly import QpTemplate
-from ibvs_qp.qp.model import LimitRow, TaskRow
-from ibvs_qp.qp.model import SymbolicModel as Model
-from ibvs_qp.tasks import EffortTask, LevelTask, PushTask, SmoothnessTask, Task, VelocityTask, YawTask
+from ibvs_qp import ControllerConfig, HybridController, Measurement, Reference, RotorGeometry, VehicleParams
+from ibvs_qp.limits import Limit
+from ibvs_qp.qp.model import LimitRow, SymbolicModel, TaskRow
+from ibvs_qp.tasks import Task
 
 
 class QuietRotors(Task):
-    """Named rotors stay near a low thrust [N] while the brush presses."""
+    """Named rotors stay near a low thrust [N]; the parameter "quiet" holds that thrust and the weight."""
 
-    def __init__(self, names: tuple[str, ...], thrust_n: float, weight: float = 0.1) -> None:
-        # 0.1 = 1 / (3 N)^2: three newtons more are worth as much as half a newton of push. It gives way.
-        self.names, self.thrust_n, self.weight = names, thrust_n, weight
+    def __init__(self, *names: str) -> None:
+        self.names = names
 
-    def rows(self, model: Model) -> list[TaskRow]:
+    def rows(self, model: SymbolicModel) -> list[TaskRow]:
         """One row per named rotor in newtons."""
         quiet, order = model.parameter("quiet", 2), model.config.vehicle.geometry.names
         return [
@@ -43,27 +37,23 @@ class QuietRotors(Task):
             for name in self.names
         ]
 
-    def pack(self, values, terms) -> None:
-        """Asked only in contact: elsewhere the weight is zero and the row stays."""
-        values["quiet"][:] = self.thrust_n, self.weight if terms.contact.in_contact else 0.0
-
 
 class ClimbLimit(Limit):
     """Upward acceleration stays below a bound [m/s^2]; soft, so that it can never make the program infeasible."""
 
-    def __init__(self, bound: float, price: float = 1000.0) -> None:
-        self.bound, self.price = bound, price
+    def __init__(self, bound: float, price: float = 4e4) -> None:
+        self.bound, self.price_of_slack = bound, price
 
-    def rows(self, model: Model) -> list[LimitRow]:
+    def rows(self, model: SymbolicModel) -> list[LimitRow]:
         """One soft row in m/s^2; body z points down."""
         return [
             LimitRow(
                 name="climb",
                 unit="m/s^2",
                 expression=-model.acceleration[2],
-                lower=ca.SX(-1e3),  # a finite bound that never binds: row types must not change
+                lower=ca.SX(-1e3),  # finite, and never reached: row types must not change
                 upper=ca.SX(self.bound),
-                price=self.price,
+                price=self.price_of_slack,
             )
         ]
 
@@ -75,46 +65,40 @@ OCTOROTOR = RotorGeometry(
     torque_ratio_m=0.020,
 )
 CONFIG = ControllerConfig(vehicle=VehicleParams(geometry=OCTOROTOR, thrust_max_n=35.0, propeller_radius_m=0.165))
-
-
-def program(tasks: list[Task], limits: list[Limit]) -> QpEngine:
-    """The controller's tasks without lines, and more; a hover that shall push with 5 N and climb with 2 m/s^2."""
-    shipped: list[Task] = [PushTask(), LevelTask(), YawTask(), VelocityTask(), EffortTask(), SmoothnessTask()]
-    engine = QpEngine(QpTemplate(Model(CONFIG), shipped + tasks, [ThrustLimit(), *limits]), CONFIG.solver)
-    values, weights, weight = engine.data.parameters, CONFIG.weights, 9.81 * CONFIG.vehicle.mass_kg
-    values["bias_wrench"][:] = 0.0, 0.0, weight, 0.0, 0.0, 0.0  # what acts beside the rotors
-    values["normal"][:], values["axis_right"][:], values["axis_down"][:] = np.eye(3)
-    values["push"][:] = 5.0, weights.push
-    values["level"][:] = 0.0, 0.0, weights.level
-    values["yaw"][:] = 0.0, weights.yaw
-    values["velocity_right"][:], values["velocity_down"][:] = (0.0, weights.velocity), (-2.0, weights.velocity)
-    values["last_thrust"][:] = values["extrapolated_thrust"][:] = 8.5
-    values["thrust_lower"][:], values["thrust_upper"][:] = CONFIG.vehicle.thrust_min, CONFIG.vehicle.thrust_max
-    in_contact = SimpleNamespace(contact=SimpleNamespace(in_contact=True))
-    for part in (*tasks, *limits):
-        part.pack(values, in_contact)  # type: ignore[arg-type]
-    return engine
+#: A hover before a wall 0.8 m away, told to rise with 1 m/s.
+HOVER = Measurement(
+    stamp_ns=4_000_000,
+    attitude=np.array([1.0, 0.0, 0.0, 0.0]),
+    angular_velocity=np.zeros(3),
+    specific_force=np.array([0.0, 0.0, -9.81]),
+    contact_wrench=np.zeros(6),
+    wrench_stamp_ns=4_000_000,
+    plane=(0.0, 0.0, 1.25, -1.0),
+    plane_stamp_ns=4_000_000,
+    velocity=np.zeros(3),
+)
+RISE = Reference(standoff=0.3, velocity=np.array([0.0, -1.0]))
 
 
 def main() -> None:
-    """Solve the same wish three times: as shipped, with the task, with task and limit."""
-    quiet, climb = QuietRotors(("r0", "r7"), thrust_n=4.0), ClimbLimit(bound=0.5)
+    """Answer the same measurement three times: as shipped, with the task, with task and limit."""
+    quiet, climb = QuietRotors("r0", "r7"), ClimbLimit(bound=0.5)
     cases: list[tuple[str, list[Task], list[Limit]]] = [
         ("as shipped", [], []),
         ("quiet rotors", [quiet], []),
         ("and limit", [quiet], [climb]),
     ]
     for words, tasks, limits in cases:
-        engine = program(tasks, limits)
-        for _ in range(5):  # a few ticks: every one starts from the last solution
-            solution = engine.solve()
-        assert solution is not None
-        u, names = solution.thrusts, engine.template.row_names
-        wrench = engine.template.model.effectiveness @ u
-        price = dict(zip(names, solution.y.tolist(), strict=True)).get("climb", 0.0)
+        controller = HybridController(CONFIG, tasks=tasks, limits=limits)
+        if tasks:
+            # 4 N, and a weight of 1 / (3 N)^2: three newtons more are worth as much as half a newton of push.
+            controller.setpoints.tick.inputs["quiet"][:] = 4.0, 0.1
+        command = controller.step(HOVER, RISE)
+        up = -command.wrench[2] / CONFIG.vehicle.mass_kg - 9.81
+        price = sum(limit.price for limit in command.active_limits if limit.name == "climb")
         print(
-            f"{words:12s}  front rotors {u[0]:5.2f} {u[7]:5.2f} N  push {wrench[0]:5.2f} N  "
-            f"climb {-wrench[2] / CONFIG.vehicle.mass_kg - 9.81:4.2f} m/s^2  price {price:5.1f}  {solution.outcome}"
+            f"{words:12s}  front rotors {command.thrusts[0]:5.2f} {command.thrusts[7]:5.2f} N  "
+            f"climb {up:4.2f} m/s^2  price of the limit {price:5.1f}"
         )
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from ibvs_qp.loop_margin import BrushSettings, require_margin
 from ibvs_qp.settings import choice, dump_toml, load_toml, setting, validate
 from ibvs_qp.vehicle import VehicleParams
 
@@ -99,13 +100,13 @@ class Weights:
     line: float = setting(100.0, "line rows; 0.1 image units/s^2 = 5 cm/s^2 at half a metre", low=0.0, high=1e6)
     line_angle: float = setting(0.05, "angle rows; yield to level flight by four orders", low=0.0, high=1e6)
     push: float = setting(
-        4.0, "push row; 0.5 N; below yaw and level: an unreachable push is given up first", low=0.0, high=1e6
+        0.5, "push row; 1.4 N: far below all others, so that an unreachable push is given up first", low=0.0, high=1e6
     )
     level: float = setting(400.0, "roll and pitch rows; 0.05 rad/s^2", low=0.0, high=1e6)
-    yaw: float = setting(100.0, "yaw row; 0.1 rad/s^2", low=0.0, high=1e6)
+    yaw: float = setting(400.0, "yaw row; 0.05 rad/s^2", low=0.0, high=1e6)
     velocity: float = setting(100.0, "free velocity rows; 0.1 m/s^2", low=0.0, high=1e6)
     height: float = setting(
-        1e4, "height row; 0.01 m/s^2 = 0.06 N: what cannot be pushed must not lift the vehicle", low=0.0, high=1e6
+        1.6e3, "height row; 0.025 m/s^2 = 0.15 N: what cannot be pushed must not lift the vehicle", low=0.0, high=1e6
     )
     effort: float = setting(1e-3, "thrust away from the last one; 30 N", low=1e-9, high=1e3)
     smoothness: float = setting(1e-3, "change of the thrust step; 30 N", low=0.0, high=1e3)
@@ -132,10 +133,10 @@ class LimitSettings:
     view_right: float = setting(
         0.48, "largest |rho| of an upright guide; the picture ends at 0.512", low=0.01, high=10.0
     )
-    view_price: float = setting(4000.0, "slack price of the line-in-view barriers", low=1e-3, high=1e8)
+    view_price: float = setting(4e4, "slack price of the line-in-view barriers", low=1e-3, high=1e8)
     view_rate_1_s: float = setting(2.0, "how fast the border may be approached", unit="1/s", low=0.1, high=100.0)
     push_share: float = setting(1.5, "push ceiling over the push reference", low=1.0, high=100.0)
-    push_price: float = setting(40.0, "slack price of the push ceiling; ten times the push row", low=1e-3, high=1e8)
+    push_price: float = setting(40.0, "slack price of the push ceiling; far above the push row", low=1e-3, high=1e8)
     approach_share: float = setting(1.5, "closing speed over that of the approach", low=1.0, high=100.0)
     approach_rate_1_s: float = setting(
         10.0, "how fast the closing speed may reach its bound", unit="1/s", low=0.1, high=100.0
@@ -162,11 +163,13 @@ class SolverSettings:
     max_iterations: int = setting(200, "deterministic deadline", low=1, high=100000)
     tolerance: float = setting(1e-5, "eps_abs", low=1e-10, high=1e-1)
     relative_tolerance: float = setting(
-        1e-6, "eps_rel; gradients reach 1e6, weak directions have curvature 2: 1e-5 leaves 0.4 N", low=1e-10, high=1e-1
+        3e-7, "eps_rel; gradients reach 1e6, the push row has curvature 0.1: 1e-6 leaves 0.02 N", low=1e-10, high=1e-1
     )
     check_interval: int = setting(5, "iterations between termination checks", low=1, high=1000)
     adaptive_rho_interval: int = setting(25, "iterations between step-size updates", low=1, high=10000)
-    scaling: int = setting(10, "Ruiz equilibration passes", low=0, high=100)
+    scaling: int = setting(
+        2, "Ruiz equilibration passes; ten cost 4 us more per tick and no iteration less", low=0, high=100
+    )
     polishing: bool = setting(False, "solve the active set exactly at the end; OSQP 1.1 prints a line per tick with it")
     direct: bool = setting(True, "talk to OSQP's extension object (half the overhead) instead of its wrapper")
     accept_residual: float = setting(5e-2, "largest violation of a capped solution", unit="N", low=1e-9, high=10.0)
@@ -186,6 +189,7 @@ class ControllerConfig:
     weights: Weights = field(default_factory=Weights)
     limits: LimitSettings = field(default_factory=LimitSettings)
     solver: SolverSettings = field(default_factory=SolverSettings)
+    brush: BrushSettings = field(default_factory=BrushSettings)
     line_profile: str = choice(
         "tip",
         "error of the line rows: at the point where the tip meets the wall, or the paper's, rho at the image centre",
@@ -205,8 +209,10 @@ class ControllerConfig:
 
     @classmethod
     def from_toml(cls, file: str | Path) -> ControllerConfig:
-        """Read a preset; raises ConfigError naming field, value, unit and allowed range."""
-        return load_toml(cls, file)
+        """Read a preset; ConfigError names field, value, unit and allowed range, also where the contact would ring."""
+        config = load_toml(cls, file)
+        require_margin(config, config.brush)
+        return config
 
     def to_toml(self) -> str:
         """Write the configuration as TOML text."""

@@ -36,7 +36,7 @@ from numpy.polynomial import Polynomial
 if TYPE_CHECKING:  # the configuration checks itself with this module
     from ibvs_qp.config import ControllerConfig
 
-#: K_fp counts in full up to this stiffness k_s and falls with its inverse beyond [N/m] (`Setpoints`).
+#: K_fp counts in full up to this stiffness k_s and falls with its inverse beyond [N/m] (`setpoints/push.py`).
 FULL_GAIN_STIFFNESS = 1500.0
 #: Order of the Pade approximants; Newton's method removes what they leave.
 PADE_ORDER = 4

@@ -21,6 +21,7 @@ from ibvs_qp.reporting import clipped_command, contact_mode, reach_margin, reach
 from ibvs_qp.setpoints import Setpoints
 from ibvs_qp.tasks import (
     EffortTask,
+    HeightTask,
     LevelTask,
     LineTask,
     PushTask,
@@ -35,7 +36,9 @@ from ibvs_qp.tasks import (
 def default_tasks(config: ControllerConfig) -> list[Task]:
     """The tasks of the program, in the order of their rows."""
     lines: list[Task] = [LineTask(slot) for slot in range(config.line_slots)]
-    return [*lines, PushTask(), StandoffTask(), LevelTask(), YawTask(), VelocityTask(), EffortTask(), SmoothnessTask()]
+    along: list[Task] = [PushTask(), StandoffTask()]
+    height: list[Task] = [] if config.line_profile == "paper" else [HeightTask()]
+    return [*lines, *along, LevelTask(), YawTask(), VelocityTask(), *height, EffortTask(), SmoothnessTask()]
 
 
 def default_limits(config: ControllerConfig) -> list[Limit]:
@@ -72,7 +75,6 @@ class HybridController:
         self, config: ControllerConfig | None = None, *, tasks: Sequence[Task] = (), limits: Sequence[Limit] = ()
     ) -> None:
         self.config = config or ControllerConfig()
-        self._further = (*tasks, *limits)
         self.template = program_template(self.config, tasks, limits)
         self.setpoints = Setpoints(self.config, self.template)
         self.engine = QpEngine(self.template, self.config.solver, ProgramData(self.template, self.setpoints.tick.extra))
@@ -104,8 +106,6 @@ class HybridController:
             return self._hold(measurement, rejected)
         if self._gate.restarted:
             self.setpoints.restart()
-        for part in self._further:
-            part.pack(self.setpoints.tick.inputs, self.setpoints)
         self.setpoints.update(checked, reference)
         solution = self.engine.solve()
         if solution is None:

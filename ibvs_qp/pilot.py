@@ -20,6 +20,7 @@ from ibvs_qp.estimation.motion import WallMotion
 from ibvs_qp.estimation.tare import WrenchTare
 from ibvs_qp.estimation.wall_lines import WallAxes, image_line
 from ibvs_qp.frames import R_BODY_CAMERA, down_in_body, to_camera
+from ibvs_qp.loop_margin import require_margin
 from ibvs_qp.measurement import (
     HORIZONTAL,
     FeatureFrame,
@@ -68,8 +69,10 @@ class PilotConfig:
 
     @classmethod
     def from_toml(cls, file: str | Path) -> PilotConfig:
-        """Read a preset."""
-        return load_toml(cls, file)
+        """Read a preset; one whose contact would ring is refused."""
+        config = load_toml(cls, file)
+        require_margin(config.controller, config.controller.brush)
+        return config
 
     def to_toml(self) -> str:
         """Write the preset as TOML text."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from allocation.geometry import TAROT_T960
 from ibvs_qp.controller import program_template
+from ibvs_qp.loop_margin import LEAST_DAMPING_RATIO, least_margin
 from ibvs_qp.pilot import PilotConfig
 from ibvs_qp.qp.replay import Explanation, TickReplay
 from ibvs_qp.settings import from_dict
@@ -92,4 +93,10 @@ def _given_up(explanation: Explanation) -> str:
 
 def loop_margin_line(config: PilotConfig) -> str:
     """Least damping of the contact mode over the stiffness range of the preset's brush."""
-    return ""
+    brush = config.controller.brush
+    margin = least_margin(config.controller, brush)
+    return (
+        f"Contact loop: least damping ratio {margin.least_damping_ratio:.2f} at {margin.frequency_hz:.1f} Hz and "
+        f"{margin.stiffness_n_m:.0f} N/m (brush {brush.stiffness_min_n_m:g} to {brush.stiffness_max_n_m:g} N/m; "
+        f"presets below {LEAST_DAMPING_RATIO:g} are refused)"
+    )

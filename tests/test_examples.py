@@ -11,6 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ibvs_qp.controller import HybridController
+
 ROOT = Path(__file__).parents[1]
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 #: Runs a script where the simulator and everything that draws cannot be imported.
@@ -67,26 +69,28 @@ def test_my_task_moves_what_it_says_and_nothing_else(printed: dict[str, str]) ->
     shipped, quiet, limited = (
         [float(number) for number in re.findall(r"-?\d+\.\d+", line)] for line in printed["my_task"].splitlines()
     )
-    # Front rotors (two), push, climb, price.
+    # Front rotors (two), climb, price.
     assert max(quiet[:2]) < 5.0 < 9.0 < min(shipped[:2])
-    assert quiet[2:4] == pytest.approx(shipped[2:4], abs=0.02)
-    assert limited[3] == pytest.approx(0.5, abs=0.2) and limited[2] == pytest.approx(5.0, abs=0.02)
-    assert limited[4] > 10.0 and shipped[4] == quiet[4] == 0.0
-    assert printed["my_task"].count(" solved") == 3
+    assert quiet[2] == pytest.approx(shipped[2], abs=0.01)
+    assert 0.5 <= limited[2] <= 0.6 and limited[3] > 10.0 and shipped[3] == quiet[3] == 0.0
+    text = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
+    assert all(line.split()[0] in text for line in printed["my_task"].splitlines())
 
 
-def test_added_rows_are_named_and_switch_off_by_weight() -> None:
+def test_added_rows_are_named_and_absent_by_weight_zero() -> None:
     example = runpy.run_path(str(ROOT / "examples" / "my_task.py"))
-    engine = example["program"]([example["QuietRotors"](("r0", "r7"), thrust_n=4.0)], [example["ClimbLimit"](0.5)])
-    names = [row.name for row in engine.template.task_rows]
-    assert names[-2:] == ["quiet_r0", "quiet_r7"] and engine.template.row_names[-1] == "climb"
-    assert engine.template.variable_names[-1] == "slack_climb"
-    shipped = example["program"]([], []).solve()
-    engine.data.parameters["quiet"][1] = 0.0
-    engine.data.parameters["velocity_down"][0] = 0.0
-    still = example["program"]([], [])
-    still.data.parameters["velocity_down"][0] = 0.0
-    for _ in range(5):
-        ours, plain = engine.solve(), still.solve()
-    np.testing.assert_allclose(ours.thrusts, plain.thrusts, atol=1e-3)
-    assert shipped is not None
+    quiet, climb = example["QuietRotors"]("r0", "r7"), example["ClimbLimit"](50.0)
+    controller = HybridController(example["CONFIG"], tasks=[quiet], limits=[climb])
+    plain = HybridController(example["CONFIG"])
+    names = [row.name for row in controller.template.task_rows]
+    assert names[-2:] == ["quiet_r0", "quiet_r7"] and controller.template.row_names[-1] == "climb"
+    assert controller.template.variable_names[-1] == "slack_climb"
+    controller.setpoints.tick.inputs["quiet"][:] = 4.0, 0.1
+    command = controller.step(example["HOVER"], example["RISE"])
+    assert {"quiet_r0", "quiet_r7"} <= {task.name for task in command.tasks}
+    controller.reset()
+    controller.setpoints.tick.inputs["quiet"][:] = 4.0, 0.0
+    ours, theirs = (one.step(example["HOVER"], example["RISE"]) for one in (controller, plain))
+    np.testing.assert_allclose(ours.wrench, theirs.wrench, atol=5e-3)
+    # Not the thrusts: what two redundant rotors share is left to the pull to the last thrusts, a thousand times weaker.
+    assert "quiet_r0" not in {task.name for task in ours.tasks}

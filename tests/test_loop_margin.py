@@ -23,6 +23,7 @@ from ibvs_qp.loop_margin import (
     require_margin,
 )
 from ibvs_qp.pilot import Pilot, PilotConfig
+from ibvs_qp.setpoints.push import SOFT_STIFFNESS
 from sim.closed_loop import PRESETS, FlightOptions, World, pilot_config
 from sim.scene import ForceTorqueScene, ImuScene, Scene
 
@@ -205,6 +206,10 @@ def test_the_allowed_value_holds_and_a_little_more_does_not() -> None:
     allowed = float(str(refusal.value).split("[0, ")[1].split("]")[0])
     assert least_margin(with_gains(force_kfp=0.999 * allowed)).least_damping_ratio >= LEAST_DAMPING_RATIO
     assert least_margin(with_gains(force_kfp=1.01 * allowed)).least_damping_ratio < LEAST_DAMPING_RATIO
+
+
+def test_model_and_controller_divide_the_gain_alike() -> None:
+    assert FULL_GAIN_STIFFNESS == SOFT_STIFFNESS
 
 
 def test_a_brush_cannot_be_inside_out() -> None:

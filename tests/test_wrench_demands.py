@@ -40,11 +40,11 @@ def test_the_rivals_on_the_same_demands(rows: dict) -> None:
     # Lateral first keeps height and level as well, at the price of more lateral force: it only knows one direction.
     sequential = rows["sequential, lateral first"]
     assert sequential["vertical_n"] < 0.01 and sequential["roll_pitch_nm"] < 0.01
-    assert sequential["lateral_n"] > rows["program"]["lateral_n"] + 1.0
+    assert sequential["lateral_n"] > rows["box least squares"]["lateral_n"] + 1.0
 
 
 def test_without_its_height_row_the_program_climbs(rows: dict) -> None:
-    assert rows["program without height row"]["vertical_n"] > 5.0
+    assert rows["program without height row"]["vertical_n"] > 2.0
 
 
 def test_what_is_given_up_is_reported(bench: dict) -> None:

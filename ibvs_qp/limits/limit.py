@@ -3,15 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
-import numpy as np
 
 from ibvs_qp.qp.model import LimitRow, SymbolicModel
-
-if TYPE_CHECKING:
-    from ibvs_qp.setpoints import Setpoints
 
 #: Bound of a row that does not limit now: finite, so that OSQP never sees the row change its type.
 WIDE = 1e4
@@ -32,11 +25,3 @@ class Limit(ABC):
     def price(model: SymbolicModel, price: float) -> float | None:
         """Price of the slack, None where the user wants barriers without slack."""
         return None if model.config.limits.hard_barriers else price
-
-    def pack(self, values: Mapping[str, np.ndarray], terms: Setpoints) -> None:  # noqa: B027 - optional
-        """Write this tick's values of the limit's own parameters, as `Task.pack` does.
-
-        Args:
-            values: Parameters of the program by name.
-            terms: What is measured and wanted at this tick.
-        """

@@ -102,8 +102,7 @@ class OsqpSolver:
         status = int(info.status_val)
         certificate = None
         if status in INFEASIBLE:
-            holder = result if result is not None else self._inner.solution
-            certificate = np.array(holder.prim_inf_cert)
+            certificate = np.array(result.prim_inf_cert if self._inner is None else self._inner.solution.prim_inf_cert)
         return RawSolution(
             x=x,
             y=y,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import casadi as ca
-import numpy as np
 
 from allocation.effectiveness import control_effectiveness
 from ibvs_qp.config import ControllerConfig
@@ -47,8 +46,7 @@ def setpoint_model(config: ControllerConfig) -> Signals:
     static = signals.output("static_wrench", ca.vertcat(vehicle.mass_kg * GRAVITY * body.down, gyroscopic) + external)
     signals.output("bias_wrench", static + expected)
 
-    inverse = np.linalg.pinv(effectiveness)
-    reach = push_reach(signals, vehicle, inverse, wall.normal, travel, friction, static)
+    reach = push_reach(signals, vehicle, wall.normal, travel, friction, static)
     push_force(signals, config, body, touch, wish, reach)
     standoff_force(signals, config, body, touch, wish)
     motion_in_plane(signals, config, body, touch, wish, wall, travel)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import casadi as ca
 
 from ibvs_qp.config import ControllerConfig
+from ibvs_qp.setpoints.height import height_wish
 from ibvs_qp.setpoints.signals import Signals
 
 
@@ -29,6 +30,7 @@ def program_parameters(signals: Signals, config: ControllerConfig) -> dict[str, 
         "yaw": ca.vertcat(out["angular"][2], weights.yaw),
         "velocity_right": ca.vertcat(out["velocity_command"][0], weights.velocity * free[0]),
         "velocity_down": ca.vertcat(out["velocity_command"][1], weights.velocity * free[1]),
+        "height": height_wish(signals, config),
         "tilt_state": ca.vertcat(roll, pitch, rate[0], rate[1]),
         "yaw_state": ca.vertcat(yaw, rate[2]),
     }

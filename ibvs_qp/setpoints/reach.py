@@ -5,6 +5,7 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
+from allocation.wrench_facets import WrenchFacets
 from ibvs_qp.setpoints.signals import Signals
 from ibvs_qp.vehicle import VehicleParams
 
@@ -21,7 +22,6 @@ IDLE_SLOPE = 1e-9
 def push_reach(
     signals: Signals,
     vehicle: VehicleParams,
-    inverse: np.ndarray,
     normal: ca.SX,
     travel: ca.SX,
     friction: ca.SX,
@@ -29,17 +29,19 @@ def push_reach(
 ) -> ca.SX:
     r"""Largest push that the limits in force can hold, level, against friction along the commanded travel [N].
 
-    Thrusts along the ray: :math:`u(f) = B^+ (f [d; p \times d] - h)` with :math:`d = n + \mu t`; the reach is the
-    first f at which one of them meets its limit.
+    The ray :math:`w(f) = f [d; p \times d] - h`, :math:`d = n + \mu t`, meets the facets of the attainable wrench set
+    (`allocation.wrench_facets`); the reach is the first f at which it leaves. Exact for any number of rotors.
     """
-    count = vehicle.geometry.count
+    facets, count = WrenchFacets(vehicle.geometry), vehicle.geometry.count
     low, high = signals.input("thrust_low", count), signals.input("thrust_high", count)
     speed = ca.norm_2(travel)
     direction = normal + ca.if_else(speed > STANDING_SPEED, friction / ca.fmax(speed, STANDING_SPEED), 0.0) * travel
     lever = ca.cross(ca.DM(vehicle.tip_position_m), direction)
-    slope = ca.DM(inverse) @ ca.vertcat(direction, lever)
-    base = -(ca.DM(inverse) @ static_wrench)
-    room = ca.if_else(slope > 0.0, high - base, low - base) / ca.if_else(ca.fabs(slope) > IDLE_SLOPE, slope, 1.0)
+    slope = ca.DM(facets.normals) @ ca.vertcat(direction, lever)
+    rising, falling = ca.DM(np.maximum(facets.shares, 0.0)), ca.DM(np.minimum(facets.shares, 0.0))
+    held = -(ca.DM(facets.normals) @ static_wrench)
+    upper, lower = rising @ high + falling @ low - held, rising @ low + falling @ high - held
+    room = ca.if_else(slope > 0.0, upper, lower) / ca.if_else(ca.fabs(slope) > IDLE_SLOPE, slope, 1.0)
     room = ca.if_else(ca.fabs(slope) > IDLE_SLOPE, room, UNBOUNDED)
     return signals.output("reach", clamp_positive(ca.mmin(room)))
 

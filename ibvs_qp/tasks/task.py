@@ -3,15 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
-import numpy as np
 
 from ibvs_qp.qp.model import SymbolicModel, TaskRow
-
-if TYPE_CHECKING:
-    from ibvs_qp.setpoints import Setpoints
 
 
 class Task(ABC):
@@ -24,13 +17,3 @@ class Task(ABC):
     @abstractmethod
     def rows(self, model: SymbolicModel) -> list[TaskRow]:
         """Rows of the task, affine in ``model.thrust``."""
-
-    def pack(self, values: Mapping[str, np.ndarray], terms: Setpoints) -> None:  # noqa: B027 - optional
-        """Write this tick's values of the task's own parameters, ``values[name][:] = ...``.
-
-        For tasks that a user adds; a task without parameters leaves it out, the shipped ones are packed together.
-
-        Args:
-            values: Parameters of the program by name.
-            terms: What is measured and wanted at this tick.
-        """
