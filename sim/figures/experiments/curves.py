@@ -66,9 +66,9 @@ def curves(
                         linewidth=1.0,
                     )
             axes.set(xlabel=panel.xlabel or xlabel, ylabel=panel.label)
-            axes.margins(y=0.15)
-            axes.set_ylim(bottom=0.0)
-            if not axes.has_data():
+            if axes.lines:
+                axes.set_ylim(0.0, max(1.12 * float(axes.dataLim.y1), 1e-9))
+            else:
                 axes.text(0.5, 0.5, "no flight came so far", transform=axes.transAxes, ha="center", color="#777777")
         handles, labels = figure.axes[0].get_legend_handles_labels()
         if handles:
