@@ -108,8 +108,10 @@ class Painter:
         mark = self._start_mark(seen)
         if mark is not None:
             error = max(error, abs(mark.offset - self.config.edge_margin_m))
-        still = math.hypot(*seen.velocity) < self.config.align_speed_m_s
-        if error < self.config.align_error_m and still:
+        # Gusts and noisy pictures may never let the vehicle stand still: what counts as aligned opens with time.
+        opening = max(1.0, ((seen.time_s - self.entered) / self.config.align_patience_s) ** 2)
+        still = math.hypot(*seen.velocity) < opening * self.config.align_speed_m_s
+        if error < opening * self.config.align_error_m and still:
             self._since = seen.time_s if math.isnan(self._since) else self._since
             if seen.time_s - self._since >= self.config.align_time_s:
                 self._right_edge = mark.offset if mark is not None else None

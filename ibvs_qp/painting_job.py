@@ -29,6 +29,9 @@ class PaintingConfig:
     align_error_m: float = setting(0.003, "line error that counts as aligned", unit="m", low=0.0005, high=0.05)
     align_speed_m_s: float = setting(0.005, "speed that counts as still", unit="m/s", low=0.001, high=0.1)
     align_time_s: float = setting(0.3, "aligned this long", unit="s", low=0.0, high=10.0)
+    align_patience_s: float = setting(
+        5.0, "after this long both tolerances open with the square of time", unit="s", low=0.5, high=300.0
+    )
     timeout_s: float = setting(
         15.0, "longest start, approach, align, press, climb or retreat", unit="s", low=1.0, high=300.0
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -80,9 +81,23 @@ class PilotConfig:
 
 
 class Pilot:
-    """The whole pilot; `step` turns one sensor frame into one command and knows no simulator."""
+    """The whole pilot; `step` turns one sensor frame into one command and knows no simulator.
 
-    def __init__(self, config: PilotConfig | None = None) -> None:
+    Attributes:
+        thrust_limits: Lower and upper thrust limits that the drive reports [N], (n,) each, or None for the configured.
+
+    Args:
+        config: Everything a flight needs.
+        painter: Strategy to follow; None paints.
+        seen_as: Applied to what perception saw in a picture, for studies of its errors.
+    """
+
+    def __init__(
+        self,
+        config: PilotConfig | None = None,
+        painter: Painter | None = None,
+        seen_as: Callable[[FeatureFrame], FeatureFrame] | None = None,
+    ) -> None:
         self.config = config or PilotConfig()
         controller, vehicle = self.config.controller, self.config.controller.vehicle
         self.controller = HybridController(controller) if self.config.law == "qp" else PaperController(controller)
@@ -93,7 +108,8 @@ class Pilot:
             self.config.estimation,
         )
         self.tare = WrenchTare(vehicle, self.config.estimation)
-        self.painter = Painter(self.config.painting)
+        self.painter = painter or Painter(self.config.painting)
+        self._seen_as = seen_as
         self._gate = SensorGate()
         self._tip = np.array(vehicle.tip_position_m)
         self._camera = np.array(vehicle.camera_position_m)
@@ -119,6 +135,7 @@ class Pilot:
         self._spread, self._covariance = -1.0, np.zeros((3, 3))
         self._last_capture = -1
         self.percept = None
+        self.thrust_limits: tuple[np.ndarray, np.ndarray] | None = None
         self.controller_time_s = 0.0
         self.measurement: Measurement | None = None
         self.reference = Reference()
@@ -220,7 +237,8 @@ class Pilot:
             velocity=self.measurement.velocity if self.measurement is not None else None,
             hints=self._hints(image.stamp_ns),
         )
-        return self.percept.features
+        seen = self.percept.features
+        return seen if self._seen_as is None or seen is None else self._seen_as(seen)
 
     def _take(self, features: FeatureFrame) -> None:
         """Correct motion and lines at the time of capture."""
@@ -244,6 +262,7 @@ class Pilot:
         velocity = covariance = None
         contact = self.terms.contact
         distance = contact.distance if contact.known else 0.5
+        low, high = self.thrust_limits or (None, None)
         if self.motion.velocity_age_s < self.config.estimation.velocity_life_s:
             right, down, *_ = self.motion.state
             (nx, ny, nz), (rx, ry, rz), (dx, dy, dz), rate = axes.normal, axes.right, axes.down, contact.rate
@@ -267,6 +286,8 @@ class Pilot:
             plane_stamp_ns=self._plane_stamp,
             velocity=velocity,
             velocity_covariance=covariance,
+            thrust_min=low,
+            thrust_max=high,
         )
 
     def _velocity_covariance(self) -> np.ndarray:

@@ -17,6 +17,8 @@ from typing import Any
 
 from ibvs_qp.errors import IbvsQpError
 
+#: Commands by name, for hints.
+COMMANDS = ("paint", "experiment", "compare", "explain")
 EXIT_INTERNAL, EXIT_USER, EXIT_INTERRUPTED = 1, 2, 130
 
 #: One thread each: the matrices are small, and the laws and their repeats share the cores as processes.
@@ -56,11 +58,15 @@ def _parse(words: list[str]) -> Any:
     """Turn words into the options of a command; the parser's own complaint becomes one line."""
     import tyro
 
+    from sim.commands.compare import Compare
+    from sim.commands.experiment import ExperimentCommand
     from sim.commands.explain import Explain
     from sim.commands.paint import Paint
 
     app = tyro.extras.SubcommandApp()
     app.command(name="paint")(Paint)
+    app.command(name="experiment")(ExperimentCommand)
+    app.command(name="compare")(Compare)
     app.command(name="explain")(Explain)
     complaint = io.StringIO()
     try:
@@ -90,7 +96,7 @@ def _one_line(text: str) -> str:
 def _refuse(message: str, words: list[str] | None = None) -> int:
     hint = ""
     if words is not None:
-        command = " ".join(["ibvs-qp", *[word for word in words[:1] if word in ("paint", "explain")]])
+        command = " ".join(["ibvs-qp", *[word for word in words[:1] if word in COMMANDS]])
         hint = f" (see {command} --help)"
     print("ibvs-qp: error: " + " ".join(message.split()) + hint, file=sys.stderr)
     return EXIT_USER

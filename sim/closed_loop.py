@@ -16,11 +16,15 @@ from ibvs_qp.pilot import Pilot, PilotConfig
 from sim.board import BoardGeometry
 from sim.cameras import CameraStream, PlaneCamera
 from sim.canvas import Canvas
-from sim.features import GeometricFeatures
+from sim.faults import Fault, FaultSchedule
+from sim.features import GeometricFeatures, add_sigma_vs
+from sim.jobs import Job, PaintJob
+from sim.miscalibration import Miscalibration
 from sim.plant import TICK_NS, Plant
 from sim.recorder import Recorder
 from sim.scene import Scene
 from sim.sensors import SensorSuite
+from sim.streams import stream
 from sim.trace import Event, Trace
 
 #: Called now and then with simulated time [s], phase name and real-time factor.
@@ -96,6 +100,7 @@ class World:
         self.sensors = SensorSuite(scene, vehicle, options.seed)
         self.canvas = Canvas(scene, options.seed)
         self._rendered = options.features == "rendered"
+        self._miscalibration = Miscalibration(scene.camera, vehicle, self._rendered)
         if self._rendered:
             camera = PlaneCamera(scene, vehicle, self.canvas, options.seed)
             # A drawing thread would hand the interpreter's lock to and fro: measured 10 % slower on two cores.
@@ -109,10 +114,11 @@ class World:
         """Sensor frame of the present tick."""
         plant = self.plant
         frame = self.sensors.sample(plant)
+        pose = self._miscalibration.pose(plant.position, plant.quaternion)
         if self._rendered:
-            image = self._stream.tick(plant.time_ns, plant.position, plant.quaternion)
-            return frame if image is None else dataclasses.replace(frame, image=image)
-        features = self._features.tick(plant.time_ns, plant.position, plant.quaternion, plant.velocity)
+            image = self._stream.tick(plant.time_ns, *pose)
+            return frame if image is None else dataclasses.replace(frame, image=self._miscalibration.picture(image))
+        features = self._features.tick(plant.time_ns, *pose, plant.velocity)
         return frame if features is None else dataclasses.replace(frame, features=features)
 
     def act(self, thrusts: np.ndarray) -> None:
@@ -130,8 +136,21 @@ class World:
             self._brush = None
 
 
+def make_pilot(scene: Scene, options: FlightOptions, config: PilotConfig, job: Job) -> Pilot:
+    """The pilot of one flight; with the scene's extra feature noise after its own perception."""
+    sigma, noise = scene.features.sigma_vs, stream(options.seed, "sigma_vs")
+    rendered = options.features == "rendered"  # the sensor model of lines adds the same noise itself
+    seen_as = (lambda frame: add_sigma_vs(frame, sigma, noise)) if rendered and sigma > 0.0 else None
+    return Pilot(config, job.strategy(config.painting), seen_as)
+
+
 def fly(
-    scene: Scene, options: FlightOptions, progress: Progress | None = None, config: PilotConfig | None = None
+    scene: Scene,
+    options: FlightOptions,
+    progress: Progress | None = None,
+    config: PilotConfig | None = None,
+    job: Job | None = None,
+    faults: tuple[Fault, ...] = (),
 ) -> Trace:
     """Fly one scene under one law; Ctrl-C ends the flight and keeps what was flown.
 
@@ -140,17 +159,21 @@ def fly(
         options: Law, seed, features, picture size and so on.
         progress: Told about time, phase and real-time factor now and then.
         config: Flown instead of the preset.
+        job: What is done at the wall; None paints.
+        faults: What goes wrong, and when.
 
     Returns:
         The trace; incomplete with a reason when the flight crashed, timed out or was interrupted.
     """
-    config = pilot_config(scene, options, config)
-    pilot, world = Pilot(config), World(scene, options, config)
-    recorder = Recorder(scene, options, world, pilot)
-    limit = BASE_TIME + STROKE_FACTOR * scene.paint.rows * scene.paint.stroke_m / scene.paint.speed_m_s
+    config, job = pilot_config(scene, options, config), job or PaintJob()
+    pilot, world = make_pilot(scene, options, config, job), World(scene, options, config)
+    recorder, schedule = Recorder(scene, options, world, pilot), FaultSchedule(faults)
+    limit = BASE_TIME + STROKE_FACTOR * job.expected_s(config.painting)
     start, reason, tick = time.perf_counter(), "", 0
     try:
         while not pilot.painter.finished:
+            for text in schedule.tick(world, pilot):
+                recorder.note(tick * TICK_NS * 1e-9, "fault", text)
             frame = world.sense()
             command = pilot.step(frame)
             world.act(command.thrusts)

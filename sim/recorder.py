@@ -128,23 +128,30 @@ class Recorder:
                 self._rejected.add(kind)
                 self._events.append(Event(t=time_s, kind="rejected", text=name))
 
+    def note(self, time_s: float, kind: str, text: str) -> None:
+        """Log an event that the pilot does not know of."""
+        self._events.append(Event(t=time_s, kind=kind, text=text))
+
     def trace(self) -> Trace:
         """Everything logged so far as a trace."""
-        arrays = self._log.arrays()
+        # Ctrl-C may strike in the middle of a tick: its half-written row is dropped. The limits come last.
+        ticks = len(self._active)
+        arrays = {name: column[:ticks] for name, column in self._log.arrays().items()}
         arrays |= {name: arrays[name].astype(np.int32) for name in INTEGERS}
         arrays["line_error_px"] = np.column_stack((arrays.pop("horizontal_error"), arrays.pop("vertical_error")))
         arrays |= self._truth(arrays.pop("motion"))
         arrays["contact_1khz"] = arrays["contact_1khz"].reshape(-1)
-        active = np.zeros((len(self._active), len(self._limits)), dtype=bool)
+        active = np.zeros((ticks, len(self._limits)), dtype=bool)
         for tick, columns in enumerate(self._active):
             active[tick, list(columns)] = True
         arrays["active"] = active
         if len(self._programs):
-            arrays |= self._programs.arrays()
+            arrays |= {name: column[:ticks] for name, column in self._programs.arrays().items()}
         vehicle = self._pilot.config.controller.vehicle
         arrays["thrust_min"], arrays["thrust_max"] = vehicle.thrust_min, vehicle.thrust_max
+        arrays["true_thrust_min"], arrays["true_thrust_max"] = self._world.plant.thrust_limits
         arrays["vision_ms"] = np.array(self._vision, float)
-        arrays["painting_1khz"] = np.repeat(np.array(self._painting, bool), STEPS_PER_TICK)
+        arrays["painting_1khz"] = np.repeat(np.array(self._painting[:ticks], bool), STEPS_PER_TICK)
         canvas = self._world.canvas
         return Trace(
             scene=self._world.scene,

@@ -109,6 +109,13 @@ class CameraScene(_Checked):
     rate_hz: float = setting(30.0, "frame rate", unit="Hz", low=5.0, high=120.0)
     latency_s: float = setting(0.060, "capture to delivery", unit="s", low=0.0, high=0.3)
     depth_noise_relative: float = setting(0.005, "white and correlated depth noise per depth", low=0.0, high=0.05)
+    mount_error_m: tuple[float, float, float] = setting(
+        (0.0, 0.0, 0.0), "true camera position from the believed one, FRD; told to nobody", unit="m", low=-0.1, high=0.1
+    )
+    mount_error_deg: tuple[float, float, float] = setting(
+        (0.0, 0.0, 0.0), "true camera attitude from the believed one, roll pitch yaw", unit="deg", low=-5.0, high=5.0
+    )
+    focal_error: float = setting(0.0, "focal length told to the pilot over the true one, minus 1", low=-0.2, high=0.2)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -22,6 +22,8 @@ FIELDS = {
     "thrusts_actual": "(N,n) thrusts after motor lag [N]",
     "thrust_min": "(n,) lower limits [N]",
     "thrust_max": "(n,) upper limits [N]",
+    "true_thrust_min": "(n,) lower limits of the real rotors at the end of the flight [N]",
+    "true_thrust_max": "(n,) upper limits of the real rotors at the end of the flight [N]",
     "push_true": "(N,) true normal contact force, > 0 pressing [N]",
     "push_measured": "(N,) tared, filtered push that the controller used [N]",
     "push_reference": "(N,) commanded push [N], 0 while free",

@@ -237,6 +237,17 @@ def test_align_needs_stillness_and_place() -> None:
     assert world.painter.phase == "press"
 
 
+def test_align_gives_way_with_time() -> None:
+    world = World(short())
+    world.fly(20.0, until="align")
+    world.edges[0].place += 0.006  # twice what is allowed: let pass after sqrt(2) times the patience
+    world.stuck = True
+    world.fly(6.5)
+    assert world.painter.phase == "align"
+    world.fly(1.5)
+    assert world.painter.phase == "press"
+
+
 def test_press_waits_for_the_push() -> None:
     world = World(short())
     world.fly(30.0, until="press")

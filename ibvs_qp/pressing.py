@@ -1,0 +1,80 @@
+"""Press and hold, then slide if wanted: the strategy for studying contact without painting a whole job."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ibvs_qp.painting import Painter
+from ibvs_qp.painting_job import PaintingConfig, Scenery, Wish
+
+#: Vertical speed of a vehicle that gives up the wall [m/s], down.
+DESCENT_M_S = 0.5
+
+
+class Presser(Painter):
+    """Approaches and aligns like the painter, presses for a time, slides for a time along the edge, and retreats.
+
+    The push is never waited for: holding begins with the touch, whatever the push then does.
+
+    Args:
+        config: The paint job; its push, margins, speed and acceleration are used.
+        hold_s: Time from touch to the slide or the retreat [s].
+        slide_s: Time of sliding to the left [s]; 0 leaves the tip where it is.
+        descend_s: After `abandon`: time of retreat and descent until the strategy ends [s].
+    """
+
+    def __init__(self, config: PaintingConfig, hold_s: float, slide_s: float = 0.0, descend_s: float = 5.0) -> None:
+        self._hold_s, self._slide_s, self._descend_s = hold_s, slide_s, descend_s
+        super().__init__(config)
+
+    def reset(self) -> None:
+        """Back to the start."""
+        super().reset()
+        self._touched = self._abandoned = math.nan
+
+    def abandon(self, time_s: float, reason: str) -> None:
+        """Give up the wall for good: detach, retreat and descend."""
+        if math.isnan(self._abandoned):
+            self._abandoned = time_s
+            self.log.append((time_s, "retreat", reason))
+            self.phase, self.entered = "retreat", time_s
+
+    def _time_out(self, seen: Scenery) -> None:
+        if (self.phase == "press" and not math.isnan(self._touched)) or not math.isnan(self._abandoned):
+            return  # a hold lasts as long as it was asked to
+        super()._time_out(seen)
+
+    def _press(self, seen: Scenery, dt: float) -> Wish:
+        self._keep_guide(seen, self._bottom_edge)
+        if math.isnan(self._touched) and seen.in_contact:
+            self._touched = seen.time_s
+        if seen.time_s - self._touched > self._hold_s:
+            if self._slide_s > 0.0:
+                self.row, self._speed = 1, 0.0
+                self._stroke_start = float(seen.odometer[0])
+                self._enter(seen, "paint", f"held for {self._hold_s:g} s, sliding")
+            else:
+                self._enter(seen, "retreat", f"held for {self._hold_s:g} s")
+        return self._wish(seen, contact=True, hold=True, mark=True)
+
+    def _paint(self, seen: Scenery, dt: float) -> Wish:
+        self._keep_guide(seen, self._bottom_edge)
+        self._check_contact(seen)
+        step = self.config.acceleration_m_s2 * dt
+        wanted = 0.0 if self._paused else self.config.speed_m_s
+        self._speed += min(max(wanted - self._speed, -2.0 * step), step)
+        if seen.time_s - self.entered > self._slide_s:
+            self._enter(seen, "retreat", f"slid for {self._slide_s:g} s")
+        return self._wish(seen, contact=True, along=-self._speed)
+
+    def _retreat(self, seen: Scenery, dt: float) -> Wish:
+        if math.isnan(self._abandoned):
+            if seen.distance > self.config.retreat_m - 0.02 and not seen.in_contact:
+                self._end(seen, "held, retreated" if not self.failed else self.reason)
+            return self._wish(seen, contact=False, standoff=self.config.retreat_m, hold=True)
+        if seen.time_s - self._abandoned > self._descend_s:
+            self._end(seen, f"wall given up, descended for {self._descend_s:g} s")
+        velocity = np.array([0.0, DESCENT_M_S])
+        return Wish(contact=False, standoff=self.config.retreat_m, velocity=velocity, guides=[], push=0.0)

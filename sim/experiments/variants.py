@@ -1,0 +1,54 @@
+"""Ablations: what of the controller is switched differently, by name; everything else is the shipped preset."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass, field
+from typing import Any
+
+from ibvs_qp.config import Gains
+from ibvs_qp.pilot import PilotConfig
+
+
+@dataclass(frozen=True, kw_only=True)
+class Variant:
+    """A named change of the controller's switches.
+
+    Attributes:
+        words: What is different, for tables.
+        switches: Fields of `ControllerConfig` and their values.
+        laws: Laws for which it makes sense.
+    """
+
+    words: str
+    switches: dict[str, Any] = field(default_factory=dict)
+    laws: tuple[str, ...] = ("qp", "paper")
+
+    def apply(self, config: PilotConfig) -> PilotConfig:
+        """The configuration with the switches set."""
+        if not self.switches:
+            return config
+        return dataclasses.replace(config, controller=dataclasses.replace(config.controller, **self.switches))
+
+
+VARIANTS = {
+    "standard": Variant(words="as shipped: each law at gains tuned alike, with ramp, feed-forward and reach check"),
+    "direct": Variant(words="direct force control, no impedance", switches={"impedance": False}),
+    "printed": Variant(
+        words="the analytic law as printed (corrected signs only): no ramp after touch, no contact feed-forward",
+        switches={"touch_ramp": False, "contact_feedforward": False, "reach_check": False},
+        laws=("paper",),
+    ),
+    "shared-gains": Variant(
+        words="one set of gains for both laws, that of the QP", switches={"gains": Gains()}, laws=("paper",)
+    ),
+    "no-feedforward": Variant(words="no contact feed-forward", switches={"contact_feedforward": False}),
+    "no-ramp": Variant(words="no ramp after touch", switches={"touch_ramp": False}),
+    "no-barriers": Variant(words="no barriers", switches={"barriers": False}, laws=("qp",)),
+    "paper-lines": Variant(
+        words="line rows of the QP at the image centre, as in the paper, instead of at the tip",
+        switches={"line_profile": "paper"},
+        laws=("qp",),
+    ),
+    "no-reach-check": Variant(words="asked push not reduced to the reach", switches={"reach_check": False}),
+}

@@ -1,0 +1,62 @@
+"""The attainable forces in level flight, with the forces that were flown inside it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import polars as pl
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from allocation import WrenchSet, control_effectiveness, level_polygon
+from ibvs_qp.frames import GRAVITY
+from ibvs_qp.vehicle import VehicleParams
+from sim.figures.experiments.common import kept_trace
+from sim.figures.style import law_colour, law_name, new_figure
+from sim.measures.window import phase_window
+from sim.sweep.parts import PARAM
+
+if TYPE_CHECKING:
+    from sim.experiments.base import Results
+
+#: One dot in so many ticks.
+EVERY = 12
+
+
+def draw_wrench_set(results: Results, rows: pl.DataFrame) -> Figure:
+    """Level, moment-free forces that the rotors can make, and those flown while pressing, per law.
+
+    Dots are the horizontal part of B u with the thrusts after the motor lag; the polygon is the cut of the attainable
+    wrench set at full lift and no moment. A flown wrench with a moment may lie outside it.
+
+    Args:
+        results: For its logs.
+        rows: Flights to show; the first kept log of each push and law is drawn.
+    """
+    vehicle = VehicleParams()
+    rotors = WrenchSet(vehicle.geometry, vehicle.thrust_min, vehicle.thrust_max)
+    corners = level_polygon(rotors, vehicle.mass_kg * GRAVITY)
+    figure = new_figure(3.6)
+    for axes, law in zip(figure.subplots(1, 2, sharex=True, sharey=True), ("qp", "paper"), strict=True):
+        axes.fill(corners[:, 1], corners[:, 0], facecolor="#e9eef1", edgecolor="#888888", linewidth=0.8)
+        flown = rows.filter(pl.col("law") == law)
+        pushes = sorted(flown[PARAM + "push_n"].unique())
+        for push, shade in zip(pushes, np.linspace(0.25, 1.0, max(len(pushes), 1)), strict=True):
+            trace = kept_trace(results, flown.filter(pl.col(PARAM + "push_n") == push))
+            if trace is not None:
+                begin, end = phase_window(trace, "press")
+                wrench = trace.thrusts_actual[(trace.t >= begin) & (trace.t <= end)][::EVERY]
+                wrench = wrench @ control_effectiveness(vehicle.geometry).T
+                axes.plot(wrench[:, 1], wrench[:, 0], ".", color=law_colour(law), alpha=float(shade), markersize=2.5,
+                          label=f"{push:g} N asked")  # fmt: skip
+        _dress(axes, law_name(law))
+    figure.axes[0].set_ylabel("force to the front [N]")
+    return figure
+
+
+def _dress(axes: Axes, title: str) -> None:
+    axes.set(title=title, xlabel="force to the right [N]", xlim=(-40, 40), ylim=(-25, 40))
+    axes.set_aspect("equal")
+    if axes.lines:
+        axes.legend(loc="lower right", fontsize=6.5, markerscale=3)

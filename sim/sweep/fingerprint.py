@@ -1,0 +1,65 @@
+"""Hashes that say whether two runs are the same: configuration, seed, and the code that flies."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import hashlib
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import allocation
+import ibvs_qp
+import sim
+from ibvs_qp.settings import to_dict
+from sim.sweep.design import Run
+
+#: Folders of `sim` whose code only words or draws results: a change there needs no new flight.
+_AFTER_THE_FLIGHT = ("figures", "commands", "experiments")
+#: Letters of a hash that are kept: 64 bit.
+_LENGTH = 16
+
+
+def _digest(content: Any) -> str:
+    text = json.dumps(content, sort_keys=True, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()[:_LENGTH]
+
+
+def configuration_hash(run: Run) -> str:
+    """Hash of scene, configuration, options, job and faults; all seeds of a cell share it."""
+    plan = run.plan
+    options = {key: value for key, value in dataclasses.asdict(plan.options).items() if key != "seed"}
+    return _digest(
+        {
+            "scene": to_dict(plan.scene),
+            "config": to_dict(plan.config),
+            "options": options,
+            "job": repr(plan.job),
+            "faults": [repr(fault) for fault in plan.faults],
+        }
+    )
+
+
+@functools.cache
+def code_hash() -> str:
+    """Hash of the source of everything that takes part in a flight."""
+    digest = hashlib.sha256()
+    for package in (allocation, ibvs_qp, sim):
+        root = Path(next(iter(package.__path__)))
+        for file in sorted(root.rglob("*.py")):
+            relative = file.relative_to(root)
+            if package is sim and relative.parts[0] in _AFTER_THE_FLIGHT:
+                continue
+            digest.update(str(relative).encode() + b"\0" + file.read_bytes())
+    return digest.hexdigest()[:_LENGTH]
+
+
+def block_hash(runs: Sequence[Run]) -> str:
+    """Identity of a block of runs: the same block under the same code has the same rows."""
+    rows = [
+        (run.experiment, run.variant, run.params, configuration_hash(run), run.seed, run.measure.__qualname__, run.keep)
+        for run in runs
+    ]
+    return _digest({"rows": rows, "code": code_hash()})

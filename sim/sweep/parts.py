@@ -1,0 +1,64 @@
+"""Parquet parts of a sweep: written whole or not at all, found again by hash, joined in the order of the design."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import polars as pl
+
+#: Columns that every row has, before parameters and figures.
+HEAD = {
+    "experiment": pl.String,
+    "law": pl.String,
+    "variant": pl.String,
+    "seed": pl.Int64,
+    "completed": pl.Boolean,
+    "reason": pl.String,
+    "config_hash": pl.String,
+    "code_hash": pl.String,
+    "version": pl.String,
+    "log": pl.String,
+}
+#: Prefix of parameter columns.
+PARAM = "param."
+
+
+def part_file(folder: Path, name: str) -> Path:
+    """File of a block."""
+    return folder / f"part-{name}.parquet"
+
+
+def write_part(file: Path, rows: Sequence[dict[str, Any]]) -> None:
+    """Write a block's rows; the file appears under its name only when complete."""
+    write_table(file, frame(rows))
+
+
+def write_table(file: Path, table: pl.DataFrame) -> None:
+    """Write a table by an atomic rename, so that no reader and no crash meets half a file."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    partial = file.with_name(f".{file.name}.{os.getpid()}")
+    table.write_parquet(partial)
+    partial.replace(file)
+
+
+def frame(rows: Sequence[dict[str, Any]]) -> pl.DataFrame:
+    """Rows as a table: head columns as they are, every figure a float, parameters of their own type."""
+    schema: dict[str, Any] = dict(HEAD)
+    for row in rows:
+        for name, value in row.items():
+            if name not in schema:
+                schema[name] = _kind(value) if name.startswith(PARAM) else pl.Float64
+    return pl.DataFrame(list(rows), schema=schema, strict=False, orient="row")
+
+
+def _kind(value: Any) -> Any:
+    return pl.Boolean if isinstance(value, bool) else pl.String if isinstance(value, str) else pl.Float64
+
+
+def join(files: Sequence[Path]) -> pl.DataFrame:
+    """One table of several parts, in the order given; a column that a part lacks is null there."""
+    tables = [pl.read_parquet(file) for file in files]
+    return pl.concat(tables, how="diagonal_relaxed") if tables else pl.DataFrame(schema=HEAD)
