@@ -14,7 +14,7 @@ import ibvs_qp
 from ibvs_qp.measurement import SensorFrame
 from ibvs_qp.pilot import Pilot, PilotConfig
 from sim.board import BoardGeometry
-from sim.cameras import CameraStream, PlaneCamera
+from sim.cameras import CameraStream, PlaneCamera, RemoteCamera
 from sim.canvas import Canvas
 from sim.features import GeometricFeatures
 from sim.plant import TICK_NS, Plant
@@ -40,7 +40,10 @@ BASE_TIME, STROKE_FACTOR = 90.0, 2.0
 
 @dataclass(frozen=True, kw_only=True)
 class FlightOptions:
-    """How to fly a scene; the defaults are the main job."""
+    """How to fly a scene; the defaults are the main job.
+
+    With `camera_process` another process draws the pictures: the same flight to the bit, sooner where a core is free.
+    """
 
     law: str = "qp"
     seed: int = 0
@@ -50,6 +53,7 @@ class FlightOptions:
     image_size: tuple[int, int] | None = None
     preset: str | None = None
     video: bool = True
+    camera_process: bool = False
 
 
 def default_preset(law: str) -> PilotConfig:
@@ -92,12 +96,15 @@ class World:
             scene = dataclasses.replace(scene, camera=dataclasses.replace(scene.camera, width=width, height=height))
         self.scene, self.geometry = scene, BoardGeometry(scene)
         vehicle = config.controller.vehicle
+        self._rendered = options.features == "rendered"
+        camera = None
+        if self._rendered and options.camera_process:  # first of all: it sets itself up meanwhile
+            camera = RemoteCamera(scene, vehicle, options.seed, lambda: self.canvas.take())
         self.plant = Plant(scene, vehicle, options.seed)
         self.sensors = SensorSuite(scene, vehicle, options.seed)
         self.canvas = Canvas(scene, options.seed)
-        self._rendered = options.features == "rendered"
         if self._rendered:
-            camera = PlaneCamera(scene, vehicle, self.canvas, options.seed)
+            camera = camera or PlaneCamera(scene, vehicle, self.canvas, options.seed)
             # A drawing thread would hand the interpreter's lock to and fro: measured 10 % slower on two cores.
             self._stream = CameraStream(camera, scene.camera.rate_hz, scene.camera.latency_s, threaded=False)
         else:
@@ -128,6 +135,10 @@ class World:
             self._brush = point
         else:
             self._brush = None
+
+    def close(self) -> int:
+        """End the process that draws the pictures; returns its peak resident memory [bytes], 0 without one."""
+        return self._stream.close() if self._rendered else 0
 
 
 def fly(
@@ -167,7 +178,10 @@ def fly(
                 progress(flown, pilot.painter.phase, flown / max(time.perf_counter() - start, 1e-9))
     except KeyboardInterrupt:
         reason = "interrupted"
-    trace = recorder.trace(time.perf_counter() - start)
+    finally:
+        wall_time, memory = time.perf_counter() - start, world.close()
+    trace = recorder.trace(wall_time)
+    trace.camera_memory_bytes = memory
     trace.completed = not reason and pilot.painter.finished and not pilot.painter.failed
     trace.reason = reason or pilot.painter.reason
     if reason:

@@ -2,6 +2,7 @@
 
 from sim.cameras.plane import PlaneCamera
 from sim.cameras.protocol import Camera, camera_intrinsics
+from sim.cameras.remote import RemoteCamera, spare_core
 from sim.cameras.stream import CameraStream
 
-__all__ = ["Camera", "CameraStream", "PlaneCamera", "camera_intrinsics"]
+__all__ = ["Camera", "CameraStream", "PlaneCamera", "RemoteCamera", "camera_intrinsics", "spare_core"]

@@ -70,6 +70,7 @@ class Paint:
         """
         from rich.console import Console
 
+        from sim.cameras import spare_core
         from sim.checks import check_preset, check_readable, check_seed
         from sim.closed_loop import FlightOptions
         from sim.flights import fly_laws
@@ -92,6 +93,7 @@ class Paint:
             image_size=size,
             preset=str(self.preset) if self.preset else None,
             video=not self.no_video,
+            camera_process=self.law != "both" and spare_core(),
         )
         laws = ("qp", "paper") if self.law == "both" else (self.law,)
         folder = RunFolder.create(self.out)
