@@ -80,7 +80,7 @@ def pilot_config(scene: Scene, options: FlightOptions, config: PilotConfig | Non
         push_n=paint.push_n,
     )
     vision = dataclasses.replace(config.vision, paint_color=paint.color, brush_width_m=paint.brush_width_m)
-    return dataclasses.replace(config, painting=painting, vision=vision, law=options.law)
+    return dataclasses.replace(config, painting=painting, vision=vision, perception=options.vision, law=options.law)
 
 
 class World:

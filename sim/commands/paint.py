@@ -39,8 +39,8 @@ class Paint:
     """Controller preset (TOML): vehicle model, gains, weights, limits; default: the built-in one."""
     features: Literal["rendered", "geometric"] = "rendered"
     """Perception: rendered pictures through the whole vision, or a sensor model of lines."""
-    vision: Literal["own"] = "own"
-    """Vision pipeline."""
+    vision: Literal["own", "paper"] = "own"
+    """Vision pipeline: the own one, or the paper's as a baseline (topmost level line, first upright one)."""
     image_size: Annotated[Literal["640x480", "424x240"] | None, _optional("640x480|424x240")] = None
     """Picture size; default: the scene's."""
     camera: Literal["plane"] = "plane"

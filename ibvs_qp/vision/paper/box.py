@@ -12,6 +12,8 @@ from ibvs_qp.vision.paper.normals import NormalImage
 
 #: Changed normals in a row that end the surface; one alone is noise.
 _IN_A_ROW = 2
+#: Rays that must agree on a side, as a number, and as a share of those that ended there.
+_VOTES, _MOST = 3, 0.5
 #: Share of readings in the seed's window, and on the surface, that must exist.
 _VALID = 0.25
 #: Normals in the box are averaged over a grid of about this many columns.
@@ -74,11 +76,9 @@ class BoxSearch:
         self._cos, self._sin = np.cos(angle), np.sin(angle)
         self._columns = np.rint(self._cos[:, None] * along).astype(np.intp)
         self._rows = np.rint(self._sin[:, None] * along).astype(np.intp)
-        sector = math.cos(math.radians(config.sector_deg)) - 1e-9
-        # rays that decide the left, top, right and bottom side
-        self._sides = [np.flatnonzero(part > sector) for part in (-self._cos, -self._sin, self._cos, self._sin)]
         self._limit = math.cos(math.radians(config.change_deg))
         self._seed_half = max(2, round(0.5 * config.seed_px * scale))
+        self._spread = config.spread_px * scale
         self._smallest = config.smallest_px * scale
         self._visible = visible
         rim = normals.border
@@ -87,6 +87,8 @@ class BoxSearch:
     def search(self, seed_pixel: tuple[float, float]) -> SurfaceBox | str:
         """Find the box around the surface on which a pixel lies, or say why there is none."""
         stride = self._normals.stride
+        if not (math.isfinite(seed_pixel[0]) and math.isfinite(seed_pixel[1])):
+            return f"seed pixel {seed_pixel} is no place in a picture"
         column, row = round(seed_pixel[0] / stride), round(seed_pixel[1] / stride)
         rows, columns = self._normals.shape
         if not (0 <= row < rows and 0 <= column < columns):
@@ -122,18 +124,31 @@ class BoxSearch:
         a, b, c = normal.tolist()
         agreement = a * n.x.ravel().take(place) + b * n.y.ravel().take(place) + c * n.z.ravel().take(place)
         changed = (agreement < self._limit) & self._visible.ravel().take(place) & inside
-        lasting = changed[:, : 1 - _IN_A_ROW] if _IN_A_ROW > 1 else changed
+        lasting = changed[:, : 1 - _IN_A_ROW]
         for shift in range(1, _IN_A_ROW):
             lasting = lasting & changed[:, shift : changed.shape[1] - _IN_A_ROW + 1 + shift]
-        ended = np.where(lasting.any(axis=1), np.argmax(lasting, axis=1), changed.shape[1])
-        leaves = np.where(inside.all(axis=1), changed.shape[1], np.argmin(inside, axis=1))
-        steps = np.minimum(ended, leaves)
-        reach = np.where(steps > 0, self._along[np.maximum(steps, 1) - 1], 0.0)
-        u, v = column + reach * self._cos, row + reach * self._sin
-        left, top, right, bottom = (
-            float(np.median(place[side])) for place, side in zip((u, v, u, v), self._sides, strict=True)
+        ended = np.flatnonzero(lasting.any(axis=1))
+        step = np.argmax(lasting[ended], axis=1)
+        there = place[ended, step]
+        u, v = columns_at[ended, step], rows_at[ended, step]
+        # the change says which way the boundary runs: across the picture if the normal turns up or down
+        level = np.abs(n.y.ravel().take(there) - b) > np.abs(n.x.ravel().take(there) - a)
+        cos, sin = self._cos[ended], self._sin[ended]
+        return (
+            self._side(u[~level & (cos < 0.0)], self._first),
+            self._side(v[level & (sin < 0.0)], self._first),
+            self._side(u[~level & (cos > 0.0)], self._last[1]),
+            self._side(v[level & (sin > 0.0)], self._last[0]),
         )
-        return left, top, right, bottom
+
+    def _side(self, places: np.ndarray, border: int) -> float:
+        """Where most rays of a side saw the boundary, or the picture's border if too few agree."""
+        if len(places) < _VOTES:
+            return float(border)
+        middle = float(np.median(places))
+        agreed = np.abs(places - middle) <= self._spread
+        count = int(np.count_nonzero(agreed))
+        return float(places[agreed].mean()) if count >= max(_VOTES, _MOST * len(places)) else float(border)
 
     def _measure(self, left: float, top: float, right: float, bottom: float, normal: np.ndarray) -> SurfaceBox | str:
         """Mean normal and distance over the box."""

@@ -20,17 +20,21 @@ class PaperConfig:
     median_px: int = setting(5, "aperture of the depth's median filter, odd", unit="px", low=3, high=5)
     smooth_px: float = setting(9.0, "window over which filtered depth is averaged", unit="px", low=1.0, high=61.0)
     baseline_px: float = setting(8.0, "distance of the two readings of a gradient", unit="px", low=2.0, high=60.0)
-    rays: int = setting(48, "directions of the search for the surface's boundary", low=8, high=360)
+    rays: int = setting(72, "directions of the search for the surface's boundary", low=8, high=360)
     ray_step_px: float = setting(3.0, "distance of the places looked at along a ray", unit="px", low=1.0, high=20.0)
-    sector_deg: float = setting(
-        24.0, "rays within this of an image axis decide that side of the box", unit="deg", low=3.0, high=45.0
+    spread_px: float = setting(
+        24.0,
+        "rays agree on a side within this: an edge 4 deg off level",
+        unit="px",
+        low=2.0,
+        high=100.0,
     )
     change_deg: float = setting(
         48.0, "turn of the normal that ends the surface (5 cm in 14 px at 0.5 m: 77)", unit="deg", low=10.0, high=85.0
     )
     seed_px: float = setting(60.0, "window whose normals make that of the seed", unit="px", low=5.0, high=300.0)
     margin_px: float = setting(
-        14.0, "grown around the box: gradients end half a window before the edge", unit="px", low=0.0, high=60.0
+        28.0, "grown around the box: gradients end half a window before the edge", unit="px", low=0.0, high=60.0
     )
     smallest_px: float = setting(60.0, "a box with a shorter side is refused", unit="px", low=10.0, high=400.0)
     canny_low: float = setting(25.0, "lower threshold of Canny, Sobel answer", unit="grey levels", low=1.0, high=1000.0)

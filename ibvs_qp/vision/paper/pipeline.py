@@ -36,12 +36,13 @@ class PaperPipeline:
         self._mask = mask
         self._key: tuple | None = None
 
-    def detect(self, frame: RgbdFrame, seed_pixel: tuple[float, float]) -> PaperDetection:
+    def detect(self, frame: RgbdFrame, seed_pixel: tuple[float, float], *others: tuple[float, float]) -> PaperDetection:
         """See one picture; never raises on data, a picture that cannot be used is refused with a reason.
 
         Args:
             frame: Colour, depth and intrinsics.
             seed_pixel: (u, v) of a place on the surface [px].
+            *others: Places tried in turn where there is no surface at the ones before.
 
         Returns:
             Surface, candidates, the two chosen lines and times.
@@ -49,18 +50,19 @@ class PaperPipeline:
         problem = frame_problem(frame)
         if problem is not None:
             return PaperDetection(refused=problem)
-        if not np.isfinite(seed_pixel).all():
-            return PaperDetection(refused=f"seed pixel {seed_pixel} is no place in a picture")
         clock = StageClock()
         self._allocate(frame)
         self._normals.update(frame.depth)
         clock.lap("normals")
-        box = self._search.search(seed_pixel)
+        box: SurfaceBox | str = ""
+        for seed in (seed_pixel, *others):
+            box = self._search.search(seed)
+            if not isinstance(box, str):
+                break
         clock.lap("box")
-        if isinstance(box, str):
-            return PaperDetection(refused=box, time_ms=clock.times)
-        found = self._lines(frame, box, clock)
-        return found
+        return (
+            PaperDetection(refused=box, time_ms=clock.times) if isinstance(box, str) else self._lines(frame, box, clock)
+        )
 
     def _lines(self, frame: RgbdFrame, box: SurfaceBox, clock: StageClock) -> PaperDetection:
         config, (height, width) = self.config, frame.depth.shape

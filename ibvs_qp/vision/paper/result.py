@@ -113,7 +113,7 @@ def _forward(ends: np.ndarray, upright: bool) -> bool:
 
 
 def _covariance(segment: np.ndarray, rho: float, theta: float, sigma: float) -> np.ndarray:
-    """Of (rho, theta), if both ends are off by ``sigma`` across the line: turning about the middle moves rho as well."""
+    """Of (rho, theta), both ends off by ``sigma`` across the line: a turn about the middle moves rho as well."""
     along = segment @ np.array([-math.sin(theta), math.cos(theta)])
     length = max(abs(float(along[1] - along[0])), 1e-6)
     lever = float(along.mean())

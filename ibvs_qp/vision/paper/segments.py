@@ -70,7 +70,7 @@ class SegmentFinder:
         if lines is None:
             return Segments(level=empty, upright=empty)
         # an averaged pixel's centre lies between those of its four
-        ends = (lines.reshape(-1, 2, 2) + (c0, r0)) * float(_DOWN) + 0.5 * (_DOWN - 1)
+        ends = (lines.reshape(-1, 2, 2) + np.array([c0, r0])) * float(_DOWN) + 0.5 * (_DOWN - 1)
         return _by_slope(ends, config.slope_deg)
 
 
