@@ -11,7 +11,7 @@ from ibvs_qp.vision.paper.config import PaperConfig
 #: Largest number of a 16-bit picture.
 _LARGEST = 65535.0
 #: Keeps the length of a normal from being zero where there is no depth at all.
-_TINY = 1e-12
+_TINY = np.float32(1e-12)
 
 
 class NormalImage:
@@ -49,7 +49,7 @@ class NormalImage:
         u, v = np.arange(columns) * self.stride, np.arange(rows) * self.stride
         self.ray_x = np.tile(((u - cx) / fx).astype(np.float32), (rows, 1))
         self.ray_y = np.repeat(((v - cy) / fy).astype(np.float32)[:, None], columns, axis=1)
-        self._metres = np.zeros((rows, columns), np.float32)
+        self._numbers = np.zeros((rows, columns), np.float32)
         self._raw, self._filtered = np.zeros((rows, columns), np.uint16), np.zeros((rows, columns), np.uint16)
         self._one, self._two = np.zeros((rows, columns), np.float32), np.zeros((rows, columns), np.float32)
         self.depth = np.zeros((rows, columns), np.float32)
@@ -74,7 +74,7 @@ class NormalImage:
         cv2.multiply(self.z, self.z, two)
         cv2.accumulateSquare(x, two)
         cv2.accumulateSquare(y, two)
-        cv2.max(two, _TINY, two)
+        np.maximum(two, _TINY, out=two)
         cv2.sqrt(two, two)
         cv2.divide(x, two, x, -1.0)
         cv2.divide(y, two, y, -1.0)
@@ -93,15 +93,16 @@ class NormalImage:
     def _filter(self, depth: np.ndarray) -> None:
         """Median against speckles and pinholes, mean against noise."""
         source = depth if self.stride == 1 else depth[:: self.stride, :: self.stride]
-        cv2.multiply(source, 1.0 / self._unit, self._metres)
+        np.multiply(source, np.float32(1.0 / self._unit), out=self._numbers)
         # not a number, negative and out of reach become 0: no reading
-        cv2.threshold(self._metres, 0.0, 0.0, cv2.THRESH_TOZERO, self._metres)
-        cv2.threshold(self._metres, _LARGEST, 0.0, cv2.THRESH_TOZERO_INV, self._metres)
-        np.copyto(self._raw, self._metres, casting="unsafe")
+        cv2.patchNaNs(self._numbers, 0.0)
+        cv2.threshold(self._numbers, 0.0, 0.0, cv2.THRESH_TOZERO, self._numbers)
+        cv2.threshold(self._numbers, _LARGEST, 0.0, cv2.THRESH_TOZERO_INV, self._numbers)
+        np.copyto(self._raw, self._numbers, casting="unsafe")
         cv2.medianBlur(self._raw, self._median, self._filtered)
         window = (self._window, self._window)
         cv2.boxFilter(self._filtered, cv2.CV_32F, window, self.depth, normalize=True, borderType=cv2.BORDER_REPLICATE)
-        cv2.multiply(self.depth, self._unit, self.depth)
+        np.multiply(self.depth, np.float32(self._unit), out=self.depth)
 
 
 def _odd(size: float) -> int:
