@@ -14,7 +14,7 @@ import ibvs_qp
 from ibvs_qp.measurement import SensorFrame
 from ibvs_qp.pilot import Pilot, PilotConfig
 from sim.board import BoardGeometry
-from sim.cameras import CameraStream, PlaneCamera
+from sim.cameras import CameraStream, open_camera
 from sim.canvas import Canvas
 from sim.features import GeometricFeatures
 from sim.plant import TICK_NS, Plant
@@ -97,7 +97,7 @@ class World:
         self.canvas = Canvas(scene, options.seed)
         self._rendered = options.features == "rendered"
         if self._rendered:
-            camera = PlaneCamera(scene, vehicle, self.canvas, options.seed)
+            camera = open_camera(options.camera, scene, vehicle, self.canvas, options.seed)
             # A drawing thread would hand the interpreter's lock to and fro: measured 10 % slower on two cores.
             self._stream = CameraStream(camera, scene.camera.rate_hz, scene.camera.latency_s, threaded=False)
         else:

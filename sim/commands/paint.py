@@ -43,8 +43,8 @@ class Paint:
     """Vision pipeline: the own one, or the paper's as a baseline (topmost level line, first upright one)."""
     image_size: Annotated[Literal["640x480", "424x240"] | None, _optional("640x480|424x240")] = None
     """Picture size; default: the scene's."""
-    camera: Literal["plane"] = "plane"
-    """Camera back end; plane needs no GL library."""
+    camera: Literal["plane", "gl", "auto"] = "plane"
+    """Camera back end: plane needs no GL library; gl and auto draw with OpenGL where there is one, else with plane."""
     law: Literal["qp", "paper", "both"] = "both"
     """Which law flies."""
     seed: int = 0
@@ -70,6 +70,7 @@ class Paint:
         """
         from rich.console import Console
 
+        from sim.cameras import resolve_camera
         from sim.checks import check_preset, check_readable, check_seed
         from sim.closed_loop import FlightOptions
         from sim.flights import fly_laws
@@ -84,11 +85,14 @@ class Paint:
         scene = load_scene(self.scene) if self.scene else Scene()
         check_preset(self.preset)
         size = _size(self.image_size)
+        camera, note = resolve_camera(self.camera)
+        if note is not None:
+            print(f"ibvs-qp: {note}", file=sys.stderr)
         options = FlightOptions(
             seed=self.seed,
             features=self.features,
             vision=self.vision,
-            camera=self.camera,
+            camera=camera,
             image_size=size,
             preset=str(self.preset) if self.preset else None,
             video=not self.no_video,
@@ -107,7 +111,7 @@ class Paint:
             "seed": self.seed,
             "scene": str(self.scene) if self.scene else "default",
             "preset": str(self.preset) if self.preset else None,
-            "camera": self.camera,
+            "camera": camera,
             "image_size": list(size or (scene.camera.width, scene.camera.height)),
             "features": self.features,
             "vision": self.vision,
