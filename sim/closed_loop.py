@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,6 +23,9 @@ from sim.recorder import Recorder
 from sim.scene import Scene
 from sim.sensors import SensorSuite
 from sim.trace import Event, Trace
+
+if TYPE_CHECKING:
+    from sim.viewer import FlightViewer
 
 #: Called now and then with simulated time [s], phase name and real-time factor.
 Progress = Callable[[float, str, float], None]
@@ -50,6 +54,7 @@ class FlightOptions:
     image_size: tuple[int, int] | None = None
     preset: str | None = None
     video: bool = True
+    view: bool = False
 
 
 def default_preset(law: str) -> PilotConfig:
@@ -102,8 +107,16 @@ class World:
             self._stream = CameraStream(camera, scene.camera.rate_hz, scene.camera.latency_s, threaded=False)
         else:
             self._features = GeometricFeatures(scene, vehicle, self.canvas, options.seed)
+        self.viewer = self._open_viewer() if options.view else None
         self._brush: np.ndarray | None = None
         self._pressed = 0
+
+    def _open_viewer(self) -> FlightViewer:
+        from sim.viewer import FlightViewer
+
+        board = self.scene.board
+        middle = self.geometry.point(0.5 * board.width_m, 0.5 * board.height_m)
+        return FlightViewer(self.plant, np.append(0.0, middle))
 
     def sense(self) -> SensorFrame:
         """Sensor frame of the present tick."""
@@ -120,6 +133,8 @@ class World:
         self.plant.step(thrusts)
         pressing = self.plant.contact_normal_force > PAINTING_FORCE
         self._pressed += pressing
+        if self.viewer is not None:
+            self.viewer.show(pressing)
         if pressing and self._brush is not None and self._pressed % STROKE_TICKS:
             return
         if pressing:
@@ -167,6 +182,9 @@ def fly(
                 progress(flown, pilot.painter.phase, flown / max(time.perf_counter() - start, 1e-9))
     except KeyboardInterrupt:
         reason = "interrupted"
+    finally:
+        if world.viewer is not None:
+            world.viewer.close()
     trace = recorder.trace(time.perf_counter() - start)
     trace.completed = not reason and pilot.painter.finished and not pilot.painter.failed
     trace.reason = reason or pilot.painter.reason

@@ -4,6 +4,8 @@ MuJoCo picks its own context by the environment variable MUJOCO_GL when it is im
 library is missing. So the variable is never set here: the context is made beside MuJoCo's choice.
 """
 
+# MuJoCo's bindings carry no types.
+# pyright: reportAttributeAccessIssue=false
 from __future__ import annotations
 
 import importlib
@@ -44,14 +46,31 @@ def open_context(width: int, height: int, platforms: tuple[str, ...] = PLATFORMS
     for platform in platforms:
         foreign = "OpenGL" in sys.modules or _PLATFORM_VARIABLE in os.environ
         try:
-            context = importlib.import_module(f"mujoco.{platform}").GLContext(width, height)
-            context.make_current()
+            context = _load(platform).GLContext(width, height)
+            _prove(context)
             return context, platform
         except Exception as error:  # missing libraries surface as AttributeError, ImportError, GLError, FatalError
             reasons.append(f"{platform}: {_short(error)}")
             if not foreign:  # PyOpenGL is bound to this platform now; the next one needs a fresh one
                 _forget(platform)
     raise CameraUnavailable(f"no OpenGL without a display ({'; '.join(reasons)}); {_REMEDY}")
+
+
+def _load(platform: str) -> Any:
+    return importlib.import_module(f"mujoco.{platform}")
+
+
+def _prove(context: Any) -> None:
+    """Make a context current and the renderer in it once: some drivers give a context but none of its functions."""
+    import mujoco
+
+    try:
+        context.make_current()
+        empty = mujoco.MjModel.from_xml_string("<mujoco/>")
+        mujoco.MjrContext(empty, mujoco.mjtFontScale.mjFONTSCALE_50).free()
+    except Exception:
+        context.free()
+        raise
 
 
 def _forget(platform: str) -> None:
@@ -63,6 +82,8 @@ def _forget(platform: str) -> None:
 
 
 def _short(error: Exception) -> str:
+    if isinstance(error, AttributeError) and "NoneType" in str(error):
+        return "library not found"
     text = " ".join(str(error).split())
     first = text.split(". ")[0].rstrip(".")
     return f"{type(error).__name__}: {first}" if first else type(error).__name__

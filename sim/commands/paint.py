@@ -53,6 +53,8 @@ class Paint:
     """Run folder; default: runs/<UTC stamp>."""
     json: Annotated[bool, _flag] = False
     """Print summary.json as one line on standard output, and nothing else."""
+    view: Annotated[bool, _flag] = False
+    """Show the flight in MuJoCo's window at real time, one law after the other; needs a display."""
     no_video: Annotated[bool, _flag] = False
     """Write no video."""
 
@@ -71,12 +73,15 @@ class Paint:
         from rich.console import Console
 
         from sim.cameras import resolve_camera
-        from sim.checks import check_preset, check_readable, check_seed
+        from sim.checks import check_mujoco, check_preset, check_readable, check_seed
+
+        check_mujoco()
         from sim.closed_loop import FlightOptions
         from sim.flights import fly_laws
         from sim.progress import flight_progress
         from sim.rundir import RunFolder
         from sim.scene import Scene, load_scene
+        from sim.viewer import check_display
 
         started = time.perf_counter()
         check_seed(self.seed)
@@ -84,6 +89,8 @@ class Paint:
             check_readable(option, file)
         scene = load_scene(self.scene) if self.scene else Scene()
         check_preset(self.preset)
+        if self.view:
+            check_display()
         size = _size(self.image_size)
         camera, note = resolve_camera(self.camera)
         if note is not None:
@@ -96,13 +103,14 @@ class Paint:
             image_size=size,
             preset=str(self.preset) if self.preset else None,
             video=not self.no_video,
+            view=self.view,
         )
         laws = ("qp", "paper") if self.law == "both" else (self.law,)
         folder = RunFolder.create(self.out)
         notes = Console(stderr=True, quiet=self.json)
         try:
             with flight_progress(notes, scene, laws) as progress:
-                flights = fly_laws(scene, options, laws, progress)
+                flights = fly_laws(scene, options, laws, progress, workers=1 if self.view else None)
         except BaseException:
             folder.discard_if_empty()
             raise
