@@ -31,6 +31,7 @@ from ibvs_qp.painting import Painter, PaintingConfig, Scenery, Wish
 from ibvs_qp.sensor_gate import SensorGate
 from ibvs_qp.settings import choice, dump_toml, load_toml, setting, validate
 from ibvs_qp.vision.config import VisionConfig
+from ibvs_qp.vision.paper.config import PaperConfig
 from ibvs_qp.vision.percept import LineHint
 
 #: Where the fresh edge exists ahead of the brush, normalised image x from the tip's side to the border.
@@ -59,6 +60,8 @@ class PilotConfig:
     vision: VisionConfig = field(default_factory=VisionConfig)
     estimation: EstimationConfig = field(default_factory=EstimationConfig)
     painting: PaintingConfig = field(default_factory=PaintingConfig)
+    perception: str = choice("own", "vision pipeline: the own one or the paper's", ("own", "paper"))
+    paper_vision: PaperConfig = field(default_factory=PaperConfig)
     law: str = choice("qp", "control law", ("qp", "paper"))
 
     def __post_init__(self) -> None:
@@ -198,9 +201,7 @@ class Pilot:
     def _see(self, frame: SensorFrame) -> FeatureFrame | None:
         """Run perception on a picture, with the gyro's turn since the last one."""
         if self._perception is None:
-            from ibvs_qp.vision.perception import Perception
-
-            self._perception = Perception(self.config.vision, self.config.controller.vehicle)
+            self._perception = self._open_eyes()
         image = frame.image
         assert image is not None
         slot = self._slot(image.stamp_ns)
@@ -215,6 +216,17 @@ class Pilot:
             hints=self._hints(image.stamp_ns),
         )
         return self.percept.features
+
+    def _open_eyes(self):
+        """The configured perception, loaded when the first picture comes."""
+        vehicle = self.config.controller.vehicle
+        if self.config.perception == "paper":
+            from ibvs_qp.vision.paper import PaperPerception
+
+            return PaperPerception(self.config.paper_vision, self.config.vision, vehicle)
+        from ibvs_qp.vision.perception import Perception
+
+        return Perception(self.config.vision, vehicle)
 
     def _take(self, features: FeatureFrame) -> None:
         """Correct motion and lines at the time of capture."""
