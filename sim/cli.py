@@ -56,9 +56,11 @@ def _parse(words: list[str]) -> Any:
     """Turn words into the options of a command; the parser's own complaint becomes one line."""
     import tyro
 
+    from sim.commands.bench import Bench
     from sim.commands.paint import Paint
 
     app = tyro.extras.SubcommandApp()
+    app.command(name="bench")(Bench)
     app.command(name="paint")(Paint)
     complaint = io.StringIO()
     try:
@@ -88,7 +90,7 @@ def _one_line(text: str) -> str:
 def _refuse(message: str, words: list[str] | None = None) -> int:
     hint = ""
     if words is not None:
-        command = " ".join(["ibvs-qp", *[word for word in words[:1] if word == "paint"]])
+        command = " ".join(["ibvs-qp", *[word for word in words[:1] if word in ("bench", "paint")]])
         hint = f" (see {command} --help)"
     print("ibvs-qp: error: " + " ".join(message.split()) + hint, file=sys.stderr)
     return EXIT_USER

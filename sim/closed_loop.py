@@ -103,7 +103,8 @@ class World:
         vehicle = config.controller.vehicle
         self._rendered = options.features == "rendered"
         camera = None
-        if self._rendered and options.camera_process and options.camera == "plane":  # first: it sets itself up meanwhile
+        if self._rendered and options.camera_process and options.camera == "plane":
+            # first of all: it sets itself up meanwhile
             camera = RemoteCamera(scene, vehicle, options.seed, lambda: self.canvas.take())
         self.plant = Plant(scene, vehicle, options.seed)
         self.sensors = SensorSuite(scene, vehicle, options.seed)

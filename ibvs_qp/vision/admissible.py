@@ -76,7 +76,8 @@ class Admissible:
         surface = first * across + strips.u * along + constant
         profiles = strips.u.shape[1]
         self._depth = strips.picture.depth
-        self._place, self._place_step = place.astype(np.intp).reshape(-1), row_step.astype(np.intp)[:, 0].repeat(profiles)
+        self._place = place.astype(np.intp).reshape(-1)
+        self._place_step = row_step.astype(np.intp)[:, 0].repeat(profiles)
         self._surface, self._surface_step = surface.reshape(-1), across[:, 0].repeat(profiles)
 
     def at(self, index: np.ndarray) -> np.ndarray:

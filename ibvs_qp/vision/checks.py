@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 
 import numpy as np
 
@@ -32,15 +33,22 @@ def frame_problem(frame: RgbdFrame) -> str | None:
 
 
 class StageClock:
-    """Wall-clock times of the stages [ms]; never enter a result."""
+    """Times of the stages [ms]; never enter a result.
+
+    Attributes:
+        clock: Tells the time [s]: by the wall; a bench puts the thread's own time here, which neighbours do not disturb.
+        times: Time per stage [ms].
+    """
+
+    clock: Callable[[], float] = staticmethod(time.perf_counter)
 
     def __init__(self) -> None:
         self.times: dict[str, float] = {}
-        self._last = time.perf_counter()
+        self._last = self.clock()
 
     def lap(self, stage: str) -> None:
         """End a stage."""
-        now = time.perf_counter()
+        now = self.clock()
         self.times[stage], self._last = 1e3 * (now - self._last), now
 
 

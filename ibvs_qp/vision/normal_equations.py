@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 
-def solve_three(
-    matrix: Sequence[float], wanted: Sequence[float]
-) -> tuple[tuple[float, float, float], float] | None:
+def solve_three(matrix: Sequence[float], wanted: Sequence[float]) -> tuple[tuple[float, float, float], float] | None:
     """Solve a symmetric system of three equations.
 
     Args:

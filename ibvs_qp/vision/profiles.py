@@ -72,7 +72,8 @@ class Strips:
             picture.mask, places, None, cv2.INTER_NEAREST, borderMode=cv2.BORDER_CONSTANT, borderValue=255.0
         )
         shape = (len(views), profiles, 2 * far + 1)
-        return cls(picture, views, u.astype(np.intp), predicted, base.astype(np.intp), colors.reshape(*shape, 3), hidden.reshape(shape), reach, side)
+        colors, hidden = colors.reshape(*shape, 3), hidden.reshape(shape)
+        return cls(picture, views, u.astype(np.intp), predicted, base.astype(np.intp), colors, hidden, reach, side)
 
     @cached_property
     def visible(self) -> np.ndarray:

@@ -9,9 +9,9 @@ import numpy as np
 
 from ibvs_qp.frames import align_line
 from ibvs_qp.vision.config import LineConfig
+from ibvs_qp.vision.fit_lines import LineFits
 from ibvs_qp.vision.profiles import Strips
 from ibvs_qp.vision.query import LineView
-from ibvs_qp.vision.fit_lines import LineFits
 
 _NO_SIDES, _NO_PIXELS = np.zeros((2, 0, 3), np.uint8), np.zeros((0, 2))
 
@@ -88,10 +88,9 @@ def finish_lines(
             continue
         first, last = fits.runs[k]
         among = int(seen[k, last]) - (int(seen[k, first - 1]) if first > 0 else 0)
-        beside = _NO_SIDES, _NO_PIXELS
-        if sides is not None:
-            beside = _contents(k, fits, strips, sides)
-        result.append(_finish(strips, k, (first, last), numbers[k], fits, count / max(among, 1), steps[k], beside, config))
+        share = count / max(among, 1)
+        beside = (_NO_SIDES, _NO_PIXELS) if sides is None else _contents(k, fits, strips, sides)
+        result.append(_finish(strips, k, (first, last), numbers[k], fits, share, steps[k], beside, config))
     return result
 
 

@@ -42,9 +42,7 @@ class RemoteCamera:
         take: `Canvas.take` of the board that is painted here; the process draws its own of the same scene and seed.
     """
 
-    def __init__(
-        self, scene: Scene, vehicle: VehicleParams, seed: int, take: Callable[[], FreshPaint | None]
-    ) -> None:
+    def __init__(self, scene: Scene, vehicle: VehicleParams, seed: int, take: Callable[[], FreshPaint | None]) -> None:
         self.intrinsics, self._take = camera_intrinsics(scene.camera), take
         shape = (scene.camera.height, scene.camera.width)
         # every picture under way has its place, and one is being read
