@@ -36,7 +36,7 @@ class StageClock:
     """Times of the stages [ms]; never enter a result.
 
     Attributes:
-        clock: Tells the time [s]: by the wall; a bench puts the thread's own time here, which neighbours do not disturb.
+        clock: Tells the time [s]: by the wall; a bench puts the thread's own time here, undisturbed by neighbours.
         times: Time per stage [ms].
     """
 

@@ -11,7 +11,7 @@ _TUKEY = 4.685
 #: Smallest residual scale [px]: below this, all residuals are rounding.
 _SCALE_MIN = 0.02
 _MAD = 1.4826
-#: Rounds of reweighting after the consensus.
+#: Rounds of fitting, the first with equal weights.
 _ROUNDS = 2
 #: Shortest distance of the points of a pair [px].
 _APART = 4.0
@@ -114,8 +114,8 @@ def consensus_lines(
     return distance[np.arange(len(u)), best], apart.any(axis=1) & (count > 0)
 
 
-def robust_lines(u: np.ndarray, v: np.ndarray, used: np.ndarray, distance: np.ndarray) -> LineFits:
-    """Tukey-weighted least-squares lines through the used points, (L, K) each, from their distances from a start."""
+def robust_lines(u: np.ndarray, v: np.ndarray, used: np.ndarray) -> LineFits:
+    """Tukey-weighted least-squares lines through the used points, (L, K) each; gross errors are out already."""
     count = used.sum(axis=1)
     middle = 0.5 * (u[:, :1] + u[:, -1:])
     half = np.maximum(0.5 * (u[:, -1:] - u[:, :1]), 1.0)
@@ -123,9 +123,8 @@ def robust_lines(u: np.ndarray, v: np.ndarray, used: np.ndarray, distance: np.nd
     basis = np.empty((*u.shape, 5))
     basis[:, :, 0], basis[:, :, 1], basis[:, :, 2] = 1.0, along, along * along
     basis[:, :, 3], basis[:, :, 4] = v, along * v
-    unit = _unit(distance, used, count)
-    weight = _tukey(distance, unit) * used
-    residual, sums, slope, level = distance, np.zeros((5, len(u))), np.zeros(len(u)), np.zeros(len(u))
+    weight, unit = used.astype(float), None
+    residual, sums, slope, level = v, np.zeros((5, len(u))), np.zeros(len(u)), np.zeros(len(u))
     spread = center = slope
     for _ in range(_ROUNDS):
         sums = (weight[:, None] @ basis)[:, 0].T
@@ -135,7 +134,8 @@ def robust_lines(u: np.ndarray, v: np.ndarray, used: np.ndarray, distance: np.nd
         slope = (sums[4] - sums[3] * center) / spread
         level = sums[3] / total
         residual = v - (level - slope * center)[:, None] - slope[:, None] * along
-        weight = _tukey(residual, _unit(residual, used, count)) * used
+        unit = _unit(residual, used, count) if unit is None else unit
+        weight = _tukey(residual, unit) * used
     total = np.maximum(weight.sum(axis=1), 1.0)
     residual = residual * used
     weighted = weight * residual

@@ -83,7 +83,7 @@ def _fit(strips: Strips, admissible: Admissible, config: LineConfig, scale: floa
     profile, limits = np.arange(support.shape[1]), np.array(runs)[:, :, None]
     support &= (profile >= limits[:, 0]) & (profile <= limits[:, 1])
     count = support.sum(axis=1)
-    lines = robust_lines(u, rows, support, distance)
+    lines = robust_lines(u, rows, support)
     before, behind = strips.sides(rows)
     change = behind.astype(np.float32) - before
     steps = (support.astype(np.float32)[:, None] @ change)[:, 0] / np.maximum(count, 1)[:, None]

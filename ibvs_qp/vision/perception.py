@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable, Sequence
 
 import cv2
 import numpy as np
@@ -25,6 +26,19 @@ from ibvs_qp.vision.tracks import LineTracker
 
 #: Pictures after a start in which lines are searched often: colours are learned in the first one.
 _WARM_UP = 8
+
+
+class _Lazy(Sequence[np.ndarray]):
+    """Pictures made when they are looked at: the first seed mostly does."""
+
+    def __init__(self, size: int, make: Callable[[int], np.ndarray]) -> None:
+        self._size, self._make = size, make
+
+    def __len__(self) -> int:
+        return self._size
+
+    def __getitem__(self, index):
+        return self._make(index)
 
 
 class Perception:
@@ -183,10 +197,14 @@ class Perception:
             seeds = [cell]
         # a wall a few centimetres behind differs in colour, hardly in depth: before the board is known, the colour
         # around each seed stands for it
-        wanted = [
-            self._colors.like_around(self._grid, coarse, seed, config.seed_radius) if prefer is None else prefer
-            for seed in seeds
-        ]
+        wanted = _Lazy(
+            len(seeds),
+            lambda index: (
+                self._colors.like_around(self._grid, coarse, seeds[index], config.seed_radius)
+                if prefer is None
+                else prefer
+            ),
+        )
         found = self._fitter.search(self._grid, inverse, seeds, down, wanted)
         self._plane = found if isinstance(found, PlaneEstimate) else None
         return None if isinstance(found, PlaneEstimate) else found

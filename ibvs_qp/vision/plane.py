@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -42,7 +43,7 @@ class PlaneFitter:
         inverse: np.ndarray,
         seeds: list[tuple[int, int]],
         down: np.ndarray | None,
-        prefer: list[np.ndarray] | None,
+        prefer: Sequence[np.ndarray] | None,
     ) -> PlaneEstimate | str:
         """Find the surface without a prediction.
 

@@ -31,10 +31,10 @@ class NoiseBank:
         self._brighter, self._darker = np.maximum(grey, 0).astype(np.uint8), np.maximum(-grey, 0).astype(np.uint8)
         # White noise blurred with this Gaussian is correlated over DEPTH_CORRELATION_PX (1/e at 2 sigma).
         shape = (rows, 2 * width)
+        self._depth = rng.standard_normal(shape, np.float32)
+        self._depth *= np.float32(depth_relative)
         blurred = cv2.GaussianBlur(rng.standard_normal(shape, np.float32), (0, 0), 0.5 * DEPTH_CORRELATION_PX)
-        white = rng.standard_normal(shape, np.float32)
-        white *= np.float32(depth_relative)
-        self._depth = cv2.scaleAdd(blurred, depth_relative / float(blurred.std()), white)
+        self._depth += blurred * np.float32(depth_relative / float(blurred.std()))
         self._depth += np.float32(1.0)
         self._lifted = np.empty((height, width * 3), np.uint8)
 
