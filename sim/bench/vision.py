@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -24,8 +25,8 @@ from sim.scene import Scene
 SIZES = ((640, 480), (424, 240))
 #: Pictures seen before any is timed: buffers, tables and caches are warm then.
 _WARM = 12
-#: Times each real frame is seen.
-_REPEATS = 8
+#: Times each real frame is seen at least, and real pictures seen in all at least.
+_REPEATS, _LEAST = 8, 3 * _WARM
 #: What a tracked picture consists of, and a detection from nothing.
 _TRACKED, _DETECTION = ("plane", "tracks"), ("plane", "tracks", "detect")
 
@@ -98,7 +99,13 @@ def _sum_us(percept: Percept, stages: Iterable[str]) -> float:
     return 1e3 * sum(percept.time_ms.get(name, 0.0) for name in stages)
 
 
-def bench_vision(frames: int, seed: int, real: Path | None, progress: Progress) -> Bench:
+def bench_vision(
+    frames: int,
+    seed: int,
+    real: Path | None,
+    progress: Progress,
+    sizes: tuple[tuple[int, int], ...] = SIZES,
+) -> Bench:
     """Measure vision on rendered pictures of a mission, and on real ones where there is a folder of them.
 
     Args:
@@ -106,9 +113,13 @@ def bench_vision(frames: int, seed: int, real: Path | None, progress: Progress) 
         seed: Of the rendered scene.
         real: Folder with a manifest.csv, or None.
         progress: Told what is measured.
+        sizes: Rendered picture sizes (width, height) [px].
 
     Returns:
-        Rows, the stages' medians and the ratios at the first size.
+        Rows, the stages' medians and the ratios at the first size (real frames, where none is rendered).
+
+    Raises:
+        IbvsQpError: When the folder of real frames cannot be used.
     """
     threads, clock = cv2.getNumThreads(), StageClock.clock
     cv2.setNumThreads(1)
@@ -116,19 +127,20 @@ def bench_vision(frames: int, seed: int, real: Path | None, progress: Progress) 
     try:
         vehicle, paint = VehicleParams(), Scene().paint
         config = VisionConfig(paint_color=paint.color, brush_width_m=paint.brush_width_m)
-        measured = []
-        for size in SIZES:
+        measured, found = [], []
+        if real is not None:
+            progress("real frames")
+            found = _see_real(real, vehicle)  # first, so that a folder that cannot be used is refused at once
+        for size in sizes:
             progress(f"rendered {size[0]}x{size[1]}")
             rivals = _Rivals(config, vehicle, f"{size[0]}x{size[1]}")
             for shot in mission_shots(size, frames, seed, vehicle):
                 rivals.see(shot)
             measured.append(rivals)
-        if real is not None:
-            progress("real frames")
-            measured += _see_real(real, vehicle)
     finally:
         cv2.setNumThreads(threads)
         StageClock.clock = staticmethod(clock)
+    measured += found
     first = measured[0]
     ratios = {
         "track_vs_paper": first.ratio("paper", "tracked_frame"),
@@ -149,7 +161,7 @@ def _see_real(folder: Path, vehicle: VehicleParams) -> list[_Rivals]:
     for (shape, _), frames in by_camera.items():
         size = f"{shape[1]}x{shape[0]}"
         rivals = _Rivals(VisionConfig(), vehicle, size, "_real")
-        for _ in range(_REPEATS):
+        for _ in range(max(_REPEATS, math.ceil(_LEAST / len(frames)))):
             for frame, seed in frames:
                 rivals.see(Shot(frame=frame, attitude=level, rotation=still, velocity=still), seed)
         known = measured.setdefault(size, rivals)
