@@ -167,19 +167,23 @@ class SparseFlow:
         self, last: np.ndarray, grey: np.ndarray, start: np.ndarray, expected: bool
     ) -> tuple[np.ndarray, np.ndarray]:
         """The points in this picture, searched from a start, and whether each was found."""
-        window = (self._config.window_px, self._config.window_px)
-        for levels in (0, _LEVELS) if expected else (_LEVELS,):
-            found, status, _ = cv2.calcOpticalFlowPyrLK(
-                last,
-                grey,
-                self._points,
-                start.copy(),  # the search writes into it
-                winSize=window,
-                maxLevel=levels,
-                criteria=_CRITERIA,
-                flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
-            )
-            near = (np.abs(found - start) < _NEAR_PX).all(axis=1)
-            if np.count_nonzero(near) >= _MOST * len(start):
-                break
+        found, status = self._lucas_kanade(last, grey, start, 0 if expected else _LEVELS)
+        near = (np.abs(found - start) < _NEAR_PX).all(axis=1)
+        if expected and np.count_nonzero(near) < _MOST * len(start):
+            found, status = self._lucas_kanade(last, grey, start, _LEVELS)
+        return found, status
+
+    def _lucas_kanade(
+        self, last: np.ndarray, grey: np.ndarray, start: np.ndarray, levels: int
+    ) -> tuple[np.ndarray, np.ndarray]:
+        found, status, _ = cv2.calcOpticalFlowPyrLK(
+            last,
+            grey,
+            self._points,
+            start.copy(),  # the search writes into it
+            winSize=(self._config.window_px, self._config.window_px),
+            maxLevel=levels,
+            criteria=_CRITERIA,
+            flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
+        )
         return found, status

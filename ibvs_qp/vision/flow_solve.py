@@ -85,10 +85,10 @@ def inverse_depths(
     cross = np.array([0, -_CROSS_PX, _CROSS_PX, -_CROSS_PX * width, _CROSS_PX * width])
     z = depth.reshape(-1).take((place @ (1, width))[:, None] + cross)
     good = (z > 0) & (z < np.inf)  # false for NaN too
-    count = good.sum(axis=1)
+    count = np.count_nonzero(good, axis=1)
     z[~good] = np.inf
     z.sort(axis=1)  # the median of the valid ones is at half their count
-    middle = z.take(np.minimum(count // 2, len(cross) - 1) + np.arange(0, z.size, len(cross)))
+    middle = z[np.arange(len(z)), np.minimum(count // 2, len(cross) - 1)]
     inverse = (1.0 / middle) * (count >= _READINGS)
     if plane is not None:
         a, b, c = plane.inverse_depth

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import cv2
 import numpy as np
@@ -28,16 +28,13 @@ from ibvs_qp.vision.tracks import LineTracker
 _WARM_UP = 8
 
 
-class _Lazy(Sequence[np.ndarray]):
-    """Pictures made when they are looked at: the first seed mostly does."""
+class _Likenesses:
+    """Labels by colour for every seed, made when they are looked at: mostly the first seed does."""
 
-    def __init__(self, size: int, make: Callable[[int], np.ndarray]) -> None:
-        self._size, self._make = size, make
+    def __init__(self, make: Callable[[int], np.ndarray]) -> None:
+        self._make = make
 
-    def __len__(self) -> int:
-        return self._size
-
-    def __getitem__(self, index):
+    def __getitem__(self, index: int, /) -> np.ndarray:
         return self._make(index)
 
 
@@ -197,13 +194,12 @@ class Perception:
             seeds = [cell]
         # a wall a few centimetres behind differs in colour, hardly in depth: before the board is known, the colour
         # around each seed stands for it
-        wanted = _Lazy(
-            len(seeds),
+        wanted = _Likenesses(
             lambda index: (
                 self._colors.like_around(self._grid, coarse, seeds[index], config.seed_radius)
                 if prefer is None
                 else prefer
-            ),
+            )
         )
         found = self._fitter.search(self._grid, inverse, seeds, down, wanted)
         self._plane = found if isinstance(found, PlaneEstimate) else None

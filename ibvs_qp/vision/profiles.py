@@ -67,9 +67,9 @@ class Strips:
         np.add(x[:, :, None], (steps * upright)[:, None], out=places[..., 0])
         np.add(y[:, :, None], (steps * ~upright)[:, None], out=places[..., 1])
         places = places.reshape(len(views) * profiles, -1, 2)
-        colors = cv2.remap(picture.rgb, places, None, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)
+        colors = cv2.remap(picture.rgb, places, _WHOLE, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)
         hidden = cv2.remap(
-            picture.mask, places, None, cv2.INTER_NEAREST, borderMode=cv2.BORDER_CONSTANT, borderValue=255.0
+            picture.mask, places, _WHOLE, cv2.INTER_NEAREST, borderMode=cv2.BORDER_CONSTANT, borderValue=255.0
         )
         shape = (len(views), profiles, 2 * far + 1)
         colors, hidden = colors.reshape(*shape, 3), hidden.reshape(shape)
@@ -137,4 +137,7 @@ class Strips:
         return flat.take(start + before, axis=0), flat.take(start + behind, axis=0)
 
 
+#: Whole pixels need no table of fractions.
+_WHOLE = np.empty((0, 0), np.uint16)
+#: A place and those beside it.
 _NEIGHBOURS = np.array([-1, 0, 1])[:, None]

@@ -12,8 +12,7 @@ import numpy as np
 
 from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.vehicle import VehicleParams
-from ibvs_qp.vision import Percept, Perception, VisionConfig
-from ibvs_qp.vision.checks import StageClock
+from ibvs_qp.vision import Percept, Perception, VisionConfig, checks
 from ibvs_qp.vision.layout import PictureLayout
 from ibvs_qp.vision.paper import PaperPipeline
 from sim.bench.mission import Shot, mission_shots
@@ -121,9 +120,9 @@ def bench_vision(
     Raises:
         IbvsQpError: When the folder of real frames cannot be used.
     """
-    threads, clock = cv2.getNumThreads(), StageClock.clock
+    threads, clock = cv2.getNumThreads(), checks.stage_time
     cv2.setNumThreads(1)
-    StageClock.clock = staticmethod(time.thread_time)
+    checks.stage_time = time.thread_time
     try:
         vehicle, paint = VehicleParams(), Scene().paint
         config = VisionConfig(paint_color=paint.color, brush_width_m=paint.brush_width_m)
@@ -139,7 +138,7 @@ def bench_vision(
             measured.append(rivals)
     finally:
         cv2.setNumThreads(threads)
-        StageClock.clock = staticmethod(clock)
+        checks.stage_time = clock
     measured += found
     first = measured[0]
     ratios = {

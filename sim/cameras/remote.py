@@ -11,6 +11,7 @@ import sys
 import traceback
 from collections.abc import Callable
 from multiprocessing.connection import Connection
+from typing import NoReturn
 
 import numpy as np
 
@@ -95,7 +96,7 @@ class RemoteCamera:
 
         return develop
 
-    def _failed(self) -> None:
+    def _failed(self) -> NoReturn:
         raise RuntimeError("the drawing process died without a word; was it out of memory?") from None
 
     def close(self) -> int:
