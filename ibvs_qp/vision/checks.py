@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 
@@ -26,8 +27,11 @@ def frame_problem(frame: RgbdFrame) -> str | None:
         return f"depth picture of type {depth.dtype}, metres in floating point are needed"
     if min(rgb.shape[:2]) < _SMALLEST:
         return f"picture of {rgb.shape[1]} x {rgb.shape[0]} px is too small"
-    intrinsics = np.asarray(frame.intrinsics, float)
-    if intrinsics.shape != (4,) or not np.isfinite(intrinsics).all() or min(intrinsics[:2]) <= 1.0:
+    try:
+        fx, fy, cx, cy = (float(number) for number in frame.intrinsics)
+    except (TypeError, ValueError):
+        fx = fy = cx = cy = math.nan
+    if not (math.isfinite(fx + fy + cx + cy) and min(fx, fy) > 1.0):
         return f"intrinsics {frame.intrinsics} are not (fx, fy, cx, cy) in pixels"
     return None
 

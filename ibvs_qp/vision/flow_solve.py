@@ -83,7 +83,7 @@ def inverse_depths(
     place = np.rint(bearings * (fx, fy) + (cx, cy)).astype(np.intp)
     place = np.minimum(np.maximum(place, _CROSS_PX), (width - 1 - _CROSS_PX, height - 1 - _CROSS_PX))
     cross = np.array([0, -_CROSS_PX, _CROSS_PX, -_CROSS_PX * width, _CROSS_PX * width])
-    z = depth.reshape(-1).take((place @ (1, width))[:, None] + cross)
+    z = depth.reshape(-1).take((place @ np.array((1, width)))[:, None] + cross)
     good = (z > 0) & (z < np.inf)  # false for NaN too
     count = np.count_nonzero(good, axis=1)
     z[~good] = np.inf
