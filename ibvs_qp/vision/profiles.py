@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import cv2
 import numpy as np
@@ -102,9 +102,7 @@ class Strips:
 
     def strongest(self, response: np.ndarray) -> np.ndarray:
         """Index of the strongest answer along the last axis, with a preference for the predicted place."""
-        offset = np.arange(-self.reach, self.reach + 1)
-        preference = np.exp(-0.5 * (offset / max(_PREFERENCE * self.reach, 1.0)) ** 2).astype(np.float32)
-        return (response * preference).argmax(axis=-1)
+        return (response * _preference(self.reach)).argmax(axis=-1)
 
     def peaks(self, response: np.ndarray, index: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Sub-pixel peaks of answers (n, 2 reach + 1) near whole places (n,).
@@ -135,6 +133,13 @@ class Strips:
         before = np.minimum(np.maximum(index - self.side, 0), last)
         behind = np.minimum(np.maximum(index + self.side, 0), last)
         return flat.take(start + before, axis=0), flat.take(start + behind, axis=0)
+
+
+@lru_cache(maxsize=16)
+def _preference(reach: int) -> np.ndarray:
+    """Weight of every place of a strip: the predicted one in the middle counts most, float32 (2 reach + 1,)."""
+    offset = np.arange(-reach, reach + 1)
+    return np.exp(-0.5 * (offset / max(_PREFERENCE * reach, 1.0)) ** 2).astype(np.float32)
 
 
 #: Whole pixels need no table of fractions.
