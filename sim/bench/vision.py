@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import time
 from collections.abc import Callable, Iterable
@@ -29,11 +30,17 @@ _REPEATS, _LEAST = 8, 3 * _WARM
 #: What a tracked picture consists of, and a detection from nothing.
 _TRACKED, _DETECTION = ("plane", "tracks"), ("plane", "tracks", "detect")
 
+#: Pictures that each rival sees in turn.
+_TURN = 10
+#: A search for lines takes longer than this, the decision against one does not [ms].
+_SEARCH_MS = 0.3
+
+_Seed = tuple[float, float] | None
 Progress = Callable[[str], None]
 
 
 class _Rivals:
-    """All that is measured on pictures of one size and camera, seen one after the other in turn."""
+    """All that is measured on pictures of one size and camera."""
 
     def __init__(self, config: VisionConfig, vehicle: VehicleParams, size: str, suffix: str = "") -> None:
         self._tracker, self._detector = Perception(config, vehicle), Perception(config, vehicle)
@@ -45,21 +52,32 @@ class _Rivals:
         self.stages: dict[str, list[float]] = {}
         self._seen = 0
 
-    def see(self, shot: Shot, seed: tuple[float, float] | None = None) -> None:
-        """Have all rivals see a picture; the first ones warm them up."""
-        frame = shot.frame
+    def see(self, shots: Iterable[Shot], seeds: Iterable[_Seed] | None = None) -> None:
+        """Have all rivals see pictures, a few at a time each: every one finds its code and tables warm, in one run."""
+        pictures = zip(shots, itertools.repeat(None) if seeds is None else seeds, strict=False)
+        for few in iter(lambda: list(itertools.islice(pictures, _TURN)), []):
+            self._prepare(*few[0])
+            first, self._seen = self._seen, self._seen + len(few)
+            for see in (self._see_tracker, self._see_detector, self._see_paper, self._see_segments):
+                for number, (shot, seed) in enumerate(few, start=first):
+                    counted = number >= _WARM
+                    rows = self.rows if counted else {name: Row(name=name) for name in self.rows}
+                    times = see(rows, shot, seed, number)
+                    for name, time_ms in times.items() if counted else ():
+                        self.stages.setdefault(name, []).append(1e3 * time_ms)
+
+    def _prepare(self, shot: Shot, seed: tuple[float, float] | None) -> None:
         if self._paper is None:
-            layout = PictureLayout(frame, self._config, self._vehicle)
+            layout = PictureLayout(shot.frame, self._config, self._vehicle)
             self._paper = PaperPipeline(mask=layout.mask if seed is None else None)
             (row, column), grid = layout.seeds[0], layout.grid
             self._seed = (float(grid.offset + grid.stride * column), float(grid.offset + grid.stride * row))
-        self._seen += 1
-        counted = self._seen > _WARM
-        rows = self.rows if counted else {name: Row(name=name) for name in self.rows}
-        first = seed if self._seen == 1 else None
+
+    def _see_tracker(self, rows: dict[str, Row], shot: Shot, seed: _Seed, number: int) -> dict[str, float]:
+        place = seed if number == 0 else None
         percept = rows["whole_frame"].measure(
             lambda: self._tracker.process(
-                frame, attitude=shot.attitude, rotation=shot.rotation, velocity=shot.velocity, seed_pixel=first
+                shot.frame, attitude=shot.attitude, rotation=shot.rotation, velocity=shot.velocity, seed_pixel=place
             )
         )
         times = percept.time_ms
@@ -68,30 +86,29 @@ class _Rivals:
             rows["tracked_frame"].times_us.append(_sum_us(percept, _TRACKED))
         if percept.features.velocity is not None:
             rows["velocity"].times_us.append(1e3 * times["flow"])
-        self._detector.reset()
-        fresh = self._detector.process(frame, attitude=shot.attitude, detect=True, seed_pixel=seed)
-        rows["detection"].times_us.append(_sum_us(fresh, _DETECTION))
-        paper = self._paper
-        found = rows["paper"].measure(lambda: paper.detect(frame, seed or self._seed))
-        if self._segments is not None:
-            segments = self._segments
-            rows["lsd"].measure(lambda: segments.detect(cv2.cvtColor(frame.rgb, cv2.COLOR_RGB2GRAY)))
-        if counted:
-            self._note("", {name: times[name] for name in ("plane", "tracks", "flow") if name in times})
-            self._note("detection_", {name: fresh.time_ms[name] for name in _DETECTION if name in fresh.time_ms})
-            self._note("paper_", found.time_ms)
+        return {name: times[name] for name in ("plane", "tracks", "flow") if name in times}
 
-    def _note(self, prefix: str, times_ms: dict[str, float]) -> None:
-        for name, time_ms in times_ms.items():
-            self.stages.setdefault(prefix + name, []).append(1e3 * time_ms)
+    def _see_detector(self, rows: dict[str, Row], shot: Shot, seed: _Seed, number: int) -> dict[str, float]:
+        self._detector.reset()
+        percept = self._detector.process(shot.frame, attitude=shot.attitude, detect=True, seed_pixel=seed)
+        rows["detection"].times_us.append(_sum_us(percept, _DETECTION))
+        return {f"detection_{name}": percept.time_ms[name] for name in _DETECTION if name in percept.time_ms}
+
+    def _see_paper(self, rows: dict[str, Row], shot: Shot, seed: _Seed, number: int) -> dict[str, float]:
+        paper = self._paper
+        assert paper is not None
+        found = rows["paper"].measure(lambda: paper.detect(shot.frame, seed or self._seed))
+        return {f"paper_{name}": time_ms for name, time_ms in found.time_ms.items()}
+
+    def _see_segments(self, rows: dict[str, Row], shot: Shot, seed: _Seed, number: int) -> dict[str, float]:
+        segments = self._segments
+        if segments is not None:
+            rows["lsd"].measure(lambda: segments.detect(cv2.cvtColor(shot.frame.rgb, cv2.COLOR_RGB2GRAY)))
+        return {}
 
     def ratio(self, rival: str, ours: str) -> float:
         """Median of a rival to the median of ours."""
         return self.rows[rival].median_us / self.rows[ours].median_us
-
-
-#: A search for lines takes longer than this, the decision against one does not [ms].
-_SEARCH_MS = 0.3
 
 
 def _sum_us(percept: Percept, stages: Iterable[str]) -> float:
@@ -133,8 +150,7 @@ def bench_vision(
         for size in sizes:
             progress(f"rendered {size[0]}x{size[1]}")
             rivals = _Rivals(config, vehicle, f"{size[0]}x{size[1]}")
-            for shot in mission_shots(size, frames, seed, vehicle):
-                rivals.see(shot)
+            rivals.see(mission_shots(size, frames, seed, vehicle))
             measured.append(rivals)
     finally:
         cv2.setNumThreads(threads)
@@ -160,9 +176,9 @@ def _see_real(folder: Path, vehicle: VehicleParams) -> list[_Rivals]:
     for (shape, _), frames in by_camera.items():
         size = f"{shape[1]}x{shape[0]}"
         rivals = _Rivals(VisionConfig(), vehicle, size, "_real")
-        for _ in range(max(_REPEATS, math.ceil(_LEAST / len(frames)))):
-            for frame, seed in frames:
-                rivals.see(Shot(frame=frame, attitude=level, rotation=still, velocity=still), seed)
+        shots = [Shot(frame=frame, attitude=level, rotation=still, velocity=still) for frame, _ in frames]
+        times = max(_REPEATS, math.ceil(_LEAST / len(frames)))
+        rivals.see(shots * times, [seed for _, seed in frames] * times)
         known = measured.setdefault(size, rivals)
         if known is not rivals:
             for name, row in rivals.rows.items():

@@ -21,7 +21,7 @@ def _optional(metavar: str) -> Any:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Bench:
-    """Measure what a picture costs, one thread, rivals warmed and seen in turn in the same run.
+    """Measure what a picture costs, one thread, rivals warmed and in turn in the same run.
 
     Example: ibvs-qp bench vision --real frames/board --json
     """
