@@ -34,6 +34,7 @@ from ibvs_qp.sensor_gate import SensorGate
 from ibvs_qp.settings import choice, dump_toml, load_toml, setting, validate
 from ibvs_qp.vectors import Row, down_row
 from ibvs_qp.vision.config import VisionConfig
+from ibvs_qp.vision.paper.config import PaperConfig
 from ibvs_qp.vision.percept import LineHint
 
 #: Where the fresh edge exists ahead of the brush, normalised image x from the tip's side to the border.
@@ -62,6 +63,8 @@ class PilotConfig:
     vision: VisionConfig = field(default_factory=VisionConfig)
     estimation: EstimationConfig = field(default_factory=EstimationConfig)
     painting: PaintingConfig = field(default_factory=PaintingConfig)
+    perception: str = choice("own", "vision pipeline: the own one or the paper's", ("own", "paper"))
+    paper_vision: PaperConfig = field(default_factory=PaperConfig)
     law: str = choice("qp", "control law", ("qp", "paper"))
 
     def __post_init__(self) -> None:
@@ -221,9 +224,7 @@ class Pilot:
     def _see(self, frame: SensorFrame) -> FeatureFrame | None:
         """Run perception on a picture, with the gyro's turn since the last one."""
         if self._perception is None:
-            from ibvs_qp.vision.perception import Perception
-
-            self._perception = Perception(self.config.vision, self.config.controller.vehicle)
+            self._perception = self._open_eyes()
         image = frame.image
         assert image is not None
         slot = self._slot(image.stamp_ns)
@@ -239,6 +240,17 @@ class Pilot:
         )
         seen = self.percept.features
         return seen if self._seen_as is None or seen is None else self._seen_as(seen)
+
+    def _open_eyes(self):
+        """The configured perception, loaded when the first picture comes."""
+        vehicle = self.config.controller.vehicle
+        if self.config.perception == "paper":
+            from ibvs_qp.vision.paper import PaperPerception
+
+            return PaperPerception(self.config.paper_vision, self.config.vision, vehicle)
+        from ibvs_qp.vision.perception import Perception
+
+        return Perception(self.config.vision, vehicle)
 
     def _take(self, features: FeatureFrame) -> None:
         """Correct motion and lines at the time of capture."""

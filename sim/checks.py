@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import tomllib
 from pathlib import Path
 
@@ -49,3 +50,20 @@ def check_preset(file: Path | None) -> None:
         tomllib.loads(file.read_text(encoding="utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ConfigError(f"{file} is not valid TOML: {error}") from None
+
+
+def check_mujoco() -> None:
+    """Refuse a MUJOCO_GL that keeps MuJoCo from loading; pictures here never depend on it.
+
+    Raises:
+        ConfigError: When the variable is set and MuJoCo cannot be imported.
+    """
+    wanted = os.environ.get("MUJOCO_GL")
+    if not wanted:
+        return
+    try:
+        import mujoco  # noqa: F401
+    except Exception as error:  # a missing library surfaces as AttributeError
+        raise ConfigError(
+            f"MUJOCO_GL = {wanted} keeps MuJoCo from loading ({error}); unset it, it is not needed"
+        ) from None

@@ -18,7 +18,7 @@ from typing import Any
 from ibvs_qp.errors import IbvsQpError
 
 #: Commands by name, for hints.
-COMMANDS = ("paint", "experiment", "compare", "explain")
+COMMANDS = ("paint", "experiment", "compare", "explain", "bench", "detect")
 EXIT_INTERNAL, EXIT_USER, EXIT_INTERRUPTED = 1, 2, 130
 
 #: One thread each: the matrices are small, and the laws and their repeats share the cores as processes.
@@ -58,12 +58,14 @@ def _parse(words: list[str]) -> Any:
     """Turn words into the options of a command; the parser's own complaint becomes one line."""
     import tyro
 
+    from sim.commands.bench import Bench
     from sim.commands.compare import Compare
     from sim.commands.experiment import ExperimentCommand
     from sim.commands.explain import Explain
     from sim.commands.paint import Paint
 
     app = tyro.extras.SubcommandApp()
+    app.command(name="bench")(Bench)
     app.command(name="paint")(Paint)
     app.command(name="experiment")(ExperimentCommand)
     app.command(name="compare")(Compare)

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,7 +15,7 @@ import ibvs_qp
 from ibvs_qp.measurement import SensorFrame
 from ibvs_qp.pilot import Pilot, PilotConfig
 from sim.board import BoardGeometry
-from sim.cameras import CameraStream, PlaneCamera
+from sim.cameras import CameraStream, RemoteCamera, open_camera
 from sim.canvas import Canvas
 from sim.faults import Fault, FaultSchedule
 from sim.features import GeometricFeatures, add_sigma_vs
@@ -26,6 +27,9 @@ from sim.scene import Scene
 from sim.sensors import SensorSuite
 from sim.streams import stream
 from sim.trace import Event, Trace
+
+if TYPE_CHECKING:
+    from sim.viewer import FlightViewer
 
 #: Called now and then with simulated time [s], phase name and real-time factor.
 Progress = Callable[[float, str, float], None]
@@ -44,7 +48,10 @@ BASE_TIME, STROKE_FACTOR = 90.0, 2.0
 
 @dataclass(frozen=True, kw_only=True)
 class FlightOptions:
-    """How to fly a scene; the defaults are the main job."""
+    """How to fly a scene; the defaults are the main job.
+
+    With `camera_process` another process draws the pictures: the same flight to the bit, sooner where a core is free.
+    """
 
     law: str = "qp"
     seed: int = 0
@@ -54,6 +61,8 @@ class FlightOptions:
     image_size: tuple[int, int] | None = None
     preset: str | None = None
     video: bool = True
+    camera_process: bool = False
+    view: bool = False
 
 
 def default_preset(law: str) -> PilotConfig:
@@ -84,7 +93,7 @@ def pilot_config(scene: Scene, options: FlightOptions, config: PilotConfig | Non
         push_n=paint.push_n,
     )
     vision = dataclasses.replace(config.vision, paint_color=paint.color, brush_width_m=paint.brush_width_m)
-    return dataclasses.replace(config, painting=painting, vision=vision, law=options.law)
+    return dataclasses.replace(config, painting=painting, vision=vision, perception=options.vision, law=options.law)
 
 
 class World:
@@ -96,19 +105,31 @@ class World:
             scene = dataclasses.replace(scene, camera=dataclasses.replace(scene.camera, width=width, height=height))
         self.scene, self.geometry = scene, BoardGeometry(scene)
         vehicle = config.controller.vehicle
+        self._rendered = options.features == "rendered"
+        camera = None
+        if self._rendered and options.camera_process and options.camera == "plane":
+            # first of all: it sets itself up meanwhile
+            camera = RemoteCamera(scene, vehicle, options.seed, lambda: self.canvas.take())
         self.plant = Plant(scene, vehicle, options.seed)
         self.sensors = SensorSuite(scene, vehicle, options.seed)
         self.canvas = Canvas(scene, options.seed)
-        self._rendered = options.features == "rendered"
         self._miscalibration = Miscalibration(scene.camera, vehicle, self._rendered)
         if self._rendered:
-            camera = PlaneCamera(scene, vehicle, self.canvas, options.seed)
+            camera = camera or open_camera(options.camera, scene, vehicle, self.canvas, options.seed)
             # A drawing thread would hand the interpreter's lock to and fro: measured 10 % slower on two cores.
             self._stream = CameraStream(camera, scene.camera.rate_hz, scene.camera.latency_s, threaded=False)
         else:
             self._features = GeometricFeatures(scene, vehicle, self.canvas, options.seed)
+        self.viewer = self._open_viewer() if options.view else None
         self._brush: np.ndarray | None = None
         self._pressed = 0
+
+    def _open_viewer(self) -> FlightViewer:
+        from sim.viewer import FlightViewer
+
+        board = self.scene.board
+        middle = self.geometry.point(0.5 * board.width_m, 0.5 * board.height_m)
+        return FlightViewer(self.plant, np.append(0.0, middle))
 
     def sense(self) -> SensorFrame:
         """Sensor frame of the present tick."""
@@ -126,6 +147,8 @@ class World:
         self.plant.step(thrusts)
         pressing = self.plant.contact_normal_force > PAINTING_FORCE
         self._pressed += pressing
+        if self.viewer is not None:
+            self.viewer.show(pressing)
         if pressing and self._brush is not None and self._pressed % STROKE_TICKS:
             return
         if pressing:
@@ -134,6 +157,12 @@ class World:
             self._brush = point
         else:
             self._brush = None
+
+    def close(self) -> int:
+        """End window and drawing process; returns the peak resident memory of the latter [bytes], 0 without one."""
+        if self.viewer is not None:
+            self.viewer.close()
+        return self._stream.close() if self._rendered else 0
 
 
 def make_pilot(scene: Scene, options: FlightOptions, config: PilotConfig, job: Job) -> Pilot:
@@ -190,8 +219,11 @@ def fly(
                 progress(flown, pilot.painter.phase, flown / max(time.perf_counter() - start, 1e-9))
     except KeyboardInterrupt:
         reason = "interrupted"
+    finally:
+        wall_time, memory = time.perf_counter() - start, world.close()
     trace = recorder.trace()
-    trace.wall_time_s = time.perf_counter() - start
+    trace.wall_time_s = wall_time
+    trace.camera_memory_bytes = memory
     trace.completed = not reason and pilot.painter.finished and not pilot.painter.failed
     trace.reason = reason or pilot.painter.reason
     if reason:

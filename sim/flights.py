@@ -33,7 +33,7 @@ _SIGINT = {signal.SIGINT}
 
 @dataclass(frozen=True, kw_only=True)
 class Flight:
-    """A trace and the peak memory of the process that flew it [bytes]; 0 if it was this process."""
+    """A trace and the peak memory of the processes that flew it beside this one [bytes]."""
 
     trace: Trace
     process_memory_bytes: int = 0
@@ -67,7 +67,7 @@ def fly_laws(
     flights: dict[str, Flight] = {}
     for law, job in jobs.items():
         trace = fly(scene, job, functools.partial(progress, law))
-        flights[law] = Flight(trace=pack_pictures(trace))
+        flights[law] = Flight(trace=pack_pictures(trace), process_memory_bytes=trace.camera_memory_bytes)
         _tell_end(law, trace, progress)
         if trace.reason == INTERRUPTED:
             break

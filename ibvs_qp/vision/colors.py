@@ -61,12 +61,10 @@ class SurfaceColors:
 
     def _make_table(self, board: np.ndarray) -> None:
         """Labels of all colours in steps of eight grey levels: thousands of colours are looked up per picture."""
-        level = (np.arange(1 << _TABLE_BITS) + 0.5) * (1 << _TABLE_SHIFT)
-        colors = np.stack(np.meshgrid(level, level, level, indexing="ij"), axis=-1).reshape(-1, 3).astype(np.float32)
-        to_board = self._distance(colors, board)
+        to_board = _distances(board)
         table = np.where(to_board < self._gate**2, np.uint8(BOARD), np.uint8(OTHER))
         if self.paint_distinct and self.paint is not None:
-            to_paint = self._distance(colors, self.paint)
+            to_paint = _distances(self.paint)
             table[(to_paint < self._gate**2) & (to_paint < to_board)] = PAINT
         self._table, self._table_board = table, board.copy()
 
@@ -91,3 +89,10 @@ class SurfaceColors:
         """Squared RGB distance, (...)."""
         offset = colors - reference
         return np.einsum("...i,...i->...", offset, offset)
+
+
+def _distances(reference: np.ndarray) -> np.ndarray:
+    """Squared RGB distance of all colours of the label table from one, float32 (32768,)."""
+    level = (np.arange(1 << _TABLE_BITS, dtype=np.float32) + np.float32(0.5)) * np.float32(1 << _TABLE_SHIFT)
+    red, green, blue = ((level - part) ** 2 for part in reference)
+    return (red[:, None, None] + green[:, None] + blue).reshape(-1)

@@ -82,7 +82,7 @@ class DetectConfig(_Checked):
     )
     min_length: float = setting(0.10, "shortest line, share of the picture's width", low=0.01, high=1.0)
     candidates: int = setting(8, "candidates refined per detection", low=1, high=100)
-    period: int = setting(12, "frames between detections of either direction while tracks live", low=1, high=1000)
+    period: int = setting(20, "frames between detections of either direction while tracks live", low=1, high=1000)
     lost_period: int = setting(3, "frames between detections while nothing is tracked", low=1, high=1000)
     min_score: float = setting(0.25, "weakest candidate that may start a track", low=0.0, high=1.0)
 

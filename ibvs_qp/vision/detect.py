@@ -26,7 +26,7 @@ _DUPLICATE_PX = 3.0
 #: Length that earns the full score, share of the picture's width.
 _FULL_LENGTH = 0.4
 #: Voted lines refined at once; those on edges found by then are left out of the next batch.
-_BATCH = 4
+_BATCH = 8
 
 
 @dataclass(frozen=True, kw_only=True)

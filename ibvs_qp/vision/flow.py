@@ -19,8 +19,10 @@ from ibvs_qp.vision.flow_solve import (
 from ibvs_qp.vision.mask import Intrinsics
 from ibvs_qp.vision.plane import PlaneEstimate
 
-#: Pyramid levels beyond the first, and those that do where the last velocity says where the points are.
-_LEVELS, _LEVELS_EXPECTED = 2, 1
+#: Pyramid levels beyond the first, needed only where the last velocity does not say where the points are.
+_LEVELS = 2
+#: Most points lie this near to where they were expected [px]: then one level finds them as well as three, to 2e-3 px.
+_NEAR_PX, _MOST = 1.5, 0.8
 #: Points expected farther off than this share of the picture start where they were: the gyro must be wrong.
 _FAR = 0.25
 #: When following a point ends: rounds, step [px].
@@ -39,7 +41,7 @@ class SparseFlow:
         """Forget the last picture and its points."""
         self._grey: np.ndarray | None = None
         self._velocity: np.ndarray | None = None
-        self._points = np.zeros((0, 2), np.float32)
+        self._points, self._bearings = np.zeros((0, 2), np.float32), np.zeros((0, 2))
         self._root = np.zeros((0, 2, 2))
         self._inverse = np.zeros(0)
         self._frames = 0
@@ -75,21 +77,21 @@ class SparseFlow:
         Returns:
             The velocity, or the reason why there is none.
         """
-        config = self._config
-        grey = cv2.cvtColor(
-            cv2.resize(rgb, (rgb.shape[1] // 2, rgb.shape[0] // 2), interpolation=cv2.INTER_AREA), cv2.COLOR_RGB2GRAY
+        config, half = self._config, half_resolution(intrinsics)
+        grey = cv2.resize(  # grey first: one channel is shrunk eight times as fast as three
+            cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY), (rgb.shape[1] // 2, rgb.shape[0] // 2), interpolation=cv2.INTER_AREA
         )
         interval = (stamp_ns - self._stamp_ns) * 1e-9
         result: FlowVelocity | str = "first picture"
         if self._grey is not None and grey.shape == self._grey.shape:
             if not 0.0 < interval <= config.interval_max_s:
-                self._points = self._points[:0]
+                self._keep(np.zeros(0, np.intp))
                 result = f"{interval:.3f} s between pictures"
             elif len(self._points) < config.min_points:
                 result = "too few points: nothing to follow"
             else:
                 result = self._follow(
-                    self._grey, grey, excluded, intrinsics, interval, rotation, camera_rotation, camera_position
+                    self._grey, grey, excluded, half, interval, rotation, camera_rotation, camera_position
                 )
         self._velocity = None
         if isinstance(result, FlowVelocity):
@@ -100,12 +102,12 @@ class SparseFlow:
             )
         self._frames += 1
         if len(self._points) < config.points_low or (self._frames >= config.redetect and not busy):
-            self._find(grey, excluded)
-        self._inverse = inverse_depths(self._points, depth, intrinsics, plane)
+            self._find(grey, excluded, half)
+        self._inverse = inverse_depths(self._bearings, depth, intrinsics, plane)
         self._grey, self._stamp_ns = grey, stamp_ns
         return result
 
-    def _find(self, grey: np.ndarray, excluded: np.ndarray) -> None:
+    def _find(self, grey: np.ndarray, excluded: np.ndarray, half: Intrinsics) -> None:
         """New points where the picture has structure, with the information each carries."""
         config, self._frames = self._config, 0
         allowed = (excluded == 0).view(np.uint8)
@@ -113,58 +115,75 @@ class SparseFlow:
             grey, config.points, config.quality, config.spacing_px, mask=allowed, blockSize=5
         )
         self._points = np.zeros((0, 2), np.float32) if corners is None else corners.reshape(-1, 2)
+        self._bearings = (self._points - half[2:]) / half[:2]
         self._root = information_root(grey, self._points, config)
+
+    def _keep(self, chosen: np.ndarray) -> None:
+        """Forget all points but the chosen ones."""
+        self._points, self._bearings = self._points.take(chosen, axis=0), self._bearings.take(chosen, axis=0)
+        self._root, self._inverse = self._root.take(chosen, axis=0), self._inverse.take(chosen)
 
     def _follow(
         self,
         last: np.ndarray,
         grey: np.ndarray,
         excluded: np.ndarray,
-        intrinsics: Intrinsics,
+        half: Intrinsics,
         interval: float,
         rotation: np.ndarray,
         camera_rotation: np.ndarray,
         camera_position: np.ndarray,
     ) -> FlowVelocity | str:
         config = self._config
-        half = half_resolution(intrinsics)
-        still = unturned(self._points, half, camera_rotation)
+        still = unturned(self._bearings, camera_rotation)
         velocity = np.zeros(3) if self._velocity is None else self._velocity
         start = expected_points(still, self._inverse, velocity, interval, half)
-        start = np.where(np.abs(start - self._points) < _FAR * grey.shape[1], start, self._points)
-        moved, status, _ = cv2.calcOpticalFlowPyrLK(
-            last,
-            grey,
-            self._points,
-            start,
-            winSize=(config.window_px, config.window_px),
-            maxLevel=_LEVELS if self._velocity is None else _LEVELS_EXPECTED,
-            criteria=_CRITERIA,
-            flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
-        )
+        near = np.abs(start - self._points) < _FAR * grey.shape[1]  # false for what is not a number
+        start = start if near.all() else np.where(near, start, self._points)
+        self._points, status = self._search(last, grey, start, self._velocity is not None)
         height, width = grey.shape
-        place = np.round(moved).astype(np.intp)
-        alive = (
-            (status.ravel() == 1)
-            & (place[:, 0] >= 0)
-            & (place[:, 0] < width)
-            & (place[:, 1] >= 0)
-            & (place[:, 1] < height)
-        )
-        alive[alive] &= excluded[place[alive, 1], place[alive, 0]] == 0
-        now, inverse, root = moved[alive], self._inverse[alive], self._root[alive]
-        self._points, self._root = now, root
-        known = inverse > 0
-        if int(np.count_nonzero(known)) < config.min_points:
+        column, row = np.rint(self._points).astype(np.intp).T
+        inside = (column >= 0) & (column < width) & (row >= 0) & (row < height) & (status.reshape(-1) == 1)
+        alive = np.flatnonzero(inside)
+        alive = alive[excluded.reshape(-1).take(row[alive] * width + column[alive]) == 0]
+        self._bearings = (self._points - half[2:]) / half[:2]
+        self._keep(alive)
+        known = np.flatnonzero(self._inverse > 0)
+        if len(known) < config.min_points:
             return "too few points with depth"
         return solve_velocity(
-            still[alive][known],
-            now[known],
-            inverse[known],
-            root[known],
-            half,
+            still.take(alive[known], axis=0),
+            self._bearings.take(known, axis=0),
+            self._inverse.take(known),
+            self._root.take(known, axis=0),
+            half[0],
             interval,
             rotation,
             camera_position,
             config,
         )
+
+    def _search(
+        self, last: np.ndarray, grey: np.ndarray, start: np.ndarray, expected: bool
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The points in this picture, searched from a start, and whether each was found."""
+        found, status = self._lucas_kanade(last, grey, start, 0 if expected else _LEVELS)
+        near = (np.abs(found - start) < _NEAR_PX).all(axis=1)
+        if expected and np.count_nonzero(near) < _MOST * len(start):
+            found, status = self._lucas_kanade(last, grey, start, _LEVELS)
+        return found, status
+
+    def _lucas_kanade(
+        self, last: np.ndarray, grey: np.ndarray, start: np.ndarray, levels: int
+    ) -> tuple[np.ndarray, np.ndarray]:
+        found, status, _ = cv2.calcOpticalFlowPyrLK(
+            last,
+            grey,
+            self._points,
+            start.copy(),  # the search writes into it
+            winSize=(self._config.window_px, self._config.window_px),
+            maxLevel=levels,
+            criteria=_CRITERIA,
+            flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
+        )
+        return found, status

@@ -11,6 +11,7 @@ import numpy as np
 from ibvs_qp.frames import R_BODY_CAMERA
 from ibvs_qp.vision.config import FlowConfig
 from ibvs_qp.vision.mask import Intrinsics
+from ibvs_qp.vision.normal_equations import solve_three
 from ibvs_qp.vision.plane import PlaneEstimate
 from ibvs_qp.vision.robust import median
 
@@ -21,8 +22,10 @@ _ROUNDS = 4
 _MAD = 1.4826
 #: Sum of squares of a 3x3 Sobel kernel over 8^2: variance of its answer per variance of the picture.
 _SOBEL_NOISE = 12.0 / 64.0
-#: Columns and rows at which the depth of a point is read, from its place [px].
-_CROSS = np.array([[0, -2, 0, 2, 0], [-2, 0, 0, 0, 2]])
+#: Distance of the four further places at which the depth of a point is read, and how many must be valid [px].
+_CROSS_PX, _READINGS = 2, 3
+#: Columns of the system of `solve_velocity`: velocity, what is seen, turn.
+_V, _SEEN, _TURN = slice(0, 3), 3, slice(4, 7)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,36 +74,34 @@ def information_root(grey: np.ndarray, points: np.ndarray, config: FlowConfig) -
 
 
 def inverse_depths(
-    points: np.ndarray, depth: np.ndarray, intrinsics: Intrinsics, plane: PlaneEstimate | None
+    bearings: np.ndarray, depth: np.ndarray, intrinsics: Intrinsics, plane: PlaneEstimate | None
 ) -> np.ndarray:
-    """1/Z of points at half resolution: the surface's where they lie on it, else their own, 0 if unknown, (n,)."""
-    if len(points) == 0:
+    """1/Z of normalised points (n, 2): the surface's where they lie on it, else their own, 0 if unknown, (n,)."""
+    if len(bearings) == 0:
         return np.zeros(0)
-    full = 2.0 * points.astype(float) + 0.5
-    place = np.round(full).astype(np.intp)
-    rows = np.minimum(np.maximum(place[:, 1, None] + _CROSS[1], 0), depth.shape[0] - 1)
-    columns = np.minimum(np.maximum(place[:, 0, None] + _CROSS[0], 0), depth.shape[1] - 1)
-    z = depth[rows, columns].astype(float)
+    (height, width), (fx, fy, cx, cy) = depth.shape, intrinsics
+    place = np.rint(bearings * (fx, fy) + (cx, cy)).astype(np.intp)
+    place = np.minimum(np.maximum(place, _CROSS_PX), (width - 1 - _CROSS_PX, height - 1 - _CROSS_PX))
+    cross = np.array([0, -_CROSS_PX, _CROSS_PX, -_CROSS_PX * width, _CROSS_PX * width])
+    z = depth.reshape(-1).take((place @ np.array((1, width)))[:, None] + cross)
     good = (z > 0) & (z < np.inf)  # false for NaN too
     count = np.count_nonzero(good, axis=1)
-    ordered = np.sort(np.where(good, z, np.inf), axis=1)  # the median of the valid ones is at half their count
-    middle = ordered[np.arange(len(points)), np.minimum(count // 2, 4)]
-    inverse = np.where(count >= 3, 1.0 / middle, 0.0)
+    z[~good] = np.inf
+    z.sort(axis=1)  # the median of the valid ones is at half their count
+    middle = z[np.arange(len(z)), np.minimum(count // 2, len(cross) - 1)]
+    inverse = (1.0 / middle) * (count >= _READINGS)
     if plane is not None:
-        fx, fy, cx, cy = intrinsics
         a, b, c = plane.inverse_depth
-        surface = a * (full[:, 0] - cx) / fx + b * (full[:, 1] - cy) / fy + c
+        surface = bearings @ (a, b) + c
         gate = max(_ON_PLANE_SIGMAS * plane.residual_sigma, 0.01)
-        inverse = np.where((inverse > 0) & (np.abs(inverse - surface) < gate * np.abs(surface)), surface, inverse)
+        near = (inverse > 0) & (np.abs(inverse - surface) < gate * np.abs(surface))
+        inverse = np.where(near, surface, inverse)
     return inverse
 
 
-def unturned(points: np.ndarray, intrinsics: Intrinsics, rotation: np.ndarray) -> np.ndarray:
-    """Where points would be now if the camera had only turned (now to before, (3, 3)): normalised, (n, 2)."""
-    fx, fy, cx, cy = intrinsics
-    a, b, c = rotation  # rows: p^T R = x a + y b + c
-    x, y = (points[:, :1] - cx) / fx, (points[:, 1:] - cy) / fy
-    turned = x * a + y * b + c
+def unturned(bearings: np.ndarray, rotation: np.ndarray) -> np.ndarray:
+    """Where normalised points would be now if the camera had only turned (now to before, (3, 3)), (n, 2)."""
+    turned = bearings @ rotation[:2] + rotation[2]  # p^T R
     return turned[:, :2] / turned[:, 2:]
 
 
@@ -115,10 +116,10 @@ def expected_points(
 
 def solve_velocity(
     still: np.ndarray,
-    now: np.ndarray,
+    end: np.ndarray,
     inverse: np.ndarray,
     root: np.ndarray,
-    intrinsics: Intrinsics,
+    focal: float,
     interval: float,
     rotation: np.ndarray,
     camera_position: np.ndarray,
@@ -128,10 +129,10 @@ def solve_velocity(
 
     Args:
         still: Points after the turn alone, normalised, (n, 2).
-        now: Points as found, pixels at half resolution, (n, 2).
+        end: Points as found, normalised, (n, 2).
         inverse: 1/Z of the points [1/m], (n,).
         root: Square roots of their information [1/px], (n, 2, 2).
-        intrinsics: Of the half-resolution picture.
+        focal: Focal length of the picture in which they were followed [px].
         interval: Time between the pictures [s].
         rotation: Turn of the body in between, in B [rad], (3,).
         camera_position: Camera centre in B [m], (3,).
@@ -140,43 +141,35 @@ def solve_velocity(
     Returns:
         The velocity, or the reason why there is none.
     """
-    fx, fy, cx, cy = intrinsics
-    end = (now - (cx, cy)) / (fx, fy)
-    x, y = (0.5 * (end + still)).T
-    whiten = root * (fx * interval)
-    translating = np.zeros((len(x), 2, 3))
-    translating[:, 0, 0] = translating[:, 1, 1] = -inverse
-    translating[:, 0, 2], translating[:, 1, 2] = inverse * x, inverse * y
-    rows = (whiten @ translating).reshape(-1, 3)
-    wanted = (whiten @ ((end - still) / interval)[:, :, None]).ravel()
-    prior = np.eye(3) / config.prior_m_s**2
-    velocity, normal = np.zeros(3), prior
-    weight = np.ones(len(x))
-    size, weighted = weight, rows
+    rows, squares = _system(still, end, inverse, root * (focal * interval), interval)
+    prior = 1.0 / config.prior_m_s**2
+    width = rows.shape[2]
+    weight = np.ones(len(rows))
+    sums, velocity, size = np.zeros((width, width)), (0.0, 0.0, 0.0), weight
     for _ in range(_ROUNDS):
-        weighted = rows * np.repeat(weight, 2)[:, None]
-        normal = weighted.T @ rows + prior
-        velocity = np.linalg.solve(normal, weighted.T @ wanted)
-        residual = (wanted - rows @ velocity).reshape(-1, 2)
-        size = np.sqrt(np.vecdot(residual, residual))
-        scale = max(_MAD * median(size), 0.5)
-        weight = np.maximum(0.0, 1.0 - (size * (1.0 / (config.gate_sigmas * scale))) ** 2) ** 2
+        sums = (weight @ squares).reshape(width, width)
+        (xx, xy, xz, xs), (_, yy, yz, ys), (_, _, zz, zs) = sums[:3, :4].tolist()
+        solved = solve_three((xx + prior, xy, xz, yy + prior, yz, zz + prior), (xs, ys, zs))
+        if solved is None:
+            return "the points determine no velocity"
+        velocity = solved[0]
+        answer = np.array((*velocity, -1.0, 0.0, 0.0, 0.0))
+        residual = rows @ answer
+        size = np.vecdot(residual, residual)
+        scale = max(_MAD * math.sqrt(median(size)), 0.5)
+        weight = np.maximum(0.0, 1.0 - size * (1.0 / (config.gate_sigmas * scale) ** 2)) ** 2
     agreeing = int(np.count_nonzero(weight > 0.1))
     if agreeing < config.min_points:
         return "too few points agree"
     if math.hypot(*velocity) > config.speed_max_m_s:
         return "faster than possible"
-    spread = max(float(weight @ (size * size)) / max(2.0 * float(weight.sum()) - 3.0, 1.0), 1.0)
-    turning = np.empty((len(x), 2, 3))
-    turning[:, 0, 0] = x * y
-    turning[:, 1, 1] = -turning[:, 0, 0]
-    turning[:, 0, 1], turning[:, 0, 2] = -(1.0 + x * x), y
-    turning[:, 1, 0], turning[:, 1, 2] = 1.0 + y * y, -x
-    leak = np.linalg.solve(normal, weighted.T @ (whiten @ turning).reshape(-1, 3))
-    leak *= config.rotation_sigma_rad / interval
-    covariance = np.linalg.inv(normal - prior * (1.0 - 1.0 / spread)) * spread + leak @ leak.T
+    spread = max(float(weight @ size) / max(2.0 * float(weight.sum()) - 3.0, 1.0), 1.0)
+    spreads = np.array((1.0, spread))[:, None, None]
+    with_prior, spread_out = np.linalg.inv(sums[_V, _V] + np.eye(3) * prior / spreads) * spreads
+    leak = with_prior @ sums[_V, _TURN] * (config.rotation_sigma_rad / interval)
+    covariance = spread_out + leak @ leak.T
     covariance = R_BODY_CAMERA @ covariance @ R_BODY_CAMERA.T
-    (wx, wy, wz), (px, py, pz) = rotation / interval, camera_position
+    (wx, wy, wz), (px, py, pz) = (rotation / interval).tolist(), camera_position.tolist()
     lever = np.array([wy * pz - wz * py, wz * px - wx * pz, wx * py - wy * px])
     return FlowVelocity(
         velocity=R_BODY_CAMERA @ velocity - lever,
@@ -184,3 +177,23 @@ def solve_velocity(
         stamp_ns=0,
         points=agreeing,
     )
+
+
+def _system(
+    still: np.ndarray, end: np.ndarray, inverse: np.ndarray, whiten: np.ndarray, interval: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Whitened rows of every point, (n, 2, 7), and their products, (n, 49): velocity (3), what is seen (1), turn (3).
+
+    The products are summed with changing weights, so each is made once.
+    """
+    x, y = (0.5 * (end + still)).T
+    rows = np.zeros((len(x), 2, 7))
+    rows[:, 0, 0] = rows[:, 1, 1] = -inverse
+    rows[:, 0, 2], rows[:, 1, 2] = inverse * x, inverse * y
+    rows[:, :, _SEEN] = (end - still) * (1.0 / interval)
+    cross = x * y
+    rows[:, 0, 4], rows[:, 1, 5] = cross, -cross
+    rows[:, 0, 5], rows[:, 0, 6] = -(1.0 + x * x), y
+    rows[:, 1, 4], rows[:, 1, 6] = 1.0 + y * y, -x
+    rows = whiten @ rows
+    return rows, (rows.transpose(0, 2, 1) @ rows).reshape(len(x), -1)

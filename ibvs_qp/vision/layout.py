@@ -7,6 +7,7 @@ import numpy as np
 from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.vehicle import VehicleParams
 from ibvs_qp.vision.config import VisionConfig
+from ibvs_qp.vision.follow_plane import PlaneFollower
 from ibvs_qp.vision.grid import CoarseGrid
 from ibvs_qp.vision.mask import brush_zone, vehicle_mask
 from ibvs_qp.vision.seeds import seed_cells
@@ -19,6 +20,7 @@ class PictureLayout:
         mask: Vehicle's mask, uint8 (H, W).
         excluded: Where no flow points may lie, at half resolution, uint8.
         grid: Coarse grid.
+        follower: Follows the surface on a still coarser one.
         seeds: Cells beside the brush.
     """
 
@@ -30,6 +32,7 @@ class PictureLayout:
         zone = brush_zone(vehicle, config.brush_width_m, config.mask, frame.intrinsics, shape)
         self.excluded = np.ascontiguousarray((self.mask | zone)[: shape[0] // 2 * 2 : 2, : shape[1] // 2 * 2 : 2])
         self.grid = CoarseGrid(shape, frame.intrinsics, self.mask, config.plane.grid_columns)
+        self.follower = PlaneFollower(config.plane, shape, frame.intrinsics, self.mask)
         self.seeds = seed_cells(self.grid, vehicle, config.brush_width_m)
 
     def fits(self, frame: RgbdFrame) -> bool:

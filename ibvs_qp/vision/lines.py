@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from ibvs_qp.vision.admissible import Admissible
 from ibvs_qp.vision.colors import SurfaceColors
 from ibvs_qp.vision.config import LineConfig
+from ibvs_qp.vision.fit_lines import consensus_lines, longest_runs, robust_lines, shifted_lines
 from ibvs_qp.vision.picture import Picture
 from ibvs_qp.vision.profiles import Strips
 from ibvs_qp.vision.query import LineQuery, LineView
-from ibvs_qp.vision.refined import Fits, RefinedLine, finish_line
-from ibvs_qp.vision.robust import consensus_lines, longest_runs, masked_median, packed, robust_lines
+from ibvs_qp.vision.refined import Fits, RefinedLine, finish_lines
+from ibvs_qp.vision.robust import masked_median
 
 #: A profile's gradient must reach this share of the line's whole step (a sharp edge reaches 0.4).
 _STEP_SHARE = 0.12
@@ -22,6 +24,10 @@ _STEP_MIN = 1e-3
 _PEAK_TO_STEP = 2.5
 #: Profiles that tell the colour step of a new line: gradients above this share of the median one.
 _TELLING = 0.5
+#: Places from which pairs of points are tried.
+_STARTS = 20
+#: Share of the visible profiles that show the edge at first sight, below which a line gets a second look.
+_ENOUGH = 0.5
 
 
 def refine_lines(
@@ -52,64 +58,100 @@ def refine_lines(
     if not used:
         return found
     strips = Strips.gather(picture, [views[k] for k in used], config, max(2, round(half_width_px)))
-    fits = _fit(strips, strips.admissible(colors), config, picture.scale)
+    fits = _fit(strips, Admissible(strips, colors), config, picture.scale)
     sides = strips.sides(fits.lines.rows(strips.u)) if contents else None
-    for index, k in enumerate(used):
-        if fits.alive[index]:
-            found[k] = finish_line(index, fits, strips, sides, config)
+    for k, line in zip(used, finish_lines(fits, strips, sides, config), strict=True):
+        found[k] = line
     return found
 
 
-def _fit(strips: Strips, admissible: np.ndarray, config: LineConfig, scale: float) -> Fits:
+def _fit(strips: Strips, admissible: Admissible, config: LineConfig, scale: float) -> Fits:
+    known = all(view.query.step is not None for view in strips.views)
     directions = _directions(strips, admissible)
     norm = np.sqrt(np.vecdot(directions, directions))
-    response = strips.response((directions / np.maximum(norm, _STEP_MIN)[:, None]).astype(np.float32)) * admissible
-    faint = _FAINT_SHARE * config.contrast_min
-    threshold = np.maximum(_STEP_SHARE * norm, faint)
-    board = np.array([view.query.kind == "board" for view in strips.views])
-    if strips.off is not None and board.any():
-        # the border of the surface is known by its two sides: beyond it the wall may change from brick to joint, and
-        # where the known step fails any step counts
-        failing = (response.max(axis=2) < threshold[:, None]) & board[:, None]
-        if failing.any():
-            response[failing] = strips.strength(failing) * admissible[failing]
-            threshold[failing.any(axis=1)] = faint
-    rows, good = strips.peaks(response, threshold)
+    units = (directions / np.maximum(norm, _STEP_MIN)[:, None]).astype(np.float32)
+    threshold = np.maximum(_STEP_SHARE * norm, _FAINT_SHARE * config.contrast_min)
+    rows, good = _edges(strips, admissible, strips.response(units), threshold, _FAINT_SHARE * config.contrast_min)
     u, gate = strips.u.astype(float), config.inlier_px * scale
-    count, (u_good, rows_good) = packed(good, u, rows)
-    level, slope, alive = consensus_lines(u_good, rows_good, count, gate)
-    alive &= (norm >= _STEP_MIN) & (count >= config.min_profiles)
-    support = good & (np.abs(rows - level[:, None] - slope[:, None] * u) < gate) & alive[:, None]
+    distance, alive = shifted_lines(rows - strips.predicted, good, gate)
+    if not (known and alive.all()):
+        distance, alive = consensus_lines(u, rows, good, gate, _STARTS)
+    alive &= (norm >= _STEP_MIN) & (good.sum(axis=1) >= config.min_profiles)
+    support = good & (np.abs(distance) < gate) & alive[:, None]
     visible = strips.visible
     runs = longest_runs(support, visible, config.bridge)
     profile, limits = np.arange(support.shape[1]), np.array(runs)[:, :, None]
     support &= (profile >= limits[:, 0]) & (profile <= limits[:, 1])
-    count, (u_in, rows_in) = packed(support, u, rows)
-    lines = robust_lines(u_in, rows_in, count)
+    count = support.sum(axis=1)
+    lines = robust_lines(u, rows, support)
     before, behind = strips.sides(rows)
-    change = (behind.astype(np.float32) - before).transpose(0, 2, 1)
-    steps = masked_median(change, support)
+    change = behind.astype(np.float32) - before
+    steps = (support.astype(np.float32)[:, None] @ change)[:, 0] / np.maximum(count, 1)[:, None]
     alive &= (count >= config.min_profiles) & (np.vecdot(steps, steps) >= config.contrast_min**2)
     return Fits(lines, support, visible, runs, steps, alive)
 
 
-def _directions(strips: Strips, admissible: np.ndarray) -> np.ndarray:
+def _edges(
+    strips: Strips, admissible: Admissible, response: np.ndarray, threshold: np.ndarray, faint: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Sub-pixel row of every profile's edge, and whether it has one, (L, K) each.
+
+    Looks at the strongest answer of every profile first; only where that may not be an edge of the line are the
+    other places judged, which costs many times as much.
+    """
+    shape, flat = strips.u.shape, response.reshape(-1, response.shape[2])
+    index = strips.strongest(flat)
+    place, peak, good = strips.peaks(flat, index)
+    limit = np.repeat(threshold, shape[1])
+    good &= (peak > limit) & admissible.at(index)
+    few = good.reshape(shape).sum(axis=1) < _ENOUGH * strips.visible.sum(axis=1)
+    if not few.any():
+        return strips.base + place.reshape(shape), good.reshape(shape)
+    rest = np.flatnonzero(few.repeat(shape[1]) & ~good)
+    shown = flat.take(rest, axis=0)
+    strong = shown.max(axis=1) > limit.take(rest) if len(rest) else np.zeros(0, bool)
+    border = admissible.board.take(rest) if admissible.depth_known else np.zeros(len(rest), bool)
+    rest, shown, strong, border = (part[strong | border] for part in (rest, shown, strong, border))
+    if len(rest):
+        allowed = admissible.everywhere(rest)
+        masked = shown * allowed
+        # the border of the surface is known by its two sides: beyond it the wall may change from brick to joint, and
+        # where the known step fails any step counts
+        failing = np.flatnonzero(border & (masked.max(axis=1) < limit.take(rest)))
+        if len(failing):
+            gradient = strips.gradient(rest.take(failing))
+            shown[failing] = np.sqrt(np.vecdot(gradient, gradient))
+            masked[failing] = shown[failing] * allowed[failing]
+            lines = np.unique(rest.take(failing) // shape[1])
+            limit.reshape(shape)[lines] = faint
+        index = strips.strongest(masked)
+        place[rest], peak, inner = strips.peaks(shown, index)
+        fits = allowed.reshape(-1).take(index + np.arange(0, allowed.size, allowed.shape[1]))
+        good[rest] = inner & fits & (peak > limit.take(rest))
+    return strips.base + place.reshape(shape), good.reshape(shape)
+
+
+def _directions(strips: Strips, admissible: Admissible) -> np.ndarray:
     """Mix of channels that shows each line: its known step along +v of the view, else what the strip shows, (L, 3)."""
-    known = [None if view.query.step is None else view.sign * view.query.step for view in strips.views]
-    fresh = [k for k, step in enumerate(known) if step is None]
-    directions = np.array([np.zeros(3) if step is None else step for step in known])
-    if not fresh:
+    steps = [view.query.step for view in strips.views]
+    directions = np.array(
+        [np.zeros(3) if step is None else view.sign * step for step, view in zip(steps, strips.views, strict=True)]
+    )
+    fresh = np.array([k for k, step in enumerate(steps) if step is None], np.intp)
+    if not len(fresh):
         return directions
-    gradient = strips.gradient(np.array(fresh))
+    profiles = strips.u.shape[1]
+    rows = (fresh[:, None] * profiles + np.arange(profiles)).reshape(-1)
+    gradient = strips.gradient(rows)
     polarity = np.array([strips.views[k].sign * strips.views[k].query.polarity for k in fresh], np.float32)
-    oriented = gradient * np.where(polarity == 0.0, np.float32(1.0), polarity)[:, None, None, None]
-    oriented[polarity == 0.0] = np.abs(oriented[polarity == 0.0])
-    strength = np.maximum(np.maximum(oriented[..., 0], oriented[..., 1]), oriented[..., 2]) * admissible[fresh]
-    lines, profiles, size = strength.shape
-    place = np.argmax(strength, axis=2) + size * np.arange(lines * profiles).reshape(lines, profiles)
-    weight = strength.take(place)
+    signs = np.repeat(polarity, profiles)[:, None, None]
+    oriented = np.where(signs == 0.0, np.abs(gradient), gradient * signs)
+    strength = np.maximum(np.maximum(oriented[..., 0], oriented[..., 1]), oriented[..., 2])
+    strength *= admissible.everywhere(rows)
+    place = strength.argmax(axis=1) + np.arange(0, strength.size, strength.shape[1])
+    weight = strength.take(place).reshape(len(fresh), profiles)
     telling = weight > _TELLING * np.sort(weight, axis=1)[:, profiles // 2, None]
-    strongest = gradient.reshape(-1, 3).take(place, axis=0).transpose(0, 2, 1)
+    strongest = gradient.reshape(-1, 3).take(place, axis=0).reshape(len(fresh), profiles, 3).transpose(0, 2, 1)
     typical = masked_median(strongest, telling)
     directions[fresh] = np.where(telling.any(axis=1)[:, None], _PEAK_TO_STEP * typical, 0.0)
     return directions

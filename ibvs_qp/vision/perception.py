@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Callable
+
+import cv2
 import numpy as np
 
 from ibvs_qp.frames import R_BODY_CAMERA, down_in_body
@@ -22,6 +26,16 @@ from ibvs_qp.vision.tracks import LineTracker
 
 #: Pictures after a start in which lines are searched often: colours are learned in the first one.
 _WARM_UP = 8
+
+
+class _Likenesses:
+    """Labels by colour for every seed, made when they are looked at: mostly the first seed does."""
+
+    def __init__(self, make: Callable[[int], np.ndarray]) -> None:
+        self._make = make
+
+    def __getitem__(self, index: int, /) -> np.ndarray:
+        return self._make(index)
 
 
 class Perception:
@@ -116,18 +130,14 @@ class Perception:
         motion = CameraMotion.of_body(turn, velocity, interval, self._camera_position)
         self._stamp_ns = frame.stamp_ns
         before = None if self._plane is None else self._plane.inverse_depth
-        coarse = self._grid.sample(frame.rgb)
-        labels = self._colors.label(coarse)
-        refused = self._fit_plane(frame, motion, labels, coarse, down, seed_pixel)
-        if self._plane is not None:
-            labels = np.where(self._plane.component, np.maximum(labels, 1), 0)
+        refused = self._fit_plane(frame, motion, down, seed_pixel)
         clock.lap("plane")
         surface = None if self._plane is None else self._plane.inverse_depth
         picture = Picture.of(frame.rgb, self._layout.mask, frame.intrinsics, frame.depth, surface)
         self._tracker.advance(picture, motion, before, interval, self._colors, tilt)
         self._tracker.hints(hints, picture, self._colors, tilt)
         clock.lap("tracks")
-        candidates = self._detect(picture, frame, labels, coarse, down, detect)
+        candidates = self._detect(picture, frame, down, detect)
         clock.lap("detect")
         flow = self._flow.update(
             frame.rgb,
@@ -150,24 +160,26 @@ class Perception:
         self,
         frame: RgbdFrame,
         motion: CameraMotion,
-        labels: np.ndarray,
-        coarse: np.ndarray,
         down: np.ndarray | None,
         seed_pixel: tuple[float, float] | None,
     ) -> str | None:
         """Follow the surface or search it; returns the reason when there is none."""
         config = self._config.plane
-        inverse = self._grid.inverse_depth(frame.depth, config.distance_min_m, config.distance_max_m)
-        prefer = labels if self._colors.board is not None else None
+        assert self._layout is not None
         if self._plane is not None and seed_pixel is None:
-            tracked = self._fitter.track(self._grid, inverse, motion.plane(self._plane.inverse_depth), down, prefer)
+            before, predicted = self._plane, motion.plane(self._plane.inverse_depth)
+            tracked = self._layout.follower.follow(
+                frame.rgb, frame.depth, predicted, before.residual_sigma, self._colors, down
+            )
             if (
                 isinstance(tracked, PlaneEstimate)
-                and tracked.component.sum() >= config.lost_share * self._plane.component.sum()
+                and tracked.component.mean() >= config.lost_share * before.component.mean()
             ):
                 self._plane = tracked
                 return None
-        assert self._layout is not None
+        coarse = self._grid.sample(frame.rgb)
+        prefer = None if self._colors.board is None else self._colors.label(coarse)
+        inverse = self._grid.inverse_depth(frame.depth, config.distance_min_m, config.distance_max_m)
         seeds = self._layout.seeds
         if seed_pixel is not None:
             u, v = seed_pixel
@@ -182,10 +194,13 @@ class Perception:
             seeds = [cell]
         # a wall a few centimetres behind differs in colour, hardly in depth: before the board is known, the colour
         # around each seed stands for it
-        wanted = [
-            self._colors.like_around(self._grid, coarse, seed, config.seed_radius) if prefer is None else prefer
-            for seed in seeds
-        ]
+        wanted = _Likenesses(
+            lambda index: (
+                self._colors.like_around(self._grid, coarse, seeds[index], config.seed_radius)
+                if prefer is None
+                else prefer
+            )
+        )
         found = self._fitter.search(self._grid, inverse, seeds, down, wanted)
         self._plane = found if isinstance(found, PlaneEstimate) else None
         return None if isinstance(found, PlaneEstimate) else found
@@ -194,8 +209,6 @@ class Perception:
         self,
         picture: Picture,
         frame: RgbdFrame,
-        labels: np.ndarray,
-        coarse: np.ndarray,
         down: np.ndarray | None,
         wanted: bool,
     ) -> list[Candidate]:
@@ -212,14 +225,14 @@ class Perception:
         self._upright_next = not self._upright_next
         directions = (self._upright_next,) if calm else (False, True)
         followed = tuple(track.line for track in self._tracker.tracks if calm and track.settled)
-        known = self._colors.board is not None
-        self._colors.learn(coarse[self._plane.component])
-        if not known:
-            labels = np.where(self._plane.component, np.maximum(self._colors.label(coarse), 1), 0)
+        coarse = self._grid.sample(frame.rgb)
+        surface = self._whole_surface(frame, coarse, down)
+        self._colors.learn(coarse[surface.component])
+        labels = np.where(surface.component, np.maximum(self._colors.label(coarse), 1), 0)
         candidates = detect_lines(
             picture,
             frame.depth,
-            self._plane,
+            surface,
             self._grid,
             labels,
             self._colors,
@@ -230,3 +243,20 @@ class Perception:
         )
         self._tracker.offer(candidates, picture)
         return candidates
+
+    def _whole_surface(self, frame: RgbdFrame, coarse: np.ndarray, down: np.ndarray | None) -> PlaneEstimate:
+        """The surface on the full coarse grid, for a search of lines; followed on a coarser one between searches."""
+        assert self._plane is not None
+        if self._plane.component.shape == self._grid.shape:
+            return self._plane
+        config = self._config.plane
+        inverse = self._grid.inverse_depth(frame.depth, config.distance_min_m, config.distance_max_m)
+        prefer = None if self._colors.board is None else self._colors.label(coarse)
+        refit = self._fitter.track(self._grid, inverse, self._plane.inverse_depth, down, prefer)
+        if isinstance(refit, PlaneEstimate):
+            return refit
+        rows, columns = self._grid.shape
+        component = cv2.resize(
+            self._plane.component.view(np.uint8), (columns, rows), interpolation=cv2.INTER_NEAREST
+        ).astype(bool)
+        return dataclasses.replace(self._plane, component=component)

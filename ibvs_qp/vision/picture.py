@@ -14,13 +14,11 @@ from ibvs_qp.vision.mask import Intrinsics
 
 @dataclass(frozen=True, kw_only=True)
 class Picture:
-    """A colour picture with the vehicle's mask, addressed by flat index so that a transposed view costs nothing.
+    """A colour picture with the vehicle's mask; a transposed view shares the data and costs nothing.
 
     Attributes:
-        colors: RGB of every pixel, uint8 (H W, 3).
-        hidden: Non-zero where the vehicle hides the view, uint8 (H W,).
         rgb: The picture itself, uint8 (H, W, 3).
-        mask: The mask itself, uint8 (H, W).
+        mask: Non-zero where the vehicle hides the view, uint8 (H, W).
         height: Rows of this view.
         width: Columns of this view.
         row_step: Flat distance of rows of this view.
@@ -31,8 +29,6 @@ class Picture:
         plane: (a, b, c) of the working surface in this view, or None.
     """
 
-    colors: np.ndarray
-    hidden: np.ndarray
     rgb: np.ndarray
     mask: np.ndarray
     height: int
@@ -56,10 +52,8 @@ class Picture:
         """Wrap a picture, its scale taken from its width."""
         height, width = mask.shape
         return cls(
-            colors=np.ascontiguousarray(rgb).reshape(-1, 3),
-            hidden=np.ascontiguousarray(mask).ravel(),
-            rgb=rgb,
-            mask=mask,
+            rgb=np.ascontiguousarray(rgb),
+            mask=np.ascontiguousarray(mask),
             height=height,
             width=width,
             row_step=width,

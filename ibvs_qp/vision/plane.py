@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Protocol
 
 import numpy as np
 
@@ -24,6 +25,14 @@ _FLAT = 1e-6
 _MAD = 1.4826
 
 
+class LabelsOfSeeds(Protocol):
+    """Colour labels for the seed of an index: a list, or something that makes them when they are looked at."""
+
+    def __getitem__(self, index: int, /) -> np.ndarray:
+        """Labels of the samples, uint8 (rows, columns)."""
+        ...
+
+
 class PlaneFitter:
     """Finds the surface through a seed and follows it from frame to frame."""
 
@@ -42,7 +51,7 @@ class PlaneFitter:
         inverse: np.ndarray,
         seeds: list[tuple[int, int]],
         down: np.ndarray | None,
-        prefer: list[np.ndarray] | None,
+        prefer: LabelsOfSeeds | None,
     ) -> PlaneEstimate | str:
         """Find the surface without a prediction.
 

@@ -73,6 +73,20 @@ class LineView:
         return cls(query, view, upright, sign, coefficients, columns, first, last)
 
     @property
+    def slope_level(self) -> tuple[float, float]:
+        """Slope and level of the line v = slope u + level [px]."""
+        p, q, r = self.coefficients
+        return -p / q, -r / q
+
+    @property
+    def surface(self) -> tuple[float, float, float]:
+        """(p, q, r) of the surface over pixels of the view, 1/Z = p u + q v + r; zero if it is unknown."""
+        if self.view.plane is None:
+            return 0.0, 0.0, 0.0
+        (a, b, c), (fx, fy, cx, cy) = self.view.plane, self.view.intrinsics
+        return a / fx, b / fy, c - a * cx / fx - b * cy / fy
+
+    @property
     def side(self) -> int:
         """Side of the surface along +v of the view: +1, -1 or 0 if unknown."""
         return self.sign * self.query.surface_side

@@ -9,10 +9,9 @@ import numpy as np
 
 from ibvs_qp.frames import align_line
 from ibvs_qp.vision.config import LineConfig
-from ibvs_qp.vision.picture import normalise
+from ibvs_qp.vision.fit_lines import LineFits
 from ibvs_qp.vision.profiles import Strips
 from ibvs_qp.vision.query import LineView
-from ibvs_qp.vision.robust import LineFits
 
 _NO_SIDES, _NO_PIXELS = np.zeros((2, 0, 3), np.uint8), np.zeros((0, 2))
 
@@ -70,40 +69,76 @@ class Fits:
     alive: np.ndarray
 
 
-def finish_line(
-    index: int, fits: Fits, strips: Strips, sides: tuple[np.ndarray, np.ndarray] | None, config: LineConfig
+def finish_lines(
+    fits: Fits, strips: Strips, sides: tuple[np.ndarray, np.ndarray] | None, config: LineConfig
+) -> list[RefinedLine | None]:
+    """Turn the fits of a batch into normalised lines; None for those that are none or lie too far off."""
+    lines, steps = fits.lines, fits.steps.tolist()
+    # plain numbers from here on: arrays of one or two elements cost ten times as much
+    numbers = np.stack(
+        (lines.level, lines.slope, lines.center, lines.level_variance, lines.slope_variance, lines.rms), axis=1
+    ).tolist()
+    counts = fits.support.sum(axis=1).tolist()
+    # no profile is seen before the first
+    seen = np.cumsum(fits.visible | fits.support, axis=1)
+    result: list[RefinedLine | None] = []
+    for k, (alive, count) in enumerate(zip(fits.alive.tolist(), counts, strict=True)):
+        if not alive:
+            result.append(None)
+            continue
+        first, last = fits.runs[k]
+        among = int(seen[k, last]) - (int(seen[k, first - 1]) if first > 0 else 0)
+        share = count / max(among, 1)
+        beside = (_NO_SIDES, _NO_PIXELS) if sides is None else _contents(k, fits, strips, sides)
+        result.append(_finish(strips, k, (first, last), numbers[k], fits, share, steps[k], beside, config))
+    return result
+
+
+def _finish(
+    strips: Strips,
+    index: int,
+    run: tuple[int, int],
+    numbers: list[float],
+    fits: Fits,
+    share: float,
+    step: list[float],
+    beside: tuple[np.ndarray, np.ndarray],
+    config: LineConfig,
 ) -> RefinedLine | None:
-    """Turn one fit of a batch into a normalised line with covariance and segment; None if it lies too far off."""
-    view, lines, (first, last) = strips.views[index], fits.lines, fits.runs[index]
-    level, slope, center = float(lines.level[index]), float(lines.slope[index]), float(lines.center[index])
-    variance = float(lines.level_variance[index]) + (config.bias_px * view.view.scale) ** 2
-    rho, theta, covariance = _polar(view, level, slope, center, variance, float(lines.slope_variance[index]))
+    view, (level, slope, center, level_variance, slope_variance, rms) = strips.views[index], numbers
+    variance = level_variance + (config.bias_px * view.view.scale) ** 2
+    rho, theta, covariance = _polar(view, level, slope, center, variance, slope_variance)
     if abs(rho) > config.rho_max:
         return None
-    u_first, u_last = float(strips.u[index, first]), float(strips.u[index, last])
-    v_first, v_last = level + slope * (u_first - center), level + slope * (u_last - center)
-    segment = normalise(np.array([[u_first, v_first], [u_last, v_last]]), view.view.intrinsics)
-    support, seen = fits.support[index], fits.visible[index, first : last + 1]
-    count = int(np.count_nonzero(support))
-    beside, pixels = _NO_SIDES, _NO_PIXELS
-    if sides is not None:
-        u = strips.u[index, support].astype(float)
-        pixels = np.column_stack((u, level + slope * (u - center)))
-        pixels = pixels[:, ::-1].copy() if view.upright else pixels
-        beside = np.stack((sides[0][index, support], sides[1][index, support])[:: view.sign])
+    u = strips.u[index]
+    ends = [(float(u[place]), level + slope * (float(u[place]) - center)) for place in run]
+    fx, fy, cx, cy = view.view.intrinsics
+    normal = [((along - cx) / fx, (across - cy) / fy) for along, across in ends]
+    (x, y, z), sign = step, view.sign
     return RefinedLine(
         rho=rho,
         theta=theta,
         covariance=covariance,
-        segment=segment[:, ::-1].copy() if view.upright else segment,
-        ends=_end_reasons(index, fits, strips),
-        inlier_share=count / max(int(np.count_nonzero(seen | support[first : last + 1])), 1),
-        rms_px=float(lines.rms[index]),
-        length_px=math.hypot(u_last - u_first, v_last - v_first),
-        step=view.sign * fits.steps[index],
-        sides=beside,
-        pixels=pixels,
+        segment=np.array([(y, x) for x, y in normal] if view.upright else normal),
+        ends=_end_reasons(strips, index, run, (level, slope, center), fits),
+        inlier_share=share,
+        rms_px=rms,
+        length_px=math.hypot(ends[1][0] - ends[0][0], ends[1][1] - ends[0][1]),
+        step=np.array((sign * x, sign * y, sign * z)),
+        sides=beside[0],
+        pixels=beside[1],
     )
+
+
+def _contents(
+    index: int, fits: Fits, strips: Strips, sides: tuple[np.ndarray, np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Colours on both sides of a line at its profiles, (2, n, 3), and the places of these, (n, 2) [px]."""
+    view, lines, support = strips.views[index], fits.lines, fits.support[index]
+    u = strips.u[index, support].astype(float)
+    pixels = np.column_stack((u, lines.level[index] + lines.slope[index] * (u - lines.center[index])))
+    beside = np.stack((sides[0][index, support], sides[1][index, support])[:: view.sign])
+    return beside, pixels[:, ::-1].copy() if view.upright else pixels
 
 
 def _polar(
@@ -127,16 +162,19 @@ def _polar(
     return aligned, theta, np.array([[rho_variance, cross], [cross, angle_slope**2 * slope_variance]])
 
 
-def _end_reasons(index: int, fits: Fits, strips: Strips) -> tuple[str, str]:
+def _end_reasons(
+    strips: Strips, index: int, run: tuple[int, int], line: tuple[float, float, float], fits: Fits
+) -> tuple[str, str]:
     """Why the segment ends at either end."""
-    view, lines, (first, last) = strips.views[index], fits.lines, fits.runs[index]
+    view, (level, slope, center) = strips.views[index], line
     profiles, margin = strips.u.shape[1], strips.side + 2
     reasons = []
-    for neighbour, cut in ((first - 1, view.columns[0] > 0.0), (last + 1, view.columns[1] < view.view.width - 1.0)):
+    cuts = view.columns[0] > 0.0, view.columns[1] < view.view.width - 1.0
+    for neighbour, cut in zip((run[0] - 1, run[1] + 1), cuts, strict=True):
         if not 0 <= neighbour < profiles:
             reasons.append("span" if cut else "picture")
             continue
-        beyond = lines.level[index] + lines.slope[index] * (strips.u[index, neighbour] - lines.center[index])
+        beyond = level + slope * (float(strips.u[index, neighbour]) - center)
         outside = not margin <= beyond <= view.view.height - 1.0 - margin
         reasons.append("picture" if outside else ("end" if fits.visible[index, neighbour] else "mask"))
     return reasons[0], reasons[1]

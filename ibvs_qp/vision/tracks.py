@@ -19,6 +19,8 @@ from ibvs_qp.vision.track import Track
 
 #: Uncertainty added per frame on prediction alone: rho and theta, standard deviations.
 _DRIFT = np.diag([2e-3**2, 2e-3**2])
+#: Squared cosine of the angle below which two lines cannot be one.
+_PARALLEL = 0.9
 
 
 class LineTracker:
@@ -174,7 +176,8 @@ class LineTracker:
 
     def _same(self, one: Track, two: Track, picture: Picture) -> bool:
         """Whether two tracks follow one edge: near at the middle of both segments, overlapping, same colour step."""
-        if float(one.step @ two.step) * math.cos(one.theta - two.theta) <= 0.0:
+        agreement = math.cos(one.theta - two.theta)
+        if agreement * agreement < _PARALLEL or float(one.step @ two.step) * agreement <= 0.0:
             return False
         limit = self._config.track.duplicate_px * picture.scale / picture.intrinsics[0]
         cos, sin = math.cos(one.theta), math.sin(one.theta)
@@ -190,7 +193,7 @@ class LineTracker:
         if hint.kind and track.kind != hint.kind:
             return math.inf
         agreement = math.cos(track.theta - hint.theta)
-        if agreement**2 < 0.9:
+        if agreement**2 < _PARALLEL:
             return math.inf
         if hint.surface_side and track.surface_side * math.copysign(1.0, agreement) != hint.surface_side:
             return math.inf

@@ -99,12 +99,13 @@ def _hough(
     rho, theta, votes = np.asarray(lines, float).reshape(-1, 3)[:_VOTED].T
     # pixel centres: half-resolution v covers the full-resolution rows 2v and 2v + 1
     left, right = rho / np.sin(theta), (rho - (width - 1) * np.cos(theta)) / np.sin(theta)
-    kept: list[int] = []
-    for index in range(len(rho)):
-        if len(kept) == _KEPT:
-            break
-        if all(abs(left[index] - left[k]) > SAME_PX or abs(right[index] - right[k]) > SAME_PX for k in kept):
+    kept, ends = [], []
+    for index, (one, other) in enumerate(zip(left.tolist(), right.tolist(), strict=True)):
+        if all(abs(one - a) > SAME_PX or abs(other - b) > SAME_PX for a, b in ends):
             kept.append(index)
+            ends.append((one, other))
+            if len(kept) == _KEPT:
+                break
     differing = _label_difference(left[kept], right[kept], labels.T if upright else labels, grid)
     result = []
     for index, difference in zip(kept, differing, strict=True):

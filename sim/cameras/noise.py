@@ -29,13 +29,13 @@ class NoiseBank:
         grey = np.rint(RGB_SIGMA * rng.standard_normal(rows * width * 3, np.float32)).astype(np.int8)
         # Unsigned saturating arithmetic is the fast path, so the two signs live apart.
         self._brighter, self._darker = np.maximum(grey, 0).astype(np.uint8), np.maximum(-grey, 0).astype(np.uint8)
-        self._white = rng.standard_normal(rows * width, np.float32) * np.float32(depth_relative)
         # White noise blurred with this Gaussian is correlated over DEPTH_CORRELATION_PX (1/e at 2 sigma).
-        blurred = cv2.GaussianBlur(
-            rng.standard_normal((rows, 2 * width), np.float32), (0, 0), 0.5 * DEPTH_CORRELATION_PX
-        )
-        self._correlated = np.float32(1.0) + blurred * np.float32(depth_relative / float(blurred.std()))
-        self._mixed = np.empty(shape, np.float32)
+        shape = (rows, 2 * width)
+        self._depth = rng.standard_normal(shape, np.float32)
+        self._depth *= np.float32(depth_relative)
+        blurred = cv2.GaussianBlur(rng.standard_normal(shape, np.float32), (0, 0), 0.5 * DEPTH_CORRELATION_PX)
+        self._depth += blurred * np.float32(depth_relative / float(blurred.std()))
+        self._depth += np.float32(1.0)
         self._lifted = np.empty((height, width * 3), np.uint8)
 
     def add_color(self, picture: np.ndarray) -> np.ndarray:
@@ -50,13 +50,10 @@ class NoiseBank:
         return noisy
 
     def depth_factor(self) -> np.ndarray:
-        """Factor 1 + white + correlated noise of one frame, float32 (H, W), valid until the next call."""
+        """Factor 1 + white + correlated noise of one frame, float32 (H, W), not to be written."""
         height, width = self._shape
-        start = int(self._rng.integers(len(self._white) - height * width))
         row, column = int(self._rng.integers(_SPARE_ROWS)), int(self._rng.integers(width))
-        white = self._white[start : start + height * width].reshape(height, width)
-        cv2.add(white, self._correlated[row : row + height, column : column + width], self._mixed)
-        return self._mixed
+        return self._depth[row : row + height, column : column + width]
 
     def depth_common(self) -> float:
         """Common-mode depth error of one frame [m]."""

@@ -101,11 +101,12 @@ class PlaneCamera:
     def expose(self, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, stamp_ns: int) -> Callable[[], RgbdFrame]:
         """Take in pose and paint, see `sim.cameras.protocol.DeferredCamera`."""
         pose = np.array(position_ned, float), np.array(quaternion_b_in_i, float)
-        return functools.partial(self._develop, *pose, stamp_ns, self.canvas.take())
+        return functools.partial(self.develop, *pose, stamp_ns, self.canvas.take())
 
-    def _develop(
+    def develop(
         self, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, stamp_ns: int, paint: FreshPaint | None
     ) -> RgbdFrame:
+        """Draw a picture from a pose and what is new of the paint; pictures are drawn in the order of exposure."""
         view = View.of_vehicle(position_ned, quaternion_b_in_i, self.vehicle.camera_position_m, self.intrinsics)
         cuts = self._compose(view, self.canvas.draw(paint))
         rgb = self._finish_color()

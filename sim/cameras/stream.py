@@ -8,6 +8,7 @@ import numpy as np
 
 from ibvs_qp.measurement import RgbdFrame
 from sim.cameras.protocol import Camera, DeferredCamera, Schedule
+from sim.cameras.remote import RemoteCamera
 
 
 class CameraStream:
@@ -26,7 +27,9 @@ class CameraStream:
     def __init__(self, camera: Camera, rate_hz: float, latency_s: float, threaded: bool = True) -> None:
         self.camera = camera
         self._schedule = Schedule(rate_hz, latency_s)
-        late = threaded and latency_s > 0.0
+        # a camera with a process of its own draws at once and is waited for at delivery
+        self._remote = camera if isinstance(camera, RemoteCamera) else None
+        late = threaded and latency_s > 0.0 and self._remote is None
         self._expose = camera.expose if late and isinstance(camera, DeferredCamera) else None
         self._worker: ThreadPoolExecutor | None = None
 
@@ -45,19 +48,26 @@ class CameraStream:
             self._schedule.push(now_ns, self._capture(position_ned, quaternion_b_in_i, now_ns))
         frame = None
         for item in self._schedule.arrived(now_ns):
-            frame = item.result() if isinstance(item, Future) else item
+            frame = item.result() if isinstance(item, Future) else item() if callable(item) else item
         assert frame is None or isinstance(frame, RgbdFrame)
         return frame
 
     def _capture(self, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, now_ns: int) -> object:
+        if self._remote is not None:
+            return self._remote.expose(position_ned, quaternion_b_in_i, now_ns)
         if self._expose is None:
             return self.camera.capture(position_ned, quaternion_b_in_i, now_ns)
         if self._worker is None:
             self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="camera")
         return self._worker.submit(self._expose(position_ned, quaternion_b_in_i, now_ns))
 
-    def close(self) -> None:
-        """End the worker thread; pictures not yet begun are dropped. Happens by itself when the stream is gone."""
+    def close(self) -> int:
+        """End the worker thread or process; pictures not yet begun are dropped.
+
+        Returns:
+            Peak resident memory of the process [bytes], 0 without one.
+        """
         if self._worker is not None:
             self._worker.shutdown(wait=True, cancel_futures=True)
             self._worker = None
+        return 0 if self._remote is None else self._remote.close()

@@ -39,12 +39,12 @@ class Paint:
     """Controller preset (TOML): vehicle model, gains, weights, limits; default: the built-in one."""
     features: Literal["rendered", "geometric"] = "rendered"
     """Perception: rendered pictures through the whole vision, or a sensor model of lines."""
-    vision: Literal["own"] = "own"
-    """Vision pipeline."""
+    vision: Literal["own", "paper"] = "own"
+    """Vision pipeline: the own one, or the paper's as a baseline (topmost level line, first upright one)."""
     image_size: Annotated[Literal["640x480", "424x240"] | None, _optional("640x480|424x240")] = None
     """Picture size; default: the scene's."""
-    camera: Literal["plane"] = "plane"
-    """Camera back end; plane needs no GL library."""
+    camera: Literal["plane", "gl", "auto"] = "plane"
+    """Camera back end: plane needs no GL library; gl and auto draw with OpenGL where there is one, else with plane."""
     law: Literal["qp", "paper", "both"] = "both"
     """Which law flies."""
     seed: int = 0
@@ -53,6 +53,8 @@ class Paint:
     """Run folder; default: runs/<UTC stamp>."""
     json: Annotated[bool, _flag] = False
     """Print summary.json as one line on standard output, and nothing else."""
+    view: Annotated[bool, _flag] = False
+    """Show the flight in MuJoCo's window at real time, one law after the other; needs a display."""
     no_video: Annotated[bool, _flag] = False
     """Write no video."""
 
@@ -70,12 +72,16 @@ class Paint:
         """
         from rich.console import Console
 
-        from sim.checks import check_preset, check_readable, check_seed
+        from sim.cameras import resolve_camera, spare_core
+        from sim.checks import check_mujoco, check_preset, check_readable, check_seed
+
+        check_mujoco()
         from sim.closed_loop import FlightOptions
         from sim.flights import fly_laws
         from sim.progress import flight_progress
         from sim.rundir import RunFolder
         from sim.scene import Scene, load_scene
+        from sim.viewer import check_display
 
         started = time.perf_counter()
         check_seed(self.seed)
@@ -83,22 +89,29 @@ class Paint:
             check_readable(option, file)
         scene = load_scene(self.scene) if self.scene else Scene()
         check_preset(self.preset)
+        if self.view:
+            check_display()
         size = _size(self.image_size)
+        camera, note = resolve_camera(self.camera)
+        if note is not None:
+            print(f"ibvs-qp: {note}", file=sys.stderr)
         options = FlightOptions(
             seed=self.seed,
             features=self.features,
             vision=self.vision,
-            camera=self.camera,
+            camera=camera,
             image_size=size,
             preset=str(self.preset) if self.preset else None,
             video=not self.no_video,
+            camera_process=self.law != "both" and spare_core(),
+            view=self.view,
         )
         laws = ("qp", "paper") if self.law == "both" else (self.law,)
         folder = RunFolder.create(self.out)
         notes = Console(stderr=True, quiet=self.json)
         try:
             with flight_progress(notes, scene, laws) as progress:
-                flights = fly_laws(scene, options, laws, progress)
+                flights = fly_laws(scene, options, laws, progress, workers=1 if self.view else None)
         except BaseException:
             folder.discard_if_empty()
             raise
@@ -107,7 +120,7 @@ class Paint:
             "seed": self.seed,
             "scene": str(self.scene) if self.scene else "default",
             "preset": str(self.preset) if self.preset else None,
-            "camera": self.camera,
+            "camera": camera,
             "image_size": list(size or (scene.camera.width, scene.camera.height)),
             "features": self.features,
             "vision": self.vision,

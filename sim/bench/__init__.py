@@ -1,0 +1,1 @@
+"""Benches: what a tick and a picture cost, beside their rivals, as ratios within one run."""

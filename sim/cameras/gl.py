@@ -1,0 +1,159 @@
+"""The camera drawn by OpenGL: the pictures of MuJoCo's classic renderer, finished as those of the plane camera."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from ibvs_qp.measurement import RgbdFrame
+from ibvs_qp.vehicle import VehicleParams
+from sim.cameras.arm import clip_near, shade_propellers, vehicle_layer
+from sim.cameras.gl_scene import FAR_M, NEAR_M, GlScene
+from sim.cameras.noise import NoiseBank
+from sim.cameras.outline import CutLine, cut_lines
+from sim.cameras.protocol import camera_intrinsics
+from sim.cameras.view import View, board_corners
+from sim.canvas import TEXTURE_PAD_PX, Canvas
+from sim.scene import Scene
+
+#: Neighbours of a rim pixel that certainly lie on the board and on the wall [px].
+_SURE_PX = 1
+
+
+class GLCamera:
+    """RGB-D camera by OpenGL, in one pass without shadows and multisampling.
+
+    What OpenGL draws is board and wall. Rim pixels, which it leaves jagged, are mixed of their two neighbours by the
+    share that the board's outline has in them. Vehicle, lens blur, noise and depth holes are those of `PlaneCamera`.
+
+    Args:
+        scene: Board, wall and camera.
+        vehicle: Where camera, arm and propellers are.
+        canvas: The board's and the wall's pictures; fresh paint is uploaded at every capture.
+        seed: Seed of the noise.
+        noise: Whether to add colour and depth noise and depth holes.
+        smooth_rim: Whether jagged rims are mended.
+
+    Raises:
+        CameraUnavailable: When this machine has no OpenGL that works without a display.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        vehicle: VehicleParams,
+        canvas: Canvas,
+        seed: int,
+        noise: bool = True,
+        smooth_rim: bool = True,
+    ) -> None:
+        self.scene, self.vehicle, self.canvas = scene, vehicle, canvas
+        self.intrinsics = camera_intrinsics(scene.camera)
+        bank, ragged = np.random.SeedSequence([seed, 0xCA3E]).spawn(2)
+        self._rng = np.random.default_rng(ragged)
+        width, height = scene.camera.width, scene.camera.height
+        shape = (height, width)
+        relative = scene.camera.depth_noise_relative
+        self._noise = NoiseBank(shape, relative, np.random.default_rng(bank)) if noise else None
+        self._layer = vehicle_layer(scene, vehicle, self.intrinsics, self._rng)
+        self._arm = np.ascontiguousarray(self._layer.picture[..., :3])
+        self._no_depth = np.flatnonzero((self._layer.holes | self._layer.propellers) & ~self._layer.mask)
+        self._corners, self._smooth_rim = board_corners(canvas.geometry), smooth_rim
+        self._drawn = GlScene(
+            canvas.geometry,
+            (width, height),
+            _face(canvas.flush()),
+            canvas.wall,
+            canvas.wall_origin,
+            canvas.wall_pixels_per_m,
+        )
+        self.platform = self._drawn.platform
+        self._rgb, self._soft = np.empty((*shape, 3), np.uint8), np.empty((*shape, 3), np.uint8)
+        self._inverse, self._ones = np.empty(shape, np.float32), np.ones(shape, np.float32)
+
+    def capture(self, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, stamp_ns: int) -> RgbdFrame:
+        """Take a picture, see `sim.cameras.protocol.Camera`; the frame owns its arrays."""
+        view = View.of_vehicle(position_ned, quaternion_b_in_i, self.vehicle.camera_position_m, self.intrinsics)
+        fresh = self.canvas.take()
+        face = _face(self.canvas.draw(fresh))
+        if fresh is not None:
+            box = _within(fresh.box, face.shape)
+            if box is not None:
+                self._drawn.paint(face, box)
+        rgb, inverse = self._drawn.draw(view)
+        cv2.flip(rgb, 0, self._rgb)
+        cv2.flip(inverse, 0, self._inverse)
+        cuts = self._cuts(view)
+        if self._smooth_rim:
+            for cut in cuts:
+                _mend_rim(self._rgb, cut)
+        shade_propellers(self._rgb, self._layer.propellers)
+        cv2.copyTo(self._arm, self._layer.mask, self._rgb)
+        cv2.GaussianBlur(self._rgb, (3, 3), 0.0, self._soft)  # binomial kernel: sigma 0.71 px
+        # drawn in the plane camera's order: both back ends make the same noise of one seed
+        common = 1.0 + self._noise.depth_common() * float(view.plane(0.0)[2]) if self._noise else 1.0
+        color = self._noise.add_color(self._soft) if self._noise else self._soft.copy()
+        return RgbdFrame(rgb=color, depth=self._depth(common, cuts), intrinsics=self.intrinsics, stamp_ns=stamp_ns)
+
+    def close(self) -> None:
+        """Free the OpenGL context; happens by itself when the camera is gone."""
+        self._drawn.close()
+
+    def _cuts(self, view: View) -> list[CutLine]:
+        """Lines of the board's outline in the picture."""
+        polygon = view.to_camera(self._corners)
+        if polygon[:, 2].min() < NEAR_M:
+            polygon = clip_near(polygon, NEAR_M)
+        fx, fy, cx, cy = self.intrinsics
+        height, width = self._inverse.shape
+        return cut_lines(polygon[:, :2] / polygon[:, 2:] * (fx, fy) + (cx, cy), width, height)[0]
+
+    def _depth(self, common: float, cuts: list[CutLine]) -> np.ndarray:
+        """Depth with noise, and holes along its steps; the vehicle takes no part in the scene's common error."""
+        depth = np.empty(self._inverse.shape, np.float32)
+        if common != 1.0:
+            np.multiply(self._inverse, np.float32(1.0 / common), out=self._inverse)
+        np.maximum(self._inverse, np.float32(1.0 / FAR_M), out=self._inverse)
+        cv2.copyTo(self._layer.inverse_depth, self._layer.mask, self._inverse)
+        cv2.divide(self._noise.depth_factor() if self._noise else self._ones, self._inverse, depth)
+        if self._noise is None:
+            return depth
+        flat, hidden = depth.reshape(-1), self._layer.mask.reshape(-1)
+        for cut in cuts:
+            places = cut.holes(self._rng)
+            flat[places[hidden.take(places) == 0]] = 0.0  # arm and brush hide the step
+        flat[self._no_depth] = 0.0
+        return depth
+
+
+def _face(texture: np.ndarray) -> np.ndarray:
+    """The board without what the texture adds beyond its outline; shared."""
+    return texture[TEXTURE_PAD_PX:-TEXTURE_PAD_PX, TEXTURE_PAD_PX:-TEXTURE_PAD_PX]
+
+
+def _within(box: tuple[int, int, int, int], shape: tuple[int, ...]) -> tuple[int, int, int, int] | None:
+    """A box of the padded texture in rows and columns of the face, or None if it lies beyond the outline."""
+    r0, r1, c0, c1 = (entry - TEXTURE_PAD_PX for entry in box)
+    r0, r1, c0, c1 = max(r0, 0), min(r1, shape[0]), max(c0, 0), min(c1, shape[1])
+    return (r0, r1, c0, c1) if r0 < r1 and c0 < c1 else None
+
+
+def _mend_rim(picture: np.ndarray, cut: CutLine) -> None:
+    """Mix the pixels along one edge of the board's outline from the neighbours on its two sides, in place."""
+    height, width = cut.shape
+    places, share = cut.rim((0, height, 0, width))
+    near, far = places.reshape(2, -1)  # the two pixels that the edge passes between, smaller index first
+    count = len(near)
+    along = np.arange(count, dtype=float)
+    axis = 1 - int(cut.flat)
+    first, last = sorted((float(cut.start[axis]), float(cut.stop[axis])))
+    used = np.flatnonzero((along >= first) & (along <= last))
+    step = (width if cut.flat else 1) * _SURE_PX
+    size = height * width - 1
+    before, behind = np.maximum(near[used] - step, 0), np.minimum(far[used] + step, size)
+    board, wall = (behind, before) if cut.normal[int(cut.flat)] > 0 else (before, behind)
+    flat = picture.reshape(-1, 3)
+    on, off = flat[board].astype(np.float32), flat[wall].astype(np.float32)
+    for row, part in zip((near, far), share.reshape(2, -1), strict=True):
+        weight = part[used, None].astype(np.float32) * np.float32(1.0 / 256.0)
+        flat[row[used]] = np.rint(off + weight * (on - off)).astype(np.uint8)
