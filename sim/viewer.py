@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import os
 import sys
+import threading
 import time
 import warnings
 from typing import TYPE_CHECKING
@@ -22,8 +23,12 @@ if TYPE_CHECKING:
 _RATE_HZ = 50.0
 #: A dab of paint: distance between two, half thickness, and how far before the board's face it lies [m].
 _DAB_STEP_M, _DAB_HALF_M, _DAB_LIFT_M = 0.01, 2e-4, 5e-4
-#: Where the camera of the window stands: looked-at point is the board's middle; distance [m], angles [deg].
-_DISTANCE_M, _AZIMUTH_DEG, _ELEVATION_DEG = 2.6, 40.0, -20.0
+#: Where the window's camera looks, from the board's middle (NED) [m], from how far [m], and at which angles [deg].
+_ASIDE_M, _DISTANCE_M, _AZIMUTH_DEG, _ELEVATION_DEG = (-0.45, 0.0, 0.2), 2.4, 35.0, -18.0
+#: Longest wait for the window to close [s].
+_CLOSE_S = 5.0
+#: Light from the camera: the model's own is made for nobody's eyes.
+_AMBIENT, _DIFFUSE = 0.55, 0.45
 
 
 class NoDisplay(IbvsQpError):
@@ -57,7 +62,7 @@ class FlightViewer:
 
     Args:
         plant: The plant shown.
-        target_ned: Point looked at, world NED [m], (3,).
+        target_ned: Middle of the board, world NED [m], (3,).
 
     Raises:
         NoDisplay: When no window can be opened.
@@ -74,15 +79,19 @@ class FlightViewer:
         self._axes = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]).ravel()
         self._next_s = 0.0
         self._dab: np.ndarray | None = None
+        light = plant.model.vis.headlight
+        light.ambient[:], light.diffuse[:] = _AMBIENT, _DIFFUSE
+        before = set(threading.enumerate())
         try:
             self._window = mujoco.viewer.launch_passive(
                 plant.model, plant.data, show_left_ui=False, show_right_ui=False
             )
         except RuntimeError as error:  # macOS wants its own interpreter
             raise NoDisplay(f"--view: {error}") from None
+        self._threads = set(threading.enumerate()) - before
         with self._window.lock():
             camera = self._window.cam
-            camera.lookat[:] = FLIP * target_ned
+            camera.lookat[:] = FLIP * (target_ned + np.array(_ASIDE_M))
             camera.distance, camera.azimuth, camera.elevation = _DISTANCE_M, _AZIMUTH_DEG, _ELEVATION_DEG
         self._started = time.perf_counter()
 
@@ -106,6 +115,8 @@ class FlightViewer:
     def close(self) -> None:
         """Close the window."""
         self._window.close()
+        for thread in self._threads:  # one that still draws when the interpreter ends would take it down
+            thread.join(_CLOSE_S)
 
     def _paint(self) -> None:
         place = FLIP * np.array([-_DAB_LIFT_M, *self._plant.tip[1:]])

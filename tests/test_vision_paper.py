@@ -89,14 +89,16 @@ def test_bottom_edge_of_clean_frames(name: str, stride: int) -> None:
     assert np.median(normals) < 1.5 and np.max(distances) < 0.01
 
 
-def test_first_upright_line_at_the_start_of_a_stroke_is_the_right_edge() -> None:
+@pytest.mark.parametrize(("along", "name", "other"), [(1.35, "right", "left"), (0.05, "left", "right")])
+def test_first_upright_line_at_the_ends_of_a_stroke_is_the_edge_there(along: float, name: str, other: str) -> None:
     world = World(dataclasses.replace(Scene(), board=dataclasses.replace(Scene().board, clutter=0)), 1)
-    frame, position, attitude = view(world, 1.35, 0.05, 0.0)
-    found = pipeline(world).detect(frame, SEED)
+    frame, position, attitude = view(world, along, 0.05, 0.0)
+    found = pipeline(world).detect(frame, SEED if name == "right" else (450.0, 120.0))
     assert found.vertical is not None
-    offset, angle = misfit(found.vertical.line, world.line(*edges(world)["right"], position, attitude), world.focal)
+    offset, angle = misfit(found.vertical.line, world.line(*edges(world)[name], position, attitude), world.focal)
     assert offset < PX and angle < DEG
-    assert found.guides["right"] is found.vertical and found.guides["left"] is None
+    assert found.vertical.identity.surface_side == (-1 if name == "right" else 1)
+    assert found.guides[name] is found.vertical and found.guides[other] is None
     assert found.guides["top"] is found.horizontal and found.guides["bottom"] is None
 
 

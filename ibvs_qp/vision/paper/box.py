@@ -72,10 +72,11 @@ class BoxSearch:
         angle = 2.0 * math.pi * np.arange(config.rays) / config.rays
         step = max(1.0, config.ray_step_px * scale)
         along = step * np.arange(1, math.ceil(math.hypot(rows, columns) / step) + 1)
-        self._along = along
+        self._step, self._count = step, np.arange(len(along))
         self._cos, self._sin = np.cos(angle), np.sin(angle)
         self._columns = np.rint(self._cos[:, None] * along).astype(np.intp)
         self._rows = np.rint(self._sin[:, None] * along).astype(np.intp)
+        self._offsets = self._rows * columns + self._columns
         self._limit = math.cos(math.radians(config.change_deg))
         self._seed_half = max(2, round(0.5 * config.seed_px * scale))
         self._spread = config.spread_px * scale
@@ -117,20 +118,19 @@ class BoxSearch:
     def _extents(self, row: int, column: int, normal: np.ndarray) -> tuple[float, float, float, float]:
         """Left, top, right and bottom of the surface [normals]."""
         n, (_, columns) = self._normals, self._normals.shape
-        rows_at, columns_at = row + self._rows, column + self._columns
-        inside = (rows_at >= self._first) & (rows_at <= self._last[0])
-        inside &= (columns_at >= self._first) & (columns_at <= self._last[1])
-        place = np.where(inside, rows_at * columns + columns_at, 0)
-        a, b, c = normal.tolist()
-        agreement = a * n.x.ravel().take(place) + b * n.y.ravel().take(place) + c * n.z.ravel().take(place)
-        changed = (agreement < self._limit) & self._visible.ravel().take(place) & inside
+        place = self._offsets + (row * columns + column)
+        a, b, c = (np.float32(entry) for entry in normal)
+        parts = (part.reshape(-1).take(place, mode="clip") for part in (n.x, n.y, n.z))
+        agreement = sum(gain * part for gain, part in zip((a, b, c), parts, strict=True))
+        inside = self._count < self._leaving(row, column)[:, None]
+        changed = (agreement < self._limit) & inside & self._visible.reshape(-1).take(place, mode="clip")
         lasting = changed[:, : 1 - _IN_A_ROW]
         for shift in range(1, _IN_A_ROW):
             lasting = lasting & changed[:, shift : changed.shape[1] - _IN_A_ROW + 1 + shift]
         ended = np.flatnonzero(lasting.any(axis=1))
         step = np.argmax(lasting[ended], axis=1)
         there = place[ended, step]
-        u, v = columns_at[ended, step], rows_at[ended, step]
+        u, v = column + self._columns[ended, step], row + self._rows[ended, step]
         # the change says which way the boundary runs: across the picture if the normal turns up or down
         level = np.abs(n.y.ravel().take(there) - b) > np.abs(n.x.ravel().take(there) - a)
         cos, sin = self._cos[ended], self._sin[ended]
@@ -140,6 +140,13 @@ class BoxSearch:
             self._side(u[~level & (cos > 0.0)], self._last[1]),
             self._side(v[level & (sin > 0.0)], self._last[0]),
         )
+
+    def _leaving(self, row: int, column: int) -> np.ndarray:
+        """Steps that every ray from a place can take within the picture, (rays,)."""
+        with np.errstate(divide="ignore"):
+            across = np.where(self._cos > 0.0, self._last[1] - column, self._first - column) / self._cos
+            down = np.where(self._sin > 0.0, self._last[0] - row, self._first - row) / self._sin
+        return np.floor((np.fmin(across, down) - 1.0) / self._step)
 
     def _side(self, places: np.ndarray, border: int) -> float:
         """Where most rays of a side saw the boundary, or the picture's border if too few agree."""

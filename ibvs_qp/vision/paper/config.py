@@ -20,8 +20,10 @@ class PaperConfig:
     median_px: int = setting(5, "aperture of the depth's median filter, odd", unit="px", low=3, high=5)
     smooth_px: float = setting(9.0, "window over which filtered depth is averaged", unit="px", low=1.0, high=61.0)
     baseline_px: float = setting(8.0, "distance of the two readings of a gradient", unit="px", low=2.0, high=60.0)
-    rays: int = setting(72, "directions of the search for the surface's boundary", low=8, high=360)
-    ray_step_px: float = setting(3.0, "distance of the places looked at along a ray", unit="px", low=1.0, high=20.0)
+    rays: int = setting(
+        180, "directions of the search: an edge seen between arm and corner still gets a few", low=8, high=720
+    )
+    ray_step_px: float = setting(5.0, "distance of the places looked at along a ray", unit="px", low=1.0, high=20.0)
     spread_px: float = setting(
         24.0,
         "rays agree on a side within this: an edge 4 deg off level",
