@@ -56,10 +56,12 @@ def _parse(words: list[str]) -> Any:
     """Turn words into the options of a command; the parser's own complaint becomes one line."""
     import tyro
 
+    from sim.commands.detect import Detect
     from sim.commands.paint import Paint
 
     app = tyro.extras.SubcommandApp()
     app.command(name="paint")(Paint)
+    app.command(name="detect")(Detect)
     complaint = io.StringIO()
     try:
         with contextlib.redirect_stderr(complaint):
@@ -88,7 +90,7 @@ def _one_line(text: str) -> str:
 def _refuse(message: str, words: list[str] | None = None) -> int:
     hint = ""
     if words is not None:
-        command = " ".join(["ibvs-qp", *[word for word in words[:1] if word == "paint"]])
+        command = " ".join(["ibvs-qp", *[word for word in words[:1] if word in ("paint", "detect")]])
         hint = f" (see {command} --help)"
     print("ibvs-qp: error: " + " ".join(message.split()) + hint, file=sys.stderr)
     return EXIT_USER

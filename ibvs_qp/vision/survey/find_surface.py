@@ -1,0 +1,131 @@
+"""The surface around a seed pixel: its plane, the samples on it by depth, and its colour."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from ibvs_qp.measurement import RgbdFrame
+from ibvs_qp.vision.colors import SurfaceColors
+from ibvs_qp.vision.config import PlaneConfig
+from ibvs_qp.vision.grid import CoarseGrid
+from ibvs_qp.vision.plane import PlaneEstimate, PlaneFitter
+from ibvs_qp.vision.surface import connected_samples
+from ibvs_qp.vision.survey.evidence import depth_gate
+from ibvs_qp.vision.survey.look import SurfaceLook, alike_colors
+
+#: Share of the surface that must have the colour around the seed for it to be the surface's.
+_GROUND_SHARE = 0.25
+#: Colours tried as the most common one.
+_TRIED = 40
+
+
+def find_surface(
+    frame: RgbdFrame,
+    grid: CoarseGrid,
+    fitter: PlaneFitter,
+    config: PlaneConfig,
+    seed_pixel: tuple[float, float],
+    colors: SurfaceColors,
+) -> SurfaceLook | str:
+    """Fit the surface through a seed, or say why there is none.
+
+    Args:
+        frame: Colour and depth.
+        grid: Coarse grid of the picture.
+        fitter: Plane fit.
+        config: Its settings.
+        seed_pixel: (u, v) of a place on the surface [px].
+        colors: Learns the colour of the surface.
+    """
+    u, v = seed_pixel
+    height, width = frame.depth.shape
+    if not (0 <= u < width and 0 <= v < height):
+        return f"seed pixel ({u:g}, {v:g}) lies outside the picture of {width} x {height} px"
+    rows, columns = grid.shape
+    seed = (
+        min(max(round((v - grid.offset) / grid.stride), 0), rows - 1),
+        min(max(round((u - grid.offset) / grid.stride), 0), columns - 1),
+    )
+    coarse = grid.sample(frame.rgb)
+    inverse = grid.inverse_depth(frame.depth, config.distance_min_m, config.distance_max_m)
+    prefer = colors.like_around(grid, coarse, seed, config.seed_radius)
+    plane = fitter.search(grid, inverse, [seed], None, [prefer])
+    if isinstance(plane, str):
+        return depth_problem(frame.depth, grid, seed, config) or plane
+    return look_of(grid, inverse, coarse, plane, seed)
+
+
+def look_of(
+    grid: CoarseGrid, inverse: np.ndarray, coarse: np.ndarray, plane: PlaneEstimate, seed: tuple[int, int] | None
+) -> SurfaceLook:
+    """Samples of a fitted surface by depth alone, and its colour: the fit may have kept to the colour of the seed."""
+    predicted = np.maximum((grid.design @ plane.inverse_depth).reshape(grid.shape), 1e-6)
+    relative = np.where(inverse > 0.0, inverse / predicted - 1.0, np.inf)
+    cells = connected_samples(np.abs(relative) < depth_gate(plane), grid, seed)
+    cells = cells if cells.any() else plane.component
+    color = _ground_color(grid, coarse, cells, seed)
+    return SurfaceLook(grid=grid, plane=plane, cells=cells, colored=cells & alike_colors(coarse, color), color=color)
+
+
+def _ground_color(grid: CoarseGrid, coarse: np.ndarray, cells: np.ndarray, seed: tuple[int, int] | None) -> np.ndarray:
+    """Colour of the bare surface: that around the seed where it covers much, else what most samples share.
+
+    A seed may lie on something printed. A wall close behind the surface may outnumber it: the seed goes first.
+    """
+    if seed is not None:
+        rows, columns = grid.window(seed, 1)
+        around = np.median(coarse[rows, columns].reshape(-1, 3).astype(float), axis=0)
+        alike = cells & alike_colors(coarse, around)
+        closed = cv2.morphologyEx(alike.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8)) > 0
+        region = connected_samples(closed, grid, seed) & alike
+        if int(region.sum()) >= _GROUND_SHARE * int(cells.sum()):
+            return np.median(coarse[region].astype(float), axis=0)
+    colors = coarse[cells].astype(float)
+    tried = colors[:: max(1, len(colors) // _TRIED)]
+    counts = [int(alike_colors(colors, color).sum()) for color in tried]
+    return np.median(colors[alike_colors(colors, tried[int(np.argmax(counts))])], axis=0)
+
+
+def end_band(look: SurfaceLook, width: int) -> np.ndarray:
+    """Samples near the end of the surface, by depth or by colour, bool (rows, columns)."""
+    kernel = np.ones((2 * width + 1, 2 * width + 1), np.uint8)
+    band = np.zeros(look.cells.shape, bool)
+    for region in (look.cells, look.colored):
+        filled = _filled(region)
+        band |= (cv2.dilate(filled, kernel) > 0) & (cv2.erode(filled, kernel, borderValue=1) == 0)
+    return band
+
+
+def _filled(region: np.ndarray) -> np.ndarray:
+    """The region without the holes that prints and missing depth leave in it, uint8."""
+    closed = cv2.morphologyEx(region.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
+    outlines, _ = cv2.findContours(closed, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    filled = np.zeros_like(closed)
+    if outlines:
+        cv2.drawContours(filled, [max(outlines, key=cv2.contourArea)], -1, 1, -1)
+    return np.maximum(filled, closed)
+
+
+def depth_problem(depth: np.ndarray, grid: CoarseGrid, seed: tuple[int, int], config: PlaneConfig) -> str | None:
+    """Why depth cannot give a surface at a seed: absent, or in wrong units; None if it is neither."""
+    samples = grid.sample(depth)
+    valid = samples[np.isfinite(samples) & (samples > 0.0)]
+    if len(valid) == 0:
+        return "the depth picture holds no valid reading"
+    low, high = config.distance_min_m, config.distance_max_m
+    typical = float(np.median(valid))
+    if not low <= typical <= high and float(((valid > low) & (valid < high)).mean()) < 0.1:
+        return (
+            f"depth of {typical:.3g} m in the middle is out of the camera's range ({low:g} to {high:g} m): "
+            "are the depth units per metre right?"
+        )
+    rows, columns = grid.window(seed, config.seed_radius)
+    around = samples[rows, columns]
+    around = around[np.isfinite(around) & (around > 0.0)]
+    if len(around) == 0:
+        return "no valid depth around the seed"
+    near = float(np.median(around))
+    if not low <= near <= high:
+        return f"depth of {near:.3g} m at the seed is out of range ({low:g} to {high:g} m)"
+    return None
