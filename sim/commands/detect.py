@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tyro
 
 from ibvs_qp.errors import ConfigError
-from ibvs_qp.vision.methods import available_methods
+from sim.detection.methods import METHODS
 
 if TYPE_CHECKING:
     from sim.detection.manifest import FrameEntry
@@ -52,7 +52,7 @@ class Detect:
     """A place on the surface; without it no surface and no guides, only lines."""
     sequence: Annotated[Path | None, _optional("DIR")] = None
     """Folder of frames; frames named PREFIX_NUMBER_color whose numbers follow on by one are a motion sequence."""
-    method: Literal[available_methods()] = "own"  # type: ignore[valid-type]
+    method: Literal[tuple(METHODS)] = "own"  # type: ignore[valid-type]
     """Pipeline."""
     all: Annotated[bool, _flag] = False
     """Candidates are every line of the whole picture, on the surface or not."""

@@ -44,7 +44,8 @@ def read_frame(
         metres = np.zeros(rgb.shape[:2], np.float32)
     else:
         metres = read_depth(depth, depth_units_per_metre)
-    (height, width), size = rgb.shape[:2], np.shape(metres)
+    height, width = rgb.shape[:2]
+    size: tuple[int, ...] = metres.shape
     if size != (height, width):
         raise PictureError(
             f"{depth} is {size[-1]} x {size[0]} px but {color} is {width} x {height} px: "

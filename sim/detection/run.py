@@ -8,9 +8,9 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from ibvs_qp.measurement import RgbdFrame
-from ibvs_qp.vision.methods import make_method
 from ibvs_qp.vision.survey.detection import Detection
 from sim.detection.manifest import FrameEntry, motion_sequences
+from sim.detection.methods import make_method
 from sim.detection.pictures import PictureError, read_frame
 
 #: Time from one frame to the next of a sequence of unknown rate [ns]: 30 Hz.
@@ -46,7 +46,7 @@ def detect_frames(
 
     Args:
         entries: The frames.
-        method_name: One of `ibvs_qp.vision.methods.available_methods()`.
+        method_name: One of `sim.detection.methods.METHODS`.
         every: Whether the candidates shall be every line of the whole picture.
         track: Whether a motion sequence is followed; otherwise every frame stands alone.
         started: Told of every frame before it is read.

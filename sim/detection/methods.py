@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import importlib
-import importlib.util
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
-from ibvs_qp.measurement import RgbdFrame
+if TYPE_CHECKING:
+    from ibvs_qp.measurement import RgbdFrame
 
 
 class FrameMethod(Protocol):
@@ -22,24 +22,16 @@ class FrameMethod(Protocol):
         ...
 
 
-#: Module and class of every method; one whose module is absent is not offered.
-_METHODS = {
-    "own": ("ibvs_qp.vision.survey", "SurveyPipeline"),
-    "paper": ("ibvs_qp.vision.paper", "PaperPipeline"),
-}
-
-
-def available_methods() -> tuple[str, ...]:
-    """Names of the methods whose module is there."""
-    return tuple(name for name, (module, _) in _METHODS.items() if importlib.util.find_spec(module) is not None)
+#: Module and class of every method; loaded on use, so that the help of the command stays quick.
+METHODS = {"own": ("ibvs_qp.vision.survey", "SurveyPipeline")}
 
 
 def make_method(name: str) -> FrameMethod:
     """A fresh pipeline with its default settings.
 
     Raises:
-        KeyError: For a name that is not among `available_methods()`.
+        KeyError: For a name that is not among `METHODS`.
     """
-    module, kind = _METHODS[name]
+    module, kind = METHODS[name]
     factory: Callable[[], FrameMethod] = getattr(importlib.import_module(module), kind)
     return factory()
