@@ -41,7 +41,7 @@ def read_frame(
     """
     rgb = read_color(color)
     if depth is None:
-        metres = np.zeros(rgb.shape[:2], np.float32)
+        metres: np.ndarray = np.zeros(rgb.shape[:2], np.float32)
     else:
         metres = read_depth(depth, depth_units_per_metre)
     height, width = rgb.shape[:2]

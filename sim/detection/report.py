@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 SCHEMA = 1
-#: Confidence from which a line is sure.
-SURE = 0.8
 
 
 def as_json(frames: list[SeenFrame], method: str) -> str:
@@ -90,15 +88,15 @@ def frame_table(frames: list[SeenFrame]) -> Table:
     from rich.table import Table
 
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    words = ("frame", "guide", "confidence")
-    for heading in ("frame", "surface", "guide", "middle, px", "slope", "confidence", "ms"):
+    words = ("frame", "guide")
+    for heading in ("frame", "surface", "guide", "middle, px", "slope", "conf.", "ms"):
         table.add_column(heading, no_wrap=True, justify="left" if heading in words else "right")
     for seen in frames:
         result = seen.result
         surface = "none" if result.plane is None else f"{result.plane.distance_m:.3f} m"
         found = {side: line for side in GUIDE_SIDES if (line := result.guides.get(side)) is not None}
         rows = [_words(line, side) for side, line in found.items()] or [("none", "", "", "")]
-        tail = (f"{seen.time_ms:.1f}",)
+        tail = (f"{seen.time_ms:.0f}",)
         table.add_row(Path(seen.entry.color).stem, surface, *rows[0], *tail)
         for row in rows[1:]:
             table.add_row("", "", *row)
@@ -115,6 +113,5 @@ def _words(line: Any, side: str) -> tuple[str, str, str, str]:
     (x1, y1), (x2, y2) = np.asarray(line.pixels, float).tolist()
     level = side in ("top", "bottom")
     slope = math.degrees(math.atan2(y2 - y1, x2 - x1) if level else math.atan2(x1 - x2, y2 - y1))
-    sure = "sure" if line.confidence >= SURE else "maybe"
     middle = f"{0.5 * (x1 + x2):.1f}, {0.5 * (y1 + y2):.1f}"
-    return side, middle, f"{math.remainder(slope, 180.0):+.2f}°", f"{line.confidence:.2f} {sure}"
+    return side, middle, f"{math.remainder(slope, 180.0):+.2f}°", f"{line.confidence:.2f}"

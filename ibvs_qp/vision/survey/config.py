@@ -21,6 +21,7 @@ class SurveyConfig:
         4, "half width of the band around the surface's end in which its edges are sought (32 px)", low=1, high=20
     )
     fitted: int = setting(16, "lines around the surface that are fitted to a fraction of a pixel", low=4, high=200)
+    detect_period: int = setting(5, "frames between detections while a sequence is followed", low=1, high=1000)
     guide_score_min: float = setting(0.30, "weakest line that is offered as a guide", low=0.0, high=1.0)
     role_deg: float = setting(
         40.0, "a line this near to level or upright may be a guide of that direction", unit="deg", low=5.0, high=45.0

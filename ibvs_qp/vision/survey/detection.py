@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ibvs_qp.vision.refined import RefinedLine
 from ibvs_qp.vision.surface import PlaneEstimate
 
 #: The four guides, by the side of the surface on which they lie.
@@ -26,6 +27,7 @@ class DetectedLine:
         borders_plane: Whether the surface ends there.
         surface_side: +1 if the surface lies on the side the normal (cos, sin) points to, -1 on the other, 0 unknown.
         line_id: Identity, kept from picture to picture of a followed sequence.
+        fit: The fit that it comes from, or None.
     """
 
     pixels: np.ndarray
@@ -37,6 +39,7 @@ class DetectedLine:
     borders_plane: bool = False
     surface_side: int = 0
     line_id: int = 0
+    fit: RefinedLine | None = None
 
     @property
     def length_px(self) -> float:

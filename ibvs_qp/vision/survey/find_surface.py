@@ -6,9 +6,10 @@ import cv2
 import numpy as np
 
 from ibvs_qp.measurement import RgbdFrame
-from ibvs_qp.vision.colors import SurfaceColors
+from ibvs_qp.vision.colors import BOARD, OTHER, SurfaceColors
 from ibvs_qp.vision.config import PlaneConfig
 from ibvs_qp.vision.grid import CoarseGrid
+from ibvs_qp.vision.motion import CameraMotion
 from ibvs_qp.vision.plane import PlaneEstimate, PlaneFitter
 from ibvs_qp.vision.surface import connected_samples
 from ibvs_qp.vision.survey.evidence import depth_gate
@@ -18,6 +19,8 @@ from ibvs_qp.vision.survey.look import SurfaceLook, alike_colors
 _GROUND_SHARE = 0.25
 #: Colours tried as the most common one.
 _TRIED = 40
+#: Share of a new picture in the running colour of a followed surface.
+_COLOR_BLEND = 0.2
 
 
 def find_surface(
@@ -56,16 +59,55 @@ def find_surface(
     return look_of(grid, inverse, coarse, plane, seed)
 
 
+def follow_surface(
+    frame: RgbdFrame,
+    grid: CoarseGrid,
+    fitter: PlaneFitter,
+    config: PlaneConfig,
+    before: SurfaceLook,
+    motion: CameraMotion | None,
+) -> SurfaceLook | str:
+    """Fit the surface again where it must be by the camera's motion, or say why that fails."""
+    coarse = grid.sample(frame.rgb)
+    inverse = grid.inverse_depth(frame.depth, config.distance_min_m, config.distance_max_m)
+    predicted = before.plane.inverse_depth if motion is None else motion.plane(before.plane.inverse_depth)
+    seed = _middle_cell(before.cells)
+    prefer = np.where(alike_colors(coarse, before.color), np.uint8(BOARD), np.uint8(OTHER))
+    plane = fitter.track(grid, inverse, predicted, None, prefer, seed)
+    if isinstance(plane, str):
+        return plane
+    cells = _on_plane(grid, inverse, plane, seed)
+    if int(cells.sum()) < config.lost_share * int(before.cells.sum()):
+        return "the surface was lost"
+    color = before.color
+    own = cells & (prefer == BOARD)
+    if int(own.sum()) >= config.min_samples:
+        color = color + _COLOR_BLEND * (np.median(coarse[own].astype(float), axis=0) - color)
+    return SurfaceLook(grid=grid, plane=plane, cells=cells, colored=cells & alike_colors(coarse, color), color=color)
+
+
+def _middle_cell(cells: np.ndarray) -> tuple[int, int]:
+    """The sample of a region that lies deepest within it."""
+    depth = cv2.distanceTransform(cells.astype(np.uint8), cv2.DIST_L1, 3)
+    row, column = np.unravel_index(int(np.argmax(depth)), cells.shape)
+    return int(row), int(column)
+
+
 def look_of(
     grid: CoarseGrid, inverse: np.ndarray, coarse: np.ndarray, plane: PlaneEstimate, seed: tuple[int, int] | None
 ) -> SurfaceLook:
     """Samples of a fitted surface by depth alone, and its colour: the fit may have kept to the colour of the seed."""
+    cells = _on_plane(grid, inverse, plane, seed)
+    color = _ground_color(grid, coarse, cells, seed)
+    return SurfaceLook(grid=grid, plane=plane, cells=cells, colored=cells & alike_colors(coarse, color), color=color)
+
+
+def _on_plane(grid: CoarseGrid, inverse: np.ndarray, plane: PlaneEstimate, seed: tuple[int, int] | None) -> np.ndarray:
+    """Connected samples on a plane by depth alone, bool (rows, columns)."""
     predicted = np.maximum((grid.design @ plane.inverse_depth).reshape(grid.shape), 1e-6)
     relative = np.where(inverse > 0.0, inverse / predicted - 1.0, np.inf)
     cells = connected_samples(np.abs(relative) < depth_gate(plane), grid, seed)
-    cells = cells if cells.any() else plane.component
-    color = _ground_color(grid, coarse, cells, seed)
-    return SurfaceLook(grid=grid, plane=plane, cells=cells, colored=cells & alike_colors(coarse, color), color=color)
+    return cells if cells.any() else plane.component
 
 
 def _ground_color(grid: CoarseGrid, coarse: np.ndarray, cells: np.ndarray, seed: tuple[int, int] | None) -> np.ndarray:
