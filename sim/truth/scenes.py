@@ -1,0 +1,192 @@
+"""What stands before the camera of a truth frame, and how it is drawn at random by families."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+import cv2
+import numpy as np
+
+from ibvs_qp.frames import R_BODY_CAMERA
+
+#: RGB colours of boards, paints and walls from which scenes choose.
+_LIGHT = ((228, 230, 222), (214, 205, 188), (196, 204, 214))
+_DARK = ((52, 56, 62), (70, 48, 44), (38, 60, 56))
+_PAINTS = ((40, 90, 200), (190, 50, 50), (50, 140, 80), (230, 190, 40))
+
+
+@dataclass(frozen=True, kw_only=True)
+class TruthScene:
+    """A board before a wall, seen from one pose.
+
+    The board's coordinates are (right, down) [m] from its middle; it lies in the plane Z = 0 of its own frame, the
+    wall `gap_m` behind it.
+
+    Attributes:
+        size_m: Width and height of the board.
+        gap_m: Distance of the wall behind the board.
+        rotation: Board frame to camera, (3, 3).
+        translation: Middle of the board in the camera frame [m], (3,).
+        board_color: RGB.
+        wall_color: RGB.
+        wall: "brick", "plaster" or "plain".
+        strokes: Painted bands as (left, top, right, bottom) [m] with their colour.
+        prints: Number of printed tags along the board's width; 0 for none.
+        clutter: Number of stickers on the board and posters on the wall.
+        shading: Relative change of the light across the picture.
+        noise: Standard deviation of the colour noise [grey levels].
+        blur_px: Standard deviation of the lens blur [px].
+        motion_px: Length of the motion blur and its direction (right, down) [px].
+        depth_noise: White, and again correlated, depth noise, share of depth.
+        smear_px: Largest distance by which the depth camera moves a step outwards [px].
+        arm: Whether arm and brush of the vehicle are in view.
+        camera: (width, height, focal length) [px].
+        seed: Of textures, clutter and noise.
+    """
+
+    size_m: tuple[float, float] = (0.60, 0.40)
+    gap_m: float = 0.05
+    rotation: np.ndarray = field(default_factory=lambda: np.eye(3))
+    translation: np.ndarray = field(default_factory=lambda: np.array([0.0, 0.0, 0.9]))
+    board_color: tuple[int, int, int] = _LIGHT[0]
+    wall_color: tuple[int, int, int] = (150, 112, 92)
+    wall: str = "brick"
+    strokes: tuple[tuple[tuple[float, float, float, float], tuple[int, int, int]], ...] = ()
+    prints: int = 0
+    clutter: int = 0
+    shading: float = 0.15
+    noise: float = 2.0
+    blur_px: float = 0.7
+    motion_px: tuple[float, float] = (0.0, 0.0)
+    depth_noise: float = 0.005
+    smear_px: float = 0.0
+    arm: bool = False
+    camera: tuple[int, int, float] = (640, 480, 610.0)
+    seed: int = 0
+
+    @property
+    def intrinsics(self) -> tuple[float, float, float, float]:
+        """(fx, fy, cx, cy) [px], pixel centres at integers."""
+        width, height, focal = self.camera
+        return focal, focal, 0.5 * (width - 1), 0.5 * (height - 1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Variation:
+    """Ranges from which the scenes of a family are drawn; angles in degrees, uniform, both signs."""
+
+    distance_m: tuple[float, float] = (0.7, 1.2)
+    roll: float = 4.0
+    yaw: float = 6.0
+    tilt: float = 3.5
+    shift_m: float = 0.06
+    base: TruthScene = field(default_factory=TruthScene)
+    dark: bool = False
+    strokes: int = 1
+
+
+#: Families of scenes: a board 5 cm and 1.2 m before a brick wall, 2 cm before plaster near the camera, dark on light,
+#: turned and oblique, printed, moving, and smeared as real depth cameras do.
+FAMILIES = {
+    "near wall": Variation(),
+    "far wall": Variation(base=TruthScene(gap_m=1.2)),
+    "flush wall": Variation(
+        distance_m=(0.45, 0.6), shift_m=0.02, base=TruthScene(gap_m=0.02, size_m=(0.32, 0.24), wall="plaster")
+    ),
+    "dark board": Variation(dark=True, base=TruthScene(wall="plaster", wall_color=(205, 200, 190))),
+    "oblique": Variation(roll=25.0, yaw=32.0, tilt=20.0, distance_m=(0.75, 1.1)),
+    "printed": Variation(yaw=25.0, strokes=0, base=TruthScene(prints=4, gap_m=0.8, size_m=(0.55, 0.42))),
+    "cluttered": Variation(base=TruthScene(clutter=6)),
+    "moving": Variation(base=TruthScene(motion_px=(3.0, 2.0), noise=3.0)),
+    "smeared depth": Variation(yaw=20.0, base=TruthScene(gap_m=0.6, smear_px=14.0, depth_noise=0.006, prints=4)),
+    "small picture": Variation(base=TruthScene(camera=(424, 240, 312.6), gap_m=0.05)),
+}
+
+
+def turned(roll: float, yaw: float, tilt: float) -> np.ndarray:
+    """Board frame to camera for a board rolled, yawed and tilted by angles [rad], (3, 3)."""
+    parts = (np.array([0.0, 0.0, roll]), np.array([0.0, yaw, 0.0]), np.array([tilt, 0.0, 0.0]))
+    rotation = np.eye(3)
+    for part in parts:
+        rotation = rotation @ cv2.Rodrigues(part)[0]
+    return rotation
+
+
+def sample_scene(variation: Variation, seed: int) -> TruthScene:
+    """One scene of a family; the same seed gives the same scene."""
+    rng = np.random.default_rng(np.random.SeedSequence([seed, 0x7472]))
+    roll, yaw, tilt = np.radians(rng.uniform(-1.0, 1.0, 3) * (variation.roll, variation.yaw, variation.tilt))
+    distance = float(rng.uniform(*variation.distance_m))
+    shift = rng.uniform(-1.0, 1.0, 2) * variation.shift_m
+    board = (_DARK if variation.dark else _LIGHT)[rng.integers(3)]
+    strokes = []
+    for _ in range(variation.strokes):
+        width, height = variation.base.size_m
+        top = float(rng.uniform(-0.25, 0.25)) * height
+        left, right = (float(entry) * width for entry in (rng.uniform(-0.45, -0.2), rng.uniform(0.2, 0.45)))
+        strokes.append(((left, top, right, top + 0.16 * height), _PAINTS[rng.integers(len(_PAINTS))]))
+    motion = tuple(float(entry) for entry in np.array(variation.base.motion_px) * rng.choice([-1.0, 1.0], 2))
+    return replace(
+        variation.base,
+        rotation=turned(float(roll), float(yaw), float(tilt)),
+        translation=np.array([*shift, distance]),
+        board_color=board,
+        strokes=tuple(strokes),
+        motion_px=(motion[0], motion[1]),
+        shading=float(rng.uniform(0.0, 0.3)),
+        seed=seed,
+    )
+
+
+def row_2_scene(seed: int) -> TruthScene:
+    """The view of design, section 4.4: brush in row 2, guide ahead of it inside its footprint, fresh edge above.
+
+    Row 1 is painted along the whole board, row 2 behind the brush only: to the left, as it is painted to the right.
+    """
+    rng = np.random.default_rng(np.random.SeedSequence([seed, 0x7232]))
+    focal, width, height = 625.2, 640, 480
+    paint = _PAINTS[rng.integers(len(_PAINTS))]
+    # the tip's image lies 0.08 m above the principal point at 0.5 m; the brush is 0.08 m wide, rows 0.072 m apart
+    jitter = rng.normal(0.0, 1.0, 3) * (0.003, 0.002, 0.003)
+    turns = np.radians(rng.normal(0.0, 1.0, 3) * (0.4, 0.5, 0.4))
+    row_2 = -0.08
+    row_1 = row_2 + 0.072
+    strokes = (
+        ((-0.8, row_1 - 0.04, 0.8, row_1 + 0.04), paint),
+        ((-0.8, row_2 - 0.04, 0.0, row_2 + 0.04), paint),
+    )
+    # board frame: its middle is put so that row 1 runs 0.05 m above the bottom edge
+    size = (1.6, 0.5)
+    bottom = row_1 + 0.05
+    middle = bottom - 0.5 * size[1]
+    moved = tuple(((l, t - middle, r, b - middle), color) for (l, t, r, b), color in strokes)
+    return TruthScene(
+        size_m=size,
+        gap_m=0.05,
+        rotation=turned(*map(float, turns)),
+        translation=np.array([jitter[0], middle + jitter[1], 0.5 + jitter[2]]),
+        board_color=_LIGHT[rng.integers(3)],
+        strokes=moved,
+        arm=True,
+        camera=(width, height, focal),
+        shading=float(rng.uniform(0.0, 0.2)),
+        seed=seed,
+    )
+
+
+def down_of(scene: TruthScene) -> np.ndarray:
+    """Direction of the board's own "down" in the camera frame, (3,); gravity for an upright board."""
+    return scene.rotation[:, 1]
+
+
+def attitude_of(scene: TruthScene) -> np.ndarray:
+    """Quaternion (w, x, y, z) of the body for a camera that looks along the body's x axis at an upright board."""
+    # world: x into the board, y right, z down; board frame: x right, y down, z into the board
+    world_of_board = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    body = world_of_board @ scene.rotation.T @ R_BODY_CAMERA.T
+    angle = math.acos(min(1.0, max(-1.0, 0.5 * (np.trace(body) - 1.0))))
+    axis = np.array([body[2, 1] - body[1, 2], body[0, 2] - body[2, 0], body[1, 0] - body[0, 1]])
+    size = float(np.linalg.norm(axis))
+    axis = axis / size if size > 1e-12 else np.array([1.0, 0.0, 0.0])
+    return np.concatenate(([math.cos(0.5 * angle)], math.sin(0.5 * angle) * axis))
