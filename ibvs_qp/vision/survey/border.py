@@ -12,6 +12,10 @@ from ibvs_qp.vision.survey.look import SurfaceLook, alike_colors
 
 #: Colours on both sides nearer than this are one [grey levels].
 _CONTRAST = 16.0
+#: Beside the bare surface, colours nearer than this to its own are the surface's [grey levels].
+_SAME_COLOR = 24.0
+#: Of the three places beyond a line at which colour is read, this many must be the surface's for it to go on.
+_MOST = 2
 #: A border that only colour shows counts this much: a step of depth is the better witness.
 _COLOR_ONLY = 0.55
 #: What depth shows counts this much where colour does not agree.
@@ -78,11 +82,16 @@ def _one_sided(
     pixels: np.ndarray, picture: Picture, look: SurfaceLook, inner: SideEvidence, outer: SideEvidence
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Score without length, by depth, by colour, of lines with the surface on the side of `inner`, (n,) each."""
+    # the nearest colours: the joints of a wall just beyond the border have its colour a little farther in
+    own = alike_colors(inner.colors[:, 0], look.color)
     like_out = alike_colors(outer.colors, look.color) & outer.inside
-    goes_on = (outer.depth[:, 1:4] == ON).any(axis=1) & like_out.any(axis=1)
+    # beside the bare surface the light is known, and what goes on must have its very colour
+    step = outer.colors - inner.colors[:, :1]
+    like_out &= ~own[:, None] | (np.vecdot(step, step) < _SAME_COLOR**2)
+    goes_on = (outer.depth[:, 1:4] == ON).any(axis=1) & (like_out.sum(axis=1) >= _MOST)
     step = _middle(outer.colors) - _middle(inner.colors)
     changes = (np.vecdot(step, step) > _CONTRAST**2) & ~like_out.all(axis=1)
-    belongs = alike_colors(inner.colors, look.color).any(axis=1).mean(axis=1)
+    belongs = own.mean(axis=1)
     by_depth = outer.end_share * (~goes_on).mean(axis=1)
     by_color = (changes & ~goes_on).mean(axis=1) * belongs
     ends = np.maximum(by_depth * (_DEPTH_ONLY + (1.0 - _DEPTH_ONLY) * by_color), _COLOR_ONLY * by_color)

@@ -17,8 +17,8 @@ from ibvs_qp.vision.survey.look import SurfaceLook, alike_colors
 
 #: Share of the surface that must have the colour around the seed for it to be the surface's.
 _GROUND_SHARE = 0.25
-#: Colours tried as the most common one.
-_TRIED = 40
+#: Samples next to the seed's colour among which the most common colour is sought, and colours tried.
+_NEAR, _TRIED = 300, 40
 #: Share of a new picture in the running colour of a followed surface.
 _COLOR_BLEND = 0.2
 
@@ -52,11 +52,23 @@ def find_surface(
     )
     coarse = grid.sample(frame.rgb)
     inverse = grid.inverse_depth(frame.depth, config.distance_min_m, config.distance_max_m)
-    prefer = colors.like_around(grid, coarse, seed, config.seed_radius)
+    like_seed = colors.like_around(grid, coarse, seed, config.seed_radius) == BOARD
+    prefer = np.where(_connected(like_seed, grid, seed), np.uint8(BOARD), np.uint8(OTHER))
     plane = fitter.search(grid, inverse, [seed], None, [prefer])
     if isinstance(plane, str):
         return depth_problem(frame.depth, grid, seed, config) or plane
-    return look_of(grid, inverse, coarse, plane, seed)
+    cells = _on_plane(grid, inverse, plane, seed)
+    color = _ground_color(grid, coarse, cells, seed)
+    alike = alike_colors(coarse, color)
+    own = cells & alike
+    if int(own.sum()) >= config.min_samples:
+        # a plane may tilt through the surface and what lies close behind it; its colour alone does not
+        prefer = np.where(alike, np.uint8(BOARD), np.uint8(OTHER))
+        again = fitter.track(grid, inverse, plane.inverse_depth, None, prefer, _middle_cell(own))
+        if isinstance(again, PlaneEstimate):
+            plane = again
+            cells = _on_plane(grid, inverse, plane, _middle_cell(own))
+    return SurfaceLook(grid=grid, plane=plane, cells=cells, colored=cells & alike, color=color)
 
 
 def follow_surface(
@@ -93,15 +105,6 @@ def _middle_cell(cells: np.ndarray) -> tuple[int, int]:
     return int(row), int(column)
 
 
-def look_of(
-    grid: CoarseGrid, inverse: np.ndarray, coarse: np.ndarray, plane: PlaneEstimate, seed: tuple[int, int] | None
-) -> SurfaceLook:
-    """Samples of a fitted surface by depth alone, and its colour: the fit may have kept to the colour of the seed."""
-    cells = _on_plane(grid, inverse, plane, seed)
-    color = _ground_color(grid, coarse, cells, seed)
-    return SurfaceLook(grid=grid, plane=plane, cells=cells, colored=cells & alike_colors(coarse, color), color=color)
-
-
 def _on_plane(grid: CoarseGrid, inverse: np.ndarray, plane: PlaneEstimate, seed: tuple[int, int] | None) -> np.ndarray:
     """Connected samples on a plane by depth alone, bool (rows, columns)."""
     predicted = np.maximum((grid.design @ plane.inverse_depth).reshape(grid.shape), 1e-6)
@@ -110,23 +113,29 @@ def _on_plane(grid: CoarseGrid, inverse: np.ndarray, plane: PlaneEstimate, seed:
     return cells if cells.any() else plane.component
 
 
-def _ground_color(grid: CoarseGrid, coarse: np.ndarray, cells: np.ndarray, seed: tuple[int, int] | None) -> np.ndarray:
-    """Colour of the bare surface: that around the seed where it covers much, else what most samples share.
+def _ground_color(grid: CoarseGrid, coarse: np.ndarray, cells: np.ndarray, seed: tuple[int, int]) -> np.ndarray:
+    """Colour of the bare surface: that around the seed where it covers much, else the most common one near by.
 
-    A seed may lie on something printed. A wall close behind the surface may outnumber it: the seed goes first.
+    A seed may lie on something printed or painted, and a wall close behind the surface may outnumber it.
     """
-    if seed is not None:
-        rows, columns = grid.window(seed, 1)
-        around = np.median(coarse[rows, columns].reshape(-1, 3).astype(float), axis=0)
-        alike = cells & alike_colors(coarse, around)
-        closed = cv2.morphologyEx(alike.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8)) > 0
-        region = connected_samples(closed, grid, seed) & alike
-        if int(region.sum()) >= _GROUND_SHARE * int(cells.sum()):
-            return np.median(coarse[region].astype(float), axis=0)
-    colors = coarse[cells].astype(float)
+    rows, columns = grid.window(seed, 1)
+    around = np.median(coarse[rows, columns].reshape(-1, 3).astype(float), axis=0)
+    alike = cells & alike_colors(coarse, around)
+    region = _connected(alike, grid, seed)
+    if int(region.sum()) >= _GROUND_SHARE * int(cells.sum()):
+        return np.median(coarse[region].astype(float), axis=0)
+    others = np.argwhere(cells & ~region)
+    near = others[np.argsort(((others - seed) ** 2).sum(axis=1), kind="stable")[:_NEAR]]
+    colors = coarse[tuple(near.T)].astype(float) if len(near) else coarse[cells].astype(float)
     tried = colors[:: max(1, len(colors) // _TRIED)]
     counts = [int(alike_colors(colors, color).sum()) for color in tried]
     return np.median(colors[alike_colors(colors, tried[int(np.argmax(counts))])], axis=0)
+
+
+def _connected(region: np.ndarray, grid: CoarseGrid, seed: tuple[int, int]) -> np.ndarray:
+    """The part of a region of samples that hangs together with a seed, gaps of one sample bridged."""
+    closed = cv2.morphologyEx(region.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8)) > 0
+    return connected_samples(closed, grid, seed) & region
 
 
 def end_band(look: SurfaceLook, width: int) -> np.ndarray:
