@@ -13,6 +13,7 @@ from ibvs_qp.vision.motion import CameraMotion
 from ibvs_qp.vision.plane import PlaneEstimate, PlaneFitter
 from ibvs_qp.vision.surface import connected_samples
 from ibvs_qp.vision.survey.evidence import depth_gate
+from ibvs_qp.vision.survey.grow import grown_plane
 from ibvs_qp.vision.survey.look import SurfaceLook, alike_colors
 
 #: Share of the surface that must have the colour around the seed for it to be the surface's.
@@ -57,6 +58,11 @@ def find_surface(
     plane = fitter.search(grid, inverse, [seed], None, [prefer])
     if isinstance(plane, str):
         return depth_problem(frame.depth, grid, seed, config) or plane
+    own = np.where(prefer == BOARD, inverse, 0.0)
+    start = own if int(np.count_nonzero(own)) >= config.min_samples else inverse
+    start = grown_plane(grid, start, seed, plane.inverse_depth, config)
+    grown = fitter.track(grid, inverse, start, None, prefer, seed)
+    plane = grown if isinstance(grown, PlaneEstimate) else plane
     cells = _on_plane(grid, inverse, plane, seed)
     color = _ground_color(grid, coarse, cells, seed)
     alike = alike_colors(coarse, color)
