@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
 from ibvs_qp.measurement import RgbdFrame
@@ -115,9 +114,7 @@ def project(scene: TruthScene, points: np.ndarray) -> np.ndarray:
     return at[..., :2] / at[..., 2:] * (fx, fy) + (cx, cy)
 
 
-def true_line(
-    scene: TruthScene, first: tuple[float, float], second: tuple[float, float], mask: np.ndarray
-) -> TrueLine:
+def true_line(scene: TruthScene, first: tuple[float, float], second: tuple[float, float], mask: np.ndarray) -> TrueLine:
     """The line through two points of the board, exact in (rho, theta)."""
     rays = np.array([first, second]) @ scene.rotation[:, :2].T + scene.translation
     a, b, c = np.cross(rays[0], rays[1])

@@ -79,9 +79,7 @@ def _warp(texture: tuple[np.ndarray, np.ndarray, float], scene: TruthScene, behi
     times = SUPERSAMPLING
     finer = np.array([[times, 0.0, 0.5 * (times - 1)], [0.0, times, 0.5 * (times - 1)], [0.0, 0.0, 1.0]])
     size = (times * scene.camera[0], times * scene.camera[1])
-    warped = cv2.warpPerspective(
-        picture, finer @ forward, size, flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT
-    )
+    warped = cv2.warpPerspective(picture, finer @ forward, size, flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT)
     return warped[..., :3].astype(np.float32)
 
 
@@ -94,9 +92,7 @@ def _wall(scene: TruthScene) -> tuple[np.ndarray, np.ndarray, float]:
 
 
 @functools.lru_cache(maxsize=8)
-def _wall_texture(
-    seed: int, shape: tuple[int, int], color: tuple[int, int, int], px_m: float, kind: str
-) -> np.ndarray:
+def _wall_texture(seed: int, shape: tuple[int, int], color: tuple[int, int, int], px_m: float, kind: str) -> np.ndarray:
     rng = np.random.default_rng(np.random.SeedSequence([seed, 0x776C]))
     if kind == "plain":
         return flat(*shape, color)

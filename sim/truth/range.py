@@ -12,9 +12,7 @@ from sim.truth.scenes import TruthScene
 _HOLE_PX, _HOLE_STEP_PX = 4, 6
 
 
-def measure_depth(
-    scene: TruthScene, inverse: tuple[np.ndarray, np.ndarray], rng: np.random.Generator
-) -> np.ndarray:
+def measure_depth(scene: TruthScene, inverse: tuple[np.ndarray, np.ndarray], rng: np.random.Generator) -> np.ndarray:
     """Depth [m], float32 (H, W), 0 where there is no reading.
 
     Args:

@@ -86,20 +86,38 @@ class Variation:
     strokes: int = 1
 
 
-#: Families of scenes: a board 5 cm and 1.2 m before a brick wall, 2 cm before plaster near the camera, dark on light,
-#: turned and oblique, printed, moving, and smeared as real depth cameras do.
+#: Families of scenes: a board 5 cm and 1.2 m before a brick wall, 2 cm before plaster near the camera, 1.5 cm
+#: before brick (which depth cannot tell apart), dark on light,
+#: turned and oblique, printed, moving, smeared as real depth cameras do, and hard: faint, noisy, 1.5 cm before the
+#: wall, where not every edge can be found and confidence has to say so.
 FAMILIES = {
     "near wall": Variation(),
     "far wall": Variation(base=TruthScene(gap_m=1.2)),
     "flush wall": Variation(
         distance_m=(0.45, 0.6), shift_m=0.02, base=TruthScene(gap_m=0.02, size_m=(0.32, 0.24), wall="plaster")
     ),
+    "thin board": Variation(base=TruthScene(gap_m=0.015)),
     "dark board": Variation(dark=True, base=TruthScene(wall="plaster", wall_color=(205, 200, 190))),
     "oblique": Variation(roll=25.0, yaw=32.0, tilt=20.0, distance_m=(0.75, 1.1)),
     "printed": Variation(yaw=25.0, strokes=0, base=TruthScene(prints=4, gap_m=0.8, size_m=(0.55, 0.42))),
     "cluttered": Variation(base=TruthScene(clutter=6)),
     "moving": Variation(base=TruthScene(motion_px=(3.0, 2.0), noise=3.0)),
     "smeared depth": Variation(yaw=20.0, base=TruthScene(gap_m=0.6, smear_px=14.0, depth_noise=0.006, prints=4)),
+    "hard": Variation(
+        yaw=25.0,
+        strokes=2,
+        base=TruthScene(
+            gap_m=0.015,
+            wall="plaster",
+            wall_color=(186, 182, 176),
+            clutter=8,
+            noise=5.0,
+            blur_px=1.5,
+            motion_px=(5.0, 3.0),
+            depth_noise=0.008,
+            smear_px=8.0,
+        ),
+    ),
     "small picture": Variation(base=TruthScene(camera=(424, 240, 312.6), gap_m=0.05)),
 }
 
@@ -158,9 +176,10 @@ def row_2_scene(seed: int) -> TruthScene:
     )
     # board frame: its middle is put so that row 1 runs 0.05 m above the bottom edge
     size = (1.6, 0.5)
-    bottom = row_1 + 0.05
-    middle = bottom - 0.5 * size[1]
-    moved = tuple(((l, t - middle, r, b - middle), color) for (l, t, r, b), color in strokes)
+    middle = row_1 + 0.05 - 0.5 * size[1]
+    moved = tuple(
+        ((left, top - middle, right, bottom - middle), color) for (left, top, right, bottom), color in strokes
+    )
     return TruthScene(
         size_m=size,
         gap_m=0.05,

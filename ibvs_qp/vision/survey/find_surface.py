@@ -12,6 +12,7 @@ from ibvs_qp.vision.grid import CoarseGrid
 from ibvs_qp.vision.motion import CameraMotion
 from ibvs_qp.vision.plane import PlaneEstimate, PlaneFitter
 from ibvs_qp.vision.surface import connected_samples
+from ibvs_qp.vision.survey.evenly_lit import evenly_lit
 from ibvs_qp.vision.survey.evidence import depth_gate
 from ibvs_qp.vision.survey.grow import grown_plane
 from ibvs_qp.vision.survey.look import SurfaceLook, alike_colors
@@ -67,6 +68,10 @@ def find_surface(
     color = _ground_color(grid, coarse, cells, seed)
     alike = alike_colors(coarse, color)
     own = cells & alike
+    even = evenly_lit(frame.rgb, grid, own, seed)
+    if even is not None:
+        alike = even
+        own = cells & even
     if int(own.sum()) >= config.min_samples:
         # a plane may tilt through the surface and what lies close behind it; its colour alone does not
         prefer = np.where(alike, np.uint8(BOARD), np.uint8(OTHER))
