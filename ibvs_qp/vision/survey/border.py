@@ -17,9 +17,9 @@ _SAME_COLOR = 24.0
 #: Of the three places beyond a line at which colour is read, this many must be the surface's for it to go on.
 _MOST = 2
 #: A border that only colour shows counts this much: a step of depth is the better witness.
-_COLOR_ONLY = 0.55
+_COLOR_ONLY = 0.75
 #: What depth shows counts this much where colour does not agree.
-_DEPTH_ONLY = 0.6
+_DEPTH_ONLY = 0.5
 #: Samples of the surface beyond a border count from this distance on [cells], and this share of them rules it out.
 _CELLS_BEYOND, _SHARE_BEYOND = 2.0, 0.25
 #: Length that earns half of what a long line earns [px at 640].

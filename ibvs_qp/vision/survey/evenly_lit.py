@@ -16,6 +16,9 @@ _ALL = 0.85
 #: Share of the samples just beyond the part that must have the surface's colour in some light: beyond prints they do
 #: not, beyond an edge towards a wall of nearly the same colour they do.
 _ALIKE_BEYOND = 0.4
+#: A part that fills this share of its convex hull, and that is this share of what has the colour, is a surface of its
+#: own: joints of a wall and the like have its colour, but are thin.
+_SOLID, _SOLID_SHARE = 0.85, 0.3
 
 
 def evenly_lit(rgb: np.ndarray, grid: CoarseGrid, own: np.ndarray, seed: tuple[int, int]) -> np.ndarray | None:
@@ -53,8 +56,12 @@ def evenly_lit(rgb: np.ndarray, grid: CoarseGrid, own: np.ndarray, seed: tuple[i
         return None
     closed = cv2.morphologyEx(part.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
     outlines, _ = cv2.findContours(closed, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    cv2.drawContours(closed, [max(outlines, key=cv2.contourArea)], -1, 1, -1)
+    outline = max(outlines, key=cv2.contourArea)
+    cv2.drawContours(closed, [outline], -1, 1, -1)
+    hull = np.zeros_like(closed)
+    cv2.fillConvexPoly(hull, cv2.convexHull(outline), 1)
+    solid = int(closed.sum()) >= max(_SOLID * int(hull.sum()), _SOLID_SHARE * total)
     ring = (cv2.dilate(closed, np.ones((5, 5), np.uint8)) > 0) & (cv2.dilate(closed, np.ones((3, 3), np.uint8)) == 0)
-    if not ring.any() or float(own[ring].mean()) < _ALIKE_BEYOND:
-        return None
-    return part
+    if solid or (ring.any() and float(own[ring].mean()) >= _ALIKE_BEYOND):
+        return (closed > 0) & own
+    return None

@@ -21,6 +21,8 @@ from ibvs_qp.vision.survey.look import SurfaceLook, alike_colors
 _GROUND_SHARE = 0.25
 #: Samples next to the seed's colour among which the most common colour is sought, and colours tried.
 _NEAR, _TRIED = 300, 40
+#: Where more than this share of all readings lies on one plane, a wall may be part of it.
+_FLUSH_SHARE = 0.75
 #: Share of a new picture in the running colour of a followed surface.
 _COLOR_BLEND = 0.2
 
@@ -68,7 +70,9 @@ def find_surface(
     color = _ground_color(grid, coarse, cells, seed)
     alike = alike_colors(coarse, color)
     own = cells & alike
-    even = evenly_lit(frame.rgb, grid, own, seed)
+    # where depth does not tell the surface from a wall close behind it, its light has to
+    flush = int(cells.sum()) > _FLUSH_SHARE * int(np.count_nonzero(inverse))
+    even = evenly_lit(frame.rgb, grid, own, seed) if flush else None
     if even is not None:
         alike = even
         own = cells & even
