@@ -22,7 +22,7 @@ _GROUND_SHARE = 0.25
 #: Samples next to the seed's colour among which the most common colour is sought, and colours tried.
 _NEAR, _TRIED = 300, 40
 #: Where more than this share of all readings lies on one plane, a wall may be part of it.
-_FLUSH_SHARE = 0.75
+_FLUSH_SHARE = 0.55
 #: Share of a new picture in the running colour of a followed surface.
 _COLOR_BLEND = 0.2
 
