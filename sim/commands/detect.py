@@ -48,6 +48,8 @@ class Detect:
     """Row of the principal point."""
     depth_units_per_metre: float = 1000.0
     """Depth values per metre: 1000 for millimetres, 5000 for TUM, 1 for metres."""
+    distortion: Annotated[tuple[float, float, float, float, float] | None, _optional("K1 K2 P1 P2 K3")] = None
+    """Lens distortion as OpenCV orders it; rho and theta are then those of the straightened lines."""
     seed_pixel: Annotated[tuple[float, float] | None, _optional("U V")] = None
     """A place on the surface; without it no surface and no guides, only lines."""
     sequence: Annotated[Path | None, _optional("DIR")] = None
@@ -98,6 +100,7 @@ class Detect:
                 self.method,
                 every=self.all,
                 track=not self.no_track,
+                distortion=self.distortion,
                 started=lambda entry: status.update(f"Looking at {entry.color} ..."),
             )
         if folder is not None:
@@ -118,6 +121,8 @@ class Detect:
         from sim.detection.manifest import FrameEntry, read_manifest
         from sim.detection.pictures import read_frame
 
+        if self.distortion is not None and not all(map(math.isfinite, self.distortion)):
+            raise ConfigError("--distortion must be five finite numbers: k1 k2 p1 p2 k3")
         if self.track and self.no_track:
             raise ConfigError("--track and --no-track exclude each other")
         if (self.rgb is None) == (self.sequence is None):

@@ -9,6 +9,7 @@ from typing import Any
 
 from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.vision.survey.detection import Detection
+from ibvs_qp.vision.survey.distortion import undistorted_line
 from sim.detection.manifest import FrameEntry, motion_sequences
 from sim.detection.methods import make_method
 from sim.detection.pictures import PictureError, read_frame
@@ -40,6 +41,7 @@ def detect_frames(
     *,
     every: bool,
     track: bool,
+    distortion: tuple[float, ...] | None = None,
     started: Callable[[FrameEntry], None] | None = None,
 ) -> list[SeenFrame]:
     """Look at frames and report them in the order given.
@@ -49,6 +51,7 @@ def detect_frames(
         method_name: One of `sim.detection.methods.METHODS`.
         every: Whether the candidates shall be every line of the whole picture.
         track: Whether a motion sequence is followed; otherwise every frame stands alone.
+        distortion: (k1, k2, p1, p2, k3) of the lens, or None for none; lines are straightened by it.
         started: Told of every frame before it is read.
     """
     seen: dict[int, SeenFrame] = {}
@@ -58,7 +61,8 @@ def detect_frames(
         for place, index in enumerate(group):
             if started is not None:
                 started(entries[index])
-            seen[index] = _look(entries[index], method, every=every, follows=follows, stamp_ns=place * _INTERVAL_NS)
+            looked = _look(entries[index], method, every=every, follows=follows, stamp_ns=place * _INTERVAL_NS)
+            seen[index] = looked if distortion is None else _straightened(looked, distortion)
     return [seen[index] for index in range(len(entries))]
 
 
@@ -81,6 +85,17 @@ def _look(entry: FrameEntry, method: Any, *, every: bool, follows: bool, stamp_n
     if (every or result.refused is not None) and hasattr(method, "every_line"):
         result = with_every_line(result, method.every_line(frame))
     return SeenFrame(entry=entry, frame=frame, result=result, time_ms=elapsed)
+
+
+def _straightened(seen: SeenFrame, coefficients: tuple[float, ...]) -> SeenFrame:
+    """The frame with the lens's distortion taken out of (rho, theta) of every line."""
+
+    def straight(line: Any) -> Any:
+        return None if line is None else undistorted_line(line, seen.entry.intrinsics, coefficients)
+
+    guides = {side: straight(line) for side, line in seen.result.guides.items()}
+    candidates = tuple(straight(line) for line in seen.result.candidates)
+    return dataclasses.replace(seen, result=dataclasses.replace(seen.result, guides=guides, candidates=candidates))
 
 
 def with_every_line(result: Any, lines: tuple[Any, ...]) -> Any:
