@@ -11,7 +11,7 @@ from ibvs_qp.vehicle import VehicleParams
 from ibvs_qp.vision import LineHint, Perception, VisionConfig
 from sim.truth import render_frame
 from sim.truth.accuracy import line_errors
-from sim.truth.scenes import attitude_of, row_2_scene
+from sim.truth.row_2 import attitude_of, row_2_scene
 
 #: Pictures of one view: two confirm a track, the third is judged.
 PICTURES = 3

@@ -69,14 +69,14 @@ def render_frame(scene: TruthScene, stamp_ns: int = 0, noise_seed: int | None = 
     width, height, _ = scene.camera
     rgb = paint_picture(scene, rng)
     inverse = _inverse_depths(scene)
-    mask = np.zeros((height, width), bool)
+    mask, layer = np.zeros((height, width), bool), None
     if scene.arm:
         flight = Scene(camera=CameraScene(width=width, height=height))
         layer = vehicle_layer(flight, VehicleParams(), scene.intrinsics, rng)
         mask = layer.mask > 0
         rgb[mask] = layer.picture[mask, :3]
     depth = measure_depth(scene, inverse, rng)
-    if scene.arm:
+    if layer is not None:
         depth[mask] = 1.0 / layer.inverse_depth[mask]
         depth[(layer.holes > 0) & ~mask] = 0.0
     half_w, half_h = 0.5 * scene.size_m[0], 0.5 * scene.size_m[1]

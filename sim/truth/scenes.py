@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field, replace
 
 import cv2
 import numpy as np
 
-from ibvs_qp.frames import R_BODY_CAMERA
-
 #: RGB colours of boards, paints and walls from which scenes choose.
-_LIGHT = ((228, 230, 222), (214, 205, 188), (196, 204, 214))
+LIGHT = ((228, 230, 222), (214, 205, 188), (196, 204, 214))
 _DARK = ((52, 56, 62), (70, 48, 44), (38, 60, 56))
-_PAINTS = ((40, 90, 200), (190, 50, 50), (50, 140, 80), (230, 190, 40))
-#: Largest relative change of the light across half a row-2 view: the flight tells board from wall by a colour gate of
-#: 42 grey levels, a tenth of a white board's colour.
-_ROW_2_SHADING = 0.08
+PAINTS = ((40, 90, 200), (190, 50, 50), (50, 140, 80), (230, 190, 40))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,7 +46,7 @@ class TruthScene:
     gap_m: float = 0.05
     rotation: np.ndarray = field(default_factory=lambda: np.eye(3))
     translation: np.ndarray = field(default_factory=lambda: np.array([0.0, 0.0, 0.9]))
-    board_color: tuple[int, int, int] = _LIGHT[0]
+    board_color: tuple[int, int, int] = LIGHT[0]
     wall_color: tuple[int, int, int] = (150, 112, 92)
     wall: str = "brick"
     strokes: tuple[tuple[tuple[float, float, float, float], tuple[int, int, int]], ...] = ()
@@ -140,13 +134,13 @@ def sample_scene(variation: Variation, seed: int) -> TruthScene:
     roll, yaw, tilt = np.radians(rng.uniform(-1.0, 1.0, 3) * (variation.roll, variation.yaw, variation.tilt))
     distance = float(rng.uniform(*variation.distance_m))
     shift = rng.uniform(-1.0, 1.0, 2) * variation.shift_m
-    board = (_DARK if variation.dark else _LIGHT)[rng.integers(3)]
+    board = (_DARK if variation.dark else LIGHT)[rng.integers(3)]
     strokes = []
     for _ in range(variation.strokes):
         width, height = variation.base.size_m
         top = float(rng.uniform(-0.25, 0.25)) * height
         left, right = (float(entry) * width for entry in (rng.uniform(-0.45, -0.2), rng.uniform(0.2, 0.45)))
-        strokes.append(((left, top, right, top + 0.16 * height), _PAINTS[rng.integers(len(_PAINTS))]))
+        strokes.append(((left, top, right, top + 0.16 * height), PAINTS[rng.integers(len(PAINTS))]))
     motion = tuple(float(entry) for entry in np.array(variation.base.motion_px) * rng.choice([-1.0, 1.0], 2))
     return replace(
         variation.base,
@@ -158,57 +152,3 @@ def sample_scene(variation: Variation, seed: int) -> TruthScene:
         shading=float(rng.uniform(0.0, 0.3)),
         seed=seed,
     )
-
-
-def row_2_scene(seed: int) -> TruthScene:
-    """The view of design, section 4.4: brush in row 2, guide ahead of it inside its footprint, fresh edge above.
-
-    Row 1 is painted along the whole board, row 2 behind the brush only: to the left, as it is painted to the right.
-    """
-    rng = np.random.default_rng(np.random.SeedSequence([seed, 0x7232]))
-    focal, width, height = 625.2, 640, 480
-    paint = _PAINTS[rng.integers(len(_PAINTS))]
-    # the tip's image lies 0.08 m above the principal point at 0.5 m; the brush is 0.08 m wide, rows 0.072 m apart
-    jitter = rng.normal(0.0, 1.0, 3) * (0.003, 0.002, 0.003)
-    turns = np.radians(rng.normal(0.0, 1.0, 3) * (0.4, 0.5, 0.4))
-    row_2 = -0.08
-    row_1 = row_2 + 0.072
-    strokes = (
-        ((-0.8, row_1 - 0.04, 0.8, row_1 + 0.04), paint),
-        ((-0.8, row_2 - 0.04, 0.0, row_2 + 0.04), paint),
-    )
-    # board frame: its middle is put so that row 1 runs 0.05 m above the bottom edge
-    size = (1.6, 0.5)
-    middle = row_1 + 0.05 - 0.5 * size[1]
-    moved = tuple(
-        ((left, top - middle, right, bottom - middle), color) for (left, top, right, bottom), color in strokes
-    )
-    return TruthScene(
-        size_m=size,
-        gap_m=0.05,
-        rotation=turned(*map(float, turns)),
-        translation=np.array([jitter[0], middle + jitter[1], 0.5 + jitter[2]]),
-        board_color=_LIGHT[rng.integers(3)],
-        strokes=moved,
-        arm=True,
-        camera=(width, height, focal),
-        shading=float(rng.uniform(0.0, _ROW_2_SHADING)),
-        seed=seed,
-    )
-
-
-def down_of(scene: TruthScene) -> np.ndarray:
-    """Direction of the board's own "down" in the camera frame, (3,); gravity for an upright board."""
-    return scene.rotation[:, 1]
-
-
-def attitude_of(scene: TruthScene) -> np.ndarray:
-    """Quaternion (w, x, y, z) of the body for a camera that looks along the body's x axis at an upright board."""
-    # world: x into the board, y right, z down; board frame: x right, y down, z into the board
-    world_of_board = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-    body = world_of_board @ scene.rotation.T @ R_BODY_CAMERA.T
-    angle = math.acos(min(1.0, max(-1.0, 0.5 * (np.trace(body) - 1.0))))
-    axis = np.array([body[2, 1] - body[1, 2], body[0, 2] - body[2, 0], body[1, 0] - body[0, 1]])
-    size = float(np.linalg.norm(axis))
-    axis = axis / size if size > 1e-12 else np.array([1.0, 0.0, 0.0])
-    return np.concatenate(([math.cos(0.5 * angle)], math.sin(0.5 * angle) * axis))
