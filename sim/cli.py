@@ -60,15 +60,17 @@ def _parse(words: list[str]) -> Any:
 
     from sim.commands.bench import Bench
     from sim.commands.compare import Compare
+    from sim.commands.detect import Detect
     from sim.commands.experiment import ExperimentCommand
     from sim.commands.explain import Explain
     from sim.commands.paint import Paint
 
     app = tyro.extras.SubcommandApp()
-    app.command(name="bench")(Bench)
     app.command(name="paint")(Paint)
+    app.command(name="bench")(Bench)
     app.command(name="experiment")(ExperimentCommand)
     app.command(name="compare")(Compare)
+    app.command(name="detect")(Detect)
     app.command(name="explain")(Explain)
     complaint = io.StringIO()
     try:

@@ -70,13 +70,18 @@ def paint_surface(rng: np.random.Generator, shape: tuple[int, int], color: tuple
 
 
 def wall_surface(
-    rng: np.random.Generator, shape: tuple[int, int], color: tuple[int, int, int], px_m: float
+    rng: np.random.Generator,
+    shape: tuple[int, int],
+    color: tuple[int, int, int],
+    px_m: float,
+    brick: bool | None = None,
 ) -> np.ndarray:
-    """Brick or plaster wall with visible texture; the seed decides which, uint8 (height, width, 4)."""
+    """Brick or plaster wall with visible texture, uint8 (height, width, 4); the seed decides which if nobody does."""
     picture = flat(*shape, color)
     fine = 3.0 * smooth_noise(rng, shape, 1.5) + 3.0 * smooth_noise(rng, shape, 0.01 * px_m)
     clouds = 6.0 * smooth_noise(rng, shape, 0.25 * px_m)
-    if rng.random() < 0.5:
+    drawn = rng.random() < 0.5
+    if drawn if brick is None else brick:
         _lay_bricks(rng, picture, px_m)
         shade(picture, fine + clouds)
     else:

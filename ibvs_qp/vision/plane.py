@@ -87,9 +87,10 @@ class PlaneFitter:
         predicted: np.ndarray,
         down: np.ndarray | None,
         prefer: np.ndarray | None,
+        seed: tuple[int, int] | None = None,
     ) -> PlaneEstimate | str:
-        """Follow the surface from predicted (a, b, c), without random search."""
-        return self._refine(grid, inverse, predicted, None, down, prefer)
+        """Follow the surface from predicted (a, b, c), without random search; it is the part around a seed if given."""
+        return self._refine(grid, inverse, predicted, seed, down, prefer)
 
     def _seed_value(self, grid: CoarseGrid, inverse: np.ndarray, seed: tuple[int, int]) -> float:
         rows, columns = grid.window(seed, self._config.seed_radius)

@@ -1,0 +1,159 @@
+"""``ibvs-qp detect``: plane, lines and guides in a frame or a folder of frames."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import tyro
+
+from ibvs_qp.errors import ConfigError
+from sim.detection.methods import METHODS
+
+if TYPE_CHECKING:
+    from sim.detection.manifest import FrameEntry
+
+
+def _optional(metavar: str) -> Any:
+    """Help text of an option whose default is worded in its description."""
+    return tyro.conf.arg(metavar=metavar, help_behavior_hint="")
+
+
+_flag = tyro.conf.arg(help_behavior_hint="")
+#: What a single frame needs, besides --rgb.
+_CAMERA = ("fx", "fy", "cx", "cy")
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Detect:
+    """Find the surface and its edges in one RGB-D frame, or in every frame of a folder with a manifest.csv.
+
+    Example: ibvs-qp detect --rgb c.png --depth d.png --fx 607 --fy 607 --cx 321 --cy 242 --depth-units-per-metre 1000
+    --seed-pixel 270 150 --overlay pictures
+    """
+
+    rgb: Annotated[Path | None, _optional("FILE")] = None
+    """Colour picture of one frame (8 or 16 bits)."""
+    depth: Annotated[Path | None, _optional("FILE")] = None
+    """Depth picture registered to it (8 or 16 bits or floating point; 0 = invalid); without it nothing but lines."""
+    fx: Annotated[float | None, _optional("PX")] = None
+    """Focal length along the rows."""
+    fy: Annotated[float | None, _optional("PX")] = None
+    """Focal length along the columns."""
+    cx: Annotated[float | None, _optional("PX")] = None
+    """Column of the principal point, pixel centres at integers."""
+    cy: Annotated[float | None, _optional("PX")] = None
+    """Row of the principal point."""
+    depth_units_per_metre: float = 1000.0
+    """Depth values per metre: 1000 for millimetres, 5000 for TUM, 1 for metres."""
+    distortion: Annotated[tuple[float, float, float, float, float] | None, _optional("K1 K2 P1 P2 K3")] = None
+    """Lens distortion as OpenCV orders it; rho and theta are then those of the straightened lines."""
+    seed_pixel: Annotated[tuple[float, float] | None, _optional("U V")] = None
+    """A place on the surface; without it no surface and no guides, only lines."""
+    sequence: Annotated[Path | None, _optional("DIR")] = None
+    """Folder of frames; frames named PREFIX_NUMBER_color whose numbers follow on by one are a motion sequence."""
+    method: Literal[tuple(METHODS)] = "own"  # type: ignore[valid-type]
+    """Pipeline."""
+    all: Annotated[bool, _flag] = False
+    """Candidates are every line of the whole picture, on the surface or not."""
+    track: Annotated[bool, _flag] = False
+    """Follow lines through a motion sequence (this is the default)."""
+    no_track: Annotated[bool, _flag] = False
+    """Look at every frame alone."""
+    overlay: Annotated[Path | None, _optional("DIR")] = None
+    """Write a picture of every frame with what was found."""
+    json: Annotated[bool, _flag] = False
+    """Print the result as one line of JSON on standard output, and nothing else."""
+    seed: int = 0
+    """Accepted as by every command; the result depends on the pictures alone."""
+
+    def run(self, words: list[str]) -> int:
+        """Look at the frames and print what was found.
+
+        Args:
+            words: The command line; not needed.
+
+        Returns:
+            0, also for frames refused with a reason.
+
+        Raises:
+            IbvsQpError: When options or files cannot be used.
+        """
+        import cv2
+        from rich.console import Console
+
+        from sim.checks import check_seed
+        from sim.detection.overlay import write_overlay
+        from sim.detection.report import as_json, frame_table, refusals
+        from sim.detection.run import detect_frames
+
+        check_seed(self.seed)
+        cv2.setNumThreads(1)
+        entries = self._entries()
+        folder = None if self.overlay is None else _folder(self.overlay)
+        notes = Console(stderr=True, quiet=self.json)
+        with notes.status("Looking ...") as status:
+            frames = detect_frames(
+                entries,
+                self.method,
+                every=self.all,
+                track=not self.no_track,
+                distortion=self.distortion,
+                started=lambda entry: status.update(f"Looking at {entry.color} ..."),
+            )
+        if folder is not None:
+            for seen in frames:
+                write_overlay(seen, folder)
+        if self.json:
+            print(as_json(frames, self.method))
+        else:
+            Console().print(frame_table(frames))
+            for reason in refusals(frames):
+                Console().print(reason, highlight=False, soft_wrap=True)
+            if folder is not None:
+                Console().print(f"Pictures: {folder}", soft_wrap=True, highlight=False)
+        return 0
+
+    def _entries(self) -> list[FrameEntry]:
+        """The frames asked for."""
+        from sim.detection.manifest import FrameEntry, read_manifest
+        from sim.detection.pictures import read_frame
+
+        if self.distortion is not None and not all(map(math.isfinite, self.distortion)):
+            raise ConfigError("--distortion must be five finite numbers: k1 k2 p1 p2 k3")
+        if self.track and self.no_track:
+            raise ConfigError("--track and --no-track exclude each other")
+        if (self.rgb is None) == (self.sequence is None):
+            raise ConfigError("give either --rgb FILE with its camera or --sequence DIR")
+        if self.sequence is not None:
+            return read_manifest(self.sequence)
+        assert self.rgb is not None
+        missing = [name for name in _CAMERA if getattr(self, name) is None]
+        if missing:
+            raise ConfigError(f"--{missing[0]} is missing: a single frame needs --fx --fy --cx --cy")
+        camera = tuple(float(getattr(self, name)) for name in _CAMERA)
+        if not all(map(math.isfinite, camera)) or min(camera[:2]) <= 1.0:
+            raise ConfigError("--fx and --fy must be above 1 px, and all four of the camera finite")
+        if not (math.isfinite(self.depth_units_per_metre) and self.depth_units_per_metre > 0.0):
+            raise ConfigError(f"--depth-units-per-metre {self.depth_units_per_metre:g} is refused: it must be above 0")
+        entry = FrameEntry(
+            color=str(self.rgb),
+            depth="" if self.depth is None else str(self.depth),
+            folder=Path(),
+            intrinsics=(camera[0], camera[1], camera[2], camera[3]),
+            depth_units_per_metre=self.depth_units_per_metre,
+            seed=self.seed_pixel,
+        )
+        read_frame(self.rgb, self.depth, entry.intrinsics, entry.depth_units_per_metre)  # refuse before any work
+        return [entry]
+
+
+def _folder(path: Path) -> Path:
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise ConfigError(f"cannot write pictures to {path}: {reason}; give another --overlay") from None
+    return path

@@ -1,0 +1,1 @@
+"""Pictures from files, through a detector, to tables, JSON and overlays."""

@@ -1,0 +1,117 @@
+"""Colour and depth pictures from files of many kinds, as one registered frame."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from ibvs_qp.errors import IbvsQpError
+from ibvs_qp.measurement import RgbdFrame
+
+#: Files of arrays instead of pictures.
+_ARRAYS = (".npy", ".npz")
+#: Largest size of a picture's side [px]: beyond, a wrong file was given.
+_LARGEST_PX = 8192
+
+
+class PictureError(IbvsQpError):
+    """A picture cannot be read or does not fit its partner."""
+
+
+def read_frame(
+    color: Path,
+    depth: Path | None,
+    intrinsics: tuple[float, float, float, float],
+    depth_units_per_metre: float,
+    stamp_ns: int = 0,
+) -> RgbdFrame:
+    """Read a registered pair of pictures.
+
+    Args:
+        color: Colour or grey picture, 8 or 16 bits.
+        depth: Depth, 8 or 16 bits or floating point (PNG, TIFF, npy, npz), or None if there is none: all invalid then.
+        intrinsics: (fx, fy, cx, cy) [px].
+        depth_units_per_metre: Depth values per metre.
+        stamp_ns: Time of capture.
+
+    Raises:
+        PictureError: When a file cannot be read or both pictures differ in size.
+    """
+    rgb = read_color(color)
+    if depth is None:
+        metres: np.ndarray = np.zeros(rgb.shape[:2], np.float32)
+    else:
+        metres = read_depth(depth, depth_units_per_metre)
+    height, width = rgb.shape[:2]
+    size: tuple[int, ...] = metres.shape
+    if size != (height, width):
+        raise PictureError(
+            f"{depth} is {size[-1]} x {size[0]} px but {color} is {width} x {height} px: "
+            "depth must be registered to colour"
+        )
+    return RgbdFrame(rgb=rgb, depth=metres, intrinsics=intrinsics, stamp_ns=stamp_ns)
+
+
+def read_color(file: Path) -> np.ndarray:
+    """RGB, uint8 (H, W, 3); 16 bits are brought to 8, grey is spread over the channels.
+
+    Raises:
+        PictureError: When the file is no such picture.
+    """
+    picture = _read(file, "colour")
+    if picture.dtype == np.uint16:
+        picture = (picture >> 8).astype(np.uint8)
+    channels = 1 if picture.ndim == 2 else picture.shape[2]
+    if picture.dtype != np.uint8 or channels not in (1, 3, 4):
+        raise PictureError(f"{file} is no colour picture of 8 or 16 bits ({picture.dtype}, {channels} channels)")
+    if channels == 1:
+        return np.repeat(picture.reshape(*picture.shape[:2], 1), 3, axis=2)
+    if file.suffix.lower() in _ARRAYS:  # arrays are RGB already
+        return np.ascontiguousarray(picture[..., :3])
+    code = cv2.COLOR_BGR2RGB if channels == 3 else cv2.COLOR_BGRA2RGB
+    return cv2.cvtColor(picture, code)
+
+
+def read_depth(file: Path, units_per_metre: float) -> np.ndarray:
+    """Depth [m], float32 (H, W), 0 where invalid.
+
+    Raises:
+        PictureError: When the file is no depth picture.
+    """
+    picture = _read(file, "depth")
+    if picture.ndim == 3:
+        if not (picture == picture[..., :1]).all():
+            raise PictureError(f"{file} has {picture.shape[2]} different channels: it is a colour picture, not depth")
+        picture = picture[..., 0]
+    if not (np.issubdtype(picture.dtype, np.integer) or np.issubdtype(picture.dtype, np.floating)):
+        raise PictureError(f"{file} holds {picture.dtype}: depth must be integer or floating point")
+    with np.errstate(invalid="ignore", over="ignore"):
+        metres = (picture / units_per_metre).astype(np.float32)
+    return np.where(np.isfinite(metres) & (metres > 0.0), metres, np.float32(0.0))
+
+
+def _read(file: Path, what: str) -> np.ndarray:
+    """Whatever a file holds, as an array of two or three dimensions."""
+    try:
+        file.open("rb").close()
+    except OSError as error:
+        raise PictureError(f"cannot read the {what} picture {file}: {error.strerror or error}") from None
+    picture = _array(file) if file.suffix.lower() in _ARRAYS else cv2.imread(str(file), cv2.IMREAD_UNCHANGED)
+    if picture is None or picture.ndim not in (2, 3) or min(picture.shape[:2], default=0) < 1:
+        raise PictureError(f"cannot read the {what} picture {file}: it is no picture (PNG, JPEG, TIFF, npy, npz)")
+    if max(picture.shape[:2]) > _LARGEST_PX:
+        raise PictureError(f"{file} is {picture.shape[1]} x {picture.shape[0]} px: at most {_LARGEST_PX} are read")
+    return picture
+
+
+def _array(file: Path) -> np.ndarray | None:
+    try:
+        content = np.load(file, allow_pickle=False)
+        if isinstance(content, np.ndarray):
+            return content
+        with content:
+            return content[content.files[0]] if len(content.files) == 1 else None
+    except (OSError, ValueError, EOFError, KeyError):
+        return None

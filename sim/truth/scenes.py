@@ -1,0 +1,154 @@
+"""What stands before the camera of a truth frame, and how it is drawn at random by families."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import cv2
+import numpy as np
+
+#: RGB colours of boards, paints and walls from which scenes choose.
+LIGHT = ((228, 230, 222), (214, 205, 188), (196, 204, 214))
+_DARK = ((52, 56, 62), (70, 48, 44), (38, 60, 56))
+PAINTS = ((40, 90, 200), (190, 50, 50), (50, 140, 80), (230, 190, 40))
+
+
+@dataclass(frozen=True, kw_only=True)
+class TruthScene:
+    """A board before a wall, seen from one pose.
+
+    The board's coordinates are (right, down) [m] from its middle; it lies in the plane Z = 0 of its own frame, the
+    wall `gap_m` behind it.
+
+    Attributes:
+        size_m: Width and height of the board.
+        gap_m: Distance of the wall behind the board.
+        rotation: Board frame to camera, (3, 3).
+        translation: Middle of the board in the camera frame [m], (3,).
+        board_color: RGB.
+        wall_color: RGB.
+        wall: "brick", "plaster" or "plain".
+        strokes: Painted bands as (left, top, right, bottom) [m] with their colour.
+        prints: Number of printed tags along the board's width; 0 for none.
+        clutter: Number of stickers on the board and posters on the wall.
+        shading: Relative change of the light across the picture.
+        noise: Standard deviation of the colour noise [grey levels].
+        blur_px: Standard deviation of the lens blur [px].
+        motion_px: Length of the motion blur and its direction (right, down) [px].
+        depth_noise: White, and again correlated, depth noise, share of depth.
+        smear_px: Largest distance by which the depth camera moves a step outwards [px].
+        arm: Whether arm and brush of the vehicle are in view.
+        camera: (width, height, focal length) [px].
+        seed: Of textures, clutter and noise.
+    """
+
+    size_m: tuple[float, float] = (0.60, 0.40)
+    gap_m: float = 0.05
+    rotation: np.ndarray = field(default_factory=lambda: np.eye(3))
+    translation: np.ndarray = field(default_factory=lambda: np.array([0.0, 0.0, 0.9]))
+    board_color: tuple[int, int, int] = LIGHT[0]
+    wall_color: tuple[int, int, int] = (150, 112, 92)
+    wall: str = "brick"
+    strokes: tuple[tuple[tuple[float, float, float, float], tuple[int, int, int]], ...] = ()
+    prints: int = 0
+    clutter: int = 0
+    shading: float = 0.15
+    noise: float = 2.0
+    blur_px: float = 0.7
+    motion_px: tuple[float, float] = (0.0, 0.0)
+    depth_noise: float = 0.005
+    smear_px: float = 0.0
+    arm: bool = False
+    camera: tuple[int, int, float] = (640, 480, 610.0)
+    seed: int = 0
+
+    @property
+    def intrinsics(self) -> tuple[float, float, float, float]:
+        """(fx, fy, cx, cy) [px], pixel centres at integers."""
+        width, height, focal = self.camera
+        return focal, focal, 0.5 * (width - 1), 0.5 * (height - 1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Variation:
+    """Ranges from which the scenes of a family are drawn; angles in degrees, uniform, both signs."""
+
+    distance_m: tuple[float, float] = (0.7, 1.2)
+    roll: float = 4.0
+    yaw: float = 6.0
+    tilt: float = 3.5
+    shift_m: float = 0.06
+    base: TruthScene = field(default_factory=TruthScene)
+    dark: bool = False
+    strokes: int = 1
+
+
+#: Families of scenes: a board 5 cm and 1.2 m before a brick wall, 2 cm before plaster near the camera, 1.5 cm
+#: before brick (which depth cannot tell apart), dark on light,
+#: turned and oblique, printed, moving, smeared as real depth cameras do, and hard: faint, noisy, 1.5 cm before the
+#: wall, where not every edge can be found and confidence has to say so.
+FAMILIES = {
+    "near wall": Variation(),
+    "far wall": Variation(base=TruthScene(gap_m=1.2)),
+    "flush wall": Variation(
+        distance_m=(0.45, 0.6), shift_m=0.02, base=TruthScene(gap_m=0.02, size_m=(0.32, 0.24), wall="plaster")
+    ),
+    "thin board": Variation(base=TruthScene(gap_m=0.015)),
+    "dark board": Variation(dark=True, base=TruthScene(wall="plaster", wall_color=(205, 200, 190))),
+    "oblique": Variation(roll=25.0, yaw=32.0, tilt=20.0, distance_m=(0.75, 1.1)),
+    "printed": Variation(yaw=25.0, strokes=0, base=TruthScene(prints=4, gap_m=0.8, size_m=(0.55, 0.42))),
+    "cluttered": Variation(base=TruthScene(clutter=6)),
+    "moving": Variation(base=TruthScene(motion_px=(3.0, 2.0), noise=3.0)),
+    "smeared depth": Variation(yaw=20.0, base=TruthScene(gap_m=0.6, smear_px=14.0, depth_noise=0.006, prints=4)),
+    "hard": Variation(
+        yaw=25.0,
+        strokes=2,
+        base=TruthScene(
+            gap_m=0.015,
+            wall="plaster",
+            wall_color=(186, 182, 176),
+            clutter=8,
+            noise=5.0,
+            blur_px=1.5,
+            motion_px=(5.0, 3.0),
+            depth_noise=0.008,
+            smear_px=8.0,
+        ),
+    ),
+    "small picture": Variation(base=TruthScene(camera=(424, 240, 312.6), gap_m=0.05)),
+}
+
+
+def turned(roll: float, yaw: float, tilt: float) -> np.ndarray:
+    """Board frame to camera for a board rolled, yawed and tilted by angles [rad], (3, 3)."""
+    parts = (np.array([0.0, 0.0, roll]), np.array([0.0, yaw, 0.0]), np.array([tilt, 0.0, 0.0]))
+    rotation = np.eye(3)
+    for part in parts:
+        rotation = rotation @ cv2.Rodrigues(part)[0]
+    return rotation
+
+
+def sample_scene(variation: Variation, seed: int) -> TruthScene:
+    """One scene of a family; the same seed gives the same scene."""
+    rng = np.random.default_rng(np.random.SeedSequence([seed, 0x7472]))
+    roll, yaw, tilt = np.radians(rng.uniform(-1.0, 1.0, 3) * (variation.roll, variation.yaw, variation.tilt))
+    distance = float(rng.uniform(*variation.distance_m))
+    shift = rng.uniform(-1.0, 1.0, 2) * variation.shift_m
+    board = (_DARK if variation.dark else LIGHT)[rng.integers(3)]
+    strokes = []
+    for _ in range(variation.strokes):
+        width, height = variation.base.size_m
+        top = float(rng.uniform(-0.25, 0.25)) * height
+        left, right = (float(entry) * width for entry in (rng.uniform(-0.45, -0.2), rng.uniform(0.2, 0.45)))
+        strokes.append(((left, top, right, top + 0.16 * height), PAINTS[rng.integers(len(PAINTS))]))
+    motion = tuple(float(entry) for entry in np.array(variation.base.motion_px) * rng.choice([-1.0, 1.0], 2))
+    return replace(
+        variation.base,
+        rotation=turned(float(roll), float(yaw), float(tilt)),
+        translation=np.array([*shift, distance]),
+        board_color=board,
+        strokes=tuple(strokes),
+        motion_px=(motion[0], motion[1]),
+        shading=float(rng.uniform(0.0, 0.3)),
+        seed=seed,
+    )
