@@ -33,7 +33,7 @@ class Miscalibration:
             raise ConfigError("camera.focal_error needs pictures; fly it with --features rendered")
         self._camera = np.array(vehicle.camera_position_m)
         self._shift = np.array(scene.mount_error_m)
-        self._turn = small_turn(np.radians(scene.mount_error_deg))
+        self._turn = small_turn(np.radians(scene.mount_error_deg).tolist())
         self._focal = 1.0 + scene.focal_error
         self._none = not (np.any(self._shift) or any(scene.mount_error_deg))
 
@@ -41,7 +41,7 @@ class Miscalibration:
         """Position (3,) and quaternion (4,) of the body to hand to the camera."""
         if self._none:
             return position, quaternion
-        turned = multiply(quaternion, self._turn)
+        turned = np.array(multiply(quaternion.tolist(), self._turn))
         real = position + rotation_from_quaternion(quaternion) @ (self._camera + self._shift)
         return real - rotation_from_quaternion(turned) @ self._camera, turned
 

@@ -15,9 +15,9 @@ from ibvs_qp.setpoints.lines import LINE_TERMS
 from ibvs_qp.vision.overlay import draw_overlay
 from sim.cameras.protocol import camera_intrinsics
 from sim.columns import Columns
+from sim.flight_truth import euler_angles, in_body, rotations
 from sim.plant import STEPS_PER_TICK
 from sim.trace import Event, Trace
-from sim.truth import euler_angles, in_body, rotations
 from sim.video import pack_picture
 
 if TYPE_CHECKING:

@@ -102,7 +102,8 @@ class OsqpSolver:
         status = int(info.status_val)
         certificate = None
         if status in INFEASIBLE:
-            certificate = np.array(result.prim_inf_cert if self._inner is None else self._inner.solution.prim_inf_cert)
+            source = self._inner.solution if self._inner is not None else result
+            certificate = np.array(source.prim_inf_cert)  # type: ignore[union-attr]
         return RawSolution(
             x=x,
             y=y,
