@@ -27,7 +27,6 @@ from ibvs_qp.frames import GRAVITY
 from ibvs_qp.limits import ThrustLimit
 from ibvs_qp.qp.acceptance import QpEngine
 from ibvs_qp.qp.assembly import QpTemplate
-from ibvs_qp.qp.evaluator import BufferedFunction, ProgramData
 from ibvs_qp.qp.model import SymbolicModel
 from ibvs_qp.tasks import EffortTask, HeightTask, LevelTask, PushTask, SmoothnessTask, VelocityTask, YawTask
 
@@ -63,9 +62,8 @@ class ProgramAllocation:
     def __init__(self, height_weight: float | None = None) -> None:
         tasks = [PushTask(), LevelTask(), YawTask(), VelocityTask(), HeightTask(), EffortTask(), SmoothnessTask()]
         template = QpTemplate(SymbolicModel(CONFIG), tasks, [ThrustLimit()])
-        self._evaluate = BufferedFunction(template.values)
-        self._data = ProgramData(template, [*self._evaluate.outputs, self._evaluate.inputs[0]])
-        self._engine = QpEngine(template, CONFIG.solver, self._data)
+        self._engine = QpEngine(template, CONFIG.solver)
+        self._data = self._engine.data
         values, hover = self._data.parameters, np.full(B.shape[1], WEIGHT / -B[2].sum())
         fixed: dict[str, Any] = {
             "bias_wrench": (0.0, 0.0, WEIGHT, 0.0, 0.0, 0.0),
@@ -95,11 +93,10 @@ class ProgramAllocation:
         values["height"][:] = down, self._height
         values["level"][:] = roll, pitch, weights.level
         values["yaw"][:] = yaw, weights.yaw
-        self._evaluate()
         solution = self._engine.solve()
         assert solution is not None
         self.outcomes[str(solution.outcome)] += 1
-        self.given_up = B @ (self._data.unlimited_thrusts() - solution.thrusts)
+        self.given_up = B @ (self._data.free - solution.thrusts)
         return solution.thrusts
 
 

@@ -171,6 +171,9 @@ class SolverSettings:
         2, "Ruiz equilibration passes; ten cost 4 us more per tick and no iteration less", low=0, high=100
     )
     polishing: bool = setting(False, "solve the active set exactly at the end; OSQP 1.1 prints a line per tick with it")
+    shortcut: bool = setting(
+        True, "where the optimum without limits breaks no limit, fly it: it is the solution, and OSQP is not asked"
+    )
     polish: bool = setting(True, "solve the rows that OSQP found active exactly, and keep the answer if it is optimal")
     direct: bool = setting(True, "talk to OSQP's extension object (half the overhead) instead of its wrapper")
     accept_residual: float = setting(5e-2, "largest violation of a capped solution", unit="N", low=1e-9, high=10.0)
@@ -196,7 +199,7 @@ class ControllerConfig:
         "error of the line rows: at the point where the tip meets the wall, or the paper's, rho at the image centre",
         ("tip", "paper"),
     )
-    line_slots: int = setting(4, "lines the fixed program has room for", low=1, high=16)
+    line_slots: int = setting(3, "lines the fixed program has room for; each costs 500 instructions", low=1, high=16)
     tick_s: float = setting(0.004, "control period", unit="s", low=0.0005, high=0.05)
     impedance: bool = setting(True, "impedance terms of the force law (False: direct force control)")
     contact_feedforward: bool = setting(True, "feed the measured contact moment and expected friction forward")

@@ -12,7 +12,7 @@ from ibvs_qp.gate import MeasurementGate, answered_stamp, check_reference
 from ibvs_qp.hold import hold_thrusts
 from ibvs_qp.limits import ApproachLimit, Limit, PushCeiling, ThrustLimit, TiltLimit, ViewLimit, YawLimit
 from ibvs_qp.measurement import Measurement, Reference
-from ibvs_qp.qp.acceptance import ACTIVE_PRICE, AcceptedSolution, QpEngine
+from ibvs_qp.qp.acceptance import AcceptedSolution, QpEngine
 from ibvs_qp.qp.assembly import QpTemplate
 from ibvs_qp.qp.evaluator import ProgramData
 from ibvs_qp.qp.model import SymbolicModel
@@ -102,6 +102,10 @@ class HybridController:
         reference, refused = check_reference(reference, self._reference)
         self._reference = reference
         rejected += refused
+        if len(reference.lines) > self.config.line_slots:
+            rejected += (
+                f"reference.lines: {len(reference.lines)} given, room for line_slots = {self.config.line_slots}",
+            )
         if checked is None:
             return self._hold(measurement, rejected)
         if self._gate.restarted:
@@ -114,13 +118,15 @@ class HybridController:
 
     def _finish(self, measurement: Measurement, solution: AcceptedSolution, rejected: tuple[str, ...]) -> Command:
         thrusts, terms = solution.thrusts, self.setpoints
-        unallocated, given_up = np.zeros(6), 0.0
-        if float(np.abs(solution.y).max()) > ACTIVE_PRICE:
-            unallocated = terms.effectiveness @ (self.engine.data.unlimited_thrusts() - thrusts)
+        unallocated, given_up, limited = np.zeros(6), 0.0, solution.limited
+        if limited:
+            unallocated = terms.effectiveness @ (self.engine.data.free - thrusts)
             given_up = float(np.abs(unallocated).max())
         terms.note(thrusts, given_up)
         stacked = self.engine.data.stacked.copy()
-        command = Command(
+        return Command.explained_later(
+            tasks=lambda: task_reports(self.template, self.engine.data, stacked, thrusts),
+            active_limits=lambda: active_limits(self.template, solution.x, solution.y) if limited else (),
             stamp_ns=int(measurement.stamp_ns),
             thrusts=thrusts,
             wrench=terms.effectiveness @ thrusts,
@@ -131,10 +137,6 @@ class HybridController:
             reach_margin=reach_margin(terms),
             iterations=solution.iterations,
             solve_time_s=solution.seconds,
-        )
-        return command.explained_by(
-            lambda: task_reports(self.template, self.engine.data, stacked, thrusts),
-            lambda: active_limits(self.template, solution.x, solution.y),
         )
 
     def _fallback(self, measurement: Measurement, rejected: tuple[str, ...]) -> Command:

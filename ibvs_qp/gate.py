@@ -24,14 +24,12 @@ LEAD_NS = 20_000_000
 
 def sound_vector(value: Any, size: int, bound: float) -> bool:
     """Whether a value is a float vector of that size with every entry within the bound."""
-    return (
-        isinstance(value, np.ndarray)
-        and value.shape == (size,)
-        and value.dtype.kind == "f"
-        and -bound <= min(entries := value.tolist())
-        and max(entries) <= bound
-        and math.isfinite(sum(entries))  # min and max of a list may step over NaN
-    )
+    if not isinstance(value, np.ndarray) or value.shape != (size,) or value.dtype.kind != "f":
+        return False
+    for entry in value.tolist():  # a plain loop: half the time of any builtin over six numbers
+        if not -bound <= entry <= bound:  # NaN as well
+            return False
+    return True
 
 
 def _number(value: Any, low: float, high: float) -> bool:

@@ -47,7 +47,8 @@ def test_paint_writes_the_run_folder_and_prints_a_table(flown, capsys):
     out, _ = capsys.readouterr()
     assert "QP law" in out and "analytic law" in out and "report.html" in out
     names = {path.name for path in (flown / "run").iterdir()}
-    assert names == {"report.html", "summary.json", "video.mp4", "log.npz", "scene.toml", "README.txt", "figures"}
+    files = {"report.html", "summary.json", "video.mp4", "log.npz", "scene.toml", "README.txt", "figures"}
+    assert names == files | {"preset_qp.toml", "preset_paper.toml"}
     figures = {path.stem for path in (flown / "run" / "figures").iterdir()}
     assert {"force", "image_error", "path", "velocity", "attitude", "thrusts", "board"} <= figures
     assert (flown / "run" / "video.mp4").stat().st_size > 10_000

@@ -9,10 +9,10 @@ from ibvs_qp.vehicle import VehicleParams
 from sim import columns
 from sim.board import BoardGeometry
 from sim.clearance import PropellerClearance
+from sim.flight_truth import euler_angles, in_body, rotations
 from sim.plant import Plant
 from sim.scene import BoardScene, Scene, StartScene
 from sim.streams import BLOCK, Normals, stream
-from sim.flight_truth import euler_angles, in_body, rotations
 
 
 def test_noise_in_blocks_is_the_noise_drawn_one_by_one() -> None:

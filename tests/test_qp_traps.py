@@ -206,7 +206,7 @@ def test_a_solver_cut_short_is_accepted_by_residual_or_replaced_by_the_exact_one
 
 
 def test_a_capped_solution_that_flies_is_as_near_as_promised() -> None:
-    settings = SolverSettings(max_iterations=10, check_interval=5, polish=False)
+    settings = SolverSettings(max_iterations=10, check_interval=5, polish=False, shortcut=False)
     controller = HybridController(ControllerConfig(solver=settings))
     vehicle, capped = SmallVehicle(controller.config), 0
     rng = np.random.default_rng(2)
@@ -226,7 +226,7 @@ def test_a_capped_solution_that_flies_is_as_near_as_promised() -> None:
 
 
 def test_without_any_solver_the_analytic_law_answers(monkeypatch: pytest.MonkeyPatch) -> None:
-    controller = flying()
+    controller = flying(config=ControllerConfig(solver=SolverSettings(shortcut=False)))
     monkeypatch.setattr(controller.engine.osqp, "solve", lambda *data: None)
     command = controller.step(measured(6), Reference(lines=line_references(2)))
     assert command.outcome is Outcome.ANALYTIC_FALLBACK

@@ -12,13 +12,11 @@ from ibvs_qp.config import SolverSettings
 from ibvs_qp.qp.assembly import QpTemplate
 from ibvs_qp.qp.evaluator import Evaluator, ProgramData
 from ibvs_qp.qp.exact_solver import ExactSolver
-from ibvs_qp.qp.osqp_solver import MAX_ITERATIONS, SOLVED, SOLVED_INACCURATE, OsqpSolver, RawSolution
+from ibvs_qp.qp.osqp_solver import MAX_ITERATIONS, SOLVED, SOLVED_INACCURATE, OsqpSolver
 from ibvs_qp.qp.polish import polished
 
 #: A multiplier above this price counts as an active limit [cost per unit].
 ACTIVE_PRICE = 1e-3
-#: Gradient that unlimited thrusts may keep [cost per N]: the softest direction has a curvature of 0.1, so 2 mN.
-COARSE_GRADIENT = 2e-4
 #: Share of the largest entry of an infeasibility certificate above which a row belongs to the conflict.
 CONFLICT_SHARE = 1e-2
 #: Largest thrust-bound violation that clipping may hide in a solved program [N].
@@ -27,7 +25,7 @@ BOUND_SLIP = 1e-2
 
 @dataclass(slots=True)
 class AcceptedSolution:
-    """Thrusts within their bounds, the full primal and dual vectors, and how they were found."""
+    """Thrusts within their bounds, the full primal and dual vectors, how they were found, and whether a row binds."""
 
     thrusts: np.ndarray
     x: np.ndarray
@@ -35,6 +33,7 @@ class AcceptedSolution:
     outcome: Outcome
     iterations: int
     seconds: float
+    limited: bool = True
 
 
 class QpEngine:
@@ -55,6 +54,8 @@ class QpEngine:
         self._matrix = template.a_pattern.copy()
         self._rotors = template.model.rotors
         self.conflict: tuple[str, ...] = ()
+        self._no_slack = np.zeros(len(template.variable_names) - self._rotors)
+        self._no_price = np.zeros(len(template.row_names))
 
     def reset(self) -> None:
         """As after construction."""
@@ -64,11 +65,13 @@ class QpEngine:
         """Solve the program as its data stands; None when nobody found a solution."""
         data, self.conflict = self.data, ()
         data.evaluate()
+        if self.settings.shortcut and data.violation[0] <= 0.0 and self.osqp.ready:
+            return self._unlimited()
         raw = self.osqp.solve(data.p, data.q, data.a, data.lower, data.upper)
         if raw is None:
             return None
         outcome = self._judge(raw.status, raw.x, raw.y)
-        if outcome is not None and self.settings.polish and self._coarse(raw, outcome):
+        if outcome is not None and self.settings.polish:
             exact = polished(data, raw.x, raw.y)
             if exact is not None:
                 return self._accept(*exact, Outcome.SOLVED, raw.iterations, raw.seconds)
@@ -82,11 +85,12 @@ class QpEngine:
         self.osqp.warm_start(*exact)
         return self._accept(*exact, Outcome.EXACT_FALLBACK, raw.iterations, raw.seconds)
 
-    def _coarse(self, raw: RawSolution, outcome: Outcome) -> bool:
-        """Whether the iterate may be wrong in the third decimal: rows bind, OSQP stopped early, or P x + q is left."""
-        if outcome is not Outcome.SOLVED or float(np.abs(raw.y).max()) > ACTIVE_PRICE:
-            return True
-        return float(np.abs(self.data.hessian() @ raw.x + self.data.q).max()) > COARSE_GRADIENT
+    def _unlimited(self) -> AcceptedSolution:
+        """No row binds: the least-squares optimum itself, to rounding; nothing is left for iterations to find."""
+        thrusts = self.data.free.copy()
+        return AcceptedSolution(
+            thrusts, np.append(thrusts, self._no_slack), self._no_price, Outcome.SOLVED, 0, 0.0, limited=False
+        )
 
     def _conflicting_rows(self, certificate: np.ndarray | None) -> tuple[str, ...]:
         """Names of the rows that no point satisfies together: the non-zeros of OSQP's certificate A' v = 0."""
@@ -125,4 +129,4 @@ class QpEngine:
     ) -> AcceptedSolution:
         n, data = self._rotors, self.data
         thrusts = np.minimum(np.maximum(x[:n], data.lower[:n]), data.upper[:n])
-        return AcceptedSolution(thrusts, x, y, outcome, iterations, seconds)
+        return AcceptedSolution(thrusts, x, y, outcome, iterations, seconds, bool(np.abs(y).max() > ACTIVE_PRICE))

@@ -58,6 +58,7 @@ class QpTemplate:
         variable_names: Names of the entries of x.
         row_names: Names of the rows of A.
         values: CasADi function of the stacked parameters giving (P, q, A, l, u) non-zeros, P as upper triangle.
+        free: CasADi function of the stacked parameters giving the thrusts without limits and their worst violation.
         report: CasADi function (parameters, thrusts) giving achieved and asked of every task row, and weights.
     """
 
@@ -85,6 +86,7 @@ class QpTemplate:
         self.values = ca.Function(
             "qp_values", [stacked], [p_upper.nz[:], ca.densify(q), a.nz[:], ca.densify(lower), ca.densify(upper)]
         )
+        self.free = ca.Function("free_optimum", [stacked], [*_free_optimum(hessian, gradient, bounds, lower, upper)])
         self.report = ca.Function("task_report", [stacked, u], [wishes.at(u), asked, weights])
         self.p_pattern, self.a_pattern = _pattern(p_upper.sparsity()), _pattern(a.sparsity())
         names = model.config.vehicle.geometry.names
@@ -107,6 +109,17 @@ class QpTemplate:
     def parameter_count(self) -> int:
         """Length of the stacked parameter vector."""
         return sum(symbol.numel() for symbol in self.model.parameters.values())
+
+
+def _free_optimum(hessian: ca.SX, gradient: ca.SX, rows: AffineRows, lower: ca.SX, upper: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """Thrusts without any limit, by Cholesky factors, and by how much they would break the worst row (< 0: none).
+
+    Where they break none, they are the solution of the program: no slack is worth taking.
+    """
+    root = ca.chol(hessian)
+    thrusts = ca.solve(root, ca.solve(root.T, -gradient))
+    at = rows.per_thrust @ thrusts
+    return thrusts, ca.fmax(ca.mmax(at - upper), ca.mmax(lower - at))
 
 
 def _pattern(sparsity: ca.Sparsity) -> sparse.csc_matrix:

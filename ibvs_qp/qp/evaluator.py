@@ -34,10 +34,12 @@ class ProgramData:
     Attributes:
         p: Non-zeros of the upper triangle of P. Likewise q, a, lower, upper.
         stacked: Parameters of the program; `parameters` are views of it by name.
+        free: Thrusts of the same tick without any limit [N], (n,).
+        violation: By how much they break the worst row, (1,); < 0 where they are the solution.
     """
 
     def __init__(self, template: QpTemplate, arrays: Sequence[np.ndarray]) -> None:
-        self.p, self.q, self.a, self.lower, self.upper, self.stacked = arrays
+        self.p, self.q, self.a, self.lower, self.upper, self.stacked, self.free, self.violation = arrays
         self.parameters = {name: self.stacked[place] for name, place in template.layout.items()}
         self._report = BufferedFunction(template.report)
         self._rotors = template.model.rotors
@@ -63,11 +65,6 @@ class ProgramData:
         full[self._row_of, self._column_of] = self.a
         return full
 
-    def unlimited_thrusts(self) -> np.ndarray:
-        """Thrusts of the same tick without any limit [N], (n,): slacks are free then and the thrusts decouple."""
-        n = self._rotors
-        return -np.linalg.solve(self.hessian()[:n, :n], self.q[:n])
-
     def report(self, stacked: np.ndarray, thrusts: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Achieved and asked values and weights of every task row at given parameters and thrusts."""
         self._report.inputs[0][:] = stacked
@@ -81,9 +78,11 @@ class Evaluator(ProgramData):
     """A program on its own: write `parameters` with ``[name][:] =``, evaluate, read the data."""
 
     def __init__(self, template: QpTemplate) -> None:
-        self._values = BufferedFunction(template.values)
-        super().__init__(template, [*self._values.outputs, self._values.inputs[0]])
+        self._values, self._free = BufferedFunction(template.values), BufferedFunction(template.free)
+        super().__init__(template, [*self._values.outputs, self._values.inputs[0], *self._free.outputs])
 
     def evaluate(self) -> None:
-        """Fill p, q, a, lower and upper from the parameters."""
+        """Fill p, q, a, lower, upper and the free optimum from the parameters."""
         self._values()
+        self._free.inputs[0][:] = self.stacked
+        self._free()

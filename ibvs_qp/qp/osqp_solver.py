@@ -47,6 +47,11 @@ class OsqpSolver:
         """Forget the iterate and the adapted step size: the next solve is as after construction."""
         self._reset_pending = True
 
+    @property
+    def ready(self) -> bool:
+        """Whether the workspace is set up: the first tick does that, so that no later one pays for it."""
+        return not self._reset_pending
+
     def _setup(self, p: np.ndarray, q: np.ndarray, a: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> None:
         settings, p_matrix, a_matrix = (
             self._settings,

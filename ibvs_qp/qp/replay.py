@@ -98,5 +98,5 @@ class TickReplay:
             tasks=tasks,
             cost=tuple((cost / (float(cost.sum()) or 1.0)).tolist()),
             active_limits=tuple(limits),
-            unallocated_wrench=effectiveness @ (data.unlimited_thrusts() - thrusts) if limits else np.zeros(6),
+            unallocated_wrench=effectiveness @ (data.free - thrusts) if limits else np.zeros(6),
         )

@@ -39,7 +39,8 @@ class Setpoints:
 
     Attributes:
         contact: Contact estimator; everything else lives in the compiled tick (`ibvs_qp.setpoints.model`).
-        tick: The compiled function; with a program its `extra` arrays are P, q, A, l, u and the stacked parameters.
+        tick: The compiled function; with a program its `extra` arrays are those of
+            `ProgramData`.
     """
 
     def __init__(self, config: ControllerConfig, template: QpTemplate | None = None) -> None:
@@ -220,4 +221,4 @@ def _program(signals: Signals, config: ControllerConfig, template: QpTemplate) -
         for name, symbol in template.model.parameters.items()
     ]
     stacked = ca.densify(ca.vertcat(*parameters))
-    return [*template.values.call([stacked]), stacked]
+    return [*template.values.call([stacked]), stacked, *template.free.call([stacked])]
