@@ -15,6 +15,8 @@ from ibvs_qp.qp.exact_solver import ExactSolver
 from ibvs_qp.qp.osqp_solver import MAX_ITERATIONS, SOLVED, SOLVED_INACCURATE, OsqpSolver
 from ibvs_qp.qp.polish import polished
 
+#: Status values whose iterate means something.
+USABLE = (SOLVED, SOLVED_INACCURATE, MAX_ITERATIONS)
 #: A multiplier above this price counts as an active limit [cost per unit].
 ACTIVE_PRICE = 1e-3
 #: Share of the largest entry of an infeasibility certificate above which a row belongs to the conflict.
@@ -71,10 +73,9 @@ class QpEngine:
         if raw is None:
             return None
         outcome = self._judge(raw.status, raw.x, raw.y)
-        if outcome is not None and self.settings.polish:
-            exact = polished(data, raw.x, raw.y)
-            if exact is not None:
-                return self._accept(*exact, Outcome.SOLVED, raw.iterations, raw.seconds)
+        exact = self._exact_by_active_rows(raw, outcome)
+        if exact is not None:
+            return self._accept(*exact, Outcome.SOLVED, raw.iterations, raw.seconds)
         if outcome is not None:
             return self._accept(raw.x, raw.y, outcome, raw.iterations, raw.seconds)
         exact = self.exact.solve(data.p, data.q, data.a, data.lower, data.upper)
@@ -84,6 +85,14 @@ class QpEngine:
             return None
         self.osqp.warm_start(*exact)
         return self._accept(*exact, Outcome.EXACT_FALLBACK, raw.iterations, raw.seconds)
+
+    def _exact_by_active_rows(self, raw: RawSolution, outcome: Outcome | None) -> tuple[np.ndarray, np.ndarray] | None:
+        """The exact solution from OSQP's guess of the active rows, where it stopped early or rows bind."""
+        if not self.settings.polish or raw.status not in USABLE or not math.isfinite(raw.x.sum() + raw.y.sum()):
+            return None
+        if outcome is Outcome.SOLVED and float(np.abs(raw.y).max()) <= ACTIVE_PRICE:
+            return None
+        return polished(self.data, raw.x, raw.y)
 
     def _unlimited(self) -> AcceptedSolution:
         """No row binds: the least-squares optimum itself, to rounding; nothing is left for iterations to find."""
@@ -104,7 +113,7 @@ class QpEngine:
         )
 
     def _judge(self, status: int, x: np.ndarray, y: np.ndarray) -> Outcome | None:
-        if status not in (SOLVED, SOLVED_INACCURATE, MAX_ITERATIONS) or not math.isfinite(x.sum() + y.sum()):
+        if status not in USABLE or not math.isfinite(x.sum() + y.sum()):
             return None
         n, data = self._rotors, self.data
         bounds = zip(x[:n].tolist(), data.lower[:n].tolist(), data.upper[:n].tolist(), strict=True)

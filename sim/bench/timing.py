@@ -10,8 +10,8 @@ from typing import Any, TypeVar
 import numpy as np
 
 SCHEMA = 1
-#: Deadlines whose misses are counted [us].
-DEADLINES_US = (250, 500, 1000)
+#: Rates whose deadlines are watched [Hz].
+DEADLINES_HZ = (250, 500, 1000)
 #: Percentiles of a row.
 _PERCENTILES = {"p50_us": 50.0, "p90_us": 90.0, "p99_us": 99.0, "p999_us": 99.9}
 
@@ -48,17 +48,18 @@ class Row:
         """The row as written to JSON."""
         times = np.array(self.times_us if self.times_us else [np.nan])
         figures = {name: float(np.percentile(times, share)) for name, share in _PERCENTILES.items()}
-        misses = {str(limit): int(np.count_nonzero(times > limit)) for limit in DEADLINES_US}
+        misses = {str(rate): int(np.count_nonzero(times > 1e6 / rate)) for rate in DEADLINES_HZ}
         return {"name": self.name, "size": self.size, **figures, "max_us": float(times.max()), "misses": misses}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Bench:
-    """A whole bench: rows, medians of the stages [us], and ratios of medians (rival to ours)."""
+    """A whole bench: rows, medians of the stages [us], ratios of medians (rival to ours), and what else to know."""
 
     rows: list[Row]
     stages_us: dict[str, float]
     ratios: dict[str, float]
+    notes: dict[str, Any] = field(default_factory=dict)
 
     def summary(self) -> dict[str, Any]:
         """The bench as written to JSON."""
@@ -67,4 +68,5 @@ class Bench:
             "rows": [row.summary() for row in self.rows],
             "stages_us": self.stages_us,
             "ratios": self.ratios,
+            **self.notes,
         }

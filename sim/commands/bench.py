@@ -1,8 +1,9 @@
-"""``ibvs-qp bench``: what vision costs beside its rivals, as ratios within one run."""
+"""``ibvs-qp bench``: what a tick or a picture costs beside its rivals, as ratios within one run."""
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -21,17 +22,21 @@ def _optional(metavar: str) -> Any:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Bench:
-    """Measure what a picture costs, one thread, rivals warmed and in turn in the same run.
+    """Measure what a control tick or a picture costs, one thread, rivals warmed and in the same run.
 
-    Example: ibvs-qp bench vision --real frames/board --json
+    Example: ibvs-qp bench qp --json
     """
 
-    what: tyro.conf.Positional[Literal["vision"]]
-    """What is measured: vision."""
+    what: tyro.conf.Positional[Literal["qp", "vision"]]
+    """What is measured: a control tick, or a picture."""
+    ticks: int = 100_000
+    """bench qp: recorded ticks of closed loops."""
+    sample: int = 50
+    """bench qp: rivals see every so many-th tick."""
     frames: int = 160
-    """Rendered pictures per size; the first 12 warm up."""
+    """bench vision: rendered pictures per size; the first 12 warm up."""
     real: Annotated[Path | None, _optional("DIR")] = None
-    """Folder of real RGB-D frames with a manifest.csv; default: rendered frames only."""
+    """bench vision: folder of real RGB-D frames with a manifest.csv; default: rendered frames only."""
     seed: int = 0
     """Varies textures, clutter and noise of the rendered pictures."""
     json: Annotated[bool, _flag] = False
@@ -52,7 +57,6 @@ class Bench:
         from rich.console import Console
 
         from ibvs_qp.errors import IbvsQpError
-        from sim.bench.vision import bench_vision
         from sim.checks import check_seed
         from sim.rundir import as_json
 
@@ -60,13 +64,28 @@ class Bench:
         if not LEAST_FRAMES <= self.frames <= MOST_FRAMES:
             raise IbvsQpError(f"--frames {self.frames} is refused: allowed is {LEAST_FRAMES} to {MOST_FRAMES}")
         notes = Console(stderr=True, quiet=self.json)
+        for option, value, low, high in (
+            ("--ticks", self.ticks, 1000, 10_000_000),
+            ("--sample", self.sample, 1, 10_000),
+        ):
+            if not low <= value <= high:
+                raise IbvsQpError(f"{option} {value} is refused: allowed is {low} to {high}")
         with notes.status("Measuring ...") as status:
-            bench = bench_vision(self.frames, self.seed, self.real, lambda text: status.update(f"Measuring {text} ..."))
+            bench = self._measure(lambda text: status.update(f"Measuring {text} ..."))
         if self.json:
             print(as_json(bench.summary()))
         else:
             _show(bench)
         return 0
+
+    def _measure(self, tell: Callable[[str], None]) -> BenchResult:
+        if self.what == "qp":
+            from sim.bench.qp import bench_qp
+
+            return bench_qp(self.ticks, self.seed, self.sample, tell)
+        from sim.bench.vision import bench_vision
+
+        return bench_vision(self.frames, self.seed, self.real, tell)
 
 
 #: Fewest and most pictures per size.
@@ -78,14 +97,19 @@ def _show(bench: BenchResult) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    table = Table("measured", "size", "median", "90 %", "99 %", "most", title="Processor time, one thread [ms]")
-    for row in bench.rows:
-        figures = row.summary()
-        cells = (figures["p50_us"], figures["p90_us"], figures["p99_us"], figures["max_us"])
-        table.add_row(row.name, row.size or "", *(f"{1e-3 * cell:.2f}" for cell in cells))
+    figures = [row.summary() for row in bench.rows]
+    unit, name = (1e-3, "ms") if any(figure["size"] for figure in figures) else (1.0, "us")
+    columns = ("measured", "size", "median", "90 %", "99 %", "99.9 %", "most", "misses 1 kHz")
+    table = Table(*columns, title=f"Processor time, one thread [{name}]")
+    for figure in figures:
+        cells = (figure[key] for key in ("p50_us", "p90_us", "p99_us", "p999_us", "max_us"))
+        texts = (f"{unit * cell:.2f}" for cell in cells)
+        table.add_row(figure["name"], figure["size"] or "", *texts, str(figure["misses"]["1000"]))
     console = Console()
     console.print(table)
-    stages = ", ".join(f"{name} {1e-3 * time_us:.2f}" for name, time_us in bench.stages_us.items())
-    console.print(f"Stages, medians [ms]: {stages}")
-    for name, ratio in bench.ratios.items():
-        console.print(f"{name}: {ratio:.1f}")
+    stages = ", ".join(f"{stage} {unit * time_us:.2f}" for stage, time_us in bench.stages_us.items())
+    console.print(f"Stages, medians [{name}]: {stages}")
+    for rival, ratio in bench.ratios.items():
+        console.print(f"{rival}: {ratio:.1f} x our median")
+    for what, note in bench.notes.items():
+        console.print(f"{what}: {note}")
