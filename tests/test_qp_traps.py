@@ -186,6 +186,10 @@ def test_reset_restores_the_first_solve_to_the_bit() -> None:
 # ------------------------------------------------------------------------------------------------- every way out
 
 
+#: One iteration, and nothing that mends what it leaves.
+CUT_SHORT = SolverSettings(max_iterations=1, check_interval=1, polish=False, shortcut=False)
+
+
 def outcomes_of(controller: HybridController, ticks: int = 40) -> list[Outcome]:
     vehicle = SmallVehicle(controller.config)
     found = []
@@ -200,7 +204,7 @@ def outcomes_of(controller: HybridController, ticks: int = 40) -> list[Outcome]:
 
 
 def test_a_solver_cut_short_is_accepted_by_residual_or_replaced_by_the_exact_one() -> None:
-    short = outcomes_of(HybridController(ControllerConfig(solver=SolverSettings(max_iterations=1, check_interval=1))))
+    short = outcomes_of(HybridController(ControllerConfig(solver=CUT_SHORT)))
     assert set(short) <= {Outcome.SOLVED, Outcome.CAPPED_ACCEPTED, Outcome.EXACT_FALLBACK}
     assert Outcome.EXACT_FALLBACK in short
 
@@ -234,7 +238,7 @@ def test_without_any_solver_the_analytic_law_answers(monkeypatch: pytest.MonkeyP
 
 
 def test_osqp_unbelieved_and_the_exact_solver_failing_leads_to_the_analytic_law() -> None:
-    controller = HybridController(ControllerConfig(solver=SolverSettings(max_iterations=1, check_interval=1)))
+    controller = HybridController(ControllerConfig(solver=CUT_SHORT))
     controller.engine.exact.solve = lambda *data: None  # type: ignore[method-assign]
     found = outcomes_of(controller)
     assert Outcome.ANALYTIC_FALLBACK in found and Outcome.EXACT_FALLBACK not in found

@@ -12,7 +12,7 @@ from ibvs_qp.config import SolverSettings
 from ibvs_qp.qp.assembly import QpTemplate
 from ibvs_qp.qp.evaluator import Evaluator, ProgramData
 from ibvs_qp.qp.exact_solver import ExactSolver
-from ibvs_qp.qp.osqp_solver import MAX_ITERATIONS, SOLVED, SOLVED_INACCURATE, OsqpSolver
+from ibvs_qp.qp.osqp_solver import MAX_ITERATIONS, SOLVED, SOLVED_INACCURATE, OsqpSolver, RawSolution
 from ibvs_qp.qp.polish import polished
 
 #: Status values whose iterate means something.

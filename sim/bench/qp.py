@@ -111,8 +111,9 @@ def _problem(
     """Makes the problem as a user of qpsolvers would: full P, two-sided rows stacked."""
 
     def build() -> Any:
-        full = p + sparse.triu(p, 1).T
-        return qpsolvers.Problem(full.tocsc(), q, sparse.vstack((a, -a)).tocsc(), np.concatenate((upper, -lower)))
+        full: Any = sparse.csc_matrix(p + sparse.triu(p, 1).T)
+        stacked: Any = sparse.csc_matrix(sparse.vstack((a, -a)))
+        return qpsolvers.Problem(full, q, stacked, np.concatenate((upper, -lower)))
 
     return build
 
