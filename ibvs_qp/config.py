@@ -136,6 +136,9 @@ class LimitSettings:
     view_price: float = setting(4e4, "slack price of the line-in-view barriers", low=1e-3, high=1e8)
     view_rate_1_s: float = setting(2.0, "how fast the border may be approached", unit="1/s", low=0.1, high=100.0)
     push_share: float = setting(1.5, "push ceiling over the push reference", low=1.0, high=100.0)
+    push_quiet_m_s: float = setting(
+        0.005, "closing speed that the push ceiling takes for noise of the estimate", unit="m/s", low=0.0, high=1.0
+    )
     push_price: float = setting(40.0, "slack price of the push ceiling; far above the push row", low=1e-3, high=1e8)
     approach_share: float = setting(1.5, "closing speed over that of the approach", low=1.0, high=100.0)
     approach_rate_1_s: float = setting(

@@ -14,13 +14,15 @@ class PushCeiling(Limit):
     Against a wall of stiffness k the push obeys :math:`m \ddot f = k (F_n - f)` with the net force F_n along n. The
     barrier :math:`\ddot h + 2p\dot h + p^2 h \ge 0` on :math:`h = f_{max} - f` with its poles at the contact's own
     :math:`p = \sqrt{k/m}` reads :math:`F_n \le f_{max} + 2\sqrt{k m}\,\dot e_s`: no more than the ceiling, and less
-    while the tip still closes in.
+    while the tip still closes in. A closing speed within the noise of its estimate counts as none: times
+    :math:`2\sqrt{k m}`, at a stiff wall 500 N s/m, it would be newtons.
     """
 
     def rows(self, model: SymbolicModel) -> list[LimitRow]:
         """One soft row in newtons; wide before touch."""
         ceiling, stiffness, rate, touching = ca.vertsplit(model.parameter("push_state", 4))
-        bound = ceiling + 2.0 * ca.sqrt(stiffness * model.config.vehicle.mass_kg) * rate
+        settings, mass = model.config.limits, model.config.vehicle.mass_kg
+        bound = ceiling + 2.0 * ca.sqrt(stiffness * mass) * ca.fmin(rate + settings.push_quiet_m_s, 0.0)
         return [
             LimitRow(
                 name="push_ceiling",
@@ -28,7 +30,7 @@ class PushCeiling(Limit):
                 expression=ca.dot(model.normal, model.wrench[:3]),
                 lower=ca.SX(-WIDE),
                 upper=ca.if_else(touching, bound, WIDE),
-                price=self.price(model, model.config.limits.push_price),
+                price=self.price(model, settings.push_price),
             )
         ]
 
