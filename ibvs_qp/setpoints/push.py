@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as ca
 
 from ibvs_qp.config import ContactSettings, ControllerConfig
-from ibvs_qp.setpoints.reach import REACH_MARGIN
+from ibvs_qp.setpoints.reach import REACH_SHARE
 from ibvs_qp.setpoints.sensed import Body, Touch, Wish, clamp
 from ibvs_qp.setpoints.signals import Signals
 
@@ -32,7 +32,7 @@ def push_force(signals: Signals, config: ControllerConfig, body: Body, touch: To
     limited, and the proportional gain falls with the measured stiffness.
     """
     gains = config.gains
-    allowed = ca.fmin(wish.push, ca.fmax(reach - REACH_MARGIN, 0.0)) if config.reach_check else wish.push
+    allowed = ca.fmin(wish.push, REACH_SHARE * reach) if config.reach_check else wish.push
     reference = signals.output("push_reference", ca.if_else(wish.press, allowed, 0.0))
     ceiling = config.limits.push_share * reference
     signals.output("push_state", ca.vertcat(ceiling, touch.stiffness, touch.rate, touch.touching * wish.press))

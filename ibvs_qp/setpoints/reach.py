@@ -9,8 +9,8 @@ from allocation.wrench_facets import WrenchFacets
 from ibvs_qp.setpoints.signals import Signals
 from ibvs_qp.vehicle import VehicleParams
 
-#: A wanted push below the reach keeps this much margin [N].
-REACH_MARGIN = 1.0
+#: Share of the reach that a push may ask for: the rest is left for holding place, whatever the vehicle can do.
+REACH_SHARE = 0.97
 #: Reach given out when nothing bounds it [N].
 UNBOUNDED = 1e6
 #: Commanded speed below which the tip counts as standing still [m/s].
