@@ -14,7 +14,7 @@ from ibvs_qp.errors import IbvsQpError
 from ibvs_qp.vehicle import VehicleParams
 from ibvs_qp.vision import checks
 from sim.bench.mission import mission_shots
-from sim.bench.timing import DEADLINES_US, Row
+from sim.bench.timing import DEADLINES_HZ, Row
 from sim.bench.vision import bench_vision
 from sim.cli import main
 from sim.scene import Scene
@@ -73,10 +73,10 @@ def test_pictures_of_the_mission_are_seeded_and_show_paint() -> None:
 def test_a_row_counts_what_it_measured() -> None:
     row = Row(name="sleep", size=None)
     assert row.measure(lambda: 7) == 7 and len(row.times_us) == 1
-    row = Row(name="given", times_us=[100.0, 300.0, 700.0, 2000.0])
+    row = Row(name="given", times_us=[900.0, 1100.0, 2100.0, 4100.0])
     figures = row.summary()
-    assert figures["p50_us"] == pytest.approx(500.0) and figures["max_us"] == 2000.0
-    assert figures["misses"] == {str(limit): misses for limit, misses in zip(DEADLINES_US, (3, 2, 1), strict=True)}
+    assert figures["p50_us"] == pytest.approx(1600.0) and figures["max_us"] == 4100.0
+    assert figures["misses"] == {str(rate): misses for rate, misses in zip(DEADLINES_HZ, (1, 2, 3), strict=True)}
 
 
 @pytest.mark.parametrize(
