@@ -85,6 +85,14 @@ def test_single_frame(tmp_path, capsys) -> None:
         assert guide["id"] in {line["id"] for line in frame["candidates"]}
 
 
+def test_the_papers_pipeline_answers_in_the_same_form(tmp_path, capsys) -> None:
+    [frame] = seen(capsys, single(*save(tmp_path), "--method", "paper"))["frames"]
+    assert frame["method"] == "paper" and frame["refused"] is None and frame["candidates"]
+    assert frame["guides"]["bottom"] is None, "it knows a topmost line and a first upright one"
+    top = frame["guides"]["top"]
+    assert top is not None and top["confidence"] < 0.8 and top["id"] in {line["id"] for line in frame["candidates"]}
+
+
 def test_all_lists_lines_of_the_whole_picture_and_leaves_the_guides(tmp_path, capsys) -> None:
     files = save(tmp_path)
     [few], [many] = (seen(capsys, single(*files, *more))["frames"] for more in ((), ("--all",)))

@@ -23,7 +23,7 @@ class FrameMethod(Protocol):
 
 
 #: Module and class of every method; loaded on use, so that the help of the command stays quick.
-METHODS = {"own": ("ibvs_qp.vision.survey", "SurveyPipeline")}
+METHODS = {"own": ("ibvs_qp.vision.survey", "SurveyPipeline"), "paper": ("sim.detection.paper", "PaperMethod")}
 
 
 def make_method(name: str) -> FrameMethod:

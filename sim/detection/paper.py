@@ -1,0 +1,52 @@
+"""The paper's pipeline as a method of `ibvs-qp detect`: its lines in the common form."""
+
+from __future__ import annotations
+
+from ibvs_qp.measurement import RgbdFrame
+from ibvs_qp.vision.detect import Candidate
+from ibvs_qp.vision.paper import PaperPipeline
+from ibvs_qp.vision.picture import denormalise
+from ibvs_qp.vision.survey import DetectedLine, Detection
+
+#: The published pipeline rates no line; what it takes for a guide it is as sure of as of any other.
+PAPER_CONFIDENCE = 0.5
+
+
+class PaperMethod:
+    """`ibvs_qp.vision.paper.PaperPipeline`, picture by picture; it neither follows nor knows a mask."""
+
+    def __init__(self) -> None:
+        self._pipeline = PaperPipeline()
+
+    def detect(self, frame: RgbdFrame, seed_pixel: tuple[float, float] | None) -> Detection:
+        """Surface, level and upright lines, topmost and first upright as guides."""
+        if seed_pixel is None:
+            return Detection(refused="no seed pixel: the bounding box is searched from one")
+        found = self._pipeline.detect(frame, seed_pixel)
+        lines = {id(line): _common(number, line, frame) for number, line in enumerate(found.candidates)}
+
+        def guide(line: Candidate | None) -> DetectedLine | None:
+            return None if line is None else lines.get(id(line), _common(len(lines), line, frame))
+
+        return Detection(
+            plane=found.plane,
+            refused=found.refused,
+            candidates=tuple(lines.values()),
+            guides={side: guide(line) for side, line in found.guides.items()},
+            time_ms=found.time_total_ms,
+        )
+
+
+def _common(number: int, candidate: Candidate, frame: RgbdFrame) -> DetectedLine:
+    line = candidate.line
+    return DetectedLine(
+        pixels=denormalise(line.segment, frame.intrinsics),
+        rho=line.rho,
+        theta=line.theta,
+        covariance=line.covariance,
+        score=candidate.score,
+        confidence=PAPER_CONFIDENCE,
+        borders_plane=candidate.identity.surface_side != 0,
+        surface_side=candidate.identity.surface_side,
+        line_id=number,
+    )
