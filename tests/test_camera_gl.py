@@ -21,6 +21,7 @@ from sim.cameras.arm import vehicle_layer
 from sim.cameras.view import View
 from sim.canvas import Canvas
 from sim.closed_loop import FlightOptions, fly
+from sim.metrics import compute_metrics
 from sim.scene import PaintScene, Scene
 
 BACK_END, WHY_NOT = resolve_camera("gl")
@@ -187,13 +188,15 @@ def test_a_short_job_is_painted_by_opengl_as_well_as_by_the_plane_camera() -> No
     board = dataclasses.replace(Scene().board, width_m=0.4)
     scene = dataclasses.replace(Scene(), paint=job, board=board)
     size = (424, 240)
-    tips = [
-        fly(scene, FlightOptions(camera=camera, image_size=size, video=False)).arrays["tip"]
-        for camera in ("plane", "gl")
-    ]
-    assert abs(len(tips[0]) - len(tips[1])) < 100
-    count = min(len(tips[0]), len(tips[1]))
-    assert np.abs(tips[0][:count] - tips[1][:count]).max() < 0.01
+    traces = {
+        camera: fly(scene, FlightOptions(camera=camera, image_size=size, video=False)) for camera in ("plane", "gl")
+    }
+    # Not tick by tick: how long alignment takes hangs on the last millimetre per second of a hover.
+    for camera, trace in traces.items():
+        figures = compute_metrics(trace)
+        assert figures["completed"], (camera, figures["reason"])
+        assert figures["path_rms_straight_m"] <= 0.005 and figures["coverage"] >= 0.97, (camera, figures)
+        assert figures["tilt_rms_deg"] <= 1.0 and figures["contact_share"] >= 0.99, (camera, figures)
 
 
 @pytest.fixture
