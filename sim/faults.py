@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -20,7 +21,7 @@ LEAST_WINDOW_N = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
-class Fault:
+class Fault(ABC):
     """Something that happens once.
 
     Attributes:
@@ -31,9 +32,9 @@ class Fault:
     after: str = "touch"
     delay_s: float = 3.0
 
+    @abstractmethod
     def strike(self, world: World, pilot: Pilot) -> str:
         """Make it happen; returns what happened, in words."""
-        raise NotImplementedError
 
 
 @dataclass(frozen=True, kw_only=True)

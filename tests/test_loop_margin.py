@@ -23,7 +23,7 @@ from ibvs_qp.loop_margin import (
     require_margin,
 )
 from ibvs_qp.pilot import Pilot, PilotConfig
-from ibvs_qp.setpoints.push import SOFT_STIFFNESS
+from ibvs_qp.setpoints import push
 from sim.closed_loop import PRESETS, FlightOptions, World, pilot_config
 from sim.scene import ForceTorqueScene, ImuScene, Scene
 
@@ -209,7 +209,7 @@ def test_the_allowed_value_holds_and_a_little_more_does_not() -> None:
 
 
 def test_model_and_controller_divide_the_gain_alike() -> None:
-    assert FULL_GAIN_STIFFNESS == SOFT_STIFFNESS
+    assert FULL_GAIN_STIFFNESS == push.FULL_GAIN_STIFFNESS
 
 
 def test_a_brush_cannot_be_inside_out() -> None:

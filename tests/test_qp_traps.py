@@ -244,6 +244,19 @@ def test_osqp_unbelieved_and_the_exact_solver_failing_leads_to_the_analytic_law(
     assert Outcome.ANALYTIC_FALLBACK in found and Outcome.EXACT_FALLBACK not in found
 
 
+def test_a_free_optimum_that_is_no_number_never_flies(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The worst violation may step over NaN: the shortcut asks the thrusts themselves."""
+    controller = flying()
+    data = controller.engine.data
+
+    def poisoned() -> None:
+        data.free[2], data.violation[0] = math.nan, -1.0
+
+    monkeypatch.setattr(data, "evaluate", poisoned)
+    command = controller.step(measured(6), Reference(lines=line_references(2)))
+    assert np.isfinite(command.thrusts).all() and command.iterations > 0
+
+
 def test_everything_failing_leads_to_hold_and_back(monkeypatch: pytest.MonkeyPatch) -> None:
     controller = flying()
     with monkeypatch.context() as broken:

@@ -67,7 +67,9 @@ class QpEngine:
         """Solve the program as its data stands; None when nobody found a solution."""
         data, self.conflict = self.data, ()
         data.evaluate()
-        if self.settings.shortcut and data.violation[0] <= 0.0 and self.osqp.ready:
+        # A maximum steps over NaN, so the thrusts are asked themselves.
+        unlimited = data.violation[0] <= 0.0 and math.isfinite(data.free.sum())
+        if self.settings.shortcut and unlimited and self.osqp.ready:
             return self._unlimited()
         raw = self.osqp.solve(data.p, data.q, data.a, data.lower, data.upper)
         if raw is None:

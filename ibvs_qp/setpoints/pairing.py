@@ -73,10 +73,6 @@ class LinePairing:
                 self._slots[key] = min(set(range(self._count)) - set(self._slots.values()))
         return freed
 
-    def slot(self, index: int) -> int:
-        """Slot of a reference by its place in the last assignment."""
-        return self._slots[self.keys[index]]
-
     def pairs(
         self, lines: tuple[LineFeature, ...], references: tuple[LineReference, ...]
     ) -> list[tuple[int, tuple[float, ...], float]]:

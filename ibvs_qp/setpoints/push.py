@@ -5,14 +5,13 @@ from __future__ import annotations
 import casadi as ca
 
 from ibvs_qp.config import ContactSettings, ControllerConfig
+from ibvs_qp.contact_loop import FULL_GAIN_STIFFNESS
 from ibvs_qp.setpoints.reach import REACH_SHARE
 from ibvs_qp.setpoints.sensed import Body, Touch, Wish, clamp
 from ibvs_qp.setpoints.signals import Signals
 
 #: Bound of the force integral as a force [N].
 FORCE_INTEGRAL_BOUND = 8.0
-#: Stiffness up to which the force gain counts in full [N/m]; it falls with 1/k beyond (the brush's nominal k).
-SOFT_STIFFNESS = 1500.0
 #: Peak force that a touch may reach while the stiffness is unknown [N]: v = F / sqrt(k m).
 TOUCH_FORCE_BUDGET = 4.9
 #: Integral gain of the approach speed at the wall [1/s^2] and bound of its force [N].
@@ -41,7 +40,7 @@ def push_force(signals: Signals, config: ControllerConfig, body: Body, touch: To
     free = signals.input("given_up") < WINDUP_FORCE
     moved = clamp(old + ca.if_else(free, body.dt, 0.0) * (wanted - touch.push), -bound, bound)
     integral = signals.remember("force_integral", ca.if_else(ca.logic_and(touch.touching, wish.press), moved, 0.0))
-    softness = ca.fmin(1.0, SOFT_STIFFNESS / touch.stiffness)
+    softness = ca.fmin(1.0, FULL_GAIN_STIFFNESS / touch.stiffness)
     force = wanted + softness * gains.force_kfp * (wanted - touch.push) + gains.force_kfi * integral
     if config.impedance:
         impedance = gains.force_ksp * touch.distance + gains.force_ksd * touch.rate

@@ -43,9 +43,4 @@ def push_reach(
     upper, lower = rising @ high + falling @ low - held, rising @ low + falling @ high - held
     room = ca.if_else(slope > 0.0, upper, lower) / ca.if_else(ca.fabs(slope) > IDLE_SLOPE, slope, 1.0)
     room = ca.if_else(ca.fabs(slope) > IDLE_SLOPE, room, UNBOUNDED)
-    return signals.output("reach", clamp_positive(ca.mmin(room)))
-
-
-def clamp_positive(value: ca.SX) -> ca.SX:
-    """Value, at least zero."""
-    return ca.fmax(value, 0.0)
+    return signals.output("reach", ca.fmax(ca.mmin(room), 0.0))
