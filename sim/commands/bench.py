@@ -104,13 +104,14 @@ def _show(bench: BenchResult) -> None:
     table.add_column("measured", no_wrap=True)
     if sized:
         table.add_column("size", no_wrap=True)
-    for column in ("median", "90 %", "99 %", "99.9 %", "most", "> 1 ms"):
+    for column in ("median", "90 %", "99 %", "99.9 %", "most", "> 4/2/1 ms"):
         table.add_column(column, justify="right", no_wrap=True)
     for figure in figures:
         cells = (figure[key] for key in ("p50_us", "p90_us", "p99_us", "p999_us", "max_us"))
         texts = (f"{unit * cell:.{2 if sized else 1}f}" for cell in cells)
         size = (figure["size"] or "",) if sized else ()
-        table.add_row(figure["name"], *size, *texts, str(figure["misses"]["1000"]))
+        misses = "/".join(str(count) for count in figure["misses"].values())
+        table.add_row(figure["name"], *size, *texts, misses)
     console = Console()
     console.print(table)
     stages = ", ".join(f"{stage} {unit * time_us:.2f}" for stage, time_us in bench.stages_us.items())
