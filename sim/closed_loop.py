@@ -134,13 +134,11 @@ class World:
     def sense(self) -> SensorFrame:
         """Sensor frame of the present tick."""
         plant = self.plant
-        frame = self.sensors.sample(plant)
         pose = self._miscalibration.pose(plant.position, plant.quaternion)
         if self._rendered:
             image = self._stream.tick(plant.time_ns, *pose)
-            return frame if image is None else dataclasses.replace(frame, image=self._miscalibration.picture(image))
-        features = self._features.tick(plant.time_ns, *pose, plant.velocity)
-        return frame if features is None else dataclasses.replace(frame, features=features)
+            return self.sensors.sample(plant, image=None if image is None else self._miscalibration.picture(image))
+        return self.sensors.sample(plant, features=self._features.tick(plant.time_ns, *pose, plant.velocity))
 
     def act(self, thrusts: np.ndarray) -> None:
         """Advance one control tick and paint where the brush presses."""

@@ -87,8 +87,8 @@ class Recorder:
             pilot.controller_time_s * 1e6,
             command.iterations,
             *plant.motion,
-            *plant.friction,
-            *plant.pushes,
+            *plant.contact_friction,
+            *plant.contact_1khz,
         )
         thrusts, actual, unallocated, velocity = self._places
         row[thrusts], row[actual], row[unallocated] = command.thrusts, plant.motor_thrusts, command.unallocated_wrench
