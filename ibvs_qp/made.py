@@ -9,7 +9,7 @@ T = TypeVar("T")
 _set = object.__setattr__
 
 
-def made(kind: type[T], **fields: Any) -> T:
+def made(kind: type[T], /, **fields: Any) -> T:
     """An instance of a frozen dataclass without slots, equal to ``kind(**fields)``.
 
     Its own constructor sets the fields one by one past the freezing and takes four times as long. Fields whose default
