@@ -93,6 +93,7 @@ class Pilot:
         config: Everything a flight needs.
         painter: Strategy to follow; None paints.
         seen_as: Applied to what perception saw in a picture, for studies of its errors.
+        controller: A controller of the configuration's law and settings that has flown before; None creates one.
     """
 
     def __init__(
@@ -100,20 +101,22 @@ class Pilot:
         config: PilotConfig | None = None,
         painter: Painter | None = None,
         seen_as: Callable[[FeatureFrame], FeatureFrame] | None = None,
+        controller: HybridController | PaperController | None = None,
     ) -> None:
         self.config = config or PilotConfig()
-        controller, vehicle = self.config.controller, self.config.controller.vehicle
-        self.controller = HybridController(controller) if self.config.law == "qp" else PaperController(controller)
+        settings, vehicle = self.config.controller, self.config.controller.vehicle
+        kind = HybridController if self.config.law == "qp" else PaperController
+        self.controller = kind(settings) if controller is None else controller
         self.motion = WallMotion(
             np.array(vehicle.tip_position_m),
             np.array(vehicle.camera_position_m),
-            controller.tick_s,
+            settings.tick_s,
             self.config.estimation,
         )
         self.tare = WrenchTare(vehicle, self.config.estimation)
         self.painter = painter or Painter(self.config.painting)
         self._seen_as = seen_as
-        self._ticks = StampRing(controller.tick_s)
+        self._ticks = StampRing(settings.tick_s)
         self._gate = SensorGate()
         self._tip = np.array(vehicle.tip_position_m)
         self._camera = np.array(vehicle.camera_position_m)

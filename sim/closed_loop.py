@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ import numpy as np
 import ibvs_qp
 from ibvs_qp.measurement import SensorFrame
 from ibvs_qp.pilot import Pilot, PilotConfig
+from sim import controller_pool
 from sim.board import BoardGeometry
 from sim.cameras import CameraStream, RemoteCamera, open_camera
 from sim.canvas import Canvas
@@ -65,6 +67,7 @@ class FlightOptions:
     view: bool = False
 
 
+@functools.lru_cache(maxsize=4)
 def default_preset(law: str) -> PilotConfig:
     """The shipped preset of a law; each was tuned by the same search (`sim.tune`)."""
     file = PRESETS / f"tarot_t960_{law}.toml"
@@ -168,7 +171,7 @@ def make_pilot(scene: Scene, options: FlightOptions, config: PilotConfig, job: J
     sigma, noise = scene.features.sigma_vs, stream(options.seed, "sigma_vs")
     rendered = options.features == "rendered"  # the sensor model of lines adds the same noise itself
     seen_as = (lambda frame: add_sigma_vs(frame, sigma, noise)) if rendered and sigma > 0.0 else None
-    return Pilot(config, job.strategy(config.painting), seen_as)
+    return Pilot(config, job.strategy(config.painting), seen_as, controller_pool.take(config.law, config.controller))
 
 
 def fly(
@@ -220,6 +223,7 @@ def fly(
     finally:
         wall_time, memory = time.perf_counter() - start, world.close()
     trace = recorder.trace()
+    controller_pool.give_back(config.law, config.controller, pilot.controller)
     trace.wall_time_s = wall_time
     trace.camera_memory_bytes = memory
     trace.completed = not reason and pilot.painter.finished and not pilot.painter.failed

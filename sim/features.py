@@ -15,7 +15,7 @@ from ibvs_qp.made import made
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL, FeatureFrame, LineFeature
 from ibvs_qp.vehicle import VehicleParams
 from sim.board import BoardGeometry
-from sim.cameras.arm import vehicle_layer
+from sim.cameras.arm import vehicle_mask
 from sim.cameras.protocol import Schedule, camera_intrinsics
 from sim.cameras.view import View
 from sim.canvas import Canvas
@@ -70,7 +70,7 @@ class GeometricFeatures:
         self.intrinsics = camera_intrinsics(scene.camera)
         own, extra = np.random.SeedSequence([seed, 0xFEA7]).spawn(2)
         self._normals, self._extra = Normals(np.random.default_rng(own)), np.random.default_rng(extra)
-        self._hidden = vehicle_layer(scene, vehicle, self.intrinsics, np.random.default_rng(0)).mask
+        self._hidden = vehicle_mask(scene, vehicle, self.intrinsics)
         self._schedule = Schedule(scene.camera.rate_hz, scene.camera.latency_s)
         fx, fy, _, _ = self.intrinsics
         self._half_view = 0.5 * scene.camera.width / fx, 0.5 * scene.camera.height / fy

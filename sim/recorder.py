@@ -126,7 +126,7 @@ class Recorder:
         pressed = np.isin(arrays["phase"], _PRESSED)
         arrays["row"][~pressed] = 0
         given = arrays.pop("given")
-        arrays["line_error_px"] = self._line_errors(given, arrays.pop("error").reshape(ticks, -1))
+        arrays["line_error_px"] = self._line_errors(given, arrays.pop("error").reshape(ticks, len(self._slots)))
         arrays |= self._believed(given, arrays["push_reference"]) | self._truth(arrays.pop("truth"))
         active = np.zeros((ticks, len(self._limits)), dtype=bool)
         for tick, columns in self._active.items():
@@ -140,7 +140,7 @@ class Recorder:
         arrays["vision_ms"] = np.array(self._vision, float)
         arrays["painting_1khz"] = np.repeat(pressed, STEPS_PER_TICK)
         canvas = self._world.canvas
-        return Trace(
+        trace = Trace(
             scene=self._world.scene,
             seed=self._options.seed,
             law=self._options.law,
@@ -149,12 +149,13 @@ class Recorder:
             outcomes=tuple(str(outcome) for outcome in Outcome),
             limits=tuple(self._limits),
             events=self._events,
-            canvas=canvas.rgb,
             canvas_px_per_m=canvas.pixels_per_m,
             coverage_mask=canvas.coverage,
             pictures=self._pictures,
             preset=self._pilot.config.to_toml(),
         )
+        trace.draw_later(lambda: canvas.rgb)
+        return trace
 
     def _input(self, given: np.ndarray, name: str) -> np.ndarray:
         """One input of the compiled tick in all rows, (N, size)."""
