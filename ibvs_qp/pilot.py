@@ -43,6 +43,10 @@ from ibvs_qp.vision.percept import LineHint
 HINT_SPAN = (0.10, 0.50)
 
 
+#: A tick is never taken to last longer than this [s]: after a pause the filters begin where they were.
+LONGEST_TICK = 0.02
+
+
 @dataclass(frozen=True, kw_only=True)
 class CameraConfig:
     """What the pilot expects of its camera beside the intrinsics, which come with every picture."""
@@ -116,7 +120,7 @@ class Pilot:
         self.tare = WrenchTare(vehicle, self.config.estimation)
         self.painter = painter or Painter(self.config.painting)
         self._seen_as = seen_as
-        self._ticks = StampRing(settings.tick_s)
+        self._tick_s, self._ticks = settings.tick_s, StampRing(settings.tick_s)
         self._gate = SensorGate()
         self._tip = np.array(vehicle.tip_position_m)
         self._camera = np.array(vehicle.camera_position_m)
@@ -174,24 +178,24 @@ class Pilot:
         return command if not refused else dataclasses.replace(command, rejected=command.rejected + refused)
 
     def _fly(self, frame: SensorFrame) -> Command:
+        stamp, estimation = frame.stamp_ns, self.config.estimation
         if self._first < 0:
-            self._first = frame.stamp_ns
-        tick = self.config.controller.tick_s
-        dt = tick if self._stamp < 0 else min(max((frame.stamp_ns - self._stamp) * 1e-9, 0.0), 0.02)
-        self._stamp = frame.stamp_ns
+            self._first = stamp
+        dt = self._tick_s if self._stamp < 0 else (stamp - self._stamp) * 1e-9
+        dt = dt if dt < LONGEST_TICK else LONGEST_TICK
+        self._stamp = stamp
         now = self._gate.last
-        force, rate = now["specific_force"], now["angular_velocity"]
-        self._remember(frame.stamp_ns, now["attitude"], rate, dt)
-        contact = self.terms.contact
-        free = not contact.in_contact and contact.distance > self.config.estimation.tare_distance_m
+        attitude, force, rate = now["attitude"], now["specific_force"], now["angular_velocity"]
+        self._remember(stamp, attitude, rate, dt)
+        contact = self.controller.setpoints.contact
+        free = not contact.in_contact and contact.distance > estimation.tare_distance_m
         wrench = self.tare.update(frame.wrench, frame.wrench_stamp_ns, force, free)
-        axes = WallAxes.of(contact.normal.tolist(), down_row(*now["attitude"]))
-        self.motion.predict(frame.stamp_ns, axes, force, rate, dt)
+        axes = WallAxes.of(contact.normal.tolist(), down_row(*attitude))
+        self.motion.predict(stamp, axes, force, rate, dt)
         features = frame.features if frame.image is None else self._see(frame)
         if features is not None and self._fresh(features.stamp_ns):
             self._take(features)
-        wish = self.painter.step(self._scenery(frame))
-        self.wish = wish
+        wish = self.wish = self.painter.step(self._scenery(frame))
         self.reference = self._refer(wish)
         self.measurement = self._measure(frame, wrench, axes, wish)
         begin = time.perf_counter()
@@ -319,19 +323,20 @@ class Pilot:
         return self._covariance
 
     def _scenery(self, frame: SensorFrame) -> Scenery:
-        contact, motion = self.terms.contact, self.motion.state
+        terms, motion = self.controller.setpoints, self.motion
+        contact, state = terms.contact, motion.state
         return Scenery(
-            time_s=(frame.stamp_ns - self._first) * 1e-9,
-            lines=self.motion.lines,
-            odometer=motion[4:6],
-            velocity=motion[:2],
-            distance=contact.distance,
-            wall_known=contact.known,
-            in_contact=contact.in_contact,
-            time_since_touch=contact.time_since_touch,
-            push=contact.push,
-            push_wanted=self.terms.push_reference,
-            tared=self.tare.ready,
+            (frame.stamp_ns - self._first) * 1e-9,
+            motion.lines,
+            state[4:6],
+            state[:2],
+            contact.distance,
+            contact.known,
+            contact.in_contact,
+            contact.time_since_touch,
+            contact.push,
+            terms.push_reference,
+            self.tare.ready,
         )
 
     def _refer(self, wish: Wish) -> Reference:

@@ -24,6 +24,7 @@ from sim.features import GeometricFeatures, add_sigma_vs
 from sim.jobs import Job, PaintJob
 from sim.miscalibration import Miscalibration
 from sim.plant import TICK_NS, Plant
+from sim.readout import PLACES
 from sim.recorder import Recorder
 from sim.scene import Scene
 from sim.sensors import SensorSuite
@@ -44,6 +45,7 @@ PAINTING_FORCE = 0.05
 STROKE_TICKS = 3
 #: Control ticks between calls of the progress function.
 PROGRESS_TICKS = 125
+_SEEN_FROM = [PLACES[name] for name in ("position", "quaternion", "body_velocity")]
 #: A flight that is not done by then is ended [s]: start and corners, plus the strokes at half speed.
 BASE_TIME, STROKE_FACTOR = 90.0, 2.0
 
@@ -137,11 +139,13 @@ class World:
     def sense(self) -> SensorFrame:
         """Sensor frame of the present tick."""
         plant = self.plant
-        pose = self._miscalibration.pose(plant.position, plant.quaternion)
         if self._rendered:
+            pose = self._miscalibration.pose(plant.position, plant.quaternion)
             image = self._stream.tick(plant.time_ns, *pose)
             return self.sensors.sample(plant, image=None if image is None else self._miscalibration.picture(image))
-        return self.sensors.sample(plant, features=self._features.tick(plant.time_ns, *pose, plant.velocity))
+        position, quaternion, velocity = (plant.truth[place] for place in _SEEN_FROM)  # read at once, not kept
+        pose = self._miscalibration.pose(position, quaternion)
+        return self.sensors.sample(plant, features=self._features.tick(plant.time_ns, *pose, velocity))
 
     def act(self, thrusts: np.ndarray) -> None:
         """Advance one control tick and paint where the brush presses."""
