@@ -173,8 +173,9 @@ class Pilot:
             command = self.controller.step(self.measurement, self.reference)  # type: ignore[arg-type]
         else:
             command = self._fly(sound)
-        if self._gate.clock.shift_ns and sound is not None:  # it answers in the time of the frames
-            command = dataclasses.replace(command, stamp_ns=frame.stamp_ns)
+        if self._gate.clock.shift_ns and sound is not None:
+            # In the time of the frames; set in place, because a copy would have all reports made.
+            object.__setattr__(command, "stamp_ns", frame.stamp_ns)
         return command if not refused else dataclasses.replace(command, rejected=command.rejected + refused)
 
     def _fly(self, frame: SensorFrame) -> Command:

@@ -99,19 +99,18 @@ def readout(sensors: int, accelerometer: int, force: int, torque: int, contact: 
 
 @functools.lru_cache(maxsize=8)
 def drive(rotors: int) -> ca.Function:
-    """What goes into MuJoCo before a tick: (wanted, lower, upper, actual thrusts, lags, air, rotation, arm) to
+    """What goes into MuJoCo before a tick, as a function of what is wanted and of the air.
 
-    (commanded thrusts [N], time constant of every rotor [s], force and moment of the air, front-left-up [N, N m]).
-    ``air`` is its force at the true centre of mass in the world [N], ``arm`` the way there from the bare vehicle's
-    centre of mass, where MuJoCo applies forces, in B [m]. Under a constant command a first-order lag never crosses it,
-    so one choice between the lags up and down holds for the tick.
+    Of (wanted, lower, upper, actual thrusts, lags, air, rotation, arm) it yields the commanded thrusts [N], the time
+    constant of every rotor [s], and force and moment of the air, front-left-up [N, N m]. ``air`` is its force at the
+    true centre of mass in the world [N], ``arm`` the way there from the bare vehicle's centre of mass, where MuJoCo
+    applies forces, in B [m]. Under a constant command a first-order lag never crosses it, so one choice between the
+    lags up and down holds for the tick.
     """
     wanted, lower, upper, actual = (ca.SX.sym(name, rotors) for name in ("wanted", "lower", "upper", "actual"))
     lags, air, rotation, arm = ca.SX.sym("lags", 2), ca.SX.sym("air", 3), ca.SX.sym("rotation", 9), ca.SX.sym("arm", 3)
     command = ca.fmin(ca.fmax(wanted, lower), upper)
-    lag = ca.vertcat(
-        *(ca.if_else(command[index] >= actual[index], lags[0], lags[1]) for index in range(rotors))
-    )
+    lag = ca.vertcat(*(ca.if_else(command[index] >= actual[index], lags[0], lags[1]) for index in range(rotors)))
     a, b, c, d, e, f, g, h, i = _entries(rotation)
     rows = (a, b, c), (d, e, f), (g, h, i)
     force = tuple(_entries(air))

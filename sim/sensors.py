@@ -155,9 +155,7 @@ class SensorSuite:
         self.vehicle = vehicle or VehicleParams()
         self.imu, self.force_torque = Imu(scene.imu, seed), ForceTorque(scene.force_torque, seed)
 
-    def sample(
-        self, plant: Plant, image: RgbdFrame | None = None, features: FeatureFrame | None = None
-    ) -> SensorFrame:
+    def sample(self, plant: Plant, image: RgbdFrame | None = None, features: FeatureFrame | None = None) -> SensorFrame:
         """What the vehicle delivers at this control tick, with the picture or the features that have come meanwhile."""
         imu, force_torque = self.imu, self.force_torque
         imu.sample(plant)

@@ -96,9 +96,7 @@ def vehicle_layer(
 _masks: dict[Hashable, np.ndarray] = {}
 
 
-def vehicle_mask(
-    scene: Scene, vehicle: VehicleParams, intrinsics: tuple[float, float, float, float]
-) -> np.ndarray:
+def vehicle_mask(scene: Scene, vehicle: VehicleParams, intrinsics: tuple[float, float, float, float]) -> np.ndarray:
     """255 where arm or brush hide the scene, uint8 (H, W), not to be written; arguments as for `vehicle_layer`."""
     key = scene.camera.height, scene.camera.width, scene.paint.brush_width_m, vehicle, intrinsics
     if key not in _masks:
