@@ -42,4 +42,4 @@ def _memory(array: np.ndarray) -> memoryview:
     """The array's own memory; a strided or converted array would silently be a copy."""
     if array.dtype != np.float64 or not array.flags.c_contiguous:
         raise ValueError("a bound array must be contiguous float64")
-    return memoryview(array.reshape(-1))
+    return memoryview(array.reshape(-1))  # type: ignore[arg-type]

@@ -6,6 +6,7 @@ Written with symbols once, evaluated where MuJoCo keeps its numbers: one call in
 from __future__ import annotations
 
 import functools
+from typing import Any
 
 import casadi as ca
 
@@ -37,7 +38,8 @@ SIZE = _STARTS[-1]
 _FINITE = 1e300
 
 
-def _entries(symbol: ca.SX) -> list[ca.SX]:
+def _entries(symbol: ca.SX) -> list[Any]:
+    """Entries of a symbol; of any type, so that they go where plain numbers go."""
     return [symbol[index] for index in range(symbol.numel())]
 
 

@@ -48,8 +48,9 @@ class Recorder:
         self._scene, self._options, self._world, self._pilot = scene, options, world, pilot
         rotors, tick = pilot.config.controller.vehicle.geometry.count, pilot.terms.tick
         self._slots = range(pilot.config.controller.line_slots)
-        self._given = next(iter(tick.inputs.values())).base
-        assert self._given is not None
+        given = next(iter(tick.inputs.values())).base
+        assert given is not None, "the inputs are views of one array"
+        self._given = given
         wide = {"truth": len(world.plant.truth), "given": len(self._given)}
         wide |= {"thrusts": rotors, "thrusts_actual": rotors, "unallocated": 6}
         self._log = Columns({name: 1 for name in NUMBERS} | {"error": len(self._slots)} | wide)

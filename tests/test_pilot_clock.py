@@ -38,23 +38,25 @@ def test_a_clock_set_back_is_followed_and_nothing_is_forgotten() -> None:
     options = FlightOptions(features="geometric", video=False)
     config = pilot_config(scene, options)
     pilot, world = Pilot(config), World(scene, options, config)
-    outcomes, known = [], {}
-    for tick in range(420):
-        if tick == 300:
-            known = {key: line.offset for key, line in pilot.motion.lines.items()}
-            phase, wished = pilot.painter.phase, world.plant.position
-        frame = moved(world.sense(), 60 * SECOND if tick < 300 else 5 * SECOND)
+    outcomes, clock = [], 60 * SECOND
+    for _ in range(300):
+        world.act(pilot.step(moved(world.sense(), clock)).thrusts)
+    known, begun = set(pilot.motion.lines), world.plant.position
+    assert pilot.painter.phase == "approach" and known
+    clock = 5 * SECOND
+    for _ in range(120):
+        frame = moved(world.sense(), clock)
         command = pilot.step(frame)
         outcomes.append(command.outcome)
-        assert command.stamp_ns in (frame.stamp_ns, pilot.measurement.stamp_ns if pilot.measurement else 0)
+        if command.outcome is Outcome.SOLVED:
+            assert command.stamp_ns == frame.stamp_ns and not command.rejected
         world.act(command.thrusts)
-    assert phase == "approach" and known
-    assert set(outcomes[300:324]) == {Outcome.HOLD} and set(outcomes[326:]) == {Outcome.SOLVED}
-    assert command.stamp_ns == frame.stamp_ns and not command.rejected
+    assert set(outcomes[:24]) == {Outcome.HOLD} and set(outcomes[26:]) == {Outcome.SOLVED}
     assert pilot.painter.phase in ("approach", "align")
-    assert set(known) <= set(pilot.motion.lines), "the same lines as before"
-    assert np.linalg.norm(world.plant.position - wished) < 0.2
+    assert known <= set(pilot.motion.lines), "the same lines as before"
+    assert np.linalg.norm(world.plant.position - begun) < 0.2
     newest = max(line.seen_ns for line in pilot.motion.lines.values())
+    assert pilot.measurement is not None
     assert 0 <= pilot.measurement.stamp_ns - newest < 0.12 * SECOND, "pictures are taken in again"
 
 
@@ -122,4 +124,6 @@ def test_a_late_correction_over_uneven_ticks_equals_the_replay() -> None:
 
     late, replay = fly(59), fly(40)
     np.testing.assert_allclose(late.state, replay.state, atol=1e-12)
-    np.testing.assert_allclose(late.at(int(stamps[50])), replay.at(int(stamps[50])), atol=1e-12)
+    one, other = late.at(int(stamps[50])), replay.at(int(stamps[50]))
+    assert one is not None and other is not None
+    np.testing.assert_allclose(one, other, atol=1e-12)
