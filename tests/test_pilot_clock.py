@@ -93,7 +93,7 @@ def test_a_stamp_finds_the_nearest_tick_whatever_the_ticks_lengths() -> None:
     assert ring.age(0) is None
     stamps: list[int] = []
     for _ in range(3 * HISTORY):
-        gap = int(rng.choice([TICK_NS, 3 * TICK_NS, 40 * TICK_NS], p=[0.7, 0.25, 0.05]))
+        gap = int(rng.choice([TICK_NS // 4, TICK_NS, 3 * TICK_NS, 40 * TICK_NS], p=[0.7, 0.2, 0.08, 0.02]))
         stamps.append((stamps[-1] if stamps else 0) + gap + int(rng.integers(-500_000, 500_000)))
         ring.add(stamps[-1])
     kept = np.array(stamps[-HISTORY:])
