@@ -29,10 +29,15 @@ class EstimationConfig:
         1e-3, "random walk of line offsets: edges are not perfectly straight", unit="m/sqrt(s)", low=1e-6, high=0.1
     )
     line_std_m: float = setting(
-        3e-4, "least deviation of one line offset, whatever the fit claims", unit="m", low=1e-6, high=0.1
+        3e-4, "least deviation of one line offset, whatever the fit claims; more is learned in flight", unit="m", low=1e-6, high=0.1
     )
     velocity_std_m_s: float = setting(2e-3, "least deviation of one flow velocity", unit="m/s", low=1e-6, high=1.0)
-    angle_gain: float = setting(0.15, "share of a frame's line angle that is believed", low=0.01, high=1.0)
+    angle_std_rad: float = setting(
+        1e-3, "least deviation of one line angle: the attitude's noise", unit="rad", low=1e-6, high=0.1
+    )
+    angle_noise: float = setting(
+        9e-4, "random walk of line angles: edges are not perfectly straight", unit="rad/sqrt(s)", low=1e-7, high=0.1
+    )
     frames_to_trust: int = setting(4, "frames until a new line has full weight", low=1, high=100)
     fade_start_s: float = setting(
         0.10, "a line this long without news fades, counted from delivery", unit="s", low=0.01, high=5.0

@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ibvs_qp.estimation.config import EstimationConfig
-from ibvs_qp.estimation.delayed import DelayedKalman
+from ibvs_qp.estimation.delayed import GATE, DelayedKalman
+from ibvs_qp.estimation.line_noise import SteadyValue, WhiteNoise
 from ibvs_qp.estimation.wall_lines import WallAxes, image_line, wall_line
 from ibvs_qp.frames import GRAVITY
 from ibvs_qp.measurement import FeatureFrame, LineFeature
@@ -29,7 +30,9 @@ class TrackedLine:
         offset: Signed distance from the tip to the line along its normal [m]; normals point down (horizontal lines)
             or right (vertical lines), so > 0 is below or right of the tip.
         angle: Angle of the normal in (right, down) [rad]; pi/2 for a level line.
+        deviation: Of the filtered offset [m], from the noise that the pictures show.
         rates: Offset per unit of the tip's motion (right, down).
+        noise: Of the measured offset [m^2]; tilt: filter of the angle.
     """
 
     track_id: int
@@ -47,6 +50,8 @@ class TrackedLine:
     source_weight: float = 1.0
     theta_variance: float = 1e-4
     rates: tuple[float, float] = (0.0, 0.0)
+    noise: WhiteNoise = field(default_factory=WhiteNoise)
+    tilt: SteadyValue = field(default_factory=SteadyValue)
     extra: dict[str, float] = field(default_factory=dict)
 
 
@@ -86,6 +91,7 @@ class WallMotion:
         self._frame_stamp = -1
         self.velocity_age_s = math.inf
         self._velocity_stamp = -1
+        self._noise_rho, self._noise_theta = WhiteNoise(), WhiteNoise()  # what all lines have shown
 
     @property
     def velocity(self) -> np.ndarray:
@@ -186,37 +192,76 @@ class WallMotion:
     def _correct_line(
         self, line: LineFeature, offset: float, angle: float, side: int, scale: float, stamp: int
     ) -> None:
-        deviation = math.hypot(self._config.line_std_m, math.sqrt(max(float(line.covariance[0, 0]), 0.0)) * scale)
+        variance = self._config.line_std_m**2 + max(float(line.covariance[0, 0]), 0.0) * scale * scale
         tracked = self.lines.get(line.track_id)
         if tracked is None:
-            tracked = self._admit(line, offset, angle, deviation, stamp)
+            tracked = self._admit(line, offset, angle, scale, variance, stamp)
             if tracked is None:
                 return
-        slot = _LINES + tracked.slot
-        if tracked.seen_ns != stamp and not self._filter.correct_entry(stamp, slot, offset, deviation**2):
-            tracked.extra["refused"] = tracked.extra.get("refused", 0.0) + 1.0
-            if tracked.extra["refused"] >= 3:  # three frames agree with each other, not with the prediction
-                self._drop(line.track_id)
+        elif tracked.seen_ns != stamp and not self._correct_offset(tracked, offset, scale, variance, stamp):
             return
-        tracked.extra.pop("refused", None)
-        tracked.angle += self._config.angle_gain * (angle - tracked.angle)
+        else:
+            self._correct_angle(tracked, line, angle, stamp)
         tracked.frames += tracked.seen_ns != stamp
-        tracked.seen_ns, tracked.deviation, tracked.source_weight = stamp, deviation, line.weight
+        tracked.seen_ns, tracked.source_weight = stamp, line.weight
         tracked.news_ns = self._stamp
-        tracked.theta_variance = float(line.covariance[1, 1])
         tracked.surface_side, tracked.kind = side, line.kind or tracked.kind
         self._point(tracked)
 
+    def _correct_offset(self, line: TrackedLine, offset: float, scale: float, variance: float, stamp: int) -> bool:
+        """Correct with one offset, as noisy as the line has shown itself; False if it is not believed."""
+        slot, past = _LINES + line.slot, self._filter.at(stamp)
+        if past is None:
+            return False
+        innovation = offset - past.item(slot)
+        difference = line.noise.difference(innovation)
+        sample = line.noise.learn(difference, variance)
+        self._noise_rho.mix(sample / (scale * scale))
+        variance, covariance = line.noise.total(variance), self._filter.covariance
+        covariance[slot, slot] = max(covariance.item(slot, slot), variance / line.frames)  # see SteadyValue
+        if not self._filter.correct_entry(stamp, slot, offset, variance):
+            line.noise.keep(innovation)
+            # Noise lies anywhere; frames that agree with each other, not with the prediction, are another line.
+            agrees = difference * difference < 2.0 * GATE * GATE * variance
+            refused = line.extra.get("refused", 0.0)
+            line.extra["refused"] = refused + 1.0 if agrees else 1.0
+            if line.extra["refused"] >= 3:
+                self._drop(line.track_id)
+            return False
+        line.noise.keep(offset - past.item(slot))  # the history itself, corrected by now
+        line.deviation = math.sqrt(covariance.item(slot, slot))
+        line.extra.pop("refused", None)
+        return True
+
+    def _correct_angle(self, tracked: TrackedLine, line: LineFeature, angle: float, stamp: int) -> None:
+        config = self._config
+        claimed = config.angle_std_rad**2 + max(float(line.covariance[1, 1]), 0.0)
+        walk = config.angle_noise**2 * (stamp - tracked.seen_ns) * 1e-9
+        self._noise_theta.mix(tracked.tilt.correct(angle, claimed, walk))
+        tracked.angle, tracked.theta_variance = tracked.tilt.value, tracked.tilt.spread
+
     def _admit(
-        self, line: LineFeature, offset: float, angle: float, deviation: float, stamp: int
+        self, line: LineFeature, offset: float, angle: float, scale: float, variance: float, stamp: int
     ) -> TrackedLine | None:
         taken = {entry.slot for entry in self.lines.values()}
         free = [slot for slot in range(SLOTS) if slot not in taken]
         if not free:
             return None
+        noise = WhiteNoise.like(self._noise_rho, scale * scale)
+        deviation, turn = math.sqrt(noise.total(variance)), WhiteNoise.like(self._noise_theta)
+        claimed = self._config.angle_std_rad**2 + max(float(line.covariance[1, 1]), 0.0)
         tracked = TrackedLine(
-            track_id=line.track_id, role=line.role, slot=free[0], angle=angle, deviation=deviation, seen_ns=stamp
+            track_id=line.track_id,
+            role=line.role,
+            slot=free[0],
+            angle=angle,
+            deviation=deviation,
+            seen_ns=stamp,
+            noise=noise,
+            tilt=SteadyValue(value=angle, spread=turn.total(claimed), noise=turn),
         )
+        tracked.noise.keep(0.0)
+        tracked.tilt.noise.keep(0.0)
         tracked.news_ns = self._stamp
         self.lines[line.track_id] = tracked
         slot = _LINES + tracked.slot
