@@ -49,6 +49,12 @@ class EstimationConfig:
     )
     tare_follow_s: float = setting(20.0, "how slowly the bias is followed after that", unit="s", low=0.5, high=1000.0)
     tare_distance_m: float = setting(0.04, "the tip counts as free beyond this distance", unit="m", low=0.005, high=1.0)
+    force_std_n: float = setting(
+        0.02, "least deviation of a force sample across the tool; more is learned in flight", unit="N", low=1e-4, high=10.0
+    )
+    contact_spread_m: float = setting(
+        0.01, "how far from the tip the contact may press", unit="m", low=0.0, high=0.5
+    )
 
     def __post_init__(self) -> None:
         """Validate."""

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ibvs_qp.estimation.config import EstimationConfig
+from ibvs_qp.estimation.tip_force import TipForce
 from ibvs_qp.frames import cross
 from ibvs_qp.vectors import cross_product
 from ibvs_qp.vehicle import VehicleParams
@@ -24,10 +25,12 @@ class WrenchTare:
         self._mass = vehicle.tool_mass_kg
         self._sensor = np.array(vehicle.force_torque_position_m)
         self._lever = (np.array(vehicle.tool_position_m) - self._sensor).tolist()
+        self._tip = TipForce(vehicle, self._config)
         self.reset()
 
     def reset(self) -> None:
         """Forget the bias."""
+        self._tip.reset()
         self._bias, self._time, self._stamp = np.zeros(6), 0.0, -1
         self._wrench = np.zeros(6)
         self._force = (0.0, 0.0, -9.81)
@@ -60,7 +63,7 @@ class WrenchTare:
             self._time += dt
             span = min(max(self._time, dt), self._config.tare_follow_s)
             self._bias = self._bias + min(1.0, dt / span) * (contact - self._bias)
-        contact = contact - self._bias
+        contact = self._tip.fuse(contact - self._bias)
         contact[3:] += cross(self._sensor, contact[:3])
         self._wrench = contact
         return contact

@@ -138,7 +138,7 @@ class Setpoints:
             contact.distance if contact.known else FAR_AWAY,
             contact.rate,
             contact.push,
-            contact.push_noise,
+            contact.across_noise,
             contact.in_contact,
             contact.ramp,
             stiffness.value,
