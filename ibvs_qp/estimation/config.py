@@ -29,7 +29,11 @@ class EstimationConfig:
         1e-3, "random walk of line offsets: edges are not perfectly straight", unit="m/sqrt(s)", low=1e-6, high=0.1
     )
     line_std_m: float = setting(
-        3e-4, "least deviation of one line offset, whatever the fit claims; more is learned in flight", unit="m", low=1e-6, high=0.1
+        3e-4,
+        "least deviation of one line offset, whatever the fit claims; more is learned in flight",
+        unit="m",
+        low=1e-6,
+        high=0.1,
     )
     velocity_std_m_s: float = setting(2e-3, "least deviation of one flow velocity", unit="m/s", low=1e-6, high=1.0)
     angle_std_rad: float = setting(
@@ -50,11 +54,13 @@ class EstimationConfig:
     tare_follow_s: float = setting(20.0, "how slowly the bias is followed after that", unit="s", low=0.5, high=1000.0)
     tare_distance_m: float = setting(0.04, "the tip counts as free beyond this distance", unit="m", low=0.005, high=1.0)
     force_std_n: float = setting(
-        0.02, "least deviation of a force sample across the tool; more is learned in flight", unit="N", low=1e-4, high=10.0
+        0.02,
+        "least deviation of a force sample across the tool; more is learned in flight",
+        unit="N",
+        low=1e-4,
+        high=10.0,
     )
-    contact_spread_m: float = setting(
-        0.01, "how far from the tip the contact may press", unit="m", low=0.0, high=0.5
-    )
+    contact_spread_m: float = setting(0.01, "how far from the tip the contact may press", unit="m", low=0.0, high=0.5)
 
     def __post_init__(self) -> None:
         """Validate."""

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 
 import numpy as np
 
 from ibvs_qp.estimation.config import EstimationConfig
-from ibvs_qp.estimation.delayed import GATE, DelayedKalman
+from ibvs_qp.estimation.delayed import DelayedKalman
 from ibvs_qp.estimation.line_noise import SteadyValue, WhiteNoise
+from ibvs_qp.estimation.tracked_line import TrackedLine
 from ibvs_qp.estimation.wall_lines import WallAxes, image_line, wall_line
 from ibvs_qp.frames import GRAVITY
 from ibvs_qp.measurement import FeatureFrame, LineFeature
@@ -20,39 +20,6 @@ from ibvs_qp.vectors import cross_product
 SLOTS = 8
 
 _VELOCITY, _BIAS, _ODOMETER, _LINES = slice(0, 2), slice(2, 4), slice(4, 6), 6
-
-
-@dataclass(slots=True)
-class TrackedLine:
-    """One line on the wall, in metres from the tip's wall point.
-
-    Attributes:
-        offset: Signed distance from the tip to the line along its normal [m]; normals point down (horizontal lines)
-            or right (vertical lines), so > 0 is below or right of the tip.
-        angle: Angle of the normal in (right, down) [rad]; pi/2 for a level line.
-        deviation: Of the filtered offset [m], from the noise that the pictures show.
-        rates: Offset per unit of the tip's motion (right, down).
-        noise: Of the measured offset [m^2]; tilt: filter of the angle.
-    """
-
-    track_id: int
-    role: str
-    slot: int
-    angle: float
-    deviation: float
-    seen_ns: int
-    news_ns: int = 0
-    frames: int = 1
-    offset: float = 0.0
-    weight: float = 0.0
-    surface_side: int = 0
-    kind: str = ""
-    source_weight: float = 1.0
-    theta_variance: float = 1e-4
-    rates: tuple[float, float] = (0.0, 0.0)
-    noise: WhiteNoise = field(default_factory=WhiteNoise)
-    tilt: SteadyValue = field(default_factory=SteadyValue)
-    extra: dict[str, float] = field(default_factory=dict)
 
 
 class WallMotion:
@@ -221,16 +188,12 @@ class WallMotion:
         covariance[slot, slot] = max(covariance.item(slot, slot), variance / line.frames)  # see SteadyValue
         if not self._filter.correct_entry(stamp, slot, offset, variance):
             line.noise.keep(innovation)
-            # Noise lies anywhere; frames that agree with each other, not with the prediction, are another line.
-            agrees = difference * difference < 2.0 * GATE * GATE * variance
-            refused = line.extra.get("refused", 0.0)
-            line.extra["refused"] = refused + 1.0 if agrees else 1.0
-            if line.extra["refused"] >= 3:
+            if line.is_another(difference, variance):
                 self._drop(line.track_id)
             return False
         line.noise.keep(offset - past.item(slot))  # the history itself, corrected by now
         line.deviation = math.sqrt(covariance.item(slot, slot))
-        line.extra.pop("refused", None)
+        line.refused = 0
         return True
 
     def _correct_angle(self, tracked: TrackedLine, line: LineFeature, angle: float, stamp: int) -> None:

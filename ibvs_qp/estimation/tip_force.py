@@ -8,21 +8,21 @@ from ibvs_qp.estimation.config import EstimationConfig
 from ibvs_qp.estimation.line_noise import WhiteNoise
 from ibvs_qp.vehicle import VehicleParams
 
+#: Levers shorter than this tell nothing about a force [m].
+LEAST_LEVER = 0.05
+
 
 class TipForce:
     r"""Weighs the two ways of measuring the force across the tool, y and z, by the noise that each shows.
 
-    A force f at the tip, a lever l ahead of the sensor, gives the moments :math:`M_z = l f_y,\; M_y = -l f_z`.
-    So besides the sensor's force, with deviation :math:`\sigma_F`, there is M / l, with
-
-    .. math:: \sigma^2 = (\sigma_M^2 + (s f_x)^2) / l^2,
-
-    where s is how far from the tip the contact may press. :math:`\sigma_F` and :math:`\sigma_M` are learned from
-    successive samples. The moments themselves and the force along the tool are left as they are.
+    A force f at the tip, r from the sensor, gives :math:`M_z = r_x f_y - r_y f_x` and
+    :math:`M_y = r_z f_x - r_x f_z`. So besides the sensor's force there is the moment's, its variance that of
+    successive samples and :math:`(s f_x / r_x)^2`, where s is how far from the tip the contact may press. The moments
+    about the sensor and the force along the tool are left as they are.
     """
 
     def __init__(self, vehicle: VehicleParams, config: EstimationConfig) -> None:
-        self._lever = vehicle.tip_position_m[0] - vehicle.force_torque_position_m[0]
+        self._lever = np.subtract(vehicle.tip_position_m, vehicle.force_torque_position_m).tolist()
         self._spread, self._floor = config.contact_spread_m, config.force_std_n**2
         self.reset()
 
@@ -36,16 +36,20 @@ class TipForce:
         Args:
             wrench: Contact wrench about the sensor, FRD axes, (6,); not changed.
         """
-        along, right, down, _, pitch, yaw = wrench.tolist()
-        samples = right, yaw / self._lever, down, -pitch / self._lever
+        ahead, right, below = self._lever
+        if ahead < LEAST_LEVER:
+            return wrench
+        fx, fy, fz, _, my, mz = wrench.tolist()
+        samples = fy, fz, (mz + right * fx) / ahead, (below * fx - my) / ahead
         variances = []
         for noise, sample in zip(self._noise, samples, strict=True):
             noise.learn(noise.difference(sample), self._floor)
             noise.keep(sample)
             variances.append(noise.total(self._floor))
-        astray = (self._spread * along / self._lever) ** 2
+        astray = (self._spread * fx / ahead) ** 2
         better = wrench.copy()
-        for axis, (direct, moment) in enumerate(((0, 1), (2, 3)), start=1):
-            of_force, of_moment = variances[direct], variances[moment] + astray
-            better[axis] = (of_moment * samples[direct] + of_force * samples[moment]) / (of_force + of_moment)
+        for axis in (0, 1):
+            of_force, of_moment = variances[axis], variances[axis + 2] + astray
+            share = of_force / (of_force + of_moment)
+            better[axis + 1] = samples[axis] + share * (samples[axis + 2] - samples[axis])
         return better
