@@ -18,6 +18,7 @@ class WrenchTare:
 
     The tool obeys :math:`m_t f_t = F_{raw} + F_c` with its specific force f_t, so
     :math:`F_c = m_t f_t - F_{raw}`, and likewise for moments about the sensor; the mean in free flight is the bias.
+    Of the force across the tool the moments tell more than the force itself (`TipForce`).
     """
 
     def __init__(self, vehicle: VehicleParams, config: EstimationConfig | None = None) -> None:
@@ -63,7 +64,8 @@ class WrenchTare:
             self._time += dt
             span = min(max(self._time, dt), self._config.tare_follow_s)
             self._bias = self._bias + min(1.0, dt / span) * (contact - self._bias)
-        contact = self._tip.fuse(contact - self._bias)
+        contact = contact - self._bias
+        contact[1:3] = self._tip.across(contact[:3].tolist(), contact[3:].tolist())
         contact[3:] += cross(self._sensor, contact[:3])
         self._wrench = contact
         return contact

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ibvs_qp.estimation.config import EstimationConfig
@@ -30,16 +32,16 @@ class TipForce:
         """Forget the noise."""
         self._noise = [WhiteNoise() for _ in range(4)]
 
-    def fuse(self, wrench: np.ndarray) -> np.ndarray:
-        """Tared wrench at the sensor with the better force across [N, N m], (6,).
+    def across(self, force: Sequence[float], moment: Sequence[float]) -> tuple[float, float]:
+        """The better force across [N]: y and z of a tared wrench at the sensor.
 
         Args:
-            wrench: Contact wrench about the sensor, FRD axes, (6,); not changed.
+            force: Contact force [N], FRD axes, (3,).
+            moment: Its moment about the sensor [N m], (3,).
         """
-        ahead, right, below = self._lever
+        (ahead, right, below), (fx, fy, fz), (_, my, mz) = self._lever, force, moment
         if ahead < LEAST_LEVER:
-            return wrench
-        fx, fy, fz, _, my, mz = wrench.tolist()
+            return fy, fz
         samples = fy, fz, (mz + right * fx) / ahead, (below * fx - my) / ahead
         variances = []
         for noise, sample in zip(self._noise, samples, strict=True):
@@ -47,9 +49,9 @@ class TipForce:
             noise.keep(sample)
             variances.append(noise.total(self._floor))
         astray = (self._spread * fx / ahead) ** 2
-        better = wrench.copy()
+        better = []
         for axis in (0, 1):
             of_force, of_moment = variances[axis], variances[axis + 2] + astray
             share = of_force / (of_force + of_moment)
-            better[axis + 1] = samples[axis] + share * (samples[axis + 2] - samples[axis])
-        return better
+            better.append(samples[axis] + share * (samples[axis + 2] - samples[axis]))
+        return better[0], better[1]
