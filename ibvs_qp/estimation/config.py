@@ -37,10 +37,18 @@ class EstimationConfig:
     )
     velocity_std_m_s: float = setting(2e-3, "least deviation of one flow velocity", unit="m/s", low=1e-6, high=1.0)
     angle_std_rad: float = setting(
-        1e-3, "least deviation of one line angle: the attitude's noise", unit="rad", low=1e-6, high=0.1
+        3e-3,
+        "least deviation of one line angle: attitude noise and the turning of a short edge that grows",
+        unit="rad",
+        low=1e-6,
+        high=0.1,
     )
     angle_noise: float = setting(
-        9e-4, "random walk of line angles: edges are not perfectly straight", unit="rad/sqrt(s)", low=1e-7, high=0.1
+        2.7e-3,
+        "random walk of line angles; with the deviation above a clean angle follows within 0.2 s",
+        unit="rad/sqrt(s)",
+        low=1e-7,
+        high=0.1,
     )
     frames_to_trust: int = setting(4, "frames until a new line has full weight", low=1, high=100)
     fade_start_s: float = setting(
