@@ -110,7 +110,7 @@ class Weights:
     )
     effort: float = setting(1e-3, "thrust away from the last one; 30 N", low=1e-9, high=1e3)
     smoothness: float = setting(1e-3, "change of the thrust step; 30 N", low=0.0, high=1e3)
-    line_sigma: float = setting(2e-3, "line deviation at which a row's weight halves", low=1e-6, high=1.0)
+    line_sigma: float = setting(2e-2, "line deviation at which a row's weight halves", low=1e-6, high=1.0)
 
     def __post_init__(self) -> None:
         """Validate."""

@@ -17,6 +17,8 @@ from ibvs_qp.painting_job import PaintingConfig, Scenery, Wish
 
 #: A guide may differ from where it must be by this much [m]: at the start, and from row to row.
 START_GATE, ROW_GATE = 0.15, 0.018
+#: A gate says nothing of a line known less well than this share of it; nobody sets out for a guide known less well [m].
+GATE_SHARE, START_DEVIATION = 1.0 / 3.0, 0.01
 #: The right board edge is trusted as start mark only this near to its expected place [m].
 RIGHT_EDGE_GATE = 0.06
 #: A guide's reference slides to its nominal offset at this speed [m/s].
@@ -89,7 +91,8 @@ class Painter:
 
     def _start(self, seen: Scenery, dt: float) -> Wish:
         guide = self._bottom_edge(seen)
-        if guide is not None and seen.wall_known and seen.tared and guide.weight > 0.9:
+        sure = guide is not None and guide.weight > 0.9 and guide.deviation < START_DEVIATION
+        if guide is not None and sure and seen.wall_known and seen.tared:
             self._guide_id, self._guide_target = guide.track_id, self.config.edge_margin_m
             self._enter(seen, "approach", f"guide {guide.offset * 1e3:+.0f} mm below the tip, wall known, wrench tared")
         distance = seen.distance if seen.wall_known else self.config.retreat_m
@@ -381,7 +384,7 @@ def clipped(value: float, low: float, high: float) -> float:
 def _nearest(lines, accept, expected: float, gate: float) -> TrackedLine | None:
     best, least = None, gate
     for line in lines:
-        if line.weight > 0.0:
+        if line.weight > 0.0 and line.deviation <= GATE_SHARE * gate:
             away = abs(line.offset - expected)
             if (away < least or (away == least and best is None)) and accept(line):
                 best, least = line, away

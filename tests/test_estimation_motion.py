@@ -157,7 +157,7 @@ def test_a_line_that_appears_at_speed_enters_where_it_is_and_is_not_refused(late
             entered += 1
     assert entered > 40
     line = stroke.motion.lines[2]
-    assert line.frames >= 4 and "refused" not in line.extra and line.weight > 0.9
+    assert line.frames >= 4 and line.refused == 0 and line.weight > 0.9
 
 
 def test_weight_grows_with_frames_and_fades_without_news() -> None:

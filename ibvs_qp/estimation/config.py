@@ -29,10 +29,27 @@ class EstimationConfig:
         1e-3, "random walk of line offsets: edges are not perfectly straight", unit="m/sqrt(s)", low=1e-6, high=0.1
     )
     line_std_m: float = setting(
-        3e-4, "least deviation of one line offset, whatever the fit claims", unit="m", low=1e-6, high=0.1
+        3e-4,
+        "least deviation of one line offset, whatever the fit claims; more is learned in flight",
+        unit="m",
+        low=1e-6,
+        high=0.1,
     )
     velocity_std_m_s: float = setting(2e-3, "least deviation of one flow velocity", unit="m/s", low=1e-6, high=1.0)
-    angle_gain: float = setting(0.15, "share of a frame's line angle that is believed", low=0.01, high=1.0)
+    angle_std_rad: float = setting(
+        3e-3,
+        "least deviation of one line angle: attitude noise and the turning of a short edge that grows",
+        unit="rad",
+        low=1e-6,
+        high=0.1,
+    )
+    angle_noise: float = setting(
+        2.7e-3,
+        "random walk of line angles; with the deviation above a clean angle follows within 0.2 s",
+        unit="rad/sqrt(s)",
+        low=1e-7,
+        high=0.1,
+    )
     frames_to_trust: int = setting(4, "frames until a new line has full weight", low=1, high=100)
     fade_start_s: float = setting(
         0.10, "a line this long without news fades, counted from delivery", unit="s", low=0.01, high=5.0
@@ -44,6 +61,14 @@ class EstimationConfig:
     )
     tare_follow_s: float = setting(20.0, "how slowly the bias is followed after that", unit="s", low=0.5, high=1000.0)
     tare_distance_m: float = setting(0.04, "the tip counts as free beyond this distance", unit="m", low=0.005, high=1.0)
+    force_std_n: float = setting(
+        0.02,
+        "least deviation of a force sample across the tool; more is learned in flight",
+        unit="N",
+        low=1e-4,
+        high=10.0,
+    )
+    contact_spread_m: float = setting(0.01, "how far from the tip the contact may press", unit="m", low=0.0, high=0.5)
 
     def __post_init__(self) -> None:
         """Validate."""

@@ -58,6 +58,7 @@ class ContactEstimator:
         self.depth = math.inf
         self.push = self.push_raw = 0.0
         self._push_mean, self._push_variance = 0.0, 0.02
+        self._moment, self._moment_variance = np.zeros(3), 0.0
         self.in_contact, self.touch_ns, self._touch_count, self._doubt_ns = False, -1, 0, -1
         self.stiffness = StiffnessEstimator()
 
@@ -152,11 +153,14 @@ class ContactEstimator:
         dt = 0.01 if self._wrench_stamp < 0 else min((measurement.wrench_stamp_ns - self._wrench_stamp) * 1e-9, 0.1)
         self._wrench_stamp = measurement.wrench_stamp_ns
         self.push_raw = -float(measurement.contact_wrench[:3] @ self.normal)
-        self.push += (1.0 - math.exp(-2.0 * math.pi * settings.force_filter_hz * dt)) * (self.push_raw - self.push)
+        gain = 1.0 - math.exp(-2.0 * math.pi * settings.force_filter_hz * dt)
+        self.push += gain * (self.push_raw - self.push)
+        self._moment += gain * (measurement.contact_wrench[3:] - self._moment)
         if not self.in_contact and self.distance > 2.0 * settings.contact_distance_m:
             share = min(1.0, dt / NOISE_TIME)
             self._push_mean += share * (self.push - self._push_mean)
             self._push_variance += share * ((self.push - self._push_mean) ** 2 - self._push_variance)
+            self._moment_variance += share * (0.5 * float(self._moment @ self._moment) - self._moment_variance)
         self._touch_count = self._touch_count + 1 if self.push > self.touch_threshold else 0
         if self.in_contact:
             self.stiffness.add(self.push, -self.distance, dt)
@@ -165,6 +169,11 @@ class ContactEstimator:
     def push_noise(self) -> float:
         """Deviation of the filtered push in free flight [N]."""
         return math.sqrt(self._push_variance)
+
+    @property
+    def across_noise(self) -> float:
+        """Deviation of the filtered moments in free flight, as a force across the tip [N]."""
+        return math.sqrt(self._moment_variance) / self._tip_list[0]
 
     @property
     def touch_threshold(self) -> float:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 
 import numpy as np
 
 from ibvs_qp.estimation.config import EstimationConfig
 from ibvs_qp.estimation.delayed import DelayedKalman
+from ibvs_qp.estimation.line_noise import SteadyValue, WhiteNoise
+from ibvs_qp.estimation.tracked_line import TrackedLine
 from ibvs_qp.estimation.wall_lines import WallAxes, image_line, wall_line
 from ibvs_qp.frames import GRAVITY
 from ibvs_qp.made import made
@@ -20,35 +21,6 @@ from ibvs_qp.vectors import cross_product
 SLOTS = 8
 
 _VELOCITY, _BIAS, _ODOMETER, _LINES = slice(0, 2), slice(2, 4), slice(4, 6), 6
-
-
-@dataclass(slots=True)
-class TrackedLine:
-    """One line on the wall, in metres from the tip's wall point.
-
-    Attributes:
-        offset: Signed distance from the tip to the line along its normal [m]; normals point down (horizontal lines)
-            or right (vertical lines), so > 0 is below or right of the tip.
-        angle: Angle of the normal in (right, down) [rad]; pi/2 for a level line.
-        rates: Offset per unit of the tip's motion (right, down).
-    """
-
-    track_id: int
-    role: str
-    slot: int
-    angle: float
-    deviation: float
-    seen_ns: int
-    news_ns: int = 0
-    frames: int = 1
-    offset: float = 0.0
-    weight: float = 0.0
-    surface_side: int = 0
-    kind: str = ""
-    source_weight: float = 1.0
-    theta_variance: float = 1e-4
-    rates: tuple[float, float] = (0.0, 0.0)
-    extra: dict[str, float] = field(default_factory=dict)
 
 
 class WallMotion:
@@ -87,6 +59,7 @@ class WallMotion:
         self._frame_stamp = -1
         self.velocity_age_s = math.inf
         self._velocity_stamp = -1
+        self._noise_rho, self._noise_theta = WhiteNoise(), WhiteNoise()  # what all lines have shown
 
     @property
     def velocity(self) -> np.ndarray:
@@ -187,37 +160,70 @@ class WallMotion:
     def _correct_line(
         self, line: LineFeature, offset: float, angle: float, side: int, scale: float, stamp: int
     ) -> None:
-        deviation = math.hypot(self._config.line_std_m, math.sqrt(max(float(line.covariance[0, 0]), 0.0)) * scale)
+        variance = self._config.line_std_m**2 + max(float(line.covariance[0, 0]), 0.0) * scale * scale
         tracked = self.lines.get(line.track_id)
         if tracked is None:
-            tracked = self._admit(line, offset, angle, deviation, stamp)
+            tracked = self._admit(line, offset, angle, scale, variance, stamp)
             if tracked is None:
                 return
-        slot = _LINES + tracked.slot
-        if tracked.seen_ns != stamp and not self._filter.correct_entry(stamp, slot, offset, deviation**2):
-            tracked.extra["refused"] = tracked.extra.get("refused", 0.0) + 1.0
-            if tracked.extra["refused"] >= 3:  # three frames agree with each other, not with the prediction
-                self._drop(line.track_id)
+        elif tracked.seen_ns != stamp and not self._correct_offset(tracked, offset, scale, variance, stamp):
             return
-        tracked.extra.pop("refused", None)
-        tracked.angle += self._config.angle_gain * (angle - tracked.angle)
+        else:
+            self._correct_angle(tracked, angle, stamp)
         tracked.frames += tracked.seen_ns != stamp
-        tracked.seen_ns, tracked.deviation, tracked.source_weight = stamp, deviation, line.weight
+        tracked.seen_ns, tracked.source_weight = stamp, line.weight
         tracked.news_ns = self._stamp
-        tracked.theta_variance = float(line.covariance[1, 1])
         tracked.surface_side, tracked.kind = side, line.kind or tracked.kind
         self._point(tracked)
 
+    def _correct_offset(self, line: TrackedLine, offset: float, scale: float, variance: float, stamp: int) -> bool:
+        """Correct with one offset, as noisy as the line has shown itself; False if it is not believed."""
+        slot, past = _LINES + line.slot, self._filter.at(stamp)
+        if past is None:
+            return False
+        innovation = offset - past.item(slot)
+        difference = line.noise.difference(innovation)
+        sample = line.noise.learn(difference, variance)
+        self._noise_rho.mix(sample / (scale * scale))
+        variance, covariance = line.noise.total(variance), self._filter.covariance
+        covariance[slot, slot] = max(covariance.item(slot, slot), variance / line.frames)  # see SteadyValue
+        if not self._filter.correct_entry(stamp, slot, offset, variance):
+            line.noise.keep(innovation)
+            if line.is_another(difference, variance):
+                self._drop(line.track_id)
+            return False
+        line.noise.keep(offset - past.item(slot))  # the history itself, corrected by now
+        line.deviation = math.sqrt(covariance.item(slot, slot))
+        line.refused = 0
+        return True
+
+    def _correct_angle(self, line: TrackedLine, angle: float, stamp: int) -> None:
+        config = self._config  # a fit's own claim is left out: on a short fresh edge it is three times too cautious
+        walk = config.angle_noise**2 * (stamp - line.seen_ns) * 1e-9
+        self._noise_theta.mix(line.tilt.correct(angle, config.angle_std_rad**2, walk))
+        line.angle, line.theta_variance = line.tilt.value, line.tilt.spread
+
     def _admit(
-        self, line: LineFeature, offset: float, angle: float, deviation: float, stamp: int
+        self, line: LineFeature, offset: float, angle: float, scale: float, variance: float, stamp: int
     ) -> TrackedLine | None:
         taken = {entry.slot for entry in self.lines.values()}
         free = [slot for slot in range(SLOTS) if slot not in taken]
         if not free:
             return None
+        noise = WhiteNoise.like(self._noise_rho, scale * scale)
+        deviation, turn = math.sqrt(noise.total(variance)), WhiteNoise.like(self._noise_theta)
         tracked = TrackedLine(
-            track_id=line.track_id, role=line.role, slot=free[0], angle=angle, deviation=deviation, seen_ns=stamp
+            track_id=line.track_id,
+            role=line.role,
+            slot=free[0],
+            angle=angle,
+            deviation=deviation,
+            seen_ns=stamp,
+            noise=noise,
+            tilt=SteadyValue(value=angle, spread=turn.total(self._config.angle_std_rad**2), noise=turn),
         )
+        tracked.noise.keep(0.0)
+        tracked.tilt.noise.keep(0.0)
         tracked.news_ns = self._stamp
         self.lines[line.track_id] = tracked
         slot = _LINES + tracked.slot

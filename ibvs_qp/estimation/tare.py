@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ibvs_qp.estimation.config import EstimationConfig
+from ibvs_qp.estimation.tip_force import TipForce
 from ibvs_qp.vectors import cross_product
 from ibvs_qp.vehicle import VehicleParams
 
@@ -17,6 +18,7 @@ class WrenchTare:
 
     The tool obeys :math:`m_t f_t = F_{raw} + F_c` with its specific force f_t, so
     :math:`F_c = m_t f_t - F_{raw}`, and likewise for moments about the sensor; the mean in free flight is the bias.
+    Of the force across the tool the moments tell more than the force itself (`TipForce`).
     """
 
     def __init__(self, vehicle: VehicleParams, config: EstimationConfig | None = None) -> None:
@@ -24,10 +26,12 @@ class WrenchTare:
         self._mass = vehicle.tool_mass_kg
         self._sensor = [float(entry) for entry in vehicle.force_torque_position_m]
         self._lever = np.subtract(vehicle.tool_position_m, self._sensor).tolist()
+        self._tip = TipForce(vehicle, self._config)
         self.reset()
 
     def reset(self) -> None:
         """Forget the bias."""
+        self._tip.reset()
         self._bias, self._time, self._stamp = [0.0] * 6, 0.0, -1
         self._wrench = np.zeros(6)
         self._force = (0.0, 0.0, -9.81)
@@ -66,6 +70,7 @@ class WrenchTare:
             share = min(1.0, dt / span)
             self._bias = [bias + share * (mean - bias) for bias, mean in zip(self._bias, contact, strict=True)]
         fx, fy, fz, mx, my, mz = [entry - bias for entry, bias in zip(contact, self._bias, strict=True)]
+        fy, fz = self._tip.across((fx, fy, fz), (mx, my, mz))
         ax, ay, az = cross_product(self._sensor, (fx, fy, fz))
         self._wrench = np.array((fx, fy, fz, mx + ax, my + ay, mz + az))
         return self._wrench

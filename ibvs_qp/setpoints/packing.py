@@ -73,7 +73,7 @@ class TickInputs:
             contact.distance if known else FAR_AWAY,
             contact.rate,
             contact.push,
-            contact.push_noise,
+            contact.across_noise,
             contact.in_contact,
             contact.ramp,
             stiffness.value,

@@ -75,7 +75,7 @@ class Touch:
         known: 1 once the wall was seen.
         normal: Unit vector into the wall, in B.
         distance: Tip to wall [m]; rate: its rate [m/s].
-        push: Filtered push [N]; noise: its deviation in free flight [N].
+        push: Filtered push [N]; noise: of the moments in free flight, as a force across the tip [N].
         touching: 1 in contact.
         ramp: 0 at touch to 1.
         stiffness: [N/m]; stiffness_known: 1 once it was measured.
