@@ -7,6 +7,7 @@ p = `Canvas.pixels_per_m`: row 0 is the top edge, column 0 the left edge.
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 
@@ -77,20 +78,26 @@ class Canvas:
         self._stamps = _brush_stamps(0.5 * paint.brush_width_m * self.pixels_per_m)
         self._dirty: tuple[int, int, int, int] | None = None
         self.edges = PaintedEdges(scene)
-        self._make_wall(np.random.default_rng(wall_seed), board.clutter - on_board)
+        self._wall_seed, self._wall_clutter = wall_seed, board.clutter - on_board
+        self._measure_wall()
 
-    def _make_wall(self, rng: np.random.Generator, clutter: int) -> None:
+    def _measure_wall(self) -> None:
         board = self.scene.board
         corners = self.geometry.point(np.array([0, 1, 1, 0]) * board.width_m, np.array([0, 0, 1, 1]) * board.height_m)
         low, high = corners.min(axis=0), corners.max(axis=0)
         size = high - low + 2.0 * WALL_EXTENT_M
-        px_m = self.wall_pixels_per_m = min(WALL_PIXELS_PER_M, math.sqrt(_MAX_PIXELS / float(np.prod(size))))
-        self.wall_origin = low - WALL_EXTENT_M
-        width, height = (math.ceil(entry * px_m) for entry in size)
-        self.wall = textures.wall_surface(rng, (height, width), self.scene.wall.color, px_m)
-        left, top = (low - self.wall_origin) * px_m
-        right, bottom = (high - self.wall_origin) * px_m
-        clutter_wall(rng, self.wall, clutter, px_m, (left, top, right, bottom))
+        self.wall_pixels_per_m = min(WALL_PIXELS_PER_M, math.sqrt(_MAX_PIXELS / float(np.prod(size))))
+        self.wall_origin, self._wall_size, self._outline = low - WALL_EXTENT_M, size, (low, high)
+
+    @functools.cached_property
+    def wall(self) -> np.ndarray:
+        """Picture of the wall, made when somebody looks at it: a flight without a camera never does."""
+        rng, px_m = np.random.default_rng(self._wall_seed), self.wall_pixels_per_m
+        width, height = (math.ceil(entry * px_m) for entry in self._wall_size)
+        wall = textures.wall_surface(rng, (height, width), self.scene.wall.color, px_m)
+        (left, top), (right, bottom) = ((corner - self.wall_origin) * px_m for corner in self._outline)
+        clutter_wall(rng, wall, self._wall_clutter, px_m, (left, top, right, bottom))
+        return wall
 
     @property
     def rgb(self) -> np.ndarray:
