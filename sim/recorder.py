@@ -165,7 +165,7 @@ class Recorder:
             outcomes=tuple(str(outcome) for outcome in Outcome),
             limits=tuple(self._limits),
             events=self._events,
-            canvas=canvas.rgb,
+            canvas=canvas.rgb if self._options.board else None,
             canvas_px_per_m=canvas.pixels_per_m,
             coverage_mask=canvas.coverage,
             pictures=self._pictures,
