@@ -23,11 +23,11 @@ class Knob:
 
     Attributes:
         label: Name shown, with the unit in brackets.
-        paths: Dotted fields of `Setting` that it sets together; the first one is read.
+        paths: Dotted fields of `Setting` that it sets together; the first one is read. Rotor limits are set in the
+            program and in the plant: what the rotors can do, the controller knows.
         low: Left end of the slider; a switch has None.
         high: Right end.
         step: Step; None for logarithmic steps.
-        hint: What moving it does.
     """
 
     label: str
@@ -35,7 +35,6 @@ class Knob:
     low: float | None = None
     high: float | None = None
     step: float | None = None
-    hint: str = ""
 
     @property
     def name(self) -> str:
@@ -63,7 +62,9 @@ _CONTACT, _VEHICLE = "pilot.controller.contact.", "pilot.controller.vehicle."
 
 
 def _weight(name: str, unit: str, low: float, high: float, hint: str = "") -> Knob:
-    return Knob(label=f"{name.replace('_', ' ')} [1/({unit})²]", paths=(_WEIGHTS + name,), low=low, high=high, hint=hint)
+    return Knob(
+        label=f"{name.replace('_', ' ')} [1/({unit})²]", paths=(_WEIGHTS + name,), low=low, high=high, hint=hint
+    )
 
 
 #: Every knob, by group in the order shown.
@@ -72,8 +73,8 @@ GROUPS: dict[str, tuple[Knob, ...]] = {
         Knob(label="push [N]", paths=("scene.paint.push_n",), low=1.0, high=40.0, step=0.5),
         Knob(label="sliding speed [m/s]", paths=("scene.paint.speed_m_s",), low=0.02, high=0.3, step=0.01),
         Knob(label="approach speed [m/s]", paths=(_CONTACT + "approach_speed_m_s",), low=0.02, high=0.3, step=0.01),
-        Knob(label="speed within 10 cm [m/s]", paths=(_CONTACT + "close_speed_m_s",), low=0.02, high=0.3, step=0.01),
-        Knob(label="speed of the last 2 cm [m/s]", paths=(_CONTACT + "touch_speed_m_s",), low=0.01, high=0.2, step=0.01),
+        Knob(label="within 10 cm [m/s]", paths=(_CONTACT + "close_speed_m_s",), low=0.02, high=0.3, step=0.01),
+        Knob(label="last 2 cm [m/s]", paths=(_CONTACT + "touch_speed_m_s",), low=0.01, high=0.2, step=0.01),
     ),
     "The world": (
         Knob(label="friction [-]", paths=("scene.wall.friction",), low=0.0, high=1.0, step=0.05),
@@ -89,7 +90,6 @@ GROUPS: dict[str, tuple[Knob, ...]] = {
             low=12.0,
             high=52.56,
             step=0.5,
-            hint="of every rotor, in the program and in the plant",
         ),
         Knob(
             label="idle thrust [N]",

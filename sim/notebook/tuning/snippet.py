@@ -1,4 +1,4 @@
-"""A few seconds of closed loop, from just before the wall to a stretch of sliding: what one change of a slider flies."""
+"""A few seconds of closed loop, from just before the wall to a stretch of sliding: what one change flies."""
 
 from __future__ import annotations
 
