@@ -61,10 +61,8 @@ _LIMITS, _WEIGHTS, _GAINS = "pilot.controller.limits.", "pilot.controller.weight
 _CONTACT, _VEHICLE = "pilot.controller.contact.", "pilot.controller.vehicle."
 
 
-def _weight(name: str, unit: str, low: float, high: float, hint: str = "") -> Knob:
-    return Knob(
-        label=f"{name.replace('_', ' ')} [1/({unit})²]", paths=(_WEIGHTS + name,), low=low, high=high, hint=hint
-    )
+def _weight(name: str, unit: str, low: float, high: float) -> Knob:
+    return Knob(label=f"{name.replace('_', ' ')} [1/({unit})²]", paths=(_WEIGHTS + name,), low=low, high=high)
 
 
 #: Every knob, by group in the order shown.
