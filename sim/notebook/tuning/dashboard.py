@@ -18,7 +18,7 @@ from sim.trace import Trace
 
 #: Size [in] and place of the panels in it; a fixed layout is drawn in half the time of a fitted one.
 SIZE_IN = (11.0, 7.2)
-MARGINS = {"left": 0.055, "right": 0.985, "top": 0.92, "bottom": 0.075, "wspace": 0.24, "hspace": 0.3}
+MARGINS = {"left": 0.055, "right": 0.965, "top": 0.92, "bottom": 0.075, "wspace": 0.24, "hspace": 0.3}
 #: Names and looks of the three flights.
 LOOKS = {
     "analytic": {"color": law_colour("paper"), "linewidth": 0.9},
@@ -29,6 +29,8 @@ NAMES = {"now": "QP now", "last": "QP before", "analytic": "analytic law"}
 #: The first tenths of a second are the vehicle's coming into the hover; scales leave them out [s].
 SETTLING_S = 1.0
 EVERY = 2
+#: Room for the time under the second panel at the right, in shares of the figure's height.
+CLOCK_ROOM = 0.03
 #: Places of the axes' labels, in shares of their axes.
 X_LABEL, Y_LABEL = (0.5, -0.17), (-0.075, 0.5)
 
@@ -43,6 +45,8 @@ def draw_dashboard(comparison: Comparison) -> Figure:
     _draw_tilt(grid[2, 0], flights, comparison)
     draw_prices(grid[0, 1], comparison.now, comparison.last)
     _draw_room(grid[1, 1], flights)
+    place = grid[2, 1].get_position()
+    grid[2, 1].set_position((place.x0, place.y0, place.width, place.height - CLOCK_ROOM))
     draw_reach(grid[2, 1], flights, LOOKS)
     end = max(float(trace.t[-1]) for trace in flights.values())
     _set_time(end, [*grid[:, 0]])
