@@ -50,8 +50,9 @@ BASE_TIME, STROKE_FACTOR = 90.0, 2.0
 class FlightOptions:
     """How to fly a scene; the defaults are the main job.
 
-    With `camera_process` another process draws the pictures: the same flight to the bit, sooner where a core is free.
-    Without `board` the trace keeps no picture of the painted board, which costs as much as a second of flight.
+    With `camera_process` another process draws the pictures, with `machine_code` the C compiler translates the
+    controller's tick, where there is one: both are the same flight to the bit, sooner.
+    Without `board` the trace keeps no picture of the painted board.
     """
 
     law: str = "qp"
@@ -63,6 +64,7 @@ class FlightOptions:
     preset: str | None = None
     video: bool = True
     camera_process: bool = False
+    machine_code: bool = False
     view: bool = False
     board: bool = True
 
@@ -95,7 +97,17 @@ def pilot_config(scene: Scene, options: FlightOptions, config: PilotConfig | Non
         push_n=paint.push_n,
     )
     vision = dataclasses.replace(config.vision, paint_color=paint.color, brush_width_m=paint.brush_width_m)
-    return dataclasses.replace(config, painting=painting, vision=vision, perception=options.vision, law=options.law)
+    controller = config.controller
+    if options.machine_code:
+        controller = dataclasses.replace(controller, machine_code=True)
+    return dataclasses.replace(
+        config,
+        controller=controller,
+        painting=painting,
+        vision=vision,
+        perception=options.vision,
+        law=options.law,
+    )
 
 
 class World:
