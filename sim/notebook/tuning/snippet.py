@@ -85,7 +85,7 @@ def fly_snippet(setting: Setting, law: str = "qp") -> Trace:
 
 @functools.lru_cache(maxsize=KEPT_FLIGHTS)
 def _fly(pilot: PilotConfig, scene: Scene, seed: int, law: str, job: SnippetJob) -> Trace:
-    options = FlightOptions(law=law, seed=seed, features="geometric", video=False, board=False)
+    options = FlightOptions(law=law, seed=seed, features="geometric", video=False)
     return fly(scene, options, config=pilot_config(scene, options, pilot), job=job)
 
 
