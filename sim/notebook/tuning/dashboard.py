@@ -29,6 +29,8 @@ NAMES = {"now": "QP now", "last": "QP before", "analytic": "analytic law"}
 #: The first tenths of a second are the vehicle's coming into the hover; scales leave them out [s].
 SETTLING_S = 1.0
 EVERY = 2
+#: Ticks up an axis at most; writing is the dearest part of the drawing.
+TICKS = 5
 #: Room for the time under the second panel at the right, in shares of the figure's height.
 CLOCK_ROOM = 0.03
 #: Places of the axes' labels, in shares of their axes.
@@ -56,6 +58,8 @@ def draw_dashboard(comparison: Comparison) -> Figure:
         axes.xaxis.set_label_coords(*X_LABEL)
         if axes in grid:
             axes.yaxis.set_label_coords(*Y_LABEL)
+        if axes in grid and axes is not grid[0, 1]:
+            axes.locator_params(axis="y", nbins=TICKS)
     handles, labels = grid[0, 0].get_legend_handles_labels()
     order = [labels.index(name) for name in (*NAMES.values(), "reference")]
     figure.legend([handles[i] for i in order], [labels[i] for i in order], loc="upper left", ncols=4,
@@ -65,11 +69,12 @@ def draw_dashboard(comparison: Comparison) -> Figure:
 
 def _set_time(end: float, column: list[Axes]) -> None:
     """Whole seconds for all axes of a column, written under the lowest."""
-    seconds = range(math.floor(end) + 1)
+    seconds = list(range(math.floor(end) + 1))
     for axes in column:
         axes.set_xlim(0.0, end)
         lowest = axes is column[-1]
-        axes.set_xticks(seconds, [str(second) for second in seconds] if lowest else [""] * len(seconds))
+        axes.set_xticks(seconds)
+        axes.tick_params(labelbottom=lowest)
     column[-1].set_xlabel("time [s]")
 
 
