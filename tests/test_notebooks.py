@@ -55,7 +55,7 @@ def test_cell(file, name, tmp_path, monkeypatch):
 
 @each
 def test_copy_has_the_same_cells(file):
-    assert copy_sources(rendered_file(file)) == notebook_sources(load_app(file)), "python -m sim.notebook.render"
+    assert copy_sources(rendered_file(file)) == notebook_sources(file), "python -m sim.notebook.render"
 
 
 @each

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import re
 from pathlib import Path
 from typing import Any
 
@@ -21,12 +22,15 @@ def load_app(notebook: Path) -> Any:
     return module.app
 
 
-def notebook_sources(app: Any) -> list[CellSource]:
-    """Cells as an export of the app, without running it, would hold them."""
+def notebook_sources(notebook: Path) -> list[CellSource]:
+    """Cells as an export of a notebook, without running it, would hold them."""
     import nbformat
-    from marimo._ast.app import InternalApp  # the command line's export does the same, two seconds later
+    from marimo._ast import load  # the command line's export does the same, two seconds later
+    from marimo._ast.app import InternalApp
     from marimo._convert.ipynb.from_ir import convert_from_ir_to_ipynb
 
+    app = load.load_app(notebook)
+    assert app is not None, f"{notebook} is no notebook"
     text = convert_from_ir_to_ipynb(InternalApp(app), sort_mode="top-down")
     return _sources(nbformat.reads(text, as_version=4))
 
@@ -39,4 +43,6 @@ def copy_sources(file: Path) -> list[CellSource]:
 
 
 def _sources(notebook: Any) -> list[CellSource]:
-    return [(cell.cell_type, cell.source.strip()) for cell in notebook.cells if cell.id != NOTE_ID]
+    # An export spaces functions by two blank lines, whatever the notebook does.
+    cells = [cell for cell in notebook.cells if cell.id != NOTE_ID]
+    return [(cell.cell_type, re.sub(r"\n{3,}", "\n\n", cell.source.strip())) for cell in cells]
