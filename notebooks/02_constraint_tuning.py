@@ -139,11 +139,11 @@ def _():
     ## Three changes worth making
 
     **Ask for more than there is: push 34 N.** The reach check follows the ray of pushes $w(f)=f\,[d;\,p{\times}d]-h$
-    to the first facet of $\mathcal{W}$ and cuts the reference to 97 % of what it finds: 29.7 N standing still,
-      and half of that as soon as friction pulls sideways. Rotor limits bind from the end of the ramp on. The program
-      gives up push first, because push has the lightest weight: the tilt stays at its bound of one degree where the
-      analytic law, which clips, leans twice as far. (The further push possible is negative for a moment: the slide
-      has begun, and the push has not yet come down.)
+    to the first facet of $\mathcal{W}$ and cuts the reference to 97 % of what it finds: 29.7 N standing still, and
+    half of that as soon as friction pulls sideways. Rotor limits bind from the end of the ramp on. The program gives
+    up push first, because push has the lightest weight: the tilt stays at its bound of one degree where the analytic
+    law, which clips, leans twice as far. (The further push possible is negative for a moment: the slide has begun,
+    and the push has not yet come down.)
     """)
     return
 
