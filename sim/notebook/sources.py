@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.util
-import re
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +42,4 @@ def copy_sources(file: Path) -> list[CellSource]:
 
 
 def _sources(notebook: Any) -> list[CellSource]:
-    # An export spaces functions by two blank lines, whatever the notebook does.
-    cells = [cell for cell in notebook.cells if cell.id != NOTE_ID]
-    return [(cell.cell_type, re.sub(r"\n{3,}", "\n\n", cell.source.strip())) for cell in cells]
+    return [(cell.cell_type, cell.source.strip()) for cell in notebook.cells if cell.id != NOTE_ID]
