@@ -32,7 +32,7 @@ CLEARANCE_TICKS = 5
 #: Pictures kept for the video per second.
 VIDEO_RATE = 10.0
 #: Columns that are one number a tick, in the order in which `Recorder.tick` fills them in; "error" for every line slot.
-NUMBERS = "t phase row outcome step_us iterations push_reference".split()
+NUMBERS = "t phase row outcome step_us iterations reach_margin push_reference".split()
 #: Columns of integers.
 INTEGERS = ("phase", "row", "outcome", "iterations")
 _ERROR = LINE_TERMS.index("error")
@@ -59,7 +59,7 @@ class Recorder:
         self._errors = [tick.outputs[f"line_{slot}_terms"] for slot in self._slots]
         self._focal = camera_intrinsics(scene.camera)[0]
         self._limits: dict[str, int] = {}
-        self._active: dict[int, list[int]] = {}
+        self._active: dict[int, list[tuple[int, float]]] = {}
         # Single precision: 1e-7 of a parameter is nothing that a person reads, and half the log.
         self._program = pilot.controller.engine.data.stacked if isinstance(pilot.controller, HybridController) else None
         self._programs = Columns({"program": 0 if self._program is None else len(self._program)}, np.float32)
@@ -82,6 +82,7 @@ class Recorder:
             _OUTCOME_INDEX[command.outcome],
             pilot.controller_time_s * 1e6,
             command.iterations,
+            command.reach_margin,
             self._push_reference.item(),
             *[terms.item(_ERROR) for terms in self._errors],
         )
@@ -92,7 +93,9 @@ class Recorder:
             self._programs.row()[:] = self._program
         active = command.active_limits
         if active:
-            self._active[self._ticks] = [self._limits.setdefault(limit.name, len(self._limits)) for limit in active]
+            places = self._limits
+            paid = [(places.setdefault(limit.name, len(places)), limit.price) for limit in active]
+            self._active[self._ticks] = paid
         if command.rejected or len(painter.log) != self._logged:
             self._note_events(time_s, command)
         if frame.image is not None and pilot.percept is not None:
@@ -129,10 +132,11 @@ class Recorder:
         given = arrays.pop("given")
         arrays["line_error_px"] = self._line_errors(given, arrays.pop("error").reshape(ticks, len(self._slots)))
         arrays |= self._believed(given, arrays["push_reference"]) | self._truth(arrays.pop("truth"))
-        active = np.zeros((ticks, len(self._limits)), dtype=bool)
-        for tick, columns in self._active.items():
-            active[tick : tick + 1, columns] = True
-        arrays["active"] = active
+        active, price = np.zeros((ticks, len(self._limits)), dtype=bool), np.zeros((ticks, len(self._limits)))
+        for tick, paid in self._active.items():
+            columns, prices = zip(*paid, strict=True)
+            active[tick : tick + 1, columns], price[tick : tick + 1, columns] = True, prices
+        arrays["active"], arrays["limit_price"] = active, price
         if len(self._programs):
             arrays |= {name: column[:ticks] for name, column in self._programs.arrays().items()}
         vehicle = self._pilot.config.controller.vehicle

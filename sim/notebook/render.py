@@ -1,0 +1,126 @@
+"""Copies of the notebooks for reading: Jupyter files with their outputs, as a code host shows them.
+
+Usage: ``python -m sim.notebook.render`` for all notebooks, or with the stems of some. Every notebook is flown in full.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from ibvs_qp.errors import ConfigError
+from sim.notebook.short import SHORT_VARIABLE
+
+#: Folder of the notebooks, of a source tree; an installed wheel has none.
+NOTEBOOKS = Path(__file__).parents[2] / "notebooks"
+RENDERED = "rendered"
+#: Largest copy; a code host shows no more than a few megabytes, and every clone pays [bytes].
+LARGEST_COPY = 1_500_000
+#: Name of the cell that a copy begins with and its notebook has not.
+NOTE_ID = "note"
+#: How marimo's own elements begin, in HTML and escaped; they need its server and are left out.
+_LIVE = ("<marimo-", "&lt;marimo-")
+
+
+def notebook_files(folder: Path = NOTEBOOKS) -> list[Path]:
+    """All notebooks, by number."""
+    return sorted(folder.glob("[0-9][0-9]_*.py"))
+
+
+def rendered_file(notebook: Path) -> Path:
+    """Where the copy of a notebook lies."""
+    return notebook.parent / RENDERED / f"{notebook.stem}.ipynb"
+
+
+def render(notebook: Path) -> Path:
+    """Run a notebook in full in a process of its own and write its copy.
+
+    Args:
+        notebook: The marimo file.
+
+    Returns:
+        The Jupyter file written.
+
+    Raises:
+        RuntimeError: When a cell fails or the copy is too large; the old copy stays.
+    """
+    import nbformat
+
+    with tempfile.TemporaryDirectory() as folder:
+        exported = Path(folder) / "copy.ipynb"
+        words = ["export", "ipynb", str(notebook), "--sort", "top-down", "--include-outputs", "-o", str(exported)]
+        environment = {name: value for name, value in os.environ.items() if name != SHORT_VARIABLE}
+        done = subprocess.run(
+            [sys.executable, "-m", "marimo", "-q", "-y", *words],
+            env=environment, cwd=notebook.parents[1], capture_output=True, text=True,
+        )  # fmt: skip
+        if done.returncode:
+            raise RuntimeError(f"{notebook.name} does not run:\n{done.stderr or done.stdout}")
+        copy = nbformat.read(exported, as_version=4)
+    for cell in copy.cells:
+        if cell.cell_type == "code":
+            cell.outputs = [output for output in cell.outputs if _can_be_read(output)]
+    copy.cells.insert(0, _note(notebook))
+    text = nbformat.writes(copy) + "\n"
+    if len(text) > LARGEST_COPY:
+        raise RuntimeError(f"the copy of {notebook.name} has {len(text)} bytes, allowed are {LARGEST_COPY}")
+    file = rendered_file(notebook)
+    file.parent.mkdir(exist_ok=True)
+    file.write_text(text, encoding="utf-8")
+    return file
+
+
+def _can_be_read(output: Any) -> bool:
+    """Whether an output shows without a running notebook: no widget, nothing printed."""
+    if output.output_type == "error":
+        raise RuntimeError(f"a cell fails: {output.ename}: {output.evalue}")
+    if output.output_type == "stream":
+        return False  # what the test cells report
+    return not any(live in str(content) for content in output.get("data", {}).values() for live in _LIVE)
+
+
+def _note(notebook: Path) -> Any:
+    import nbformat
+
+    place = f"notebooks/{notebook.name}"
+    text = (
+        f"*A copy of [`{place}`](../{notebook.name}) for reading. Sliders and switches show only where it runs:* "
+        f"`marimo edit {place}`"
+    )
+    return nbformat.v4.new_markdown_cell(text, id=NOTE_ID)
+
+
+def chosen(names: list[str]) -> list[Path]:
+    """Notebooks of these stems, or all.
+
+    Raises:
+        ConfigError: When there is no such notebook.
+    """
+    files = {file.stem: file for file in notebook_files()}
+    for name in names:
+        if name not in files:
+            raise ConfigError(f"no notebook {name!r}; known: {', '.join(files) or 'none (run in a source tree)'}")
+    return [files[name] for name in names] if names else list(files.values())
+
+
+def main(names: list[str]) -> int:
+    """Render notebooks by their stems, all of them without any."""
+    try:
+        if importlib.util.find_spec("marimo") is None:
+            raise ConfigError("notebooks need marimo; install it with pip install -c constraints.txt -e '.[notebooks]'")
+        for notebook in chosen(names):
+            file = render(notebook)
+            print(f"{file.relative_to(NOTEBOOKS.parent)}: {file.stat().st_size / 1e3:.0f} kB")
+    except ConfigError as error:
+        print(f"ibvs-qp: error: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

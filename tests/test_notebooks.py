@@ -1,0 +1,85 @@
+"""Every notebook runs, its test cells pass, it is well formed, and its copy for reading is current."""
+
+import ast
+import functools
+import subprocess
+import sys
+from pathlib import Path
+
+import nbformat
+import pytest
+
+from sim.notebook.render import LARGEST_COPY, NOTEBOOKS, chosen, notebook_files, rendered_file
+from sim.notebook.short import SHORT_VARIABLE
+from sim.notebook.sources import copy_sources, load_app, notebook_sources
+
+FILES = notebook_files()
+#: What a copy must not need: marimo's elements, scripts, anything from elsewhere.
+LIVE = ("<marimo-", "&lt;marimo-", "<script", "<iframe", 'src="http', "src='http", "application/javascript")
+
+
+def test_functions(file: Path) -> list[str]:
+    """Names of the test functions in a notebook's cells."""
+    tree = ast.parse(file.read_text(encoding="utf-8"))
+    return [node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef) and node.name.startswith("test_")]
+
+
+test_functions.__test__ = False  # type: ignore[attr-defined]
+CASES = [pytest.param(file, name, id=f"{file.stem}-{name}") for file in FILES for name in test_functions(file)]
+each = pytest.mark.parametrize("file", FILES, ids=[file.stem for file in FILES])
+
+
+@pytest.fixture(autouse=True)
+def short_form(monkeypatch):
+    monkeypatch.setenv(SHORT_VARIABLE, "1")
+
+
+@functools.cache
+def run(file: Path) -> dict:
+    """Run a notebook; what its cells define."""
+    _, definitions = load_app(file).run()
+    return dict(definitions)
+
+
+@each
+def test_notebook_runs_and_has_test_cells(file):
+    run(file)
+    assert test_functions(file)
+
+
+@pytest.mark.parametrize(("file", "name"), CASES)
+def test_cell(file, name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    run(file)[name]()
+
+
+@each
+def test_copy_has_the_same_cells(file):
+    assert copy_sources(rendered_file(file)) == notebook_sources(file), "python -m sim.notebook.render"
+
+
+@each
+def test_copy_shows_pictures_without_network(file):
+    copy, outputs = rendered_file(file), []
+    assert copy.stat().st_size <= LARGEST_COPY
+    for cell in nbformat.read(copy, as_version=4).cells:
+        outputs += cell.get("outputs", [])
+    assert not [output for output in outputs if output.output_type in ("error", "stream")]
+    assert not [word for word in LIVE for output in outputs if word in str(output.get("data", ""))]
+    assert any("image/png" in output.get("data", {}) for output in outputs)
+
+
+def test_copies_belong_to_notebooks():
+    copies = {file.stem for file in (NOTEBOOKS / "rendered").glob("*.ipynb")}
+    assert copies == {file.stem for file in FILES}
+
+
+def test_notebooks_are_well_formed():
+    words = [sys.executable, "-m", "marimo", "-q", "check", "--strict", *map(str, FILES)]
+    done = subprocess.run(words, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_unknown_notebook_is_named():
+    with pytest.raises(Exception, match="no notebook '07_none'; known: 01_first_flight"):
+        chosen(["07_none"])
