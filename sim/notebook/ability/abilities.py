@@ -90,13 +90,13 @@ def push_over_share(rotor: str, shares: np.ndarray, mass_kg: float, tilt_deg: fl
 
 
 def push_over_tip(
-    lengths: Sequence[float], heights: Sequence[float], mass_kg: float, tilt_deg: float, friction: float
+    lengths: Sequence[float], heights: np.ndarray, mass_kg: float, tilt_deg: float, friction: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Push standing still, and whichever way it slides [N], over the tip's place; (lengths, heights) each.
 
     Args:
         lengths: Tip ahead of the centre of mass [m].
-        heights: Tip below the centre of mass [m].
+        heights: Tip below the centre of mass [m], (heights,).
         mass_kg: Mass.
         tilt_deg: Tilt of the rotors.
         friction: Coulomb coefficient [-].

@@ -34,7 +34,7 @@ def draw_sliding(case: VehicleCase, frictions: Sequence[float], asked: float) ->
                       fontsize=6.5, color=style["color"])  # fmt: skip
     axes.set_xticks(np.radians([0, 90, 180, 270]), ["right", "up", "left", "down"])
     axes.set_title("Greatest push [N] by travel of the tip; numbers: friction", pad=12)
-    axes.set_rlabel_position(112.5)
+    axes.set_rlabel_position(112.5)  # type: ignore[attr-defined]
     return figure
 
 
