@@ -7,6 +7,7 @@ p = `Canvas.pixels_per_m`: row 0 is the top edge, column 0 the left edge.
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 
@@ -63,34 +64,55 @@ class Canvas:
             np.random.SeedSequence([part, board.texture_seed, scene.wall.texture_seed, seed]) for part in range(3)
         )
         shape = (_whole(board.height_m * self.pixels_per_m), _whole(board.width_m * self.pixels_per_m))
-        rng = np.random.default_rng(board_seed)
-        on_board = int(rng.binomial(board.clutter, 0.5))
-        rim = max(1, round(_RIM_M * self.pixels_per_m))
-        face = textures.board_surface(rng, shape, board.color, rim)
-        clutter_board(rng, face, on_board, self.pixels_per_m)
-        pad = TEXTURE_PAD_PX
-        self._blank = cv2.copyMakeBorder(face, pad, pad, pad, pad, cv2.BORDER_REPLICATE)
-        self._texture = self._blank.copy()
-        padded = (shape[0] + 2 * pad, shape[1] + 2 * pad)
-        self._fresh = textures.paint_surface(np.random.default_rng(paint_seed), padded, paint.color)
+        self._board_rng = np.random.default_rng(board_seed)
+        self._on_board = int(self._board_rng.binomial(board.clutter, 0.5))
+        padded = (shape[0] + 2 * TEXTURE_PAD_PX, shape[1] + 2 * TEXTURE_PAD_PX)
         self._coverage, self._drawn = np.zeros(padded, np.uint8), np.zeros(padded, np.uint8)
         self._stamps = _brush_stamps(0.5 * paint.brush_width_m * self.pixels_per_m)
         self._dirty: tuple[int, int, int, int] | None = None
         self.edges = PaintedEdges(scene)
-        self._make_wall(np.random.default_rng(wall_seed), board.clutter - on_board)
+        self._paint_seed, self._wall_seed = paint_seed, wall_seed
+        self._measure_wall()
 
-    def _make_wall(self, rng: np.random.Generator, clutter: int) -> None:
+    def _measure_wall(self) -> None:
         board = self.scene.board
         corners = self.geometry.point(np.array([0, 1, 1, 0]) * board.width_m, np.array([0, 0, 1, 1]) * board.height_m)
         low, high = corners.min(axis=0), corners.max(axis=0)
         size = high - low + 2.0 * WALL_EXTENT_M
-        px_m = self.wall_pixels_per_m = min(WALL_PIXELS_PER_M, math.sqrt(_MAX_PIXELS / float(np.prod(size))))
-        self.wall_origin = low - WALL_EXTENT_M
-        width, height = (math.ceil(entry * px_m) for entry in size)
-        self.wall = textures.wall_surface(rng, (height, width), self.scene.wall.color, px_m)
-        left, top = (low - self.wall_origin) * px_m
-        right, bottom = (high - self.wall_origin) * px_m
-        clutter_wall(rng, self.wall, clutter, px_m, (left, top, right, bottom))
+        self.wall_pixels_per_m = min(WALL_PIXELS_PER_M, math.sqrt(_MAX_PIXELS / float(np.prod(size))))
+        self.wall_origin, self._wall_size, self._outline = low - WALL_EXTENT_M, size, (low, high)
+
+    # Pictures are made when somebody looks at them: a flight without a camera never does.
+
+    @functools.cached_property
+    def _blank(self) -> np.ndarray:
+        """The board without paint, padded."""
+        rng, pad, height, width = self._board_rng, TEXTURE_PAD_PX, *self._coverage.shape
+        rim = max(1, round(_RIM_M * self.pixels_per_m))
+        face = textures.board_surface(rng, (height - 2 * pad, width - 2 * pad), self.scene.board.color, rim)
+        clutter_board(rng, face, self._on_board, self.pixels_per_m)
+        return cv2.copyMakeBorder(face, pad, pad, pad, pad, cv2.BORDER_REPLICATE)
+
+    @functools.cached_property
+    def _texture(self) -> np.ndarray:
+        """The board as last drawn."""
+        return self._blank.copy()
+
+    @functools.cached_property
+    def _fresh(self) -> np.ndarray:
+        """The board covered with paint all over."""
+        rng = np.random.default_rng(self._paint_seed)
+        return textures.paint_surface(rng, self._coverage.shape, self.scene.paint.color)
+
+    @functools.cached_property
+    def wall(self) -> np.ndarray:
+        """Picture of the wall."""
+        rng, px_m = np.random.default_rng(self._wall_seed), self.wall_pixels_per_m
+        width, height = (math.ceil(entry * px_m) for entry in self._wall_size)
+        wall = textures.wall_surface(rng, (height, width), self.scene.wall.color, px_m)
+        (left, top), (right, bottom) = ((corner - self.wall_origin) * px_m for corner in self._outline)
+        clutter_wall(rng, wall, self.scene.board.clutter - self._on_board, px_m, (left, top, right, bottom))
+        return wall
 
     @property
     def rgb(self) -> np.ndarray:

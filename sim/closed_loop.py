@@ -51,6 +51,7 @@ class FlightOptions:
     """How to fly a scene; the defaults are the main job.
 
     With `camera_process` another process draws the pictures: the same flight to the bit, sooner where a core is free.
+    Without `board` the trace keeps no picture of the painted board, which costs as much as a second of flight.
     """
 
     law: str = "qp"
@@ -63,6 +64,7 @@ class FlightOptions:
     video: bool = True
     camera_process: bool = False
     view: bool = False
+    board: bool = True
 
 
 def default_preset(law: str) -> PilotConfig:

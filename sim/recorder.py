@@ -32,7 +32,7 @@ CLEARANCE_TICKS = 5
 VIDEO_RATE = 10.0
 #: Columns that are one number a tick; vectors follow, in the order in which `Recorder.tick` fills them in.
 NUMBERS = """t push_true push_measured push_reference standoff_estimate horizontal_error vertical_error
-contact_weight phase row outcome step_us iterations""".split()
+contact_weight phase row outcome step_us iterations reach_margin""".split()
 #: Columns of integers.
 INTEGERS = ("phase", "row", "outcome", "iterations")
 _ERROR = LINE_TERMS.index("error")
@@ -55,7 +55,7 @@ class Recorder:
         tick, slots = pilot.terms.tick, range(pilot.config.controller.line_slots)
         self._lines = [(tick.inputs[f"line_{slot}"], slot, tick.outputs[f"line_{slot}_terms"]) for slot in slots]
         self._limits: dict[str, int] = {}
-        self._active: list[tuple[int, ...]] = []
+        self._active: list[tuple[tuple[int, float], ...]] = []
         # Single precision: 1e-7 of a parameter is nothing that a person reads, and half the log.
         self._program = pilot.controller.engine.data.stacked if isinstance(pilot.controller, HybridController) else None
         self._programs = Columns({"program": 0 if self._program is None else len(self._program)}, np.float32)
@@ -86,6 +86,7 @@ class Recorder:
             _OUTCOME_INDEX[command.outcome],
             pilot.controller_time_s * 1e6,
             command.iterations,
+            command.reach_margin,
             *plant.motion,
             *plant.friction,
             *plant.pushes,
@@ -98,7 +99,8 @@ class Recorder:
             self._programs.row()[:] = self._program
         self._painting.append(painting)
         active = command.active_limits
-        self._active.append(tuple([self._limits.setdefault(limit.name, len(self._limits)) for limit in active]))
+        places = [self._limits.setdefault(limit.name, len(self._limits)) for limit in active]
+        self._active.append(tuple(zip(places, [limit.price for limit in active], strict=True)))
         self._note_events(time_s, command)
         if frame.image is not None and pilot.percept is not None:
             self._vision.append(sum(pilot.percept.time_ms.values()))
@@ -141,10 +143,11 @@ class Recorder:
         arrays["line_error_px"] = np.column_stack((arrays.pop("horizontal_error"), arrays.pop("vertical_error")))
         arrays |= self._truth(arrays.pop("motion"))
         arrays["contact_1khz"] = arrays["contact_1khz"].reshape(-1)
-        active = np.zeros((ticks, len(self._limits)), dtype=bool)
-        for tick, columns in enumerate(self._active):
-            active[tick, list(columns)] = True
-        arrays["active"] = active
+        active, price = np.zeros((ticks, len(self._limits)), dtype=bool), np.zeros((ticks, len(self._limits)))
+        for tick, limits in enumerate(self._active):
+            for column, paid in limits:
+                active[tick, column], price[tick, column] = True, paid
+        arrays["active"], arrays["limit_price"] = active, price
         if len(self._programs):
             arrays |= {name: column[:ticks] for name, column in self._programs.arrays().items()}
         vehicle = self._pilot.config.controller.vehicle
@@ -162,7 +165,7 @@ class Recorder:
             outcomes=tuple(str(outcome) for outcome in Outcome),
             limits=tuple(self._limits),
             events=self._events,
-            canvas=canvas.rgb,
+            canvas=canvas.rgb if self._options.board else None,
             canvas_px_per_m=canvas.pixels_per_m,
             coverage_mask=canvas.coverage,
             pictures=self._pictures,

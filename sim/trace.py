@@ -36,6 +36,8 @@ FIELDS = {
     "row": "(N,) row being painted, 1 based; 0 outside rows, climbs carry the row they lead to",
     "outcome": "(N,) index into outcomes",
     "active": "(N,L) bool, limit active, columns named by limits",
+    "limit_price": "(N,L) price |d cost / d bound| of every active limit per unit, 0 where inactive, NaN where unknown",
+    "reach_margin": "(N,) further push that the rotors can hold at the present contact [N]; NaN where not known",
     "unallocated": "(N,6) unallocated wrench [N, N m]",
     "step_us": "(N,) duration of the controller step [us]",
     "iterations": "(N,) solver iterations",

@@ -29,12 +29,15 @@ CASES = [pytest.param(file, name, id=f"{file.stem}-{name}") for file in FILES fo
 each = pytest.mark.parametrize("file", FILES, ids=[file.stem for file in FILES])
 
 
+@pytest.fixture(autouse=True)
+def short_form(monkeypatch):
+    monkeypatch.setenv(SHORT_VARIABLE, "1")
+
+
 @functools.cache
 def run(file: Path) -> dict:
-    """Run a notebook in its short form; what its cells define."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv(SHORT_VARIABLE, "1")
-        _, definitions = load_app(file).run()
+    """Run a notebook; what its cells define."""
+    _, definitions = load_app(file).run()
     return dict(definitions)
 
 
