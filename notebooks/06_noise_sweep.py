@@ -39,8 +39,8 @@ def _():
       4 cm and 6 cm for 0.02, 0.08 and 0.12, thirty times a second. Its angle is off by 1.1°, 4.6° and 6.9°.
     - $\sigma_f$ on *every axis of every force sample*, a hundred times a second: 1, 2 and 3 N beside a push of 5 N.
 
-    The job is a small C (two rows and the climb between them), flown by both laws with the same seeds. Every flight is a
-    row of a Parquet table with its settings, its seed and its figures:
+    The job is a small C (two rows and the climb between them), flown by both laws with the same seeds. Every flight is
+    a row of a Parquet table with its settings, its seed and its figures:
 
     ```sh
     ibvs-qp experiment noise-sweep --out runs/noise       # the record: 3 x 3 cells, ten flights, both laws, with vision
@@ -58,7 +58,7 @@ def _():
         placeholder="runs/noise/noise-sweep.parquet (empty: the sample)",
         full_width=True,
     )
-    file
+    mo.vstack([file])
     return (file,)
 
 
@@ -86,7 +86,7 @@ def _(problem, table):
 @app.cell(hide_code=True)
 def _():
     chosen = mo.ui.dropdown([figure.words for figure in FIGURES], value=FIGURES[0].words, label="figure")
-    chosen
+    mo.vstack([chosen])
     return (chosen,)
 
 
@@ -112,7 +112,7 @@ def _(chosen, table):
 
     ## Is one law better?
 
-    Both laws fly the same seeds, so compare them **pair by pair**: the noise of a seed is in both flights and cancels in
+    Both laws fly the same seeds, so compare them **pair by pair**: what a seed brings is in both flights and cancels in
     the difference. An interval (bootstrap of the median) that does not contain zero says that the sign is no accident.
 
     """
@@ -190,7 +190,7 @@ def _(table):
     rows = table.to_dicts()
     worst = table.filter(pl.col("completed") & (pl.col("law") == "qp")).sort("path_rms_m", descending=True).to_dicts()
     flight = mo.ui.dropdown([row_name(row) for row in rows], value=row_name((worst or rows)[0]), label="fly again")
-    flight
+    mo.vstack([flight])
     return flight, rows
 
 

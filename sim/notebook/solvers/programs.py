@@ -15,7 +15,7 @@ from ibvs_qp.qp.assembly import QpTemplate
 from ibvs_qp.qp.evaluator import Evaluator
 from sim.bench.ticks import Tick, flown_ticks
 from sim.experiments.scenes import near_wall
-from sim.jobs import PressJob
+from sim.notebook.tuning.snippet import SnippetJob
 
 #: Push asked for in the recorded press [N]; the rotors reach 30.4 N.
 HARD_PUSH_N = 35.0
@@ -84,12 +84,12 @@ def packed(ticks: Iterable[Tick], config: ControllerConfig | None = None) -> Str
 
 
 def hard_press(ticks: int, seed: int = 0) -> Stretch:
-    """A press beyond reach from 0.15 m before the wall; nobody reduces the push.
+    """A press beyond reach from just before the wall; nobody reduces the push.
 
     Args:
-        ticks: Ticks flown; the rotors meet their idle floor after about 1400, 1 s after the touch.
+        ticks: Ticks flown; the rotors meet their idle floor after about 1150, 1 s after the touch.
         seed: Of the flight.
     """
     scene = near_wall(paint={"push_n": HARD_PUSH_N})
-    job = PressJob(hold_s=ticks * ControllerConfig().tick_s)
+    job = SnippetJob(hold_s=ticks * ControllerConfig().tick_s, slide_s=0.0)
     return packed(itertools.islice(flown_ticks(scene, seed, job, (), reach_check=False), ticks))
