@@ -77,7 +77,8 @@ class HybridController:
         self.config = config or ControllerConfig()
         self.template = program_template(self.config, tasks, limits)
         self.setpoints = Setpoints(self.config, self.template)
-        self.engine = QpEngine(self.template, self.config.solver, ProgramData(self.template, self.setpoints.tick.extra))
+        data = ProgramData(self.template, self.setpoints.tick.extra)
+        self.engine = QpEngine(self.template, self.config.solver, data, self.config.machine_code)
         self._gate = MeasurementGate(self.config.vehicle.geometry.count)
         self.reset()
 

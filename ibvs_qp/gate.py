@@ -18,6 +18,8 @@ LINE_BOUND, PLANE_BOUND = 1e6, 1e3
 LEAP_NS = 1_000_000_000
 #: Stamps in a row that must agree until a clock that went back is believed.
 RESTART_STAMPS = 25
+#: Stamps end here: a whole number of nanoseconds in 63 bits with room for a sum.
+STAMP_END = 2**62
 #: A sensor's stamp may lead the tick's by this much [ns].
 LEAD_NS = 20_000_000
 
@@ -41,14 +43,25 @@ def _number(value: Any, low: float, high: float) -> bool:
 def is_stamp(value: Any) -> bool:
     """Whether a value is a time stamp: a whole number of nanoseconds that fits 63 bits."""
     if type(value) is int:
-        return 0 <= value < 2**62
-    return isinstance(value, (int, np.integer)) and not isinstance(value, bool) and bool(0 <= value < 2**62)
+        return 0 <= value < STAMP_END
+    return isinstance(value, (int, np.integer)) and not isinstance(value, bool) and bool(0 <= value < STAMP_END)
 
 
 def answered_stamp(measurement: Any) -> int:
     """Stamp of whatever was handed in, 0 if it has none."""
     stamp = measurement.stamp_ns if isinstance(measurement, Measurement) else None
     return int(stamp) if stamp is not None and is_stamp(stamp) else 0
+
+
+#: Array fields that every tick brings: shape and bound of their entries.
+BOUNDS = {
+    "angular_velocity": (3, RATE_BOUND),
+    "contact_wrench": (6, WRENCH_BOUND),
+    "specific_force": (3, ACCELERATION_BOUND),
+    "velocity": (3, VELOCITY_BOUND),
+}
+#: A quaternion whose squared length is this far from 1 is no attitude.
+UNIT_SLIP = 0.02
 
 
 class MeasurementGate:
@@ -60,14 +73,16 @@ class MeasurementGate:
 
     def __init__(self, rotors: int) -> None:
         self._rotors = rotors
+        self._nothing = np.zeros(3)
+        self._per_bound = np.concatenate([np.ones(4), *(np.full(size, 1 / bound) for size, bound in BOUNDS.values())])
         self.reset()
 
     def reset(self) -> None:
         """Forget the last good values."""
-        self._attitude: np.ndarray | None = None
+        self._numbers, self._next = np.zeros(len(self._per_bound)), np.zeros(len(self._per_bound))
+        self._known = False
         self._plane: tuple[float, ...] | None = None
-        self._omega = np.zeros(3)
-        self._wrench, self._wrench_stamp = np.zeros(6), 0
+        self._wrench_stamp = 0
         self._stamp: int | None = None
         self._odd_stamp, self._odd_count = -1, 0
         self.restarted = False
@@ -75,18 +90,55 @@ class MeasurementGate:
     @property
     def inertial(self) -> Measurement | None:
         """Last good attitude and rate, for the last resort; None when nothing was ever measured."""
-        if self._attitude is None:
+        if not self._known:
             return None
         return Measurement(
             stamp_ns=self._stamp or 0,
-            attitude=self._attitude,
-            angular_velocity=self._omega,
-            contact_wrench=self._wrench,
+            attitude=self._numbers[:4].copy(),
+            angular_velocity=self._numbers[4:7].copy(),
+            contact_wrench=self._numbers[7:13].copy(),
             wrench_stamp_ns=self._wrench_stamp,
         )
 
     def check(self, measurement: Measurement) -> tuple[Measurement | None, tuple[str, ...]]:
         """A measurement that is safe to use, or None when not even an attitude is known, and what was refused."""
+        self.restarted = False
+        if type(measurement) is Measurement and self._sound(measurement):
+            return measurement, ()
+        return self._mend(measurement)
+
+    def _sound(self, measurement: Measurement) -> bool:
+        """Whether surely nothing is to refuse, asked of all numbers at once; where not sure, `_mend` finds out."""
+        stamp, wrench_stamp = measurement.stamp_ns, measurement.wrench_stamp_ns
+        if type(stamp) is not int or type(wrench_stamp) is not int or not 0 <= wrench_stamp <= stamp + LEAD_NS:
+            return False
+        if self._stamp is None or self._odd_count or not 0 < stamp - self._stamp <= LEAP_NS or stamp >= STAMP_END:
+            return False
+        if measurement.thrust_min is not None or measurement.thrust_max is not None:
+            return False
+        plane = measurement.plane
+        if plane is not None and not (plane is self._plane and _past(measurement.plane_stamp_ns, stamp)):
+            return False
+        lines, force, velocity = measurement.lines, measurement.specific_force, measurement.velocity
+        if type(lines) is not tuple or not all(map(_good_line, lines)):
+            return False
+        attitude, rate, wrench = measurement.attitude, measurement.angular_velocity, measurement.contact_wrench
+        force, velocity = self._nothing if force is None else force, self._nothing if velocity is None else velocity
+        if not (_is_array(attitude, (4,)) and _is_array(rate, (3,)) and _is_array(wrench, (6,))):
+            return False
+        if not (_is_array(force, (3,)) and _is_array(velocity, (3,))):
+            return False
+        numbers = np.concatenate((attitude, rate, wrench, force, velocity), out=self._next)
+        w, x, y, z, *shares = (numbers * self._per_bound).tolist()
+        # A sum of squares below 1 has no term above 1; NaN is below nothing. Plain numbers overflow without a word.
+        if not (abs(w * w + x * x + y * y + z * z - 1.0) <= UNIT_SLIP and sum([s * s for s in shares]) <= 1.0):
+            return False
+        self._numbers, self._next = numbers, self._numbers
+        self._stamp, self._wrench_stamp = stamp, wrench_stamp
+        return True
+
+    def _mend(self, measurement: Measurement) -> tuple[Measurement | None, tuple[str, ...]]:
+        """Field by field: what fails is named and replaced by the last good value."""
         changes: dict[str, Any] = {}
         rejected: list[str] = []
 
@@ -94,24 +146,23 @@ class MeasurementGate:
             rejected.append(f"{name}: {why}")
             changes[name] = value
 
-        self.restarted = False
         if not isinstance(measurement, Measurement):
             return None, ("measurement: not a Measurement",)
         why = self._refuse_stamp(measurement.stamp_ns)
         if why:
             return None, (f"stamp_ns: {why}",)
-        stamp = int(measurement.stamp_ns)
+        stamp, kept = int(measurement.stamp_ns), self._numbers
         attitude = measurement.attitude
-        if not sound_vector(attitude, 4, 1.01) or abs(float(attitude @ attitude) - 1.0) > 0.02:
-            if self._attitude is None:
+        if not sound_vector(attitude, 4, 1.01) or abs(float(attitude @ attitude) - 1.0) > UNIT_SLIP:
+            if not self._known:
                 return None, ("attitude: not a unit quaternion",)
-            refuse("attitude", "not a unit quaternion", self._attitude)
+            refuse("attitude", "not a unit quaternion", kept[:4].copy())
         else:
-            self._attitude = attitude.copy()  # the caller may fill the same array again
+            kept[:4], self._known = attitude, True
         if sound_vector(measurement.angular_velocity, 3, RATE_BOUND):
-            self._omega = measurement.angular_velocity.copy()
+            kept[4:7] = measurement.angular_velocity
         else:
-            refuse("angular_velocity", f"not 3 finite values within {RATE_BOUND} rad/s", self._omega)
+            refuse("angular_velocity", f"not 3 finite values within {RATE_BOUND} rad/s", kept[4:7].copy())
         if measurement.specific_force is not None and not sound_vector(
             measurement.specific_force, 3, ACCELERATION_BOUND
         ):
@@ -151,13 +202,14 @@ class MeasurementGate:
             _past(measurement.wrench_stamp_ns, stamp),
         )
         if good and past:
-            self._wrench, self._wrench_stamp = measurement.contact_wrench.copy(), int(measurement.wrench_stamp_ns)
+            self._numbers[7:13], self._wrench_stamp = measurement.contact_wrench, int(measurement.wrench_stamp_ns)
             return {}
+        kept = self._numbers[7:13].copy()
         if not good:
-            refuse("contact_wrench", f"not 6 finite values within {WRENCH_BOUND} N or N m", self._wrench)
+            refuse("contact_wrench", f"not 6 finite values within {WRENCH_BOUND} N or N m", kept)
         if not past:
             refuse("wrench_stamp_ns", "not a time before the tick", self._wrench_stamp)
-        return {"contact_wrench": self._wrench, "wrench_stamp_ns": self._wrench_stamp}
+        return {"contact_wrench": kept, "wrench_stamp_ns": self._wrench_stamp}
 
     def _known_plane(self, plane: Any) -> bool:
         """Whether a plane is sound; the tuple of the last tick, which cannot have changed, is not asked again."""
@@ -204,17 +256,18 @@ def _good_plane(plane: Any) -> bool:
 
 
 def _good_line(line: Any) -> bool:
-    return (
-        isinstance(line, LineFeature)
-        and _good_role(line.role)
-        and _number(line.rho, -LINE_BOUND, LINE_BOUND)
-        and _number(line.theta, -LINE_BOUND, LINE_BOUND)
-        and _number(line.weight, 0.0, 1.0)
-        and isinstance(line.covariance, np.ndarray)
-        and line.covariance.shape == (2, 2)
-        and line.covariance.dtype.kind == "f"
-        and math.isfinite(sum(map(sum, line.covariance.tolist())))
-    )
+    if not isinstance(line, LineFeature) or not _good_role(line.role) or not _is_array(line.covariance, (2, 2)):
+        return False
+    (a, b), (c, d) = line.covariance.tolist()
+    return math.isfinite(a + b + c + d) and _good_place(line.rho, line.theta) and _number(line.weight, 0.0, 1.0)
+
+
+def _good_place(rho: Any, theta: Any) -> bool:
+    return _number(rho, -LINE_BOUND, LINE_BOUND) and _number(theta, -LINE_BOUND, LINE_BOUND)
+
+
+def _is_array(value: Any, shape: tuple[int, ...]) -> bool:
+    return type(value) is np.ndarray and value.shape == shape and value.dtype.kind == "f"
 
 
 def _good_role(role: Any) -> bool:
@@ -240,9 +293,4 @@ def check_reference(reference: Reference, last: Reference) -> tuple[Reference, t
 
 
 def _good_reference_line(line: Any) -> bool:
-    return (
-        isinstance(line, LineReference)
-        and _good_role(line.role)
-        and _number(line.rho, -LINE_BOUND, LINE_BOUND)
-        and _number(line.theta, -LINE_BOUND, LINE_BOUND)
-    )
+    return isinstance(line, LineReference) and _good_role(line.role) and _good_place(line.rho, line.theta)

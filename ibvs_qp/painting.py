@@ -62,10 +62,9 @@ class Painter:
         """Advance the phase machine by one tick."""
         dt = 0.0 if math.isnan(self._last_time) else seen.time_s - self._last_time
         self._last_time = seen.time_s
-        if self.phase in ("start", "approach", "align", "press", "climb", "retreat"):
-            if seen.time_s - self.entered > self.config.timeout_s:
-                self._time_out(seen)
-        return getattr(self, f"_{self.phase}")(seen, dt)
+        if seen.time_s - self.entered > self.config.timeout_s and self.phase not in ("paint", "done"):
+            self._time_out(seen)
+        return getattr(self, "_" + self.phase)(seen, dt)
 
     def _enter(self, seen: Scenery, phase: str, reason: str) -> None:
         self.log.append((seen.time_s, phase, reason))
@@ -145,10 +144,10 @@ class Painter:
         travel = -1.0 if self.row % 2 == 1 else 1.0
         remaining, edge = self._remaining(seen, travel)
         self._check_contact(seen)
-        speed = min(config.speed_m_s, math.sqrt(2.0 * config.acceleration_m_s2 * max(remaining, 0.0)))
-        speed = 0.0 if self._paused else min(speed, 2.0 * max(remaining, 0.0) + 0.005)
+        left = remaining if remaining > 0.0 else 0.0
+        speed = min(config.speed_m_s, math.sqrt(2.0 * config.acceleration_m_s2 * left), 2.0 * left + 0.005)
         step = config.acceleration_m_s2 * dt
-        self._speed += min(max(speed - self._speed, -2.0 * step), step)
+        self._speed += clipped((0.0 if self._paused else speed) - self._speed, -2.0 * step, step)
         if remaining <= 0.004:
             self._speed = 0.0
             self._since = seen.time_s if math.isnan(self._since) else self._since
@@ -179,7 +178,7 @@ class Painter:
         speed = min(config.climb_speed_m_s, math.sqrt(2.0 * config.acceleration_m_s2 * max(left, 0.0)) + 0.002)
         speed = 0.0 if self._paused else speed
         step = config.acceleration_m_s2 * dt
-        self._speed += min(max(speed - self._speed, -2.0 * step), step)
+        self._speed += clipped(speed - self._speed, -2.0 * step, step)
         move = min(self._speed * dt, max(left, 0.0))
         self._climbed += move
         self._guide_target += move
@@ -271,7 +270,7 @@ class Painter:
 
     def _slide_guide(self, nominal: float, dt: float) -> None:
         gap = nominal - self._guide_target
-        self._guide_target += min(max(gap, -SLIDE_SPEED * dt), SLIDE_SPEED * dt)
+        self._guide_target += clipped(gap, -SLIDE_SPEED * dt, SLIDE_SPEED * dt)
 
     def _guide_error(self, seen: Scenery) -> float:
         line = seen.lines.get(self._guide_id)
@@ -355,12 +354,11 @@ class Painter:
                 guides.append((start, self.config.edge_margin_m))
         if edge is not None and edge.weight > 0.0:
             guides.append((edge, self._edge_reference(edge, edge_rate)))
-        if hold and not any(entry.role == VERTICAL for entry, _ in guides):
-            back = HOLD_GAIN * (self._anchor - float(seen.odometer[0]))
-            right = min(max(back, -HOLD_SPEED), HOLD_SPEED)
+        if hold and not any([entry.role == VERTICAL for entry, _ in guides]):
+            right = clipped(HOLD_GAIN * (self._anchor - seen.odometer[0]), -HOLD_SPEED, HOLD_SPEED)
         c, s = math.cos(slope), math.sin(slope)
         velocity = np.array((right + along * c + climb * s, along * s - climb * c))
-        return Wish(contact=contact, standoff=standoff, velocity=velocity, guides=guides, push=self.config.push_n)
+        return Wish(contact, standoff, velocity, guides, self.config.push_n)
 
     def _edge_reference(self, edge: TrackedLine, edge_rate: float) -> float:
         """The stop edge's wanted offset: from where it was first seen to the margin, at the stroke's own speed."""
@@ -375,6 +373,16 @@ class Painter:
         return self._edge_target
 
 
+def clipped(value: float, low: float, high: float) -> float:
+    """The value within its bounds; plain comparisons, because calls of min and max cost several times as much."""
+    return low if value < low else high if value > high else value
+
+
 def _nearest(lines, accept, expected: float, gate: float) -> TrackedLine | None:
-    good = [line for line in lines if line.weight > 0.0 and accept(line) and abs(line.offset - expected) <= gate]
-    return min(good, key=lambda line: abs(line.offset - expected), default=None)
+    best, least = None, gate
+    for line in lines:
+        if line.weight > 0.0:
+            away = abs(line.offset - expected)
+            if (away < least or (away == least and best is None)) and accept(line):
+                best, least = line, away
+    return best

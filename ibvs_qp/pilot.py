@@ -17,10 +17,12 @@ from ibvs_qp.config import ControllerConfig
 from ibvs_qp.controller import HybridController
 from ibvs_qp.estimation.config import EstimationConfig
 from ibvs_qp.estimation.motion import WallMotion
+from ibvs_qp.estimation.stamps import HISTORY, StampRing
 from ibvs_qp.estimation.tare import WrenchTare
 from ibvs_qp.estimation.wall_lines import WallAxes, image_line
 from ibvs_qp.frames import to_camera
 from ibvs_qp.loop_margin import require_margin
+from ibvs_qp.made import made
 from ibvs_qp.measurement import (
     HORIZONTAL,
     FeatureFrame,
@@ -39,8 +41,10 @@ from ibvs_qp.vision.percept import LineHint
 
 #: Where the fresh edge exists ahead of the brush, normalised image x from the tip's side to the border.
 HINT_SPAN = (0.10, 0.50)
-#: Ticks of inertial history kept for late pictures.
-HISTORY = 128
+
+
+#: A tick is never taken to last longer than this [s]: after a pause the filters begin where they were.
+LONGEST_TICK = 0.02
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,6 +97,7 @@ class Pilot:
         config: Everything a flight needs.
         painter: Strategy to follow; None paints.
         seen_as: Applied to what perception saw in a picture, for studies of its errors.
+        controller: A controller of the configuration's law and settings that has flown before; None creates one.
     """
 
     def __init__(
@@ -100,19 +105,22 @@ class Pilot:
         config: PilotConfig | None = None,
         painter: Painter | None = None,
         seen_as: Callable[[FeatureFrame], FeatureFrame] | None = None,
+        controller: HybridController | PaperController | None = None,
     ) -> None:
         self.config = config or PilotConfig()
-        controller, vehicle = self.config.controller, self.config.controller.vehicle
-        self.controller = HybridController(controller) if self.config.law == "qp" else PaperController(controller)
+        settings, vehicle = self.config.controller, self.config.controller.vehicle
+        kind = HybridController if self.config.law == "qp" else PaperController
+        self.controller = kind(settings) if controller is None else controller
         self.motion = WallMotion(
             np.array(vehicle.tip_position_m),
             np.array(vehicle.camera_position_m),
-            controller.tick_s,
+            settings.tick_s,
             self.config.estimation,
         )
         self.tare = WrenchTare(vehicle, self.config.estimation)
         self.painter = painter or Painter(self.config.painting)
         self._seen_as = seen_as
+        self._tick_s, self._ticks = settings.tick_s, StampRing(settings.tick_s)
         self._gate = SensorGate()
         self._tip = np.array(vehicle.tip_position_m)
         self._camera = np.array(vehicle.camera_position_m)
@@ -131,7 +139,7 @@ class Pilot:
         if self._perception is not None:
             self._perception.reset()
         self._first = self._stamp = -1
-        self._ticks = 0
+        self._ticks.reset()
         self._history_attitude = [[1.0, 0.0, 0.0, 0.0]] * HISTORY
         self._turn: Row = (0.0, 0.0, 0.0)
         self._history_turn = [self._turn] * HISTORY
@@ -165,27 +173,29 @@ class Pilot:
             command = self.controller.step(self.measurement, self.reference)  # type: ignore[arg-type]
         else:
             command = self._fly(sound)
+        if self._gate.clock.shift_ns and sound is not None:  # it answers in the time of the frames
+            command = dataclasses.replace(command, stamp_ns=frame.stamp_ns)
         return command if not refused else dataclasses.replace(command, rejected=command.rejected + refused)
 
     def _fly(self, frame: SensorFrame) -> Command:
+        stamp, estimation = frame.stamp_ns, self.config.estimation
         if self._first < 0:
-            self._first = frame.stamp_ns
-        tick = self.config.controller.tick_s
-        dt = tick if self._stamp < 0 else min(max((frame.stamp_ns - self._stamp) * 1e-9, 0.0), 0.02)
-        self._stamp = frame.stamp_ns
+            self._first = stamp
+        dt = self._tick_s if self._stamp < 0 else (stamp - self._stamp) * 1e-9
+        dt = dt if dt < LONGEST_TICK else LONGEST_TICK
+        self._stamp = stamp
         now = self._gate.last
-        force, rate = now["specific_force"], now["angular_velocity"]
-        self._remember(now["attitude"], rate, dt)
-        contact = self.terms.contact
-        free = not contact.in_contact and contact.distance > self.config.estimation.tare_distance_m
+        attitude, force, rate = now["attitude"], now["specific_force"], now["angular_velocity"]
+        self._remember(stamp, attitude, rate, dt)
+        contact = self.controller.setpoints.contact
+        free = not contact.in_contact and contact.distance > estimation.tare_distance_m
         wrench = self.tare.update(frame.wrench, frame.wrench_stamp_ns, force, free)
-        axes = WallAxes.of(contact.normal.tolist(), down_row(*now["attitude"]))
-        self.motion.predict(frame.stamp_ns, axes, force, rate, dt)
+        axes = WallAxes.of(contact.normal.tolist(), down_row(*attitude))
+        self.motion.predict(stamp, axes, force, rate, dt)
         features = frame.features if frame.image is None else self._see(frame)
         if features is not None and self._fresh(features.stamp_ns):
             self._take(features)
-        wish = self.painter.step(self._scenery(frame))
-        self.wish = wish
+        wish = self.wish = self.painter.step(self._scenery(frame))
         self.reference = self._refer(wish)
         self.measurement = self._measure(frame, wrench, axes, wish)
         begin = time.perf_counter()
@@ -193,11 +203,10 @@ class Pilot:
         self.controller_time_s = time.perf_counter() - begin
         return command
 
-    def _remember(self, attitude: list[float], rate: list[float], dt: float) -> None:
+    def _remember(self, stamp_ns: int, attitude: list[float], rate: list[float], dt: float) -> None:
         (x, y, z), (wx, wy, wz) = self._turn, rate
         self._turn = x + dt * wx, y + dt * wy, z + dt * wz
-        self._ticks += 1
-        slot = self._ticks % HISTORY
+        slot = self._ticks.add(stamp_ns)
         self._history_attitude[slot] = attitude
         self._history_turn[slot] = self._turn
 
@@ -218,8 +227,11 @@ class Pilot:
         return 0 <= self._stamp - stamp_ns <= self.config.camera.latest_s * 1e9
 
     def _slot(self, stamp_ns: int) -> int:
-        age = round((self._stamp - stamp_ns) * 1e-9 / self.config.controller.tick_s)
-        return (self._ticks - min(max(age, 0), min(HISTORY, self._ticks) - 1)) % HISTORY
+        """Where the tick nearest to a stamp is remembered; the newest or the oldest where none is."""
+        age = self._ticks.age(stamp_ns)
+        if age is None:
+            age = 0 if stamp_ns > self._stamp else min(HISTORY, self._ticks.now) - 1
+        return self._ticks.slot(age)
 
     def _see(self, frame: SensorFrame) -> FeatureFrame | None:
         """Run perception on a picture, with the gyro's turn since the last one."""
@@ -286,14 +298,15 @@ class Pilot:
                 )
             )
             covariance = self._velocity_covariance()
-        return Measurement(
+        return made(
+            Measurement,
             stamp_ns=frame.stamp_ns,
             attitude=frame.attitude,
             angular_velocity=frame.angular_velocity,
             specific_force=frame.specific_force,
             contact_wrench=wrench,
             wrench_stamp_ns=frame.wrench_stamp_ns,
-            lines=tuple(self.motion.feature(line, axes, distance, frame.stamp_ns) for line, _ in wish.guides),
+            lines=tuple([self.motion.feature(line, axes, distance, frame.stamp_ns) for line, _ in wish.guides]),
             plane=self._plane,
             plane_stamp_ns=self._plane_stamp,
             velocity=velocity,
@@ -310,19 +323,20 @@ class Pilot:
         return self._covariance
 
     def _scenery(self, frame: SensorFrame) -> Scenery:
-        contact, motion = self.terms.contact, self.motion.state
+        terms, motion = self.controller.setpoints, self.motion
+        contact, state = terms.contact, motion.state
         return Scenery(
-            time_s=(frame.stamp_ns - self._first) * 1e-9,
-            lines=self.motion.lines,
-            odometer=motion[4:6],
-            velocity=motion[:2],
-            distance=contact.distance,
-            wall_known=contact.known,
-            in_contact=contact.in_contact,
-            time_since_touch=contact.time_since_touch,
-            push=contact.push,
-            push_wanted=self.terms.push_reference,
-            tared=self.tare.ready,
+            (frame.stamp_ns - self._first) * 1e-9,
+            motion.lines,
+            state[4:6],
+            state[:2],
+            contact.distance,
+            contact.known,
+            contact.in_contact,
+            contact.time_since_touch,
+            contact.push,
+            terms.push_reference,
+            self.tare.ready,
         )
 
     def _refer(self, wish: Wish) -> Reference:
@@ -332,12 +346,12 @@ class Pilot:
         references = []
         for line, offset in wish.guides:
             if line.role == HORIZONTAL:
-                references.append(
-                    LineReference(rho=(offset + self._tip_camera[1]) / depth, theta=0.5 * math.pi, role=line.role)
-                )
+                rho, theta = (offset + self._tip_camera[1]) / depth, 0.5 * math.pi
             else:
-                references.append(LineReference(rho=offset / depth, theta=0.0, role=line.role))
-        return Reference(
+                rho, theta = offset / depth, 0.0
+            references.append(made(LineReference, rho=rho, theta=theta, role=line.role))
+        return made(
+            Reference,
             push_force=wish.push,
             standoff=wish.standoff,
             lines=tuple(references),

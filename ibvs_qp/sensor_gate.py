@@ -9,6 +9,7 @@ import numpy as np
 
 from ibvs_qp.gate import ACCELERATION_BOUND, RATE_BOUND, WRENCH_BOUND, is_stamp
 from ibvs_qp.measurement import SensorFrame
+from ibvs_qp.stamp_follower import StampFollower
 
 #: Name, size and largest believable entry of every raw vector.
 _VECTORS = (
@@ -17,16 +18,23 @@ _VECTORS = (
     ("specific_force", 3, ACCELERATION_BOUND),
     ("wrench", 6, WRENCH_BOUND),
 )
+#: A quaternion whose squared length is this far from 1 is no attitude.
+_UNIT_SLIP = 0.02
+_FLOAT = np.dtype(np.float64)
 
 
 class SensorGate:
-    """Passes sound frames on untouched; one NaN in a filter would stay there for the rest of the flight.
+    """Passes sound frames on; one NaN in a filter would stay there for the rest of the flight.
+
+    The stamps of what it passes on never run backwards (`StampFollower`).
 
     Attributes:
         last: Last good numbers of every raw vector by name, the present ones where they are sound.
+        clock: Turns the frames' stamps into the pilot's time.
     """
 
     def __init__(self) -> None:
+        self.clock = StampFollower()
         self.reset()
 
     def reset(self) -> None:
@@ -37,14 +45,45 @@ class SensorGate:
             "specific_force": [0.0, 0.0, -9.81],
             "wrench": [0.0] * 6,
         }
-        self._stamp = -1
+        self.clock.reset()
         self._wrench_stamp = 0
 
     def check(self, frame: Any) -> tuple[SensorFrame | None, tuple[str, ...]]:
         """A frame that is safe to filter, or None when it has no sound time, and the names of what was refused."""
-        if not isinstance(frame, SensorFrame) or not is_stamp(frame.stamp_ns) or frame.stamp_ns <= self._stamp:
-            return None, ("sensor frame: stamp_ns not after the last one",)
-        self._stamp = frame.stamp_ns
+        why = self.clock.refuse(frame.stamp_ns) if isinstance(frame, SensorFrame) else "not in a sensor frame"
+        if why:
+            return None, (f"sensor frame: stamp_ns {why}",)
+        if self.clock.shift_ns:
+            frame = _shifted(frame, self.clock.shift_ns)
+        if frame.image is None and frame.features is None and self._sound(frame):
+            return frame, ()
+        return self._mend(frame)
+
+    def _sound(self, frame: SensorFrame) -> bool:
+        """Whether surely nothing is to refuse; where it is not sure, `_mend` finds out name by name."""
+        attitude, rate, force, wrench = frame.attitude, frame.angular_velocity, frame.specific_force, frame.wrench
+        if not (_is_row(attitude, (4,)) and _is_row(rate, (3,)) and _is_row(force, (3,)) and _is_row(wrench, (6,))):
+            return False
+        stamp = frame.wrench_stamp_ns
+        if type(stamp) is not int or not 0 <= stamp <= frame.stamp_ns:
+            return False
+        w, x, y, z = turn = attitude.tolist()
+        p, q, r = turning = rate.tolist()
+        a, b, c = felt = force.tolist()
+        f, g, h, i, j, k = load = wrench.tolist()
+        # A sum of squares within the squared bound has no entry beyond the bound; NaN is within nothing.
+        if not (
+            abs(w * w + x * x + y * y + z * z - 1.0) <= _UNIT_SLIP
+            and p * p + q * q + r * r <= RATE_BOUND * RATE_BOUND
+            and a * a + b * b + c * c <= ACCELERATION_BOUND * ACCELERATION_BOUND
+            and f * f + g * g + h * h + i * i + j * j + k * k <= WRENCH_BOUND * WRENCH_BOUND
+        ):
+            return False
+        self.last = {"attitude": turn, "angular_velocity": turning, "specific_force": felt, "wrench": load}
+        self._wrench_stamp = stamp
+        return True
+
+    def _mend(self, frame: SensorFrame) -> tuple[SensorFrame, tuple[str, ...]]:
         changes: dict[str, Any] = {}
         last = self.last
         for name, size, bound in _VECTORS:
@@ -65,6 +104,25 @@ class SensorGate:
         return dataclasses.replace(frame, **changes), tuple(f"sensor {name}: not sound" for name in changes)
 
 
+def _shifted(frame: SensorFrame, shift_ns: int) -> SensorFrame:
+    """The frame in the pilot's time; what has no sound stamp keeps it and is refused later."""
+    changes: dict[str, Any] = {"stamp_ns": frame.stamp_ns + shift_ns}
+    if is_stamp(frame.wrench_stamp_ns):
+        changes["wrench_stamp_ns"] = frame.wrench_stamp_ns + shift_ns
+    for name, part in (("image", frame.image), ("features", frame.features)):
+        if part is None or not is_stamp(getattr(part, "stamp_ns", None)):
+            continue
+        moved = {"stamp_ns": part.stamp_ns + shift_ns}
+        if getattr(part, "velocity_stamp_ns", 0):
+            moved["velocity_stamp_ns"] = part.velocity_stamp_ns + shift_ns  # type: ignore[union-attr]
+        changes[name] = dataclasses.replace(part, **moved)
+    return dataclasses.replace(frame, **changes)
+
+
+def _is_row(value: Any, shape: tuple[int, ...]) -> bool:
+    return type(value) is np.ndarray and value.dtype is _FLOAT and value.shape == shape
+
+
 def _sound(value: Any, size: int, bound: float) -> list[float] | None:
     """The numbers of a float vector of that size with every entry within the bound, else None."""
     if not isinstance(value, np.ndarray) or value.shape != (size,) or value.dtype.kind != "f":
@@ -77,4 +135,4 @@ def _sound(value: Any, size: int, bound: float) -> list[float] | None:
 
 
 def _unit(w: float, x: float, y: float, z: float) -> bool:
-    return abs(w * w + x * x + y * y + z * z - 1.0) <= 0.02
+    return abs(w * w + x * x + y * y + z * z - 1.0) <= _UNIT_SLIP

@@ -14,6 +14,7 @@ with app.setup:
         TuningBench,
         changed_text,
         command_line,
+        compare_pair,
         comparison_table,
         control_panel,
         draw_dashboard,
@@ -111,8 +112,8 @@ def _():
 
     **Left: response.** The push on the board, with its reference: zero in free flight, then a ramp of one second from
     the first touch, cut to what the rotors can hold. The error of the guiding edge, where the picture shows the brush
-    tip; one pixel is about 0.9 mm on the board. The tilt of the vehicle, which should be none: it is fully actuated,
-    it need not lean to push.
+    tip; one pixel is 0.8 mm on the board. The tilt of the vehicle, which should be none: it is fully actuated, it
+    need not lean to push.
 
     **Right: limits.** Each row of the first panel is a limit that was active at some time, the dearest above, with
     the share of ticks in which it bound; the colour is the price on a scale of logarithms. Under it the distance of
@@ -139,8 +140,8 @@ def _():
 
     **Ask for more than there is: push 34 N.** The reach check follows the ray of pushes $w(f) = f\,[d;\; p \times d]
     - h$ to the first facet of $\mathcal{W}$ and cuts the reference to 97 % of what it finds, 30.6 N standing still
-    and less against friction while sliding. Rotor limits bind from the end of the ramp on. The program gives up push
-    first, because push has the lightest weight: the vehicle stays level to a fraction of a degree.
+      and less against friction while sliding. Rotor limits bind from the end of the ramp on. The program gives up
+      push first, because push has the lightest weight: the vehicle stays level to a fraction of a degree.
     """)
     return
 
@@ -161,22 +162,19 @@ def _(at_the_limit):
 @app.cell(hide_code=True)
 def _():
     mo.md(r"""
-    **Turn the priorities round: the weight of the push from 0.5 to 5000, at the same 34 N and without the reach
-    check.** Nothing but one weight says who gives way. Now tilt, height and lines pay for the push. The prices tell
-    it as well: when the rotor limits are hit, a newton of thrust is worth a thousand times more, because what it buys
-    is weighted so.
+    **Turn the priorities round: the weight of the push from 0.5 to 5000, at the same 34 N, without the reach check.**
+    The flight before is the same without the reach check at the shipped weight. Nothing but one weight says who gives
+    way: now the vehicle leans into the wall by ten degrees, because leaning turns lift into push, and gets its 34 N.
+    The prices tell it as well: a newton of thrust is worth more when what it buys is weighted more.
     """)
     return
 
 
 @app.cell
 def _():
-    push_first = TuningBench().compare(
-        {
-            "scene.paint.push_n": 34.0,
-            "pilot.controller.reach_check": False,
-            "pilot.controller.weights.push": 5000.0,
-        }
+    push_first = compare_pair(
+        {"scene.paint.push_n": 34.0, "pilot.controller.reach_check": False},
+        {"pilot.controller.weights.push": 5000.0},
     )
     picture(draw_dashboard, push_first)
     return (push_first,)
@@ -191,28 +189,32 @@ def _(push_first):
 @app.cell(hide_code=True)
 def _():
     mo.md(r"""
-    **Hit the wall: 0.15 m/s up to the touch and a force gain of 3, without the impedance's damping.** The contact is
-    a spring $k$ and a damper under the mass $m$; a tip that arrives at $v$ strikes with $v\sqrt{k m}$, here 14 N. Two
-    soft limits stand against it: the approach barrier bounds the closing speed, and the force ceiling bounds the push
-    by the contact's own poles,
+    **A bad force law: six times the force gain, no damping, no ramp.** The contact is a spring $k$ and a damper under
+    the mass $m$, and this force law alone would drive it into ringing. The *force ceiling* bounds the push by the
+    contact's own poles,
 
-    $$ F_n \;\le\; f_\text{max} + 2\sqrt{k m}\;\dot e_s , $$
+    $$
+    F_n \;\le\; f_\text{max} + 2\sqrt{k m}\;\dot e_s ,
+    $$
 
-    so that a tip that still closes in is braked before the spring says so. Switch them off one after the other and
-    look at the greatest push.
+    with $\dot e_s < 0$ while the tip closes in, so that it is braked before the spring is compressed. The flight
+    before is the same without the ceiling: 15 N instead of 7 N at the peak. Switch off the approach barrier as well,
+    and the tip strikes with 33 N. Note the price: a limit that has to mend a force law is dear, and busy in a third
+    of all ticks. A limit that pays for itself is one that is never asked.
     """)
     return
 
 
 @app.cell
 def _():
-    hard_touch = TuningBench().compare(
-        {
-            "pilot.controller.contact.close_speed_m_s": 0.15,
-            "pilot.controller.contact.touch_speed_m_s": 0.15,
-            "pilot.controller.gains.force_kfp": 3.0,
-            "pilot.controller.gains.force_ksd": 0.0,
-        }
+    bad_force_law = {
+        "pilot.controller.gains.force_kfp": 2.1,
+        "pilot.controller.gains.force_ksd": 0.0,
+        "pilot.controller.touch_ramp": False,
+    }
+    hard_touch = compare_pair(
+        bad_force_law | {"pilot.controller.limits.push_barrier": False},
+        {"pilot.controller.limits.push_barrier": True},
     )
     picture(draw_dashboard, hard_touch)
     return (hard_touch,)

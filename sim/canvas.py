@@ -60,59 +60,76 @@ class Canvas:
         board, paint = scene.board, scene.paint
         self.scene, self.geometry = scene, BoardGeometry(scene)
         self.pixels_per_m = min(pixels_per_m, math.sqrt(_MAX_PIXELS / (board.width_m * board.height_m)))
-        board_seed, wall_seed, paint_seed = (
+        self._seeds = [
             np.random.SeedSequence([part, board.texture_seed, scene.wall.texture_seed, seed]) for part in range(3)
-        )
-        shape = (_whole(board.height_m * self.pixels_per_m), _whole(board.width_m * self.pixels_per_m))
-        self._board_rng = np.random.default_rng(board_seed)
-        self._on_board = int(self._board_rng.binomial(board.clutter, 0.5))
-        padded = (shape[0] + 2 * TEXTURE_PAD_PX, shape[1] + 2 * TEXTURE_PAD_PX)
+        ]
+        self._shape = _whole(board.height_m * self.pixels_per_m), _whole(board.width_m * self.pixels_per_m)
+        pad = TEXTURE_PAD_PX
+        padded = (self._shape[0] + 2 * pad, self._shape[1] + 2 * pad)
         self._coverage, self._drawn = np.zeros(padded, np.uint8), np.zeros(padded, np.uint8)
         self._stamps = _brush_stamps(0.5 * paint.brush_width_m * self.pixels_per_m)
         self._dirty: tuple[int, int, int, int] | None = None
         self.edges = PaintedEdges(scene)
-        self._paint_seed, self._wall_seed = paint_seed, wall_seed
-        self._measure_wall()
 
-    def _measure_wall(self) -> None:
-        board = self.scene.board
-        corners = self.geometry.point(np.array([0, 1, 1, 0]) * board.width_m, np.array([0, 0, 1, 1]) * board.height_m)
-        low, high = corners.min(axis=0), corners.max(axis=0)
-        size = high - low + 2.0 * WALL_EXTENT_M
-        self.wall_pixels_per_m = min(WALL_PIXELS_PER_M, math.sqrt(_MAX_PIXELS / float(np.prod(size))))
-        self.wall_origin, self._wall_size, self._outline = low - WALL_EXTENT_M, size, (low, high)
+    def _surface_source(self) -> tuple[np.random.Generator, int]:
+        """Source of the board's grain, and how many of the distracting objects lie on the board."""
+        rng = np.random.default_rng(self._seeds[0])
+        return rng, int(rng.binomial(self.scene.board.clutter, 0.5))
 
-    # Pictures are made when somebody looks at them: a flight without a camera never does.
+    # Pictures are made when somebody looks: a flight without a camera needs none of them.
 
     @functools.cached_property
     def _blank(self) -> np.ndarray:
-        """The board without paint, padded."""
-        rng, pad, height, width = self._board_rng, TEXTURE_PAD_PX, *self._coverage.shape
-        rim = max(1, round(_RIM_M * self.pixels_per_m))
-        face = textures.board_surface(rng, (height - 2 * pad, width - 2 * pad), self.scene.board.color, rim)
-        clutter_board(rng, face, self._on_board, self.pixels_per_m)
+        """The board before it is painted, padded, uint8 (h, w, 4)."""
+        rng, on_board = self._surface_source()
+        face = textures.board_surface(
+            rng, self._shape, self.scene.board.color, max(1, round(_RIM_M * self.pixels_per_m))
+        )
+        clutter_board(rng, face, on_board, self.pixels_per_m)
+        pad = TEXTURE_PAD_PX
         return cv2.copyMakeBorder(face, pad, pad, pad, pad, cv2.BORDER_REPLICATE)
 
     @functools.cached_property
     def _texture(self) -> np.ndarray:
-        """The board as last drawn."""
+        """The board as painted so far, padded, uint8 (h, w, 4)."""
         return self._blank.copy()
 
     @functools.cached_property
     def _fresh(self) -> np.ndarray:
-        """The board covered with paint all over."""
-        rng = np.random.default_rng(self._paint_seed)
-        return textures.paint_surface(rng, self._coverage.shape, self.scene.paint.color)
+        """The board as if it were painted all over, padded, uint8 (h, w, 4)."""
+        return textures.paint_surface(
+            np.random.default_rng(self._seeds[2]), self._coverage.shape, self.scene.paint.color
+        )
 
     @functools.cached_property
-    def wall(self) -> np.ndarray:
-        """Picture of the wall."""
-        rng, px_m = np.random.default_rng(self._wall_seed), self.wall_pixels_per_m
-        width, height = (math.ceil(entry * px_m) for entry in self._wall_size)
+    def _wall(self) -> tuple[np.ndarray, np.ndarray, float]:
+        board, rng = self.scene.board, np.random.default_rng(self._seeds[1])
+        corners = self.geometry.point(np.array([0, 1, 1, 0]) * board.width_m, np.array([0, 0, 1, 1]) * board.height_m)
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        size = high - low + 2.0 * WALL_EXTENT_M
+        px_m = min(WALL_PIXELS_PER_M, math.sqrt(_MAX_PIXELS / float(np.prod(size))))
+        origin = low - WALL_EXTENT_M
+        width, height = (math.ceil(entry * px_m) for entry in size)
         wall = textures.wall_surface(rng, (height, width), self.scene.wall.color, px_m)
-        (left, top), (right, bottom) = ((corner - self.wall_origin) * px_m for corner in self._outline)
-        clutter_wall(rng, wall, self.scene.board.clutter - self._on_board, px_m, (left, top, right, bottom))
-        return wall
+        left, top = (low - origin) * px_m
+        right, bottom = (high - origin) * px_m
+        clutter_wall(rng, wall, board.clutter - self._surface_source()[1], px_m, (left, top, right, bottom))
+        return wall, origin, px_m
+
+    @property
+    def wall(self) -> np.ndarray:
+        """The wall around and behind the board, uint8 (h, w, 4)."""
+        return self._wall[0]
+
+    @property
+    def wall_origin(self) -> np.ndarray:
+        """World (y, z) of the wall picture's upper left corner [m], (2,)."""
+        return self._wall[1]
+
+    @property
+    def wall_pixels_per_m(self) -> float:
+        """Resolution of the wall picture [px/m]."""
+        return self._wall[2]
 
     @property
     def rgb(self) -> np.ndarray:
@@ -220,6 +237,7 @@ def _inner(padded: np.ndarray) -> np.ndarray:
     return padded[TEXTURE_PAD_PX:-TEXTURE_PAD_PX, TEXTURE_PAD_PX:-TEXTURE_PAD_PX]
 
 
+@functools.lru_cache(maxsize=4)
 def _brush_stamps(radius_px: float) -> list[list[np.ndarray]]:
     """Antialiased discs at every sub-pixel position, uint8, indexed [row phase][column phase]."""
     half = math.ceil(radius_px) + 2

@@ -20,6 +20,9 @@ BLOCK = 256
 class PropellerClearance:
     """Distance of the propeller discs to the board's face inside its outline and to the wall elsewhere.
 
+    Attributes:
+        reach: No disc comes farther from the body's origin than this, whatever its attitude [m].
+
     Args:
         board: Board and wall.
         vehicle: Rotors and propeller radius.
@@ -35,7 +38,7 @@ class PropellerClearance:
         # World (y, z) from the corner to (along, up) of the board.
         self._outline = np.column_stack((board.along, board.up))
         self._corner = board.point(0.0, 0.0)
-        self._reach = float(np.linalg.norm(self._positions, axis=1).max()) + self._radius
+        self.reach = float(np.linalg.norm(self._positions, axis=1).max()) + self._radius
 
     def _rim(self, position: np.ndarray, axis: np.ndarray) -> np.ndarray:
         first = np.cross(axis, [1.0, 0.0, 0.0])
@@ -54,7 +57,7 @@ class PropellerClearance:
 
     def strikes(self, position: Sequence[float], rotation: Sequence[Sequence[float]]) -> bool:
         """Whether any disc touches board or wall; costs next to nothing while the body keeps its distance."""
-        if position[0] + self._reach <= 0.0:
+        if position[0] + self.reach <= 0.0:
             return False
         where, turn = np.array(position), np.array(rotation)
         return self.foremost(where, turn) > 0.0 and self.distance(where, turn) <= 0.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ import numpy as np
 import ibvs_qp
 from ibvs_qp.measurement import SensorFrame
 from ibvs_qp.pilot import Pilot, PilotConfig
+from sim import controller_pool
 from sim.board import BoardGeometry
 from sim.cameras import CameraStream, RemoteCamera, open_camera
 from sim.canvas import Canvas
@@ -22,6 +24,7 @@ from sim.features import GeometricFeatures, add_sigma_vs
 from sim.jobs import Job, PaintJob
 from sim.miscalibration import Miscalibration
 from sim.plant import TICK_NS, Plant
+from sim.readout import PLACES
 from sim.recorder import Recorder
 from sim.scene import Scene
 from sim.sensors import SensorSuite
@@ -42,6 +45,7 @@ PAINTING_FORCE = 0.05
 STROKE_TICKS = 3
 #: Control ticks between calls of the progress function.
 PROGRESS_TICKS = 125
+_SEEN_FROM = [PLACES[name] for name in ("position", "quaternion", "body_velocity")]
 #: A flight that is not done by then is ended [s]: start and corners, plus the strokes at half speed.
 BASE_TIME, STROKE_FACTOR = 90.0, 2.0
 
@@ -50,8 +54,8 @@ BASE_TIME, STROKE_FACTOR = 90.0, 2.0
 class FlightOptions:
     """How to fly a scene; the defaults are the main job.
 
-    With `camera_process` another process draws the pictures: the same flight to the bit, sooner where a core is free.
-    Without `board` the trace keeps no picture of the painted board, which costs as much as a second of flight.
+    With `camera_process` another process draws the pictures, with `machine_code` the C compiler translates the
+    controller's tick, where there is one: both are the same flight to the bit, sooner.
     """
 
     law: str = "qp"
@@ -63,10 +67,11 @@ class FlightOptions:
     preset: str | None = None
     video: bool = True
     camera_process: bool = False
+    machine_code: bool = False
     view: bool = False
-    board: bool = True
 
 
+@functools.lru_cache(maxsize=4)
 def default_preset(law: str) -> PilotConfig:
     """The shipped preset of a law; each was tuned by the same search (`sim.tune`)."""
     file = PRESETS / f"tarot_t960_{law}.toml"
@@ -95,7 +100,17 @@ def pilot_config(scene: Scene, options: FlightOptions, config: PilotConfig | Non
         push_n=paint.push_n,
     )
     vision = dataclasses.replace(config.vision, paint_color=paint.color, brush_width_m=paint.brush_width_m)
-    return dataclasses.replace(config, painting=painting, vision=vision, perception=options.vision, law=options.law)
+    controller = config.controller
+    if options.machine_code:
+        controller = dataclasses.replace(controller, machine_code=True)
+    return dataclasses.replace(
+        config,
+        controller=controller,
+        painting=painting,
+        vision=vision,
+        perception=options.vision,
+        law=options.law,
+    )
 
 
 class World:
@@ -136,13 +151,13 @@ class World:
     def sense(self) -> SensorFrame:
         """Sensor frame of the present tick."""
         plant = self.plant
-        frame = self.sensors.sample(plant)
-        pose = self._miscalibration.pose(plant.position, plant.quaternion)
         if self._rendered:
+            pose = self._miscalibration.pose(plant.position, plant.quaternion)
             image = self._stream.tick(plant.time_ns, *pose)
-            return frame if image is None else dataclasses.replace(frame, image=self._miscalibration.picture(image))
-        features = self._features.tick(plant.time_ns, *pose, plant.velocity)
-        return frame if features is None else dataclasses.replace(frame, features=features)
+            return self.sensors.sample(plant, image=None if image is None else self._miscalibration.picture(image))
+        position, quaternion, velocity = (plant.truth[place] for place in _SEEN_FROM)  # read at once, not kept
+        pose = self._miscalibration.pose(position, quaternion)
+        return self.sensors.sample(plant, features=self._features.tick(plant.time_ns, *pose, velocity))
 
     def act(self, thrusts: np.ndarray) -> None:
         """Advance one control tick and paint where the brush presses."""
@@ -172,7 +187,7 @@ def make_pilot(scene: Scene, options: FlightOptions, config: PilotConfig, job: J
     sigma, noise = scene.features.sigma_vs, stream(options.seed, "sigma_vs")
     rendered = options.features == "rendered"  # the sensor model of lines adds the same noise itself
     seen_as = (lambda frame: add_sigma_vs(frame, sigma, noise)) if rendered and sigma > 0.0 else None
-    return Pilot(config, job.strategy(config.painting), seen_as)
+    return Pilot(config, job.strategy(config.painting), seen_as, controller_pool.take(config.law, config.controller))
 
 
 def fly(
@@ -224,6 +239,7 @@ def fly(
     finally:
         wall_time, memory = time.perf_counter() - start, world.close()
     trace = recorder.trace()
+    controller_pool.give_back(config.law, config.controller, pilot.controller)
     trace.wall_time_s = wall_time
     trace.camera_memory_bytes = memory
     trace.completed = not reason and pilot.painter.finished and not pilot.painter.failed

@@ -13,7 +13,8 @@ GROUND_CLEARANCE_M = 0.15
 #: Tilt at which a vehicle counts as flipped [deg].
 FLIP_DEG = 60.0
 
-_FLIP_COSINE = math.cos(math.radians(FLIP_DEG))
+#: The same as the least cosine of the tilt.
+FLIP_COSINE = math.cos(math.radians(FLIP_DEG))
 
 
 def crash_reason(
@@ -28,7 +29,7 @@ def crash_reason(
     """
     if not math.isfinite(sum(position) + sum(map(sum, rotation))):
         return "non-finite state"
-    if rotation[2][2] < _FLIP_COSINE:
+    if rotation[2][2] < FLIP_COSINE:
         return f"flip: tilted by more than {FLIP_DEG:g} deg"
     if position[2] > -GROUND_CLEARANCE_M:
         return "hit the ground"

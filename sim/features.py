@@ -11,10 +11,11 @@ import math
 
 import numpy as np
 
+from ibvs_qp.made import made
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL, FeatureFrame, LineFeature
 from ibvs_qp.vehicle import VehicleParams
 from sim.board import BoardGeometry
-from sim.cameras.arm import vehicle_layer
+from sim.cameras.arm import vehicle_mask
 from sim.cameras.protocol import Schedule, camera_intrinsics
 from sim.cameras.view import View
 from sim.canvas import Canvas
@@ -69,7 +70,7 @@ class GeometricFeatures:
         self.intrinsics = camera_intrinsics(scene.camera)
         own, extra = np.random.SeedSequence([seed, 0xFEA7]).spawn(2)
         self._normals, self._extra = Normals(np.random.default_rng(own)), np.random.default_rng(extra)
-        self._hidden = vehicle_layer(scene, vehicle, self.intrinsics, np.random.default_rng(0)).mask
+        self._hidden = vehicle_mask(scene, vehicle, self.intrinsics)
         self._schedule = Schedule(scene.camera.rate_hz, scene.camera.latency_s)
         fx, fy, _, _ = self.intrinsics
         self._half_view = 0.5 * scene.camera.width / fx, 0.5 * scene.camera.height / fy
@@ -77,7 +78,8 @@ class GeometricFeatures:
         corners = np.array([(0.0, 0.0), (width, 0.0), (width, height), (0.0, height), (0.5 * width, 0.5 * height)])
         self._outline = self._world(corners[:, 0], corners[:, 1])
         self._unit = self._world(np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0]))
-        self._last_pixel = scene.camera.width - 1, scene.camera.height - 1
+        self._last_pixel = np.array((scene.camera.width - 1.0, scene.camera.height - 1.0))
+        self._focal, self._centre = np.array(self.intrinsics[:2]), np.array(self.intrinsics[2:])
 
     def tick(
         self, now_ns: int, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, velocity_body: np.ndarray
@@ -108,7 +110,8 @@ class GeometricFeatures:
         if self._noise:
             lines = [self._blurred(line) for line in lines]
             velocity += SIGMA_VELOCITY_M_S * np.array(self._normals.take(3))
-        frame = FeatureFrame(
+        frame = made(
+            FeatureFrame,
             lines=tuple(lines),
             plane=(a, b, c, -1.0),
             stamp_ns=stamp_ns,
@@ -132,15 +135,15 @@ class GeometricFeatures:
         return lines
 
     def _paint_lines(self, view: View, stamp_ns: int) -> list[LineFeature | None]:
-        lines = []
+        rows, points = self._edges.all_exposed()
+        if len(rows) < 2:
+            return []
         corner, per_metre = self._board_in_camera(view)
-        for row in range(1, self.scene.paint.rows + 1):
-            points = self._edges.exposed(row)
-            if len(points) < 2:
-                continue
-            seen = np.flatnonzero(self._unhidden(corner + points @ per_metre))
+        seen = self._unhidden(corner + points @ per_metre)
+        lines = []
+        for row, place in _by_row(rows[seen], seen):
             # The longest piece without a gap; a gap is where a later row, the brush or the picture's border lies.
-            piece = _longest_run(seen, points[:, 0])
+            piece = _longest_run(place, points[:, 0])
             if len(piece) < 2:
                 continue
             (left, right), (low, high) = fitted_ends(points[piece])
@@ -156,17 +159,15 @@ class GeometricFeatures:
         return spots[0], spots[1:] - spots[0]
 
     def _unhidden(self, spots: np.ndarray) -> np.ndarray:
-        """Which points in camera coordinates are in the picture and not behind arm or brush, bool (n,)."""
-        fx, fy, cx, cy = self.intrinsics
-        last_column, last_row = self._last_pixel
-        x, y, z = spots.T
-        depth = np.maximum(z, NEAR_M)  # nearer ones are refused below
-        u, v = x * fx / depth + cx, y * fy / depth + cy
-        good = (z > NEAR_M) & (u >= 0.0) & (u <= last_column) & (v >= 0.0) & (v <= last_row)
-        places = np.flatnonzero(good)
-        row, column = np.rint(v[places]).astype(int), np.rint(u[places]).astype(int)
-        good[places] = self._hidden[row, column] == 0
-        return good
+        """Indices of the points in camera coordinates that are in the picture and not behind arm or brush."""
+        depth = spots[:, 2:]
+        pixels = spots[:, :2] * self._focal
+        pixels /= np.maximum(depth, NEAR_M)  # nearer ones are refused below
+        pixels += self._centre
+        inside = (pixels >= 0.0) & (pixels <= self._last_pixel)
+        places = (inside[:, 0] & inside[:, 1] & (depth[:, 0] > NEAR_M)).nonzero()[0]
+        column, row = np.rint(pixels[places]).astype(int).T
+        return places[self._hidden[row, column] == 0]
 
     def _blurred(self, line: LineFeature) -> LineFeature:
         rho, theta = self._normals.take(2)
@@ -183,6 +184,13 @@ class GeometricFeatures:
         x, y, z = (n + SIGMA_NORMAL * (tilt - n * along) for n, tilt in ((x, i), (y, j), (z, k)))
         scale = math.sqrt(x * x + y * y + z * z) * (distance + SIGMA_DISTANCE_M * far)
         return x / scale, y / scale, z / scale
+
+
+def _by_row(rows: np.ndarray, places: np.ndarray) -> list[tuple[int, np.ndarray]]:
+    """Every row that occurs, in order, and its part of the places."""
+    ends = [*((rows[1:] != rows[:-1]).nonzero()[0] + 1).tolist(), len(rows)] if len(rows) else []
+    starts = [0, *ends[:-1]]
+    return [(int(rows[start]), places[start:end]) for start, end in zip(starts, ends, strict=False)]
 
 
 def _longest_run(seen: np.ndarray, along: np.ndarray) -> np.ndarray:

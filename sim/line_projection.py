@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from ibvs_qp.frames import align_line
+from ibvs_qp.made import made
 from ibvs_qp.measurement import HORIZONTAL, LineFeature
 
 #: Noise of rho [-] and theta [rad] of one line: a good sub-pixel fit (0.1 px, 0.06 deg) at 640x480.
@@ -77,11 +77,13 @@ def projected_line(
     rho, theta = align_line(rho, theta, 0.5 * math.pi if role == HORIZONTAL else 0.0)
     x, y, z = surface
     side = x * math.cos(theta) + y * math.sin(theta) - rho * z  # times the point's depth, which is positive
-    return LineFeature(
+    return made(
+        LineFeature,
         rho=rho,
         theta=theta,
         covariance=_COVARIANCE,
         role=role,
+        weight=1.0,
         stamp_ns=stamp_ns,
         track_id=track,
         segment=segment,
@@ -108,4 +110,4 @@ def moved_line(line: LineFeature, rho: float, theta: float) -> LineFeature:
         c, s = math.cos(theta), math.sin(theta)
         away = [(x, y, x * c + y * s - rho) for x, y in segment.tolist()]
         segment = np.array([(x - gap * c, y - gap * s) for x, y, gap in away])
-    return dataclasses.replace(line, rho=rho, theta=theta, segment=segment)
+    return made(LineFeature, **(line.__dict__ | {"rho": rho, "theta": theta, "segment": segment}))

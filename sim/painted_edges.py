@@ -32,6 +32,8 @@ class PaintedEdges:
         # Bins of a row that some later row lies over, kept up to date as paint comes: they are asked for all the time.
         self._covered = np.zeros((self._rows + 1, self._bins), dtype=bool)
         self._reach = math.ceil(self._radius / BIN_M)
+        self._open = np.zeros((self._rows + 1, self._bins), dtype=bool)  # painted and not covered
+        self._middles = (np.arange(self._bins) + 0.5) * BIN_M
 
     def stroke(self, previous: BoardPoint | None, current: BoardPoint) -> None:
         """Record a stroke between two tip positions (along, up) [m]; see `sim.canvas.Canvas.stroke`."""
@@ -51,13 +53,20 @@ class PaintedEdges:
             height = u0 + (place - a0) / (a1 - a0) * (u1 - u0) + self._radius
             if height > top[k]:
                 if top[k] == -math.inf:
-                    self._covered[:row, max(0, k - self._reach) : k + self._reach + 1] = True
+                    over = slice(max(0, k - self._reach), k + self._reach + 1)
+                    self._covered[:row, over] = True
+                    self._open[:row, over] = False
+                    self._open[row, k] = not self._covered[row, k]
                 top[k] = height
 
     def exposed(self, row: int) -> np.ndarray:
         """Points (along, up) [m] of a row's upper edge that no later row covers, in order along the board, (n, 2)."""
-        top = self._top[row]
-        bins = np.flatnonzero((top > -math.inf) & ~self._covered[row])
-        points = np.empty((len(bins), 2))
-        points[:, 0], points[:, 1] = (bins + 0.5) * BIN_M, top[bins]
-        return points
+        rows, points = self.all_exposed()
+        return points[rows == row]
+
+    def all_exposed(self) -> tuple[np.ndarray, np.ndarray]:
+        """Row of every exposed point, in order, (n,), and the points of `exposed` of all rows, (n, 2)."""
+        rows, bins = self._open.nonzero()
+        points = np.empty((len(rows), 2))
+        points[:, 0], points[:, 1] = self._middles[bins], self._top[rows, bins]
+        return rows, points

@@ -9,7 +9,7 @@ import math
 import mujoco
 import numpy as np
 
-from ibvs_qp.vectors import cross_product, rotation_rows, turned, turned_back
+from ibvs_qp.bound_function import BoundFunction
 from ibvs_qp.vehicle import VehicleParams
 from sim.board import BoardGeometry
 from sim.clearance import PropellerClearance
@@ -17,6 +17,7 @@ from sim.crash import crash_reason
 from sim.model import build_model
 from sim.mujoco_frames import FLIP, FLIP_QUATERNION
 from sim.readings import PlantReadings
+from sim.readout import PLACES, SIZE, drive, readout
 from sim.scene import Scene
 from sim.streams import stream
 from sim.trim import hover_thrusts, start_pose, true_limits
@@ -28,6 +29,7 @@ TICK_NS = 4_000_000
 
 #: End of a flight whose controller commands something that is no number; physics stands still from then on.
 NOT_FINITE = "non-finite thrust command"
+_CENTRE_VELOCITY, _SAFE = PLACES["centre_velocity"], PLACES["safe"].start
 
 
 class Plant(PlantReadings):
@@ -41,6 +43,7 @@ class Plant(PlantReadings):
         time_ns: Simulated time since the start [ns].
         crashed: Why the flight is over (propeller strike, ground, flip, non-finite state), or None.
         wind: The air; its mean may be changed in flight.
+        truth: What can be read of it now, laid out as `sim.readout.PLACES`; neither to be kept nor written.
 
     Args:
         scene: The truth.
@@ -53,39 +56,50 @@ class Plant(PlantReadings):
         self.model, self._ids = build_model(scene, self.vehicle)
         self.data = mujoco.MjData(self.model)
         self._lower, self._upper = true_limits(scene, self.vehicle)
-        self._lags = scene.vehicle.motor_lag_up_s, scene.vehicle.motor_lag_down_s
-        self._centre, self._tip = np.array(scene.vehicle.com_offset_m), np.array(self.vehicle.tip_position_m)
-        self._centre_list = self._centre.tolist()
         self.clearance = PropellerClearance(BoardGeometry(scene), self.vehicle)
         drag = self.vehicle.linear_drag_n_s_m
         self.wind = Wind(scene.wind, drag, TICK_NS * 1e-9, stream(seed, "wind"))
-        # Moment arm from the bare vehicle's centre of mass, where MuJoCo applies forces, to the whole one's.
-        self._drag_arm = (self._centre - FLIP * self.model.body_ipos[self._ids.vehicle]).tolist()
-        # Views: fetching them from MuJoCo each time costs more than reading them.
-        self._qpos, self._qvel, self._act = self.data.qpos, self.data.qvel, self.data.act
-        self._ctrl, self._lag = self.data.ctrl, self.model.actuator_dynprm[:, 0]
-        self._sensordata, self._applied = self.data.sensordata, self.data.xfrc_applied[self._ids.vehicle]
-        self._rising = np.zeros(self.model.nu, dtype=bool)
         self.time_ns = 0
         self.crashed: str | None = None
+        self._bind()
         self._start(*start_pose(scene, self.vehicle, seed), hover_thrusts(scene, self.vehicle))
+
+    def _bind(self) -> None:
+        """Compiled arithmetic on MuJoCo's own memory: fetching its arrays each time costs more than reading them."""
+        model, data, ids, truth = self.model, self.data, self._ids, self.scene.vehicle
+        self._sensordata, self._act = data.sensordata, data.act
+        self._sensed = np.zeros((STEPS_PER_TICK, model.nsensordata))
+        centre = np.array(truth.com_offset_m)
+        points = np.concatenate((centre, self.vehicle.tip_position_m, [self.clearance.reach]))
+        starts = [place.start for place in (ids.accelerometer, ids.force, ids.torque, ids.contact)]
+        self.truth = np.zeros(SIZE)
+        self._read = BoundFunction(
+            readout(model.nsensordata, *starts, STEPS_PER_TICK),
+            (data.qpos, data.qvel, self._sensed, points),
+            (self.truth,),
+        )
+        self._wanted, self._air, self._lags = np.zeros(model.nu), np.zeros(3), np.zeros(model.nu)
+        self._lag = model.actuator_dynprm[:, 0]
+        lags = np.array((truth.motor_lag_up_s, truth.motor_lag_down_s))
+        # Moment arm from the bare vehicle's centre of mass, where MuJoCo applies forces, to the whole one's.
+        arm = centre - FLIP * model.body_ipos[ids.vehicle]
+        self._drive = BoundFunction(
+            drive(model.nu),
+            (self._wanted, self._lower, self._upper, data.act, lags, self._air, self.truth[PLACES["rotation"]], arm),
+            (data.ctrl, self._lags, data.xfrc_applied[ids.vehicle]),
+        )
 
     def _start(self, position: np.ndarray, yaw: float, thrusts: np.ndarray) -> None:
         self.data.qpos[:3] = FLIP * position
         self.data.qpos[3:7] = FLIP_QUATERNION * (math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw))
         self.data.act[:] = self.data.ctrl[:] = thrusts
         mujoco.mj_forward(self.model, self.data)
-        self._sensors = [self._sensordata.tolist()] * STEPS_PER_TICK
-        self._pushes = [0.0] * STEPS_PER_TICK
+        self._sensed[:] = self._sensordata
         self._refresh()
 
     def _refresh(self) -> None:
-        """Convert the state once per tick; plain numbers, because arrays of three cost ten times their arithmetic."""
-        x, y, z, qw, qx, qy, qz = self._qpos.tolist()
-        vx, vy, vz, wx, wy, wz = self._qvel.tolist()
-        self._position, self._quaternion = (x, -y, -z), (qw, qx, -qy, -qz)
-        self._rotation = rotation_rows(qw, qx, -qy, -qz)
-        self._world_velocity, self._angular_velocity = (vx, -vy, -vz), (wx, -wy, -wz)
+        """Read the state; once per tick."""
+        self._read()
 
     def step(self, thrusts: np.ndarray) -> None:
         """Advance one control tick of 4 ms under constant commanded thrusts.
@@ -96,34 +110,24 @@ class Plant(PlantReadings):
         if self.crashed == NOT_FINITE or not math.isfinite(sum(thrusts.tolist())):
             self.crashed, self.time_ns = self.crashed or NOT_FINITE, self.time_ns + TICK_NS
             return
-        model, data, sensordata, command = self.model, self.data, self._sensordata, self._ctrl
-        np.minimum(np.maximum(thrusts, self._lower, out=command), self._upper, out=command)
-        # Under a constant command a first-order lag never crosses it, so one choice holds for the tick.
-        self._lag[:] = self._lags[1]
-        np.copyto(self._lag, self._lags[0], where=np.greater_equal(command, self._act, out=self._rising))
-        self._apply_air()
-        self._sensors = sensors = []
-        for _ in range(STEPS_PER_TICK):
-            mujoco.mj_step(model, data)
-            sensors.append(sensordata.tolist())
+        model, data, sensed, sensordata, advance = self.model, self.data, self._sensed, self._sensordata, mujoco.mj_step
+        self._wanted[:] = thrusts
+        self._air[:] = self.wind.force(self.truth[_CENTRE_VELOCITY].tolist())
+        self._drive()
+        self._lag[:] = self._lags
+        for step in range(STEPS_PER_TICK):
+            advance(model, data)
+            sensed[step] = sensordata
         self.time_ns += TICK_NS
-        found = self._ids.contact.start
-        self._pushes = [row[found + 1] if row[found] > 0.0 else 0.0 for row in sensors]
-        self._refresh()
-        self.crashed = self.crashed or crash_reason(self._position, self._rotation, self.clearance)
-
-    def _apply_air(self) -> None:
-        """Drag and gusts at the true centre of mass, as force and moment at the bare vehicle's."""
-        force = self.wind.force(self._velocity_of(self._centre_list))
-        moment = turned(self._rotation, cross_product(self._drag_arm, turned_back(self._rotation, force)))
-        (fx, fy, fz), (mx, my, mz) = force, moment
-        self._applied[:] = fx, -fy, -fz, mx, -my, -mz
+        self._read()
+        if self.truth.item(_SAFE) != 1.0 and self.crashed is None:
+            self.crashed = crash_reason(self.position.tolist(), self.rotation.tolist(), self.clearance)
 
     @property
     def thrust_limits(self) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper limits of the real rotors now [N], (n,) each; a fault may set new ones."""
-        return self._lower, self._upper
+        return self._lower.copy(), self._upper.copy()
 
     @thrust_limits.setter
     def thrust_limits(self, limits: tuple[np.ndarray, np.ndarray]) -> None:
-        self._lower, self._upper = (np.array(limit, float) for limit in limits)
+        self._lower[:], self._upper[:] = limits

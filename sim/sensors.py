@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections import deque
 from collections.abc import Sequence
+from typing import Any
 
+import casadi as ca
 import numpy as np
 
-from ibvs_qp.measurement import SensorFrame
+from ibvs_qp.bound_function import BoundFunction
+from ibvs_qp.made import made
+from ibvs_qp.measurement import FeatureFrame, RgbdFrame, SensorFrame
 from ibvs_qp.vehicle import VehicleParams
 from sim.plant import Plant
+from sim.readout import PLACES, SIZE
 from sim.scene import ForceTorqueScene, ImuScene, Scene
-from sim.streams import Normals, stream
+from sim.streams import NormalRows, Normals, stream
 
 NS = 1_000_000_000
+_WRENCH = PLACES["ft_wrench"]
 
 
 class SampleClock:
@@ -37,8 +44,8 @@ class SampleClock:
         return True
 
 
-def multiply(a: Sequence[float], b: Sequence[float]) -> tuple[float, float, float, float]:
-    """Product of two quaternions (w, x, y, z)."""
+def multiply(a: Sequence[Any], b: Sequence[Any]) -> tuple[Any, Any, Any, Any]:
+    """Product of two quaternions (w, x, y, z) of plain numbers or symbols."""
     (aw, ax, ay, az), (bw, bx, by, bz) = a, b
     return (
         aw * bw - ax * bx - ay * by - az * bz,
@@ -66,29 +73,48 @@ class Imu:
     def __init__(self, scene: ImuScene, seed: int) -> None:
         self._clock = SampleClock(scene.rate_hz)
         root = math.sqrt(scene.rate_hz)
-        self._gyro_sigma, self._accel_sigma = scene.gyro_density * root, scene.accel_density * root
-        self._attitude_sigma = math.radians(scene.attitude_noise_deg)
-        self._gyro, self._accel = Normals(stream(seed, "gyro")), Normals(stream(seed, "accelerometer"))
         attitude = stream(seed, "attitude")
         direction, yaw = attitude.uniform(-math.pi, math.pi, 2).tolist()
-        self._attitude = Normals(attitude)
         size = math.radians(scene.attitude_bias_deg)
-        self._tilt = size * math.cos(direction), size * math.sin(direction)
-        self._yaw = math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw)
+        tilt = size * math.cos(direction), size * math.sin(direction)
+        sigmas = math.radians(scene.attitude_noise_deg), scene.gyro_density * root, scene.accel_density * root
+        self._settings = np.array((*sigmas, *tilt, math.cos(0.5 * yaw), math.sin(0.5 * yaw), 1.0))
+        self._noise = NormalRows((attitude, stream(seed, "gyro"), stream(seed, "accelerometer")), 3)
+        self._kick, self._sample = np.zeros(9), np.zeros(10)
+        self._plant: Plant | None = None
         self.attitude = self.angular_velocity = self.specific_force = np.zeros(0)
+
+    def _look_at(self, plant: Plant) -> None:
+        self._plant = plant
+        arguments = plant.truth, self._kick, self._settings
+        self._read = BoundFunction(imu_function(), arguments, (self._sample,))
 
     def sample(self, plant: Plant) -> None:
         """Take a sample if one is due."""
         if not self._clock.due(plant.time_ns):
             return
-        (i, j, k), sigma, (tilt_x, tilt_y) = self._attitude.take(3), self._attitude_sigma, self._tilt
-        turn = small_turn((tilt_x + sigma * i, tilt_y + sigma * j, sigma * k))
-        motion = plant.motion
-        self.attitude = np.array(multiply(self._yaw, multiply(motion[6:10], turn)))
-        (i, j, k), sigma, (x, y, z) = self._gyro.take(3), self._gyro_sigma, motion[10:]
-        self.angular_velocity = np.array((x + sigma * i, y + sigma * j, z + sigma * k))
-        (i, j, k), sigma, (x, y, z) = self._accel.take(3), self._accel_sigma, plant.felt
-        self.specific_force = np.array((x + sigma * i, y + sigma * j, z + sigma * k))
+        if plant is not self._plant:
+            self._look_at(plant)
+        self._kick[:] = self._noise.take()
+        self._read()
+        sample = self._sample.copy()
+        self.attitude, self.angular_velocity, self.specific_force = sample[:4], sample[4:7], sample[7:]
+
+
+@functools.cache
+def imu_function() -> ca.Function:
+    """Function of (readings, nine normal numbers, settings) yielding attitude, angular velocity and specific force."""
+    truth, kick, settings = ca.SX.sym("truth", SIZE), ca.SX.sym("kick", 9), ca.SX.sym("settings", 8)
+    # The one is a symbol, because a literal's division would be drawn into the products: other rounding.
+    spread, gyro, accel, tilt_x, tilt_y, yaw_w, yaw_z, one = (settings[index] for index in range(8))
+    quaternion, rate, felt = (truth[PLACES[name]] for name in ("quaternion", "rate", "felt"))
+    vector = tilt_x + spread * kick[0], tilt_y + spread * kick[1], spread * kick[2]
+    x, y, z = (0.5 * entry for entry in vector)
+    length = ca.sqrt(one + x * x + y * y + z * z)
+    turn = one / length, x / length, y / length, z / length
+    attitude = multiply((yaw_w, 0.0, 0.0, yaw_z), multiply([quaternion[index] for index in range(4)], turn))
+    sample = ca.vertcat(*attitude, rate + gyro * kick[3:6], felt + accel * kick[6:9])
+    return ca.Function("imu", [truth, kick, settings], [ca.densify(sample)])
 
 
 class ForceTorque:
@@ -111,7 +137,7 @@ class ForceTorque:
         """Take a sample if one is due, and deliver those whose delay is over."""
         now = plant.time_ns
         if self._clock.due(now):
-            self._line.append((now, plant.ft_wrench + self.bias + self._sigma * self._noise.take(6)))
+            self._line.append((now, plant.truth[_WRENCH] + self.bias + self._sigma * self._noise.take(6)))
         while self._line and (self._line[0][0] + self._latency_ns <= now or not self.wrench.size):
             self.stamp_ns, self.wrench = self._line.popleft()
 
@@ -129,15 +155,21 @@ class SensorSuite:
         self.vehicle = vehicle or VehicleParams()
         self.imu, self.force_torque = Imu(scene.imu, seed), ForceTorque(scene.force_torque, seed)
 
-    def sample(self, plant: Plant) -> SensorFrame:
-        """What the vehicle delivers at this control tick, without picture or features."""
-        self.imu.sample(plant)
-        self.force_torque.sample(plant)
-        return SensorFrame(
+    def sample(
+        self, plant: Plant, image: RgbdFrame | None = None, features: FeatureFrame | None = None
+    ) -> SensorFrame:
+        """What the vehicle delivers at this control tick, with the picture or the features that have come meanwhile."""
+        imu, force_torque = self.imu, self.force_torque
+        imu.sample(plant)
+        force_torque.sample(plant)
+        return made(
+            SensorFrame,
             stamp_ns=plant.time_ns,
-            attitude=self.imu.attitude,
-            angular_velocity=self.imu.angular_velocity,
-            specific_force=self.imu.specific_force,
-            wrench=self.force_torque.wrench,
-            wrench_stamp_ns=self.force_torque.stamp_ns,
+            attitude=imu.attitude,
+            angular_velocity=imu.angular_velocity,
+            specific_force=imu.specific_force,
+            wrench=force_torque.wrench,
+            wrench_stamp_ns=force_torque.stamp_ns,
+            image=image,
+            features=features,
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zlib
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -34,3 +35,25 @@ class Normals:
             self._block = self._block[start:] + self._generator.standard_normal(max(BLOCK, count)).tolist()
             start, self._next = 0, count
         return self._block[start : self._next]
+
+
+class NormalRows:
+    """Rows of standard normal numbers, a few of each of several generators: the same numbers as one by one.
+
+    Args:
+        generators: Sources; nobody else may draw from them any more.
+        each: Numbers of each generator in a row.
+    """
+
+    def __init__(self, generators: Sequence[np.random.Generator], each: int) -> None:
+        self._generators, self._each = tuple(generators), each
+        self._next, self._rows = 0, np.zeros((0, each * len(self._generators)))
+
+    def take(self) -> np.ndarray:
+        """The next row, not to be written, (numbers,)."""
+        if self._next == len(self._rows):
+            count = BLOCK // self._each
+            blocks = [source.standard_normal(count * self._each) for source in self._generators]
+            self._next, self._rows = 0, np.hstack([block.reshape(count, self._each) for block in blocks])
+        self._next += 1
+        return self._rows[self._next - 1]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -93,19 +94,34 @@ class Trace:
     reason: str = ""
     wall_time_s: float = 0.0
     camera_memory_bytes: int = 0
-    canvas: np.ndarray | None = None
+    canvas: np.ndarray | None = field(default_factory=lambda: None)  # no class attribute: see `draw_later`
     canvas_px_per_m: float = 0.0
     canvas_origin_m: tuple[float, float] = (0.0, 0.0)
     coverage_mask: np.ndarray | None = None
     pictures: list[tuple[float, np.ndarray, str]] = field(default_factory=list)
     preset: str = ""
 
+    def draw_later(self, draw: Callable[[], np.ndarray]) -> None:
+        """Have `canvas` drawn when somebody looks at it: a sweep or a search for gains never does."""
+        self.__dict__.pop("canvas", None)
+        self.__dict__["_draw"] = draw
+
     def __getattr__(self, name: str) -> Any:
         """Arrays read as attributes: ``trace.push_true``."""
-        arrays = self.__dict__.get("arrays", {})
+        own = self.__dict__
+        if name == "canvas" and "_draw" in own:
+            own["canvas"] = own.pop("_draw")()
+            return own["canvas"]
+        arrays = own.get("arrays", {})
         if name in arrays:
             return arrays[name]
         raise AttributeError(name)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Pickled with the canvas drawn."""
+        state = self.__dict__ | {"canvas": self.canvas}
+        state.pop("_draw", None)
+        return state
 
     def save(self, file: str | Path, prefix: str = "") -> None:
         """Write every array to a compressed npz file; load with ``numpy.load``."""

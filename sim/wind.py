@@ -24,7 +24,7 @@ class Wind:
         scene: Mean wind [m/s] (NED) and gust force [N rms per axis].
         linear_drag: Force per airspeed [N s/m].
         tick_s: Time between calls of `force` [s].
-        generator: Source of the gusts; drawn from even without gusts, so that its stream never shifts.
+        generator: Source of the gusts.
     """
 
     def __init__(self, scene: WindScene, linear_drag: float, tick_s: float, generator: np.random.Generator) -> None:
@@ -42,8 +42,11 @@ class Wind:
         Args:
             velocity: Velocity of the centre of mass, world NED [m/s], (3,).
         """
-        (a, b, c), (i, j, k), decay, kick, drag = self._gust, self._normals.take(3), self._decay, self._kick, self._drag
-        self._gust = gx, gy, gz = decay * a + kick * i, decay * b + kick * j, decay * c + kick * k
         mx, my, mz = self.mean.tolist()
         vx, vy, vz = velocity
+        drag = self._drag
+        if self._rms == 0.0:
+            return drag * (mx - vx), drag * (my - vy), drag * (mz - vz)
+        (a, b, c), (i, j, k), decay, kick = self._gust, self._normals.take(3), self._decay, self._kick
+        self._gust = gx, gy, gz = decay * a + kick * i, decay * b + kick * j, decay * c + kick * k
         return gx + drag * (mx - vx), gy + drag * (my - vy), gz + drag * (mz - vz)

@@ -11,7 +11,8 @@ import math
 import numpy as np
 
 from ibvs_qp.config import ControllerConfig
-from ibvs_qp.estimation.delayed import HISTORY, DelayedKalman
+from ibvs_qp.estimation.delayed import DelayedKalman
+from ibvs_qp.estimation.stamps import HISTORY
 from ibvs_qp.estimation.surface import StiffnessEstimator
 from ibvs_qp.frames import GRAVITY
 from ibvs_qp.measurement import Measurement
@@ -100,7 +101,7 @@ class ContactEstimator:
             acceleration = nx * (fx + GRAVITY * gx) + ny * (fy + GRAVITY * gy) + nz * (fz + GRAVITY * gz)
         distance, speed, bias = self._filter.state.tolist()
         state = (distance - dt * (speed + lever), speed + dt * (acceleration - bias), bias)
-        self._filter.remember(measurement.stamp_ns, state)
+        self._filter.remember(measurement.stamp_ns, state, dt)
 
     def _correct_plane(self, plane: tuple[float, float, float, float], stamp: int) -> None:
         a, b, c, d = plane
@@ -118,7 +119,7 @@ class ContactEstimator:
             return
         if not self._believe(stamp, distance):
             return
-        age = min(max(round((self._stamp - stamp) * 1e-9 / self._config.tick_s), 0), min(HISTORY, self._ticks) - 1)
+        age = self._filter.ticks.age(stamp) or 0
         history, start, end = self._normal_history, (self._ticks - age) % HISTORY, self._ticks % HISTORY + 1
         correction = NORMAL_GAIN * (normal - history[start])
         for part in (slice(start, end),) if start < end else (slice(start, None), slice(0, end)):

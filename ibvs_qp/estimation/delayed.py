@@ -6,10 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-#: Ticks of history kept; at 250 Hz half a second, far beyond any camera's latency.
-HISTORY = 128
+from ibvs_qp.estimation.stamps import HISTORY, StampRing
+
 #: Innovations beyond this many standard deviations are refused.
 GATE = 6.0
+#: A tick that differs from the nominal one by more than this is counted as it was [s].
+UNEVEN_S = 1e-9
 #: Rows (1, j, j (j - 1) / 2): what a correction, its first and its second integral have become j ticks later.
 _PATHS = np.array([(1.0, j, 0.5 * j * (j - 1.0)) for j in range(HISTORY)])
 
@@ -17,6 +19,7 @@ _PATHS = np.array([(1.0, j, 0.5 * j * (j - 1.0)) for j in range(HISTORY)])
 class DelayedKalman:
     r"""Integrator chain :math:`\dot x = G x + g(t)` with :math:`G^3 = 0`, corrected at past stamps.
 
+    The tick that a stamp belongs to is found by time, and where ticks differ in length their own lengths count.
     Because G is nilpotent, a correction dx at the capture time reaches j ticks later as
     :math:`dx + j h G dx + \tfrac12 j (j-1) h^2 G^2 dx`: exact, and one small vector product for the whole history,
     instead of replaying the inputs (Larsen et al., 1998, on fusing delayed measurements). The covariance lives
@@ -36,6 +39,7 @@ class DelayedKalman:
         self.noise = np.array(noise, float)
         self.initial_std = np.array(initial_std, float)
         self.tick = tick_s
+        self.ticks = StampRing(tick_s)
         self.reset()
 
     def reset(self) -> None:
@@ -43,25 +47,27 @@ class DelayedKalman:
         size = len(self.noise)
         self.covariance = np.diag(self.initial_std**2)
         self._history = np.zeros((HISTORY, size))
-        self._stamps = [-1] * HISTORY
-        self._now = 0
+        self.ticks.reset()
+        self._lengths = [self.tick] * HISTORY
+        self._uneven = 0
         self._covariance_stamp = -1
 
     @property
     def state(self) -> np.ndarray:
         """The state now, (n,): the newest entry of the history itself."""
-        return self._history[self._now % HISTORY]
+        return self._history[self.ticks.now % HISTORY]
 
     def predict(self, stamp_ns: int, increment: np.ndarray, dt: float) -> None:
         """Advance the state by one tick: x += dt G x + increment, and remember it."""
-        self.remember(stamp_ns, self.state + dt * (self.chain @ self.state) + increment)
+        self.remember(stamp_ns, self.state + dt * (self.chain @ self.state) + increment, dt)
 
-    def remember(self, stamp_ns: int, state: Sequence[float] | np.ndarray) -> None:
-        """Take a state that was advanced by one tick elsewhere."""
-        self._now += 1
-        slot = self._now % HISTORY
+    def remember(self, stamp_ns: int, state: Sequence[float] | np.ndarray, dt: float | None = None) -> None:
+        """Take a state that was advanced by one tick elsewhere; by ``dt`` [s], None for the nominal tick."""
+        slot = self.ticks.add(stamp_ns)
         self._history[slot] = state
-        self._stamps[slot] = stamp_ns
+        self._lengths[slot] = self.tick if dt is None else dt
+        if dt is not None and abs(dt - self.tick) > UNEVEN_S:
+            self._uneven = self.ticks.now
 
     def set_entry(self, index: int, value: float, std: float) -> None:
         """Set one state entry now and in the past, uncorrelated with the rest (a new line, a first distance)."""
@@ -87,15 +93,8 @@ class DelayedKalman:
 
     def at(self, stamp_ns: int) -> np.ndarray | None:
         """State remembered for a stamp (the nearest tick), None if it is not in the history."""
-        age = self._age(stamp_ns)
+        age = self.ticks.age(stamp_ns)
         return None if age is None else self._past(age)
-
-    def _age(self, stamp_ns: int) -> int | None:
-        newest = self._stamps[self._now % HISTORY]
-        age = round((newest - stamp_ns) * 1e-9 / self.tick)
-        if newest < 0 or age < -1 or age >= min(HISTORY, self._now):
-            return None
-        return max(0, age)
 
     def correct(
         self, stamp_ns: int, rows: np.ndarray, values: np.ndarray, covariance: np.ndarray, gate: float = GATE
@@ -163,11 +162,11 @@ class DelayedKalman:
         return True
 
     def _past(self, age: int) -> np.ndarray:
-        return self._history[(self._now - age) % HISTORY]
+        return self._history[self.ticks.slot(age)]
 
     def _go_to(self, stamp_ns: int) -> int | None:
         """Bring the covariance to a stamp; its age in ticks, None if it is forgotten."""
-        age = self._age(stamp_ns)
+        age = self.ticks.age(stamp_ns)
         if age is None:
             return None
         if self._covariance_stamp >= 0:
@@ -206,13 +205,22 @@ class DelayedKalman:
     def _apply(self, correction: np.ndarray, age: int) -> None:
         """Add a correction at a past tick and what has become of it since."""
         first = self.chain @ correction * self.tick
-        path = _PATHS[: age + 1] @ np.array((correction, first, self.chain @ first * self.tick))
-        start, end = (self._now - age) % HISTORY, self._now % HISTORY + 1
+        second = self.chain @ first * self.tick
+        path = self._paths(age) @ np.array((correction, first, second))
+        start, end = self.ticks.slot(age), self.ticks.slot(0) + 1
         if start < end:
             self._history[start:end] += path
         else:
             self._history[start:] += path[: HISTORY - start]
             self._history[:end] += path[HISTORY - start :]
+
+    def _paths(self, age: int) -> np.ndarray:
+        """`_PATHS` of the last ticks, (age + 1, 3), in units of the nominal tick where they had other lengths."""
+        if self.ticks.now - age >= self._uneven:
+            return _PATHS[: age + 1]
+        lengths = np.array([self._lengths[self.ticks.slot(back)] for back in range(age - 1, -1, -1)]) / self.tick
+        once = np.concatenate(([0.0], np.cumsum(lengths)))
+        return np.column_stack((np.ones(age + 1), once, np.concatenate(([0.0], np.cumsum(lengths * once[:-1])))))
 
 
 def _diagonal(matrix: np.ndarray) -> np.ndarray:

@@ -12,6 +12,7 @@ from ibvs_qp.estimation.config import EstimationConfig
 from ibvs_qp.estimation.delayed import DelayedKalman
 from ibvs_qp.estimation.wall_lines import WallAxes, image_line, wall_line
 from ibvs_qp.frames import GRAVITY
+from ibvs_qp.made import made
 from ibvs_qp.measurement import FeatureFrame, LineFeature
 from ibvs_qp.vectors import cross_product
 
@@ -128,7 +129,7 @@ class WallMotion:
         for line in self.lines.values():
             c, s = line.rates
             state[_LINES + line.slot] += c * right + s * down
-        self._filter.remember(stamp_ns, state)
+        self._filter.remember(stamp_ns, state, dt)
         self.state, self._stamp = state, stamp_ns
         self._refresh(stamp_ns)
 
@@ -237,7 +238,8 @@ class WallMotion:
         rho, theta, scale = image_line(line.offset, line.angle, axes, self._tip_from_camera, foot_distance)
         slot = _LINES + line.slot
         variance = max(self._filter.covariance.item(slot, slot), 1e-10) / (scale * scale)
-        return LineFeature(
+        return made(
+            LineFeature,
             rho=rho,
             theta=theta,
             covariance=np.array(((variance, 0.0), (0.0, line.theta_variance))),
@@ -245,6 +247,7 @@ class WallMotion:
             weight=line.weight,
             stamp_ns=stamp_ns,
             track_id=line.track_id,
+            segment=None,
             surface_side=line.surface_side,
             kind=line.kind,
         )

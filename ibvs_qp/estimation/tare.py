@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from ibvs_qp.estimation.config import EstimationConfig
-from ibvs_qp.frames import cross
 from ibvs_qp.vectors import cross_product
 from ibvs_qp.vehicle import VehicleParams
 
@@ -22,13 +22,13 @@ class WrenchTare:
     def __init__(self, vehicle: VehicleParams, config: EstimationConfig | None = None) -> None:
         self._config = config or EstimationConfig()
         self._mass = vehicle.tool_mass_kg
-        self._sensor = np.array(vehicle.force_torque_position_m)
-        self._lever = (np.array(vehicle.tool_position_m) - self._sensor).tolist()
+        self._sensor = [float(entry) for entry in vehicle.force_torque_position_m]
+        self._lever = np.subtract(vehicle.tool_position_m, self._sensor).tolist()
         self.reset()
 
     def reset(self) -> None:
         """Forget the bias."""
-        self._bias, self._time, self._stamp = np.zeros(6), 0.0, -1
+        self._bias, self._time, self._stamp = [0.0] * 6, 0.0, -1
         self._wrench = np.zeros(6)
         self._force = (0.0, 0.0, -9.81)
 
@@ -49,18 +49,23 @@ class WrenchTare:
         # The accelerometer is noisier than the force sensor needs; average it about as long as a force sample lasts.
         (x, y, z), (fx, fy, fz) = self._force, specific_force
         self._force = x + 0.3 * (fx - x), y + 0.3 * (fy - y), z + 0.3 * (fz - z)
-        if stamp_ns <= self._stamp or not np.isfinite(raw).all():
+        if stamp_ns <= self._stamp:
+            return self._wrench
+        numbers = raw.tolist()
+        if not math.isfinite(sum(numbers)):
             return self._wrench
         dt = 0.01 if self._stamp < 0 else min((stamp_ns - self._stamp) * 1e-9, 0.1)
         self._stamp = stamp_ns
         x, y, z = self._force
         load = self._mass * x, self._mass * y, self._mass * z
-        contact = np.array((*load, *cross_product(self._lever, load))) - raw
+        lever = cross_product(self._lever, load)
+        contact = [own - felt for own, felt in zip((*load, *lever), numbers, strict=True)]
         if free:
             self._time += dt
             span = min(max(self._time, dt), self._config.tare_follow_s)
-            self._bias = self._bias + min(1.0, dt / span) * (contact - self._bias)
-        contact = contact - self._bias
-        contact[3:] += cross(self._sensor, contact[:3])
-        self._wrench = contact
-        return contact
+            share = min(1.0, dt / span)
+            self._bias = [bias + share * (mean - bias) for bias, mean in zip(self._bias, contact, strict=True)]
+        fx, fy, fz, mx, my, mz = [entry - bias for entry, bias in zip(contact, self._bias, strict=True)]
+        ax, ay, az = cross_product(self._sensor, (fx, fy, fz))
+        self._wrench = np.array((fx, fy, fz, mx + ax, my + ay, mz + az))
+        return self._wrench

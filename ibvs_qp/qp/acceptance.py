@@ -9,11 +9,11 @@ import numpy as np
 
 from ibvs_qp.command import Outcome
 from ibvs_qp.config import SolverSettings
+from ibvs_qp.qp.active_set import ActiveSet
 from ibvs_qp.qp.assembly import QpTemplate
 from ibvs_qp.qp.evaluator import Evaluator, ProgramData
 from ibvs_qp.qp.exact_solver import ExactSolver
 from ibvs_qp.qp.osqp_solver import MAX_ITERATIONS, SOLVED, SOLVED_INACCURATE, OsqpSolver, RawSolution
-from ibvs_qp.qp.polish import polished
 
 #: Status values whose iterate means something.
 USABLE = (SOLVED, SOLVED_INACCURATE, MAX_ITERATIONS)
@@ -49,9 +49,16 @@ class QpEngine:
         conflict: Names of the rows that contradict each other, after a solve that found no feasible point.
     """
 
-    def __init__(self, template: QpTemplate, settings: SolverSettings, data: ProgramData | None = None) -> None:
+    def __init__(
+        self,
+        template: QpTemplate,
+        settings: SolverSettings,
+        data: ProgramData | None = None,
+        to_machine_code: bool = False,
+    ) -> None:
         self.template, self.settings, self.data = template, settings, data or Evaluator(template)
         self.osqp = OsqpSolver(template, settings)
+        self.active_set = ActiveSet(template, to_machine_code)
         self.exact = ExactSolver(template)
         self._matrix = template.a_pattern.copy()
         self._rotors = template.model.rotors
@@ -62,15 +69,15 @@ class QpEngine:
     def reset(self) -> None:
         """As after construction."""
         self.osqp.reset()
+        self.active_set.reset()
 
     def solve(self) -> AcceptedSolution | None:
         """Solve the program as its data stands; None when nobody found a solution."""
         data, self.conflict = self.data, ()
         data.evaluate()
-        # A maximum steps over NaN, so the thrusts are asked themselves.
-        unlimited = data.violation[0] <= 0.0 and math.isfinite(data.free.sum())
-        if self.settings.shortcut and unlimited and self.osqp.ready:
-            return self._unlimited()
+        known = self._without_iterating() if self.settings.shortcut and self.osqp.ready else None
+        if known is not None:
+            return known
         raw = self.osqp.solve(data.p, data.q, data.a, data.lower, data.upper)
         if raw is None:
             return None
@@ -94,14 +101,20 @@ class QpEngine:
             return None
         if outcome is Outcome.SOLVED and float(np.abs(raw.y).max()) <= ACTIVE_PRICE:
             return None
-        return polished(self.data, raw.x, raw.y)
+        return self.active_set.solve_near(self.data, raw.x, raw.y)
 
-    def _unlimited(self) -> AcceptedSolution:
-        """No row binds: the least-squares optimum itself, to rounding; nothing is left for iterations to find."""
-        thrusts = self.data.free.copy()
-        return AcceptedSolution(
-            thrusts, np.append(thrusts, self._no_slack), self._no_price, Outcome.SOLVED, 0, 0.0, limited=False
-        )
+    def _without_iterating(self) -> AcceptedSolution | None:
+        """The solution where no row binds, or the rows of the last tick do; nothing is left for iterations to find."""
+        data = self.data
+        # A maximum steps over NaN, so the numbers are asked themselves.
+        if not math.isfinite(data.free.sum() + data.lower.sum() + data.upper.sum()):
+            return None
+        if data.violation[0] <= 0.0:
+            thrusts = data.free.copy()
+            x = np.concatenate((thrusts, self._no_slack))
+            return AcceptedSolution(thrusts, x, self._no_price, Outcome.SOLVED, 0, 0.0, limited=False)
+        exact = self.active_set.solve(data)
+        return None if exact is None else self._accept(*exact, Outcome.SOLVED, 0, 0.0)
 
     def _conflicting_rows(self, certificate: np.ndarray | None) -> tuple[str, ...]:
         """Names of the rows that no point satisfies together: the non-zeros of OSQP's certificate A' v = 0."""

@@ -43,9 +43,20 @@ class AffineRows:
         ja, ju = self._by_acceleration, self._by_thrust
         weighted_a, weighted_u = ja.T @ ca.diag(weights), ju.T @ ca.diag(weights)
         cross = per_acceleration.T @ (weighted_a @ ju)
-        hessian = per_acceleration.T @ (weighted_a @ ja) @ per_acceleration + cross + cross.T + weighted_u @ ju
+        by_acceleration = _symmetric_product(weighted_a, ja) @ per_acceleration
+        hessian = _symmetric_product(per_acceleration.T, by_acceleration) + cross + cross.T + weighted_u @ ju
         offset = self.constant - asked
         return ca.densify(hessian), per_acceleration.T @ (weighted_a @ offset) + weighted_u @ offset
+
+
+def _symmetric_product(left: ca.SX | ca.DM, right: ca.SX) -> ca.SX:
+    """Product that is known to be symmetric: the upper triangle is worked out, the lower one is the same symbols."""
+    size = left.shape[0]
+    upper = ca.SX(size, size)
+    for i in range(size):
+        for j in range(i, size):
+            upper[i, j] = left[i, :] @ right[:, j]
+    return ca.triu2symm(upper)
 
 
 class QpTemplate:

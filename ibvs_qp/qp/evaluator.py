@@ -7,13 +7,16 @@ from collections.abc import Sequence
 import casadi as ca
 import numpy as np
 
+from ibvs_qp.machine_code import machine_code
 from ibvs_qp.qp.assembly import QpTemplate
 
 
 class BufferedFunction:
     """A CasADi function bound to owned contiguous arrays; calling it fills the output arrays in place."""
 
-    def __init__(self, function: ca.Function) -> None:
+    def __init__(self, function: ca.Function, to_machine_code: bool = False) -> None:
+        if to_machine_code:
+            function = machine_code(function)
         self._buffer, self._trigger = function.buffer()
         self.inputs = [np.zeros(function.numel_in(i)) for i in range(function.n_in())]
         self.outputs = [np.zeros(function.numel_out(i)) for i in range(function.n_out())]

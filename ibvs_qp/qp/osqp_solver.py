@@ -73,7 +73,6 @@ class OsqpSolver:
             check_termination=settings.check_interval,
             adaptive_rho_interval=settings.adaptive_rho_interval,
             scaling=settings.scaling,
-            polishing=settings.polishing,
             warm_starting=True,
         )
         self._reset_pending = False

@@ -9,7 +9,7 @@ import numpy as np
 
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.frames import R_BODY_CAMERA, to_camera
-from ibvs_qp.setpoints.sensed import Body, Touch, clamp
+from ibvs_qp.setpoints.sensed import SLOT_INPUTS, Body, Touch, clamp
 from ibvs_qp.setpoints.signals import Signals
 from ibvs_qp.setpoints.wall import Wall
 
@@ -21,8 +21,6 @@ RATE_FILTER = 0.08
 ERROR_BOUND = 0.10
 #: The wall is never taken to be nearer to the camera than this [m].
 LEAST_DEPTH = 0.05
-#: Entries of a slot's input: present, rho, theta, its reference's rho and theta, weight, variance of rho.
-SLOT_INPUTS = 7
 #: Entries of a slot's output "line_k_terms", in this order.
 LINE_TERMS = "error error_rate angle_error angle_rate integral weight rho_error rho_rate".split()
 

@@ -14,7 +14,7 @@ from ibvs_qp.setpoints.in_plane import motion_in_plane
 from ibvs_qp.setpoints.push import push_force, standoff_force
 from ibvs_qp.setpoints.reach import push_reach
 from ibvs_qp.setpoints.rotors import rotor_terms
-from ibvs_qp.setpoints.sensed import Body, Touch, Wish
+from ibvs_qp.setpoints.sensed import Body, Touch, Wish, packed_inputs
 from ibvs_qp.setpoints.signals import Signals
 from ibvs_qp.setpoints.wall import wall_axes, wanted_turn
 
@@ -26,6 +26,7 @@ def setpoint_model(config: ControllerConfig) -> Signals:
     wrench and what the contact will put on the vehicle; friction, reach, forces along n, lines and velocities follow.
     """
     signals, vehicle = Signals(), config.vehicle
+    packed_inputs(signals, config.line_slots)
     effectiveness = control_effectiveness(vehicle.geometry)
     body, touch, wish = Body.of(signals), Touch.of(signals), Wish.of(signals)
     wall = wall_axes(signals, body, touch)

@@ -8,6 +8,26 @@ import casadi as ca
 
 from ibvs_qp.setpoints.signals import Signals
 
+#: Inputs that come as arrays, in the order in which a tick is packed.
+ARRAYS = {"attitude": 4, "angular_velocity": 3, "contact_wrench": 6, "specific_force": 3, "velocity": 3, "normal": 3}
+#: Entries of the input "touch", in this order.
+TOUCH = ("known", "distance", "rate", "push", "noise", "touching", "ramp", "stiffness", "stiffness_known")
+#: Entries of a line slot's input: present, rho, theta, its reference's rho and theta, weight, variance of rho.
+SLOT_INPUTS = 7
+
+
+def packed_inputs(signals: Signals, line_slots: int) -> None:
+    """Ask for everything that is packed every tick, arrays first, then single numbers: two blocks side by side."""
+    for name, size in ARRAYS.items():
+        signals.input(name, size)
+    for name in ("dt", "felt", "moving", "contact_weight"):
+        signals.input(name)
+    signals.input("touch", len(TOUCH))
+    signals.input("reference", 5)
+    signals.input("vertical", line_slots)
+    for slot in range(line_slots):
+        signals.input(f"line_{slot}", SLOT_INPUTS)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Body:
@@ -45,10 +65,6 @@ class Body:
             velocity=signals.input("velocity", 3),
             moving=signals.input("moving"),
         )
-
-
-#: Entries of the input "touch", in this order.
-TOUCH = ("known", "distance", "rate", "push", "noise", "touching", "ramp", "stiffness", "stiffness_known")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,11 +11,12 @@ from ibvs_qp.estimation.contact import ContactEstimator
 from ibvs_qp.frames import camera_twist_matrix, down_in_body
 from ibvs_qp.hold import hold_thrusts
 from ibvs_qp.limits.thrust import thrust_window
-from ibvs_qp.measurement import HORIZONTAL, VERTICAL, Measurement, Reference
+from ibvs_qp.measurement import Measurement, Reference
 from ibvs_qp.qp.assembly import QpTemplate
 from ibvs_qp.setpoints.lines import LINE_TERMS
 from ibvs_qp.setpoints.model import setpoint_model
-from ibvs_qp.setpoints.pairing import LinePairing, LineTerm
+from ibvs_qp.setpoints.packing import TickInputs
+from ibvs_qp.setpoints.pairing import LineTerm
 from ibvs_qp.setpoints.program import program_parameters
 from ibvs_qp.setpoints.reach import UNBOUNDED
 from ibvs_qp.setpoints.signals import Signals
@@ -25,8 +26,6 @@ from ibvs_qp.setpoints.tick_function import TickFunction
 LONGEST_TICK = 0.02
 #: Thrust step that stands for "no rate limit" before the first command [N].
 ANY_STEP = 1e6
-#: Distance given to the equations while the wall is unknown [m].
-FAR_AWAY = 1e3
 
 
 def _number(name: str, index: int, text: str) -> property:
@@ -50,8 +49,9 @@ class Setpoints:
         self.inverse = np.linalg.pinv(self.effectiveness)
         self.contact = ContactEstimator(config)
         signals = setpoint_model(config)
-        self.tick = TickFunction(signals, _program(signals, config, template) if template else ())
-        self._pairing = LinePairing(config.line_slots)
+        program = _program(signals, config, template) if template else ()
+        self.tick = TickFunction(signals, program, config.machine_code)
+        self._inputs = TickInputs(self.tick, config.line_slots)
         self._twist = camera_twist_matrix(np.array(vehicle.camera_position_m))
         self._values, out = self.tick.inputs, self.tick.outputs
         self.normal, self.right, self.down = out["normal"], out["axis_right"], out["axis_down"]
@@ -62,22 +62,20 @@ class Setpoints:
             out["thrust_upper"],
         )
         self._values["thrust_floor"][:], self._values["thrust_ceiling"][:] = vehicle.thrust_min, vehicle.thrust_max
-        self._lines_in = [self._values[f"line_{slot}"] for slot in range(config.line_slots)]
         self.reset()
 
     def reset(self) -> None:
         """As before the first measurement."""
         self.contact.reset()
         self.tick.reset()
-        self._pairing.reset()
-        self._stamp, self._present = -1, []
+        self._inputs.reset()
+        self._stamp = -1
         values = self._values
         values["commanded"][0] = values["given_up"][0] = values["contact_weight"][0] = 0.0
         values["thrust_change"][:] = 0.0
         values["thrust_step"][0] = ANY_STEP
-        values["vertical"][:] = 0.0
-        for place in self._lines_in:
-            place[:] = 0.0
+        values["thrust_low"][:], values["thrust_high"][:] = values["thrust_floor"], values["thrust_ceiling"]
+        self._limits_given = False
         self.last: np.ndarray | None = None
         self.normal[:], self.right[:], self.down[:] = np.eye(3)
         self.tick.outputs["reach"][0] = UNBOUNDED
@@ -106,61 +104,21 @@ class Setpoints:
         dt = config.tick_s if self._stamp < 0 else min(max((stamp - self._stamp) * 1e-9, 0.0), LONGEST_TICK)
         self._stamp = stamp
         self.contact.update(measurement, down_in_body(measurement.attitude))
-        self._pack_body(measurement, dt)
-        self._pack_contact(reference)
-        self._pack_lines(measurement, reference)
+        self._inputs.write(measurement, reference, self.contact, dt)
         if self.last is None:
             values["thrust_last"][:] = hold_thrusts(config, measurement)
-        floor, ceiling = values["thrust_floor"], values["thrust_ceiling"]
         low, high = measurement.thrust_min, measurement.thrust_max
-        values["thrust_low"][:] = floor if low is None else np.maximum(low, floor)
-        values["thrust_high"][:] = ceiling if high is None else np.minimum(high, ceiling)
-        if low is not None or high is not None:
-            values["thrust_high"][:] = np.maximum(values["thrust_high"], values["thrust_low"])
+        if low is not None or high is not None or self._limits_given:
+            self._narrow(low, high)
         self.tick()
 
-    def _pack_body(self, measurement: Measurement, dt: float) -> None:
-        values, force, velocity = self._values, measurement.specific_force, measurement.velocity
-        values["dt"][0] = dt
-        values["attitude"][:] = measurement.attitude
-        values["angular_velocity"][:] = measurement.angular_velocity
-        values["contact_wrench"][:] = measurement.contact_wrench
-        values["felt"][0], values["moving"][0] = force is not None, velocity is not None
-        values["specific_force"][:] = 0.0 if force is None else force
-        values["velocity"][:] = 0.0 if velocity is None else velocity
-
-    def _pack_contact(self, reference: Reference) -> None:
-        contact, values = self.contact, self._values
-        stiffness, press = contact.stiffness, reference.contact
-        values["normal"][:] = contact.normal
-        values["touch"][:] = (
-            contact.known,
-            contact.distance if contact.known else FAR_AWAY,
-            contact.rate,
-            contact.push,
-            contact.push_noise,
-            contact.in_contact,
-            contact.ramp,
-            stiffness.value,
-            stiffness.known,
-        )
-        values["contact_weight"][0] = contact.contact_weight if press else 0.0
-        right, down = reference.velocity.tolist()
-        values["reference"][:] = reference.push_force, reference.standoff, right, down, press
-
-    def _pack_lines(self, measurement: Measurement, reference: Reference) -> None:
-        for slot in self._pairing.assign(reference.lines):
-            for kind in ("integral", "last"):
-                self.tick.states[f"line_{slot}_{kind}"][:] = 0.0
-        for slot, _ in self._present:
-            self._lines_in[slot][0] = 0.0
-        self._present = []
-        if not self.contact.known:
-            return
-        for slot, entry, vertical in self._pairing.pairs(measurement.lines, reference.lines):
-            self._lines_in[slot][:] = entry
-            self._values["vertical"][slot] = vertical
-            self._present.append((slot, VERTICAL if vertical else HORIZONTAL))
+    def _narrow(self, low: np.ndarray | None, high: np.ndarray | None) -> None:
+        """Limits that a measurement brings hold within those of the vehicle."""
+        values, self._limits_given = self._values, low is not None or high is not None
+        floor, ceiling = values["thrust_floor"], values["thrust_ceiling"]
+        lowest = floor if low is None else np.maximum(low, floor)
+        values["thrust_low"][:] = lowest
+        values["thrust_high"][:] = np.maximum(ceiling if high is None else np.minimum(high, ceiling), lowest)
 
     def note(self, thrusts: np.ndarray, given_up: float) -> None:
         """Take note of what was commanded and of the largest force or moment given up (anti-windup)."""
@@ -205,7 +163,7 @@ class Setpoints:
         """Terms of the lines that were paired, in the order of their references."""
         out, plane = self.tick.outputs, self.plane
         terms = []
-        for slot, role in self._present:
+        for slot, role in self._inputs.present:
             rho, theta, tip_x, tip_y, *_ = out[f"line_{slot}"].tolist()
             errors = dict(zip(LINE_TERMS, out[f"line_{slot}_terms"].tolist(), strict=True))
             place = {"rho": rho, "theta": theta, "tip_x": tip_x, "tip_y": tip_y}

@@ -17,16 +17,17 @@ class TickFunction:
 
     Attributes:
         inputs, states, outputs: Views by name; write inputs with ``[:] =``, outputs hold after a call.
+        values: All inputs in one column, in the order in which they were asked for.
         extra: Arrays of the additional results, in their order.
     """
 
-    def __init__(self, signals: Signals, extra: Sequence[ca.SX] = ()) -> None:
+    def __init__(self, signals: Signals, extra: Sequence[ca.SX] = (), to_machine_code: bool = False) -> None:
         results = [signals.next_states, stack(signals.outputs), *(ca.densify(result) for result in extra)]
         function = ca.Function("tick", [stack(signals.inputs), stack(signals.states)], ca.cse(results))
-        self._call = BufferedFunction(function)
-        values, self._state = self._call.inputs
+        self._call = BufferedFunction(function, to_machine_code)
+        self.values, self._state = self._call.inputs
         self._next, results_out, *self.extra = self._call.outputs
-        self.inputs = {name: values[place] for name, place in places(signals.inputs).items()}
+        self.inputs = {name: self.values[place] for name, place in places(signals.inputs).items()}
         self.states = {name: self._state[place] for name, place in places(signals.states).items()}
         self.outputs = {name: results_out[place] for name, place in places(signals.outputs).items()}
         self._start = np.concatenate([*signals.starts.values(), np.zeros(0)])

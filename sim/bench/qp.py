@@ -14,6 +14,7 @@ from scipy import sparse
 
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.controller import HybridController
+from ibvs_qp.machine_code import compiler
 from ibvs_qp.qp.exact_solver import ExactSolver
 from sim.bench.stages import stage_medians
 from sim.bench.ticks import Tick, recorded_ticks
@@ -40,25 +41,28 @@ def bench_qp(count: int, seed: int, sample: int, tell: Callable[[str], None]) ->
     tell(f"{count} ticks of closed loops")
     ticks = recorded_ticks(count, seed)
     tell("the controller's step")
-    step, iterations, outcomes = _steps(HybridController(), ticks, "step")
-    tell("OSQP at every tick")
-    config = ControllerConfig()
-    asked = dataclasses.replace(config, solver=dataclasses.replace(config.solver, shortcut=False))
+    config = dataclasses.replace(ControllerConfig(), machine_code=True)
+    step, iterations, outcomes = _steps(HybridController(config), ticks, "step")
     few = ticks[: max(len(ticks) // 5, WARM_UP)]
+    tell("the step without machine code")
+    interpreted, _, _ = _steps(HybridController(), few, "step_interpreted")
+    tell("OSQP at every tick")
+    asked = dataclasses.replace(config, solver=dataclasses.replace(config.solver, shortcut=False))
     every, every_iterations, _ = _steps(HybridController(asked), few, "step_osqp_every_tick")
     tell("rivals")
     rivals, differences = _rivals(ticks, sample)
     stages = stage_medians(asked, few)
-    ratios = {row.name: row.median_us / step.median_us for row in (every, *rivals) if row.times_us}
+    ratios = {row.name: row.median_us / step.median_us for row in (interpreted, every, *rivals) if row.times_us}
     notes = {
         "ticks": len(ticks),
+        "compiler": " ".join(compiler() or ("none",)),
         "rivals_see_every": sample,
         "iterations": _histogram(iterations),
         "iterations_osqp_every_tick": _histogram(every_iterations),
         "outcomes": outcomes,
         "difference_to_exact_n": differences,
     }
-    return Bench(rows=[step, every, *rivals], stages_us=stages, ratios=ratios, notes=notes)
+    return Bench(rows=[step, interpreted, every, *rivals], stages_us=stages, ratios=ratios, notes=notes)
 
 
 def _steps(controller: HybridController, ticks: list[Tick], name: str) -> tuple[Row, list[int], dict[str, int]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from dataclasses import dataclass
 
 import cv2
@@ -89,6 +90,21 @@ def vehicle_layer(
     return VehicleLayer(
         picture=picture, mask=mask, inverse_depth=inverse_depth, holes=_ragged_outline(mask, rng), propellers=propellers
     )
+
+
+#: Masks drawn so far, by all that they depend on; every flight without pictures needs one and takes 30 ms to draw it.
+_masks: dict[Hashable, np.ndarray] = {}
+
+
+def vehicle_mask(
+    scene: Scene, vehicle: VehicleParams, intrinsics: tuple[float, float, float, float]
+) -> np.ndarray:
+    """255 where arm or brush hide the scene, uint8 (H, W), not to be written; arguments as for `vehicle_layer`."""
+    key = scene.camera.height, scene.camera.width, scene.paint.brush_width_m, vehicle, intrinsics
+    if key not in _masks:
+        _masks[key] = vehicle_layer(scene, vehicle, intrinsics, np.random.default_rng(0)).mask
+        _masks[key].flags.writeable = False
+    return _masks[key]
 
 
 def shade_propellers(picture: np.ndarray, propellers: np.ndarray) -> None:

@@ -65,17 +65,18 @@ class Schedule:
     def __init__(self, rate_hz: float, latency_s: float) -> None:
         self._rate_hz, self._latency_ns = rate_hz, round(latency_s * NS_PER_S)
         self._start_ns: int | None = None
-        self._captures = 0
+        self._next_ns = -1
         self._queue: deque[tuple[int, object]] = deque()
 
     def due(self, now_ns: int) -> bool:
         """Whether a capture is due now; counts it. The first call starts the clock and captures."""
         if self._start_ns is None:
-            self._start_ns = now_ns
-        if now_ns < self._start_ns + round(self._captures * NS_PER_S / self._rate_hz):
+            self._start_ns = self._next_ns = now_ns
+        if now_ns < self._next_ns:
             return False
         # Slots that a slow caller missed are lost, as in a camera; their pictures do not pile up.
-        self._captures = math.floor((now_ns - self._start_ns) * self._rate_hz / NS_PER_S + 1e-6) + 1
+        captures = math.floor((now_ns - self._start_ns) * self._rate_hz / NS_PER_S + 1e-6) + 1
+        self._next_ns = self._start_ns + round(captures * NS_PER_S / self._rate_hz)
         return True
 
     def push(self, stamp_ns: int, item: object) -> None:
@@ -91,5 +92,7 @@ class Schedule:
 
     def pop(self, now_ns: int) -> object | None:
         """The newest item that has arrived since the last call, or None."""
+        if not self._queue or self._queue[0][0] > now_ns:
+            return None
         items = self.arrived(now_ns)
         return items[-1] if items else None

@@ -104,6 +104,7 @@ class Paint:
             preset=str(self.preset) if self.preset else None,
             video=not self.no_video,
             camera_process=self.law != "both" and spare_core(),
+            machine_code=True,
             view=self.view,
         )
         laws = ("qp", "paper") if self.law == "both" else (self.law,)

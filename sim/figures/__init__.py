@@ -28,7 +28,7 @@ FIGURES = {
     "board": ("The painted board; dashed: the intended band", draw_board),
 }
 
-__all__ = ["FIGURES", "draw_all"]
+__all__ = ["FIGURES", "draw_all", "draw_board", "draw_force", "draw_image_error", "draw_path"]
 
 
 def draw_all(traces: dict[str, Trace], folder: Path) -> dict[str, tuple[str, Path]]:

@@ -5,6 +5,7 @@ Usage: ``python -m sim.notebook.render`` for all notebooks, or with the stems of
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import subprocess
 import sys
@@ -110,6 +111,8 @@ def chosen(names: list[str]) -> list[Path]:
 def main(names: list[str]) -> int:
     """Render notebooks by their stems, all of them without any."""
     try:
+        if importlib.util.find_spec("marimo") is None:
+            raise ConfigError("notebooks need marimo; install it with pip install -c constraints.txt -e '.[notebooks]'")
         for notebook in chosen(names):
             file = render(notebook)
             print(f"{file.relative_to(NOTEBOOKS.parent)}: {file.stat().st_size / 1e3:.0f} kB")

@@ -1,6 +1,6 @@
 """Notebook 02: every change of a weight, a limit or the scene is flown again and compared."""
 
-from sim.notebook.tuning.bench import TuningBench
+from sim.notebook.tuning.bench import TuningBench, compare_pair
 from sim.notebook.tuning.comparison import changed_text, comparison_table
 from sim.notebook.tuning.controls import control_panel, make_controls
 from sim.notebook.tuning.dashboard import draw_dashboard
@@ -15,6 +15,7 @@ __all__ = [
     "TuningBench",
     "changed_text",
     "command_line",
+    "compare_pair",
     "comparison_table",
     "control_panel",
     "draw_dashboard",

@@ -110,6 +110,18 @@ class TuningBench:
         return now, known
 
 
+def compare_pair(before: dict[str, Any], change: dict[str, Any]) -> Comparison:
+    """One change of the shipped setting beside a further one.
+
+    Args:
+        before: Values of knobs in the flight to compare with.
+        change: Further values, of the flight shown.
+    """
+    bench = TuningBench()
+    bench.base = turned(bench.base, before)
+    return bench.compare(change)
+
+
 @functools.lru_cache(maxsize=KEPT_FLIGHTS)
 def _side_by_side(setting: Setting, analytic: Setting) -> tuple[Trace, Trace]:
     jobs = [joblib.delayed(fly_snippet)(setting), joblib.delayed(fly_snippet)(analytic, "paper")]

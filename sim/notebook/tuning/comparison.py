@@ -90,7 +90,7 @@ def comparison_table(comparison: Comparison) -> str:
     """What changed, and the figures of the present, the last and the analytic flight, as markdown."""
     flights = (comparison.now, comparison.last, comparison.analytic)
     columns = [figures(trace) for trace in flights]
-    lines = ["| | QP now | QP before | analytic law |", "|---|--:|--:|--:|"]
+    lines = ["| | QP now | QP before | analytic law |", "|:--|--:|--:|--:|"]
     for name, (form, _) in FIGURES.items():
         cells = ("–" if math.isnan(column[name]) else form.format(column[name]) for column in columns)
         lines.append(f"| {name} | " + " | ".join(cells) + " |")

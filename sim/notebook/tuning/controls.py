@@ -27,7 +27,7 @@ def _widget(knob: Knob, value: Any) -> Any:
 
 
 def control_panel(controls: Any, *further: Any) -> Any:
-    """The knobs in their groups, one open at a time, at the side of the page.
+    """The knobs at the side of the page: the first group in full, the others to be opened.
 
     Args:
         controls: From `make_controls`.
@@ -35,5 +35,11 @@ def control_panel(controls: Any, *further: Any) -> Any:
     """
     import marimo as mo
 
-    groups = {title: mo.vstack([controls[knob.name] for knob in knobs], gap=0.3) for title, knobs in GROUPS.items()}
-    return mo.sidebar([mo.md("### Settings"), mo.accordion(groups, multiple=True), *further], width="22rem")
+    # The values written beside the sliders need room at the right.
+    groups = {
+        title: mo.vstack([controls[knob.name] for knob in knobs], gap=0.3).style({"padding-right": "1.2rem"})
+        for title, knobs in GROUPS.items()
+    }
+    first, *others = groups
+    folded = mo.accordion({title: groups[title] for title in others}, multiple=True)
+    return mo.sidebar([mo.md(f"### {first}"), groups[first], folded, *further], width="22rem")

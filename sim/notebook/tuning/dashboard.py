@@ -18,7 +18,7 @@ from sim.trace import Trace
 
 #: Size [in] and place of the panels in it; a fixed layout is drawn in half the time of a fitted one.
 SIZE_IN = (11.0, 7.2)
-MARGINS = {"left": 0.055, "right": 0.985, "top": 0.92, "bottom": 0.075, "wspace": 0.24, "hspace": 0.3}
+MARGINS = {"left": 0.055, "right": 0.965, "top": 0.92, "bottom": 0.075, "wspace": 0.24, "hspace": 0.3}
 #: Names and looks of the three flights.
 LOOKS = {
     "analytic": {"color": law_colour("paper"), "linewidth": 0.9},
@@ -29,6 +29,10 @@ NAMES = {"now": "QP now", "last": "QP before", "analytic": "analytic law"}
 #: The first tenths of a second are the vehicle's coming into the hover; scales leave them out [s].
 SETTLING_S = 1.0
 EVERY = 2
+#: Ticks up an axis at most; writing is the dearest part of the drawing.
+TICKS = 5
+#: Room for the time under the second panel at the right, in shares of the figure's height.
+CLOCK_ROOM = 0.03
 #: Places of the axes' labels, in shares of their axes.
 X_LABEL, Y_LABEL = (0.5, -0.17), (-0.075, 0.5)
 
@@ -43,6 +47,8 @@ def draw_dashboard(comparison: Comparison) -> Figure:
     _draw_tilt(grid[2, 0], flights, comparison)
     draw_prices(grid[0, 1], comparison.now, comparison.last)
     _draw_room(grid[1, 1], flights)
+    place = grid[2, 1].get_position()
+    grid[2, 1].set_position((place.x0, place.y0, place.width, place.height - CLOCK_ROOM))
     draw_reach(grid[2, 1], flights, LOOKS)
     end = max(float(trace.t[-1]) for trace in flights.values())
     _set_time(end, [*grid[:, 0]])
@@ -52,6 +58,8 @@ def draw_dashboard(comparison: Comparison) -> Figure:
         axes.xaxis.set_label_coords(*X_LABEL)
         if axes in grid:
             axes.yaxis.set_label_coords(*Y_LABEL)
+        if axes in grid and axes is not grid[0, 1]:
+            axes.locator_params(axis="y", nbins=TICKS)
     handles, labels = grid[0, 0].get_legend_handles_labels()
     order = [labels.index(name) for name in (*NAMES.values(), "reference")]
     figure.legend([handles[i] for i in order], [labels[i] for i in order], loc="upper left", ncols=4,
@@ -61,11 +69,12 @@ def draw_dashboard(comparison: Comparison) -> Figure:
 
 def _set_time(end: float, column: list[Axes]) -> None:
     """Whole seconds for all axes of a column, written under the lowest."""
-    seconds = range(math.floor(end) + 1)
+    seconds = list(range(math.floor(end) + 1))
     for axes in column:
         axes.set_xlim(0.0, end)
         lowest = axes is column[-1]
-        axes.set_xticks(seconds, [str(second) for second in seconds] if lowest else [""] * len(seconds))
+        axes.set_xticks(seconds)
+        axes.tick_params(labelbottom=lowest)
     column[-1].set_xlabel("time [s]")
 
 

@@ -105,6 +105,7 @@ GROUPS: dict[str, tuple[Knob, ...]] = {
         Knob(label="price of the ceiling", paths=(_LIMITS + "push_price",), low=0.1, high=1e5),
         Knob(label="approach barrier", paths=(_LIMITS + "approach_barrier",)),
         Knob(label="reach check", paths=("pilot.controller.reach_check",)),
+        Knob(label="ramp after touch", paths=("pilot.controller.touch_ramp",)),
     ),
     "Weights": (
         _weight("line", "1/s²", 0.1, 1e4),

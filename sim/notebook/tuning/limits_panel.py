@@ -47,7 +47,7 @@ def draw_prices(axes: Axes, now: Trace, last: Trace) -> None:
                 image = axes.imshow(strip, extent=extent, aspect="auto", norm=norm, cmap="viridis_r",
                                     interpolation="nearest")  # fmt: skip
     axes.set_ylim(len(names) - 0.5, -0.5)
-    axes.set_yticks(range(len(names)), [""] * len(names))
+    axes.set_yticks([])
     for place, name in enumerate(names):
         share = float(now.active[:, now.limits.index(name)].mean()) if name in now.limits else 0.0
         axes.text(0.005, place - 0.1, f"{name.replace('_', ' ')}  {100 * share:.1f} %", va="center", fontsize=6.8,

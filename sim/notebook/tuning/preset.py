@@ -6,6 +6,7 @@ import shlex
 from pathlib import Path
 
 from ibvs_qp.errors import ConfigError
+from ibvs_qp.loop_margin import require_margin
 from ibvs_qp.pilot import PilotConfig
 from ibvs_qp.settings import dump_toml
 from sim.notebook.tuning.snippet import Setting
@@ -31,19 +32,19 @@ def save_setting(setting: Setting, preset: str | Path) -> tuple[Path, Path]:
         Both files.
 
     Raises:
-        ConfigError: When the file cannot be written, or the preset would be refused when it is read.
+        ConfigError: When the file cannot be written, or the contact would ring with this preset.
     """
     file = Path(preset).expanduser()
     if file.suffix != ".toml":
         raise ConfigError(f"{file} is refused: the name of a preset ends in .toml")
-    scene = scene_file(file)
+    scene, controller = scene_file(file), setting.pilot.controller
+    require_margin(controller, controller.brush)
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(setting.pilot.to_toml(), encoding="utf-8")
         scene.write_text(dump_toml(setting.scene), encoding="utf-8")
     except OSError as error:
         raise ConfigError(f"cannot write {file}: {error.strerror or error}") from None
-    PilotConfig.from_toml(file)
     return file, scene
 
 

@@ -85,8 +85,10 @@ def fly_snippet(setting: Setting, law: str = "qp") -> Trace:
 
 @functools.lru_cache(maxsize=KEPT_FLIGHTS)
 def _fly(pilot: PilotConfig, scene: Scene, seed: int, law: str, job: SnippetJob) -> Trace:
-    options = FlightOptions(law=law, seed=seed, features="geometric", video=False, board=False)
-    return fly(scene, options, config=pilot_config(scene, options, pilot), job=job)
+    options = FlightOptions(law=law, seed=seed, features="geometric", video=False)
+    trace = fly(scene, options, config=pilot_config(scene, options, pilot), job=job)
+    trace.canvas = None  # nobody looks at the board here, and a trace that changes the process would draw it
+    return trace
 
 
 def analytic_setting(setting: Setting, own_gains: bool = True) -> Setting:
