@@ -72,7 +72,7 @@ class WallTask:
 @functools.lru_cache(maxsize=_KEPT)
 def fly_task(task: WallTask, law: str) -> Trace:
     """Fly a task under a law with geometric features; a task flown before is remembered."""
-    options = FlightOptions(law=law, seed=task.seed, features="geometric", video=False, board=False)
+    options = FlightOptions(law=law, seed=task.seed, features="geometric", video=False)
     return fly(task.scene, options, config=pilot_config(task.scene, options, task.pilot(law)), job=task.job)
 
 
