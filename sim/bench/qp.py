@@ -101,8 +101,7 @@ def _rivals(ticks: list[Tick], sample: int) -> tuple[list[Row], dict[str, float]
         for name, row in rows.items():
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
-                dense = name not in qpsolvers.sparse_solvers
-                row.measure(lambda: qpsolvers.solve_problem(problem(dense), solver=name))  # noqa: B023 - called at once
+                row.measure(lambda: qpsolvers.solve_problem(problem(), solver=name))  # noqa: B023 - called at once
         found = exact_row.measure(lambda: exact.solve(data.p, data.q, data.a, data.lower, data.upper))
         if found is not None:
             difference.append(float(np.abs(found[0][: len(command.thrusts)] - command.thrusts).max()))
@@ -112,14 +111,12 @@ def _rivals(ticks: list[Tick], sample: int) -> tuple[list[Row], dict[str, float]
 
 def _problem(
     p: sparse.csc_matrix, a: sparse.csc_matrix, q: np.ndarray, lower: np.ndarray, upper: np.ndarray
-) -> Callable[[bool], Any]:
-    """Makes the problem as a user of qpsolvers would: full P, two-sided rows stacked, dense for who knows no other."""
+) -> Callable[[], Any]:
+    """Makes the problem as a user of qpsolvers would: full P, two-sided rows stacked."""
 
-    def build(dense: bool) -> Any:
+    def build() -> Any:
         full: Any = sparse.csc_matrix(p + sparse.triu(p, 1).T)
         stacked: Any = sparse.csc_matrix(sparse.vstack((a, -a)))
-        if dense:
-            full, stacked = full.toarray(), stacked.toarray()
         return qpsolvers.Problem(full, q, stacked, np.concatenate((upper, -lower)))
 
     return build
