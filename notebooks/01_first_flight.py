@@ -66,8 +66,9 @@ def _():
     The board's face is found in the depth picture as a plane $1/Z = a x + b y + c$ over normalised image coordinates;
     its edges are found in the colour picture where the plane ends or the paint begins. A line is $x\cos\theta +
     y\sin\theta = \rho$; it moves with the camera's twist by the interaction matrix $[\dot\rho,\,\dot\theta]^\top =
-    L(\rho,\theta,\text{plane})\,[v,\,\omega]^\top$. The detections are drawn into the pictures below. The dark bar is
-    the arm, which hides its own tip's surroundings.
+    L(\rho,\theta,\text{plane})\,[v,\,\omega]^\top$. The detections are drawn into the pictures below: tinted is what
+    belongs to the plane, beside each line stand its track, what it borders on and its confidence. The dark bar is the
+    arm, the orange disc the brush; what they hide must be known otherwise.
     """)
     return
 

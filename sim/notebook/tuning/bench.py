@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import joblib
 
@@ -127,4 +127,4 @@ def _side_by_side(setting: Setting, analytic: Setting) -> tuple[Trace, Trace]:
     jobs = [joblib.delayed(fly_snippet)(setting), joblib.delayed(fly_snippet)(analytic, "paper")]
     with joblib.parallel_config("loky", n_jobs=WORKERS, inner_max_num_threads=1, idle_worker_timeout=IDLE_S):
         now, paper = joblib.Parallel()(jobs)
-    return now, paper
+    return cast(Trace, now), cast(Trace, paper)

@@ -18,7 +18,7 @@ from sim.trace import Trace
 
 #: Size [in] and place of the panels in it; a fixed layout is drawn in half the time of a fitted one.
 SIZE_IN = (11.0, 7.2)
-MARGINS = {"left": 0.055, "right": 0.965, "top": 0.92, "bottom": 0.075, "wspace": 0.24, "hspace": 0.3}
+MARGINS = {"left": 0.055, "right": 0.945, "top": 0.92, "bottom": 0.075, "wspace": 0.24, "hspace": 0.3}
 #: Names and looks of the three flights.
 LOOKS = {
     "analytic": {"color": law_colour("paper"), "linewidth": 0.9},
@@ -39,7 +39,8 @@ X_LABEL, Y_LABEL = (0.5, -0.17), (-0.075, 0.5)
 
 def draw_dashboard(comparison: Comparison) -> Figure:
     """Push, image error, tilt; limits with their prices, room to the limits, and the attainable forces."""
-    figure = Figure(figsize=SIZE_IN, layout="none")
+    figure = Figure(figsize=SIZE_IN)
+    figure.set_layout_engine("none")
     grid = figure.subplots(3, 2, gridspec_kw={**MARGINS, "width_ratios": [1.0, 1.0], "height_ratios": [1.0, 1.0, 1.15]})
     flights = {name: getattr(comparison, name) for name in LOOKS}
     _draw_push(grid[0, 0], flights)
@@ -109,8 +110,8 @@ def _draw_tilt(axes: Axes, flights: dict[str, Trace], comparison: Comparison) ->
     greatest = max(float(tilts[name][trace.t > SETTLING_S].max(initial=0.2)) for name, trace in flights.items())
     if limits.tilt_barrier and limits.tilt_deg < 1.5 * greatest:
         axes.axhline(limits.tilt_deg, color="#b3261e", linewidth=0.9, linestyle=(0, (5, 2)))
-        axes.annotate("bound on roll and on pitch", (0.995, limits.tilt_deg), xycoords=("axes fraction", "data"),
-                      ha="right", va="bottom", fontsize=7, color="#b3261e")  # fmt: skip
+        axes.annotate("bound on roll and on pitch", (0.01, limits.tilt_deg), xycoords=("axes fraction", "data"),
+                      ha="left", va="bottom", fontsize=7, color="#b3261e")  # fmt: skip
     axes.set(title="tilt of the vehicle", ylabel="tilt [°]", ylim=(0.0, 1.15 * greatest))
 
 

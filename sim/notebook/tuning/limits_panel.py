@@ -55,6 +55,8 @@ def draw_prices(axes: Axes, now: Trace, last: Trace) -> None:
                   path_effects=[withStroke(linewidth=2.0, foreground="white")])  # fmt: skip
     if image is not None and axes.figure is not None:
         decades = range(math.ceil(norm.vmin or 0.0), math.floor(norm.vmax or 0.0) + 1)
-        bar = axes.figure.colorbar(image, ax=axes, fraction=0.035, pad=0.015, ticks=list(decades))
+        place = axes.get_position()
+        beside = axes.figure.add_axes((place.x1 + 0.004, place.y0, 0.008, place.height))  # keeps the axes' width
+        bar = axes.figure.colorbar(image, cax=beside, ticks=list(decades))
         bar.ax.set_yticklabels([f"$10^{{{decade}}}$" for decade in decades], fontsize=6.5)
         bar.set_label("|d cost / d bound|", fontsize=7)
