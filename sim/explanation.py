@@ -22,10 +22,10 @@ _REGULAR = ("effort", "smooth")
 _AXES = ("front", "right", "down", "roll", "pitch", "yaw")
 
 
-def explain_tick(trace: Trace, tick: int) -> tuple[PilotConfig, Explanation | None]:
-    """Configuration flown and the explanation of one tick of a QP flight."""
+def explain_tick(trace: Trace, tick: int, solver: str | None = None) -> tuple[PilotConfig, Explanation | None]:
+    """Configuration flown and the explanation of one tick of a QP flight, by the exact solver or a named one."""
     config = from_dict(PilotConfig, tomllib.loads(trace.preset))
-    replay = TickReplay(program_template(config.controller))
+    replay = TickReplay(program_template(config.controller), solver)
     return config, replay.explain(trace.arrays["program"][tick].astype(float))
 
 

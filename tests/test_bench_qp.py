@@ -22,7 +22,13 @@ def test_bench_qp_as_json(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["bench", "qp", "--ticks", "1200", "--sample", "60", "--json"]) == 0
     table = json.loads(capsys.readouterr().out)
     rows = {row["name"]: row for row in table["rows"]}
-    assert table["schema"] == 1 and {"step", "step_osqp_every_tick", "qpsolvers_osqp", "casadi_daqp"} <= set(rows)
+    assert table["schema"] == 1 and {
+        "step",
+        "step_interpreted",
+        "step_osqp_every_tick",
+        "qpsolvers_osqp",
+        "casadi_daqp",
+    } <= set(rows)
     assert set(rows["step"]) == {"name", "size", "p50_us", "p90_us", "p99_us", "p999_us", "max_us", "misses"}
     assert set(table["stages_us"]) == {"pack", "evaluate", "update", "solve", "unpack"}
     assert table["ratios"]["qpsolvers_osqp"] > 1.0

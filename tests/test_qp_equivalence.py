@@ -18,10 +18,12 @@ from ibvs_qp.analytic import analytic_thrusts
 from ibvs_qp.command import Command, Outcome
 from ibvs_qp.config import ControllerConfig, SolverSettings, Weights
 from ibvs_qp.controller import HybridController
+from ibvs_qp.errors import IbvsQpError
 from ibvs_qp.frames import R_BODY_CAMERA, camera_twist_matrix
 from ibvs_qp.limits.thrust import LEAST_GAP, thrust_window
 from ibvs_qp.measurement import Reference
 from ibvs_qp.qp.acceptance import AcceptedSolution
+from ibvs_qp.qp.offline import installed_solvers, solve_offline
 from ibvs_qp.vision.interaction import endpoint_line_row, line_interaction_matrix
 
 LAST = np.array([11.0, 12.0, 10.5, 11.5, 12.5, 11.2])
@@ -264,6 +266,22 @@ def test_a_step_without_iterations_is_the_step_with_osqp() -> None:
             # OSQP's tolerance, carried on from tick to tick by what the rows remember.
             np.testing.assert_allclose(one.thrusts, two.thrusts, atol=2e-2)
     assert steps >= 380
+
+
+@pytest.mark.parametrize("solver", installed_solvers())
+def test_any_back_end_of_qpsolvers_finds_the_same_solution_offline(solver: str) -> None:
+    for controller, exact in random_programs(10, (8.0, 13.0)):
+        options = {"eps_abs": 1e-9, "eps_rel": 1e-9, "max_iter": 100_000} if solver == "osqp" else {}
+        found = solve_offline(controller.template, controller.engine.data, solver, **options)
+        assert found is not None
+        np.testing.assert_allclose(found[0][:6], exact[0][:6], atol=1e-2)
+        assert found[1].shape == exact[1].shape
+
+
+def test_an_unknown_back_end_is_refused_by_name() -> None:
+    controller = HybridController()
+    with pytest.raises(IbvsQpError, match=r"'gurobbi' is not installed; there are .*osqp"):
+        solve_offline(controller.template, controller.engine.data, "gurobbi")
 
 
 # --------------------------------------------------------------------------------------------- what may not matter

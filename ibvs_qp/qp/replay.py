@@ -68,10 +68,15 @@ def active_limits(template: QpTemplate, x: np.ndarray, y: np.ndarray) -> tuple[A
 
 
 class TickReplay:
-    """Explains recorded ticks of one program."""
+    """Explains recorded ticks of one program.
 
-    def __init__(self, template: QpTemplate) -> None:
-        self._template = template
+    Args:
+        template: The program.
+        solver: Back end of qpsolvers that solves it; None for the exact solver.
+    """
+
+    def __init__(self, template: QpTemplate, solver: str | None = None) -> None:
+        self._template, self._solver = template, solver
         self._data = Evaluator(template)
         self._exact = ExactSolver(template)
 
@@ -84,7 +89,7 @@ class TickReplay:
         data, template = self._data, self._template
         data.stacked[:] = stacked
         data.evaluate()
-        solution = self._exact.solve(data.p, data.q, data.a, data.lower, data.upper)
+        solution = self._solve()
         if solution is None:
             return None
         x, y = solution
@@ -100,3 +105,11 @@ class TickReplay:
             active_limits=tuple(limits),
             unallocated_wrench=effectiveness @ (data.free - thrusts) if limits else np.zeros(6),
         )
+
+    def _solve(self) -> tuple[np.ndarray, np.ndarray] | None:
+        data = self._data
+        if self._solver is None:
+            return self._exact.solve(data.p, data.q, data.a, data.lower, data.upper)
+        from ibvs_qp.qp.offline import solve_offline
+
+        return solve_offline(self._template, data, self._solver)

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 import gc
-import warnings
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
-import qpsolvers
-from scipy import sparse
 
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.controller import HybridController
 from ibvs_qp.machine_code import compiler
 from ibvs_qp.qp.exact_solver import ExactSolver
+from ibvs_qp.qp.offline import installed_solvers, solve_offline
 from sim.bench.stages import stage_medians
 from sim.bench.ticks import Tick, recorded_ticks
 from sim.bench.timing import Bench, Row
+from sim.bench.yardstick import mink_row
 
 #: Ticks that warm a controller up before it is measured.
 WARM_UP = 500
@@ -51,6 +49,9 @@ def bench_qp(count: int, seed: int, sample: int, tell: Callable[[str], None]) ->
     every, every_iterations, _ = _steps(HybridController(asked), few, "step_osqp_every_tick")
     tell("rivals")
     rivals, differences = _rivals(ticks, sample)
+    yardstick = mink_row(max(len(ticks) // sample, 1))
+    if yardstick is not None:
+        rivals.append(yardstick)
     stages = stage_medians(asked, few)
     ratios = {row.name: row.median_us / step.median_us for row in (interpreted, every, *rivals) if row.times_us}
     notes = {
@@ -60,7 +61,8 @@ def bench_qp(count: int, seed: int, sample: int, tell: Callable[[str], None]) ->
         "iterations": _histogram(iterations),
         "iterations_osqp_every_tick": _histogram(every_iterations),
         "outcomes": outcomes,
-        "difference_to_exact_n": differences,
+        "difference_to_exact_n": differences.pop("step", {}),
+        "rivals_difference_to_exact_n": differences,
     }
     return Bench(rows=[step, interpreted, every, *rivals], stages_us=stages, ratios=ratios, notes=notes)
 
@@ -81,14 +83,13 @@ def _steps(controller: HybridController, ticks: list[Tick], name: str) -> tuple[
     return row, iterations, outcomes
 
 
-def _rivals(ticks: list[Tick], sample: int) -> tuple[list[Row], dict[str, float]]:
+def _rivals(ticks: list[Tick], sample: int) -> tuple[list[Row], dict[str, dict[str, float]]]:
     """The same ticks packed by the same controller, the program solved by somebody else from scratch."""
     controller = HybridController()
-    installed = [name for name in RIVALS if name in qpsolvers.available_solvers]
-    rows = {name: Row(name=f"qpsolvers_{name}") for name in installed}
+    rows = {name: Row(name=f"qpsolvers_{name}") for name in RIVALS if name in installed_solvers()}
     exact_row, exact = Row(name="casadi_daqp"), ExactSolver(controller.template)
-    data, template, last, difference = controller.engine.data, controller.template, -1, []
-    p_full, a_full = template.p_pattern.copy(), template.a_pattern.copy()
+    data, template, last = controller.engine.data, controller.template, -1
+    differences: dict[str, list[float]] = {name: [] for name in ("step", *rows)}
     for index, (measurement, reference) in enumerate(ticks):
         if measurement.stamp_ns <= last:
             controller.reset()
@@ -96,30 +97,21 @@ def _rivals(ticks: list[Tick], sample: int) -> tuple[list[Row], dict[str, float]
         command = controller.step(measurement, reference)
         if index % sample or index < WARM_UP:
             continue
-        p_full.data, a_full.data = data.p.copy(), data.a.copy()
-        problem = _problem(p_full, a_full, data.q, data.lower, data.upper)
-        for name, row in rows.items():
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")
-                row.measure(lambda: qpsolvers.solve_problem(problem(), solver=name))  # noqa: B023 - called at once
         found = exact_row.measure(lambda: exact.solve(data.p, data.q, data.a, data.lower, data.upper))
+        answers = {"step": command.thrusts}
+        for name, row in rows.items():
+            answer = row.measure(lambda: solve_offline(template, data, name))  # noqa: B023 - called at once
+            if answer is not None:
+                answers[name] = answer[0][: len(command.thrusts)]
         if found is not None:
-            difference.append(float(np.abs(found[0][: len(command.thrusts)] - command.thrusts).max()))
-    figures = {"p99": float(np.percentile(difference, 99.0)), "max": max(difference)} if difference else {}
+            for name, thrusts in answers.items():
+                differences[name].append(float(np.abs(found[0][: len(thrusts)] - thrusts).max()))
+    figures = {
+        name: {"p99": float(np.percentile(errors, 99.0)), "max": max(errors)}
+        for name, errors in differences.items()
+        if errors
+    }
     return [*rows.values(), exact_row], figures
-
-
-def _problem(
-    p: sparse.csc_matrix, a: sparse.csc_matrix, q: np.ndarray, lower: np.ndarray, upper: np.ndarray
-) -> Callable[[], Any]:
-    """Makes the problem as a user of qpsolvers would: full P, two-sided rows stacked."""
-
-    def build() -> Any:
-        full: Any = sparse.csc_matrix(p + sparse.triu(p, 1).T)
-        stacked: Any = sparse.csc_matrix(sparse.vstack((a, -a)))
-        return qpsolvers.Problem(full, q, stacked, np.concatenate((upper, -lower)))
-
-    return build
 
 
 def _histogram(iterations: list[int]) -> dict[str, int]:

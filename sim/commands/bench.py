@@ -98,17 +98,24 @@ def _show(bench: BenchResult) -> None:
     from rich.table import Table
 
     figures = [row.summary() for row in bench.rows]
-    unit, name = (1e-3, "ms") if any(figure["size"] for figure in figures) else (1.0, "us")
-    columns = ("measured", "size", "median", "90 %", "99 %", "99.9 %", "most", "misses 1 kHz")
-    table = Table(*columns, title=f"Processor time, one thread [{name}]")
+    sized = any(figure["size"] for figure in figures)
+    unit, name = (1e-3, "ms") if sized else (1.0, "us")
+    table = Table(title=f"Processor time, one thread, in {name}")
+    table.add_column("measured", no_wrap=True)
+    if sized:
+        table.add_column("size", no_wrap=True)
+    for column in ("median", "90 %", "99 %", "99.9 %", "most", "> 4/2/1 ms"):
+        table.add_column(column, justify="right", no_wrap=True)
     for figure in figures:
         cells = (figure[key] for key in ("p50_us", "p90_us", "p99_us", "p999_us", "max_us"))
-        texts = (f"{unit * cell:.2f}" for cell in cells)
-        table.add_row(figure["name"], figure["size"] or "", *texts, str(figure["misses"]["1000"]))
+        texts = (f"{unit * cell:.{2 if sized else 1}f}" for cell in cells)
+        size = (figure["size"] or "",) if sized else ()
+        misses = "/".join(str(count) for count in figure["misses"].values())
+        table.add_row(figure["name"], *size, *texts, misses)
     console = Console()
     console.print(table)
     stages = ", ".join(f"{stage} {unit * time_us:.2f}" for stage, time_us in bench.stages_us.items())
-    console.print(f"Stages, medians [{name}]: {stages}")
+    console.print(f"Stages, medians in {name}: {stages}")
     for rival, ratio in bench.ratios.items():
         console.print(f"{rival}: {ratio:.1f} x our median")
     for what, note in bench.notes.items():

@@ -34,6 +34,8 @@ class Explain:
     """Time of the tick since the start [s]."""
     seed: Annotated[int | None, tyro.conf.arg(metavar="INT", help_behavior_hint="")] = None
     """Checked against the run's, if given."""
+    solver: Annotated[str | None, tyro.conf.arg(metavar="NAME", help_behavior_hint="")] = None
+    """Back end of qpsolvers that solves the tick again; default: the exact solver."""
     json: Annotated[bool, tyro.conf.arg(help_behavior_hint="")] = False
     """Print one JSON line instead."""
 
@@ -55,7 +57,7 @@ class Explain:
 
         trace = self._flight()
         tick = self._tick(trace)
-        config, explanation = explain_tick(trace, tick)
+        config, explanation = explain_tick(trace, tick, self.solver)
         if explanation is None:
             raise ExplainError(f"the program at {self.at:g} s has no solution: hard barriers contradict each other")
         if self.json:
