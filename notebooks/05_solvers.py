@@ -102,8 +102,9 @@ def _(results):
       and still be off by newtons along the push. Tested every 5 iterations at 1e-3 it stops too early; the defaults do
       better at the same tolerance only because they test every 25 iterations.
     - *Iterations buy digits*, a few for every decade of tolerance, and never all of them.
-    - *So the shipped controller lets OSQP find the active rows and then solves on them exactly*
-      (`ibvs_qp/qp/polish.py`): rounding error, at a cost that does not depend on the tolerance.
+    - *So the shipped controller asks OSQP last.* The rows that bound in the last tick mostly bind in this one: it
+      solves on them exactly and mends the guess a few times (`ibvs_qp/qp/active_set.py`). Only where that fails OSQP
+      iterates, and its final rows are solved exactly in turn: rounding error, whatever the tolerance was.
     - *Where OSQP does not win:* at this size (six thrusts, a handful of slacks) DAQP with a kept workspace is faster
       than OSQP **and** exact. Called through CasADi or `qpsolvers` the same DAQP loses that lead to conversions. In the
       controller it is the exact fallback. What speaks for OSQP here is not the median: every iteration costs the
@@ -124,10 +125,11 @@ def _(results, stretch):
 @app.cell(hide_code=True)
 def _():
     mo.md(r"""
-    **Tick by tick.** Where no limit binds the shipped controller needs no iterations, and OSQP alone needs few, but at
-    a loose tolerance it drifts: the push row is so light that a wrong push hardly shows in the residuals. Where limits
-    bind (tinted) the iterations rise, most at ticks at which the set of active rows *changes*: the warm start is then
-    wrong about a multiplier, and multipliers move by one step size per iteration. Those ticks make the tail of times.
+    **Tick by tick.** OSQP alone needs few iterations where no limit binds, but at a loose tolerance it drifts: the
+    push row is so light that a wrong push hardly shows in the residuals. Where limits bind (tinted) iterations rise,
+    most at ticks at which the set of active rows *changes*: the warm start is then wrong about a multiplier, and
+    multipliers move by one step size per iteration. Those ticks make the tail of the times. The shipped controller
+    hardly ever gets there.
 
     ## OSQP's settings
 

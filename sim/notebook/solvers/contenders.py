@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import dataclasses
 import importlib.util
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import qpsolvers
-from scipy import sparse
 
 from ibvs_qp.config import SolverSettings
+from ibvs_qp.qp.acceptance import QpEngine
+from ibvs_qp.qp.active_set import ActiveSet
 from ibvs_qp.qp.assembly import QpTemplate
 from ibvs_qp.qp.evaluator import ProgramData
 from ibvs_qp.qp.exact_solver import ExactSolver
+from ibvs_qp.qp.offline import installed_solvers, solve_offline
 from ibvs_qp.qp.osqp_solver import OsqpSolver
-from ibvs_qp.qp.polish import polished
 
 #: One tick: the solution x, (variables,), or None; and iterations, 0 where a solver does not say.
 Answer = tuple[np.ndarray | None, int]
@@ -55,25 +54,51 @@ class Contender:
 def kept_osqp(name: str, settings: SolverSettings, family: str = "OSQP, kept") -> Contender:
     """One workspace for all ticks, values updated in place, warm started.
 
-    With `settings.polish` the active rows are solved exactly afterwards; with `settings.shortcut` the optimum without
-    limits is taken where it breaks none, as the controller does.
+    With `settings.polish` the rows that its iterates end on are solved exactly afterwards.
     """
 
     def make(template: QpTemplate) -> Callable[[ProgramData], Answer]:
-        solver, slacks = OsqpSolver(template, settings), np.zeros(len(template.variable_names) - template.model.rotors)
+        solver, rows = OsqpSolver(template, settings), ActiveSet(template)
 
         def answer(data: ProgramData) -> Answer:
-            if settings.shortcut and data.violation[0] <= 0.0:
-                return np.append(data.free, slacks), 0
             raw = solver.solve(data.p, data.q, data.a, data.lower, data.upper)
             if raw is None:
                 return None, 0
-            exact = polished(data, raw.x, raw.y) if settings.polish else None
+            exact = rows.solve_near(data, raw.x, raw.y) if settings.polish else None
             return (raw.x if exact is None else exact[0]), raw.iterations
 
         return answer
 
     return Contender(name=name, family=family, make=make)
+
+
+def flown(name: str, settings: SolverSettings) -> Contender:
+    """What the controller does: no limits, last tick's rows, OSQP and its rows, DAQP, whichever answers first."""
+
+    def make(template: QpTemplate) -> Callable[[ProgramData], Answer]:
+        engine = QpEngine(template, settings)
+
+        def answer(data: ProgramData) -> Answer:
+            engine.data = _Evaluated(data)  # type: ignore[assignment]
+            found = engine.solve()
+            return (None, 0) if found is None else (found.x, found.iterations)
+
+        return answer
+
+    return Contender(name=name, family="ours", make=make)
+
+
+class _Evaluated:
+    """Data that is up to date already, as the compiled tick leaves it: evaluating is not the solver's work."""
+
+    def __init__(self, data: ProgramData) -> None:
+        self._data = data
+
+    def evaluate(self) -> None:
+        """Nothing to do."""
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._data, name)
 
 
 def casadi_daqp() -> Contender:
@@ -116,25 +141,13 @@ def qpsolvers_back_end(name: str) -> Contender:
     """A back end as a user of qpsolvers calls it: a new problem at every tick, its default settings."""
 
     def make(template: QpTemplate) -> Callable[[ProgramData], Answer]:
-        p, a = template.p_pattern.copy(), template.a_pattern.copy()
-
         def answer(data: ProgramData) -> Answer:
-            p.data, a.data = data.p.copy(), data.a.copy()
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")
-                problem = qpsolvers_problem(p, a, data, dense=name not in qpsolvers.sparse_solvers)
-                return qpsolvers.solve_problem(problem, solver=name).x, 0
+            found = solve_offline(template, data, name)
+            return (None, 0) if found is None else (found[0], 0)
 
         return answer
 
     return Contender(name=f"qpsolvers {name}", family="qpsolvers", make=make)
-
-
-def qpsolvers_problem(p: sparse.csc_matrix, a: sparse.csc_matrix, data: ProgramData, dense: bool) -> qpsolvers.Problem:
-    """A program as qpsolvers wants it: full P, two-sided rows stacked; dense where a back end knows nothing else."""
-    full, rows = sparse.csc_matrix(p + sparse.triu(p, 1).T), sparse.csc_matrix(sparse.vstack((a, -a)))
-    matrices: tuple[Any, Any] = (full.toarray(), rows.toarray()) if dense else (full, rows)
-    return qpsolvers.Problem(matrices[0], data.q, matrices[1], np.concatenate((data.upper, -data.lower)))
 
 
 def field() -> list[Contender]:
@@ -144,10 +157,9 @@ def field() -> list[Contender]:
     for power in (3, 4, 5, 6, 8):
         settings = dataclasses.replace(tight, tolerance=10.0**-power, relative_tolerance=10.0**-power)
         contenders.append(kept_osqp(f"OSQP 1e-{power}", settings))
-    shipped = SolverSettings()
-    contenders.append(kept_osqp("shipped, always OSQP", dataclasses.replace(shipped, shortcut=False), "ours"))
-    contenders.append(kept_osqp("shipped", shipped, "ours"))
+    contenders.append(flown("shipped, always OSQP", dataclasses.replace(SolverSettings(), shortcut=False)))
+    contenders.append(flown("shipped", SolverSettings()))
     contenders.append(casadi_daqp())
     if importlib.util.find_spec("daqp") is not None:
         contenders.append(kept_daqp())
-    return [*contenders, *(qpsolvers_back_end(name) for name in BACK_ENDS if name in qpsolvers.available_solvers)]
+    return [*contenders, *(qpsolvers_back_end(name) for name in BACK_ENDS if name in installed_solvers())]

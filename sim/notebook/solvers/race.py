@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ibvs_qp.qp.active_set import ActiveSet
 from ibvs_qp.qp.evaluator import ProgramData
 from ibvs_qp.qp.exact_solver import ExactSolver
-from ibvs_qp.qp.polish import polished
 from sim.notebook.solvers.contenders import Contender
 from sim.notebook.solvers.programs import Stretch
 
@@ -62,10 +62,10 @@ def exact_solutions(stretch: Stretch) -> Exact:
     Raises:
         RuntimeError: When a tick has no solution, which the programs of this controller always have.
     """
-    solver, rows, residuals = ExactSolver(stretch.template), [], []
+    solver, active, rows, residuals = ExactSolver(stretch.template), ActiveSet(stretch.template), [], []
     for data in stretch.evaluators():
         found = solver.solve(data.p, data.q, data.a, data.lower, data.upper)
-        found = None if found is None else (polished(data, *found) or found)
+        found = None if found is None else (active.solve_near(data, *found) or found)
         if found is None:
             raise RuntimeError("a recorded tick has no solution")
         rows.append(found[0])
