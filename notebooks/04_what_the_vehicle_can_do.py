@@ -80,7 +80,7 @@ def _(case, friction, nominal):
     mo.md(
         r"""
     **What to see.** *Top right* is the triangle of horizontal forces that are possible in level flight at full lift
-    and without any moment: three of its corners point where a pair of opposite rotors pushes. Its long corner points
+    and without any moment; each corner points where a pair of opposite rotors pushes. Its long corner points
     to the **front**, and that is where the arm must be: the same vehicle with the arm at the back pushes half as hard.
     *Bottom left* shows why: at the height of the weight the set is cut near its lower corner, where rotors idle.
     Vehicles of this class hover at a fifth of their full thrust; **the idle floor ends the push, not the ceiling**.
