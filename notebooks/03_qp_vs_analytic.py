@@ -298,6 +298,7 @@ def _(flight, limits, press, pressed, saturated):
 
     def test_within_limits_all_of_the_difference_is_in_the_wishes():
         inside = ~flight.limited & (flight.law == flight.law_free).all(axis=1)
+        inside[0] = False  # the first tick sets OSQP up, which answers it to its tolerance
         difference = (flight.qp - flight.law) - (flight.qp_free - flight.law_free)
         assert inside.any() and np.abs(difference[inside]).max() < 1e-6
 
