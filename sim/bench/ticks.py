@@ -34,7 +34,7 @@ def recorded_ticks(count: int, seed: int) -> list[Tick]:
     ticks: list[Tick] = []
     while True:
         for scene, job, faults, reach_check in _flights(Scene()):
-            for tick in _fly(scene, seed, job, faults, reach_check):
+            for tick in flown_ticks(scene, seed, job, faults, reach_check):
                 ticks.append(tick)
                 if len(ticks) >= count:
                     return ticks
@@ -49,7 +49,16 @@ def _flights(scene: Scene) -> Iterator[tuple[Scene, Job, tuple[Fault, ...], bool
     yield scene, PaintJob(), (Derate(share=0.3, rotor=TAROT_T960.names[0]),), True
 
 
-def _fly(scene: Scene, seed: int, job: Job, faults: tuple[Fault, ...], reach_check: bool) -> Iterator[Tick]:
+def flown_ticks(scene: Scene, seed: int, job: Job, faults: tuple[Fault, ...], reach_check: bool) -> Iterator[Tick]:
+    """Ticks of one flight of the QP law on geometric features.
+
+    Args:
+        scene: The truth.
+        seed: Of the flight.
+        job: What is done at the wall.
+        faults: What goes wrong.
+        reach_check: Whether a push beyond reach is reduced.
+    """
     options = FlightOptions(seed=seed, features="geometric", video=False)
     config = pilot_config(scene, options)
     config = dataclasses.replace(config, controller=dataclasses.replace(config.controller, reach_check=reach_check))

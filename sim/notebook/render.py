@@ -80,7 +80,7 @@ def _can_be_read(output: Any) -> bool:
     if output.output_type == "error":
         raise RuntimeError(f"a cell fails: {output.ename}: {output.evalue}")
     if output.output_type == "stream":
-        return False  # what the test cells report
+        return False  # warnings of libraries, and marimo's own run of the test cells
     return not any(live in str(content) for content in output.get("data", {}).values() for live in _LIVE)
 
 

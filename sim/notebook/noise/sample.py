@@ -1,0 +1,59 @@
+"""A small noise sweep for reading: every cell of the experiment, short strokes, lines from the sensor model.
+
+Usage: ``python -m sim.notebook.noise.sample`` writes `SAMPLE` anew; interrupted, it goes on where it stopped.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from pathlib import Path
+
+from sim.experiments.base import Choice, runs
+from sim.experiments.noise_sweep import NAME, QUICK_STROKE_M, SIGMA_F, SIGMA_VS
+from sim.experiments.scenes import short_job
+from sim.measures import paint_figures
+from sim.sweep import run_sweep
+from sim.sweep.design import Run
+from sim.sweep.parts import write_table
+
+#: Table that the notebook reads when it is given no other.
+SAMPLE = Path(__file__).parents[3] / "notebooks" / "data" / "noise_sweep.parquet"
+#: Flights per cell and law.
+SEEDS = 3
+
+
+def sample_runs(seeds: int = SEEDS) -> list[Run]:
+    """All nine cells under both laws, without logs."""
+    choice, flights = Choice(features="geometric"), []
+    for vs in SIGMA_VS:
+        for force in SIGMA_F:
+            flights += runs(
+                NAME,
+                choice,
+                scene=short_job(QUICK_STROKE_M, features={"sigma_vs": vs}, force_torque={"sigma_n": force}),
+                measure=paint_figures,
+                params={"sigma_vs": vs, "sigma_f_n": force},
+                seeds=seeds,
+                keep=False,
+            )
+    return flights
+
+
+def main() -> int:
+    """Fly the sample and write its table."""
+    folder = Path(tempfile.gettempdir()) / "ibvs-qp-noise-sample"
+
+    def tell(done: int, count: int, _: int) -> None:
+        print(f"{done} of {count} flights", file=sys.stderr)
+
+    result = run_sweep(sample_runs(), folder, progress=tell)
+    if result.interrupted:
+        return 130
+    write_table(SAMPLE, result.table.drop("log"))
+    print(f"{SAMPLE}: {result.table.height} flights")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,95 @@
+"""What notebooks 03, 05 and 06 compute beside what their own test cells hold."""
+
+import numpy as np
+import polars as pl
+import pytest
+
+from ibvs_qp.config import SolverSettings
+from ibvs_qp.errors import ConfigError
+from sim.notebook.noise.effects import averaged_samples, effects
+from sim.notebook.noise.sample import SEEDS, sample_runs
+from sim.notebook.noise.table import FIGURES, FORCE, VS, read_sweep, success, sweep_or_sample
+from sim.notebook.noise.words import differences_table, success_table
+from sim.notebook.solvers.contenders import kept_osqp
+from sim.notebook.solvers.programs import packed
+from sim.notebook.solvers.race import exact_solutions, optimality_residual, race
+from sim.notebook.solvers.words import race_table
+
+
+def made_table(vs_power: float, force_power: float, seeds: int = 4) -> pl.DataFrame:
+    rng, rows = np.random.default_rng(3), []
+    for vs in (0.02, 0.08, 0.12):
+        for force in (1.0, 2.0, 3.0):
+            for law in ("qp", "paper"):
+                for seed in range(seeds):
+                    value = 0.05 * vs**vs_power * force**force_power * float(np.exp(rng.normal(0.0, 0.02)))
+                    settings = {"experiment": "noise-sweep", "law": law, "variant": "standard", "seed": seed}
+                    ended = {"completed": not (vs > 0.1 and seed == 0), "reason": "flown", VS: vs, FORCE: force}
+                    figures = {"path_rms_m": value * (2.0 if law == "paper" else 1.0), "force_rms_n": 0.2 * force}
+                    rows.append(settings | ended | figures)
+    return pl.DataFrame(rows)
+
+
+def test_effects_find_exponents_and_shares():
+    found = effects(made_table(0.7, 0.0), "qp", FIGURES[0])
+    assert found.vs_exponent == pytest.approx(0.7, abs=0.03) and found.force_exponent == pytest.approx(0.0, abs=0.03)
+    assert found.vs_share > 0.98 and found.force_share < 0.05 and found.flights == 33
+
+
+def test_averaged_samples_undo_the_root_of_n():
+    _, samples = averaged_samples(made_table(1.0, 0.0), "qp", *FIGURES[:2])
+    assert samples == {1.0: pytest.approx(25.0), 2.0: pytest.approx(25.0), 3.0: pytest.approx(25.0)}
+
+
+def test_pairs_and_completion_are_told():
+    table = made_table(1.0, 0.0)
+    assert success(table).filter((pl.col("law") == "qp") & (pl.col(VS) == 0.12))["completed"].to_list() == [0.75] * 3
+    assert "3 of 4" in success_table(table) and differences_table(table, FIGURES[0]).count("QP better") == 9
+
+
+def test_a_wrong_file_is_named_and_the_sample_stands_in(tmp_path):
+    other = tmp_path / "other.parquet"
+    pl.DataFrame({"a": [1]}).write_parquet(other)
+    for file, words in (
+        (str(tmp_path / "none.parquet"), "no file"),
+        (str(other), "no column law"),
+        (__file__, "Parquet"),
+    ):
+        with pytest.raises(ConfigError, match=words):
+            read_sweep(file)
+    table, problem = sweep_or_sample(str(other))
+    assert "no column" in problem and table.height == len(sample_runs(SEEDS))
+
+
+@pytest.fixture(scope="module")
+def stretch():
+    """Ticks of a vehicle before a wall, pushed about, some beyond its thrust."""
+    from controller_scenes import random_tick
+
+    rng = np.random.default_rng(1)
+    return packed(random_tick(rng, 2, tick) for tick in range(60))
+
+
+def test_the_yardstick_meets_the_optimality_conditions_and_others_do_not(stretch):
+    exact = exact_solutions(stretch)
+    assert exact.residual.max() < 1e-9 and 0.0 < stretch.limited.mean() < 1.0
+    data = next(iter(stretch.evaluators()))
+    assert optimality_residual(data, exact.x[0] + 1e-3, np.zeros(len(data.lower))) > 1e-7
+
+
+def test_a_race_counts_errors_of_every_tick(stretch):
+    exact = exact_solutions(stretch)
+    tight = race(kept_osqp("tight", SolverSettings(shortcut=False)), stretch, exact)
+    loose = race(
+        kept_osqp("loose", SolverSettings(tolerance=1e-1, relative_tolerance=1e-1, polish=False)), stretch, exact
+    )
+    assert tight.errors_n.max() < 1e-6 < loose.errors_n.max() and tight.unanswered == 0
+    assert len(tight.times_us) == len(stretch.t) and (tight.iterations > 0).all()
+    assert race_table([tight, loose], reference="tight").count("\n") == 3
+
+
+def test_a_busy_stretch_is_half_limited(stretch):
+    part = stretch.busy(10)
+    assert len(part.t) == 10 and abs(part.limited.mean() - 0.5) <= abs(stretch.limited.mean() - 0.5) + 1e-9
+    with pytest.raises(ValueError, match="61 ticks asked for, 60 recorded"):
+        stretch.busy(61)
