@@ -69,13 +69,36 @@ class SurfaceColors:
         self._table, self._table_board = table, board.copy()
 
     def like_around(self, grid: CoarseGrid, colors: np.ndarray, seed: tuple[int, int], radius: int) -> np.ndarray:
-        """Labels of samples that look like those around a seed: BOARD or OTHER, uint8 (rows, columns)."""
-        rows, columns = grid.window(seed, radius)
-        window = colors[rows, columns][grid.free[rows, columns]].astype(np.float32)
-        if len(window) == 0:
+        """Labels of samples by the colour around a seed: BOARD for what looks like it, uint8 (rows, columns)."""
+        around = self._around(grid, colors, seed, radius)
+        if around is None:
             return np.full(grid.shape, BOARD, np.uint8)
-        near = self._distance(colors.astype(np.float32), np.median(window, axis=0)) < self._gate**2
-        return np.where(near, np.uint8(BOARD), np.uint8(OTHER))
+        samples = colors.astype(np.float32)
+        labels = np.where(self._distance(samples, around) < self._gate**2, np.uint8(BOARD), np.uint8(OTHER))
+        if self.paint is not None and float(self._distance(self.paint, around)) > self._gate**2:
+            labels[(labels == OTHER) & (self._distance(samples, self.paint) < self._gate**2)] = PAINT
+        return labels
+
+    def bare(
+        self, grid: CoarseGrid, colors: np.ndarray, seeds: list[tuple[int, int]], radius: int
+    ) -> list[tuple[int, int]]:
+        """Those of the seeds that do not lie on paint; all of them if every one does, or if the paint is unknown."""
+        if self.paint is None:
+            return seeds
+        around = [self._around(grid, colors, seed, radius) for seed in seeds]
+        limit = self._gate**2
+        return [
+            seed
+            for seed, color in zip(seeds, around, strict=True)
+            if color is None or float(self._distance(self.paint, color)) > limit
+        ] or seeds
+
+    @staticmethod
+    def _around(grid: CoarseGrid, colors: np.ndarray, seed: tuple[int, int], radius: int) -> np.ndarray | None:
+        """Median colour of the samples around a seed that the vehicle leaves free, (3,), or None without any."""
+        rows, columns = grid.window(seed, radius)
+        window = colors[rows, columns][grid.free[rows, columns]]
+        return np.sort(window, axis=0)[len(window) // 2].astype(np.float32) if len(window) else None
 
     @property
     def paint_distinct(self) -> bool:

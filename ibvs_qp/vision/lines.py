@@ -26,7 +26,7 @@ _PEAK_TO_STEP = 2.5
 _TELLING = 0.5
 #: Places from which pairs of points are tried.
 _STARTS = 20
-#: Share of the visible profiles that show the edge at first sight, below which a line gets a second look.
+#: Share of the visible profiles, where the line was seen last, below which first sight is not enough.
 _ENOUGH = 0.5
 
 
@@ -104,7 +104,7 @@ def _edges(
     place, peak, good = strips.peaks(flat, index)
     limit = np.repeat(threshold, shape[1])
     good &= (peak > limit) & admissible.at(index)
-    few = good.reshape(shape).sum(axis=1) < _ENOUGH * strips.visible.sum(axis=1)
+    few = good.reshape(shape).sum(axis=1) < _ENOUGH * (strips.visible & strips.expected).sum(axis=1)
     if not few.any():
         return strips.base + place.reshape(shape), good.reshape(shape)
     rest = np.flatnonzero(few.repeat(shape[1]) & ~good)

@@ -82,6 +82,12 @@ class Strips:
         one, two, three = (self.hidden[:, :, middle + step] for step in _MIDDLE)
         return (one | two | three) == 0
 
+    @property
+    def expected(self) -> np.ndarray:
+        """Profiles within the part of each line that is known, bool (L, K)."""
+        first, last = np.array([view.extent for view in self.views]).T[:, :, None]
+        return (self.u >= first) & (self.u <= last)
+
     def gradient(self, rows: np.ndarray) -> np.ndarray:
         """Central differences of the channels along +v [grey levels per px] of profiles (n,), (n, 2 reach + 1, 3)."""
         cut = self.side - 1

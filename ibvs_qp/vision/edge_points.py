@@ -1,0 +1,86 @@
+"""Where the colours of a picture step up or down, on every other row and every fourth column."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from ibvs_qp.vision.grid import CoarseGrid
+from ibvs_qp.vision.picture import Picture
+
+#: Columns and rows of the view per point: a line is told by far fewer points than it has pixels, its place is not.
+PER_ROW, _PER_COLUMN = 4, 2
+#: A central difference over this many sums of pixels answers as Sobel's kernel does.
+_SOBEL = 4.0
+
+
+def edge_points(
+    picture: Picture, upright: bool, gradient_min: float, region: np.ndarray | None, grid: CoarseGrid
+) -> tuple[np.ndarray, np.ndarray]:
+    """Places where colours rise, and where they fall, along +v of the view in which lines are level.
+
+    Args:
+        picture: Colour and mask.
+        upright: Whether the view is the transposed one.
+        gradient_min: Weakest step as Sobel's kernel answers it at half resolution [grey levels].
+        region: Non-zero on the samples around which lines are wanted, uint8 (rows, columns), or None for all.
+        grid: Where these samples lie.
+
+    Returns:
+        (u, v) in half-resolution pixels of the view, 0 at the picture's border, float32 (n, 2) each.
+    """
+    height, width = picture.mask.shape
+    columns, rows = (width // _PER_COLUMN, height // PER_ROW) if upright else (width // PER_ROW, height // _PER_COLUMN)
+    thin = cv2.split(cv2.resize(picture.rgb, (columns, rows), interpolation=cv2.INTER_LINEAR))
+    if upright:
+        thin = tuple(cv2.transpose(plane) for plane in thin)
+        rows, columns = columns, rows
+    pairs = [(plane[2:], plane[:-2]) for plane in thin]
+    threshold = max(1, round(gradient_min / _SOBEL))
+    return tuple(
+        _allowed(_thin(signed, threshold), columns, picture, upright, region, grid, (rows, columns))
+        for signed in (
+            _strongest([cv2.subtract(below, above) for below, above in pairs]),
+            _strongest([cv2.subtract(above, below) for below, above in pairs]),
+        )
+    )
+
+
+def _strongest(channels: list[np.ndarray]) -> np.ndarray:
+    return cv2.max(cv2.max(channels[0], channels[1]), channels[2])
+
+
+def _thin(strength: np.ndarray, threshold: int) -> np.ndarray:
+    """Flat places where the step is strong and the strongest across the line."""
+    edges = strength > threshold
+    edges[1:] &= strength[1:] >= strength[:-1]
+    edges[:-1] &= strength[:-1] > strength[1:]
+    return np.flatnonzero(edges)
+
+
+def _allowed(
+    places: np.ndarray,
+    columns: int,
+    picture: Picture,
+    upright: bool,
+    region: np.ndarray | None,
+    grid: CoarseGrid,
+    shape: tuple[int, int],
+) -> np.ndarray:
+    """Those of the places that the vehicle does not hide and around which lines are wanted, in half pixels."""
+    row = places // columns
+    column = places - row * columns
+    view = picture.transposed if upright else picture
+    across, along = view.height / shape[0], view.width / shape[1]
+    v, u = (row + np.float32(1.5)) * np.float32(across), (column + np.float32(0.5)) * np.float32(along)
+    y, x = (u, v) if upright else (v, u)  # from the corner of the picture, pixel centres at halves
+    x_px, y_px = x.astype(np.intp), y.astype(np.intp)
+    free = picture.mask.reshape(-1).take(y_px * picture.mask.shape[1] + x_px) == 0
+    if region is not None:
+        rows, cells = region.shape
+        cell = np.minimum(y_px // grid.stride, rows - 1) * cells + np.minimum(x_px // grid.stride, cells - 1)
+        free &= region.reshape(-1).take(cell) > 0
+    points = np.empty((len(places), 2), np.float32)
+    points[:, 0], points[:, 1] = u, v
+    points *= np.float32(0.5)
+    return points.compress(free, axis=0)
