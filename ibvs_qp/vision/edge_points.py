@@ -10,6 +10,8 @@ from ibvs_qp.vision.picture import Picture
 
 #: Columns and rows of the view per point: a line is told by far fewer points than it has pixels, its place is not.
 PER_ROW, _PER_COLUMN = 4, 2
+#: Steps this many times the weakest one have a full vote, fainter ones less: noise must not outvote an edge.
+_FULL = 4.0
 #: A central difference over this many sums of pixels answers as Sobel's kernel does.
 _SOBEL = 4.0
 
@@ -27,7 +29,8 @@ def edge_points(
         grid: Where these samples lie.
 
     Returns:
-        (u, v) in half-resolution pixels of the view, 0 at the picture's border, float32 (n, 2) each.
+        (u, v) in half-resolution pixels of the view, 0 at the picture's border, and the weight of its vote, up to 1:
+        float32 (n, 3) each.
     """
     height, width = picture.mask.shape
     columns, rows = (width // _PER_COLUMN, height // PER_ROW) if upright else (width // PER_ROW, height // _PER_COLUMN)
@@ -37,13 +40,14 @@ def edge_points(
         rows, columns = columns, rows
     pairs = [(plane[2:], plane[:-2]) for plane in thin]
     threshold = max(1, round(gradient_min / _SOBEL))
-    return tuple(
-        _allowed(_thin(signed, threshold), columns, picture, upright, region, grid, (rows, columns))
-        for signed in (
-            _strongest([cv2.subtract(below, above) for below, above in pairs]),
-            _strongest([cv2.subtract(above, below) for below, above in pairs]),
-        )
+    signed = (
+        _strongest([cv2.subtract(below, above) for below, above in pairs]),
+        _strongest([cv2.subtract(above, below) for below, above in pairs]),
     )
+    rising, falling = (
+        _points(steps, _thin(steps, threshold), threshold, picture, upright, region, grid) for steps in signed
+    )
+    return rising, falling
 
 
 def _strongest(channels: list[np.ndarray]) -> np.ndarray:
@@ -58,29 +62,32 @@ def _thin(strength: np.ndarray, threshold: int) -> np.ndarray:
     return np.flatnonzero(edges)
 
 
-def _allowed(
+def _points(
+    steps: np.ndarray,
     places: np.ndarray,
-    columns: int,
+    threshold: int,
     picture: Picture,
     upright: bool,
     region: np.ndarray | None,
     grid: CoarseGrid,
-    shape: tuple[int, int],
 ) -> np.ndarray:
-    """Those of the places that the vehicle does not hide and around which lines are wanted, in half pixels."""
+    """Those of the places that the vehicle does not hide and around which lines are wanted, with their weights."""
+    rows, columns = steps.shape
     row = places // columns
     column = places - row * columns
     view = picture.transposed if upright else picture
-    across, along = view.height / shape[0], view.width / shape[1]
+    across, along = view.height / (rows + 2), view.width / columns
     v, u = (row + np.float32(1.5)) * np.float32(across), (column + np.float32(0.5)) * np.float32(along)
-    y, x = (u, v) if upright else (v, u)  # from the corner of the picture, pixel centres at halves
+    x, y = (v, u) if upright else (u, v)  # from the corner of the picture, pixel centres at halves
     x_px, y_px = x.astype(np.intp), y.astype(np.intp)
     free = picture.mask.reshape(-1).take(y_px * picture.mask.shape[1] + x_px) == 0
     if region is not None:
-        rows, cells = region.shape
-        cell = np.minimum(y_px // grid.stride, rows - 1) * cells + np.minimum(x_px // grid.stride, cells - 1)
+        last_row, last_column = region.shape[0] - 1, region.shape[1] - 1
+        cell = np.minimum(y_px // grid.stride, last_row) * region.shape[1]
+        cell += np.minimum(x_px // grid.stride, last_column)
         free &= region.reshape(-1).take(cell) > 0
-    points = np.empty((len(places), 2), np.float32)
-    points[:, 0], points[:, 1] = u, v
-    points *= np.float32(0.5)
-    return points.compress(free, axis=0)
+    kept = np.flatnonzero(free)
+    points = np.empty((len(kept), 3), np.float32)
+    points[:, 0], points[:, 1] = 0.5 * u.take(kept), 0.5 * v.take(kept)
+    points[:, 2] = np.minimum(steps.reshape(-1).take(places.take(kept)) * np.float32(1.0 / (_FULL * threshold)), 1.0)
+    return points

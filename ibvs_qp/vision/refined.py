@@ -158,9 +158,7 @@ def _polar(
     return aligned, theta, np.array([[rho_variance, cross], [cross, angle_slope**2 * slope_variance]])
 
 
-def _end_reasons(
-    strips: Strips, index: int, run: tuple[int, int], line: LineFit, fits: Fits
-) -> tuple[str, str]:
+def _end_reasons(strips: Strips, index: int, run: tuple[int, int], line: LineFit, fits: Fits) -> tuple[str, str]:
     """Why the segment ends at either end."""
     view = strips.views[index]
     profiles, margin = strips.u.shape[1], strips.side + 2

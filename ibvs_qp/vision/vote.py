@@ -1,4 +1,4 @@
-"""Votes for lines: steps of colour on a thinned-out picture, a Hough transform restricted to around level and upright."""
+"""Votes for lines: steps of colour on a thinned-out picture, a Hough transform around level and upright only."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from ibvs_qp.vision.plane import PlaneEstimate
 _VOTED, _KEPT = 40, 5
 #: Points this near to a line vote for it, and this near to it are explained by it [half-resolution px].
 _NEAR, SAME_PX = 1.0, 2.0
-#: A line of whose points a better one explains more than this share is seen already.
-_SHARED = 0.5
+#: Weight of the points of a faint line that must still be found.
+_FAINT = 0.4
 #: Distance from a line at which the coarse labels of its two sides are compared [cells].
 _LABEL_CELLS = 1.5
 #: Share of a line along which its sides must differ to be looked at: neither border nor paint edge otherwise.
@@ -28,7 +28,7 @@ _DIFFERENT = 0.04
 
 @dataclass(frozen=True)
 class VotedLine:
-    """A line from the vote, in full-resolution pixels of the (transposed) view: its rows at the first and last column."""
+    """A line from the vote: its rows at the first and last column of the (transposed) view [px]."""
 
     upright: bool
     polarity: int
@@ -89,7 +89,7 @@ def _hough(
     ]
     least = max(4, round(0.5 * config.detect.min_length * max(view.width, view.height) / PER_ROW))
     voted = cv2.HoughLinesPointSet(
-        points[:, None],
+        np.ascontiguousarray(points[:, None, :2]),
         _VOTED,
         least,
         min(rhos) - 1.0,
@@ -101,19 +101,17 @@ def _hough(
     )
     if voted is None:
         return []
-    votes, rho, theta = np.asarray(voted, float).reshape(-1, 3).T
+    _, rho, theta = np.asarray(voted, float).reshape(-1, 3).T
     sine, cosine = np.sin(theta), np.cos(theta)
     left, right = rho / sine, (rho - width * cosine) / sine
-    # how many of the points that each line runs along are explained by each other
     lines = np.stack((cosine, sine, -rho), axis=1).astype(np.float32)
-    distance = np.abs(lines @ np.column_stack((points, np.ones(len(points), np.float32))).T)
-    shared = ((distance < _NEAR).astype(np.float32) @ (distance < SAME_PX).astype(np.float32).T).tolist()
+    distance = np.abs(lines[:, :2] @ points[:, :2].T + lines[:, 2:])
     falls = 0.5 * (left + right) > 0.5 * (moved + height)
     left, right = left - moved * falls, right - moved * falls
-    kept = _distinct(falls.tolist(), shared)
+    kept, votes = _distinct(distance, points[:, 2].copy(), falls.tolist(), _FAINT * least)
     differing = _label_difference(left[kept], right[kept], labels.T if upright else labels, grid)
     result = []
-    for index, difference in zip(kept, differing.tolist(), strict=True):
+    for index, own, difference in zip(kept, votes, differing.tolist(), strict=True):
         if difference < _DIFFERENT:
             continue
         slope = float(right[index] - left[index]) / width
@@ -121,19 +119,36 @@ def _hough(
         at_zero = 2.0 * float(left[index]) - 0.5 + 0.5 * slope
         at_last = at_zero + slope * (view.width - 1.0)
         polarity = -1 if falls[index] else 1
-        result.append(VotedLine(upright, polarity, at_zero, at_last, float(votes[index]) * (0.1 + difference)))
+        result.append(VotedLine(upright, polarity, at_zero, at_last, own * (0.1 + difference)))
     return result
 
 
-def _distinct(falls: list[bool], shared: list[list[float]]) -> list[int]:
-    """The best lines of either polarity, without those whose points better ones explain."""
-    kept: list[int] = []
+def _distinct(distance: np.ndarray, free: np.ndarray, falls: list[bool], least: float) -> tuple[list[int], list[float]]:
+    """Lines in the order of the votes that are left when better ones have taken theirs, and these votes.
+
+    Args:
+        distance: Of every line from every point [half-resolution px], (L, n).
+        free: Weights of the points, (n,); those that are taken lose theirs.
+        falls: Polarity of the lines, (L).
+        least: Least weight of a line.
+    """
+    near = (distance < _NEAR).astype(np.float32)
+    open_ = np.ones(len(near), np.float32)
     room = {True: _KEPT, False: _KEPT}
-    for index, (fall, explained) in enumerate(zip(falls, shared, strict=True)):
-        if room[fall] and not any(explained[k] > _SHARED * explained[index] for k in kept):
-            kept.append(index)
-            room[fall] -= 1
-    return kept
+    kept: list[int] = []
+    votes: list[float] = []
+    while any(room.values()):
+        left = (near @ free) * open_
+        best = int(left.argmax())
+        if left[best] < least:
+            break
+        open_[best] = 0.0
+        free[distance[best] < SAME_PX] = 0.0
+        if room[falls[best]]:
+            room[falls[best]] -= 1
+            kept.append(best)
+            votes.append(float(left[best]))
+    return kept, votes
 
 
 def _label_difference(left: np.ndarray, right: np.ndarray, labels: np.ndarray, grid: CoarseGrid) -> np.ndarray:
