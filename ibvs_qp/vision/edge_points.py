@@ -1,4 +1,4 @@
-"""Where the colours of a picture step up or down, on every other row and every fourth column."""
+"""Where the colours of a picture step up or down, on every other row and about every eighth column."""
 
 from __future__ import annotations
 
@@ -8,10 +8,13 @@ import numpy as np
 from ibvs_qp.vision.grid import CoarseGrid
 from ibvs_qp.vision.picture import Picture
 
-#: Columns and rows of the view per point: a line is told by far fewer points than it has pixels, its place is not.
-PER_ROW, _PER_COLUMN = 4, 2
+#: Points along the longer side of a picture: a line is told by far fewer points than it has pixels (it is refined with
+#: as many), its place across is not; and pixels per point across.
+POINTS, _ACROSS_PX = 80, 2
 #: Steps this many times the weakest one have a full vote, fainter ones less: noise must not outvote an edge.
 _FULL = 4.0
+#: Most points of one polarity that vote; a line right across the picture has POINTS.
+_MOST = 500
 #: A central difference over this many sums of pixels answers as Sobel's kernel does.
 _SOBEL = 4.0
 
@@ -33,11 +36,12 @@ def edge_points(
         float32 (n, 3) each.
     """
     height, width = picture.mask.shape
-    columns, rows = (width // _PER_COLUMN, height // PER_ROW) if upright else (width // PER_ROW, height // _PER_COLUMN)
+    apart = max(height, width) / POINTS
+    columns, rows = width // _ACROSS_PX, height // _ACROSS_PX
+    columns, rows = (columns, round(height / apart)) if upright else (round(width / apart), rows)
     thin = cv2.split(cv2.resize(picture.rgb, (columns, rows), interpolation=cv2.INTER_LINEAR))
     if upright:
         thin = tuple(cv2.transpose(plane) for plane in thin)
-        rows, columns = columns, rows
     pairs = [(plane[2:], plane[:-2]) for plane in thin]
     threshold = max(1, round(gradient_min / _SOBEL))
     signed = (
@@ -87,7 +91,11 @@ def _points(
         cell += np.minimum(x_px // grid.stride, last_column)
         free &= region.reshape(-1).take(cell) > 0
     kept = np.flatnonzero(free)
+    weight = np.minimum(steps.reshape(-1).take(places.take(kept)) * np.float32(1.0 / (_FULL * threshold)), 1.0)
+    if len(kept) > _MOST:  # grain and prints: the strongest tell the lines, and the votes of all would take long
+        strongest = np.argpartition(-weight, _MOST)[:_MOST]
+        kept, weight = kept.take(strongest), weight.take(strongest)
     points = np.empty((len(kept), 3), np.float32)
     points[:, 0], points[:, 1] = 0.5 * u.take(kept), 0.5 * v.take(kept)
-    points[:, 2] = np.minimum(steps.reshape(-1).take(places.take(kept)) * np.float32(1.0 / (_FULL * threshold)), 1.0)
+    points[:, 2] = weight
     return points

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from ibvs_qp.vision.config import VisionConfig
-from ibvs_qp.vision.edge_points import PER_ROW, edge_points
+from ibvs_qp.vision.edge_points import POINTS, edge_points
 from ibvs_qp.vision.grid import CoarseGrid
 from ibvs_qp.vision.picture import Picture
 from ibvs_qp.vision.plane import PlaneEstimate
@@ -18,6 +18,8 @@ from ibvs_qp.vision.plane import PlaneEstimate
 _VOTED, _KEPT = 40, 5
 #: Points this near to a line vote for it, and this near to it are explained by it [half-resolution px].
 _NEAR, SAME_PX = 1.0, 2.0
+#: Lines of less than this share of the best one's weight are not looked at.
+_POOR = 0.03
 #: Weight of the points of a faint line that must still be found.
 _FAINT = 0.4
 #: Distance from a line at which the coarse labels of its two sides are compared [cells].
@@ -87,7 +89,7 @@ def _hough(
         for v in (0.0, moved + height)
         for angle in (low, high)
     ]
-    least = max(4, round(0.5 * config.detect.min_length * max(view.width, view.height) / PER_ROW))
+    least = max(3, round(0.5 * config.detect.min_length * POINTS))
     voted = cv2.HoughLinesPointSet(
         np.ascontiguousarray(points[:, None, :2]),
         _VOTED,
@@ -133,22 +135,23 @@ def _distinct(distance: np.ndarray, free: np.ndarray, falls: list[bool], least: 
         least: Least weight of a line.
     """
     near = (distance < _NEAR).astype(np.float32)
-    open_ = np.ones(len(near), np.float32)
+    wanted = np.ones(len(near), np.float32)
     room = {True: _KEPT, False: _KEPT}
     kept: list[int] = []
     votes: list[float] = []
-    while any(room.values()):
-        left = (near @ free) * open_
+    while True:
+        left = (near @ free) * wanted
         best = int(left.argmax())
-        if left[best] < least:
-            break
-        open_[best] = 0.0
+        own = float(left[best])
+        if own < max(least, _POOR * (votes[0] if votes else 0.0)):
+            return kept, votes
+        kept.append(best)
+        votes.append(own)
         free[distance[best] < SAME_PX] = 0.0
-        if room[falls[best]]:
-            room[falls[best]] -= 1
-            kept.append(best)
-            votes.append(float(left[best]))
-    return kept, votes
+        wanted[best] = 0.0
+        room[falls[best]] -= 1
+        if not room[falls[best]]:
+            wanted[np.array(falls) == falls[best]] = 0.0
 
 
 def _label_difference(left: np.ndarray, right: np.ndarray, labels: np.ndarray, grid: CoarseGrid) -> np.ndarray:
