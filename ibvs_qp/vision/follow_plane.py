@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import cv2
 import numpy as np
 
 from ibvs_qp.vision.colors import BOARD, PAINT, SurfaceColors
@@ -47,6 +48,7 @@ class PlaneFollower:
         self._design = design = grid.design - (0.5 / fx, 0.5 / fy, 0.0)
         x, y, one = design.T
         self._products = np.column_stack((x * x, x * y, x, y * y, y, one))
+        self._corners = cv2.convertMaps(grid.places.astype(np.float32) - np.float32(0.5), None, cv2.CV_16SC2)
         rows, columns = (size // _BLOCK for size in grid.shape)
         self._blocks = rows, columns
 
@@ -122,13 +124,9 @@ class PlaneFollower:
 
     def _means(self, depth: np.ndarray) -> np.ndarray:
         """Mean of four neighbours at every sample [m], (n,); one without a reading pulls it far off the surface."""
-        start, stride = self._grid.offset - 1, self._grid.stride
-        upper, lower = depth[start::stride], depth[start + 1 :: stride]
-        (rows, columns), total = self._grid.shape, np.zeros(self._grid.shape)
-        for line in (upper, lower):
-            for first in (start, start + 1):
-                total += line[:rows, first::stride][:, :columns]
-        return 0.25 * total.reshape(-1)
+        depth = depth.astype(np.float32, copy=False)
+        means = cv2.remap(depth, *self._corners, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        return means.reshape(-1).astype(np.float64)
 
     def _problem(self, plane: np.ndarray, down: np.ndarray | None) -> str | None:
         """Why a plane cannot be the surface, or None."""

@@ -18,6 +18,7 @@ class CoarseGrid:
         stride: Distance of samples [px].
         shape: (rows, columns) of the grid.
         free: Samples the vehicle does not hide, bool (rows, columns).
+        places: (u, v) of the samples [px], int16 (rows, columns, 2).
         design: Columns x, y, 1 in normalised coordinates, (rows * columns, 3).
     """
 
@@ -33,13 +34,13 @@ class CoarseGrid:
         x, y = np.meshgrid((u - cx) / fx, (v - cy) / fy)
         self.design = np.column_stack((x.ravel(), y.ravel(), np.ones(x.size)))
         along, across = np.meshgrid(u, v)
-        self._places = np.stack((along, across), axis=2).astype(np.int16)
+        self.places = np.stack((along, across), axis=2).astype(np.int16)
         self.free = self.sample(mask) == 0
 
     def sample(self, picture: np.ndarray) -> np.ndarray:
         """Values of a picture at the samples, (rows, columns, ...)."""
         if picture.ndim == 3:  # a few bytes at a time: three times as fast as numpy's strides
-            return cv2.remap(picture, self._places, _WHOLE, cv2.INTER_NEAREST)
+            return cv2.remap(picture, self.places, _WHOLE, cv2.INTER_NEAREST)
         return picture[self.offset :: self.stride, self.offset :: self.stride]
 
     def inverse_depth(self, depth: np.ndarray, nearest: float, farthest: float) -> np.ndarray:
