@@ -9,6 +9,8 @@ from ibvs_qp.vision.mask import Intrinsics
 
 #: Whole pixels need no table of fractions.
 _WHOLE = np.empty((0, 0), np.uint16)
+#: Types that OpenCV can read at places.
+_FAST = (np.dtype(np.uint8), np.dtype(np.float32))
 
 
 class CoarseGrid:
@@ -39,7 +41,7 @@ class CoarseGrid:
 
     def sample(self, picture: np.ndarray) -> np.ndarray:
         """Values of a picture at the samples, (rows, columns, ...)."""
-        if picture.ndim == 3:  # a few bytes at a time: three times as fast as numpy's strides
+        if picture.dtype in _FAST:  # three times as fast as numpy's strides
             return cv2.remap(picture, self.places, _WHOLE, cv2.INTER_NEAREST)
         return picture[self.offset :: self.stride, self.offset :: self.stride]
 
