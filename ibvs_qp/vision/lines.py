@@ -7,7 +7,8 @@ import numpy as np
 from ibvs_qp.vision.admissible import Admissible
 from ibvs_qp.vision.colors import SurfaceColors
 from ibvs_qp.vision.config import LineConfig
-from ibvs_qp.vision.fit_lines import consensus_lines, fitted_rows, longest_runs, robust_lines, shifted_lines
+from ibvs_qp.vision.consensus import consensus_lines, shifted_lines
+from ibvs_qp.vision.fit_lines import fitted_rows, longest_runs, robust_lines
 from ibvs_qp.vision.picture import Picture
 from ibvs_qp.vision.profiles import Strips
 from ibvs_qp.vision.query import LineQuery, LineView
