@@ -201,10 +201,10 @@ def test_arm_hangs_from_above_and_the_brush_hides_its_footprint() -> None:
 def test_propellers_stay_outside_the_nominal_picture_and_enter_a_wider_one() -> None:
     scene = Scene()
     canvas = Canvas(scene, 0)
-    assert PlaneCamera(scene, VEHICLE, canvas, 0)._propeller_box is None
+    assert PlaneCamera(scene, VEHICLE, canvas, 0).finish.propeller_box is None
     wide = dataclasses.replace(scene, camera=CameraScene(vertical_fov_deg=75.0))
     camera = PlaneCamera(wide, VEHICLE, canvas, 0)
-    box = camera._propeller_box
+    box = camera.finish.propeller_box
     assert box is not None and box[0] == 0 and box[1] < 240, "from above, in the upper half"
     depth = camera.capture(*facing(wide, 0.7, 0.05, 0.0), 0).depth
     assert (depth[0, :3] == 0.0).all() or (depth[0, -3:] == 0.0).all()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -9,6 +10,8 @@ import pytest
 
 from ibvs_qp.vehicle import VehicleParams
 from ibvs_qp.vision import LineHint, Perception, VisionConfig
+from sim.bench.mission import mission_shots
+from sim.scene import Scene
 from sim.truth import render_frame
 from sim.truth.accuracy import line_errors
 from sim.truth.row_2 import attitude_of, row_2_scene
@@ -58,3 +61,15 @@ def test_row_2_takes_the_guide_in_every_picture(count: int) -> None:
         angles.append(offset[1])
     assert np.median(offsets) <= 0.05 and np.percentile(offsets, 95) <= 0.3, offsets
     assert np.median(angles) <= 0.03, angles
+
+
+def test_a_cold_start_in_row_2_tells_board_from_paint() -> None:
+    """Most places beside the brush are painted then: the surface is sought where it is bare."""
+    vehicle, paint = VehicleParams(), Scene().paint
+    shot = next(itertools.islice(mission_shots((640, 480), 16, 1, vehicle), 12, None))
+    config = VisionConfig(paint_color=paint.color, brush_width_m=paint.brush_width_m)
+    percept = Perception(config, vehicle).process(shot.frame, attitude=shot.attitude, detect=True)
+    sure = [(entry.identity.kind, entry.role) for entry in percept.candidates if entry.score >= 0.8]
+    assert percept.plane is not None and percept.plane.inlier_share > 0.5
+    assert sure.count(("board", "horizontal")) == 1, "the lower border"
+    assert sure.count(("paint", "horizontal")) >= 2, "row 1's lower edge, its upper edge ahead, row 2's fresh one"

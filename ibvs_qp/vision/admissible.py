@@ -88,10 +88,13 @@ class Admissible:
         allowed = self._strips.hidden.reshape(-1).take(places).max(axis=0) == 0
         if not self._judges:
             return allowed
-        labels = self._colors.label(self._strips.colors.reshape(-1, 3).take(places[::2], axis=0))
-        keys = self._keys + _LABEL_STEPS @ labels
+        before, behind = self._colors.label(self._strips.colors.reshape(-1, 3).take(places[::2], axis=0))
+        keys = self._keys + before
+        keys += 3 * behind
         if self._depth is not None:
-            keys += _OFF_STEPS @ self._off(pixels[::2], np.s_[:])
+            before, behind = self._off(pixels[::2], np.s_[:])
+            keys += 9 * before
+            keys += 18 * behind
         return allowed & _FITS.take(keys)
 
     def everywhere(self, rows: np.ndarray) -> np.ndarray:

@@ -47,19 +47,43 @@ class LineIdentity:
     quality: float = 0.1
 
 
-def identify(
-    line: RefinedLine,
+def identify_lines(
+    lines: list[RefinedLine],
     picture: Picture,
     depth: np.ndarray,
     plane: PlaneEstimate | None,
     grid: CoarseGrid,
     colors: SurfaceColors,
     config: LineConfig,
+) -> list[LineIdentity]:
+    """Tell by colour and depth on both sides of each line what it is."""
+    if not lines:
+        return []
+    labels = np.split(
+        colors.label(np.concatenate([line.sides for line in lines], axis=1)),
+        np.cumsum([len(line.pixels) for line in lines[:-1]]),
+        axis=1,
+    )
+    steps = _depth_steps(lines, picture, depth, plane)
+    surface = None if plane is None else grid.design[np.flatnonzero(plane.component)]
+    return [
+        _identify(line, label, step, surface, grid, colors, config)
+        for line, label, step in zip(lines, labels, steps, strict=True)
+    ]
+
+
+def _identify(
+    line: RefinedLine,
+    labels: np.ndarray,
+    steps: list[tuple[float | None, float]],
+    surface: np.ndarray | None,
+    grid: CoarseGrid,
+    colors: SurfaceColors,
+    config: LineConfig,
 ) -> LineIdentity:
-    """Tell by colour and depth on both sides of a line what it is."""
-    labels = colors.label(line.sides)
-    board, paint = (labels == BOARD).mean(axis=1), (labels == PAINT).mean(axis=1)
-    steps = [_depth_step(line, picture, depth, plane, side) for side in (-1, 1)]
+    """What a line is by the labels (2, n) and the depth steps of its two sides."""
+    count = max(labels.shape[1], 1)
+    board, paint = ((np.count_nonzero(labels == kind, axis=1) / count).tolist() for kind in (BOARD, PAINT))
     gates = [max(_STEP_MIN, config.depth_step_sigmas * sigma) for _, sigma in steps]
     off = [value is not None and abs(value) > gate for (value, _), gate in zip(steps, gates, strict=True)]
     known = [value is not None for value, _ in steps]
@@ -75,50 +99,73 @@ def identify(
             continue
         value, gate = steps[other][0], gates[other]
         farther = value is not None and value > gate
-        beyond = _share_beyond(line, plane, grid, side)
-        if farther and beyond <= _BEYOND:
-            return LineIdentity(kind="board", surface_side=side, borders_plane=True, quality=1.0)
         foreign = colors.board is not None and board[other] + paint[other] <= _HAS_NOT
-        if foreign and beyond <= _BEYOND and not (known[other] and off[other]):
-            return LineIdentity(kind="board", surface_side=side, quality=0.6)
+        foreign = foreign and not (known[other] and off[other])
+        if (farther or foreign) and _share_beyond(line, surface, grid, side) <= _BEYOND:
+            quality = 1.0 if farther else 0.6
+            return LineIdentity(kind="board", surface_side=side, borders_plane=farther, quality=quality)
     return LineIdentity()
 
 
-def _depth_step(
-    line: RefinedLine, picture: Picture, depth: np.ndarray, plane: PlaneEstimate | None, side: int
-) -> tuple[float | None, float]:
-    """How much farther than the surface one side is, share of depth, with its standard deviation; None if unseen."""
+def _depth_steps(
+    lines: list[RefinedLine], picture: Picture, depth: np.ndarray, plane: PlaneEstimate | None
+) -> list[list[tuple[float | None, float]]]:
+    """How much farther than the surface either side of each line is, share of depth, with its standard deviation.
+
+    None where too few readings tell; the nearest of a few distances that tells enough is taken.
+    """
+    found: list[list[tuple[float | None, float]]] = [[(None, 1.0), (None, 1.0)] for _ in lines]
     if plane is None:
-        return None, 1.0
-    height, width = depth.shape
-    normal = side * np.array([np.cos(line.theta), np.sin(line.theta)])
+        return found
+    missing = [(k, index) for k in range(len(lines)) for index in (0, 1)]
     for distance in _DEPTH_PX:
-        place = np.round(line.pixels + distance * picture.scale * normal).astype(np.intp)
-        inside = (place[:, 0] >= 0) & (place[:, 0] < width) & (place[:, 1] >= 0) & (place[:, 1] < height)
-        place = place[inside]
-        z = depth[place[:, 1], place[:, 0]].astype(float)
-        seen = (z > 0) & np.isfinite(z) & (picture.mask[place[:, 1], place[:, 0]] == 0)
-        count = int(np.count_nonzero(seen))
-        if count < max(_VALID * len(line.pixels), 5):
-            continue
-        fx, fy, cx, cy = picture.intrinsics
-        x, y = (place[seen, 0] - cx) / fx, (place[seen, 1] - cy) / fy
-        a, b, c = plane.inverse_depth
-        value = median(z[seen] * (a * x + b * y + c)) - 1.0
-        return value, plane.residual_sigma * math.sqrt(_CORRELATED / count)
-    return None, 1.0
+        offsets = [
+            (
+                (-1, 1)[index] * distance * picture.scale * math.cos(lines[k].theta),
+                (-1, 1)[index] * distance * picture.scale * math.sin(lines[k].theta),
+            )
+            for k, index in missing
+        ]
+        places = np.concatenate([lines[k].pixels + offset for (k, _), offset in zip(missing, offsets, strict=True)])
+        relative = _relative_depths(places, picture, depth, plane)
+        start, left = 0, []
+        for k, index in missing:
+            total = len(lines[k].pixels)
+            part = relative[start : start + total]
+            start += total
+            part = part[np.isfinite(part)]
+            if len(part) < max(_VALID * total, 5):
+                left.append((k, index))
+            else:
+                found[k][index] = median(part) - 1.0, plane.residual_sigma * math.sqrt(_CORRELATED / len(part))
+        missing = left
+        if not missing:
+            break
+    return found
 
 
-def _share_beyond(line: RefinedLine, plane: PlaneEstimate | None, grid: CoarseGrid, side: int) -> float:
-    """Share of the surface's samples abreast of the segment that lie beyond the line: ~0 at a true border."""
-    if plane is None:
+def _relative_depths(places: np.ndarray, picture: Picture, depth: np.ndarray, plane: PlaneEstimate) -> np.ndarray:
+    """Depth at places (n, 2) [px] as a share of the surface's there, (n,); NaN where nothing is seen."""
+    (height, width), (fx, fy, cx, cy) = depth.shape, picture.intrinsics
+    u, v = np.rint(places).T
+    inside = (u >= 0) & (u < width) & (v >= 0) & (v < height)
+    flat = (np.where(inside, v, 0.0) * width + np.where(inside, u, 0.0)).astype(np.intp)
+    z = depth.reshape(-1).take(flat)
+    seen = inside & (z > 0) & (z < np.inf) & (picture.mask.reshape(-1).take(flat) == 0)  # false for NaN too
+    a, b, c = plane.inverse_depth.tolist()
+    surface = (a / fx) * u + (b / fy) * v + (c - a * cx / fx - b * cy / fy)
+    return np.where(seen, z * surface, np.nan)
+
+
+def _share_beyond(line: RefinedLine, points: np.ndarray | None, grid: CoarseGrid, side: int) -> float:
+    """Share of the surface's samples (n, 3) abreast of the segment that lie beyond the line: ~0 at a true border."""
+    if points is None:
         return 0.0
-    cos, sin = np.cos(line.theta), np.sin(line.theta)
-    points = grid.design[plane.component.ravel()]
+    cos, sin = math.cos(line.theta), math.sin(line.theta)
     across = side * (points[:, 0] * cos + points[:, 1] * sin - line.rho)
     along = points[:, 1] * cos - points[:, 0] * sin
     ends = line.segment[:, 1] * cos - line.segment[:, 0] * sin
     abreast = (along > ends.min()) & (along < ends.max())
     margin = 1.5 * grid.stride / grid.intrinsics[0]
-    beyond, within = int((abreast & (across < -margin)).sum()), int((abreast & (across > margin)).sum())
+    beyond, within = (int(np.count_nonzero(abreast & part)) for part in (across < -margin, across > margin))
     return beyond / max(beyond + within, 1)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 
 from ibvs_qp.vision.grid import CoarseGrid
@@ -12,6 +14,8 @@ _BLEND = 0.2
 _JUDGED = 500
 #: Bits per channel of the label table, the shift that leaves them, and the board's drift that renews it.
 _TABLE_BITS, _TABLE_SHIFT, _TABLE_DRIFT = 5, 3, 1.5
+_TABLE_STEPS = np.array((1 << 2 * _TABLE_BITS, 1 << _TABLE_BITS, 1), np.float32)
+_SUM = np.ones(3, np.float32)
 #: Labels of `SurfaceColors.label`.
 OTHER, BOARD, PAINT = 0, 1, 2
 #: Colours nearer to each other than this share of the gate cannot be told apart.
@@ -56,26 +60,49 @@ class SurfaceColors:
             return np.zeros(colors.shape[:-1], np.uint8)
         if len(self._table) == 0 or np.abs(self.board - self._table_board).max() > _TABLE_DRIFT:
             self._make_table(self.board)
-        coarse = (colors >> _TABLE_SHIFT).astype(np.uint16)
-        return self._table.take((coarse[..., 0] << 2 * _TABLE_BITS) | (coarse[..., 1] << _TABLE_BITS) | coarse[..., 2])
+        # single precision holds the place exactly, and has the only fast product
+        return self._table.take(((colors >> _TABLE_SHIFT).astype(np.float32) @ _TABLE_STEPS).astype(np.intp))
 
     def _make_table(self, board: np.ndarray) -> None:
         """Labels of all colours in steps of eight grey levels: thousands of colours are looked up per picture."""
         to_board = _distances(board)
-        table = np.where(to_board < self._gate**2, np.uint8(BOARD), np.uint8(OTHER))
-        if self.paint_distinct and self.paint is not None:
-            to_paint = _distances(self.paint)
-            table[(to_paint < self._gate**2) & (to_paint < to_board)] = PAINT
+        table = (to_board < self._gate**2).view(np.uint8)  # true is BOARD, false OTHER
+        if self.paint_distinct:
+            places, to_paint = self._paint_colors
+            table[places[to_paint < to_board.take(places)]] = PAINT
         self._table, self._table_board = table, board.copy()
 
+    @cached_property
+    def _paint_colors(self) -> tuple[np.ndarray, np.ndarray]:
+        """Places in the label table that look like paint, and how far they are from it."""
+        assert self.paint is not None
+        to_paint = _distances(self.paint)
+        places = np.flatnonzero(to_paint < self._gate**2)
+        return places, to_paint.take(places)
+
     def like_around(self, grid: CoarseGrid, colors: np.ndarray, seed: tuple[int, int], radius: int) -> np.ndarray:
-        """Labels of samples that look like those around a seed: BOARD or OTHER, uint8 (rows, columns)."""
-        rows, columns = grid.window(seed, radius)
-        window = colors[rows, columns][grid.free[rows, columns]].astype(np.float32)
-        if len(window) == 0:
-            return np.full(grid.shape, BOARD, np.uint8)
-        near = self._distance(colors.astype(np.float32), np.median(window, axis=0)) < self._gate**2
-        return np.where(near, np.uint8(BOARD), np.uint8(OTHER))
+        """Labels of samples by the colour around a seed: BOARD for what looks like it, uint8 (rows, columns)."""
+        [around] = self._around(grid, colors, [seed], radius)
+        samples = colors.reshape(-1, 3).astype(np.float32)
+        labels = (self._distance(samples, around) < self._gate**2).view(np.uint8)
+        if self.paint is not None and float(self._distance(self.paint, around)) > self._gate**2:
+            labels[(self._distance(samples, self.paint) < self._gate**2) & (labels == OTHER)] = PAINT
+        return labels.reshape(grid.shape)
+
+    def bare(
+        self, grid: CoarseGrid, colors: np.ndarray, seeds: list[tuple[int, int]], radius: int
+    ) -> list[tuple[int, int]]:
+        """Those of the seeds that do not lie on paint; all of them if every one does, or if the paint is unknown."""
+        if self.paint is None or not seeds:
+            return seeds
+        painted = self._distance(self._around(grid, colors, seeds, radius), self.paint) < self._gate**2
+        return [seed for seed, paint in zip(seeds, painted.tolist(), strict=True) if not paint] or seeds
+
+    @staticmethod
+    def _around(grid: CoarseGrid, colors: np.ndarray, seeds: list[tuple[int, int]], radius: int) -> np.ndarray:
+        """Median colours of the samples around seeds, float32 (n, 3)."""
+        windows = np.sort(colors.reshape(-1, 3).take(grid.windows(seeds, radius), axis=0), axis=1)
+        return windows[:, windows.shape[1] // 2].astype(np.float32)
 
     @property
     def paint_distinct(self) -> bool:
@@ -87,8 +114,8 @@ class SurfaceColors:
     @staticmethod
     def _distance(colors: np.ndarray, reference: np.ndarray) -> np.ndarray:
         """Squared RGB distance, (...)."""
-        offset = colors - reference
-        return np.einsum("...i,...i->...", offset, offset)
+        # differences of rows of three cost many times as much as the two products
+        return np.square(colors) @ _SUM + (colors @ (-2.0 * reference) + float(reference @ reference))
 
 
 def _distances(reference: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL
-from ibvs_qp.vision.classify import LineIdentity, identify
+from ibvs_qp.vision.classify import LineIdentity, identify_lines
 from ibvs_qp.vision.colors import SurfaceColors
 from ibvs_qp.vision.config import VisionConfig
 from ibvs_qp.vision.grid import CoarseGrid
@@ -17,16 +17,16 @@ from ibvs_qp.vision.picture import Picture, normalised_line
 from ibvs_qp.vision.plane import PlaneEstimate
 from ibvs_qp.vision.query import LineQuery
 from ibvs_qp.vision.refined import RefinedLine
-from ibvs_qp.vision.vote import SAME_PX, VotedLine, vote_lines
+from ibvs_qp.vision.vote import VotedLine, vote_lines
 
 #: Half width of the strip in which a voted line is refined [px at 640]: two half-resolution bins.
 _REFINE_PX = 6.0
 #: Refined lines nearer than this at both ends of the picture are one [px at 640].
 _DUPLICATE_PX = 3.0
+#: A voted line nearer than this to both ends of a known one is that one [px at 640].
+_COVERED_PX = 8.0
 #: Length that earns the full score, share of the picture's width.
 _FULL_LENGTH = 0.4
-#: Voted lines refined at once; those on edges found by then are left out of the next batch.
-_BATCH = 8
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,25 +81,20 @@ def detect_lines(
     voted = vote_lines(picture, plane, grid, labels, config, math.remainder(tilt, 0.5 * math.pi), directions)
     voted = [entry for entry in voted if not any(_covered(entry, line, picture) for line in known)]
     voted.sort(key=lambda entry: -entry.rank)
-    found: list[Candidate] = []
-    left = math.ceil(config.detect.candidates * len(directions) / 2)
-    while voted and left > 0:
-        size = min(left, _BATCH)
-        batch, voted = voted[:size], voted[size:]
-        queries = [_query(entry, picture) for entry in batch]
-        width = _REFINE_PX * picture.scale
-        lines = refine_lines(picture, queries, half_width_px=width, config=config.line, colors=colors, contents=True)
-        left -= size
-        for line in lines:
-            if line is None:
-                continue
-            if any(_same(line, other.line, picture) for other in found):
-                left += len(directions) - 1  # seen already: does not count in a full search
-                continue
-            candidate = _candidate(line, picture, depth, plane, grid, colors, config, tilt)
-            if candidate is not None:
-                found.append(candidate)
-        voted = [entry for entry in voted if not any(_covered(entry, other.line, picture) for other in found)]
+    best = voted[: math.ceil(config.detect.candidates * len(directions) / 2)]
+    width = _REFINE_PX * picture.scale
+    queries = [_query(entry, picture) for entry in best]
+    fits = refine_lines(picture, queries, half_width_px=width, config=config.line, colors=colors, contents=True)
+    lines: list[RefinedLine] = []
+    for fit in fits:
+        if (
+            fit is not None
+            and fit.length_px >= config.detect.min_length * picture.mask.shape[1]
+            and not any(_same(fit, other, picture) for other in lines)
+        ):
+            lines.append(fit)
+    identities = identify_lines(lines, picture, depth, plane, grid, colors, config.line)
+    found = [_candidate(line, identity, picture, tilt) for line, identity in zip(lines, identities, strict=True)]
     return sorted(found, key=lambda candidate: -candidate.score)
 
 
@@ -117,34 +112,22 @@ def _query(entry: VotedLine, picture: Picture) -> LineQuery:
     return LineQuery(rho=rho, theta=theta, polarity=entry.polarity)
 
 
-def _candidate(
-    line: RefinedLine,
-    picture: Picture,
-    depth: np.ndarray,
-    plane: PlaneEstimate | None,
-    grid: CoarseGrid,
-    colors: SurfaceColors,
-    config: VisionConfig,
-    tilt: float,
-) -> Candidate | None:
-    """A fitted line with its identity and score, or None if it is too short."""
-    if line.length_px < config.detect.min_length * picture.mask.shape[1]:
-        return None
-    identity = identify(line, picture, depth, plane, grid, colors, config.line)
+def _candidate(line: RefinedLine, identity: LineIdentity, picture: Picture, tilt: float) -> Candidate:
+    """A fitted line with its score."""
     length = min(line.length_px / (_FULL_LENGTH * picture.mask.shape[1]), 1.0)
     score = identity.quality * (0.4 + 0.6 * length) * line.inlier_share
-    return Candidate(line=line, role=role_of(line.theta, tilt), identity=identity, score=float(score))
+    return Candidate(line=line, role=role_of(line.theta, tilt), identity=identity, score=score)
 
 
 def _covered(entry: VotedLine, line: RefinedLine, picture: Picture) -> bool:
-    """Whether a voted line is an edge already fitted: within the vote's resolution at both ends of its segment."""
+    """Whether a voted line is a known edge: near at both ends of its segment."""
     fx, fy, cx, cy = picture.intrinsics
     across = picture.height if entry.upright else picture.width
     slope = (entry.right - entry.left) / (across - 1.0)
     for x, y in line.segment.tolist():
         u, v = fx * x + cx, fy * y + cy
         along, level = (v, u) if entry.upright else (u, v)
-        if abs(entry.left + slope * along - level) >= 2.0 * SAME_PX:
+        if abs(entry.left + slope * along - level) >= _COVERED_PX * picture.scale:
             return False
     return True
 
@@ -155,8 +138,9 @@ def _same(one: RefinedLine, two: RefinedLine, picture: Picture) -> bool:
         return False
     limit = _DUPLICATE_PX * picture.scale / picture.intrinsics[0]
     cos, sin = math.cos(two.theta), math.sin(two.theta)
-    apart = np.abs(one.segment @ np.array([cos, sin]) - two.rho)
-    along_one = one.segment @ np.array([-sin, cos])
-    along_two = two.segment @ np.array([-sin, cos])
-    overlap = min(along_one.max(), along_two.max()) - max(along_one.min(), along_two.min())
-    return bool(apart.max() < limit and overlap > 0.0)
+    ends = one.segment.tolist()
+    if any(abs(x * cos + y * sin - two.rho) >= limit for x, y in ends):
+        return False
+    low_one, high_one = sorted(y * cos - x * sin for x, y in ends)
+    low_two, high_two = sorted(y * cos - x * sin for x, y in two.segment.tolist())
+    return min(high_one, high_two) > max(low_one, low_two)

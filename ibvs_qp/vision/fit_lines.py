@@ -1,10 +1,13 @@
-"""Robust straight lines through one point per profile, many lines at once: consensus start, Tukey fit, runs."""
+"""Robust straight lines through one point per profile, many lines at once: Tukey fit, runs of support."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
+
+from ibvs_qp.vision.consensus import middle_values
 
 #: Tukey's constant: 95 % efficiency on normal residuals.
 _TUKEY = 4.685
@@ -13,17 +16,13 @@ _SCALE_MIN = 0.02
 _MAD = 1.4826
 #: Rounds of fitting, the first with equal weights.
 _ROUNDS = 2
-#: Shortest distance of the points of a pair [px].
-_APART = 4.0
-#: Share of the points that must agree with a prediction moved across its line, else lines are tried.
-_AGREEING = 0.8
 #: Largest correlation of neighbouring residuals accounted for.
 _CORRELATION_MAX = 0.8
 
 
-@dataclass
-class LineFits:
-    """Lines v = level + slope (u - center), (L,) each.
+@dataclass(frozen=True, slots=True)
+class LineFit:
+    """A line v = level + slope (u - center), in plain numbers: arrays of a few elements cost ten times as much.
 
     Attributes:
         level: Row at the centre [px].
@@ -34,138 +33,111 @@ class LineFits:
         rms: Of the residuals [px].
     """
 
-    level: np.ndarray
-    slope: np.ndarray
-    center: np.ndarray
-    level_variance: np.ndarray
-    slope_variance: np.ndarray
-    rms: np.ndarray
-
-    def rows(self, u: np.ndarray) -> np.ndarray:
-        """Rows at the columns of every line, (L, K)."""
-        return self.level[:, None] + self.slope[:, None] * (u - self.center[:, None])
+    level: float
+    slope: float
+    center: float
+    level_variance: float
+    slope_variance: float
+    rms: float
 
 
-def shifted_lines(distance: np.ndarray, used: np.ndarray, gate: float) -> tuple[np.ndarray, np.ndarray]:
-    """Distances of the points from the predicted line moved to the middle of them, and whether most agree with it.
-
-    Args:
-        distance: From the prediction [px], (L, K).
-        used: Points that count, bool (L, K).
-        gate: Distance within which a point agrees [px].
-
-    Returns:
-        Distances (L, K) and agreement (L,).
-    """
-    count = used.sum(axis=1)
-    ordered = np.where(used, distance, np.inf)
-    ordered.sort(axis=1)
-    lines, size = ordered.shape
-    middle = ordered.take(np.minimum(count // 2, size - 1) + np.arange(0, lines * size, size))
-    moved = distance - middle[:, None]
-    near = used & (np.abs(moved) < gate)
-    return moved, near.sum(axis=1) >= np.maximum(_AGREEING * count, 1.0)
+def fitted_rows(lines: list[LineFit], u: np.ndarray) -> np.ndarray:
+    """Rows at the columns (L, K) of every line, (L, K)."""
+    at_zero, slope = np.array([(line.level - line.slope * line.center, line.slope) for line in lines]).T[:, :, None]
+    return at_zero + slope * u
 
 
-def consensus_lines(
-    u: np.ndarray, v: np.ndarray, used: np.ndarray, gate: float, starts: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Distances of the points from the line that most of them agree with, and whether any pair spans a line.
-
-    The lines tried run through fixed pairs, a half and a third of the points apart.
+def robust_lines(u: np.ndarray, v: np.ndarray, used: np.ndarray, count: np.ndarray) -> list[LineFit]:
+    """Tukey-weighted least-squares lines through the used points; gross errors are out already.
 
     Args:
         u: Positions along the lines [px], growing, (L, K).
         v: Positions across them [px], (L, K).
         used: Points that count, bool (L, K).
-        gate: Distance within which a point agrees [px].
-        starts: Places from which pairs are tried.
-
-    Returns:
-        Distances (L, K) and validity (L,).
+        count: How many these are, (L,).
     """
-    count = used.sum(axis=1)
-    held = np.flatnonzero(used)
-    if len(held) == 0:
-        return np.full(u.shape, np.inf), np.zeros(len(u), bool)
-    counts = np.maximum(count, 1)[:, None]
-    one = (np.linspace(0.0, 1.0, starts) * (counts - 1)).astype(np.intp)
-    two = np.concatenate(((one + counts // 2) % counts, (one + counts // 3) % counts), axis=1)
-    before = np.minimum(np.cumsum(count) - count, len(held) - 1)[:, None]  # a line without points borrows some
-    last = len(held) - 1
-    one = held.take(np.minimum(np.concatenate((one, one), axis=1) + before, last))
-    two = held.take(np.minimum(two + before, last))
-    u, v = u.astype(np.float32), v.astype(np.float32)
-    u_one, v_one = u.take(one), v.take(one)
-    run = u.take(two) - u_one
-    apart = np.abs(run) > _APART
-    slope = (v.take(two) - v_one) / np.where(apart, run, np.float32(np.inf))
-    level = v_one - slope * u_one
-    lines = np.stack((level, slope), axis=2)
-    points = np.stack((np.ones_like(u), u), axis=1)
-    distance = lines @ points
-    distance -= v[:, None]
-    closeness = distance * distance
-    closeness *= np.float32(-1.0 / gate**2)
-    closeness += np.float32(1.0)
-    np.maximum(closeness, np.float32(0.0), out=closeness)
-    score = (closeness @ used.astype(np.float32)[:, :, None])[:, :, 0]
-    best = np.where(apart, score, np.float32(-1.0)).argmax(axis=1)
-    return distance[np.arange(len(u)), best], apart.any(axis=1) & (count > 0)
-
-
-def robust_lines(u: np.ndarray, v: np.ndarray, used: np.ndarray) -> LineFits:
-    """Tukey-weighted least-squares lines through the used points, (L, K) each; gross errors are out already."""
-    count = used.sum(axis=1)
     middle = 0.5 * (u[:, :1] + u[:, -1:])
     half = np.maximum(0.5 * (u[:, -1:] - u[:, :1]), 1.0)
     along = (u - middle) / half
     basis = np.empty((*u.shape, 5))
-    basis[:, :, 0], basis[:, :, 1], basis[:, :, 2] = 1.0, along, along * along
-    basis[:, :, 3], basis[:, :, 4] = v, along * v
-    weight, unit = used.astype(float), None
-    residual, sums, slope, level = v, np.zeros((5, len(u))), np.zeros(len(u)), np.zeros(len(u))
-    spread = center = slope
+    basis[:, :, 0], basis[:, :, 1], basis[:, :, 3] = 1.0, along, v
+    np.multiply(along[:, :, None], basis[:, :, 1:4:2], out=basis[:, :, 2:5:2])
+    weight = mask = used.astype(float)
+    unit, residual, solved = None, v, []
     for _ in range(_ROUNDS):
-        sums = (weight[:, None] @ basis)[:, 0].T
-        total = np.maximum(sums[0], 1e-9)
-        center = sums[1] / total
-        spread = np.maximum(sums[2] - sums[1] * center, 1e-9)
-        slope = (sums[4] - sums[3] * center) / spread
-        level = sums[3] / total
-        residual = v - (level - slope * center)[:, None] - slope[:, None] * along
+        solved = [_solve(*sums) for sums in (weight[:, None] @ basis)[:, 0].tolist()]
+        at_middle, slope = np.array([entry[:2] for entry in solved]).T[:, :, None]
+        residual = v - at_middle
+        residual -= slope * along
         unit = _unit(residual, used, count) if unit is None else unit
-        weight = _tukey(residual, unit) * used
-    total = np.maximum(weight.sum(axis=1), 1.0)
-    residual = residual * used
+        weight = _tukey(residual, unit)
+        weight *= mask
+    residual = residual * mask
     weighted = weight * residual
-    square = np.vecdot(weighted, residual)
-    variance = square / np.maximum(total - 2.0, 1.0) + _SCALE_MIN**2 / 12.0
-    neighbours = np.vecdot(weighted[:, :-1], weighted[:, 1:]) / np.maximum(square, 1e-12)
-    neighbours = np.minimum(np.maximum(neighbours, 0.0), _CORRELATION_MAX)
-    variance *= (1.0 + neighbours) / (1.0 - neighbours)
-    rms = np.sqrt(np.vecdot(residual, residual) / np.maximum(count, 1))
-    half, middle = half[:, 0], middle[:, 0]
-    return LineFits(
-        level, slope / half, middle + half * center, variance / total, variance / (spread * half * half), rms
+    sums = (
+        weight.sum(axis=1),
+        np.vecdot(weighted, residual),
+        np.vecdot(weighted[:, :-1], weighted[:, 1:]),
+        np.vecdot(residual, residual),
+        count,
+        half[:, 0],
+        middle[:, 0],
+    )
+    return [_line(line, *numbers) for line, *numbers in zip(solved, *(part.tolist() for part in sums), strict=True)]
+
+
+def _solve(
+    total: float, along: float, square: float, rows: float, product: float
+) -> tuple[float, float, float, float, float]:
+    """Row in the middle, slope, row at the centre, centre and spread from weighted sums."""
+    total = max(total, 1e-9)
+    center = along / total
+    spread = max(square - along * center, 1e-9)
+    slope, level = (product - rows * center) / spread, rows / total
+    return level - slope * center, slope, level, center, spread
+
+
+def _line(
+    solved: tuple[float, float, float, float, float],
+    total: float,
+    square: float,
+    neighbours: float,
+    residuals: float,
+    count: float,
+    half: float,
+    middle: float,
+) -> LineFit:
+    """A fit with the variances that its residuals tell."""
+    _, slope, level, center, spread = solved
+    total = max(total, 1.0)
+    variance = square / max(total - 2.0, 1.0) + _SCALE_MIN**2 / 12.0
+    correlation = min(max(neighbours / max(square, 1e-12), 0.0), _CORRELATION_MAX)
+    variance *= (1.0 + correlation) / (1.0 - correlation)
+    return LineFit(
+        level,
+        slope / half,
+        middle + half * center,
+        variance / total,
+        variance / (spread * half * half),
+        math.sqrt(residuals / max(count, 1)),
     )
 
 
 def _unit(residual: np.ndarray, used: np.ndarray, count: np.ndarray) -> np.ndarray:
     """Inverse of the residual at which a point has no weight, from the median one of each line, (L, 1)."""
-    ordered = np.where(used, np.abs(residual), np.inf)
-    ordered.sort(axis=1)
-    lines, size = ordered.shape
-    middle = ordered.take(np.minimum(count // 2, size - 1) + np.arange(0, lines * size, size))
-    middle[count == 0] = 1.0
-    return (1.0 / (_TUKEY * np.maximum(_MAD * middle, _SCALE_MIN)))[:, None]
+    middle = middle_values(np.abs(residual), used, count)
+    middle = [0.0 if value == math.inf else value for value in middle.tolist()]
+    return np.array([1.0 / (_TUKEY * max(_MAD * value, _SCALE_MIN)) for value in middle])[:, None]
 
 
 def _tukey(residual: np.ndarray, unit: np.ndarray) -> np.ndarray:
     """Weights by residuals."""
-    share = residual * unit
-    weight = np.maximum(0.0, 1.0 - share * share)
-    return weight * weight
+    weight = residual * unit
+    weight *= weight
+    np.subtract(1.0, weight, out=weight)
+    np.maximum(weight, 0.0, out=weight)
+    weight *= weight
+    return weight
 
 
 def longest_runs(support: np.ndarray, visible: np.ndarray, bridge: int) -> list[tuple[int, int]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import cv2
 import numpy as np
 
 from ibvs_qp.vision.colors import BOARD, PAINT, SurfaceColors
@@ -19,6 +20,8 @@ _SPARSER = 2
 #: Gate of what looks like paint, share of the board's: the half of the first gate (1.25 % of depth), and more than two
 #: sigmas of the last one, lie well within a gap of 0.02 m at 0.5 m (4 %).
 _PAINT_GATES = (0.5, 0.75)
+#: Halfway to the next pixel along both axes, as OpenCV counts fractions of a pixel: in 32nds, 32 rows of them.
+_HALFWAY = 32 * 16 + 16
 #: Side of the blocks over which residuals are averaged to measure their correlation [samples].
 _BLOCK = 4
 #: Smallest determinant of the normal matrix, share of the product of its diagonal.
@@ -47,6 +50,8 @@ class PlaneFollower:
         self._design = design = grid.design - (0.5 / fx, 0.5 / fy, 0.0)
         x, y, one = design.T
         self._products = np.column_stack((x * x, x * y, x, y * y, y, one))
+        self._before = grid.places - np.int16(1)
+        self._between = np.full(grid.shape, _HALFWAY, np.uint16)
         rows, columns = (size // _BLOCK for size in grid.shape)
         self._blocks = rows, columns
 
@@ -122,13 +127,9 @@ class PlaneFollower:
 
     def _means(self, depth: np.ndarray) -> np.ndarray:
         """Mean of four neighbours at every sample [m], (n,); one without a reading pulls it far off the surface."""
-        start, stride = self._grid.offset - 1, self._grid.stride
-        upper, lower = depth[start::stride], depth[start + 1 :: stride]
-        (rows, columns), total = self._grid.shape, np.zeros(self._grid.shape)
-        for line in (upper, lower):
-            for first in (start, start + 1):
-                total += line[:rows, first::stride][:, :columns]
-        return 0.25 * total.reshape(-1)
+        depth = depth.astype(np.float32, copy=False)
+        means = cv2.remap(depth, self._before, self._between, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        return means.reshape(-1).astype(np.float64)
 
     def _problem(self, plane: np.ndarray, down: np.ndarray | None) -> str | None:
         """Why a plane cannot be the surface, or None."""

@@ -7,7 +7,8 @@ import numpy as np
 from ibvs_qp.vision.admissible import Admissible
 from ibvs_qp.vision.colors import SurfaceColors
 from ibvs_qp.vision.config import LineConfig
-from ibvs_qp.vision.fit_lines import consensus_lines, longest_runs, robust_lines, shifted_lines
+from ibvs_qp.vision.consensus import consensus_lines, shifted_lines
+from ibvs_qp.vision.fit_lines import fitted_rows, longest_runs, robust_lines
 from ibvs_qp.vision.picture import Picture
 from ibvs_qp.vision.profiles import Strips
 from ibvs_qp.vision.query import LineQuery, LineView
@@ -26,7 +27,7 @@ _PEAK_TO_STEP = 2.5
 _TELLING = 0.5
 #: Places from which pairs of points are tried.
 _STARTS = 20
-#: Share of the visible profiles that show the edge at first sight, below which a line gets a second look.
+#: Share of the visible profiles, where the line was seen last, below which first sight is not enough.
 _ENOUGH = 0.5
 
 
@@ -59,7 +60,7 @@ def refine_lines(
         return found
     strips = Strips.gather(picture, [views[k] for k in used], config, max(2, round(half_width_px)))
     fits = _fit(strips, Admissible(strips, colors), config, picture.scale)
-    sides = strips.sides(fits.lines.rows(strips.u)) if contents else None
+    sides = strips.sides(fitted_rows(fits.lines, strips.u)) if contents else None
     for k, line in zip(used, finish_lines(fits, strips, sides, config), strict=True):
         found[k] = line
     return found
@@ -72,23 +73,23 @@ def _fit(strips: Strips, admissible: Admissible, config: LineConfig, scale: floa
     units = (directions / np.maximum(norm, _STEP_MIN)[:, None]).astype(np.float32)
     threshold = np.maximum(_STEP_SHARE * norm, _FAINT_SHARE * config.contrast_min)
     rows, good = _edges(strips, admissible, strips.response(units), threshold, _FAINT_SHARE * config.contrast_min)
-    u, gate = strips.u.astype(float), config.inlier_px * scale
+    gate = config.inlier_px * scale
     distance, alive = shifted_lines(rows - strips.predicted, good, gate)
     if not (known and alive.all()):
-        distance, alive = consensus_lines(u, rows, good, gate, _STARTS)
-    alive &= (norm >= _STEP_MIN) & (good.sum(axis=1) >= config.min_profiles)
+        distance, alive = consensus_lines(strips.u, rows, good, gate, _STARTS)
+    alive &= (norm >= _STEP_MIN) & (np.count_nonzero(good, axis=1) >= config.min_profiles)
     support = good & (np.abs(distance) < gate) & alive[:, None]
     visible = strips.visible
     runs = longest_runs(support, visible, config.bridge)
-    profile, limits = np.arange(support.shape[1]), np.array(runs)[:, :, None]
-    support &= (profile >= limits[:, 0]) & (profile <= limits[:, 1])
-    count = support.sum(axis=1)
-    lines = robust_lines(u, rows, support)
+    for held, (first, last) in zip(support, runs, strict=True):
+        held[:first] = held[last + 1 :] = False
+    count = np.count_nonzero(support, axis=1)
+    lines = robust_lines(strips.u, rows, support, count)
     before, behind = strips.sides(rows)
-    change = behind.astype(np.float32) - before
+    change = np.subtract(behind, before, dtype=np.float32)
     steps = (support.astype(np.float32)[:, None] @ change)[:, 0] / np.maximum(count, 1)[:, None]
     alive &= (count >= config.min_profiles) & (np.vecdot(steps, steps) >= config.contrast_min**2)
-    return Fits(lines, support, visible, runs, steps, alive)
+    return Fits(lines, support, visible, count, runs, steps, alive)
 
 
 def _edges(
@@ -104,7 +105,7 @@ def _edges(
     place, peak, good = strips.peaks(flat, index)
     limit = np.repeat(threshold, shape[1])
     good &= (peak > limit) & admissible.at(index)
-    few = good.reshape(shape).sum(axis=1) < _ENOUGH * strips.visible.sum(axis=1)
+    few = good.reshape(shape).sum(axis=1) < _ENOUGH * (strips.visible & strips.expected).sum(axis=1)
     if not few.any():
         return strips.base + place.reshape(shape), good.reshape(shape)
     rest = np.flatnonzero(few.repeat(shape[1]) & ~good)

@@ -192,6 +192,8 @@ class Perception:
                 self._plane = None
                 return f"seed pixel ({u:g}, {v:g}) lies outside the picture"
             seeds = [cell]
+        elif prefer is None:
+            seeds = self._colors.bare(self._grid, coarse, seeds, config.seed_radius)
         # a wall a few centimetres behind differs in colour, hardly in depth: before the board is known, the colour
         # around each seed stands for it
         wanted = _Likenesses(

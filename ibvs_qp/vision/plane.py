@@ -14,7 +14,7 @@ from ibvs_qp.vision.robust import median
 from ibvs_qp.vision.surface import PlaneEstimate, connected_samples, plane_covariance
 
 #: Samples used to judge hypotheses and the spread of residuals; more cost time and change nothing.
-_JUDGED = 1000
+_JUDGED = 400
 #: Radius that counts around the seed when hypotheses are judged, normalised.
 _NEAR = 0.25
 #: Share of the coarse gate within which a sample votes for a hypothesis.
@@ -65,7 +65,7 @@ class PlaneFitter:
         Returns:
             The surface, or the reason why there is none.
         """
-        values = [self._seed_value(grid, inverse, seed) for seed in seeds]
+        values = self._seed_values(grid, inverse, seeds)
         order = sorted((index for index, value in enumerate(values) if value > 0), key=lambda index: -values[index])
         reason = "no valid depth around the seed"
         for index in order:
@@ -92,11 +92,19 @@ class PlaneFitter:
         """Follow the surface from predicted (a, b, c), without random search; it is the part around a seed if given."""
         return self._refine(grid, inverse, predicted, seed, down, prefer)
 
-    def _seed_value(self, grid: CoarseGrid, inverse: np.ndarray, seed: tuple[int, int]) -> float:
-        rows, columns = grid.window(seed, self._config.seed_radius)
-        window = inverse[rows, columns][grid.free[rows, columns]]
-        window = window[window > 0]
-        return median(window) if len(window) >= 2 * self._config.seed_radius + 1 else 0.0
+    def _seed_values(self, grid: CoarseGrid, inverse: np.ndarray, seeds: list[tuple[int, int]]) -> list[float]:
+        """Median 1/Z around every seed [1/m], 0 where too few samples have one."""
+        if not seeds:
+            return []
+        radius = self._config.seed_radius
+        places = grid.windows(seeds, radius)
+        known = inverse.reshape(-1).take(places)
+        known[~grid.free.reshape(-1).take(places) | ~(known > 0.0)] = np.inf
+        known.sort(axis=1)
+        counts = np.count_nonzero(known < np.inf, axis=1).tolist()
+        return [
+            float(row[count // 2]) if count >= 2 * radius + 1 else 0.0 for row, count in zip(known, counts, strict=True)
+        ]
 
     def _hypothesis(
         self,

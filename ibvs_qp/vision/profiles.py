@@ -51,29 +51,35 @@ class Strips:
     @classmethod
     def gather(cls, picture: Picture, views: list[LineView], config: LineConfig, reach: int) -> Strips:
         """Read the pixels within `reach` rows of every line."""
-        table = np.array([(view.first, view.last, *view.slope_level, view.view.height) for view in views])
-        first, last, slope, level, height = table.T[:, :, None]
-        profiles = min(config.profiles, int((last - first).min()) + 1)  # no column twice
+        spans = [view.last - view.first for view in views]
+        profiles = min(config.profiles, int(min(spans)) + 1)  # no column twice
         side = max(2, round(SIDE_PX * picture.scale))
         far = reach + side
-        u = np.floor(first + (last - first) * (np.arange(profiles) * (1.0 / (profiles - 1))) + 0.5)
-        predicted = slope * u + level
-        base = np.minimum(np.maximum(np.rint(predicted), -2.0 * far), height + 2.0 * far)
-        # one call reads the strips of level and upright lines alike, places outside the picture included
-        upright = np.array([view.upright for view in views])[:, None]
-        places = np.empty((len(views), profiles, 2 * far + 1, 2), np.int16)
-        steps = np.arange(-far, far + 1, dtype=np.int16)
-        x, y = np.where(upright, base, u).astype(np.int16), np.where(upright, u, base).astype(np.int16)
-        np.add(x[:, :, None], (steps * upright)[:, None], out=places[..., 0])
-        np.add(y[:, :, None], (steps * ~upright)[:, None], out=places[..., 1])
-        places = places.reshape(len(views) * profiles, -1, 2)
-        colors = cv2.remap(picture.rgb, places, _WHOLE, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)
-        hidden = cv2.remap(
-            picture.mask, places, _WHOLE, cv2.INTER_NEAREST, borderMode=cv2.BORDER_CONSTANT, borderValue=255.0
+        table = np.array(
+            [
+                (view.first + 0.5, span, *view.slope_level, view.view.height + 2.0 * far, *_CODES[view.upright])
+                for view, span in zip(views, spans, strict=True)
+            ]
         )
-        shape = (len(views), profiles, 2 * far + 1)
+        first, span, slope, level, lowest, u_code, v_code = table.T[:, :, None]
+        u = np.floor(first + span * _shares(profiles))
+        predicted = slope * u + level
+        base = np.minimum(np.maximum(np.rint(predicted), -2.0 * far), lowest)
+        # one call reads the strips of level and upright lines alike, places outside the picture included; both
+        # coordinates are counted up in one number
+        places = np.empty((len(views), profiles, 2 * far + 1), np.int32)
+        middles = (u_code * u + v_code * base).astype(np.int32)
+        steps = np.arange(-far, far + 1, dtype=np.int32)
+        for place, middle, view in zip(places, middles, views, strict=True):
+            np.add(middle[:, None], steps if view.upright else steps * _ROW, out=place)
+        shape = places.shape
+        pairs = places.view(np.int16).reshape(-1, shape[2], 2)
+        colors = cv2.remap(picture.rgb, pairs, _WHOLE, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)
+        hidden = cv2.remap(
+            picture.mask, pairs, _WHOLE, cv2.INTER_NEAREST, borderMode=cv2.BORDER_CONSTANT, borderValue=255.0
+        )
         colors, hidden = colors.reshape(*shape, 3), hidden.reshape(shape)
-        return cls(picture, views, u.astype(np.intp), predicted, base.astype(np.intp), colors, hidden, reach, side)
+        return cls(picture, views, u, predicted, base, colors, hidden, reach, side)
 
     @cached_property
     def visible(self) -> np.ndarray:
@@ -81,6 +87,12 @@ class Strips:
         middle = self.reach + self.side
         one, two, three = (self.hidden[:, :, middle + step] for step in _MIDDLE)
         return (one | two | three) == 0
+
+    @property
+    def expected(self) -> np.ndarray:
+        """Profiles within the part of each line that is known, bool (L, K)."""
+        first, last = np.array([view.extent for view in self.views]).T[:, :, None]
+        return (self.u >= first) & (self.u <= last)
 
     def gradient(self, rows: np.ndarray) -> np.ndarray:
         """Central differences of the channels along +v [grey levels per px] of profiles (n,), (n, 2 reach + 1, 3)."""
@@ -119,20 +131,28 @@ class Strips:
         place = inner + np.arange(0, inner.size * size, size)
         around = response.take(place + _NEIGHBOURS)
         peak = around[1]
-        before, middle, behind = np.log(np.maximum(around, np.maximum(_FLOOR * peak, np.float32(1e-6))))
-        curvature = np.minimum(before - 2.0 * middle + behind, np.float32(-1e-6))
-        shift = (0.5 * (before - behind) / curvature) * (curvature < -2e-6)  # flat: no peak to interpolate
-        return inner - self.reach + np.minimum(np.maximum(shift, -0.7), 0.7), peak, index == inner
+        share = around[::2] / np.maximum(peak, np.float32(1e-6))
+        before, behind = np.log(np.maximum(share, np.float32(_FLOOR)))
+        curvature = np.minimum(before + behind, np.float32(-1e-6))
+        shift = (before - behind) * np.float32(0.5) / curvature
+        np.minimum(np.maximum(shift, np.float32(-0.7), out=shift), np.float32(0.7), out=shift)
+        shift *= curvature < -2e-6  # flat, or no peak at all: nothing to interpolate
+        return (inner - self.reach) + shift, peak, index == inner
 
     def sides(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Colours before and behind given rows (L, K), each uint8 (L, K, 3)."""
-        last = self.colors.shape[2] - 1
-        index = np.rint(rows - self.base).astype(np.intp) + (self.reach + self.side)
-        start = np.arange(0, index.size * (last + 1), last + 1).reshape(index.shape)
+        pixels = self.colors.shape[2]
+        index = np.rint(rows - self.base).astype(np.intp)
+        index = np.minimum(np.maximum(index, -self.reach), self.reach)
+        index += np.arange(self.reach + self.side, rows.size * pixels, pixels).reshape(rows.shape)
         flat = self.colors.reshape(-1, 3)
-        before = np.minimum(np.maximum(index - self.side, 0), last)
-        behind = np.minimum(np.maximum(index + self.side, 0), last)
-        return flat.take(start + before, axis=0), flat.take(start + behind, axis=0)
+        return flat.take(index - self.side, axis=0), flat.take(index + self.side, axis=0)
+
+
+@lru_cache(maxsize=16)
+def _shares(profiles: int) -> np.ndarray:
+    """Places of the profiles along a line, 0 to 1, (profiles,)."""
+    return np.arange(profiles) * (1.0 / (profiles - 1))
 
 
 @lru_cache(maxsize=16)
@@ -142,6 +162,10 @@ def _preference(reach: int) -> np.ndarray:
     return np.exp(-0.5 * (offset / max(_PREFERENCE * reach, 1.0)) ** 2).astype(np.float32)
 
 
+#: A step down in places counted as x + _ROW y, which in memory are pairs of 16 bits; left of the picture y is off by
+#: one, where nothing is seen anyway. What columns and rows of the view count, level and upright.
+_ROW = 1 << 16
+_CODES = ((1.0, float(_ROW)), (float(_ROW), 1.0))
 #: Whole pixels need no table of fractions.
 _WHOLE = np.empty((0, 0), np.uint16)
 #: A place and those beside it.

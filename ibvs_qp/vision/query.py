@@ -20,6 +20,7 @@ class LineQuery:
         step: Colour step across the line, along the normal, (3,); None for a new line.
         polarity: +1 or -1 if a new line's colours rise or fall along the normal, 0 if unknown.
         span: Normalised range along x (level lines) or y (upright ones) to look at, or None for the whole picture.
+        extent: The same kind of range in which it was seen last, or None: most of what is visible there must show it.
         kind: "board", "paint" or "": what the two sides must look like.
         surface_side: Side of the working surface along the normal.
     """
@@ -29,6 +30,7 @@ class LineQuery:
     step: np.ndarray | None = None
     polarity: int = 0
     span: tuple[float, float] | None = None
+    extent: tuple[float, float] | None = None
     kind: str = ""
     surface_side: int = 0
 
@@ -71,6 +73,14 @@ class LineView:
         coefficients = pixel_line(query.rho, angle, view.intrinsics)
         first, last = max(columns[0], 0.0), min(columns[1], view.width - 1.0)
         return cls(query, view, upright, sign, coefficients, columns, first, last)
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        """Columns between which it is known to lie; all of the view if nothing is known."""
+        if self.query.extent is None:
+            return 0.0, self.view.width - 1.0
+        fx, _, cx, _ = self.view.intrinsics
+        return fx * self.query.extent[0] + cx, fx * self.query.extent[1] + cx
 
     @property
     def slope_level(self) -> tuple[float, float]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ibvs_qp.frames import align_line
 from ibvs_qp.vision.config import LineConfig
-from ibvs_qp.vision.fit_lines import LineFits
+from ibvs_qp.vision.fit_lines import LineFit
 from ibvs_qp.vision.profiles import Strips
 from ibvs_qp.vision.query import LineView
 
@@ -56,14 +56,16 @@ class Fits:
         lines: The fitted lines.
         support: Profiles that agree, bool (L, K).
         visible: Profiles that could be seen, bool (L, K).
+        count: How many agree, (L,).
         runs: First and last supporting profile, (L).
         steps: Colour behind minus colour before, along +v, (L, 3).
         alive: Whether there is a line at all, bool (L,).
     """
 
-    lines: LineFits
+    lines: list[LineFit]
     support: np.ndarray
     visible: np.ndarray
+    count: np.ndarray
     runs: list[tuple[int, int]]
     steps: np.ndarray
     alive: np.ndarray
@@ -73,24 +75,16 @@ def finish_lines(
     fits: Fits, strips: Strips, sides: tuple[np.ndarray, np.ndarray] | None, config: LineConfig
 ) -> list[RefinedLine | None]:
     """Turn the fits of a batch into normalised lines; None for those that are none or lie too far off."""
-    lines, steps = fits.lines, fits.steps.tolist()
-    # plain numbers from here on: arrays of one or two elements cost ten times as much
-    numbers = np.stack(
-        (lines.level, lines.slope, lines.center, lines.level_variance, lines.slope_variance, lines.rms), axis=1
-    ).tolist()
-    counts = fits.support.sum(axis=1).tolist()
-    # no profile is seen before the first
-    seen = np.cumsum(fits.visible | fits.support, axis=1)
+    steps, seen = fits.steps.tolist(), fits.visible | fits.support
     result: list[RefinedLine | None] = []
-    for k, (alive, count) in enumerate(zip(fits.alive.tolist(), counts, strict=True)):
+    for k, (alive, count) in enumerate(zip(fits.alive.tolist(), fits.count.tolist(), strict=True)):
         if not alive:
             result.append(None)
             continue
         first, last = fits.runs[k]
-        among = int(seen[k, last]) - (int(seen[k, first - 1]) if first > 0 else 0)
-        share = count / max(among, 1)
+        share = count / max(int(np.count_nonzero(seen[k, first : last + 1])), 1)
         beside = (_NO_SIDES, _NO_PIXELS) if sides is None else _contents(k, fits, strips, sides)
-        result.append(_finish(strips, k, (first, last), numbers[k], fits, share, steps[k], beside, config))
+        result.append(_finish(strips, k, (first, last), fits, share, steps[k], beside, config))
     return result
 
 
@@ -98,20 +92,19 @@ def _finish(
     strips: Strips,
     index: int,
     run: tuple[int, int],
-    numbers: list[float],
     fits: Fits,
     share: float,
     step: list[float],
     beside: tuple[np.ndarray, np.ndarray],
     config: LineConfig,
 ) -> RefinedLine | None:
-    view, (level, slope, center, level_variance, slope_variance, rms) = strips.views[index], numbers
-    variance = level_variance + (config.bias_px * view.view.scale) ** 2
-    rho, theta, covariance = _polar(view, level, slope, center, variance, slope_variance)
+    view, line = strips.views[index], fits.lines[index]
+    variance = line.level_variance + (config.bias_px * view.view.scale) ** 2
+    rho, theta, covariance = _polar(view, line.level, line.slope, line.center, variance, line.slope_variance)
     if abs(rho) > config.rho_max:
         return None
-    u = strips.u[index]
-    ends = [(float(u[place]), level + slope * (float(u[place]) - center)) for place in run]
+    columns = strips.u[index].take(run).tolist()
+    ends = [(u, line.level + line.slope * (u - line.center)) for u in columns]
     fx, fy, cx, cy = view.view.intrinsics
     normal = [((along - cx) / fx, (across - cy) / fy) for along, across in ends]
     (x, y, z), sign = step, view.sign
@@ -120,9 +113,9 @@ def _finish(
         theta=theta,
         covariance=covariance,
         segment=np.array([(y, x) for x, y in normal] if view.upright else normal),
-        ends=_end_reasons(strips, index, run, (level, slope, center), fits),
+        ends=_end_reasons(strips, index, run, line, fits),
         inlier_share=share,
-        rms_px=rms,
+        rms_px=line.rms,
         length_px=math.hypot(ends[1][0] - ends[0][0], ends[1][1] - ends[0][1]),
         step=np.array((sign * x, sign * y, sign * z)),
         sides=beside[0],
@@ -134,11 +127,14 @@ def _contents(
     index: int, fits: Fits, strips: Strips, sides: tuple[np.ndarray, np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Colours on both sides of a line at its profiles, (2, n, 3), and the places of these, (n, 2) [px]."""
-    view, lines, support = strips.views[index], fits.lines, fits.support[index]
-    u = strips.u[index, support].astype(float)
-    pixels = np.column_stack((u, lines.level[index] + lines.slope[index] * (u - lines.center[index])))
-    beside = np.stack((sides[0][index, support], sides[1][index, support])[:: view.sign])
-    return beside, pixels[:, ::-1].copy() if view.upright else pixels
+    view, line, held = strips.views[index], fits.lines[index], np.flatnonzero(fits.support[index])
+    u = strips.u[index].take(held)
+    pixels = np.empty((len(held), 2))
+    pixels[:, int(view.upright)], pixels[:, 1 - int(view.upright)] = u, line.level + line.slope * (u - line.center)
+    beside = np.empty((2, len(held), 3), np.uint8)
+    for side, colors in zip((0, 1)[:: view.sign], sides, strict=True):
+        beside[side] = colors[index].take(held, axis=0)
+    return beside, pixels
 
 
 def _polar(
@@ -162,11 +158,9 @@ def _polar(
     return aligned, theta, np.array([[rho_variance, cross], [cross, angle_slope**2 * slope_variance]])
 
 
-def _end_reasons(
-    strips: Strips, index: int, run: tuple[int, int], line: tuple[float, float, float], fits: Fits
-) -> tuple[str, str]:
+def _end_reasons(strips: Strips, index: int, run: tuple[int, int], line: LineFit, fits: Fits) -> tuple[str, str]:
     """Why the segment ends at either end."""
-    view, (level, slope, center) = strips.views[index], line
+    view = strips.views[index]
     profiles, margin = strips.u.shape[1], strips.side + 2
     reasons = []
     cuts = view.columns[0] > 0.0, view.columns[1] < view.view.width - 1.0
@@ -174,7 +168,7 @@ def _end_reasons(
         if not 0 <= neighbour < profiles:
             reasons.append("span" if cut else "picture")
             continue
-        beyond = level + slope * (float(strips.u[index, neighbour]) - center)
+        beyond = line.level + line.slope * (float(strips.u[index, neighbour]) - line.center)
         outside = not margin <= beyond <= view.view.height - 1.0 - margin
         reasons.append("picture" if outside else ("end" if fits.visible[index, neighbour] else "mask"))
     return reasons[0], reasons[1]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -39,6 +40,13 @@ class Track:
     def settled(self) -> bool:
         """Whether it is followed in this picture and a detection could add nothing to what is known of it."""
         return self.confirmed and self.lost_s == 0.0 and (self.borders_plane or self.kind == "paint")
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        """Range along x (level lines) or y (upright ones) in which it was seen last, normalised."""
+        axis = 1 if abs(math.cos(self.theta)) > abs(math.sin(self.theta)) else 0
+        (first, last) = self.line.segment[:, axis].tolist()
+        return (first, last) if first <= last else (last, first)
 
     def adopt(self, line: RefinedLine) -> None:
         """Take a fresh fit."""

@@ -124,7 +124,12 @@ class LineTracker:
         """Healthy fits of all tracks around their predictions."""
         queries = [
             LineQuery(
-                rho=track.rho, theta=track.theta, step=track.step, kind=track.kind, surface_side=track.surface_side
+                rho=track.rho,
+                theta=track.theta,
+                step=track.step,
+                extent=track.extent,
+                kind=track.kind,
+                surface_side=track.surface_side,
             )
             for track in self.tracks
         ]

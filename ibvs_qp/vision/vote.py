@@ -1,4 +1,4 @@
-"""Votes for lines: gradients at half resolution, a Hough transform restricted to around level and upright."""
+"""Votes for lines: steps of colour on a thinned-out picture, a Hough transform around level and upright only."""
 
 from __future__ import annotations
 
@@ -9,14 +9,19 @@ import cv2
 import numpy as np
 
 from ibvs_qp.vision.config import VisionConfig
+from ibvs_qp.vision.edge_points import POINTS, edge_points
 from ibvs_qp.vision.grid import CoarseGrid
 from ibvs_qp.vision.picture import Picture
 from ibvs_qp.vision.plane import PlaneEstimate
 
-#: Voted lines looked at per orientation and polarity, before suppression, and kept after it.
+#: Voted lines looked at per orientation, and kept of each polarity.
 _VOTED, _KEPT = 40, 5
-#: Lines nearer than this at both ends are one [half-resolution px].
-SAME_PX = 4.0
+#: Points this near to a line vote for it, and this near to it are explained by it [half-resolution px].
+_NEAR, SAME_PX = 1.0, 2.0
+#: Lines of less than this share of the best one's weight are not looked at.
+_POOR = 0.03
+#: Weight of the points of a faint line that must still be found.
+_FAINT = 0.4
 #: Distance from a line at which the coarse labels of its two sides are compared [cells].
 _LABEL_CELLS = 1.5
 #: Share of a line along which its sides must differ to be looked at: neither border nor paint edge otherwise.
@@ -25,7 +30,7 @@ _DIFFERENT = 0.04
 
 @dataclass(frozen=True)
 class VotedLine:
-    """A line from the vote: v = level + slope (u - center) in half-resolution pixels of the (transposed) view."""
+    """A line from the vote: its rows at the first and last column of the (transposed) view [px]."""
 
     upright: bool
     polarity: int
@@ -44,89 +49,118 @@ def vote_lines(
     directions: tuple[bool, ...],
 ) -> list[VotedLine]:
     """Most voted level (False) and upright (True) lines of both polarities, on and around the surface, unsorted."""
-    height, width = picture.mask.shape
-    half = cv2.resize(picture.rgb, (width // 2, height // 2), interpolation=cv2.INTER_AREA)
-    allowed = cv2.resize(picture.mask, (width // 2, height // 2), interpolation=cv2.INTER_NEAREST) == 0
-    if plane is not None:
-        region = cv2.dilate(plane.component.astype(np.uint8), np.ones((5, 5), np.uint8))
-        allowed &= cv2.resize(region, (width // 2, height // 2), interpolation=cv2.INTER_NEAREST) > 0
+    region = None if plane is None else cv2.dilate(plane.component.view(np.uint8), np.ones((5, 5), np.uint8))
     found: list[VotedLine] = []
     for upright in directions:
-        gradient = cv2.Sobel(half, cv2.CV_16S, int(upright), int(not upright), ksize=3)
-        channels = cv2.split(gradient)
-        rising = cv2.max(cv2.max(channels[0], channels[1]), channels[2])
-        falling = cv2.subtract(np.zeros_like(rising), cv2.min(cv2.min(channels[0], channels[1]), channels[2]))
+        rising, falling = edge_points(picture, upright, config.detect.gradient_min, region, grid)
         center = 0.5 * math.pi + (-tilt if upright else tilt)
-        for polarity, strength in ((1, rising), (-1, falling)):
-            edges = _thin(strength, upright, config.detect.gradient_min)
-            edges &= allowed
-            edges = edges.T if upright else edges
-            found += _hough(np.ascontiguousarray(edges, np.uint8), upright, polarity, center, labels, grid, config)
+        found += _hough(
+            rising, falling, picture.transposed if upright else picture, upright, center, labels, grid, config
+        )
     return found
 
 
-def _thin(strength: np.ndarray, upright: bool, threshold: float) -> np.ndarray:
-    """Places where the gradient is strong and the strongest across the line."""
-    edges = strength > threshold
-    if upright:
-        edges[:, 1:] &= strength[:, 1:] >= strength[:, :-1]
-        edges[:, :-1] &= strength[:, :-1] > strength[:, 1:]
-    else:
-        edges[1:] &= strength[1:] >= strength[:-1]
-        edges[:-1] &= strength[:-1] > strength[1:]
-    return edges
-
-
 def _hough(
-    edges: np.ndarray,
+    rising: np.ndarray,
+    falling: np.ndarray,
+    view: Picture,
     upright: bool,
-    polarity: int,
     center: float,
     labels: np.ndarray,
     grid: CoarseGrid,
     config: VisionConfig,
 ) -> list[VotedLine]:
-    """Most voted lines of one orientation and polarity, near-duplicates removed, ranked with their coarse labels."""
+    """Most voted lines of one orientation, those with the same points removed, ranked with their coarse labels.
+
+    Both polarities are voted for at once, the falling edges moved down so far that no line runs through both.
+    """
     spread = math.radians(config.detect.half_range_deg)
     low, high = max(center - spread, 0.0), min(center + spread, math.pi)
-    width = edges.shape[1]
-    least = max(8, round(0.5 * config.detect.min_length * 0.5 * max(edges.shape)))
-    lines = cv2.HoughLinesWithAccumulator(
-        edges, 1.0, math.radians(config.detect.angle_step_deg), least, min_theta=low, max_theta=high
-    )
-    if lines is None:
+    if len(rising) + len(falling) == 0 or not low < high:
         return []
-    rho, theta, votes = np.asarray(lines, float).reshape(-1, 3)[:_VOTED].T
-    # pixel centres: half-resolution v covers the full-resolution rows 2v and 2v + 1
-    left, right = rho / np.sin(theta), (rho - (width - 1) * np.cos(theta)) / np.sin(theta)
-    kept, ends = [], []
-    for index, (one, other) in enumerate(zip(left.tolist(), right.tolist(), strict=True)):
-        if all(abs(one - a) > SAME_PX or abs(other - b) > SAME_PX for a, b in ends):
-            kept.append(index)
-            ends.append((one, other))
-            if len(kept) == _KEPT:
-                break
+    width, height = 0.5 * view.width, 0.5 * view.height
+    reach = width * max(abs(math.cos(low)) / max(math.sin(low), 0.1), abs(math.cos(high)) / max(math.sin(high), 0.1))
+    moved = height + reach + SAME_PX
+    points = np.concatenate((rising, falling))
+    points[len(rising) :, 1] += moved
+    rhos = [
+        u * math.cos(angle) + v * math.sin(angle)
+        for u in (0.0, width)
+        for v in (0.0, moved + height)
+        for angle in (low, high)
+    ]
+    least = max(3, round(0.5 * config.detect.min_length * POINTS))
+    voted = cv2.HoughLinesPointSet(
+        np.ascontiguousarray(points[:, None, :2]),
+        _VOTED,
+        least,
+        min(rhos) - 1.0,
+        max(rhos) + 1.0,
+        1.0,
+        low,
+        high,
+        math.radians(config.detect.angle_step_deg),
+    )
+    if voted is None:
+        return []
+    _, rho, theta = np.asarray(voted, float).reshape(-1, 3).T
+    sine, cosine = np.sin(theta), np.cos(theta)
+    left, right = rho / sine, (rho - width * cosine) / sine
+    lines = np.stack((cosine, sine, -rho), axis=1).astype(np.float32)
+    distance = np.abs(lines[:, :2] @ points[:, :2].T + lines[:, 2:])
+    falls = 0.5 * (left + right) > 0.5 * (moved + height)
+    left, right = left - moved * falls, right - moved * falls
+    kept, votes = _distinct(distance, points[:, 2].copy(), falls.tolist(), _FAINT * least)
     differing = _label_difference(left[kept], right[kept], labels.T if upright else labels, grid)
     result = []
-    for index, difference in zip(kept, differing, strict=True):
+    for index, own, difference in zip(kept, votes, differing.tolist(), strict=True):
         if difference < _DIFFERENT:
             continue
-        slope = (right[index] - left[index]) / (width - 1.0)
-        at_zero = 2.0 * left[index] + 0.5 - slope * 0.5
-        full_width = 2.0 * width - 1.0
-        result.append(
-            VotedLine(upright, polarity, at_zero, at_zero + slope * full_width, votes[index] * (0.1 + difference))
-        )
+        slope = float(right[index] - left[index]) / width
+        # half-resolution row v covers the full-resolution rows 2 v and 2 v + 1 around 2 v - 0.5
+        at_zero = 2.0 * float(left[index]) - 0.5 + 0.5 * slope
+        at_last = at_zero + slope * (view.width - 1.0)
+        polarity = -1 if falls[index] else 1
+        result.append(VotedLine(upright, polarity, at_zero, at_last, own * (0.1 + difference)))
     return result
+
+
+def _distinct(distance: np.ndarray, free: np.ndarray, falls: list[bool], least: float) -> tuple[list[int], list[float]]:
+    """Lines in the order of the votes that are left when better ones have taken theirs, and these votes.
+
+    Args:
+        distance: Of every line from every point [half-resolution px], (L, n).
+        free: Weights of the points, (n,); those that are taken lose theirs.
+        falls: Polarity of the lines, (L).
+        least: Least weight of a line.
+    """
+    near = (distance < _NEAR).astype(np.float32)
+    wanted = np.ones(len(near), np.float32)
+    room = {True: _KEPT, False: _KEPT}
+    kept: list[int] = []
+    votes: list[float] = []
+    while True:
+        left = (near @ free) * wanted
+        best = int(left.argmax())
+        own = float(left[best])
+        if own < max(least, _POOR * (votes[0] if votes else 0.0)):
+            return kept, votes
+        kept.append(best)
+        votes.append(own)
+        free[distance[best] < SAME_PX] = 0.0
+        wanted[best] = 0.0
+        room[falls[best]] -= 1
+        if not room[falls[best]]:
+            wanted[np.array(falls) == falls[best]] = 0.0
 
 
 def _label_difference(left: np.ndarray, right: np.ndarray, labels: np.ndarray, grid: CoarseGrid) -> np.ndarray:
     """Share of places along each line whose two sides have different coarse labels, (n,)."""
     rows, columns = labels.shape
     share = (np.arange(columns) + 0.5) / columns
-    level = (left[:, None] * (1.0 - share) + right[:, None] * share) * 2.0 / grid.stride - 0.5
-    above, below = (np.round(level + offset).astype(np.intp) for offset in (-_LABEL_CELLS, _LABEL_CELLS))
+    level = (left[:, None] + (right - left)[:, None] * share) * (2.0 / grid.stride) - 0.5
+    above, below = (np.rint(level + offset).astype(np.intp) for offset in (-_LABEL_CELLS, _LABEL_CELLS))
     inside = (above >= 0) & (below < rows)
     k = np.arange(columns)
     different = labels[np.clip(above, 0, rows - 1), k] != labels[np.clip(below, 0, rows - 1), k]
-    return (different & inside).mean(axis=1)
+    return np.count_nonzero(different & inside, axis=1) / columns

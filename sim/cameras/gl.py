@@ -7,11 +7,9 @@ import numpy as np
 
 from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.vehicle import VehicleParams
-from sim.cameras.arm import clip_near, shade_propellers, vehicle_layer
-from sim.cameras.gl_scene import FAR_M, NEAR_M, GlScene
-from sim.cameras.noise import NoiseBank
-from sim.cameras.outline import CutLine, cut_lines
-from sim.cameras.protocol import camera_intrinsics
+from sim.cameras.finish import PictureFinish
+from sim.cameras.gl_scene import GlScene
+from sim.cameras.outline import CutLine
 from sim.cameras.view import View, board_corners
 from sim.canvas import TEXTURE_PAD_PX, Canvas
 from sim.scene import Scene
@@ -48,16 +46,9 @@ class GLCamera:
         smooth_rim: bool = True,
     ) -> None:
         self.scene, self.vehicle, self.canvas = scene, vehicle, canvas
-        self.intrinsics = camera_intrinsics(scene.camera)
-        bank, ragged = np.random.SeedSequence([seed, 0xCA3E]).spawn(2)
-        self._rng = np.random.default_rng(ragged)
+        self.finish = PictureFinish(scene, vehicle, seed, noise)
+        self.intrinsics = self.finish.intrinsics
         width, height = scene.camera.width, scene.camera.height
-        shape = (height, width)
-        relative = scene.camera.depth_noise_relative
-        self._noise = NoiseBank(shape, relative, np.random.default_rng(bank)) if noise else None
-        self._layer = vehicle_layer(scene, vehicle, self.intrinsics, self._rng)
-        self._arm = np.ascontiguousarray(self._layer.picture[..., :3])
-        self._no_depth = np.flatnonzero((self._layer.holes | self._layer.propellers) & ~self._layer.mask)
         self._corners, self._smooth_rim = board_corners(canvas.geometry), smooth_rim
         self._drawn = GlScene(
             canvas.geometry,
@@ -68,8 +59,7 @@ class GLCamera:
             canvas.wall_pixels_per_m,
         )
         self.platform = self._drawn.platform
-        self._rgb, self._soft = np.empty((*shape, 3), np.uint8), np.empty((*shape, 3), np.uint8)
-        self._inverse, self._ones = np.empty(shape, np.float32), np.ones(shape, np.float32)
+        self._rgb, self._inverse = np.empty((height, width, 3), np.uint8), np.empty((height, width), np.float32)
 
     def capture(self, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, stamp_ns: int) -> RgbdFrame:
         """Take a picture, see `sim.cameras.protocol.Camera`; the frame owns its arrays."""
@@ -83,47 +73,20 @@ class GLCamera:
         rgb, inverse = self._drawn.draw(view)
         cv2.flip(rgb, 0, self._rgb)
         cv2.flip(inverse, 0, self._inverse)
-        cuts = self._cuts(view)
+        cuts, _ = self.finish.outline(view, self._corners)
         if self._smooth_rim:
             for cut in cuts:
                 _mend_rim(self._rgb, cut)
-        shade_propellers(self._rgb, self._layer.propellers)
-        cv2.copyTo(self._arm, self._layer.mask, self._rgb)
-        cv2.GaussianBlur(self._rgb, (3, 3), 0.0, self._soft)  # binomial kernel: sigma 0.71 px
-        # drawn in the plane camera's order: both back ends make the same noise of one seed
-        common = 1.0 + self._noise.depth_common() * float(view.plane(0.0)[2]) if self._noise else 1.0
-        color = self._noise.add_color(self._soft) if self._noise else self._soft.copy()
-        return RgbdFrame(rgb=color, depth=self._depth(common, cuts), intrinsics=self.intrinsics, stamp_ns=stamp_ns)
+        common = self.finish.common_error(view)
+        if common != 0.0:
+            np.multiply(self._inverse, np.float32(1.0 / (1.0 + common)), out=self._inverse)
+        color = self.finish.color(self._rgb)
+        depth = self.finish.depth(self._inverse, cuts)
+        return RgbdFrame(rgb=color, depth=depth, intrinsics=self.intrinsics, stamp_ns=stamp_ns)
 
     def close(self) -> None:
         """Free the OpenGL context; happens by itself when the camera is gone."""
         self._drawn.close()
-
-    def _cuts(self, view: View) -> list[CutLine]:
-        """Lines of the board's outline in the picture."""
-        polygon = view.to_camera(self._corners)
-        if polygon[:, 2].min() < NEAR_M:
-            polygon = clip_near(polygon, NEAR_M)
-        fx, fy, cx, cy = self.intrinsics
-        height, width = self._inverse.shape
-        return cut_lines(polygon[:, :2] / polygon[:, 2:] * (fx, fy) + (cx, cy), width, height)[0]
-
-    def _depth(self, common: float, cuts: list[CutLine]) -> np.ndarray:
-        """Depth with noise, and holes along its steps; the vehicle takes no part in the scene's common error."""
-        depth = np.empty(self._inverse.shape, np.float32)
-        if common != 1.0:
-            np.multiply(self._inverse, np.float32(1.0 / common), out=self._inverse)
-        np.maximum(self._inverse, np.float32(1.0 / FAR_M), out=self._inverse)
-        cv2.copyTo(self._layer.inverse_depth, self._layer.mask, self._inverse)
-        cv2.divide(self._noise.depth_factor() if self._noise else self._ones, self._inverse, depth)
-        if self._noise is None:
-            return depth
-        flat, hidden = depth.reshape(-1), self._layer.mask.reshape(-1)
-        for cut in cuts:
-            places = cut.holes(self._rng)
-            flat[places[hidden.take(places) == 0]] = 0.0  # arm and brush hide the step
-        flat[self._no_depth] = 0.0
-        return depth
 
 
 def _face(texture: np.ndarray) -> np.ndarray:

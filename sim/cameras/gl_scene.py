@@ -10,12 +10,11 @@ import mujoco
 import numpy as np
 
 from sim.board import BoardGeometry
+from sim.cameras.finish import FAR_M, NEAR_M
 from sim.cameras.gl_context import CameraUnavailable, open_context
 from sim.cameras.view import View
 from sim.mujoco_frames import FLIP
 
-#: Nearest and farthest depth drawn [m].
-NEAR_M, FAR_M = 0.05, 20.0
 #: Half size of the plain wall beyond its picture [m], and how far it lies behind it [m]: below the depth's accuracy.
 _PLAIN_M, _BEHIND_M = 100.0, 2e-5
 #: Materials glow by themselves: what is drawn has exactly the colours of the pictures, whatever the light.

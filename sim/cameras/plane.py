@@ -15,10 +15,8 @@ import numpy as np
 
 from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.vehicle import VehicleParams
-from sim.cameras.arm import clip_near, shade_propellers, vehicle_layer
-from sim.cameras.noise import NoiseBank
-from sim.cameras.outline import Box, CutLine, cut_lines
-from sim.cameras.protocol import camera_intrinsics
+from sim.cameras.finish import PictureFinish
+from sim.cameras.outline import Box, CutLine
 from sim.cameras.view import View, board_corners, board_steps
 from sim.canvas import TEXTURE_PAD_PX, Canvas, FreshPaint
 from sim.scene import Scene
@@ -26,8 +24,6 @@ from sim.scene import Scene
 _SHIFT = 6  # sub-pixel bits of polygon corners
 _EVEN, _HALF = np.uint32(0x00FF00FF), np.uint32(0x00800080)  # every other byte of a pixel, and its rounding
 _WARP = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-#: Nearest depth at which the board's outline is projected, and farthest that a reading exists [m].
-_NEAR_M, _FAR_M = 0.05, 20.0
 
 
 class _Sheet(NamedTuple):
@@ -71,16 +67,9 @@ class PlaneCamera:
 
     def __init__(self, scene: Scene, vehicle: VehicleParams, canvas: Canvas, seed: int, noise: bool = True) -> None:
         self.scene, self.vehicle, self.canvas = scene, vehicle, canvas
-        self.intrinsics = camera_intrinsics(scene.camera)
-        bank, ragged = np.random.SeedSequence([seed, 0xCA3E]).spawn(2)
-        self._rng = np.random.default_rng(ragged)
+        self.finish = PictureFinish(scene, vehicle, seed, noise)
+        self.intrinsics = self.finish.intrinsics
         shape = (scene.camera.height, scene.camera.width)
-        relative = scene.camera.depth_noise_relative
-        self._noise = NoiseBank(shape, relative, np.random.default_rng(bank)) if noise else None
-        self._layer = vehicle_layer(scene, vehicle, self.intrinsics, self._rng)
-        self._arm_box = _bounding_box(self._layer.mask)
-        self._no_depth = np.flatnonzero((self._layer.holes | self._layer.propellers) & ~self._layer.mask)
-        self._propeller_box = _bounding_box(self._layer.propellers)
         self._corners = board_corners(canvas.geometry)
         self._board_steps = board_steps(canvas.geometry, canvas.pixels_per_m, TEXTURE_PAD_PX)
         step = 1.0 / canvas.wall_pixels_per_m
@@ -90,8 +79,7 @@ class PlaneCamera:
         self._picture, self._behind = np.empty((*shape, 4), np.uint8), np.empty((*shape, 4), np.uint8)
         self._mask = np.zeros(shape, np.uint8)
         self._inverse, self._inverse_behind = np.empty(shape, np.float32), np.empty(shape, np.float32)
-        self._rgb, self._soft = np.empty((*shape, 3), np.uint8), np.empty((*shape, 3), np.uint8)
-        self._ones = np.ones(shape, np.float32)
+        self._rgb = np.empty((*shape, 3), np.uint8)
         self._v, self._u = np.indices(shape, np.float32)
 
     def capture(self, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, stamp_ns: int) -> RgbdFrame:
@@ -109,34 +97,21 @@ class PlaneCamera:
         """Draw a picture from a pose and what is new of the paint; pictures are drawn in the order of exposure."""
         view = View.of_vehicle(position_ned, quaternion_b_in_i, self.vehicle.camera_position_m, self.intrinsics)
         cuts = self._compose(view, self.canvas.draw(paint))
-        rgb = self._finish_color()
-        depth = self._finish_depth(cuts)
+        cv2.cvtColor(self._picture, cv2.COLOR_RGBA2RGB, self._rgb)
+        rgb = self.finish.color(self._rgb)
+        depth = self.finish.depth(self._inverse, cuts)
         return RgbdFrame(rgb=rgb, depth=depth, intrinsics=self.intrinsics, stamp_ns=stamp_ns)
 
     def _compose(self, view: View, texture: np.ndarray) -> list[CutLine]:
-        """Colours and inverse depths of board, wall and vehicle; returns the outline lines in view."""
-        height, width = self._mask.shape
-        polygon = view.to_camera(self._corners)
-        if polygon[:, 2].min() < _NEAR_M:
-            polygon = clip_near(polygon, _NEAR_M)
-        fx, fy, cx, cy = self.intrinsics
-        polygon = polygon[:, :2] / polygon[:, 2:] * (fx, fy) + (cx, cy)
-        cuts, board_box = cut_lines(polygon, width, height)
-        common = self._noise.depth_common() * (view.plane(0.0)[2]) if self._noise else 0.0
+        """Colours and inverse depths of board and wall; returns the outline lines in view."""
+        cuts, board_box = self.finish.outline(view, self._corners)
+        common = self.finish.common_error(view)
         if board_box is not None:
             board = _Sheet.seen(view, texture, self._board_steps, common)
             self._draw(board, board_box, self._picture, self._inverse)
         wall = _Sheet.seen(view, self.canvas.wall, self._wall_steps, common)
         for cut in cuts:
             self._cut(wall, cut)
-        if self._propeller_box is not None:
-            r0, r1, c0, c1 = self._propeller_box
-            shade_propellers(self._picture[r0:r1, c0:c1], self._layer.propellers[r0:r1, c0:c1])
-        if self._arm_box is not None:
-            r0, r1, c0, c1 = self._arm_box
-            mask = self._layer.mask[r0:r1, c0:c1]
-            cv2.copyTo(self._layer.picture[r0:r1, c0:c1], mask, self._picture[r0:r1, c0:c1])
-            cv2.copyTo(self._layer.inverse_depth[r0:r1, c0:c1], mask, self._inverse[r0:r1, c0:c1])
         return cuts
 
     def _draw(self, sheet: _Sheet, box: Box, picture: np.ndarray, inverse: np.ndarray) -> None:
@@ -173,30 +148,6 @@ class PlaneCamera:
         cv2.copyTo(self._inverse_behind[r0:r1, c0:c1], mask, self._inverse[r0:r1, c0:c1])
         picture[places] = mixed
 
-    def _finish_color(self) -> np.ndarray:
-        """Lens blur and sensor noise."""
-        cv2.cvtColor(self._picture, cv2.COLOR_RGBA2RGB, self._rgb)
-        cv2.GaussianBlur(self._rgb, (3, 3), 0.0, self._soft)  # binomial kernel: sigma 0.71 px
-        return self._noise.add_color(self._soft) if self._noise else self._soft.copy()
-
-    def _finish_depth(self, cuts: list[CutLine]) -> np.ndarray:
-        """Depth with noise, and holes along its steps."""
-        depth = np.empty(self._mask.shape, np.float32)
-        farthest = 1.0 / _FAR_M
-        corners = self._inverse[:: len(self._inverse) - 1, :: self._inverse.shape[1] - 1]
-        if corners.min() < farthest:  # only when the plane's horizon comes near the picture
-            np.maximum(self._inverse, np.float32(farthest), out=self._inverse)
-        factor = self._noise.depth_factor() if self._noise else self._ones
-        cv2.divide(factor, self._inverse, depth)
-        if self._noise is None:
-            return depth
-        flat = depth.reshape(-1)
-        for cut in cuts:
-            places = cut.holes(self._rng)
-            flat[places[self._layer.mask.reshape(-1).take(places) == 0]] = 0.0  # arm and brush hide the step
-        flat[self._no_depth] = 0.0
-        return depth
-
 
 def _inverse(matrix: np.ndarray) -> np.ndarray:
     """Inverse of a 3 x 3 matrix by cofactors, in a fraction of the general one's time."""
@@ -215,10 +166,3 @@ def _mix(front: np.ndarray, behind: np.ndarray, share: np.ndarray) -> np.ndarray
     even = ((front & _EVEN) * share + (behind & _EVEN) * rest + _HALF) >> np.uint32(8)
     odd = ((front >> np.uint32(8)) & _EVEN) * share + ((behind >> np.uint32(8)) & _EVEN) * rest + _HALF
     return (even & _EVEN) | (odd & ~_EVEN)
-
-
-def _bounding_box(mask: np.ndarray) -> Box | None:
-    if not mask.any():
-        return None
-    left, top, width, height = cv2.boundingRect(mask)
-    return top, top + height, left, left + width

@@ -1,0 +1,101 @@
+"""Where the colours of a picture step up or down, on every other row and about every eighth column."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from ibvs_qp.vision.grid import CoarseGrid
+from ibvs_qp.vision.picture import Picture
+
+#: Points along the longer side of a picture: a line is told by far fewer points than it has pixels (it is refined with
+#: as many), its place across is not; and pixels per point across.
+POINTS, _ACROSS_PX = 80, 2
+#: Steps this many times the weakest one have a full vote, fainter ones less: noise must not outvote an edge.
+_FULL = 4.0
+#: Most points of one polarity that vote; a line right across the picture has POINTS.
+_MOST = 500
+#: A central difference over this many sums of pixels answers as Sobel's kernel does.
+_SOBEL = 4.0
+
+
+def edge_points(
+    picture: Picture, upright: bool, gradient_min: float, region: np.ndarray | None, grid: CoarseGrid
+) -> tuple[np.ndarray, np.ndarray]:
+    """Places where colours rise, and where they fall, along +v of the view in which lines are level.
+
+    Args:
+        picture: Colour and mask.
+        upright: Whether the view is the transposed one.
+        gradient_min: Weakest step as Sobel's kernel answers it at half resolution [grey levels].
+        region: Non-zero on the samples around which lines are wanted, uint8 (rows, columns), or None for all.
+        grid: Where these samples lie.
+
+    Returns:
+        (u, v) in half-resolution pixels of the view, 0 at the picture's border, and the weight of its vote, up to 1:
+        float32 (n, 3) each.
+    """
+    height, width = picture.mask.shape
+    apart = max(height, width) / POINTS
+    columns, rows = width // _ACROSS_PX, height // _ACROSS_PX
+    columns, rows = (columns, round(height / apart)) if upright else (round(width / apart), rows)
+    thin = cv2.split(cv2.resize(picture.rgb, (columns, rows), interpolation=cv2.INTER_LINEAR))
+    if upright:
+        thin = tuple(cv2.transpose(plane) for plane in thin)
+    pairs = [(plane[2:], plane[:-2]) for plane in thin]
+    threshold = max(1, round(gradient_min / _SOBEL))
+    signed = (
+        _strongest([cv2.subtract(below, above) for below, above in pairs]),
+        _strongest([cv2.subtract(above, below) for below, above in pairs]),
+    )
+    rising, falling = (
+        _points(steps, _thin(steps, threshold), threshold, picture, upright, region, grid) for steps in signed
+    )
+    return rising, falling
+
+
+def _strongest(channels: list[np.ndarray]) -> np.ndarray:
+    return cv2.max(cv2.max(channels[0], channels[1]), channels[2])
+
+
+def _thin(strength: np.ndarray, threshold: int) -> np.ndarray:
+    """Flat places where the step is strong and the strongest across the line."""
+    edges = strength > threshold
+    edges[1:] &= strength[1:] >= strength[:-1]
+    edges[:-1] &= strength[:-1] > strength[1:]
+    return np.flatnonzero(edges)
+
+
+def _points(
+    steps: np.ndarray,
+    places: np.ndarray,
+    threshold: int,
+    picture: Picture,
+    upright: bool,
+    region: np.ndarray | None,
+    grid: CoarseGrid,
+) -> np.ndarray:
+    """Those of the places that the vehicle does not hide and around which lines are wanted, with their weights."""
+    rows, columns = steps.shape
+    row = places // columns
+    column = places - row * columns
+    view = picture.transposed if upright else picture
+    across, along = view.height / (rows + 2), view.width / columns
+    v, u = (row + np.float32(1.5)) * np.float32(across), (column + np.float32(0.5)) * np.float32(along)
+    x, y = (v, u) if upright else (u, v)  # from the corner of the picture, pixel centres at halves
+    x_px, y_px = x.astype(np.intp), y.astype(np.intp)
+    free = picture.mask.reshape(-1).take(y_px * picture.mask.shape[1] + x_px) == 0
+    if region is not None:
+        last_row, last_column = region.shape[0] - 1, region.shape[1] - 1
+        cell = np.minimum(y_px // grid.stride, last_row) * region.shape[1]
+        cell += np.minimum(x_px // grid.stride, last_column)
+        free &= region.reshape(-1).take(cell) > 0
+    kept = np.flatnonzero(free)
+    weight = np.minimum(steps.reshape(-1).take(places.take(kept)) * np.float32(1.0 / (_FULL * threshold)), 1.0)
+    if len(kept) > _MOST:  # grain and prints: the strongest tell the lines, and the votes of all would take long
+        strongest = np.argpartition(-weight, _MOST)[:_MOST]
+        kept, weight = kept.take(strongest), weight.take(strongest)
+    points = np.empty((len(kept), 3), np.float32)
+    points[:, 0], points[:, 1] = 0.5 * u.take(kept), 0.5 * v.take(kept)
+    points[:, 2] = weight
+    return points
