@@ -39,7 +39,7 @@ def setpoint_model(config: ControllerConfig) -> Signals:
         expected = contact_feedforward(signals, config.contact, body, touch, travel, before)
     near = ca.logic_or(touch.touching, touch.distance < config.contact.contact_distance_m)
     external = external_wrench(
-        signals, vehicle, effectiveness, body, expected[3:], wall.normal, near, config.contact_feedforward
+        signals, vehicle, effectiveness, body, expected[3:], wall.normal, near, touch.noise, config.contact_feedforward
     )
     inertia = ca.DM(vehicle.inertia_kg_m2)
     gyroscopic = -ca.cross(body.rate, inertia * body.rate)

@@ -48,7 +48,8 @@ class Body:
 
 
 #: Entries of the input "touch", in this order.
-TOUCH = ("known", "distance", "rate", "push", "noise", "touching", "ramp", "stiffness", "stiffness_known")
+TOUCH = ("known", "distance", "rate", "acceleration", "push", "noise", "touching", "ramp")
+TOUCH += ("stiffness", "stiffness_known")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,7 +59,7 @@ class Touch:
     Attributes:
         known: 1 once the wall was seen.
         normal: Unit vector into the wall, in B.
-        distance: Tip to wall [m]; rate: its rate [m/s].
+        distance: Tip to wall [m]; rate: its rate [m/s]; acceleration: the rate's own [m/s^2].
         push: Filtered push [N]; noise: its deviation in free flight [N].
         touching: 1 in contact.
         ramp: 0 at touch to 1.
@@ -69,6 +70,7 @@ class Touch:
     normal: ca.SX
     distance: ca.SX
     rate: ca.SX
+    acceleration: ca.SX
     push: ca.SX
     noise: ca.SX
     touching: ca.SX

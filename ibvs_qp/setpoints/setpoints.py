@@ -137,6 +137,7 @@ class Setpoints:
             contact.known,
             contact.distance if contact.known else FAR_AWAY,
             contact.rate,
+            contact.acceleration,
             contact.push,
             contact.push_noise,
             contact.in_contact,
