@@ -31,6 +31,10 @@ SETTLE_TIME = 0.8
 HOLD_GAIN, HOLD_SPEED = 0.8, 0.03
 
 
+#: Vertical speed of a vehicle that gives up the wall [m/s], down: slow, because nothing measures the height.
+DESCENT_M_S = 0.15
+
+
 class Painter:
     """Phase machine of the paint job; `step` returns the wish of the tick."""
 
@@ -42,7 +46,7 @@ class Painter:
         """Back to the start."""
         self.phase, self.row, self.entered = "start", 0, 0.0
         self.log: list[tuple[float, str, str]] = []
-        self.finished = self.failed = False
+        self.finished = self.failed = self._given_up = False
         self.reason = ""
         self._guide_id = self._edge_id = -1
         self._guide_target = self.config.edge_margin_m
@@ -81,6 +85,21 @@ class Painter:
         self.failed, self.reason = True, self.reason or reason
         self._speed = 0.0
         self._enter(seen, "retreat", reason)
+
+    def abandon(self, seen: Scenery, reason: str) -> None:
+        """Give up the wall for good: detach, get clear of it and descend."""
+        self.failed = True
+        self._give_up(seen, reason)
+
+    def _give_up(self, seen: Scenery, reason: str) -> None:
+        self.reason, self._given_up = reason, True
+        self._enter(seen, "retreat", reason)
+
+    def _escape(self, seen: Scenery, dt: float) -> Wish:
+        if seen.time_s - self.entered > self.config.descend_s:
+            self._end(seen, f"{self.reason}: wall given up, descended for {self.config.descend_s:g} s")
+        velocity = np.array([0.0, DESCENT_M_S])
+        return Wish(contact=False, standoff=self.config.retreat_m, velocity=velocity, guides=[], push=0.0)
 
     def _end(self, seen: Scenery, reason: str, failed: bool = False) -> None:
         self.failed = self.failed or failed
@@ -198,6 +217,8 @@ class Painter:
         return self._wish(seen, contact=True, climb=self._speed if left > 0.0 else 0.0, edge=edge, hold=edge is None)
 
     def _retreat(self, seen: Scenery, dt: float) -> Wish:
+        if self._given_up:
+            return self._escape(seen, dt)
         if seen.distance > self.config.retreat_m - 0.02 and not seen.in_contact:
             self._end(seen, "all rows painted, retreated" if not self.failed else self.reason)
         return self._wish(seen, contact=False, standoff=self.config.retreat_m, hold=True)

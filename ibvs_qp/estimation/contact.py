@@ -172,6 +172,11 @@ class ContactEstimator:
             self.stiffness.add(self.push, -self.distance, dt)
 
     @property
+    def speed(self) -> float:
+        """Speed of the centre of mass into the wall [m/s], whatever the tip does by turning."""
+        return -self.rate - self._lever_speed
+
+    @property
     def push_noise(self) -> float:
         """Deviation of the filtered push in free flight [N]."""
         return math.sqrt(self._push_variance)

@@ -29,7 +29,7 @@ def setpoint_model(config: ControllerConfig) -> Signals:
     effectiveness = control_effectiveness(vehicle.geometry)
     body, touch, wish = Body.of(signals), Touch.of(signals), Wish.of(signals)
     wall = wall_axes(signals, body, touch)
-    wanted_turn(signals, config.gains, body, touch)
+    wanted_turn(signals, config.gains, body, touch, wish)
     travel = wish.velocity[0] * wall.right + wish.velocity[1] * wall.down
 
     before, friction = estimated_friction(signals, body, touch, travel, SLIDING_COMMAND, config.contact.stuck_speed_m_s)

@@ -69,7 +69,8 @@ def standoff_force(signals: Signals, config: ControllerConfig, body: Body, touch
     speed = ca.fmin(ca.fmax(gains.standoff_kp * error, -settings.retreat_speed_m_s), allowed)
     lag = speed + rate_ahead(config.vehicle, touch)
     search = _search(signals, config, body, touch, wish, lag)
-    signals.output("approach_state", ca.vertcat(allowed, touch.rate, search / mass, free))
+    steady = ca.logic_and(free, ca.logic_not(signals.outputs["tilted"]))  # a turning tip is no approach
+    signals.output("approach_state", ca.vertcat(allowed, touch.rate, search / mass, steady))
     landing = ca.logic_and(wish.press, touch.distance < settings.touch_distance_m)
     force = mass * ca.if_else(landing, settings.landing_kd, gains.standoff_kd) * lag + search
     return signals.output("standoff_command", ca.if_else(touch.known, force, 0.0))

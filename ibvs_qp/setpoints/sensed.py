@@ -87,18 +87,20 @@ class Touch:
 
 @dataclass(frozen=True, kw_only=True)
 class Wish:
-    """The reference: push [N], stand-off [m], velocity right and down [m/s], and whether to press."""
+    """The reference: push [N], stand-off [m], velocity right and down [m/s], whether to press, roll and pitch [rad]."""
 
     push: ca.SX
     standoff: ca.SX
     velocity: ca.SX
     press: ca.SX
+    tilt: ca.SX
 
     @classmethod
     def of(cls, signals: Signals) -> Wish:
         """Ask for the inputs."""
-        push, standoff, right, down, press = ca.vertsplit(signals.input("reference", 5))
-        return cls(push=push, standoff=standoff, velocity=ca.vertcat(right, down), press=press)
+        push, standoff, right, down, press, roll, pitch = ca.vertsplit(signals.input("reference", 7))
+        velocity, tilt = ca.vertcat(right, down), ca.vertcat(roll, pitch)
+        return cls(push=push, standoff=standoff, velocity=velocity, press=press, tilt=tilt)
 
 
 def clamp(value: ca.SX, low: float | ca.SX, high: float | ca.SX) -> ca.SX:
