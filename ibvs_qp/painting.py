@@ -25,6 +25,8 @@ SLIDE_SPEED = 0.01
 LEAST_STROKE = 0.5
 #: How far past its nominal length row 1 may run in search of its end [m].
 OVERRUN = 0.10
+#: Errors and speed of the alignment are averaged over this time [s]: half a period of the sway in hover.
+SWAY_TIME = 0.4
 #: Stiction may keep the tip from the last millimetres; a stop settles for this long at most [s].
 SETTLE_TIME = 0.8
 #: Position hold along the wall by the odometer [1/s], speed-limited [m/s].
@@ -46,6 +48,7 @@ class Painter:
         """Back to the start."""
         self.phase, self.row, self.entered = "start", 0, 0.0
         self.log: list[tuple[float, str, str]] = []
+        self._calm: tuple[float, ...] | None = None
         self.finished = self.failed = self._given_up = False
         self.reason = ""
         self._guide_id = self._edge_id = -1
@@ -123,13 +126,13 @@ class Painter:
 
     def _align(self, seen: Scenery, dt: float) -> Wish:
         self._keep_guide(seen, self._bottom_edge)
-        error = self._guide_error(seen)
-        mark = self._start_mark(seen)
-        if mark is not None:
-            error = max(error, abs(mark.offset - self.config.edge_margin_m))
+        line, mark = seen.lines.get(self._guide_id), self._start_mark(seen)
+        high = math.inf if line is None else line.offset - self._guide_target
+        aside = 0.0 if mark is None else mark.offset - self.config.edge_margin_m
+        error, speed = self._without_sway((high, aside, *seen.velocity[:2]), dt)
         # Gusts and noisy pictures may never let the vehicle stand still: what counts as aligned opens with time.
         opening = max(1.0, ((seen.time_s - self.entered) / self.config.align_patience_s) ** 2)
-        still = math.hypot(*seen.velocity) < opening * self.config.align_speed_m_s
+        still = speed < opening * self.config.align_speed_m_s
         if error < opening * self.config.align_error_m and still:
             self._since = seen.time_s if math.isnan(self._since) else self._since
             if seen.time_s - self._since >= self.config.align_time_s:
@@ -139,6 +142,17 @@ class Painter:
         else:
             self._since = math.nan
         return self._wish(seen, contact=False, standoff=self.config.standoff_m, hold=True, mark=True)
+
+    def _without_sway(self, now: tuple[float, ...], dt: float) -> tuple[float, float]:
+        """Error and speed averaged over a sway: a hovering vehicle sways by as much as is allowed, about its place."""
+        if not all(map(math.isfinite, now)):
+            self._calm = None
+            return math.inf, math.inf
+        share = 1.0 - math.exp(-dt / SWAY_TIME)
+        last = self._calm or now
+        self._calm = tuple(old + share * (new - old) for old, new in zip(last, now, strict=True))
+        high, aside, right, down = self._calm
+        return max(abs(high), abs(aside)), math.hypot(right, down)
 
     def _press(self, seen: Scenery, dt: float) -> Wish:
         self._keep_guide(seen, self._bottom_edge)

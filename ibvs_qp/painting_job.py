@@ -30,7 +30,7 @@ class PaintingConfig:
     align_speed_m_s: float = setting(0.005, "speed that counts as still", unit="m/s", low=0.001, high=0.1)
     align_time_s: float = setting(0.3, "aligned this long", unit="s", low=0.0, high=10.0)
     align_patience_s: float = setting(
-        5.0, "after this long both tolerances open with the square of time", unit="s", low=0.5, high=300.0
+        2.0, "after this long both tolerances open with the square of time", unit="s", low=0.5, high=300.0
     )
     descend_s: float = setting(
         5.0, "after the wall was given up: time of retreat and descent", unit="s", low=0.5, high=60.0

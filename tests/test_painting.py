@@ -230,7 +230,7 @@ def test_align_needs_stillness_and_place() -> None:
     world.fly(20.0, until="align")
     world.edges[0].place += 0.004  # the guide is off by more than allowed, and the tip does not follow
     world.stuck = True
-    world.fly(5.0)
+    world.fly(2.0)
     assert world.painter.phase == "align"
     world.stuck = False
     world.fly(5.0, until="press")
@@ -242,9 +242,9 @@ def test_align_gives_way_with_time() -> None:
     world.fly(20.0, until="align")
     world.edges[0].place += 0.006  # twice what is allowed: let pass after sqrt(2) times the patience
     world.stuck = True
-    world.fly(6.5)
+    world.fly(2.5)
     assert world.painter.phase == "align"
-    world.fly(1.5)
+    world.fly(1.0)
     assert world.painter.phase == "press"
 
 
