@@ -234,6 +234,8 @@ def check_reference(reference: Reference, last: Reference) -> tuple[Reference, t
         rejected.append("reference.standoff: not within [-1, 10] m")
     if not sound_vector(reference.velocity, 2, VELOCITY_BOUND):
         rejected.append("reference.velocity: not 2 finite values")
+    if not sound_vector(reference.travel, 2, VELOCITY_BOUND):
+        rejected.append("reference.travel: not 2 finite values")
     if not sound_vector(reference.tilt, 2, TILT_BOUND):
         rejected.append(f"reference.tilt: not 2 finite values within {TILT_BOUND} rad")
     if not isinstance(reference.contact, (bool, np.bool_)):

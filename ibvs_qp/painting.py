@@ -40,6 +40,8 @@ DESCENT_M_S = 0.15
 class Painter:
     """Phase machine of the paint job; `step` returns the wish of the tick."""
 
+    _slides = True  # whether a stroke follows the press
+
     def __init__(self, config: PaintingConfig) -> None:
         self.config = config
         self.reset()
@@ -395,7 +397,10 @@ class Painter:
             right = min(max(back, -HOLD_SPEED), HOLD_SPEED)
         c, s = math.cos(slope), math.sin(slope)
         velocity = np.array((right + along * c + climb * s, along * s - climb * c))
-        return Wish(contact=contact, standoff=standoff, velocity=velocity, guides=guides, push=self.config.push_n)
+        wish = Wish(contact=contact, standoff=standoff, velocity=velocity, guides=guides, push=self.config.push_n)
+        if contact and self._slides:
+            wish.travel = np.array((-self.config.speed_m_s, 0.0))
+        return wish
 
     def _edge_reference(self, edge: TrackedLine, edge_rate: float) -> float:
         """The stop edge's wanted offset: from where it was first seen to the margin, at the stroke's own speed."""

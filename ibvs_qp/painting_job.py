@@ -81,3 +81,4 @@ class Wish:
     guides: list[tuple[TrackedLine, float]]
     push: float
     tilt: np.ndarray = field(default_factory=lambda: np.zeros(2))
+    travel: np.ndarray = field(default_factory=lambda: np.zeros(2))

@@ -356,4 +356,5 @@ class Pilot:
             velocity=wish.velocity,
             contact=wish.contact,
             tilt=wish.tilt,
+            travel=wish.travel,
         )

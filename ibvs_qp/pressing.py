@@ -22,7 +22,7 @@ class Presser(Painter):
     """
 
     def __init__(self, config: PaintingConfig, hold_s: float, slide_s: float = 0.0, descend_s: float = 5.0) -> None:
-        self._hold_s, self._slide_s = hold_s, slide_s
+        self._hold_s, self._slide_s, self._slides = hold_s, slide_s, slide_s > 0.0
         super().__init__(dataclasses.replace(config, descend_s=descend_s))
 
     def reset(self) -> None:

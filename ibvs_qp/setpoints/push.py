@@ -17,6 +17,8 @@ FORCE_INTEGRAL_BOUND = 8.0
 TOUCH_FORCE_BUDGET = 2.9
 #: How fast the approach slows down to the speed of the touch [1/s].
 SLOWING = 1.5
+#: Fastest fall and rise of the push in contact, when reach or wish change [N/s]: a limit that is lost is followed.
+FALL, RISE = 60.0, 10.0
 #: Integral gain of the approach speed at the wall [1/s^2] and bound of its force [N].
 SEARCH_GAIN, SEARCH_BOUND = 6.0, 6.0
 #: Lowest stand-off aimed at while the tip shall touch [m]: behind the surface, so that the approach never stalls.
@@ -35,6 +37,9 @@ def push_force(signals: Signals, config: ControllerConfig, body: Body, touch: To
     """
     gains = config.gains
     allowed = ca.fmin(wish.push, REACH_SHARE * reach) if config.reach_check else wish.push
+    last, step = signals.state("push_allowed"), ca.vertcat(FALL, RISE) * body.dt
+    allowed = ca.if_else(touch.touching, clamp(allowed, last - step[0], last + step[1]), allowed)
+    signals.remember("push_allowed", allowed)
     reference = signals.output("push_reference", ca.if_else(wish.press, allowed, 0.0))
     ceiling = config.limits.push_share * reference
     signals.output("push_state", ca.vertcat(ceiling, touch.stiffness, touch.rate, touch.touching * wish.press))

@@ -87,20 +87,21 @@ class Touch:
 
 @dataclass(frozen=True, kw_only=True)
 class Wish:
-    """The reference: push [N], stand-off [m], velocity right and down [m/s], whether to press, roll and pitch [rad]."""
+    """The reference: push [N], stand-off [m], velocity right and down [m/s], whether to press, tilt [rad], planned travel [m/s]."""
 
     push: ca.SX
     standoff: ca.SX
     velocity: ca.SX
     press: ca.SX
     tilt: ca.SX
+    plan: ca.SX
 
     @classmethod
     def of(cls, signals: Signals) -> Wish:
         """Ask for the inputs."""
-        push, standoff, right, down, press, roll, pitch = ca.vertsplit(signals.input("reference", 7))
+        push, standoff, right, down, press, roll, pitch, *plan = ca.vertsplit(signals.input("reference", 9))
         velocity, tilt = ca.vertcat(right, down), ca.vertcat(roll, pitch)
-        return cls(push=push, standoff=standoff, velocity=velocity, press=press, tilt=tilt)
+        return cls(push=push, standoff=standoff, velocity=velocity, press=press, tilt=tilt, plan=ca.vertcat(*plan))
 
 
 def clamp(value: ca.SX, low: float | ca.SX, high: float | ca.SX) -> ca.SX:

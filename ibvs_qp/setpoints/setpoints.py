@@ -147,7 +147,15 @@ class Setpoints:
         )
         values["contact_weight"][0] = contact.contact_weight if press else 0.0
         right, down = reference.velocity.tolist()
-        values["reference"][:] = reference.push_force, reference.standoff, right, down, press, *reference.tilt.tolist()
+        values["reference"][:] = (
+            reference.push_force,
+            reference.standoff,
+            right,
+            down,
+            press,
+            *reference.tilt,
+            *reference.travel,
+        )
 
     def _pack_lines(self, measurement: Measurement, reference: Reference) -> None:
         for slot in self._pairing.assign(reference.lines):
