@@ -27,6 +27,8 @@ LEAST_STROKE = 0.5
 OVERRUN = 0.10
 #: Errors and speed of the alignment are averaged over this time [s]: half a period of the sway in hover.
 SWAY_TIME = 0.4
+#: Farthest that the alignment's tolerances open: 15 mm and 25 mm/s, what 3 N rms of gusts leave.
+MOST_OPENING = 5.0
 #: Stiction may keep the tip from the last millimetres; a stop settles for this long at most [s].
 SETTLE_TIME = 0.8
 #: Position hold along the wall by the odometer [1/s], speed-limited [m/s].
@@ -133,7 +135,8 @@ class Painter:
         aside = 0.0 if mark is None else mark.offset - self.config.edge_margin_m
         error, speed = self._without_sway((high, aside, *seen.velocity[:2]), dt)
         # Gusts and noisy pictures may never let the vehicle stand still: what counts as aligned opens with time.
-        opening = max(1.0, ((seen.time_s - self.entered) / self.config.align_patience_s) ** 2)
+        waited = (seen.time_s - self.entered) / self.config.align_patience_s
+        opening = min(max(1.0, waited**2), MOST_OPENING)
         still = speed < opening * self.config.align_speed_m_s
         if error < opening * self.config.align_error_m and still:
             self._since = seen.time_s if math.isnan(self._since) else self._since

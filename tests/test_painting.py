@@ -266,7 +266,7 @@ def test_press_waits_for_the_push() -> None:
     [
         ("start", lambda world: world.hidden.add(1)),
         ("approach", lambda world: setattr(world, "distance", 50.0)),
-        ("align", lambda world: (world.edges[0].__setattr__("place", 0.06), setattr(world, "stuck", True))),
+        ("align", lambda world: (world.edges[0].__setattr__("place", 0.08), setattr(world, "stuck", True))),
         ("press", lambda world: setattr(world, "contact_allowed", False)),
         ("climb", lambda world: setattr(world, "contact_allowed", False)),
     ],

@@ -87,7 +87,13 @@ class Touch:
 
 @dataclass(frozen=True, kw_only=True)
 class Wish:
-    """The reference: push [N], stand-off [m], velocity right and down [m/s], whether to press, tilt [rad], planned travel [m/s]."""
+    """The reference.
+
+    Attributes:
+        push: [N]; press: whether to; standoff: [m].
+        velocity: Right and down [m/s]; plan: the one that is planned.
+        tilt: Roll and pitch [rad].
+    """
 
     push: ca.SX
     standoff: ca.SX
