@@ -56,9 +56,17 @@ class ContactSettings:
     close_speed_m_s: float = setting(0.05, "approach speed within close_distance", unit="m/s", low=0.002, high=0.3)
     close_distance_m: float = setting(0.10, "where the approach slows down", unit="m", low=0.01, high=1.0)
     touch_speed_m_s: float = setting(
-        0.02, "speed of the last centimetres while the stiffness is unknown", unit="m/s", low=0.001, high=0.2
+        0.012, "speed of the last centimetre while the stiffness is unknown", unit="m/s", low=0.001, high=0.2
     )
-    touch_distance_m: float = setting(0.02, "where the last centimetres begin", unit="m", low=0.005, high=0.2)
+    touch_distance_m: float = setting(0.01, "where the last centimetre begins", unit="m", low=0.005, high=0.2)
+    landing_kd: float = setting(
+        15.0,
+        "approach speed error to acceleration in the last centimetre: 90 N s/m absorb a touch that the brush does not; "
+        "above, the approach-speed barrier would bind",
+        unit="1/s",
+        low=0.0,
+        high=50.0,
+    )
     retreat_speed_m_s: float = setting(0.15, "speed away from the wall", unit="m/s", low=0.01, high=0.5)
     depth_min_m: float = setting(0.53, "camera to wall, lambda = 1 below", unit="m", low=0.1, high=3.0)
     depth_max_m: float = setting(0.63, "camera to wall, lambda = 0 above", unit="m", low=0.1, high=3.0)

@@ -8,7 +8,14 @@ With x the penetration of the undeformed tip (e_s = -x), f the push and F the ro
 
 .. math::
     F_c = -\Big(K + \frac{K_{fi}}{s}\Big) \frac{e^{-s T_f}}{s/\omega_f + 1} f
-          - (K_{sp} + K_{sd} s)\, e^{-s T_h} x, \quad K = K_{fp} \min(1, k_s / k).
+          - \Big(K_{sp} + K_{sd} s \Big(W + \frac{\tau s}{\tau_a s + 1}\Big)\Big)\, e^{-s T_h} x - \hat g,
+    \quad K = K_{fp} \min(1, k_s / k), \quad
+    \hat g = \frac{1}{s/\omega_g + 1} (m \ddot x + e^{-s T_f} f - F).
+
+The impedance damps the rate one motor lag ahead; the rate itself counts by
+:math:`W = 1 - \frac{\kappa}{s + \kappa} e^{-s T_c}`: with every picture, T_c late, the estimator takes the speed of a
+tip in contact for nothing (`estimation/contact.py`). The observer of gusts (`setpoints/external_wrench.py`) leaves a
+loop only for the age of the felt force.
 
 T_f is the age of the force that the controller works with, T_h half a tick: how long a command is held on average, and
 again how old the accelerometer's mean over the last tick is, from which the impedance gets its rate. The lag tau is the
@@ -18,7 +25,9 @@ external wrench do not move. The closed loop's poles are the zeros of
 
 .. math::
     \Delta(s) = m s^2 + (b + c) s + k + \frac{e^{-s T_h}}{\tau s + 1} \Big[\Big(K + \frac{K_{fi}}{s}\Big)
-    \frac{e^{-s T_f}(k + b s)}{s/\omega_f + 1} + (K_{sp} + K_{sd} s)\, e^{-s T_h}\Big].
+    \frac{e^{-s T_f}(k + b s)}{s/\omega_f + 1}
+    + \Big(K_{sp} + K_{sd} s \Big(W + \frac{\tau s}{\tau_a s + 1}\Big)\Big)\, e^{-s T_h}
+    + \frac{(e^{-s T_f} - 1)(k + b s) - c s}{s/\omega_g + 1}\Big].
 
 Pade approximants of the delays give a polynomial whose roots start Newton's method on the exact function. Force
 feedback adds stiffness late, which is negative damping: it is what the margin is spent on.
@@ -38,6 +47,14 @@ if TYPE_CHECKING:  # the configuration checks itself with this module
 
 #: K_fp counts in full up to this stiffness k_s and falls with its inverse beyond [N/m] (`setpoints/push.py`).
 FULL_GAIN_STIFFNESS = 1500.0
+#: Bandwidth at which gusts along the normal are learnt in contact [rad/s], and time constant of the filter of the
+#: acceleration by which the impedance looks ahead [s], a tenth of the motors' lag.
+GUST_BANDWIDTH, ACCELERATION_FILTER = 9.0, 6e-3
+#: Noise density of the acceleration along the normal [m/s^2/sqrt(Hz)] (IMU 4e-3, attitude noise), and deviation of the
+#: speed of a tip that the wall holds [m/s]: nothing but the swing of the contact. Their ratio is the bandwidth kappa.
+ACCELERATION_NOISE, HELD_SPEED_STD = 6e-3, 5e-3
+#: Period of the pictures, and their mean age: latency and half a period [s].
+FRAME_PERIOD, FRAME_AGE = 1.0 / 30.0, 0.077
 #: Order of the Pade approximants; Newton's method removes what they leave.
 PADE_ORDER = 4
 #: Poles faster than this are those of the approximants, far above what rotors with 50 ms of lag can excite [rad/s].
@@ -64,6 +81,9 @@ class ContactLoop:
         self.proportional = gains.force_kfp * min(1.0, FULL_GAIN_STIFFNESS / stiffness)
         self.integral = gains.force_kfi
         self.spring, self.damper = (gains.force_ksp, gains.force_ksd) if config.impedance else (0.0, 0.0)
+        self.ahead, self.gust_lag = self.lag, 1.0 / GUST_BANDWIDTH
+        self.washout = ACCELERATION_NOISE / (HELD_SPEED_STD * math.sqrt(FRAME_PERIOD))
+        self.observer = 1.0 if config.contact_feedforward else 0.0  # without feed-forward it rests at the wall
         self.force_delay, self.rate_delay = force_delay_s + hold, 2.0 * hold
 
     def poles(self) -> list[complex]:
@@ -74,9 +94,15 @@ class ContactLoop:
         motor, filtered = self.lag * s + 1.0, self.filter_lag * s + 1.0
         free = self.mass * s**2 + (self.damping + self.drag) * s + self.stiffness
         force = (self.proportional * s + self.integral) * (self.damping * s + self.stiffness)
-        total = free * s * motor * filtered * force_bottom * rate_bottom
-        total = total + force * force_top * rate_bottom
-        total = total + (self.damper * s + self.spring) * s * filtered * rate_top * force_bottom
+        smooth, gust = ACCELERATION_FILTER * s + 1.0, self.gust_lag * s + 1.0
+        late_top, late_bottom = _pade(FRAME_AGE)
+        washed, held = (s + self.washout) * late_bottom - self.washout * late_top, (s + self.washout) * late_bottom
+        impedance = self.damper * s * (washed * smooth + held * self.ahead * s) + self.spring * smooth * held
+        unseen = (force_top - force_bottom) * (self.stiffness + self.damping * s) - self.drag * s * force_bottom
+        total = free * s * motor * filtered * force_bottom
+        total = (total + force * force_top) * rate_bottom * smooth * gust
+        total = total + self.observer * unseen * s * filtered * rate_bottom * smooth
+        total = total * held + impedance * s * filtered * rate_top * force_bottom * gust
         # Time in hundredths of a second keeps the coefficients within a few orders of each other.
         scaled = Polynomial(np.asarray(total.coef, float) * 100.0 ** np.arange(total.coef.size))
         starts = [100.0 * complex(root) for root in scaled.roots() if root.imag >= -1e-9]
@@ -92,9 +118,13 @@ class ContactLoop:
         r"""The module's :math:`\Delta(s)`."""
         force = (self.proportional + self.integral / s) * cmath.exp(-s * self.force_delay)
         force *= (self.stiffness + self.damping * s) / (self.filter_lag * s + 1.0)
-        motion = (self.spring + self.damper * s) * cmath.exp(-s * self.rate_delay)
+        ahead = 1.0 - self.washout * cmath.exp(-s * FRAME_AGE) / (s + self.washout)
+        ahead += self.ahead * s / (ACCELERATION_FILTER * s + 1.0)
+        motion = (self.spring + self.damper * s * ahead) * cmath.exp(-s * self.rate_delay)
+        unseen = (cmath.exp(-s * self.force_delay) - 1.0) * (self.stiffness + self.damping * s) - self.drag * s
+        gust = self.observer * unseen / (self.gust_lag * s + 1.0)
         free = self.mass * s * s + (self.damping + self.drag) * s + self.stiffness
-        return free + (force + motion) / (self.lag * s + 1.0)
+        return free + (force + motion + gust) / (self.lag * s + 1.0)
 
     def _refine(self, start: complex) -> complex | None:
         """Newton's method from an approximate pole; None when it leads elsewhere."""
@@ -106,6 +136,8 @@ class ContactLoop:
                 return None
             change = value / slope
             pole -= change
+            if abs(pole) > 4.0 * FASTEST_MODE:
+                return None
             if abs(change) < POLE_TOLERANCE * abs(pole):
                 break
         # A real pole may have been met on the way from a pair; a far jump is another pole, found from its own start.

@@ -14,6 +14,8 @@ from ibvs_qp.measurement import LineFeature, LineReference, Measurement, Referen
 RATE_BOUND, ACCELERATION_BOUND, WRENCH_BOUND, VELOCITY_BOUND = 35.0, 200.0, 500.0, 20.0
 #: Largest believable line parameter (normalised, rad) and entry of a plane over D [1/m].
 LINE_BOUND, PLANE_BOUND = 1e6, 1e3
+#: Largest roll or pitch that may be asked for [rad].
+TILT_BOUND = 0.6
 #: A stamp this far from the last one is a fault until the next ones agree with it [ns].
 LEAP_NS = 1_000_000_000
 #: Stamps in a row that must agree until a clock that went back is believed.
@@ -285,6 +287,10 @@ def check_reference(reference: Reference, last: Reference) -> tuple[Reference, t
         rejected.append("reference.standoff: not within [-1, 10] m")
     if not sound_vector(reference.velocity, 2, VELOCITY_BOUND):
         rejected.append("reference.velocity: not 2 finite values")
+    if not sound_vector(reference.travel, 2, VELOCITY_BOUND):
+        rejected.append("reference.travel: not 2 finite values")
+    if not sound_vector(reference.tilt, 2, TILT_BOUND):
+        rejected.append(f"reference.tilt: not 2 finite values within {TILT_BOUND} rad")
     if not isinstance(reference.contact, (bool, np.bool_)):
         rejected.append("reference.contact: neither True nor False")
     if not isinstance(reference.lines, tuple) or not all(_good_reference_line(line) for line in reference.lines):

@@ -97,6 +97,9 @@ class Reference:
         lines: Wanted lines; they pair with the measured ones by role, then order.
         velocity: Wanted velocity in the wall plane (right, down) [m/s], (2,).
         contact: Press the wall (True) or keep the stand-off (False: lambda = 0).
+        travel: Velocity in the wall plane that is planned at this push [m/s], (2,): reach is taken for it before it
+            begins.
+        tilt: Wanted roll and pitch [rad], (2,): level, but for a vehicle that lost a rotor.
     """
 
     push_force: float = 0.0
@@ -104,6 +107,8 @@ class Reference:
     lines: tuple[LineReference, ...] = ()
     velocity: np.ndarray = field(default_factory=lambda: np.zeros(2))
     contact: bool = False
+    tilt: np.ndarray = field(default_factory=lambda: np.zeros(2))
+    travel: np.ndarray = field(default_factory=lambda: np.zeros(2))
 
 
 @dataclass(frozen=True, kw_only=True)

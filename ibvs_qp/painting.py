@@ -27,14 +27,24 @@ SLIDE_SPEED = 0.01
 LEAST_STROKE = 0.5
 #: How far past its nominal length row 1 may run in search of its end [m].
 OVERRUN = 0.10
+#: Errors and speed of the alignment are averaged over this time [s]: half a period of the sway in hover.
+SWAY_TIME = 0.4
+#: Farthest that the alignment's tolerances open: 15 mm and 25 mm/s, what 3 N rms of gusts leave.
+MOST_OPENING = 5.0
 #: Stiction may keep the tip from the last millimetres; a stop settles for this long at most [s].
 SETTLE_TIME = 0.8
 #: Position hold along the wall by the odometer [1/s], speed-limited [m/s].
 HOLD_GAIN, HOLD_SPEED = 0.8, 0.03
 
 
+#: Vertical speed of a vehicle that gives up the wall [m/s], down: slow, because nothing measures the height.
+DESCENT_M_S = 0.15
+
+
 class Painter:
     """Phase machine of the paint job; `step` returns the wish of the tick."""
+
+    _slides = True  # whether a stroke follows the press
 
     def __init__(self, config: PaintingConfig) -> None:
         self.config = config
@@ -44,7 +54,8 @@ class Painter:
         """Back to the start."""
         self.phase, self.row, self.entered = "start", 0, 0.0
         self.log: list[tuple[float, str, str]] = []
-        self.finished = self.failed = False
+        self._calm: tuple[float, ...] | None = None
+        self.finished = self.failed = self._given_up = False
         self.reason = ""
         self._guide_id = self._edge_id = -1
         self._guide_target = self.config.edge_margin_m
@@ -83,6 +94,21 @@ class Painter:
         self._speed = 0.0
         self._enter(seen, "retreat", reason)
 
+    def abandon(self, seen: Scenery, reason: str) -> None:
+        """Give up the wall for good: detach, get clear of it and descend."""
+        self.failed = True
+        self._give_up(seen, reason)
+
+    def _give_up(self, seen: Scenery, reason: str) -> None:
+        self.reason, self._given_up = reason, True
+        self._enter(seen, "retreat", reason)
+
+    def _escape(self, seen: Scenery, dt: float) -> Wish:
+        if seen.time_s - self.entered > self.config.descend_s:
+            self._end(seen, f"{self.reason}: wall given up, descended for {self.config.descend_s:g} s")
+        velocity = np.array([0.0, DESCENT_M_S])
+        return Wish(contact=False, standoff=self.config.retreat_m, velocity=velocity, guides=[], push=0.0)
+
     def _end(self, seen: Scenery, reason: str, failed: bool = False) -> None:
         self.failed = self.failed or failed
         self.reason = self.reason or reason
@@ -106,13 +132,14 @@ class Painter:
 
     def _align(self, seen: Scenery, dt: float) -> Wish:
         self._keep_guide(seen, self._bottom_edge)
-        error = self._guide_error(seen)
-        mark = self._start_mark(seen)
-        if mark is not None:
-            error = max(error, abs(mark.offset - self.config.edge_margin_m))
+        line, mark = seen.lines.get(self._guide_id), self._start_mark(seen)
+        high = math.inf if line is None else line.offset - self._guide_target
+        aside = 0.0 if mark is None else mark.offset - self.config.edge_margin_m
+        error, speed = self._without_sway((high, aside, *seen.velocity[:2]), dt)
         # Gusts and noisy pictures may never let the vehicle stand still: what counts as aligned opens with time.
-        opening = max(1.0, ((seen.time_s - self.entered) / self.config.align_patience_s) ** 2)
-        still = math.hypot(*seen.velocity) < opening * self.config.align_speed_m_s
+        waited = (seen.time_s - self.entered) / self.config.align_patience_s
+        opening = min(max(1.0, waited**2), MOST_OPENING)
+        still = speed < opening * self.config.align_speed_m_s
         if error < opening * self.config.align_error_m and still:
             self._since = seen.time_s if math.isnan(self._since) else self._since
             if seen.time_s - self._since >= self.config.align_time_s:
@@ -122,6 +149,17 @@ class Painter:
         else:
             self._since = math.nan
         return self._wish(seen, contact=False, standoff=self.config.standoff_m, hold=True, mark=True)
+
+    def _without_sway(self, now: tuple[float, ...], dt: float) -> tuple[float, float]:
+        """Error and speed averaged over a sway: a hovering vehicle sways by as much as is allowed, about its place."""
+        if not all(map(math.isfinite, now)):
+            self._calm = None
+            return math.inf, math.inf
+        share = 1.0 - math.exp(-dt / SWAY_TIME)
+        last = self._calm or now
+        self._calm = tuple(old + share * (new - old) for old, new in zip(last, now, strict=True))
+        high, aside, right, down = self._calm
+        return max(abs(high), abs(aside)), math.hypot(right, down)
 
     def _press(self, seen: Scenery, dt: float) -> Wish:
         self._keep_guide(seen, self._bottom_edge)
@@ -200,6 +238,8 @@ class Painter:
         return self._wish(seen, contact=True, climb=self._speed if left > 0.0 else 0.0, edge=edge, hold=edge is None)
 
     def _retreat(self, seen: Scenery, dt: float) -> Wish:
+        if self._given_up:
+            return self._escape(seen, dt)
         if seen.distance > self.config.retreat_m - 0.02 and not seen.in_contact:
             self._end(seen, "all rows painted, retreated" if not self.failed else self.reason)
         return self._wish(seen, contact=False, standoff=self.config.retreat_m, hold=True)
@@ -361,7 +401,10 @@ class Painter:
             right = clipped(HOLD_GAIN * (self._anchor - seen.odometer[0]), -HOLD_SPEED, HOLD_SPEED)
         c, s = math.cos(slope), math.sin(slope)
         velocity = np.array((right + along * c + climb * s, along * s - climb * c))
-        return Wish(contact, standoff, velocity, guides, self.config.push_n)
+        wish = Wish(contact, standoff, velocity, guides, self.config.push_n)
+        if contact and self._slides:
+            wish.travel = np.array((-self.config.speed_m_s, 0.0))
+        return wish
 
     def _edge_reference(self, edge: TrackedLine, edge_rate: float) -> float:
         """The stop edge's wanted offset: from where it was first seen to the margin, at the stroke's own speed."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -30,7 +30,10 @@ class PaintingConfig:
     align_speed_m_s: float = setting(0.005, "speed that counts as still", unit="m/s", low=0.001, high=0.1)
     align_time_s: float = setting(0.3, "aligned this long", unit="s", low=0.0, high=10.0)
     align_patience_s: float = setting(
-        5.0, "after this long both tolerances open with the square of time", unit="s", low=0.5, high=300.0
+        2.0, "after this long both tolerances open with the square of time", unit="s", low=0.5, high=300.0
+    )
+    descend_s: float = setting(
+        5.0, "after the wall was given up: time of retreat and descent", unit="s", low=0.5, high=60.0
     )
     timeout_s: float = setting(
         15.0, "longest start, approach, align, press, climb or retreat", unit="s", low=1.0, high=300.0
@@ -77,3 +80,5 @@ class Wish:
     velocity: np.ndarray
     guides: list[tuple[TrackedLine, float]]
     push: float
+    tilt: np.ndarray = field(default_factory=lambda: np.zeros(2))
+    travel: np.ndarray = field(default_factory=lambda: np.zeros(2))

@@ -34,6 +34,7 @@ from ibvs_qp.measurement import (
 from ibvs_qp.painting import Painter, PaintingConfig, Scenery, Wish
 from ibvs_qp.sensor_gate import SensorGate
 from ibvs_qp.settings import choice, dump_toml, load_toml, setting, validate
+from ibvs_qp.supervisor import Supervisor
 from ibvs_qp.vectors import Row, down_row
 from ibvs_qp.vision.config import VisionConfig
 from ibvs_qp.vision.paper.config import PaperConfig
@@ -118,6 +119,7 @@ class Pilot:
             self.config.estimation,
         )
         self.tare = WrenchTare(vehicle, self.config.estimation)
+        self.supervisor = Supervisor(vehicle)
         self.painter = painter or Painter(self.config.painting)
         self._seen_as = seen_as
         self._tick_s, self._ticks = settings.tick_s, StampRing(settings.tick_s)
@@ -135,6 +137,7 @@ class Pilot:
         self.motion.reset()
         self.tare.reset()
         self.painter.reset()
+        self.supervisor.reset()
         self._gate.reset()
         if self._perception is not None:
             self._perception.reset()
@@ -193,10 +196,20 @@ class Pilot:
         wrench = self.tare.update(frame.wrench, frame.wrench_stamp_ns, force, free)
         axes = WallAxes.of(contact.normal.tolist(), down_row(*attitude))
         self.motion.predict(stamp, axes, force, rate, dt)
-        features = frame.features if frame.image is None else self._see(frame)
+        # Without a rotor the vehicle turns away from the wall: what it sees then is not what the strategy knows.
+        blind = self.supervisor.lost
+        features = None if blind else frame.features if frame.image is None else self._see(frame)
         if features is not None and self._fresh(features.stamp_ns):
             self._take(features)
-        wish = self.wish = self.painter.step(self._scenery(frame))
+        scenery = self._scenery(frame)
+        if self.supervisor.consider(self.thrust_limits):
+            self.painter.abandon(scenery, "no level hover is left")
+        wish = self.painter.step(scenery)
+        if self.supervisor.lost:
+            away = contact.distance + float(contact.normal @ self._tip)
+            tilt = self.supervisor.tilt(away, contact.speed, float(self.motion.state[0]), contact.normal, dt)
+            wish = dataclasses.replace(wish, tilt=tilt)
+        self.wish = wish
         self.reference = self._refer(wish)
         self.measurement = self._measure(frame, wrench, axes, wish)
         begin = time.perf_counter()
@@ -288,7 +301,7 @@ class Pilot:
         contact = self.terms.contact
         distance = contact.distance if contact.known else 0.5
         low, high = self.thrust_limits or (None, None)
-        if self.motion.velocity_age_s < self.config.estimation.velocity_life_s:
+        if self.supervisor.lost or self.motion.velocity_age_s < self.config.estimation.velocity_life_s:
             right, down, *_ = self.motion.state
             (nx, ny, nz), (rx, ry, rz), (dx, dy, dz), rate = axes.normal, axes.right, axes.down, contact.rate
             velocity = np.array(
@@ -358,4 +371,6 @@ class Pilot:
             lines=tuple(references),
             velocity=wish.velocity,
             contact=wish.contact,
+            tilt=wish.tilt,
+            travel=wish.travel,
         )

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
-
-import numpy as np
 
 from ibvs_qp.painting import Painter
 from ibvs_qp.painting_job import PaintingConfig, Scenery, Wish
-
-#: Vertical speed of a vehicle that gives up the wall [m/s], down.
-DESCENT_M_S = 0.5
 
 
 class Presser(Painter):
@@ -26,23 +22,20 @@ class Presser(Painter):
     """
 
     def __init__(self, config: PaintingConfig, hold_s: float, slide_s: float = 0.0, descend_s: float = 5.0) -> None:
-        self._hold_s, self._slide_s, self._descend_s = hold_s, slide_s, descend_s
-        super().__init__(config)
+        self._hold_s, self._slide_s, self._slides = hold_s, slide_s, slide_s > 0.0
+        super().__init__(dataclasses.replace(config, descend_s=descend_s))
 
     def reset(self) -> None:
         """Back to the start."""
         super().reset()
-        self._touched = self._abandoned = math.nan
+        self._touched = math.nan
 
-    def abandon(self, time_s: float, reason: str) -> None:
-        """Give up the wall for good: detach, retreat and descend."""
-        if math.isnan(self._abandoned):
-            self._abandoned = time_s
-            self.log.append((time_s, "retreat", reason))
-            self.phase, self.entered = "retreat", time_s
+    def abandon(self, seen: Scenery, reason: str) -> None:
+        """Give up the wall for good; what a press studies is how, so that the flight ends as planned."""
+        self._give_up(seen, reason)
 
     def _time_out(self, seen: Scenery) -> None:
-        if (self.phase == "press" and not math.isnan(self._touched)) or not math.isnan(self._abandoned):
+        if self.phase == "press" and not math.isnan(self._touched):
             return  # a hold lasts as long as it was asked to
         super()._time_out(seen)
 
@@ -70,11 +63,6 @@ class Presser(Painter):
         return self._wish(seen, contact=True, along=-self._speed)
 
     def _retreat(self, seen: Scenery, dt: float) -> Wish:
-        if math.isnan(self._abandoned):
-            if seen.distance > self.config.retreat_m - 0.02 and not seen.in_contact:
-                self._end(seen, "held, retreated" if not self.failed else self.reason)
-            return self._wish(seen, contact=False, standoff=self.config.retreat_m, hold=True)
-        if seen.time_s - self._abandoned > self._descend_s:
-            self._end(seen, f"wall given up, descended for {self._descend_s:g} s")
-        velocity = np.array([0.0, DESCENT_M_S])
-        return Wish(contact=False, standoff=self.config.retreat_m, velocity=velocity, guides=[], push=0.0)
+        if not self._given_up and seen.distance > self.config.retreat_m - 0.02 and not seen.in_contact:
+            self._end(seen, "held, retreated" if not self.failed else self.reason)
+        return super()._retreat(seen, dt)

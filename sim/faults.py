@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ibvs_qp.pressing import Presser
-
 if TYPE_CHECKING:
     from ibvs_qp.pilot import Pilot
     from sim.closed_loop import World
@@ -63,8 +61,6 @@ class Derate(Fault):
         plant.thrust_limits = lower, np.maximum(upper, 0.0)
         if self.told:
             pilot.thrust_limits = plant.thrust_limits
-            if stopped.any() and isinstance(pilot.painter, Presser):
-                pilot.painter.abandon(world.plant.time_ns * 1e-9, f"rotor {self.rotor} lost")
         return f"{self.rotor or 'every rotor'} derated to {100.0 * self.share:g} % of full thrust"
 
 

@@ -12,6 +12,7 @@ from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import SensorFrame
 from ibvs_qp.pilot import Pilot
 from ibvs_qp.setpoints.lines import LINE_TERMS
+from ibvs_qp.setpoints.sensed import TOUCH
 from ibvs_qp.vision.overlay import draw_overlay
 from sim.cameras.protocol import camera_intrinsics
 from sim.columns import Columns
@@ -178,11 +179,11 @@ class Recorder:
 
     def _believed(self, given: np.ndarray, push_reference: np.ndarray) -> dict[str, np.ndarray]:
         """What the controller was told or has estimated."""
-        known, distance, _, push, _, _, ramp, *_ = self._input(given, "touch").T
+        touch = dict(zip(TOUCH, self._input(given, "touch").T, strict=True))
         return {
-            "push_measured": push.copy(),
-            "push_reference": push_reference * ramp,
-            "standoff_estimate": np.where(known > 0.0, distance, math.inf),
+            "push_measured": touch["push"].copy(),
+            "push_reference": push_reference * touch["ramp"],
+            "standoff_estimate": np.where(touch["known"] > 0.0, touch["distance"], math.inf),
             "contact_weight": self._input(given, "contact_weight")[:, 0].copy(),
             "velocity_estimate": np.where(self._input(given, "moving") > 0.0, self._input(given, "velocity"), math.nan),
         }

@@ -7,6 +7,7 @@ import pytest
 from symbolic_block import Block
 
 from allocation import control_effectiveness
+from ibvs_qp.contact_loop import GUST_BANDWIDTH
 from ibvs_qp.setpoints.external_wrench import FORCE_BOUND, MOMENT_BOUND, external_wrench
 from ibvs_qp.setpoints.sensed import Body, Touch
 from ibvs_qp.vehicle import VehicleParams
@@ -22,7 +23,15 @@ def observer(adapt_in_contact: bool = True) -> Block:
     def build(signals):
         body, touch = Body.of(signals), Touch.of(signals)
         return external_wrench(
-            signals, VEHICLE, MATRIX, body, body.wrench[3:], touch.normal, touch.touching, adapt_in_contact
+            signals,
+            VEHICLE,
+            MATRIX,
+            body,
+            body.wrench[3:],
+            touch.normal,
+            touch.touching,
+            touch.noise,
+            adapt_in_contact,
         )
 
     return Block(build)
@@ -72,12 +81,27 @@ def test_wind_and_contact_are_told_apart() -> None:
     np.testing.assert_allclose(found[3:], 0.0, atol=0.01)
 
 
-def test_in_contact_nothing_is_learnt_along_the_normal() -> None:
-    """What the wall takes along n belongs to the force task; an observer there would fight it."""
-    found = hover(np.array([4.0, 0, 0, 0, 0, 0]), touching=True)
-    assert wrench(found)[0] == 0.0
-    free = hover(np.array([4.0, 0, 0, 0, 0, 0]))
-    assert wrench(free)[0] == pytest.approx(4.0, abs=0.02)
+def test_a_gust_onto_the_wall_is_told_from_what_the_wall_returns() -> None:
+    """4 N of wind along n while the wall returns 5 N; what the wall returns is no load, however much it changes."""
+    for push in (5.0, 9.0):
+        contact = np.array([-push, 0, 0, 0, 0, 0])
+        found = hover(np.array([4.0, 0, 0, 0, 0, 0]), touching=True, contact=contact)
+        assert wrench(found)[0] == pytest.approx(4.0, abs=0.02)
+
+
+def test_a_noisy_force_sensor_slows_the_observer_in_contact() -> None:
+    """Its noise would become push: with 1 N of filtered noise a gust is learnt ten times slower, not faster."""
+    found = []
+    for noise in (0.0, 1.0):
+        block = hover(np.zeros(6), seconds=1.0)
+        block.touch(touching=True, noise=noise)
+        gust = np.array([2.0, 0, 0, 0, 0, 0])
+        thrusts = np.linalg.solve(MATRIX, -np.array([0, 0, WEIGHT, 0, 0, 0]))
+        for _ in range(25):
+            without_lag(block, thrusts, specific_force=STILL + gust[:3] / VEHICLE.mass_kg)
+        found.append(float(wrench(block)[0]))
+    assert found[0] == pytest.approx(2.0 * (1.0 - np.exp(-0.1 * GUST_BANDWIDTH)), rel=0.01)
+    assert found[1] < 0.1 * found[0]
 
 
 def test_acceleration_is_not_taken_for_a_load() -> None:

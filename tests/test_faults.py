@@ -12,6 +12,7 @@ from sim.closed_loop import FlightOptions, World, fly, make_pilot, pilot_config
 from sim.experiments.scenes import near_wall
 from sim.faults import Derate, FaultSchedule, WindStep
 from sim.jobs import PressJob
+from sim.measures.loss import loss_figures
 from sim.miscalibration import Miscalibration
 from sim.scene import CameraScene, Scene
 
@@ -49,10 +50,34 @@ def test_an_untold_fault_changes_the_plant_alone():
 def test_a_stopped_rotor_gives_nothing_and_the_wall_is_given_up():
     world, pilot = world_and_pilot()
     Derate(rotor="rear_left", share=0.0).strike(world, pilot)
-    assert pilot.painter.phase == "retreat"
+    assert pilot.step(world.sense()).mode == "free" and pilot.painter.phase == "retreat"
     for _ in range(200):
         world.plant.step(np.full(6, 11.0))
     assert world.plant.thrusts_actual[5] == pytest.approx(0.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("rotor", ["front_left", pytest.param("mid_right", marks=pytest.mark.slow)])
+def test_a_vehicle_that_loses_a_rotor_while_pressing_leaves_the_wall_and_comes_down(rotor):
+    """The issue's figures; front_left leaves a force of 8 N towards the wall unless the vehicle tilts."""
+    fault = Derate(delay_s=1.0, rotor=rotor, share=0.0)
+    trace = fly(near_wall(), OPTIONS, job=PressJob(hold_s=8.0, descend_s=5.0), faults=(fault,))
+    figures = loss_figures(trace)
+    # Touch, ramp, loss of the rotor and the phases since: no thrust ever steps farther than the rate limit.
+    assert np.abs(np.diff(trace.thrusts[1:], axis=0)).max() <= 500.0 * 0.004 + 1e-6
+    assert trace.completed, trace.reason
+    assert figures["survived_s"] >= 4.99 and figures["detached"] == 1.0
+    assert figures["tilt_peak_deg"] <= 25.0 and 0.0 < figures["descent_peak_m_s"] <= 1.5
+
+
+def test_only_a_lost_hover_is_given_up():
+    pilot = world_and_pilot()[1]
+    lower, upper = np.full(6, 1.2), np.full(6, 52.56)
+    assert not pilot.supervisor.consider((lower, upper))
+    upper[0] = 0.4 * 52.56
+    assert not pilot.supervisor.consider((lower, upper)) and not pilot.supervisor.lost
+    upper[0] = lower[0] = 0.0
+    assert pilot.supervisor.consider((lower, upper)) and pilot.supervisor.lost
+    assert not pilot.supervisor.consider((lower, upper)), "said once"
 
 
 def test_wind_pushes_from_the_step_on():

@@ -100,7 +100,7 @@ def ringing(push: np.ndarray, dt: float, order: int = 8) -> tuple[float, float]:
     return -pole.real / abs(pole), abs(pole) / (2.0 * math.pi)
 
 
-@pytest.mark.parametrize("force_kfp", [0.3467, 0.8])
+@pytest.mark.parametrize("force_kfp", [0.8, 1.6])  # the shipped 0.35 is damped 0.45: nothing rings
 def test_predicts_the_ringing_of_the_flown_contact(force_kfp: float) -> None:
     # From farther away: the estimator of distance and rate has settled, as the model of the loop assumes.
     config, push = pushed(1500.0, 0.004, 6.2, distance=0.45, force_kfp=force_kfp)
@@ -116,8 +116,8 @@ def test_predicts_the_ringing_of_the_flown_contact(force_kfp: float) -> None:
     ("stiffness", "latency", "gains"),
     [
         (3500.0, 0.004, {}),
-        (1500.0, 0.004, {"force_kfp": 1.6}),
-        (1500.0, 0.04, {"force_kfp": 1.6}),
+        (1500.0, 0.004, {"force_kfp": 8.0}),
+        (1500.0, 0.04, {"force_kfp": 2.0}),
         pytest.param(1500.0, 0.04, {}, marks=pytest.mark.slow),
         pytest.param(1500.0, 0.004, {"force_kfi": 15.0}, marks=pytest.mark.slow),
     ],
@@ -135,6 +135,7 @@ def test_holds_where_a_margin_is_and_oscillates_where_none_is(stiffness: float, 
 
 def test_without_feedback_it_is_the_damped_oscillator() -> None:
     free = with_gains(force_kfp=0.0, force_kfi=0.0, force_ksp=0.0, force_ksd=0.0)
+    free = dataclasses.replace(free, contact_feedforward=False)  # nor the observer of gusts
     for stiffness in (500.0, 1500.0, 10_000.0):
         margin = contact_mode_damping(free, stiffness, 30.0, 0.009)
         assert margin.least_damping_ratio == pytest.approx(30.9 / (2.0 * math.sqrt(6.0 * stiffness)), rel=1e-9)
@@ -170,7 +171,7 @@ def unstable_zeros(loop: ContactLoop) -> int:
 
 def test_more_gain_and_a_switched_off_impedance_cost_damping() -> None:
     ratios = [contact_mode_damping(with_gains(force_kfp=k), 1500.0, 30.0, 0.009).least_damping_ratio for k in (0, 1, 2)]
-    assert ratios[0] > ratios[1] > 0.0 > ratios[2]
+    assert ratios[0] > ratios[1] > 0.1 > ratios[2]
     direct = dataclasses.replace(ControllerConfig(), impedance=False)
     assert (
         contact_mode_damping(direct, 1500.0, 30.0, 0.009).least_damping_ratio
@@ -187,11 +188,11 @@ def test_every_preset_keeps_the_margin(file: Path) -> None:
 @pytest.mark.parametrize(
     ("gains", "brush", "words"),
     [
-        ({"force_kfp": 1.2}, {}, r"gains\.force_kfp = 1\.2 is refused: allowed is \[0, 0\.39"),
+        ({"force_kfp": 3.0}, {}, r"gains\.force_kfp = 3\.0 is refused: allowed is \[0, 1\.3"),
         ({"force_kfi": 30.0}, {}, r"gains\.force_kfi = 30\.0 is refused: allowed is \[0, 7\."),
-        ({"force_ksp": 2000.0}, {}, r"gains\.force_ksp = 2000\.0 is refused"),
-        ({}, {"stiffness_max_n_m": 1e4}, r"brush\.stiffness_max_n_m = 10000\.0 N/m is refused: allowed is \[1000, 38"),
-        ({}, {"stiffness_min_n_m": 9e3, "stiffness_max_n_m": 1e4}, r"brush\.damping_n_s_m = 30\.0 N s/m is refused"),
+        ({"force_ksp": 4000.0}, {}, r"gains\.force_ksp = 4000\.0 is refused"),
+        ({}, {"stiffness_max_n_m": 3e4}, r"brush\.stiffness_max_n_m = 30000\.0 N/m is refused: allowed is \[1000, 268"),
+        ({}, {"stiffness_min_n_m": 28e3, "stiffness_max_n_m": 3e4}, r"brush\.damping_n_s_m = 30\.0 N s/m is refused"),
     ],
 )
 def test_a_refusal_names_field_value_and_what_is_allowed(gains: dict, brush: dict, words: str) -> None:
@@ -202,7 +203,7 @@ def test_a_refusal_names_field_value_and_what_is_allowed(gains: dict, brush: dic
 
 def test_the_allowed_value_holds_and_a_little_more_does_not() -> None:
     with pytest.raises(ConfigError) as refusal:
-        require_margin(with_gains(force_kfp=1.2))
+        require_margin(with_gains(force_kfp=3.0))
     allowed = float(str(refusal.value).split("[0, ")[1].split("]")[0])
     assert least_margin(with_gains(force_kfp=0.999 * allowed)).least_damping_ratio >= LEAST_DAMPING_RATIO
     assert least_margin(with_gains(force_kfp=1.01 * allowed)).least_damping_ratio < LEAST_DAMPING_RATIO

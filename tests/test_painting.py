@@ -230,7 +230,7 @@ def test_align_needs_stillness_and_place() -> None:
     world.fly(20.0, until="align")
     world.edges[0].place += 0.004  # the guide is off by more than allowed, and the tip does not follow
     world.stuck = True
-    world.fly(5.0)
+    world.fly(2.0)
     assert world.painter.phase == "align"
     world.stuck = False
     world.fly(5.0, until="press")
@@ -242,9 +242,9 @@ def test_align_gives_way_with_time() -> None:
     world.fly(20.0, until="align")
     world.edges[0].place += 0.006  # twice what is allowed: let pass after sqrt(2) times the patience
     world.stuck = True
-    world.fly(6.5)
+    world.fly(2.5)
     assert world.painter.phase == "align"
-    world.fly(1.5)
+    world.fly(1.0)
     assert world.painter.phase == "press"
 
 
@@ -266,7 +266,7 @@ def test_press_waits_for_the_push() -> None:
     [
         ("start", lambda world: world.hidden.add(1)),
         ("approach", lambda world: setattr(world, "distance", 50.0)),
-        ("align", lambda world: (world.edges[0].__setattr__("place", 0.06), setattr(world, "stuck", True))),
+        ("align", lambda world: (world.edges[0].__setattr__("place", 0.08), setattr(world, "stuck", True))),
         ("press", lambda world: setattr(world, "contact_allowed", False)),
         ("climb", lambda world: setattr(world, "contact_allowed", False)),
     ],

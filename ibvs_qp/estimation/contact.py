@@ -11,22 +11,27 @@ import math
 import numpy as np
 
 from ibvs_qp.config import ControllerConfig
+from ibvs_qp.contact_loop import ACCELERATION_FILTER, ACCELERATION_NOISE, HELD_SPEED_STD
 from ibvs_qp.estimation.delayed import DelayedKalman
 from ibvs_qp.estimation.stamps import HISTORY
 from ibvs_qp.estimation.surface import StiffnessEstimator
 from ibvs_qp.frames import GRAVITY
 from ibvs_qp.measurement import Measurement
 
-#: Accelerometer and unmodelled-gravity noise density along the normal [m/s^2/sqrt(Hz)] (IMU 4e-3, attitude noise).
-ACCELERATION_NOISE = 6e-3
 #: Drift of the accelerometer bias that gravity leaks through the attitude bias [m/s^3/sqrt(Hz)].
 BIAS_NOISE = 2e-3
 #: Deviation of the distance of one fitted plane [m]: common mode of the depth camera.
 DISTANCE_STD = 1.2e-3
+#: This long after the touch the wall holds the tip [s]. Its speed says more than depth then, whose noise [m] the
+#: impedance damping would turn into push.
+HELD_AFTER, HELD_DISTANCE_STD = 0.3, 5e-3
 #: Share of a frame's normal innovation that is believed; the normal averages over about six frames.
 NORMAL_GAIN = 0.15
 #: A plane this far from the expected distance is a leap [m], believed after so many frames in a row.
 LEAP, LEAP_FRAMES = 0.05, 5
+#: A loss no longer than this is a bounce [s], after which the ramp goes on where it stopped, if no later than this
+#: share of it: 16 % of the push; the whole of it at once would throw the brush at the wall.
+SHORT_LOSS, RESUMED = 0.5, 0.4
 #: Free-flight noise of the push is averaged over this time [s].
 NOISE_TIME = 1.0
 
@@ -54,12 +59,13 @@ class ContactEstimator:
         self._plane_stamp = self._wrench_stamp = self._stamp = -1
         self.normal = np.array([1.0, 0.0, 0.0])
         self.known, self._leaps = False, 0
-        self.distance, self.rate, self._lever_speed = math.inf, 0.0, 0.0
+        self.distance, self.rate, self.acceleration, self._lever_speed = math.inf, 0.0, 0.0, 0.0
         self.depth = math.inf
         self.push = self.push_raw = 0.0
         self._push_mean, self._push_variance = 0.0, 0.02
         self._moment, self._moment_variance = np.zeros(3), 0.0
         self.in_contact, self.touch_ns, self._touch_count, self._doubt_ns = False, -1, 0, -1
+        self._ramped, self._lost_ns = 0.0, -1
         self.stiffness = StiffnessEstimator()
 
     def update(self, measurement: Measurement, down: tuple[float, float, float]) -> None:
@@ -101,6 +107,8 @@ class ContactEstimator:
             gx, gy, gz = down
             acceleration = nx * (fx + GRAVITY * gx) + ny * (fy + GRAVITY * gy) + nz * (fz + GRAVITY * gz)
         distance, speed, bias = self._filter.state.tolist()
+        share = 1.0 - math.exp(-dt / ACCELERATION_FILTER)
+        self.acceleration += share * (bias - acceleration - self.acceleration)
         state = (distance - dt * (speed + lever), speed + dt * (acceleration - bias), bias)
         self._filter.remember(measurement.stamp_ns, state, dt)
 
@@ -130,7 +138,10 @@ class ContactEstimator:
 
     def _believe(self, stamp: int, distance: float) -> bool:
         """Correct with a measured distance: a jump is believed slowly, a leap only when the next frames repeat it."""
-        if self._filter.correct_entry(stamp, 0, distance, DISTANCE_STD**2):
+        held = self.in_contact and (stamp - self.touch_ns) * 1e-9 > HELD_AFTER
+        if self._filter.correct_entry(stamp, 0, distance, (HELD_DISTANCE_STD if held else DISTANCE_STD) ** 2):
+            if held:
+                self._filter.correct_entry(stamp, 1, -self._lever_speed, HELD_SPEED_STD**2)
             self._leaps = 0
             return True
         past = self._filter.at(stamp)
@@ -166,6 +177,11 @@ class ContactEstimator:
             self.stiffness.add(self.push, -self.distance, dt)
 
     @property
+    def speed(self) -> float:
+        """Speed of the centre of mass into the wall [m/s], whatever the tip does by turning."""
+        return -self.rate - self._lever_speed
+
+    @property
     def push_noise(self) -> float:
         """Deviation of the filtered push in free flight [N]."""
         return math.sqrt(self._push_variance)
@@ -186,6 +202,8 @@ class ContactEstimator:
         if not self.in_contact:
             if self._touch_count >= settings.touch_samples and self.distance < settings.contact_distance_m:
                 self.in_contact, self.touch_ns, self._doubt_ns = True, stamp, -1
+                short = self._lost_ns >= 0 and (stamp - self._lost_ns) * 1e-9 < SHORT_LOSS
+                self._ramped = min(self._ramped, RESUMED * self._config.contact.ramp_s) if short else 0.0
                 self.stiffness.start()
             return
         self._doubt_ns = (
@@ -193,6 +211,7 @@ class ContactEstimator:
         )
         doubted = self._doubt_ns >= 0 and (stamp - self._doubt_ns) * 1e-9 >= settings.loss_time_s
         if doubted or self.distance > settings.contact_distance_m:
+            self._ramped, self._lost_ns = self._ramped + self.time_since_touch, stamp
             self.in_contact, self.touch_ns, self._touch_count = False, -1, 0
 
     @property
@@ -208,10 +227,11 @@ class ContactEstimator:
 
     @property
     def ramp(self) -> float:
-        """0 at touch to 1 after the ramp time; 0 while free."""
+        """0 at touch to 1 after the ramp time; 0 while free; after a short loss it goes on where it stopped."""
         if not self._config.touch_ramp:
             return 1.0
-        return min(1.0, self.time_since_touch / self._config.contact.ramp_s) if self.in_contact else 0.0
+        done = (self._ramped + self.time_since_touch) / self._config.contact.ramp_s
+        return min(1.0, done) if self.in_contact else 0.0
 
     @property
     def contact_weight(self) -> float:

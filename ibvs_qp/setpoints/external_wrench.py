@@ -5,12 +5,17 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
+from ibvs_qp.contact_loop import GUST_BANDWIDTH
 from ibvs_qp.setpoints.sensed import Body, clamp
 from ibvs_qp.setpoints.signals import Signals
 from ibvs_qp.vehicle import VehicleParams
 
-#: Bandwidth of the force observer in free flight and in contact [rad/s].
-FORCE_BANDWIDTH_FREE, FORCE_BANDWIDTH_CONTACT = 4.0, 1.5
+#: Bandwidth of the force observer in free flight, and in contact in the wall's plane [rad/s]; along its normal it is
+#: `ibvs_qp.contact_loop.GUST_BANDWIDTH`.
+FORCE_BANDWIDTH_FREE, FORCE_BANDWIDTH_WALL = 4.0, 4.0
+#: In contact the force sensor's noise is handed on as force: the bandwidths halve at this filtered noise [N], the one
+#: in the wall not below its least value [rad/s].
+QUIET_PUSH, LEAST_BANDWIDTH_WALL = 0.15, 1.5
 #: Bandwidth of the moment observer [rad/s]; below the attitude loop so that the two do not fight.
 MOMENT_BANDWIDTH = 2.5
 #: The force observer averages evenly over this time at the start, then turns to its bandwidth [s].
@@ -38,6 +43,7 @@ def external_wrench(
     expected: ca.SX,
     normal: ca.SX,
     touching: ca.SX,
+    noise: ca.SX,
     adapt_in_contact: bool,
 ) -> ca.SX:
     r"""Momentum and accelerometer observer of the unmodelled wrench at the centre of mass [N, N m], (6,).
@@ -45,7 +51,9 @@ def external_wrench(
     Force: :math:`m f_{spec} - B_F \hat u - F_c`, low-passed, with the lagged thrusts :math:`\hat u` and the measured
     contact force F_c. Moment: first-order momentum observer of
     :math:`J\dot\Omega + \Omega\times J\Omega - B_M \hat u - M_{ff}` (De Luca and Mattone, 2003, without joint axes).
-    In contact the component along the wall normal is frozen at nothing: it belongs to the force task.
+    In contact the felt force is taken off, so that a gust along the normal is told from the wall's answer: with the
+    true thrusts and force there is no loop through the wall. A gust of correlation time T_g and rms s then leaves a
+    push error of :math:`s\sqrt{T/(T_g+T)}`, T being the observer's time constant plus motor lag and delays.
 
     Args:
         signals: Keeps the observer's states.
@@ -55,13 +63,14 @@ def external_wrench(
         expected: Moment already fed forward [N m], (3,).
         normal: Unit vector into the wall, in B.
         touching: 1 in contact or about to be.
+        noise: Deviation of the filtered push in free flight [N].
         adapt_in_contact: False without feed-forward: contact moments would be taken for a load.
     """
     thrusts, ready = lagged_thrusts(signals, vehicle, body.dt)
     rotors = ca.DM(effectiveness) @ thrusts
     awake = ca.logic_and(ready, body.dt > 0.0)
     active = awake if adapt_in_contact else ca.logic_and(awake, ca.logic_not(touching))
-    force = _force(signals, vehicle, body, rotors[:3], normal, touching, awake, active)
+    force = _force(signals, vehicle, body, rotors[:3], normal, touching, noise, awake, active)
     moment = _moment(signals, vehicle, body, rotors[3:] + expected, awake, active)
     return ca.vertcat(force, moment)
 
@@ -85,6 +94,7 @@ def _force(
     rotors: ca.SX,
     normal: ca.SX,
     touching: ca.SX,
+    noise: ca.SX,
     awake: ca.SX,
     active: ca.SX,
 ) -> ca.SX:
@@ -92,10 +102,17 @@ def _force(
     time = signals.remember("external_time", ca.if_else(awake, time + body.dt, time))
     free = vehicle.mass_kg * body.specific_force - rotors - old
     felt = free - body.wrench[:3]
-    across = felt - normal * ca.dot(normal, felt)
-    step = ca.if_else(touching, across, free)
-    bandwidth = ca.if_else(touching, FORCE_BANDWIDTH_CONTACT, FORCE_BANDWIDTH_FREE)
+    along = normal * ca.dot(normal, felt)
+    quiet = 1.0 / (1.0 + (noise / QUIET_PUSH) ** 2)
+    pressing = GUST_BANDWIDTH * quiet
+    sliding = ca.fmax(FORCE_BANDWIDTH_WALL * quiet, LEAST_BANDWIDTH_WALL)
+    learnt = _share(pressing, body.dt) * along + _share(sliding, body.dt) * (felt - along)
     average = ca.if_else(time < START_TIME, body.dt / ca.fmax(time, 1e-9), 0.0)
-    share = ca.fmax(1.0 - ca.exp(-bandwidth * body.dt), average)
-    new = clamp(old + share * step, -FORCE_BOUND, FORCE_BOUND)
+    step = ca.if_else(touching, learnt, ca.fmax(_share(FORCE_BANDWIDTH_FREE, body.dt), average) * free)
+    new = clamp(old + step, -FORCE_BOUND, FORCE_BOUND)
     return signals.remember("external_force", ca.if_else(ca.logic_and(active, body.felt), new, old))
+
+
+def _share(bandwidth: ca.SX | float, dt: ca.SX) -> ca.SX:
+    """Share of the difference that a first-order filter takes over in a tick."""
+    return 1.0 - ca.exp(-bandwidth * dt)

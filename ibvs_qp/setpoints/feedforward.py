@@ -33,7 +33,7 @@ def contact_feedforward(
         friction: Estimated Coulomb coefficient.
     """
     share = 1.0 - ca.exp(-2.0 * ca.pi * settings.force_filter_hz * body.dt)
-    gain = touch.touching * settings.moment_gain / (1.0 + (touch.noise / settings.moment_noise_n) ** 2)
+    gain = touch.touching * settings.moment_gain / (1.0 + (touch.across_noise / settings.moment_noise_n) ** 2)
     old = signals.state("feedforward_moment", 3)
     moment = signals.remember("feedforward_moment", old + share * (gain * body.wrench[3:] - old))
     speed = ca.norm_2(travel)

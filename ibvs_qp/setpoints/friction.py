@@ -18,6 +18,16 @@ LEAST_PUSH, LEAST_SPEED = 1.5, 0.02
 PATIENCE, RISE = 0.4, 0.3
 
 
+#: Friction against which a slide is planned until sliding has shown it: the most a brush has, and so long a slide [s].
+CAUTIOUS_FRICTION, SHOWN_AFTER = 0.8, 0.5
+
+
+def cautious_friction(signals: Signals, friction: ca.SX) -> ca.SX:
+    """Friction for the reach: the most that is plausible until a slide has shown what it is."""
+    shown = signals.next_state("friction_slid") >= SHOWN_AFTER
+    return ca.if_else(shown, friction, ca.fmax(friction, CAUTIOUS_FRICTION))
+
+
 def estimated_friction(
     signals: Signals, body: Body, touch: Touch, travel: ca.SX, sliding_command: float, stuck_speed: float
 ) -> tuple[ca.SX, ca.SX]:
@@ -45,5 +55,7 @@ def estimated_friction(
     value = ca.if_else(ca.logic_and(watching, waited > PATIENCE), raised, before)
     ratio = clamp(-ca.dot(direction, body.wrench[:3]) / ca.fmax(touch.push, LEAST_PUSH), *FRICTION_RANGE)
     sound = ca.logic_and(ca.logic_and(watching, touch.push >= LEAST_PUSH), along >= LEAST_SPEED)
+    slid = signals.state("friction_slid")
+    signals.remember("friction_slid", slid + ca.if_else(sound, body.dt, 0.0))
     value = value + ca.if_else(sound, ca.fmin(1.0, body.dt / AVERAGING_TIME), 0.0) * (ratio - value)
     return before, signals.remember("friction", value)

@@ -9,10 +9,10 @@ from ibvs_qp.config import ControllerConfig
 from ibvs_qp.frames import GRAVITY
 from ibvs_qp.setpoints.external_wrench import external_wrench
 from ibvs_qp.setpoints.feedforward import SLIDING_COMMAND, contact_feedforward
-from ibvs_qp.setpoints.friction import estimated_friction
+from ibvs_qp.setpoints.friction import cautious_friction, estimated_friction
 from ibvs_qp.setpoints.in_plane import motion_in_plane
 from ibvs_qp.setpoints.push import push_force, standoff_force
-from ibvs_qp.setpoints.reach import push_reach
+from ibvs_qp.setpoints.reach import STANDING_SPEED, push_reach
 from ibvs_qp.setpoints.rotors import rotor_terms
 from ibvs_qp.setpoints.sensed import Body, Touch, Wish, packed_inputs
 from ibvs_qp.setpoints.signals import Signals
@@ -30,7 +30,7 @@ def setpoint_model(config: ControllerConfig) -> Signals:
     effectiveness = control_effectiveness(vehicle.geometry)
     body, touch, wish = Body.of(signals), Touch.of(signals), Wish.of(signals)
     wall = wall_axes(signals, body, touch)
-    wanted_turn(signals, config.gains, body, touch)
+    wanted_turn(signals, config.gains, body, touch, wish)
     travel = wish.velocity[0] * wall.right + wish.velocity[1] * wall.down
 
     before, friction = estimated_friction(signals, body, touch, travel, SLIDING_COMMAND, config.contact.stuck_speed_m_s)
@@ -40,14 +40,16 @@ def setpoint_model(config: ControllerConfig) -> Signals:
         expected = contact_feedforward(signals, config.contact, body, touch, travel, before)
     near = ca.logic_or(touch.touching, touch.distance < config.contact.contact_distance_m)
     external = external_wrench(
-        signals, vehicle, effectiveness, body, expected[3:], wall.normal, near, config.contact_feedforward
+        signals, vehicle, effectiveness, body, expected[3:], wall.normal, near, touch.noise, config.contact_feedforward
     )
     inertia = ca.DM(vehicle.inertia_kg_m2)
     gyroscopic = -ca.cross(body.rate, inertia * body.rate)
     static = signals.output("static_wrench", ca.vertcat(vehicle.mass_kg * GRAVITY * body.down, gyroscopic) + external)
     signals.output("bias_wrench", static + expected)
 
-    reach = push_reach(signals, vehicle, wall.normal, travel, friction, static)
+    planned = wish.plan[0] * wall.right + wish.plan[1] * wall.down
+    ahead = ca.if_else(ca.norm_2(travel) > STANDING_SPEED, travel, planned)
+    reach = push_reach(signals, vehicle, wall.normal, ahead, cautious_friction(signals, friction), static)
     push_force(signals, config, body, touch, wish, reach)
     standoff_force(signals, config, body, touch, wish)
     motion_in_plane(signals, config, body, touch, wish, wall, travel)

@@ -9,7 +9,7 @@ import numpy as np
 from ibvs_qp.estimation.contact import ContactEstimator
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL, Measurement, Reference
 from ibvs_qp.setpoints.pairing import LinePairing
-from ibvs_qp.setpoints.sensed import ARRAYS, SLOT_INPUTS, TOUCH
+from ibvs_qp.setpoints.sensed import ARRAYS, REFERENCE_INPUTS, SLOT_INPUTS, TOUCH
 from ibvs_qp.setpoints.tick_function import TickFunction
 
 #: Distance given to the equations while the wall is unknown [m].
@@ -29,7 +29,7 @@ class TickInputs:
         self._tick, self._slots, self._pairing = tick, slots, LinePairing(slots)
         self._arrays = tick.values[: sum(ARRAYS.values())]
         numbers = tick.values[len(self._arrays) :]
-        self._format = struct.Struct(f"{4 + len(TOUCH) + 5 + slots + slots * SLOT_INPUTS}d")
+        self._format = struct.Struct(f"{4 + len(TOUCH) + REFERENCE_INPUTS + slots + slots * SLOT_INPUTS}d")
         self._numbers = memoryview(numbers).cast("B")  # type: ignore[arg-type]
         self.reset()
 
@@ -72,7 +72,9 @@ class TickInputs:
             known,
             contact.distance if known else FAR_AWAY,
             contact.rate,
+            contact.acceleration,
             contact.push,
+            contact.push_noise,
             contact.across_noise,
             contact.in_contact,
             contact.ramp,
@@ -83,6 +85,8 @@ class TickInputs:
             right,
             down,
             press,
+            *reference.tilt.tolist(),
+            *reference.travel.tolist(),
             *self._vertical,
             *self._lines,
         )

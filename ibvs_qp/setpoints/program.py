@@ -18,20 +18,21 @@ def program_parameters(signals: Signals, config: ControllerConfig) -> dict[str, 
     """
     out, gains, weights = signals.outputs, config.gains, config.weights
     share, rate = signals.input("contact_weight"), signals.input("angular_velocity", 3)
-    roll, pitch, yaw = ca.vertsplit(out["angles"])
+    yaw = out["angles"][2]
     paper = config.line_profile == "paper"
     free = ca.SX.ones(2) if paper else out["free"]
+    own = 1.0 - out["tilted"]  # a vehicle that lost a rotor moves by tilting, and cannot hold yaw
     values = {
         "turn_share": ca.SX(1.0) if paper else 1.0 - share * (1.0 - gains.line_turn_share),
         "normal_share": share if paper else ca.SX(1.0),
         "push": ca.vertcat(out["push_command"], weights.push * share),
-        "standoff": ca.vertcat(out["standoff_command"], weights.push * (1.0 - share)),
+        "standoff": ca.vertcat(out["standoff_command"], weights.push * (1.0 - share) * own),
         "level": ca.vertcat(out["angular"][0], out["angular"][1], weights.level),
         "yaw": ca.vertcat(out["angular"][2], weights.yaw),
-        "velocity_right": ca.vertcat(out["velocity_command"][0], weights.velocity * free[0]),
+        "velocity_right": ca.vertcat(out["velocity_command"][0], weights.velocity * free[0] * own),
         "velocity_down": ca.vertcat(out["velocity_command"][1], weights.velocity * free[1]),
         "height": height_wish(signals, config),
-        "tilt_state": ca.vertcat(roll, pitch, rate[0], rate[1]),
-        "yaw_state": ca.vertcat(yaw, rate[2]),
+        "tilt_state": ca.vertcat(out["tilt_error"], out["tilt_rate"]),
+        "yaw_state": ca.vertcat(yaw * own, rate[2] * own),
     }
     return out | values

@@ -11,7 +11,10 @@ from ibvs_qp.setpoints.signals import Signals
 #: Inputs that come as arrays, in the order in which a tick is packed.
 ARRAYS = {"attitude": 4, "angular_velocity": 3, "contact_wrench": 6, "specific_force": 3, "velocity": 3, "normal": 3}
 #: Entries of the input "touch", in this order.
-TOUCH = ("known", "distance", "rate", "push", "noise", "touching", "ramp", "stiffness", "stiffness_known")
+TOUCH = ("known", "distance", "rate", "acceleration", "push", "noise", "across_noise", "touching", "ramp")
+TOUCH += ("stiffness", "stiffness_known")
+#: Entries of the input "reference": push, stand-off, velocity (2), press, roll, pitch, travel (2).
+REFERENCE_INPUTS = 9
 #: Entries of a line slot's input: present, rho, theta, its reference's rho and theta, weight, variance of rho.
 SLOT_INPUTS = 7
 
@@ -23,7 +26,7 @@ def packed_inputs(signals: Signals, line_slots: int) -> None:
     for name in ("dt", "felt", "moving", "contact_weight"):
         signals.input(name)
     signals.input("touch", len(TOUCH))
-    signals.input("reference", 5)
+    signals.input("reference", REFERENCE_INPUTS)
     signals.input("vertical", line_slots)
     for slot in range(line_slots):
         signals.input(f"line_{slot}", SLOT_INPUTS)
@@ -74,8 +77,9 @@ class Touch:
     Attributes:
         known: 1 once the wall was seen.
         normal: Unit vector into the wall, in B.
-        distance: Tip to wall [m]; rate: its rate [m/s].
-        push: Filtered push [N]; noise: of the moments in free flight, as a force across the tip [N].
+        distance: Tip to wall [m]; rate: its rate [m/s]; acceleration: the rate's own [m/s^2].
+        push: Filtered push [N]; noise: its deviation in free flight [N].
+        across_noise: Deviation of the moments in free flight, as a force across the tip [N].
         touching: 1 in contact.
         ramp: 0 at touch to 1.
         stiffness: [N/m]; stiffness_known: 1 once it was measured.
@@ -85,8 +89,10 @@ class Touch:
     normal: ca.SX
     distance: ca.SX
     rate: ca.SX
+    acceleration: ca.SX
     push: ca.SX
     noise: ca.SX
+    across_noise: ca.SX
     touching: ca.SX
     ramp: ca.SX
     stiffness: ca.SX
@@ -101,18 +107,28 @@ class Touch:
 
 @dataclass(frozen=True, kw_only=True)
 class Wish:
-    """The reference: push [N], stand-off [m], velocity right and down [m/s], and whether to press."""
+    """The reference.
+
+    Attributes:
+        push: [N]; press: whether to; standoff: [m].
+        velocity: Right and down [m/s]; plan: the one that is planned.
+        tilt: Roll and pitch [rad].
+    """
 
     push: ca.SX
     standoff: ca.SX
     velocity: ca.SX
     press: ca.SX
+    tilt: ca.SX
+    plan: ca.SX
 
     @classmethod
     def of(cls, signals: Signals) -> Wish:
         """Ask for the inputs."""
-        push, standoff, right, down, press = ca.vertsplit(signals.input("reference", 5))
-        return cls(push=push, standoff=standoff, velocity=ca.vertcat(right, down), press=press)
+        entries = ca.vertsplit(signals.input("reference", REFERENCE_INPUTS))
+        push, standoff, right, down, press, roll, pitch, *plan = entries
+        velocity, tilt = ca.vertcat(right, down), ca.vertcat(roll, pitch)
+        return cls(push=push, standoff=standoff, velocity=velocity, press=press, tilt=tilt, plan=ca.vertcat(*plan))
 
 
 def clamp(value: ca.SX, low: float | ca.SX, high: float | ca.SX) -> ca.SX:

@@ -36,6 +36,10 @@ class Signals:
         self._next[name] = value
         return value
 
+    def next_state(self, name: str) -> ca.SX:
+        """What `remember` set under a name."""
+        return self._next[name]
+
     def output(self, name: str, value: ca.SX) -> ca.SX:
         """Name a result of the tick; returns the value."""
         self.outputs[name] = value
