@@ -122,7 +122,9 @@ def _listed(place: str, given: list[Any]) -> tuple[Parameter, ...]:
         raise ConfigError(f"{place} = [] is refused: at least one value is needed")
     for value in given:
         if not isinstance(value, (bool, int, float, str)):
-            raise ConfigError(f"{place} = {value!r} is refused: give single values; entries of a list are {place}.0, ...")
+            raise ConfigError(
+                f"{place} = {value!r} is refused: give single values; entries of a list are {place}.0, ..."
+            )
     return tuple(given)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+import typing
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -99,3 +100,17 @@ def _put(tree: dict[str, Any], parts: list[str], value: Any, path: str) -> None:
     else:
         held = f"a list of {len(node)}, entries 0 to {len(node) - 1}" if isinstance(node, list) else "a single value"
         raise ConfigError(f"unknown parameter {path!r}: {path.rsplit('.', 1)[0]} is {held}")
+
+
+def unit_of(path: str) -> str:
+    """Unit of a dotted path; empty where it has none or there is no such path."""
+    kinds = {"scene": Scene, "pilot": PilotConfig, "job": PressJob}
+    root, *parts = path.split(".")
+    kind, unit = kinds.get(root), ""
+    for part in parts:
+        fields = {each.name: each for each in dataclasses.fields(kind)} if dataclasses.is_dataclass(kind) else {}
+        if part not in fields:
+            break
+        unit = fields[part].metadata.get("unit", "")
+        kind = typing.get_type_hints(kind)[part]
+    return unit

@@ -31,7 +31,7 @@ class SweepSettings:
     name: str = setting("sweep", "name of the table: letters, digits, - and _")
     about: str = setting("", "what is asked, in a sentence")
     job: str = choice("press", "press and slide, or paint", tuple(JOBS))
-    laws: tuple[str, ...] = setting(("qp",), "laws that fly every point, with the same seeds")
+    laws: tuple[str, ...] = ("qp",)  # laws that fly every point, with the same seeds
     features: str = choice("geometric", "sensor model of lines, or rendered pictures", ("geometric", "rendered"))
     vision: str = choice("own", "perception of rendered pictures", ("own", "paper"))
     scene: str = setting("", "scene file, beside the spec; empty is the default scene")
