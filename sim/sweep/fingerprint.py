@@ -17,7 +17,7 @@ from ibvs_qp.settings import to_dict
 from sim.sweep.design import Run
 
 #: Folders of `sim` whose code only words or draws results: a change there needs no new flight.
-_AFTER_THE_FLIGHT = ("figures", "commands", "experiments")
+_AFTER_THE_FLIGHT = ("figures", "commands", "experiments", "tune")
 #: Letters of a hash that are kept: 64 bit.
 _LENGTH = 16
 
