@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 
 #: Key under which a trial keeps its share of failed flights.
 FAILED = "failed"
+#: Trials before the sampler learns from them, and the greatest factor by which they change a gain: over the whole of
+#: so many ranges hardly a draw would fly.
+STARTUP, NEAR = 10, 1.6
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -75,7 +78,6 @@ def open_study(plan: SearchPlan) -> optuna.Study:
         if not study.trials:
             for name, value in identity.items():
                 study.set_user_attr(name, value)
-            study.enqueue_trial(searched_gains(plan.shipped))
     except (OSError, ValueError, optuna.exceptions.StorageInternalError) as error:
         reason = str(error).split("\n")[0]
         raise ConfigError(f"cannot open {plan.storage}: {reason}; give a file or a database with --storage") from None
@@ -110,9 +112,25 @@ def _ask(plan: SearchPlan, study: optuna.Study, number: int) -> tuple[optuna.Tri
     import optuna
 
     draw = int(np.random.SeedSequence([plan.seed, number]).generate_state(1)[0])
-    study.sampler = optuna.samplers.TPESampler(seed=draw, multivariate=True, constant_liar=False)
+    study.sampler = optuna.samplers.TPESampler(
+        seed=draw, multivariate=True, constant_liar=False, n_startup_trials=STARTUP
+    )
+    if number < STARTUP:
+        study.enqueue_trial(_near_shipped(plan, number))
     trial = study.ask()
     return trial, {name: trial.suggest_float(name, *span, log=True) for name, span in RANGES.items()}
+
+
+def _near_shipped(plan: SearchPlan, number: int) -> dict[str, float]:
+    """The shipped gains first, then each of them times a random factor, within the range of the search."""
+    factors = (
+        np.random.default_rng([plan.seed, number]).uniform(-1.0, 1.0, len(RANGES)) if number else np.zeros(len(RANGES))
+    )
+    start = searched_gains(plan.shipped)
+    return {
+        name: float(np.clip(start[name] * NEAR**factor, *RANGES[name]))
+        for name, factor in zip(RANGES, factors, strict=True)
+    }
 
 
 def evaluate(gains: Sequence[dict[str, float]], plan: SearchPlan, parallel: joblib.Parallel) -> list[Score]:
