@@ -41,7 +41,11 @@ def cluster_pool(scheduler: str | None, workers: int) -> Iterator[Pool]:
     logging.getLogger("distributed").setLevel(logging.ERROR)
     with contextlib.ExitStack() as stack:
         if scheduler is None:
-            local = distributed.LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None)
+            local = distributed.LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                dashboard_address=None,  # type: ignore[arg-type]
+            )
             client = stack.enter_context(distributed.Client(stack.enter_context(local)))
         else:
             client = stack.enter_context(_connect(scheduler))
@@ -74,12 +78,12 @@ def require_usable(client: Client) -> None:
         raise ConfigError(
             f"the cluster has no worker after {FIRST_WORKER_S:.0f} s; start one with `dask worker ADDRESS --nthreads 1`"
         ) from None
-    for worker, threads in client.nthreads().items():
+    for worker, threads in dict(client.nthreads()).items():  # type: ignore[arg-type]
         if threads != 1:
             raise ConfigError(
                 f"worker {worker} has {threads} threads, and flights share the interpreter's lock; "
                 f"start it with --nthreads 1 --nworkers {threads}"
             )
-    for worker, code in client.run(code_hash).items():
+    for worker, code in dict(client.run(code_hash)).items():  # type: ignore[arg-type]
         if code != code_hash():
             raise ConfigError(f"worker {worker} flies other code than this computer; install the same version there")

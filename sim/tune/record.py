@@ -110,8 +110,11 @@ def _page(outcome: Outcome, summary: dict[str, Any]) -> list[str]:
         "",
     ]
     if outcome.chosen is None:
-        return [*lines, "No trial betters the shipped preset on the whole without being clearly worse in one objective, "
-                "in the search and on the seeds of the choice: the shipped preset stays."]  # fmt: skip
+        return [
+            *lines,
+            "No trial betters the shipped preset on the whole without being clearly worse in one objective, in the "
+            "search and on the seeds of the choice: the shipped preset stays.",
+        ]
     share = 100.0 * (1.0 - math.exp(gain_over(outcome.scores[outcome.chosen], shipped)))
     lines += [
         f"Trial {outcome.chosen} was chosen; on the flights of the search its objectives are {share:.0f} % smaller on "

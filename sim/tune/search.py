@@ -60,27 +60,27 @@ def open_study(plan: SearchPlan) -> optuna.Study:
     """
     try:
         import optuna
+        from optuna.study import StudyDirection
     except ImportError:
         raise ConfigError("tuning needs the extra tune: pip install -c constraints.txt -e '.[tune]'") from None
     optuna.logging.set_verbosity(optuna.logging.ERROR)
-    identity = {"law": plan.shipped.law, "seed": plan.seed, "flights": plan.flights, "features": plan.features}
     try:
         study = optuna.create_study(
             study_name=f"{plan.shipped.law}-{plan.seed}",
             storage=_storage(plan.storage),
-            directions=["minimize"] * len(OBJECTIVES),
+            directions=[StudyDirection.MINIMIZE] * len(OBJECTIVES),
             load_if_exists=True,
         )
-        held = {name: study.user_attrs.get(name, value) for name, value in identity.items()}
-        if held != identity:
-            other = ", ".join(f"{name} {value}" for name, value in held.items())
-            raise ConfigError(f"{plan.storage} holds a search with {other}; give another --out, or the same options")
-        if not study.trials:
-            for name, value in identity.items():
-                study.set_user_attr(name, value)
-    except (OSError, ValueError, optuna.exceptions.StorageInternalError) as error:
+    except Exception as error:  # files, URLs, drivers and databases each fail in their own way
         reason = str(error).split("\n")[0]
         raise ConfigError(f"cannot open {plan.storage}: {reason}; give a file or a database with --storage") from None
+    identity = {"law": plan.shipped.law, "seed": plan.seed, "flights": plan.flights, "features": plan.features}
+    held = {name: study.user_attrs.get(name, value) for name, value in identity.items()}
+    if held != identity:
+        other = ", ".join(f"{name} {value}" for name, value in held.items())
+        raise ConfigError(f"{plan.storage} holds a search with {other}; give another --out, or the same options")
+    for name, value in identity.items():
+        study.set_user_attr(name, value)
     return study
 
 

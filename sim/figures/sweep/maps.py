@@ -1,4 +1,4 @@
-"""Heat maps over two parameters: medians of a figure, shares of flights that ended as planned, and what depends on what."""
+"""Heat maps: medians of a figure and shares of success over two parameters, and what depends on what."""
 
 from __future__ import annotations
 
@@ -66,17 +66,17 @@ def _draw(
     for row, (x, y) in zip(grid, pairs, strict=True):
         cells = [_cells(part, x, y, value) for part in parts]
         norm = Normalize(*(span or _span(cells)))
-        for axes, cell, title in zip(row, cells, titles, strict=False):
-            shown = _panel(axes, cell, x, y, norm, SHARE_MAP if span else FIGURE_MAP)
-            axes.set_title(title)
-        _bar(canvas, shown, list(row[: len(parts)]), label)
+        shown = [
+            _panel(axes, cell, x, y, norm, SHARE_MAP if span else FIGURE_MAP, title)
+            for axes, cell, title in zip(row, cells, titles, strict=False)
+        ]
+        _bar(canvas, shown[0], list(row[: len(parts)]), label)
         if both:
             difference = cells[1] - cells[0]
             reach = np.nanmax(np.abs(difference), initial=1e-12) if np.isfinite(difference).any() else 1.0
             scale = TwoSlopeNorm(0.0, -reach, reach)
-            shown = _panel(row[-1], difference, x, y, scale, DIFFERENCE_MAP + ("_r" if span else ""))
-            row[-1].set_title("analytic - QP")
-            _bar(canvas, shown, [row[-1]], "")
+            colours = DIFFERENCE_MAP + ("_r" if span else "")
+            _bar(canvas, _panel(row[-1], difference, x, y, scale, colours, "analytic - QP"), [row[-1]], "")
         for axes in row[1:]:
             axes.set_ylabel("")
             axes.set_yticklabels([])
@@ -98,11 +98,12 @@ def _cells(part: np.ndarray, x: Levels, y: Levels, value: CellValue) -> np.ndarr
     return cells
 
 
-def _panel(axes: Axes, cells: np.ndarray, x: Levels, y: Levels, norm: Normalize, colours: str) -> AxesImage:
+def _panel(axes: Axes, cells: np.ndarray, x: Levels, y: Levels, norm: Normalize, colours: str, title: str) -> AxesImage:
     map_ = matplotlib.colormaps[colours].with_extremes(bad="#eeeeee")
     shown = axes.imshow(cells, origin="lower", aspect="auto", norm=norm, cmap=map_)
     axes.set_xticks(range(len(x.names)), x.names, rotation=40 if sum(map(len, x.names)) > 24 else 0, ha="center")
     axes.set_yticks(range(len(y.names)), y.names)
+    axes.set_title(title)
     axes.set_xlabel(x.label)
     axes.set_ylabel(y.label)
     axes.tick_params(labelsize=7, length=0)
@@ -136,10 +137,11 @@ def draw_dependence(table: pl.DataFrame, figures: list[Figure], columns: list[st
     canvas = new_figure(1.3 + 0.26 * len(columns))
     grid = canvas.subplots(1, len(laws), squeeze=False)[0]
     x, y = Levels("", "", merits, np.array([])), Levels("", "", names, np.array([]))
-    for axes, law, each in zip(grid, laws, found, strict=True):
-        shown = _panel(axes, each, x, y, TwoSlopeNorm(0.0, -1.0, 1.0), DIFFERENCE_MAP + "_r")
-        axes.set_title(law_name(law))
+    shown = [
+        _panel(axes, each, x, y, TwoSlopeNorm(0.0, -1.0, 1.0), DIFFERENCE_MAP + "_r", law_name(law))
+        for axes, law, each in zip(grid, laws, found, strict=True)
+    ]
     for axes in grid[1:]:
         axes.set_yticklabels([])
-    _bar(canvas, shown, list(grid), "rank correlation")
+    _bar(canvas, shown[0], list(grid), "rank correlation")
     return canvas

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import polars as pl
+from matplotlib.figure import Figure as Canvas
 
 from ibvs_qp.errors import ConfigError
 from sim.figures.style import law_name, save, styled
@@ -79,8 +80,8 @@ def write_report(table: pl.DataFrame, folder: Path, title: str, wanted: tuple[st
     return page
 
 
-def _draw_all(table: pl.DataFrame, figures: list[Figure], columns: list[str]) -> dict[str, tuple[str, object]]:
-    drawn = {}
+def _draw_all(table: pl.DataFrame, figures: list[Figure], columns: list[str]) -> dict[str, tuple[str, Canvas]]:
+    drawn: dict[str, tuple[str, Canvas]] = {}
     if not columns:
         return drawn
     boxed = telling(table, figures, columns, MOST_BOXES)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -103,7 +104,7 @@ def levels(table: pl.DataFrame, column: str) -> Levels:
     edges = np.unique(np.nanquantile(numbers, np.linspace(0.0, 1.0, BINS + 1)))
     level = np.clip(np.searchsorted(edges, numbers, side="right") - 1, 0, len(edges) - 2)
     level[np.isnan(numbers)] = -1
-    names = tuple(f"{_short(low)}–{_short(high)}" for low, high in zip(edges[:-1], edges[1:], strict=True))
+    names = tuple(f"{_short(low)}–{_short(high)}" for low, high in itertools.pairwise(edges))
     return Levels(column, label, names, level)
 
 
@@ -120,7 +121,7 @@ def rank_correlation(table: pl.DataFrame, figures: list[Figure], columns: list[s
         for place, merit in enumerate(merits):
             pair = pl.DataFrame([table[column].cast(pl.Float64), merit.cast(pl.Float64)]).drop_nulls().to_numpy()
             if len(pair) >= LEAST_ROWS and np.ptp(pair, axis=0).all():
-                result[row, place] = spearmanr(pair[:, 0], pair[:, 1]).statistic
+                result[row, place] = spearmanr(pair[:, 0], pair[:, 1])[0]
     return result
 
 
