@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable
 
 import matplotlib
@@ -17,11 +18,13 @@ from sim.figures.style import law_name, new_figure
 from sim.figures.sweep.shown import Figure, Levels, levels, rank_correlation
 
 #: Colour maps: of a figure (dark is bad), of a difference (blue: QP law better), of a share.
-FIGURE_MAP, DIFFERENCE_MAP, SHARE_MAP = "YlOrRd", "RdBu", "RdYlGn"
+FIGURE_MAP, DIFFERENCE_MAP, SHARE_MAP = "YlOrRd", "RdBu", "YlGn"
 #: Height of a row of panels, of one cell, and of what stands around [in].
 _ROW_IN, _CELL_IN, _AROUND_IN = 1.2, 0.22, 0.55
 #: Levels up to which a cell's number is written into it.
 _MOST_WRITTEN = 8
+#: Letters of a row of tick labels that fit under a panel side by side.
+_LETTERS = 24
 #: Share of figures that the colours span: an outlier must not wash out the rest.
 _COLOUR_QUANTILE = 0.95
 
@@ -85,7 +88,10 @@ def _draw(
 
 def _span(cells: list[np.ndarray]) -> tuple[float, float]:
     good = np.concatenate([cell[np.isfinite(cell)] for cell in cells])
-    return (0.0, max(float(np.quantile(good, _COLOUR_QUANTILE)), 1e-12)) if len(good) else (0.0, 1.0)
+    if not len(good):
+        return 0.0, 1.0
+    low, high = float(good.min()), float(np.quantile(good, _COLOUR_QUANTILE))
+    return (low, high) if high > low else (low - 0.5, low + 0.5)
 
 
 def _cells(part: np.ndarray, x: Levels, y: Levels, value: CellValue) -> np.ndarray:
@@ -101,7 +107,8 @@ def _cells(part: np.ndarray, x: Levels, y: Levels, value: CellValue) -> np.ndarr
 def _panel(axes: Axes, cells: np.ndarray, x: Levels, y: Levels, norm: Normalize, colours: str, title: str) -> AxesImage:
     map_ = matplotlib.colormaps[colours].with_extremes(bad="#eeeeee")
     shown = axes.imshow(cells, origin="lower", aspect="auto", norm=norm, cmap=map_)
-    axes.set_xticks(range(len(x.names)), x.names, rotation=40 if sum(map(len, x.names)) > 24 else 0, ha="center")
+    turned = {"rotation": 40, "ha": "right", "rotation_mode": "anchor"} if sum(map(len, x.names)) > _LETTERS else {}
+    axes.set_xticks(range(len(x.names)), x.names, **turned)
     axes.set_yticks(range(len(y.names)), y.names)
     axes.set_title(title)
     axes.set_xlabel(x.label)
@@ -110,11 +117,12 @@ def _panel(axes: Axes, cells: np.ndarray, x: Levels, y: Levels, norm: Normalize,
     axes.grid(visible=False)
     axes.spines[:].set_visible(False)
     if max(cells.shape) <= _MOST_WRITTEN:
+        digits = max(0, 1 - math.floor(math.log10(max(norm.vmax or 0.0, 1e-12))))
         for (i, j), number in np.ndenumerate(cells):
             if np.isfinite(number):
                 red, green, blue, _ = map_(norm(number))
                 dark = 0.3 * red + 0.59 * green + 0.11 * blue < 0.5
-                axes.text(j, i, f"{number:.2g}" if abs(number) < 99.5 else f"{number:.0f}", ha="center", va="center",
+                axes.text(j, i, f"{number:.{digits}f}", ha="center", va="center",
                           fontsize=6.5, color="white" if dark else "#222222")  # fmt: skip
     return shown
 

@@ -94,7 +94,8 @@ def levels(table: pl.DataFrame, column: str) -> Levels:
     values = table[column]
     path = column.removeprefix(PARAM)
     unit = unit_of(path)
-    label = ".".join(path.split(".")[-2:]) + (f" [{unit}]" if unit else "")
+    parts = path.split(".")
+    label = ".".join(parts[-3 if parts[-1].isdigit() else -2 :]) + (f" [{unit}]" if unit else "")
     distinct = values.drop_nulls().unique().sort()
     if not values.dtype.is_numeric() or len(distinct) <= MOST_LEVELS:
         place = {value: index for index, value in enumerate(distinct.to_list())}
