@@ -117,13 +117,13 @@ class Tune:
             search(plan, study, lambda done: progress(done, plan.trials, before))
         trials, parts = finished(study), folder / "parts"
         with sweep_progress(notes, f"{self.law}: choice") as progress:
-            chosen = choose(plan, trials, -(-self.unseen // 2), parts, progress)
+            choice = choose(plan, trials, -(-self.unseen // 2), parts, progress)
         table = None
-        if chosen is not None:
+        if choice.chosen is not None:
             with sweep_progress(notes, f"{self.law}: unseen seeds") as progress:
-                table = unseen(plan, trials[chosen][0], self.unseen, parts, progress)
+                table = unseen(plan, trials[choice.chosen][0], self.unseen, parts, progress)
         command = shlex.join(["ibvs-qp", *words])
-        outcome = Outcome(plan=plan, trials=trials, chosen=chosen, table=table, command=command, again=self._again())
+        outcome = Outcome(plan=plan, trials=trials, choice=choice, table=table, command=command, again=self._again())
         return write(outcome, folder)
 
     def _again(self) -> str:

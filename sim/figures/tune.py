@@ -15,7 +15,7 @@ from sim.tune.objectives import OBJECTIVES, Score
 from sim.tune.verdict import TUNED, paired
 
 #: Trials worse than this many times the shipped preset lie outside the picture.
-_SHOWN_TO = 2.5
+_SHOWN_TO = 4.0
 _MARKERS = ("o", "s", "^", "D")
 
 
@@ -41,8 +41,8 @@ def draw_front(law: str, scores: dict[int, Score], shipped: Score, chosen: int |
             axes.scatter(x.scale * end[i], y.scale * end[j], s=70, marker="o", facecolor="none", edgecolor="#222222",
                          linewidth=1.3, label="chosen")  # fmt: skip
         for axis, objective, place in ((axes.set_xlim, x, i), (axes.set_ylim, y, j)):
-            least = min(each.values[place] for each in [*able.values(), shipped])
-            axis(0.9 * objective.scale * least, _SHOWN_TO * objective.scale * start[place])
+            seen = [each.values[place] for each in [*able.values(), shipped]]
+            axis(0.9 * objective.scale * min(seen), objective.scale * min(1.05 * max(seen), _SHOWN_TO * start[place]))
         axes.set_xlabel(x.label)
         axes.set_ylabel(y.label)
     handles, labels = grid[0].get_legend_handles_labels()

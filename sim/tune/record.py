@@ -13,11 +13,11 @@ from sim.figures.style import law_name, save, styled
 from sim.figures.tune import draw_front, draw_unseen
 from sim.rundir import as_json
 from sim.sweep.parts import write_table
-from sim.tune.choice import front, gain_over
+from sim.tune.choice import allowed, front, gain_over
 from sim.tune.objectives import OBJECTIVES, Score
 from sim.tune.search import SearchPlan
 from sim.tune.space import RANGES, with_gains
-from sim.tune.verdict import Trials, differences, shipped_score
+from sim.tune.verdict import SHIPPED, Choice, Trials, differences, shipped_score
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,7 +27,7 @@ class Outcome:
     Attributes:
         plan: What was searched.
         trials: Gains and score by number.
-        chosen: Number of the chosen one; None keeps the shipped preset.
+        choice: What the finalists did, and the number of the chosen one.
         table: Flights of shipped and chosen on unseen seeds; None when nothing was chosen.
         command: The command line.
         again: The command that gives the same on any computer.
@@ -35,7 +35,7 @@ class Outcome:
 
     plan: SearchPlan
     trials: Trials
-    chosen: int | None
+    choice: Choice
     table: pl.DataFrame | None
     command: str
     again: str
@@ -44,6 +44,11 @@ class Outcome:
     def law(self) -> str:
         """Law tuned."""
         return self.plan.shipped.law
+
+    @property
+    def chosen(self) -> int | None:
+        """Number of the chosen trial; None keeps the shipped preset."""
+        return self.choice.chosen
 
     @property
     def scores(self) -> dict[int, Score]:
@@ -63,6 +68,7 @@ def content(outcome: Outcome, folder: Path) -> dict[str, Any]:
         "trials": len(found),
         "completed_trials": sum(not each.failed for each in found.values()),
         "front": front(found),
+        "finalists": {name: _objectives(each) for name, each in outcome.choice.scores.items()},
         "chosen": outcome.chosen,
         "gains": None if outcome.chosen is None else outcome.trials[outcome.chosen][0],
         "unseen": [] if outcome.table is None else differences(outcome.table),
@@ -82,10 +88,7 @@ def write(outcome: Outcome, folder: Path) -> dict[str, Any]:
     head = "# The shipped preset: no trial of the search may take its place.\n" if outcome.chosen is None else head
     preset = with_gains(outcome.plan.shipped, gains).to_toml()
     (folder / f"{law}.toml").write_text(head + preset, encoding="utf-8")
-    rows = [
-        {**dict(zip((each.column for each in OBJECTIVES), score.values, strict=True)), "failed": score.failed, **params}
-        for params, score in outcome.trials.values()
-    ]
+    rows = [{**_objectives(score), **params} for params, score in outcome.trials.values()]
     record = {**summary, "ranges": RANGES, "all_trials": rows}
     (folder / f"{law}_trials.json").write_text(as_json(record, indent=1) + "\n", encoding="utf-8")
     with styled():
@@ -98,6 +101,25 @@ def write(outcome: Outcome, folder: Path) -> dict[str, Any]:
     return summary
 
 
+def _objectives(score: Score) -> dict[str, float]:
+    return dict(zip((each.column for each in OBJECTIVES), score.values, strict=True)) | {"failed": score.failed}
+
+
+def _finalists(scores: dict[str, Score]) -> list[str]:
+    """Table of the finalists beside the shipped preset."""
+    if not scores:
+        return []
+    heads = ["on the seeds of the choice", *(each.label for each in OBJECTIVES), "flights failed", "may take its place"]
+    lines = ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
+    for name, each in scores.items():
+        values = (f"{one.scale * value:.3g}" for one, value in zip(OBJECTIVES, each.values, strict=True))
+        good = allowed(each, scores[SHIPPED]) and gain_over(each, scores[SHIPPED]) < 0.0
+        words = "" if name == SHIPPED else "yes" if good else "no"
+        title = name if name == SHIPPED else f"trial {name}"
+        lines.append(f"| {title} | {' | '.join(values)} | {100.0 * each.failed:.0f} % | {words} |")
+    return [*lines, ""]
+
+
 def _page(outcome: Outcome, summary: dict[str, Any]) -> list[str]:
     law, shipped = outcome.law, shipped_score(outcome.plan, outcome.trials)
     lines = [
@@ -108,6 +130,7 @@ def _page(outcome: Outcome, summary: dict[str, Any]) -> list[str]:
         "",
         f"![Front](figures/{law}-front.png)",
         "",
+        *_finalists(outcome.choice.scores),
     ]
     if outcome.chosen is None:
         return [

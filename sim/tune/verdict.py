@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -25,8 +26,21 @@ SHIPPED, TUNED = "shipped", "tuned"
 Trials = dict[int, tuple[dict[str, float], Score]]
 
 
-def choose(plan: SearchPlan, trials: Trials, count: int, parts: Path, progress: SweepProgress) -> int | None:
-    """Fly the best trials on seeds of their own and choose one; None when the shipped preset stays.
+@dataclass(frozen=True)
+class Choice:
+    """The finalists on the seeds of the choice.
+
+    Attributes:
+        chosen: Trial that takes the shipped preset's place; None when that stays.
+        scores: Of the shipped preset and of every finalist, by name or number; empty when no trial came so far.
+    """
+
+    chosen: int | None
+    scores: dict[str, Score]
+
+
+def choose(plan: SearchPlan, trials: Trials, count: int, parts: Path, progress: SweepProgress) -> Choice:
+    """Fly the best trials and the shipped preset on seeds of their own and choose one.
 
     Args:
         plan: The search.
@@ -40,16 +54,18 @@ def choose(plan: SearchPlan, trials: Trials, count: int, parts: Path, progress: 
     """
     best = ranked({number: each for number, (_, each) in trials.items()}, shipped_score(plan, trials))[:FINALISTS]
     if not best:
-        return None
+        return Choice(None, {})
     chosen = seeds(CHOICE_SEED, plan.seed, count)
     runs = flights(plan.shipped, SHIPPED, chosen, plan.features)
     for number in best:
         runs += flights(with_gains(plan.shipped, trials[number][0]), str(number), chosen, plan.features)
     table = _fly(runs, parts, plan.jobs, progress)
-    scores = {name: score(table.filter(pl.col("variant") == name).to_dicts()) for name in table["variant"].unique()}
+    names = table["variant"].unique(maintain_order=True)
+    scores = {name: score(table.filter(pl.col("variant") == name).to_dicts()) for name in names}
     good = [number for number in best if allowed(scores[str(number)], scores[SHIPPED])]
     good = [number for number in good if gain_over(scores[str(number)], scores[SHIPPED]) < 0.0]
-    return min(good, key=lambda number: gain_over(scores[str(number)], scores[SHIPPED]), default=None)
+    best_of = min(good, key=lambda number: gain_over(scores[str(number)], scores[SHIPPED]), default=None)
+    return Choice(best_of, scores)
 
 
 def shipped_score(plan: SearchPlan, trials: Trials) -> Score:
