@@ -18,7 +18,7 @@ from typing import Any
 from ibvs_qp.errors import IbvsQpError
 
 #: Commands by name, for hints.
-COMMANDS = ("paint", "experiment", "compare", "explain", "bench", "detect")
+COMMANDS = ("paint", "experiment", "compare", "explain", "bench", "detect", "sweep", "tune")
 EXIT_INTERNAL, EXIT_USER, EXIT_INTERRUPTED = 1, 2, 130
 
 #: One thread each: the matrices are small, and the laws and their repeats share the cores as processes.
@@ -64,6 +64,8 @@ def _parse(words: list[str]) -> Any:
     from sim.commands.experiment import ExperimentCommand
     from sim.commands.explain import Explain
     from sim.commands.paint import Paint
+    from sim.commands.sweep import Sweep
+    from sim.commands.tune import Tune
 
     app = tyro.extras.SubcommandApp()
     app.command(name="paint")(Paint)
@@ -72,6 +74,8 @@ def _parse(words: list[str]) -> Any:
     app.command(name="compare")(Compare)
     app.command(name="detect")(Detect)
     app.command(name="explain")(Explain)
+    app.command(name="sweep")(Sweep)
+    app.command(name="tune")(Tune)
     complaint = io.StringIO()
     try:
         with contextlib.redirect_stderr(complaint):

@@ -8,6 +8,7 @@ from typing import Protocol
 from ibvs_qp.painting import Painter
 from ibvs_qp.painting_job import PaintingConfig
 from ibvs_qp.pressing import Presser
+from ibvs_qp.settings import setting, validate
 
 
 class Job(Protocol):
@@ -39,9 +40,13 @@ class PaintJob:
 class PressJob:
     """Press for `hold_s`, then slide for `slide_s`; after a lost rotor descend for `descend_s` [s]."""
 
-    hold_s: float = 8.0
-    slide_s: float = 0.0
-    descend_s: float = 5.0
+    hold_s: float = setting(8.0, "time at one place after the touch", unit="s", low=0.0, high=600.0)
+    slide_s: float = setting(0.0, "time of sliding after that", unit="s", low=0.0, high=600.0)
+    descend_s: float = setting(5.0, "time of the descent after a lost rotor", unit="s", low=0.0, high=600.0)
+
+    def __post_init__(self) -> None:
+        """Validate."""
+        validate(self)
 
     def strategy(self, config: PaintingConfig) -> Painter:
         """The presser."""

@@ -1,9 +1,10 @@
-"""One run of a sweep: everything that decides a flight, and what is measured on it."""
+"""One run of a sweep, and a design of many: everything that decides a flight, and what is measured on it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
 from ibvs_qp.pilot import PilotConfig
 from sim.closed_loop import FlightOptions
@@ -68,3 +69,81 @@ class Run:
     def seed(self) -> int:
         """Seed flown."""
         return self.plan.options.seed
+
+
+@dataclass(frozen=True, kw_only=True)
+class Refusal:
+    """A run whose values are refused together, though each alone is allowed: a row with the reason, never flown."""
+
+    experiment: str
+    variant: str
+    params: dict[str, Parameter]
+    law: str
+    seed: int
+    reason: str
+
+
+class Block(Protocol):
+    """Runs that are flown in one go and share a part on disk; sent to other processes, so it must be small."""
+
+    def __len__(self) -> int:
+        """Number of runs."""
+        ...
+
+    @property
+    def name(self) -> str:
+        """Identity: the same name has the same rows."""
+        ...
+
+    def runs(self) -> Iterable[Run | Refusal]:
+        """The runs, in order; made where they are flown."""
+        ...
+
+
+class Design(Protocol):
+    """A sequence of runs that are made when they are needed, so that a million of them fit into memory."""
+
+    def __len__(self) -> int:
+        """Number of runs."""
+        ...
+
+    def block(self, start: int, stop: int) -> Block:
+        """Runs start, ..., stop - 1."""
+        ...
+
+
+@dataclass(frozen=True)
+class ListedBlock:
+    """A block of runs that were listed one by one."""
+
+    listed: tuple[Run, ...]
+
+    def __len__(self) -> int:
+        """Number of runs."""
+        return len(self.listed)
+
+    @property
+    def name(self) -> str:
+        """Hash of the runs and of the code that flies them."""
+        from sim.sweep.fingerprint import block_hash
+
+        return block_hash(self.listed)
+
+    def runs(self) -> Sequence[Run]:
+        """The runs."""
+        return self.listed
+
+
+@dataclass(frozen=True)
+class Listed:
+    """A design whose runs were listed one by one."""
+
+    listed: Sequence[Run]
+
+    def __len__(self) -> int:
+        """Number of runs."""
+        return len(self.listed)
+
+    def block(self, start: int, stop: int) -> ListedBlock:
+        """Runs start, ..., stop - 1."""
+        return ListedBlock(tuple(self.listed[start:stop]))

@@ -17,12 +17,13 @@ from ibvs_qp.settings import to_dict
 from sim.sweep.design import Run
 
 #: Folders of `sim` whose code only words or draws results: a change there needs no new flight.
-_AFTER_THE_FLIGHT = ("figures", "commands", "experiments")
+_AFTER_THE_FLIGHT = ("figures", "commands", "experiments", "tune")
 #: Letters of a hash that are kept: 64 bit.
 _LENGTH = 16
 
 
-def _digest(content: Any) -> str:
+def digest(content: Any) -> str:
+    """Short hash of anything that JSON can hold."""
     text = json.dumps(content, sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()[:_LENGTH]
 
@@ -31,7 +32,7 @@ def configuration_hash(run: Run) -> str:
     """Hash of scene, configuration, options, job and faults; all seeds of a cell share it."""
     plan = run.plan
     options = {key: value for key, value in dataclasses.asdict(plan.options).items() if key != "seed"}
-    return _digest(
+    return digest(
         {
             "scene": to_dict(plan.scene),
             "config": to_dict(plan.config),
@@ -45,15 +46,15 @@ def configuration_hash(run: Run) -> str:
 @functools.cache
 def code_hash() -> str:
     """Hash of the source of everything that takes part in a flight."""
-    digest = hashlib.sha256()
+    source = hashlib.sha256()
     for package in (allocation, ibvs_qp, sim):
         root = Path(next(iter(package.__path__)))
         for file in sorted(root.rglob("*.py")):
             relative = file.relative_to(root)
             if package is sim and relative.parts[0] in _AFTER_THE_FLIGHT:
                 continue
-            digest.update(str(relative).encode() + b"\0" + file.read_bytes())
-    return digest.hexdigest()[:_LENGTH]
+            source.update(str(relative).encode() + b"\0" + file.read_bytes())
+    return source.hexdigest()[:_LENGTH]
 
 
 def block_hash(runs: Sequence[Run]) -> str:
@@ -62,4 +63,4 @@ def block_hash(runs: Sequence[Run]) -> str:
         (run.experiment, run.variant, run.params, configuration_hash(run), run.seed, run.measure.__qualname__, run.keep)
         for run in runs
     ]
-    return _digest({"rows": rows, "code": code_hash()})
+    return digest({"rows": rows, "code": code_hash()})

@@ -1,11 +1,10 @@
-"""Fly one block of a design in this process and leave its part on disk."""
+"""Fly one block of a design in this process; what fails becomes a row with the reason."""
 
 from __future__ import annotations
 
 import math
 import signal
 import traceback
-from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -15,51 +14,55 @@ from ibvs_qp.settings import dump_toml
 from sim.closed_loop import fly
 from sim.flight_log import save_log
 from sim.flights import INTERRUPTED
-from sim.sweep.design import Run
+from sim.sweep.design import Block, Refusal, Run
 from sim.sweep.fingerprint import code_hash, configuration_hash
-from sim.sweep.parts import PARAM, part_file, write_part
+from sim.sweep.parts import PARAM
 from sim.trace import Trace
 
+#: A row of the table: column to value.
+Row = dict[str, Any]
 
-def fly_block(runs: Sequence[Run], name: str, folder: Path, worker: bool) -> int:
-    """Fly the runs of a block and write its part.
+
+def fly_block(block: Block, name: str, folder: Path, leave_interrupt: bool = False) -> tuple[str, list[Row]]:
+    """Fly the runs of a block.
 
     Args:
-        runs: The block.
+        block: The runs.
         name: Its hash.
-        folder: Where the parts are.
-        worker: Whether this is a process of its own, which leaves Ctrl-C to its parent.
+        folder: Where logs are kept.
+        leave_interrupt: Whether Ctrl-C is left to the parent of this process.
 
     Returns:
-        Number of runs flown.
+        The name, and a row per run.
 
     Raises:
-        KeyboardInterrupt: On Ctrl-C; nothing is written then.
+        KeyboardInterrupt: On Ctrl-C; the block is lost then.
     """
-    if worker:
+    if leave_interrupt:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
     import cv2
 
     cv2.setNumThreads(1)  # the runs share the cores as processes
-    rows = [_row(run, f"{name}-{index}", folder) for index, run in enumerate(runs)]
-    write_part(part_file(folder, name), rows)
-    return len(rows)
+    return name, [_row(run, f"{name}-{index}", folder) for index, run in enumerate(block.runs())]
 
 
-def _row(run: Run, name: str, folder: Path) -> dict[str, Any]:
+def _row(run: Run | Refusal, name: str, folder: Path) -> Row:
     """Fly one run; one that fails is a row with the reason and no figures."""
-    row: dict[str, Any] = {
+    row: Row = {
         "experiment": run.experiment,
         "law": run.law,
         "variant": run.variant,
         "seed": run.seed,
         "completed": False,
-        "config_hash": configuration_hash(run),
+        "config_hash": None,
         "code_hash": code_hash(),
         "version": version("ibvs-qp"),
         "log": None,
         **{PARAM + key: value for key, value in run.params.items()},
     }
+    if isinstance(run, Refusal):
+        return {**row, "reason": f"refused: {run.reason}"}
+    row["config_hash"] = configuration_hash(run)
     plan = run.plan
     try:
         trace = fly(plan.scene, plan.options, config=plan.config, job=plan.job, faults=plan.faults)

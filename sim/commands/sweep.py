@@ -1,0 +1,202 @@
+"""``ibvs-qp sweep``: fly any grid or random design, on this computer or on a cluster, and report it."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import os
+import shlex
+import shutil
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from sim.sweep import Planned, SweepResult
+    from sim.sweep.pools import Pool
+
+_flag = tyro.conf.arg(help_behavior_hint="")
+PARTS = "parts"
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Sweep:
+    """Fly a grid or random design over scene, vehicle, noise and controller parameters; docs/sweeps.md explains specs.
+
+    Example: ibvs-qp sweep sim/sweep/specs/friction_mass.toml --out runs/friction
+
+    Draw again: ibvs-qp sweep --report runs/friction
+    """
+
+    spec: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="SPEC", help_behavior_hint="")] = None
+    """The design (TOML)."""
+    report: Annotated[Path | None, tyro.conf.arg(metavar="DIR_OR_PARQUET", help_behavior_hint="")] = None
+    """Fly nothing: draw box plots, heat maps and success-rate maps of a table that is there."""
+    figures: Annotated[tuple[str, ...], tyro.conf.arg(metavar="COLUMN ...", help_behavior_hint="")] = ()
+    """Columns to report; default: path, push, tilt and thrust rate."""
+    jobs: Annotated[int | None, tyro.conf.arg(metavar="N", help_behavior_hint="")] = None
+    """Processes of this computer; default: one per core. The table does not depend on it."""
+    dask: Annotated[bool, _flag] = False
+    """Fly on a Dask cluster started here for the time of the sweep."""
+    scheduler: Annotated[str | None, tyro.conf.arg(metavar="ADDRESS", help_behavior_hint="")] = None
+    """Fly on the Dask cluster of this scheduler, such as tcp://head:8786."""
+    seed: Annotated[int | None, tyro.conf.arg(metavar="N", help_behavior_hint="")] = None
+    """First seed, instead of the spec's."""
+    out: Annotated[Path | None, tyro.conf.arg(metavar="DIR", help_behavior_hint="")] = None
+    """Folder; default: runs/<UTC stamp>. Given one with finished blocks, only the others are flown."""
+    plan: Annotated[bool, _flag] = False
+    """Print how many flights there are and how long they fly, and stop."""
+    json: Annotated[bool, _flag] = False
+    """Print one line of JSON on standard output, and nothing else."""
+
+    def run(self, words: list[str]) -> int:
+        """Fly what is not on disk yet and report it, or report a table.
+
+        Args:
+            words: The command line, for the record.
+
+        Returns:
+            0, or 130 after Ctrl-C.
+
+        Raises:
+            IbvsQpError: When spec, table, cluster, jobs or folder is refused.
+        """
+        from rich.console import Console
+
+        from ibvs_qp.errors import ConfigError
+
+        if (self.spec is None) == (self.report is None):
+            raise ConfigError("give a spec to fly, or --report with a table to draw (see ibvs-qp sweep --help)")
+        if self.report is not None:
+            return self._report(self.report)
+        notes = Console(stderr=True, quiet=self.json)
+        return self._fly(words, notes)
+
+    def _report(self, path: Path) -> int:
+        from sim.figures.sweep import write_report
+        from sim.figures.sweep.page import read_table
+        from sim.rundir import RunFolder, as_json
+
+        table, folder = read_table(path)
+        out = RunFolder.create(self.out or folder).path
+        page = write_report(table, out, f"Sweep {path.stem if path.is_file() else path.name}", self.figures)
+        print(as_json({"schema": 1, "report": str(page), "flights": table.height}) if self.json else f"Report: {page}")
+        return 0
+
+    def _fly(self, words: list[str], notes: Console) -> int:
+        from sim.figures.sweep import write_report
+        from sim.rundir import RunFolder, as_json
+        from sim.sweep import run_sweep
+        from sim.sweep.parts import write_table
+        from sim.sweep.progress import sweep_progress
+
+        started = time.perf_counter()
+        design = self._design()
+        settings = design.spec.settings
+        _print_plan(notes if not self.plan else type(notes)(), design)
+        if self.plan:
+            return 0
+        folder = RunFolder.create(self.out).path
+        with self._pool(notes) as pool, sweep_progress(notes, settings.name) as progress:
+            result = run_sweep(
+                design,
+                folder / PARTS,
+                workers=self.jobs or _cores(),
+                block_runs=settings.block_runs,
+                progress=progress,
+                pool=pool,
+            )
+        assert self.spec is not None
+        if self.spec.resolve() != (folder / "spec.toml").resolve():
+            shutil.copyfile(self.spec, folder / "spec.toml")
+        table = folder / f"{settings.name}.parquet"
+        write_table(table, result.table)
+        page = None
+        if result.table.height and not result.interrupted:
+            with notes.status("Drawing the report ..."):
+                page = write_report(result.table, folder, f"Sweep {settings.name}", self.figures)
+        content = {
+            "schema": 1,
+            "command": shlex.join(["ibvs-qp", *words]),
+            **_facts(design, result),
+            "data_file": str(table),
+            "run_dir": str(folder),
+            "report": str(page) if page else None,
+            "wall_time_s": time.perf_counter() - started,
+        }
+        (folder / "sweep.json").write_text(as_json(content, indent=1) + "\n", encoding="utf-8")
+        if self.json:
+            print(as_json(content))
+        elif page is not None:
+            print(f"{content['completed']} of {content['flights']} flights ended as planned. Report: {page}")
+        if result.interrupted:
+            given = any(word.split("=")[0] == "--out" for word in words)
+            again = shlex.join(["ibvs-qp", *words, *([] if given else ["--out", str(folder)])])
+            print(f"ibvs-qp: interrupted; finished blocks are in {folder}; go on with: {again}", file=sys.stderr)
+            return 130
+        return 0
+
+    def _design(self) -> Planned:
+        from ibvs_qp.errors import ConfigError, out_of_range
+        from sim.checks import check_seed
+        from sim.sweep import Planned, load_spec
+
+        if self.jobs is not None and self.jobs < 1:
+            raise out_of_range("--jobs", self.jobs, "", "allowed are 1, 2, 3, ...")
+        if self.dask and self.scheduler:
+            raise ConfigError("--dask starts a cluster here, --scheduler uses one that runs; give one of them")
+        assert self.spec is not None
+        spec = load_spec(self.spec)
+        if self.seed is not None:
+            check_seed(self.seed)
+            spec = dataclasses.replace(spec, settings=dataclasses.replace(spec.settings, seed=self.seed))
+        return Planned(spec)
+
+    @contextlib.contextmanager
+    def _pool(self, notes: Console) -> Iterator[Pool | None]:
+        if not (self.dask or self.scheduler):
+            yield None
+            return
+        from sim.sweep.cluster import cluster_pool
+
+        with contextlib.ExitStack() as stack:
+            with notes.status("Waiting for the cluster ..."):
+                pool = stack.enter_context(cluster_pool(self.scheduler, self.jobs or _cores()))
+            yield pool
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _facts(design: Planned, result: SweepResult) -> dict[str, object]:
+    failed = result.table.filter(~result.table["completed"])
+    reasons = failed["reason"].value_counts(sort=True, name="n").rows()
+    return {
+        "name": design.spec.settings.name,
+        "planned": len(design),
+        "flights": result.table.height,
+        "completed": int(result.table["completed"].sum()),
+        "failed": {str(reason): count for reason, count in sorted(reasons, key=lambda row: (-row[1], str(row[0])))},
+        "on_disk_before": result.reused,
+        "interrupted": result.interrupted,
+    }
+
+
+def _print_plan(console: Console, design: Planned) -> None:
+    from sim.sweep.design import Run
+
+    settings, first = design.spec.settings, design.run(0)
+    blocks = -(-len(design) // settings.block_runs)
+    air = f", about {len(design) * first.expected_s / 60.0:.0f} min in the air" if isinstance(first, Run) else ""
+    varied = ", ".join(axis.path for axis in (*design.spec.grid, *design.spec.random)) or "seeds only"
+    console.print(
+        f"{settings.name}: {len(design)} flights in {blocks} blocks{air}; varied: {varied}", soft_wrap=True,
+        highlight=False,
+    )  # fmt: skip

@@ -1,0 +1,136 @@
+"""``ibvs-qp tune``: search for gains, choose, and judge the choice on unseen seeds."""
+
+from __future__ import annotations
+
+import dataclasses
+import shlex
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import tyro
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from sim.tune.search import SearchPlan
+
+_flag = tyro.conf.arg(help_behavior_hint="")
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Tune:
+    """Tune the gains of a law: push, path, tilt and thrust rate at once, over three scenes; needs the extra tune.
+
+    Example: ibvs-qp tune --law qp --trials 200 --out runs/tune
+    """
+
+    law: Literal["qp", "paper"] = "qp"
+    """Law to tune."""
+    trials: int = 200
+    """Finished trials at which the search stops; the same --out goes on with what is there."""
+    seed: int = 0
+    """Seed of sampler and flights."""
+    flights: int = 1
+    """Seeds per scene in every trial."""
+    unseen: int = 6
+    """Seeds per scene on which shipped and tuned are compared; the best few trials fly half of that to be chosen."""
+    features: Literal["geometric", "rendered"] = "geometric"
+    """Perception: a sensor model of lines, or rendered pictures, which take five times as long."""
+    preset: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
+    """Preset to start from; default: the shipped one."""
+    jobs: int = 1
+    """Trials side by side; the search depends on their number, not on what is faster."""
+    storage: Annotated[str | None, tyro.conf.arg(metavar="FILE_OR_URL", help_behavior_hint="")] = None
+    """Journal file or database that several processes or computers may share; default: in --out."""
+    out: Annotated[Path | None, tyro.conf.arg(metavar="DIR", help_behavior_hint="")] = None
+    """Folder; default: runs/<UTC stamp>."""
+    json: Annotated[bool, _flag] = False
+    """Print one line of JSON on standard output, and nothing else."""
+
+    def run(self, words: list[str]) -> int:
+        """Search, choose, judge and write.
+
+        Args:
+            words: The command line, for the record.
+
+        Returns:
+            0, or 130 after Ctrl-C.
+
+        Raises:
+            IbvsQpError: When an option, the storage or the folder is refused.
+        """
+        from rich.console import Console
+
+        from sim.rundir import RunFolder, as_json
+
+        self._check()
+        notes = Console(stderr=True, quiet=self.json)
+        folder = RunFolder.create(self.out).path
+        plan = self._plan(folder)
+        try:
+            summary = self._search(plan, folder, words, notes)
+        except KeyboardInterrupt:
+            given = any(word.split("=")[0] == "--out" for word in words)
+            again = shlex.join(["ibvs-qp", *words, *([] if given else ["--out", str(folder)])])
+            print(f"ibvs-qp: interrupted; finished trials are in {plan.storage}; go on with: {again}", file=sys.stderr)
+            return 130
+        print(as_json(summary) if self.json else f"Report: {summary['report']}\nPreset: {summary['preset']}")
+        return 0
+
+    def _check(self) -> None:
+        from ibvs_qp.errors import out_of_range
+        from sim.checks import check_preset, check_readable, check_seed
+
+        check_seed(self.seed)
+        for name in ("trials", "flights", "unseen", "jobs"):
+            if getattr(self, name) < 1:
+                raise out_of_range(f"--{name}", getattr(self, name), "", "allowed are 1, 2, 3, ...")
+        check_readable("--preset", self.preset)
+        check_preset(self.preset)
+
+    def _plan(self, folder: Path) -> SearchPlan:
+        from ibvs_qp.pilot import PilotConfig
+        from sim.closed_loop import default_preset
+        from sim.tune.search import SearchPlan
+
+        start = PilotConfig.from_toml(self.preset) if self.preset else default_preset(self.law)
+        return SearchPlan(
+            shipped=dataclasses.replace(start, law=self.law),
+            trials=self.trials,
+            seed=self.seed,
+            flights=self.flights,
+            features=self.features,
+            jobs=self.jobs,
+            storage=self.storage or str(folder / "journal.log"),
+        )
+
+    def _search(self, plan: SearchPlan, folder: Path, words: list[str], notes: Console) -> dict[str, Any]:
+        from sim.sweep.progress import sweep_progress
+        from sim.tune.record import Outcome, write
+        from sim.tune.search import finished, open_study, search
+        from sim.tune.verdict import choose, unseen
+
+        study = open_study(plan)
+        before = len(finished(study))
+        with sweep_progress(notes, f"{self.law}: trials") as progress:
+            search(plan, study, lambda done: progress(done, plan.trials, before))
+        trials, parts = finished(study), folder / "parts"
+        with sweep_progress(notes, f"{self.law}: choice") as progress:
+            choice = choose(plan, trials, -(-self.unseen // 2), parts, progress)
+        table = None
+        if choice.chosen is not None:
+            with sweep_progress(notes, f"{self.law}: unseen seeds") as progress:
+                table = unseen(plan, trials[choice.chosen][0], self.unseen, parts, progress)
+        command = shlex.join(["ibvs-qp", *words])
+        outcome = Outcome(plan=plan, trials=trials, choice=choice, table=table, command=command, again=self._again())
+        return write(outcome, folder)
+
+    def _again(self) -> str:
+        """The command that gives the same on any computer."""
+        default = type(self)()
+        words = ["ibvs-qp", "tune", "--law", self.law, "--trials", str(self.trials)]
+        for name in ("seed", "flights", "unseen", "features", "preset", "jobs"):
+            if getattr(self, name) != getattr(default, name):
+                words += [f"--{name}", str(getattr(self, name))]
+        return shlex.join(words)

@@ -1,0 +1,77 @@
+"""Figures of a search: the front of all trials, and shipped against tuned on unseen seeds."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import polars as pl
+from matplotlib.figure import Figure
+
+from sim.figures.style import FAINT, REFERENCE, law_colour, law_name, new_figure
+from sim.sweep.parts import PARAM
+from sim.tune.choice import front
+from sim.tune.objectives import OBJECTIVES, Score
+from sim.tune.verdict import TUNED, paired
+
+#: Trials worse than this many times the shipped preset lie outside the picture.
+_SHOWN_TO = 4.0
+_MARKERS = ("o", "s", "^", "D")
+
+
+def draw_front(law: str, scores: dict[int, Score], shipped: Score, chosen: int | None) -> Figure:
+    """Every pair of objectives: trials, those that no other betters, the shipped and the chosen preset."""
+    able = {number: each for number, each in scores.items() if not each.failed}
+    best = front(scores)
+    figure = new_figure(4.8)
+    grid = figure.subplots(2, 3).ravel()
+    pairs = itertools.combinations(range(len(OBJECTIVES)), 2)
+    for axes, (i, j) in zip(grid, pairs, strict=True):
+        x, y = OBJECTIVES[i], OBJECTIVES[j]
+        for numbers, colour, size, label in (
+            ([number for number in able if number not in best], FAINT, 9, "trial"),
+            (best, law_colour(law), 14, "on the front of all four"),
+        ):
+            points = np.array([able[number].values for number in numbers]).reshape(-1, len(OBJECTIVES))
+            axes.scatter(x.scale * points[:, i], y.scale * points[:, j], s=size, color=colour, label=label, linewidth=0)
+        start = shipped.values
+        axes.scatter(x.scale * start[i], y.scale * start[j], s=60, marker="x", color="#222222", label="shipped")
+        if chosen is not None:
+            end = scores[chosen].values
+            axes.scatter(x.scale * end[i], y.scale * end[j], s=70, marker="o", facecolor="none", edgecolor="#222222",
+                         linewidth=1.3, label="chosen")  # fmt: skip
+        for axis, objective, place in ((axes.set_xlim, x, i), (axes.set_ylim, y, j)):
+            seen = [each.values[place] for each in [*able.values(), shipped]]
+            axis(0.9 * objective.scale * min(seen), objective.scale * min(1.05 * max(seen), _SHOWN_TO * start[place]))
+        axes.set_xlabel(x.label)
+        axes.set_ylabel(y.label)
+    handles, labels = grid[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper right", ncols=4)
+    figure.suptitle(f"{law_name(law)}: {len(scores)} trials, {len(able)} that complete every flight", x=0.01, ha="left",
+                    fontsize=9, fontweight="bold")  # fmt: skip
+    return figure
+
+
+def draw_unseen(law: str, table: pl.DataFrame) -> Figure:
+    """Shipped against tuned, a mark per flight; below the diagonal the tuned preset is better."""
+    both = paired(table)
+    names = both[PARAM + "scene"].unique(maintain_order=True).to_list()
+    figure = new_figure(2.5)
+    grid = figure.subplots(1, len(OBJECTIVES))
+    for axes, each in zip(grid, OBJECTIVES, strict=True):
+        for scene, marker in zip(names, _MARKERS, strict=False):
+            rows = both.filter(pl.col(PARAM + "scene") == scene)
+            before, after = (each.scale * rows[name].to_numpy() for name in (each.column, f"{each.column}.{TUNED}"))
+            axes.scatter(before, after, s=16, marker=marker, alpha=0.75, linewidth=0, label=scene,
+                         color=law_colour(law) if scene == names[0] else None)  # fmt: skip
+        reach = 1.08 * max(*axes.get_xlim(), *axes.get_ylim())
+        axes.plot((0.0, reach), (0.0, reach), **REFERENCE)
+        axes.set_xlim(0.0, reach)
+        axes.set_ylim(0.0, reach)
+        axes.set_aspect("equal")
+        axes.set_title(each.label, fontsize=8)
+        axes.set_xlabel("shipped")
+    grid[0].set_ylabel("tuned")
+    figure.legend(*grid[0].get_legend_handles_labels(), loc="outside upper right", ncols=len(names))
+    figure.suptitle(f"{law_name(law)}, unseen seeds", x=0.01, ha="left", fontsize=9, fontweight="bold")
+    return figure

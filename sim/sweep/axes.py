@@ -1,0 +1,142 @@
+"""Axes of a design: a parameter and its values, listed, evenly spaced, or drawn."""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ibvs_qp.errors import ConfigError
+from ibvs_qp.settings import choice, from_dict, setting, validate
+from sim.sweep.design import Parameter
+
+SCALES = ("linear", "log")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Span:
+    """A range of a parameter, as written in a spec."""
+
+    low: float = setting(math.nan, "lower end")
+    high: float = setting(math.nan, "upper end")
+    steps: int = setting(0, "number of values on a grid, both ends included", low=0, high=100000)
+    scale: str = choice("linear", "evenly spaced, or drawn, in the value or in its logarithm", SCALES)
+
+    def __post_init__(self) -> None:
+        """Validate."""
+        validate(self)
+
+    def at(self, share: float) -> float:
+        """Value at a share 0..1 of the way from low to high."""
+        if self.scale == "log":
+            return float(self.low * (self.high / self.low) ** share)
+        return float(self.low + (self.high - self.low) * share)
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One varied parameter.
+
+    Attributes:
+        path: Dotted path.
+        values: Listed values, on a grid or to choose from; empty for a range to draw from.
+        span: That range.
+        whole: Whether values are whole numbers.
+    """
+
+    path: str
+    values: tuple[Parameter, ...] = ()
+    span: Span | None = None
+    whole: bool = False
+
+    def draw(self, share: float) -> Parameter:
+        """The value that a uniform number 0..1 stands for."""
+        if self.span is None:
+            return self.values[min(int(share * len(self.values)), len(self.values) - 1)]
+        value = self.span.at(share)
+        return round(value) if self.whole else value
+
+    @property
+    def ends(self) -> tuple[Parameter, ...]:
+        """Values that are checked before anything flies: all that are listed, or both ends of the range."""
+        return self.values or (self.draw(0.0), self.draw(1.0))
+
+
+def grid_axis(path: str, given: Any, present: Any) -> Axis:
+    """An axis of a grid.
+
+    Args:
+        path: Dotted path.
+        given: A list of values, or a table low, high, steps, scale.
+        present: The present value, which tells whole numbers.
+
+    Raises:
+        ConfigError: When it is neither, or the range is refused.
+    """
+    place = f"grid.{path}"
+    if isinstance(given, list):
+        return Axis(path, _listed(place, given))
+    span = _span(place, given)
+    if span.steps < 1:
+        raise ConfigError(f"{place}.steps = {span.steps} is refused: a grid needs 1, 2, 3, ... values")
+    whole = _is_whole(present)
+    shares = np.linspace(0.0, 1.0, span.steps)
+    values = [round(span.at(share)) if whole else span.at(share) for share in shares]
+    return Axis(path, tuple(dict.fromkeys(values)), whole=whole)
+
+
+def random_axis(path: str, given: Any, present: Any) -> Axis:
+    """An axis that is drawn from: a list to choose from, or a table low, high, scale."""
+    place = f"random.{path}"
+    if isinstance(given, list):
+        return Axis(path, _listed(place, given))
+    span = _span(place, given)
+    if span.steps:
+        raise ConfigError(f"{place}.steps is refused: a drawn parameter has no steps; `samples` says how many")
+    return Axis(path, span=span, whole=_is_whole(present))
+
+
+@functools.lru_cache(maxsize=4)
+def shares(kind: str, samples: int, axes: int, seed: int) -> np.ndarray:
+    """Uniform numbers of a random design, (samples, axes); more samples begin with the same numbers.
+
+    Args:
+        kind: "random", or "sobol" for points that fill the box more evenly.
+        samples: Number of points.
+        axes: Number of parameters.
+        seed: Seed of the draw.
+    """
+    if kind == "sobol":
+        from scipy.stats import qmc
+
+        power = max(0, math.ceil(math.log2(samples))) if samples else 0
+        return qmc.Sobol(axes, rng=np.random.default_rng(seed)).random_base2(power)[:samples]
+    return np.random.default_rng(seed).random((samples, axes))
+
+
+def _listed(place: str, given: list[Any]) -> tuple[Parameter, ...]:
+    if not given:
+        raise ConfigError(f"{place} = [] is refused: at least one value is needed")
+    for value in given:
+        if not isinstance(value, (bool, int, float, str)):
+            raise ConfigError(
+                f"{place} = {value!r} is refused: give single values; entries of a list are {place}.0, ..."
+            )
+    return tuple(given)
+
+
+def _span(place: str, given: Any) -> Span:
+    if not isinstance(given, dict) or not {"low", "high"} <= given.keys():
+        raise ConfigError(f"{place} = {given!r} is refused: give a list of values, or a table with low and high")
+    span = from_dict(Span, given, place)
+    if not span.low <= span.high or (span.scale == "log" and span.low <= 0.0):
+        need = "low > 0 and low <= high on a logarithmic scale" if span.scale == "log" else "low <= high"
+        raise ConfigError(f"{place} = [{span.low:g}, {span.high:g}] is refused: {need} is needed")
+    return span
+
+
+def _is_whole(value: Any) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool)

@@ -1,0 +1,167 @@
+"""A sweep as a TOML file: what is flown, what is held, what is varied."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ibvs_qp.errors import ConfigError, out_of_range
+from ibvs_qp.pilot import PilotConfig
+from ibvs_qp.settings import choice, from_dict, setting, validate
+from sim.closed_loop import FlightOptions, default_preset
+from sim.jobs import PaintJob, PressJob
+from sim.scene import Scene, load_scene
+from sim.sweep.axes import Axis, grid_axis, random_axis
+from sim.sweep.setup import Setup, changed, flown_by, value_at
+
+LAWS = ("qp", "paper")
+JOBS = {"paint": PaintJob, "press": PressJob}
+#: Sections of a spec that hold dotted paths.
+SECTIONS = ("fixed", "grid", "random")
+
+
+@dataclass(frozen=True, kw_only=True)
+class SweepSettings:
+    """The keys of a spec outside its sections."""
+
+    name: str = setting("sweep", "name of the table: letters, digits, - and _")
+    about: str = setting("", "what is asked, in a sentence")
+    job: str = choice("press", "press and slide, or paint", tuple(JOBS))
+    laws: tuple[str, ...] = ("qp",)  # laws that fly every point, with the same seeds
+    features: str = choice("geometric", "sensor model of lines, or rendered pictures", ("geometric", "rendered"))
+    vision: str = choice("own", "perception of rendered pictures", ("own", "paper"))
+    scene: str = setting("", "scene file, beside the spec; empty is the default scene")
+    preset_qp: str = setting("", "preset of the QP law, beside the spec; empty is the shipped one")
+    preset_paper: str = setting("", "preset of the analytic law")
+    seed: int = setting(0, "first seed", low=0, high=2**31 - 1)
+    seeds: int = setting(1, "flights of every point and law: seed, seed + 1, ...", low=1, high=1_000_000)
+    samples: int = setting(0, "number of draws of [random]", low=0, high=1_000_000_000)
+    draw: str = choice("random", "how they are drawn", ("random", "sobol"))
+    block_runs: int = setting(10, "runs per block: what an interrupt may lose", low=1, high=100_000)
+
+    def __post_init__(self) -> None:
+        """Validate."""
+        validate(self)
+        if not re.fullmatch(r"[A-Za-z0-9_-]+", self.name):
+            raise out_of_range("name", self.name, "", "allowed are letters, digits, - and _")
+        if not self.laws or not set(self.laws) <= set(LAWS):
+            raise out_of_range("laws", list(self.laws), "", "allowed are qp and paper")
+
+
+@dataclass(frozen=True, kw_only=True)
+class SweepSpec:
+    """A sweep, checked.
+
+    Attributes:
+        settings: Keys outside the sections.
+        setups: What every law starts from, [fixed] included.
+        grid: Axes of the grid; every combination is flown.
+        random: Axes that are drawn; every draw is flown at every point of the grid.
+    """
+
+    settings: SweepSettings
+    setups: dict[str, Setup]
+    grid: tuple[Axis, ...]
+    random: tuple[Axis, ...]
+
+
+def load_spec(file: Path) -> SweepSpec:
+    """Read a spec and check every name and every value that can be checked alone.
+
+    Raises:
+        ConfigError: Naming the file and what is wrong in it.
+    """
+    try:
+        table = tomllib.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ConfigError(f"cannot read {file}: {error.strerror or error}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{file} is not valid TOML: {error}") from None
+    try:
+        return parse_spec(table, file.parent)
+    except ConfigError as error:
+        raise ConfigError(f"{file}: {error}") from None
+
+
+def parse_spec(table: dict[str, Any], folder: Path) -> SweepSpec:
+    """Check a spec that was read; scene and presets lie beside it.
+
+    Raises:
+        ConfigError: Naming what is wrong.
+    """
+    sections = {name: _section(table, name) for name in SECTIONS}
+    settings = from_dict(SweepSettings, {key: value for key, value in table.items() if key not in SECTIONS})
+    if bool(sections["random"]) != bool(settings.samples):
+        raise ConfigError("samples and [random] go together: give both or neither")
+    scene = load_scene(folder / settings.scene) if settings.scene else Scene()
+    _refuse_twice(sections)
+    setups = {}
+    for law in settings.laws:
+        start = Setup(scene=scene, pilot=_preset(settings, law, folder), job=JOBS[settings.job]())
+        setups[law] = changed(start, sections["fixed"])
+    first = next(iter(setups.values()))
+    grid = tuple(grid_axis(path, given, value_at(first, path)) for path, given in sections["grid"].items())
+    random = tuple(random_axis(path, given, value_at(first, path)) for path, given in sections["random"].items())
+    spec = SweepSpec(settings=settings, setups=setups, grid=grid, random=random)
+    _check_values(spec, sections["fixed"])
+    return spec
+
+
+def options_of(settings: SweepSettings, law: str, seed: int) -> FlightOptions:
+    """How a run is flown."""
+    return FlightOptions(law=law, seed=seed, features=settings.features, vision=settings.vision, video=False)
+
+
+def _section(table: dict[str, Any], name: str) -> dict[str, Any]:
+    given = table.get(name, {})
+    if not isinstance(given, dict):
+        raise ConfigError(f"{name} must be a table of dotted paths, got {given!r}")
+    return flat(given, name == "fixed")
+
+
+def flat(table: dict[str, Any], fixed: bool, prefix: str = "") -> dict[str, Any]:
+    """Dotted paths of nested tables, so that quotes around a path may be left out; low and high make a range."""
+    paths = {}
+    for key, value in table.items():
+        if isinstance(value, dict) and (fixed or not {"low", "high"} & value.keys()):
+            paths |= flat(value, fixed, f"{prefix}{key}.")
+        else:
+            paths[prefix + key] = value
+    return paths
+
+
+def _preset(settings: SweepSettings, law: str, folder: Path) -> PilotConfig:
+    file = {"qp": settings.preset_qp, "paper": settings.preset_paper}[law]
+    return PilotConfig.from_toml(folder / file) if file else default_preset(law)
+
+
+def _refuse_twice(sections: dict[str, dict[str, Any]]) -> None:
+    seen: dict[str, str] = {}
+    for name, paths in sections.items():
+        for path in paths:
+            if path in seen:
+                raise ConfigError(f"{path} is in [{seen[path]}] and in [{name}]; leave it in one of them")
+            seen[path] = name
+
+
+def _check_values(spec: SweepSpec, fixed: dict[str, Any]) -> None:
+    """Every value alone, under every law; and that nothing else decides it when it flies."""
+    varied = {path: (value,) for path, value in fixed.items()}
+    varied |= {axis.path: axis.ends for axis in (*spec.grid, *spec.random)}
+    for law, setup in spec.setups.items():
+        options = options_of(spec.settings, law, spec.settings.seed)
+        for path, values in varied.items():
+            for value in values:
+                asked = changed(setup, {path: value})
+                if not path.startswith("pilot."):
+                    continue
+                flown = dataclasses.replace(asked, pilot=flown_by(asked, options))
+                if value_at(flown, path) != value_at(asked, path):
+                    raise ConfigError(
+                        f"{path} cannot be set here: scene.paint, laws and vision decide it; "
+                        "the paint job, for one, is told to the pilot by the scene"
+                    )

@@ -1,0 +1,67 @@
+"""What a trial flies: short paint jobs on three scenes; search, choice and report each have seeds of their own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from ibvs_qp.pilot import PilotConfig
+from sim.closed_loop import FlightOptions, pilot_config
+from sim.experiments.scenes import changed, short_job
+from sim.jobs import PaintJob
+from sim.measures.effort import paint_row
+from sim.scene import Scene
+from sim.sweep.design import FlightPlan, Run
+
+#: Length of a row [m]: touch, both corners and a climb in about 17 s of flight.
+STROKE_M = 0.2
+#: First seed of the search, of the choice among its best, and of the report; none is flown by another experiment.
+SEARCH_SEED, CHOICE_SEED, REPORT_SEED = 1000, 2000, 3000
+#: Starts, approaches and retreats beside the strokes [s]; sizes the bar only.
+_AROUND_S = 9.0
+
+
+def scenes() -> dict[str, Scene]:
+    """The nominal scene, a hard wall under a heavy vehicle, and noise with gusts."""
+    nominal = short_job(STROKE_M)
+    return {
+        "nominal": nominal,
+        "hard": changed(
+            nominal,
+            wall={"friction": 0.6, "stiffness_n_m": 4000.0},
+            vehicle={"mass_kg": 6.5},
+            force_torque={"sigma_n": 0.4},
+        ),
+        "rough": changed(nominal, features={"sigma_vs": 0.01}, wind={"gust_n_rms": 1.0}, vehicle={"mass_kg": 5.6}),
+    }
+
+
+def flights(config: PilotConfig, variant: str, seeds: Iterable[int], features: str) -> list[Run]:
+    """Every scene with every seed under a preset.
+
+    Args:
+        config: The preset; its law flies.
+        variant: Name under which its rows go.
+        seeds: Seeds.
+        features: "geometric" or "rendered".
+    """
+    runs = []
+    for name, scene in scenes().items():
+        for seed in seeds:
+            options = FlightOptions(law=config.law, seed=seed, features=features, video=False)
+            flown = pilot_config(scene, options, config)
+            runs.append(
+                Run(
+                    experiment="tune",
+                    variant=variant,
+                    params={"scene": name},
+                    plan=FlightPlan(scene=scene, config=flown, options=options),
+                    measure=paint_row,
+                    expected_s=_AROUND_S + PaintJob().expected_s(flown.painting),
+                )
+            )
+    return runs
+
+
+def seeds(first: int, seed: int, count: int) -> Sequence[int]:
+    """Seeds of one purpose: searches with different seeds fly different ones."""
+    return range(first + 10_000 * seed, first + 10_000 * seed + count)

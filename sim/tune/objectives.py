@@ -1,0 +1,71 @@
+"""What is minimised: push, path, tilt and nervousness of the rotors, each a mean over the flights of a trial."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Objective:
+    """One figure to be made small.
+
+    Attributes:
+        column: Of the row of a flight.
+        words: In words.
+        scale: Factor to the shown unit.
+        unit: That unit.
+        failed: What a flight that does not complete counts as, in the unit of the column: far beyond any that does.
+    """
+
+    column: str
+    words: str
+    scale: float
+    unit: str
+    failed: float
+
+    @property
+    def label(self) -> str:
+        """Words with unit."""
+        return f"{self.words} [{self.unit}]"
+
+
+OBJECTIVES = (
+    Objective("force_rms_n", "push error, rms", 1.0, "N", 3.0),
+    Objective("path_rms_m", "path error, rms", 1e3, "mm", 0.05),
+    Objective("tilt_peak_deg", "tilt, peak", 1.0, "deg", 20.0),
+    Objective("jitter_n_s", "thrust rate, rms", 1.0, "N/s", 1000.0),
+)
+
+
+@dataclass(frozen=True)
+class Score:
+    """What a preset is worth.
+
+    Attributes:
+        values: Mean of every objective.
+        failed: Share of flights that did not complete; a preset whose contact would ring counts as all failed.
+    """
+
+    values: tuple[float, ...]
+    failed: float
+
+
+def score(rows: Iterable[Mapping[str, Any]]) -> Score:
+    """Means over flights; one that failed, or has no figure, counts with the objective's `failed`."""
+    rows = list(rows)
+    values = tuple(sum(_value(row, each) for row in rows) / len(rows) for each in OBJECTIVES)
+    return Score(values, sum(not row["completed"] for row in rows) / len(rows))
+
+
+def refused() -> Score:
+    """Of a preset that may not fly."""
+    return Score(tuple(each.failed for each in OBJECTIVES), 1.0)
+
+
+def _value(row: Mapping[str, Any], objective: Objective) -> float:
+    value = row.get(objective.column)
+    good = row["completed"] and value is not None and math.isfinite(value)
+    return min(float(value), objective.failed) if good else objective.failed  # type: ignore[arg-type]

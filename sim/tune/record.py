@@ -1,0 +1,158 @@
+"""What a search leaves: the preset, every trial, the verdict on unseen seeds, figures and a page."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import polars as pl
+
+from sim.figures.style import law_name, save, styled
+from sim.figures.tune import draw_front, draw_unseen
+from sim.rundir import as_json
+from sim.sweep.parts import write_table
+from sim.tune.choice import allowed, front, gain_over
+from sim.tune.objectives import OBJECTIVES, Score
+from sim.tune.search import SearchPlan
+from sim.tune.space import RANGES, with_gains
+from sim.tune.verdict import SHIPPED, Choice, Trials, differences, shipped_score
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """A finished search.
+
+    Attributes:
+        plan: What was searched.
+        trials: Gains and score by number.
+        choice: What the finalists did, and the number of the chosen one.
+        table: Flights of shipped and chosen on unseen seeds; None when nothing was chosen.
+        command: The command line.
+        again: The command that gives the same on any computer.
+    """
+
+    plan: SearchPlan
+    trials: Trials
+    choice: Choice
+    table: pl.DataFrame | None
+    command: str
+    again: str
+
+    @property
+    def law(self) -> str:
+        """Law tuned."""
+        return self.plan.shipped.law
+
+    @property
+    def chosen(self) -> int | None:
+        """Number of the chosen trial; None keeps the shipped preset."""
+        return self.choice.chosen
+
+    @property
+    def scores(self) -> dict[int, Score]:
+        """Scores by trial."""
+        return {number: each for number, (_, each) in self.trials.items()}
+
+
+def content(outcome: Outcome, folder: Path) -> dict[str, Any]:
+    """The JSON: everything but the trials."""
+    found = outcome.scores
+    return {
+        "schema": 1,
+        "command": outcome.command,
+        "law": outcome.law,
+        "seed": outcome.plan.seed,
+        "features": outcome.plan.features,
+        "trials": len(found),
+        "completed_trials": sum(not each.failed for each in found.values()),
+        "front": front(found),
+        "finalists": {name: _objectives(each) for name, each in outcome.choice.scores.items()},
+        "chosen": outcome.chosen,
+        "gains": None if outcome.chosen is None else outcome.trials[outcome.chosen][0],
+        "unseen": [] if outcome.table is None else differences(outcome.table),
+        "preset": str(folder / f"{outcome.law}.toml"),
+        "report": str(folder / f"report_{outcome.law}.md"),
+        "run_dir": str(folder),
+    }
+
+
+def write(outcome: Outcome, folder: Path) -> dict[str, Any]:
+    """Write everything; returns the JSON."""
+    law, found, summary = outcome.law, outcome.scores, content(outcome, folder)
+    gains = {} if outcome.chosen is None else outcome.trials[outcome.chosen][0]
+    head = (
+        f"# Gains found by `{outcome.again}`: trial {outcome.chosen} of {len(found)}; everything else is as shipped.\n"
+    )
+    head = "# The shipped preset: no trial of the search may take its place.\n" if outcome.chosen is None else head
+    preset = with_gains(outcome.plan.shipped, gains).to_toml()
+    (folder / f"{law}.toml").write_text(head + preset, encoding="utf-8")
+    rows = [{**_objectives(score), **params} for params, score in outcome.trials.values()]
+    record = {**summary, "ranges": RANGES, "all_trials": rows}
+    (folder / f"{law}_trials.json").write_text(as_json(record, indent=1) + "\n", encoding="utf-8")
+    with styled():
+        shipped = shipped_score(outcome.plan, outcome.trials)
+        save(draw_front(law, found, shipped, outcome.chosen), folder / "figures" / f"{law}-front.png")
+        if outcome.table is not None:
+            write_table(folder / f"{law}_unseen.parquet", outcome.table)
+            save(draw_unseen(law, outcome.table), folder / "figures" / f"{law}-unseen.png")
+    (folder / f"report_{law}.md").write_text("\n".join(_page(outcome, summary)) + "\n", encoding="utf-8")
+    return summary
+
+
+def _objectives(score: Score) -> dict[str, float]:
+    return dict(zip((each.column for each in OBJECTIVES), score.values, strict=True)) | {"failed": score.failed}
+
+
+def _finalists(scores: dict[str, Score]) -> list[str]:
+    """Table of the finalists beside the shipped preset."""
+    if not scores:
+        return []
+    heads = ["on the seeds of the choice", *(each.label for each in OBJECTIVES), "flights failed", "may take its place"]
+    lines = ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
+    for name, each in scores.items():
+        values = (f"{one.scale * value:.3g}" for one, value in zip(OBJECTIVES, each.values, strict=True))
+        good = allowed(each, scores[SHIPPED]) and gain_over(each, scores[SHIPPED]) < 0.0
+        words = "" if name == SHIPPED else "yes" if good else "no"
+        title = name if name == SHIPPED else f"trial {name}"
+        lines.append(f"| {title} | {' | '.join(values)} | {100.0 * each.failed:.0f} % | {words} |")
+    return [*lines, ""]
+
+
+def _page(outcome: Outcome, summary: dict[str, Any]) -> list[str]:
+    law, shipped = outcome.law, shipped_score(outcome.plan, outcome.trials)
+    lines = [
+        f"# Tuning of the {law_name(law)}",
+        "",
+        f"`{outcome.again}`: {summary['trials']} trials, of which {summary['completed_trials']} completed every flight "
+        f"and {len(summary['front'])} are on the front.",
+        "",
+        f"![Front](figures/{law}-front.png)",
+        "",
+        *_finalists(outcome.choice.scores),
+    ]
+    if outcome.chosen is None:
+        return [
+            *lines,
+            "No trial betters the shipped preset on the whole without being clearly worse in one objective, in the "
+            "search and on the seeds of the choice: the shipped preset stays.",
+        ]
+    share = 100.0 * (1.0 - math.exp(gain_over(outcome.scores[outcome.chosen], shipped)))
+    lines += [
+        f"Trial {outcome.chosen} was chosen; on the flights of the search its objectives are {share:.0f} % smaller on "
+        "the geometric mean. On seeds that neither search nor choice saw:",
+        "",
+        "| scene | objective | flights | shipped | tuned | tuned - shipped (95 % interval) | verdict |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    scale = {each.column: each for each in OBJECTIVES}
+    for each in summary["unseen"]:
+        objective = scale[each["objective"]]
+        a, b = (objective.scale * each[name] for name in ("shipped", "tuned"))
+        median, low, high = (objective.scale * each["difference"][name] for name in ("median", "low", "high"))
+        lines.append(
+            f"| {each['scene']} | {objective.label} | {each['n']} | {a:.3g} | {b:.3g} | "
+            f"{median:+.3g} ({low:+.3g} to {high:+.3g}) | {each['verdict']} |"
+        )
+    return [*lines, "", f"![Unseen seeds](figures/{law}-unseen.png)"]

@@ -1,0 +1,45 @@
+"""What is searched: the gains that both laws share, each over a logarithmic range."""
+
+from __future__ import annotations
+
+import dataclasses
+
+from ibvs_qp.pilot import PilotConfig
+
+#: Search range of every gain, both laws alike: [low, high] on a logarithmic scale, about a decade around what flies.
+RANGES = {
+    "line_kp": (4.0, 40.0),
+    "line_kd": (3.0, 14.0),
+    "line_ki": (0.5, 15.0),
+    "theta_kp": (4.0, 60.0),
+    "theta_kd": (3.0, 16.0),
+    "line_turn_share": (0.1, 1.0),
+    "velocity_kp": (1.0, 8.0),
+    "velocity_ki": (0.3, 6.0),
+    "attitude_kp": (15.0, 80.0),
+    "attitude_kd": (6.0, 18.0),
+    "yaw_kp": (8.0, 60.0),
+    "yaw_kd": (4.0, 16.0),
+    "force_ksp": (10.0, 300.0),
+    "force_ksd": (30.0, 250.0),
+    "force_kfp": (0.05, 1.0),
+    "force_kfi": (0.4, 5.0),
+}
+#: Digits that are kept of a gain, so that the preset written is the one flown.
+DIGITS = 4
+
+
+def rounded(gains: dict[str, float]) -> dict[str, float]:
+    """Gains as a preset shows them."""
+    return {name: float(f"{value:.{DIGITS}g}") for name, value in gains.items()}
+
+
+def with_gains(config: PilotConfig, gains: dict[str, float]) -> PilotConfig:
+    """The pilot with other gains."""
+    controller = dataclasses.replace(config.controller, gains=dataclasses.replace(config.controller.gains, **gains))
+    return dataclasses.replace(config, controller=controller)
+
+
+def searched_gains(config: PilotConfig) -> dict[str, float]:
+    """The present values of what is searched."""
+    return {name: getattr(config.controller.gains, name) for name in RANGES}
