@@ -16,7 +16,7 @@ from sim.tune.verdict import TUNED, paired
 
 #: Trials worse than this many times the shipped preset lie outside the picture.
 _SHOWN_TO = 4.0
-_MARKERS = ("o", "s", "^", "D")
+_MARKERS, _SHADES = ("o", "s", "^", "D"), ("#222222", "#8a8a8a", "#c0a000")
 
 
 def draw_front(law: str, scores: dict[int, Score], shipped: Score, chosen: int | None) -> Figure:
@@ -47,7 +47,7 @@ def draw_front(law: str, scores: dict[int, Score], shipped: Score, chosen: int |
         axes.set_ylabel(y.label)
     handles, labels = grid[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper right", ncols=4)
-    figure.suptitle(f"{law_name(law)}: {len(scores)} trials, {len(able)} that complete every flight", x=0.01, ha="left",
+    figure.suptitle(f"{law_name(law)}, {len(scores)} trials", x=0.01, ha="left",
                     fontsize=9, fontweight="bold")  # fmt: skip
     return figure
 
@@ -59,11 +59,11 @@ def draw_unseen(law: str, table: pl.DataFrame) -> Figure:
     figure = new_figure(2.5)
     grid = figure.subplots(1, len(OBJECTIVES))
     for axes, each in zip(grid, OBJECTIVES, strict=True):
-        for scene, marker in zip(names, _MARKERS, strict=False):
+        for scene, marker, shade in zip(names, _MARKERS, (law_colour(law), *_SHADES), strict=False):
             rows = both.filter(pl.col(PARAM + "scene") == scene)
             before, after = (each.scale * rows[name].to_numpy() for name in (each.column, f"{each.column}.{TUNED}"))
             axes.scatter(before, after, s=16, marker=marker, alpha=0.75, linewidth=0, label=scene,
-                         color=law_colour(law) if scene == names[0] else None)  # fmt: skip
+                         color=shade)  # fmt: skip
         reach = 1.08 * max(*axes.get_xlim(), *axes.get_ylim())
         axes.plot((0.0, reach), (0.0, reach), **REFERENCE)
         axes.set_xlim(0.0, reach)
