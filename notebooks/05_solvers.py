@@ -49,7 +49,7 @@ def _():
 
 @app.cell
 def _():
-    flight = hard_press(ticks=unless_short(1900, 1220))
+    flight = hard_press(ticks=unless_short(1900, 1320))
     stretch = flight.busy(unless_short(500, 100))
     exact = exact_solutions(stretch)
     return exact, flight, stretch

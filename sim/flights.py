@@ -14,6 +14,7 @@ import threading
 import traceback
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any
@@ -104,6 +105,7 @@ def _start(
 ) -> None:
     """Start a process per job; Ctrl-C is blocked so that it cannot hit their imports."""
     context = multiprocessing.get_context("spawn")
+    resource_tracker.ensure_running()  # its own start lets Ctrl-C through again
     signal.pthread_sigmask(signal.SIG_BLOCK, _SIGINT)
     try:
         for law, job in jobs.items():

@@ -52,7 +52,7 @@ def test_plain_python_presses_and_slides(printed: dict[str, str]) -> None:
         printed["plain_python"],
     )
     assert len(rows) == 12
-    pressed = [row for row in rows if float(row[0]) >= 4.0]
+    pressed = [row for row in rows if float(row[0]) >= 5.0]  # the last centimetre is flown at 12 mm/s
     assert all(row[1] == "contact" and row[5] == "solved" for row in pressed)
     assert np.abs([float(row[2]) - 5.0 for row in pressed]).max() <= 0.5
     assert np.abs([float(row[3]) for row in pressed]).max() <= 3.0

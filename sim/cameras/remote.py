@@ -10,6 +10,7 @@ import signal
 import sys
 import traceback
 from collections.abc import Callable
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from typing import NoReturn
 
@@ -56,6 +57,7 @@ class RemoteCamera:
         self._process = context.Process(
             target=_draw, args=(scene, vehicle, seed, memory, places, there), name="camera", daemon=True
         )
+        resource_tracker.ensure_running()  # its own start lets Ctrl-C through again
         signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # Ctrl-C must not hit its imports
         try:
             self._process.start()

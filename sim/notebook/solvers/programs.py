@@ -87,7 +87,7 @@ def hard_press(ticks: int, seed: int = 0) -> Stretch:
     """A press beyond reach from just before the wall; nobody reduces the push.
 
     Args:
-        ticks: Ticks flown; the rotors meet their idle floor after about 1150, 1 s after the touch.
+        ticks: Ticks flown; the rotors meet their idle floor after about 1270, 1 s after the touch.
         seed: Of the flight.
     """
     scene = near_wall(paint={"push_n": HARD_PUSH_N})
