@@ -84,7 +84,8 @@ def standoff_force(signals: Signals, config: ControllerConfig, body: Body, touch
 def _search(signals: Signals, config: ControllerConfig, body: Body, touch: Touch, wish: Wish, lag: ca.SX) -> ca.SX:
     """Lean on harder while the tip should move in but does not: a noisy force sensor needs a firmer touch."""
     old, gain = signals.state("search_force"), config.vehicle.mass_kg * SEARCH_GAIN
-    moved = clamp(old + gain * lag * body.dt, 0.0, SEARCH_BOUND)
+    step = ca.if_else(signals.input("given_up") < WINDUP_FORCE, body.dt, 0.0)
+    moved = clamp(old + gain * lag * step, 0.0, SEARCH_BOUND)
     near = ca.logic_and(wish.press, touch.distance < config.contact.contact_distance_m)
     new = ca.if_else(near, ca.if_else(touch.touching, old, moved), 0.0)
     return signals.remember("search_force", ca.if_else(touch.known, new, old))
