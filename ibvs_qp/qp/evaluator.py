@@ -7,28 +7,24 @@ from collections.abc import Sequence
 import casadi as ca
 import numpy as np
 
+from ibvs_qp.bound_function import BoundFunction
 from ibvs_qp.machine_code import machine_code
 from ibvs_qp.qp.assembly import QpTemplate
 
 
-class BufferedFunction:
-    """A CasADi function bound to owned contiguous arrays; calling it fills the output arrays in place."""
+class BufferedFunction(BoundFunction):
+    """A CasADi function bound to arrays of its own; calling it fills the output arrays in place.
+
+    Attributes:
+        inputs, outputs: The arrays, one per argument and result.
+    """
 
     def __init__(self, function: ca.Function, to_machine_code: bool = False) -> None:
         if to_machine_code:
             function = machine_code(function)
-        self._buffer, self._trigger = function.buffer()
         self.inputs = [np.zeros(function.numel_in(i)) for i in range(function.n_in())]
         self.outputs = [np.zeros(function.numel_out(i)) for i in range(function.n_out())]
-        for index, array in enumerate(self.inputs):
-            self._buffer.set_arg(index, memoryview(array))  # type: ignore[arg-type, call-arg]
-        for index, array in enumerate(self.outputs):
-            self._buffer.set_res(index, memoryview(array))  # type: ignore[arg-type, call-arg]
-        self._function = function  # the buffer does not keep the function alive
-
-    def __call__(self) -> None:
-        """Evaluate on the present inputs."""
-        self._trigger()
+        super().__init__(function, self.inputs, self.outputs)
 
 
 class ProgramData:
