@@ -104,7 +104,8 @@ def _(results):
     - *Iterations buy digits*, a few for every decade of tolerance, and never all of them.
     - *So the shipped controller asks OSQP last.* The rows that bound in the last tick mostly bind in this one: it
       solves on them exactly and mends the guess a few times (`ibvs_qp/qp/active_set.py`). Only where that fails OSQP
-      iterates, and its final rows are solved exactly in turn. Asked at every tick it stays at its tolerance where no row has a price.
+      iterates, and its final rows are solved exactly in turn. Asked at every tick it stays at its tolerance where no
+      row has a price.
     - *Where OSQP does not win:* at this size (six thrusts, a handful of slacks) DAQP with a kept workspace is faster
       than OSQP **and** exact. Called through CasADi or `qpsolvers` the same DAQP loses that lead to conversions. In the
       controller it is the exact fallback. What speaks for OSQP here is not the median: every iteration costs the
