@@ -98,10 +98,31 @@ def test_a_noisy_force_sensor_slows_the_observer_in_contact() -> None:
         gust = np.array([2.0, 0, 0, 0, 0, 0])
         thrusts = np.linalg.solve(MATRIX, -np.array([0, 0, WEIGHT, 0, 0, 0]))
         for _ in range(25):
+            block.tick.states["gust_power"][:] = 1.0  # amid gusts
             without_lag(block, thrusts, specific_force=STILL + gust[:3] / VEHICLE.mass_kg)
         found.append(float(wrench(block)[0]))
-    assert found[0] == pytest.approx(2.0 * (1.0 - np.exp(-0.1 * GUST_BANDWIDTH)), rel=0.01)
+    assert found[0] == pytest.approx(2.0 * (1.0 - np.exp(-0.1 * GUST_BANDWIDTH)), rel=0.02)
     assert found[1] < 0.1 * found[0]
+
+
+def test_in_calm_air_sensor_noise_is_not_handed_on_and_a_gust_wakes_the_observer() -> None:
+    rng, block = np.random.default_rng(3), observer()
+    block.touch(touching=True)
+    thrusts = np.linalg.solve(MATRIX, -np.array([0, 0, WEIGHT, 0, 0, 0]))
+
+    def fly(gust: float, seconds: float) -> np.ndarray:
+        found = []
+        for _ in range(round(seconds / TICK)):
+            noise = rng.normal(0.0, 0.25)  # 6 kg x 4e-3 m/s^2/sqrt(Hz) at 250 Hz, and the force sensor's
+            force = np.array([(gust + noise) / VEHICLE.mass_kg, 0.0, 0.0])
+            without_lag(block, thrusts, specific_force=STILL + force)
+            found.append(float(wrench(block)[0]))
+        return np.array(found)
+
+    calm = fly(0.0, 6.0)[500:]
+    fixed = 0.25 * np.sqrt(GUST_BANDWIDTH * TICK / 2.0)  # what a first-order filter leaves of white noise
+    assert np.std(calm) < 0.4 * fixed
+    assert fly(1.0, 0.5)[-1] > 0.8  # 1 N that comes at once is learnt within half a second
 
 
 def test_acceleration_is_not_taken_for_a_load() -> None:

@@ -9,13 +9,17 @@ from symbolic_block import Block
 from ibvs_qp.setpoints.friction import ASSUMED_FRICTION, FRICTION_RANGE, PATIENCE, RISE, estimated_friction
 from ibvs_qp.setpoints.sensed import Body, Touch
 
+#: Place of the tip, ahead of the centre of mass and above it [m].
+TIP = (0.6, 0.0, -0.1)
+
 
 def estimator(travel: float = 0.1) -> Block:
     """The estimator on its own, travelling to the right against the wall."""
 
     def build(signals):
         body, touch = Body.of(signals), Touch.of(signals)
-        return estimated_friction(signals, body, touch, signals.input("travel", 3), 0.01, 0.005)[1]
+        tip = body.velocity_of(TIP)
+        return estimated_friction(signals, body, touch, tip, signals.input("travel", 3), 0.01, 0.005)[1]
 
     block = Block(build)
     block.touch(touching=1.0)
@@ -53,6 +57,16 @@ def test_a_held_tip_raises_the_belief_until_it_breaks_away() -> None:
     assert slide(block, 5.0, 1.5, 0.0, round(PATIENCE / 0.004) - 1) == ASSUMED_FRICTION
     assert slide(block, 5.0, 1.5, 0.0, 250) == pytest.approx(ASSUMED_FRICTION + RISE, abs=0.01)
     assert slide(block, 5.0, 1.5, 0.0, 2500) == FRICTION_RANGE[1]
+
+
+def test_a_vehicle_that_turns_about_a_held_tip_learns_nothing_from_its_growing_force() -> None:
+    """Its centre of mass moves to the right by 0.05 m/s, its tip stands: the force is what we push, not friction."""
+    block, speed = estimator(), 0.05
+    turn = (0.0, 0.0, -speed / TIP[0])
+    block.touch(push=5.0)
+    for force in np.linspace(0.0, 1.5, 90):  # shorter than the patience
+        block(contact_wrench=(-5.0, -force, 0.0, 0.0, 0.0, 0.0), velocity=(0.0, speed, 0.0), angular_velocity=turn)
+    assert float(block.tick.outputs["value"][0]) == ASSUMED_FRICTION
 
 
 def test_friction_stays_plausible() -> None:

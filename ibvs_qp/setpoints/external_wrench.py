@@ -17,6 +17,9 @@ FORCE_BANDWIDTH_FREE, FORCE_BANDWIDTH_WALL = 4.0, 1.5
 #: In contact the force sensor's noise is handed on as force: the bandwidth along the normal halves at this filtered
 #: noise [N].
 QUIET_PUSH = 0.15
+#: In calm air the observer along the normal only hands on the sensors' noise. Its bandwidth halves where what it has
+#: not learnt yet is this strong [N rms], low-passed at its own bandwidth and averaged over this time [s].
+CALM_AIR, CALM_TIME = 0.1, 0.5
 #: Bandwidth of the moment observer [rad/s]; below the attitude loop so that the two do not fight.
 MOMENT_BANDWIDTH = 2.5
 #: The force observer averages evenly over this time at the start, then turns to its bandwidth [s].
@@ -41,7 +44,7 @@ def external_wrench(
     vehicle: VehicleParams,
     effectiveness: np.ndarray,
     body: Body,
-    expected: ca.SX,
+    felt_moment: ca.SX,
     normal: ca.SX,
     touching: ca.SX,
     noise: ca.SX,
@@ -61,7 +64,7 @@ def external_wrench(
         vehicle: Mass, inertia, motor lags.
         effectiveness: B, (6, n).
         body: Inertial measurements.
-        expected: Moment already fed forward [N m], (3,).
+        felt_moment: Moment of the contact, measured [N m], (3,).
         normal: Unit vector into the wall, in B.
         touching: 1 in contact or about to be.
         noise: Deviation of the filtered push in free flight [N].
@@ -72,7 +75,7 @@ def external_wrench(
     awake = ca.logic_and(ready, body.dt > 0.0)
     active = awake if adapt_in_contact else ca.logic_and(awake, ca.logic_not(touching))
     force = _force(signals, vehicle, body, rotors[:3], normal, touching, noise, awake, active)
-    moment = _moment(signals, vehicle, body, rotors[3:] + expected, awake, active)
+    moment = _moment(signals, vehicle, body, rotors[3:] + felt_moment, awake, active)
     return ca.vertcat(force, moment)
 
 
@@ -103,14 +106,22 @@ def _force(
     time = signals.remember("external_time", ca.if_else(awake, time + body.dt, time))
     free = vehicle.mass_kg * body.specific_force - rotors - old
     felt = free - body.wrench[:3]
-    along = normal * ca.dot(normal, felt)
-    quiet = 1.0 / (1.0 + (noise / QUIET_PUSH) ** 2)
-    pressing = GUST_BANDWIDTH * quiet
+    size = ca.dot(normal, felt)
+    along = size * normal
+    pressing = GUST_BANDWIDTH * _windy(signals, body.dt, touching * size) / (1.0 + (noise / QUIET_PUSH) ** 2)
     learnt = _share(pressing, body.dt) * along + _share(FORCE_BANDWIDTH_WALL, body.dt) * (felt - along)
     average = ca.if_else(time < START_TIME, body.dt / ca.fmax(time, 1e-9), 0.0)
     step = ca.if_else(touching, learnt, ca.fmax(_share(FORCE_BANDWIDTH_FREE, body.dt), average) * free)
     new = clamp(old + step, -FORCE_BOUND, FORCE_BOUND)
     return signals.remember("external_force", ca.if_else(ca.logic_and(active, body.felt), new, old))
+
+
+def _windy(signals: Signals, dt: ca.SX, unlearnt: ca.SX) -> ca.SX:
+    """Weight of the observer along the normal: 0 in calm air to 1 in gusts, by the power of the unlearnt force."""
+    smooth, power = signals.state("gust_unlearnt"), signals.state("gust_power")
+    smooth = signals.remember("gust_unlearnt", smooth + _share(GUST_BANDWIDTH, dt) * (unlearnt - smooth))
+    power = signals.remember("gust_power", power + _share(1.0 / CALM_TIME, dt) * (smooth**2 - power))
+    return power / (power + CALM_AIR**2)
 
 
 def _share(bandwidth: ca.SX | float, dt: ca.SX) -> ca.SX:

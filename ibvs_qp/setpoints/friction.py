@@ -29,7 +29,7 @@ def cautious_friction(signals: Signals, friction: ca.SX) -> ca.SX:
 
 
 def estimated_friction(
-    signals: Signals, body: Body, touch: Touch, travel: ca.SX, sliding_command: float, stuck_speed: float
+    signals: Signals, body: Body, touch: Touch, tip: ca.SX, travel: ca.SX, sliding_command: float, stuck_speed: float
 ) -> tuple[ca.SX, ca.SX]:
     r"""Friction coefficient believed before and after this tick.
 
@@ -37,8 +37,9 @@ def estimated_friction(
 
     Args:
         signals: Keeps the estimate.
-        body: Velocity and measured force.
+        body: Measured force and time step.
         touch: Push and whether the tip touches.
+        tip: Velocity of the tip, in B [m/s], (3,): a vehicle that turns about a held tip moves, its tip does not.
         travel: Commanded velocity in the wall plane, in B [m/s], (3,).
         sliding_command: Commanded speed above which the tip is meant to slide [m/s].
         stuck_speed: Speed below which it counts as held [m/s].
@@ -46,7 +47,7 @@ def estimated_friction(
     before, held = signals.state("friction", start=ASSUMED_FRICTION), signals.state("friction_held")
     speed = ca.norm_2(travel)
     direction = travel / ca.fmax(speed, 1e-9)
-    along = ca.dot(direction, body.velocity)
+    along = ca.dot(direction, tip)
     watching = ca.logic_and(ca.logic_and(touch.touching, body.moving), speed > 0.0)
     still = ca.logic_and(speed > sliding_command, along < stuck_speed)
     waited = ca.if_else(still, held + body.dt, 0.0)

@@ -33,14 +33,18 @@ def setpoint_model(config: ControllerConfig) -> Signals:
     wanted_turn(signals, config.gains, body, touch, wish)
     travel = wish.velocity[0] * wall.right + wish.velocity[1] * wall.down
 
-    before, friction = estimated_friction(signals, body, touch, travel, SLIDING_COMMAND, config.contact.stuck_speed_m_s)
+    tip = body.velocity_of(vehicle.tip_position_m)
+    before, friction = estimated_friction(
+        signals, body, touch, tip, travel, SLIDING_COMMAND, config.contact.stuck_speed_m_s
+    )
     signals.output("friction", friction)
-    expected = ca.SX.zeros(6)
+    expected, felt_moment = ca.SX.zeros(6), ca.SX.zeros(3)
     if config.contact_feedforward:
-        expected = contact_feedforward(signals, config.contact, body, touch, travel, before)
+        contact = contact_feedforward(signals, config, body, touch, travel, before)
+        expected, felt_moment = ca.vertcat(contact.force, contact.moment), contact.felt_moment
     near = ca.logic_or(touch.touching, touch.distance < config.contact.contact_distance_m)
     external = external_wrench(
-        signals, vehicle, effectiveness, body, expected[3:], wall.normal, near, touch.noise, config.contact_feedforward
+        signals, vehicle, effectiveness, body, felt_moment, wall.normal, near, touch.noise, config.contact_feedforward
     )
     inertia = ca.DM(vehicle.inertia_kg_m2)
     gyroscopic = -ca.cross(body.rate, inertia * body.rate)

@@ -69,6 +69,14 @@ class Body:
             moving=signals.input("moving"),
         )
 
+    def velocity_of(self, point: tuple[float, float, float]) -> ca.SX:
+        r"""Velocity of a point of the body, :math:`v + \Omega \times p` [m/s], (3,).
+
+        Args:
+            point: The point, in B [m].
+        """
+        return self.velocity + ca.cross(self.rate, ca.DM(point))
+
 
 @dataclass(frozen=True, kw_only=True)
 class Touch:
