@@ -216,6 +216,9 @@ class ControllerConfig:
     touch_ramp: bool = setting(True, "ramp lambda and the force reference after touch")
     reach_check: bool = setting(True, "reduce a push that the vehicle cannot hold")
     barriers: bool = setting(True, "all barriers; each has its own switch in limits")
+    thrust_rows: bool = setting(
+        True, "the program knows the rotors' limits (False: it does not, and its thrusts are clipped afterwards)"
+    )
     machine_code: bool = setting(
         False, "translate the tick with the C compiler, if there is one: the same bits, 1 s once, 25 us less per tick"
     )

@@ -115,6 +115,11 @@ class HybridController:
         solution = self.engine.solve()
         if solution is None:
             return self._fallback(checked, rejected)
+        if not self.config.thrust_rows:
+            mode = contact_mode(self.setpoints, self._reference)
+            return clipped_command(
+                self.setpoints, int(checked.stamp_ns), solution.thrusts, solution.outcome, mode, rejected
+            )
         return self._finish(checked, solution, rejected)
 
     def _finish(self, measurement: Measurement, solution: AcceptedSolution, rejected: tuple[str, ...]) -> Command:

@@ -12,6 +12,8 @@ from ibvs_qp.qp.model import LimitRow, SymbolicModel
 
 #: Least distance between lower and upper bound [N]: OSQP takes a row for an equality below 1e-4 and refactorises.
 LEAST_GAP = 1e-3
+#: Bound of a thrust that the program shall not know limits of [N]; finite, for solvers.
+NO_LIMIT = 1e4
 
 
 class ThrustLimit(Limit):
@@ -22,6 +24,8 @@ class ThrustLimit(Limit):
         lower = model.parameter("thrust_lower", model.rotors)
         upper = model.parameter("thrust_upper", model.rotors)
         names = model.config.vehicle.geometry.names
+        if not model.config.thrust_rows:
+            lower, upper = ca.SX.ones(model.rotors) * -NO_LIMIT, ca.SX.ones(model.rotors) * NO_LIMIT
         return [
             LimitRow(name=f"thrust_{names[i]}", unit="N", expression=model.thrust[i], lower=lower[i], upper=upper[i])
             for i in range(model.rotors)

@@ -45,6 +45,11 @@ VARIANTS = {
     "no-feedforward": Variant(words="no contact feed-forward", switches={"contact_feedforward": False}),
     "no-ramp": Variant(words="no ramp after touch", switches={"touch_ramp": False}),
     "no-barriers": Variant(words="no barriers", switches={"barriers": False}, laws=("qp",)),
+    "clipped": Variant(
+        words="a program without rotor limits, its thrusts clipped afterwards, no reach check",
+        switches={"thrust_rows": False, "reach_check": False},
+        laws=("qp",),
+    ),
     "paper-lines": Variant(
         words="line rows of the QP at the image centre, as in the paper, instead of at the tip",
         switches={"line_profile": "paper"},

@@ -25,6 +25,7 @@ _STYLES = (
     ("standard", 0.3, "-", "reach check"),
     ("no-reach-check", 0.3, "--", "no reach check"),
     ("no-reach-check", 0.05, ":", "no check, friction 0.05"),
+    ("clipped", 0.3, "-.", "clipped afterwards"),
 )
 #: Offset of the laws along x [N].
 _SHIFT = {"qp": -0.12, "paper": 0.12}
