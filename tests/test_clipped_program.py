@@ -8,7 +8,6 @@ import numpy as np
 from controller_scenes import line_references
 from small_vehicle import SmallVehicle
 
-from allocation import control_effectiveness
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import Reference
