@@ -5,19 +5,14 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
+from sim.commands.options import flag, optional
+
 if TYPE_CHECKING:
     from sim.bench.timing import Bench as BenchResult
-
-_flag = tyro.conf.arg(help_behavior_hint="")
-
-
-def _optional(metavar: str) -> Any:
-    """Help text of an option whose default is worded in its description."""
-    return tyro.conf.arg(metavar=metavar, help_behavior_hint="")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -35,11 +30,11 @@ class Bench:
     """bench qp: rivals see every so many-th tick."""
     frames: int = 160
     """bench vision: rendered pictures per size; the first 12 warm up."""
-    real: Annotated[Path | None, _optional("DIR")] = None
+    real: Annotated[Path | None, optional("DIR")] = None
     """bench vision: folder of real RGB-D frames with a manifest.csv; default: rendered frames only."""
     seed: int = 0
     """Varies textures, clutter and noise of the rendered pictures."""
-    json: Annotated[bool, _flag] = False
+    json: Annotated[bool, flag] = False
     """Print one JSON line on standard output, and nothing else."""
 
     def run(self, words: list[str]) -> int:

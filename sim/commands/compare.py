@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
+from sim.commands.options import flag, optional
+
 if TYPE_CHECKING:
     import polars as pl
 
-_flag = tyro.conf.arg(help_behavior_hint="")
 #: Figures shown first; the rest is in the JSON.
 SHOWN = (
     "path_rms_straight_m", "path_rms_corner_m", "path_rms_m", "force_rms_straight_n", "force_rms_corner_n",
@@ -41,13 +42,13 @@ class Compare:
     """Presets only: first seed."""
     features: Literal["rendered", "geometric"] = "rendered"
     """Presets only: perception."""
-    quick: Annotated[bool, _flag] = False
+    quick: Annotated[bool, flag] = False
     """Presets only: a short paint job instead of the whole one."""
-    jobs: Annotated[int | None, tyro.conf.arg(metavar="N", help_behavior_hint="")] = None
+    jobs: Annotated[int | None, optional("N")] = None
     """Presets only: processes side by side; default: one per core."""
-    out: Annotated[Path | None, tyro.conf.arg(metavar="DIR", help_behavior_hint="")] = None
+    out: Annotated[Path | None, optional("DIR")] = None
     """Presets only: folder of the flights; default: runs/<UTC stamp>."""
-    json: Annotated[bool, _flag] = False
+    json: Annotated[bool, flag] = False
     """Print one line of JSON on standard output, and nothing else."""
 
     def run(self, words: list[str]) -> int:

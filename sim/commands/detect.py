@@ -5,23 +5,16 @@ from __future__ import annotations
 import dataclasses
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
-
-import tyro
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from ibvs_qp.errors import ConfigError
+from sim.commands.options import flag, optional
 from sim.detection.methods import METHODS
 
 if TYPE_CHECKING:
     from sim.detection.manifest import FrameEntry
 
 
-def _optional(metavar: str) -> Any:
-    """Help text of an option whose default is worded in its description."""
-    return tyro.conf.arg(metavar=metavar, help_behavior_hint="")
-
-
-_flag = tyro.conf.arg(help_behavior_hint="")
 #: What a single frame needs, besides --rgb.
 _CAMERA = ("fx", "fy", "cx", "cy")
 
@@ -34,37 +27,37 @@ class Detect:
     --seed-pixel 270 150 --overlay pictures
     """
 
-    rgb: Annotated[Path | None, _optional("FILE")] = None
+    rgb: Annotated[Path | None, optional("FILE")] = None
     """Colour picture of one frame (8 or 16 bits)."""
-    depth: Annotated[Path | None, _optional("FILE")] = None
+    depth: Annotated[Path | None, optional("FILE")] = None
     """Depth picture registered to it (8 or 16 bits or floating point; 0 = invalid); without it nothing but lines."""
-    fx: Annotated[float | None, _optional("PX")] = None
+    fx: Annotated[float | None, optional("PX")] = None
     """Focal length along the rows."""
-    fy: Annotated[float | None, _optional("PX")] = None
+    fy: Annotated[float | None, optional("PX")] = None
     """Focal length along the columns."""
-    cx: Annotated[float | None, _optional("PX")] = None
+    cx: Annotated[float | None, optional("PX")] = None
     """Column of the principal point, pixel centres at integers."""
-    cy: Annotated[float | None, _optional("PX")] = None
+    cy: Annotated[float | None, optional("PX")] = None
     """Row of the principal point."""
     depth_units_per_metre: float = 1000.0
     """Depth values per metre: 1000 for millimetres, 5000 for TUM, 1 for metres."""
-    distortion: Annotated[tuple[float, float, float, float, float] | None, _optional("K1 K2 P1 P2 K3")] = None
+    distortion: Annotated[tuple[float, float, float, float, float] | None, optional("K1 K2 P1 P2 K3")] = None
     """Lens distortion as OpenCV orders it; rho and theta are then those of the straightened lines."""
-    seed_pixel: Annotated[tuple[float, float] | None, _optional("U V")] = None
+    seed_pixel: Annotated[tuple[float, float] | None, optional("U V")] = None
     """A place on the surface; without it no surface and no guides, only lines."""
-    sequence: Annotated[Path | None, _optional("DIR")] = None
+    sequence: Annotated[Path | None, optional("DIR")] = None
     """Folder of frames; frames named PREFIX_NUMBER_color whose numbers follow on by one are a motion sequence."""
     method: Literal[tuple(METHODS)] = "own"  # type: ignore[valid-type]
     """Pipeline."""
-    all: Annotated[bool, _flag] = False
+    all: Annotated[bool, flag] = False
     """Candidates are every line of the whole picture, on the surface or not."""
-    track: Annotated[bool, _flag] = False
+    track: Annotated[bool, flag] = False
     """Follow lines through a motion sequence (this is the default)."""
-    no_track: Annotated[bool, _flag] = False
+    no_track: Annotated[bool, flag] = False
     """Look at every frame alone."""
-    overlay: Annotated[Path | None, _optional("DIR")] = None
+    overlay: Annotated[Path | None, optional("DIR")] = None
     """Write a picture of every frame with what was found."""
-    json: Annotated[bool, _flag] = False
+    json: Annotated[bool, flag] = False
     """Print the result as one line of JSON on standard output, and nothing else."""
     seed: int = 0
     """Accepted as by every command; the result depends on the pictures alone."""

@@ -14,12 +14,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
+from sim.commands.options import check_count, flag, go_on, optional
+
 if TYPE_CHECKING:
     from rich.console import Console
 
     from sim.sweep.design import Run
 
-_flag = tyro.conf.arg(help_behavior_hint="")
 Name = Literal[
     "force-hold",
     "paint",
@@ -45,19 +46,19 @@ class ExperimentCommand:
     name: Annotated[Name, tyro.conf.Positional, tyro.conf.arg(metavar="NAME")]
     """Which: force-hold, paint, noise-sweep, saturation, sloped-edge, friction, gust, rotor-derate, approach, payload
     or all."""
-    quick: Annotated[bool, _flag] = False
+    quick: Annotated[bool, flag] = False
     """Few cells and seeds: minutes, not the record."""
     features: Literal["rendered", "geometric"] = "rendered"
     """Perception: rendered pictures through the whole vision, or a sensor model of lines."""
     seed: int = 0
     """First seed; flights of a cell take this and the following ones."""
-    jobs: Annotated[int | None, tyro.conf.arg(metavar="N", help_behavior_hint="")] = None
+    jobs: Annotated[int | None, optional("N")] = None
     """Processes side by side; default: one per core. The results do not depend on it."""
-    out: Annotated[Path | None, tyro.conf.arg(metavar="DIR", help_behavior_hint="")] = None
+    out: Annotated[Path | None, optional("DIR")] = None
     """Folder; default: runs/<UTC stamp>. Given one with finished flights, only the others are flown."""
-    plan: Annotated[bool, _flag] = False
+    plan: Annotated[bool, flag] = False
     """Print how many flights there are and how long they fly, and stop."""
-    json: Annotated[bool, _flag] = False
+    json: Annotated[bool, flag] = False
     """Print the summary as one line on standard output, and nothing else."""
 
     def run(self, words: list[str]) -> int:
@@ -76,7 +77,6 @@ class ExperimentCommand:
 
         from rich.console import Console
 
-        from ibvs_qp.errors import out_of_range
         from sim.checks import check_seed
         from sim.experiments import chosen, designs
         from sim.experiments.base import Choice
@@ -88,8 +88,7 @@ class ExperimentCommand:
 
         started = time.perf_counter()
         check_seed(self.seed)
-        if self.jobs is not None and self.jobs < 1:
-            raise out_of_range("--jobs", self.jobs, "", "allowed are 1, 2, 3, ...")
+        check_count("--jobs", self.jobs)
         notes = Console(stderr=True, quiet=self.json)
         choice = Choice(quick=self.quick, seed=self.seed, features=self.features)
         runs = designs(self.name, choice)
@@ -127,7 +126,7 @@ class ExperimentCommand:
             if page is not None:
                 Console().print(f"Results: {page}", soft_wrap=True, highlight=False)
         if result.interrupted:
-            again = shlex.join(["ibvs-qp", *_with_out(words, folder)])
+            again = go_on(words, folder)
             print(f"ibvs-qp: interrupted; finished flights are in {folder}; go on with: {again}", file=sys.stderr)
             return 130
         return 0
@@ -141,11 +140,6 @@ class ExperimentCommand:
 
 def _cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def _with_out(words: Sequence[str], folder: Path) -> list[str]:
-    given = any(word == "--out" or word.startswith("--out=") for word in words)
-    return [*words] if given else [*words, "--out", str(folder)]
 
 
 def _print_plan(console: Console, runs: Sequence[Run]) -> None:

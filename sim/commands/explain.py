@@ -11,6 +11,7 @@ import numpy as np
 import tyro
 
 from ibvs_qp.errors import IbvsQpError
+from sim.commands.options import optional
 
 if TYPE_CHECKING:
     from ibvs_qp.qp.replay import Explanation
@@ -32,9 +33,9 @@ class Explain:
     """Run folder of a flight under the QP law."""
     at: float
     """Time of the tick since the start [s]."""
-    seed: Annotated[int | None, tyro.conf.arg(metavar="INT", help_behavior_hint="")] = None
+    seed: Annotated[int | None, optional("INT")] = None
     """Checked against the run's, if given."""
-    solver: Annotated[str | None, tyro.conf.arg(metavar="NAME", help_behavior_hint="")] = None
+    solver: Annotated[str | None, optional("NAME")] = None
     """Back end of qpsolvers that solves the tick again; default: the exact solver."""
     json: Annotated[bool, tyro.conf.arg(help_behavior_hint="")] = False
     """Print one JSON line instead."""

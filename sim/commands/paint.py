@@ -7,23 +7,15 @@ import shlex
 import sys
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
-import tyro
+from sim.commands.options import flag, optional
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from sim.flights import Flight
     from sim.rundir import RunFolder
-
-
-def _optional(metavar: str) -> Any:
-    """Help text of an option whose default is worded in its description."""
-    return tyro.conf.arg(metavar=metavar, help_behavior_hint="")
-
-
-_flag = tyro.conf.arg(help_behavior_hint="")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -33,15 +25,15 @@ class Paint:
     Example: ibvs-qp paint --seed 3 --image-size 424x240 --out runs/seed3
     """
 
-    scene: Annotated[Path | None, _optional("FILE")] = None
+    scene: Annotated[Path | None, optional("FILE")] = None
     """Scene file (TOML); default: the built-in scene, a C of two rows."""
-    preset: Annotated[Path | None, _optional("FILE")] = None
+    preset: Annotated[Path | None, optional("FILE")] = None
     """Controller preset (TOML): vehicle model, gains, weights, limits; default: the built-in one."""
     features: Literal["rendered", "geometric"] = "rendered"
     """Perception: rendered pictures through the whole vision, or a sensor model of lines."""
     vision: Literal["own", "paper"] = "own"
     """Vision pipeline: the own one, or the paper's as a baseline (topmost level line, first upright one)."""
-    image_size: Annotated[Literal["640x480", "424x240"] | None, _optional("640x480|424x240")] = None
+    image_size: Annotated[Literal["640x480", "424x240"] | None, optional("640x480|424x240")] = None
     """Picture size; default: the scene's."""
     camera: Literal["plane", "gl", "auto"] = "plane"
     """Camera back end: plane needs no GL library; gl and auto draw with OpenGL where there is one, else with plane."""
@@ -49,13 +41,13 @@ class Paint:
     """Which law flies."""
     seed: int = 0
     """Varies start pose, textures, clutter, noise and biases; the same seed flies the same flight."""
-    out: Annotated[Path | None, _optional("DIR")] = None
+    out: Annotated[Path | None, optional("DIR")] = None
     """Run folder; default: runs/<UTC stamp>."""
-    json: Annotated[bool, _flag] = False
+    json: Annotated[bool, flag] = False
     """Print summary.json as one line on standard output, and nothing else."""
-    view: Annotated[bool, _flag] = False
+    view: Annotated[bool, flag] = False
     """Show the flight in MuJoCo's window at real time, one law after the other; needs a display."""
-    no_video: Annotated[bool, _flag] = False
+    no_video: Annotated[bool, flag] = False
     """Write no video."""
 
     def run(self, words: list[str]) -> int:

@@ -15,13 +15,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from sim.commands.options import check_count, flag, go_on, optional
+
 if TYPE_CHECKING:
     from rich.console import Console
 
     from sim.sweep import Planned, SweepResult
     from sim.sweep.pools import Pool
 
-_flag = tyro.conf.arg(help_behavior_hint="")
 PARTS = "parts"
 
 
@@ -34,25 +35,25 @@ class Sweep:
     Draw again: ibvs-qp sweep --report runs/friction
     """
 
-    spec: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="SPEC", help_behavior_hint="")] = None
+    spec: Annotated[Path | None, tyro.conf.Positional, optional("SPEC")] = None
     """The design (TOML)."""
-    report: Annotated[Path | None, tyro.conf.arg(metavar="DIR_OR_PARQUET", help_behavior_hint="")] = None
+    report: Annotated[Path | None, optional("DIR_OR_PARQUET")] = None
     """Fly nothing: draw box plots, heat maps and success-rate maps of a table that is there."""
-    figures: Annotated[tuple[str, ...], tyro.conf.arg(metavar="COLUMN ...", help_behavior_hint="")] = ()
+    figures: Annotated[tuple[str, ...], optional("COLUMN ...")] = ()
     """Columns to report; default: path, push, tilt and thrust rate."""
-    jobs: Annotated[int | None, tyro.conf.arg(metavar="N", help_behavior_hint="")] = None
+    jobs: Annotated[int | None, optional("N")] = None
     """Processes of this computer; default: one per core. The table does not depend on it."""
-    dask: Annotated[bool, _flag] = False
+    dask: Annotated[bool, flag] = False
     """Fly on a Dask cluster started here for the time of the sweep."""
-    scheduler: Annotated[str | None, tyro.conf.arg(metavar="ADDRESS", help_behavior_hint="")] = None
+    scheduler: Annotated[str | None, optional("ADDRESS")] = None
     """Fly on the Dask cluster of this scheduler, such as tcp://head:8786."""
-    seed: Annotated[int | None, tyro.conf.arg(metavar="N", help_behavior_hint="")] = None
+    seed: Annotated[int | None, optional("N")] = None
     """First seed, instead of the spec's."""
-    out: Annotated[Path | None, tyro.conf.arg(metavar="DIR", help_behavior_hint="")] = None
+    out: Annotated[Path | None, optional("DIR")] = None
     """Folder; default: runs/<UTC stamp>. Given one with finished blocks, only the others are flown."""
-    plan: Annotated[bool, _flag] = False
+    plan: Annotated[bool, flag] = False
     """Print how many flights there are and how long they fly, and stop."""
-    json: Annotated[bool, _flag] = False
+    json: Annotated[bool, flag] = False
     """Print one line of JSON on standard output, and nothing else."""
 
     def run(self, words: list[str]) -> int:
@@ -136,19 +137,17 @@ class Sweep:
         elif page is not None:
             print(f"{content['completed']} of {content['flights']} flights ended as planned. Report: {page}")
         if result.interrupted:
-            given = any(word.split("=")[0] == "--out" for word in words)
-            again = shlex.join(["ibvs-qp", *words, *([] if given else ["--out", str(folder)])])
+            again = go_on(words, folder)
             print(f"ibvs-qp: interrupted; finished blocks are in {folder}; go on with: {again}", file=sys.stderr)
             return 130
         return 0
 
     def _design(self) -> Planned:
-        from ibvs_qp.errors import ConfigError, out_of_range
+        from ibvs_qp.errors import ConfigError
         from sim.checks import check_seed
         from sim.sweep import Planned, load_spec
 
-        if self.jobs is not None and self.jobs < 1:
-            raise out_of_range("--jobs", self.jobs, "", "allowed are 1, 2, 3, ...")
+        check_count("--jobs", self.jobs)
         if self.dask and self.scheduler:
             raise ConfigError("--dask starts a cluster here, --scheduler uses one that runs; give one of them")
         assert self.spec is not None

@@ -8,14 +8,12 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import tyro
+from sim.commands.options import check_count, flag, go_on, optional
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from sim.tune.search import SearchPlan
-
-_flag = tyro.conf.arg(help_behavior_hint="")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -37,15 +35,15 @@ class Tune:
     """Seeds per scene on which shipped and tuned are compared; the best few trials fly half of that to be chosen."""
     features: Literal["geometric", "rendered"] = "geometric"
     """Perception: a sensor model of lines, or rendered pictures, which take five times as long."""
-    preset: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
+    preset: Annotated[Path | None, optional("FILE")] = None
     """Preset to start from; default: the shipped one."""
     jobs: int = 1
     """Trials side by side; the search depends on their number, not on what is faster."""
-    storage: Annotated[str | None, tyro.conf.arg(metavar="FILE_OR_URL", help_behavior_hint="")] = None
+    storage: Annotated[str | None, optional("FILE_OR_URL")] = None
     """Journal file or database that several processes or computers may share; default: in --out."""
-    out: Annotated[Path | None, tyro.conf.arg(metavar="DIR", help_behavior_hint="")] = None
+    out: Annotated[Path | None, optional("DIR")] = None
     """Folder; default: runs/<UTC stamp>."""
-    json: Annotated[bool, _flag] = False
+    json: Annotated[bool, flag] = False
     """Print one line of JSON on standard output, and nothing else."""
 
     def run(self, words: list[str]) -> int:
@@ -71,21 +69,18 @@ class Tune:
         try:
             summary = self._search(plan, folder, words, notes)
         except KeyboardInterrupt:
-            given = any(word.split("=")[0] == "--out" for word in words)
-            again = shlex.join(["ibvs-qp", *words, *([] if given else ["--out", str(folder)])])
+            again = go_on(words, folder)
             print(f"ibvs-qp: interrupted; finished trials are in {plan.storage}; go on with: {again}", file=sys.stderr)
             return 130
         print(as_json(summary) if self.json else f"Report: {summary['report']}\nPreset: {summary['preset']}")
         return 0
 
     def _check(self) -> None:
-        from ibvs_qp.errors import out_of_range
         from sim.checks import check_preset, check_readable, check_seed
 
         check_seed(self.seed)
         for name in ("trials", "flights", "unseen", "jobs"):
-            if getattr(self, name) < 1:
-                raise out_of_range(f"--{name}", getattr(self, name), "", "allowed are 1, 2, 3, ...")
+            check_count(f"--{name}", getattr(self, name))
         check_readable("--preset", self.preset)
         check_preset(self.preset)
 
