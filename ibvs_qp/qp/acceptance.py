@@ -155,4 +155,5 @@ class QpEngine:
     ) -> AcceptedSolution:
         n, data = self._rotors, self.data
         thrusts = np.minimum(np.maximum(x[:n], data.lower[:n]), data.upper[:n])
-        return AcceptedSolution(thrusts, x, y, outcome, iterations, seconds, bool(np.abs(y).max() > ACTIVE_PRICE))
+        limited = max(map(abs, y.tolist())) > ACTIVE_PRICE
+        return AcceptedSolution(thrusts, x, y, outcome, iterations, seconds, limited)

@@ -127,7 +127,7 @@ class Setpoints:
             values["commanded"][0] = 1.0
             values["thrust_step"][0] = self.config.vehicle.thrust_rate_n_s * self.config.tick_s
         else:
-            values["thrust_change"][:] = thrusts - self.last
+            np.subtract(thrusts, self.last, out=values["thrust_change"])
         values["thrust_last"][:] = thrusts
         values["given_up"][0] = given_up
         self.last = thrusts
