@@ -63,7 +63,7 @@ class ContactEstimator:
         self.depth = math.inf
         self.push = self.push_raw = 0.0
         self._push_mean, self._push_variance = 0.0, 0.02
-        self._moment, self._moment_variance = np.zeros(3), 0.0
+        self._moment, self._moment_variance = (0.0, 0.0, 0.0), 0.0
         self.in_contact, self.touch_ns, self._touch_count, self._doubt_ns = False, -1, 0, -1
         self._ramped, self._lost_ns = 0.0, -1
         self.stiffness = StiffnessEstimator()
@@ -117,12 +117,12 @@ class ContactEstimator:
         x, y, z = -c / d, -a / d, -b / d  # from camera to body axes
         length = math.sqrt(x * x + y * y + z * z)
         tip_x, tip_y, tip_z = self._tip_from_camera
-        normal = np.array((x, y, z)) / length
         distance = (1.0 - x * tip_x - y * tip_y - z * tip_z) / length
+        x, y, z = x / length, y / length, z / length
         self._plane_stamp = stamp
         if not self.known:
-            self.normal = normal
-            self._normal_history[:] = normal
+            self.normal = np.array((x, y, z))
+            self._normal_history[:] = self.normal
             self._filter.set_entry(0, distance, 0.01)
             self.known = True
             return
@@ -130,11 +130,14 @@ class ContactEstimator:
             return
         age = self._filter.ticks.age(stamp) or 0
         history, start, end = self._normal_history, (self._ticks - age) % HISTORY, self._ticks % HISTORY + 1
-        correction = NORMAL_GAIN * (normal - history[start])
+        past_x, past_y, past_z = history[start].tolist()
+        dx, dy, dz = NORMAL_GAIN * (x - past_x), NORMAL_GAIN * (y - past_y), NORMAL_GAIN * (z - past_z)
         for part in (slice(start, end),) if start < end else (slice(start, None), slice(0, end)):
-            history[part] += correction
-        self.normal = self.normal + correction
-        self.normal /= math.sqrt(self.normal @ self.normal)
+            history[part] += (dx, dy, dz)
+        nx, ny, nz = self.normal.tolist()
+        nx, ny, nz = nx + dx, ny + dy, nz + dz
+        length = math.sqrt(nx * nx + ny * ny + nz * nz)
+        self.normal = np.array((nx / length, ny / length, nz / length))
 
     def _believe(self, stamp: int, distance: float) -> bool:
         """Correct with a measured distance: a jump is believed slowly, a leap only when the next frames repeat it."""
@@ -163,15 +166,17 @@ class ContactEstimator:
         settings = self._config.contact
         dt = 0.01 if self._wrench_stamp < 0 else min((measurement.wrench_stamp_ns - self._wrench_stamp) * 1e-9, 0.1)
         self._wrench_stamp = measurement.wrench_stamp_ns
-        self.push_raw = -float(measurement.contact_wrench[:3] @ self.normal)
+        (fx, fy, fz, mx, my, mz), (nx, ny, nz) = measurement.contact_wrench.tolist(), self.normal.tolist()
+        self.push_raw = -(fx * nx + fy * ny + fz * nz)
         gain = 1.0 - math.exp(-2.0 * math.pi * settings.force_filter_hz * dt)
         self.push += gain * (self.push_raw - self.push)
-        self._moment += gain * (measurement.contact_wrench[3:] - self._moment)
+        x, y, z = self._moment
+        self._moment = x, y, z = x + gain * (mx - x), y + gain * (my - y), z + gain * (mz - z)
         if not self.in_contact and self.distance > 2.0 * settings.contact_distance_m:
             share = min(1.0, dt / NOISE_TIME)
             self._push_mean += share * (self.push - self._push_mean)
             self._push_variance += share * ((self.push - self._push_mean) ** 2 - self._push_variance)
-            self._moment_variance += share * (0.5 * float(self._moment @ self._moment) - self._moment_variance)
+            self._moment_variance += share * (0.5 * (x * x + y * y + z * z) - self._moment_variance)
         self._touch_count = self._touch_count + 1 if self.push > self.touch_threshold else 0
         if self.in_contact:
             self.stiffness.add(self.push, -self.distance, dt)
