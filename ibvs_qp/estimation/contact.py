@@ -37,7 +37,18 @@ NOISE_TIME = 1.0
 
 
 class ContactEstimator:
-    """Wall normal, tip distance and rate, push, contact state and lambda; one instance per controller."""
+    """Wall normal, tip distance and rate, push, contact state and lambda; one instance per controller.
+
+    Attributes:
+        normal: Unit vector into the wall, in B, (3,); known: whether the wall was ever seen.
+        distance: Tip to wall [m]; rate: its rate [m/s]; acceleration: the rate's own, filtered [m/s^2].
+        depth: Camera to wall along the normal [m].
+        push: Filtered push [N]; push_raw: of the last sample.
+        in_contact: Whether the tip touches; touch_ns: since when.
+        ramp: 0 at touch to 1 after the ramp time; 0 while free.
+        contact_weight: Lambda (paper, corrected), 0 far away to 1.
+        stiffness: Of brush and wall.
+    """
 
     def __init__(self, config: ControllerConfig) -> None:
         """Prepare for the geometry and settings of a controller."""
@@ -67,6 +78,7 @@ class ContactEstimator:
         self.in_contact, self.touch_ns, self._touch_count, self._doubt_ns = False, -1, 0, -1
         self._ramped, self._lost_ns = 0.0, -1
         self.stiffness = StiffnessEstimator()
+        self._update_weight()
 
     def update(self, measurement: Measurement, down: tuple[float, float, float]) -> None:
         """Take in one measurement; ``down`` is the unit gravity direction in B."""
@@ -83,6 +95,7 @@ class ContactEstimator:
             self._update_depth()
         self._update_push(measurement)
         self._update_contact(stamp)
+        self._update_weight()
 
     def _predict(
         self, measurement: Measurement, down: tuple[float, float, float], omega: np.ndarray, dt: float
@@ -230,19 +243,20 @@ class ContactEstimator:
         cx, cy, cz = self._tip_from_camera
         self.depth = self.distance + nx * cx + ny * cy + nz * cz
 
-    @property
-    def ramp(self) -> float:
-        """0 at touch to 1 after the ramp time; 0 while free; after a short loss it goes on where it stopped."""
-        if not self._config.touch_ramp:
-            return 1.0
-        done = (self._ramped + self.time_since_touch) / self._config.contact.ramp_s
-        return min(1.0, done) if self.in_contact else 0.0
+    def _update_weight(self) -> None:
+        r"""Ramp and lambda, :math:`\tfrac12(1+\cos(\pi (d-d_{min})/(d_{max}-d_{min})))` times the ramp (corrected).
 
-    @property
-    def contact_weight(self) -> float:
-        r"""Lambda: :math:`\tfrac12(1+\cos(\pi (d-d_{min})/(d_{max}-d_{min})))` times the ramp (paper, corrected)."""
+        The ramp goes from 0 at touch to 1 and is 0 while free; after a short loss it goes on where it stopped.
+        """
         settings = self._config.contact
+        if not self._config.touch_ramp:
+            self.ramp = 1.0
+        elif self.in_contact:
+            self.ramp = min(1.0, (self._ramped + self.time_since_touch) / settings.ramp_s)
+        else:
+            self.ramp = 0.0
         share = (self.depth - settings.depth_min_m) / (settings.depth_max_m - settings.depth_min_m)
         if share >= 1.0:
-            return 0.0
-        return self.ramp * (1.0 if share <= 0.0 else 0.5 * (1.0 + math.cos(math.pi * share)))
+            self.contact_weight = 0.0
+        else:
+            self.contact_weight = self.ramp * (1.0 if share <= 0.0 else 0.5 * (1.0 + math.cos(math.pi * share)))

@@ -94,6 +94,7 @@ class TickInputs:
         if not wall_known:
             return
         for slot, entry, vertical in self._pairing.pairs(measurement.lines, reference.lines):
-            self._lines[slot * SLOT_INPUTS : (slot + 1) * SLOT_INPUTS] = entry
+            start = slot * SLOT_INPUTS
+            self._lines[start : start + SLOT_INPUTS] = entry
             self._vertical[slot] = vertical
             self.present.append((slot, VERTICAL if vertical else HORIZONTAL))
