@@ -194,9 +194,9 @@ class DelayedKalman:
         self.covariance -= product
 
     def _propagate(self, dt: float) -> None:
-        step = dt * self.chain + (0.5 * dt * dt) * self.chain.dot(self.chain)
+        step = dt * self.chain + (0.5 * dt * dt) * (self.chain @ self.chain)
         _diagonal(step)[:] += 1.0
-        moved = step.dot(self.covariance).dot(step.T)  # on so few numbers half the time of @
+        moved = step @ self.covariance @ step.T
         _diagonal(moved)[:] += self.noise * dt
         moved += moved.T.copy()
         moved *= 0.5
@@ -204,9 +204,9 @@ class DelayedKalman:
 
     def _apply(self, correction: np.ndarray, age: int) -> None:
         """Add a correction at a past tick and what has become of it since."""
-        first = self.chain.dot(correction) * self.tick
-        second = self.chain.dot(first) * self.tick
-        path = self._paths(age).dot(np.array((correction, first, second)))
+        first = self.chain @ correction * self.tick
+        second = self.chain @ first * self.tick
+        path = self._paths(age) @ np.array((correction, first, second))
         start, end = self.ticks.slot(age), self.ticks.slot(0) + 1
         if start < end:
             self._history[start:end] += path
