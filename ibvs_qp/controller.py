@@ -8,7 +8,7 @@ import numpy as np
 
 from ibvs_qp.command import Command, Outcome
 from ibvs_qp.config import ControllerConfig
-from ibvs_qp.gate import MeasurementGate, answered_stamp, check_reference
+from ibvs_qp.gate import MeasurementGate, answered_stamp
 from ibvs_qp.hold import hold_thrusts
 from ibvs_qp.limits import ApproachLimit, Limit, PushCeiling, ThrustLimit, TiltLimit, ViewLimit, YawLimit
 from ibvs_qp.measurement import Measurement, Reference
@@ -17,6 +17,7 @@ from ibvs_qp.qp.assembly import QpTemplate
 from ibvs_qp.qp.evaluator import ProgramData
 from ibvs_qp.qp.model import SymbolicModel
 from ibvs_qp.qp.replay import active_limits, task_reports
+from ibvs_qp.reference_gate import check_reference
 from ibvs_qp.reporting import clipped_command, contact_mode, reach_margin, reach_note
 from ibvs_qp.setpoints import Setpoints
 from ibvs_qp.tasks import (

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Sequence
 from math import hypot
 from operator import le
@@ -11,22 +10,20 @@ from typing import Any
 
 import numpy as np
 
-from ibvs_qp.measurement import LineFeature, LineReference, Measurement, Reference
+from ibvs_qp.measurement import Measurement
 from ibvs_qp.sound import (
     ACCELERATION_BOUND,
-    LINE_BOUND,
     PLANE_BOUND,
-    PUSH_BOUND,
     RATE_BOUND,
-    STANDOFF_RANGE,
     THRUST_BOUND,
-    TILT_BOUND,
     UNIT_SLIP,
     VELOCITY_BOUND,
     WRENCH_BOUND,
     entries,
+    good_line,
+    is_number,
+    sound_vector,
     surely_good_lines,
-    surely_good_reference,
 )
 
 #: A stamp this far from the last one is a fault until the next ones agree with it [ns].
@@ -37,22 +34,6 @@ RESTART_STAMPS = 25
 STAMP_END = 2**62
 #: A sensor's stamp may lead the tick's by this much [ns].
 LEAD_NS = 20_000_000
-
-
-def sound_vector(value: Any, size: int, bound: float) -> bool:
-    """Whether a value is a float vector of that size with every entry within the bound."""
-    if not isinstance(value, np.ndarray) or value.shape != (size,) or value.dtype.kind != "f":
-        return False
-    for entry in value.tolist():  # a plain loop: half the time of any builtin over six numbers
-        if not -bound <= entry <= bound:  # NaN as well
-            return False
-    return True
-
-
-def _number(value: Any, low: float, high: float) -> bool:
-    if type(value) is float:
-        return low <= value <= high
-    return isinstance(value, (int, float, np.integer, np.floating)) and bool(low <= value <= high)
 
 
 def is_stamp(value: Any) -> bool:
@@ -238,7 +219,7 @@ class MeasurementGate:
         if not isinstance(measurement.lines, tuple):
             refuse("lines", "not a tuple", ())
             return
-        good = tuple(line for line in measurement.lines if _good_line(line))
+        good = tuple(line for line in measurement.lines if good_line(line))
         if len(good) != len(measurement.lines):
             refuse("lines", f"{len(measurement.lines) - len(good)} not finite or malformed", good)
 
@@ -265,53 +246,6 @@ def _good_plane(plane: Any) -> bool:
     if not isinstance(plane, (tuple, list, np.ndarray)) or len(plane) != 4:
         return False
     a, b, c, d = plane
-    if not all(_number(entry, -1e12, 1e12) for entry in plane) or d == 0.0:
+    if not all(is_number(entry, -1e12, 1e12) for entry in plane) or d == 0.0:
         return False
     return abs(a / d) < PLANE_BOUND and abs(b / d) < PLANE_BOUND and 0.05 < -c / d < PLANE_BOUND
-
-
-def _good_line(line: Any) -> bool:
-    if not isinstance(line, LineFeature) or not _good_role(line.role) or not _is_array(line.covariance, (2, 2)):
-        return False
-    (a, b), (c, d) = line.covariance.tolist()
-    return math.isfinite(a + b + c + d) and _good_place(line.rho, line.theta) and _number(line.weight, 0.0, 1.0)
-
-
-def _good_place(rho: Any, theta: Any) -> bool:
-    return _number(rho, -LINE_BOUND, LINE_BOUND) and _number(theta, -LINE_BOUND, LINE_BOUND)
-
-
-def _is_array(value: Any, shape: tuple[int, ...]) -> bool:
-    return type(value) is np.ndarray and value.shape == shape and value.dtype.kind == "f"
-
-
-def _good_role(role: Any) -> bool:
-    return isinstance(role, str) and role in ("horizontal", "vertical")
-
-
-def check_reference(reference: Reference, last: Reference) -> tuple[Reference, tuple[str, ...]]:
-    """The reference if it is sound, else the last sound one and the names of what was refused."""
-    if surely_good_reference(reference):
-        return reference, ()
-    if not isinstance(reference, Reference):
-        return last, ("reference: not a Reference",)
-    rejected = []
-    if not _number(reference.push_force, 0.0, PUSH_BOUND):
-        rejected.append("reference.push_force: not within [0, 1000] N")
-    if not _number(reference.standoff, *STANDOFF_RANGE):
-        rejected.append("reference.standoff: not within [-1, 10] m")
-    if not sound_vector(reference.velocity, 2, VELOCITY_BOUND):
-        rejected.append("reference.velocity: not 2 finite values")
-    if not sound_vector(reference.travel, 2, VELOCITY_BOUND):
-        rejected.append("reference.travel: not 2 finite values")
-    if not sound_vector(reference.tilt, 2, TILT_BOUND):
-        rejected.append(f"reference.tilt: not 2 finite values within {TILT_BOUND} rad")
-    if not isinstance(reference.contact, (bool, np.bool_)):
-        rejected.append("reference.contact: neither True nor False")
-    if not isinstance(reference.lines, tuple) or not all(_good_reference_line(line) for line in reference.lines):
-        rejected.append("reference.lines: not a tuple of finite lines with a known role")
-    return (last, tuple(rejected)) if rejected else (reference, ())
-
-
-def _good_reference_line(line: Any) -> bool:
-    return isinstance(line, LineReference) and _good_role(line.role) and _good_place(line.rho, line.theta)

@@ -1,12 +1,14 @@
-"""Single values that come in, asked at once: whether a number, a vector, a line or a reference is surely sound.
+"""When a value that comes in is sound: bounds, and questions about numbers, vectors and lines.
 
-A "no" refuses nothing yet: `ibvs_qp.gate` then asks field by field and names what is wrong. Everything here runs every
-tick on plain numbers; arrays of three cost ten times their arithmetic. `math.hypot` is the length of a vector in one
-call: within a bound it has no entry beyond that bound, and not-a-number is within nothing.
+What begins with "surely" is asked every tick of everything at once; its "no" refuses nothing yet, `ibvs_qp.gate` and
+`ibvs_qp.reference_gate` then ask field by field and name what is wrong. It runs on plain numbers, because arrays of
+three cost ten times their arithmetic: `math.hypot` is the length of a vector in one call, within a bound it has no
+entry beyond that bound, and not-a-number is within nothing.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from math import hypot
 from typing import Any
@@ -51,7 +53,7 @@ def surely_good_lines(lines: Any) -> bool:
         if type(spread) is not np.ndarray or spread.dtype.char != "d" or spread.shape != (2, 2):
             return False
         (a, b), (c, d) = spread.tolist()
-        if not (hypot(rho, theta, a, b, c, d) <= LINE_BOUND and 0.0 <= weight <= 1.0 and _known_role(role)):
+        if not (hypot(rho, theta, a, b, c, d) <= LINE_BOUND and 0.0 <= weight <= 1.0 and good_role(role)):
             return False
     return True
 
@@ -68,7 +70,7 @@ def surely_good_reference(reference: Any) -> bool:
         if type(line) is not LineReference:
             return False
         rho, theta = line.rho, line.theta
-        if not (isinstance(rho, float) and isinstance(theta, float) and _known_role(line.role)):
+        if not (isinstance(rho, float) and isinstance(theta, float) and good_role(line.role)):
             return False
         if not hypot(rho, theta) <= LINE_BOUND:
             return False
@@ -81,5 +83,41 @@ def surely_good_reference(reference: Any) -> bool:
     )
 
 
-def _known_role(role: Any) -> bool:
-    return type(role) is str and (role == HORIZONTAL or role == VERTICAL)
+def sound_vector(value: Any, size: int, bound: float) -> bool:
+    """Whether a value is a float vector of that size with every entry within the bound."""
+    if not isinstance(value, np.ndarray) or value.shape != (size,) or value.dtype.kind != "f":
+        return False
+    for entry in value.tolist():  # a plain loop: half the time of any builtin over six numbers
+        if not -bound <= entry <= bound:  # NaN as well
+            return False
+    return True
+
+
+def is_number(value: Any, low: float, high: float) -> bool:
+    """Whether a value is a number within [low, high]."""
+    if type(value) is float:
+        return low <= value <= high
+    return isinstance(value, (int, float, np.integer, np.floating)) and bool(low <= value <= high)
+
+
+def good_line(line: Any) -> bool:
+    """Whether a value is a sound `LineFeature`."""
+    if not isinstance(line, LineFeature) or not good_role(line.role) or not is_array(line.covariance, (2, 2)):
+        return False
+    (a, b), (c, d) = line.covariance.tolist()
+    return math.isfinite(a + b + c + d) and good_place(line.rho, line.theta) and is_number(line.weight, 0.0, 1.0)
+
+
+def good_place(rho: Any, theta: Any) -> bool:
+    """Whether both parameters of a line are within their bound."""
+    return is_number(rho, -LINE_BOUND, LINE_BOUND) and is_number(theta, -LINE_BOUND, LINE_BOUND)
+
+
+def is_array(value: Any, shape: tuple[int, ...]) -> bool:
+    """Whether a value is an array of floats of that shape."""
+    return type(value) is np.ndarray and value.shape == shape and value.dtype.kind == "f"
+
+
+def good_role(role: Any) -> bool:
+    """Whether a value names a role of a line."""
+    return isinstance(role, str) and role in (HORIZONTAL, VERTICAL)
