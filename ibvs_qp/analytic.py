@@ -6,9 +6,10 @@ import numpy as np
 
 from ibvs_qp.command import Command, Outcome
 from ibvs_qp.config import ControllerConfig
-from ibvs_qp.gate import MeasurementGate, answered_stamp, check_reference
+from ibvs_qp.gate import MeasurementGate, answered_stamp
 from ibvs_qp.hold import hold_thrusts
 from ibvs_qp.measurement import Measurement, Reference
+from ibvs_qp.reference_gate import check_reference
 from ibvs_qp.reporting import clipped_command, contact_mode, reach_note
 from ibvs_qp.setpoints import Setpoints
 

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from ibvs_qp.made import made
+
 
 class Outcome(StrEnum):
     """How a command was found; every exit of a step has one of these names."""
@@ -86,12 +88,10 @@ class Command:
     ) -> Command:
         """A command whose reports are made when somebody reads them: the tick does not pay for them.
 
-        The other fields go in at once, all of them: a frozen dataclass's own constructor sets them one by one and
-        takes four times as long.
+        The other fields must be given, all of them.
         """
-        command = object.__new__(cls)
-        command.__dict__.update(fields, _explain={"tasks": tasks, "active_limits": active_limits})
-        return command
+        fields["_explain"] = {"tasks": tasks, "active_limits": active_limits}
+        return made(cls, **fields)
 
     def __getattr__(self, name: str) -> Any:
         """Make the task and limit reports at their first reading."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from ibvs_qp.command import Command, Outcome
 from ibvs_qp.config import ControllerConfig
-from ibvs_qp.gate import MeasurementGate, answered_stamp, check_reference
+from ibvs_qp.gate import MeasurementGate, answered_stamp
 from ibvs_qp.hold import hold_thrusts
 from ibvs_qp.limits import ApproachLimit, Limit, PushCeiling, ThrustLimit, TiltLimit, ViewLimit, YawLimit
 from ibvs_qp.measurement import Measurement, Reference
@@ -17,6 +17,7 @@ from ibvs_qp.qp.assembly import QpTemplate
 from ibvs_qp.qp.evaluator import ProgramData
 from ibvs_qp.qp.model import SymbolicModel
 from ibvs_qp.qp.replay import active_limits, task_reports
+from ibvs_qp.reference_gate import check_reference
 from ibvs_qp.reporting import clipped_command, contact_mode, reach_margin, reach_note
 from ibvs_qp.setpoints import Setpoints
 from ibvs_qp.tasks import (
@@ -126,8 +127,8 @@ class HybridController:
         thrusts, terms = solution.thrusts, self.setpoints
         unallocated, given_up, limited = np.zeros(6), 0.0, solution.limited
         if limited:
-            unallocated = terms.effectiveness @ (self.engine.data.free - thrusts)
-            given_up = float(np.abs(unallocated).max())
+            unallocated = terms.effectiveness.dot(self.engine.data.free - thrusts)
+            given_up = max(map(abs, unallocated.tolist()))
         terms.note(thrusts, given_up)
         stacked = self.engine.data.stacked.copy()
         return Command.explained_later(
@@ -135,7 +136,7 @@ class HybridController:
             active_limits=lambda: active_limits(self.template, solution.x, solution.y) if limited else (),
             stamp_ns=int(measurement.stamp_ns),
             thrusts=thrusts,
-            wrench=terms.effectiveness @ thrusts,
+            wrench=terms.effectiveness.dot(thrusts),  # half the time of @ on six numbers
             outcome=solution.outcome,
             mode=contact_mode(self.setpoints, self._reference),
             rejected=rejected + reach_note(terms, self._reference),

@@ -3,19 +3,29 @@
 from __future__ import annotations
 
 import dataclasses
-import math
+from collections.abc import Sequence
+from math import hypot
+from operator import le
 from typing import Any
 
 import numpy as np
 
-from ibvs_qp.measurement import LineFeature, LineReference, Measurement, Reference
+from ibvs_qp.measurement import Measurement
+from ibvs_qp.sound import (
+    ACCELERATION_BOUND,
+    PLANE_BOUND,
+    RATE_BOUND,
+    THRUST_BOUND,
+    UNIT_SLIP,
+    VELOCITY_BOUND,
+    WRENCH_BOUND,
+    entries,
+    good_line,
+    is_number,
+    sound_vector,
+    surely_good_lines,
+)
 
-#: Largest believable entries: body rate [rad/s], specific force [m/s^2], wrench [N, N m] and velocity [m/s].
-RATE_BOUND, ACCELERATION_BOUND, WRENCH_BOUND, VELOCITY_BOUND = 35.0, 200.0, 500.0, 20.0
-#: Largest believable line parameter (normalised, rad) and entry of a plane over D [1/m].
-LINE_BOUND, PLANE_BOUND = 1e6, 1e3
-#: Largest roll or pitch that may be asked for [rad].
-TILT_BOUND = 0.6
 #: A stamp this far from the last one is a fault until the next ones agree with it [ns].
 LEAP_NS = 1_000_000_000
 #: Stamps in a row that must agree until a clock that went back is believed.
@@ -24,22 +34,6 @@ RESTART_STAMPS = 25
 STAMP_END = 2**62
 #: A sensor's stamp may lead the tick's by this much [ns].
 LEAD_NS = 20_000_000
-
-
-def sound_vector(value: Any, size: int, bound: float) -> bool:
-    """Whether a value is a float vector of that size with every entry within the bound."""
-    if not isinstance(value, np.ndarray) or value.shape != (size,) or value.dtype.kind != "f":
-        return False
-    for entry in value.tolist():  # a plain loop: half the time of any builtin over six numbers
-        if not -bound <= entry <= bound:  # NaN as well
-            return False
-    return True
-
-
-def _number(value: Any, low: float, high: float) -> bool:
-    if type(value) is float:
-        return low <= value <= high
-    return isinstance(value, (int, float, np.integer, np.floating)) and bool(low <= value <= high)
 
 
 def is_stamp(value: Any) -> bool:
@@ -55,17 +49,6 @@ def answered_stamp(measurement: Any) -> int:
     return int(stamp) if stamp is not None and is_stamp(stamp) else 0
 
 
-#: Array fields that every tick brings: shape and bound of their entries.
-BOUNDS = {
-    "angular_velocity": (3, RATE_BOUND),
-    "contact_wrench": (6, WRENCH_BOUND),
-    "specific_force": (3, ACCELERATION_BOUND),
-    "velocity": (3, VELOCITY_BOUND),
-}
-#: A quaternion whose squared length is this far from 1 is no attitude.
-UNIT_SLIP = 0.02
-
-
 class MeasurementGate:
     """Passes good measurements on untouched, mends bad ones, and says what it refused.
 
@@ -74,15 +57,14 @@ class MeasurementGate:
     """
 
     def __init__(self, rotors: int) -> None:
-        self._rotors = rotors
-        self._nothing = np.zeros(3)
-        self._per_bound = np.concatenate([np.ones(4), *(np.full(size, 1 / bound) for size, bound in BOUNDS.values())])
+        self._rotors, self._shape = rotors, (rotors,)
         self.reset()
 
     def reset(self) -> None:
         """Forget the last good values."""
-        self._numbers, self._next = np.zeros(len(self._per_bound)), np.zeros(len(self._per_bound))
-        self._known = False
+        self._attitude: Sequence[float] | None = None
+        self._rate: Sequence[float] = [0.0] * 3
+        self._wrench: Sequence[float] = [0.0] * 6
         self._plane: tuple[float, ...] | None = None
         self._wrench_stamp = 0
         self._stamp: int | None = None
@@ -92,13 +74,13 @@ class MeasurementGate:
     @property
     def inertial(self) -> Measurement | None:
         """Last good attitude and rate, for the last resort; None when nothing was ever measured."""
-        if not self._known:
+        if self._attitude is None:
             return None
         return Measurement(
             stamp_ns=self._stamp or 0,
-            attitude=self._numbers[:4].copy(),
-            angular_velocity=self._numbers[4:7].copy(),
-            contact_wrench=self._numbers[7:13].copy(),
+            attitude=np.array(self._attitude),
+            angular_velocity=np.array(self._rate),
+            contact_wrench=np.array(self._wrench),
             wrench_stamp_ns=self._wrench_stamp,
         )
 
@@ -110,34 +92,47 @@ class MeasurementGate:
         return self._mend(measurement)
 
     def _sound(self, measurement: Measurement) -> bool:
-        """Whether surely nothing is to refuse, asked of all numbers at once; where not sure, `_mend` finds out."""
-        stamp, wrench_stamp = measurement.stamp_ns, measurement.wrench_stamp_ns
+        """Whether surely nothing is to refuse; where it is not sure, `_mend` finds out field by field."""
+        stamp, wrench_stamp, plane = measurement.stamp_ns, measurement.wrench_stamp_ns, measurement.plane
         if type(stamp) is not int or type(wrench_stamp) is not int or not 0 <= wrench_stamp <= stamp + LEAD_NS:
             return False
         if self._stamp is None or self._odd_count or not 0 < stamp - self._stamp <= LEAP_NS or stamp >= STAMP_END:
             return False
-        if measurement.thrust_min is not None or measurement.thrust_max is not None:
+        if plane is not None and not (_past(measurement.plane_stamp_ns, stamp) and self._known_plane(plane)):
             return False
-        plane = measurement.plane
-        if plane is not None and not (plane is self._plane and _past(measurement.plane_stamp_ns, stamp)):
+        if not (surely_good_lines(measurement.lines) and self._good_limits(measurement)):
             return False
-        lines, force, velocity = measurement.lines, measurement.specific_force, measurement.velocity
-        if type(lines) is not tuple or not all(map(_good_line, lines)):
+        attitude, rate = entries(measurement.attitude, (4,)), entries(measurement.angular_velocity, (3,))
+        wrench, force, velocity = (
+            entries(measurement.contact_wrench, (6,)),
+            measurement.specific_force,
+            measurement.velocity,
+        )
+        length = hypot(*attitude)
+        if not (
+            abs(length * length - 1.0) <= UNIT_SLIP
+            and hypot(*rate) <= RATE_BOUND
+            and hypot(*wrench) <= WRENCH_BOUND
+            and (force is None or hypot(*entries(force, (3,))) <= ACCELERATION_BOUND)
+            and (velocity is None or hypot(*entries(velocity, (3,))) <= VELOCITY_BOUND)
+        ):
             return False
-        attitude, rate, wrench = measurement.attitude, measurement.angular_velocity, measurement.contact_wrench
-        force, velocity = self._nothing if force is None else force, self._nothing if velocity is None else velocity
-        if not (_is_array(attitude, (4,)) and _is_array(rate, (3,)) and _is_array(wrench, (6,))):
-            return False
-        if not (_is_array(force, (3,)) and _is_array(velocity, (3,))):
-            return False
-        numbers = np.concatenate((attitude, rate, wrench, force, velocity), out=self._next)
-        w, x, y, z, *shares = (numbers * self._per_bound).tolist()
-        # A sum of squares below 1 has no term above 1; NaN is below nothing. Plain numbers overflow without a word.
-        if not (abs(w * w + x * x + y * y + z * z - 1.0) <= UNIT_SLIP and sum([s * s for s in shares]) <= 1.0):
-            return False
-        self._numbers, self._next = numbers, self._numbers
+        self._attitude, self._rate, self._wrench = attitude, rate, wrench
         self._stamp, self._wrench_stamp = stamp, wrench_stamp
         return True
+
+    def _good_limits(self, measurement: Measurement) -> bool:
+        """Whether the thrust limits are surely sound, if there are any."""
+        low, high = measurement.thrust_min, measurement.thrust_max
+        if low is None and high is None:
+            return True
+        lowest = None if low is None else entries(low, self._shape)
+        highest = None if high is None else entries(high, self._shape)
+        if not (lowest is None or hypot(*lowest) <= THRUST_BOUND):
+            return False
+        if not (highest is None or hypot(*highest) <= THRUST_BOUND):
+            return False
+        return lowest is None or highest is None or all(map(le, lowest, highest))
 
     def _mend(self, measurement: Measurement) -> tuple[Measurement | None, tuple[str, ...]]:
         """Field by field: what fails is named and replaced by the last good value."""
@@ -153,18 +148,17 @@ class MeasurementGate:
         why = self._refuse_stamp(measurement.stamp_ns)
         if why:
             return None, (f"stamp_ns: {why}",)
-        stamp, kept = int(measurement.stamp_ns), self._numbers
-        attitude = measurement.attitude
+        stamp, attitude = int(measurement.stamp_ns), measurement.attitude
         if not sound_vector(attitude, 4, 1.01) or abs(float(attitude @ attitude) - 1.0) > UNIT_SLIP:
-            if not self._known:
+            if self._attitude is None:
                 return None, ("attitude: not a unit quaternion",)
-            refuse("attitude", "not a unit quaternion", kept[:4].copy())
+            refuse("attitude", "not a unit quaternion", np.array(self._attitude))
         else:
-            kept[:4], self._known = attitude, True
+            self._attitude = attitude.tolist()
         if sound_vector(measurement.angular_velocity, 3, RATE_BOUND):
-            kept[4:7] = measurement.angular_velocity
+            self._rate = measurement.angular_velocity.tolist()
         else:
-            refuse("angular_velocity", f"not 3 finite values within {RATE_BOUND} rad/s", kept[4:7].copy())
+            refuse("angular_velocity", f"not 3 finite values within {RATE_BOUND} rad/s", np.array(self._rate))
         if measurement.specific_force is not None and not sound_vector(
             measurement.specific_force, 3, ACCELERATION_BOUND
         ):
@@ -204,9 +198,9 @@ class MeasurementGate:
             _past(measurement.wrench_stamp_ns, stamp),
         )
         if good and past:
-            self._numbers[7:13], self._wrench_stamp = measurement.contact_wrench, int(measurement.wrench_stamp_ns)
+            self._wrench, self._wrench_stamp = measurement.contact_wrench.tolist(), int(measurement.wrench_stamp_ns)
             return {}
-        kept = self._numbers[7:13].copy()
+        kept = np.array(self._wrench)
         if not good:
             refuse("contact_wrench", f"not 6 finite values within {WRENCH_BOUND} N or N m", kept)
         if not past:
@@ -225,7 +219,7 @@ class MeasurementGate:
         if not isinstance(measurement.lines, tuple):
             refuse("lines", "not a tuple", ())
             return
-        good = tuple(line for line in measurement.lines if _good_line(line))
+        good = tuple(line for line in measurement.lines if good_line(line))
         if len(good) != len(measurement.lines):
             refuse("lines", f"{len(measurement.lines) - len(good)} not finite or malformed", good)
 
@@ -235,7 +229,7 @@ class MeasurementGate:
         bounds = {}
         for name in ("thrust_min", "thrust_max"):
             value = getattr(measurement, name)
-            good = value is not None and sound_vector(value, self._rotors, 1e4)
+            good = value is not None and sound_vector(value, self._rotors, THRUST_BOUND)
             bounds[name] = value if good else None
             if value is not None and not good:
                 refuse(name, f"not {self._rotors} finite values", None)
@@ -249,54 +243,9 @@ def _past(stamp: Any, tick: int) -> bool:
 
 
 def _good_plane(plane: Any) -> bool:
-    if not isinstance(plane, (tuple, list, np.ndarray)) or np.shape(plane) != (4,):
+    if not isinstance(plane, (tuple, list, np.ndarray)) or len(plane) != 4:
         return False
     a, b, c, d = plane
-    if not all(_number(entry, -1e12, 1e12) for entry in plane) or d == 0.0:
+    if not all(is_number(entry, -1e12, 1e12) for entry in plane) or d == 0.0:
         return False
     return abs(a / d) < PLANE_BOUND and abs(b / d) < PLANE_BOUND and 0.05 < -c / d < PLANE_BOUND
-
-
-def _good_line(line: Any) -> bool:
-    if not isinstance(line, LineFeature) or not _good_role(line.role) or not _is_array(line.covariance, (2, 2)):
-        return False
-    (a, b), (c, d) = line.covariance.tolist()
-    return math.isfinite(a + b + c + d) and _good_place(line.rho, line.theta) and _number(line.weight, 0.0, 1.0)
-
-
-def _good_place(rho: Any, theta: Any) -> bool:
-    return _number(rho, -LINE_BOUND, LINE_BOUND) and _number(theta, -LINE_BOUND, LINE_BOUND)
-
-
-def _is_array(value: Any, shape: tuple[int, ...]) -> bool:
-    return type(value) is np.ndarray and value.shape == shape and value.dtype.kind == "f"
-
-
-def _good_role(role: Any) -> bool:
-    return isinstance(role, str) and role in ("horizontal", "vertical")
-
-
-def check_reference(reference: Reference, last: Reference) -> tuple[Reference, tuple[str, ...]]:
-    """The reference if it is sound, else the last sound one and the names of what was refused."""
-    if not isinstance(reference, Reference):
-        return last, ("reference: not a Reference",)
-    rejected = []
-    if not _number(reference.push_force, 0.0, 1e3):
-        rejected.append("reference.push_force: not within [0, 1000] N")
-    if not _number(reference.standoff, -1.0, 10.0):
-        rejected.append("reference.standoff: not within [-1, 10] m")
-    if not sound_vector(reference.velocity, 2, VELOCITY_BOUND):
-        rejected.append("reference.velocity: not 2 finite values")
-    if not sound_vector(reference.travel, 2, VELOCITY_BOUND):
-        rejected.append("reference.travel: not 2 finite values")
-    if not sound_vector(reference.tilt, 2, TILT_BOUND):
-        rejected.append(f"reference.tilt: not 2 finite values within {TILT_BOUND} rad")
-    if not isinstance(reference.contact, (bool, np.bool_)):
-        rejected.append("reference.contact: neither True nor False")
-    if not isinstance(reference.lines, tuple) or not all(_good_reference_line(line) for line in reference.lines):
-        rejected.append("reference.lines: not a tuple of finite lines with a known role")
-    return (last, tuple(rejected)) if rejected else (reference, ())
-
-
-def _good_reference_line(line: Any) -> bool:
-    return isinstance(line, LineReference) and _good_role(line.role) and _good_place(line.rho, line.theta)

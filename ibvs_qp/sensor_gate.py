@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ibvs_qp.gate import ACCELERATION_BOUND, RATE_BOUND, WRENCH_BOUND, is_stamp
+from ibvs_qp.gate import is_stamp
 from ibvs_qp.measurement import SensorFrame
+from ibvs_qp.sound import ACCELERATION_BOUND, RATE_BOUND, WRENCH_BOUND
 from ibvs_qp.stamp_follower import StampFollower
 
 #: Name, size and largest believable entry of every raw vector.

@@ -17,6 +17,7 @@ from small_vehicle import SmallVehicle
 from ibvs_qp.analytic import PaperController
 from ibvs_qp.command import Command, Outcome
 from ibvs_qp.controller import HybridController
+from ibvs_qp.gate import MeasurementGate
 from ibvs_qp.measurement import LineFeature, LineReference, Measurement, Reference
 
 LAWS = [HybridController, PaperController]
@@ -294,6 +295,36 @@ def broken_reference(draw: Any) -> Any:
     names = [field.name for field in fields(Reference)]
     chosen = draw(st.lists(st.sampled_from(names), max_size=3, unique=True))
     return replace(good_reference(), **{name: draw(anything) for name in chosen})
+
+
+def passed_at_once(changes: dict[str, Any]) -> bool:
+    """Whether a measurement passes at once; if so, asking field by field must find nothing either."""
+    at_once, thorough = MeasurementGate(6), MeasurementGate(6)
+    for gate in (at_once, thorough):
+        assert gate.check(measured(0))[1] == ()
+    seen = measured(1, **changes)
+    if not at_once._sound(seen):
+        return False
+    kept, rejected = thorough._mend(seen)
+    assert kept is seen and rejected == (), changes
+    for name in ("attitude", "angular_velocity", "contact_wrench", "wrench_stamp_ns", "stamp_ns"):
+        np.testing.assert_array_equal(getattr(at_once.inertial, name), getattr(thorough.inertial, name))
+    return True
+
+
+def test_sound_measurements_pass_at_once_and_broken_ones_never() -> None:
+    limits = {"thrust_min": np.full(6, 2.0), "thrust_max": np.full(6, 20.0)}
+    for sound in ({}, limits, {"thrust_max": np.zeros(6)}, {"velocity": None, "plane": None, "specific_force": None}):
+        assert passed_at_once(sound)
+    assert not passed_at_once({"thrust_min": np.full(6, 20.0), "thrust_max": np.full(6, 2.0)})
+    for name, value, _ in BROKEN_FIELDS:
+        assert not passed_at_once({name: value}), (name, value)
+
+
+@settings(max_examples=300, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+@given(changes=broken_measurement())
+def test_what_passes_at_once_would_pass_field_by_field(changes: dict[str, Any]) -> None:
+    passed_at_once(changes)
 
 
 @pytest.fixture(scope="module", params=LAWS)

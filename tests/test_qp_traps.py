@@ -17,6 +17,7 @@ from ibvs_qp.command import Outcome
 from ibvs_qp.config import ControllerConfig, SolverSettings
 from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import Reference
+from ibvs_qp.qp.evaluator import Evaluator
 from ibvs_qp.qp.osqp_solver import SOLVED, OsqpSolver
 
 #: What OSQP 1.1 writes into x when it found no solution: its NaN pattern read as a number.
@@ -255,6 +256,17 @@ def test_a_free_optimum_that_is_no_number_never_flies(monkeypatch: pytest.Monkey
     monkeypatch.setattr(data, "evaluate", poisoned)
     command = controller.step(measured(6), Reference(lines=line_references(2)))
     assert np.isfinite(command.thrusts).all() and command.iterations > 0
+
+
+def test_a_bound_that_is_no_number_is_never_stepped_over() -> None:
+    controller = flying()
+    data = Evaluator(controller.template)
+    data.stacked[:] = controller.engine.data.stacked
+    data.evaluate()
+    assert math.isfinite(data.violation[0])
+    data.parameters["thrust_upper"][0] = math.nan
+    data.evaluate()
+    assert np.isfinite(data.free).all() and data.violation[0] == math.inf
 
 
 def test_everything_failing_leads_to_hold_and_back(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -37,7 +37,18 @@ NOISE_TIME = 1.0
 
 
 class ContactEstimator:
-    """Wall normal, tip distance and rate, push, contact state and lambda; one instance per controller."""
+    """Wall normal, tip distance and rate, push, contact state and lambda; one instance per controller.
+
+    Attributes:
+        normal: Unit vector into the wall, in B, (3,); known: whether the wall was ever seen.
+        distance: Tip to wall [m]; rate: its rate [m/s]; acceleration: the rate's own, filtered [m/s^2].
+        depth: Camera to wall along the normal [m].
+        push: Filtered push [N]; push_raw: of the last sample.
+        in_contact: Whether the tip touches; touch_ns: since when.
+        ramp: 0 at touch to 1 after the ramp time; 0 while free.
+        contact_weight: Lambda (paper, corrected), 0 far away to 1.
+        stiffness: Of brush and wall.
+    """
 
     def __init__(self, config: ControllerConfig) -> None:
         """Prepare for the geometry and settings of a controller."""
@@ -63,10 +74,11 @@ class ContactEstimator:
         self.depth = math.inf
         self.push = self.push_raw = 0.0
         self._push_mean, self._push_variance = 0.0, 0.02
-        self._moment, self._moment_variance = np.zeros(3), 0.0
+        self._moment, self._moment_variance = (0.0, 0.0, 0.0), 0.0
         self.in_contact, self.touch_ns, self._touch_count, self._doubt_ns = False, -1, 0, -1
         self._ramped, self._lost_ns = 0.0, -1
         self.stiffness = StiffnessEstimator()
+        self._update_weight()
 
     def update(self, measurement: Measurement, down: tuple[float, float, float]) -> None:
         """Take in one measurement; ``down`` is the unit gravity direction in B."""
@@ -83,6 +95,7 @@ class ContactEstimator:
             self._update_depth()
         self._update_push(measurement)
         self._update_contact(stamp)
+        self._update_weight()
 
     def _predict(
         self, measurement: Measurement, down: tuple[float, float, float], omega: np.ndarray, dt: float
@@ -117,12 +130,12 @@ class ContactEstimator:
         x, y, z = -c / d, -a / d, -b / d  # from camera to body axes
         length = math.sqrt(x * x + y * y + z * z)
         tip_x, tip_y, tip_z = self._tip_from_camera
-        normal = np.array((x, y, z)) / length
         distance = (1.0 - x * tip_x - y * tip_y - z * tip_z) / length
+        x, y, z = x / length, y / length, z / length
         self._plane_stamp = stamp
         if not self.known:
-            self.normal = normal
-            self._normal_history[:] = normal
+            self.normal = np.array((x, y, z))
+            self._normal_history[:] = self.normal
             self._filter.set_entry(0, distance, 0.01)
             self.known = True
             return
@@ -130,11 +143,14 @@ class ContactEstimator:
             return
         age = self._filter.ticks.age(stamp) or 0
         history, start, end = self._normal_history, (self._ticks - age) % HISTORY, self._ticks % HISTORY + 1
-        correction = NORMAL_GAIN * (normal - history[start])
+        past_x, past_y, past_z = history[start].tolist()
+        dx, dy, dz = NORMAL_GAIN * (x - past_x), NORMAL_GAIN * (y - past_y), NORMAL_GAIN * (z - past_z)
         for part in (slice(start, end),) if start < end else (slice(start, None), slice(0, end)):
-            history[part] += correction
-        self.normal = self.normal + correction
-        self.normal /= math.sqrt(self.normal @ self.normal)
+            history[part] += (dx, dy, dz)
+        nx, ny, nz = self.normal.tolist()
+        nx, ny, nz = nx + dx, ny + dy, nz + dz
+        length = math.sqrt(nx * nx + ny * ny + nz * nz)
+        self.normal = np.array((nx / length, ny / length, nz / length))
 
     def _believe(self, stamp: int, distance: float) -> bool:
         """Correct with a measured distance: a jump is believed slowly, a leap only when the next frames repeat it."""
@@ -163,15 +179,17 @@ class ContactEstimator:
         settings = self._config.contact
         dt = 0.01 if self._wrench_stamp < 0 else min((measurement.wrench_stamp_ns - self._wrench_stamp) * 1e-9, 0.1)
         self._wrench_stamp = measurement.wrench_stamp_ns
-        self.push_raw = -float(measurement.contact_wrench[:3] @ self.normal)
+        (fx, fy, fz, mx, my, mz), (nx, ny, nz) = measurement.contact_wrench.tolist(), self.normal.tolist()
+        self.push_raw = -(fx * nx + fy * ny + fz * nz)
         gain = 1.0 - math.exp(-2.0 * math.pi * settings.force_filter_hz * dt)
         self.push += gain * (self.push_raw - self.push)
-        self._moment += gain * (measurement.contact_wrench[3:] - self._moment)
+        x, y, z = self._moment
+        self._moment = x, y, z = x + gain * (mx - x), y + gain * (my - y), z + gain * (mz - z)
         if not self.in_contact and self.distance > 2.0 * settings.contact_distance_m:
             share = min(1.0, dt / NOISE_TIME)
             self._push_mean += share * (self.push - self._push_mean)
             self._push_variance += share * ((self.push - self._push_mean) ** 2 - self._push_variance)
-            self._moment_variance += share * (0.5 * float(self._moment @ self._moment) - self._moment_variance)
+            self._moment_variance += share * (0.5 * (x * x + y * y + z * z) - self._moment_variance)
         self._touch_count = self._touch_count + 1 if self.push > self.touch_threshold else 0
         if self.in_contact:
             self.stiffness.add(self.push, -self.distance, dt)
@@ -225,19 +243,20 @@ class ContactEstimator:
         cx, cy, cz = self._tip_from_camera
         self.depth = self.distance + nx * cx + ny * cy + nz * cz
 
-    @property
-    def ramp(self) -> float:
-        """0 at touch to 1 after the ramp time; 0 while free; after a short loss it goes on where it stopped."""
-        if not self._config.touch_ramp:
-            return 1.0
-        done = (self._ramped + self.time_since_touch) / self._config.contact.ramp_s
-        return min(1.0, done) if self.in_contact else 0.0
+    def _update_weight(self) -> None:
+        r"""Ramp and lambda, :math:`\tfrac12(1+\cos(\pi (d-d_{min})/(d_{max}-d_{min})))` times the ramp (corrected).
 
-    @property
-    def contact_weight(self) -> float:
-        r"""Lambda: :math:`\tfrac12(1+\cos(\pi (d-d_{min})/(d_{max}-d_{min})))` times the ramp (paper, corrected)."""
+        The ramp goes from 0 at touch to 1 and is 0 while free; after a short loss it goes on where it stopped.
+        """
         settings = self._config.contact
+        if not self._config.touch_ramp:
+            self.ramp = 1.0
+        elif self.in_contact:
+            self.ramp = min(1.0, (self._ramped + self.time_since_touch) / settings.ramp_s)
+        else:
+            self.ramp = 0.0
         share = (self.depth - settings.depth_min_m) / (settings.depth_max_m - settings.depth_min_m)
         if share >= 1.0:
-            return 0.0
-        return self.ramp * (1.0 if share <= 0.0 else 0.5 * (1.0 + math.cos(math.pi * share)))
+            self.contact_weight = 0.0
+        else:
+            self.contact_weight = self.ramp * (1.0 if share <= 0.0 else 0.5 * (1.0 + math.cos(math.pi * share)))

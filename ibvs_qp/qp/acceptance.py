@@ -63,7 +63,7 @@ class QpEngine:
         self._matrix = template.a_pattern.copy()
         self._rotors = template.model.rotors
         self.conflict: tuple[str, ...] = ()
-        self._no_slack = np.zeros(len(template.variable_names) - self._rotors)
+        self._no_slack = np.zeros(len(template.variable_names))
         self._no_price = np.zeros(len(template.row_names))
 
     def reset(self) -> None:
@@ -106,12 +106,14 @@ class QpEngine:
     def _without_iterating(self) -> AcceptedSolution | None:
         """The solution where no row binds, or the rows of the last tick do; nothing is left for iterations to find."""
         data = self.data
-        # A maximum steps over NaN, so the numbers are asked themselves.
-        if not math.isfinite(data.free.sum() + data.lower.sum() + data.upper.sum()):
+        violation = data.violation.item(0)
+        # A violation steps over a thrust that is no number, so the thrusts are asked themselves.
+        if not (violation < math.inf and math.isfinite(sum(data.free.tolist()))):
             return None
-        if data.violation[0] <= 0.0:
-            thrusts = data.free.copy()
-            x = np.concatenate((thrusts, self._no_slack))
+        if violation <= 0.0:
+            x = self._no_slack.copy()
+            thrusts = x[: self._rotors]
+            thrusts[:] = data.free
             return AcceptedSolution(thrusts, x, self._no_price, Outcome.SOLVED, 0, 0.0, limited=False)
         exact = self.active_set.solve(data)
         return None if exact is None else self._accept(*exact, Outcome.SOLVED, 0, 0.0)
@@ -153,4 +155,5 @@ class QpEngine:
     ) -> AcceptedSolution:
         n, data = self._rotors, self.data
         thrusts = np.minimum(np.maximum(x[:n], data.lower[:n]), data.upper[:n])
-        return AcceptedSolution(thrusts, x, y, outcome, iterations, seconds, bool(np.abs(y).max() > ACTIVE_PRICE))
+        limited = max(map(abs, y.tolist())) > ACTIVE_PRICE
+        return AcceptedSolution(thrusts, x, y, outcome, iterations, seconds, limited)

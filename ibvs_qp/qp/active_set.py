@@ -42,7 +42,7 @@ class ActiveSet:
 
     def reset(self) -> None:
         """No row is taken for active."""
-        self._active, self._sides = np.zeros(0, int), np.zeros(0)
+        self._take({})
 
     def solve(self, data: ProgramData) -> tuple[np.ndarray, np.ndarray] | None:
         """Solution and multipliers from the rows active last, or None if they cannot be mended.
@@ -63,7 +63,8 @@ class ActiveSet:
         """
         self._evaluate(data)
         at = data.rows() @ x
-        self._take(data.upper - at < y, at - data.lower < -y)
+        high, low = (data.upper - at < y).tolist(), (at - data.lower < -y).tolist()
+        self._take({row: 1.0 if high[row] else -1.0 for row in range(len(at)) if high[row] or low[row]})
         return self._mend(data)
 
     def _evaluate(self, data: ProgramData) -> None:
@@ -71,44 +72,61 @@ class ActiveSet:
         p[:], a[:], free[:] = data.p, data.a, data.free
         self._dual()
 
-    def _take(self, high: np.ndarray, low: np.ndarray) -> None:
-        self._active = (high | low).nonzero()[0]
-        self._sides = np.where(high, 1.0, -1.0)[self._active]
+    def _take(self, sides: dict[int, float]) -> None:
+        """A guess: rows in rising order, each with 1 where its upper bound binds and -1 where the lower one does."""
+        self._sides, self._active = sides, np.array(list(sides), int)
 
     def _mend(self, data: ProgramData) -> tuple[np.ndarray, np.ndarray] | None:
-        lower, upper = data.lower, data.upper
+        # A handful of rows: plain numbers where arrays cost ten times their arithmetic.
+        lower, upper, at_free = data.lower.tolist(), data.upper.tolist(), self._at_free.tolist()
         for _ in range(ROUNDS):
-            active, sides, at, prices = self._active, self._sides, self._at_free, _NONE
-            if len(active):
-                rows = self._coupling[active]
-                beyond = at[active] - np.where(sides > 0.0, upper[active], lower[active])
+            sides, active, prices, at = self._sides, self._active, _NONE, at_free
+            if sides:
+                rows = self._coupling.take(active, axis=0)
+                beyond = [at[row] - (upper[row] if side > 0.0 else lower[row]) for row, side in sides.items()]
                 try:
-                    prices = np.linalg.solve(rows[:, active], beyond)
+                    prices = np.linalg.solve(rows.take(active, axis=1), np.array(beyond))
                 except np.linalg.LinAlgError:  # rows that depend on each other
                     return None
-                at = at - prices @ rows
-            slip = TOLERANCE * (1.0 + max(at.max(), -at.min()))
-            if not slip < math.inf:  # not a number, too
+                at = (self._at_free - prices.dot(rows)).tolist()
+            slip = TOLERANCE * (1.0 + max(max(at), -min(at)))
+            if not math.isfinite(sum(at)):
                 return None
-            pulls = prices * sides
-            wrong = pulls < -TOLERANCE * (1.0 + abs(pulls).max()) if len(active) else pulls > 0.0
-            above, below = at > upper + slip, at < lower - slip
-            if not (wrong.any() or (above | below).any()):
+            stays = self._pulling(prices)
+            outside = _outside(at, lower, upper, slip)
+            if not outside and len(stays) == len(sides):
                 return self._solution(data, active, prices)
-            high, low = above, below
-            stays = active[~wrong]
-            high[stays[sides[~wrong] > 0.0]] = True
-            low[stays[sides[~wrong] < 0.0]] = True
-            self._take(high & ~below, low & ~above)
+            self._take(_next_guess(outside, stays))
         self.reset()
         return None
+
+    def _pulling(self, prices: np.ndarray) -> dict[int, float]:
+        """The active rows whose multiplier does not pull the wrong way."""
+        pulls = [price * side for price, side in zip(prices.tolist(), self._sides.values(), strict=True)]
+        least = -TOLERANCE * (1.0 + max(map(abs, pulls), default=0.0))
+        return {row: side for (row, side), pull in zip(self._sides.items(), pulls, strict=True) if pull >= least}
 
     def _solution(self, data: ProgramData, active: np.ndarray, found: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         prices = np.zeros(len(self._at_free))
         prices[active] = found
-        x = -(found @ self._per_row[active])
+        x = -found.dot(self._per_row.take(active, axis=0))
         x[: self._rotors] += data.free
         return x, prices
+
+
+def _outside(at: list[float], lower: list[float], upper: list[float], slip: float) -> dict[int, float]:
+    """Rows beyond a bound: 1 above, -1 below, 0 where crossed bounds make it both."""
+    found = {}
+    for row, (value, low, high) in enumerate(zip(at, lower, upper, strict=True)):
+        if value > high + slip or value < low - slip:
+            found[row] = float((value > high + slip) - (value < low - slip))
+    return found
+
+
+def _next_guess(outside: dict[int, float], stays: dict[int, float]) -> dict[int, float]:
+    """Rows that stay and rows that join, on the side of the bound they broke; crossed bounds bind nobody."""
+    sides = stays | outside
+    return {row: sides[row] for row in sorted(sides) if sides[row]}
 
 
 def _dual_function(template: QpTemplate) -> ca.Function:

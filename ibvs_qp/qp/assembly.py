@@ -125,12 +125,15 @@ class QpTemplate:
 def _free_optimum(hessian: ca.SX, gradient: ca.SX, rows: AffineRows, lower: ca.SX, upper: ca.SX) -> tuple[ca.SX, ca.SX]:
     """Thrusts without any limit, by Cholesky factors, and by how much they would break the worst row (< 0: none).
 
-    Where they break none, they are the solution of the program: no slack is worth taking.
+    Where they break none, they are the solution of the program: no slack is worth taking. A maximum steps over
+    not-a-number; where a bound is none, the violation is infinite.
     """
     root = ca.chol(hessian)
     thrusts = ca.solve(root, ca.solve(root.T, -gradient))
     at = rows.per_thrust @ thrusts
-    return thrusts, ca.fmax(ca.mmax(at - upper), ca.mmax(lower - at))
+    worst = ca.fmax(ca.mmax(at - upper), ca.mmax(lower - at))
+    bounded = ca.fabs(ca.sum1(thrusts) + ca.sum1(lower) + ca.sum1(upper)) < ca.inf
+    return thrusts, ca.if_else(bounded, worst, ca.inf)
 
 
 def _pattern(sparsity: ca.Sparsity) -> sparse.csc_matrix:

@@ -34,7 +34,8 @@ class ProgramData:
         p: Non-zeros of the upper triangle of P. Likewise q, a, lower, upper.
         stacked: Parameters of the program; `parameters` are views of it by name.
         free: Thrusts of the same tick without any limit [N], (n,).
-        violation: By how much they break the worst row, (1,); < 0 where they are the solution.
+        violation: By how much they break the worst row, (1,); < 0 where they are the solution, infinite where a number
+            is missing.
     """
 
     def __init__(self, template: QpTemplate, arrays: Sequence[np.ndarray]) -> None:

@@ -1,10 +1,8 @@
-"""One tick's measured numbers into the inputs of the compiled tick: arrays in one copy, single numbers in another."""
+"""One tick's measured numbers into the inputs of the compiled tick, all of them in one call."""
 
 from __future__ import annotations
 
 import struct
-
-import numpy as np
 
 from ibvs_qp.estimation.contact import ContactEstimator
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL, Measurement, Reference
@@ -15,7 +13,7 @@ from ibvs_qp.setpoints.tick_function import TickFunction
 #: Distance given to the equations while the wall is unknown [m].
 FAR_AWAY = 1e3
 
-_NOTHING = np.zeros(3)
+_NOTHING = (0.0, 0.0, 0.0)
 
 
 class TickInputs:
@@ -27,10 +25,9 @@ class TickInputs:
 
     def __init__(self, tick: TickFunction, slots: int) -> None:
         self._tick, self._slots, self._pairing = tick, slots, LinePairing(slots)
-        self._arrays = tick.values[: sum(ARRAYS.values())]
-        numbers = tick.values[len(self._arrays) :]
-        self._format = struct.Struct(f"{4 + len(TOUCH) + REFERENCE_INPUTS + slots + slots * SLOT_INPUTS}d")
-        self._numbers = memoryview(numbers).cast("B")  # type: ignore[arg-type]
+        count = sum(ARRAYS.values()) + 4 + len(TOUCH) + REFERENCE_INPUTS + slots + slots * SLOT_INPUTS
+        self._pack = struct.Struct(f"{count}d").pack_into
+        self._memory = memoryview(tick.values).cast("B")  # type: ignore[arg-type]
         self.reset()
 
     def reset(self) -> None:
@@ -50,21 +47,17 @@ class TickInputs:
             dt: Time since the last tick [s].
         """
         force, velocity = measurement.specific_force, measurement.velocity
-        parts = (
-            measurement.attitude,
-            measurement.angular_velocity,
-            measurement.contact_wrench,
-            _NOTHING if force is None else force,
-            _NOTHING if velocity is None else velocity,
-            contact.normal,
-        )
-        np.concatenate(parts, out=self._arrays)
-        self._pair(measurement, reference, contact.known)
         press, known, stiffness = reference.contact, contact.known, contact.stiffness
-        right, down = reference.velocity.tolist()
-        self._format.pack_into(
-            self._numbers,
+        self._pair(measurement, reference, known)
+        self._pack(
+            self._memory,
             0,
+            *measurement.attitude.tolist(),
+            *measurement.angular_velocity.tolist(),
+            *measurement.contact_wrench.tolist(),
+            *(_NOTHING if force is None else force.tolist()),
+            *(_NOTHING if velocity is None else velocity.tolist()),
+            *contact.normal.tolist(),
             dt,
             force is not None,
             velocity is not None,
@@ -82,8 +75,7 @@ class TickInputs:
             stiffness.known,
             reference.push_force,
             reference.standoff,
-            right,
-            down,
+            *reference.velocity.tolist(),
             press,
             *reference.tilt.tolist(),
             *reference.travel.tolist(),
@@ -102,6 +94,7 @@ class TickInputs:
         if not wall_known:
             return
         for slot, entry, vertical in self._pairing.pairs(measurement.lines, reference.lines):
-            self._lines[slot * SLOT_INPUTS : (slot + 1) * SLOT_INPUTS] = entry
+            start = slot * SLOT_INPUTS
+            self._lines[start : start + SLOT_INPUTS] = entry
             self._vertical[slot] = vertical
             self.present.append((slot, VERTICAL if vertical else HORIZONTAL))

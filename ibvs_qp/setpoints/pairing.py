@@ -52,6 +52,7 @@ class LinePairing:
         self._roles: tuple[str, ...] = ()
         self._slots: dict[tuple[str, int], int] = {}
         self.keys: list[tuple[str, int]] = []
+        self._places: list[tuple[int, float]] = []
 
     def assign(self, references: tuple[LineReference, ...]) -> list[int]:
         """Give every reference its slot.
@@ -71,6 +72,7 @@ class LinePairing:
         for key in self.keys:
             if key not in self._slots:
                 self._slots[key] = min(set(range(self._count)) - set(self._slots.values()))
+        self._places = [(self._slots[key], float(key[0] == VERTICAL)) for key in self.keys]
         return freed
 
     def pairs(
@@ -78,14 +80,14 @@ class LinePairing:
     ) -> list[tuple[int, tuple[float, ...], float]]:
         """Entries of every slot that has a line: (slot, input, 1 for a vertical line)."""
         found = []
-        for index, (role, place) in enumerate(self.keys):
+        for reference, (role, place), (slot, vertical) in zip(references, self.keys, self._places, strict=False):
             line = _nth(lines, role, place)
             if line is None or not abs(line.rho) < RHO_BOUND:
                 continue
-            reference = references[index]
-            rho, theta = align_line(line.rho, line.theta, reference.theta)
-            entry = (1.0, rho, theta, reference.rho, reference.theta, line.weight, line.covariance[0, 0])
-            found.append((self._slots[(role, place)], entry, float(role == VERTICAL)))
+            wanted = reference.theta
+            rho, theta = align_line(line.rho, line.theta, wanted)
+            entry = (1.0, rho, theta, reference.rho, wanted, line.weight, line.covariance.item(0))
+            found.append((slot, entry, vertical))
         return found
 
 

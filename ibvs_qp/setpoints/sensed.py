@@ -20,7 +20,7 @@ SLOT_INPUTS = 7
 
 
 def packed_inputs(signals: Signals, line_slots: int) -> None:
-    """Ask for everything that is packed every tick, arrays first, then single numbers: two blocks side by side."""
+    """Ask for everything that is packed every tick, arrays first, then single numbers: one block."""
     for name, size in ARRAYS.items():
         signals.input(name, size)
     for name in ("dt", "felt", "moving", "contact_weight"):

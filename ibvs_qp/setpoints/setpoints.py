@@ -27,6 +27,8 @@ LONGEST_TICK = 0.02
 #: Thrust step that stands for "no rate limit" before the first command [N].
 ANY_STEP = 1e6
 
+_NO_LIMITS: tuple[list[float] | None, list[float] | None] = (None, None)
+
 
 def _number(name: str, index: int, text: str) -> property:
     """Read-only result of the last tick as a plain number."""
@@ -75,7 +77,7 @@ class Setpoints:
         values["thrust_change"][:] = 0.0
         values["thrust_step"][0] = ANY_STEP
         values["thrust_low"][:], values["thrust_high"][:] = values["thrust_floor"], values["thrust_ceiling"]
-        self._limits_given = False
+        self._limits = _NO_LIMITS
         self.last: np.ndarray | None = None
         self.normal[:], self.right[:], self.down[:] = np.eye(3)
         self.tick.outputs["reach"][0] = UNBOUNDED
@@ -108,13 +110,15 @@ class Setpoints:
         if self.last is None:
             values["thrust_last"][:] = hold_thrusts(config, measurement)
         low, high = measurement.thrust_min, measurement.thrust_max
-        if low is not None or high is not None or self._limits_given:
+        limits = (None if low is None else low.tolist(), None if high is None else high.tolist())
+        if limits != self._limits:
+            self._limits = limits
             self._narrow(low, high)
         self.tick()
 
     def _narrow(self, low: np.ndarray | None, high: np.ndarray | None) -> None:
         """Limits that a measurement brings hold within those of the vehicle."""
-        values, self._limits_given = self._values, low is not None or high is not None
+        values = self._values
         floor, ceiling = values["thrust_floor"], values["thrust_ceiling"]
         lowest = floor if low is None else np.maximum(low, floor)
         values["thrust_low"][:] = lowest
@@ -127,7 +131,7 @@ class Setpoints:
             values["commanded"][0] = 1.0
             values["thrust_step"][0] = self.config.vehicle.thrust_rate_n_s * self.config.tick_s
         else:
-            values["thrust_change"][:] = thrusts - self.last
+            np.subtract(thrusts, self.last, out=values["thrust_change"])
         values["thrust_last"][:] = thrusts
         values["given_up"][0] = given_up
         self.last = thrusts

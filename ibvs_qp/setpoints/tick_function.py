@@ -22,11 +22,12 @@ class TickFunction:
     """
 
     def __init__(self, signals: Signals, extra: Sequence[ca.SX] = (), to_machine_code: bool = False) -> None:
-        results = [signals.next_states, stack(signals.outputs), *(ca.densify(result) for result in extra)]
+        states = ca.densify(signals.next_states)
+        results = [states, ca.sum1(states), stack(signals.outputs), *(ca.densify(result) for result in extra)]
         function = ca.Function("tick", [stack(signals.inputs), stack(signals.states)], ca.cse(results))
         self._call = BufferedFunction(function, to_machine_code)
         self.values, self._state = self._call.inputs
-        self._next, results_out, *self.extra = self._call.outputs
+        self._next, self._sum, results_out, *self.extra = self._call.outputs
         self.inputs = {name: self.values[place] for name, place in places(signals.inputs).items()}
         self.states = {name: self._state[place] for name, place in places(signals.states).items()}
         self.outputs = {name: results_out[place] for name, place in places(signals.outputs).items()}
@@ -40,5 +41,5 @@ class TickFunction:
     def __call__(self) -> None:
         """Evaluate; the states move on unless a result of theirs is not finite."""
         self._call()
-        if math.isfinite(self._next.sum()):
+        if math.isfinite(self._sum.item(0)):
             self._state[:] = self._next
