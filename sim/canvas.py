@@ -172,14 +172,16 @@ class Canvas:
     def _stamp(self, column: float, row: float) -> None:
         phase_column, phase_row = round(column * _PHASES), round(row * _PHASES)
         stamp = self._stamps[phase_row % _PHASES][phase_column % _PHASES]
-        half = len(stamp) // 2
-        left, top = phase_column // _PHASES - half, phase_row // _PHASES - half
-        height, width = self._coverage.shape
-        c0, c1, r0, r1 = max(left, 0), min(left + len(stamp), width), max(top, 0), min(top + len(stamp), height)
-        if c0 >= c1 or r0 >= r1:
-            return
+        size, (height, width) = len(stamp), self._coverage.shape
+        left, top = phase_column // _PHASES - size // 2, phase_row // _PHASES - size // 2
+        c0, c1, r0, r1 = left, left + size, top, top + size
+        if left < 0 or top < 0 or c1 > width or r1 > height:
+            c0, c1, r0, r1 = max(left, 0), min(c1, width), max(top, 0), min(r1, height)
+            if c0 >= c1 or r0 >= r1:
+                return
+            stamp = stamp[r0 - top : r1 - top, c0 - left : c1 - left]
         patch = self._coverage[r0:r1, c0:c1]
-        np.maximum(patch, stamp[r0 - top : r1 - top, c0 - left : c1 - left], out=patch)
+        np.maximum(patch, stamp, out=patch)
         old = self._dirty
         self._dirty = (
             (r0, r1, c0, c1) if old is None else (min(old[0], r0), max(old[1], r1), min(old[2], c0), max(old[3], c1))

@@ -127,8 +127,8 @@ class World:
         if self._rendered and options.camera_process and options.camera == "plane":
             # first of all: it sets itself up meanwhile
             camera = RemoteCamera(scene, vehicle, options.seed, lambda: self.canvas.take())
-        self.plant = Plant(scene, vehicle, options.seed)
-        self.sensors = SensorSuite(scene, vehicle, options.seed)
+        self.plant = Plant(scene, vehicle, options.seed, options.machine_code)
+        self.sensors = SensorSuite(scene, vehicle, options.seed, options.machine_code)
         self.canvas = Canvas(scene, options.seed)
         self._miscalibration = Miscalibration(scene.camera, vehicle, self._rendered)
         if self._rendered:
@@ -138,7 +138,7 @@ class World:
         else:
             self._features = GeometricFeatures(scene, vehicle, self.canvas, options.seed)
         self.viewer = self._open_viewer() if options.view else None
-        self._brush: np.ndarray | None = None
+        self._brush: tuple[float, float] | None = None
         self._pressed = 0
 
     def _open_viewer(self) -> FlightViewer:
@@ -169,7 +169,7 @@ class World:
         if pressing and self._brush is not None and self._pressed % STROKE_TICKS:
             return
         if pressing:
-            point = self.geometry.board_coordinates(self.plant.tip[1:])
+            point = self.geometry.spot(*self.plant.tip_on_wall)
             self.canvas.stroke(self._brush, point)
             self._brush = point
         else:
