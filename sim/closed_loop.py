@@ -136,7 +136,9 @@ class World:
             # A drawing thread would hand the interpreter's lock to and fro: measured 10 % slower on two cores.
             self._stream = CameraStream(camera, scene.camera.rate_hz, scene.camera.latency_s, threaded=False)
         else:
-            self._features = GeometricFeatures(scene, vehicle, self.canvas, options.seed)
+            self._features = GeometricFeatures(
+                scene, vehicle, self.canvas, options.seed, to_machine_code=options.machine_code
+            )
         self.viewer = self._open_viewer() if options.view else None
         self._brush: tuple[float, float] | None = None
         self._pressed = 0

@@ -119,7 +119,7 @@ class Plant(PlantReadings):
             self.crashed, self.time_ns = self.crashed or NOT_FINITE, self.time_ns + TICK_NS
             return
         self._wanted[:] = thrusts
-        _put_three(self._air, 0, *self.wind.force(self._centre_velocity.tolist()))
+        _put_three(self._air.data, 0, *self.wind.force(self._centre_velocity.tolist()))
         self._drive()
         self._lag[:] = self._lags
         mujoco.mj_step(self.model, self.data, STEPS_PER_TICK)

@@ -58,7 +58,7 @@ class Recorder:
         self._log = Columns({name: 1 for name in NUMBERS} | {"error": len(self._slots)} | wide)
         self._pack = struct.Struct(f"{len(NUMBERS) + len(self._slots)}d").pack
         # What stays where it is; a view of the memory is copied faster than an array.
-        self._standing = memoryview(world.plant.truth), memoryview(given), memoryview(world.plant.motor_thrusts)
+        self._standing = world.plant.truth.data, given.data, world.plant.motor_thrusts.data
         self._push_reference = tick.outputs["push_reference"]
         self._errors = [tick.outputs[f"line_{slot}_terms"] for slot in self._slots]
         self._focal = camera_intrinsics(scene.camera)[0]
