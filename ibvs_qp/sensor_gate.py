@@ -21,6 +21,7 @@ _VECTORS = (
 #: A quaternion whose squared length is this far from 1 is no attitude.
 _UNIT_SLIP = 0.02
 _FLOAT = np.dtype(np.float64)
+_THREE, _FOUR, _SIX = (3,), (4,), (6,)
 
 
 class SensorGate:
@@ -55,15 +56,16 @@ class SensorGate:
             return None, (f"sensor frame: stamp_ns {why}",)
         if self.clock.shift_ns:
             frame = _shifted(frame, self.clock.shift_ns)
-        if frame.image is None and frame.features is None and self._sound(frame):
+        if _dated(frame.image) and _dated(frame.features) and self._sound(frame):
             return frame, ()
         return self._mend(frame)
 
     def _sound(self, frame: SensorFrame) -> bool:
         """Whether surely nothing is to refuse; where it is not sure, `_mend` finds out name by name."""
         attitude, rate, force, wrench = frame.attitude, frame.angular_velocity, frame.specific_force, frame.wrench
-        if not (_is_row(attitude, (4,)) and _is_row(rate, (3,)) and _is_row(force, (3,)) and _is_row(wrench, (6,))):
-            return False
+        for value, shape in ((attitude, _FOUR), (rate, _THREE), (force, _THREE), (wrench, _SIX)):
+            if type(value) is not np.ndarray or value.dtype is not _FLOAT or value.shape != shape:
+                return False
         stamp = frame.wrench_stamp_ns
         if type(stamp) is not int or not 0 <= stamp <= frame.stamp_ns:
             return False
@@ -97,11 +99,16 @@ class SensorGate:
         else:
             self._wrench_stamp = frame.wrench_stamp_ns
         for name, part in (("image", frame.image), ("features", frame.features)):
-            if part is not None and not is_stamp(getattr(part, "stamp_ns", None)):
+            if not _dated(part):
                 changes[name] = None
         if not changes:
             return frame, ()
         return dataclasses.replace(frame, **changes), tuple(f"sensor {name}: not sound" for name in changes)
+
+
+def _dated(part: Any) -> bool:
+    """Whether a part of a frame is absent or has a stamp."""
+    return part is None or is_stamp(getattr(part, "stamp_ns", None))
 
 
 def _shifted(frame: SensorFrame, shift_ns: int) -> SensorFrame:
@@ -117,10 +124,6 @@ def _shifted(frame: SensorFrame, shift_ns: int) -> SensorFrame:
             moved["velocity_stamp_ns"] = part.velocity_stamp_ns + shift_ns  # type: ignore[union-attr]
         changes[name] = dataclasses.replace(part, **moved)
     return dataclasses.replace(frame, **changes)
-
-
-def _is_row(value: Any, shape: tuple[int, ...]) -> bool:
-    return type(value) is np.ndarray and value.dtype is _FLOAT and value.shape == shape
 
 
 def _sound(value: Any, size: int, bound: float) -> list[float] | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Sequence
 
 import numpy as np
@@ -47,6 +48,13 @@ class DelayedKalman:
         size = len(self.noise)
         self.covariance = np.diag(self.initial_std**2)
         self._history = np.zeros((HISTORY, size))
+        row = struct.Struct(f"{size}d")
+        self._put, self._row_bytes, self._bytes = row.pack_into, row.size, self._history.data
+        # A correction, its first and its second integral; products of a correction's covariance.
+        self._terms = np.zeros((3, size))
+        self._correction, self._first, self._second = self._terms
+        self._product, self._step = np.zeros((size, size)), np.zeros((size, size))
+        self._step_diagonal = _diagonal(self._step)
         self.ticks.reset()
         self._lengths = [self.tick] * HISTORY
         self._uneven = 0
@@ -64,7 +72,7 @@ class DelayedKalman:
     def remember(self, stamp_ns: int, state: Sequence[float] | np.ndarray, dt: float | None = None) -> None:
         """Take a state that was advanced by one tick elsewhere; by ``dt`` [s], None for the nominal tick."""
         slot = self.ticks.add(stamp_ns)
-        self._history[slot] = state
+        self._put(self._bytes, slot * self._row_bytes, *state)
         self._lengths[slot] = self.tick if dt is None else dt
         if dt is not None and abs(dt - self.tick) > UNEVEN_S:
             self._uneven = self.ticks.now
@@ -189,24 +197,33 @@ class DelayedKalman:
 
     def _shrink(self, known: np.ndarray, spread: float) -> None:
         """P - known known' / spread, symmetric to the bit."""
-        product = known[:, None] * known
+        product = self._product
+        np.multiply(known[:, None], known, out=product)
         product /= spread
         self.covariance -= product
 
     def _propagate(self, dt: float) -> None:
-        step = dt * self.chain + (0.5 * dt * dt) * (self.chain @ self.chain)
-        _diagonal(step)[:] += 1.0
+        step, chain = self._step, self.chain
+        np.multiply(chain, dt, out=step)
+        step += (0.5 * dt * dt) * (chain @ chain)
+        diagonal = self._step_diagonal
+        diagonal += 1.0
         moved = step @ self.covariance @ step.T
-        _diagonal(moved)[:] += self.noise * dt
+        diagonal = _diagonal(moved)
+        diagonal += self.noise * dt
         moved += moved.T.copy()
         moved *= 0.5
         self.covariance = moved
 
     def _apply(self, correction: np.ndarray, age: int) -> None:
         """Add a correction at a past tick and what has become of it since."""
-        first = self.chain @ correction * self.tick
-        second = self.chain @ first * self.tick
-        path = self._paths(age) @ np.array((correction, first, second))
+        chain, tick, first, second = self.chain, self.tick, self._first, self._second
+        self._correction[:] = correction
+        np.matmul(chain, correction, out=first)
+        first *= tick
+        np.matmul(chain, first, out=second)
+        second *= tick
+        path = self._paths(age) @ self._terms
         start, end = self.ticks.slot(age), self.ticks.slot(0) + 1
         if start < end:
             self._history[start:end] += path

@@ -20,6 +20,7 @@ from ibvs_qp.vectors import cross_product
 #: Lines followed at once.
 SLOTS = 8
 
+_NOTHING = np.zeros((2, 2))
 _VELOCITY, _BIAS, _ODOMETER, _LINES = slice(0, 2), slice(2, 4), slice(4, 6), 6
 
 
@@ -101,26 +102,27 @@ class WallMotion:
         right, down = right + dt * vr, down + dt * vd
         for line in self.lines.values():
             c, s = line.rates
-            state[_LINES + line.slot] += c * right + s * down
+            slot = _LINES + line.slot
+            line.offset = offset = state[slot] + (c * right + s * down)
+            state[slot] = offset
         self._filter.remember(stamp_ns, state, dt)
         self.state, self._stamp = state, stamp_ns
-        self._refresh(stamp_ns)
+        self._fade(stamp_ns)
+        self.velocity_age_s = (stamp_ns - self._velocity_stamp) * 1e-9 if self._velocity_stamp >= 0 else math.inf
 
-    def _refresh(self, stamp_ns: int) -> None:
-        config, old = self._config, []
+    def _fade(self, stamp_ns: int) -> None:
+        """Lines that no picture shows any more fade and go."""
+        start, end, old = self._config.fade_start_s, self._config.fade_end_s, []
         for key, line in self.lines.items():
             age = (stamp_ns - line.news_ns) * 1e-9
-            if age > config.fade_end_s:
+            if age <= start and age <= end:
+                line.weight = line.fresh_weight
+            elif age <= end:
+                line.weight = line.fresh_weight * ((end - age) / (end - start))
+            else:
                 old.append(key)
-                continue
-            weight = min(1.0, line.frames / config.frames_to_trust) * line.source_weight
-            if age > config.fade_start_s:
-                weight *= (config.fade_end_s - age) / (config.fade_end_s - config.fade_start_s)
-            line.weight = weight
-            line.offset = self.state[_LINES + line.slot]
         for key in old:
             self._drop(key)
-        self.velocity_age_s = (stamp_ns - self._velocity_stamp) * 1e-9 if self._velocity_stamp >= 0 else math.inf
 
     def _drop(self, key: int) -> None:
         slot = _LINES + self.lines.pop(key).slot
@@ -171,7 +173,8 @@ class WallMotion:
         else:
             self._correct_angle(tracked, angle, stamp)
         tracked.frames += tracked.seen_ns != stamp
-        tracked.seen_ns, tracked.source_weight = stamp, line.weight
+        tracked.seen_ns = stamp
+        tracked.fresh_weight = min(1.0, tracked.frames / self._config.frames_to_trust) * line.weight
         tracked.news_ns = self._stamp
         tracked.surface_side, tracked.kind = side, line.kind or tracked.kind
         self._point(tracked)
@@ -244,11 +247,13 @@ class WallMotion:
         rho, theta, scale = image_line(line.offset, line.angle, axes, self._tip_from_camera, foot_distance)
         slot = _LINES + line.slot
         variance = max(self._filter.covariance.item(slot, slot), 1e-10) / (scale * scale)
+        covariance = _NOTHING.copy()
+        covariance[0, 0], covariance[1, 1] = variance, line.theta_variance
         return made(
             LineFeature,
             rho=rho,
             theta=theta,
-            covariance=np.array(((variance, 0.0), (0.0, line.theta_variance))),
+            covariance=covariance,
             role=line.role,
             weight=line.weight,
             stamp_ns=stamp_ns,
