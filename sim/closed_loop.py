@@ -139,6 +139,7 @@ class World:
             self._features = GeometricFeatures(
                 scene, vehicle, self.canvas, options.seed, to_machine_code=options.machine_code
             )
+        self._seen_from = tuple(self.plant.truth[place] for place in _SEEN_FROM)  # the readings themselves
         self.viewer = self._open_viewer() if options.view else None
         self._brush: tuple[float, float] | None = None
         self._pressed = 0
@@ -157,9 +158,9 @@ class World:
             pose = self._miscalibration.pose(plant.position, plant.quaternion)
             image = self._stream.tick(plant.time_ns, *pose)
             return self.sensors.sample(plant, image=None if image is None else self._miscalibration.picture(image))
-        position, quaternion, velocity = (plant.truth[place] for place in _SEEN_FROM)  # read at once, not kept
+        position, quaternion, velocity = self._seen_from  # read at once, not kept
         pose = self._miscalibration.pose(position, quaternion)
-        return self.sensors.sample(plant, features=self._features.tick(plant.time_ns, *pose, velocity))
+        return self.sensors.sample(plant, None, self._features.tick(plant.time_ns, *pose, velocity))
 
     def act(self, thrusts: np.ndarray) -> None:
         """Advance one control tick and paint where the brush presses."""

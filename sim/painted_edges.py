@@ -34,11 +34,20 @@ class PaintedEdges:
         self._reach = math.ceil(self._radius / BIN_M)
         self._open = np.zeros((self._rows + 1, self._bins), dtype=bool)  # painted and not covered
         self._middles = (np.arange(self._bins) + 0.5) * BIN_M
+        self._coming: list[tuple[BoardPoint, BoardPoint]] = []  # strokes that nobody has looked at yet
 
     def stroke(self, previous: BoardPoint | None, current: BoardPoint) -> None:
         """Record a stroke between two tip positions (along, up) [m]; see `sim.canvas.Canvas.stroke`."""
-        if previous is None:
-            return
+        if previous is not None:
+            self._coming.append((previous, current))
+
+    def _catch_up(self) -> None:
+        """Take in the strokes since somebody last looked; together they find everything at hand."""
+        for previous, current in self._coming:
+            self._add(previous, current)
+        self._coming.clear()
+
+    def _add(self, previous: BoardPoint, current: BoardPoint) -> None:
         a0, u0, a1, u1 = float(previous[0]), float(previous[1]), float(current[0]), float(current[1])
         if abs(a1 - a0) <= _FLATNESS * abs(u1 - u0):
             return
@@ -66,6 +75,7 @@ class PaintedEdges:
 
     def all_exposed(self) -> tuple[np.ndarray, np.ndarray]:
         """Row of every exposed point, in order, (n,), and the points of `exposed` of all rows, (n, 2)."""
+        self._catch_up()
         rows, bins = self._open.nonzero()
         points = np.empty((len(rows), 2))
         points[:, 0], points[:, 1] = self._middles[bins], self._top[rows, bins]
