@@ -205,10 +205,10 @@ class DelayedKalman:
     def _propagate(self, dt: float) -> None:
         step, chain = self._step, self.chain
         np.multiply(chain, dt, out=step)
-        step += (0.5 * dt * dt) * (chain @ chain)
+        step += (0.5 * dt * dt) * chain.dot(chain)
         diagonal = self._step_diagonal
         diagonal += 1.0
-        moved = step @ self.covariance @ step.T
+        moved = step.dot(self.covariance).dot(step.T)  # on so few numbers half the time of @
         diagonal = _diagonal(moved)
         diagonal += self.noise * dt
         moved += moved.T.copy()
@@ -219,11 +219,11 @@ class DelayedKalman:
         """Add a correction at a past tick and what has become of it since."""
         chain, tick, first, second = self.chain, self.tick, self._first, self._second
         self._correction[:] = correction
-        np.matmul(chain, correction, out=first)
+        np.dot(chain, correction, out=first)
         first *= tick
-        np.matmul(chain, first, out=second)
+        np.dot(chain, first, out=second)
         second *= tick
-        path = self._paths(age) @ self._terms
+        path = self._paths(age).dot(self._terms)
         start, end = self.ticks.slot(age), self.ticks.slot(0) + 1
         if start < end:
             self._history[start:end] += path

@@ -10,6 +10,7 @@ import numpy as np
 from ibvs_qp.estimation.config import EstimationConfig
 from ibvs_qp.estimation.delayed import DelayedKalman
 from ibvs_qp.estimation.line_noise import SteadyValue, WhiteNoise
+from ibvs_qp.estimation.stamps import StampRing
 from ibvs_qp.estimation.tracked_line import TrackedLine
 from ibvs_qp.estimation.wall_lines import WallAxes, image_line, wall_line
 from ibvs_qp.frames import GRAVITY
@@ -61,6 +62,11 @@ class WallMotion:
         self.velocity_age_s = math.inf
         self._velocity_stamp = -1
         self._noise_rho, self._noise_theta = WhiteNoise(), WhiteNoise()  # what all lines have shown
+
+    @property
+    def ticks(self) -> StampRing:
+        """Stamps of the ticks remembered."""
+        return self._filter.ticks
 
     @property
     def velocity(self) -> np.ndarray:
