@@ -98,6 +98,7 @@ class GeometricFeatures:
     def _bind(self, translated: Callable[[ca.Function], ca.Function]) -> None:
         """Compiled projection on memory that holds its arguments."""
         scene, half = self.scene, 0.5 * (self._last_pixel + 1.0) / self._focal
+        self._half = half.tolist()
         width, height = scene.board.width_m, scene.board.height_m
         corners = np.array([(0.0, 0.0), (width, 0.0), (width, height), (0.0, height), (0.5 * width, 0.5 * height)])
         outline = self._world(corners[:, 0], corners[:, 1]).reshape(-1)
@@ -137,7 +138,7 @@ class GeometricFeatures:
         self._look()
         board = self._board.tolist()
         found = [(board[at], role, kind, track) for at, role, kind, track in _BOARD_LINES if board[at.start]]
-        found += self._paint_lines()
+        found += self._paint_lines(board)
         a, b, c = self._plane(*board[PLANE])
         velocity = np.array(velocity_body, float)
         take = self._normals.take
@@ -161,8 +162,11 @@ class GeometricFeatures:
         yz = self._geometry.point(along, up)
         return np.concatenate((np.zeros((*yz.shape[:-1], 1)), yz), axis=-1)
 
-    def _paint_lines(self) -> list[_Line]:
-        rows, points = self._edges.all_exposed()
+    def _paint_lines(self, board: list[float]) -> list[_Line]:
+        low, high = self._edges.heights
+        if low > high:
+            return []
+        rows, points = self._edges.all_exposed(*self._in_view(board, low, high))
         if len(rows) < 2:
             return []
         seen = self._unhidden(self._corner + points @ self._per_metre)
@@ -179,6 +183,21 @@ class GeometricFeatures:
             if numbers[0]:
                 lines.append((numbers, HORIZONTAL, "paint", _FIRST_ROW_TRACK + row))
         return lines
+
+    def _in_view(self, board: list[float], low: float, high: float) -> tuple[float, float]:
+        """Between which places along the board all in the picture from one height to another lies [m]."""
+        x, _, z, along_x, _, along_z, up_x, _, up_z = board[: PER_METRE.stop]
+        half, first, last = self._half[0], -math.inf, math.inf
+        for sign in (1.0, -1.0):  # half z +- x >= 0, which is linear along the board and up
+            at, rate, rise = half * z + sign * x, half * along_z + sign * along_x, half * up_z + sign * up_x
+            if rate == 0.0:
+                continue
+            meets = -(at + low * rise) / rate, -(at + high * rise) / rate
+            if rate > 0.0:
+                first = max(first, min(meets))
+            else:
+                last = min(last, max(meets))
+        return first, last
 
     def _unhidden(self, spots: np.ndarray) -> np.ndarray:
         """Indices of the points in camera coordinates that are in the picture and not behind arm or brush."""

@@ -13,6 +13,7 @@ from ibvs_qp.estimation.stamps import HISTORY, StampRing
 GATE = 6.0
 #: A tick that differs from the nominal one by more than this is counted as it was [s].
 UNEVEN_S = 1e-9
+_put_four = struct.Struct("4d").pack_into
 #: Rows (1, j, j (j - 1) / 2): what a correction, its first and its second integral have become j ticks later.
 _PATHS = np.array([(1.0, j, 0.5 * j * (j - 1.0)) for j in range(HISTORY)])
 
@@ -54,7 +55,10 @@ class DelayedKalman:
         self._terms = np.zeros((3, size))
         self._correction, self._first, self._second = self._terms
         self._product, self._step = np.zeros((size, size)), np.zeros((size, size))
-        self._step_diagonal = _diagonal(self._step)
+        self._step_diagonal = self._step.reshape(-1)[:: size + 1]
+        self._noise = np.diag(self.noise)
+        self._pair, self._gain = np.zeros((2, 2)), np.zeros((2, size))
+        self._pair_bytes = self._pair.data
         self.ticks.reset()
         self._lengths = [self.tick] * HISTORY
         self._uneven = 0
@@ -161,12 +165,15 @@ class DelayedKalman:
         wa, wb = (bb * da - ab * db) / determinant, (aa * db - ab * da) / determinant
         if da * wa + db * wb > 2.0 * GATE * GATE:
             return False
-        a, b = p[:, first].copy(), p[:, first + 1] - (ab / aa) * p[:, first]
-        # One after the other, made independent first: P - a a' / aa - b b' / (bb - ab^2 / aa).
-        self._shrink(a, aa)
-        self._shrink(b, determinant / aa)
-        rest = (db - ab / aa * da) * aa / determinant
-        self._apply(a * (da / aa) + b * rest, age)
+        # Rows for columns: P is symmetric, but for the rounding here, which the next propagation mends.
+        known, gain = p[first : first + 2], self._gain
+        _put_four(self._pair_bytes, 0, bb / determinant, -ab / determinant, -ab / determinant, aa / determinant)
+        np.dot(self._pair, known, out=gain)
+        correction = da * gain[0]
+        correction += db * gain[1]
+        np.dot(known.T, gain, out=self._product)
+        p -= self._product
+        self._apply(correction, age)
         return True
 
     def _past(self, age: int) -> np.ndarray:
@@ -209,9 +216,9 @@ class DelayedKalman:
         diagonal = self._step_diagonal
         diagonal += 1.0
         moved = step.dot(self.covariance).dot(step.T)  # on so few numbers half the time of @
-        diagonal = _diagonal(moved)
-        diagonal += self.noise * dt
-        moved += moved.T.copy()
+        np.multiply(self._noise, dt, out=self._product)
+        moved += self._product
+        moved = moved + moved.T
         moved *= 0.5
         self.covariance = moved
 
@@ -238,8 +245,3 @@ class DelayedKalman:
         lengths = np.array([self._lengths[self.ticks.slot(back)] for back in range(age - 1, -1, -1)]) / self.tick
         once = np.concatenate(([0.0], np.cumsum(lengths)))
         return np.column_stack((np.ones(age + 1), once, np.concatenate(([0.0], np.cumsum(lengths * once[:-1])))))
-
-
-def _diagonal(matrix: np.ndarray) -> np.ndarray:
-    """The diagonal of a contiguous square matrix as a view that can be written."""
-    return matrix.reshape(-1)[:: len(matrix) + 1]

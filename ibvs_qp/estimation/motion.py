@@ -155,11 +155,17 @@ class WallMotion:
         self.state = self._filter.state.tolist()
 
     def _correct_velocity(self, frame: FeatureFrame, axes: WallAxes) -> None:
-        if frame.velocity is None or frame.velocity_covariance is None or not np.isfinite(frame.velocity).all():
+        if frame.velocity is None or frame.velocity_covariance is None:
             return
-        plane = np.array((axes.right, axes.down))
-        (aa, ab), (_, bb) = (plane @ frame.velocity_covariance @ plane.T).tolist()
-        right, down = (plane @ frame.velocity).tolist()
+        x, y, z = frame.velocity.tolist()
+        if not math.isfinite(x + y + z):
+            return
+        (rx, ry, rz), (dx, dy, dz) = axes.right, axes.down
+        right, down = rx * x + ry * y + rz * z, dx * x + dy * y + dz * z
+        rows = frame.velocity_covariance.tolist()
+        ux, uy, uz = [a * rx + b * ry + c * rz for a, b, c in rows]
+        vx, vy, vz = [a * dx + b * dy + c * dz for a, b, c in rows]
+        aa, ab, bb = rx * ux + ry * uy + rz * uz, rx * vx + ry * vy + rz * vz, dx * vx + dy * vy + dz * vz
         floor = self._config.velocity_std_m_s**2
         stamp = frame.velocity_stamp_ns or frame.stamp_ns
         if self._filter.correct_pair(stamp, 0, (right, down), (aa + floor, ab, bb + floor)):
