@@ -44,6 +44,8 @@ from ibvs_qp.vision.percept import LineHint
 HINT_SPAN = (0.10, 0.50)
 
 
+_EYE = np.eye(3)
+
 #: A tick is never taken to last longer than this [s]: after a pause the filters begin where they were.
 LONGEST_TICK = 0.02
 
@@ -145,7 +147,7 @@ class Pilot:
         self._history_attitude = [[1.0, 0.0, 0.0, 0.0]] * HISTORY
         self._turn: Row = (0.0, 0.0, 0.0)
         self._history_turn = [self._turn] * HISTORY
-        self._spread, self._covariance = -1.0, np.zeros((3, 3))
+        self._covariance = self.motion.velocity_variance * _EYE
         self._last_capture = -1
         self.percept = None
         self.thrust_limits: tuple[np.ndarray, np.ndarray] | None = None
@@ -295,6 +297,7 @@ class Pilot:
             return
         gravity = down_row(*self._history_attitude[self._slot(features.stamp_ns)])
         self.motion.correct(features, WallAxes.of(normal, gravity), distance)
+        self._covariance = self.motion.velocity_variance * _EYE  # nothing else changes it
 
     def _measure(self, frame: SensorFrame, wrench: np.ndarray, axes: WallAxes, wish: Wish) -> Measurement:
         velocity = covariance = None
@@ -311,7 +314,7 @@ class Pilot:
                     rz * right + dz * down - nz * rate,
                 )
             )
-            covariance = self._velocity_covariance()
+            covariance = self._covariance
         return made(
             Measurement,
             stamp_ns=frame.stamp_ns,
@@ -328,13 +331,6 @@ class Pilot:
             thrust_min=low,
             thrust_max=high,
         )
-
-    def _velocity_covariance(self) -> np.ndarray:
-        """Made anew only when a picture has changed it."""
-        spread = self.motion.velocity_variance
-        if spread != self._spread:
-            self._spread, self._covariance = spread, spread * np.eye(3)
-        return self._covariance
 
     def _scenery(self, frame: SensorFrame) -> Scenery:
         terms, motion = self.controller.setpoints, self.motion

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import Any
 
 import numpy as np
@@ -63,22 +64,21 @@ class SensorGate:
     def _sound(self, frame: SensorFrame) -> bool:
         """Whether surely nothing is to refuse; where it is not sure, `_mend` finds out name by name."""
         attitude, rate, force, wrench = frame.attitude, frame.angular_velocity, frame.specific_force, frame.wrench
-        for value, shape in ((attitude, _FOUR), (rate, _THREE), (force, _THREE), (wrench, _SIX)):
-            if type(value) is not np.ndarray or value.dtype is not _FLOAT or value.shape != shape:
-                return False
+        if not (
+            _is_row(attitude, _FOUR) and _is_row(rate, _THREE) and _is_row(force, _THREE) and _is_row(wrench, _SIX)
+        ):
+            return False
         stamp = frame.wrench_stamp_ns
         if type(stamp) is not int or not 0 <= stamp <= frame.stamp_ns:
             return False
         w, x, y, z = turn = attitude.tolist()
-        p, q, r = turning = rate.tolist()
-        a, b, c = felt = force.tolist()
-        f, g, h, i, j, k = load = wrench.tolist()
-        # A sum of squares within the squared bound has no entry beyond the bound; NaN is within nothing.
+        turning, felt, load = rate.tolist(), force.tolist(), wrench.tolist()
+        # A vector within the bound has no entry beyond it; NaN is within nothing.
         if not (
             abs(w * w + x * x + y * y + z * z - 1.0) <= _UNIT_SLIP
-            and p * p + q * q + r * r <= RATE_BOUND * RATE_BOUND
-            and a * a + b * b + c * c <= ACCELERATION_BOUND * ACCELERATION_BOUND
-            and f * f + g * g + h * h + i * i + j * j + k * k <= WRENCH_BOUND * WRENCH_BOUND
+            and math.hypot(*turning) <= RATE_BOUND
+            and math.hypot(*felt) <= ACCELERATION_BOUND
+            and math.hypot(*load) <= WRENCH_BOUND
         ):
             return False
         self.last = {"attitude": turn, "angular_velocity": turning, "specific_force": felt, "wrench": load}
@@ -124,6 +124,10 @@ def _shifted(frame: SensorFrame, shift_ns: int) -> SensorFrame:
             moved["velocity_stamp_ns"] = part.velocity_stamp_ns + shift_ns  # type: ignore[union-attr]
         changes[name] = dataclasses.replace(part, **moved)
     return dataclasses.replace(frame, **changes)
+
+
+def _is_row(value: Any, shape: tuple[int, ...]) -> bool:
+    return type(value) is np.ndarray and value.dtype is _FLOAT and value.shape == shape
 
 
 def _sound(value: Any, size: int, bound: float) -> list[float] | None:

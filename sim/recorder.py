@@ -33,7 +33,8 @@ PHASES = ("start", "approach", "align", "press", "paint", "climb", "retreat", "d
 CLEARANCE_TICKS = 5
 #: Pictures kept for the video per second.
 VIDEO_RATE = 10.0
-#: Columns that are one number a tick, in the order in which `Recorder.tick` fills them in; "error" for every line slot.
+#: Columns that are one number a tick, in the order in which `Recorder.tick` fills them in; "error" for every line slot
+#: follows the last of them.
 NUMBERS = "t phase row outcome step_us iterations reach_margin push_reference".split()
 #: Columns of integers.
 INTEGERS = ("phase", "row", "outcome", "iterations")
@@ -56,11 +57,11 @@ class Recorder:
         wide = {"truth": len(world.plant.truth), "given": len(self._given)}
         wide |= {"thrusts": rotors, "thrusts_actual": rotors, "unallocated": 6}
         self._log = Columns({name: 1 for name in NUMBERS} | {"error": len(self._slots)} | wide)
-        self._pack = struct.Struct(f"{len(NUMBERS) + len(self._slots)}d").pack
+        self._pack = struct.Struct(f"{len(NUMBERS) - 1}d").pack
         # What stays where it is; a view of the memory is copied faster than an array.
-        self._standing = world.plant.truth.data, given.data, world.plant.motor_thrusts.data
-        self._push_reference = tick.outputs["push_reference"]
-        self._errors = [tick.outputs[f"line_{slot}_terms"] for slot in self._slots]
+        errors = [tick.outputs[f"line_{slot}_terms"][_ERROR : _ERROR + 1].data for slot in self._slots]
+        self._standing = tick.outputs["push_reference"].data, *errors, world.plant.truth.data, given.data
+        self._actual = world.plant.motor_thrusts.data
         self._focal = camera_intrinsics(scene.camera)[0]
         self._limits: dict[str, int] = {}
         self._active: dict[int, list[tuple[int, float]]] = {}
@@ -86,12 +87,9 @@ class Recorder:
             pilot.controller_time_s * 1e6,
             command.iterations,
             command.reach_margin,
-            self._push_reference.item(),
-            *[terms.item(_ERROR) for terms in self._errors],
         )
-        truth, given, actual = self._standing
         thrusts, unallocated = command.thrusts.data, command.unallocated_wrench.data
-        self._log.add(b"".join((numbers, truth, given, thrusts, actual, unallocated)))
+        self._log.add(b"".join((numbers, *self._standing, thrusts, self._actual, unallocated)))
         if self._program is not None:
             self._programs.add(self._program.tobytes())
         active = command.active_limits
