@@ -240,10 +240,10 @@ def fly(
     except KeyboardInterrupt:
         reason = "interrupted"
     finally:
-        wall_time, memory = time.perf_counter() - start, world.close()
+        memory = world.close()
     trace = recorder.trace()
+    trace.wall_time_s = time.perf_counter() - start  # with what was put off until the end
     controller_pool.give_back(config.law, config.controller, pilot.controller)
-    trace.wall_time_s = wall_time
     trace.camera_memory_bytes = memory
     trace.completed = not reason and pilot.painter.finished and not pilot.painter.failed
     trace.reason = reason or pilot.painter.reason
