@@ -119,6 +119,7 @@ class Pilot:
             np.array(vehicle.camera_position_m),
             settings.tick_s,
             self.config.estimation,
+            settings.machine_code,
         )
         self.tare = WrenchTare(vehicle, self.config.estimation)
         self.supervisor = Supervisor(vehicle)

@@ -7,7 +7,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ibvs_qp.bound_function import BoundFunction
+from ibvs_qp.estimation.propagation import propagation
 from ibvs_qp.estimation.stamps import HISTORY, StampRing
+from ibvs_qp.machine_code import machine_code
 
 #: Innovations beyond this many standard deviations are refused.
 GATE = 6.0
@@ -28,7 +31,15 @@ class DelayedKalman:
     on the timeline of the captures, so nothing but the state is touched per tick.
     """
 
-    def __init__(self, chain: np.ndarray, noise: np.ndarray, initial_std: np.ndarray, tick_s: float) -> None:
+    def __init__(
+        self,
+        chain: np.ndarray,
+        noise: np.ndarray,
+        initial_std: np.ndarray,
+        tick_s: float,
+        pattern: np.ndarray | None = None,
+        to_machine_code: bool = False,
+    ) -> None:
         """Set up the filter.
 
         Args:
@@ -36,10 +47,20 @@ class DelayedKalman:
             noise: Power spectral densities of the process noise, (n,) [unit^2/s].
             initial_std: Standard deviations at the start, (n,).
             tick_s: Control period [s].
+            pattern: Where the chain may have entries, (n, n) bool; None: where it has now.
+            to_machine_code: Whether a C compiler translates the propagation; the same bits, sooner.
         """
         self.chain = np.array(chain, float)
         self.noise = np.array(noise, float)
         self.initial_std = np.array(initial_std, float)
+        size = len(self.noise)
+        self.covariance, self._product, self._time = np.zeros((size, size)), np.zeros((size, size)), np.zeros(1)
+        function = propagation(size, (self.chain != 0.0 if pattern is None else np.asarray(pattern, bool)).tobytes())
+        self._propagated = BoundFunction(
+            machine_code(function) if to_machine_code else function,
+            (self.chain, self.covariance, self.noise, self._time),
+            (self._product,),
+        )
         self.tick = tick_s
         self.ticks = StampRing(tick_s)
         self.reset()
@@ -47,16 +68,13 @@ class DelayedKalman:
     def reset(self) -> None:
         """Forget everything."""
         size = len(self.noise)
-        self.covariance = np.diag(self.initial_std**2)
+        self.covariance[:] = np.diag(self.initial_std**2)
         self._history = np.zeros((HISTORY, size))
         row = struct.Struct(f"{size}d")
         self._put, self._row_bytes, self._bytes = row.pack_into, row.size, self._history.data
-        # A correction, its first and its second integral; products of a correction's covariance.
+        # A correction, its first and its second integral.
         self._terms = np.zeros((3, size))
         self._correction, self._first, self._second = self._terms
-        self._product, self._step = np.zeros((size, size)), np.zeros((size, size))
-        self._step_diagonal = self._step.reshape(-1)[:: size + 1]
-        self._noise = np.diag(self.noise)
         self._pair, self._gain = np.zeros((2, 2)), np.zeros((2, size))
         self._pair_bytes = self._pair.data
         self.ticks.reset()
@@ -134,8 +152,8 @@ class DelayedKalman:
         gain = np.linalg.solve(spread, rows @ self.covariance).T
         if innovation @ np.linalg.solve(spread, innovation) > gate * gate * len(values):
             return False
-        self.covariance = self.covariance - gain @ rows @ self.covariance
-        self.covariance = 0.5 * (self.covariance + self.covariance.T)
+        self.covariance -= gain @ rows @ self.covariance
+        self.covariance[:] = 0.5 * (self.covariance + self.covariance.T)
         self._apply(gain @ innovation, age)
         return True
 
@@ -210,17 +228,9 @@ class DelayedKalman:
         self.covariance -= product
 
     def _propagate(self, dt: float) -> None:
-        step, chain = self._step, self.chain
-        np.multiply(chain, dt, out=step)
-        step += (0.5 * dt * dt) * chain.dot(chain)
-        diagonal = self._step_diagonal
-        diagonal += 1.0
-        moved = step.dot(self.covariance).dot(step.T)  # on so few numbers half the time of @
-        np.multiply(self._noise, dt, out=self._product)
-        moved += self._product
-        moved = moved + moved.T
-        moved *= 0.5
-        self.covariance = moved
+        self._time[0] = dt
+        self._propagated()
+        self.covariance[:] = self._product
 
     def _apply(self, correction: np.ndarray, age: int) -> None:
         """Add a correction at a past tick and what has become of it since."""

@@ -34,7 +34,12 @@ class WallMotion:
     """
 
     def __init__(
-        self, tip: np.ndarray, camera: np.ndarray, tick_s: float, config: EstimationConfig | None = None
+        self,
+        tip: np.ndarray,
+        camera: np.ndarray,
+        tick_s: float,
+        config: EstimationConfig | None = None,
+        to_machine_code: bool = False,
     ) -> None:
         self._config = config = config or EstimationConfig()
         self._tip = np.asarray(tip, float).tolist()
@@ -48,7 +53,9 @@ class WallMotion:
         noise[_ODOMETER] = 1e-10
         deviation = np.full(size, 0.05)
         deviation[_BIAS], deviation[_ODOMETER] = 0.1, 1e-6
-        self._filter = DelayedKalman(chain, noise, deviation, tick_s)
+        pattern = chain != 0.0
+        pattern[_LINES:, _VELOCITY] = True
+        self._filter = DelayedKalman(chain, noise, deviation, tick_s, pattern, to_machine_code)
         self.reset()
 
     def reset(self) -> None:
