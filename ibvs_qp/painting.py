@@ -13,7 +13,7 @@ import numpy as np
 
 from ibvs_qp.estimation.motion import TrackedLine
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL
-from ibvs_qp.painting_job import PaintingConfig, Scenery, Wish
+from ibvs_qp.painting_job import NONE, PaintingConfig, Scenery, Wish
 
 #: A guide may differ from where it must be by this much [m]: at the start, and from row to row.
 START_GATE, ROW_GATE = 0.15, 0.018
@@ -48,6 +48,8 @@ class Painter:
 
     def __init__(self, config: PaintingConfig) -> None:
         self.config = config
+        self._travel = np.array((-config.speed_m_s, 0.0))
+        self._travel.flags.writeable = False  # shared by all wishes
         self.reset()
 
     def reset(self) -> None:
@@ -401,10 +403,8 @@ class Painter:
             right = clipped(HOLD_GAIN * (self._anchor - seen.odometer[0]), -HOLD_SPEED, HOLD_SPEED)
         c, s = math.cos(slope), math.sin(slope)
         velocity = np.array((right + along * c + climb * s, along * s - climb * c))
-        wish = Wish(contact, standoff, velocity, guides, self.config.push_n)
-        if contact and self._slides:
-            wish.travel = np.array((-self.config.speed_m_s, 0.0))
-        return wish
+        travel = self._travel if contact and self._slides else NONE
+        return Wish(contact, standoff, velocity, guides, self.config.push_n, NONE, travel)
 
     def _edge_reference(self, edge: TrackedLine, edge_rate: float) -> float:
         """The stop edge's wanted offset: from where it was first seen to the margin, at the stroke's own speed."""

@@ -54,6 +54,11 @@ class PaintingConfig:
         return self.pitch_m - 0.5 * self.brush_width_m
 
 
+#: No tilt, no travel; shared by all wishes.
+NONE = np.zeros(2)
+NONE.flags.writeable = False
+
+
 @dataclass(slots=True)
 class Scenery:
     """What the strategy knows at one tick, all of it estimated."""
@@ -80,5 +85,5 @@ class Wish:
     velocity: np.ndarray
     guides: list[tuple[TrackedLine, float]]
     push: float
-    tilt: np.ndarray = field(default_factory=lambda: np.zeros(2))
-    travel: np.ndarray = field(default_factory=lambda: np.zeros(2))
+    tilt: np.ndarray = field(default_factory=lambda: NONE)
+    travel: np.ndarray = field(default_factory=lambda: NONE)

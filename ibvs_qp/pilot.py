@@ -17,7 +17,7 @@ from ibvs_qp.config import ControllerConfig
 from ibvs_qp.controller import HybridController
 from ibvs_qp.estimation.config import EstimationConfig
 from ibvs_qp.estimation.motion import WallMotion
-from ibvs_qp.estimation.stamps import HISTORY, StampRing
+from ibvs_qp.estimation.stamps import HISTORY
 from ibvs_qp.estimation.tare import WrenchTare
 from ibvs_qp.estimation.wall_lines import WallAxes, image_line
 from ibvs_qp.frames import to_camera
@@ -43,6 +43,8 @@ from ibvs_qp.vision.percept import LineHint
 #: Where the fresh edge exists ahead of the brush, normalised image x from the tip's side to the border.
 HINT_SPAN = (0.10, 0.50)
 
+
+_EYE = np.eye(3)
 
 #: A tick is never taken to last longer than this [s]: after a pause the filters begin where they were.
 LONGEST_TICK = 0.02
@@ -117,12 +119,13 @@ class Pilot:
             np.array(vehicle.camera_position_m),
             settings.tick_s,
             self.config.estimation,
+            settings.machine_code,
         )
         self.tare = WrenchTare(vehicle, self.config.estimation)
         self.supervisor = Supervisor(vehicle)
         self.painter = painter or Painter(self.config.painting)
         self._seen_as = seen_as
-        self._tick_s, self._ticks = settings.tick_s, StampRing(settings.tick_s)
+        self._tick_s = settings.tick_s
         self._gate = SensorGate()
         self._tip = np.array(vehicle.tip_position_m)
         self._camera = np.array(vehicle.camera_position_m)
@@ -142,11 +145,10 @@ class Pilot:
         if self._perception is not None:
             self._perception.reset()
         self._first = self._stamp = -1
-        self._ticks.reset()
         self._history_attitude = [[1.0, 0.0, 0.0, 0.0]] * HISTORY
         self._turn: Row = (0.0, 0.0, 0.0)
         self._history_turn = [self._turn] * HISTORY
-        self._spread, self._covariance = -1.0, np.zeros((3, 3))
+        self._covariance = self.motion.velocity_variance * _EYE
         self._last_capture = -1
         self.percept = None
         self.thrust_limits: tuple[np.ndarray, np.ndarray] | None = None
@@ -190,12 +192,12 @@ class Pilot:
         self._stamp = stamp
         now = self._gate.last
         attitude, force, rate = now["attitude"], now["specific_force"], now["angular_velocity"]
-        self._remember(stamp, attitude, rate, dt)
         contact = self.controller.setpoints.contact
         free = not contact.in_contact and contact.distance > estimation.tare_distance_m
         wrench = self.tare.update(frame.wrench, frame.wrench_stamp_ns, force, free)
         axes = WallAxes.of(contact.normal.tolist(), down_row(*attitude))
         self.motion.predict(stamp, axes, force, rate, dt)
+        self._remember(attitude, rate, dt)
         # Without a rotor the vehicle turns away from the wall: what it sees then is not what the strategy knows.
         blind = self.supervisor.lost
         features = None if blind else frame.features if frame.image is None else self._see(frame)
@@ -217,10 +219,10 @@ class Pilot:
         self.controller_time_s = time.perf_counter() - begin
         return command
 
-    def _remember(self, stamp_ns: int, attitude: list[float], rate: list[float], dt: float) -> None:
+    def _remember(self, attitude: list[float], rate: list[float], dt: float) -> None:
         (x, y, z), (wx, wy, wz) = self._turn, rate
         self._turn = x + dt * wx, y + dt * wy, z + dt * wz
-        slot = self._ticks.add(stamp_ns)
+        slot = self.motion.ticks.now % HISTORY
         self._history_attitude[slot] = attitude
         self._history_turn[slot] = self._turn
 
@@ -242,10 +244,11 @@ class Pilot:
 
     def _slot(self, stamp_ns: int) -> int:
         """Where the tick nearest to a stamp is remembered; the newest or the oldest where none is."""
-        age = self._ticks.age(stamp_ns)
+        ticks = self.motion.ticks
+        age = ticks.age(stamp_ns)
         if age is None:
-            age = 0 if stamp_ns > self._stamp else min(HISTORY, self._ticks.now) - 1
-        return self._ticks.slot(age)
+            age = 0 if stamp_ns > self._stamp else min(HISTORY, ticks.now) - 1
+        return ticks.slot(age)
 
     def _see(self, frame: SensorFrame) -> FeatureFrame | None:
         """Run perception on a picture, with the gyro's turn since the last one."""
@@ -295,6 +298,7 @@ class Pilot:
             return
         gravity = down_row(*self._history_attitude[self._slot(features.stamp_ns)])
         self.motion.correct(features, WallAxes.of(normal, gravity), distance)
+        self._covariance = self.motion.velocity_variance * _EYE  # nothing else changes it
 
     def _measure(self, frame: SensorFrame, wrench: np.ndarray, axes: WallAxes, wish: Wish) -> Measurement:
         velocity = covariance = None
@@ -311,7 +315,7 @@ class Pilot:
                     rz * right + dz * down - nz * rate,
                 )
             )
-            covariance = self._velocity_covariance()
+            covariance = self._covariance
         return made(
             Measurement,
             stamp_ns=frame.stamp_ns,
@@ -328,13 +332,6 @@ class Pilot:
             thrust_min=low,
             thrust_max=high,
         )
-
-    def _velocity_covariance(self) -> np.ndarray:
-        """Made anew only when a picture has changed it."""
-        spread = self.motion.velocity_variance
-        if spread != self._spread:
-            self._spread, self._covariance = spread, spread * np.eye(3)
-        return self._covariance
 
     def _scenery(self, frame: SensorFrame) -> Scenery:
         terms, motion = self.controller.setpoints, self.motion

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ _VECTORS = (
 #: A quaternion whose squared length is this far from 1 is no attitude.
 _UNIT_SLIP = 0.02
 _FLOAT = np.dtype(np.float64)
+_THREE, _FOUR, _SIX = (3,), (4,), (6,)
 
 
 class SensorGate:
@@ -56,28 +58,28 @@ class SensorGate:
             return None, (f"sensor frame: stamp_ns {why}",)
         if self.clock.shift_ns:
             frame = _shifted(frame, self.clock.shift_ns)
-        if frame.image is None and frame.features is None and self._sound(frame):
+        if _dated(frame.image) and _dated(frame.features) and self._sound(frame):
             return frame, ()
         return self._mend(frame)
 
     def _sound(self, frame: SensorFrame) -> bool:
         """Whether surely nothing is to refuse; where it is not sure, `_mend` finds out name by name."""
         attitude, rate, force, wrench = frame.attitude, frame.angular_velocity, frame.specific_force, frame.wrench
-        if not (_is_row(attitude, (4,)) and _is_row(rate, (3,)) and _is_row(force, (3,)) and _is_row(wrench, (6,))):
+        if not (
+            _is_row(attitude, _FOUR) and _is_row(rate, _THREE) and _is_row(force, _THREE) and _is_row(wrench, _SIX)
+        ):
             return False
         stamp = frame.wrench_stamp_ns
         if type(stamp) is not int or not 0 <= stamp <= frame.stamp_ns:
             return False
         w, x, y, z = turn = attitude.tolist()
-        p, q, r = turning = rate.tolist()
-        a, b, c = felt = force.tolist()
-        f, g, h, i, j, k = load = wrench.tolist()
-        # A sum of squares within the squared bound has no entry beyond the bound; NaN is within nothing.
+        turning, felt, load = rate.tolist(), force.tolist(), wrench.tolist()
+        # A vector within the bound has no entry beyond it; NaN is within nothing.
         if not (
             abs(w * w + x * x + y * y + z * z - 1.0) <= _UNIT_SLIP
-            and p * p + q * q + r * r <= RATE_BOUND * RATE_BOUND
-            and a * a + b * b + c * c <= ACCELERATION_BOUND * ACCELERATION_BOUND
-            and f * f + g * g + h * h + i * i + j * j + k * k <= WRENCH_BOUND * WRENCH_BOUND
+            and math.hypot(*turning) <= RATE_BOUND
+            and math.hypot(*felt) <= ACCELERATION_BOUND
+            and math.hypot(*load) <= WRENCH_BOUND
         ):
             return False
         self.last = {"attitude": turn, "angular_velocity": turning, "specific_force": felt, "wrench": load}
@@ -98,11 +100,16 @@ class SensorGate:
         else:
             self._wrench_stamp = frame.wrench_stamp_ns
         for name, part in (("image", frame.image), ("features", frame.features)):
-            if part is not None and not is_stamp(getattr(part, "stamp_ns", None)):
+            if not _dated(part):
                 changes[name] = None
         if not changes:
             return frame, ()
         return dataclasses.replace(frame, **changes), tuple(f"sensor {name}: not sound" for name in changes)
+
+
+def _dated(part: Any) -> bool:
+    """Whether a part of a frame is absent or has a stamp."""
+    return part is None or is_stamp(getattr(part, "stamp_ns", None))
 
 
 def _shifted(frame: SensorFrame, shift_ns: int) -> SensorFrame:

@@ -43,6 +43,16 @@ class BoardGeometry:
         """Inverse of `point`: (along, up) [m] of world (y, z), (..., 2)."""
         return (np.asarray(yz, float) - self._corner) @ self._axes
 
+    def spot(self, y: float, z: float) -> tuple[float, float]:
+        """`board_coordinates` of one point in plain numbers: the brush asks for it all the time."""
+        (corner_y, corner_z), (right_y, right_z), (up_y, up_z) = self._numbers
+        y, z = y - corner_y, z - corner_z
+        return y * right_y + z * right_z, y * up_y + z * up_z
+
+    @cached_property
+    def _numbers(self) -> tuple[list[float], list[float], list[float]]:
+        return self._corner.tolist(), self.along.tolist(), self.up.tolist()
+
     @cached_property
     def _corner(self) -> np.ndarray:
         """World (y, z) of the bottom left corner [m], (2,)."""

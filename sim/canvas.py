@@ -29,6 +29,8 @@ _RIM_M = 0.006
 TEXTURE_PAD_PX = 8
 #: Sub-pixel positions of the brush stamp per axis, and distance between stamps [px]: 2^2 / (8 r) = 0.01 px of scallop.
 _PHASES, _STAMP_STEP_PX = 16, 2.0
+#: Stamps drawn together: one by one each of them would wait for the memory of its pixels.
+_STAMPS_AT_ONCE = 64
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,7 @@ class Canvas:
         padded = (self._shape[0] + 2 * pad, self._shape[1] + 2 * pad)
         self._coverage, self._drawn = np.zeros(padded, np.uint8), np.zeros(padded, np.uint8)
         self._stamps = _brush_stamps(0.5 * paint.brush_width_m * self.pixels_per_m)
+        self._coming: list[tuple[float, float]] = []  # (column, row) of stamps that are still to be drawn
         self._dirty: tuple[int, int, int, int] | None = None
         self.edges = PaintedEdges(scene)
 
@@ -135,6 +138,7 @@ class Canvas:
     def rgb(self) -> np.ndarray:
         """The painted board, uint8 RGB (height, width, 3), a copy."""
         # Made afresh: the texture may be in use by a thread that draws a picture.
+        self._draw_stamps()
         coverage, fresh, blank = _inner(self._coverage), _inner(self._fresh), _inner(self._blank)
         picture = blank[..., :3].copy()
         painted = coverage > 0
@@ -144,6 +148,7 @@ class Canvas:
     @property
     def coverage(self) -> np.ndarray:
         """Share of every pixel that is painted, float32 0..1, (height, width)."""
+        self._draw_stamps()
         return _inner(self._coverage).astype(np.float32) / np.float32(255.0)
 
     def stroke(self, previous: BoardPoint | None, current: BoardPoint) -> None:
@@ -160,26 +165,36 @@ class Canvas:
         scale, height = self.pixels_per_m, self.scene.board.height_m
         shift = TEXTURE_PAD_PX - 0.5
         column, row = float(current[0]) * scale + shift, (height - float(current[1])) * scale + shift
+        stamps = self._coming
         if previous is None:
-            self._stamp(column, row)
+            stamps.append((column, row))
             return
         from_column, from_row = float(previous[0]) * scale + shift, (height - float(previous[1])) * scale + shift
         steps = max(1, math.ceil(math.hypot(column - from_column, row - from_row) / _STAMP_STEP_PX))
         for k in range(1, steps + 1):
             part = k / steps
-            self._stamp(from_column + part * (column - from_column), from_row + part * (row - from_row))
+            stamps.append((from_column + part * (column - from_column), from_row + part * (row - from_row)))
+        if len(stamps) >= _STAMPS_AT_ONCE:
+            self._draw_stamps()
+
+    def _draw_stamps(self) -> None:
+        for column, row in self._coming:
+            self._stamp(column, row)
+        self._coming.clear()
 
     def _stamp(self, column: float, row: float) -> None:
         phase_column, phase_row = round(column * _PHASES), round(row * _PHASES)
         stamp = self._stamps[phase_row % _PHASES][phase_column % _PHASES]
-        half = len(stamp) // 2
-        left, top = phase_column // _PHASES - half, phase_row // _PHASES - half
-        height, width = self._coverage.shape
-        c0, c1, r0, r1 = max(left, 0), min(left + len(stamp), width), max(top, 0), min(top + len(stamp), height)
-        if c0 >= c1 or r0 >= r1:
-            return
+        size, (height, width) = len(stamp), self._coverage.shape
+        left, top = phase_column // _PHASES - size // 2, phase_row // _PHASES - size // 2
+        c0, c1, r0, r1 = left, left + size, top, top + size
+        if left < 0 or top < 0 or c1 > width or r1 > height:
+            c0, c1, r0, r1 = max(left, 0), min(c1, width), max(top, 0), min(r1, height)
+            if c0 >= c1 or r0 >= r1:
+                return
+            stamp = stamp[r0 - top : r1 - top, c0 - left : c1 - left]
         patch = self._coverage[r0:r1, c0:c1]
-        np.maximum(patch, stamp[r0 - top : r1 - top, c0 - left : c1 - left], out=patch)
+        np.maximum(patch, stamp, out=patch)
         old = self._dirty
         self._dirty = (
             (r0, r1, c0, c1) if old is None else (min(old[0], r0), max(old[1], r1), min(old[2], c0), max(old[3], c1))
@@ -187,6 +202,7 @@ class Canvas:
 
     def take(self) -> FreshPaint | None:
         """What strokes have changed since the last call, or None."""
+        self._draw_stamps()
         if self._dirty is None:
             return None
         r0, r1, c0, c1 = box = self._dirty

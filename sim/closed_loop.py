@@ -127,8 +127,8 @@ class World:
         if self._rendered and options.camera_process and options.camera == "plane":
             # first of all: it sets itself up meanwhile
             camera = RemoteCamera(scene, vehicle, options.seed, lambda: self.canvas.take())
-        self.plant = Plant(scene, vehicle, options.seed)
-        self.sensors = SensorSuite(scene, vehicle, options.seed)
+        self.plant = Plant(scene, vehicle, options.seed, options.machine_code)
+        self.sensors = SensorSuite(scene, vehicle, options.seed, options.machine_code)
         self.canvas = Canvas(scene, options.seed)
         self._miscalibration = Miscalibration(scene.camera, vehicle, self._rendered)
         if self._rendered:
@@ -136,9 +136,12 @@ class World:
             # A drawing thread would hand the interpreter's lock to and fro: measured 10 % slower on two cores.
             self._stream = CameraStream(camera, scene.camera.rate_hz, scene.camera.latency_s, threaded=False)
         else:
-            self._features = GeometricFeatures(scene, vehicle, self.canvas, options.seed)
+            self._features = GeometricFeatures(
+                scene, vehicle, self.canvas, options.seed, to_machine_code=options.machine_code
+            )
+        self._seen_from = tuple(self.plant.truth[place] for place in _SEEN_FROM)  # the readings themselves
         self.viewer = self._open_viewer() if options.view else None
-        self._brush: np.ndarray | None = None
+        self._brush: tuple[float, float] | None = None
         self._pressed = 0
 
     def _open_viewer(self) -> FlightViewer:
@@ -155,9 +158,9 @@ class World:
             pose = self._miscalibration.pose(plant.position, plant.quaternion)
             image = self._stream.tick(plant.time_ns, *pose)
             return self.sensors.sample(plant, image=None if image is None else self._miscalibration.picture(image))
-        position, quaternion, velocity = (plant.truth[place] for place in _SEEN_FROM)  # read at once, not kept
+        position, quaternion, velocity = self._seen_from  # read at once, not kept
         pose = self._miscalibration.pose(position, quaternion)
-        return self.sensors.sample(plant, features=self._features.tick(plant.time_ns, *pose, velocity))
+        return self.sensors.sample(plant, None, self._features.tick(plant.time_ns, *pose, velocity))
 
     def act(self, thrusts: np.ndarray) -> None:
         """Advance one control tick and paint where the brush presses."""
@@ -169,7 +172,7 @@ class World:
         if pressing and self._brush is not None and self._pressed % STROKE_TICKS:
             return
         if pressing:
-            point = self.geometry.board_coordinates(self.plant.tip[1:])
+            point = self.geometry.spot(*self.plant.tip_on_wall)
             self.canvas.stroke(self._brush, point)
             self._brush = point
         else:
@@ -237,10 +240,10 @@ def fly(
     except KeyboardInterrupt:
         reason = "interrupted"
     finally:
-        wall_time, memory = time.perf_counter() - start, world.close()
+        memory = world.close()
     trace = recorder.trace()
+    trace.wall_time_s = time.perf_counter() - start  # with what was put off until the end
     controller_pool.give_back(config.law, config.controller, pilot.controller)
-    trace.wall_time_s = wall_time
     trace.camera_memory_bytes = memory
     trace.completed = not reason and pilot.painter.finished and not pilot.painter.failed
     trace.reason = reason or pilot.painter.reason

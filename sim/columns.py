@@ -1,11 +1,11 @@
-"""A table of floats that grows row by row: preallocated blocks instead of a small array per entry."""
+"""A table of numbers that grows row by row: bytes joined as they come, picked apart at the end."""
 
 from __future__ import annotations
 
 import numpy as np
 
-#: Rows of one block: half a minute of flight at the control rate.
-BLOCK_ROWS = 8192
+#: Rows kept as they came before they are made an array of the wanted type.
+BLOCK_ROWS = 1024
 
 
 class Columns:
@@ -16,7 +16,7 @@ class Columns:
 
     Args:
         widths: Numbers per row of each column.
-        dtype: Of all of them.
+        dtype: Of all of them once they are stored; rows come in double precision.
     """
 
     def __init__(self, widths: dict[str, int], dtype: type = np.float64) -> None:
@@ -27,23 +27,27 @@ class Columns:
             self.places[name] = slice(self._width, self._width + width)
             self._width += width
         self._blocks: list[np.ndarray] = []
-        self._count = 0
+        self._rows: list[bytes] = []
 
     def __len__(self) -> int:
         """Rows so far."""
-        return self._count
+        return sum(map(len, self._blocks)) + len(self._rows)
 
-    def row(self) -> np.ndarray:
-        """The next row, to be filled in, (numbers per row,)."""
-        place = self._count % BLOCK_ROWS
-        if place == 0:
-            self._blocks.append(np.zeros((BLOCK_ROWS, self._width), self._dtype))
-        self._count += 1
-        return self._blocks[-1][place]
+    def add(self, row: bytes) -> None:
+        """The next row, all its numbers in double precision."""
+        rows = self._rows
+        rows.append(row)
+        if len(rows) == BLOCK_ROWS:
+            self._blocks.append(self._block(rows))
+            self._rows = []
+
+    def _block(self, rows: list[bytes]) -> np.ndarray:
+        numbers = np.frombuffer(b"".join(rows)).reshape(len(rows), self._width)
+        return numbers.astype(self._dtype, copy=False)
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Every column so far, (N,) or (N, width)."""
-        table = np.concatenate([np.zeros((0, self._width), self._dtype), *self._blocks])[: self._count]
+        table = np.concatenate([np.zeros((0, self._width), self._dtype), *self._blocks, self._block(self._rows)])
         columns = {name: table[:, place] for name, place in self.places.items()}
         return {
             name: np.ascontiguousarray(column[:, 0] if column.shape[1] == 1 else column)

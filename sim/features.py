@@ -8,26 +8,32 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
+from collections.abc import Callable
 
+import casadi as ca
 import numpy as np
 
+from ibvs_qp.bound_function import BoundFunction
+from ibvs_qp.machine_code import machine_code
 from ibvs_qp.made import made
-from ibvs_qp.measurement import HORIZONTAL, VERTICAL, FeatureFrame, LineFeature
+from ibvs_qp.measurement import HORIZONTAL, VERTICAL, FeatureFrame
 from ibvs_qp.vehicle import VehicleParams
 from sim.board import BoardGeometry
 from sim.cameras.arm import vehicle_mask
 from sim.cameras.protocol import Schedule, camera_intrinsics
-from sim.cameras.view import View
 from sim.canvas import Canvas
-from sim.line_projection import (
+from sim.edge_view import (
+    BOARD_EDGES,
+    BOARD_VIEW,
+    CORNER,
+    EDGE_NUMBERS,
     NEAR_M,
-    SIGMA_RHO,
-    SIGMA_THETA,
-    fitted_ends,
-    moved_line,
-    projected_line,
-    visible_segment,
+    PER_METRE,
+    PLANE,
+    board_view,
+    painted_edge_view,
 )
+from sim.line_projection import fitted_ends, moved_line, seen_line
 from sim.painted_edges import BIN_M, PaintedEdges
 from sim.scene import Scene
 from sim.streams import Normals
@@ -41,8 +47,14 @@ _VELOCITY_COVARIANCE.flags.writeable = False  # shared by all frames
 #: Track identities: board edges by name, rows from `_FIRST_ROW_TRACK`.
 BOARD_TRACKS = {"bottom": 1, "right": 2, "top": 3, "left": 4}
 _FIRST_ROW_TRACK = 10
-#: Corners at the ends of every edge: bottom left 0, bottom right 1, top right 2, top left 3.
-_EDGES = {"bottom": (0, 1), "right": (1, 2), "top": (3, 2), "left": (0, 3)}
+_BOARD_LINES = [
+    (slice(start, start + EDGE_NUMBERS), VERTICAL if upright else HORIZONTAL, "board", BOARD_TRACKS[name])
+    for start, (name, (*_, upright)) in zip(
+        range(PLANE.stop, BOARD_VIEW, EDGE_NUMBERS), BOARD_EDGES.items(), strict=True
+    )
+]
+#: What a line is before its noise: its numbers, role, kind and track.
+_Line = tuple[list[float], str, str, int]
 #: How far above an edge a point lies for certain on its upper side [m].
 _ABOVE_M = 0.02
 
@@ -59,10 +71,17 @@ class GeometricFeatures:
         painted: The canvas, or the painted edges alone.
         seed: Seed of the noise.
         noise: Whether to add any noise at all.
+        to_machine_code: Whether a C compiler translates the projection; the same bits, sooner.
     """
 
     def __init__(
-        self, scene: Scene, vehicle: VehicleParams, painted: Canvas | PaintedEdges, seed: int, noise: bool = True
+        self,
+        scene: Scene,
+        vehicle: VehicleParams,
+        painted: Canvas | PaintedEdges,
+        seed: int,
+        noise: bool = True,
+        to_machine_code: bool = False,
     ) -> None:
         self.scene, self.vehicle, self._noise = scene, vehicle, noise
         self._edges = painted.edges if isinstance(painted, Canvas) else painted
@@ -72,14 +91,27 @@ class GeometricFeatures:
         self._normals, self._extra = Normals(np.random.default_rng(own)), np.random.default_rng(extra)
         self._hidden = vehicle_mask(scene, vehicle, self.intrinsics)
         self._schedule = Schedule(scene.camera.rate_hz, scene.camera.latency_s)
-        fx, fy, _, _ = self.intrinsics
-        self._half_view = 0.5 * scene.camera.width / fx, 0.5 * scene.camera.height / fy
-        width, height = scene.board.width_m, scene.board.height_m
-        corners = np.array([(0.0, 0.0), (width, 0.0), (width, height), (0.0, height), (0.5 * width, 0.5 * height)])
-        self._outline = self._world(corners[:, 0], corners[:, 1])
-        self._unit = self._world(np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0]))
         self._last_pixel = np.array((scene.camera.width - 1.0, scene.camera.height - 1.0))
         self._focal, self._centre = np.array(self.intrinsics[:2]), np.array(self.intrinsics[2:])
+        self._bind(machine_code if to_machine_code else lambda function: function)
+
+    def _bind(self, translated: Callable[[ca.Function], ca.Function]) -> None:
+        """Compiled projection on memory that holds its arguments."""
+        scene, half = self.scene, 0.5 * (self._last_pixel + 1.0) / self._focal
+        self._half = half.tolist()
+        width, height = scene.board.width_m, scene.board.height_m
+        corners = np.array([(0.0, 0.0), (width, 0.0), (width, height), (0.0, height), (0.5 * width, 0.5 * height)])
+        outline = self._world(corners[:, 0], corners[:, 1]).reshape(-1)
+        unit = self._world(np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])).reshape(-1)
+        self._position, self._quaternion, camera = np.zeros(3), np.zeros(4), np.array(self.vehicle.camera_position_m)
+        self._board, self._piece, self._edge = np.zeros(BOARD_VIEW), np.zeros(6), np.zeros(EDGE_NUMBERS)
+        self._look = BoundFunction(
+            translated(board_view()), (self._position, self._quaternion, camera, outline, unit, half), (self._board,)
+        )
+        self._look_at_piece = BoundFunction(
+            translated(painted_edge_view()), (self._board, self._piece, half), (self._edge,)
+        )
+        self._corner, self._per_metre = self._board[CORNER], self._board[PER_METRE].reshape(2, 3)
 
     def tick(
         self, now_ns: int, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, velocity_body: np.ndarray
@@ -102,14 +134,19 @@ class GeometricFeatures:
         self, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, velocity_body: np.ndarray, stamp_ns: int
     ) -> FeatureFrame:
         """What perception would report about a picture taken now; arguments as for `tick`."""
-        camera = self.vehicle.camera_position_m
-        view = View.of_vehicle(position_ned, quaternion_b_in_i, camera, self.intrinsics)
-        lines = [line for line in (*self._board_lines(view, stamp_ns), *self._paint_lines(view, stamp_ns)) if line]
-        a, b, c = self._plane(view)
+        self._position[:], self._quaternion[:] = position_ned, quaternion_b_in_i
+        self._look()
+        board = self._board.tolist()
+        found = [(board[at], role, kind, track) for at, role, kind, track in _BOARD_LINES if board[at.start]]
+        found += self._paint_lines(board)
+        a, b, c = self._plane(*board[PLANE])
         velocity = np.array(velocity_body, float)
+        take = self._normals.take
         if self._noise:
-            lines = [self._blurred(line) for line in lines]
-            velocity += SIGMA_VELOCITY_M_S * np.array(self._normals.take(3))
+            lines = [seen_line(*line, stamp_ns, take(2)) for line in found]
+            velocity += SIGMA_VELOCITY_M_S * np.array(take(3))
+        else:
+            lines = [seen_line(*line, stamp_ns) for line in found]
         frame = made(
             FeatureFrame,
             lines=tuple(lines),
@@ -125,38 +162,42 @@ class GeometricFeatures:
         yz = self._geometry.point(along, up)
         return np.concatenate((np.zeros((*yz.shape[:-1], 1)), yz), axis=-1)
 
-    def _board_lines(self, view: View, stamp_ns: int) -> list[LineFeature | None]:
-        spots = view.to_camera(self._outline).tolist()
-        lines = []
-        for name, (start, end) in _EDGES.items():
-            piece = visible_segment((spots[start], spots[end]), self._half_view)
-            role = HORIZONTAL if name in ("bottom", "top") else VERTICAL
-            lines.append(projected_line(piece, spots[4], role, "board", BOARD_TRACKS[name], stamp_ns))
-        return lines
-
-    def _paint_lines(self, view: View, stamp_ns: int) -> list[LineFeature | None]:
-        rows, points = self._edges.all_exposed()
+    def _paint_lines(self, board: list[float]) -> list[_Line]:
+        low, high = self._edges.heights
+        if low > high:
+            return []
+        rows, points = self._edges.all_exposed(*self._in_view(board, low, high))
         if len(rows) < 2:
             return []
-        corner, per_metre = self._board_in_camera(view)
-        seen = self._unhidden(corner + points @ per_metre)
-        lines = []
+        seen = self._unhidden(self._corner + points @ self._per_metre)
+        lines: list[_Line] = []
         for row, place in _by_row(rows[seen], seen):
             # The longest piece without a gap; a gap is where a later row, the brush or the picture's border lies.
             piece = _longest_run(place, points[:, 0])
             if len(piece) < 2:
                 continue
             (left, right), (low, high) = fitted_ends(points[piece])
-            middle = 0.5 * (left + right), 0.5 * (low + high) + _ABOVE_M
-            *ends, above = (corner + np.array(((left, low), (right, high), middle)) @ per_metre).tolist()
-            visible = visible_segment(ends, self._half_view)
-            lines.append(projected_line(visible, above, HORIZONTAL, "paint", _FIRST_ROW_TRACK + row, stamp_ns))
+            self._piece[:] = left, low, right, high, 0.5 * (left + right), 0.5 * (low + high) + _ABOVE_M
+            self._look_at_piece()
+            numbers = self._edge.tolist()
+            if numbers[0]:
+                lines.append((numbers, HORIZONTAL, "paint", _FIRST_ROW_TRACK + row))
         return lines
 
-    def _board_in_camera(self, view: View) -> tuple[np.ndarray, np.ndarray]:
-        """Camera coordinates of the board's corner [m], (3,), and per metre along and up, (2, 3)."""
-        spots = view.to_camera(self._unit)
-        return spots[0], spots[1:] - spots[0]
+    def _in_view(self, board: list[float], low: float, high: float) -> tuple[float, float]:
+        """Between which places along the board all in the picture from one height to another lies [m]."""
+        x, _, z, along_x, _, along_z, up_x, _, up_z = board[: PER_METRE.stop]
+        half, first, last = self._half[0], -math.inf, math.inf
+        for sign in (1.0, -1.0):  # half z +- x >= 0, which is linear along the board and up
+            at, rate, rise = half * z + sign * x, half * along_z + sign * along_x, half * up_z + sign * up_x
+            if rate == 0.0:
+                continue
+            meets = -(at + low * rise) / rate, -(at + high * rise) / rate
+            if rate > 0.0:
+                first = max(first, min(meets))
+            else:
+                last = min(last, max(meets))
+        return first, last
 
     def _unhidden(self, spots: np.ndarray) -> np.ndarray:
         """Indices of the points in camera coordinates that are in the picture and not behind arm or brush."""
@@ -169,12 +210,7 @@ class GeometricFeatures:
         column, row = np.rint(pixels[places]).astype(int).T
         return places[self._hidden[row, column] == 0]
 
-    def _blurred(self, line: LineFeature) -> LineFeature:
-        rho, theta = self._normals.take(2)
-        return moved_line(line, SIGMA_RHO * rho, SIGMA_THETA * theta)
-
-    def _plane(self, view: View) -> tuple[float, float, float]:
-        a, b, c = view.plane(0.0).tolist()
+    def _plane(self, a: float, b: float, c: float) -> tuple[float, float, float]:
         if not self._noise:
             return a, b, c
         size = math.sqrt(a * a + b * b + c * c)

@@ -29,6 +29,9 @@ TIP_RADIUS_M = 0.005
 #: Thickness of the board drawn [m].
 BOARD_THICKNESS_M = 0.004
 
+#: Physics steps of 1 ms in one control tick; MuJoCo remembers what its sensors read at each of them.
+STEPS_PER_TICK = 4
+
 
 @dataclass(frozen=True, kw_only=True)
 class ModelIds:
@@ -41,6 +44,7 @@ class ModelIds:
         force: Slice: force of the vehicle on the tool, front-left-up [N].
         torque: Slice: the moment at the force/torque sensor [N m].
         contact: Slice: found flag, then force (normal, tangents) and the normal and first tangent axes.
+        remembered: Where in ``history`` the samples of those four sensors at the steps of a tick begin, oldest first.
     """
 
     vehicle: int
@@ -49,6 +53,7 @@ class ModelIds:
     force: slice
     torque: slice
     contact: slice
+    remembered: tuple[int, int, int, int]
 
 
 def _numbers(*values: float | np.ndarray) -> str:
@@ -137,10 +142,11 @@ def build_xml(scene: Scene, vehicle: VehicleParams) -> str:
   {pair_xml("tip", "face")}
   <actuator>{actuators}</actuator>
   <sensor>
-    <accelerometer name="accelerometer" site="imu"/>
-    <force name="force" site="force_torque"/>
-    <torque name="torque" site="force_torque"/>
-    <contact name="contact" geom1="tip" geom2="face" num="1" data="found force normal tangent"/>
+    <accelerometer name="accelerometer" site="imu" nsample="{STEPS_PER_TICK}"/>
+    <force name="force" site="force_torque" nsample="{STEPS_PER_TICK}"/>
+    <torque name="torque" site="force_torque" nsample="{STEPS_PER_TICK}"/>
+    <contact name="contact" geom1="tip" geom2="face" num="1" data="found force normal tangent"
+      nsample="{STEPS_PER_TICK}"/>
   </sensor>
 </mujoco>"""
 
@@ -158,9 +164,11 @@ def build_model(scene: Scene, vehicle: VehicleParams) -> tuple[mujoco.MjModel, M
     mujoco.mj_setConst(model, mujoco.MjData(model))
     wall = scene.wall
     set_contact(model, stiffness=wall.stiffness_n_m, damping=wall.damping_n_s_m, friction=wall.friction)
-    slices = {}
+    slices, remembered = {}, []
     for name in ("accelerometer", "force", "torque", "contact"):
         sensor = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SENSOR, name)
         start = int(model.sensor_adr[sensor])
         slices[name] = slice(start, start + int(model.sensor_dim[sensor]))
-    return model, ModelIds(**ids, **slices)
+        # A ring of samples behind two numbers of MuJoCo's own and the stamps; whole ticks leave its oldest first.
+        remembered.append(int(model.sensor_historyadr[sensor]) + 2 + STEPS_PER_TICK)
+    return model, ModelIds(**ids, **slices, remembered=tuple(remembered))

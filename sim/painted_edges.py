@@ -34,11 +34,21 @@ class PaintedEdges:
         self._reach = math.ceil(self._radius / BIN_M)
         self._open = np.zeros((self._rows + 1, self._bins), dtype=bool)  # painted and not covered
         self._middles = (np.arange(self._bins) + 0.5) * BIN_M
+        self._lowest, self._highest = math.inf, -math.inf
+        self._coming: list[tuple[BoardPoint, BoardPoint]] = []  # strokes that nobody has looked at yet
 
     def stroke(self, previous: BoardPoint | None, current: BoardPoint) -> None:
         """Record a stroke between two tip positions (along, up) [m]; see `sim.canvas.Canvas.stroke`."""
-        if previous is None:
-            return
+        if previous is not None:
+            self._coming.append((previous, current))
+
+    def _catch_up(self) -> None:
+        """Take in the strokes since somebody last looked; together they find everything at hand."""
+        for previous, current in self._coming:
+            self._add(previous, current)
+        self._coming.clear()
+
+    def _add(self, previous: BoardPoint, current: BoardPoint) -> None:
         a0, u0, a1, u1 = float(previous[0]), float(previous[1]), float(current[0]), float(current[1])
         if abs(a1 - a0) <= _FLATNESS * abs(u1 - u0):
             return
@@ -52,6 +62,7 @@ class PaintedEdges:
             place = min(max((k + 0.5) * BIN_M, a0), a1)
             height = u0 + (place - a0) / (a1 - a0) * (u1 - u0) + self._radius
             if height > top[k]:
+                self._lowest, self._highest = min(self._lowest, height), max(self._highest, height)
                 if top[k] == -math.inf:
                     over = slice(max(0, k - self._reach), k + self._reach + 1)
                     self._covered[:row, over] = True
@@ -59,14 +70,28 @@ class PaintedEdges:
                     self._open[row, k] = not self._covered[row, k]
                 top[k] = height
 
+    @property
+    def heights(self) -> tuple[float, float]:
+        """Between which heights every point lies [m]; the lower one is above the other where nothing is painted."""
+        self._catch_up()
+        return self._lowest, self._highest
+
     def exposed(self, row: int) -> np.ndarray:
         """Points (along, up) [m] of a row's upper edge that no later row covers, in order along the board, (n, 2)."""
         rows, points = self.all_exposed()
         return points[rows == row]
 
-    def all_exposed(self) -> tuple[np.ndarray, np.ndarray]:
-        """Row of every exposed point, in order, (n,), and the points of `exposed` of all rows, (n, 2)."""
-        rows, bins = self._open.nonzero()
+    def all_exposed(self, first_m: float = -math.inf, last_m: float = math.inf) -> tuple[np.ndarray, np.ndarray]:
+        """Row of every exposed point, in order, (n,), and the points of `exposed` of all rows, (n, 2).
+
+        Args:
+            first_m: Points farther left along the board are left out [m].
+            last_m: Likewise farther right.
+        """
+        self._catch_up()
+        start = 0 if first_m <= 0.0 else min(int(first_m / BIN_M), self._bins)
+        end = self._bins if last_m >= self._bins * BIN_M else max(int(last_m / BIN_M) + 1, start)
+        rows, bins = self._open[:, start:end].nonzero()
         points = np.empty((len(rows), 2))
-        points[:, 0], points[:, 1] = self._middles[bins], self._top[rows, bins]
+        points[:, 0], points[:, 1] = self._middles[start:end][bins], self._top[:, start:end][rows, bins]
         return rows, points

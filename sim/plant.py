@@ -5,16 +5,18 @@
 from __future__ import annotations
 
 import math
+import struct
 
 import mujoco
 import numpy as np
 
 from ibvs_qp.bound_function import BoundFunction
+from ibvs_qp.machine_code import machine_code
 from ibvs_qp.vehicle import VehicleParams
 from sim.board import BoardGeometry
 from sim.clearance import PropellerClearance
 from sim.crash import crash_reason
-from sim.model import build_model
+from sim.model import STEPS_PER_TICK, build_model
 from sim.mujoco_frames import FLIP, FLIP_QUATERNION
 from sim.readings import PlantReadings
 from sim.readout import PLACES, SIZE, drive, readout
@@ -23,13 +25,13 @@ from sim.streams import stream
 from sim.trim import hover_thrusts, start_pose, true_limits
 from sim.wind import Wind
 
-#: Physics steps of 1 ms in one control tick, and the tick in nanoseconds.
-STEPS_PER_TICK = 4
+#: The control tick in nanoseconds.
 TICK_NS = 4_000_000
 
 #: End of a flight whose controller commands something that is no number; physics stands still from then on.
 NOT_FINITE = "non-finite thrust command"
-_CENTRE_VELOCITY, _SAFE = PLACES["centre_velocity"], PLACES["safe"].start
+_SAFE = PLACES["safe"].start
+_put_three = struct.Struct("3d").pack_into
 
 
 class Plant(PlantReadings):
@@ -49,9 +51,13 @@ class Plant(PlantReadings):
         scene: The truth.
         vehicle: Geometry and nominal parameters.
         seed: Varies start pose and gusts.
+        to_machine_code: Whether a C compiler translates the arithmetic around the physics; the same bits, sooner.
     """
 
-    def __init__(self, scene: Scene, vehicle: VehicleParams | None = None, seed: int = 0) -> None:
+    def __init__(
+        self, scene: Scene, vehicle: VehicleParams | None = None, seed: int = 0, to_machine_code: bool = False
+    ) -> None:
+        self._translate = machine_code if to_machine_code else lambda function: function
         self.scene, self.vehicle = scene, vehicle or VehicleParams()
         self.model, self._ids = build_model(scene, self.vehicle)
         self.data = mujoco.MjData(self.model)
@@ -67,15 +73,14 @@ class Plant(PlantReadings):
     def _bind(self) -> None:
         """Compiled arithmetic on MuJoCo's own memory: fetching its arrays each time costs more than reading them."""
         model, data, ids, truth = self.model, self.data, self._ids, self.scene.vehicle
-        self._sensordata, self._act = data.sensordata, data.act
-        self._sensed = np.zeros((STEPS_PER_TICK, model.nsensordata))
+        self._act = data.act
         centre = np.array(truth.com_offset_m)
         points = np.concatenate((centre, self.vehicle.tip_position_m, [self.clearance.reach]))
-        starts = [place.start for place in (ids.accelerometer, ids.force, ids.torque, ids.contact)]
         self.truth = np.zeros(SIZE)
+        self._centre_velocity = self.truth[PLACES["centre_velocity"]]
         self._read = BoundFunction(
-            readout(model.nsensordata, *starts, STEPS_PER_TICK),
-            (data.qpos, data.qvel, self._sensed, points),
+            self._translate(readout(model.nhistory, *ids.remembered, STEPS_PER_TICK)),
+            (data.qpos, data.qvel, data.history, points),
             (self.truth,),
         )
         self._wanted, self._air, self._lags = np.zeros(model.nu), np.zeros(3), np.zeros(model.nu)
@@ -84,7 +89,7 @@ class Plant(PlantReadings):
         # Moment arm from the bare vehicle's centre of mass, where MuJoCo applies forces, to the whole one's.
         arm = centre - FLIP * model.body_ipos[ids.vehicle]
         self._drive = BoundFunction(
-            drive(model.nu),
+            self._translate(drive(model.nu)),
             (self._wanted, self._lower, self._upper, data.act, lags, self._air, self.truth[PLACES["rotation"]], arm),
             (data.ctrl, self._lags, data.xfrc_applied[ids.vehicle]),
         )
@@ -94,7 +99,10 @@ class Plant(PlantReadings):
         self.data.qpos[3:7] = FLIP_QUATERNION * (math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw))
         self.data.act[:] = self.data.ctrl[:] = thrusts
         mujoco.mj_forward(self.model, self.data)
-        self._sensed[:] = self._sensordata
+        ids, sensed, history = self._ids, self.data.sensordata, self.data.history
+        for start, place in zip(ids.remembered, (ids.accelerometer, ids.force, ids.torque, ids.contact), strict=True):
+            now = sensed[place]
+            history[start : start + STEPS_PER_TICK * len(now)] = np.tile(now, STEPS_PER_TICK)
         self._refresh()
 
     def _refresh(self) -> None:
@@ -110,14 +118,11 @@ class Plant(PlantReadings):
         if self.crashed == NOT_FINITE or not math.isfinite(sum(thrusts.tolist())):
             self.crashed, self.time_ns = self.crashed or NOT_FINITE, self.time_ns + TICK_NS
             return
-        model, data, sensed, sensordata, advance = self.model, self.data, self._sensed, self._sensordata, mujoco.mj_step
         self._wanted[:] = thrusts
-        self._air[:] = self.wind.force(self.truth[_CENTRE_VELOCITY].tolist())
+        _put_three(self._air.data, 0, *self.wind.force(self._centre_velocity.tolist()))
         self._drive()
         self._lag[:] = self._lags
-        for step in range(STEPS_PER_TICK):
-            advance(model, data)
-            sensed[step] = sensordata
+        mujoco.mj_step(self.model, self.data, STEPS_PER_TICK)
         self.time_ns += TICK_NS
         self._read()
         if self.truth.item(_SAFE) != 1.0 and self.crashed is None:

@@ -44,12 +44,13 @@ def _entries(symbol: ca.SX) -> list[Any]:
 
 
 @functools.lru_cache(maxsize=8)
-def readout(sensors: int, accelerometer: int, force: int, torque: int, contact: int, steps: int) -> ca.Function:
-    """Function of (qpos, qvel, sensordata of every physics step, points) yielding `READINGS`.
+def readout(size: int, accelerometer: int, force: int, torque: int, contact: int, steps: int) -> ca.Function:
+    """Function of (qpos, qvel, history, points) yielding `READINGS`.
 
     Args:
-        sensors: Numbers of ``sensordata``.
-        accelerometer: Where its three begin; likewise force, torque and contact (found, force, normal, tangent).
+        size: Numbers of ``history``, MuJoCo's memory of what its sensors read at every physics step.
+        accelerometer: Where its samples begin, three numbers each, oldest first; likewise force, torque and contact
+            (ten numbers: found, force, normal, tangent).
         force: See there.
         torque: See there.
         contact: See there.
@@ -59,7 +60,12 @@ def readout(sensors: int, accelerometer: int, force: int, torque: int, contact: 
     vehicle but the tool reaches [m].
     """
     place, speed = ca.SX.sym("qpos", 7), ca.SX.sym("qvel", 6)
-    sensed, points = ca.SX.sym("sensordata", sensors, steps), ca.SX.sym("points", 7)
+    history, points = ca.SX.sym("history", size), ca.SX.sym("points", 7)
+
+    def sensed(start: int, width: int, step: int) -> list[Any]:
+        begin = start + width * (step % steps)
+        return _entries(history[begin : begin + width])
+
     x, y, z, qw, qx, qy, qz = _entries(place)
     vx, vy, vz, wx, wy, wz = _entries(speed)
     position, quaternion = (x, -y, -z), (qw, qx, -qy, -qz)
@@ -68,12 +74,13 @@ def readout(sensors: int, accelerometer: int, force: int, torque: int, contact: 
     numbers = _entries(points)
     centre, tip, reach = numbers[:3], numbers[3:6], numbers[6]
     swing = turned(rotation, cross_product(rate, centre))
-    felt = [sum(_entries(sensed[accelerometer + axis, :])[1:], sensed[accelerometer + axis, 0]) for axis in range(3)]
+    felts = zip(*(sensed(accelerometer, 3, step) for step in range(steps)), strict=True)
+    felt = [sum(samples[1:], samples[0]) for samples in felts]
     share = 1.0 / steps
-    last = _entries(sensed[:, -1])
-    fx, fy, fz, mx, my, mz = (*last[force : force + 3], *last[torque : torque + 3])
-    pushes = [ca.if_else(sensed[contact, step] > 0.0, sensed[contact + 1, step], 0.0) for step in range(steps)]
-    found, _, first, second, *axes = last[contact : contact + 10]
+    fx, fy, fz, mx, my, mz = (*sensed(force, 3, -1), *sensed(torque, 3, -1))
+    touches = [sensed(contact, 10, step) for step in range(steps)]
+    pushes = [ca.if_else(touch[0] > 0.0, touch[1], 0.0) for touch in touches]
+    found, _, first, second, *axes = touches[-1]
     (_, ty, tz), (_, sy, sz) = axes[3:6], cross_product(axes[:3], axes[3:6])
     # Minus the force on the board, in NED: the two signs of y and z cancel.
     friction = [ca.if_else(found < 1.0, 0.0, value) for value in (first * ty + second * sy, first * tz + second * sz)]
@@ -96,7 +103,7 @@ def readout(sensors: int, accelerometer: int, force: int, torque: int, contact: 
         "safe": (safe,),
     }
     row = ca.vertcat(*(entry for name in READINGS for entry in values[name]))
-    return ca.Function("readout", [place, speed, sensed, points], [ca.densify(row)])
+    return ca.Function("readout", [place, speed, history, points], [ca.densify(row)])
 
 
 @functools.lru_cache(maxsize=8)

@@ -12,6 +12,7 @@ import casadi as ca
 import numpy as np
 
 from ibvs_qp.bound_function import BoundFunction
+from ibvs_qp.machine_code import machine_code
 from ibvs_qp.made import made
 from ibvs_qp.measurement import FeatureFrame, RgbdFrame, SensorFrame
 from ibvs_qp.vehicle import VehicleParams
@@ -70,8 +71,8 @@ class Imu:
     by a constant tilt in a random direction and turned by an arbitrary yaw, both fixed by the seed.
     """
 
-    def __init__(self, scene: ImuScene, seed: int) -> None:
-        self._clock = SampleClock(scene.rate_hz)
+    def __init__(self, scene: ImuScene, seed: int, to_machine_code: bool = False) -> None:
+        self._clock, self._to_machine_code = SampleClock(scene.rate_hz), to_machine_code
         root = math.sqrt(scene.rate_hz)
         attitude = stream(seed, "attitude")
         direction, yaw = attitude.uniform(-math.pi, math.pi, 2).tolist()
@@ -87,7 +88,8 @@ class Imu:
     def _look_at(self, plant: Plant) -> None:
         self._plant = plant
         arguments = plant.truth, self._kick, self._settings
-        self._read = BoundFunction(imu_function(), arguments, (self._sample,))
+        function = machine_code(imu_function()) if self._to_machine_code else imu_function()
+        self._read = BoundFunction(function, arguments, (self._sample,))
 
     def sample(self, plant: Plant) -> None:
         """Take a sample if one is due."""
@@ -149,11 +151,15 @@ class SensorSuite:
         scene: Rates, noise, biases and delays.
         vehicle: The vehicle that carries them.
         seed: Same seed, same noise to the bit; each sensor has its own stream.
+        to_machine_code: Whether a C compiler translates the arithmetic; the same bits, sooner.
     """
 
-    def __init__(self, scene: Scene, vehicle: VehicleParams | None = None, seed: int = 0) -> None:
+    def __init__(
+        self, scene: Scene, vehicle: VehicleParams | None = None, seed: int = 0, to_machine_code: bool = False
+    ) -> None:
         self.vehicle = vehicle or VehicleParams()
-        self.imu, self.force_torque = Imu(scene.imu, seed), ForceTorque(scene.force_torque, seed)
+        self.imu = Imu(scene.imu, seed, to_machine_code)
+        self.force_torque = ForceTorque(scene.force_torque, seed)
 
     def sample(self, plant: Plant, image: RgbdFrame | None = None, features: FeatureFrame | None = None) -> SensorFrame:
         """What the vehicle delivers at this control tick, with the picture or the features that have come meanwhile."""

@@ -234,3 +234,28 @@ def test_same_seed_same_bits() -> None:
         return [line.rho for k in range(5) for line in features.capture(*pose, STILL, k).lines]
 
     assert run(1) == run(1) != run(2)
+
+
+@pytest.mark.parametrize("slope", [0.0, 3.0])
+@pytest.mark.parametrize(("along", "up", "roll", "yaw"), [
+    (0.2, ROW2, 0.0, 0.0), (0.7, ROW2, 8.0, -9.0), (1.3, 0.3, -8.0, 9.0),
+])  # fmt: skip
+def test_painted_edges_outside_the_picture_are_left_out_and_no_other(
+    monkeypatch: pytest.MonkeyPatch, slope: float, along: float, up: float, roll: float, yaw: float
+) -> None:
+    scene = dataclasses.replace(SCENE, board=BoardScene(slope_deg=slope))
+    features, pose = (
+        GeometricFeatures(scene, VEHICLE, painted_c(), 0, noise=False),
+        facing(scene, along, up, 0.0, roll, yaw),
+    )
+    seen: list[int] = []
+    unhidden = features._unhidden
+    monkeypatch.setattr(features, "_unhidden", lambda spots: seen.append(len(spots)) or unhidden(spots))
+    asked_for = features.capture(*pose, STILL, 0)
+    monkeypatch.setattr(features, "_in_view", lambda *_: (-math.inf, math.inf))
+    everything = features.capture(*pose, STILL, 0)
+    assert seen[0] < 0.6 * seen[1]
+    assert [line.track_id for line in asked_for.lines] == [line.track_id for line in everything.lines]
+    for ours, theirs in zip(asked_for.lines, everything.lines, strict=True):
+        assert (ours.rho, ours.theta) == (theirs.rho, theirs.theta)
+        np.testing.assert_array_equal(ours.segment, theirs.segment)

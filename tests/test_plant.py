@@ -11,6 +11,7 @@ from ibvs_qp.errors import ConfigError
 from ibvs_qp.frames import GRAVITY, rotation_from_quaternion, skew
 from ibvs_qp.vehicle import VehicleParams
 from sim.board import BoardGeometry
+from sim.model import STEPS_PER_TICK
 from sim.mujoco_frames import FLIP, FLIP6
 from sim.plant import TICK_NS, Plant
 from sim.scene import Scene, StartScene, VehicleScene, WindScene
@@ -198,3 +199,26 @@ def test_contact_reads_zero_in_free_air_and_friction_opposes_the_slide():
     assert friction[0] < 0.0 and friction[1] < 0.0
     assert np.linalg.norm(friction) == pytest.approx(0.3 * plant.contact_normal_force, rel=0.01)
     assert plant.ft_wrench[0] > 4.0
+
+
+def test_forces_of_a_tick_are_those_of_its_physics_steps_in_order():
+    """MuJoCo's memory of its sensors is read oldest first: the same steps taken singly tell what it must hold."""
+    plant, single = Plant(Scene(), seed=2), Plant(Scene(), seed=2)
+    for each in (plant, single):
+        each.data.qpos[0] += 0.002 - each.tip[0]  # 2 mm inside the wall: the push changes from step to step
+    for _ in range(50):
+        plant.step(1.01 * plant.thrusts_actual)
+        single._wanted[:] = 1.01 * single.thrusts_actual
+        single._air[:] = single.wind.force(single._centre_velocity.tolist())
+        single._drive()
+        single._lag[:] = single._lags
+        felt, pushes = [], []
+        for _ in range(STEPS_PER_TICK):
+            mujoco.mj_step(single.model, single.data)
+            felt.append(single.data.sensordata[single._ids.accelerometer].copy())
+            found, push, *_ = single.data.sensordata[single._ids.contact]
+            pushes.append(push if found else 0.0)
+        single._read()
+        np.testing.assert_array_equal(plant.truth, single.truth)
+        np.testing.assert_allclose(plant.contact_1khz, pushes, atol=1e-12)
+        np.testing.assert_allclose(FLIP * np.mean(felt, axis=0), plant.specific_force, atol=1e-12)

@@ -12,17 +12,17 @@ from sim.scene import Scene
 
 @pytest.mark.parametrize("entry", [500, 501])
 def test_a_half_written_tick_is_dropped(monkeypatch: pytest.MonkeyPatch, entry: int) -> None:
-    """Once between the log's row and the program's, once right after the log's row was taken."""
-    row, count = Columns.row, 0
+    """Once between the log's row and the program's, once before the log's row was there."""
+    add, count = Columns.add, 0
 
-    def interrupted(self: Columns):
+    def interrupted(self: Columns, row: bytes):
         nonlocal count
         count += 1
         if count == entry:
             raise KeyboardInterrupt
-        return row(self)
+        return add(self, row)
 
-    monkeypatch.setattr(Columns, "row", interrupted)
+    monkeypatch.setattr(Columns, "add", interrupted)
     trace = fly(Scene(), FlightOptions(features="geometric", video=False))
     assert trace.reason == "interrupted"
     assert {len(trace.t), len(trace.tip), len(trace.active), len(trace.contact_1khz) // 4} == {len(trace.t)}

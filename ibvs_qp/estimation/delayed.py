@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Sequence
 
 import numpy as np
 
+from ibvs_qp.bound_function import BoundFunction
+from ibvs_qp.estimation.propagation import propagation
 from ibvs_qp.estimation.stamps import HISTORY, StampRing
+from ibvs_qp.machine_code import machine_code
 
 #: Innovations beyond this many standard deviations are refused.
 GATE = 6.0
 #: A tick that differs from the nominal one by more than this is counted as it was [s].
 UNEVEN_S = 1e-9
+_put_four = struct.Struct("4d").pack_into
 #: Rows (1, j, j (j - 1) / 2): what a correction, its first and its second integral have become j ticks later.
 _PATHS = np.array([(1.0, j, 0.5 * j * (j - 1.0)) for j in range(HISTORY)])
 
@@ -26,7 +31,15 @@ class DelayedKalman:
     on the timeline of the captures, so nothing but the state is touched per tick.
     """
 
-    def __init__(self, chain: np.ndarray, noise: np.ndarray, initial_std: np.ndarray, tick_s: float) -> None:
+    def __init__(
+        self,
+        chain: np.ndarray,
+        noise: np.ndarray,
+        initial_std: np.ndarray,
+        tick_s: float,
+        pattern: np.ndarray | None = None,
+        to_machine_code: bool = False,
+    ) -> None:
         """Set up the filter.
 
         Args:
@@ -34,10 +47,20 @@ class DelayedKalman:
             noise: Power spectral densities of the process noise, (n,) [unit^2/s].
             initial_std: Standard deviations at the start, (n,).
             tick_s: Control period [s].
+            pattern: Where the chain may have entries, (n, n) bool; None: where it has now.
+            to_machine_code: Whether a C compiler translates the propagation; the same bits, sooner.
         """
         self.chain = np.array(chain, float)
         self.noise = np.array(noise, float)
         self.initial_std = np.array(initial_std, float)
+        size = len(self.noise)
+        self.covariance, self._product, self._time = np.zeros((size, size)), np.zeros((size, size)), np.zeros(1)
+        function = propagation(size, (self.chain != 0.0 if pattern is None else np.asarray(pattern, bool)).tobytes())
+        self._propagated = BoundFunction(
+            machine_code(function) if to_machine_code else function,
+            (self.chain, self.covariance, self.noise, self._time),
+            (self._product,),
+        )
         self.tick = tick_s
         self.ticks = StampRing(tick_s)
         self.reset()
@@ -45,8 +68,15 @@ class DelayedKalman:
     def reset(self) -> None:
         """Forget everything."""
         size = len(self.noise)
-        self.covariance = np.diag(self.initial_std**2)
+        self.covariance[:] = np.diag(self.initial_std**2)
         self._history = np.zeros((HISTORY, size))
+        row = struct.Struct(f"{size}d")
+        self._put, self._row_bytes, self._bytes = row.pack_into, row.size, self._history.data
+        # A correction, its first and its second integral.
+        self._terms = np.zeros((3, size))
+        self._correction, self._first, self._second = self._terms
+        self._pair, self._gain = np.zeros((2, 2)), np.zeros((2, size))
+        self._pair_bytes = self._pair.data
         self.ticks.reset()
         self._lengths = [self.tick] * HISTORY
         self._uneven = 0
@@ -64,7 +94,7 @@ class DelayedKalman:
     def remember(self, stamp_ns: int, state: Sequence[float] | np.ndarray, dt: float | None = None) -> None:
         """Take a state that was advanced by one tick elsewhere; by ``dt`` [s], None for the nominal tick."""
         slot = self.ticks.add(stamp_ns)
-        self._history[slot] = state
+        self._put(self._bytes, slot * self._row_bytes, *state)
         self._lengths[slot] = self.tick if dt is None else dt
         if dt is not None and abs(dt - self.tick) > UNEVEN_S:
             self._uneven = self.ticks.now
@@ -122,8 +152,8 @@ class DelayedKalman:
         gain = np.linalg.solve(spread, rows @ self.covariance).T
         if innovation @ np.linalg.solve(spread, innovation) > gate * gate * len(values):
             return False
-        self.covariance = self.covariance - gain @ rows @ self.covariance
-        self.covariance = 0.5 * (self.covariance + self.covariance.T)
+        self.covariance -= gain @ rows @ self.covariance
+        self.covariance[:] = 0.5 * (self.covariance + self.covariance.T)
         self._apply(gain @ innovation, age)
         return True
 
@@ -153,12 +183,15 @@ class DelayedKalman:
         wa, wb = (bb * da - ab * db) / determinant, (aa * db - ab * da) / determinant
         if da * wa + db * wb > 2.0 * GATE * GATE:
             return False
-        a, b = p[:, first].copy(), p[:, first + 1] - (ab / aa) * p[:, first]
-        # One after the other, made independent first: P - a a' / aa - b b' / (bb - ab^2 / aa).
-        self._shrink(a, aa)
-        self._shrink(b, determinant / aa)
-        rest = (db - ab / aa * da) * aa / determinant
-        self._apply(a * (da / aa) + b * rest, age)
+        # Rows for columns: P is symmetric, but for the rounding here, which the next propagation mends.
+        known, gain = p[first : first + 2], self._gain
+        _put_four(self._pair_bytes, 0, bb / determinant, -ab / determinant, -ab / determinant, aa / determinant)
+        np.dot(self._pair, known, out=gain)
+        correction = da * gain[0]
+        correction += db * gain[1]
+        np.dot(known.T, gain, out=self._product)
+        p -= self._product
+        self._apply(correction, age)
         return True
 
     def _past(self, age: int) -> np.ndarray:
@@ -189,24 +222,25 @@ class DelayedKalman:
 
     def _shrink(self, known: np.ndarray, spread: float) -> None:
         """P - known known' / spread, symmetric to the bit."""
-        product = known[:, None] * known
+        product = self._product
+        np.multiply(known[:, None], known, out=product)
         product /= spread
         self.covariance -= product
 
     def _propagate(self, dt: float) -> None:
-        step = dt * self.chain + (0.5 * dt * dt) * (self.chain @ self.chain)
-        _diagonal(step)[:] += 1.0
-        moved = step @ self.covariance @ step.T
-        _diagonal(moved)[:] += self.noise * dt
-        moved += moved.T.copy()
-        moved *= 0.5
-        self.covariance = moved
+        self._time[0] = dt
+        self._propagated()
+        self.covariance[:] = self._product
 
     def _apply(self, correction: np.ndarray, age: int) -> None:
         """Add a correction at a past tick and what has become of it since."""
-        first = self.chain @ correction * self.tick
-        second = self.chain @ first * self.tick
-        path = self._paths(age) @ np.array((correction, first, second))
+        chain, tick, first, second = self.chain, self.tick, self._first, self._second
+        self._correction[:] = correction
+        np.dot(chain, correction, out=first)
+        first *= tick
+        np.dot(chain, first, out=second)
+        second *= tick
+        path = self._paths(age).dot(self._terms)
         start, end = self.ticks.slot(age), self.ticks.slot(0) + 1
         if start < end:
             self._history[start:end] += path
@@ -221,8 +255,3 @@ class DelayedKalman:
         lengths = np.array([self._lengths[self.ticks.slot(back)] for back in range(age - 1, -1, -1)]) / self.tick
         once = np.concatenate(([0.0], np.cumsum(lengths)))
         return np.column_stack((np.ones(age + 1), once, np.concatenate(([0.0], np.cumsum(lengths * once[:-1])))))
-
-
-def _diagonal(matrix: np.ndarray) -> np.ndarray:
-    """The diagonal of a contiguous square matrix as a view that can be written."""
-    return matrix.reshape(-1)[:: len(matrix) + 1]

@@ -51,11 +51,24 @@ class WhiteNoise:
         Returns:
             The sample of the variance that was believed [unit^2].
         """
-        sample = 0.5 * difference * difference
-        if self.count >= PRIOR:
-            sample = min(sample, CLIP * CLIP * self.total(claimed))
-        self.mix(sample)
+        sample, count, variance = 0.5 * difference * difference, self.count, self.variance
+        if count >= PRIOR:
+            most = CLIP * CLIP * (claimed if claimed > variance else variance)
+            sample = most if most < sample else sample
+        self.count = count = count + 1 if count < WINDOW else WINDOW
+        self.variance = variance + (sample - variance) / count
         return sample
+
+    def hear(self, sample: float, claimed: float) -> float:
+        """`learn` and `keep` of a signal without a prediction, in one call; the variance of one sample then.
+
+        Args:
+            sample: Its value now [unit].
+            claimed: Variance that the source claims [unit^2].
+        """
+        difference, self._residual = sample - self._residual, sample
+        self.learn(difference, claimed)
+        return claimed if claimed > self.variance else self.variance
 
     def mix(self, sample: float) -> None:
         """Average one sample of the variance."""

@@ -10,6 +10,7 @@ import numpy as np
 from ibvs_qp.estimation.config import EstimationConfig
 from ibvs_qp.estimation.delayed import DelayedKalman
 from ibvs_qp.estimation.line_noise import SteadyValue, WhiteNoise
+from ibvs_qp.estimation.stamps import StampRing
 from ibvs_qp.estimation.tracked_line import TrackedLine
 from ibvs_qp.estimation.wall_lines import WallAxes, image_line, wall_line
 from ibvs_qp.frames import GRAVITY
@@ -20,6 +21,7 @@ from ibvs_qp.vectors import cross_product
 #: Lines followed at once.
 SLOTS = 8
 
+_NOTHING = np.zeros((2, 2))
 _VELOCITY, _BIAS, _ODOMETER, _LINES = slice(0, 2), slice(2, 4), slice(4, 6), 6
 
 
@@ -32,7 +34,12 @@ class WallMotion:
     """
 
     def __init__(
-        self, tip: np.ndarray, camera: np.ndarray, tick_s: float, config: EstimationConfig | None = None
+        self,
+        tip: np.ndarray,
+        camera: np.ndarray,
+        tick_s: float,
+        config: EstimationConfig | None = None,
+        to_machine_code: bool = False,
     ) -> None:
         self._config = config = config or EstimationConfig()
         self._tip = np.asarray(tip, float).tolist()
@@ -46,7 +53,9 @@ class WallMotion:
         noise[_ODOMETER] = 1e-10
         deviation = np.full(size, 0.05)
         deviation[_BIAS], deviation[_ODOMETER] = 0.1, 1e-6
-        self._filter = DelayedKalman(chain, noise, deviation, tick_s)
+        pattern = chain != 0.0
+        pattern[_LINES:, _VELOCITY] = True
+        self._filter = DelayedKalman(chain, noise, deviation, tick_s, pattern, to_machine_code)
         self.reset()
 
     def reset(self) -> None:
@@ -60,6 +69,11 @@ class WallMotion:
         self.velocity_age_s = math.inf
         self._velocity_stamp = -1
         self._noise_rho, self._noise_theta = WhiteNoise(), WhiteNoise()  # what all lines have shown
+
+    @property
+    def ticks(self) -> StampRing:
+        """Stamps of the ticks remembered."""
+        return self._filter.ticks
 
     @property
     def velocity(self) -> np.ndarray:
@@ -101,26 +115,27 @@ class WallMotion:
         right, down = right + dt * vr, down + dt * vd
         for line in self.lines.values():
             c, s = line.rates
-            state[_LINES + line.slot] += c * right + s * down
+            slot = _LINES + line.slot
+            line.offset = offset = state[slot] + (c * right + s * down)
+            state[slot] = offset
         self._filter.remember(stamp_ns, state, dt)
         self.state, self._stamp = state, stamp_ns
-        self._refresh(stamp_ns)
+        self._fade(stamp_ns)
+        self.velocity_age_s = (stamp_ns - self._velocity_stamp) * 1e-9 if self._velocity_stamp >= 0 else math.inf
 
-    def _refresh(self, stamp_ns: int) -> None:
-        config, old = self._config, []
+    def _fade(self, stamp_ns: int) -> None:
+        """Lines that no picture shows any more fade and go."""
+        start, end, old = self._config.fade_start_s, self._config.fade_end_s, []
         for key, line in self.lines.items():
             age = (stamp_ns - line.news_ns) * 1e-9
-            if age > config.fade_end_s:
+            if age <= start and age <= end:
+                line.weight = line.fresh_weight
+            elif age <= end:
+                line.weight = line.fresh_weight * ((end - age) / (end - start))
+            else:
                 old.append(key)
-                continue
-            weight = min(1.0, line.frames / config.frames_to_trust) * line.source_weight
-            if age > config.fade_start_s:
-                weight *= (config.fade_end_s - age) / (config.fade_end_s - config.fade_start_s)
-            line.weight = weight
-            line.offset = self.state[_LINES + line.slot]
         for key in old:
             self._drop(key)
-        self.velocity_age_s = (stamp_ns - self._velocity_stamp) * 1e-9 if self._velocity_stamp >= 0 else math.inf
 
     def _drop(self, key: int) -> None:
         slot = _LINES + self.lines.pop(key).slot
@@ -147,11 +162,17 @@ class WallMotion:
         self.state = self._filter.state.tolist()
 
     def _correct_velocity(self, frame: FeatureFrame, axes: WallAxes) -> None:
-        if frame.velocity is None or frame.velocity_covariance is None or not np.isfinite(frame.velocity).all():
+        if frame.velocity is None or frame.velocity_covariance is None:
             return
-        plane = np.array((axes.right, axes.down))
-        (aa, ab), (_, bb) = (plane @ frame.velocity_covariance @ plane.T).tolist()
-        right, down = (plane @ frame.velocity).tolist()
+        x, y, z = frame.velocity.tolist()
+        if not math.isfinite(x + y + z):
+            return
+        (rx, ry, rz), (dx, dy, dz) = axes.right, axes.down
+        right, down = rx * x + ry * y + rz * z, dx * x + dy * y + dz * z
+        rows = frame.velocity_covariance.tolist()
+        ux, uy, uz = [a * rx + b * ry + c * rz for a, b, c in rows]
+        vx, vy, vz = [a * dx + b * dy + c * dz for a, b, c in rows]
+        aa, ab, bb = rx * ux + ry * uy + rz * uz, rx * vx + ry * vy + rz * vz, dx * vx + dy * vy + dz * vz
         floor = self._config.velocity_std_m_s**2
         stamp = frame.velocity_stamp_ns or frame.stamp_ns
         if self._filter.correct_pair(stamp, 0, (right, down), (aa + floor, ab, bb + floor)):
@@ -171,7 +192,8 @@ class WallMotion:
         else:
             self._correct_angle(tracked, angle, stamp)
         tracked.frames += tracked.seen_ns != stamp
-        tracked.seen_ns, tracked.source_weight = stamp, line.weight
+        tracked.seen_ns = stamp
+        tracked.fresh_weight = min(1.0, tracked.frames / self._config.frames_to_trust) * line.weight
         tracked.news_ns = self._stamp
         tracked.surface_side, tracked.kind = side, line.kind or tracked.kind
         self._point(tracked)
@@ -244,11 +266,13 @@ class WallMotion:
         rho, theta, scale = image_line(line.offset, line.angle, axes, self._tip_from_camera, foot_distance)
         slot = _LINES + line.slot
         variance = max(self._filter.covariance.item(slot, slot), 1e-10) / (scale * scale)
+        covariance = _NOTHING.copy()
+        covariance[0, 0], covariance[1, 1] = variance, line.theta_variance
         return made(
             LineFeature,
             rho=rho,
             theta=theta,
-            covariance=np.array(((variance, 0.0), (0.0, line.theta_variance))),
+            covariance=covariance,
             role=line.role,
             weight=line.weight,
             stamp_ns=stamp_ns,

@@ -25,6 +25,8 @@ class StampRing:
         self._stamps = [-1] * HISTORY
         self.now = 0
         self._newest = -1
+        self._asked: tuple[int, int] | None = None  # the last question, its answer in `_answer`
+        self._answer: int | None = None
 
     def add(self, stamp_ns: int) -> int:
         """Remember one more tick; returns its slot."""
@@ -39,6 +41,12 @@ class StampRing:
 
     def age(self, stamp_ns: int) -> int | None:
         """How many ticks ago the tick nearest to a stamp was; None where none is remembered so far back or ahead."""
+        question = stamp_ns, self.now  # everything in a picture asks the same
+        if question != self._asked:
+            self._asked, self._answer = question, self._find(stamp_ns)
+        return self._answer
+
+    def _find(self, stamp_ns: int) -> int | None:
         stamps, now, newest, tick = self._stamps, self.now, self._newest, self._tick_ns
         filled = min(HISTORY, now)
         if not filled or newest - stamp_ns < -1.5 * tick:

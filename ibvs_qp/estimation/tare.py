@@ -55,21 +55,23 @@ class WrenchTare:
         self._force = x + 0.3 * (fx - x), y + 0.3 * (fy - y), z + 0.3 * (fz - z)
         if stamp_ns <= self._stamp:
             return self._wrench
-        numbers = raw.tolist()
+        rx, ry, rz, rp, rq, rr = numbers = raw.tolist()
         if not math.isfinite(sum(numbers)):
             return self._wrench
         dt = 0.01 if self._stamp < 0 else min((stamp_ns - self._stamp) * 1e-9, 0.1)
         self._stamp = stamp_ns
         x, y, z = self._force
-        load = self._mass * x, self._mass * y, self._mass * z
-        lever = cross_product(self._lever, load)
-        contact = [own - felt for own, felt in zip((*load, *lever), numbers, strict=True)]
+        fx, fy, fz = load = self._mass * x, self._mass * y, self._mass * z
+        mx, my, mz = cross_product(self._lever, load)
+        contact = fx - rx, fy - ry, fz - rz, mx - rp, my - rq, mz - rr
         if free:
             self._time += dt
             span = min(max(self._time, dt), self._config.tare_follow_s)
             share = min(1.0, dt / span)
             self._bias = [bias + share * (mean - bias) for bias, mean in zip(self._bias, contact, strict=True)]
-        fx, fy, fz, mx, my, mz = [entry - bias for entry, bias in zip(contact, self._bias, strict=True)]
+        fx, fy, fz, mx, my, mz = contact
+        bx, by, bz, bp, bq, br = self._bias
+        fx, fy, fz, mx, my, mz = fx - bx, fy - by, fz - bz, mx - bp, my - bq, mz - br
         fy, fz = self._tip.across((fx, fy, fz), (mx, my, mz))
         ax, ay, az = cross_product(self._sensor, (fx, fy, fz))
         self._wrench = np.array((fx, fy, fz, mx + ax, my + ay, mz + az))

@@ -43,11 +43,8 @@ class TipForce:
         if ahead < LEAST_LEVER:
             return fy, fz
         samples = fy, fz, (mz + right * fx) / ahead, (below * fx - my) / ahead
-        variances = []
-        for noise, sample in zip(self._noise, samples, strict=True):
-            noise.learn(noise.difference(sample), self._floor)
-            noise.keep(sample)
-            variances.append(noise.total(self._floor))
+        floor = self._floor
+        variances = [noise.hear(sample, floor) for noise, sample in zip(self._noise, samples, strict=True)]
         astray = (self._spread * fx / ahead) ** 2
         better = []
         for axis in (0, 1):

@@ -20,6 +20,7 @@ class TrackedLine:
             or right (vertical lines), so > 0 is below or right of the tip.
         angle: Angle of the normal in (right, down) [rad]; pi/2 for a level line.
         deviation: Of the filtered offset [m], from the noise that the pictures show.
+        weight: How much it counts now; fresh_weight: how much while pictures show it.
         rates: Offset per unit of the tip's motion (right, down).
         noise: Of the measured offset [m^2]; tilt: filter of the angle.
         refused: Offsets beyond the gate in a row that agree with each other.
@@ -35,9 +36,9 @@ class TrackedLine:
     frames: int = 1
     offset: float = 0.0
     weight: float = 0.0
+    fresh_weight: float = 0.0
     surface_side: int = 0
     kind: str = ""
-    source_weight: float = 1.0
     theta_variance: float = 1e-4
     rates: tuple[float, float] = (0.0, 0.0)
     noise: WhiteNoise = field(default_factory=WhiteNoise)
