@@ -58,10 +58,15 @@ class SurfaceColors:
         """OTHER, BOARD or PAINT for colours uint8 (..., 3); all OTHER while the board is unknown."""
         if self.board is None:
             return np.zeros(colors.shape[:-1], np.uint8)
+        # single precision holds the place exactly, and has the only fast product
+        return self.table().take(((colors >> _TABLE_SHIFT).astype(np.float32) @ _TABLE_STEPS).astype(np.intp))
+
+    def table(self) -> np.ndarray:
+        """Labels of all colours in steps of eight grey levels, red first, uint8 (32768,); the board must be known."""
+        assert self.board is not None
         if len(self._table) == 0 or np.abs(self.board - self._table_board).max() > _TABLE_DRIFT:
             self._make_table(self.board)
-        # single precision holds the place exactly, and has the only fast product
-        return self._table.take(((colors >> _TABLE_SHIFT).astype(np.float32) @ _TABLE_STEPS).astype(np.intp))
+        return self._table
 
     def _make_table(self, board: np.ndarray) -> None:
         """Labels of all colours in steps of eight grey levels: thousands of colours are looked up per picture."""
