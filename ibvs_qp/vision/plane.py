@@ -10,8 +10,10 @@ import numpy as np
 from ibvs_qp.vision.colors import BOARD, PAINT
 from ibvs_qp.vision.config import PlaneConfig
 from ibvs_qp.vision.grid import CoarseGrid
+from ibvs_qp.vision.native import native
+from ibvs_qp.vision.native_plane import NativePlane, Refit, estimate_of
 from ibvs_qp.vision.robust import median
-from ibvs_qp.vision.surface import PlaneEstimate, connected_samples, plane_covariance
+from ibvs_qp.vision.surface import BLOCK, PlaneEstimate, connected_samples, plane_covariance, surface_problem
 
 #: Samples used to judge hypotheses and the spread of residuals; more cost time and change nothing.
 _JUDGED = 400
@@ -19,6 +21,9 @@ _JUDGED = 400
 _NEAR = 0.25
 #: Share of the coarse gate within which a sample votes for a hypothesis.
 _VOTE = 0.6
+#: Gate of what looks like paint in either round, share of the board's: a wall that looks like paint must not get in, so
+#: what looks like it counts in the last round only, and has to fit twice as well.
+_PAINT_GATES = (0.0, 0.5)
 #: Smallest determinant of the normal matrix, share of the product of its diagonal.
 _FLAT = 1e-6
 #: Turns a median absolute deviation into a standard deviation of a normal distribution.
@@ -39,6 +44,8 @@ class PlaneFitter:
     def __init__(self, config: PlaneConfig) -> None:
         """Take the settings and start its own random generator."""
         self._config = config
+        self._grid: CoarseGrid | None = None
+        self._native: NativePlane | None = None
         self.reset()
 
     def reset(self) -> None:
@@ -158,6 +165,29 @@ class PlaneFitter:
         down: np.ndarray | None,
         prefer: np.ndarray | None,
     ) -> PlaneEstimate | str:
+        """Two rounds of least squares within gates that the residuals set, around a start."""
+        if grid is not self._grid:
+            library, self._grid = native(), grid
+            self._native = None
+            if library is not None:
+                least = self._config.min_samples
+                self._native = NativePlane(library, self._config, grid, grid.design, least, BLOCK, _PAINT_GATES)
+        if self._native is not None:
+            refit = self._native.refit(inverse, prefer, start, seed=seed)
+            if refit is not None:
+                return estimate_of(refit, down, self._config) if isinstance(refit, Refit) else refit
+        return self._refine_with_numpy(grid, inverse, start, seed, down, prefer)
+
+    def _refine_with_numpy(
+        self,
+        grid: CoarseGrid,
+        inverse: np.ndarray,
+        start: np.ndarray,
+        seed: tuple[int, int] | None,
+        down: np.ndarray | None,
+        prefer: np.ndarray | None,
+    ) -> PlaneEstimate | str:
+        """The same where there is no machine code, and to say what it computes."""
         config, design, flat = self._config, grid.design, inverse.ravel()
         usable = (flat > 0) & grid.free.ravel()
         seen = int(np.count_nonzero(usable))
@@ -175,8 +205,7 @@ class PlaneFitter:
             inlier = usable & (size < gate)
             if board is not None and paint is not None:
                 colored = inlier & board
-                if last:  # a wall that looks like paint must not get in: what looks like it has to fit twice as well
-                    colored |= inlier & paint & (size < 0.5 * gate)
+                colored |= inlier & paint & (size < _PAINT_GATES[last] * gate)
                 inlier = colored if int(np.count_nonzero(colored)) >= config.min_samples else inlier
             component = connected_samples(inlier.reshape(grid.shape), grid, seed).ravel()
             chosen = np.flatnonzero(component)
@@ -191,11 +220,10 @@ class PlaneFitter:
             if np.linalg.det(normal_matrix) < _FLAT * math.prod(normal_matrix.diagonal().tolist()):
                 return "samples on the surface lie on one line"
             plane = np.linalg.solve(normal_matrix, samples.T @ flat.take(chosen))
-        if not bool(self._upright(plane[None], down)[0]):
-            return "the surface does not stand upright or does not face the camera"
+        problem = surface_problem(plane, down, self._config)
+        if problem is not None:
+            return problem
         length = math.hypot(*plane)
-        if not config.distance_min_m <= 1.0 / length <= config.distance_max_m:
-            return f"the surface lies {1.0 / length:.2f} m away, out of range"
         residual = np.where(component, flat - design @ plane, 0.0)
         return PlaneEstimate(
             inverse_depth=plane,
