@@ -6,13 +6,15 @@ import cv2
 import numpy as np
 
 from ibvs_qp.vision.grid import CoarseGrid
+from ibvs_qp.vision.native import native
+from ibvs_qp.vision.native_votes import edge_points_natively
 from ibvs_qp.vision.picture import Picture
 
 #: Points along the longer side of a picture: a line is told by far fewer points than it has pixels (it is refined with
 #: as many), its place across is not; and pixels per point across.
 POINTS, _ACROSS_PX = 80, 2
 #: Steps this many times the weakest one have a full vote, fainter ones less: noise must not outvote an edge.
-_FULL = 4.0
+_FULL = 4
 #: Most points of one polarity that vote; a line right across the picture has POINTS.
 _MOST = 500
 #: A central difference over this many sums of pixels answers as Sobel's kernel does.
@@ -32,18 +34,39 @@ def edge_points(
         grid: Where these samples lie.
 
     Returns:
-        (u, v) in half-resolution pixels of the view, 0 at the picture's border, and the weight of its vote, up to 1:
-        float32 (n, 3) each.
+        (u, v) in half-resolution pixels of the view, 0 at the picture's border, and the weight of its vote, whole numbers
+        up to `full_vote`, so that sums of them are exact: float32 (n, 3) each.
     """
     height, width = picture.mask.shape
     apart = max(height, width) / POINTS
     columns, rows = width // _ACROSS_PX, height // _ACROSS_PX
     columns, rows = (columns, round(height / apart)) if upright else (round(width / apart), rows)
-    thin = cv2.split(cv2.resize(picture.rgb, (columns, rows), interpolation=cv2.INTER_LINEAR))
+    thin = cv2.resize(picture.rgb, (columns, rows), interpolation=cv2.INTER_LINEAR)
+    threshold = _threshold(gradient_min)
+    library = native()
+    if library is not None:
+        full = full_vote(gradient_min)
+        return edge_points_natively(library, thin, picture, upright, threshold, full, _MOST, region, grid)
+    return points_with_numpy(thin, picture, upright, threshold, region, grid)
+
+
+def full_vote(gradient_min: float) -> int:
+    """Weight of a full vote, the step that has it [grey levels]."""
+    return min(_FULL * _threshold(gradient_min), 255)
+
+
+def _threshold(gradient_min: float) -> int:
+    return max(1, round(gradient_min / _SOBEL))
+
+
+def points_with_numpy(
+    thin: np.ndarray, picture: Picture, upright: bool, threshold: int, region: np.ndarray | None, grid: CoarseGrid
+) -> tuple[np.ndarray, np.ndarray]:
+    """The same where there is no machine code, and to say what it computes."""
+    planes = cv2.split(thin)
     if upright:
-        thin = tuple(cv2.transpose(plane) for plane in thin)
-    pairs = [(plane[2:], plane[:-2]) for plane in thin]
-    threshold = max(1, round(gradient_min / _SOBEL))
+        planes = tuple(cv2.transpose(plane) for plane in planes)
+    pairs = [(plane[2:], plane[:-2]) for plane in planes]
     signed = (
         _strongest([cv2.subtract(below, above) for below, above in pairs]),
         _strongest([cv2.subtract(above, below) for below, above in pairs]),
@@ -91,11 +114,20 @@ def _points(
         cell += np.minimum(x_px // grid.stride, last_column)
         free &= region.reshape(-1).take(cell) > 0
     kept = np.flatnonzero(free)
-    weight = np.minimum(steps.reshape(-1).take(places.take(kept)) * np.float32(1.0 / (_FULL * threshold)), 1.0)
+    full = min(_FULL * threshold, 255)
+    strength = np.minimum(steps.reshape(-1).take(places.take(kept)), full)
     if len(kept) > _MOST:  # grain and prints: the strongest tell the lines, and the votes of all would take long
-        strongest = np.argpartition(-weight, _MOST)[:_MOST]
-        kept, weight = kept.take(strongest), weight.take(strongest)
+        strongest = _strongest_points(strength)
+        kept, strength = kept.take(strongest), strength.take(strongest)
     points = np.empty((len(kept), 3), np.float32)
     points[:, 0], points[:, 1] = 0.5 * u.take(kept), 0.5 * v.take(kept)
-    points[:, 2] = weight
+    points[:, 2] = strength
     return points
+
+
+def _strongest_points(strength: np.ndarray) -> np.ndarray:
+    """Places of the strongest ones, and of the weakest of these as many as there is room for, evenly spread."""
+    cut = np.partition(strength, len(strength) - _MOST)[len(strength) - _MOST]
+    tied, sure = np.flatnonzero(strength == cut), np.flatnonzero(strength > cut)
+    share = np.arange(len(tied) + 1) * (_MOST - len(sure)) // len(tied)
+    return np.sort(np.concatenate((sure, tied[share[1:] > share[:-1]])))

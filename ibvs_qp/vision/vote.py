@@ -9,8 +9,10 @@ import cv2
 import numpy as np
 
 from ibvs_qp.vision.config import VisionConfig
-from ibvs_qp.vision.edge_points import POINTS, edge_points
+from ibvs_qp.vision.edge_points import POINTS, edge_points, full_vote
 from ibvs_qp.vision.grid import CoarseGrid
+from ibvs_qp.vision.native import native
+from ibvs_qp.vision.native_votes import distinct_natively
 from ibvs_qp.vision.picture import Picture
 from ibvs_qp.vision.plane import PlaneEstimate
 
@@ -107,10 +109,15 @@ def _hough(
     sine, cosine = np.sin(theta), np.cos(theta)
     left, right = rho / sine, (rho - width * cosine) / sine
     lines = np.stack((cosine, sine, -rho), axis=1).astype(np.float32)
-    distance = np.abs(lines[:, :2] @ points[:, :2].T + lines[:, 2:])
     falls = 0.5 * (left + right) > 0.5 * (moved + height)
     left, right = left - moved * falls, right - moved * falls
-    kept, votes = _distinct(distance, points[:, 2].copy(), falls.tolist(), _FAINT * least)
+    library, faint = native(), _FAINT * least * full_vote(config.detect.gradient_min)
+    if library is None:
+        kept, votes = distinct_with_numpy(lines, falls, points, faint)
+    else:
+        kept, votes = distinct_natively(
+            library, lines, falls, points, near=_NEAR, same=SAME_PX, faint=faint, poor=_POOR, room=_KEPT
+        )
     differing = _label_difference(left[kept], right[kept], labels.T if upright else labels, grid)
     result = []
     for index, own, difference in zip(kept, votes, differing.tolist(), strict=True):
@@ -125,15 +132,19 @@ def _hough(
     return result
 
 
-def _distinct(distance: np.ndarray, free: np.ndarray, falls: list[bool], least: float) -> tuple[list[int], list[float]]:
+def distinct_with_numpy(
+    lines: np.ndarray, falling: np.ndarray, points: np.ndarray, least: float
+) -> tuple[list[int], list[float]]:
     """Lines in the order of the votes that are left when better ones have taken theirs, and these votes.
 
     Args:
-        distance: Of every line from every point [half-resolution px], (L, n).
-        free: Weights of the points, (n,); those that are taken lose theirs.
-        falls: Polarity of the lines, (L).
+        lines: (p, q, r) of p u + q v + r = 0 with unit normal, float32 (L, 3).
+        falling: Polarity of the lines, bool (L,).
+        points: (u, v) [half-resolution px] and weight, float32 (n, 3).
         least: Least weight of a line.
     """
+    distance, free = np.abs(lines[:, :2] @ points[:, :2].T + lines[:, 2:]), points[:, 2].copy()
+    falls = falling.tolist()
     near = (distance < _NEAR).astype(np.float32)
     wanted = np.ones(len(near), np.float32)
     room = {True: _KEPT, False: _KEPT}

@@ -1,4 +1,4 @@
-"""Vision's inner loops as machine code, where there is a C compiler: numpy calls on small arrays cost most of a picture.
+"""Inner loops of vision as machine code, where there is a C compiler; calls on small arrays cost most of a picture.
 
 The C files of this folder are joined into one and translated once. The numpy code beside them says what they compute;
 both agree to rounding, and numpy serves where there is no compiler.
@@ -15,7 +15,7 @@ from pathlib import Path
 from ibvs_qp.shared_library import compiler, shared_library
 
 #: The files, in the order in which they are joined.
-FILES = ("native.h", "edges.c", "line_fit.c", "fit_lines.c", "planes.c")
+FILES = ("native.h", "edges.c", "line_fit.c", "fit_lines.c", "planes.c", "votes.c")
 #: Products and sums are not contracted, so that all processors of one kind agree.
 FLAGS = ("-O2", "-fPIC", "-shared", "-ffp-contract=off")
 

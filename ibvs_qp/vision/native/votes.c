@@ -1,0 +1,114 @@
+/* Points that vote for lines, and which lines are left when better ones have taken theirs: the machine code of
+   edge_points.py and vote.py. */
+
+/* A thinned-out picture and what of the full one it shows; see ibvs_qp/vision/native_votes.py. */
+typedef struct {
+    double rows, columns; /* of the view, in which lines are level */
+    double row_step, column_step; /* of the view, in the thinned-out picture in memory [px] */
+    double upright, height, width; /* of the picture itself */
+    double threshold, full, most; /* weakest step, the step of a full vote [grey levels], most points */
+    double grid_rows, grid_columns, stride; /* of the region */
+} Thin;
+
+/* Rises, or falls, of the strongest channel along +v; 0 in two rows less than the view has. */
+static void steps_of(const Thin *thin, const uint8_t *rgb, int falls, uint8_t *steps) {
+    int rows = (int)thin->rows - 2, columns = (int)thin->columns;
+    long down = 3 * (long)thin->row_step, right = 3 * (long)thin->column_step;
+    for (int r = 0; r < rows; r++)
+        for (int c = 0; c < columns; c++) {
+            const uint8_t *above = rgb + r * down + c * right, *below = above + 2 * down;
+            int most = 0;
+            for (int k = 0; k < 3; k++) {
+                int step = falls ? above[k] - below[k] : below[k] - above[k];
+                most = step > most ? step : most;
+            }
+            steps[r * columns + c] = (uint8_t)most;
+        }
+}
+
+/* Points of one polarity: u, v at half resolution and weight each; returns how many. */
+int edge_points(const Thin *thin, const uint8_t *rgb, int falls, const uint8_t *mask, const uint8_t *region,
+                float *points) {
+    int rows = (int)thin->rows - 2, columns = (int)thin->columns, upright = thin->upright != 0.0, count = 0;
+    int threshold = (int)thin->threshold, full = (int)thin->full, most = (int)thin->most;
+    long width = (long)thin->width, stride = (long)thin->stride, grid_columns = (long)thin->grid_columns;
+    long last_row = (long)thin->grid_rows - 1, last_column = grid_columns - 1;
+    float across = (float)((upright ? thin->width : thin->height) / thin->rows);
+    float along = (float)((upright ? thin->height : thin->width) / thin->columns);
+    long levels[256] = {0};
+    uint8_t *steps = malloc((long)rows * columns);
+    if (steps == NULL) return -1;
+    steps_of(thin, rgb, falls, steps);
+    for (int r = 0; r < rows; r++)
+        for (int c = 0; c < columns; c++) {
+            const uint8_t *step = steps + r * columns + c;
+            if (*step <= threshold || (r && *step < step[-columns]) || (r + 1 < rows && *step <= step[columns])) continue;
+            float v = (r + 1.5f) * across, u = (c + 0.5f) * along;
+            long x = (long)(upright ? v : u), y = (long)(upright ? u : v);
+            if (mask[y * width + x]) continue;
+            if (region != NULL) {
+                long row = y / stride, column = x / stride;
+                row = row < last_row ? row : last_row, column = column < last_column ? column : last_column;
+                if (!region[row * grid_columns + column]) continue;
+            }
+            int strength = *step < full ? *step : full;
+            levels[strength]++;
+            points[3 * count] = 0.5f * u, points[3 * count + 1] = 0.5f * v, points[3 * count + 2] = (float)strength;
+            count++;
+        }
+    free(steps);
+    long cut = full, above = 0, seen = 0, held = 0;
+    if (count > most) { /* the strongest, and of the last of these as many as there is room for, evenly spread */
+        while (above + levels[cut] < most) above += levels[cut--];
+    } else cut = 0;
+    for (int k = 0; k < count; k++) {
+        const float *point = points + 3 * k;
+        long strength = (long)point[2];
+        if (strength < cut) continue;
+        if (cut && strength == cut) {
+            long room = most - above, all = levels[cut], before = seen++ * room / all;
+            if (seen * room / all == before) continue;
+        }
+        float *kept = points + 3 * held++;
+        kept[0] = point[0], kept[1] = point[1], kept[2] = (float)strength;
+    }
+    return (int)held;
+}
+
+/* Lines (p, q, r) in the order of the votes that are left when better ones have taken theirs, at most `room` of either
+   polarity; returns how many are kept. Points nearer than `near` vote, nearer than `same` they are taken. */
+int distinct_lines(const float *lines, const uint8_t *falls, int count, float *points, int n, float near, float same,
+                   double faint, double poor, int room, int32_t *kept, double *votes) {
+    uint8_t *at = malloc((long)count * n + count), *wanted = at + (long)count * n;
+    int held = 0, left[2] = {room, room};
+    if (at == NULL) return -1;
+    for (int line = 0; line < count; line++) {
+        const float *l = lines + 3 * line;
+        wanted[line] = 1;
+        for (int k = 0; k < n; k++) {
+            float away = fabsf(l[0] * points[3 * k] + l[1] * points[3 * k + 1] + l[2]);
+            at[(long)line * n + k] = (uint8_t)((away < near) + 2 * (away < same));
+        }
+    }
+    for (;;) {
+        int best = -1;
+        double most = 0.0;
+        for (int line = 0; line < count; line++) {
+            double own = 0.0;
+            const uint8_t *row = at + (long)line * n;
+            if (!wanted[line]) continue;
+            for (int k = 0; k < n; k++)
+                if (row[k] & 1) own += points[3 * k + 2];
+            if (best < 0 || own > most) best = line, most = own;
+        }
+        if (best < 0 || most < fmax(faint, held ? poor * votes[0] : 0.0)) break;
+        kept[held] = best, votes[held++] = most;
+        for (int k = 0; k < n; k++)
+            if (at[(long)best * n + k] & 2) points[3 * k + 2] = 0.0f;
+        wanted[best] = 0;
+        if (--left[falls[best]] == 0)
+            for (int line = 0; line < count; line++) wanted[line] &= falls[line] != falls[best];
+    }
+    free(at);
+    return held;
+}

@@ -1,0 +1,109 @@
+"""Votes for lines by machine code: fills in the tables of native/votes.c and reads them."""
+
+from __future__ import annotations
+
+import ctypes
+
+import numpy as np
+
+from ibvs_qp.vision.grid import CoarseGrid
+from ibvs_qp.vision.picture import Picture
+
+
+def edge_points_natively(
+    library: ctypes.CDLL,
+    thin: np.ndarray,
+    picture: Picture,
+    upright: bool,
+    threshold: int,
+    full: int,
+    most: int,
+    region: np.ndarray | None,
+    grid: CoarseGrid,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Rises and falls of colour along +v of the view, see `ibvs_qp.vision.edge_points.edge_points`.
+
+    Args:
+        library: The machine code.
+        thin: The thinned-out picture, uint8 (h, w, 3).
+        picture: The full one.
+        upright: Whether the view is the transposed one.
+        threshold: Weakest step [grey levels].
+        full: Step with a full vote [grey levels].
+        most: Most points of either kind.
+        region: Non-zero on the samples around which lines are wanted, uint8, or None for all.
+        grid: Where these samples lie.
+
+    Raises:
+        MemoryError: When memory ran out.
+    """
+    rows, columns, _ = thin.shape
+    shape = (columns, rows, 1, columns) if upright else (rows, columns, columns, 1)
+    height, width = picture.mask.shape
+    cells = grid.shape if region is None else region.shape
+    table = np.array((*shape, upright, height, width, threshold, full, most, *cells, grid.stride), float)
+    region = None if region is None else np.ascontiguousarray(region)
+    found = []
+    for falls in (0, 1):
+        points = np.empty((rows * columns, 3), np.float32)
+        count = library.edge_points(
+            ctypes.c_void_p(table.ctypes.data),
+            ctypes.c_void_p(thin.ctypes.data),
+            falls,
+            ctypes.c_void_p(picture.mask.ctypes.data),
+            ctypes.c_void_p(None if region is None else region.ctypes.data),
+            ctypes.c_void_p(points.ctypes.data),
+        )
+        if count < 0:
+            raise MemoryError("no memory for points of edges")
+        found.append(points[:count])
+    return found[0], found[1]
+
+
+def distinct_natively(
+    library: ctypes.CDLL,
+    lines: np.ndarray,
+    falls: np.ndarray,
+    points: np.ndarray,
+    *,
+    near: float,
+    same: float,
+    faint: float,
+    poor: float,
+    room: int,
+) -> tuple[list[int], list[float]]:
+    """Lines that are left when better ones have taken their points, and their votes, best first.
+
+    Args:
+        library: The machine code.
+        lines: (p, q, r) of p u + q v + r = 0 with unit normal, float32 (L, 3).
+        falls: Polarity of the lines, bool (L,).
+        points: (u, v) and weight, float32 (n, 3); not changed.
+        near: Distance within which a point votes [half-resolution px].
+        same: Distance within which a point is taken [half-resolution px].
+        faint: Least weight of a line.
+        poor: The same, as a share of the best one's.
+        room: Most lines of either polarity.
+
+    Raises:
+        MemoryError: When memory ran out.
+    """
+    points, falls, lines = points.copy(), falls.view(np.uint8), np.ascontiguousarray(lines)
+    kept, votes = np.empty(2 * room, np.int32), np.empty(2 * room)
+    count = library.distinct_lines(
+        ctypes.c_void_p(lines.ctypes.data),
+        ctypes.c_void_p(falls.ctypes.data),
+        len(lines),
+        ctypes.c_void_p(points.ctypes.data),
+        len(points),
+        ctypes.c_float(near),
+        ctypes.c_float(same),
+        ctypes.c_double(faint),
+        ctypes.c_double(poor),
+        room,
+        ctypes.c_void_p(kept.ctypes.data),
+        ctypes.c_void_p(votes.ctypes.data),
+    )
+    if count < 0:
+        raise MemoryError("no memory for votes")
+    return kept[:count].tolist(), votes[:count].tolist()
