@@ -7,7 +7,7 @@ import numpy as np
 
 from ibvs_qp.vision.grid import CoarseGrid
 from ibvs_qp.vision.native import native
-from ibvs_qp.vision.native_votes import edge_points_natively
+from ibvs_qp.vision.native_votes import points_natively
 from ibvs_qp.vision.picture import Picture
 
 #: Points along the longer side of a picture: a line is told by far fewer points than it has pixels (it is refined with
@@ -34,20 +34,31 @@ def edge_points(
         grid: Where these samples lie.
 
     Returns:
-        (u, v) in half-resolution pixels of the view, 0 at the picture's border, and the weight of its vote, whole numbers
-        up to `full_vote`, so that sums of them are exact: float32 (n, 3) each.
+        (u, v) in half-resolution pixels of the view, 0 at the picture's border, and the weight of its vote, whole
+        numbers up to `full_vote`, so that sums of them are exact: float32 (n, 3) each.
     """
     height, width = picture.mask.shape
     apart = max(height, width) / POINTS
     columns, rows = width // _ACROSS_PX, height // _ACROSS_PX
     columns, rows = (columns, round(height / apart)) if upright else (round(width / apart), rows)
     thin = cv2.resize(picture.rgb, (columns, rows), interpolation=cv2.INTER_LINEAR)
-    threshold = _threshold(gradient_min)
-    library = native()
-    if library is not None:
+    planes = cv2.split(thin)
+    if upright:
+        planes = tuple(cv2.transpose(plane) for plane in planes)
+    pairs = [(plane[2:], plane[:-2]) for plane in planes]
+    signed = (
+        _strongest([cv2.subtract(below, above) for below, above in pairs]),
+        _strongest([cv2.subtract(above, below) for below, above in pairs]),
+    )
+    threshold, library = _threshold(gradient_min), native()
+    if library is None:
+        rising, falling = (points_with_numpy(steps, threshold, picture, upright, region, grid) for steps in signed)
+    else:
         full = full_vote(gradient_min)
-        return edge_points_natively(library, thin, picture, upright, threshold, full, _MOST, region, grid)
-    return points_with_numpy(thin, picture, upright, threshold, region, grid)
+        rising, falling = (
+            points_natively(library, steps, picture, upright, threshold, full, _MOST, region, grid) for steps in signed
+        )
+    return rising, falling
 
 
 def full_vote(gradient_min: float) -> int:
@@ -57,24 +68,6 @@ def full_vote(gradient_min: float) -> int:
 
 def _threshold(gradient_min: float) -> int:
     return max(1, round(gradient_min / _SOBEL))
-
-
-def points_with_numpy(
-    thin: np.ndarray, picture: Picture, upright: bool, threshold: int, region: np.ndarray | None, grid: CoarseGrid
-) -> tuple[np.ndarray, np.ndarray]:
-    """The same where there is no machine code, and to say what it computes."""
-    planes = cv2.split(thin)
-    if upright:
-        planes = tuple(cv2.transpose(plane) for plane in planes)
-    pairs = [(plane[2:], plane[:-2]) for plane in planes]
-    signed = (
-        _strongest([cv2.subtract(below, above) for below, above in pairs]),
-        _strongest([cv2.subtract(above, below) for below, above in pairs]),
-    )
-    rising, falling = (
-        _points(steps, _thin(steps, threshold), threshold, picture, upright, region, grid) for steps in signed
-    )
-    return rising, falling
 
 
 def _strongest(channels: list[np.ndarray]) -> np.ndarray:
@@ -89,16 +82,16 @@ def _thin(strength: np.ndarray, threshold: int) -> np.ndarray:
     return np.flatnonzero(edges)
 
 
-def _points(
+def points_with_numpy(
     steps: np.ndarray,
-    places: np.ndarray,
     threshold: int,
     picture: Picture,
     upright: bool,
     region: np.ndarray | None,
     grid: CoarseGrid,
 ) -> np.ndarray:
-    """Those of the places that the vehicle does not hide and around which lines are wanted, with their weights."""
+    """Places of strong steps that the vehicle does not hide and around which lines are wanted, with their weights."""
+    places = _thin(steps, threshold)
     rows, columns = steps.shape
     row = places // columns
     column = places - row * columns

@@ -10,9 +10,9 @@ from ibvs_qp.vision.grid import CoarseGrid
 from ibvs_qp.vision.picture import Picture
 
 
-def edge_points_natively(
+def points_natively(
     library: ctypes.CDLL,
-    thin: np.ndarray,
+    steps: np.ndarray,
     picture: Picture,
     upright: bool,
     threshold: int,
@@ -20,44 +20,27 @@ def edge_points_natively(
     most: int,
     region: np.ndarray | None,
     grid: CoarseGrid,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Rises and falls of colour along +v of the view, see `ibvs_qp.vision.edge_points.edge_points`.
+) -> np.ndarray:
+    """Points where colours step, see `ibvs_qp.vision.edge_points.edge_points`.
 
     Args:
         library: The machine code.
-        thin: The thinned-out picture, uint8 (h, w, 3).
-        picture: The full one.
+        steps: Steps of one polarity along +v of the thinned-out view, uint8 (rows, columns).
+        picture: The full picture.
         upright: Whether the view is the transposed one.
         threshold: Weakest step [grey levels].
         full: Step with a full vote [grey levels].
-        most: Most points of either kind.
+        most: Most points.
         region: Non-zero on the samples around which lines are wanted, uint8, or None for all.
         grid: Where these samples lie.
-
-    Raises:
-        MemoryError: When memory ran out.
     """
-    rows, columns, _ = thin.shape
-    shape = (columns, rows, 1, columns) if upright else (rows, columns, columns, 1)
-    height, width = picture.mask.shape
-    cells = grid.shape if region is None else region.shape
-    table = np.array((*shape, upright, height, width, threshold, full, most, *cells, grid.stride), float)
     region = None if region is None else np.ascontiguousarray(region)
-    found = []
-    for falls in (0, 1):
-        points = np.empty((rows * columns, 3), np.float32)
-        count = library.edge_points(
-            ctypes.c_void_p(table.ctypes.data),
-            ctypes.c_void_p(thin.ctypes.data),
-            falls,
-            ctypes.c_void_p(picture.mask.ctypes.data),
-            ctypes.c_void_p(None if region is None else region.ctypes.data),
-            ctypes.c_void_p(points.ctypes.data),
-        )
-        if count < 0:
-            raise MemoryError("no memory for points of edges")
-        found.append(points[:count])
-    return found[0], found[1]
+    cells = grid.shape if region is None else region.shape
+    table = np.array((*steps.shape, upright, *picture.mask.shape, threshold, full, most, *cells, grid.stride), float)
+    points = np.empty((steps.size, 3), np.float32)
+    parts = (table, steps, picture.mask, region, points)
+    count = library.edge_points(*(ctypes.c_void_p(None if part is None else part.ctypes.data) for part in parts))
+    return points[:count]
 
 
 def distinct_natively(

@@ -1,44 +1,24 @@
 /* Points that vote for lines, and which lines are left when better ones have taken theirs: the machine code of
    edge_points.py and vote.py. */
 
-/* A thinned-out picture and what of the full one it shows; see ibvs_qp/vision/native_votes.py. */
+/* Steps in a thinned-out picture and what of the full one it shows; see ibvs_qp/vision/native_votes.py. */
 typedef struct {
-    double rows, columns; /* of the view, in which lines are level */
-    double row_step, column_step; /* of the view, in the thinned-out picture in memory [px] */
+    double rows, columns; /* of the steps, two rows less than the view in which lines are level */
     double upright, height, width; /* of the picture itself */
     double threshold, full, most; /* weakest step, the step of a full vote [grey levels], most points */
     double grid_rows, grid_columns, stride; /* of the region */
 } Thin;
 
-/* Rises, or falls, of the strongest channel along +v; 0 in two rows less than the view has. */
-static void steps_of(const Thin *thin, const uint8_t *rgb, int falls, uint8_t *steps) {
-    int rows = (int)thin->rows - 2, columns = (int)thin->columns;
-    long down = 3 * (long)thin->row_step, right = 3 * (long)thin->column_step;
-    for (int r = 0; r < rows; r++)
-        for (int c = 0; c < columns; c++) {
-            const uint8_t *above = rgb + r * down + c * right, *below = above + 2 * down;
-            int most = 0;
-            for (int k = 0; k < 3; k++) {
-                int step = falls ? above[k] - below[k] : below[k] - above[k];
-                most = step > most ? step : most;
-            }
-            steps[r * columns + c] = (uint8_t)most;
-        }
-}
-
-/* Points of one polarity: u, v at half resolution and weight each; returns how many. */
-int edge_points(const Thin *thin, const uint8_t *rgb, int falls, const uint8_t *mask, const uint8_t *region,
-                float *points) {
-    int rows = (int)thin->rows - 2, columns = (int)thin->columns, upright = thin->upright != 0.0, count = 0;
+/* Points where the step across the line is strong and the strongest: u, v at half resolution and weight each; returns
+   how many. */
+int edge_points(const Thin *thin, const uint8_t *steps, const uint8_t *mask, const uint8_t *region, float *points) {
+    int rows = (int)thin->rows, columns = (int)thin->columns, upright = thin->upright != 0.0, count = 0;
     int threshold = (int)thin->threshold, full = (int)thin->full, most = (int)thin->most;
     long width = (long)thin->width, stride = (long)thin->stride, grid_columns = (long)thin->grid_columns;
     long last_row = (long)thin->grid_rows - 1, last_column = grid_columns - 1;
-    float across = (float)((upright ? thin->width : thin->height) / thin->rows);
-    float along = (float)((upright ? thin->height : thin->width) / thin->columns);
+    float across = (float)((upright ? thin->width : thin->height) / (rows + 2));
+    float along = (float)((upright ? thin->height : thin->width) / columns);
     long levels[256] = {0};
-    uint8_t *steps = malloc((long)rows * columns);
-    if (steps == NULL) return -1;
-    steps_of(thin, rgb, falls, steps);
     for (int r = 0; r < rows; r++)
         for (int c = 0; c < columns; c++) {
             const uint8_t *step = steps + r * columns + c;
@@ -56,7 +36,6 @@ int edge_points(const Thin *thin, const uint8_t *rgb, int falls, const uint8_t *
             points[3 * count] = 0.5f * u, points[3 * count + 1] = 0.5f * v, points[3 * count + 2] = (float)strength;
             count++;
         }
-    free(steps);
     long cut = full, above = 0, seen = 0, held = 0;
     if (count > most) { /* the strongest, and of the last of these as many as there is room for, evenly spread */
         while (above + levels[cut] < most) above += levels[cut--];
