@@ -61,7 +61,7 @@ def distinct_natively(
         library: The machine code.
         lines: (p, q, r) of p u + q v + r = 0 with unit normal, float32 (L, 3).
         falls: Polarity of the lines, bool (L,).
-        points: (u, v) and weight, float32 (n, 3); not changed.
+        points: (u, v) and weight, float32 (n, 3).
         near: Distance within which a point votes [half-resolution px].
         same: Distance within which a point is taken [half-resolution px].
         faint: Least weight of a line.
@@ -71,7 +71,7 @@ def distinct_natively(
     Raises:
         MemoryError: When memory ran out.
     """
-    points, falls, lines = points.copy(), falls.view(np.uint8), np.ascontiguousarray(lines)
+    falls, lines = falls.view(np.uint8), np.ascontiguousarray(lines)
     kept, votes = np.empty(2 * room, np.int32), np.empty(2 * room)
     count = library.distinct_lines(
         ctypes.c_void_p(lines.ctypes.data),
@@ -90,3 +90,24 @@ def distinct_natively(
     if count < 0:
         raise MemoryError("no memory for votes")
     return kept[:count].tolist(), votes[:count].tolist()
+
+
+def differing_natively(
+    library: ctypes.CDLL, lines: list[tuple[float, float]], labels: np.ndarray, scale: float, beside: float
+) -> list[float]:
+    """Share of places along each line whose two sides have different coarse labels.
+
+    Args:
+        library: The machine code.
+        lines: Levels at the left and the right border [half-resolution px].
+        labels: Labels of the view, uint8 (rows, columns), any strides.
+        scale: Samples per half-resolution pixel.
+        beside: Distance from the line at which labels are compared [samples].
+    """
+    (rows, columns), (down, right_step) = labels.shape, labels.strides
+    place, steps = ctypes.c_void_p(labels.ctypes.data), (ctypes.c_long(down), ctypes.c_long(right_step), rows, columns)
+    counts = [
+        library.differing_labels(place, *steps, *(ctypes.c_double(number) for number in (left, right, scale, beside)))
+        for left, right in lines
+    ]
+    return [count / columns for count in counts]

@@ -12,7 +12,7 @@ from ibvs_qp.vision.config import VisionConfig
 from ibvs_qp.vision.edge_points import POINTS, edge_points, full_vote
 from ibvs_qp.vision.grid import CoarseGrid
 from ibvs_qp.vision.native import native
-from ibvs_qp.vision.native_votes import distinct_natively
+from ibvs_qp.vision.native_votes import differing_natively, distinct_natively
 from ibvs_qp.vision.picture import Picture
 from ibvs_qp.vision.plane import PlaneEstimate
 
@@ -118,9 +118,13 @@ def _hough(
         kept, votes = distinct_natively(
             library, lines, falls, points, near=_NEAR, same=SAME_PX, faint=faint, poor=_POOR, room=_KEPT
         )
-    differing = _label_difference(left[kept], right[kept], labels.T if upright else labels, grid)
+    shown, ends = labels.T if upright else labels, [(float(left[k]), float(right[k])) for k in kept]
+    if library is None:
+        differing = differing_with_numpy(ends, shown, 2.0 / grid.stride)
+    else:
+        differing = differing_natively(library, ends, shown, 2.0 / grid.stride, _LABEL_CELLS)
     result = []
-    for index, own, difference in zip(kept, votes, differing.tolist(), strict=True):
+    for index, own, difference in zip(kept, votes, differing, strict=True):
         if difference < _DIFFERENT:
             continue
         slope = float(right[index] - left[index]) / width
@@ -165,13 +169,14 @@ def distinct_with_numpy(
             wanted[np.array(falls) == falls[best]] = 0.0
 
 
-def _label_difference(left: np.ndarray, right: np.ndarray, labels: np.ndarray, grid: CoarseGrid) -> np.ndarray:
-    """Share of places along each line whose two sides have different coarse labels, (n,)."""
+def differing_with_numpy(lines: list[tuple[float, float]], labels: np.ndarray, scale: float) -> list[float]:
+    """What `differing_natively` computes, where there is no machine code."""
     rows, columns = labels.shape
     share = (np.arange(columns) + 0.5) / columns
-    level = (left[:, None] + (right - left)[:, None] * share) * (2.0 / grid.stride) - 0.5
+    left, right = np.array(lines).reshape(-1, 2).T
+    level = (left[:, None] + (right - left)[:, None] * share) * scale - 0.5
     above, below = (np.rint(level + offset).astype(np.intp) for offset in (-_LABEL_CELLS, _LABEL_CELLS))
     inside = (above >= 0) & (below < rows)
     k = np.arange(columns)
     different = labels[np.clip(above, 0, rows - 1), k] != labels[np.clip(below, 0, rows - 1), k]
-    return np.count_nonzero(different & inside, axis=1) / columns
+    return (np.count_nonzero(different & inside, axis=1) / columns).tolist()

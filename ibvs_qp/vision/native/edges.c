@@ -85,16 +85,10 @@ static int strongest(const float *answer, const float *preference, int size) {
     return best;
 }
 
-static int ascending(const void *one, const void *two) {
-    float a = *(const float *)one, b = *(const float *)two;
-    return (a > b) - (a < b);
-}
-
 /* Mix of channels that shows a new line: the typical strongest step of the strip. */
-static void direction_of(const Strip *strip, float *scratch, double *direction) {
+static void direction_of(const Strip *strip, float *scratch, double *sorted, double *direction) {
     int profiles = strip->profiles, count = 0;
-    float polarity = (float)strip->query->polarity, *weight = scratch, *sorted = scratch + profiles;
-    float *steps = scratch + 2 * profiles;
+    float polarity = (float)strip->query->polarity, *weight = scratch, *steps = scratch + profiles;
     for (int k = 0; k < profiles; k++) {
         int best = 0;
         weight[k] = 0.0f;
@@ -109,14 +103,12 @@ static void direction_of(const Strip *strip, float *scratch, double *direction) 
         sorted[k] = weight[k];
         for (int c = 0; c < 3; c++) steps[3 * k + c] = gradient(strip, k, best, c);
     }
-    qsort(sorted, profiles, sizeof(float), ascending);
-    float least = TELLING * sorted[profiles / 2];
+    float least = TELLING * (float)upper_median(sorted, profiles);
     for (int c = 0; c < 3; c++) {
         count = 0;
         for (int k = 0; k < profiles; k++)
             if (weight[k] > least) sorted[count++] = steps[3 * k + c];
-        qsort(sorted, count, sizeof(float), ascending);
-        direction[c] = count ? PEAK_TO_STEP * sorted[count / 2] : 0.0f;
+        direction[c] = count ? PEAK_TO_STEP * (float)upper_median(sorted, count) : 0.0f;
     }
 }
 

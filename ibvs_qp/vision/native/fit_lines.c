@@ -46,7 +46,7 @@ int fit_lines(const Scene *scene, const Setting *s, const Query *queries, Fit *f
               uint8_t *visible, uint8_t *sides) {
     int lines = (int)s->lines, profiles = (int)s->profiles, reach = (int)s->reach, answers = 2 * reach + 1;
     long points = (long)lines * profiles, pixels = 2 * (reach + (int)s->side) + 1;
-    long doubles = 4 * points + 3 * profiles, floats = (long)profiles * answers + 2 * answers + 8 + 5 * profiles;
+    long doubles = 4 * points + 3 * profiles, floats = (long)profiles * answers + 2 * answers + 8 + 4 * profiles;
     double *memory = malloc(doubles * sizeof(double) + floats * sizeof(float) + 4 * points * pixels +
                             (long)profiles * answers + profiles * sizeof(int));
     if (memory == NULL) return 0;
@@ -55,7 +55,7 @@ int fit_lines(const Scene *scene, const Setting *s, const Query *queries, Fit *f
     double *scratch = memory + 4 * points;
     float *answer = (float *)(scratch + 3 * profiles), *preference = answer + (long)profiles * answers + answers + 2;
     float *told = preference + answers + 6;
-    int *held = (int *)(told + 5 * profiles);
+    int *held = (int *)(told + 4 * profiles);
     all.colors = (uint8_t *)(held + profiles), all.hidden = all.colors + 3 * points * pixels;
     uint8_t *allowed = all.hidden + points * pixels;
     double faint = FAINT_SHARE * s->contrast_min;
@@ -71,7 +71,7 @@ int fit_lines(const Scene *scene, const Setting *s, const Query *queries, Fit *f
         uint8_t *good = support + line * profiles, *seen = visible + line * profiles;
         long at = (long)line * profiles;
         gather(&strip, all.predicted + at, seen);
-        if (q->known == 0.0) direction_of(&strip, told, direction);
+        if (q->known == 0.0) direction_of(&strip, told, scratch, direction);
         double norm = sqrt(direction[0] * direction[0] + direction[1] * direction[1] + direction[2] * direction[2]);
         float unit[3];
         for (int c = 0; c < 3; c++) unit[c] = 0.5f * (float)(direction[c] / fmax(norm, STEP_MIN));

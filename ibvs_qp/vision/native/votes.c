@@ -9,6 +9,13 @@ typedef struct {
     double grid_rows, grid_columns, stride; /* of the region */
 } Thin;
 
+/* Places of a row where the step is strong and no weaker than in the rows beside it; the last row has none behind. */
+static void strongest_of(const uint8_t *row, const uint8_t *above, const uint8_t *below, int n, uint8_t threshold,
+                         uint8_t *strong) {
+    for (int c = 0; c < n; c++) strong[c] = (row[c] > threshold) & (row[c] >= above[c]);
+    for (int c = 0; c < n && below != NULL; c++) strong[c] &= row[c] > below[c];
+}
+
 /* Points where the step across the line is strong and the strongest: u, v at half resolution and weight each; returns
    how many. */
 int edge_points(const Thin *thin, const uint8_t *steps, const uint8_t *mask, const uint8_t *region, float *points) {
@@ -19,10 +26,17 @@ int edge_points(const Thin *thin, const uint8_t *steps, const uint8_t *mask, con
     float across = (float)((upright ? thin->width : thin->height) / (rows + 2));
     float along = (float)((upright ? thin->height : thin->width) / columns);
     long levels[256] = {0};
-    for (int r = 0; r < rows; r++)
+    uint8_t *strong = calloc(columns + 8, 1);
+    if (strong == NULL) return -1;
+    for (int r = 0; r < rows; r++) {
+        const uint8_t *row = steps + r * columns, *above = r ? row - columns : row;
+        strongest_of(row, above, r + 1 < rows ? row + columns : NULL, columns, (uint8_t)threshold, strong);
         for (int c = 0; c < columns; c++) {
-            const uint8_t *step = steps + r * columns + c;
-            if (*step <= threshold || (r && *step < step[-columns]) || (r + 1 < rows && *step <= step[columns])) continue;
+            uint64_t eight;
+            memcpy(&eight, strong + c, sizeof eight);
+            if (eight == 0) c += 7; /* most places are flat */
+            if (eight == 0 || !strong[c]) continue;
+            const uint8_t *step = row + c;
             float v = (r + 1.5f) * across, u = (c + 0.5f) * along;
             long x = (long)(upright ? v : u), y = (long)(upright ? u : v);
             if (mask[y * width + x]) continue;
@@ -36,6 +50,8 @@ int edge_points(const Thin *thin, const uint8_t *steps, const uint8_t *mask, con
             points[3 * count] = 0.5f * u, points[3 * count + 1] = 0.5f * v, points[3 * count + 2] = (float)strength;
             count++;
         }
+    }
+    free(strong);
     long cut = full, above = 0, seen = 0, held = 0;
     if (count > most) { /* the strongest, and of the last of these as many as there is room for, evenly spread */
         while (above + levels[cut] < most) above += levels[cut--];
@@ -56,38 +72,55 @@ int edge_points(const Thin *thin, const uint8_t *steps, const uint8_t *mask, con
 
 /* Lines (p, q, r) in the order of the votes that are left when better ones have taken theirs, at most `room` of either
    polarity; returns how many are kept. Points nearer than `near` vote, nearer than `same` they are taken. */
-int distinct_lines(const float *lines, const uint8_t *falls, int count, float *points, int n, float near, float same,
+int distinct_lines(const float *lines, const uint8_t *falls, int count, const float *points, int n, float near, float same,
                    double faint, double poor, int room, int32_t *kept, double *votes) {
-    uint8_t *at = malloc((long)count * n + count), *wanted = at + (long)count * n;
+    float *u = malloc(2 * n * sizeof(float) + n * sizeof(int32_t) + (long)count * n + count), *v = u + n;
+    if (u == NULL) return -1;
+    int32_t *weight = (int32_t *)(v + n);
+    uint8_t *at = (uint8_t *)(weight + n), *wanted = at + (long)count * n;
     int held = 0, left[2] = {room, room};
-    if (at == NULL) return -1;
+    for (int k = 0; k < n; k++)
+        u[k] = points[3 * k], v[k] = points[3 * k + 1], weight[k] = (int32_t)points[3 * k + 2];
     for (int line = 0; line < count; line++) {
         const float *l = lines + 3 * line;
         wanted[line] = 1;
         for (int k = 0; k < n; k++) {
-            float away = fabsf(l[0] * points[3 * k] + l[1] * points[3 * k + 1] + l[2]);
+            float away = fabsf(l[0] * u[k] + l[1] * v[k] + l[2]);
             at[(long)line * n + k] = (uint8_t)((away < near) + 2 * (away < same));
         }
     }
     for (;;) {
         int best = -1;
-        double most = 0.0;
+        int32_t most = 0;
         for (int line = 0; line < count; line++) {
-            double own = 0.0;
+            int32_t own = 0;
             const uint8_t *row = at + (long)line * n;
             if (!wanted[line]) continue;
-            for (int k = 0; k < n; k++)
-                if (row[k] & 1) own += points[3 * k + 2];
+            for (int k = 0; k < n; k++) own += (row[k] & 1) * weight[k];
             if (best < 0 || own > most) best = line, most = own;
         }
         if (best < 0 || most < fmax(faint, held ? poor * votes[0] : 0.0)) break;
         kept[held] = best, votes[held++] = most;
         for (int k = 0; k < n; k++)
-            if (at[(long)best * n + k] & 2) points[3 * k + 2] = 0.0f;
+            if (at[(long)best * n + k] & 2) weight[k] = 0;
         wanted[best] = 0;
         if (--left[falls[best]] == 0)
             for (int line = 0; line < count; line++) wanted[line] &= falls[line] != falls[best];
     }
-    free(at);
+    free(u);
     return held;
+}
+
+/* Places along a line, of as many as there are columns, whose two sides have different coarse labels. */
+int differing_labels(const uint8_t *labels, long row_step, long column_step, int rows, int columns, double left,
+                     double right, double scale, double beside) {
+    int count = 0;
+    for (int c = 0; c < columns; c++) {
+        double level = (left + (right - left) * ((c + 0.5) / columns)) * scale - 0.5;
+        double above = rint(level - beside), below = rint(level + beside);
+        if (!(above >= 0.0 && below < rows)) continue;
+        const uint8_t *column = labels + c * column_step;
+        count += column[(long)above * row_step] != column[(long)below * row_step];
+    }
+    return count;
 }
