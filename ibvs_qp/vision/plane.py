@@ -10,17 +10,14 @@ import numpy as np
 from ibvs_qp.vision.colors import BOARD, PAINT
 from ibvs_qp.vision.config import PlaneConfig
 from ibvs_qp.vision.grid import CoarseGrid
+from ibvs_qp.vision.hypotheses import judged_planes
 from ibvs_qp.vision.native import native
 from ibvs_qp.vision.native_plane import NativePlane, Refit, estimate_of
 from ibvs_qp.vision.robust import median
 from ibvs_qp.vision.surface import BLOCK, PlaneEstimate, connected_samples, plane_covariance, surface_problem
 
-#: Samples used to judge hypotheses and the spread of residuals; more cost time and change nothing.
+#: Samples used to judge the spread of residuals; more cost time and change nothing.
 _JUDGED = 400
-#: Radius that counts around the seed when hypotheses are judged, normalised.
-_NEAR = 0.25
-#: Share of the coarse gate within which a sample votes for a hypothesis.
-_VOTE = 0.6
 #: Gate of what looks like paint in either round, share of the board's: a wall that looks like paint must not get in, so
 #: what looks like it counts in the last round only, and has to fit twice as well.
 _PAINT_GATES = (0.0, 0.5)
@@ -123,28 +120,11 @@ class PlaneFitter:
         prefer: np.ndarray | None,
     ) -> np.ndarray | None:
         """Best of many planes through the seed and two random samples near it."""
-        config, design, flat = self._config, grid.design, inverse.ravel()
-        origin = design[seed[0] * grid.shape[1] + seed[1]]
-        square = (design[:, 0] - origin[0]) ** 2 + (design[:, 1] - origin[1]) ** 2
-        usable = (flat > 0) & grid.free.ravel() & (square < config.seed_reach**2)
-        if prefer is not None and int((usable & (prefer.ravel() == BOARD)).sum()) >= config.min_samples:
-            usable &= prefer.ravel() == BOARD
-        near = np.flatnonzero(usable)
-        if len(near) < config.min_samples:
+        tried = judged_planes(self._config, grid, inverse, seed, value, prefer, self._random)
+        if tried is None:
             return None
-        judged = near[:: max(1, len(near) // _JUDGED)]
-        first, second = self._random.choice(near, (2, config.hypotheses))
-        arm_1, arm_2 = design[first, :2] - origin[:2], design[second, :2] - origin[:2]
-        rise_1, rise_2 = flat[first] - value, flat[second] - value
-        cross = arm_1[:, 0] * arm_2[:, 1] - arm_1[:, 1] * arm_2[:, 0]
-        safe = np.where(np.abs(cross) > 1e-4, cross, np.inf)
-        a = (rise_1 * arm_2[:, 1] - rise_2 * arm_1[:, 1]) / safe
-        b = (rise_2 * arm_1[:, 0] - rise_1 * arm_2[:, 0]) / safe
-        planes = np.column_stack((a, b, value - a * origin[0] - b * origin[1]))
-        allowed = self._upright(planes, down)
-        residual = np.abs(planes @ design[judged].T - flat[judged])
-        weight = np.exp(-square[judged] / _NEAR**2)
-        score = ((residual < _VOTE * config.coarse_gate * flat[judged]) * weight).sum(axis=1) * allowed
+        planes, score = tried
+        score = score * self._upright(planes, down)
         best = int(np.argmax(score))
         return planes[best] if score[best] > 0 else None
 

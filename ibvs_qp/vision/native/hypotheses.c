@@ -1,4 +1,4 @@
-/* The first guess of a surface through a seed: the machine code of the search in plane.py. */
+/* The first guess of a surface through a seed: the machine code of hypotheses.py. */
 
 /* Samples with a reading that lie near the seed, of the board's colour if enough are; returns how many. */
 int near_seed(const double *design, const double *inverse, const uint8_t *labels, const uint8_t *free_of, int size,
@@ -20,13 +20,14 @@ int near_seed(const double *design, const double *inverse, const uint8_t *labels
 
 /* Planes through the seed, where 1/Z is `value`, and each pair of samples: what agrees with each, and the plane. */
 void judge_planes(const double *design, const double *inverse, int seed, double value, const int64_t *pairs, int count,
-                  const int32_t *judged, int n, double gate, double width, double *planes, double *scores) {
+                  const int32_t *judged, int n, double gate, double width, double span, double *planes,
+                  double *scores) {
     const double *origin = design + 3 * seed;
     for (int k = 0; k < count; k++) {
         const double *one = design + 3 * pairs[k], *two = design + 3 * pairs[count + k];
         double x1 = one[0] - origin[0], y1 = one[1] - origin[1], x2 = two[0] - origin[0], y2 = two[1] - origin[1];
         double rise1 = inverse[pairs[k]] - value, rise2 = inverse[pairs[count + k]] - value, cross = x1 * y2 - y1 * x2;
-        double safe = fabs(cross) > 1e-4 ? cross : INFINITY;
+        double safe = fabs(cross) > span ? cross : INFINITY;
         planes[3 * k] = (rise1 * y2 - rise2 * y1) / safe;
         planes[3 * k + 1] = (rise2 * x1 - rise1 * x2) / safe;
         planes[3 * k + 2] = value - planes[3 * k] * origin[0] - planes[3 * k + 1] * origin[1];
