@@ -11,6 +11,8 @@ import numpy as np
 from ibvs_qp.frames import R_BODY_CAMERA
 from ibvs_qp.vision.config import FlowConfig
 from ibvs_qp.vision.mask import Intrinsics
+from ibvs_qp.vision.native import native
+from ibvs_qp.vision.native_flow import depths_natively, solve_natively
 from ibvs_qp.vision.normal_equations import solve_three
 from ibvs_qp.vision.plane import PlaneEstimate
 from ibvs_qp.vision.robust import median
@@ -79,6 +81,22 @@ def inverse_depths(
     """1/Z of normalised points (n, 2): the surface's where they lie on it, else their own, 0 if unknown, (n,)."""
     if len(bearings) == 0:
         return np.zeros(0)
+    library = native()
+    if library is None:
+        return depths_with_numpy(bearings, depth, intrinsics, plane)
+    surface = None if plane is None else plane.inverse_depth
+    return depths_natively(library, bearings, depth, intrinsics, surface, _gate(plane), _CROSS_PX, _READINGS)
+
+
+def _gate(plane: PlaneEstimate | None) -> float:
+    """How near to the surface a point is on it, share of 1/Z."""
+    return 0.0 if plane is None else max(_ON_PLANE_SIGMAS * plane.residual_sigma, 0.01)
+
+
+def depths_with_numpy(
+    bearings: np.ndarray, depth: np.ndarray, intrinsics: Intrinsics, plane: PlaneEstimate | None
+) -> np.ndarray:
+    """The same where there is no machine code, and to say what it computes."""
     (height, width), (fx, fy, cx, cy) = depth.shape, intrinsics
     place = np.rint(bearings * (fx, fy) + (cx, cy)).astype(np.intp)
     place = np.minimum(np.maximum(place, _CROSS_PX), (width - 1 - _CROSS_PX, height - 1 - _CROSS_PX))
@@ -93,8 +111,7 @@ def inverse_depths(
     if plane is not None:
         a, b, c = plane.inverse_depth
         surface = bearings @ (a, b) + c
-        gate = max(_ON_PLANE_SIGMAS * plane.residual_sigma, 0.01)
-        near = (inverse > 0) & (np.abs(inverse - surface) < gate * np.abs(surface))
+        near = (inverse > 0) & (np.abs(inverse - surface) < _gate(plane) * np.abs(surface))
         inverse = np.where(near, surface, inverse)
     return inverse
 
@@ -141,29 +158,29 @@ def solve_velocity(
     Returns:
         The velocity, or the reason why there is none.
     """
-    rows, squares = _system(still, end, inverse, root * (focal * interval), interval)
-    prior = 1.0 / config.prior_m_s**2
-    width = rows.shape[2]
-    weight = np.ones(len(rows))
-    sums, velocity, size = np.zeros((width, width)), (0.0, 0.0, 0.0), weight
-    for _ in range(_ROUNDS):
-        sums = (weight @ squares).reshape(width, width)
-        (xx, xy, xz, xs), (_, yy, yz, ys), (_, _, zz, zs) = sums[:3, :4].tolist()
-        solved = solve_three((xx + prior, xy, xz, yy + prior, yz, zz + prior), (xs, ys, zs))
-        if solved is None:
-            return "the points determine no velocity"
-        velocity = solved[0]
-        answer = np.array((*velocity, -1.0, 0.0, 0.0, 0.0))
-        residual = rows @ answer
-        size = np.vecdot(residual, residual)
-        scale = max(_MAD * math.sqrt(median(size)), 0.5)
-        weight = np.maximum(0.0, 1.0 - size * (1.0 / (config.gate_sigmas * scale) ** 2)) ** 2
-    agreeing = int(np.count_nonzero(weight > 0.1))
+    prior, library = 1.0 / config.prior_m_s**2, native()
+    if library is None:
+        solved = solve_with_numpy(still, end, inverse, root, focal * interval, interval, prior, config.gate_sigmas)
+    else:
+        solved = solve_natively(
+            library,
+            still,
+            end,
+            inverse,
+            root,
+            scale=focal * interval,
+            interval=interval,
+            prior=prior,
+            gate_sigmas=config.gate_sigmas,
+        )
+    if solved is None:
+        return "the points determine no velocity"
+    (*velocity, square, total, agreeing), sums = solved
     if agreeing < config.min_points:
         return "too few points agree"
     if math.hypot(*velocity) > config.speed_max_m_s:
         return "faster than possible"
-    spread = max(float(weight @ size) / max(2.0 * float(weight.sum()) - 3.0, 1.0), 1.0)
+    spread = max(square / max(2.0 * total - 3.0, 1.0), 1.0)
     spreads = np.array((1.0, spread))[:, None, None]
     with_prior, spread_out = np.linalg.inv(sums[_V, _V] + np.eye(3) * prior / spreads) * spreads
     leak = with_prior @ sums[_V, _TURN] * (config.rotation_sigma_rad / interval)
@@ -172,11 +189,42 @@ def solve_velocity(
     (wx, wy, wz), (px, py, pz) = (rotation / interval).tolist(), camera_position.tolist()
     lever = np.array([wy * pz - wz * py, wz * px - wx * pz, wx * py - wy * px])
     return FlowVelocity(
-        velocity=R_BODY_CAMERA @ velocity - lever,
+        velocity=R_BODY_CAMERA @ np.array(velocity) - lever,
         covariance=0.5 * (covariance + covariance.T),
         stamp_ns=0,
-        points=agreeing,
+        points=int(agreeing),
     )
+
+
+def solve_with_numpy(
+    still: np.ndarray,
+    end: np.ndarray,
+    inverse: np.ndarray,
+    root: np.ndarray,
+    scale: float,
+    interval: float,
+    prior: float,
+    gate_sigmas: float,
+) -> tuple[list[float], np.ndarray] | None:
+    """What `solve_natively` computes, where there is no machine code."""
+    rows, squares = _system(still, end, inverse, root * scale, interval)
+    width = rows.shape[2]
+    weight = np.ones(len(rows))
+    sums, velocity, size = np.zeros((width, width)), (0.0, 0.0, 0.0), weight
+    for _ in range(_ROUNDS):
+        sums = (weight @ squares).reshape(width, width)
+        (xx, xy, xz, xs), (_, yy, yz, ys), (_, _, zz, zs) = sums[:3, :4].tolist()
+        solved = solve_three((xx + prior, xy, xz, yy + prior, yz, zz + prior), (xs, ys, zs))
+        if solved is None:
+            return None
+        velocity = solved[0]
+        answer = np.array((*velocity, -1.0, 0.0, 0.0, 0.0))
+        residual = rows @ answer
+        size = np.vecdot(residual, residual)
+        spread = max(_MAD * math.sqrt(median(size)), 0.5)
+        weight = np.maximum(0.0, 1.0 - size * (1.0 / (gate_sigmas * spread) ** 2)) ** 2
+    agreeing = float(np.count_nonzero(weight > 0.1))
+    return [*velocity, float(weight @ size), float(weight.sum()), agreeing], sums
 
 
 def _system(

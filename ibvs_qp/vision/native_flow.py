@@ -1,0 +1,91 @@
+"""Velocity from followed points by machine code: fills in the tables of native/flow.c and reads them."""
+
+from __future__ import annotations
+
+import ctypes
+
+import numpy as np
+
+#: Numbers per point of the whitened system, and columns of its sums: velocity (3), what is seen (1), turn (3).
+_ROW, _WIDTH = 14, 7
+
+
+def solve_natively(
+    library: ctypes.CDLL,
+    still: np.ndarray,
+    end: np.ndarray,
+    inverse: np.ndarray,
+    root: np.ndarray,
+    *,
+    scale: float,
+    interval: float,
+    prior: float,
+    gate_sigmas: float,
+) -> tuple[list[float], np.ndarray] | None:
+    """Robust weighted least squares, see `ibvs_qp.vision.flow_solve.solve_velocity`.
+
+    Args:
+        library: The machine code.
+        still: Points after the turn alone, normalised, (n, 2).
+        end: Points as found, normalised, (n, 2).
+        inverse: 1/Z of the points [1/m], (n,).
+        root: Square roots of their information [1/px], (n, 2, 2).
+        scale: What turns these into those of a velocity [px s].
+        interval: Time between the pictures [s].
+        prior: Information of the prior [s2/m2].
+        gate_sigmas: Residuals beyond so many robust sigmas get no weight.
+
+    Returns:
+        Velocity (3), sum of weighted squares, sum of weights and points that agree, and the sums of products (7, 7) of
+        the last round; None where the points determine no velocity.
+    """
+    count = len(still)
+    settings = np.array((count, scale, interval, prior, gate_sigmas), float)
+    parts = [np.ascontiguousarray(part, float) for part in (still, end, inverse, root)]
+    scratch = np.empty((_ROW + 3) * count)
+    rows, weight, size, values = np.split(scratch, (_ROW * count, (_ROW + 1) * count, (_ROW + 2) * count))
+    out, sums = np.empty(6), np.empty((_WIDTH, _WIDTH))
+    places = (settings, *parts, rows, weight, size, values, out, sums)
+    if not library.solve_flow(*(ctypes.c_void_p(part.ctypes.data) for part in places)):
+        return None
+    return out.tolist(), sums
+
+
+def depths_natively(
+    library: ctypes.CDLL,
+    bearings: np.ndarray,
+    depth: np.ndarray,
+    intrinsics: tuple[float, float, float, float],
+    plane: np.ndarray | None,
+    gate: float,
+    cross: int,
+    least: int,
+) -> np.ndarray:
+    """1/Z of normalised points, see `ibvs_qp.vision.flow_solve.inverse_depths`, (n,).
+
+    Args:
+        library: The machine code.
+        bearings: The points, (n, 2).
+        depth: Depth [m], (H, W).
+        intrinsics: (fx, fy, cx, cy) [px].
+        plane: (a, b, c) of the surface, or None.
+        gate: A point this near to it lies on it, share of 1/Z.
+        cross: Distance of the four further places at which the depth of a point is read [px].
+        least: How many readings must be valid.
+    """
+    bearings, depth = np.ascontiguousarray(bearings, float), np.ascontiguousarray(depth, np.float32)
+    camera, inverse = np.array(intrinsics, float), np.empty(len(bearings))
+    plane = None if plane is None else np.ascontiguousarray(plane, float)
+    library.flow_depths(
+        ctypes.c_void_p(bearings.ctypes.data),
+        len(bearings),
+        ctypes.c_void_p(depth.ctypes.data),
+        *depth.shape,
+        ctypes.c_void_p(camera.ctypes.data),
+        ctypes.c_void_p(None if plane is None else plane.ctypes.data),
+        ctypes.c_double(gate),
+        cross,
+        least,
+        ctypes.c_void_p(inverse.ctypes.data),
+    )
+    return inverse
