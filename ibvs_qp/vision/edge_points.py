@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import cv2
 import numpy as np
 
@@ -50,15 +52,10 @@ def edge_points(
         _strongest([cv2.subtract(below, above) for below, above in pairs]),
         _strongest([cv2.subtract(above, below) for below, above in pairs]),
     )
-    threshold, library = _threshold(gradient_min), native()
-    if library is None:
-        rising, falling = (points_with_numpy(steps, threshold, picture, upright, region, grid) for steps in signed)
-    else:
-        full = full_vote(gradient_min)
-        rising, falling = (
-            points_natively(library, steps, picture, upright, threshold, full, _MOST, region, grid) for steps in signed
-        )
-    return rising, falling
+    library = native()
+    points = points_with_numpy if library is None else functools.partial(points_natively, library)
+    wanted = picture, upright, _threshold(gradient_min), full_vote(gradient_min), _MOST, region, grid
+    return points(signed[0], *wanted), points(signed[1], *wanted)
 
 
 def full_vote(gradient_min: float) -> int:
@@ -84,13 +81,18 @@ def _thin(strength: np.ndarray, threshold: int) -> np.ndarray:
 
 def points_with_numpy(
     steps: np.ndarray,
-    threshold: int,
     picture: Picture,
     upright: bool,
+    threshold: int,
+    full: int,
+    most: int,
     region: np.ndarray | None,
     grid: CoarseGrid,
 ) -> np.ndarray:
-    """Places of strong steps that the vehicle does not hide and around which lines are wanted, with their weights."""
+    """Places of strong steps that the vehicle does not hide and around which lines are wanted, with their weights.
+
+    Arguments as for `ibvs_qp.vision.native_votes.points_natively`.
+    """
     places = _thin(steps, threshold)
     rows, columns = steps.shape
     row = places // columns
@@ -107,10 +109,9 @@ def points_with_numpy(
         cell += np.minimum(x_px // grid.stride, last_column)
         free &= region.reshape(-1).take(cell) > 0
     kept = np.flatnonzero(free)
-    full = min(_FULL * threshold, 255)
     strength = np.minimum(steps.reshape(-1).take(places.take(kept)), full)
-    if len(kept) > _MOST:  # grain and prints: the strongest tell the lines, and the votes of all would take long
-        strongest = _strongest_points(strength)
+    if len(kept) > most:  # grain and prints: the strongest tell the lines, and the votes of all would take long
+        strongest = _strongest_points(strength, most)
         kept, strength = kept.take(strongest), strength.take(strongest)
     points = np.empty((len(kept), 3), np.float32)
     points[:, 0], points[:, 1] = 0.5 * u.take(kept), 0.5 * v.take(kept)
@@ -118,9 +119,9 @@ def points_with_numpy(
     return points
 
 
-def _strongest_points(strength: np.ndarray) -> np.ndarray:
+def _strongest_points(strength: np.ndarray, most: int) -> np.ndarray:
     """Places of the strongest ones, and of the weakest of these as many as there is room for, evenly spread."""
-    cut = np.partition(strength, len(strength) - _MOST)[len(strength) - _MOST]
+    cut = np.partition(strength, len(strength) - most)[len(strength) - most]
     tied, sure = np.flatnonzero(strength == cut), np.flatnonzero(strength > cut)
-    share = np.arange(len(tied) + 1) * (_MOST - len(sure)) // len(tied)
+    share = np.arange(len(tied) + 1) * (most - len(sure)) // len(tied)
     return np.sort(np.concatenate((sure, tied[share[1:] > share[:-1]])))

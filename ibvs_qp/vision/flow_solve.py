@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 
@@ -10,24 +11,20 @@ import numpy as np
 
 from ibvs_qp.frames import R_BODY_CAMERA
 from ibvs_qp.vision.config import FlowConfig
+from ibvs_qp.vision.flow_numpy import depths_with_numpy, solve_with_numpy
 from ibvs_qp.vision.mask import Intrinsics
 from ibvs_qp.vision.native import native
 from ibvs_qp.vision.native_flow import depths_natively, solve_natively
-from ibvs_qp.vision.normal_equations import solve_three
 from ibvs_qp.vision.plane import PlaneEstimate
-from ibvs_qp.vision.robust import median
 
 #: A point within this many residual sigmas of the surface takes the surface's depth, which is far less noisy.
 _ON_PLANE_SIGMAS = 4.0
-#: Rounds of reweighting.
-_ROUNDS = 4
-_MAD = 1.4826
 #: Sum of squares of a 3x3 Sobel kernel over 8^2: variance of its answer per variance of the picture.
 _SOBEL_NOISE = 12.0 / 64.0
 #: Distance of the four further places at which the depth of a point is read, and how many must be valid [px].
 _CROSS_PX, _READINGS = 2, 3
-#: Columns of the system of `solve_velocity`: velocity, what is seen, turn.
-_V, _SEEN, _TURN = slice(0, 3), 3, slice(4, 7)
+#: Columns of the system of `solve_velocity`: velocity and turn.
+_V, _TURN = slice(0, 3), slice(4, 7)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,39 +78,11 @@ def inverse_depths(
     """1/Z of normalised points (n, 2): the surface's where they lie on it, else their own, 0 if unknown, (n,)."""
     if len(bearings) == 0:
         return np.zeros(0)
-    library = native()
-    if library is None:
-        return depths_with_numpy(bearings, depth, intrinsics, plane)
-    surface = None if plane is None else plane.inverse_depth
-    return depths_natively(library, bearings, depth, intrinsics, surface, _gate(plane), _CROSS_PX, _READINGS)
-
-
-def _gate(plane: PlaneEstimate | None) -> float:
-    """How near to the surface a point is on it, share of 1/Z."""
-    return 0.0 if plane is None else max(_ON_PLANE_SIGMAS * plane.residual_sigma, 0.01)
-
-
-def depths_with_numpy(
-    bearings: np.ndarray, depth: np.ndarray, intrinsics: Intrinsics, plane: PlaneEstimate | None
-) -> np.ndarray:
-    """The same where there is no machine code, and to say what it computes."""
-    (height, width), (fx, fy, cx, cy) = depth.shape, intrinsics
-    place = np.rint(bearings * (fx, fy) + (cx, cy)).astype(np.intp)
-    place = np.minimum(np.maximum(place, _CROSS_PX), (width - 1 - _CROSS_PX, height - 1 - _CROSS_PX))
-    cross = np.array([0, -_CROSS_PX, _CROSS_PX, -_CROSS_PX * width, _CROSS_PX * width])
-    z = depth.reshape(-1).take((place @ np.array((1, width)))[:, None] + cross)
-    good = (z > 0) & (z < np.inf)  # false for NaN too
-    count = np.count_nonzero(good, axis=1)
-    z[~good] = np.inf
-    z.sort(axis=1)  # the median of the valid ones is at half their count
-    middle = z[np.arange(len(z)), np.minimum(count // 2, len(cross) - 1)]
-    inverse = (1.0 / middle) * (count >= _READINGS)
+    library, surface, gate = native(), None, 0.0
     if plane is not None:
-        a, b, c = plane.inverse_depth
-        surface = bearings @ (a, b) + c
-        near = (inverse > 0) & (np.abs(inverse - surface) < _gate(plane) * np.abs(surface))
-        inverse = np.where(near, surface, inverse)
-    return inverse
+        surface, gate = plane.inverse_depth, max(_ON_PLANE_SIGMAS * plane.residual_sigma, 0.01)
+    wanted = bearings, depth, intrinsics, surface, gate, _CROSS_PX, _READINGS
+    return depths_with_numpy(*wanted) if library is None else depths_natively(library, *wanted)
 
 
 def unturned(bearings: np.ndarray, rotation: np.ndarray) -> np.ndarray:
@@ -159,20 +128,17 @@ def solve_velocity(
         The velocity, or the reason why there is none.
     """
     prior, library = 1.0 / config.prior_m_s**2, native()
-    if library is None:
-        solved = solve_with_numpy(still, end, inverse, root, focal * interval, interval, prior, config.gate_sigmas)
-    else:
-        solved = solve_natively(
-            library,
-            still,
-            end,
-            inverse,
-            root,
-            scale=focal * interval,
-            interval=interval,
-            prior=prior,
-            gate_sigmas=config.gate_sigmas,
-        )
+    solve = solve_with_numpy if library is None else functools.partial(solve_natively, library)
+    solved = solve(
+        still,
+        end,
+        inverse,
+        root,
+        scale=focal * interval,
+        interval=interval,
+        prior=prior,
+        gate_sigmas=config.gate_sigmas,
+    )
     if solved is None:
         return "the points determine no velocity"
     (*velocity, square, total, agreeing), sums = solved
@@ -194,54 +160,3 @@ def solve_velocity(
         stamp_ns=0,
         points=int(agreeing),
     )
-
-
-def solve_with_numpy(
-    still: np.ndarray,
-    end: np.ndarray,
-    inverse: np.ndarray,
-    root: np.ndarray,
-    scale: float,
-    interval: float,
-    prior: float,
-    gate_sigmas: float,
-) -> tuple[list[float], np.ndarray] | None:
-    """What `solve_natively` computes, where there is no machine code."""
-    rows, squares = _system(still, end, inverse, root * scale, interval)
-    width = rows.shape[2]
-    weight = np.ones(len(rows))
-    sums, velocity, size = np.zeros((width, width)), (0.0, 0.0, 0.0), weight
-    for _ in range(_ROUNDS):
-        sums = (weight @ squares).reshape(width, width)
-        (xx, xy, xz, xs), (_, yy, yz, ys), (_, _, zz, zs) = sums[:3, :4].tolist()
-        solved = solve_three((xx + prior, xy, xz, yy + prior, yz, zz + prior), (xs, ys, zs))
-        if solved is None:
-            return None
-        velocity = solved[0]
-        answer = np.array((*velocity, -1.0, 0.0, 0.0, 0.0))
-        residual = rows @ answer
-        size = np.vecdot(residual, residual)
-        spread = max(_MAD * math.sqrt(median(size)), 0.5)
-        weight = np.maximum(0.0, 1.0 - size * (1.0 / (gate_sigmas * spread) ** 2)) ** 2
-    agreeing = float(np.count_nonzero(weight > 0.1))
-    return [*velocity, float(weight @ size), float(weight.sum()), agreeing], sums
-
-
-def _system(
-    still: np.ndarray, end: np.ndarray, inverse: np.ndarray, whiten: np.ndarray, interval: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Whitened rows of every point, (n, 2, 7), and their products, (n, 49): velocity (3), what is seen (1), turn (3).
-
-    The products are summed with changing weights, so each is made once.
-    """
-    x, y = (0.5 * (end + still)).T
-    rows = np.zeros((len(x), 2, 7))
-    rows[:, 0, 0] = rows[:, 1, 1] = -inverse
-    rows[:, 0, 2], rows[:, 1, 2] = inverse * x, inverse * y
-    rows[:, :, _SEEN] = (end - still) * (1.0 / interval)
-    cross = x * y
-    rows[:, 0, 4], rows[:, 1, 5] = cross, -cross
-    rows[:, 0, 5], rows[:, 0, 6] = -(1.0 + x * x), y
-    rows[:, 1, 4], rows[:, 1, 6] = 1.0 + y * y, -x
-    rows = whiten @ rows
-    return rows, (rows.transpose(0, 2, 1) @ rows).reshape(len(x), -1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 
@@ -112,17 +113,11 @@ def _hough(
     falls = 0.5 * (left + right) > 0.5 * (moved + height)
     left, right = left - moved * falls, right - moved * falls
     library, faint = native(), _FAINT * least * full_vote(config.detect.gradient_min)
-    if library is None:
-        kept, votes = distinct_with_numpy(lines, falls, points, faint)
-    else:
-        kept, votes = distinct_natively(
-            library, lines, falls, points, near=_NEAR, same=SAME_PX, faint=faint, poor=_POOR, room=_KEPT
-        )
+    distinct = distinct_with_numpy if library is None else functools.partial(distinct_natively, library)
+    kept, votes = distinct(lines, falls, points, near=_NEAR, same=SAME_PX, faint=faint, poor=_POOR, room=_KEPT)
     shown, ends = labels.T if upright else labels, [(float(left[k]), float(right[k])) for k in kept]
-    if library is None:
-        differing = differing_with_numpy(ends, shown, 2.0 / grid.stride)
-    else:
-        differing = differing_natively(library, ends, shown, 2.0 / grid.stride, _LABEL_CELLS)
+    differ = differing_with_numpy if library is None else functools.partial(differing_natively, library)
+    differing = differ(ends, shown, 2.0 / grid.stride, _LABEL_CELLS)
     result = []
     for index, own, difference in zip(kept, votes, differing, strict=True):
         if difference < _DIFFERENT:
@@ -137,45 +132,51 @@ def _hough(
 
 
 def distinct_with_numpy(
-    lines: np.ndarray, falling: np.ndarray, points: np.ndarray, least: float
+    lines: np.ndarray,
+    falling: np.ndarray,
+    points: np.ndarray,
+    *,
+    near: float,
+    same: float,
+    faint: float,
+    poor: float,
+    room: int,
 ) -> tuple[list[int], list[float]]:
     """Lines in the order of the votes that are left when better ones have taken theirs, and these votes.
 
-    Args:
-        lines: (p, q, r) of p u + q v + r = 0 with unit normal, float32 (L, 3).
-        falling: Polarity of the lines, bool (L,).
-        points: (u, v) [half-resolution px] and weight, float32 (n, 3).
-        least: Least weight of a line.
+    Arguments as for `ibvs_qp.vision.native_votes.distinct_natively`.
     """
     distance, free = np.abs(lines[:, :2] @ points[:, :2].T + lines[:, 2:]), points[:, 2].copy()
     falls = falling.tolist()
-    near = (distance < _NEAR).astype(np.float32)
-    wanted = np.ones(len(near), np.float32)
-    room = {True: _KEPT, False: _KEPT}
+    votes_for = (distance < near).astype(np.float32)
+    wanted = np.ones(len(votes_for), np.float32)
+    rooms = {True: room, False: room}
     kept: list[int] = []
     votes: list[float] = []
     while True:
-        left = (near @ free) * wanted
+        left = (votes_for @ free) * wanted
         best = int(left.argmax())
         own = float(left[best])
-        if own < max(least, _POOR * (votes[0] if votes else 0.0)):
+        if own < max(faint, poor * (votes[0] if votes else 0.0)):
             return kept, votes
         kept.append(best)
         votes.append(own)
-        free[distance[best] < SAME_PX] = 0.0
+        free[distance[best] < same] = 0.0
         wanted[best] = 0.0
-        room[falls[best]] -= 1
-        if not room[falls[best]]:
+        rooms[falls[best]] -= 1
+        if not rooms[falls[best]]:
             wanted[np.array(falls) == falls[best]] = 0.0
 
 
-def differing_with_numpy(lines: list[tuple[float, float]], labels: np.ndarray, scale: float) -> list[float]:
+def differing_with_numpy(
+    lines: list[tuple[float, float]], labels: np.ndarray, scale: float, beside: float
+) -> list[float]:
     """What `differing_natively` computes, where there is no machine code."""
     rows, columns = labels.shape
     share = (np.arange(columns) + 0.5) / columns
     left, right = np.array(lines).reshape(-1, 2).T
     level = (left[:, None] + (right - left)[:, None] * share) * scale - 0.5
-    above, below = (np.rint(level + offset).astype(np.intp) for offset in (-_LABEL_CELLS, _LABEL_CELLS))
+    above, below = (np.rint(level + offset).astype(np.intp) for offset in (-beside, beside))
     inside = (above >= 0) & (below < rows)
     k = np.arange(columns)
     different = labels[np.clip(above, 0, rows - 1), k] != labels[np.clip(below, 0, rows - 1), k]
