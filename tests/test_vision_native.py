@@ -118,9 +118,10 @@ def test_every_function_computes_what_numpy_does(shots: list[Shot], fresh: pytes
     compare(hypotheses, "_near_natively", hypotheses.near_with_numpy, np.array_equal)
     compare(hypotheses, "_judge_natively", hypotheses.judge_with_numpy, exact)
     compare(flow_solve, "depths_natively", flow_solve.depths_with_numpy, exact)
+    compare(flow_solve, "root_natively", flow_solve.root_with_numpy, lambda a, b: close(a, b, 1e-6))
     compare(flow_solve, "solve_natively", flow_solve.solve_with_numpy, lambda a, b: close(a, b, 1e-6))
     see(shots)
-    assert len(calls) == 9 and min(calls.values()) > 20, calls
+    assert len(calls) == 10 and min(calls.values()) > 20, calls
 
 
 @needs_compiler

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import cv2
 import numpy as np
 
 from ibvs_qp.vision.mask import Intrinsics
@@ -15,6 +16,22 @@ _ROUNDS = 4
 _MAD = 1.4826
 #: Columns of the system: what is seen, after velocity (0 to 2) and before turn (4 to 6).
 _SEEN = 3
+
+
+def root_with_numpy(
+    grey: np.ndarray, points: np.ndarray, reach: int, floor: float, noise: float, error: float
+) -> np.ndarray:
+    """Square roots of the information of points; arguments as for `ibvs_qp.vision.native_flow.root_natively`."""
+    gx = cv2.Sobel(grey, cv2.CV_32F, 1, 0, ksize=3, scale=0.125)
+    gy = cv2.Sobel(grey, cv2.CV_32F, 0, 1, ksize=3, scale=0.125)
+    steps = np.arange(-reach, reach + 1)
+    rows = np.clip(np.round(points[:, 1]).astype(np.intp)[:, None] + steps, 0, grey.shape[0] - 1)[:, :, None]
+    columns = np.clip(np.round(points[:, 0]).astype(np.intp)[:, None] + steps, 0, grey.shape[1] - 1)[:, None, :]
+    patch = np.stack((gx[rows, columns], gy[rows, columns]), axis=-1).reshape(len(points), -1, 2).astype(float)
+    values, vectors = np.linalg.eigh(patch.transpose(0, 2, 1) @ patch)
+    values = np.maximum(values - floor, 0.0) / noise
+    values = np.sqrt(values / (1.0 + values * error))
+    return (vectors * values[:, None, :]) @ vectors.transpose(0, 2, 1)
 
 
 def depths_with_numpy(

@@ -6,15 +6,14 @@ import functools
 import math
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
 from ibvs_qp.frames import R_BODY_CAMERA
 from ibvs_qp.vision.config import FlowConfig
-from ibvs_qp.vision.flow_numpy import depths_with_numpy, solve_with_numpy
+from ibvs_qp.vision.flow_numpy import depths_with_numpy, root_with_numpy, solve_with_numpy
 from ibvs_qp.vision.mask import Intrinsics
 from ibvs_qp.vision.native import native
-from ibvs_qp.vision.native_flow import depths_natively, solve_natively
+from ibvs_qp.vision.native_flow import depths_natively, root_natively, solve_natively
 from ibvs_qp.vision.plane import PlaneEstimate
 
 #: A point within this many residual sigmas of the surface takes the surface's depth, which is far less noisy.
@@ -58,18 +57,10 @@ def information_root(grey: np.ndarray, points: np.ndarray, config: FlowConfig) -
     """
     if len(points) == 0:
         return np.zeros((0, 2, 2))
-    gx = cv2.Sobel(grey, cv2.CV_32F, 1, 0, ksize=3, scale=0.125)
-    gy = cv2.Sobel(grey, cv2.CV_32F, 0, 1, ksize=3, scale=0.125)
-    reach = config.window_px // 2
-    steps = np.arange(-reach, reach + 1)
-    rows = np.clip(np.round(points[:, 1]).astype(np.intp)[:, None] + steps, 0, grey.shape[0] - 1)[:, :, None]
-    columns = np.clip(np.round(points[:, 0]).astype(np.intp)[:, None] + steps, 0, grey.shape[1] - 1)[:, None, :]
-    patch = np.stack((gx[rows, columns], gy[rows, columns]), axis=-1).reshape(len(points), -1, 2).astype(float)
-    values, vectors = np.linalg.eigh(patch.transpose(0, 2, 1) @ patch)
-    variance = config.grey_sigma**2
-    values = np.maximum(values - 2.0 * config.window_px**2 * _SOBEL_NOISE * variance, 0.0) / variance
-    values = np.sqrt(values / (1.0 + values * config.pixel_sigma**2))
-    return (vectors * values[:, None, :]) @ vectors.transpose(0, 2, 1)
+    library, variance = native(), config.grey_sigma**2
+    floor = 2.0 * config.window_px**2 * _SOBEL_NOISE * variance
+    root = root_with_numpy if library is None else functools.partial(root_natively, library)
+    return root(grey, points, config.window_px // 2, floor, variance, config.pixel_sigma**2)
 
 
 def inverse_depths(

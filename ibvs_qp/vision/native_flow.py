@@ -89,3 +89,30 @@ def depths_natively(
         ctypes.c_void_p(inverse.ctypes.data),
     )
     return inverse
+
+
+def root_natively(
+    library: ctypes.CDLL, grey: np.ndarray, points: np.ndarray, reach: int, floor: float, noise: float, error: float
+) -> np.ndarray:
+    """Square roots of the information that following each point carries [1/px], symmetric, (n, 2, 2).
+
+    Args:
+        library: The machine code.
+        grey: The picture, uint8 (H, W).
+        points: Places [px], float32 (n, 2).
+        reach: Half width of the window [px].
+        floor: What noise alone makes of the structure tensor [grey levels squared].
+        noise: Variance of the picture [grey levels squared].
+        error: Variance of a followed point that structure cannot lower [px2].
+    """
+    roots, points = np.empty((len(points), 2, 2)), np.ascontiguousarray(points, np.float32)
+    library.flow_information(
+        ctypes.c_void_p(grey.ctypes.data),
+        *(ctypes.c_long(size) for size in grey.shape),
+        ctypes.c_void_p(points.ctypes.data),
+        len(points),
+        reach,
+        *(ctypes.c_double(number) for number in (floor, noise, error)),
+        ctypes.c_void_p(roots.ctypes.data),
+    )
+    return roots

@@ -76,3 +76,39 @@ void flow_depths(const double *bearings, int n, const float *depth, int height, 
         if (fabs(inverse[i] - surface) < gate * fabs(surface)) inverse[i] = surface;
     }
 }
+
+/* Index within a row of n, mirrored at its ends without repeating them. */
+static inline long mirrored(long i, long n) { return i < 0 ? -i : i >= n ? 2 * n - 2 - i : i; }
+
+/* Square root of what following a point tells, along one principal direction: no more than its own error allows. */
+static double told(double value, double floor, double noise, double error) {
+    double information = fmax(value - floor, 0.0) / noise;
+    return sqrt(information / (1.0 + information * error));
+}
+
+/* Square roots of the information that following each point carries, symmetric 2 x 2 each. */
+void flow_information(const uint8_t *grey, long height, long width, const float *points, int n, int reach, double floor,
+                      double noise, double error, double *roots) {
+    for (int i = 0; i < n; i++) {
+        long u = (long)rintf(points[2 * i]), v = (long)rintf(points[2 * i + 1]);
+        double xx = 0.0, xy = 0.0, yy = 0.0;
+        for (long dv = -reach; dv <= reach; dv++) {
+            long row = v + dv < 0 ? 0 : v + dv >= height ? height - 1 : v + dv;
+            const uint8_t *above = grey + mirrored(row - 1, height) * width, *at = grey + row * width;
+            const uint8_t *below = grey + mirrored(row + 1, height) * width;
+            for (long du = -reach; du <= reach; du++) {
+                long c = u + du < 0 ? 0 : u + du >= width ? width - 1 : u + du;
+                long l = mirrored(c - 1, width), r = mirrored(c + 1, width);
+                int gx = above[r] - above[l] + 2 * (at[r] - at[l]) + below[r] - below[l];
+                int gy = below[l] + 2 * below[c] + below[r] - above[l] - 2 * above[c] - above[r];
+                xx += gx * gx, xy += gx * gy, yy += gy * gy;
+            }
+        }
+        xx /= 64.0, xy /= 64.0, yy /= 64.0;
+        double middle = 0.5 * (xx + yy), half = hypot(0.5 * (xx - yy), xy);
+        double high = told(middle + half, floor, noise, error), low = told(middle - half, floor, noise, error);
+        double slope = half > 0.0 ? (high - low) / (2.0 * half) : 0.0, level = 0.5 * (high + low);
+        roots[4 * i] = level + slope * (xx - middle), roots[4 * i + 3] = level + slope * (yy - middle);
+        roots[4 * i + 1] = roots[4 * i + 2] = slope * xy;
+    }
+}
