@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import ctypes
 from functools import cached_property
 
 import numpy as np
 
 from ibvs_qp.vision.grid import CoarseGrid
+from ibvs_qp.vision.native import native
 
 #: Share of a new sample in the board's running colour.
 _BLEND = 0.2
@@ -58,6 +60,15 @@ class SurfaceColors:
         """OTHER, BOARD or PAINT for colours uint8 (..., 3); all OTHER while the board is unknown."""
         if self.board is None:
             return np.zeros(colors.shape[:-1], np.uint8)
+        library = native()
+        if library is not None:
+            colors, labels = np.ascontiguousarray(colors), np.empty(colors.shape[:-1], np.uint8)
+            parts = (self.table(), labels)
+            count = ctypes.c_long(labels.size)
+            library.labels_of(
+                ctypes.c_void_p(colors.ctypes.data), count, *(ctypes.c_void_p(part.ctypes.data) for part in parts)
+            )
+            return labels
         # single precision holds the place exactly, and has the only fast product
         return self.table().take(((colors >> _TABLE_SHIFT).astype(np.float32) @ _TABLE_STEPS).astype(np.intp))
 

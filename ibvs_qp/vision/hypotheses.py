@@ -123,7 +123,7 @@ def _judge_natively(
     judged: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     count, pairs, judged = pairs.shape[1], pairs.astype(np.int64), np.ascontiguousarray(judged, np.int32)
-    planes, scores = np.empty((count, 3)), np.empty(count)
+    planes, scores = np.empty((3, count)), np.empty(count)
     library.judge_planes(
         *(ctypes.c_void_p(part.ctypes.data) for part in (grid.design, inverse)),
         seed,
@@ -135,4 +135,4 @@ def _judge_natively(
         *(ctypes.c_double(number) for number in (_VOTE * config.coarse_gate, _NEAR, _SPAN)),
         *(ctypes.c_void_p(part.ctypes.data) for part in (planes, scores)),
     )
-    return planes, scores
+    return planes.T, scores

@@ -38,6 +38,11 @@ void sample_labels(const uint8_t *rgb, long width, const int16_t *places, long n
     for (long i = 0; i < n; i++) labels[i] = (uint8_t)label_of(table, rgb + 3 * (places[2 * i + 1] * width + places[2 * i]));
 }
 
+/* Labels of n colours. */
+void labels_of(const uint8_t *colors, long n, const uint8_t *table, uint8_t *labels) {
+    for (long i = 0; i < n; i++) labels[i] = (uint8_t)label_of(table, colors + 3 * i);
+}
+
 /* Keep the connected part of the chosen samples around the seed, or the largest; hidden samples connect. */
 static long keep_connected(uint8_t *chosen, const uint8_t *free_of, const Grid *grid, int *stack, int *part) {
     int rows = (int)grid->rows, columns = (int)grid->columns, size = rows * columns, parts = 0;

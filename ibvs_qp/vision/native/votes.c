@@ -11,9 +11,10 @@ typedef struct {
 
 /* Places of a row where the step is strong and no weaker than in the rows beside it; the last row has none behind. */
 static void strongest_of(const uint8_t *row, const uint8_t *above, const uint8_t *below, int n, uint8_t threshold,
-                         uint8_t *strong) {
+                         uint8_t *restrict strong) {
     for (int c = 0; c < n; c++) strong[c] = (row[c] > threshold) & (row[c] >= above[c]);
-    for (int c = 0; c < n && below != NULL; c++) strong[c] &= row[c] > below[c];
+    if (below == NULL) return;
+    for (int c = 0; c < n; c++) strong[c] &= row[c] > below[c];
 }
 
 /* Points where the step across the line is strong and the strongest: u, v at half resolution and weight each; returns
