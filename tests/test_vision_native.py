@@ -52,8 +52,9 @@ def see(shots: list[Shot]) -> list[Percept]:
     tracking, searching = Perception(config, VehicleParams()), Perception(config, VehicleParams())
     seen = []
     for shot in shots:
-        motion = {"attitude": shot.attitude, "rotation": shot.rotation, "velocity": shot.velocity}
-        seen.append(tracking.process(shot.frame, **motion))
+        seen.append(
+            tracking.process(shot.frame, attitude=shot.attitude, rotation=shot.rotation, velocity=shot.velocity)
+        )
         searching.reset()
         seen.append(searching.process(shot.frame, attitude=shot.attitude, detect=True))
     assert not any(percept.refused for percept in seen)

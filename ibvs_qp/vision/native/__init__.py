@@ -15,7 +15,18 @@ from pathlib import Path
 from ibvs_qp.shared_library import compiler, shared_library
 
 #: The files, in the order in which they are joined.
-FILES = ("native.h", "edges.c", "line_fit.c", "fit_lines.c", "planes.c", "hypotheses.c", "votes.c", "sides.c", "flow.c")
+FILES = (
+    "native.h",
+    "edges.c",
+    "line_fit.c",
+    "fit_lines.c",
+    "samples.c",
+    "planes.c",
+    "hypotheses.c",
+    "votes.c",
+    "sides.c",
+    "flow.c",
+)
 #: Products and sums are not contracted, so that all processors of one kind agree.
 FLAGS = ("-O3", "-fPIC", "-shared", "-ffp-contract=off")
 
