@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from ibvs_qp.vision.grid import CoarseGrid
-from ibvs_qp.vision.native import native
+from ibvs_qp.vision.native import native, place
 
 #: Share of a new sample in the board's running colour.
 _BLEND = 0.2
@@ -65,9 +65,7 @@ class SurfaceColors:
             colors, labels = np.ascontiguousarray(colors), np.empty(colors.shape[:-1], np.uint8)
             parts = (self.table(), labels)
             count = ctypes.c_long(labels.size)
-            library.labels_of(
-                ctypes.c_void_p(colors.ctypes.data), count, *(ctypes.c_void_p(part.ctypes.data) for part in parts)
-            )
+            library.labels_of(place(colors), count, *(place(part) for part in parts))
             return labels
         # single precision holds the place exactly, and has the only fast product
         return self.table().take(((colors >> _TABLE_SHIFT).astype(np.float32) @ _TABLE_STEPS).astype(np.intp))

@@ -9,7 +9,7 @@ import numpy as np
 from ibvs_qp.vision.colors import BOARD
 from ibvs_qp.vision.config import PlaneConfig
 from ibvs_qp.vision.grid import CoarseGrid
-from ibvs_qp.vision.native import native
+from ibvs_qp.vision.native import native, place
 
 #: Samples used to judge hypotheses; more cost time and change nothing.
 _JUDGED = 400
@@ -102,12 +102,12 @@ def _near_natively(
     near = np.empty(inverse.size, np.int32)
     parts = (grid.design, inverse, None if prefer is None else np.ascontiguousarray(prefer), grid.free)
     count = library.near_seed(
-        *(ctypes.c_void_p(None if part is None else part.ctypes.data) for part in parts),
+        *(place(part) for part in parts),
         inverse.size,
         seed,
         ctypes.c_double(config.seed_reach),
         config.min_samples,
-        ctypes.c_void_p(near.ctypes.data),
+        place(near),
     )
     return near[:count]
 
@@ -125,14 +125,14 @@ def _judge_natively(
     count, pairs, judged = pairs.shape[1], pairs.astype(np.int64), np.ascontiguousarray(judged, np.int32)
     planes, scores = np.empty((3, count)), np.empty(count)
     library.judge_planes(
-        *(ctypes.c_void_p(part.ctypes.data) for part in (grid.design, inverse)),
+        *(place(part) for part in (grid.design, inverse)),
         seed,
         ctypes.c_double(value),
-        ctypes.c_void_p(pairs.ctypes.data),
+        place(pairs),
         count,
-        ctypes.c_void_p(judged.ctypes.data),
+        place(judged),
         len(judged),
         *(ctypes.c_double(number) for number in (_VOTE * config.coarse_gate, _NEAR, _SPAN)),
-        *(ctypes.c_void_p(part.ctypes.data) for part in (planes, scores)),
+        *(place(part) for part in (planes, scores)),
     )
     return planes.T, scores

@@ -6,6 +6,8 @@ import ctypes
 
 import numpy as np
 
+from ibvs_qp.vision.native import place
+
 #: Numbers per point of the whitened system, and columns of its sums: velocity (3), what is seen (1), turn (3).
 _ROW, _WIDTH = 14, 7
 
@@ -46,7 +48,7 @@ def solve_natively(
     rows, weight, size, values = np.split(scratch, (_ROW * count, (_ROW + 1) * count, (_ROW + 2) * count))
     out, sums = np.empty(6), np.empty((_WIDTH, _WIDTH))
     places = (settings, *parts, rows, weight, size, values, out, sums)
-    if not library.solve_flow(*(ctypes.c_void_p(part.ctypes.data) for part in places)):
+    if not library.solve_flow(*(place(part) for part in places)):
         return None
     return out.tolist(), sums
 
@@ -77,16 +79,16 @@ def depths_natively(
     camera, inverse = np.array(intrinsics, float), np.empty(len(bearings))
     plane = None if plane is None else np.ascontiguousarray(plane, float)
     library.flow_depths(
-        ctypes.c_void_p(bearings.ctypes.data),
+        place(bearings),
         len(bearings),
-        ctypes.c_void_p(depth.ctypes.data),
+        place(depth),
         *depth.shape,
-        ctypes.c_void_p(camera.ctypes.data),
-        ctypes.c_void_p(None if plane is None else plane.ctypes.data),
+        place(camera),
+        place(plane),
         ctypes.c_double(gate),
         cross,
         least,
-        ctypes.c_void_p(inverse.ctypes.data),
+        place(inverse),
     )
     return inverse
 
@@ -107,12 +109,12 @@ def root_natively(
     """
     roots, points = np.empty((len(points), 2, 2)), np.ascontiguousarray(points, np.float32)
     library.flow_information(
-        ctypes.c_void_p(grey.ctypes.data),
+        place(grey),
         *(ctypes.c_long(size) for size in grey.shape),
-        ctypes.c_void_p(points.ctypes.data),
+        place(points),
         len(points),
         reach,
         *(ctypes.c_double(number) for number in (floor, noise, error)),
-        ctypes.c_void_p(roots.ctypes.data),
+        place(roots),
     )
     return roots

@@ -11,6 +11,7 @@ from ibvs_qp.vision.admissible import FITS, kind_of
 from ibvs_qp.vision.colors import SurfaceColors
 from ibvs_qp.vision.config import LineConfig
 from ibvs_qp.vision.fit_lines import LineFit
+from ibvs_qp.vision.native import place
 from ibvs_qp.vision.picture import Picture
 from ibvs_qp.vision.profiles import profile_count, side_px
 from ibvs_qp.vision.query import LineView
@@ -82,7 +83,7 @@ def fit_natively(
     support, visible = np.empty((2, count, profiles), np.uint8)
     sides = np.empty((2, count, profiles, 3), np.uint8) if contents else None
     arrays = (settings, queries, found, u, support, visible, sides)
-    if not library.fit_lines(scene, *(ctypes.c_void_p(None if part is None else part.ctypes.data) for part in arrays)):
+    if not library.fit_lines(scene, *(place(part) for part in arrays)):
         return None
     rows = found.tolist()
     fits = Fits(

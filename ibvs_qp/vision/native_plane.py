@@ -9,6 +9,7 @@ import numpy as np
 
 from ibvs_qp.vision.config import PlaneConfig
 from ibvs_qp.vision.grid import CoarseGrid
+from ibvs_qp.vision.native import place
 from ibvs_qp.vision.surface import PlaneEstimate, surface_problem
 
 #: Numbers in a `Surface` of planes.c: plane, inverse of the normal matrix, and five more.
@@ -94,21 +95,21 @@ class NativePlane:
         self._design, self._free = np.ascontiguousarray(design), np.ascontiguousarray(grid.free)
         self._places = grid.places
         self._corners = np.ascontiguousarray(grid.places - np.int16(1))
-        self._fixed = [ctypes.c_void_p(part.ctypes.data) for part in (self._grid, self._design, self._free)]
+        self._fixed = [place(part) for part in (self._grid, self._design, self._free)]
 
     def means(self, depth: np.ndarray) -> np.ndarray:
         """1/Z of the means of four neighbours at the samples [1/m], 0 without a reading in range, (rows, columns)."""
         depth, inverse = np.ascontiguousarray(depth, np.float32), np.empty(self._shape)
         self._library.sample_means(
-            ctypes.c_void_p(depth.ctypes.data),
+            place(depth),
             ctypes.c_long(depth.shape[0]),
             ctypes.c_long(depth.shape[1]),
-            ctypes.c_void_p(self._corners.ctypes.data),
+            place(self._corners),
             self._fixed[2],
             ctypes.c_long(inverse.size),
             ctypes.c_double(self._config.distance_min_m),
             ctypes.c_double(self._config.distance_max_m),
-            ctypes.c_void_p(inverse.ctypes.data),
+            place(inverse),
         )
         return inverse
 
@@ -116,12 +117,12 @@ class NativePlane:
         """Labels of the samples' colours, uint8 (rows, columns)."""
         rgb, labels = np.ascontiguousarray(rgb), np.empty(self._shape, np.uint8)
         self._library.sample_labels(
-            ctypes.c_void_p(rgb.ctypes.data),
+            place(rgb),
             ctypes.c_long(rgb.shape[1]),
-            ctypes.c_void_p(self._places.ctypes.data),
+            place(self._places),
             ctypes.c_long(labels.size),
-            ctypes.c_void_p(table.ctypes.data),
-            ctypes.c_void_p(labels.ctypes.data),
+            place(table),
+            place(labels),
         )
         return labels
 
@@ -155,12 +156,12 @@ class NativePlane:
         problem = self._library.refit_plane(
             grid,
             design,
-            ctypes.c_void_p(inverse.ctypes.data),
-            ctypes.c_void_p(None if labels is None else labels.ctypes.data),
+            place(inverse),
+            place(labels),
             free,
-            ctypes.c_void_p(start.ctypes.data),
-            ctypes.c_void_p(component.ctypes.data),
-            ctypes.c_void_p(found.ctypes.data),
+            place(start),
+            place(component),
+            place(found),
         )
         if problem:
             return _PROBLEMS[problem] if problem < len(_PROBLEMS) else None

@@ -10,6 +10,7 @@ import numpy as np
 
 from ibvs_qp.vision.colors import SurfaceColors
 from ibvs_qp.vision.grid import CoarseGrid
+from ibvs_qp.vision.native import place
 from ibvs_qp.vision.picture import Picture
 from ibvs_qp.vision.refined import RefinedLine
 from ibvs_qp.vision.surface import PlaneEstimate
@@ -75,14 +76,11 @@ def look_natively(
     sides = np.ascontiguousarray(np.concatenate([line.sides for line in lines], axis=1))
     labels, found = None if colors.board is None else colors.table(), np.empty((len(lines), 10))
     done = library.identify(
-        *(ctypes.c_void_p(part.ctypes.data) for part in (look, edges)),
+        *(place(part) for part in (look, edges)),
         len(lines),
-        *(ctypes.c_void_p(part.ctypes.data) for part in (pixels, sides)),
+        *(place(part) for part in (pixels, sides)),
         ctypes.c_long(len(pixels)),
-        *(
-            ctypes.c_void_p(None if part is None else part.ctypes.data)
-            for part in (labels, depth, picture.mask, grid.design, component, found)
-        ),
+        *(place(part) for part in (labels, depth, picture.mask, grid.design, component, found)),
     )
     if not done:
         raise MemoryError("no memory for the sides of lines")

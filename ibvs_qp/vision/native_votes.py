@@ -7,6 +7,7 @@ import ctypes
 import numpy as np
 
 from ibvs_qp.vision.grid import CoarseGrid
+from ibvs_qp.vision.native import place
 from ibvs_qp.vision.picture import Picture
 
 
@@ -39,7 +40,7 @@ def points_natively(
     table = np.array((*steps.shape, upright, *picture.mask.shape, threshold, full, most, *cells, grid.stride), float)
     points = np.empty((steps.size, 3), np.float32)
     parts = (table, steps, picture.mask, region, points)
-    count = library.edge_points(*(ctypes.c_void_p(None if part is None else part.ctypes.data) for part in parts))
+    count = library.edge_points(*(place(part) for part in parts))
     return points[:count]
 
 
@@ -74,18 +75,18 @@ def distinct_natively(
     falls, lines = falls.view(np.uint8), np.ascontiguousarray(lines)
     kept, votes = np.empty(2 * room, np.int32), np.empty(2 * room)
     count = library.distinct_lines(
-        ctypes.c_void_p(lines.ctypes.data),
-        ctypes.c_void_p(falls.ctypes.data),
+        place(lines),
+        place(falls),
         len(lines),
-        ctypes.c_void_p(points.ctypes.data),
+        place(points),
         len(points),
         ctypes.c_float(near),
         ctypes.c_float(same),
         ctypes.c_double(faint),
         ctypes.c_double(poor),
         room,
-        ctypes.c_void_p(kept.ctypes.data),
-        ctypes.c_void_p(votes.ctypes.data),
+        place(kept),
+        place(votes),
     )
     if count < 0:
         raise MemoryError("no memory for votes")
@@ -105,9 +106,10 @@ def differing_natively(
         beside: Distance from the line at which labels are compared [samples].
     """
     (rows, columns), (down, right_step) = labels.shape, labels.strides
-    place, steps = ctypes.c_void_p(labels.ctypes.data), (ctypes.c_long(down), ctypes.c_long(right_step), rows, columns)
+    steps = (ctypes.c_long(down), ctypes.c_long(right_step), rows, columns)
+    at = place(labels)
     counts = [
-        library.differing_labels(place, *steps, *(ctypes.c_double(number) for number in (left, right, scale, beside)))
+        library.differing_labels(at, *steps, *(ctypes.c_double(number) for number in (left, right, scale, beside)))
         for left, right in lines
     ]
     return [count / columns for count in counts]

@@ -12,6 +12,8 @@ import logging
 import subprocess
 from pathlib import Path
 
+import numpy as np
+
 from ibvs_qp.shared_library import compiler, shared_library
 
 #: The files, in the order in which they are joined.
@@ -47,3 +49,9 @@ def native() -> ctypes.CDLL | None:
     except (OSError, subprocess.SubprocessError) as error:
         log.warning("vision runs on numpy: %s", error)
         return None
+
+
+def place(array: np.ndarray | None) -> ctypes.c_void_p:
+    """Where an array lies in memory, NULL without one; the array must outlive the call, and be contiguous."""
+    # half the time of array.ctypes
+    return ctypes.c_void_p(None if array is None else array.__array_interface__["data"][0])

@@ -22,37 +22,41 @@ static void strongest_of(const uint8_t *row, const uint8_t *above, const uint8_t
 int edge_points(const Thin *thin, const uint8_t *steps, const uint8_t *mask, const uint8_t *region, float *points) {
     int rows = (int)thin->rows, columns = (int)thin->columns, upright = thin->upright != 0.0, count = 0;
     int threshold = (int)thin->threshold, full = (int)thin->full, most = (int)thin->most;
-    long width = (long)thin->width, stride = (long)thin->stride, grid_columns = (long)thin->grid_columns;
-    long last_row = (long)thin->grid_rows - 1, last_column = grid_columns - 1;
+    int width = (int)thin->width, stride = (int)thin->stride, cells = (int)thin->grid_columns;
+    int last_along = upright ? (int)thin->grid_rows - 1 : cells - 1;
+    int last_across = upright ? cells - 1 : (int)thin->grid_rows - 1;
     float across = (float)((upright ? thin->width : thin->height) / (rows + 2));
     float along = (float)((upright ? thin->height : thin->width) / columns);
     long levels[256] = {0};
-    uint8_t *strong = calloc(columns + 8, 1);
-    if (strong == NULL) return -1;
+    int *pixel = malloc(2 * columns * sizeof(int) + columns + 8), *cell = pixel + columns;
+    if (pixel == NULL) return -1;
+    uint8_t *strong = (uint8_t *)(cell + columns);
+    memset(strong, 0, columns + 8);
+    for (int c = 0; c < columns; c++) { /* what the columns of the view count in mask and region */
+        int at = (int)((c + 0.5f) * along), of = at / stride < last_along ? at / stride : last_along;
+        pixel[c] = upright ? at * width : at, cell[c] = upright ? of * cells : of;
+    }
     for (int r = 0; r < rows; r++) {
         const uint8_t *row = steps + r * columns, *above = r ? row - columns : row;
+        float v = (r + 1.5f) * across;
+        int at = (int)v, of = at / stride < last_across ? at / stride : last_across;
+        int row_pixel = upright ? at : at * width, row_cell = upright ? of : of * cells;
         strongest_of(row, above, r + 1 < rows ? row + columns : NULL, columns, (uint8_t)threshold, strong);
         for (int c = 0; c < columns; c++) {
             uint64_t eight;
             memcpy(&eight, strong + c, sizeof eight);
             if (eight == 0) c += 7; /* most places are flat */
-            if (eight == 0 || !strong[c]) continue;
+            if (eight == 0 || !strong[c] || mask[row_pixel + pixel[c]]) continue;
+            if (region != NULL && !region[row_cell + cell[c]]) continue;
             const uint8_t *step = row + c;
-            float v = (r + 1.5f) * across, u = (c + 0.5f) * along;
-            long x = (long)(upright ? v : u), y = (long)(upright ? u : v);
-            if (mask[y * width + x]) continue;
-            if (region != NULL) {
-                long row = y / stride, column = x / stride;
-                row = row < last_row ? row : last_row, column = column < last_column ? column : last_column;
-                if (!region[row * grid_columns + column]) continue;
-            }
+            float u = (c + 0.5f) * along;
             int strength = *step < full ? *step : full;
             levels[strength]++;
             points[3 * count] = 0.5f * u, points[3 * count + 1] = 0.5f * v, points[3 * count + 2] = (float)strength;
             count++;
         }
     }
-    free(strong);
+    free(pixel);
     long cut = full, above = 0, seen = 0, held = 0;
     if (count > most) { /* the strongest, and of the last of these as many as there is room for, evenly spread */
         while (above + levels[cut] < most) above += levels[cut--];
