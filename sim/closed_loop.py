@@ -124,9 +124,9 @@ class World:
         vehicle = config.controller.vehicle
         self._rendered = options.features == "rendered"
         camera = None
-        if self._rendered and options.camera_process and options.camera == "plane":
+        if self._rendered and options.camera_process and options.camera in ("plane", "gl"):
             # first of all: it sets itself up meanwhile
-            camera = RemoteCamera(scene, vehicle, options.seed, lambda: self.canvas.take())
+            camera = RemoteCamera(scene, vehicle, options.seed, lambda: self.canvas.take(), options.camera)
         self.plant = Plant(scene, vehicle, options.seed, options.machine_code)
         self.sensors = SensorSuite(scene, vehicle, options.seed, options.machine_code)
         self.canvas = Canvas(scene, options.seed)

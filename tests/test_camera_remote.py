@@ -9,7 +9,7 @@ import pytest
 
 from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.vehicle import VehicleParams
-from sim.cameras import CameraStream, PlaneCamera, RemoteCamera
+from sim.cameras import Camera, CameraStream, PlaneCamera, RemoteCamera, open_camera, resolve_camera
 from sim.canvas import Canvas
 from sim.closed_loop import FlightOptions, World, pilot_config
 from sim.scene import CameraScene, Scene
@@ -27,7 +27,7 @@ def remote() -> Iterator[tuple[Canvas, RemoteCamera]]:
     camera.close()
 
 
-def painted_flight(canvas: Canvas, camera: PlaneCamera | RemoteCamera) -> list[tuple[int, RgbdFrame]]:
+def painted_flight(canvas: Canvas, camera: Camera) -> list[tuple[int, RgbdFrame]]:
     """Frames and arrival ticks of a camera that moves along the lower right corner while the brush paints."""
     stream = CameraStream(camera, SCENE.camera.rate_hz, SCENE.camera.latency_s, threaded=False)
     frames, previous, position = [], None, np.empty(3)
@@ -53,6 +53,20 @@ def test_another_process_changes_no_bit(remote: tuple[Canvas, RemoteCamera]) -> 
         assert np.array_equal(one.rgb, other.rgb) and np.array_equal(one.depth, other.depth)
     assert not np.array_equal(here[0][1].rgb, here[-1][1].rgb)
     assert there[-1][1].rgb.base is None, "the frame owns its arrays; the shared place is used again"
+
+
+@pytest.mark.skipif(resolve_camera("gl")[0] != "gl", reason="no OpenGL without a display")
+def test_another_process_changes_no_bit_of_opengl() -> None:
+    canvas, sent = Canvas(SCENE, 4), Canvas(SCENE, 4)
+    here = painted_flight(canvas, open_camera("gl", SCENE, VehicleParams(), canvas, 4))
+    camera = RemoteCamera(SCENE, VehicleParams(), 4, sent.take, "gl")
+    try:
+        there = painted_flight(sent, camera)
+    finally:
+        camera.close()
+    assert len(here) >= 16 and [k for k, _ in here] == [k for k, _ in there]
+    for (_, one), (_, other) in zip(here, there, strict=True):
+        assert np.array_equal(one.rgb, other.rgb) and np.array_equal(one.depth, other.depth)
 
 
 def test_pictures_must_not_pile_up(remote: tuple[Canvas, RemoteCamera]) -> None:

@@ -28,7 +28,7 @@ def _fits(kind: int, surface_behind: bool, labels: tuple[int, int], off: tuple[b
 
 
 #: All answers of `_fits`, read at kind, side, off behind, off before, label behind, label before, in this order.
-_FITS = np.array(
+FITS = np.array(
     [
         _fits(kind, side, (before, behind), (off_before, off_behind))
         for kind, side, off_behind, off_before, behind, before in itertools.product(
@@ -50,7 +50,7 @@ class Admissible:
     def __init__(self, strips: Strips, colors: SurfaceColors) -> None:
         """Take strips and the looks of the surface."""
         self._strips, self._colors = strips, colors
-        kinds = [_kind(view.query.kind, view.side, colors) for view in strips.views]
+        kinds = [kind_of(view.query.kind, view.side, colors) for view in strips.views]
         keys = [
             _KIND_STEP * kind + _SIDE_STEP * (view.side > 0) for kind, view in zip(kinds, strips.views, strict=True)
         ]
@@ -95,7 +95,7 @@ class Admissible:
             before, behind = self._off(pixels[::2], np.s_[:])
             keys += 9 * before
             keys += 18 * behind
-        return allowed & _FITS.take(keys)
+        return allowed & FITS.take(keys)
 
     def everywhere(self, rows: np.ndarray) -> np.ndarray:
         """The same at all places of chosen profiles (n,), bool (n, 2 reach + 1)."""
@@ -112,7 +112,7 @@ class Admissible:
             nine, eighteen = _OFF_STEPS.astype(np.uint8)
             off = self._off(np.arange(pixels), (rows, None))
             keys += nine * off[:, :-far] + eighteen * off[:, far:]
-        return allowed & _FITS.take(keys + self._keys[rows, None])
+        return allowed & FITS.take(keys + self._keys[rows, None])
 
     def _off(self, pixels: np.ndarray, rows) -> np.ndarray:
         """Whether pixels of profiles have a depth that is known not to be the surface's; shapes broadcast."""
@@ -122,7 +122,8 @@ class Admissible:
         return (relative > 0.0) & (np.abs(relative - 1.0) > _OFF_PLANE)  # no reading: not known to be off
 
 
-def _kind(kind: str, side: int, colors: SurfaceColors) -> int:
+def kind_of(kind: str, side: int, colors: SurfaceColors) -> int:
+    """What a line of some kind demands of its sides: nothing, a paint edge, or the surface's border."""
     if not kind or side == 0 or colors.board is None:
         return _ANY
     if kind == "paint":

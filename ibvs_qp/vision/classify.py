@@ -10,6 +10,8 @@ import numpy as np
 from ibvs_qp.vision.colors import BOARD, PAINT, SurfaceColors
 from ibvs_qp.vision.config import LineConfig
 from ibvs_qp.vision.grid import CoarseGrid
+from ibvs_qp.vision.native import native
+from ibvs_qp.vision.native_sides import Evidence, look_natively
 from ibvs_qp.vision.picture import Picture
 from ibvs_qp.vision.plane import PlaneEstimate
 from ibvs_qp.vision.refined import RefinedLine
@@ -59,31 +61,29 @@ def identify_lines(
     """Tell by colour and depth on both sides of each line what it is."""
     if not lines:
         return []
-    labels = np.split(
-        colors.label(np.concatenate([line.sides for line in lines], axis=1)),
-        np.cumsum([len(line.pixels) for line in lines[:-1]]),
-        axis=1,
-    )
-    steps = _depth_steps(lines, picture, depth, plane)
-    surface = None if plane is None else grid.design[np.flatnonzero(plane.component)]
-    return [
-        _identify(line, label, step, surface, grid, colors, config)
-        for line, label, step in zip(lines, labels, steps, strict=True)
-    ]
+    library = native()
+    if library is None:
+        shown = look_with_numpy(lines, picture, depth, plane, grid, colors)
+    else:
+        shown = look_natively(
+            library,
+            lines,
+            picture,
+            depth,
+            plane,
+            grid,
+            colors,
+            distances_px=tuple(distance * picture.scale for distance in _DEPTH_PX),
+            valid=_VALID,
+            correlated=_CORRELATED,
+            margin=_margin(grid),
+        )
+    return [_identify(evidence, colors, config) for evidence in shown]
 
 
-def _identify(
-    line: RefinedLine,
-    labels: np.ndarray,
-    steps: list[tuple[float | None, float]],
-    surface: np.ndarray | None,
-    grid: CoarseGrid,
-    colors: SurfaceColors,
-    config: LineConfig,
-) -> LineIdentity:
-    """What a line is by the labels (2, n) and the depth steps of its two sides."""
-    count = max(labels.shape[1], 1)
-    board, paint = ((np.count_nonzero(labels == kind, axis=1) / count).tolist() for kind in (BOARD, PAINT))
+def _identify(shown: Evidence, colors: SurfaceColors, config: LineConfig) -> LineIdentity:
+    """What a line is by what its two sides show."""
+    board, paint, steps = shown.board, shown.paint, shown.steps
     gates = [max(_STEP_MIN, config.depth_step_sigmas * sigma) for _, sigma in steps]
     off = [value is not None and abs(value) > gate for (value, _), gate in zip(steps, gates, strict=True)]
     known = [value is not None for value, _ in steps]
@@ -101,10 +101,36 @@ def _identify(
         farther = value is not None and value > gate
         foreign = colors.board is not None and board[other] + paint[other] <= _HAS_NOT
         foreign = foreign and not (known[other] and off[other])
-        if (farther or foreign) and _share_beyond(line, surface, grid, side) <= _BEYOND:
+        # hardly any of the surface lies beyond a true border
+        beyond = shown.samples[other] / max(sum(shown.samples), 1)
+        if (farther or foreign) and beyond <= _BEYOND:
             quality = 1.0 if farther else 0.6
             return LineIdentity(kind="board", surface_side=side, borders_plane=farther, quality=quality)
     return LineIdentity()
+
+
+def look_with_numpy(
+    lines: list[RefinedLine],
+    picture: Picture,
+    depth: np.ndarray,
+    plane: PlaneEstimate | None,
+    grid: CoarseGrid,
+    colors: SurfaceColors,
+) -> list[Evidence]:
+    """Both sides of every line where there is no machine code, and to say what it computes."""
+    labels = np.split(
+        colors.label(np.concatenate([line.sides for line in lines], axis=1)),
+        np.cumsum([len(line.pixels) for line in lines[:-1]]),
+        axis=1,
+    )
+    steps = _depth_steps(lines, picture, depth, plane)
+    surface = None if plane is None else grid.design[np.flatnonzero(plane.component)]
+    found = []
+    for line, label, step in zip(lines, labels, steps, strict=True):
+        count = max(label.shape[1], 1)
+        board, paint = ((np.count_nonzero(label == kind, axis=1) / count).tolist() for kind in (BOARD, PAINT))
+        found.append(Evidence(board, paint, step, _samples_beside(line, surface, grid)))
+    return found
 
 
 def _depth_steps(
@@ -157,15 +183,18 @@ def _relative_depths(places: np.ndarray, picture: Picture, depth: np.ndarray, pl
     return np.where(seen, z * surface, np.nan)
 
 
-def _share_beyond(line: RefinedLine, points: np.ndarray | None, grid: CoarseGrid, side: int) -> float:
-    """Share of the surface's samples (n, 3) abreast of the segment that lie beyond the line: ~0 at a true border."""
+def _samples_beside(line: RefinedLine, points: np.ndarray | None, grid: CoarseGrid) -> list[int]:
+    """The surface's samples (n, 3) abreast of the segment that lie clearly before and clearly behind the line."""
     if points is None:
-        return 0.0
+        return [0, 0]
     cos, sin = math.cos(line.theta), math.sin(line.theta)
-    across = side * (points[:, 0] * cos + points[:, 1] * sin - line.rho)
+    across = points[:, 0] * cos + points[:, 1] * sin - line.rho
     along = points[:, 1] * cos - points[:, 0] * sin
     ends = line.segment[:, 1] * cos - line.segment[:, 0] * sin
-    abreast = (along > ends.min()) & (along < ends.max())
-    margin = 1.5 * grid.stride / grid.intrinsics[0]
-    beyond, within = (int(np.count_nonzero(abreast & part)) for part in (across < -margin, across > margin))
-    return beyond / max(beyond + within, 1)
+    abreast, margin = (along > ends.min()) & (along < ends.max()), _margin(grid)
+    return [int(np.count_nonzero(abreast & part)) for part in (across < -margin, across > margin)]
+
+
+def _margin(grid: CoarseGrid) -> float:
+    """How far from a line samples of the surface count, normalised."""
+    return 1.5 * grid.stride / grid.intrinsics[0]

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import ctypes
 from functools import cached_property
 
 import numpy as np
 
 from ibvs_qp.vision.grid import CoarseGrid
+from ibvs_qp.vision.native import native, place
 
 #: Share of a new sample in the board's running colour.
 _BLEND = 0.2
@@ -58,10 +60,22 @@ class SurfaceColors:
         """OTHER, BOARD or PAINT for colours uint8 (..., 3); all OTHER while the board is unknown."""
         if self.board is None:
             return np.zeros(colors.shape[:-1], np.uint8)
+        library = native()
+        if library is not None:
+            colors, labels = np.ascontiguousarray(colors), np.empty(colors.shape[:-1], np.uint8)
+            parts = (self.table(), labels)
+            count = ctypes.c_long(labels.size)
+            library.labels_of(place(colors), count, *(place(part) for part in parts))
+            return labels
+        # single precision holds the place exactly, and has the only fast product
+        return self.table().take(((colors >> _TABLE_SHIFT).astype(np.float32) @ _TABLE_STEPS).astype(np.intp))
+
+    def table(self) -> np.ndarray:
+        """Labels of all colours in steps of eight grey levels, red first, uint8 (32768,); the board must be known."""
+        assert self.board is not None
         if len(self._table) == 0 or np.abs(self.board - self._table_board).max() > _TABLE_DRIFT:
             self._make_table(self.board)
-        # single precision holds the place exactly, and has the only fast product
-        return self._table.take(((colors >> _TABLE_SHIFT).astype(np.float32) @ _TABLE_STEPS).astype(np.intp))
+        return self._table
 
     def _make_table(self, board: np.ndarray) -> None:
         """Labels of all colours in steps of eight grey levels: thousands of colours are looked up per picture."""

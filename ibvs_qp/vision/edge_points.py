@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import functools
+
 import cv2
 import numpy as np
 
 from ibvs_qp.vision.grid import CoarseGrid
+from ibvs_qp.vision.native import native
+from ibvs_qp.vision.native_votes import points_natively
 from ibvs_qp.vision.picture import Picture
 
 #: Points along the longer side of a picture: a line is told by far fewer points than it has pixels (it is refined with
 #: as many), its place across is not; and pixels per point across.
 POINTS, _ACROSS_PX = 80, 2
 #: Steps this many times the weakest one have a full vote, fainter ones less: noise must not outvote an edge.
-_FULL = 4.0
+_FULL = 4
 #: Most points of one polarity that vote; a line right across the picture has POINTS.
 _MOST = 500
 #: A central difference over this many sums of pixels answers as Sobel's kernel does.
@@ -32,26 +36,35 @@ def edge_points(
         grid: Where these samples lie.
 
     Returns:
-        (u, v) in half-resolution pixels of the view, 0 at the picture's border, and the weight of its vote, up to 1:
-        float32 (n, 3) each.
+        (u, v) in half-resolution pixels of the view, 0 at the picture's border, and the weight of its vote, whole
+        numbers up to `full_vote`, so that sums of them are exact: float32 (n, 3) each.
     """
     height, width = picture.mask.shape
     apart = max(height, width) / POINTS
     columns, rows = width // _ACROSS_PX, height // _ACROSS_PX
     columns, rows = (columns, round(height / apart)) if upright else (round(width / apart), rows)
-    thin = cv2.split(cv2.resize(picture.rgb, (columns, rows), interpolation=cv2.INTER_LINEAR))
+    thin = cv2.resize(picture.rgb, (columns, rows), interpolation=cv2.INTER_LINEAR)
+    planes = cv2.split(thin)
     if upright:
-        thin = tuple(cv2.transpose(plane) for plane in thin)
-    pairs = [(plane[2:], plane[:-2]) for plane in thin]
-    threshold = max(1, round(gradient_min / _SOBEL))
+        planes = tuple(cv2.transpose(plane) for plane in planes)
+    pairs = [(plane[2:], plane[:-2]) for plane in planes]
     signed = (
         _strongest([cv2.subtract(below, above) for below, above in pairs]),
         _strongest([cv2.subtract(above, below) for below, above in pairs]),
     )
-    rising, falling = (
-        _points(steps, _thin(steps, threshold), threshold, picture, upright, region, grid) for steps in signed
-    )
-    return rising, falling
+    library = native()
+    points = points_with_numpy if library is None else functools.partial(points_natively, library)
+    wanted = picture, upright, _threshold(gradient_min), full_vote(gradient_min), _MOST, region, grid
+    return points(signed[0], *wanted), points(signed[1], *wanted)
+
+
+def full_vote(gradient_min: float) -> int:
+    """Weight of a full vote, the step that has it [grey levels]."""
+    return min(_FULL * _threshold(gradient_min), 255)
+
+
+def _threshold(gradient_min: float) -> int:
+    return max(1, round(gradient_min / _SOBEL))
 
 
 def _strongest(channels: list[np.ndarray]) -> np.ndarray:
@@ -66,16 +79,21 @@ def _thin(strength: np.ndarray, threshold: int) -> np.ndarray:
     return np.flatnonzero(edges)
 
 
-def _points(
+def points_with_numpy(
     steps: np.ndarray,
-    places: np.ndarray,
-    threshold: int,
     picture: Picture,
     upright: bool,
+    threshold: int,
+    full: int,
+    most: int,
     region: np.ndarray | None,
     grid: CoarseGrid,
 ) -> np.ndarray:
-    """Those of the places that the vehicle does not hide and around which lines are wanted, with their weights."""
+    """Places of strong steps that the vehicle does not hide and around which lines are wanted, with their weights.
+
+    Arguments as for `ibvs_qp.vision.native_votes.points_natively`.
+    """
+    places = _thin(steps, threshold)
     rows, columns = steps.shape
     row = places // columns
     column = places - row * columns
@@ -91,11 +109,19 @@ def _points(
         cell += np.minimum(x_px // grid.stride, last_column)
         free &= region.reshape(-1).take(cell) > 0
     kept = np.flatnonzero(free)
-    weight = np.minimum(steps.reshape(-1).take(places.take(kept)) * np.float32(1.0 / (_FULL * threshold)), 1.0)
-    if len(kept) > _MOST:  # grain and prints: the strongest tell the lines, and the votes of all would take long
-        strongest = np.argpartition(-weight, _MOST)[:_MOST]
-        kept, weight = kept.take(strongest), weight.take(strongest)
+    strength = np.minimum(steps.reshape(-1).take(places.take(kept)), full)
+    if len(kept) > most:  # grain and prints: the strongest tell the lines, and the votes of all would take long
+        strongest = _strongest_points(strength, most)
+        kept, strength = kept.take(strongest), strength.take(strongest)
     points = np.empty((len(kept), 3), np.float32)
     points[:, 0], points[:, 1] = 0.5 * u.take(kept), 0.5 * v.take(kept)
-    points[:, 2] = weight
+    points[:, 2] = strength
     return points
+
+
+def _strongest_points(strength: np.ndarray, most: int) -> np.ndarray:
+    """Places of the strongest ones, and of the weakest of these as many as there is room for, evenly spread."""
+    cut = np.partition(strength, len(strength) - most)[len(strength) - most]
+    tied, sure = np.flatnonzero(strength == cut), np.flatnonzero(strength > cut)
+    share = np.arange(len(tied) + 1) * (most - len(sure)) // len(tied)
+    return np.sort(np.concatenate((sure, tied[share[1:] > share[:-1]])))

@@ -2,30 +2,28 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
 from ibvs_qp.frames import R_BODY_CAMERA
 from ibvs_qp.vision.config import FlowConfig
+from ibvs_qp.vision.flow_numpy import depths_with_numpy, root_with_numpy, solve_with_numpy
 from ibvs_qp.vision.mask import Intrinsics
-from ibvs_qp.vision.normal_equations import solve_three
+from ibvs_qp.vision.native import native
+from ibvs_qp.vision.native_flow import depths_natively, root_natively, solve_natively
 from ibvs_qp.vision.plane import PlaneEstimate
-from ibvs_qp.vision.robust import median
 
 #: A point within this many residual sigmas of the surface takes the surface's depth, which is far less noisy.
 _ON_PLANE_SIGMAS = 4.0
-#: Rounds of reweighting.
-_ROUNDS = 4
-_MAD = 1.4826
 #: Sum of squares of a 3x3 Sobel kernel over 8^2: variance of its answer per variance of the picture.
 _SOBEL_NOISE = 12.0 / 64.0
 #: Distance of the four further places at which the depth of a point is read, and how many must be valid [px].
 _CROSS_PX, _READINGS = 2, 3
-#: Columns of the system of `solve_velocity`: velocity, what is seen, turn.
-_V, _SEEN, _TURN = slice(0, 3), 3, slice(4, 7)
+#: Columns of the system of `solve_velocity`: velocity and turn.
+_V, _TURN = slice(0, 3), slice(4, 7)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,18 +57,10 @@ def information_root(grey: np.ndarray, points: np.ndarray, config: FlowConfig) -
     """
     if len(points) == 0:
         return np.zeros((0, 2, 2))
-    gx = cv2.Sobel(grey, cv2.CV_32F, 1, 0, ksize=3, scale=0.125)
-    gy = cv2.Sobel(grey, cv2.CV_32F, 0, 1, ksize=3, scale=0.125)
-    reach = config.window_px // 2
-    steps = np.arange(-reach, reach + 1)
-    rows = np.clip(np.round(points[:, 1]).astype(np.intp)[:, None] + steps, 0, grey.shape[0] - 1)[:, :, None]
-    columns = np.clip(np.round(points[:, 0]).astype(np.intp)[:, None] + steps, 0, grey.shape[1] - 1)[:, None, :]
-    patch = np.stack((gx[rows, columns], gy[rows, columns]), axis=-1).reshape(len(points), -1, 2).astype(float)
-    values, vectors = np.linalg.eigh(patch.transpose(0, 2, 1) @ patch)
-    variance = config.grey_sigma**2
-    values = np.maximum(values - 2.0 * config.window_px**2 * _SOBEL_NOISE * variance, 0.0) / variance
-    values = np.sqrt(values / (1.0 + values * config.pixel_sigma**2))
-    return (vectors * values[:, None, :]) @ vectors.transpose(0, 2, 1)
+    library, variance = native(), config.grey_sigma**2
+    floor = 2.0 * config.window_px**2 * _SOBEL_NOISE * variance
+    root = root_with_numpy if library is None else functools.partial(root_natively, library)
+    return root(grey, points, config.window_px // 2, floor, variance, config.pixel_sigma**2)
 
 
 def inverse_depths(
@@ -79,24 +69,11 @@ def inverse_depths(
     """1/Z of normalised points (n, 2): the surface's where they lie on it, else their own, 0 if unknown, (n,)."""
     if len(bearings) == 0:
         return np.zeros(0)
-    (height, width), (fx, fy, cx, cy) = depth.shape, intrinsics
-    place = np.rint(bearings * (fx, fy) + (cx, cy)).astype(np.intp)
-    place = np.minimum(np.maximum(place, _CROSS_PX), (width - 1 - _CROSS_PX, height - 1 - _CROSS_PX))
-    cross = np.array([0, -_CROSS_PX, _CROSS_PX, -_CROSS_PX * width, _CROSS_PX * width])
-    z = depth.reshape(-1).take((place @ np.array((1, width)))[:, None] + cross)
-    good = (z > 0) & (z < np.inf)  # false for NaN too
-    count = np.count_nonzero(good, axis=1)
-    z[~good] = np.inf
-    z.sort(axis=1)  # the median of the valid ones is at half their count
-    middle = z[np.arange(len(z)), np.minimum(count // 2, len(cross) - 1)]
-    inverse = (1.0 / middle) * (count >= _READINGS)
+    library, surface, gate = native(), None, 0.0
     if plane is not None:
-        a, b, c = plane.inverse_depth
-        surface = bearings @ (a, b) + c
-        gate = max(_ON_PLANE_SIGMAS * plane.residual_sigma, 0.01)
-        near = (inverse > 0) & (np.abs(inverse - surface) < gate * np.abs(surface))
-        inverse = np.where(near, surface, inverse)
-    return inverse
+        surface, gate = plane.inverse_depth, max(_ON_PLANE_SIGMAS * plane.residual_sigma, 0.01)
+    wanted = bearings, depth, intrinsics, surface, gate, _CROSS_PX, _READINGS
+    return depths_with_numpy(*wanted) if library is None else depths_natively(library, *wanted)
 
 
 def unturned(bearings: np.ndarray, rotation: np.ndarray) -> np.ndarray:
@@ -141,29 +118,26 @@ def solve_velocity(
     Returns:
         The velocity, or the reason why there is none.
     """
-    rows, squares = _system(still, end, inverse, root * (focal * interval), interval)
-    prior = 1.0 / config.prior_m_s**2
-    width = rows.shape[2]
-    weight = np.ones(len(rows))
-    sums, velocity, size = np.zeros((width, width)), (0.0, 0.0, 0.0), weight
-    for _ in range(_ROUNDS):
-        sums = (weight @ squares).reshape(width, width)
-        (xx, xy, xz, xs), (_, yy, yz, ys), (_, _, zz, zs) = sums[:3, :4].tolist()
-        solved = solve_three((xx + prior, xy, xz, yy + prior, yz, zz + prior), (xs, ys, zs))
-        if solved is None:
-            return "the points determine no velocity"
-        velocity = solved[0]
-        answer = np.array((*velocity, -1.0, 0.0, 0.0, 0.0))
-        residual = rows @ answer
-        size = np.vecdot(residual, residual)
-        scale = max(_MAD * math.sqrt(median(size)), 0.5)
-        weight = np.maximum(0.0, 1.0 - size * (1.0 / (config.gate_sigmas * scale) ** 2)) ** 2
-    agreeing = int(np.count_nonzero(weight > 0.1))
+    prior, library = 1.0 / config.prior_m_s**2, native()
+    solve = solve_with_numpy if library is None else functools.partial(solve_natively, library)
+    solved = solve(
+        still,
+        end,
+        inverse,
+        root,
+        scale=focal * interval,
+        interval=interval,
+        prior=prior,
+        gate_sigmas=config.gate_sigmas,
+    )
+    if solved is None:
+        return "the points determine no velocity"
+    (*velocity, square, total, agreeing), sums = solved
     if agreeing < config.min_points:
         return "too few points agree"
     if math.hypot(*velocity) > config.speed_max_m_s:
         return "faster than possible"
-    spread = max(float(weight @ size) / max(2.0 * float(weight.sum()) - 3.0, 1.0), 1.0)
+    spread = max(square / max(2.0 * total - 3.0, 1.0), 1.0)
     spreads = np.array((1.0, spread))[:, None, None]
     with_prior, spread_out = np.linalg.inv(sums[_V, _V] + np.eye(3) * prior / spreads) * spreads
     leak = with_prior @ sums[_V, _TURN] * (config.rotation_sigma_rad / interval)
@@ -172,28 +146,8 @@ def solve_velocity(
     (wx, wy, wz), (px, py, pz) = (rotation / interval).tolist(), camera_position.tolist()
     lever = np.array([wy * pz - wz * py, wz * px - wx * pz, wx * py - wy * px])
     return FlowVelocity(
-        velocity=R_BODY_CAMERA @ velocity - lever,
+        velocity=R_BODY_CAMERA @ np.array(velocity) - lever,
         covariance=0.5 * (covariance + covariance.T),
         stamp_ns=0,
-        points=agreeing,
+        points=int(agreeing),
     )
-
-
-def _system(
-    still: np.ndarray, end: np.ndarray, inverse: np.ndarray, whiten: np.ndarray, interval: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Whitened rows of every point, (n, 2, 7), and their products, (n, 49): velocity (3), what is seen (1), turn (3).
-
-    The products are summed with changing weights, so each is made once.
-    """
-    x, y = (0.5 * (end + still)).T
-    rows = np.zeros((len(x), 2, 7))
-    rows[:, 0, 0] = rows[:, 1, 1] = -inverse
-    rows[:, 0, 2], rows[:, 1, 2] = inverse * x, inverse * y
-    rows[:, :, _SEEN] = (end - still) * (1.0 / interval)
-    cross = x * y
-    rows[:, 0, 4], rows[:, 1, 5] = cross, -cross
-    rows[:, 0, 5], rows[:, 0, 6] = -(1.0 + x * x), y
-    rows[:, 1, 4], rows[:, 1, 6] = 1.0 + y * y, -x
-    rows = whiten @ rows
-    return rows, (rows.transpose(0, 2, 1) @ rows).reshape(len(x), -1)

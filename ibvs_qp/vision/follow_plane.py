@@ -10,9 +10,11 @@ import numpy as np
 from ibvs_qp.vision.colors import BOARD, PAINT, SurfaceColors
 from ibvs_qp.vision.config import PlaneConfig
 from ibvs_qp.vision.grid import CoarseGrid
+from ibvs_qp.vision.native import native
+from ibvs_qp.vision.native_plane import NativePlane, Refit, estimate_of
 from ibvs_qp.vision.normal_equations import solve_three
 from ibvs_qp.vision.robust import median
-from ibvs_qp.vision.surface import PlaneEstimate, connected_samples
+from ibvs_qp.vision.surface import PlaneEstimate, connected_samples, surface_problem
 
 #: Samples per row against the grid of the search: the noise holds together over 20 px of 640, so that the mean of four
 #: neighbours every 16 px tells as much as one reading every 8 px.
@@ -54,6 +56,10 @@ class PlaneFollower:
         self._between = np.full(grid.shape, _HALFWAY, np.uint16)
         rows, columns = (size // _BLOCK for size in grid.shape)
         self._blocks = rows, columns
+        library = native()
+        self._native = (
+            None if library is None else NativePlane(library, config, grid, design, self._least, _BLOCK, _PAINT_GATES)
+        )
 
     def follow(
         self,
@@ -77,6 +83,23 @@ class PlaneFollower:
         Returns:
             The surface, its component on this grid, or the reason why there is none.
         """
+        if self._native is not None:
+            labels = None if colors.board is None else self._native.labels(rgb, colors.table())
+            refit = self._native.refit(self._native.means(depth), labels, predicted, sigma=sigma)
+            if refit is not None:
+                return estimate_of(refit, down, self._config) if isinstance(refit, Refit) else refit
+        return self.follow_with_numpy(rgb, depth, predicted, sigma, colors, down)
+
+    def follow_with_numpy(
+        self,
+        rgb: np.ndarray,
+        depth: np.ndarray,
+        predicted: np.ndarray,
+        sigma: float,
+        colors: SurfaceColors,
+        down: np.ndarray | None,
+    ) -> PlaneEstimate | str:
+        """The same where there is no machine code, and to say what it computes."""
         config, grid, design = self._config, self._grid, self._design
         z = self._means(depth)
         usable = self._free & (z > config.distance_min_m) & (z < config.distance_max_m)  # false for NaN too
@@ -110,7 +133,7 @@ class PlaneFollower:
             plane = np.array(solved[0])
             normal_matrix = np.array(((xx, xy, x), (xy, yy, y), (x, y, count)))
             gate = min(max(config.fine_gate_sigmas * sigma, config.fine_gate_low), config.fine_gate_high)
-        problem = self._problem(plane, down)
+        problem = surface_problem(plane, down, config)
         if problem is not None:
             return problem
         length = math.hypot(*plane.tolist())
@@ -130,19 +153,6 @@ class PlaneFollower:
         depth = depth.astype(np.float32, copy=False)
         means = cv2.remap(depth, self._before, self._between, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         return means.reshape(-1).astype(np.float64)
-
-    def _problem(self, plane: np.ndarray, down: np.ndarray | None) -> str | None:
-        """Why a plane cannot be the surface, or None."""
-        config, (a, b, c) = self._config, plane.tolist()
-        length = math.hypot(a, b, c)
-        upright = c > math.cos(math.radians(config.max_oblique_deg)) * length
-        if down is not None:
-            upright &= abs(float(plane @ down)) < math.sin(math.radians(config.max_lean_deg)) * length
-        if not upright:
-            return "the surface does not stand upright or does not face the camera"
-        if not config.distance_min_m <= 1.0 / length <= config.distance_max_m:
-            return f"the surface lies {1.0 / length:.2f} m away, out of range"
-        return None
 
     def _covariance(
         self, residual: np.ndarray, normal_matrix: np.ndarray, count: float, plane: np.ndarray

@@ -9,10 +9,12 @@ from ibvs_qp.vision.colors import SurfaceColors
 from ibvs_qp.vision.config import LineConfig
 from ibvs_qp.vision.consensus import consensus_lines, shifted_lines
 from ibvs_qp.vision.fit_lines import fitted_rows, longest_runs, robust_lines
+from ibvs_qp.vision.native import native
+from ibvs_qp.vision.native_lines import Fitted, fit_natively
 from ibvs_qp.vision.picture import Picture
 from ibvs_qp.vision.profiles import Strips
 from ibvs_qp.vision.query import LineQuery, LineView
-from ibvs_qp.vision.refined import Fits, RefinedLine, finish_lines
+from ibvs_qp.vision.refined import Fits, Profiles, RefinedLine, finish_lines
 from ibvs_qp.vision.robust import masked_median
 
 #: A profile's gradient must reach this share of the line's whole step (a sharp edge reaches 0.4).
@@ -58,12 +60,25 @@ def refine_lines(
     used = [k for k, view in enumerate(views) if view.last - view.first >= config.profiles // 8]
     if not used:
         return found
-    strips = Strips.gather(picture, [views[k] for k in used], config, max(2, round(half_width_px)))
-    fits = _fit(strips, Admissible(strips, colors), config, picture.scale)
-    sides = strips.sides(fitted_rows(fits.lines, strips.u)) if contents else None
-    for k, line in zip(used, finish_lines(fits, strips, sides, config), strict=True):
+    wanted, reach, library = [views[k] for k in used], max(2, round(half_width_px)), native()
+    fitted = None
+    if library is not None:
+        fitted = fit_natively(library, picture, wanted, reach, config, colors, contents)
+    if fitted is None:
+        fitted = fit_with_numpy(picture, wanted, reach, config, colors, contents)
+    for k, line in zip(used, finish_lines(*fitted, config), strict=True):
         found[k] = line
     return found
+
+
+def fit_with_numpy(
+    picture: Picture, views: list[LineView], reach: int, config: LineConfig, colors: SurfaceColors, contents: bool
+) -> Fitted:
+    """Fit lines where there is no machine code, and to say what it computes; arguments as for `fit_natively`."""
+    strips = Strips.gather(picture, views, config, reach)
+    fits = _fit(strips, Admissible(strips, colors), config, picture.scale)
+    sides = np.array(strips.sides(fitted_rows(fits.lines, strips.u))) if contents else None
+    return Fitted(fits, Profiles(views, strips.u, strips.side), sides)
 
 
 def _fit(strips: Strips, admissible: Admissible, config: LineConfig, scale: float) -> Fits:
@@ -89,7 +104,10 @@ def _fit(strips: Strips, admissible: Admissible, config: LineConfig, scale: floa
     change = np.subtract(behind, before, dtype=np.float32)
     steps = (support.astype(np.float32)[:, None] @ change)[:, 0] / np.maximum(count, 1)[:, None]
     alive &= (count >= config.min_profiles) & (np.vecdot(steps, steps) >= config.contrast_min**2)
-    return Fits(lines, support, visible, count, runs, steps, alive)
+    seen = [
+        int(np.count_nonzero(one[first : last + 1])) for one, (first, last) in zip(visible | support, runs, strict=True)
+    ]
+    return Fits(lines, support, visible, count.tolist(), seen, runs, steps.tolist(), alive.tolist())
 
 
 def _edges(
@@ -150,7 +168,7 @@ def _directions(strips: Strips, admissible: Admissible) -> np.ndarray:
     strength = np.maximum(np.maximum(oriented[..., 0], oriented[..., 1]), oriented[..., 2])
     strength *= admissible.everywhere(rows)
     place = strength.argmax(axis=1) + np.arange(0, strength.size, strength.shape[1])
-    weight = strength.take(place).reshape(len(fresh), profiles)
+    weight = np.maximum(strength.take(place), 0.0).reshape(len(fresh), profiles)  # the other polarity tells nothing
     telling = weight > _TELLING * np.sort(weight, axis=1)[:, profiles // 2, None]
     strongest = gradient.reshape(-1, 3).take(place, axis=0).reshape(len(fresh), profiles, 3).transpose(0, 2, 1)
     typical = masked_median(strongest, telling)

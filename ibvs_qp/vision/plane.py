@@ -10,15 +10,17 @@ import numpy as np
 from ibvs_qp.vision.colors import BOARD, PAINT
 from ibvs_qp.vision.config import PlaneConfig
 from ibvs_qp.vision.grid import CoarseGrid
+from ibvs_qp.vision.hypotheses import judged_planes
+from ibvs_qp.vision.native import native
+from ibvs_qp.vision.native_plane import NativePlane, Refit, estimate_of
 from ibvs_qp.vision.robust import median
-from ibvs_qp.vision.surface import PlaneEstimate, connected_samples, plane_covariance
+from ibvs_qp.vision.surface import BLOCK, PlaneEstimate, connected_samples, plane_covariance, surface_problem
 
-#: Samples used to judge hypotheses and the spread of residuals; more cost time and change nothing.
+#: Samples used to judge the spread of residuals; more cost time and change nothing.
 _JUDGED = 400
-#: Radius that counts around the seed when hypotheses are judged, normalised.
-_NEAR = 0.25
-#: Share of the coarse gate within which a sample votes for a hypothesis.
-_VOTE = 0.6
+#: Gate of what looks like paint in either round, share of the board's: a wall that looks like paint must not get in, so
+#: what looks like it counts in the last round only, and has to fit twice as well.
+_PAINT_GATES = (0.0, 0.5)
 #: Smallest determinant of the normal matrix, share of the product of its diagonal.
 _FLAT = 1e-6
 #: Turns a median absolute deviation into a standard deviation of a normal distribution.
@@ -39,6 +41,8 @@ class PlaneFitter:
     def __init__(self, config: PlaneConfig) -> None:
         """Take the settings and start its own random generator."""
         self._config = config
+        self._grid: CoarseGrid | None = None
+        self._native: NativePlane | None = None
         self.reset()
 
     def reset(self) -> None:
@@ -116,28 +120,11 @@ class PlaneFitter:
         prefer: np.ndarray | None,
     ) -> np.ndarray | None:
         """Best of many planes through the seed and two random samples near it."""
-        config, design, flat = self._config, grid.design, inverse.ravel()
-        origin = design[seed[0] * grid.shape[1] + seed[1]]
-        square = (design[:, 0] - origin[0]) ** 2 + (design[:, 1] - origin[1]) ** 2
-        usable = (flat > 0) & grid.free.ravel() & (square < config.seed_reach**2)
-        if prefer is not None and int((usable & (prefer.ravel() == BOARD)).sum()) >= config.min_samples:
-            usable &= prefer.ravel() == BOARD
-        near = np.flatnonzero(usable)
-        if len(near) < config.min_samples:
+        tried = judged_planes(self._config, grid, inverse, seed, value, prefer, self._random)
+        if tried is None:
             return None
-        judged = near[:: max(1, len(near) // _JUDGED)]
-        first, second = self._random.choice(near, (2, config.hypotheses))
-        arm_1, arm_2 = design[first, :2] - origin[:2], design[second, :2] - origin[:2]
-        rise_1, rise_2 = flat[first] - value, flat[second] - value
-        cross = arm_1[:, 0] * arm_2[:, 1] - arm_1[:, 1] * arm_2[:, 0]
-        safe = np.where(np.abs(cross) > 1e-4, cross, np.inf)
-        a = (rise_1 * arm_2[:, 1] - rise_2 * arm_1[:, 1]) / safe
-        b = (rise_2 * arm_1[:, 0] - rise_1 * arm_2[:, 0]) / safe
-        planes = np.column_stack((a, b, value - a * origin[0] - b * origin[1]))
-        allowed = self._upright(planes, down)
-        residual = np.abs(planes @ design[judged].T - flat[judged])
-        weight = np.exp(-square[judged] / _NEAR**2)
-        score = ((residual < _VOTE * config.coarse_gate * flat[judged]) * weight).sum(axis=1) * allowed
+        planes, score = tried
+        score = score * self._upright(planes, down)
         best = int(np.argmax(score))
         return planes[best] if score[best] > 0 else None
 
@@ -158,6 +145,29 @@ class PlaneFitter:
         down: np.ndarray | None,
         prefer: np.ndarray | None,
     ) -> PlaneEstimate | str:
+        """Two rounds of least squares within gates that the residuals set, around a start."""
+        if grid is not self._grid:
+            library, self._grid = native(), grid
+            self._native = None
+            if library is not None:
+                least = self._config.min_samples
+                self._native = NativePlane(library, self._config, grid, grid.design, least, BLOCK, _PAINT_GATES)
+        if self._native is not None:
+            refit = self._native.refit(inverse, prefer, start, seed=seed)
+            if refit is not None:
+                return estimate_of(refit, down, self._config) if isinstance(refit, Refit) else refit
+        return self._refine_with_numpy(grid, inverse, start, seed, down, prefer)
+
+    def _refine_with_numpy(
+        self,
+        grid: CoarseGrid,
+        inverse: np.ndarray,
+        start: np.ndarray,
+        seed: tuple[int, int] | None,
+        down: np.ndarray | None,
+        prefer: np.ndarray | None,
+    ) -> PlaneEstimate | str:
+        """The same where there is no machine code, and to say what it computes."""
         config, design, flat = self._config, grid.design, inverse.ravel()
         usable = (flat > 0) & grid.free.ravel()
         seen = int(np.count_nonzero(usable))
@@ -175,8 +185,7 @@ class PlaneFitter:
             inlier = usable & (size < gate)
             if board is not None and paint is not None:
                 colored = inlier & board
-                if last:  # a wall that looks like paint must not get in: what looks like it has to fit twice as well
-                    colored |= inlier & paint & (size < 0.5 * gate)
+                colored |= inlier & paint & (size < _PAINT_GATES[last] * gate)
                 inlier = colored if int(np.count_nonzero(colored)) >= config.min_samples else inlier
             component = connected_samples(inlier.reshape(grid.shape), grid, seed).ravel()
             chosen = np.flatnonzero(component)
@@ -191,11 +200,10 @@ class PlaneFitter:
             if np.linalg.det(normal_matrix) < _FLAT * math.prod(normal_matrix.diagonal().tolist()):
                 return "samples on the surface lie on one line"
             plane = np.linalg.solve(normal_matrix, samples.T @ flat.take(chosen))
-        if not bool(self._upright(plane[None], down)[0]):
-            return "the surface does not stand upright or does not face the camera"
+        problem = surface_problem(plane, down, self._config)
+        if problem is not None:
+            return problem
         length = math.hypot(*plane)
-        if not config.distance_min_m <= 1.0 / length <= config.distance_max_m:
-            return f"the surface lies {1.0 / length:.2f} m away, out of range"
         residual = np.where(component, flat - design @ plane, 0.0)
         return PlaneEstimate(
             inverse_depth=plane,

@@ -52,8 +52,7 @@ class Strips:
     def gather(cls, picture: Picture, views: list[LineView], config: LineConfig, reach: int) -> Strips:
         """Read the pixels within `reach` rows of every line."""
         spans = [view.last - view.first for view in views]
-        profiles = min(config.profiles, int(min(spans)) + 1)  # no column twice
-        side = max(2, round(SIDE_PX * picture.scale))
+        profiles, side = profile_count(views, config), side_px(picture)
         far = reach + side
         table = np.array(
             [
@@ -147,6 +146,16 @@ class Strips:
         index += np.arange(self.reach + self.side, rows.size * pixels, pixels).reshape(rows.shape)
         flat = self.colors.reshape(-1, 3)
         return flat.take(index - self.side, axis=0), flat.take(index + self.side, axis=0)
+
+
+def profile_count(views: list[LineView], config: LineConfig) -> int:
+    """Profiles along each of the lines: no column twice."""
+    return min(config.profiles, int(min(view.last - view.first for view in views)) + 1)
+
+
+def side_px(picture: Picture) -> int:
+    """Distance from an edge at which its two sides are looked at, whole [px]."""
+    return max(2, round(SIDE_PX * picture.scale))
 
 
 @lru_cache(maxsize=16)

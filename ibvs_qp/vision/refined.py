@@ -10,7 +10,6 @@ import numpy as np
 from ibvs_qp.frames import align_line
 from ibvs_qp.vision.config import LineConfig
 from ibvs_qp.vision.fit_lines import LineFit
-from ibvs_qp.vision.profiles import Strips
 from ibvs_qp.vision.query import LineView
 
 _NO_SIDES, _NO_PIXELS = np.zeros((2, 0, 3), np.uint8), np.zeros((0, 2))
@@ -48,6 +47,21 @@ class RefinedLine:
     pixels: np.ndarray
 
 
+@dataclass(frozen=True)
+class Profiles:
+    """Where the profiles of a batch of L lines lie: K columns of every line.
+
+    Attributes:
+        views: The lines, each level in its own view, (L).
+        u: Columns of the profiles, (L, K).
+        side: Distance of the two sides from the edge [px].
+    """
+
+    views: list[LineView]
+    u: np.ndarray
+    side: int
+
+
 @dataclass
 class Fits:
     """Results of a batch of L lines with K profiles, each in its own view.
@@ -56,49 +70,52 @@ class Fits:
         lines: The fitted lines.
         support: Profiles that agree, bool (L, K).
         visible: Profiles that could be seen, bool (L, K).
-        count: How many agree, (L,).
+        count: How many agree, (L).
+        seen: Profiles within the run that agree or could be seen, (L).
         runs: First and last supporting profile, (L).
-        steps: Colour behind minus colour before, along +v, (L, 3).
-        alive: Whether there is a line at all, bool (L,).
+        steps: Colour behind minus colour before, along +v, (L) of 3.
+        alive: Whether there is a line at all, (L).
     """
 
     lines: list[LineFit]
     support: np.ndarray
     visible: np.ndarray
-    count: np.ndarray
+    count: list[int]
+    seen: list[int]
     runs: list[tuple[int, int]]
-    steps: np.ndarray
-    alive: np.ndarray
+    steps: list[list[float]]
+    alive: list[bool]
 
 
 def finish_lines(
-    fits: Fits, strips: Strips, sides: tuple[np.ndarray, np.ndarray] | None, config: LineConfig
+    fits: Fits, profiles: Profiles, sides: np.ndarray | None, config: LineConfig
 ) -> list[RefinedLine | None]:
-    """Turn the fits of a batch into normalised lines; None for those that are none or lie too far off."""
-    steps, seen = fits.steps.tolist(), fits.visible | fits.support
+    """Turn the fits of a batch into normalised lines; None for those that are none or lie too far off.
+
+    Args:
+        fits: The fits.
+        profiles: Where their profiles lie.
+        sides: Colours before and behind every line at its profiles, uint8 (2, L, K, 3), or None.
+        config: Settings.
+    """
     result: list[RefinedLine | None] = []
-    for k, (alive, count) in enumerate(zip(fits.alive.tolist(), fits.count.tolist(), strict=True)):
+    for k, alive in enumerate(fits.alive):
         if not alive:
             result.append(None)
             continue
-        first, last = fits.runs[k]
-        share = count / max(int(np.count_nonzero(seen[k, first : last + 1])), 1)
-        beside = (_NO_SIDES, _NO_PIXELS) if sides is None else _contents(k, fits, strips, sides)
-        result.append(_finish(strips, k, (first, last), fits, share, steps[k], beside, config))
+        beside = (_NO_SIDES, _NO_PIXELS) if sides is None else _contents(k, fits, profiles, sides)
+        result.append(_finish(profiles, k, fits, beside, config))
     return result
 
 
 def _finish(
-    strips: Strips,
+    strips: Profiles,
     index: int,
-    run: tuple[int, int],
     fits: Fits,
-    share: float,
-    step: list[float],
     beside: tuple[np.ndarray, np.ndarray],
     config: LineConfig,
 ) -> RefinedLine | None:
-    view, line = strips.views[index], fits.lines[index]
+    view, line, run, step = strips.views[index], fits.lines[index], fits.runs[index], fits.steps[index]
     variance = line.level_variance + (config.bias_px * view.view.scale) ** 2
     rho, theta, covariance = _polar(view, line.level, line.slope, line.center, variance, line.slope_variance)
     if abs(rho) > config.rho_max:
@@ -114,7 +131,7 @@ def _finish(
         covariance=covariance,
         segment=np.array([(y, x) for x, y in normal] if view.upright else normal),
         ends=_end_reasons(strips, index, run, line, fits),
-        inlier_share=share,
+        inlier_share=fits.count[index] / max(fits.seen[index], 1),
         rms_px=line.rms,
         length_px=math.hypot(ends[1][0] - ends[0][0], ends[1][1] - ends[0][1]),
         step=np.array((sign * x, sign * y, sign * z)),
@@ -123,17 +140,15 @@ def _finish(
     )
 
 
-def _contents(
-    index: int, fits: Fits, strips: Strips, sides: tuple[np.ndarray, np.ndarray]
-) -> tuple[np.ndarray, np.ndarray]:
+def _contents(index: int, fits: Fits, strips: Profiles, sides: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Colours on both sides of a line at its profiles, (2, n, 3), and the places of these, (n, 2) [px]."""
     view, line, held = strips.views[index], fits.lines[index], np.flatnonzero(fits.support[index])
     u = strips.u[index].take(held)
     pixels = np.empty((len(held), 2))
     pixels[:, int(view.upright)], pixels[:, 1 - int(view.upright)] = u, line.level + line.slope * (u - line.center)
     beside = np.empty((2, len(held), 3), np.uint8)
-    for side, colors in zip((0, 1)[:: view.sign], sides, strict=True):
-        beside[side] = colors[index].take(held, axis=0)
+    for side, colors in zip((0, 1)[:: view.sign], sides[:, index], strict=True):
+        beside[side] = colors.take(held, axis=0)
     return beside, pixels
 
 
@@ -158,7 +173,7 @@ def _polar(
     return aligned, theta, np.array([[rho_variance, cross], [cross, angle_slope**2 * slope_variance]])
 
 
-def _end_reasons(strips: Strips, index: int, run: tuple[int, int], line: LineFit, fits: Fits) -> tuple[str, str]:
+def _end_reasons(strips: Profiles, index: int, run: tuple[int, int], line: LineFit, fits: Fits) -> tuple[str, str]:
     """Why the segment ends at either end."""
     view = strips.views[index]
     profiles, margin = strips.u.shape[1], strips.side + 2

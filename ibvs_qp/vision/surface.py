@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from ibvs_qp.vision.config import PlaneConfig
 from ibvs_qp.vision.grid import CoarseGrid
 
 #: Side of the blocks over which residuals are averaged to measure their correlation [cells].
-_BLOCK = 8
+BLOCK = 8
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,6 +44,20 @@ class PlaneEstimate:
         return a, b, c, -1.0
 
 
+def surface_problem(plane: np.ndarray, down: np.ndarray | None, config: PlaneConfig) -> str | None:
+    """Why a fitted (a, b, c) cannot be the surface, or None; ``down`` is gravity's direction in C, (3,), if known."""
+    a, b, c = plane.tolist()
+    length = math.hypot(a, b, c)
+    upright = c > math.cos(math.radians(config.max_oblique_deg)) * length
+    if down is not None:
+        upright &= abs(float(plane @ down)) < math.sin(math.radians(config.max_lean_deg)) * length
+    if not upright:
+        return "the surface does not stand upright or does not face the camera"
+    if not config.distance_min_m <= 1.0 / length <= config.distance_max_m:
+        return f"the surface lies {1.0 / length:.2f} m away, out of range"
+    return None
+
+
 def connected_samples(inlier: np.ndarray, grid: CoarseGrid, seed: tuple[int, int] | None) -> np.ndarray:
     """Connected inliers around the seed (the largest, without one); hidden samples connect."""
     _, labels = cv2.connectedComponents((inlier | ~grid.free).view(np.uint8), connectivity=4, ltype=cv2.CV_16U)
@@ -65,9 +80,9 @@ def plane_covariance(
     common_mode: float,
 ) -> np.ndarray:
     """Least-squares covariance, inflated by the correlation of the residuals over blocks, plus the common mode."""
-    rows, columns = (size // _BLOCK for size in grid.shape)
-    square = residual.reshape(grid.shape)[: rows * _BLOCK, : columns * _BLOCK]
-    sums = square.reshape(rows, _BLOCK, columns, _BLOCK).sum(axis=(1, 3))
+    rows, columns = (size // BLOCK for size in grid.shape)
+    square = residual.reshape(grid.shape)[: rows * BLOCK, : columns * BLOCK]
+    sums = square.reshape(rows, BLOCK, columns, BLOCK).sum(axis=(1, 3))
     total = float(np.vdot(residual, residual))
     inflation = max(1.0, float(np.vdot(sums, sums)) / total) if total > 0 else 1.0
     variance = total / max(count - 3, 1)

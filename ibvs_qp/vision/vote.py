@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 
@@ -9,8 +10,10 @@ import cv2
 import numpy as np
 
 from ibvs_qp.vision.config import VisionConfig
-from ibvs_qp.vision.edge_points import POINTS, edge_points
+from ibvs_qp.vision.edge_points import POINTS, edge_points, full_vote
 from ibvs_qp.vision.grid import CoarseGrid
+from ibvs_qp.vision.native import native
+from ibvs_qp.vision.native_votes import differing_natively, distinct_natively
 from ibvs_qp.vision.picture import Picture
 from ibvs_qp.vision.plane import PlaneEstimate
 
@@ -107,13 +110,16 @@ def _hough(
     sine, cosine = np.sin(theta), np.cos(theta)
     left, right = rho / sine, (rho - width * cosine) / sine
     lines = np.stack((cosine, sine, -rho), axis=1).astype(np.float32)
-    distance = np.abs(lines[:, :2] @ points[:, :2].T + lines[:, 2:])
     falls = 0.5 * (left + right) > 0.5 * (moved + height)
     left, right = left - moved * falls, right - moved * falls
-    kept, votes = _distinct(distance, points[:, 2].copy(), falls.tolist(), _FAINT * least)
-    differing = _label_difference(left[kept], right[kept], labels.T if upright else labels, grid)
+    library, faint = native(), _FAINT * least * full_vote(config.detect.gradient_min)
+    distinct = distinct_with_numpy if library is None else functools.partial(distinct_natively, library)
+    kept, votes = distinct(lines, falls, points, near=_NEAR, same=SAME_PX, faint=faint, poor=_POOR, room=_KEPT)
+    shown, ends = labels.T if upright else labels, [(float(left[k]), float(right[k])) for k in kept]
+    differ = differing_with_numpy if library is None else functools.partial(differing_natively, library)
+    differing = differ(ends, shown, 2.0 / grid.stride, _LABEL_CELLS)
     result = []
-    for index, own, difference in zip(kept, votes, differing.tolist(), strict=True):
+    for index, own, difference in zip(kept, votes, differing, strict=True):
         if difference < _DIFFERENT:
             continue
         slope = float(right[index] - left[index]) / width
@@ -125,42 +131,53 @@ def _hough(
     return result
 
 
-def _distinct(distance: np.ndarray, free: np.ndarray, falls: list[bool], least: float) -> tuple[list[int], list[float]]:
+def distinct_with_numpy(
+    lines: np.ndarray,
+    falling: np.ndarray,
+    points: np.ndarray,
+    *,
+    near: float,
+    same: float,
+    faint: float,
+    poor: float,
+    room: int,
+) -> tuple[list[int], list[float]]:
     """Lines in the order of the votes that are left when better ones have taken theirs, and these votes.
 
-    Args:
-        distance: Of every line from every point [half-resolution px], (L, n).
-        free: Weights of the points, (n,); those that are taken lose theirs.
-        falls: Polarity of the lines, (L).
-        least: Least weight of a line.
+    Arguments as for `ibvs_qp.vision.native_votes.distinct_natively`.
     """
-    near = (distance < _NEAR).astype(np.float32)
-    wanted = np.ones(len(near), np.float32)
-    room = {True: _KEPT, False: _KEPT}
+    distance, free = np.abs(lines[:, :2] @ points[:, :2].T + lines[:, 2:]), points[:, 2].copy()
+    falls = falling.tolist()
+    votes_for = (distance < near).astype(np.float32)
+    wanted = np.ones(len(votes_for), np.float32)
+    rooms = {True: room, False: room}
     kept: list[int] = []
     votes: list[float] = []
     while True:
-        left = (near @ free) * wanted
+        left = (votes_for @ free) * wanted
         best = int(left.argmax())
         own = float(left[best])
-        if own < max(least, _POOR * (votes[0] if votes else 0.0)):
+        if own < max(faint, poor * (votes[0] if votes else 0.0)):
             return kept, votes
         kept.append(best)
         votes.append(own)
-        free[distance[best] < SAME_PX] = 0.0
+        free[distance[best] < same] = 0.0
         wanted[best] = 0.0
-        room[falls[best]] -= 1
-        if not room[falls[best]]:
+        rooms[falls[best]] -= 1
+        if not rooms[falls[best]]:
             wanted[np.array(falls) == falls[best]] = 0.0
 
 
-def _label_difference(left: np.ndarray, right: np.ndarray, labels: np.ndarray, grid: CoarseGrid) -> np.ndarray:
-    """Share of places along each line whose two sides have different coarse labels, (n,)."""
+def differing_with_numpy(
+    lines: list[tuple[float, float]], labels: np.ndarray, scale: float, beside: float
+) -> list[float]:
+    """What `differing_natively` computes, where there is no machine code."""
     rows, columns = labels.shape
     share = (np.arange(columns) + 0.5) / columns
-    level = (left[:, None] + (right - left)[:, None] * share) * (2.0 / grid.stride) - 0.5
-    above, below = (np.rint(level + offset).astype(np.intp) for offset in (-_LABEL_CELLS, _LABEL_CELLS))
+    left, right = np.array(lines).reshape(-1, 2).T
+    level = (left[:, None] + (right - left)[:, None] * share) * scale - 0.5
+    above, below = (np.rint(level + offset).astype(np.intp) for offset in (-beside, beside))
     inside = (above >= 0) & (below < rows)
     k = np.arange(columns)
     different = labels[np.clip(above, 0, rows - 1), k] != labels[np.clip(below, 0, rows - 1), k]
-    return np.count_nonzero(different & inside, axis=1) / columns
+    return (np.count_nonzero(different & inside, axis=1) / columns).tolist()

@@ -11,7 +11,7 @@ from sim.cameras.finish import PictureFinish
 from sim.cameras.gl_scene import GlScene
 from sim.cameras.outline import CutLine
 from sim.cameras.view import View, board_corners
-from sim.canvas import TEXTURE_PAD_PX, Canvas
+from sim.canvas import TEXTURE_PAD_PX, Canvas, FreshPaint
 from sim.scene import Scene
 
 #: Neighbours of a rim pixel that certainly lie on the board and on the wall [px].
@@ -63,8 +63,13 @@ class GLCamera:
 
     def capture(self, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, stamp_ns: int) -> RgbdFrame:
         """Take a picture, see `sim.cameras.protocol.Camera`; the frame owns its arrays."""
+        return self.develop(position_ned, quaternion_b_in_i, stamp_ns, self.canvas.take())
+
+    def develop(
+        self, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, stamp_ns: int, fresh: FreshPaint | None
+    ) -> RgbdFrame:
+        """Draw a picture from a pose and what is new of the paint; pictures are drawn in the order of exposure."""
         view = View.of_vehicle(position_ned, quaternion_b_in_i, self.vehicle.camera_position_m, self.intrinsics)
-        fresh = self.canvas.take()
         face = _face(self.canvas.draw(fresh))
         if fresh is not None:
             box = _within(fresh.box, face.shape)

@@ -1,4 +1,4 @@
-"""A plane camera drawn by a process of its own: pictures are late anyway, so the flight need not wait for them."""
+"""A camera drawn by a process of its own: pictures are late anyway, so the flight need not wait for them."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def spare_core(processes: int = 1) -> bool:
 
 
 class RemoteCamera:
-    """`PlaneCamera` in another process: the same pictures to the bit, handed over in shared memory.
+    """`PlaneCamera` or `GLCamera` in another process: the same pictures to the bit, handed over in shared memory.
 
     Pose and fresh paint of a capture are sent to the process, which draws in order. Close it after use.
 
@@ -42,9 +42,17 @@ class RemoteCamera:
         vehicle: Where camera, arm and propellers are.
         seed: Seed of canvas and noise.
         take: `Canvas.take` of the board that is painted here; the process draws its own of the same scene and seed.
+        back_end: "plane" or "gl".
     """
 
-    def __init__(self, scene: Scene, vehicle: VehicleParams, seed: int, take: Callable[[], FreshPaint | None]) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        vehicle: VehicleParams,
+        seed: int,
+        take: Callable[[], FreshPaint | None],
+        back_end: str = "plane",
+    ) -> None:
         self.intrinsics, self._take = camera_intrinsics(scene.camera), take
         shape = (scene.camera.height, scene.camera.width)
         # every picture under way has its place, and one is being read
@@ -55,7 +63,7 @@ class RemoteCamera:
         self._begun = self._done = 0
         self._pipe, there = context.Pipe()
         self._process = context.Process(
-            target=_draw, args=(scene, vehicle, seed, memory, places, there), name="camera", daemon=True
+            target=_draw, args=(back_end, scene, vehicle, seed, memory, places, there), name="camera", daemon=True
         )
         resource_tracker.ensure_running()  # its own start lets Ctrl-C through again
         signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # Ctrl-C must not hit its imports
@@ -139,16 +147,28 @@ def _views(memory, places: int, shape: tuple[int, int]) -> list[tuple[np.ndarray
     return views
 
 
-def _draw(scene: Scene, vehicle: VehicleParams, seed: int, memory, places: int, pipe: Connection) -> None:
+def _open(back_end: str, scene: Scene, vehicle: VehicleParams, seed: int):
+    """The camera that draws; OpenGL is loaded only where it is used."""
+    canvas = Canvas(scene, seed)
+    if back_end == "gl":
+        from sim.cameras.gl import GLCamera
+
+        return GLCamera(scene, vehicle, canvas, seed)
+    from sim.cameras.plane import PlaneCamera
+
+    return PlaneCamera(scene, vehicle, canvas, seed)
+
+
+def _draw(
+    back_end: str, scene: Scene, vehicle: VehicleParams, seed: int, memory, places: int, pipe: Connection
+) -> None:
     """Draw what is asked for until None comes or the other end closes."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the flight decides what Ctrl-C means
     import cv2
 
-    from sim.cameras.plane import PlaneCamera
-
     cv2.setNumThreads(1)
     try:
-        camera = PlaneCamera(scene, vehicle, Canvas(scene, seed), seed)
+        camera = _open(back_end, scene, vehicle, seed)
         views = _views(memory, places, (scene.camera.height, scene.camera.width))
         while True:
             order = pipe.recv()

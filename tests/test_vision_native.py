@@ -1,0 +1,177 @@
+"""Machine code of vision: it computes what the numpy code beside it says, and that one serves without a compiler."""
+
+from __future__ import annotations
+
+import itertools
+import shutil
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from ibvs_qp.vehicle import VehicleParams
+from ibvs_qp.vision import (
+    Perception,
+    VisionConfig,
+    classify,
+    edge_points,
+    flow_solve,
+    follow_plane,
+    hypotheses,
+    lines,
+    plane,
+    vote,
+)
+from ibvs_qp.vision import native as native_module
+from ibvs_qp.vision.percept import Percept
+from sim.bench.mission import Shot, mission_shots
+from sim.scene import Scene
+
+needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler on this machine")
+#: Rounding: single precision where pixels are mixed, double elsewhere.
+SINGLE, DOUBLE = 1e-5, 1e-9
+
+
+@pytest.fixture(scope="module")
+def shots() -> list[Shot]:
+    return list(itertools.islice(mission_shots((424, 240), 40, 3, VehicleParams()), 40))
+
+
+@pytest.fixture
+def fresh(monkeypatch: pytest.MonkeyPatch):
+    """Lets a test choose its compiler; what was translated for it is forgotten afterwards."""
+    native_module.native.cache_clear()
+    yield monkeypatch
+    native_module.native.cache_clear()
+
+
+def see(shots: list[Shot]) -> list[Percept]:
+    """What perception makes of pictures followed, and of each by itself."""
+    paint = Scene().paint
+    config = VisionConfig(paint_color=paint.color, brush_width_m=paint.brush_width_m)
+    tracking, searching = Perception(config, VehicleParams()), Perception(config, VehicleParams())
+    seen = []
+    for shot in shots:
+        seen.append(
+            tracking.process(shot.frame, attitude=shot.attitude, rotation=shot.rotation, velocity=shot.velocity)
+        )
+        searching.reset()
+        seen.append(searching.process(shot.frame, attitude=shot.attitude, detect=True))
+    assert not any(percept.refused for percept in seen)
+    return seen
+
+
+def close(one, two, tolerance: float) -> bool:
+    """Whether two results are equal, numbers to rounding."""
+    if isinstance(one, (list, tuple)):
+        return len(one) == len(two) and all(close(a, b, tolerance) for a, b in zip(one, two, strict=True))
+    if isinstance(one, (np.ndarray, float)):
+        return np.shape(one) == np.shape(two) and np.allclose(one, two, rtol=tolerance, atol=tolerance, equal_nan=True)
+    return one == two
+
+
+def same_fits(ours, numpys) -> bool:
+    """Whether two batches of fitted lines agree."""
+    one, two, alive = ours.fits, numpys.fits, numpys.fits.alive
+    same = one.alive == alive and np.array_equal(ours.profiles.u, numpys.profiles.u)
+    for k in np.flatnonzero(alive):
+        a, b = one.lines[k], two.lines[k]
+        same &= np.array_equal(one.support[k], two.support[k]) and np.array_equal(one.visible[k], two.visible[k])
+        same &= (one.runs[k], one.seen[k], one.count[k]) == (two.runs[k], two.seen[k], two.count[k])
+        same &= close([a.level, a.slope, a.center, a.rms], [b.level, b.slope, b.center, b.rms], SINGLE)
+        same &= abs(a.level_variance / b.level_variance - 1.0) < 1e-3 and close(one.steps[k], two.steps[k], DOUBLE)
+        if ours.sides is not None:  # a side read at half a pixel may be rounded either way
+            same &= np.mean(np.all(ours.sides[:, k] == numpys.sides[:, k], axis=-1)) > 0.95
+    return bool(same)
+
+
+@needs_compiler
+def test_every_function_computes_what_numpy_does(shots: list[Shot], fresh: pytest.MonkeyPatch) -> None:
+    fresh.delenv("CC", raising=False)
+    calls = Counter()
+
+    def compare(module, native: str, reference, same) -> None:
+        function = getattr(module, native)
+
+        def both(library, *args, **kwargs):
+            found = function(library, *args, **kwargs)
+            assert same(found, reference(*args, **kwargs)), f"{native} differs from numpy"
+            calls[native] += 1
+            return found
+
+        fresh.setattr(module, native, both)
+
+    def exact(a, b) -> bool:
+        return close(a, b, DOUBLE)
+
+    def told(a, b) -> bool:
+        return all(exact([x.board, x.paint, x.steps, x.samples], [y.board, y.paint, y.steps, y.samples])
+                   for x, y in zip(a, b, strict=True))  # fmt: skip
+
+    def look(*args, **kwargs):
+        return classify.look_with_numpy(*args)
+
+    compare(lines, "fit_natively", lines.fit_with_numpy, same_fits)
+    compare(edge_points, "points_natively", edge_points.points_with_numpy, np.array_equal)
+    compare(vote, "distinct_natively", vote.distinct_with_numpy, exact)
+    compare(vote, "differing_natively", vote.differing_with_numpy, exact)
+    compare(classify, "look_natively", look, told)
+    compare(hypotheses, "_near_natively", hypotheses.near_with_numpy, np.array_equal)
+    compare(hypotheses, "_judge_natively", hypotheses.judge_with_numpy, exact)
+    compare(flow_solve, "depths_natively", flow_solve.depths_with_numpy, exact)
+    compare(flow_solve, "root_natively", flow_solve.root_with_numpy, lambda a, b: close(a, b, 1e-6))
+    compare(flow_solve, "solve_natively", flow_solve.solve_with_numpy, lambda a, b: close(a, b, 1e-6))
+    see(shots)
+    assert len(calls) == 10 and min(calls.values()) > 20, calls
+
+
+@needs_compiler
+def test_the_surface_is_refitted_as_numpy_does(shots: list[Shot], fresh: pytest.MonkeyPatch) -> None:
+    fresh.delenv("CC", raising=False)
+    calls = Counter()
+
+    def compare(kind: type, name: str, reference: str) -> None:
+        function = getattr(kind, name)
+
+        def both(self, *args):
+            found, wanted = function(self, *args), getattr(self, reference)(*args)
+            calls[name] += 1
+            if isinstance(wanted, str):
+                assert found == wanted
+                return found
+            for field in ("inverse_depth", "covariance", "normal", "distance_m", "inlier_share", "residual_sigma"):
+                assert close(getattr(found, field), getattr(wanted, field), DOUBLE), field
+            np.testing.assert_array_equal(found.component, wanted.component)
+            return found
+
+        fresh.setattr(kind, name, both)
+
+    compare(follow_plane.PlaneFollower, "follow", "follow_with_numpy")
+    compare(plane.PlaneFitter, "_refine", "_refine_with_numpy")
+    see(shots)
+    assert min(calls["follow"], calls["_refine"]) > 20, calls
+
+
+@needs_compiler
+def test_without_a_compiler_the_same_is_seen(shots: list[Shot], fresh: pytest.MonkeyPatch) -> None:
+    found = []
+    for command in ("cc", "no-such-compiler"):
+        fresh.setenv("CC", command)
+        native_module.native.cache_clear()
+        assert (native_module.native() is None) == (command != "cc")
+        found.append(see(shots))
+    for ours, numpys in zip(*found, strict=True):
+        assert close(ours.features.plane, numpys.features.plane, DOUBLE)
+        assert [line.track_id for line in ours.features.lines] == [line.track_id for line in numpys.features.lines]
+        for one, two in zip(ours.features.lines, numpys.features.lines, strict=True):
+            assert close([one.rho, one.theta, one.segment], [two.rho, two.theta, two.segment], SINGLE)
+        assert close(ours.features.velocity, numpys.features.velocity, SINGLE)
+
+
+def test_a_compiler_that_fails_is_reported_once_and_numpy_serves(
+    fresh: pytest.MonkeyPatch, tmp_path, caplog: pytest.LogCaptureFixture
+) -> None:
+    fresh.setenv("CC", "false")
+    fresh.setenv("IBVS_QP_CACHE", str(tmp_path))
+    assert native_module.native() is None and native_module.native() is None
+    assert len(caplog.records) == 1 and "numpy" in caplog.text
