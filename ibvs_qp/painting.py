@@ -1,8 +1,6 @@
 """Painting strategy: from what is seen and felt to the reference of the controller, row by row.
 
-Everything is in metres around the tip's wall point (see `TrackedLine`). Guides are chosen by association: distance
-to where they must be, the side on which the surface lies, and the direction of travel; never by "topmost" or
-"first vertical" (design, section 4.4).
+Everything is in metres around the tip's wall point (see `TrackedLine`). Which line is which: `ibvs_qp.guides`.
 """
 
 from __future__ import annotations
@@ -12,15 +10,21 @@ import math
 import numpy as np
 
 from ibvs_qp.estimation.motion import TrackedLine
-from ibvs_qp.measurement import HORIZONTAL, VERTICAL
+from ibvs_qp.guides import (
+    FIRST_STOP_GATE,
+    ROW_GATE,
+    START_GATE,
+    STOP_GATE,
+    bottom_edge,
+    fresh_edge,
+    start_mark,
+    stop_edge,
+)
+from ibvs_qp.measurement import VERTICAL
 from ibvs_qp.painting_job import NONE, PaintingConfig, Scenery, Wish
 
-#: A guide may differ from where it must be by this much [m]: at the start, and from row to row.
-START_GATE, ROW_GATE = 0.15, 0.018
-#: A gate says nothing of a line known less well than this share of it; nobody sets out for a guide known less well [m].
-GATE_SHARE, START_DEVIATION = 1.0 / 3.0, 0.01
-#: The right board edge is trusted as start mark only this near to its expected place [m].
-RIGHT_EDGE_GATE = 0.06
+#: Nobody sets out for a guide known less well than this [m].
+START_DEVIATION = 0.01
 #: A guide's reference slides to its nominal offset at this speed [m/s].
 SLIDE_SPEED = 0.01
 #: Share of a stroke after which its end may come.
@@ -266,35 +270,15 @@ class Painter:
         return self.config.fresh_edge_m - left, -1.0 if self.row % 2 == 1 else 1.0
 
     def _bottom_edge(self, seen: Scenery) -> TrackedLine | None:
-        """The horizontal line below the tip with the surface above it, nearest to where the guide must be."""
-        expected = self._guide_target if self.phase != "start" else self.config.edge_margin_m
-        gate = START_GATE if self.phase in ("start", "approach") else ROW_GATE
-        return _nearest(
-            seen.lines.values(),
-            lambda line: line.role == HORIZONTAL and line.kind != "paint" and line.surface_side <= 0,
-            expected,
-            gate,
-        )
+        far = self.phase in ("start", "approach")
+        expected = self.config.edge_margin_m if self.phase == "start" else self._guide_target
+        return bottom_edge(seen.lines.values(), expected, START_GATE if far else ROW_GATE)
 
     def _fresh_edge(self, seen: Scenery) -> TrackedLine | None:
-        """The upper edge of the last row: paint below, bare surface above, where this row expects it."""
-        return _nearest(
-            seen.lines.values(),
-            lambda line: line.role == HORIZONTAL and line.kind != "board" and line.surface_side <= 0,
-            self.config.fresh_edge_m,
-            ROW_GATE,
-        )
+        return fresh_edge(seen.lines.values(), self.config.fresh_edge_m)
 
     def _start_mark(self, seen: Scenery) -> TrackedLine | None:
-        """The right board edge, if it is where a row that starts one margin inside would have it."""
-        return _nearest(
-            seen.lines.values(),
-            lambda line: (
-                line.role == VERTICAL and line.kind != "paint" and line.surface_side <= 0 and line.weight > 0.3
-            ),
-            self.config.edge_margin_m,
-            RIGHT_EDGE_GATE,
-        )
+        return start_mark(seen.lines.values(), self.config.edge_margin_m)
 
     def _keep_guide(self, seen: Scenery, chooser) -> None:
         """Stay with the guide while it lives; when it is gone, look for it where it must be."""
@@ -330,11 +314,12 @@ class Painter:
             ahead = config.stroke_m - travelled
         else:
             ahead = place - self._stroke_end if travel < 0 else self._stroke_start - place
-        side = 1 if travel < 0 else -1
         wanted = travel * (config.edge_margin_m if travel < 0 else (self._right_edge or config.edge_margin_m))
         edge = seen.lines.get(self._edge_id)
         if (edge is None or edge.weight < 0.05) and travelled > LEAST_STROKE * config.stroke_m * (self.row == 1):
-            edge = self._stop_edge(seen, travel, side, ahead, wanted)
+            known = travel < 0 or self._right_edge is not None
+            gate, expected = FIRST_STOP_GATE if self.row == 1 else STOP_GATE, wanted + travel * max(ahead, 0.0)
+            edge = stop_edge(seen.lines.values(), travel, expected, gate) if known else None
         if edge is not None:
             self._edge_id = edge.track_id
             return travel * (edge.offset - wanted), edge
@@ -342,25 +327,6 @@ class Painter:
         if self.row == 1:
             return ahead + OVERRUN, None  # the stroke ends at the edge, which may come a little late
         return ahead, None
-
-    def _stop_edge(self, seen: Scenery, travel: float, side: int, ahead: float, wanted: float) -> TrackedLine | None:
-        """The vertical edge ahead whose surface lies on the side we come from, near where the stroke must end."""
-        if travel > 0 and self._right_edge is None:
-            return None
-        gate = 0.25 if self.row == 1 else 0.06
-        best = _nearest(
-            seen.lines.values(),
-            lambda line: (
-                line.role == VERTICAL
-                and line.kind != "paint"
-                and line.surface_side == side
-                and line.weight > 0.9
-                and travel * line.offset > 0.0
-            ),
-            wanted + travel * max(ahead, 0.0),
-            gate,
-        )
-        return best
 
     def _check_contact(self, seen: Scenery) -> None:
         if not seen.in_contact and not self._paused:
@@ -422,13 +388,3 @@ class Painter:
 def clipped(value: float, low: float, high: float) -> float:
     """The value within its bounds; plain comparisons, because calls of min and max cost several times as much."""
     return low if value < low else high if value > high else value
-
-
-def _nearest(lines, accept, expected: float, gate: float) -> TrackedLine | None:
-    best, least = None, gate
-    for line in lines:
-        if line.weight > 0.0 and line.deviation <= GATE_SHARE * gate:
-            away = abs(line.offset - expected)
-            if (away < least or (away == least and best is None)) and accept(line):
-                best, least = line, away
-    return best
