@@ -169,7 +169,11 @@ def runs(
             pilot = change(pilot)
         for index in range(seeds):
             options = FlightOptions(
-                law=law, seed=choice.seed + index, features=features or choice.features, video=False
+                law=law,
+                seed=choice.seed + index,
+                features=features or choice.features,
+                vision=VARIANTS[variant].vision,
+                video=False,
             )
             config = pilot_config(scene, options, pilot)
             flights.append(

@@ -11,7 +11,16 @@ from sim.sweep.design import Run
 
 NAME = "paint"
 SEEDS, ABLATION_SEEDS = 30, 4
-ABLATIONS = ("printed", "shared-gains", "no-feedforward", "no-ramp", "no-barriers", "clipped", "paper-lines")
+ABLATIONS = (
+    "printed",
+    "shared-gains",
+    "no-feedforward",
+    "no-ramp",
+    "no-barriers",
+    "clipped",
+    "paper-lines",
+    "paper-vision",
+)
 #: Stroke of the quick flights [m].
 QUICK_STROKE_M = 0.4
 

@@ -17,11 +17,13 @@ class Variant:
     Attributes:
         words: What is different, for tables.
         switches: Fields of `ControllerConfig` and their values.
+        vision: Perception of rendered pictures, as in `FlightOptions`.
         laws: Laws for which it makes sense.
     """
 
     words: str
     switches: dict[str, Any] = field(default_factory=dict)
+    vision: str = "own"
     laws: tuple[str, ...] = ("qp", "paper")
 
     def apply(self, config: PilotConfig) -> PilotConfig:
@@ -54,6 +56,10 @@ VARIANTS = {
         words="line rows of the QP at the image centre, as in the paper, instead of at the tip",
         switches={"line_profile": "paper"},
         laws=("qp",),
+    ),
+    "paper-vision": Variant(
+        words="the paper's vision: normal picture, Canny and Hough, topmost level line and first upright one",
+        vision="paper",
     ),
     "no-reach-check": Variant(words="asked push not reduced to the reach", switches={"reach_check": False}),
 }

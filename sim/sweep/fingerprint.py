@@ -18,6 +18,8 @@ from sim.sweep.design import Run
 
 #: Folders of `sim` whose code only words or draws results: a change there needs no new flight.
 _AFTER_THE_FLIGHT = ("figures", "commands", "experiments", "tune")
+#: What source is written in.
+_SOURCES = (".py", ".c", ".h")
 #: Letters of a hash that are kept: 64 bit.
 _LENGTH = 16
 
@@ -49,7 +51,7 @@ def code_hash() -> str:
     source = hashlib.sha256()
     for package in (allocation, ibvs_qp, sim):
         root = Path(next(iter(package.__path__)))
-        for file in sorted(root.rglob("*.py")):
+        for file in sorted(file for suffix in _SOURCES for file in root.rglob(f"*{suffix}")):
             relative = file.relative_to(root)
             if package is sim and relative.parts[0] in _AFTER_THE_FLIGHT:
                 continue
