@@ -167,8 +167,14 @@ class Painter:
         high, aside, right, down = self._calm
         return max(abs(high), abs(aside)), math.hypot(right, down)
 
+    def _hold_where_it_touched(self, seen: Scenery) -> None:
+        """A tip that is pressed is held by friction: to wish it elsewhere would be to wish a slide."""
+        if seen.in_contact and math.isnan(self._since):
+            self._since, self._anchor = seen.time_s, float(seen.odometer[0])
+
     def _press(self, seen: Scenery, dt: float) -> Wish:
         self._keep_guide(seen, self._bottom_edge)
+        self._hold_where_it_touched(seen)
         settled = seen.in_contact and seen.time_since_touch > 1.2
         if settled and abs(seen.push - seen.push_wanted) < 0.15 * max(seen.push_wanted, 1.0):
             self.row = 1

@@ -41,6 +41,7 @@ class Presser(Painter):
 
     def _press(self, seen: Scenery, dt: float) -> Wish:
         self._keep_guide(seen, self._bottom_edge)
+        self._hold_where_it_touched(seen)
         if math.isnan(self._touched) and seen.in_contact:
             self._touched = seen.time_s
         if seen.time_s - self._touched > self._hold_s:

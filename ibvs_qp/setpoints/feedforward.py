@@ -69,12 +69,12 @@ def contact_feedforward(
     felt = signals.remember("feedforward_moment", old + share * (gain * body.wrench[3:] - old))
     model = settings.moment_gain * ca.cross(ca.DM(config.vehicle.tip_position_m), force)
     known = signals.state("feedforward_known", 3)
-    late = 1.0 - ca.exp(-body.dt / _moment_lag(config))
+    late = 1.0 - ca.exp(-body.dt / moment_lag(config))
     known = signals.remember("feedforward_known", known + late * (model - known))
     return ContactFeedforward(force=force, moment=felt + model - known, felt_moment=felt)
 
 
-def _moment_lag(config: ControllerConfig) -> float:
+def moment_lag(config: ControllerConfig) -> float:
     """How late a measured moment is when the rotors answer to it: their mean lag and the filter's [s]."""
     vehicle = config.vehicle
     motors = 0.5 * (vehicle.motor_lag_up_s + vehicle.motor_lag_down_s)

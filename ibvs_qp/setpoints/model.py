@@ -30,7 +30,7 @@ def setpoint_model(config: ControllerConfig) -> Signals:
     effectiveness = control_effectiveness(vehicle.geometry)
     body, touch, wish = Body.of(signals), Touch.of(signals), Wish.of(signals)
     wall = wall_axes(signals, body, touch)
-    wanted_turn(signals, config.gains, body, touch, wish)
+    wanted_turn(signals, config, body, touch, wish)
     travel = wish.velocity[0] * wall.right + wish.velocity[1] * wall.down
 
     tip = body.velocity_of(vehicle.tip_position_m)

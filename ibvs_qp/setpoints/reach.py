@@ -13,8 +13,8 @@ from ibvs_qp.vehicle import VehicleParams
 REACH_SHARE = 0.97
 #: Reach given out when nothing bounds it [N].
 UNBOUNDED = 1e6
-#: Commanded speed below which the tip counts as standing still [m/s].
-STANDING_SPEED = 1e-3
+#: Commanded speed below which the tip counts as standing still [m/s]: what a drifting odometer wishes is no slide.
+STANDING_SPEED = 1e-2
 #: Thrust per newton of push below which a rotor does not mind.
 IDLE_SLOPE = 1e-9
 

@@ -6,12 +6,15 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from ibvs_qp.config import Gains
-from ibvs_qp.setpoints.sensed import Body, Touch, Wish, clamp
+from ibvs_qp.config import ControllerConfig
+from ibvs_qp.setpoints.feedforward import SLIDING_COMMAND, moment_lag
+from ibvs_qp.setpoints.sensed import SLOT_INPUTS, Body, Touch, Wish, clamp
 from ibvs_qp.setpoints.signals import Signals
 
 #: Yaw acceleration asked for at most by a vehicle that has lost a rotor [rad/s^2].
 LOST_TURN = 2.0
+#: Share of the stiffest stable yaw that is used while friction holds the tip.
+HELD_SHARE = 1.0 / 3.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,12 +34,42 @@ def wall_axes(signals: Signals, body: Body, touch: Touch) -> Wall:
     return Wall(normal=signals.output("normal", touch.normal), right=right, down=down)
 
 
-def wanted_turn(signals: Signals, gains: Gains, body: Body, touch: Touch, wish: Wish) -> None:
+def held_yaw_gain(config: ControllerConfig) -> float:
+    r"""Stiffest yaw of a vehicle whose tip is held by friction while no line fixes its place sideways [1/s^2].
+
+    It turns about the tip, L ahead. The fed-forward contact moment comes T late, and what is late of it is the moment
+    of the vehicle's own mass: :math:`J\ddot\psi = J\alpha + T \, d/dt (m L^2 \ddot\psi + L F_y)`. With
+    :math:`\alpha = -K_p \psi - K_d \dot\psi` and :math:`F_y = -m K_v v_y`, :math:`v_y = -L \dot\psi`, Routh asks for
+
+    .. math:: K_p < K_d \Big(\frac{J}{m L^2 T} + K_v\Big),
+
+    31 for the shipped vehicle. A third of it is taken. Stiffer, the vehicle rocks about its tip until it slips.
+    """
+    vehicle, gains = config.vehicle, config.gains
+    swing = vehicle.mass_kg * vehicle.tip_position_m[0] ** 2 * moment_lag(config)
+    return HELD_SHARE * gains.yaw_kd * (vehicle.inertia_kg_m2[2] / max(swing, 1e-9) + gains.velocity_kp)
+
+
+def _yaw_gain(signals: Signals, config: ControllerConfig, touch: Touch, wish: Wish) -> ca.SX:
+    """Yaw stiffness: the configured one, softer while friction alone holds the tip sideways."""
+    gain = config.gains.yaw_kp
+    if not config.contact_feedforward:
+        return ca.SX(gain)
+    vertical, fixed = signals.input("vertical", config.line_slots), ca.SX(0.0)
+    for slot in range(config.line_slots):
+        present, *_, weight, _ = ca.vertsplit(signals.input(f"line_{slot}", SLOT_INPUTS))
+        fixed = ca.fmax(fixed, vertical[slot] * present * weight)
+    held = ca.logic_and(touch.touching, ca.norm_2(wish.velocity) <= SLIDING_COMMAND) * (1.0 - fixed)
+    return gain + held * (min(gain, held_yaw_gain(config)) - gain)
+
+
+def wanted_turn(signals: Signals, config: ControllerConfig, body: Body, touch: Touch, wish: Wish) -> None:
     r"""Angles and wanted accelerations :math:`-K_p \varphi - K_d \dot\varphi` of roll, pitch and yaw [rad/s^2]."""
+    gains = config.gains
     roll = ca.atan2(body.down[1], body.down[2])
     pitch = ca.asin(clamp(-body.down[0], -1.0, 1.0))
     yaw = ca.if_else(touch.known, -ca.atan2(touch.normal[1], touch.normal[0]), 0.0)
-    level, turn = (gains.attitude_kp, gains.attitude_kd), (gains.yaw_kp, gains.yaw_kd)
+    level, turn = (gains.attitude_kp, gains.attitude_kd), (_yaw_gain(signals, config, touch, wish), gains.yaw_kd)
     tilt = signals.output("tilt_error", ca.vertcat(roll, pitch) - wish.tilt)
     lost = signals.output("tilted", ca.norm_2(wish.tilt) > 0.0)
     # A tilted vehicle that turns about the vertical has roll and pitch rates without changing either angle.
