@@ -73,13 +73,14 @@ static void keep_strongest(const uint8_t *steps, const uint8_t *before, const ui
 }
 
 /* Strongest steps of either polarity in the view in which lines are level, (2, rows, columns) of it; `strong` is all 0.
-   `scratch` is 0 and has room for the thinned-out picture and twice one channel of it. */
-static void strongest_steps(const Thin *thin, const uint8_t *rgb, const int *table, uint8_t *scratch, uint8_t *strong) {
+   `steps` is 0 too and has room for two channels of the thinned-out picture, `scratch` for all of it and a row. */
+static void strongest_steps(const Thin *thin, const uint8_t *rgb, const int *table, uint8_t *scratch, uint8_t *steps,
+                            uint8_t *strong) {
     int rows = (int)thin->rows, columns = (int)thin->columns, width = (int)thin->width, upright = thin->upright != 0.0;
     const int *across = table, *second = across + rows, *along = second + rows, *share = along + columns;
     long line = CHANNELS * (long)width, wide = CHANNELS * (long)columns, size = (long)rows * columns;
     int halves = table[2 * (rows + columns)];
-    uint8_t threshold = (uint8_t)thin->threshold, *row = scratch, *steps = scratch + wide * rows;
+    uint8_t threshold = (uint8_t)thin->threshold, *row = scratch;
     long view = upright ? (long)rows * (columns - 2) : (long)columns * (rows - 2);
     for (int r = 0; r < rows; r++) {
         const uint8_t *one = rgb + across[r] * line;
@@ -162,15 +163,17 @@ int edge_points(const Thin *thin, const uint8_t *rgb, const uint8_t *mask, const
                 int32_t *counts) {
     int rows = (int)thin->rows, columns = (int)thin->columns, height = (int)thin->height, width = (int)thin->width;
     long size = (long)rows * columns, numbers = 2 * (rows + columns) + 1 + size + 2 * (rows + columns);
-    uint8_t *memory = calloc(numbers * sizeof(int) + (CHANNELS + 4) * size + 8 * columns + 8, 1);
+    uint8_t *memory = malloc(numbers * sizeof(int) + (CHANNELS + 4) * size + 8 * columns + 16);
     if (memory == NULL) return 0;
     int *table = (int *)memory, *along = table + 2 * rows, *held = along + 2 * columns + 1;
-    uint8_t *strong = (uint8_t *)(held + size + 2 * (rows + columns)), *scratch = strong + 2 * size + 8;
+    uint8_t *strong = (uint8_t *)(held + size + 2 * (rows + columns)), *steps = strong + 2 * size + 8;
+    uint8_t *scratch = steps + 2 * size + 8;
+    memset(strong, 0, 4 * size + 16);
     int halves = shares_of(rows, height, table, table + rows);
     halves &= shares_of(columns, width, along, along + columns);
     /* the mean of four pixels reads two bytes too far */
     table[2 * (rows + columns)] = halves && (along[columns - 1] + 2 < width || table[rows - 1] + 2 < height);
-    strongest_steps(thin, rgb, table, scratch, strong);
+    strongest_steps(thin, rgb, table, scratch, steps, strong);
     long view = thin->upright != 0.0 ? (long)rows * (columns - 2) : (long)columns * (rows - 2);
     counts[0] = points_of(thin, strong, mask, region, held, points);
     counts[1] = points_of(thin, strong + view, mask, region, held, points + 3 * counts[0]);
