@@ -16,6 +16,7 @@ import traceback
 from typing import Any
 
 from ibvs_qp.errors import IbvsQpError
+from sim.memory import keep_memory
 
 #: Commands by name, for hints.
 COMMANDS = ("paint", "experiment", "compare", "explain", "bench", "detect", "sweep", "tune")
@@ -38,6 +39,7 @@ def main(arguments: list[str] | None = None) -> int:
     """
     for variable in _THREAD_VARIABLES:
         os.environ.setdefault(variable, "1")
+    keep_memory()
     words = sys.argv[1:] if arguments is None else arguments
     try:
         return _parse(words).run(words)

@@ -79,12 +79,22 @@ class SurfaceColors:
 
     def _make_table(self, board: np.ndarray) -> None:
         """Labels of all colours in steps of eight grey levels: thousands of colours are looked up per picture."""
+        library, self._table_board = native(), board.copy()
+        if library is None:
+            self._table = self._table_with_numpy(board)
+            return
+        self._table = np.empty(1 << 3 * _TABLE_BITS, np.uint8)
+        paint = self.paint if self.paint_distinct else None
+        library.label_table(place(self._table_board), place(paint), ctypes.c_float(self._gate**2), place(self._table))
+
+    def _table_with_numpy(self, board: np.ndarray) -> np.ndarray:
+        """The same where there is no machine code."""
         to_board = _distances(board)
         table = (to_board < self._gate**2).view(np.uint8)  # true is BOARD, false OTHER
         if self.paint_distinct:
             places, to_paint = self._paint_colors
             table[places[to_paint < to_board.take(places)]] = PAINT
-        self._table, self._table_board = table, board.copy()
+        return table
 
     @cached_property
     def _paint_colors(self) -> tuple[np.ndarray, np.ndarray]:
@@ -97,11 +107,27 @@ class SurfaceColors:
     def like_around(self, grid: CoarseGrid, colors: np.ndarray, seed: tuple[int, int], radius: int) -> np.ndarray:
         """Labels of samples by the colour around a seed: BOARD for what looks like it, uint8 (rows, columns)."""
         [around] = self._around(grid, colors, [seed], radius)
+        library = native()
+        if library is not None:
+            return self._like_natively(library, colors, around)
+        return self._like_with_numpy(colors, around)
+
+    def _like_natively(self, library: ctypes.CDLL, colors: np.ndarray, around: np.ndarray) -> np.ndarray:
+        paint, apart = self.paint, self._gate**2
+        if paint is not None and float(self._distance(paint, around)) <= apart:
+            paint = None
+        colors, labels = np.ascontiguousarray(colors), np.empty(colors.shape[:-1], np.uint8)
+        gate, count = ctypes.c_float(apart), ctypes.c_long(labels.size)
+        library.like_colors(place(colors), count, *(place(part) for part in (around, paint)), gate, place(labels))
+        return labels
+
+    def _like_with_numpy(self, colors: np.ndarray, around: np.ndarray) -> np.ndarray:
+        """The same where there is no machine code."""
         samples = colors.reshape(-1, 3).astype(np.float32)
         labels = (self._distance(samples, around) < self._gate**2).view(np.uint8)
         if self.paint is not None and float(self._distance(self.paint, around)) > self._gate**2:
             labels[(self._distance(samples, self.paint) < self._gate**2) & (labels == OTHER)] = PAINT
-        return labels.reshape(grid.shape)
+        return labels.reshape(colors.shape[:-1])
 
     def bare(
         self, grid: CoarseGrid, colors: np.ndarray, seeds: list[tuple[int, int]], radius: int

@@ -25,8 +25,8 @@ _SOBEL = 4.0
 
 def edge_points(
     picture: Picture, upright: bool, gradient_min: float, region: np.ndarray | None, grid: CoarseGrid
-) -> tuple[np.ndarray, np.ndarray]:
-    """Places where colours rise, and where they fall, along +v of the view in which lines are level.
+) -> tuple[np.ndarray, int]:
+    """Places where colours rise, and then those where they fall, along +v of the view in which lines are level.
 
     Args:
         picture: Colour and mask.
@@ -37,25 +37,15 @@ def edge_points(
 
     Returns:
         (u, v) in half-resolution pixels of the view, 0 at the picture's border, and the weight of its vote, whole
-        numbers up to `full_vote`, so that sums of them are exact: float32 (n, 3) each.
+        numbers up to `full_vote`, so that sums of them are exact: float32 (n, 3); and how many of them rise.
     """
     height, width = picture.mask.shape
     apart = max(height, width) / POINTS
     columns, rows = width // _ACROSS_PX, height // _ACROSS_PX
-    columns, rows = (columns, round(height / apart)) if upright else (round(width / apart), rows)
-    thin = cv2.resize(picture.rgb, (columns, rows), interpolation=cv2.INTER_LINEAR)
-    planes = cv2.split(thin)
-    if upright:
-        planes = tuple(cv2.transpose(plane) for plane in planes)
-    pairs = [(plane[2:], plane[:-2]) for plane in planes]
-    signed = (
-        _strongest([cv2.subtract(below, above) for below, above in pairs]),
-        _strongest([cv2.subtract(above, below) for below, above in pairs]),
-    )
+    size = (columns, round(height / apart)) if upright else (round(width / apart), rows)
     library = native()
     points = points_with_numpy if library is None else functools.partial(points_natively, library)
-    wanted = picture, upright, _threshold(gradient_min), full_vote(gradient_min), _MOST, region, grid
-    return points(signed[0], *wanted), points(signed[1], *wanted)
+    return points(picture, upright, size, _threshold(gradient_min), full_vote(gradient_min), _MOST, region, grid)
 
 
 def full_vote(gradient_min: float) -> int:
@@ -80,6 +70,27 @@ def _thin(strength: np.ndarray, threshold: int) -> np.ndarray:
 
 
 def points_with_numpy(
+    picture: Picture,
+    upright: bool,
+    size: tuple[int, int],
+    threshold: int,
+    full: int,
+    most: int,
+    region: np.ndarray | None,
+    grid: CoarseGrid,
+) -> tuple[np.ndarray, int]:
+    """What `ibvs_qp.vision.native_votes.points_natively` computes, where there is no machine code."""
+    planes = cv2.split(cv2.resize(picture.rgb, size, interpolation=cv2.INTER_LINEAR))
+    if upright:
+        planes = tuple(cv2.transpose(plane) for plane in planes)
+    pairs = [(plane[2:], plane[:-2]) for plane in planes]
+    rising = _strongest([cv2.subtract(below, above) for below, above in pairs])
+    falling = _strongest([cv2.subtract(above, below) for below, above in pairs])
+    found = [_points(steps, picture, upright, threshold, full, most, region, grid) for steps in (rising, falling)]
+    return np.concatenate(found), len(found[0])
+
+
+def _points(
     steps: np.ndarray,
     picture: Picture,
     upright: bool,
@@ -89,10 +100,7 @@ def points_with_numpy(
     region: np.ndarray | None,
     grid: CoarseGrid,
 ) -> np.ndarray:
-    """Places of strong steps that the vehicle does not hide and around which lines are wanted, with their weights.
-
-    Arguments as for `ibvs_qp.vision.native_votes.points_natively`.
-    """
+    """Places of strong steps that the vehicle does not hide and around which lines are wanted, with their weights."""
     places = _thin(steps, threshold)
     rows, columns = steps.shape
     row = places // columns

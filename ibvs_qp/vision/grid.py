@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import ctypes
+import functools
+
 import cv2
 import numpy as np
 
 from ibvs_qp.vision.mask import Intrinsics
+from ibvs_qp.vision.native import native, place
 
 #: Whole pixels need no table of fractions.
 _WHOLE = np.empty((0, 0), np.uint16)
 #: Types that OpenCV can read at places.
 _FAST = (np.dtype(np.uint8), np.dtype(np.float32))
+#: Sets of windows that are remembered.
+_REMEMBERED = 32
 
 
 class CoarseGrid:
@@ -38,6 +44,7 @@ class CoarseGrid:
         along, across = np.meshgrid(u, v)
         self.places = np.stack((along, across), axis=2).astype(np.int16)
         self.free = self.sample(mask) == 0
+        self._windows = functools.lru_cache(maxsize=_REMEMBERED)(self._make_windows)
 
     def sample(self, picture: np.ndarray) -> np.ndarray:
         """Values of a picture at the samples, (rows, columns, ...)."""
@@ -47,6 +54,12 @@ class CoarseGrid:
 
     def inverse_depth(self, depth: np.ndarray, nearest: float, farthest: float) -> np.ndarray:
         """1/Z at the samples [1/m], 0 where the depth is absent, not finite or out of range, (rows, columns)."""
+        library = native()
+        if library is not None and depth.dtype == np.float32 and depth.flags.c_contiguous:
+            inverse, size = np.empty(self.shape), (ctypes.c_long(depth.shape[1]), ctypes.c_long(self.free.size))
+            limits = ctypes.c_double(nearest), ctypes.c_double(farthest)
+            library.sample_depths(place(depth), size[0], place(self.places), size[1], *limits, place(inverse))
+            return inverse
         z = self.sample(depth).astype(np.float64)
         good = (z > nearest) & (z < farthest)  # false for NaN too
         return np.divide(1.0, z, out=np.zeros_like(z), where=good)
@@ -64,7 +77,13 @@ class CoarseGrid:
         )
 
     def windows(self, cells: list[tuple[int, int]], radius: int) -> np.ndarray:
-        """Flat places of the windows around cells, those beyond the border moved to it, (n, (2 radius + 1)^2)."""
+        """Flat places of the windows around cells, those beyond the border moved to it, (n, (2 radius + 1)^2).
+
+        Not to be written: the same cells are asked for again and again.
+        """
+        return self._windows(tuple(cells), radius)
+
+    def _make_windows(self, cells: tuple[tuple[int, int], ...], radius: int) -> np.ndarray:
         steps = np.arange(-radius, radius + 1)
         row, column = np.array(cells).T[:, :, None]
         rows = np.minimum(np.maximum(row + steps, 0), self.shape[0] - 1)

@@ -146,10 +146,7 @@ def _contents(index: int, fits: Fits, strips: Profiles, sides: np.ndarray) -> tu
     u = strips.u[index].take(held)
     pixels = np.empty((len(held), 2))
     pixels[:, int(view.upright)], pixels[:, 1 - int(view.upright)] = u, line.level + line.slope * (u - line.center)
-    beside = np.empty((2, len(held), 3), np.uint8)
-    for side, colors in zip((0, 1)[:: view.sign], sides[:, index], strict=True):
-        beside[side] = colors.take(held, axis=0)
-    return beside, pixels
+    return sides[:: view.sign, index].take(held, axis=1), pixels
 
 
 def _polar(

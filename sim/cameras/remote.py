@@ -20,6 +20,7 @@ from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.vehicle import VehicleParams
 from sim.cameras.protocol import camera_intrinsics
 from sim.canvas import Canvas, FreshPaint
+from sim.memory import keep_memory
 from sim.scene import Scene
 
 #: Time given to the process to end by itself [s].
@@ -167,6 +168,7 @@ def _draw(
     import cv2
 
     cv2.setNumThreads(1)
+    keep_memory()
     try:
         camera = _open(back_end, scene, vehicle, seed)
         views = _views(memory, places, (scene.camera.height, scene.camera.width))

@@ -25,6 +25,7 @@ FILES = (
     "samples.c",
     "planes.c",
     "hypotheses.c",
+    "thin.c",
     "votes.c",
     "sides.c",
     "flow.c",

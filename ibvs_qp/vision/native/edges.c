@@ -87,19 +87,20 @@ static int strongest(const float *answer, const float *preference, int size) {
 
 /* Mix of channels that shows a new line: the typical strongest step of the strip. */
 static void direction_of(const Strip *strip, float *scratch, double *sorted, double *direction) {
-    int profiles = strip->profiles, count = 0;
-    float polarity = (float)strip->query->polarity, *weight = scratch, *steps = scratch + profiles;
+    int profiles = strip->profiles, count = 0, polarity = (int)strip->query->polarity;
+    float *weight = scratch, *steps = scratch + profiles;
     for (int k = 0; k < profiles; k++) {
-        int best = 0;
-        weight[k] = 0.0f;
-        for (int i = 0; i < strip->answers; i++) {
-            float strength = -INFINITY;
-            for (int c = 0; c < 3; c++) {
-                float g = gradient(strip, k, i, c);
-                strength = fmaxf(strength, polarity == 0.0f ? fabsf(g) : g * polarity);
-            }
-            if (strength > weight[k] && admissible(strip, k, i)) weight[k] = strength, best = i;
+        int best = 0, strongest = 0; /* in whole numbers: twice the gradients */
+        const uint8_t *color = strip->colors + 3 * (k * strip->pixels + strip->side);
+        for (int i = 0; i < strip->answers; i++, color += 3) {
+            int red = color[3] - color[-3], green = color[4] - color[-2], blue = color[5] - color[-1], most;
+            if (polarity == 0) red = abs(red), green = abs(green), blue = abs(blue);
+            else red *= polarity, green *= polarity, blue *= polarity;
+            most = red > green ? red : green;
+            most = most > blue ? most : blue;
+            if (most > strongest && admissible(strip, k, i)) strongest = most, best = i;
         }
+        weight[k] = 0.5f * (float)strongest;
         sorted[k] = weight[k];
         for (int c = 0; c < 3; c++) steps[3 * k + c] = gradient(strip, k, best, c);
     }

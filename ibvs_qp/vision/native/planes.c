@@ -19,45 +19,50 @@ typedef struct {
     double count, usable, total, blocks, spread;
 } Surface;
 
-/* Keep the connected part of the chosen samples around the seed, or the largest; hidden samples connect. */
-static long keep_connected(uint8_t *chosen, const uint8_t *free_of, const Grid *grid, int *stack, int *part) {
-    int rows = (int)grid->rows, columns = (int)grid->columns, size = rows * columns, parts = 0;
-    long best = 0, most = 0;
-    memset(part, 0, size * sizeof(int));
-    for (int start = 0; start < size; start++) {
-        if (part[start] || !(chosen[start] || !free_of[start])) continue;
-        long count = 0;
-        int top = 0;
-        part[start] = ++parts;
-        stack[top++] = start;
-        while (top) {
-            int at = stack[--top], row = at / columns, column = at - row * columns;
-            int next[4] = {row ? at - columns : -1, row + 1 < rows ? at + columns : -1, column ? at - 1 : -1,
-                           column + 1 < columns ? at + 1 : -1};
-            count += chosen[at];
-            for (int k = 0; k < 4; k++) {
-                int to = next[k];
-                if (to < 0 || part[to] || !(chosen[to] || !free_of[to])) continue;
-                part[to] = parts;
-                stack[top++] = to;
+static int root_of(const int *parent, int part) {
+    while (parent[part] != part) part = parent[part];
+    return part;
+}
+
+/* Connected parts of the chosen samples, numbered from 1 as they are met; hidden samples connect. `parent` has room for
+   half the samples and one more. */
+static int connect(const uint8_t *chosen, const uint8_t *free_of, int rows, int columns, int *part, int *parent) {
+    int parts = 0;
+    for (int at = 0, r = 0; r < rows; r++)
+        for (int c = 0; c < columns; c++, at++) {
+            int left = c ? part[at - 1] : 0, above = r ? part[at - columns] : 0;
+            if (!(chosen[at] || !free_of[at])) part[at] = 0;
+            else if (!left && !above) part[at] = ++parts, parent[parts] = parts;
+            else if (!left || !above || left == above) part[at] = left ? left : above;
+            else { /* the part that was met first has the name */
+                int one = root_of(parent, left), two = root_of(parent, above);
+                part[at] = one < two ? one : two;
+                parent[one < two ? two : one] = part[at];
             }
         }
-        if (count > most) most = count, best = parts;
-    }
+    for (int k = 1; k <= parts; k++) parent[k] = parent[parent[k]];
+    for (int at = 0; at < rows * columns; at++)
+        if (part[at]) part[at] = parent[part[at]];
+    return parts;
+}
+
+/* Keep the connected part of the chosen samples around the seed, or the largest; hidden samples connect. */
+static long keep_connected(uint8_t *chosen, const uint8_t *free_of, const Grid *grid, int *votes, int *part) {
+    int rows = (int)grid->rows, columns = (int)grid->columns, size = rows * columns, best = 0;
+    int parts = connect(chosen, free_of, rows, columns, part, votes);
+    memset(votes, 0, (parts + 1) * sizeof(int));
     if (grid->seed >= 0.0) {
         int seed = (int)grid->seed, row = seed / columns, column = seed - row * columns;
-        int *votes = stack; /* as many places as parts at most */
-        memset(votes, 0, (parts + 1) * sizeof(int));
-        best = 0;
         for (int r = row < 2 ? 0 : row - 2; r <= row + 2 && r < rows; r++)
             for (int c = column < 2 ? 0 : column - 2; c <= column + 2 && c < columns; c++)
                 if (chosen[r * columns + c]) votes[part[r * columns + c]]++;
-        for (int k = 1; k <= parts; k++)
-            if (votes[k] > votes[best]) best = k;
-        most = votes[best];
-    }
+    } else
+        for (int at = 0; at < size; at++)
+            if (chosen[at]) votes[part[at]]++;
+    for (int k = 1; k <= parts; k++)
+        if (votes[k] > votes[best]) best = k;
     long count = 0;
-    for (int i = 0; i < size; i++) count += chosen[i] = most && chosen[i] && part[i] == best;
+    for (int at = 0; at < size; at++) count += chosen[at] = best && chosen[at] && part[at] == best;
     return count;
 }
 
@@ -154,10 +159,10 @@ int refit_plane(const Grid *grid, const double *design, const double *inverse, c
                 const uint8_t *free_of, const double *start, uint8_t *chosen, Surface *out) {
     enum { GOOD, FEW_ON_SURFACE, FEW_READINGS, ON_A_LINE, NO_MEMORY };
     int size = (int)(grid->rows * grid->columns), problem = GOOD, searched = grid->adaptive != 0.0;
-    double *relative = malloc(size * (2 * sizeof(double) + 2 * sizeof(int) + 1)), gate = grid->gate;
+    double *relative = malloc(size * (2 * sizeof(double) + 2 * sizeof(int) + 1) + sizeof(int)), gate = grid->gate;
     if (relative == NULL) return NO_MEMORY;
     double *values = relative + size;
-    int *stack = (int *)(values + size), *part = stack + size;
+    int *votes = (int *)(values + size), *part = votes + size + 1;
     uint8_t *usable = (uint8_t *)(part + size);
     memcpy(out->plane, start, sizeof out->plane);
     out->usable = 0.0, out->spread = grid->sigma;
@@ -172,7 +177,7 @@ int refit_plane(const Grid *grid, const double *design, const double *inverse, c
             out->spread = MAD_TO_SIGMA * upper_median(values, held);
         }
         long count = choose(grid, relative, usable, labels, gate, grid->paint_gates[last], chosen);
-        if (last || searched) count = keep_connected(chosen, free_of, grid, stack, part);
+        if (last || searched) count = keep_connected(chosen, free_of, grid, votes, part);
         out->count = count;
         if (count < grid->least) problem = FEW_ON_SURFACE;
         else if (!solve_plane(design, inverse, chosen, size, out->plane, out->inverse)) problem = ON_A_LINE;
