@@ -200,10 +200,11 @@ class WallMotion:
 
     def _correct_offset(self, line: TrackedLine, offset: float, scale: float, variance: float, stamp: int) -> bool:
         """Correct with one offset, as noisy as the line has shown itself; False if it is not believed."""
-        slot, past = _LINES + line.slot, self._filter.at(stamp)
+        slot = _LINES + line.slot
+        past = self._filter.entry(stamp, slot)
         if past is None:
             return False
-        innovation = offset - past.item(slot)
+        innovation = offset - past
         difference = line.noise.difference(innovation)
         sample = line.noise.learn(difference, variance)
         self._noise_rho.mix(sample / (scale * scale))
@@ -214,7 +215,8 @@ class WallMotion:
             if line.is_another(difference, variance):
                 self._drop(line.track_id)
             return False
-        line.noise.keep(offset - past.item(slot))  # the history itself, corrected by now
+        past = self._filter.entry(stamp, slot)  # corrected by now
+        line.noise.keep(innovation if past is None else offset - past)
         line.deviation = math.sqrt(covariance.item(slot, slot))
         line.refused = 0
         return True
