@@ -181,7 +181,7 @@ class WallMotion:
     def _correct_line(
         self, line: LineFeature, offset: float, angle: float, side: int, scale: float, stamp: int
     ) -> None:
-        variance = self._config.line_std_m**2 + max(float(line.covariance[0, 0]), 0.0) * scale * scale
+        variance = self._config.line_std_m**2 + max(line.covariance.item(0, 0), 0.0) * scale * scale
         tracked = self.lines.get(line.track_id)
         if tracked is None:
             tracked = self._admit(line, offset, angle, scale, variance, stamp)
@@ -191,7 +191,8 @@ class WallMotion:
             return
         else:
             self._correct_angle(tracked, angle, stamp)
-        tracked.frames += tracked.seen_ns != stamp
+        if tracked.seen_ns != stamp:
+            tracked.frames += 1
         tracked.seen_ns = stamp
         tracked.fresh_weight = min(1.0, tracked.frames / self._config.frames_to_trust) * line.weight
         tracked.news_ns = self._stamp
@@ -209,7 +210,9 @@ class WallMotion:
         sample = line.noise.learn(difference, variance)
         self._noise_rho.mix(sample / (scale * scale))
         variance, covariance = line.noise.total(variance), self._filter.covariance
-        covariance[slot, slot] = max(covariance.item(slot, slot), variance / line.frames)  # see SteadyValue
+        least = variance / line.frames  # see SteadyValue
+        if covariance.item(slot, slot) < least:
+            covariance[slot, slot] = least
         if not self._filter.correct_entry(stamp, slot, offset, variance):
             line.noise.keep(innovation)
             if line.is_another(difference, variance):
@@ -260,8 +263,9 @@ class WallMotion:
 
     def _point(self, line: TrackedLine) -> None:
         """Let the filter know how a line's offset follows the velocity: against its normal."""
-        line.rates = -math.cos(line.angle), -math.sin(line.angle)
-        self._filter.chain[_LINES + line.slot, _VELOCITY] = line.rates
+        line.rates = right, down = -math.cos(line.angle), -math.sin(line.angle)
+        chain, slot = self._filter.chain, _LINES + line.slot
+        chain[slot, 0], chain[slot, 1] = right, down
 
     def feature(self, line: TrackedLine, axes: WallAxes, foot_distance: float, stamp_ns: int) -> LineFeature:
         """The line as the camera would see it now: rho, theta at the tick's own time."""
