@@ -47,9 +47,7 @@ class Columns:
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Every column so far, (N,) or (N, width)."""
-        table = np.concatenate([np.zeros((0, self._width), self._dtype), *self._blocks, self._block(self._rows)])
-        columns = {name: table[:, place] for name, place in self.places.items()}
-        return {
-            name: np.ascontiguousarray(column[:, 0] if column.shape[1] == 1 else column)
-            for name, column in columns.items()
-        }
+        blocks = [*self._blocks, self._block(self._rows)]
+        # Straight from the blocks: a table in between would be as many bytes again, of memory never touched before.
+        columns = {name: np.concatenate([block[:, place] for block in blocks]) for name, place in self.places.items()}
+        return {name: column[:, 0] if column.shape[1] == 1 else column for name, column in columns.items()}

@@ -6,7 +6,6 @@ It stands in for perception where the controller alone is studied (``--features 
 from __future__ import annotations
 
 import dataclasses
-import itertools
 import math
 from collections.abc import Callable
 
@@ -25,16 +24,15 @@ from sim.canvas import Canvas
 from sim.edge_view import (
     BOARD_EDGES,
     BOARD_VIEW,
-    CORNER,
     EDGE_NUMBERS,
-    NEAR_M,
     PER_METRE,
     PLANE,
     board_view,
     painted_edge_view,
 )
-from sim.line_projection import fitted_ends, moved_line, seen_line
-from sim.painted_edges import BIN_M, PaintedEdges
+from sim.line_projection import moved_line, seen_line
+from sim.painted_edges import PaintedEdges
+from sim.painted_pieces import PaintedPieces
 from sim.scene import Scene
 from sim.streams import Normals
 
@@ -89,15 +87,15 @@ class GeometricFeatures:
         self.intrinsics = camera_intrinsics(scene.camera)
         own, extra = np.random.SeedSequence([seed, 0xFEA7]).spawn(2)
         self._normals, self._extra = Normals(np.random.default_rng(own)), np.random.default_rng(extra)
-        self._hidden = vehicle_mask(scene, vehicle, self.intrinsics)
         self._schedule = Schedule(scene.camera.rate_hz, scene.camera.latency_s)
-        self._last_pixel = np.array((scene.camera.width - 1.0, scene.camera.height - 1.0))
-        self._focal, self._centre = np.array(self.intrinsics[:2]), np.array(self.intrinsics[2:])
         self._bind(machine_code if to_machine_code else lambda function: function)
+        hidden = vehicle_mask(scene, vehicle, self.intrinsics)
+        self._pieces = PaintedPieces(self._edges, self._board, self.intrinsics, hidden, to_machine_code)
 
     def _bind(self, translated: Callable[[ca.Function], ca.Function]) -> None:
         """Compiled projection on memory that holds its arguments."""
-        scene, half = self.scene, 0.5 * (self._last_pixel + 1.0) / self._focal
+        scene = self.scene
+        half = 0.5 * np.array((scene.camera.width, scene.camera.height)) / self.intrinsics[:2]
         self._half = half.tolist()
         width, height = scene.board.width_m, scene.board.height_m
         corners = np.array([(0.0, 0.0), (width, 0.0), (width, height), (0.0, height), (0.5 * width, 0.5 * height)])
@@ -111,7 +109,6 @@ class GeometricFeatures:
         self._look_at_piece = BoundFunction(
             translated(painted_edge_view()), (self._board, self._piece, half), (self._edge,)
         )
-        self._corner, self._per_metre = self._board[CORNER], self._board[PER_METRE].reshape(2, 3)
 
     def tick(
         self, now_ns: int, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, velocity_body: np.ndarray
@@ -166,17 +163,9 @@ class GeometricFeatures:
         low, high = self._edges.heights
         if low > high:
             return []
-        rows, points = self._edges.all_exposed(*self._in_view(board, low, high))
-        if len(rows) < 2:
-            return []
-        seen = self._unhidden(self._corner + points @ self._per_metre)
         lines: list[_Line] = []
-        for row, place in _by_row(rows[seen], seen):
-            # The longest piece without a gap; a gap is where a later row, the brush or the picture's border lies.
-            piece = _longest_run(place, points[:, 0])
-            if len(piece) < 2:
-                continue
-            (left, right), (low, high) = fitted_ends(points[piece])
+        span = self._in_view(board, low, high)
+        for row, left, low, right, high in self._pieces.seen(*span):
             self._piece[:] = left, low, right, high, 0.5 * (left + right), 0.5 * (low + high) + _ABOVE_M
             self._look_at_piece()
             numbers = self._edge.tolist()
@@ -199,17 +188,6 @@ class GeometricFeatures:
                 last = min(last, max(meets))
         return first, last
 
-    def _unhidden(self, spots: np.ndarray) -> np.ndarray:
-        """Indices of the points in camera coordinates that are in the picture and not behind arm or brush."""
-        depth = spots[:, 2:]
-        pixels = spots[:, :2] * self._focal
-        pixels /= np.maximum(depth, NEAR_M)  # nearer ones are refused below
-        pixels += self._centre
-        inside = (pixels >= 0.0) & (pixels <= self._last_pixel)
-        places = (inside[:, 0] & inside[:, 1] & (depth[:, 0] > NEAR_M)).nonzero()[0]
-        column, row = np.rint(pixels[places]).astype(int).T
-        return places[self._hidden[row, column] == 0]
-
     def _plane(self, a: float, b: float, c: float) -> tuple[float, float, float]:
         if not self._noise:
             return a, b, c
@@ -220,24 +198,6 @@ class GeometricFeatures:
         x, y, z = (n + SIGMA_NORMAL * (tilt - n * along) for n, tilt in ((x, i), (y, j), (z, k)))
         scale = math.sqrt(x * x + y * y + z * z) * (distance + SIGMA_DISTANCE_M * far)
         return x / scale, y / scale, z / scale
-
-
-def _by_row(rows: np.ndarray, places: np.ndarray) -> list[tuple[int, np.ndarray]]:
-    """Every row that occurs, in order, and its part of the places."""
-    ends = [*((rows[1:] != rows[:-1]).nonzero()[0] + 1).tolist(), len(rows)] if len(rows) else []
-    starts = [0, *ends[:-1]]
-    return [(int(rows[start]), places[start:end]) for start, end in zip(starts, ends, strict=False)]
-
-
-def _longest_run(seen: np.ndarray, along: np.ndarray) -> np.ndarray:
-    """The longest run of indices whose points follow one another without a gap along the board."""
-    if len(seen) == 0 or along[seen[-1]] - along[seen[0]] < (len(seen) - 0.5) * BIN_M:
-        return seen
-    where = along[seen]
-    breaks = np.flatnonzero(where[1:] - where[:-1] > 1.5 * BIN_M) + 1
-    bounds = [0, *breaks.tolist(), len(seen)]
-    start, end = max(itertools.pairwise(bounds), key=lambda run: run[1] - run[0])
-    return seen[start:end]
 
 
 def add_sigma_vs(frame: FeatureFrame, sigma: float, rng: np.random.Generator) -> FeatureFrame:

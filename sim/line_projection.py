@@ -53,16 +53,6 @@ def _on_line(x1: float, y1: float, x2: float, y2: float, rho: float, theta: floa
     return np.array((x1 - near * c, y1 - near * s, x2 - far * c, y2 - far * s)).reshape(2, 2)
 
 
-def fitted_ends(points: np.ndarray) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Least-squares line up(along) through points (n, 2), as (along, up) of its two ends."""
-    along, up = points.T
-    middle, height = float(np.add.reduce(along)) / len(along), float(np.add.reduce(up)) / len(up)
-    away = along - middle
-    slope = float(away @ up) / float(away @ away)
-    first, last = along.item(0), along.item(-1)
-    return (first, last), (height + slope * (first - middle), height + slope * (last - middle))
-
-
 def moved_line(line: LineFeature, rho: float, theta: float) -> LineFeature:
     """The line with rho and theta changed by the given amounts, its end points moved onto it."""
     rho, theta = line.rho + rho, line.theta + theta

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from ibvs_qp.estimation.delayed import HISTORY, DelayedKalman
+from ibvs_qp.shared_library import compiler
 
 TICK = 0.004
 TICK_NS = 4_000_000
@@ -130,3 +131,48 @@ def test_measured_entries_correct_like_the_rows_they_stand_for(entries: tuple[in
         assert not short.correct_entry(newest, 0, 9.0, 1e-5)
     else:
         assert not short.correct_pair(newest, 0, (9.0, 9.0), (4e-5, 1e-5, 2e-5))
+
+
+@pytest.mark.parametrize("latency", [0, 15])
+def test_corrections_gathered_at_one_stamp_reach_the_present_like_those_looked_at_one_by_one(latency: int) -> None:
+    """Across the ring's seam, with a new entry and a refused one in between."""
+    rng = np.random.default_rng(5)
+    gathered, watched = new_filter(), new_filter()
+    for k in range(HISTORY + 40):
+        inputs = rng.normal(0.0, 0.01, 3)
+        values = rng.normal(0.0, 0.02, 4).tolist()
+        for f in (gathered, watched):
+            f.predict(k * TICK_NS, inputs, TICK)
+            if k % 8 or k < 20:
+                continue
+            stamp = (k - latency) * TICK_NS
+            for entry, value in enumerate((*values[:2], 9.0)):
+                believed = value != 9.0
+                assert f.correct_entry(stamp, entry % 2, value, 1e-4, gate=1e3 if believed else 1.0) == believed
+                if f is watched:
+                    past = f.at(stamp)
+                    assert past is not None and f.entry(stamp, entry % 2) == past[entry % 2]
+                    f.state  # noqa: B018
+            if k % 16 == 0:
+                f.set_entry(2, values[2], 0.1)
+            assert f.correct_pair(stamp, 0, (values[0], values[3]), (1.0, 0.0, 1.0))
+        if k % 8 == 0 and k >= 20:
+            assert gathered.entry(stamp, 1) == pytest.approx(watched.entry(stamp, 1), abs=1e-13)
+            np.testing.assert_allclose(gathered.state, watched.state, atol=1e-13)
+            np.testing.assert_allclose(gathered.covariance, watched.covariance, atol=1e-15)
+    np.testing.assert_allclose(gathered._history, watched._history, atol=1e-13)
+
+
+@pytest.mark.skipif(compiler() is None, reason="no C compiler")
+def test_machine_code_of_the_corrections_gives_the_same_bits() -> None:
+    states = []
+    for way in (False, True):
+        rng = np.random.default_rng(6)
+        f = DelayedKalman(CHAIN, np.array([1e-10, 1e-6, 1e-7]), np.array([0.1, 0.1, 0.1]), TICK, to_machine_code=way)
+        for k in range(100):
+            f.predict(k * TICK_NS, rng.normal(0.0, 0.01, 3), TICK)
+            if k % 8 == 0 and k > 15:
+                f.correct_pair((k - 15) * TICK_NS, 0, (0.01, -0.02), (1e-4, 1e-5, 1e-4))
+                f.correct_entry((k - 15) * TICK_NS, 2, 0.01, 1e-4)
+        states.append(np.append(f.state, f.covariance))
+    np.testing.assert_array_equal(*states)

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ibvs_qp.bound_function import BoundFunction
+from ibvs_qp.estimation.correction import correction
 from ibvs_qp.estimation.propagation import propagation
 from ibvs_qp.estimation.stamps import HISTORY, StampRing
 from ibvs_qp.machine_code import machine_code
@@ -16,7 +17,7 @@ from ibvs_qp.machine_code import machine_code
 GATE = 6.0
 #: A tick that differs from the nominal one by more than this is counted as it was [s].
 UNEVEN_S = 1e-9
-_put_four = struct.Struct("4d").pack_into
+_put_six = struct.Struct("6d").pack_into
 #: Rows (1, j, j (j - 1) / 2): what a correction, its first and its second integral have become j ticks later.
 _PATHS = np.array([(1.0, j, 0.5 * j * (j - 1.0)) for j in range(HISTORY)])
 
@@ -28,7 +29,12 @@ class DelayedKalman:
     Because G is nilpotent, a correction dx at the capture time reaches j ticks later as
     :math:`dx + j h G dx + \tfrac12 j (j-1) h^2 G^2 dx`: exact, and one small vector product for the whole history,
     instead of replaying the inputs (Larsen et al., 1998, on fusing delayed measurements). The covariance lives
-    on the timeline of the captures, so nothing but the state is touched per tick.
+    on the timeline of the captures, so nothing but the state is touched per tick. What is corrected at one stamp is
+    gathered there, and reaches the later ticks in one go when somebody asks for them.
+
+    Attributes:
+        chain: G, (n, n), entries only where the pattern allows; may be written.
+        covariance: Of the state at the stamp of the last correction, (n, n); may be written.
     """
 
     def __init__(
@@ -54,12 +60,18 @@ class DelayedKalman:
         self.noise = np.array(noise, float)
         self.initial_std = np.array(initial_std, float)
         size = len(self.noise)
-        self.covariance, self._product, self._time = np.zeros((size, size)), np.zeros((size, size)), np.zeros(1)
-        function = propagation(size, (self.chain != 0.0 if pattern is None else np.asarray(pattern, bool)).tobytes())
-        self._propagated = BoundFunction(
-            machine_code(function) if to_machine_code else function,
-            (self.chain, self.covariance, self.noise, self._time),
-            (self._product,),
+        # Covariance, the past state that is being corrected, and what has been added to it with its integrals.
+        self._belief, self._corrected = np.zeros(size * (size + 4)), np.zeros(size * (size + 4))
+        parts = self._belief[size * size :].reshape(4, size)
+        self.covariance, self._past, self._terms = self._belief[: size * size].reshape(size, size), parts[0], parts[1:]
+        self._product, self._time = np.zeros((size, size)), np.zeros(1)
+        self._entries, self._measured = np.zeros((2, size)), np.zeros(6)
+        known = (self.chain != 0.0 if pattern is None else np.asarray(pattern, bool)).tobytes()
+        functions = propagation(size, known), correction(size, known)
+        grow, correct = map(machine_code, functions) if to_machine_code else functions
+        self._propagated = BoundFunction(grow, (self.chain, self.covariance, self.noise, self._time), (self._product,))
+        self._correct = BoundFunction(
+            correct, (self.chain, self._belief, self._entries, self._measured), (self._corrected,)
         )
         self.tick = tick_s
         self.ticks = StampRing(tick_s)
@@ -72,19 +84,18 @@ class DelayedKalman:
         self._history = np.zeros((HISTORY, size))
         row = struct.Struct(f"{size}d")
         self._put, self._row_bytes, self._bytes = row.pack_into, row.size, self._history.data
-        # A correction, its first and its second integral.
-        self._terms = np.zeros((3, size))
-        self._correction, self._first, self._second = self._terms
-        self._pair, self._gain = np.zeros((2, 2)), np.zeros((2, size))
-        self._pair_bytes = self._pair.data
         self.ticks.reset()
         self._lengths = [self.tick] * HISTORY
         self._uneven = 0
         self._covariance_stamp = -1
+        self._open, self._age = -1, 0  # stamp at which corrections are gathered, and its age in ticks
+        self._terms[:] = 0.0
 
     @property
     def state(self) -> np.ndarray:
         """The state now, (n,): the newest entry of the history itself."""
+        if self._open >= 0:
+            self._settle()
         return self._history[self.ticks.now % HISTORY]
 
     def predict(self, stamp_ns: int, increment: np.ndarray, dt: float) -> None:
@@ -93,6 +104,8 @@ class DelayedKalman:
 
     def remember(self, stamp_ns: int, state: Sequence[float] | np.ndarray, dt: float | None = None) -> None:
         """Take a state that was advanced by one tick elsewhere; by ``dt`` [s], None for the nominal tick."""
+        if self._open >= 0:
+            self._settle()
         slot = self.ticks.add(stamp_ns)
         self._put(self._bytes, slot * self._row_bytes, *state)
         self._lengths[slot] = self.tick if dt is None else dt
@@ -101,6 +114,7 @@ class DelayedKalman:
 
     def set_entry(self, index: int, value: float, std: float) -> None:
         """Set one state entry now and in the past, uncorrelated with the rest (a new line, a first distance)."""
+        self._settle()
         self._history[:, index] = value
         self.covariance[index, :] = 0.0
         self.covariance[:, index] = 0.0
@@ -123,8 +137,16 @@ class DelayedKalman:
 
     def at(self, stamp_ns: int) -> np.ndarray | None:
         """State remembered for a stamp (the nearest tick), None if it is not in the history."""
+        self._settle()
         age = self.ticks.age(stamp_ns)
-        return None if age is None else self._past(age)
+        return None if age is None else self._history[self.ticks.slot(age)]
+
+    def entry(self, stamp_ns: int, index: int) -> float | None:
+        """One entry of `at` as a plain number; between corrections at one stamp this is the short way."""
+        if stamp_ns == self._open:
+            return self._past.item(index)
+        past = self.at(stamp_ns)
+        return None if past is None else past.item(index)
 
     def correct(
         self, stamp_ns: int, rows: np.ndarray, values: np.ndarray, covariance: np.ndarray, gate: float = GATE
@@ -141,40 +163,42 @@ class DelayedKalman:
         Returns:
             False if the stamp is not in the history or the innovation is beyond the gate.
         """
-        age = self._go_to(stamp_ns)
-        if age is None:
+        if not self._go_to(stamp_ns):
             return False
-        past = self._past(age)
-        innovation = values - rows @ past
-        if len(innovation) == 1:
-            return self._take(age, self.covariance @ rows[0], rows[0], innovation.item(), covariance.item(0), gate)
+        innovation = values - rows @ self._past
         spread = rows @ self.covariance @ rows.T + covariance
         gain = np.linalg.solve(spread, rows @ self.covariance).T
         if innovation @ np.linalg.solve(spread, innovation) > gate * gate * len(values):
             return False
         self.covariance -= gain @ rows @ self.covariance
         self.covariance[:] = 0.5 * (self.covariance + self.covariance.T)
-        self._apply(gain @ innovation, age)
+        moved = gain @ innovation
+        self._past += moved
+        for term in self._terms:
+            term += moved
+            moved = self.tick * (self.chain @ moved)
         return True
 
     def correct_entry(self, stamp_ns: int, index: int, value: float, variance: float, gate: float = GATE) -> bool:
-        """The same for one measured entry of the state, a scalar: divisions where many values need linear systems."""
-        age = self._go_to(stamp_ns)
-        if age is None:
+        """The same for one measured entry of the state: one compiled call."""
+        if not self._go_to(stamp_ns):
             return False
-        past = self._past(age)
-        known = self.covariance[:, index].copy()
-        return self._take(age, known, index, value - past.item(index), variance, gate)
+        innovation, spread = value - self._past.item(index), self.covariance.item(index, index) + variance
+        if innovation * innovation > gate * gate * spread:
+            return False
+        entries = self._entries
+        entries[0, index] = 1.0
+        self._take(1.0 / spread, 0.0, 0.0, innovation, 0.0)
+        entries[0, index] = 0.0
+        return True
 
     def correct_pair(
         self, stamp_ns: int, first: int, values: tuple[float, float], covariance: tuple[float, float, float]
     ) -> bool:
         """The same for two neighbouring entries at once, with the covariance's entries (1,1), (1,2), (2,2)."""
-        age = self._go_to(stamp_ns)
-        if age is None:
+        if not self._go_to(stamp_ns):
             return False
-        past = self._past(age)
-        p = self.covariance
+        p, past = self.covariance, self._past
         da, db = values[0] - past.item(first), values[1] - past.item(first + 1)
         aa = p.item(first, first) + covariance[0]
         ab = p.item(first, first + 1) + covariance[1]
@@ -183,64 +207,47 @@ class DelayedKalman:
         wa, wb = (bb * da - ab * db) / determinant, (aa * db - ab * da) / determinant
         if da * wa + db * wb > 2.0 * GATE * GATE:
             return False
-        # Rows for columns: P is symmetric, but for the rounding here, which the next propagation mends.
-        known, gain = p[first : first + 2], self._gain
-        _put_four(self._pair_bytes, 0, bb / determinant, -ab / determinant, -ab / determinant, aa / determinant)
-        np.dot(self._pair, known, out=gain)
-        correction = da * gain[0]
-        correction += db * gain[1]
-        np.dot(known.T, gain, out=self._product)
-        p -= self._product
-        self._apply(correction, age)
+        entries = self._entries
+        entries[0, first] = entries[1, first + 1] = 1.0
+        self._take(bb / determinant, -ab / determinant, aa / determinant, da, db)
+        entries[0, first] = entries[1, first + 1] = 0.0
         return True
 
-    def _past(self, age: int) -> np.ndarray:
-        return self._history[self.ticks.slot(age)]
-
-    def _go_to(self, stamp_ns: int) -> int | None:
-        """Bring the covariance to a stamp; its age in ticks, None if it is forgotten."""
+    def _go_to(self, stamp_ns: int) -> bool:
+        """Bring covariance and past state to a stamp; False if it is forgotten."""
+        if stamp_ns == self._open:
+            return True
+        self._settle()
         age = self.ticks.age(stamp_ns)
         if age is None:
-            return None
+            return False
         if self._covariance_stamp >= 0:
             dt = max(0.0, (stamp_ns - self._covariance_stamp) * 1e-9)
             if dt > 0.0:
                 self._propagate(min(dt, 1.0))
         self._covariance_stamp = max(stamp_ns, self._covariance_stamp)
-        return age
-
-    def _take(
-        self, age: int, known: np.ndarray, row: np.ndarray | int, innovation: float, variance: float, gate: float
-    ) -> bool:
-        """One scalar measurement: ``known`` = P h, where h is the row, or the row of one entry given by its index."""
-        spread = (known.item(row) if isinstance(row, int) else float(row @ known)) + variance
-        if innovation * innovation > gate * gate * spread:
-            return False
-        self._shrink(known, spread)
-        self._apply(known * (innovation / spread), age)
+        self._open, self._age = stamp_ns, age
+        self._past[:] = self._history[self.ticks.slot(age)]
         return True
 
-    def _shrink(self, known: np.ndarray, spread: float) -> None:
-        """P - known known' / spread, symmetric to the bit."""
-        product = self._product
-        np.multiply(known[:, None], known, out=product)
-        product /= spread
-        self.covariance -= product
+    def _take(self, wa: float, wab: float, wb: float, da: float, db: float) -> None:
+        """Correct by what `_entries` say is measured; see `ibvs_qp.estimation.correction`."""
+        _put_six(self._measured.data, 0, wa, wab, wb, da, db, self.tick)
+        self._correct()
+        self._belief[:] = self._corrected
 
     def _propagate(self, dt: float) -> None:
         self._time[0] = dt
         self._propagated()
         self.covariance[:] = self._product
 
-    def _apply(self, correction: np.ndarray, age: int) -> None:
-        """Add a correction at a past tick and what has become of it since."""
-        chain, tick, first, second = self.chain, self.tick, self._first, self._second
-        self._correction[:] = correction
-        np.dot(chain, correction, out=first)
-        first *= tick
-        np.dot(chain, first, out=second)
-        second *= tick
-        path = self._paths(age).dot(self._terms)
+    def _settle(self) -> None:
+        """Add what was corrected at a past tick, and what has become of it since, to the history."""
+        if self._open < 0:
+            return  # nothing was
+        age, terms, self._open = self._age, self._terms, -1
+        path = self._paths(age).dot(terms)
+        terms[:] = 0.0
         start, end = self.ticks.slot(age), self.ticks.slot(0) + 1
         if start < end:
             self._history[start:end] += path

@@ -68,16 +68,18 @@ class WhiteNoise:
         """
         difference, self._residual = sample - self._residual, sample
         self.learn(difference, claimed)
-        return claimed if claimed > self.variance else self.variance
+        variance = self.variance
+        return claimed if claimed > variance else variance
 
     def mix(self, sample: float) -> None:
         """Average one sample of the variance."""
-        self.count = min(self.count + 1, WINDOW)
-        self.variance += (sample - self.variance) / self.count
+        self.count = count = self.count + 1 if self.count < WINDOW else WINDOW
+        self.variance += (sample - self.variance) / count
 
     def total(self, claimed: float) -> float:
         """Variance of the measurement: what is claimed, or more if the pictures show more [unit^2]."""
-        return max(claimed, self.variance)
+        variance = self.variance
+        return variance if variance > claimed else claimed
 
     def keep(self, residual: float) -> None:
         """Remember what the correction has left of the innovation."""
@@ -112,13 +114,15 @@ class SteadyValue:
         Returns:
             The sample of the noise's variance, for the other lines.
         """
-        innovation = measured - self.value
-        sample = self.noise.learn(self.noise.difference(innovation), claimed)
-        variance = self.noise.total(claimed)
-        self.spread = max(self.spread + walk, variance / self.pictures)
-        gain = self.spread / (self.spread + variance)
+        noise, innovation, pictures = self.noise, measured - self.value, self.pictures
+        sample = noise.learn(noise.difference(innovation), claimed)
+        variance = noise.total(claimed)
+        spread, least = self.spread + walk, variance / pictures
+        if spread < least:
+            spread = least
+        gain = spread / (spread + variance)
         self.value += gain * innovation
-        self.spread *= 1.0 - gain
-        self.pictures += 1
-        self.noise.keep((1.0 - gain) * innovation)
+        self.spread = spread * (1.0 - gain)
+        self.pictures = pictures + 1
+        noise.keep((1.0 - gain) * innovation)
         return sample

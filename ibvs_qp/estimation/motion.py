@@ -181,7 +181,7 @@ class WallMotion:
     def _correct_line(
         self, line: LineFeature, offset: float, angle: float, side: int, scale: float, stamp: int
     ) -> None:
-        variance = self._config.line_std_m**2 + max(float(line.covariance[0, 0]), 0.0) * scale * scale
+        variance = self._config.line_std_m**2 + max(line.covariance.item(0, 0), 0.0) * scale * scale
         tracked = self.lines.get(line.track_id)
         if tracked is None:
             tracked = self._admit(line, offset, angle, scale, variance, stamp)
@@ -191,7 +191,8 @@ class WallMotion:
             return
         else:
             self._correct_angle(tracked, angle, stamp)
-        tracked.frames += tracked.seen_ns != stamp
+        if tracked.seen_ns != stamp:
+            tracked.frames += 1
         tracked.seen_ns = stamp
         tracked.fresh_weight = min(1.0, tracked.frames / self._config.frames_to_trust) * line.weight
         tracked.news_ns = self._stamp
@@ -200,21 +201,25 @@ class WallMotion:
 
     def _correct_offset(self, line: TrackedLine, offset: float, scale: float, variance: float, stamp: int) -> bool:
         """Correct with one offset, as noisy as the line has shown itself; False if it is not believed."""
-        slot, past = _LINES + line.slot, self._filter.at(stamp)
+        slot = _LINES + line.slot
+        past = self._filter.entry(stamp, slot)
         if past is None:
             return False
-        innovation = offset - past.item(slot)
+        innovation = offset - past
         difference = line.noise.difference(innovation)
         sample = line.noise.learn(difference, variance)
         self._noise_rho.mix(sample / (scale * scale))
         variance, covariance = line.noise.total(variance), self._filter.covariance
-        covariance[slot, slot] = max(covariance.item(slot, slot), variance / line.frames)  # see SteadyValue
+        least = variance / line.frames  # see SteadyValue
+        if covariance.item(slot, slot) < least:
+            covariance[slot, slot] = least
         if not self._filter.correct_entry(stamp, slot, offset, variance):
             line.noise.keep(innovation)
             if line.is_another(difference, variance):
                 self._drop(line.track_id)
             return False
-        line.noise.keep(offset - past.item(slot))  # the history itself, corrected by now
+        past = self._filter.entry(stamp, slot)  # corrected by now
+        line.noise.keep(innovation if past is None else offset - past)
         line.deviation = math.sqrt(covariance.item(slot, slot))
         line.refused = 0
         return True
@@ -258,8 +263,9 @@ class WallMotion:
 
     def _point(self, line: TrackedLine) -> None:
         """Let the filter know how a line's offset follows the velocity: against its normal."""
-        line.rates = -math.cos(line.angle), -math.sin(line.angle)
-        self._filter.chain[_LINES + line.slot, _VELOCITY] = line.rates
+        line.rates = right, down = -math.cos(line.angle), -math.sin(line.angle)
+        chain, slot = self._filter.chain, _LINES + line.slot
+        chain[slot, 0], chain[slot, 1] = right, down
 
     def feature(self, line: TrackedLine, axes: WallAxes, foot_distance: float, stamp_ns: int) -> LineFeature:
         """The line as the camera would see it now: rho, theta at the tick's own time."""

@@ -7,7 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ibvs_qp.measurement import HORIZONTAL, LineFeature
-from ibvs_qp.vectors import Row, cross_product
+from ibvs_qp.vectors import Row
+
+#: A wall whose normal is this close to gravity's direction is a floor, and has no level direction of its own.
+_LEAST_CROSS = 1e-6
 
 
 @dataclass(slots=True)
@@ -22,10 +25,13 @@ class WallAxes:
     @classmethod
     def of(cls, normal: Sequence[float], gravity: Sequence[float]) -> WallAxes:
         """Axes of a wall with a given normal, under a given direction of gravity."""
-        x, y, z = cross_product(gravity, normal)
-        length = max(math.sqrt(x * x + y * y + z * z), 1e-6)
-        right = x / length, y / length, z / length
-        return cls(normal=normal, right=right, down=cross_product(normal, right), gravity=gravity)
+        (gx, gy, gz), (nx, ny, nz) = gravity, normal
+        x, y, z = gy * nz - gz * ny, gz * nx - gx * nz, gx * ny - gy * nx
+        length = math.sqrt(x * x + y * y + z * z)
+        if length < _LEAST_CROSS:
+            length = _LEAST_CROSS
+        rx, ry, rz = right = x / length, y / length, z / length
+        return cls(normal, right, (ny * rz - nz * ry, nz * rx - nx * rz, nx * ry - ny * rx), gravity)
 
 
 def wall_line(
