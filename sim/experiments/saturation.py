@@ -35,7 +35,7 @@ def design(choice: Choice) -> list[Run]:
     seeds = 1 if choice.quick else 2
     flights = []
     cells = [("standard", FRICTION), ("no-reach-check", FRICTION), ("no-reach-check", SLIPPERY)]
-    for variant, friction in cells if choice.quick else [*cells, ("clipped", FRICTION)]:
+    for variant, friction in [*cells, ("clipped", FRICTION)]:
         pushes = CLIPPED_N if variant == "clipped" else STATIC_N
         if choice.quick:
             pushes = (20.0, 35.0) if friction == FRICTION and variant == "standard" else (35.0,)
