@@ -11,7 +11,7 @@ import pytest
 
 from ibvs_qp.errors import ConfigError
 from sim.comparison import compare, read_run
-from sim.experiments import experiment
+from sim.experiments import NAMES, experiment
 from sim.experiments.base import Criterion
 from sim.experiments.verdict import _judge
 from sim.sweep.parts import frame, write_table
@@ -88,6 +88,22 @@ def test_a_bound_is_held_by_the_median_and_counted_per_flight():
     assert verdict.met and (verdict.held, verdict.n, verdict.worst) == (2, 3, 0.9)
     assert not judged([0.6, 0.7, 0.1], bound=0.5).met
     assert judged([0.97, 0.99], bound=0.95, least=True).met
+
+
+def test_what_must_never_happen_must_hold_in_every_flight():
+    flags = [1.0, 1.0, 0.0]
+    assert not judged(flags, bound=1.0, least=True, every=True).met
+    lenient = judged(flags, bound=1.0, least=True)
+    assert lenient.met and lenient.words == "yes (median; 2 of 3)"
+    assert judged([1.0, 1.0], bound=1.0, least=True, every=True).words == "yes"
+    assert judged([5.0, 9.0, 5.1], bound=6.5, every=True).words == "no"
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_flags_peaks_and_mishaps_are_asked_of_every_flight(name):
+    never = ("completed", "survived_s", "detached", "bounces")
+    for criterion in experiment(name).criteria:
+        assert criterion.every == (criterion.metric in never or "peak" in criterion.metric), criterion.text
 
 
 def test_a_crash_is_no_good_figure():

@@ -170,7 +170,9 @@ def _print_verdicts(console: Console, content: dict[str, Any]) -> None:
             sign, unit = ">=" if entry["least"] else "<=", f" {entry['unit']}" if entry["unit"] else ""
             median = f"{entry['median']:.3g}{unit}" if math.isfinite(entry["median"]) else "–"
             held = f"{entry['held']} of {entry['n']}"
-            table.add_row(figure, f"{sign} {entry['bound']:.4g}{unit}", median, held, "yes" if entry["met"] else "NO")
+            table.add_row(
+                figure, f"{sign} {entry['bound']:.4g}{unit}", median, held, entry["words"] if entry["met"] else "NO"
+            )
         console.print(table)
 
 

@@ -48,8 +48,8 @@ EXPERIMENT = Experiment(
         Column(metric="settle_s", label="settled after touch", unit="s"),
     ),
     criteria=(
-        Criterion(text="peak", metric="touch_peak_n", bound=6.5, unit="N"),
-        Criterion(text="bounces", metric="bounces", bound=1.0),
+        Criterion(text="peak", metric="touch_peak_n", bound=6.5, unit="N", every=True),
+        Criterion(text="bounces", metric="bounces", bound=1.0, every=True),
         Criterion(text="settled after touch", metric="settle_s", bound=1.5, unit="s"),
     ),
     draw=curves(

@@ -72,6 +72,7 @@ class Criterion:
         scale: Factor into `unit`.
         unit: Unit in which it is shown.
         failed_too: Whether flights that did not end as planned count with their figures.
+        every: Whether every flight must hold it, not the median of the cell: flags, peaks, and counts of mishaps.
     """
 
     text: str
@@ -83,6 +84,7 @@ class Criterion:
     scale: float = 1.0
     unit: str = ""
     failed_too: bool = False
+    every: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)

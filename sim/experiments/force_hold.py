@@ -96,8 +96,8 @@ EXPERIMENT = Experiment(
     ),
     criteria=(
         Criterion(text="within ±0.5 N after first touch", metric="settle_s", bound=1.5, params=_HOLD, unit="s"),
-        Criterion(text="peak", metric="touch_peak_n", bound=6.5, params=_HOLD, unit="N"),
-        Criterion(text="bounces", metric="bounces", bound=1.0, params=_HOLD),
+        Criterion(text="peak", metric="touch_peak_n", bound=6.5, params=_HOLD, unit="N", every=True),
+        Criterion(text="bounces", metric="bounces", bound=1.0, params=_HOLD, every=True),
         Criterion(text="steady push error, rms", metric="force_rms_n", bound=0.15, params=_HOLD, unit="N"),
         Criterion(text="tilt, rms", metric="tilt_rms_deg", bound=0.5, params=_HOLD, unit="deg"),
     ),

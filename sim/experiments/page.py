@@ -20,6 +20,8 @@ from sim.sweep.statistics import cells, paired_differences, parameters
 _HEAD = """# Results of the experiments
 
 Generated from data by `{command}`; do not edit. {lead}
+*Met*: flags, peaks and bounces (marked *every*) must hold in every flight, other figures by the median of the cell,
+then with the count of flights where not all hold; a flight without the figure makes it a no.
 Medians over the flights of a cell, in brackets their 95 % bootstrap interval; *done* counts the flights that ended as
 planned. Differences are analytic law minus QP law, flown with the same seeds; **bold** where the interval excludes
 zero. What each experiment flies and what the paper reports is in [experiments.md](../experiments.md).
@@ -100,13 +102,14 @@ def _summary(flown: Sequence[tuple[Experiment, pl.DataFrame, dict[str, tuple[str
 def _verdict_line(experiment: Experiment, verdict: Verdict, shown: dict[str, Any]) -> str:
     criterion = verdict.criterion
     sign, unit = (">=" if criterion.least else "<="), f" {criterion.unit}" if criterion.unit else ""
+    sign += " every" if criterion.every else ""
     cell = _words(experiment, shown) or "all"
     if criterion.variant != "standard":
         cell += f", {criterion.variant}"
     return (
         f"| {experiment.name} | {criterion.text} | {cell} | {sign} {verdict.bound:.4g}{unit} | "
         f"{_number(verdict.median, unit)} | {_number(verdict.worst, unit)} | {verdict.held} of {verdict.n} | "
-        f"{'yes' if verdict.met else '**no**'} |"
+        f"{verdict.words if verdict.met else '**no**'} |"
     )
 
 

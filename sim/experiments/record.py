@@ -68,7 +68,9 @@ def summary(
                 "worst": verdict.worst,
                 "held": verdict.held,
                 "n": verdict.n,
+                "every": verdict.criterion.every,
                 "met": verdict.met,
+                "words": verdict.words,
             }
             for each in experiments
             for listed in [verdicts(each, rows_of(table, each))]

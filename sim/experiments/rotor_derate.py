@@ -80,7 +80,9 @@ EXPERIMENT = Experiment(
             scale=100.0,
             unit="%",
         ),
-        Criterion(text="derated: tilt, peak", metric="tilt_peak_deg", bound=2.0, params=_DERATE, unit="deg"),
+        Criterion(
+            text="derated: tilt, peak", metric="tilt_peak_deg", bound=2.0, params=_DERATE, unit="deg", every=True
+        ),
         Criterion(
             text="loss: flies on",
             metric="survived_s",
@@ -89,13 +91,28 @@ EXPERIMENT = Experiment(
             params=_LOSS,
             failed_too=True,
             unit="s",
+            every=True,
         ),
         Criterion(
-            text="loss: tilt, peak", metric="tilt_peak_deg", bound=25.0, params=_LOSS, failed_too=True, unit="deg"
+            text="loss: tilt, peak",
+            metric="tilt_peak_deg",
+            bound=25.0,
+            params=_LOSS,
+            failed_too=True,
+            unit="deg",
+            every=True,
         ),
-        Criterion(text="loss: detached", metric="detached", bound=1.0, least=True, params=_LOSS, failed_too=True),
         Criterion(
-            text="loss: descent", metric="descent_peak_m_s", bound=1.5, params=_LOSS, failed_too=True, unit="m/s"
+            text="loss: detached", metric="detached", bound=1.0, least=True, params=_LOSS, failed_too=True, every=True
+        ),
+        Criterion(
+            text="loss: descent",
+            metric="descent_peak_m_s",
+            bound=1.5,
+            params=_LOSS,
+            failed_too=True,
+            unit="m/s",
+            every=True,
         ),
     ),
     draw=draw_derate,

@@ -149,6 +149,7 @@ EXPERIMENT = Experiment(
                     variant=variant,
                     scale=1e3,
                     unit="mm",
+                    every=True,
                 ),
                 Criterion(
                     text="35 N: tilt, rms",
@@ -165,6 +166,7 @@ EXPERIMENT = Experiment(
                     params=_asked(35.0),
                     variant=variant,
                     unit="deg",
+                    every=True,
                 ),
             )
         ),

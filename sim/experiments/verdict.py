@@ -36,9 +36,18 @@ class Verdict:
 
     @property
     def met(self) -> bool:
-        """Whether the median holds the bound and every flight has the figure."""
+        """Whether every flight has the figure and holds the bound, or their median where the criterion asks no more."""
+        if not self.n or self.known < self.n:
+            return False
         good = self.median >= self.bound if self.criterion.least else self.median <= self.bound
-        return bool(np.isfinite(self.median) and good and self.known == self.n)
+        return self.held == self.n if self.criterion.every else bool(good)
+
+    @property
+    def words(self) -> str:
+        """``yes`` or ``no``, and what every flight says where the median speaks for them."""
+        if self.met and self.held < self.n:
+            return f"yes (median; {self.held} of {self.n})"
+        return "yes" if self.met else "no"
 
     @property
     def bound(self) -> float:
