@@ -116,7 +116,7 @@ class ExperimentCommand:
             lead = f"{table.height} flights, {self.features} features, first seed {self.seed}, {facts['version']}."
             lead = ("A quick run with few flights, not the record: " if self.quick else "") + lead
             with notes.status("Drawing the figures ..."):
-                page = write_page(folder, experiments, table, lead, self._again())
+                page = write_page(folder, experiments, table, lead, self._again(), self.name)
         content["wall_time_s"] = time.perf_counter() - started
         write_summary(folder, content)
         if self.json:
@@ -132,10 +132,11 @@ class ExperimentCommand:
         return 0
 
     def _again(self) -> str:
-        """The command that flies the same on any computer."""
-        words = ["ibvs-qp", "experiment", self.name, *(["--quick"] if self.quick else [])]
+        """The command that flies one experiment alike on any computer, with ``{name}`` where its name goes."""
+        words = ["ibvs-qp", "experiment", "NAME", *(["--quick"] if self.quick else [])]
         words += ["--features", self.features] if self.features != "rendered" else []
-        return shlex.join([*words, *(["--seed", str(self.seed)] if self.seed else [])])
+        words += ["--seed", str(self.seed)] if self.seed else []
+        return shlex.join(words).replace("NAME", "{name}")
 
 
 def _cores() -> int:

@@ -48,6 +48,7 @@ class Column:
         scale: Factor into that unit.
         digits: Digits after the point.
         better: +1 when more is better, -1 when less is, 0 when neither.
+        of_all: Whether flights that did not end as planned have it as well.
     """
 
     metric: str
@@ -56,6 +57,7 @@ class Column:
     scale: float = 1.0
     digits: int = 2
     better: int = -1
+    of_all: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,6 +120,7 @@ class Experiment:
         criteria: What the QP law is held to.
         draw: Its figures.
         params: Parameters shown in the table, with their headings.
+        folded: Cells that its table folds away, as a figure shows them, by parameter.
     """
 
     name: str
@@ -129,6 +132,7 @@ class Experiment:
     criteria: tuple[Criterion, ...]
     draw: Draw
     params: dict[str, str]
+    folded: Mapping[str, Parameter] = field(default_factory=dict)
 
 
 def runs(

@@ -102,4 +102,5 @@ EXPERIMENT = Experiment(
         Criterion(text="tilt, rms", metric="tilt_rms_deg", bound=0.5, params=_HOLD, unit="deg"),
     ),
     draw=draw_force_hold,
+    folded={"kind": "map"},
 )

@@ -60,7 +60,7 @@ EXPERIMENT = Experiment(
     "for good.",
     paper="Not reported.",
     design=design,
-    params={"kind": "flights", "wind": "gust [N rms] or wind [m/s]", "direction": "direction"},
+    params={"kind": "flights", "wind": "gust or wind (N rms, m/s)", "direction": "direction"},
     columns=(
         Column(metric="path_rms_m", label="path, rms", unit="mm", scale=1e3),
         Column(metric="force_rms_n", label="push error, rms", unit="N", digits=3),

@@ -60,7 +60,7 @@ EXPERIMENT = Experiment(
     "and descend. A loss leaves this vehicle no level hover without lateral force; yaw or place must be given up.",
     paper="Not reported.",
     design=design,
-    params={"kind": "event", "rotor": "rotor", "share": "thrust left", "told": "told"},
+    params={"kind": "event", "rotor": "rotor", "share": "thrust left", "told": "told to the pilot"},
     columns=(
         Column(metric="push_mean_n", label="delivered", unit="N", better=1),
         Column(metric="reach_n", label="reach left", unit="N", better=0),
