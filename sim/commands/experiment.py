@@ -172,7 +172,11 @@ def _print_verdicts(console: Console, content: dict[str, Any]) -> None:
             median = f"{entry['median']:.3g}{unit}" if math.isfinite(entry["median"]) else "–"
             held = f"{entry['held']} of {entry['n']}"
             table.add_row(
-                figure, f"{sign} {entry['bound']:.4g}{unit}", median, held, entry["words"] if entry["met"] else "NO"
+                figure,
+                f"{sign} {entry['bound']:.4g}{unit}",
+                median,
+                held,
+                "NO" if entry["words"] == "no" else entry["words"],
             )
         console.print(table)
 

@@ -9,7 +9,7 @@ from typing import Any
 import polars as pl
 
 from sim.experiments.base import Column, Experiment
-from sim.experiments.wording import folded, shown
+from sim.experiments.wording import folded, of, shown
 from sim.sweep.paired import needed, paired_differences, sign
 
 
@@ -41,7 +41,7 @@ def balance(experiment: Experiment, table: pl.DataFrame) -> Iterator[Paired]:
         if folded(experiment, entry["params"]):
             continue
         for column in columns:
-            found = entry["differences"].get(column.metric)
+            found = of(entry["differences"], column, entry["params"])
             if found is None:
                 continue
             winner = {1: "qp", -1: "paper", 0: ""}[-column.better * sign(found)]

@@ -49,6 +49,7 @@ class Column:
         digits: Digits after the point.
         better: +1 when more is better, -1 when less is, 0 when neither.
         of_all: Whether flights that did not end as planned have it as well.
+        where: Cells that it applies to, by parameter; empty is all.
     """
 
     metric: str
@@ -58,6 +59,7 @@ class Column:
     digits: int = 2
     better: int = -1
     of_all: bool = False
+    where: Mapping[str, Parameter] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,7 +14,7 @@ from sim.experiments.base import Experiment
 from sim.experiments.clipping import clipping
 from sim.experiments.variants import VARIANTS
 from sim.experiments.verdict import Verdict, telling, verdicts
-from sim.experiments.wording import cell, entry, figure, folded, headed, markdown, shown
+from sim.experiments.wording import cell, entry, figure, folded, headed, markdown, of, shown
 from sim.experiments.worth import difference, worth
 from sim.figures.style import law_name
 from sim.sweep.paired import needed, paired_differences
@@ -30,8 +30,8 @@ then with the count of flights where not all hold; a flight without the figure m
 Medians over the flights of a cell, in brackets their 95 % bootstrap interval; *done* counts the flights that ended as
 planned, and only those have figures. Differences are analytic law minus QP law, flown with the same seeds, over the
 flights that both ended as planned, in brackets the exact interval of the median; **bold** where it excludes zero. Of
-fewer than {needed} pairs there is no such interval: they are too few to tell. What each experiment flies and what the paper reports is in
-[experiments.md](../experiments.md).
+fewer than {needed} pairs there is no such interval: they are too few to tell. What each experiment flies and what the
+paper reports is in [experiments.md](../experiments.md).
 
 """
 
@@ -85,7 +85,7 @@ def _verdict_line(experiment: Experiment, verdict: Verdict, place: dict[str, Any
     return (
         f"| {experiment.name} | {criterion.text} | {where} | {sign} {verdict.bound:.4g}{unit} | "
         f"{_number(verdict.median, unit)} | {_number(verdict.worst, unit)} | {verdict.held} of {verdict.n} | "
-        f"{verdict.words if verdict.met else '**no**'} |"
+        f"{'**no**' if verdict.words == 'no' else verdict.words} |"
     )
 
 
@@ -100,7 +100,7 @@ def _table(experiment: Experiment, table: pl.DataFrame) -> str:
     for flown in cells(table, {column.metric for column in columns if column.of_all}):
         row = [entry(flown["params"].get(name, "")) for name in experiment.params]
         row += [flown["variant"], law_name(flown["law"]), f"{flown['completed']} of {flown['n']}"]
-        row += [figure(flown["metrics"].get(column.metric), column) for column in columns]
+        row += [figure(of(flown["metrics"], column, flown["params"]), column) for column in columns]
         rows[folded(experiment, flown["params"])].append(row)
     text = markdown(heads, rows[False])
     if rows[True]:
@@ -122,7 +122,7 @@ def _differences(experiment: Experiment, table: pl.DataFrame) -> str:
     for flown in found:
         row = [entry(flown["params"].get(name, "")) for name in experiment.params]
         row += [flown["variant"], f"{flown['n']} of {flown['flown']}", " and ".join(map(str, flown["failed"]))]
-        rows.append(row + [difference(flown["differences"].get(column.metric), column) for column in columns])
+        rows.append(row + [difference(of(flown["differences"], column, flown["params"]), column) for column in columns])
     return f"Analytic law minus QP law:\n\n{markdown(heads, rows)}\n"
 
 

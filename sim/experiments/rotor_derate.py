@@ -65,10 +65,13 @@ EXPERIMENT = Experiment(
         Column(metric="push_mean_n", label="delivered", unit="N", better=1),
         Column(metric="reach_n", label="reach left", unit="N", better=0),
         Column(metric="height_error_peak_m", label="height error, peak", unit="mm", scale=1e3, digits=1),
-        Column(metric="tilt_peak_deg", label="tilt, peak", unit="deg"),
-        Column(metric="yaw_peak_deg", label="yaw, peak", unit="deg"),
-        Column(metric="survived_s", label="flew on for", unit="s", better=1),
+        Column(metric="tilt_peak_deg", label="tilt, peak", unit="deg", of_all=True),
+        Column(metric="yaw_peak_deg", label="yaw, peak", unit="deg", where={"kind": "derate"}),
+        Column(metric="survived_s", label="flew on for", unit="s", digits=1, better=1, of_all=True),
         Column(metric="descent_peak_m_s", label="descent, fastest", unit="m/s"),
+        Column(metric="yaw_turned_deg", label="turned since the loss", unit="deg", digits=0),
+        Column(metric="yaw_rate_peak_deg_s", label="yaw rate, peak", unit="deg/s", digits=0),
+        Column(metric="push_spike_n", label="push after the loss, peak", unit="N"),
     ),
     criteria=(
         Criterion(

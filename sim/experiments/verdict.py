@@ -24,6 +24,7 @@ class Verdict:
         held: Flights that hold the bound.
         known: Flights that have the figure; one that failed counts only where the criterion says so.
         n: Flights.
+        measured: Whether the table has the figure at all.
     """
 
     criterion: Criterion
@@ -33,6 +34,7 @@ class Verdict:
     held: int
     known: int
     n: int
+    measured: bool = True
 
     @property
     def met(self) -> bool:
@@ -45,6 +47,8 @@ class Verdict:
     @property
     def words(self) -> str:
         """``yes`` or ``no``, and what every flight says where the median speaks for them."""
+        if not self.measured:
+            return "not measured"
         if self.met and self.held < self.n:
             return f"yes (median; {self.held} of {self.n})"
         return "yes" if self.met else "no"
@@ -83,7 +87,16 @@ def _judge(criterion: Criterion, params: dict, cell: pl.DataFrame) -> Verdict:
     bound = criterion.scale * criterion.bound
     held = np.count_nonzero(good >= bound if criterion.least else good <= bound)
     if not len(good):
-        return Verdict(criterion=criterion, params=params, median=np.nan, worst=np.nan, held=0, known=0, n=len(values))
+        return Verdict(
+            criterion=criterion,
+            params=params,
+            median=np.nan,
+            worst=np.nan,
+            held=0,
+            known=0,
+            n=len(values),
+            measured=criterion.metric in cell.columns,
+        )
     worst = good.min() if criterion.least else good.max()
     return Verdict(
         criterion=criterion,

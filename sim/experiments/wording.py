@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -74,6 +74,13 @@ def markdown(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 def shown(experiment: Experiment, table: pl.DataFrame) -> list[Column]:
     """Columns of an experiment that its table holds."""
     return [column for column in experiment.columns if column.metric in table.columns]
+
+
+def of(figures: Mapping[str, Any], column: Column, params: Mapping[str, Any]) -> Any:
+    """What a cell has of a column; None where the column does not apply."""
+    return (
+        figures.get(column.metric) if all(params.get(name) == value for name, value in column.where.items()) else None
+    )
 
 
 def folded(experiment: Experiment, params: dict[str, Any]) -> bool:

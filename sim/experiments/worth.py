@@ -10,7 +10,7 @@ import polars as pl
 
 from sim.experiments.base import Column, Experiment
 from sim.experiments.variants import REFERENCES
-from sim.experiments.wording import cell, figure, folded, headed, markdown, rounded, shown, varying
+from sim.experiments.wording import cell, figure, folded, headed, markdown, of, rounded, shown, varying
 from sim.figures.style import law_name
 from sim.sweep.paired import needed, sign, variant_differences
 
@@ -23,8 +23,9 @@ def worth(flown: Sequence[tuple[Experiment, pl.DataFrame]]) -> str:
     """
     text = (
         "Variant minus what it is judged against, same law, same seeds, over the flights that both ended as planned; "
-        f"**bold** as above, from {needed()} pairs on. A positive difference of an error means that the part helps. *Done* "
-        "counts the flights of the variant and of its reference that ended as planned, out of the seeds that both flew.\n"
+        f"**bold** as above, from {needed()} pairs on. A positive difference of an error means that the part helps. "
+        "*Done* counts the flights of the variant and of its reference that ended as planned, out of the seeds that "
+        "both flew.\n"
     )
     for experiment, table in flown:
         columns = shown(experiment, table)
@@ -48,7 +49,11 @@ def _row(experiment: Experiment, entry: dict[str, Any], params: dict[str, Any], 
     flown = entry["flown"]
     done = f"{flown - variant} and {flown - reference} of {flown}"
     row = [entry["variant"], entry["against"], law_name(entry["law"]), cell(experiment, params), done]
-    return [*row, str(entry["n"]), *(difference(entry["differences"].get(column.metric), column) for column in columns)]
+    return [
+        *row,
+        str(entry["n"]),
+        *(difference(of(entry["differences"], column, entry["params"]), column) for column in columns),
+    ]
 
 
 def difference(found: dict[str, float] | None, column: Column) -> str:
