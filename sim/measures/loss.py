@@ -20,9 +20,9 @@ def loss_figures(trace: Trace) -> dict[str, float]:
         trace: A flight with a lost rotor.
 
     Returns:
-        ``survived_s`` counts from the loss to the crash or the planned end, ``yaw_turned_deg`` is the greatest turn away
-        from the heading at the loss, full turns included, ``push_spike_n`` the greatest push after the loss; empty if
-        the fault never came.
+        ``survived_s`` counts from the loss to the crash or the planned end, ``yaw_turned_deg`` is the greatest turn
+        away from the heading at the loss, full turns included, ``push_spike_n`` the greatest push after the loss; empty
+        if the fault never came.
     """
     fault = event_time(trace, "fault")
     after = trace.t >= fault if not math.isnan(fault) else np.zeros(len(trace.t), bool)
