@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from itertools import accumulate
 
 import polars as pl
 import pytest
@@ -11,8 +12,11 @@ from synthetic_trace import Errors, synthetic_trace
 
 import sim.sweep.flying
 from sim.cli import main
+from sim.experiments import experiment
+from sim.experiments.base import Choice
 from sim.figures.experiments.force_hold import predicted_damping
 from sim.jobs import PressJob
+from sim.sweep import run_sweep
 
 
 @pytest.fixture
@@ -95,6 +99,24 @@ def test_refusals_are_one_line(flown, capsys, words, named):
     out, err = capsys.readouterr()
     assert out == "" and err.count("\n") == 1 and named in err and err.startswith("ibvs-qp: error: ")
     assert not flown
+
+
+def test_the_time_left_goes_by_expected_flying_time(flown, tmp_path):
+    flights = (
+        experiment("friction").design(Choice(quick=True)) + experiment("force-hold").design(Choice(quick=True))[:1]
+    )
+    told: list[tuple[float, float]] = []
+    run_sweep(flights, tmp_path, timed=lambda *times: told.append(times))
+    assert [entry[0] for entry in told] == pytest.approx(list(accumulate(run.expected_s for run in flights)))
+    assert told[-1][0] == told[-1][1] and len({run.expected_s for run in flights}) > 1
+
+
+def test_the_page_says_how_to_redo_it_with_the_same_choices(flown, tmp_path):
+    words = ["experiment", "approach", "--quick", "--seed", "3", "--features", "geometric"]
+    assert main([*words, "--jobs", "1", "--json", "--out", "run"]) == 0
+    page = (tmp_path / "run" / "results.md").read_text()
+    assert "To redo it: `ibvs-qp experiment approach --quick --features geometric --seed 3`" in page
+    assert "too few to tell" in page and "-0.00" not in page and "_n_m" not in page
 
 
 def test_plan_flies_nothing(flown, tmp_path, capsys):

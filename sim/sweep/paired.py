@@ -1,4 +1,4 @@
-"""Differences of flights that share a seed: median, bootstrap interval, and an exact interval that says what is sure."""
+"""Differences of flights that share a seed: median, bootstrap interval, and an exact one that says what is sure."""
 
 from __future__ import annotations
 
