@@ -48,8 +48,8 @@ def account(flown: Sequence[tuple[Experiment, pl.DataFrame]]) -> str:
     text = (
         "Figures of cells that both laws flew with the same seeds, over the flights that both ended as planned. Surely "
         f"better: the exact {100.0 * CONFIDENCE:g} % interval of the median difference (order statistics, the inverse "
-        f"of the sign test) excludes zero; it takes {needed()} pairs, and fewer can never say so. There are {compared} "
-        "comparisons with enough pairs: if the laws were alike, up to "
+        f"of the sign test) excludes zero; it takes {needed()} pairs, and fewer can never say so. Comparisons with "
+        f"enough pairs: {compared}; if the laws were alike, up to "
         f"{(1.0 - CONFIDENCE) * compared:.0f} of them would look sure by chance alone.\n\n"
     )
     text += markdown(_HEADS, rows)

@@ -44,7 +44,7 @@ def clipping(table: pl.DataFrame) -> str:
             )
             if part.height:
                 done = part.filter(pl.col("completed"))
-                middle = [np.median(done[name].to_numpy()) if done.height else np.nan for name, *_ in _FIGURES]
+                middle = [_median(done, name) for name, *_ in _FIGURES]
                 shown = [rounded(f * value, digits) for value, (*_, f, digits) in zip(middle, _FIGURES, strict=True)]
                 lines.append([f"{push:g}", words, f"{done.height} of {part.height}", *shown])
                 scores[words] = (1.0 - done.height / part.height, middle[0])
@@ -61,6 +61,11 @@ def clipping(table: pl.DataFrame) -> str:
         + "\n".join(sentences)
         + "\n"
     )
+
+
+def _median(rows: pl.DataFrame, name: str) -> float:
+    known = rows[name].drop_nulls().to_numpy() if name in rows.columns else np.zeros(0)
+    return float(np.median(known)) if known.size else np.nan
 
 
 def _verdict(push: float, scores: dict[str, tuple[float, float]]) -> str:
