@@ -101,6 +101,21 @@ def test_refusals_are_one_line(flown, capsys, words, named):
     assert not flown
 
 
+def test_all_cut_short_still_reports_what_was_flown(flown, monkeypatch, capsys):
+    whole = sim.sweep.flying.fly
+
+    def fly(*arguments, **named):
+        if len(flown) == 2:
+            raise KeyboardInterrupt
+        return whole(*arguments, **named)
+
+    monkeypatch.setattr(sim.sweep.flying, "fly", fly)
+    assert main(["experiment", "all", "--quick", "--jobs", "1", "--json", "--out", "run"]) == 130
+    content = json.loads(capsys.readouterr().out)
+    assert sum(cell["n"] for cell in content["cells"]) == 2
+    assert {entry["experiment"] for entry in content["verdicts"]} == {"force-hold"}
+
+
 def test_the_time_left_goes_by_expected_flying_time(flown, tmp_path):
     flights = (
         experiment("friction").design(Choice(quick=True)) + experiment("force-hold").design(Choice(quick=True))[:1]

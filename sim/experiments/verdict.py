@@ -62,7 +62,7 @@ class Verdict:
 def verdicts(experiment: Experiment, table: pl.DataFrame) -> list[Verdict]:
     """Every criterion in every cell of the QP law that it holds for."""
     result = []
-    for criterion in experiment.criteria:
+    for criterion in experiment.criteria if table.height else ():
         rows = table.filter((pl.col("law") == "qp") & (pl.col("variant") == criterion.variant))
         for name, value in criterion.params.items():
             rows = rows.filter(pl.col(PARAM + name) == value) if PARAM + name in rows.columns else rows.clear()
