@@ -35,8 +35,18 @@ def test_medians_of_flights_that_ended_as_planned_and_how_many_did_not() -> None
         {"variant": "x", "error_m": 8.0},
     ]
     assert digest(table(*rows), [LINE]).splitlines()[2] == (
-        "| error [mm] | 2.00; fails in 1 of 4 | fails in 1 of 1 | – | 4 | `experiment paint` |"
+        "| error [mm] | 2.00 (1.00 to 9.00); fails in 1 of 4 | fails in 1 of 1 | – | 4, 1 | `experiment paint` |"
     )
+
+
+def test_who_lives_is_counted_over_all_flights_and_what_else_is_kept_stands_behind() -> None:
+    rows = table({"error_m": 5.0, "tilt": 1.25}, {"error_m": 3.0, "completed": False})
+    lives = Line(words="alive", experiment="paint", metric="error_m", at_least=5.0)
+    also = Line(words="push", experiment="paint", metric="error_m", also=(("tilt", "tilt {} deg", 1.0, 1),))
+    assert [line.split(" | ")[1] for line in digest(rows, [lives, also]).splitlines()[2:]] == [
+        "1 of 2",
+        "5.00; tilt 1.2 deg; fails in 1 of 2",
+    ]
 
 
 def test_lines_without_flights_are_left_out() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from itertools import accumulate
 
 import polars as pl
 import pytest
@@ -11,8 +12,11 @@ from synthetic_trace import Errors, synthetic_trace
 
 import sim.sweep.flying
 from sim.cli import main
+from sim.experiments import experiment
+from sim.experiments.base import Choice
 from sim.figures.experiments.force_hold import predicted_damping
 from sim.jobs import PressJob
+from sim.sweep import run_sweep
 
 
 @pytest.fixture
@@ -95,6 +99,39 @@ def test_refusals_are_one_line(flown, capsys, words, named):
     out, err = capsys.readouterr()
     assert out == "" and err.count("\n") == 1 and named in err and err.startswith("ibvs-qp: error: ")
     assert not flown
+
+
+def test_all_cut_short_still_reports_what_was_flown(flown, monkeypatch, capsys):
+    whole = sim.sweep.flying.fly
+
+    def fly(*arguments, **named):
+        if len(flown) == 2:
+            raise KeyboardInterrupt
+        return whole(*arguments, **named)
+
+    monkeypatch.setattr(sim.sweep.flying, "fly", fly)
+    assert main(["experiment", "all", "--quick", "--jobs", "1", "--json", "--out", "run"]) == 130
+    content = json.loads(capsys.readouterr().out)
+    assert sum(cell["n"] for cell in content["cells"]) == 2
+    assert {entry["experiment"] for entry in content["verdicts"]} == {"force-hold"}
+
+
+def test_the_time_left_goes_by_expected_flying_time(flown, tmp_path):
+    flights = (
+        experiment("friction").design(Choice(quick=True)) + experiment("force-hold").design(Choice(quick=True))[:1]
+    )
+    told: list[tuple[float, float]] = []
+    run_sweep(flights, tmp_path, timed=lambda *times: told.append(times))
+    assert [entry[0] for entry in told] == pytest.approx(list(accumulate(run.expected_s for run in flights)))
+    assert told[-1][0] == told[-1][1] and len({run.expected_s for run in flights}) > 1
+
+
+def test_the_page_says_how_to_redo_it_with_the_same_choices(flown, tmp_path):
+    words = ["experiment", "approach", "--quick", "--seed", "3", "--features", "geometric"]
+    assert main([*words, "--jobs", "1", "--json", "--out", "run"]) == 0
+    page = (tmp_path / "run" / "results.md").read_text()
+    assert "To redo it: `ibvs-qp experiment approach --quick --features geometric --seed 3`" in page
+    assert "too few to tell" in page and "-0.00" not in page and "_n_m" not in page
 
 
 def test_plan_flies_nothing(flown, tmp_path, capsys):

@@ -72,3 +72,16 @@ def test_a_lost_rotor_is_followed_from_the_loss_on():
     assert figures["tilt_peak_deg"] == pytest.approx(3.0)
     assert figures["detached"] == 0.0
     assert loss_figures(press_trace()) == {}
+
+
+def test_a_spin_after_a_loss_counts_its_full_turns():
+    trace = press_trace(fault_s=6.0)
+    trace.arrays["propeller_clearance"] = np.full(len(trace.t), 0.3)
+    turn = np.where(trace.t > 6.0, 2.0 * (trace.t - 6.0), 0.0)
+    euler = trace.arrays["euler"].copy()
+    euler[:, 2] = (turn + np.pi) % (2.0 * np.pi) - np.pi
+    trace.arrays["euler"] = euler
+    figures = loss_figures(trace)
+    assert figures["yaw_turned_deg"] == pytest.approx(np.degrees(turn[-1]), rel=1e-3)
+    assert figures["yaw_rate_peak_deg_s"] == pytest.approx(np.degrees(2.0), rel=1e-2)
+    assert figures["push_spike_n"] == np.max(trace.contact_1khz[6000:])

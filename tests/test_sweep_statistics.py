@@ -11,11 +11,12 @@ import pytest
 
 from ibvs_qp.errors import ConfigError
 from sim.comparison import compare, read_run
-from sim.experiments import experiment
+from sim.experiments import NAMES, experiment
 from sim.experiments.base import Criterion
 from sim.experiments.verdict import _judge
 from sim.sweep.parts import frame, write_table
-from sim.sweep.statistics import cells, median_interval, paired_differences
+from sim.sweep.paired import exact_interval, needed, paired_differences, sign, variant_differences
+from sim.sweep.statistics import cells, median_interval
 
 
 def table(values: dict[str, list[float]], name: str = "error", **params: float) -> pl.DataFrame:
@@ -68,6 +69,39 @@ def test_seeds_that_one_law_did_not_fly_are_left_out():
     assert paired_differences(data)[0]["n"] == 2
 
 
+def test_an_interval_that_excludes_zero_is_rarely_wrong_and_never_comes_of_too_few_pairs():
+    rng = np.random.default_rng(9)
+    for count in (2, 3, 4, 5, 6, 8, 10, 30):
+        values = rng.normal(0.0, 1.0, (3000, count))
+        wrong = np.mean([low > 0.0 or high < 0.0 for low, high in map(exact_interval, values)])
+        assert wrong <= (0.065 if count >= needed() else 0.0), (count, wrong)
+    assert needed() == 6
+    assert exact_interval(np.arange(1.0, 7.0)) == (1.0, 6.0)
+
+
+def test_flights_that_a_law_did_not_end_are_failures_and_no_differences():
+    data = table({"qp": [1.0, 1.0, 1.0], "paper": [2.0, 90.0, 2.0]})
+    data = data.with_columns(pl.Series("completed", [True, True, False, True, False, True]))
+    found = paired_differences(data)[0]
+    assert (found["flown"], found["n"], found["failed"]) == (3, 1, [1, 1])
+    assert found["differences"]["error"]["median"] == 1.0 and sign(found["differences"]["error"]) == 0
+    by_law = {cell["law"]: cell["metrics"]["error"]["median"] for cell in cells(data)}
+    assert by_law == {"qp": 1.0, "paper": 2.0}
+    lived = {cell["law"]: cell["metrics"]["error"]["median"] for cell in cells(data, of_all=("error",))}
+    assert lived["paper"] == 2.0 and len(lived) == 2
+
+
+def test_a_variant_is_compared_with_what_it_is_judged_against():
+    parts = [table({"qp": [1.0, 2.0]}), table({"qp": [4.0, 4.0]}), table({"qp": [9.0, 9.0]})]
+    names = ("standard", "unchecked", "clipped")
+    data = pl.concat([part.with_columns(variant=pl.lit(name)) for part, name in zip(parts, names, strict=True)])
+    found = variant_differences(data, {"clipped": ("unchecked", "standard"), "unchecked": ("standard",)})
+    assert [(each["variant"], each["against"]) for each in found] == [
+        ("unchecked", "standard"), ("clipped", "unchecked"),
+    ]  # fmt: skip
+    assert found[0]["differences"]["error"]["median"] == 2.5 and found[1]["differences"]["error"]["median"] == 5.0
+
+
 def test_cells_keep_the_order_and_count_failures():
     data = pl.concat([table({"qp": [1.0]}, push=20.0), table({"qp": [2.0, 3.0]}, push=5.0)])
     data = data.with_columns(pl.Series("completed", [True, False, True]))
@@ -88,6 +122,22 @@ def test_a_bound_is_held_by_the_median_and_counted_per_flight():
     assert verdict.met and (verdict.held, verdict.n, verdict.worst) == (2, 3, 0.9)
     assert not judged([0.6, 0.7, 0.1], bound=0.5).met
     assert judged([0.97, 0.99], bound=0.95, least=True).met
+
+
+def test_what_must_never_happen_must_hold_in_every_flight():
+    flags = [1.0, 1.0, 0.0]
+    assert not judged(flags, bound=1.0, least=True, every=True).met
+    lenient = judged(flags, bound=1.0, least=True)
+    assert lenient.met and lenient.words == "yes (median; 2 of 3)"
+    assert judged([1.0, 1.0], bound=1.0, least=True, every=True).words == "yes"
+    assert judged([5.0, 9.0, 5.1], bound=6.5, every=True).words == "no"
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_flags_peaks_and_mishaps_are_asked_of_every_flight(name):
+    never = ("completed", "survived_s", "detached", "bounces", "reduced_said")
+    for criterion in experiment(name).criteria:
+        assert criterion.every or not (criterion.metric in never or "peak" in criterion.metric), criterion.text
 
 
 def test_a_crash_is_no_good_figure():

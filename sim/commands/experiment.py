@@ -97,7 +97,9 @@ class ExperimentCommand:
             return 0
         folder = RunFolder.create(self.out).path
         with sweep_progress(notes, self.name) as progress:
-            result = run_sweep(runs, folder / PARTS, workers=self.jobs or _cores(), progress=progress)
+            result = run_sweep(
+                runs, folder / PARTS, workers=self.jobs or _cores(), progress=progress, timed=progress.timed
+            )
         facts: dict[str, Any] = {
             "command": shlex.join(["ibvs-qp", *words]),
             "version": version("ibvs-qp"),
@@ -116,7 +118,7 @@ class ExperimentCommand:
             lead = f"{table.height} flights, {self.features} features, first seed {self.seed}, {facts['version']}."
             lead = ("A quick run with few flights, not the record: " if self.quick else "") + lead
             with notes.status("Drawing the figures ..."):
-                page = write_page(folder, experiments, table, lead, self._again())
+                page = write_page(folder, experiments, table, lead, self._again(), self.name)
         content["wall_time_s"] = time.perf_counter() - started
         write_summary(folder, content)
         if self.json:
@@ -132,10 +134,11 @@ class ExperimentCommand:
         return 0
 
     def _again(self) -> str:
-        """The command that flies the same on any computer."""
-        words = ["ibvs-qp", "experiment", self.name, *(["--quick"] if self.quick else [])]
+        """The command that flies one experiment alike on any computer, with ``{name}`` where its name goes."""
+        words = ["ibvs-qp", "experiment", "NAME", *(["--quick"] if self.quick else [])]
         words += ["--features", self.features] if self.features != "rendered" else []
-        return shlex.join([*words, *(["--seed", str(self.seed)] if self.seed else [])])
+        words += ["--seed", str(self.seed)] if self.seed else []
+        return shlex.join(words).replace("NAME", "{name}")
 
 
 def _cores() -> int:
@@ -170,7 +173,13 @@ def _print_verdicts(console: Console, content: dict[str, Any]) -> None:
             sign, unit = ">=" if entry["least"] else "<=", f" {entry['unit']}" if entry["unit"] else ""
             median = f"{entry['median']:.3g}{unit}" if math.isfinite(entry["median"]) else "–"
             held = f"{entry['held']} of {entry['n']}"
-            table.add_row(figure, f"{sign} {entry['bound']:.4g}{unit}", median, held, "yes" if entry["met"] else "NO")
+            table.add_row(
+                figure,
+                f"{sign} {entry['bound']:.4g}{unit}",
+                median,
+                held,
+                "NO" if entry["words"] == "no" else entry["words"],
+            )
         console.print(table)
 
 

@@ -37,19 +37,20 @@ EXPERIMENT = Experiment(
     name=NAME,
     title="Approach and first touch",
     about="From 0.45 m to a held push of 5 N on walls of 1 to 10 kN/m, with the ramp after touch and without it.",
-    paper="Contact about 20 s after activation; no peak is reported.",
+    paper="Contact at about 20 s on the clock of its plot, whose start against the activation is not told; no peak is "
+    "reported. First touch here counts from the start of the flight, which is when the law is activated.",
     design=design,
     params={"stiffness_n_m": "wall [N/m]"},
     columns=(
-        Column(metric="first_touch_s", label="first touch", unit="s", digits=1, better=0),
+        Column(metric="first_touch_s", label="first touch after the start", unit="s", digits=1, better=0),
         Column(metric="approach_speed_m_s", label="speed at touch", unit="mm/s", scale=1e3, digits=0, better=0),
         Column(metric="touch_peak_n", label="peak", unit="N"),
         Column(metric="bounces", label="bounces", digits=0),
         Column(metric="settle_s", label="settled after touch", unit="s"),
     ),
     criteria=(
-        Criterion(text="peak", metric="touch_peak_n", bound=6.5, unit="N"),
-        Criterion(text="bounces", metric="bounces", bound=1.0),
+        Criterion(text="peak", metric="touch_peak_n", bound=6.5, unit="N", every=True),
+        Criterion(text="bounces", metric="bounces", bound=1.0, every=True),
         Criterion(text="settled after touch", metric="settle_s", bound=1.5, unit="s"),
     ),
     draw=curves(

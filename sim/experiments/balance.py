@@ -9,7 +9,8 @@ from typing import Any
 import polars as pl
 
 from sim.experiments.base import Column, Experiment
-from sim.sweep.statistics import paired_differences
+from sim.experiments.wording import folded, of, shown
+from sim.sweep.paired import needed, paired_differences, sign
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,39 +21,35 @@ class Paired:
         column: The figure.
         variant: Variant flown.
         params: The cell.
-        pairs: Seeds flown by both.
-        median: Analytic law minus QP law, in the figure's unit.
-        low: Lower end of its interval.
-        high: Upper end.
-        winner: "qp", "paper", or "" when the interval holds zero or more is neither better nor worse.
+        pairs: Flights that both ended as planned and have the figure.
+        difference: Analytic law minus QP law: median, bootstrap and exact interval, in SI.
+        winner: "qp", "paper", "" when neither is surely better, or "few" when there are too few pairs to tell.
     """
 
     column: Column
     variant: str
     params: dict[str, Any]
     pairs: int
-    median: float
-    low: float
-    high: float
+    difference: dict[str, float]
     winner: str
 
 
 def balance(experiment: Experiment, table: pl.DataFrame) -> Iterator[Paired]:
-    """Every figure that an experiment shows, in every cell that both laws flew more than once."""
-    columns = [column for column in experiment.columns if column.metric in table.columns]
+    """Every judged figure of an experiment, in every cell that both laws flew; cells that are folded away are not."""
+    columns = [column for column in shown(experiment, table) if column.better]
     for entry in paired_differences(table, [column.metric for column in columns]):
-        if entry["n"] < 2:
+        if folded(experiment, entry["params"]):
             continue
         for column in columns:
-            found = entry["differences"].get(column.metric)
+            found = of(entry["differences"], column, entry["params"])
             if found is None:
                 continue
-            sign = -column.better if found["low"] > 0.0 else column.better if found["high"] < 0.0 else 0
+            winner = {1: "qp", -1: "paper", 0: ""}[-column.better * sign(found)]
             yield Paired(
                 column=column,
                 variant=entry["variant"],
                 params=entry["params"],
-                pairs=entry["n"],
-                winner={1: "qp", -1: "paper", 0: ""}[sign],
-                **{name: column.scale * found[name] for name in ("median", "low", "high")},
+                pairs=found["pairs"],
+                difference=found,
+                winner=winner if found["pairs"] >= needed() else "few",
             )

@@ -48,6 +48,8 @@ class Column:
         scale: Factor into that unit.
         digits: Digits after the point.
         better: +1 when more is better, -1 when less is, 0 when neither.
+        of_all: Whether flights that did not end as planned have it as well.
+        where: Cells that it applies to, by parameter; empty is all.
     """
 
     metric: str
@@ -56,6 +58,8 @@ class Column:
     scale: float = 1.0
     digits: int = 2
     better: int = -1
+    of_all: bool = False
+    where: Mapping[str, Parameter] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,6 +76,7 @@ class Criterion:
         scale: Factor into `unit`.
         unit: Unit in which it is shown.
         failed_too: Whether flights that did not end as planned count with their figures.
+        every: Whether every flight must hold it, not the median of the cell: flags, peaks, and counts of mishaps.
     """
 
     text: str
@@ -83,6 +88,7 @@ class Criterion:
     scale: float = 1.0
     unit: str = ""
     failed_too: bool = False
+    every: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,6 +122,7 @@ class Experiment:
         criteria: What the QP law is held to.
         draw: Its figures.
         params: Parameters shown in the table, with their headings.
+        folded: Cells that its table folds away, as a figure shows them, by parameter.
     """
 
     name: str
@@ -127,6 +134,7 @@ class Experiment:
     criteria: tuple[Criterion, ...]
     draw: Draw
     params: dict[str, str]
+    folded: Mapping[str, Parameter] = field(default_factory=dict)
 
 
 def runs(

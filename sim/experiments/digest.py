@@ -14,7 +14,10 @@ from typing import Any
 import numpy as np
 import polars as pl
 
+from sim.experiments.rotor_derate import DESCEND_S
+from sim.experiments.wording import rounded
 from sim.sweep.parts import PARAM
+from sim.sweep.statistics import median_interval
 
 #: What surrounds the table in a text.
 BEGIN, END = "<!-- experiments: generated -->", "<!-- end of experiments -->"
@@ -22,7 +25,7 @@ BEGIN, END = "<!-- experiments: generated -->", "<!-- end of experiments -->"
 
 @dataclass(frozen=True, kw_only=True)
 class Line:
-    """A row: medians of one figure over the flights of both laws that match.
+    """A row: one figure over the flights of both laws that match.
 
     Attributes:
         words: What is measured, with its unit.
@@ -33,6 +36,8 @@ class Line:
         variant: Of the controller.
         params: Parameters of the cells; others vary.
         published: What the literature reports of it.
+        also: Further figures shown behind it: metric, words with "{}" for the number, scale, decimals.
+        at_least: Counts the flights, failed ones too, that reach this value instead of showing a median.
     """
 
     words: str
@@ -43,6 +48,13 @@ class Line:
     variant: str = "standard"
     params: dict[str, Any] = field(default_factory=dict)
     published: str = "–"
+    also: tuple[tuple[str, str, float, int], ...] = ()
+    at_least: float | None = None
+
+
+#: What a press keeps of height and attitude.
+_KEPT = (("height_error_peak_m", "height off by {} mm", 1e3, 1), ("tilt_peak_deg", "tilt {} deg, peaks", 1.0, 2))
+_BEYOND = {"kind": "static", "push_n": 35.0, "friction": 0.3}
 
 
 LINES = (
@@ -63,11 +75,11 @@ LINES = (
     ),
     Line(words="roll and pitch, rms [deg]", experiment="paint", metric="tilt_rms_deg"),
     Line(
-        words="push within 0.5 N after first touch [s]",
+        words="push within 0.5 N, from first touch [s]",
         experiment="force-hold",
         metric="settle_s",
         params={"kind": "hold", "stiffness_n_m": 1500.0},
-        published="about 10 s",
+        published="about 10 s (20 to 30 s of its plot)",
     ),
     Line(
         words="path in the heaviest noise, rms [mm]",
@@ -90,7 +102,8 @@ LINES = (
         metric="push_mean_n",
         digits=1,
         variant="no-reach-check",
-        params={"kind": "static", "push_n": 35.0},
+        params=_BEYOND,
+        also=_KEPT,
     ),
     Line(
         words="the QP's thrusts clipped afterwards instead: push [N]",
@@ -98,7 +111,8 @@ LINES = (
         metric="push_mean_n",
         digits=1,
         variant="clipped",
-        params={"kind": "static", "push_n": 35.0},
+        params=_BEYOND,
+        also=_KEPT,
     ),
     Line(
         words="yaw, peak, sliding at friction 0.8 [deg]",
@@ -113,11 +127,11 @@ LINES = (
         params={"kind": "gust", "wind": 2.0},
     ),
     Line(
-        words="a rotor lost while pressing: flies on, then lands [s]",
+        words=f"alive {DESCEND_S:g} s after a rotor is lost while pressing, of flights",
         experiment="rotor-derate",
         metric="survived_s",
-        digits=1,
         params={"kind": "loss"},
+        at_least=DESCEND_S,
     ),
 )
 
@@ -129,36 +143,45 @@ def digest(table: pl.DataFrame, lines: Sequence[Line] = LINES) -> str:
         table: Rows of all experiments.
         lines: What to show; lines without flights are left out.
     """
-    text = ["| | QP | analytic law | published | flights | redo it: `ibvs-qp` |", "|---|---|---|---|---|---|"]
+    text = [
+        "| | QP | analytic law | published | flights, QP and analytic | redo it: `ibvs-qp` |",
+        "|---|---|---|---|---|---|",
+    ]
     for line in lines:
         rows = _matching(table, line)
         if rows.height:
-            laws = (_figure(rows.filter(pl.col("law") == law), line) for law in ("qp", "paper"))
-            count = rows.filter(pl.col("law") == "qp").height
-            text.append(
-                f"| {line.words} | {' | '.join(laws)} | {line.published} | {count} | `experiment {line.experiment}` |"
-            )
+            laws = [rows.filter(pl.col("law") == law) for law in ("qp", "paper")]
+            count = ", ".join(str(each.height) if each.height else "–" for each in laws)
+            figures = " | ".join(_figure(each, line) for each in laws)
+            text.append(f"| {line.words} | {figures} | {line.published} | {count} | `experiment {line.experiment}` |")
     return "\n".join(text) + "\n"
 
 
 def _matching(table: pl.DataFrame, line: Line) -> pl.DataFrame:
     rows = table.filter((pl.col("experiment") == line.experiment) & (pl.col("variant") == line.variant))
     for name, value in line.params.items():
-        rows = rows.filter(pl.col(PARAM + name) == value)
+        rows = rows.filter(pl.col(PARAM + name) == value) if PARAM + name in rows.columns else rows.clear()
     return rows
 
 
 def _figure(rows: pl.DataFrame, line: Line) -> str:
-    """Median over the flights that ended as planned, and how many did not."""
+    """Median with its interval over the flights that ended as planned, and how many did not."""
     if not rows.height:
         return "–"
+    if line.at_least is not None:
+        return f"{int((rows[line.metric].fill_null(0.0) >= line.at_least).sum())} of {rows.height}"
     done = rows.filter(pl.col("completed"))
-    values = line.scale * done[line.metric].drop_nulls().to_numpy() if done.height else np.zeros(0)
     missed = rows.height - done.height
+    fails = f"fails in {missed} of {rows.height}"
+    values = line.scale * done[line.metric].drop_nulls().to_numpy()
     if not values.size:
-        return f"fails in {missed} of {rows.height}"
-    text = f"{np.median(values):.{line.digits}f}"
-    return f"{text}; fails in {missed} of {rows.height}" if missed else text
+        return fails
+    middle, low, high = (rounded(value, line.digits) for value in median_interval(values).values())
+    parts = [middle if low == high else f"{middle} ({low} to {high})"]
+    for metric, words, scale, digits in line.also:
+        more = done[metric].drop_nulls().to_numpy()
+        parts += [words.format(rounded(scale * float(np.median(more)), digits))] if more.size else []
+    return "; ".join([*parts, *([fails] if missed else [])])
 
 
 def put_into(text: str, table: str) -> str:

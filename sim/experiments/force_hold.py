@@ -77,8 +77,10 @@ EXPERIMENT = Experiment(
     title="Force holding with and without impedance",
     about="Approach, touch and hold 5 N for 9 s on walls of 1.5, 5 and 10 kN/m. The map multiplies the force gains "
     "and delays the force/torque sensor on geometric features, to find where direct force control oscillates.",
-    paper="5 N hold; about 10 s from activation to the reference; direct force control oscillates and crashed on "
-    "hardware. No error figure is printed. Best published real flight of this class: 0.7 N rms.",
+    paper="5 N hold. On the clock of its plot, contact at about 20 s and the way to the reference from 20 to 30 s: "
+    "about 10 s after touch. Settling here counts from first touch too, first touch from the start of the flight. "
+    "Direct force control oscillates and crashed on hardware. No error figure is printed. Best published real flight "
+    "of this class: 0.7 N rms.",
     design=design,
     params={
         "kind": "flights",
@@ -87,6 +89,7 @@ EXPERIMENT = Experiment(
         "delay_s": "F/T delay [s]",
     },
     columns=(
+        Column(metric="first_touch_s", label="first touch after the start", unit="s", digits=1, better=0),
         Column(metric="settle_s", label="settled after touch", unit="s"),
         Column(metric="touch_peak_n", label="peak at touch", unit="N"),
         Column(metric="bounces", label="bounces", digits=0),
@@ -96,10 +99,11 @@ EXPERIMENT = Experiment(
     ),
     criteria=(
         Criterion(text="within ±0.5 N after first touch", metric="settle_s", bound=1.5, params=_HOLD, unit="s"),
-        Criterion(text="peak", metric="touch_peak_n", bound=6.5, params=_HOLD, unit="N"),
-        Criterion(text="bounces", metric="bounces", bound=1.0, params=_HOLD),
+        Criterion(text="peak", metric="touch_peak_n", bound=6.5, params=_HOLD, unit="N", every=True),
+        Criterion(text="bounces", metric="bounces", bound=1.0, params=_HOLD, every=True),
         Criterion(text="steady push error, rms", metric="force_rms_n", bound=0.15, params=_HOLD, unit="N"),
         Criterion(text="tilt, rms", metric="tilt_rms_deg", bound=0.5, params=_HOLD, unit="deg"),
     ),
     draw=draw_force_hold,
+    folded={"kind": "map"},
 )

@@ -50,7 +50,7 @@ EXPERIMENT = Experiment(
     params={"sigma_vs": "sigma_vs", "sigma_f_n": "sigma_f [N]"},
     columns=PATH_COLUMNS,
     criteria=(
-        Criterion(text="completed", metric="completed", bound=1.0, least=True, failed_too=True),
+        Criterion(text="completed", metric="completed", bound=1.0, least=True, failed_too=True, every=True),
         *(
             Criterion(
                 text=f"push error, rms, sigma_f {sigma:g} N",

@@ -60,6 +60,6 @@ EXPERIMENT = Experiment(
     design=design,
     params={"error": "what is wrong"},
     columns=PATH_COLUMNS,
-    criteria=(Criterion(text="completed", metric="completed", bound=1.0, least=True, failed_too=True),),
+    criteria=(Criterion(text="completed", metric="completed", bound=1.0, least=True, failed_too=True, every=True),),
     draw=draw_payload,
 )

@@ -11,11 +11,13 @@ import polars as pl
 from sim.experiments import ALL
 from sim.experiments.base import Experiment, Results
 from sim.experiments.page import results_page
+from sim.experiments.variants import REFERENCES
 from sim.experiments.verdict import telling, verdicts
 from sim.figures.style import save, styled
 from sim.rundir import as_json
+from sim.sweep.paired import paired_differences, variant_differences
 from sim.sweep.parts import write_table
-from sim.sweep.statistics import cells, paired_differences
+from sim.sweep.statistics import cells
 
 SCHEMA = 1
 #: Parts and logs lie here, under the folder of the experiment.
@@ -40,7 +42,8 @@ def summary(
         folder: Where the data file is.
         facts: quick, seed, features, version, command, interrupted, wall_time_s.
     """
-    listed = cells(table) if table.height else []
+    of_all = {column.metric for each in experiments for column in each.columns if column.of_all}
+    listed = cells(table, of_all) if table.height else []
     if name == ALL:
         for cell in listed:
             cell["params"] = {"experiment": cell["experiment"], **cell["params"]}
@@ -53,6 +56,7 @@ def summary(
         **{key: facts[key] for key in ("command", "version", "seed", "features", "interrupted", "wall_time_s")},
         "cells": listed,
         "differences": paired_differences(table) if table.height else [],
+        "parts": variant_differences(table, REFERENCES) if table.height else [],
         "verdicts": [
             {
                 "experiment": each.name,
@@ -68,7 +72,9 @@ def summary(
                 "worst": verdict.worst,
                 "held": verdict.held,
                 "n": verdict.n,
+                "every": verdict.criterion.every,
                 "met": verdict.met,
+                "words": verdict.words,
             }
             for each in experiments
             for listed in [verdicts(each, rows_of(table, each))]
@@ -95,8 +101,19 @@ def write_summary(folder: Path, content: dict[str, Any]) -> None:
     (folder / f"{content['name']}.json").write_text(as_json(content, indent=1) + "\n", encoding="utf-8")
 
 
-def write_page(folder: Path, experiments: Sequence[Experiment], table: pl.DataFrame, lead: str, command: str) -> Path:
-    """Draw every figure and write the results page; returns its file."""
+def write_page(
+    folder: Path, experiments: Sequence[Experiment], table: pl.DataFrame, lead: str, command: str, name: str = ALL
+) -> Path:
+    """Draw every figure and write the results page; returns its file.
+
+    Args:
+        folder: Where it goes, with logs in its ``parts``.
+        experiments: Those flown.
+        table: Their rows.
+        lead: A sentence on what was flown.
+        command: The command that flies one alike, with ``{name}`` where its name goes.
+        name: What was flown: an experiment, or "all".
+    """
     flown = []
     with styled():
         for experiment in experiments:
@@ -104,9 +121,9 @@ def write_page(folder: Path, experiments: Sequence[Experiment], table: pl.DataFr
             if not rows.height:
                 continue
             figures = {}
-            for name, (caption, figure) in experiment.draw(Results(table=rows, folder=folder / PARTS)).items():
-                save(figure, folder / "figures" / f"{name}.png")
-                figures[name] = (caption, Path("figures") / f"{name}.png")
+            for title, (caption, figure) in experiment.draw(Results(table=rows, folder=folder / PARTS)).items():
+                save(figure, folder / "figures" / f"{title}.png")
+                figures[title] = (caption, Path("figures") / f"{title}.png")
             flown.append((experiment, rows, figures))
-    (folder / PAGE).write_text(results_page(flown, lead, command), encoding="utf-8")
+    (folder / PAGE).write_text(results_page(flown, lead, command, name), encoding="utf-8")
     return folder / PAGE

@@ -20,6 +20,8 @@ PRESS_S, HOLD_S, SLIDE_S = 9.0, 3.0, 5.0
 STATIC_N, SLIDING_N, DERATED_PUSH_N = (15.0, 20.0, 25.0, 27.5, 30.0, 35.0), (5.0, 10.0, 15.0, 20.0), (10.0, 13.0, 20.0)
 DERATED_N = 20.0
 FRICTION, SLIPPERY = 0.3, 0.05
+#: Friction and asked push [N] of the slides beyond reach.
+BEYOND = ((0.3, 20.0), (0.8, 10.0), (0.8, 15.0), (0.8, 20.0))
 #: Asked pushes of the program without rotor limits [N], its thrusts clipped afterwards.
 CLIPPED_N = (20.0, 25.0, 27.5, 30.0, 35.0)
 
@@ -149,6 +151,7 @@ EXPERIMENT = Experiment(
                     variant=variant,
                     scale=1e3,
                     unit="mm",
+                    every=True,
                 ),
                 Criterion(
                     text="35 N: tilt, rms",
@@ -165,6 +168,48 @@ EXPERIMENT = Experiment(
                     params=_asked(35.0),
                     variant=variant,
                     unit="deg",
+                    every=True,
+                ),
+            )
+        ),
+        *(
+            criterion
+            for friction, push in BEYOND
+            for cell in ({"kind": "sliding", "push_n": push, "friction": friction},)
+            for criterion in (
+                Criterion(
+                    text=f"sliding at friction {friction:g}, {push:g} N: push over reach",
+                    metric="reach_share",
+                    bound=1.0,
+                    params=cell,
+                    scale=100.0,
+                    unit="%",
+                    every=True,
+                ),
+                Criterion(
+                    text=f"sliding at friction {friction:g}, {push:g} N: reduced with the reason",
+                    metric="reduced_said",
+                    bound=1.0,
+                    least=True,
+                    params=cell,
+                    every=True,
+                ),
+                Criterion(
+                    text=f"sliding at friction {friction:g}, {push:g} N: yaw held, peak",
+                    metric="yaw_peak_deg",
+                    bound=3.0,
+                    params=cell,
+                    unit="deg",
+                    every=True,
+                ),
+                Criterion(
+                    text=f"sliding at friction {friction:g}, {push:g} N: completed",
+                    metric="completed",
+                    bound=1.0,
+                    least=True,
+                    params=cell,
+                    failed_too=True,
+                    every=True,
                 ),
             )
         ),

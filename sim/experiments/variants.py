@@ -19,12 +19,14 @@ class Variant:
         switches: Fields of `ControllerConfig` and their values.
         vision: Perception of rendered pictures, as in `FlightOptions`.
         laws: Laws for which it makes sense.
+        against: Variants that it is judged against: the first that flew the same cell.
     """
 
     words: str
     switches: dict[str, Any] = field(default_factory=dict)
     vision: str = "own"
     laws: tuple[str, ...] = ("qp", "paper")
+    against: tuple[str, ...] = ("standard",)
 
     def apply(self, config: PilotConfig) -> PilotConfig:
         """The configuration with the switches set."""
@@ -51,6 +53,7 @@ VARIANTS = {
         words="a program without rotor limits, its thrusts clipped afterwards, no reach check",
         switches={"thrust_rows": False, "reach_check": False},
         laws=("qp",),
+        against=("no-reach-check", "standard"),
     ),
     "paper-lines": Variant(
         words="line rows of the QP at the image centre, as in the paper, instead of at the tip",
@@ -63,3 +66,5 @@ VARIANTS = {
     ),
     "no-reach-check": Variant(words="asked push not reduced to the reach", switches={"reach_check": False}),
 }
+#: What each variant is judged against.
+REFERENCES = {name: variant.against for name, variant in VARIANTS.items()}

@@ -24,6 +24,7 @@ class Verdict:
         held: Flights that hold the bound.
         known: Flights that have the figure; one that failed counts only where the criterion says so.
         n: Flights.
+        measured: Whether the table has the figure at all.
     """
 
     criterion: Criterion
@@ -33,12 +34,24 @@ class Verdict:
     held: int
     known: int
     n: int
+    measured: bool = True
 
     @property
     def met(self) -> bool:
-        """Whether the median holds the bound and every flight has the figure."""
+        """Whether every flight has the figure and holds the bound, or their median where the criterion asks no more."""
+        if not self.n or self.known < self.n:
+            return False
         good = self.median >= self.bound if self.criterion.least else self.median <= self.bound
-        return bool(np.isfinite(self.median) and good and self.known == self.n)
+        return self.held == self.n if self.criterion.every else bool(good)
+
+    @property
+    def words(self) -> str:
+        """``yes`` or ``no``, and what every flight says where the median speaks for them."""
+        if not self.measured:
+            return "not measured"
+        if self.met and self.held < self.n:
+            return f"yes (median; {self.held} of {self.n})"
+        return "yes" if self.met else "no"
 
     @property
     def bound(self) -> float:
@@ -49,7 +62,7 @@ class Verdict:
 def verdicts(experiment: Experiment, table: pl.DataFrame) -> list[Verdict]:
     """Every criterion in every cell of the QP law that it holds for."""
     result = []
-    for criterion in experiment.criteria:
+    for criterion in experiment.criteria if table.height else ():
         rows = table.filter((pl.col("law") == "qp") & (pl.col("variant") == criterion.variant))
         for name, value in criterion.params.items():
             rows = rows.filter(pl.col(PARAM + name) == value) if PARAM + name in rows.columns else rows.clear()
@@ -74,7 +87,16 @@ def _judge(criterion: Criterion, params: dict, cell: pl.DataFrame) -> Verdict:
     bound = criterion.scale * criterion.bound
     held = np.count_nonzero(good >= bound if criterion.least else good <= bound)
     if not len(good):
-        return Verdict(criterion=criterion, params=params, median=np.nan, worst=np.nan, held=0, known=0, n=len(values))
+        return Verdict(
+            criterion=criterion,
+            params=params,
+            median=np.nan,
+            worst=np.nan,
+            held=0,
+            known=0,
+            n=len(values),
+            measured=criterion.metric in cell.columns,
+        )
     worst = good.min() if criterion.least else good.max()
     return Verdict(
         criterion=criterion,

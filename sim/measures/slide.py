@@ -14,6 +14,8 @@ from sim.trace import Trace
 
 #: Sliding figures begin this long after the slide was asked for [s]: the speed ramp is over.
 SLIDING_AFTER_S = 1.0
+#: How a command begins to say that the asked push is beyond reach.
+_REDUCED = "reference.push_force"
 
 
 def slide_figures(trace: Trace) -> dict[str, float]:
@@ -50,6 +52,8 @@ def slide_figures(trace: Trace) -> dict[str, float]:
         "stuck_share": float(np.mean(stuck)),
         "path_rms_m": rms(height[after]),
         "push_mean_n": mean(push[after]),
+        "push_commanded_n": mean(trace.push_reference[after]),
+        "reduced_said": float(any(e.kind == "rejected" and e.text.startswith(_REDUCED) for e in trace.events)),
         "force_rms_n": rms(push[after] - trace.push_reference[after]),
         "force_error_rms_n": rms(push[after] - asked),
         "delivered_share": mean(push[after]) / asked,

@@ -129,6 +129,11 @@ class ListedBlock:
 
         return block_hash(self.listed)
 
+    @property
+    def expected_s(self) -> float:
+        """Flying time to expect [s]."""
+        return sum(run.expected_s for run in self.listed)
+
     def runs(self) -> Sequence[Run]:
         """The runs."""
         return self.listed

@@ -14,6 +14,8 @@ from sim.sweep.pools import Pool, local_pool
 
 #: Told the number of runs finished, the number of all, and how many of the finished were on disk already.
 SweepProgress = Callable[[int, int, int], None]
+#: Told the flying time expected of what this sweep has flown, and of all that it had to fly [s].
+SweepTime = Callable[[float, float], None]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,6 +40,7 @@ def run_sweep(
     workers: int = 1,
     block_runs: int = 1,
     progress: SweepProgress | None = None,
+    timed: SweepTime | None = None,
     pool: Pool | None = None,
 ) -> SweepResult:
     """Fly every run of a design that is not on disk yet.
@@ -51,6 +54,7 @@ def run_sweep(
         workers: Processes side by side; the table does not depend on it.
         block_runs: Runs per part.
         progress: Told about every finished block.
+        timed: Told their expected flying time, as flights of one design differ in length.
         pool: Flies the blocks instead of `workers` processes of this computer.
     """
     folder.mkdir(parents=True, exist_ok=True)
@@ -62,11 +66,16 @@ def run_sweep(
     reused = done = count - sum(len(block) for block, _ in missing)
     tell = progress or (lambda *_: None)
     tell(done, count, reused)
+    expected = {name: float(getattr(block, "expected_s", len(block))) for block, name in missing} if timed else {}
+    flown_s, all_s = 0.0, sum(expected.values())
     interrupted = False
     try:
         for name, rows in (pool or local_pool(workers))(missing, folder):
             write_part(part_file(folder, name), rows)
             done += len(rows)
+            if timed is not None:
+                flown_s += expected[name]
+                timed(flown_s, all_s)
             tell(done, count, reused)
     except KeyboardInterrupt:
         interrupted = True

@@ -1,10 +1,10 @@
-"""What a table of runs says: medians with bootstrap intervals per cell, and paired differences between the laws."""
+"""What a table of runs says: medians with bootstrap intervals per cell."""
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
@@ -66,11 +66,19 @@ def split(table: pl.DataFrame, keys: Sequence[str]) -> list[tuple[dict[str, Any]
     return [(dict(zip(columns, values, strict=True)), rows) for values, rows in groups]
 
 
-def cells(table: pl.DataFrame) -> list[dict[str, Any]]:
-    """Cells of the contract: law, variant, params, n, completed, and every figure with its interval."""
+def cells(table: pl.DataFrame, of_all: Collection[str] = ()) -> list[dict[str, Any]]:
+    """Cells of the contract: law, variant, params, n, completed, and every figure with its interval.
+
+    Figures are those of flights that ended as planned: what a crash cut short measures nothing.
+
+    Args:
+        table: Rows.
+        of_all: Figures that failed flights have as well, such as how long they lived.
+    """
     names, result = figure_names(table), []
     for key, rows in split(table, ("experiment", "law", "variant")):
-        metrics = {name: median_interval(rows[name].to_numpy()) for name in names if rows[name].drop_nulls().len()}
+        done = rows.filter(pl.col("completed"))
+        columns = {name: (rows if name in of_all else done)[name].drop_nulls() for name in names}
         result.append(
             {
                 "experiment": key["experiment"],
@@ -78,43 +86,10 @@ def cells(table: pl.DataFrame) -> list[dict[str, Any]]:
                 "variant": key["variant"],
                 "params": parameters(key),
                 "n": rows.height,
-                "completed": int(rows["completed"].sum()),
-                "metrics": metrics,
-            }
-        )
-    return result
-
-
-def paired_differences(table: pl.DataFrame, names: Sequence[str] | None = None) -> list[dict[str, Any]]:
-    """Analytic law minus QP law, seed by seed, per variant and parameters: median with interval.
-
-    An interval without zero says that the sign of the difference is no accident of the seeds; a positive difference
-    of an error means that the QP law is better.
-
-    Args:
-        table: Rows of both laws.
-        names: Figures to compare; None takes all.
-    """
-    wanted = list(names or figure_names(table))
-    result = []
-    for key, rows in split(table, ("experiment", "variant")):
-        both = rows.filter(pl.col("law") == "qp").join(
-            rows.filter(pl.col("law") == "paper"), on="seed", suffix=".paper", maintain_order="left"
-        )
-        if not both.height:
-            continue
-        figures = {}
-        for name in wanted:
-            difference = (both[f"{name}.paper"] - both[name]).cast(pl.Float64).to_numpy()
-            if np.isfinite(difference).any():
-                figures[name] = median_interval(difference)
-        result.append(
-            {
-                "experiment": key["experiment"],
-                "variant": key["variant"],
-                "params": parameters(key),
-                "n": both.height,
-                "differences": figures,
+                "completed": done.height,
+                "metrics": {
+                    name: median_interval(values.to_numpy()) for name, values in columns.items() if len(values)
+                },
             }
         )
     return result
