@@ -51,10 +51,9 @@ def _capture(camera: PlaneCamera, trace: Trace, tick: int) -> RgbdFrame:
     return camera.capture(trace.position[tick], trace.attitude[tick], round(trace.t[tick] * 1e9))
 
 
-def final_view(trace: Trace) -> np.ndarray:
-    """What the camera sees at the end of the flight, uint8 (H, W, 3)."""
-    last = len(trace.t) - 1
-    return _capture(_camera(trace, last), trace, last).rgb
+def painted_board(trace: Trace) -> np.ndarray:
+    """The board as painted by the end of the flight, painted again from the log, uint8 RGB (h, w, 3)."""
+    return _canvas(trace, len(trace.t)).rgb
 
 
 def draw_snapshots(trace: Trace) -> Figure:
