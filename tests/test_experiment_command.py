@@ -11,7 +11,7 @@ from synthetic_trace import Errors, synthetic_trace
 
 import sim.sweep.flying
 from sim.cli import main
-from sim.figures.experiments.force_hold import predicted_damping
+from sim.figures.experiments.force_map import predicted_damping
 from sim.jobs import PressJob
 
 
