@@ -36,7 +36,10 @@ def draw_paint(results: Results) -> dict[str, tuple[str, Figure]]:
                 draw_demonstration(trace),
             )
             if law == "qp":
-                caption = "Line detection at three moments; below, wall normals and the bounding box of the plane"
+                caption = (
+                    "Line detection at three moments; below, normals of the depth picture and the bounding box of the "
+                    "plane found, both computed for this figure"
+                )
                 figures["line-detection"] = (caption, draw_snapshots(trace))
     if results.table["seed"].n_unique() > 1:
         figures["paint-spread"] = ("Spread over the seeds, box plots", _spread(results))
