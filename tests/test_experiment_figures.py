@@ -68,11 +68,12 @@ def test_a_hold_that_crashed_has_lost_the_wall():
     assert (cells["lost"] == (cells[PARAM + "force_gain"] == 5.0)).all()
 
 
-def test_a_variant_without_a_log_borrows_no_reference(monkeypatch, tmp_path):
+@pytest.mark.parametrize("logged", ["standard", "direct"])
+def test_a_variant_without_a_log_borrows_no_reference(monkeypatch, tmp_path, logged):
     table = table_of("force-hold", force_std_n=0.1, contact_share=1.0)
 
     def trace(results, rows):
-        if rows["variant"].first() != "direct":
+        if rows["variant"].first() != logged:
             return None
         made = press_trace()
         made.arrays["line_error_px"] = 0.0 * made.t[:, None].repeat(2, 1)
@@ -80,7 +81,8 @@ def test_a_variant_without_a_log_borrows_no_reference(monkeypatch, tmp_path):
 
     monkeypatch.setattr(force_hold, "kept_trace", trace)
     figures = force_hold.draw_force_hold(Results(table=table, folder=tmp_path))
-    empty, drawn = figures["force-hold-1.5kNm"][1].axes[:2]
+    panels = figures["force-hold-1.5kNm"][1].axes[:2]
+    empty, drawn = panels if logged == "direct" else panels[::-1]
     assert len(drawn.lines) == 3
     assert not empty.lines and empty.texts[0].get_text() == "not flown"
 
