@@ -55,7 +55,7 @@ def _around(results: Results, kind: str) -> Figure | None:
     for axes, label in zip(grid, ("true push [N]", "tilt [deg]", "yaw [deg]"), strict=True):
         axes.axvline(0.0, color="#888888", linewidth=0.8)
         axes.set(xlabel="time since the event [s]", ylabel=label)
-    rotor = str(rotor).replace("mid_", "mid ").replace("_", " ")
+    rotor = str(rotor).replace("_", " ")
     reach = flown["reach_n"].drop_nulls() if "reach_n" in flown.columns else flown["seed"].clear()
     if kind == "derate" and reach.len():
         grid[0].axhline(float(reach[0]), color="#888888", linestyle="--", linewidth=0.8)
