@@ -14,7 +14,7 @@ import sim.sweep.flying
 from sim.cli import main
 from sim.experiments import experiment
 from sim.experiments.base import Choice
-from sim.figures.experiments.force_hold import predicted_damping
+from sim.figures.experiments.force_map import predicted_damping
 from sim.jobs import PressJob
 from sim.sweep import run_sweep
 

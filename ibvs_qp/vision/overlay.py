@@ -18,12 +18,13 @@ _TINT, _TICK_PX, _TEXT = 0.22, 14, 0.42
 _FONT, _PAD_PX, _CLEAR_PX = cv2.FONT_HERSHEY_SIMPLEX, 3, 10
 
 
-def draw_overlay(rgb: np.ndarray, percept: Percept) -> np.ndarray:
+def draw_overlay(rgb: np.ndarray, percept: Percept, *, words: bool = True) -> np.ndarray:
     """Draw surface, mask, tracks and velocity into a copy of the picture.
 
     Args:
         rgb: The picture, uint8 (H, W, 3).
         percept: What was seen in it.
+        words: Whether to write what each track is, and distance and velocity; too small to read in print.
 
     Returns:
         uint8 (H, W, 3).
@@ -39,9 +40,10 @@ def draw_overlay(rgb: np.ndarray, percept: Percept) -> np.ndarray:
         segments = [denormalise(track.segment, percept.intrinsics) for track in percept.tracks]
         for track, ends in zip(percept.tracks, segments, strict=True):
             _draw_track(result, track, ends)
-        for track, ends in zip(percept.tracks, segments, strict=True):  # last: no line runs through a label
+        for track, ends in zip(percept.tracks, segments, strict=True) if words else ():  # last: no line covers a label
             _label_track(result, track, ends)
-    _write(result, _caption(percept), (6, height - 8))
+    if words:
+        _write(result, _caption(percept), (6, height - 8))
     return result
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 import shlex
 import sys
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from sim.commands.options import flag, optional
+from sim.commands.options import check_count, flag, go_on, optional
 
 if TYPE_CHECKING:
     import polars as pl
@@ -66,33 +67,54 @@ class Compare:
         from sim.comparison import compare, read_run
         from sim.rundir import as_json
 
-        presets = [path.is_file() for path in (self.run_a, self.run_b)]
-        interrupted = False
-        if all(presets):
-            a, b, interrupted = self._fly()
+        folder, interrupted = None, False
+        if self._presets():
+            a, b, folder, interrupted = self._fly()
         else:
             a, b = read_run(self.run_a), read_run(self.run_b)
-        if interrupted:
-            print("ibvs-qp: interrupted; give the same --out to go on", file=sys.stderr)
-            return 130
-        cells = compare(a, b)
+        cells = [] if interrupted else compare(a, b)
         if self.json:
             content: dict[str, Any] = {
                 "schema": 1,
                 "command": shlex.join(["ibvs-qp", *words]),
                 "run_a": str(self.run_a),
                 "run_b": str(self.run_b),
+                "run_dir": None if folder is None else str(folder),
+                "interrupted": interrupted,
                 "cells": [
                     {**cell, "differences": {each.figure: _plain(each) for each in cell["differences"]}}
                     for cell in cells
                 ],
             }
             print(as_json(content))
-        else:
+        elif not interrupted:
             _print(cells, self.run_a, self.run_b)
+        if interrupted and folder is not None:
+            again = go_on(words, folder)
+            print(f"ibvs-qp: interrupted; finished flights are in {folder}; go on with: {again}", file=sys.stderr)
+            return 130
         return 0
 
-    def _fly(self) -> tuple[pl.DataFrame, pl.DataFrame, bool]:
+    def _presets(self) -> bool:
+        """Whether both are presets; False when both are folders.
+
+        Raises:
+            ConfigError: When one is a preset and the other a folder, or one does not exist.
+        """
+        from ibvs_qp.errors import ConfigError
+
+        for path in (self.run_a, self.run_b):
+            if not path.exists():
+                raise ConfigError(f"{path} does not exist; give two run folders or two presets (TOML)")
+        files = [path.is_file() for path in (self.run_a, self.run_b)]
+        if files[0] != files[1]:
+            file, folder = (self.run_a, self.run_b) if files[0] else (self.run_b, self.run_a)
+            raise ConfigError(
+                f"{file} is a file and {folder} a folder; give two run folders or two presets (TOML) to compare"
+            )
+        return files[0]
+
+    def _fly(self) -> tuple[pl.DataFrame, pl.DataFrame, Path, bool]:
         import polars as pl
         from rich.console import Console
 
@@ -103,6 +125,8 @@ class Compare:
         from sim.sweep.progress import sweep_progress
 
         check_seed(self.seed)
+        check_count("--seeds", self.seeds)
+        check_count("--jobs", self.jobs)
         for option, file in (("RUN_A", self.run_a), ("RUN_B", self.run_b)):
             check_readable(option, file)
             check_preset(file)
@@ -115,12 +139,18 @@ class Compare:
         ]
         folder = RunFolder.create(self.out).path
         with sweep_progress(Console(stderr=True, quiet=self.json), "compare") as progress:
-            result = run_sweep(runs, folder / "parts", workers=self.jobs or 1, progress=progress)
+            result = run_sweep(runs, folder / "parts", workers=self.jobs or _cores(), progress=progress)
+        if "variant" not in result.table.columns:  # stopped before the first flight was done
+            return result.table, result.table, folder, True
         variants = [result.table.filter(pl.col("variant") == name) for name in ("a", "b")]
         # What is compared is preset against preset, whatever law each of them names.
         alike = [pl.lit("preset").alias("variant"), *([pl.lit("own").alias("law")] if self.law == "own" else [])]
         a, b = (table.with_columns(alike) for table in variants)
-        return a, b, result.interrupted
+        return a, b, folder, result.interrupted
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _plain(difference: Any) -> dict[str, float]:

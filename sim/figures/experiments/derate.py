@@ -35,16 +35,17 @@ def _around(results: Results, kind: str) -> Figure | None:
     cells = table.select(PARAM + "rotor", PARAM + "share").unique(maintain_order=True).rows()
     # The cells in the middle of the table say most: neither harmless nor hopeless.
     rotor, share = cells[len(cells) // 2]
+    flown = select(table, rotor=rotor, share=share)
     figure = new_figure(2.8)
     grid = figure.subplots(1, 3)
     for law in ("paper", "qp"):
-        trace = kept_trace(results, select(table, law=law, rotor=rotor, share=share))
+        trace = kept_trace(results, select(flown, law=law))
         if trace is None:
             continue
         fault = event_time(trace, "fault")
         t = trace.t - fault
         near = (t > -BEFORE_S) & (t < AFTER_S)
-        series = (trace.push_true, tilt_deg(trace), np.degrees(trace.euler[:, 2]))
+        series = (trace.push_true, tilt_deg(trace), np.degrees(np.unwrap(trace.euler[:, 2])))
         for axes, values in zip(grid, series, strict=True):
             axes.plot(t[near], values[near], color=law_colour(law), label=law_name(law), linewidth=0.9)
             if not near[-1] or t[-1] > AFTER_S:
@@ -54,11 +55,15 @@ def _around(results: Results, kind: str) -> Figure | None:
     for axes, label in zip(grid, ("true push [N]", "tilt [deg]", "yaw [deg]"), strict=True):
         axes.axvline(0.0, color="#888888", linewidth=0.8)
         axes.set(xlabel="time since the event [s]", ylabel=label)
-    reach = select(table, rotor=rotor, share=share)
-    if kind == "derate" and "reach_n" in reach.columns:
-        grid[0].axhline(float(reach["reach_n"].drop_nulls()[0]), color="#888888", linestyle="--", linewidth=0.8)
+    rotor = str(rotor).replace("_", " ")
+    reach = flown["reach_n"].drop_nulls() if "reach_n" in flown.columns else flown["seed"].clear()
+    if kind == "derate" and reach.len():
+        grid[0].axhline(float(reach[0]), color="#888888", linestyle="--", linewidth=0.8)
         grid[0].set_title(f"{rotor} at {100 * float(share):g} %; dashed: reach left")
+    elif kind == "derate":
+        grid[0].set_title(f"{rotor} at {100 * float(share):g} %")
     else:
         grid[0].set_title(f"{rotor} stopped; x: crash")
-    grid[0].legend(loc="best")
+    if grid[0].get_legend_handles_labels()[0]:
+        grid[0].legend(loc="best")
     return figure

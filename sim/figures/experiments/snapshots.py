@@ -5,6 +5,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
 from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.vehicle import VehicleParams
@@ -25,6 +27,8 @@ MOMENTS = (0.05, 0.5, 0.92)
 LEAD_FRAMES, FRAME_TICKS = 12, 8
 #: Cells over which a normal is taken, and width of the box's line [px].
 CELL_PX, BOX_PX = 15, 3
+#: Lean of the normals in the legend, as the sine of the angle.
+LEAN = 0.6
 #: Distance from the fitted plane, relative, within which a pixel belongs to it.
 PLANE_GATE = 0.03
 
@@ -51,17 +55,16 @@ def _capture(camera: PlaneCamera, trace: Trace, tick: int) -> RgbdFrame:
     return camera.capture(trace.position[tick], trace.attitude[tick], round(trace.t[tick] * 1e9))
 
 
-def final_view(trace: Trace) -> np.ndarray:
-    """What the camera sees at the end of the flight, uint8 (H, W, 3)."""
-    last = len(trace.t) - 1
-    return _capture(_camera(trace, last), trace, last).rgb
+def painted_board(trace: Trace) -> np.ndarray:
+    """The board as painted by the end of the flight, painted again from the log, uint8 RGB (h, w, 3)."""
+    return _canvas(trace, len(trace.t)).rgb
 
 
 def draw_snapshots(trace: Trace) -> Figure:
     """Three moments: picture with detected lines above, normals with the plane's bounding box below."""
     begin, end = phase_window(trace, "paint")
     row = np.flatnonzero((trace.t >= begin) & (trace.t <= end) & (trace.row <= 1))
-    figure = new_figure(3.9)
+    figure = new_figure(4.6)
     grid = figure.subplots(2, len(MOMENTS))
     for (above, below), share in zip(grid.T, MOMENTS, strict=True):
         tick = int(row[int(share * (len(row) - 1))])
@@ -73,12 +76,28 @@ def draw_snapshots(trace: Trace) -> Figure:
             frame = _capture(camera, trace, at)
             percept = perception.process(frame, attitude=trace.attitude[at], rotation=np.zeros(3), velocity=None)
         assert frame is not None and percept is not None
-        above.imshow(draw_overlay(frame.rgb, percept))
+        above.imshow(draw_overlay(frame.rgb, percept, words=False))
         below.imshow(normal_picture(frame, percept.features.plane if percept.features else None))
-        above.set_title(f"{trace.t[tick]:.1f} s")
+        above.set_title(f"t = {trace.t[tick]:.1f} s, row {int(trace.row[tick])}")
         for axes in (above, below):
             axes.set_axis_off()
+    keys = [
+        Line2D([], [], color="#ffa000", linewidth=2, label="edge of the board (tick: side of the surface)"),
+        Line2D([], [], color="#ff00c8", linewidth=2, label="edge of the paint"),
+        Patch(facecolor="#bfe9c8", label="working surface found"),
+        Patch(facecolor="#7f4a4a", label="masked tool"),
+        Patch(facecolor=_normal_colour(0.0, 0.0), label="normal to the camera"),
+        Patch(facecolor=_normal_colour(LEAN, 0.0), label="normal leaning right"),
+        Patch(facecolor=_normal_colour(0.0, LEAN), label="normal leaning up"),
+        Patch(facecolor="white", edgecolor="#555555", label="bounding box, made for this figure"),
+    ]
+    figure.legend(handles=keys, loc="outside lower center", ncols=3, fontsize=7.5)
     return figure
+
+
+def _normal_colour(right: float, up: float) -> tuple[float, float, float]:
+    """Colour of a normal in `normal_picture`, 0..1."""
+    return 0.5 * (1.0 + right), 0.5 * (1.0 + up), 0.5 * (1.0 + (1.0 - right**2 - up**2) ** 0.5)
 
 
 def normal_picture(frame: RgbdFrame, plane: tuple[float, float, float, float] | None) -> np.ndarray:
