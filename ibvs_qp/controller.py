@@ -70,7 +70,7 @@ class HybridController:
         limits: Further limits.
 
     Raises:
-        ConfigError: When a row is not affine in the thrusts, or the configuration is refused.
+        ConfigError: When a row is not affine in the thrusts, two rows share a name, or the configuration is refused.
     """
 
     def __init__(
