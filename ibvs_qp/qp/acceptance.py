@@ -11,6 +11,7 @@ from ibvs_qp.command import Outcome
 from ibvs_qp.config import SolverSettings
 from ibvs_qp.qp.active_set import ActiveSet
 from ibvs_qp.qp.assembly import QpTemplate
+from ibvs_qp.qp.conflict import conflicting_rows
 from ibvs_qp.qp.evaluator import Evaluator, ProgramData
 from ibvs_qp.qp.exact_solver import ExactSolver
 from ibvs_qp.qp.osqp_solver import MAX_ITERATIONS, SOLVED, SOLVED_INACCURATE, OsqpSolver, RawSolution
@@ -19,8 +20,6 @@ from ibvs_qp.qp.osqp_solver import MAX_ITERATIONS, SOLVED, SOLVED_INACCURATE, Os
 USABLE = (SOLVED, SOLVED_INACCURATE, MAX_ITERATIONS)
 #: A multiplier above this price counts as an active limit [cost per unit].
 ACTIVE_PRICE = 1e-3
-#: Share of the largest entry of an infeasibility certificate above which a row belongs to the conflict.
-CONFLICT_SHARE = 1e-2
 #: Largest thrust-bound violation that clipping may hide in a solved program [N].
 BOUND_SLIP = 1e-2
 
@@ -46,7 +45,7 @@ class QpEngine:
 
     Attributes:
         data: Data of the program; on its own an `Evaluator` whose parameters are yours to write.
-        conflict: Names of the rows that contradict each other, after a solve that found no feasible point.
+        conflict: Names of a smallest set of hard rows that contradict each other, after a solve that found nothing.
     """
 
     def __init__(
@@ -89,7 +88,7 @@ class QpEngine:
             return self._accept(raw.x, raw.y, outcome, raw.iterations, raw.seconds)
         exact = self.exact.solve(data.p, data.q, data.a, data.lower, data.upper)
         if exact is None:
-            self.conflict = self._conflicting_rows(raw.certificate)
+            self.conflict = conflicting_rows(self.template, data)
             self.osqp.reset()
             return None
         self.osqp.warm_start(*exact)
@@ -117,17 +116,6 @@ class QpEngine:
             return AcceptedSolution(thrusts, x, self._no_price, Outcome.SOLVED, 0, 0.0, limited=False)
         exact = self.active_set.solve(data)
         return None if exact is None else self._accept(*exact, Outcome.SOLVED, 0, 0.0)
-
-    def _conflicting_rows(self, certificate: np.ndarray | None) -> tuple[str, ...]:
-        """Names of the rows that no point satisfies together: the non-zeros of OSQP's certificate A' v = 0."""
-        if certificate is None or not np.isfinite(certificate).all():
-            return ()
-        size = np.abs(certificate)
-        return tuple(
-            name
-            for name, entry in zip(self.template.row_names, size, strict=True)
-            if entry > CONFLICT_SHARE * size.max()
-        )
 
     def _judge(self, status: int, x: np.ndarray, y: np.ndarray) -> Outcome | None:
         if status not in USABLE or not math.isfinite(x.sum() + y.sum()):

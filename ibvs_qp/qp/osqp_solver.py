@@ -14,8 +14,6 @@ from ibvs_qp.qp.assembly import QpTemplate
 
 #: Status values of OSQP 1.x whose iterate means something.
 SOLVED, SOLVED_INACCURATE, MAX_ITERATIONS = 1, 2, 7
-#: Status values that say no point satisfies all rows, the second with less certainty.
-INFEASIBLE = (3, 4)
 
 
 @dataclass(slots=True)
@@ -27,7 +25,6 @@ class RawSolution:
     status: int
     iterations: int
     seconds: float
-    certificate: np.ndarray | None = None
 
 
 class OsqpSolver:
@@ -95,7 +92,6 @@ class OsqpSolver:
                 return None
         else:
             self._solver.update(q=q, l=lower, u=upper, Px=p, Ax=a)
-        result = None
         if self._inner is None:
             result = self._solver.solve(raise_error=False)
             x, y, info = result.x, result.y, result.info
@@ -103,16 +99,10 @@ class OsqpSolver:
             self._inner.solve()
             solution, info = self._inner.solution, self._inner.info
             x, y = np.array(solution.x), np.array(solution.y)
-        status = int(info.status_val)
-        certificate = None
-        if status in INFEASIBLE:
-            source = self._inner.solution if self._inner is not None else result
-            certificate = np.array(source.prim_inf_cert)  # type: ignore[union-attr]
         return RawSolution(
             x=x,
             y=y,
-            certificate=certificate,
-            status=status,
+            status=int(info.status_val),
             iterations=int(info.iter),
             seconds=time.perf_counter() - start,
         )
