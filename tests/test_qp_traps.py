@@ -14,11 +14,11 @@ from small_vehicle import SmallVehicle
 
 from ibvs_qp.analytic import analytic_thrusts
 from ibvs_qp.command import Outcome
-from ibvs_qp.config import ControllerConfig, SolverSettings
+from ibvs_qp.config import ControllerConfig, LimitSettings, SolverSettings
 from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import Reference
 from ibvs_qp.qp.evaluator import Evaluator
-from ibvs_qp.qp.osqp_solver import SOLVED, OsqpSolver
+from ibvs_qp.qp.osqp_solver import MAX_ITERATIONS, SOLVED, SOLVED_INACCURATE, OsqpSolver
 
 #: What OSQP 1.1 writes into x when it found no solution: its NaN pattern read as a number.
 GARBAGE = 2143289344.0
@@ -113,6 +113,25 @@ def test_garbage_with_a_good_status_does_not_fly_either() -> None:
     assert engine._judge(SOLVED, inside, np.zeros(rows)) is Outcome.SOLVED
     for status in (3, 4, 5, 6, 8, 9, 10, 11):  # infeasible, unbounded, interrupted, unsolved: the number is chance
         assert engine._judge(status, inside, np.zeros(rows)) is None
+
+
+@pytest.mark.parametrize("status", [SOLVED, SOLVED_INACCURATE, MAX_ITERATIONS])
+def test_an_iterate_that_breaks_a_hard_row_does_not_fly(status: int) -> None:
+    """All thrusts within their boxes and no dual residual: a barrier without slack is broken none the less."""
+    hard = ControllerConfig(limits=LimitSettings(hard_barriers=True))
+    engine, row = flying(config=hard).engine, 6
+    assert engine.template.row_names[row] == "tilt_roll" and engine.template.row_slack[row] < 0
+    data = engine.data
+    x, per_thrust = data.free.copy(), data.rows()[row]
+    engine.dual_residual = lambda x, y: 0.0  # type: ignore[method-assign]
+    prices, at = np.zeros(len(data.lower)), float(per_thrust @ x)
+    newton = float(np.linalg.norm(per_thrust))  # one newton of thrust in the row's own unit
+    for distance, flies in ((-1.0, True), (1e-3, True), (0.1, False)):
+        for side in (data.upper, data.lower):
+            kept = side[row]
+            side[row] = at - distance * newton if side is data.upper else at + distance * newton
+            assert (engine._judge(status, x, prices) is not None) == flies
+            side[row] = kept
 
 
 @pytest.mark.parametrize("place", range(5))

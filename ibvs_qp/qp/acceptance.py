@@ -20,7 +20,7 @@ from ibvs_qp.qp.osqp_solver import MAX_ITERATIONS, SOLVED, SOLVED_INACCURATE, Os
 USABLE = (SOLVED, SOLVED_INACCURATE, MAX_ITERATIONS)
 #: A multiplier above this price counts as an active limit [cost per unit].
 ACTIVE_PRICE = 1e-3
-#: Largest thrust-bound violation that clipping may hide in a solved program [N].
+#: Largest violation of a hard row in a solved program [N of thrust]; that of a thrust is clipped away.
 BOUND_SLIP = 1e-2
 
 
@@ -61,6 +61,7 @@ class QpEngine:
         self.exact = ExactSolver(template)
         self._matrix = template.a_pattern.copy()
         self._rotors = template.model.rotors
+        self._hard = np.flatnonzero(template.row_slack[self._rotors :] < 0) + self._rotors
         self.conflict: tuple[str, ...] = ()
         self._no_slack = np.zeros(len(template.variable_names))
         self._no_price = np.zeros(len(template.row_names))
@@ -123,11 +124,21 @@ class QpEngine:
         n, data = self._rotors, self.data
         bounds = zip(x[:n].tolist(), data.lower[:n].tolist(), data.upper[:n].tolist(), strict=True)
         slip = max(max(low - thrust, thrust - high) for thrust, low, high in bounds)
+        if len(self._hard):
+            slip = max(slip, self._hard_slip(x))
         if status == SOLVED:
             return Outcome.SOLVED if slip <= BOUND_SLIP else None
         if slip > self.settings.accept_residual or self.dual_residual(x, y) > self.settings.accept_residual:
             return None
         return Outcome.INACCURATE_ACCEPTED if status == SOLVED_INACCURATE else Outcome.CAPPED_ACCEPTED
+
+    def _hard_slip(self, x: np.ndarray) -> float:
+        """How far the thrusts lie beyond the hard rows that are not the thrusts themselves [N]."""
+        data, hard = self.data, self._hard
+        rows = data.rows()[hard, : self._rotors]
+        at, newton = rows @ x[: self._rotors], np.linalg.norm(rows, axis=1)
+        beyond = np.maximum(data.lower[hard] - at, at - data.upper[hard])
+        return float((beyond / np.where(newton > 0.0, newton, 1.0)).max())
 
     def dual_residual(self, x: np.ndarray, y: np.ndarray) -> float:
         """Largest entry of P^-1 (P x + q + A' y): the thrust error that the residual stands for [N].
