@@ -31,13 +31,16 @@ class OsqpSolver:
     """The per-tick solver.
 
     Guards (each reproduced on OSQP 1.1): non-finite data never reaches the workspace, because one NaN poisons the
-    warm start for good; l <= u is enforced, because an update with l > u is dropped silently; arrays are owned,
-    contiguous and of fixed length, because strides and lengths are not checked; the matrices handed to set-up are
-    private copies, because updates write into them; a reset sets up anew, because the adapted rho survives.
+    warm start for good; l <= u is enforced, because an update with l > u is dropped silently; strided arrays are copied
+    and wrong lengths refused, because neither is checked; what is handed to set-up are private copies, because updates
+    write into the matrices; a reset sets up anew, because the adapted rho survives. That bounds never come within 1e-4
+    of each other, where a row would change its type and the matrix be factorised anew, is the limits' part.
     """
 
     def __init__(self, template: QpTemplate, settings: SolverSettings) -> None:
         self._template, self._settings = template, settings
+        variables, rows = len(template.variable_names), len(template.row_names)
+        self._lengths = (template.p_pattern.nnz, variables, template.a_pattern.nnz, rows, rows)
         self._reset_pending = True
 
     def reset(self) -> None:
@@ -80,8 +83,15 @@ class OsqpSolver:
     def solve(
         self, p: np.ndarray, q: np.ndarray, a: np.ndarray, lower: np.ndarray, upper: np.ndarray
     ) -> RawSolution | None:
-        """Solve with new values; None when the data is not finite or a bound pair is crossed."""
+        """Solve with new values; None when the data is not finite or a bound pair is crossed.
+
+        Raises:
+            ValueError: When an array has another length than the program.
+        """
         start = time.perf_counter()
+        p, q, a, lower, upper = arrays = [np.ascontiguousarray(array, float) for array in (p, q, a, lower, upper)]
+        if tuple(map(len, arrays)) != self._lengths:
+            raise ValueError(f"P, q, A, l, u need {self._lengths} entries, not {tuple(map(len, arrays))}")
         finite = math.isfinite(q.sum() + p.sum() + a.sum() + lower.sum() + upper.sum())
         if not finite or (lower > upper).any():
             return None
