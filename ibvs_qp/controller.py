@@ -15,6 +15,7 @@ from ibvs_qp.measurement import Measurement, Reference
 from ibvs_qp.qp.acceptance import AcceptedSolution, QpEngine
 from ibvs_qp.qp.assembly import QpTemplate
 from ibvs_qp.qp.evaluator import ProgramData
+from ibvs_qp.qp.faults import program_faults
 from ibvs_qp.qp.model import SymbolicModel
 from ibvs_qp.qp.replay import active_limits, task_reports
 from ibvs_qp.reference_gate import check_reference
@@ -69,7 +70,7 @@ class HybridController:
         limits: Further limits.
 
     Raises:
-        ConfigError: When a row is not affine in the thrusts, or the configuration is refused.
+        ConfigError: When a row is not affine in the thrusts, two rows share a name, or the configuration is refused.
     """
 
     def __init__(
@@ -154,6 +155,9 @@ class HybridController:
         mode = contact_mode(self.setpoints, self._reference)
         if self.engine.conflict:
             rejected += (f"limits: no solution keeps all of {', '.join(self.engine.conflict)}",)
+        else:
+            faults = program_faults(self.template, self.engine.data)
+            rejected += faults or ("program: no solver found a solution",)
         if not np.isfinite(free).all():
             free, outcome, mode = hold_thrusts(self.config, measurement), Outcome.HOLD, "hold"
         return clipped_command(self.setpoints, int(measurement.stamp_ns), free, outcome, mode, rejected)

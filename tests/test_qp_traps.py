@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import osqp
@@ -14,11 +15,12 @@ from small_vehicle import SmallVehicle
 
 from ibvs_qp.analytic import analytic_thrusts
 from ibvs_qp.command import Outcome
-from ibvs_qp.config import ControllerConfig, SolverSettings
+from ibvs_qp.config import ControllerConfig, LimitSettings, SolverSettings
 from ibvs_qp.controller import HybridController
+from ibvs_qp.limits.thrust import thrust_window
 from ibvs_qp.measurement import Reference
 from ibvs_qp.qp.evaluator import Evaluator
-from ibvs_qp.qp.osqp_solver import SOLVED, OsqpSolver
+from ibvs_qp.qp.osqp_solver import MAX_ITERATIONS, SOLVED, SOLVED_INACCURATE, OsqpSolver
 
 #: What OSQP 1.1 writes into x when it found no solution: its NaN pattern read as a number.
 GARBAGE = 2143289344.0
@@ -90,7 +92,57 @@ def test_bare_osqp_writes_into_matrices_that_it_was_given() -> None:
     assert touched or not np.array_equal(rows.data, [1.0, 1.0])
 
 
+def test_bare_osqp_reads_through_the_gaps_of_a_strided_array() -> None:
+    solver = bare()
+    solver.update(q=np.array([-0.2, 9.0, -0.6, 9.0])[::2])  # -0.2 and -0.6 are meant
+    result = solver.solve(raise_error=False)
+    assert result.info.status_val == SOLVED
+    np.testing.assert_allclose(result.x, [0.2, 0.0], atol=1e-3)  # -0.2 and 9 were read
+
+
+def test_bare_osqp_reads_beyond_the_end_of_a_short_array() -> None:
+    solver, memory = bare(), np.array([-0.2, -0.6])
+    solver.update(q=memory[:1])  # one number for two variables; what lies behind it is ours, luckily
+    result = solver.solve(raise_error=False)
+    assert result.info.status_val == SOLVED
+    np.testing.assert_allclose(result.x, [0.2, 0.6], atol=1e-3)
+
+
+def test_bare_osqp_keeps_its_adapted_step_size_when_it_is_started_afresh() -> None:
+    solver = osqp.OSQP()
+    rows = sparse.csc_matrix([[1.0, 1.0], [1.0, 0.0], [0.0, 1.0]])
+    box = (np.array([1.0, 0.0, 0.0]), np.array([1.0, 0.7, 0.7]))
+    fine = {"eps_abs": 1e-9, "eps_rel": 1e-9, "check_termination": 5, "adaptive_rho_interval": 25, "scaling": 2}
+    solver.setup(sparse.diags([1.0, 1e3], format="csc"), -np.ones(2), rows, *box, verbose=False, **fine)
+    first = solver.solve(raise_error=False)
+    assert first.info.rho_updates > 0
+    solver.warm_start(x=np.zeros(2), y=np.zeros(3))
+    second = solver.solve(raise_error=False)
+    assert first.info.iter != second.info.iter and not np.array_equal(first.x, second.x)
+
+
+def test_bare_osqp_builds_its_matrix_anew_where_bounds_come_within_1e_4() -> None:
+    """A row of less width counts as an equality, a thousand times stiffer: one iteration from one start tells."""
+
+    def after_one_iteration(width: float) -> np.ndarray:
+        solver = bare(max_iter=1, scaling=0)
+        solver.update(l=np.full(2, 0.5), u=np.full(2, 0.5 + width))
+        return solver.solve(raise_error=False).x
+
+    assert np.abs(after_one_iteration(1e-3) - after_one_iteration(1.1e-4)).max() < 1e-3
+    assert np.abs(after_one_iteration(1.1e-4) - after_one_iteration(0.9e-4)).max() > 0.1
+
+
 # -------------------------------------------------------------------------------------------------------- the guards
+
+
+#: OSQP's own object and its wrapper: an update that is refused is an error code here and silence there.
+both_ways = pytest.mark.parametrize("direct", [True, False])
+
+
+def solver_of(controller: HybridController, direct: bool = True) -> OsqpSolver:
+    """A solver of its own for the program of a controller."""
+    return OsqpSolver(controller.template, replace(controller.config.solver, direct=direct))
 
 
 def test_an_infeasible_program_is_never_believed() -> None:
@@ -115,11 +167,31 @@ def test_garbage_with_a_good_status_does_not_fly_either() -> None:
         assert engine._judge(status, inside, np.zeros(rows)) is None
 
 
+@pytest.mark.parametrize("status", [SOLVED, SOLVED_INACCURATE, MAX_ITERATIONS])
+def test_an_iterate_that_breaks_a_hard_row_does_not_fly(status: int) -> None:
+    """All thrusts within their boxes and no dual residual: a barrier without slack is broken none the less."""
+    hard = ControllerConfig(limits=LimitSettings(hard_barriers=True))
+    engine, row = flying(config=hard).engine, 6
+    assert engine.template.row_names[row] == "tilt_roll" and engine.template.row_slack[row] < 0
+    data = engine.data
+    x, per_thrust = data.free.copy(), data.rows()[row]
+    engine.dual_residual = lambda x, y: 0.0  # type: ignore[method-assign]
+    prices, at = np.zeros(len(data.lower)), float(per_thrust @ x)
+    newton = float(np.linalg.norm(per_thrust))  # one newton of thrust in the row's own unit
+    for distance, flies in ((-1.0, True), (1e-3, True), (0.1, False)):
+        for side in (data.upper, data.lower):
+            kept = side[row]
+            side[row] = at - distance * newton if side is data.upper else at + distance * newton
+            assert (engine._judge(status, x, prices) is not None) == flies
+            side[row] = kept
+
+
 @pytest.mark.parametrize("place", range(5))
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
-def test_data_that_is_not_finite_never_reaches_the_workspace(place: int, value: float) -> None:
+@both_ways
+def test_data_that_is_not_finite_never_reaches_the_workspace(place: int, value: float, direct: bool) -> None:
     controller = flying()
-    clean, solver = (OsqpSolver(controller.template, controller.config.solver) for _ in range(2))
+    clean, solver = (solver_of(controller, direct) for _ in range(2))
     data = data_of(controller)
     for one in (solver, clean):
         assert one.solve(*data).status == SOLVED  # type: ignore[union-attr]
@@ -131,9 +203,10 @@ def test_data_that_is_not_finite_never_reaches_the_workspace(place: int, value: 
     np.testing.assert_array_equal(after.x, expected.x)  # as if the bad tick had never been
 
 
-def test_crossed_bounds_are_refused_and_leave_no_trace() -> None:
+@both_ways
+def test_crossed_bounds_are_refused_and_leave_no_trace(direct: bool) -> None:
     controller = flying()
-    solver = OsqpSolver(controller.template, controller.config.solver)
+    solver = solver_of(controller, direct)
     p, q, a, lower, upper = data_of(controller)
     first = solver.solve(p, q, a, lower, upper)
     assert solver.solve(p, q, a, upper + 1.0, upper) is None
@@ -142,20 +215,88 @@ def test_crossed_bounds_are_refused_and_leave_no_trace() -> None:
     np.testing.assert_allclose(again.x, first.x, atol=1e-3)
 
 
-def test_matrices_handed_to_the_solver_are_private_copies() -> None:
+@both_ways
+def test_arrays_handed_to_the_solver_stay_as_they_were(direct: bool) -> None:
+    """Every solve has arrays of its own: an update writes into the matrices of the set-up."""
     controller = flying()
     template = controller.template
-    solver = OsqpSolver(template, controller.config.solver)
-    data = data_of(controller)
-    kept = [array.copy() for array in data]
-    for _ in range(3):
-        solver.solve(*data)
-        data[1] += 1.0
-        kept[1] += 1.0
-    for array, before in zip(data, kept, strict=True):
-        np.testing.assert_array_equal(array, before)
+    solver, data = solver_of(controller, direct), data_of(controller)
+    handed = [[array * (1.0 + 0.01 * tick) for array in data] for tick in range(4)]
+    kept = [[array.copy() for array in arrays] for arrays in handed]
+    for arrays in handed:
+        assert solver.solve(*arrays) is not None
+    for arrays, before in zip(handed, kept, strict=True):
+        for array, values in zip(arrays, before, strict=True):
+            np.testing.assert_array_equal(array, values)
     np.testing.assert_array_equal(template.p_pattern.data, 1.0)  # as it was made
     np.testing.assert_array_equal(template.a_pattern.data, 1.0)
+
+
+def test_nothing_handed_to_the_set_up_is_shared_with_the_caller(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever a release of OSQP does with arrays it was given, the program of the next tick does not reach them."""
+    controller, given = flying(), []
+    setup = osqp.OSQP.setup
+
+    def seen(
+        self: osqp.OSQP, p: sparse.csc_matrix, q: np.ndarray, a: sparse.csc_matrix, *rest: Any, **named: Any
+    ) -> None:
+        given.extend((p.data, q, a.data, *rest))
+        setup(self, p, q, a, *rest, **named)
+
+    monkeypatch.setattr(osqp.OSQP, "setup", seen)
+    data = data_of(controller)
+    solver_of(controller).solve(*data)
+    assert len(given) == 5
+    own = [*data, controller.template.p_pattern.data, controller.template.a_pattern.data]
+    assert not any(np.shares_memory(one, other) for one in given for other in own)
+
+
+@both_ways
+@pytest.mark.parametrize("place", range(5))
+def test_strided_arrays_and_other_types_are_read_as_meant(place: int, direct: bool) -> None:
+    controller = flying()
+    data = data_of(controller)
+    plain, solver = solver_of(controller, direct), solver_of(controller, direct)
+    for one in (plain, solver):
+        one.solve(*data)
+    expected = plain.solve(*data)
+    assert expected is not None
+    strided = list(data)
+    strided[place] = np.repeat(data[place], 2)
+    strided[place][1::2] = 77.0
+    strided[place] = strided[place][::2]
+    found = solver.solve(*strided)
+    assert found is not None
+    np.testing.assert_array_equal(found.x, expected.x)
+    single = [array.astype(np.float32) for array in data]
+    expected, found = plain.solve(*(array.astype(float) for array in single)), solver.solve(*single)
+    assert expected is not None and found is not None
+    np.testing.assert_array_equal(found.x, expected.x)
+
+
+@both_ways
+@pytest.mark.parametrize("place", range(5))
+@pytest.mark.parametrize("change", [-1, 1])
+def test_an_array_of_another_length_is_refused(place: int, change: int, direct: bool) -> None:
+    controller = flying()
+    solver, data = solver_of(controller, direct), data_of(controller)
+    first = solver.solve(*data)
+    wrong = list(data)
+    wrong[place] = np.resize(data[place], len(data[place]) + change)
+    with pytest.raises(ValueError, match="entries"):
+        solver.solve(*wrong)
+    again = solver.solve(*data)
+    assert first is not None and again is not None
+    np.testing.assert_allclose(again.x, first.x, atol=1e-3)
+
+
+def test_bounds_of_thrusts_stay_a_millinewton_apart() -> None:
+    """Ten times the width at which OSQP takes a row for an equality, whatever the limits ask for."""
+    last, floor, ceiling = np.full(6, 20.0), np.full(6, FLOOR), np.full(6, CEILING)
+    for low, high in ((20.0, 20.0), (25.0, 15.0), (FLOOR, FLOOR), (CEILING, CEILING), (0.0, 0.0), (99.0, 99.0)):
+        for step in (0.0, 2.0, 100.0):
+            least, most = thrust_window(last, np.full(6, low), np.full(6, high), step, floor, ceiling)
+            assert (most - least > 0.999e-3).all()
 
 
 def test_buffers_are_contiguous_doubles_of_fixed_length() -> None:

@@ -11,6 +11,7 @@ from ibvs_qp.command import Outcome
 from ibvs_qp.config import SolverSettings
 from ibvs_qp.qp.active_set import ActiveSet
 from ibvs_qp.qp.assembly import QpTemplate
+from ibvs_qp.qp.conflict import conflicting_rows
 from ibvs_qp.qp.evaluator import Evaluator, ProgramData
 from ibvs_qp.qp.exact_solver import ExactSolver
 from ibvs_qp.qp.osqp_solver import MAX_ITERATIONS, SOLVED, SOLVED_INACCURATE, OsqpSolver, RawSolution
@@ -19,9 +20,7 @@ from ibvs_qp.qp.osqp_solver import MAX_ITERATIONS, SOLVED, SOLVED_INACCURATE, Os
 USABLE = (SOLVED, SOLVED_INACCURATE, MAX_ITERATIONS)
 #: A multiplier above this price counts as an active limit [cost per unit].
 ACTIVE_PRICE = 1e-3
-#: Share of the largest entry of an infeasibility certificate above which a row belongs to the conflict.
-CONFLICT_SHARE = 1e-2
-#: Largest thrust-bound violation that clipping may hide in a solved program [N].
+#: Largest violation of a hard row in a solved program [N of thrust]; that of a thrust is clipped away.
 BOUND_SLIP = 1e-2
 
 
@@ -46,7 +45,7 @@ class QpEngine:
 
     Attributes:
         data: Data of the program; on its own an `Evaluator` whose parameters are yours to write.
-        conflict: Names of the rows that contradict each other, after a solve that found no feasible point.
+        conflict: Names of a smallest set of hard rows that contradict each other, after a solve that found nothing.
     """
 
     def __init__(
@@ -62,6 +61,7 @@ class QpEngine:
         self.exact = ExactSolver(template)
         self._matrix = template.a_pattern.copy()
         self._rotors = template.model.rotors
+        self._hard = np.flatnonzero(template.row_slack[self._rotors :] < 0) + self._rotors
         self.conflict: tuple[str, ...] = ()
         self._no_slack = np.zeros(len(template.variable_names))
         self._no_price = np.zeros(len(template.row_names))
@@ -89,7 +89,7 @@ class QpEngine:
             return self._accept(raw.x, raw.y, outcome, raw.iterations, raw.seconds)
         exact = self.exact.solve(data.p, data.q, data.a, data.lower, data.upper)
         if exact is None:
-            self.conflict = self._conflicting_rows(raw.certificate)
+            self.conflict = conflicting_rows(self.template, data)
             self.osqp.reset()
             return None
         self.osqp.warm_start(*exact)
@@ -118,28 +118,27 @@ class QpEngine:
         exact = self.active_set.solve(data)
         return None if exact is None else self._accept(*exact, Outcome.SOLVED, 0, 0.0)
 
-    def _conflicting_rows(self, certificate: np.ndarray | None) -> tuple[str, ...]:
-        """Names of the rows that no point satisfies together: the non-zeros of OSQP's certificate A' v = 0."""
-        if certificate is None or not np.isfinite(certificate).all():
-            return ()
-        size = np.abs(certificate)
-        return tuple(
-            name
-            for name, entry in zip(self.template.row_names, size, strict=True)
-            if entry > CONFLICT_SHARE * size.max()
-        )
-
     def _judge(self, status: int, x: np.ndarray, y: np.ndarray) -> Outcome | None:
         if status not in USABLE or not math.isfinite(x.sum() + y.sum()):
             return None
         n, data = self._rotors, self.data
         bounds = zip(x[:n].tolist(), data.lower[:n].tolist(), data.upper[:n].tolist(), strict=True)
         slip = max(max(low - thrust, thrust - high) for thrust, low, high in bounds)
+        if len(self._hard):
+            slip = max(slip, self._hard_slip(x))
         if status == SOLVED:
             return Outcome.SOLVED if slip <= BOUND_SLIP else None
         if slip > self.settings.accept_residual or self.dual_residual(x, y) > self.settings.accept_residual:
             return None
         return Outcome.INACCURATE_ACCEPTED if status == SOLVED_INACCURATE else Outcome.CAPPED_ACCEPTED
+
+    def _hard_slip(self, x: np.ndarray) -> float:
+        """How far the thrusts lie beyond the hard rows that are not the thrusts themselves [N]."""
+        data, hard = self.data, self._hard
+        rows = data.rows()[hard, : self._rotors]
+        at, newton = rows @ x[: self._rotors], np.linalg.norm(rows, axis=1)
+        beyond = np.maximum(data.lower[hard] - at, at - data.upper[hard])
+        return float((beyond / np.where(newton > 0.0, newton, 1.0)).max())
 
     def dual_residual(self, x: np.ndarray, y: np.ndarray) -> float:
         """Largest entry of P^-1 (P x + q + A' y): the thrust error that the residual stands for [N].

@@ -10,6 +10,7 @@ from scipy import sparse
 
 from ibvs_qp.limits.limit import Limit
 from ibvs_qp.qp.model import LimitRow, SymbolicModel, TaskRow
+from ibvs_qp.qp.row_check import check_rows
 from ibvs_qp.tasks.task import Task
 
 
@@ -23,8 +24,6 @@ class AffineRows:
         u, acceleration = model.thrust, model.acceleration
         self._model = model
         self._by_acceleration, self._by_thrust = ca.jacobian(rows, acceleration), ca.jacobian(rows, u)
-        if ca.depends_on(ca.veccat(self._by_acceleration, self._by_thrust), ca.veccat(u, acceleration)):
-            raise ValueError("task and limit rows must be affine in the thrusts")
         at_rest = ca.substitute(rows, ca.veccat(u, acceleration), ca.DM.zeros(model.rotors + 6))
         self.constant = at_rest + self._by_acceleration @ model.free_acceleration
 
@@ -71,13 +70,19 @@ class QpTemplate:
         values: CasADi function of the stacked parameters giving (P, q, A, l, u) non-zeros, P as upper triangle.
         free: CasADi function of the stacked parameters giving the thrusts without limits and their worst violation.
         report: CasADi function (parameters, thrusts) giving achieved and asked of every task row, and weights.
+        row_slack: Column of every row's slack in x, -1 where the row is hard, (rows,).
+
+    Raises:
+        ConfigError: When two rows share a name, or a row is not affine in the thrusts.
     """
 
     def __init__(self, model: SymbolicModel, tasks: Sequence[Task], limits: Sequence[Limit]) -> None:
         self.model = model
         self.task_rows: list[TaskRow] = [row for task in tasks for row in task.rows(model)]
         self.limit_rows: list[LimitRow] = [row for limit in limits for row in limit.rows(model)]
-        soft = [row for row in self.limit_rows if row.price is not None]
+        check_rows(model, self.task_rows, self.limit_rows)
+        places = [place for place, row in enumerate(self.limit_rows) if row.price is not None]
+        soft = [self.limit_rows[place] for place in places]
         n, m = model.rotors, len(soft)
         weights = ca.vertcat(*(row.weight for row in self.task_rows))
         asked = ca.vertcat(*(row.target for row in self.task_rows))
@@ -88,8 +93,8 @@ class QpTemplate:
         p_upper = ca.triu(ca.diagcat(hessian, ca.SX(ca.diag(prices))) if m else hessian)
         q = ca.vertcat(gradient, ca.DM.zeros(m))
         slack = ca.DM.zeros(len(self.limit_rows), m)
-        for column, row in enumerate(soft):
-            slack[self.limit_rows.index(row), column] = -1.0
+        for column, place in enumerate(places):
+            slack[place, column] = -1.0
         a = ca.horzcat(bounds.per_thrust, ca.sparsify(slack))
         lower = ca.vertcat(*(row.lower for row in self.limit_rows)) - bounds.constant
         upper = ca.vertcat(*(row.upper for row in self.limit_rows)) - bounds.constant
@@ -105,8 +110,7 @@ class QpTemplate:
         self.row_names = tuple(row.name for row in self.limit_rows)
         self.row_units = tuple(row.unit for row in self.limit_rows)
         self.row_slack = np.full(len(self.limit_rows), -1)
-        for column, row in enumerate(soft):
-            self.row_slack[self.limit_rows.index(row)] = n + column
+        self.row_slack[places] = np.arange(n, n + m)
         self.layout = self._layout()
 
     def _layout(self) -> dict[str, slice]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from allocation.effectiveness import control_effectiveness
 from ibvs_qp.config import ControllerConfig
+from ibvs_qp.errors import ConfigError
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,12 +57,12 @@ class SymbolicModel:
         self.free_acceleration = ca.DM(inverse_mass.diagonal()) * self.parameter("bias_wrench", 6)
 
     def parameter(self, name: str, size: int = 1) -> ca.SX:
-        """The symbol of a named parameter, made at the first request."""
+        """The symbol of a named parameter, made at the first request; ConfigError when it has another size already."""
         if name not in self._parameters:
             self._parameters[name] = ca.SX.sym(name, size)
         symbol = self._parameters[name]
         if symbol.numel() != size:
-            raise ValueError(f"parameter {name!r} has {symbol.numel()} entries, {size} asked for")
+            raise ConfigError(f"parameter {name!r} has {symbol.numel()} entries, {size} asked for")
         return symbol
 
     @property

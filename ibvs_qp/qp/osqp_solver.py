@@ -14,8 +14,6 @@ from ibvs_qp.qp.assembly import QpTemplate
 
 #: Status values of OSQP 1.x whose iterate means something.
 SOLVED, SOLVED_INACCURATE, MAX_ITERATIONS = 1, 2, 7
-#: Status values that say no point satisfies all rows, the second with less certainty.
-INFEASIBLE = (3, 4)
 
 
 @dataclass(slots=True)
@@ -27,20 +25,22 @@ class RawSolution:
     status: int
     iterations: int
     seconds: float
-    certificate: np.ndarray | None = None
 
 
 class OsqpSolver:
     """The per-tick solver.
 
     Guards (each reproduced on OSQP 1.1): non-finite data never reaches the workspace, because one NaN poisons the
-    warm start for good; l <= u is enforced, because an update with l > u is dropped silently; arrays are owned,
-    contiguous and of fixed length, because strides and lengths are not checked; the matrices handed to set-up are
-    private copies, because updates write into them; a reset sets up anew, because the adapted rho survives.
+    warm start for good; l <= u is enforced, because an update with l > u is dropped silently; strided arrays are copied
+    and wrong lengths refused, because neither is checked; what is handed to set-up are private copies, because updates
+    write into the matrices; a reset sets up anew, because the adapted rho survives. That bounds never come within 1e-4
+    of each other, where a row would change its type and the matrix be factorised anew, is the limits' part.
     """
 
     def __init__(self, template: QpTemplate, settings: SolverSettings) -> None:
         self._template, self._settings = template, settings
+        variables, rows = len(template.variable_names), len(template.row_names)
+        self._lengths = (template.p_pattern.nnz, variables, template.a_pattern.nnz, rows, rows)
         self._reset_pending = True
 
     def reset(self) -> None:
@@ -83,8 +83,15 @@ class OsqpSolver:
     def solve(
         self, p: np.ndarray, q: np.ndarray, a: np.ndarray, lower: np.ndarray, upper: np.ndarray
     ) -> RawSolution | None:
-        """Solve with new values; None when the data is not finite or a bound pair is crossed."""
+        """Solve with new values; None when the data is not finite or a bound pair is crossed.
+
+        Raises:
+            ValueError: When an array has another length than the program.
+        """
         start = time.perf_counter()
+        p, q, a, lower, upper = arrays = [np.ascontiguousarray(array, float) for array in (p, q, a, lower, upper)]
+        if tuple(map(len, arrays)) != self._lengths:
+            raise ValueError(f"P, q, A, l, u need {self._lengths} entries, not {tuple(map(len, arrays))}")
         finite = math.isfinite(q.sum() + p.sum() + a.sum() + lower.sum() + upper.sum())
         if not finite or (lower > upper).any():
             return None
@@ -95,7 +102,6 @@ class OsqpSolver:
                 return None
         else:
             self._solver.update(q=q, l=lower, u=upper, Px=p, Ax=a)
-        result = None
         if self._inner is None:
             result = self._solver.solve(raise_error=False)
             x, y, info = result.x, result.y, result.info
@@ -103,16 +109,10 @@ class OsqpSolver:
             self._inner.solve()
             solution, info = self._inner.solution, self._inner.info
             x, y = np.array(solution.x), np.array(solution.y)
-        status = int(info.status_val)
-        certificate = None
-        if status in INFEASIBLE:
-            source = self._inner.solution if self._inner is not None else result
-            certificate = np.array(source.prim_inf_cert)  # type: ignore[union-attr]
         return RawSolution(
             x=x,
             y=y,
-            certificate=certificate,
-            status=status,
+            status=int(info.status_val),
             iterations=int(info.iter),
             seconds=time.perf_counter() - start,
         )

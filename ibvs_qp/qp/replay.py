@@ -9,6 +9,7 @@ import numpy as np
 from ibvs_qp.command import ActiveLimit, TaskReport
 from ibvs_qp.qp.acceptance import ACTIVE_PRICE
 from ibvs_qp.qp.assembly import QpTemplate
+from ibvs_qp.qp.conflict import conflicting_rows
 from ibvs_qp.qp.evaluator import Evaluator, ProgramData
 from ibvs_qp.qp.exact_solver import ExactSolver
 
@@ -73,15 +74,19 @@ class TickReplay:
     Args:
         template: The program.
         solver: Back end of qpsolvers that solves it; None for the exact solver.
+
+    Attributes:
+        conflict: Names of the rows that contradict each other, where the last tick explained has no solution.
     """
 
     def __init__(self, template: QpTemplate, solver: str | None = None) -> None:
         self._template, self._solver = template, solver
         self._data = Evaluator(template)
         self._exact = ExactSolver(template)
+        self.conflict: tuple[str, ...] = ()
 
     def explain(self, stacked: np.ndarray) -> Explanation | None:
-        """Solve and explain the program of these parameters; None if it has no solution.
+        """Solve and explain the program of these parameters; None if it has no solution, see `conflict`.
 
         Args:
             stacked: Parameters as `ProgramData.stacked` held them in flight, (parameters,).
@@ -89,8 +94,9 @@ class TickReplay:
         data, template = self._data, self._template
         data.stacked[:] = stacked
         data.evaluate()
-        solution = self._solve()
+        solution, self.conflict = self._solve(), ()
         if solution is None:
+            self.conflict = conflicting_rows(template, data)
             return None
         x, y = solution
         thrusts = x[: template.model.rotors]

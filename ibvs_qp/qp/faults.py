@@ -1,0 +1,47 @@
+"""Why a program cannot be solved at all: parameters, tasks and limits that are not what a program is made of."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ibvs_qp.qp.assembly import QpTemplate
+from ibvs_qp.qp.evaluator import ProgramData
+
+
+def program_faults(template: QpTemplate, data: ProgramData) -> tuple[str, ...]:
+    """One sentence per broken parameter, or else per broken row; asked only where no solver answered.
+
+    A parameter that is no number breaks every row that uses it, so rows are looked at where all parameters are sound.
+    """
+    broken = [_broken(name, values) for name, values in data.parameters.items() if not np.isfinite(values).all()]
+    return tuple(broken) or (*_task_faults(template, data), *_limit_faults(template, data))
+
+
+def _broken(name: str, values: np.ndarray) -> str:
+    entries = ", ".join(f"{value:g}" for value in values.tolist())
+    return f"parameter {name}: ({entries}) is not finite"
+
+
+def _task_faults(template: QpTemplate, data: ProgramData) -> list[str]:
+    """Rows whose value, target or weight is no number, and weights below zero."""
+    thrusts = np.ones(template.model.rotors)  # not zero, so that a factor that is no number shows in any case
+    achieved, asked, weights = data.report(data.stacked, thrusts)
+    found = []
+    for row, value, target, weight in zip(template.task_rows, achieved, asked, weights, strict=True):
+        if not np.isfinite((value, target, weight)).all():
+            found.append(f"task {row.name}: value {value:g}, target {target:g} or weight {weight:g} is not finite")
+        elif weight < 0.0:
+            found.append(f"task {row.name}: its weight {weight:g} is below zero")
+    return found
+
+
+def _limit_faults(template: QpTemplate, data: ProgramData) -> list[str]:
+    """Rows that hold a number that is none, and rows whose bounds leave no room between them."""
+    found = []
+    for i, row in enumerate(template.limit_rows):
+        crossed = data.lower[i] - data.upper[i]
+        if not np.isfinite((*data.rows()[i], data.lower[i], data.upper[i])).all():
+            found.append(f"limit {row.name}: its row or one of its bounds is not finite")
+        elif crossed > 0.0:
+            found.append(f"limit {row.name}: its lower bound is {crossed:.3g} {row.unit} above its upper one")
+    return found
