@@ -239,7 +239,7 @@ class ControllerConfig:
     def from_toml(cls, file: str | Path) -> ControllerConfig:
         """Read a preset; ConfigError names field, value, unit and allowed range, also where the contact would ring."""
         config = load_toml(cls, file)
-        require_margin(config, config.brush)
+        require_margin(config, config.brush, f"{file}: ")
         return config
 
     def to_toml(self) -> str:
