@@ -34,8 +34,8 @@ def reach_note(terms: Setpoints, reference: Reference) -> tuple[str, ...]:
     asked, least = reference.push_force, terms.least_push
     if not reference.contact or max(asked - terms.push_reference, least - asked) < REDUCED:
         return ()
-    sliding = float(np.abs(reference.velocity).max()) > 0.0
-    how = f"against friction {terms.friction:.2f} along the travel" if sliding else "standing still"
+    friction = terms.reach_friction  # of the travel commanded, or planned at this push
+    how = f"against friction {friction:.2f} along the travel" if friction > 0.0 else "standing still"
     if least > terms.reach:
         return (f"reference.push_force: {asked:.1f} N asked, the rotors cannot hold any push level, {how}",)
     if least - asked >= REDUCED:

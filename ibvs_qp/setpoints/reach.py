@@ -37,6 +37,7 @@ def push_reach(
     facets, count = WrenchFacets(vehicle.geometry), vehicle.geometry.count
     low, high = signals.input("thrust_low", count), signals.input("thrust_high", count)
     speed = ca.norm_2(travel)
+    signals.output("reach_friction", ca.if_else(speed > STANDING_SPEED, friction, 0.0))
     direction = normal + ca.if_else(speed > STANDING_SPEED, friction / ca.fmax(speed, STANDING_SPEED), 0.0) * travel
     lever = ca.cross(ca.DM(vehicle.tip_position_m), direction)
     slope = ca.DM(facets.normals) @ ca.vertcat(direction, lever)

@@ -145,6 +145,7 @@ class Setpoints:
     friction = _number("friction", 0, "Friction coefficient believed.")
     reach = _number("reach", 0, "Largest push that the limits in force can hold [N].")
     least_push = _number("least_push", 0, "Smallest push that they can hold [N]; above the reach when they hold none.")
+    reach_friction = _number("reach_friction", 0, "Friction coefficient that the reach counts on; 0 standing still.")
     free_right = _number("free", 0, "Share of the direction right that no line fixes.")
     free_down = _number("free", 1, "Share of the direction down that no line fixes.")
 
