@@ -14,7 +14,7 @@ from ibvs_qp.settings import require_order, setting, validate
 class VehicleParams:
     """The tilted hexarotor with its arm, tool, force/torque sensor and camera (positions FRD from the centre of mass).
 
-    Nominal values: section 5 of the design; sources in docs/vehicle.md.
+    Nominal values: the Tarot T960 of the paper, with the arm and tool assumed here.
     """
 
     geometry: RotorGeometry = TAROT_T960
