@@ -10,8 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from ibvs_qp.errors import out_of_range
 from ibvs_qp.loop_margin import BrushSettings, require_margin
-from ibvs_qp.settings import choice, dump_toml, load_toml, setting, validate
+from ibvs_qp.settings import choice, dump_toml, load_toml, require_order, setting, validate
 from ibvs_qp.vehicle import VehicleParams
 
 
@@ -97,8 +98,11 @@ class ContactSettings:
     )
 
     def __post_init__(self) -> None:
-        """Validate."""
+        """Validate; pairs too that only make sense in one order."""
         validate(self)
+        require_order(self, "depth_min_m", "depth_max_m", "lambda falls from 1 to 0 between them")
+        require_order(self, "touch_distance_m", "close_distance_m", "the last centimetre is the end of the slow part")
+        require_order(self, "loss_force_n", "touch_force_n", "a touch would be lost as it is found")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -224,14 +228,18 @@ class ControllerConfig:
     )
 
     def __post_init__(self) -> None:
-        """Validate."""
+        """Validate; the depths at which the push begins against the arm's length too."""
         validate(self)
+        arm = round(self.vehicle.tip_position_m[0] - self.vehicle.camera_position_m[0], 9)
+        if self.contact.depth_min_m < arm:
+            allowed = f"allowed is at least {arm:g} m, where the camera is when the tip touches"
+            raise out_of_range("contact.depth_min_m", self.contact.depth_min_m, "m", allowed)
 
     @classmethod
     def from_toml(cls, file: str | Path) -> ControllerConfig:
         """Read a preset; ConfigError names field, value, unit and allowed range, also where the contact would ring."""
         config = load_toml(cls, file)
-        require_margin(config, config.brush)
+        require_margin(config, config.brush, f"{file}: ")
         return config
 
     def to_toml(self) -> str:

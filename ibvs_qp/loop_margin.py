@@ -108,12 +108,13 @@ def least_margin(config: ControllerConfig, brush: BrushSettings | None = None) -
     return min(margins, key=lambda margin: margin.least_damping_ratio)
 
 
-def require_margin(config: ControllerConfig, brush: BrushSettings | None = None) -> LoopMargin:
+def require_margin(config: ControllerConfig, brush: BrushSettings | None = None, place: str = "") -> LoopMargin:
     """Refuse a controller whose contact would ring.
 
     Args:
         config: The controller.
         brush: What it shall press with and against; the default brush if None.
+        place: Where the controller was found, before the field's name: "preset.toml: controller.".
 
     Returns:
         The least margin over the brush's stiffness range.
@@ -138,18 +139,21 @@ def require_margin(config: ControllerConfig, brush: BrushSettings | None = None)
     def with_gain(name: str, value: float) -> bool:
         return good(dataclasses.replace(config, gains=dataclasses.replace(config.gains, **{name: value})), brush)
 
+    units = {field.name: field.metadata["unit"] for field in dataclasses.fields(config.gains)}
     for name in GAIN_NAMES:
         value = getattr(config.gains, name)
         if value > 0.0 and with_gain(name, 0.0):
             allowed = _search(0.0, value, lambda entry, name=name: with_gain(name, entry))
-            raise out_of_range(f"gains.{name}", value, "", f"allowed is [0, {allowed:.4g}] {reason}")
+            unit = units[name]
+            words = " ".join(filter(None, (f"allowed is [0, {allowed:.4g}]", unit, reason)))
+            raise out_of_range(f"{place}gains.{name}", value, unit, words)
     low, high = brush.stiffness_min_n_m, brush.stiffness_max_n_m
     if good(config, dataclasses.replace(brush, stiffness_max_n_m=low)):
         allowed = _search(low, high, lambda k: good(config, dataclasses.replace(brush, stiffness_max_n_m=k)))
-        raise out_of_range("brush.stiffness_max_n_m", high, "N/m", f"allowed is [{low:g}, {allowed:.0f}] N/m {reason}")
-    raise out_of_range(
-        "brush.damping_n_s_m", brush.damping_n_s_m, "N s/m", f"too little {reason}; no one gain mends it"
-    )
+        words = f"allowed is [{low:g}, {allowed:.0f}] N/m {reason}"
+        raise out_of_range(f"{place}brush.stiffness_max_n_m", high, "N/m", words)
+    words = f"too little {reason}; no one gain mends it"
+    raise out_of_range(f"{place}brush.damping_n_s_m", brush.damping_n_s_m, "N s/m", words)
 
 
 def _search(good: float, bad: float, holds: Callable[[float], bool]) -> float:

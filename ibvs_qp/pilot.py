@@ -82,7 +82,7 @@ class PilotConfig:
     def from_toml(cls, file: str | Path) -> PilotConfig:
         """Read a preset; one whose contact would ring is refused."""
         config = load_toml(cls, file)
-        require_margin(config.controller, config.controller.brush)
+        require_margin(config.controller, config.controller.brush, f"{file}: controller.")
         return config
 
     def to_toml(self) -> str:

@@ -24,20 +24,25 @@ def contact_mode(terms: Setpoints, reference: Reference) -> str:
 
 
 def reach_margin(terms: Setpoints) -> float:
-    """Further push possible at the present contact [N]; NaN while no wall is known."""
-    return terms.reach - max(terms.contact.push, 0.0) if terms.contact.known else math.nan
+    """Further push possible at the present contact [N]; NaN while no wall is known, or no push can be held."""
+    held = terms.contact.known and terms.least_push <= terms.reach
+    return terms.reach - max(terms.contact.push, 0.0) if held else math.nan
 
 
 def reach_note(terms: Setpoints, reference: Reference) -> tuple[str, ...]:
-    """Says that the push was reduced, and why; empty if it was not."""
-    if not reference.contact or reference.push_force - terms.push_reference < REDUCED:
+    """Says that the push was reduced, or is less than can be held, and why; empty if neither."""
+    asked, least = reference.push_force, terms.least_push
+    if not reference.contact or max(asked - terms.push_reference, least - asked) < REDUCED:
         return ()
-    sliding = float(np.abs(reference.velocity).max()) > 0.0
-    how = f"against friction {terms.friction:.2f} along the travel" if sliding else "standing still"
-    return (
-        f"reference.push_force: {reference.push_force:.1f} N reduced to {terms.push_reference:.1f} N, "
-        f"the rotors' reach {how}",
-    )
+    friction = terms.reach_friction  # of the travel commanded, or planned at this push
+    how = f"against friction {friction:.2f} along the travel" if friction > 0.0 else "standing still"
+    if least > terms.reach:
+        return (f"reference.push_force: {asked:.1f} N asked, the rotors cannot hold any push level, {how}",)
+    if least - asked >= REDUCED:
+        return (
+            f"reference.push_force: {asked:.1f} N asked, below what the rotors can hold: least {least:.1f} N, {how}",
+        )
+    return (f"reference.push_force: {asked:.1f} N reduced to {terms.push_reference:.1f} N, the rotors' reach {how}",)
 
 
 def clipped_command(

@@ -56,6 +56,24 @@ def validate(instance: Any, prefix: str = "") -> None:
             _check_number(name, value, field.default, meta)
 
 
+def require_order(instance: Any, smaller: str, larger: str, reason: str) -> None:
+    """Refuse two fields of a settings dataclass unless the first lies below the second.
+
+    Args:
+        instance: The settings.
+        smaller: Name of the field that must be smaller, in the same unit as the other.
+        larger: Name of the other.
+        reason: What goes wrong otherwise.
+
+    Raises:
+        ConfigError: Naming both fields, their values and their unit.
+    """
+    low, high = getattr(instance, smaller), getattr(instance, larger)
+    if not low < high:
+        unit = next(field.metadata["unit"] for field in dataclasses.fields(instance) if field.name == larger)
+        raise out_of_range(smaller, low, unit, f"must lie below {larger} = {high!r} {unit}: {reason}")
+
+
 def _check_number(name: str, value: Any, default: Any, meta: typing.Mapping[str, Any]) -> None:
     if isinstance(default, (bool, str)) or (value is None and default is None):
         return

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from allocation.geometry import TAROT_T960, RotorGeometry
-from ibvs_qp.settings import setting, validate
+from ibvs_qp.settings import require_order, setting, validate
 
 
 @dataclass(frozen=True, kw_only=True)
 class VehicleParams:
     """The tilted hexarotor with its arm, tool, force/torque sensor and camera (positions FRD from the centre of mass).
 
-    Nominal values: section 5 of the design; sources in docs/vehicle.md.
+    Nominal values: the Tarot T960 of the paper, with the arm and tool assumed here.
     """
 
     geometry: RotorGeometry = TAROT_T960
@@ -45,6 +45,7 @@ class VehicleParams:
     def __post_init__(self) -> None:
         """Refuse values out of range."""
         validate(self)
+        require_order(self, "tool_mass_kg", "mass_kg", "the tool is part of the vehicle")
         for field in ("thrust_min_n", "thrust_max_n"):
             value = getattr(self, field)
             if isinstance(value, tuple) and len(value) != self.geometry.count:

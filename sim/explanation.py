@@ -1,44 +1,102 @@
-"""A recorded tick in words: tables of tasks, limits and rotors, and the contact loop's margin."""
+"""A recorded tick in words: tables of tasks, limits and rotors, what was refused, and the contact loop's margin."""
 
 from __future__ import annotations
 
+import functools
+import math
 import tomllib
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from allocation.geometry import TAROT_T960
+from ibvs_qp.command import Outcome
+from ibvs_qp.config import ControllerConfig
 from ibvs_qp.controller import program_template
 from ibvs_qp.loop_margin import LEAST_DAMPING_RATIO, least_margin
 from ibvs_qp.pilot import PilotConfig
+from ibvs_qp.qp.assembly import QpTemplate
 from ibvs_qp.qp.replay import Explanation, TickReplay
+from ibvs_qp.setpoints.signals import places
 from ibvs_qp.settings import from_dict
 
 if TYPE_CHECKING:
-    from sim.trace import Trace
+    from sim.trace import Event, Trace
 
 #: Names of rows that only regularise.
 _REGULAR = ("effort", "smooth")
 _AXES = ("front", "right", "down", "roll", "pitch", "yaw")
 
 
+#: A push this much below what the job asks is told beside it [N].
+_REDUCED = 1e-3
+
+
+@functools.lru_cache(maxsize=2)
+def _template(config: ControllerConfig) -> QpTemplate:
+    return program_template(config)
+
+
+def flown_config(trace: Trace) -> PilotConfig:
+    """The configuration that a flight was flown with."""
+    return from_dict(PilotConfig, tomllib.loads(trace.preset))
+
+
 def explain_tick(trace: Trace, tick: int, solver: str | None = None) -> tuple[PilotConfig, Explanation | None]:
     """Configuration flown and the explanation of one tick of a QP flight, by the exact solver or a named one."""
-    config = from_dict(PilotConfig, tomllib.loads(trace.preset))
-    replay = TickReplay(program_template(config.controller), solver)
+    config = flown_config(trace)
+    replay = TickReplay(_template(config.controller), solver)
     return config, replay.explain(trace.arrays["program"][tick].astype(float))
 
 
-def explanation_tables(trace: Trace, tick: int, explanation: Explanation) -> list[Any]:
-    """What a person reads: a headline, tasks, limits, rotors, wrench given up."""
+def held(trace: Trace, tick: int) -> bool:
+    """Whether the tick answered without a program: the one in its row is that of an earlier tick."""
+    return trace.outcomes[int(trace.outcome[tick])] == Outcome.HOLD
+
+
+def thrust_window(trace: Trace, tick: int, config: PilotConfig) -> tuple[np.ndarray, np.ndarray]:
+    """Lower and upper thrusts that a tick's program knew: box, deratings and rate limit [N], (n,) each."""
+    layout, row = places(_template(config.controller).model.parameters), trace.arrays["program"][tick]
+    return row[layout["thrust_lower"]], row[layout["thrust_upper"]]
+
+
+def refused(trace: Trace, tick: int) -> list[Event]:
+    """Inputs refused until this tick, each kind where it was refused first, as the log keeps them."""
+    now = float(trace.t[tick]) + 1e-6  # rounding of the time
+    return [event for event in trace.events if event.kind == "rejected" and event.t <= now]
+
+
+def explanation_tables(trace: Trace, tick: int, explanation: Explanation, config: PilotConfig) -> list[Any]:
+    """What a person reads: a headline, what was refused, tasks, limits, rotors, wrench given up."""
+    headline = _headline(trace, tick, config)
+    rotors = _rotors(trace, tick, explanation, config)
+    parts = [_tasks(explanation), _limits(explanation), rotors, _given_up(explanation.unallocated_wrench)]
+    return [headline, *_refused(trace, tick), *parts]
+
+
+def held_tables(trace: Trace, tick: int, config: PilotConfig) -> list[Any]:
+    """The same for a tick that held: without tasks and limits, because nothing was asked of a program."""
+    table = _table("Thrusts [N]", ("rotor",), ("flown",))
+    for name, flew in zip(config.controller.vehicle.geometry.names, trace.thrusts[tick], strict=True):
+        table.add_row(name, f"{flew:.3f}")
+    words = "The tick held: no program was solved, the thrusts carry the weight and stay level by the last good data."
+    return [_headline(trace, tick, config), *_refused(trace, tick), words, table, _given_up(trace.unallocated[tick])]
+
+
+def _headline(trace: Trace, tick: int, config: PilotConfig) -> str:
     phase, outcome = trace.phases[int(trace.phase[tick])], trace.outcomes[int(trace.outcome[tick])]
-    push, asked = float(trace.push_measured[tick]), float(trace.push_reference[tick])
-    headline = (
+    push, given = float(trace.push_measured[tick]), float(trace.push_reference[tick])
+    asked, margin = config.painting.push_n, float(trace.reach_margin[tick])
+    less = f", {asked:.2f} N by the job before ramp and reach" if 0.0 < given < asked - _REDUCED else ""
+    reach = "reach not known, or no push can be held" if math.isnan(margin) else f"{margin:.2f} N further within reach"
+    return (
         f"[bold]t = {trace.t[tick]:.3f} s[/], phase {phase}, lambda {trace.contact_weight[tick]:.2f}\n"
-        f"push {push:.2f} N of {asked:.2f} N asked; {outcome} after {int(trace.iterations[tick])} iterations"
+        f"push {push:.2f} N of {given:.2f} N asked{less}; {reach}\n"
+        f"{outcome} after {int(trace.iterations[tick])} iterations"
     )
-    rotors = _rotors(trace, tick, explanation)
-    return [headline, _tasks(explanation), _limits(explanation), rotors, _given_up(explanation)]
+
+
+def _refused(trace: Trace, tick: int) -> list[str]:
+    return [f"Refused at {event.t:.3f} s: {event.text}" for event in refused(trace, tick)]
 
 
 def _table(title: str, words: tuple[str, ...], numbers: tuple[str, ...], last: tuple[str, ...] = ()) -> Any:
@@ -72,18 +130,16 @@ def _limits(explanation: Explanation) -> Any:
     return table
 
 
-def _rotors(trace: Trace, tick: int, explanation: Explanation) -> Any:
-    count = len(explanation.thrusts)
-    names = TAROT_T960.names if TAROT_T960.count == count else tuple(f"rotor {i + 1}" for i in range(count))
+def _rotors(trace: Trace, tick: int, explanation: Explanation, config: PilotConfig) -> Any:
+    names, window = config.controller.vehicle.geometry.names, thrust_window(trace, tick, config)
     table = _table("Thrusts [N]", ("rotor",), ("flown", "exact", "from", "to"))
-    rows = zip(names, trace.thrusts[tick], explanation.thrusts, trace.thrust_min, trace.thrust_max, strict=True)
+    rows = zip(names, trace.thrusts[tick], explanation.thrusts, *window, strict=True)
     for name, flew, exact, low, high in rows:
-        table.add_row(name, f"{flew:.3f}", f"{exact:.3f}", f"{low:g}", f"{high:g}")
+        table.add_row(name, f"{flew:.3f}", f"{exact:.3f}", f"{low:.3f}", f"{high:.3f}")
     return table
 
 
-def _given_up(explanation: Explanation) -> str:
-    lost = explanation.unallocated_wrench
+def _given_up(lost: np.ndarray) -> str:
     if not np.any(np.abs(lost) > 1e-6):
         return "Nothing was given up."
     units = ("N",) * 3 + ("N m",) * 3

@@ -129,6 +129,9 @@ def test_interrupt_while_drawing_keeps_the_log(flown, capsys, monkeypatch):
         (["paint", "--scene", "."], ["--scene"]),
         (["paint", "--preset", "missing.toml"], ["missing.toml", "--preset"]),
         (["paint", "--preset", "broken.toml"], ["broken.toml", "not valid TOML"]),
+        (["paint", "--preset", "key.toml"], ["key.toml: unknown key 'controller.gains.line_pk'", "line_kp"]),
+        (["paint", "--preset", "value.toml"], ["value.toml: controller.tick_s = 9.0 s", "[0.0005, 0.05] s"]),
+        (["paint", "--preset", "rings.toml"], ["rings.toml: controller.gains.force_ksp = 4000.0 N/m", "] N/m for a"]),
         (["paint", "--out", "file"], ["file", "--out"]),
         (["paint", "--out", "file/below"], ["file/below", "--out"]),
         (["paint", "--seed", "-1"], ["--seed", "-1"]),
@@ -147,6 +150,9 @@ def test_user_errors_are_one_line(flown, capsys, words, needles):
     (flown / "range.toml").write_text("[wall]\nfriction = 7.0\n")
     (flown / "kind.toml").write_text('[paint]\nrows = "two"\n')
     (flown / "broken.toml").write_text("[wall\n")
+    (flown / "key.toml").write_text("[controller.gains]\nline_pk = 1.0\n")
+    (flown / "value.toml").write_text("[controller]\ntick_s = 9.0\n")
+    (flown / "rings.toml").write_text("[controller.gains]\nforce_ksp = 4000.0\n")
     (flown / "file").write_text("")
     before = sorted(flown.rglob("*"))
     assert main(words) == 2

@@ -54,6 +54,22 @@ def test_flying_the_controller_loads_nothing_it_does_not_need() -> None:
     assert leaked == set()
 
 
+def test_importing_the_controller_adds_little_to_numpy_casadi_and_osqp() -> None:
+    """What costs time at the import: beyond the three packages that every tick uses, own files and a TOML writer."""
+    needed = loaded("import sys, numpy, casadi, osqp\nprint(' '.join(sorted(sys.modules)))")
+    names = "ControllerConfig, HybridController, Measurement, PaperController, Reference"
+    modules = loaded(f"import sys\nfrom ibvs_qp import {names}\nprint(' '.join(sorted(sys.modules)))")
+    added = {name.split(".")[0] for name in modules - needed}
+    assert added - set(sys.stdlib_module_names) == {"allocation", "ibvs_qp", "tomli_w"}
+    # Of the own packages only what flies: no painting strategy or pilot, and of vision one matrix.
+    parts = {name for name in modules if name.split(".")[0] == "ibvs_qp"}
+    assert not parts & {"ibvs_qp.painting", "ibvs_qp.pilot", "ibvs_qp.supervisor"}
+    assert {name for name in parts if name.startswith("ibvs_qp.vision.")} == {"ibvs_qp.vision.interaction"}
+    # scipy.sparse comes with OSQP, the heavy parts of scipy with nothing.
+    public = {name.split(".")[1] for name in modules if name.startswith("scipy.")}
+    assert {name for name in public if not name.startswith("_")} == {"sparse", "version"}
+
+
 def test_a_command_line_check_loads_no_solver() -> None:
     modules = loaded("import sys, ibvs_qp, allocation, ibvs_qp.vision\nprint(' '.join(sorted(sys.modules)))")
     assert not modules & {"casadi", "osqp", "scipy", "cv2", "numpy"}

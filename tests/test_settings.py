@@ -128,6 +128,31 @@ def test_missing_and_broken_files_are_named(tmp_path: Path) -> None:
     assert refusal(lambda: ControllerConfig.from_toml(wrong)).startswith(f"{wrong}: tick_s = 9.0 s is refused")
 
 
+@pytest.mark.parametrize(
+    ("kind", "values", "words"),
+    [
+        (ContactSettings, {"depth_min_m": 0.6, "depth_max_m": 0.6}, "must lie below depth_max_m = 0.6 m"),
+        (ContactSettings, {"depth_min_m": 0.63, "depth_max_m": 0.53}, "must lie below depth_max_m = 0.53 m"),
+        (ContactSettings, {"touch_distance_m": 0.15}, "must lie below close_distance_m = 0.1 m"),
+        (ContactSettings, {"loss_force_n": 0.6}, "must lie below touch_force_n = 0.5 N"),
+        (VehicleParams, {"tool_mass_kg": 5.0, "mass_kg": 4.0}, "must lie below mass_kg = 4.0 kg"),
+    ],
+)
+def test_pairs_in_the_wrong_order_are_refused(kind: type, values: dict[str, float], words: str) -> None:
+    text = refusal(lambda: kind(**values))
+    first, value = next(iter(values.items()))
+    assert text.startswith(f"{first} = {value!r} ") and words in text
+
+
+def test_a_push_that_could_never_begin_is_refused() -> None:
+    """Lambda depends on the distance of the camera, and in contact the arm keeps that: half a metre, or more."""
+    text = refusal(lambda: from_dict(ControllerConfig, {"contact": {"depth_min_m": 0.2, "depth_max_m": 0.4}}))
+    assert text.startswith("contact.depth_min_m = 0.2 m is refused: allowed is at least 0.5 m")
+    long_arm = VehicleParams(tip_position_m=(0.9, 0.0, 0.0))
+    assert "at least 0.7 m" in refusal(lambda: ControllerConfig(vehicle=long_arm))
+    ControllerConfig(vehicle=long_arm, contact=ContactSettings(depth_min_m=0.73, depth_max_m=0.83))
+
+
 def test_optional_and_tuple_fields() -> None:
     @dataclasses.dataclass(frozen=True, kw_only=True)
     class Sample:

@@ -80,7 +80,7 @@ class Setpoints:
         self._limits = _NO_LIMITS
         self.last: np.ndarray | None = None
         self.normal[:], self.right[:], self.down[:] = np.eye(3)
-        self.tick.outputs["reach"][0] = UNBOUNDED
+        self.tick.outputs["reach"][0], self.tick.outputs["least_push"][0] = UNBOUNDED, 0.0
 
     def restart(self) -> None:
         """As before the first measurement, but the rotors go on from where they are: the clock was set anew."""
@@ -144,6 +144,8 @@ class Setpoints:
     standoff_command = _number("standoff_command", 0, "Force along n that the approach wants [N].")
     friction = _number("friction", 0, "Friction coefficient believed.")
     reach = _number("reach", 0, "Largest push that the limits in force can hold [N].")
+    least_push = _number("least_push", 0, "Smallest push that they can hold [N]; above the reach when they hold none.")
+    reach_friction = _number("reach_friction", 0, "Friction coefficient that the reach counts on; 0 standing still.")
     free_right = _number("free", 0, "Share of the direction right that no line fixes.")
     free_down = _number("free", 1, "Share of the direction down that no line fixes.")
 

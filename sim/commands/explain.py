@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,6 +15,7 @@ from ibvs_qp.errors import IbvsQpError
 from sim.commands.options import optional
 
 if TYPE_CHECKING:
+    from ibvs_qp.pilot import PilotConfig
     from ibvs_qp.qp.replay import Explanation
     from sim.trace import Trace
 
@@ -54,18 +56,26 @@ class Explain:
         """
         from rich.console import Console
 
-        from sim.explanation import explain_tick, explanation_tables, loop_margin_line
+        from sim.explanation import explain_tick, explanation_tables, flown_config, held, held_tables, loop_margin_line
 
         trace = self._flight()
         tick = self._tick(trace)
-        config, explanation = explain_tick(trace, tick, self.solver)
-        if explanation is None:
-            raise ExplainError(f"the program at {self.at:g} s has no solution: hard barriers contradict each other")
+        explanation = None
+        if held(trace, tick):
+            config = flown_config(trace)
+        else:
+            config, explanation = explain_tick(trace, tick, self.solver)
+            if explanation is None:
+                raise ExplainError(f"the program at {self.at:g} s has no solution: hard barriers contradict each other")
         if self.json:
-            print(json.dumps(_table(trace, tick, explanation), allow_nan=False))
+            print(json.dumps(_table(trace, tick, explanation, config), allow_nan=False))
             return 0
         console = Console()
-        for part in explanation_tables(trace, tick, explanation):
+        if explanation is None:
+            parts = held_tables(trace, tick, config)
+        else:
+            parts = explanation_tables(trace, tick, explanation, config)
+        for part in parts:
             console.print(part)
         console.print(loop_margin_line(config))
         return 0
@@ -89,17 +99,38 @@ class Explain:
         return int(np.argmin(np.abs(trace.t - self.at)))
 
 
-def _table(trace: Trace, tick: int, explanation: Explanation) -> dict[str, Any]:
+def _table(trace: Trace, tick: int, explanation: Explanation | None, config: PilotConfig) -> dict[str, Any]:
+    """One tick as JSON; without a program (a held tick) no tasks, no limits and no window."""
     from dataclasses import asdict
 
-    tasks = zip(explanation.tasks, explanation.cost, strict=True)
-    return {
+    from sim.explanation import refused, thrust_window
+
+    flown, margin = trace.thrusts[tick].tolist(), float(trace.reach_margin[tick])
+    table = {
         "schema": 1,
         "t": float(trace.t[tick]),
         "phase": trace.phases[int(trace.phase[tick])],
         "outcome": trace.outcomes[int(trace.outcome[tick])],
+        "push_asked": config.painting.push_n,
+        "push_reference": float(trace.push_reference[tick]),
+        "reach_margin": None if math.isnan(margin) else margin,
+        "rejected": [{"t": event.t, "text": event.text} for event in refused(trace, tick)],
+        "thrusts": flown,
+        "flown_thrusts": flown,
+        "thrust_lower": None,
+        "thrust_upper": None,
+        "tasks": [],
+        "active_limits": [],
+        "unallocated_wrench": trace.unallocated[tick].tolist(),
+    }
+    if explanation is None:
+        return table
+    lower, upper = thrust_window(trace, tick, config)
+    tasks = zip(explanation.tasks, explanation.cost, strict=True)
+    return table | {
         "thrusts": explanation.thrusts.tolist(),
-        "flown_thrusts": trace.thrusts[tick].tolist(),
+        "thrust_lower": lower.tolist(),
+        "thrust_upper": upper.tolist(),
         "tasks": [asdict(task) | {"cost_share": cost} for task, cost in tasks],
         "active_limits": [asdict(limit) for limit in explanation.active_limits],
         "unallocated_wrench": explanation.unallocated_wrench.tolist(),

@@ -65,10 +65,10 @@ class Paint:
         from rich.console import Console
 
         from sim.cameras import resolve_camera, spare_core
-        from sim.checks import check_mujoco, check_preset, check_readable, check_seed
+        from sim.checks import check_mujoco, check_readable, check_seed
 
         check_mujoco()
-        from sim.closed_loop import FlightOptions
+        from sim.closed_loop import FlightOptions, pilot_config
         from sim.flights import fly_laws
         from sim.progress import flight_progress
         from sim.rundir import RunFolder
@@ -80,7 +80,6 @@ class Paint:
         for option, file in (("--scene", self.scene), ("--preset", self.preset)):
             check_readable(option, file)
         scene = load_scene(self.scene) if self.scene else Scene()
-        check_preset(self.preset)
         if self.view:
             check_display()
         size = _size(self.image_size)
@@ -99,6 +98,7 @@ class Paint:
             machine_code=True,
             view=self.view,
         )
+        pilot_config(scene, options)  # a preset is refused here, before anything is shown or written
         laws = ("qp", "paper") if self.law == "both" else (self.law,)
         folder = RunFolder.create(self.out)
         notes = Console(stderr=True, quiet=self.json)
