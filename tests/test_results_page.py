@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import polars as pl
 
 from sim.experiments import experiment
@@ -13,7 +15,7 @@ from sim.experiments.worth import worth
 from sim.sweep.parts import frame
 
 
-def rows(name: str, law: str, variant: str, errors: list[float | None], **more) -> list[dict]:
+def rows(name: str, law: str, variant: str, errors: Sequence[float | None], **more) -> list[dict]:
     metric = {"saturation": "force_error_rms_n", "paint": "tilt_rms_deg", "force-hold": "settle_s"}[name]
     facts = {"experiment": name, "law": law, "variant": variant, "reason": "crash: flip"}
     return [
