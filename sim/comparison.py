@@ -11,6 +11,7 @@ from typing import Any
 import polars as pl
 
 from ibvs_qp.errors import ConfigError
+from sim.sweep.paired import exact_interval
 from sim.sweep.parts import PARAM, frame
 from sim.sweep.statistics import figure_names, median_interval
 
@@ -60,8 +61,10 @@ class Difference:
         a: Median of run A over the shared flights.
         b: Median of run B.
         median: Median of the differences B - A, flight by flight.
-        low: Lower end of its interval.
+        low: Lower end of its bootstrap interval.
         high: Upper end.
+        sure_low: Lower end of the exact interval of six pairs or more, see `sim.sweep.paired`; else NaN.
+        sure_high: Upper end.
     """
 
     figure: str
@@ -70,11 +73,13 @@ class Difference:
     median: float
     low: float
     high: float
+    sure_low: float
+    sure_high: float
 
     @property
     def sure(self) -> bool:
-        """Whether the interval excludes zero."""
-        return self.low > 0.0 or self.high < 0.0
+        """Whether the exact interval excludes zero."""
+        return self.sure_low > 0.0 or self.sure_high < 0.0
 
 
 def compare(a: pl.DataFrame, b: pl.DataFrame) -> list[dict[str, Any]]:
@@ -115,4 +120,6 @@ def _difference(rows: pl.DataFrame, name: str) -> Difference | None:
     change = median_interval(second - first)
     if not math.isfinite(change["median"]):
         return None
-    return Difference(figure=name, a=median_interval(first)["median"], b=median_interval(second)["median"], **change)
+    low, high = exact_interval(second - first)
+    medians = {"a": median_interval(first)["median"], "b": median_interval(second)["median"]}
+    return Difference(figure=name, **medians, **change, sure_low=low, sure_high=high)

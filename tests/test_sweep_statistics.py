@@ -14,8 +14,8 @@ from sim.comparison import compare, read_run
 from sim.experiments import NAMES, experiment
 from sim.experiments.base import Criterion
 from sim.experiments.verdict import _judge
-from sim.sweep.parts import frame, write_table
 from sim.sweep.paired import exact_interval, needed, paired_differences, sign, variant_differences
+from sim.sweep.parts import frame, write_table
 from sim.sweep.statistics import cells, median_interval
 
 

@@ -11,7 +11,7 @@ from sim.figures.style import law_name
 from sim.notebook.noise.again import Again
 from sim.notebook.noise.effects import averaged_samples, effects
 from sim.notebook.noise.table import FIGURES, FORCE, VS, Figure, grid_of, reasons, success
-from sim.sweep.statistics import paired_differences
+from sim.sweep.paired import paired_differences
 
 _PATH, _PUSH = FIGURES[:2]
 
