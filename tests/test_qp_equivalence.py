@@ -8,12 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from controller_scenes import CEILING, FLOOR, dense, exact_thrusts, line_references, pack, random_tick
+from controller_scenes import CEILING, FLOOR, dense, exact_thrusts, line_references, measured, pack, random_tick
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_vehicle import SmallVehicle
 
 from allocation import control_effectiveness
+from allocation.geometry import TAROT_T960
 from ibvs_qp.analytic import analytic_thrusts
 from ibvs_qp.command import Command, Outcome
 from ibvs_qp.config import ControllerConfig, SolverSettings, Weights
@@ -24,6 +25,7 @@ from ibvs_qp.limits.thrust import LEAST_GAP, thrust_window
 from ibvs_qp.measurement import Reference
 from ibvs_qp.qp.acceptance import AcceptedSolution
 from ibvs_qp.qp.offline import installed_solvers, solve_offline
+from ibvs_qp.qp.replay import active_limits
 from ibvs_qp.vision.interaction import endpoint_line_row, line_interaction_matrix
 
 LAST = np.array([11.0, 12.0, 10.5, 11.5, 12.5, 11.2])
@@ -363,6 +365,48 @@ def test_the_price_of_a_limit_is_the_slope_of_the_cost() -> None:
     lost = control_effectiveness(controller.config.vehicle.geometry) @ (solution[0][:6] - command.thrusts)
     assert np.abs(lost).max() > 0.5
     np.testing.assert_allclose(command.unallocated_wrench, lost, atol=0.01)
+
+
+def optimal_cost(controller: HybridController, row: int, side: str, change: float) -> float:
+    """Least weighted squares, by task rows and slack, where one bound is moved by `change`."""
+    data = controller.engine.data
+    bounds = {"lower": data.lower.copy(), "upper": data.upper.copy()}
+    bounds[side][row] += change
+    solution = controller.engine.exact.solve(data.p, data.q, data.a, bounds["lower"], bounds["upper"])
+    assert solution is not None
+    achieved, asked, weights = data.report(data.stacked, solution[0][:6])
+    cost = 0.5 * float(weights @ (achieved - asked) ** 2)
+    for limit, slot in zip(controller.template.limit_rows, controller.template.row_slack, strict=True):
+        cost += 0.0 if limit.price is None else 0.5 * limit.price * solution[0][slot] ** 2
+    return cost
+
+
+@pytest.mark.parametrize(
+    ("name", "side"),
+    [
+        ("tilt_roll", "upper"),
+        ("tilt_pitch", "lower"),
+        ("push_ceiling", "upper"),
+        (f"thrust_{TAROT_T960.names[2]}", "lower"),
+    ],
+)
+def test_the_price_of_every_kind_of_limit_is_the_slope_of_the_cost(name: str, side: str) -> None:
+    """The cost is worked out from weights, residuals, prices and slack: as the documents say it, halves and all."""
+    controller = HybridController()
+    controller.step(measured(0), Reference())
+    data, row = controller.engine.data, controller.template.row_names.index(name)
+    at, sign = float(data.rows()[row, :6] @ data.free), 1.0 if side == "upper" else -1.0
+    tight = data.upper if side == "upper" else data.lower
+    tight[row] = at - sign * 0.5  # half a unit away from what the tasks want
+    solution = controller.engine.exact.solve(data.p, data.q, data.a, data.lower, data.upper)
+    assert solution is not None
+    (active,) = [limit for limit in active_limits(controller.template, *solution) if limit.name == name]
+    assert active.side == side
+    step = 1e-3
+    slope = (optimal_cost(controller, row, side, step) - optimal_cost(controller, row, side, -step)) / (2.0 * step)
+    assert active.price == pytest.approx(-sign * slope, rel=1e-4)
+    price = controller.template.limit_rows[row].price
+    assert active.slack * (price or 0.0) == pytest.approx(active.price if price else 0.0, rel=1e-6)
 
 
 newtons = st.floats(-100.0, 200.0)

@@ -14,7 +14,7 @@ from ibvs_qp.errors import ConfigError
 
 @dataclass(frozen=True, kw_only=True)
 class TaskRow:
-    """One least-squares row: weight * (expression(u) - target)^2, the expression affine in the thrusts."""
+    """One least-squares row: weight * (expression(u) - target)^2 / 2, the expression affine in the thrusts."""
 
     name: str
     unit: str
@@ -25,7 +25,7 @@ class TaskRow:
 
 @dataclass(frozen=True, kw_only=True)
 class LimitRow:
-    """One two-sided row lower <= expression(u) <= upper; with a price it is soft: slack costs price * s^2."""
+    """One two-sided row lower <= expression(u) <= upper; with a price it is soft: slack costs price * s^2 / 2."""
 
     name: str
     unit: str

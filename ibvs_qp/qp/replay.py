@@ -21,6 +21,7 @@ class Explanation:
     Attributes:
         thrusts: Of the exact solution [N], (n,).
         tasks: Every task row with a weight; `cost` are their shares of the cost, in the same order.
+        slack_cost: Share of the cost that is paid for slack of limits; with those of the tasks it makes one.
         active_limits: Limits that bind, dearest first.
         unallocated_wrench: Wrench of the same tick without limits minus the wrench [N, N m], (6,).
     """
@@ -28,6 +29,7 @@ class Explanation:
     thrusts: np.ndarray
     tasks: tuple[TaskReport, ...]
     cost: tuple[float, ...]
+    slack_cost: float
     active_limits: tuple[ActiveLimit, ...]
     unallocated_wrench: np.ndarray
 
@@ -101,13 +103,17 @@ class TickReplay:
         x, y = solution
         thrusts = x[: template.model.rotors]
         tasks = task_reports(template, data, stacked, thrusts)
-        cost = np.array([task.weight * task.residual**2 for task in tasks])
+        cost = np.array([0.5 * task.weight * task.residual**2 for task in tasks])
+        slack = x[len(thrusts) :]
+        slack_cost = 0.5 * float(slack @ (data.hessian().diagonal()[len(thrusts) :] * slack))
+        total = float(cost.sum()) + slack_cost or 1.0
         limits = sorted(active_limits(template, x, y), key=lambda limit: -limit.price)
         effectiveness = template.model.effectiveness
         return Explanation(
             thrusts=thrusts,
             tasks=tasks,
-            cost=tuple((cost / (float(cost.sum()) or 1.0)).tolist()),
+            cost=tuple((cost / total).tolist()),
+            slack_cost=slack_cost / total,
             active_limits=tuple(limits),
             unallocated_wrench=effectiveness @ (data.free - thrusts) if limits else np.zeros(6),
         )
