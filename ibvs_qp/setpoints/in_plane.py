@@ -22,8 +22,8 @@ def motion_in_plane(
     signals: Signals, config: ControllerConfig, body: Body, touch: Touch, wish: Wish, wall: Wall, travel: ca.SX
 ) -> None:
     """Line errors and wanted accelerations right and down; integrals rest while stuck or while rotors are limited."""
-    tip = body.velocity_of(config.vehicle.tip_position_m)  # a vehicle that turns about a held tip moves
-    across = tip - wall.normal * ca.dot(wall.normal, tip)
+    # The body's velocity, not the tip's: a tip that creeps at high friction must not stop the integral that frees it.
+    across = body.velocity - wall.normal * ca.dot(wall.normal, body.velocity)
     slow = ca.norm_2(across) * body.moving < config.contact.stuck_speed_m_s
     stuck = ca.logic_and(touch.touching, slow)
     integrate = ca.logic_and(ca.logic_not(stuck), signals.input("given_up") < WINDUP_FORCE)
