@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import nnls
 
 from ibvs_qp.qp.assembly import QpTemplate
 from ibvs_qp.qp.evaluator import ProgramData
@@ -48,6 +47,8 @@ def _certificate(table: np.ndarray, chosen: list[int]) -> list[int]:
     """Rows of a proof that the chosen rows (coefficients, lower, upper) have no solution; none if they have one."""
     if not chosen:  # nothing contradicts nothing; and scipy 1.17 crashes on an empty matrix
         return []
+    from scipy.optimize import nnls  # heavy, and only a program without a solution needs it
+
     rows, lower, upper = table[chosen, :-2], table[chosen, -2], table[chosen, -1]
     sides = np.vstack((np.hstack((rows.T, -rows.T)), np.concatenate((upper, -lower))))
     wanted = np.zeros(len(sides))

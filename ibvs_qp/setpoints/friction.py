@@ -37,7 +37,7 @@ def estimated_friction(
 
     Args:
         signals: Keeps the estimate.
-        body: Measured force and time step.
+        body: Velocity and measured force.
         touch: Push and whether the tip touches.
         tip: Velocity of the tip, in B [m/s], (3,): a vehicle that turns about a held tip moves, its tip does not.
         travel: Commanded velocity in the wall plane, in B [m/s], (3,).
@@ -47,7 +47,8 @@ def estimated_friction(
     before, held = signals.state("friction", start=ASSUMED_FRICTION), signals.state("friction_held")
     speed = ca.norm_2(travel)
     direction = travel / ca.fmax(speed, 1e-9)
-    along = ca.dot(direction, tip)
+    # Both must move: a vehicle that turns about a held tip moves, and its tip's velocity is the noisier one.
+    along = ca.fmin(ca.dot(direction, body.velocity), ca.dot(direction, tip))
     watching = ca.logic_and(ca.logic_and(touch.touching, body.moving), speed > 0.0)
     still = ca.logic_and(speed > sliding_command, along < stuck_speed)
     waited = ca.if_else(still, held + body.dt, 0.0)
