@@ -20,7 +20,7 @@ def mink_row(ticks: int) -> Row | None:
     """Times of `mink.solve_ik` with a hand task, a posture task and joint speed limits; None without mink."""
     if importlib.util.find_spec("mink") is None:
         return None
-    import mink
+    import mink  # pyright: ignore[reportMissingImports] -- from the extra "solvers"
     import mujoco
 
     model = mujoco.MjModel.from_xml_string(_arm())  # type: ignore[attr-defined, reportAttributeAccessIssue]

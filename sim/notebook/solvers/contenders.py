@@ -120,7 +120,7 @@ def kept_daqp() -> Contender:
     """DAQP's own binding: one workspace, data updated in place."""
 
     def make(template: QpTemplate) -> Callable[[ProgramData], Answer]:
-        import daqp
+        import daqp  # pyright: ignore[reportMissingImports] -- from the extra "solvers"
 
         model, ready = daqp.Model(), False
 
