@@ -15,6 +15,9 @@ from ibvs_qp.loop_margin import BrushSettings, require_margin
 from ibvs_qp.settings import choice, dump_toml, load_toml, require_order, setting, validate
 from ibvs_qp.vehicle import VehicleParams
 
+#: No estimator or filter takes a tick to last longer than this [s]: after a pause they go on from where they were.
+LONGEST_TICK = 0.02
+
 
 @dataclass(frozen=True, kw_only=True)
 class Gains:
@@ -214,7 +217,9 @@ class ControllerConfig:
         ("tip", "paper"),
     )
     line_slots: int = setting(3, "lines the fixed program has room for; each costs 500 instructions", low=1, high=16)
-    tick_s: float = setting(0.004, "control period", unit="s", low=0.0005, high=0.05)
+    tick_s: float = setting(
+        0.004, "control period; a longer tick than 0.02 s is taken for a pause", unit="s", low=0.0005, high=LONGEST_TICK
+    )
     impedance: bool = setting(True, "impedance terms of the force law (False: direct force control)")
     contact_feedforward: bool = setting(True, "feed the measured contact moment and expected friction forward")
     touch_ramp: bool = setting(True, "ramp lambda and the force reference after touch")

@@ -13,7 +13,7 @@ import numpy as np
 
 from ibvs_qp.analytic import PaperController
 from ibvs_qp.command import Command
-from ibvs_qp.config import ControllerConfig
+from ibvs_qp.config import LONGEST_TICK, ControllerConfig
 from ibvs_qp.controller import HybridController
 from ibvs_qp.estimation.config import EstimationConfig
 from ibvs_qp.estimation.motion import WallMotion
@@ -45,9 +45,6 @@ HINT_SPAN = (0.10, 0.50)
 
 
 _EYE = np.eye(3)
-
-#: A tick is never taken to last longer than this [s]: after a pause the filters begin where they were.
-LONGEST_TICK = 0.02
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -109,8 +109,9 @@ def _(results):
     - *Where OSQP does not win:* at this size (six thrusts, a handful of slacks) DAQP with a kept workspace is faster
       than OSQP **and** exact. Called through CasADi or `qpsolvers` the same DAQP loses that lead to conversions. In the
       controller it is the exact fallback. What speaks for OSQP here is not the median: every iteration costs the
-      same, so a cap on iterations is a deadline, and an infeasible program comes with a certificate that names the rows
-      in conflict.
+      same, so a cap on iterations is a deadline. Which rows contradict each other where there is no solution does not
+      come from the solver: an iterate that was cut short holds no certificate, so a smallest set of rows in conflict is
+      sought by itself (Farkas' lemma by non-negative least squares, `ibvs_qp/qp/conflict.py`).
     """
     )
     return

@@ -155,7 +155,7 @@ def test_far_from_their_bounds_barriers_change_nothing() -> None:
 
 
 def test_hard_barriers_that_conflict_are_named() -> None:
-    """A vehicle that tumbles faster than its rotors can stop: the certificate names who asks for the impossible."""
+    """A vehicle that tumbles faster than its rotors can stop: those who ask for the impossible are named."""
     hard = replace(ControllerConfig(), limits=LimitSettings(hard_barriers=True))
     controller, vehicle = HybridController(hard), SmallVehicle(hard)
     controller.step(vehicle.measure(0), Reference())

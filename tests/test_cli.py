@@ -130,7 +130,7 @@ def test_interrupt_while_drawing_keeps_the_log(flown, capsys, monkeypatch):
         (["paint", "--preset", "missing.toml"], ["missing.toml", "--preset"]),
         (["paint", "--preset", "broken.toml"], ["broken.toml", "not valid TOML"]),
         (["paint", "--preset", "key.toml"], ["key.toml: unknown key 'controller.gains.line_pk'", "line_kp"]),
-        (["paint", "--preset", "value.toml"], ["value.toml: controller.tick_s = 9.0 s", "[0.0005, 0.05] s"]),
+        (["paint", "--preset", "value.toml"], ["value.toml: controller.tick_s = 9.0 s", "[0.0005, 0.02] s"]),
         (["paint", "--preset", "rings.toml"], ["rings.toml: controller.gains.force_ksp = 4000.0 N/m", "] N/m for a"]),
         (["paint", "--out", "file"], ["file", "--out"]),
         (["paint", "--out", "file/below"], ["file/below", "--out"]),

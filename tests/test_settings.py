@@ -6,14 +6,26 @@ import dataclasses
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
+from controller_scenes import TICK_NS, measured
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ibvs_qp.config import ContactSettings, ControllerConfig, Gains, LimitSettings, SolverSettings, Weights
+from ibvs_qp.config import (
+    LONGEST_TICK,
+    ContactSettings,
+    ControllerConfig,
+    Gains,
+    LimitSettings,
+    SolverSettings,
+    Weights,
+)
 from ibvs_qp.errors import ConfigError
+from ibvs_qp.measurement import Reference
 from ibvs_qp.painting import PaintingConfig
 from ibvs_qp.pilot import PilotConfig
+from ibvs_qp.setpoints import Setpoints
 from ibvs_qp.settings import choice, dump_toml, from_dict, load_toml, setting, validate
 from ibvs_qp.vehicle import VehicleParams
 
@@ -168,3 +180,19 @@ def test_optional_and_tuple_fields() -> None:
     assert "maybe = 2.0 m" in refusal(lambda: Sample(maybe=2.0))
     assert "pair" in refusal(lambda: Sample(pair=(0.1, 2.0)))
     assert "word = 'c'" in refusal(lambda: Sample(word="c"))
+
+
+def test_the_longest_tick_allowed_is_integrated_in_full() -> None:
+    """A controller set to a longer one would fall behind time: its filters take any more for a pause."""
+    low, high = 0.0005, LONGEST_TICK
+    assert (
+        refusal(lambda: ControllerConfig(tick_s=0.05))
+        == f"tick_s = 0.05 s is refused: allowed is [{low:g}, {high:g}] s"
+    )
+    config = ControllerConfig(tick_s=LONGEST_TICK)
+    terms, ticks, step = Setpoints(config), 12, round(LONGEST_TICK * 1e9)
+    for tick in range(ticks):  # carried along at 1 m/s, and the accelerometer says 1 m/s^2 towards the wall
+        felt = np.array([1.0, 0.0, -9.81])
+        terms.update(measured(0, stamp_ns=(tick + 1) * step, specific_force=felt, plane_stamp_ns=TICK_NS), Reference())
+    assert terms.tick.inputs["dt"][0] == pytest.approx(LONGEST_TICK)
+    assert -terms.contact.rate == pytest.approx((ticks - 1) * LONGEST_TICK, rel=0.1)

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from ibvs_qp.config import ControllerConfig
+from ibvs_qp.config import LONGEST_TICK, ControllerConfig
 from ibvs_qp.contact_loop import ACCELERATION_FILTER, ACCELERATION_NOISE, HELD_SPEED_STD
 from ibvs_qp.estimation.delayed import DelayedKalman
 from ibvs_qp.estimation.stamps import HISTORY
@@ -83,7 +83,7 @@ class ContactEstimator:
     def update(self, measurement: Measurement, down: tuple[float, float, float]) -> None:
         """Take in one measurement; ``down`` is the unit gravity direction in B."""
         stamp = measurement.stamp_ns
-        dt = self._config.tick_s if self._stamp < 0 else min(max((stamp - self._stamp) * 1e-9, 0.0), 0.02)
+        dt = self._config.tick_s if self._stamp < 0 else min(max((stamp - self._stamp) * 1e-9, 0.0), LONGEST_TICK)
         self._stamp = stamp
         omega = measurement.angular_velocity
         self._predict(measurement, down, omega, dt)
