@@ -12,6 +12,7 @@ from pathlib import Path
 
 from ibvs_qp.errors import out_of_range
 from ibvs_qp.loop_margin import BrushSettings, require_margin
+from ibvs_qp.program_settings import LimitSettings, Weights
 from ibvs_qp.settings import choice, dump_toml, load_toml, require_order, setting, validate
 from ibvs_qp.vehicle import VehicleParams
 
@@ -106,72 +107,6 @@ class ContactSettings:
         require_order(self, "depth_min_m", "depth_max_m", "lambda falls from 1 to 0 between them")
         require_order(self, "touch_distance_m", "close_distance_m", "the last centimetre is the end of the slow part")
         require_order(self, "loss_force_n", "touch_force_n", "a touch would be lost as it is found")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Weights:
-    """Weights of the least-squares tasks, each the inverse square of an error one would accept in its unit."""
-
-    line: float = setting(100.0, "line rows; 0.1 image units/s^2 = 5 cm/s^2 at half a metre", low=0.0, high=1e6)
-    line_angle: float = setting(0.05, "angle rows; yield to level flight by four orders", low=0.0, high=1e6)
-    push: float = setting(
-        0.5, "push row; 1.4 N: far below all others, so that an unreachable push is given up first", low=0.0, high=1e6
-    )
-    level: float = setting(400.0, "roll and pitch rows; 0.05 rad/s^2", low=0.0, high=1e6)
-    yaw: float = setting(400.0, "yaw row; 0.05 rad/s^2", low=0.0, high=1e6)
-    velocity: float = setting(100.0, "free velocity rows; 0.1 m/s^2", low=0.0, high=1e6)
-    height: float = setting(
-        1.6e3, "height row; 0.025 m/s^2 = 0.15 N: what cannot be pushed must not lift the vehicle", low=0.0, high=1e6
-    )
-    effort: float = setting(1e-3, "thrust away from the last one; 30 N", low=1e-9, high=1e3)
-    smoothness: float = setting(1e-3, "change of the thrust step; 30 N", low=0.0, high=1e3)
-    line_sigma: float = setting(2e-2, "line deviation at which a row's weight halves", low=1e-6, high=1.0)
-
-    def __post_init__(self) -> None:
-        """Validate."""
-        validate(self)
-
-
-@dataclass(frozen=True, kw_only=True)
-class LimitSettings:
-    """Soft limits of the program and their prices (per squared unit of slack)."""
-
-    tilt_deg: float = setting(1.0, "zero-tilt bound on roll and pitch", unit="deg", low=0.05, high=45.0)
-    tilt_price: float = setting(4000.0, "slack price of the tilt barriers", low=1e-3, high=1e8)
-    tilt_rate_1_s: float = setting(8.0, "how fast the tilt barriers may be approached", unit="1/s", low=0.1, high=100.0)
-    yaw_deg: float = setting(
-        10.0, "yaw bound; the propellers strike the wall at 19 deg", unit="deg", low=0.5, high=45.0
-    )
-    yaw_price: float = setting(1000.0, "slack price of the yaw barrier", low=1e-3, high=1e8)
-    yaw_rate_1_s: float = setting(5.0, "how fast the yaw barrier may be approached", unit="1/s", low=0.1, high=100.0)
-    view_down: float = setting(0.35, "largest |rho| of a level guide; the picture ends at 0.384", low=0.01, high=10.0)
-    view_right: float = setting(
-        0.48, "largest |rho| of an upright guide; the picture ends at 0.512", low=0.01, high=10.0
-    )
-    view_price: float = setting(4e4, "slack price of the line-in-view barriers", low=1e-3, high=1e8)
-    view_rate_1_s: float = setting(2.0, "how fast the border may be approached", unit="1/s", low=0.1, high=100.0)
-    push_share: float = setting(1.5, "push ceiling over the push reference", low=1.0, high=100.0)
-    push_quiet_m_s: float = setting(
-        0.005, "closing speed that the push ceiling takes for noise of the estimate", unit="m/s", low=0.0, high=1.0
-    )
-    push_price: float = setting(40.0, "slack price of the push ceiling; far above the push row", low=1e-3, high=1e8)
-    approach_share: float = setting(1.5, "closing speed over that of the approach", low=1.0, high=100.0)
-    approach_rate_1_s: float = setting(
-        10.0, "how fast the closing speed may reach its bound", unit="1/s", low=0.1, high=100.0
-    )
-    approach_price: float = setting(4000.0, "slack price of the approach-speed barrier", low=1e-3, high=1e8)
-    tilt_barrier: bool = setting(True, "zero-tilt barriers on roll and pitch")
-    yaw_barrier: bool = setting(True, "yaw barrier")
-    view_barrier: bool = setting(True, "line-in-view barriers")
-    push_barrier: bool = setting(True, "push-force ceiling")
-    approach_barrier: bool = setting(True, "approach-speed barrier")
-    hard_barriers: bool = setting(
-        False, "no slack on any barrier: the program may have no solution, and the conflicting rows are named then"
-    )
-
-    def __post_init__(self) -> None:
-        """Validate."""
-        validate(self)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -23,17 +23,20 @@ from ibvs_qp.errors import ConfigError, out_of_range
 T = TypeVar("T")
 
 
-def setting(default: Any, doc: str, *, unit: str = "", low: float = -math.inf, high: float = math.inf) -> Any:
+def setting(
+    default: Any, doc: str, *, unit: str = "", why: str = "", low: float = -math.inf, high: float = math.inf
+) -> Any:
     """Declare a settings field with its unit and closed allowed range [low, high].
 
     Args:
         default: Default value; numbers, booleans, strings, or tuples of numbers.
-        doc: What it is and where its value comes from.
+        doc: What it is, and where its value comes from unless ``why`` says so.
         unit: SI unit, empty for a pure number.
+        why: Reason for the default.
         low: Smallest allowed value (each entry, for tuples).
         high: Largest allowed value.
     """
-    return dataclasses.field(default=default, metadata={"doc": doc, "unit": unit, "low": low, "high": high})
+    return dataclasses.field(default=default, metadata={"doc": doc, "unit": unit, "why": why, "low": low, "high": high})
 
 
 def choice(default: str, doc: str, options: tuple[str, ...]) -> Any:

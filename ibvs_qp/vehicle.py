@@ -22,9 +22,32 @@ class VehicleParams:
     inertia_kg_m2: tuple[float, float, float] = setting(
         (0.22, 0.30, 0.48), "principal inertia about the centre of mass", unit="kg m^2", low=1e-3, high=50.0
     )
-    thrust_min_n: float | tuple[float, ...] = setting(1.2, "idle thrust of a rotor", unit="N", low=0.0, high=200.0)
-    thrust_max_n: float | tuple[float, ...] = setting(52.56, "full thrust of a rotor", unit="N", low=0.0, high=200.0)
-    thrust_rate_n_s: float = setting(500.0, "fastest commanded thrust change", unit="N/s", low=1.0, high=1e5)
+    thrust_min_n: float | tuple[float, ...] = setting(
+        1.2,
+        "idle thrust of a rotor",
+        unit="N",
+        why="15 % of full speed, 2.25 % of full thrust: a stopped propeller starts late; it, not full thrust, bounds "
+        "push",
+        low=0.0,
+        high=200.0,
+    )
+    thrust_max_n: float | tuple[float, ...] = setting(
+        52.56,
+        "full thrust of a rotor",
+        unit="N",
+        why="KDE 4215XF with a 15 inch propeller at full throttle, as published with the vehicle",
+        low=0.0,
+        high=200.0,
+    )
+    thrust_rate_n_s: float = setting(
+        500.0,
+        "fastest commanded thrust change",
+        unit="N/s",
+        why="2 N a tick: hover to idle in 20 ms, faster than the motors' 57 ms follow, so it costs no performance, and "
+        "no tick jumps",
+        low=1.0,
+        high=1e5,
+    )
     motor_lag_up_s: float = setting(0.045, "first-order lag of rising thrust", unit="s", low=1e-3, high=0.5)
     motor_lag_down_s: float = setting(0.070, "first-order lag of falling thrust", unit="s", low=1e-3, high=0.5)
     propeller_radius_m: float = setting(0.19, "propeller disc (15 inch)", unit="m", low=0.01, high=1.0)

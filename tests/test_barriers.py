@@ -135,6 +135,18 @@ def test_a_fast_approach_is_braked_before_it_touches() -> None:
     assert without.push > 15.0
 
 
+@pytest.mark.parametrize(("factor", "tilt_deg", "rho"), [(1.0, 1.08, 0.356), (0.1, 1.15, 0.417)])
+def test_prices_are_worth_what_the_settings_say(factor: float, tilt_deg: float, rho: float) -> None:
+    """Figures of `ibvs_qp/program_settings.py`: a tenth of the price is too cheap."""
+    shipped = LimitSettings()
+    cheap = config(limits={"tilt_price": factor * shipped.tilt_price})
+    pitched = fly(cheap, Reference(standoff=0.1, lines=line_references(2)), 1.5, lines=2, prepare=turning(1, 0.25))
+    assert pitched.tilt_deg == pytest.approx(tilt_deg, abs=0.02)
+    cheap = config(limits={"view_price": factor * shipped.view_price})
+    out = Reference(standoff=0.1, lines=(LineReference(rho=0.6, theta=0.5 * math.pi, role=HORIZONTAL),))
+    assert fly(cheap, out, 4.0, lines=1).rho == pytest.approx(rho, abs=0.003)
+
+
 def test_far_from_their_bounds_barriers_change_nothing() -> None:
     """Press and hold two lines: wherever no barrier binds, the program without them has the same solution."""
     reference = Reference(push_force=5.0, contact=True, lines=line_references(2))

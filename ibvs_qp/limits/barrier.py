@@ -25,6 +25,10 @@ def barrier_bounds(angle: ca.SX, rate: ca.SX, bound: float, pole: float) -> tupl
 class TiltLimit(Limit):
     """Zero-tilt barriers on roll and pitch."""
 
+    bounded_by = ("limits.tilt_deg", "limits.tilt_rate_1_s")
+    priced_by = "limits.tilt_price"
+    switched_by = "limits.tilt_barrier"
+
     def rows(self, model: SymbolicModel) -> list[LimitRow]:
         """Two soft rows in rad/s^2."""
         settings = model.config.limits
@@ -49,6 +53,10 @@ class TiltLimit(Limit):
 
 class YawLimit(Limit):
     """Yaw barrier about the wall normal: the front propellers strike the wall at 19 degrees."""
+
+    bounded_by = ("limits.yaw_deg", "limits.yaw_rate_1_s")
+    priced_by = "limits.yaw_price"
+    switched_by = "limits.yaw_barrier"
 
     def rows(self, model: SymbolicModel) -> list[LimitRow]:
         """One soft row in rad/s^2; the angle is that of the body axis away from the wall normal."""

@@ -18,6 +18,10 @@ class PushCeiling(Limit):
     :math:`2\sqrt{k m}`, at a stiff wall 500 N s/m, it would be newtons.
     """
 
+    bounded_by = ("limits.push_share", "limits.push_quiet_m_s")
+    priced_by = "limits.push_price"
+    switched_by = "limits.push_barrier"
+
     def rows(self, model: SymbolicModel) -> list[LimitRow]:
         """One soft row in newtons; wide before touch."""
         ceiling, stiffness, rate, touching = ca.vertsplit(model.parameter("push_state", 4))
@@ -41,6 +45,10 @@ class ApproachLimit(Limit):
     First-order barrier on :math:`h = v_{max}(e_s) + \dot e_s`: :math:`n^T \dot V \le p\,h`. What the approach leans
     on a wall that it does not feel yet is no acceleration and is let through.
     """
+
+    bounded_by = ("limits.approach_share", "limits.approach_rate_1_s")
+    priced_by = "limits.approach_price"
+    switched_by = "limits.approach_barrier"
 
     def rows(self, model: SymbolicModel) -> list[LimitRow]:
         """One soft row in m/s^2; wide in contact and while the wall is unknown."""

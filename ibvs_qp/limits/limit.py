@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from typing import ClassVar
 
 from ibvs_qp.qp.model import LimitRow, SymbolicModel
 
@@ -15,7 +16,16 @@ class Limit(ABC):
 
     Only thrust and thrust rate are hard and their intersection is never empty, so the program is feasible by
     construction. Row types never change from tick to tick.
+
+    Attributes:
+        bounded_by: Fields of `ibvs_qp.config.ControllerConfig` that set its bounds, with unit, default and reason.
+        priced_by: Field that holds the price of its slack; none where it is hard.
+        switched_by: Field that takes it out of the program.
     """
+
+    bounded_by: ClassVar[tuple[str, ...]] = ()
+    priced_by: ClassVar[str | None] = None
+    switched_by: ClassVar[str | None] = None
 
     @abstractmethod
     def rows(self, model: SymbolicModel) -> list[LimitRow]:

@@ -19,6 +19,9 @@ NO_LIMIT = 1e4
 class ThrustLimit(Limit):
     """Each thrust within its box and within reach of the last one at the rate limit."""
 
+    bounded_by = ("vehicle.thrust_min_n", "vehicle.thrust_max_n", "vehicle.thrust_rate_n_s")
+    switched_by = "thrust_rows"
+
     def rows(self, model: SymbolicModel) -> list[LimitRow]:
         """One hard row per rotor in newtons."""
         lower = model.parameter("thrust_lower", model.rotors)

@@ -14,11 +14,16 @@ from ibvs_qp.tasks.line import symbolic_line_rows
 
 
 class ViewLimit(Limit):
-    r"""Bounds on the motion :math:`\ddot\rho = L_\rho S \dot\nu` of the outermost guide of each role.
+    r"""The outermost guide of each role stays in the picture.
 
-    One row for the level lines and one for the upright ones, however many lines there are: the one nearest to the
-    border speaks for its role. Without a line the row is as wide as the sky.
+    The rows bound its motion :math:`\ddot\rho = L_\rho S \dot\nu`: one for the level lines and one for the upright
+    ones, however many lines there are. The one nearest to the border speaks for its role; without a line the row is as
+    wide as the sky.
     """
+
+    bounded_by = ("limits.view_down", "limits.view_right", "limits.view_rate_1_s")
+    priced_by = "limits.view_price"
+    switched_by = "limits.view_barrier"
 
     def rows(self, model: SymbolicModel) -> list[LimitRow]:
         """Two soft rows in 1/s^2."""

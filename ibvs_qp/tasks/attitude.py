@@ -9,6 +9,8 @@ from ibvs_qp.tasks.task import Task
 class LevelTask(Task):
     """Roll and pitch accelerations that bring the vehicle level (zero-tilt strategy of the paper)."""
 
+    weighed_by = ("weights.level",)
+
     def rows(self, model: SymbolicModel) -> list[TaskRow]:
         """Two rows in rad/s^2."""
         level = model.parameter("level", 3)
@@ -22,6 +24,8 @@ class LevelTask(Task):
 
 class YawTask(Task):
     """Yaw acceleration that faces the wall normal measured by the depth camera."""
+
+    weighed_by = ("weights.yaw",)
 
     def rows(self, model: SymbolicModel) -> list[TaskRow]:
         """One row in rad/s^2."""

@@ -11,6 +11,8 @@ from ibvs_qp.tasks.task import Task
 class EffortTask(Task):
     """Thrusts near the last ones; a pull to zero would be a steady push and height bias."""
 
+    weighed_by = ("weights.effort",)
+
     def rows(self, model: SymbolicModel) -> list[TaskRow]:
         """One row per rotor in newtons."""
         last, weight = model.parameter("last_thrust", model.rotors), ca.SX(model.config.weights.effort)
@@ -23,6 +25,8 @@ class EffortTask(Task):
 
 class SmoothnessTask(Task):
     """The thrust step repeats the last one: changes bend, they do not break."""
+
+    weighed_by = ("weights.smoothness",)
 
     def rows(self, model: SymbolicModel) -> list[TaskRow]:
         """One row per rotor in newtons."""

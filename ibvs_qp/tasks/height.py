@@ -18,6 +18,8 @@ class HeightTask(Task):
     pitch for height through its lever.
     """
 
+    weighed_by = ("weights.height",)
+
     def rows(self, model: SymbolicModel) -> list[TaskRow]:
         """One row in m/s^2."""
         height = model.parameter("height", 2)

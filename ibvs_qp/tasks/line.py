@@ -22,11 +22,14 @@ def symbolic_line_rows(rho: ca.SX, theta: ca.SX, plane: ca.SX) -> tuple[ca.SX, c
 
 
 class LineTask(Task):
-    r"""Line error of one slot: :math:`L S \dot\nu = -(K_p e + K_d \dot e + K_i \int e)`.
+    r"""A line of the picture goes where its reference is, as seen from the tip's wall point; one task a slot.
 
-    The error row is :math:`L_\rho + (x_t \sin\theta - y_t \cos\theta) L_\theta`, the motion of the line relative to
-    the image (x_t, y_t) of the tip's wall point: endpoint closed loop. The angle row yields to level flight.
+    Its rows ask for :math:`L S \dot\nu = -(K_p e + K_d \dot e + K_i \int e)`. The error row is
+    :math:`L_\rho + (x_t \sin\theta - y_t \cos\theta) L_\theta`, the motion of the line relative to the image
+    (x_t, y_t) of the tip's wall point: endpoint closed loop. The angle row yields to level flight.
     """
+
+    weighed_by = ("weights.line", "weights.line_angle")
 
     def __init__(self, slot: int) -> None:
         self.slot = slot

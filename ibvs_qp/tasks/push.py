@@ -14,6 +14,8 @@ class PushTask(Task):
     :math:`F_f = F_{ref} + K_{sp} e_s + K_{sd} \dot e_s + K_{fp}(F_{ref} - f) + K_{fi}\int (F_{ref} - f)`.
     """
 
+    weighed_by = ("weights.push",)
+
     def rows(self, model: SymbolicModel) -> list[TaskRow]:
         """One row in newtons."""
         push = model.parameter("push", 2)
@@ -30,6 +32,8 @@ class PushTask(Task):
 
 class StandoffTask(Task):
     """Net force along n equals mass times the wanted approach acceleration [N], weight 1 - lambda."""
+
+    weighed_by = ("weights.push",)
 
     def rows(self, model: SymbolicModel) -> list[TaskRow]:
         """One row in newtons, so that the blend with the push row is linear in lambda."""

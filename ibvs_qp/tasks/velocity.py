@@ -11,6 +11,8 @@ from ibvs_qp.tasks.task import Task
 class VelocityTask(Task):
     """Acceleration along right and down of the wall plane (PI law on the estimated velocity)."""
 
+    weighed_by = ("weights.velocity",)
+
     def rows(self, model: SymbolicModel) -> list[TaskRow]:
         """Two rows in m/s^2; a line of full weight takes its direction's weight away."""
         rows = []
