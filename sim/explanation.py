@@ -15,9 +15,10 @@ from ibvs_qp.controller import program_template
 from ibvs_qp.loop_margin import LEAST_DAMPING_RATIO, least_margin
 from ibvs_qp.pilot import PilotConfig
 from ibvs_qp.qp.assembly import QpTemplate
-from ibvs_qp.qp.replay import Explanation, TickReplay
+from ibvs_qp.qp.replay import Explanation, LimitValue, TickReplay
 from ibvs_qp.setpoints.signals import places
 from ibvs_qp.settings import from_dict
+from sim.explained_limits import conflict_parts, limit_parts, share_of, table_of
 
 if TYPE_CHECKING:
     from sim.trace import Event, Trace
@@ -25,8 +26,8 @@ if TYPE_CHECKING:
 #: Names of rows that only regularise.
 _REGULAR = ("effort", "smooth")
 _AXES = ("front", "right", "down", "roll", "pitch", "yaw")
-
-
+#: A force or moment given up that is smaller than this is none [N, N m].
+_NOTHING = 5e-4
 #: A push this much below what the job asks is told beside it [N].
 _REDUCED = 1e-3
 
@@ -46,6 +47,13 @@ def explain_tick(trace: Trace, tick: int, solver: str | None = None) -> tuple[Pi
     config = flown_config(trace)
     replay = TickReplay(_template(config.controller), solver)
     return config, replay.explain(trace.arrays["program"][tick].astype(float))
+
+
+def explain_conflict(trace: Trace, tick: int) -> tuple[LimitValue, ...]:
+    """A smallest set of hard limits of one tick that contradict each other, as the thrusts flown served them; or ()."""
+    replay = TickReplay(_template(flown_config(trace).controller))
+    replay.explain(trace.arrays["program"][tick].astype(float))
+    return replay.limit_values(replay.conflict, trace.thrusts[tick])
 
 
 def held(trace: Trace, tick: int) -> bool:
@@ -68,14 +76,20 @@ def refused(trace: Trace, tick: int) -> list[Event]:
 def explanation_tables(trace: Trace, tick: int, explanation: Explanation, config: PilotConfig) -> list[Any]:
     """What a person reads: a headline, what was refused, tasks, limits, rotors, wrench given up."""
     headline = _headline(trace, tick, config)
-    rotors = _rotors(trace, tick, explanation, config)
-    parts = [_tasks(explanation), _limits(explanation), rotors, _given_up(explanation.unallocated_wrench)]
+    rotors = _rotors(trace, tick, explanation.thrusts, config)
+    parts = [_tasks(explanation), *limit_parts(explanation), rotors, _given_up(explanation.unallocated_wrench)]
     return [headline, *_refused(trace, tick), *parts]
+
+
+def conflict_tables(trace: Trace, tick: int, conflict: tuple[LimitValue, ...], config: PilotConfig) -> list[Any]:
+    """The same for a tick whose hard limits contradict each other: who they are, and what flew instead."""
+    parts = [*conflict_parts(conflict), _rotors(trace, tick, None, config), _given_up(trace.unallocated[tick])]
+    return [_headline(trace, tick, config), *_refused(trace, tick), *parts]
 
 
 def held_tables(trace: Trace, tick: int, config: PilotConfig) -> list[Any]:
     """The same for a tick that held: without tasks and limits, because nothing was asked of a program."""
-    table = _table("Thrusts [N]", ("rotor",), ("flown",))
+    table = table_of("Thrusts [N]", ("rotor",), ("flown",))
     for name, flew in zip(config.controller.vehicle.geometry.names, trace.thrusts[tick], strict=True):
         table.add_row(name, f"{flew:.3f}")
     words = "The tick held: no program was solved, the thrusts carry the weight and stay level by the last good data."
@@ -99,51 +113,34 @@ def _refused(trace: Trace, tick: int) -> list[str]:
     return [f"Refused at {event.t:.3f} s: {event.text}" for event in refused(trace, tick)]
 
 
-def _table(title: str, words: tuple[str, ...], numbers: tuple[str, ...], last: tuple[str, ...] = ()) -> Any:
-    from rich.table import Table
-
-    table = Table(title=title, title_justify="left")
-    for column in (*words, *numbers, *last):
-        table.add_column(column, justify="right" if column in numbers else "left", no_wrap=True)
-    return table
-
-
 def _tasks(explanation: Explanation) -> Any:
     columns = ("task", "unit"), ("asked", "does", "residual", "weight", "cost")
-    table, quiet = _table("Tasks: what was asked, what the program does", *columns), 0.0
+    table, quiet = table_of("Tasks: what was asked, what the program does", *columns), 0.0
     for task, cost in zip(explanation.tasks, explanation.cost, strict=True):
         if task.name.startswith(_REGULAR):
             quiet += cost
             continue
         values = (f"{value:+.4f}" for value in (task.asked, task.achieved, task.residual))
-        table.add_row(task.name, task.unit, *values, f"{task.weight:.4g}", f"{cost:.0%}")
-    table.add_row("effort, smoothness", "N", "", "", "", "", f"{quiet:.0%}")
+        table.add_row(task.name, task.unit, *values, f"{task.weight:.4g}", share_of(cost))
+    table.add_row("effort, smoothness", "N", "", "", "", "", share_of(quiet))
     return table
 
 
-def _limits(explanation: Explanation) -> Any:
-    if not explanation.active_limits:
-        return "No limit is active: the thrusts are the weighted least-squares law."
-    table = _table("Active limits; price = |d cost / d bound|", ("limit", "side"), ("price", "slack"), ("unit",))
-    for limit in explanation.active_limits:
-        table.add_row(limit.name, limit.side, f"{limit.price:.4g}", f"{limit.slack:.4g}", limit.unit)
-    return table
-
-
-def _rotors(trace: Trace, tick: int, explanation: Explanation, config: PilotConfig) -> Any:
-    names, window = config.controller.vehicle.geometry.names, thrust_window(trace, tick, config)
-    table = _table("Thrusts [N]", ("rotor",), ("flown", "exact", "from", "to"))
-    rows = zip(names, trace.thrusts[tick], explanation.thrusts, *window, strict=True)
-    for name, flew, exact, low, high in rows:
-        table.add_row(name, f"{flew:.3f}", f"{exact:.3f}", f"{low:.3f}", f"{high:.3f}")
+def _rotors(trace: Trace, tick: int, exact: np.ndarray | None, config: PilotConfig) -> Any:
+    columns = {"flown": trace.thrusts[tick]} | ({} if exact is None else {"exact": exact})
+    columns |= dict(zip(("from", "to"), thrust_window(trace, tick, config), strict=True))
+    table = table_of("Thrusts [N]", ("rotor",), tuple(columns))
+    for name, *numbers in zip(config.controller.vehicle.geometry.names, *columns.values(), strict=True):
+        table.add_row(name, *(f"{number:.3f}" for number in numbers))
     return table
 
 
 def _given_up(lost: np.ndarray) -> str:
-    if not np.any(np.abs(lost) > 1e-6):
-        return "Nothing was given up."
     units = ("N",) * 3 + ("N m",) * 3
-    parts = (f"{name} {value:+.3f} {unit}" for name, value, unit in zip(_AXES, lost, units, strict=True))
+    told = [entry for entry in zip(_AXES, lost.tolist(), units, strict=True) if abs(entry[1]) >= _NOTHING]
+    if not told:
+        return "Nothing was given up."
+    parts = (f"{name} {value:+.3f} {unit}" for name, value, unit in told)
     return "Given up to the limits: " + ", ".join(parts)
 
 

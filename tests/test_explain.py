@@ -10,9 +10,12 @@ import numpy as np
 import pytest
 from closed_loop_rigs import short_scene
 
+from ibvs_qp.controller import program_template
+from ibvs_qp.setpoints.signals import places
+from ibvs_qp.settings import dump_toml
 from sim.cli import main
 from sim.closed_loop import FlightOptions, fly
-from sim.explanation import explain_tick, explanation_tables
+from sim.explanation import explain_tick, explanation_tables, flown_config
 from sim.flight_log import load_run, save_log
 from sim.trace import Event, Trace
 
@@ -20,8 +23,6 @@ from sim.trace import Event, Trace
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Trace]:
     """The start of a flight under both laws, as `paint` leaves it."""
-    from ibvs_qp.settings import dump_toml
-
     folder = tmp_path_factory.mktemp("run")
     scene = short_scene(0.1, rows=1)
     traces = {}
@@ -116,6 +117,74 @@ def test_a_push_below_the_jobs_is_told_beside_it(run: tuple[Path, Trace], capsys
     told = shown(explanation_tables(trace, tick, explanation, greedy), capsys)
     assert "35.00 N by the job" in told and f"{trace.reach_margin[tick]:.2f} N further" in told
     assert "by the job" not in shown(explanation_tables(trace, tick, explanation, config), capsys)
+
+
+def turning(trace: Trace, tick: int, rate: float, hard: bool = False) -> Trace:
+    """The flight with a pitch rate of its own [rad/s] in the program of a tick, barriers hard or soft."""
+    config = flown_config(trace)
+    limits = dataclasses.replace(config.controller.limits, hard_barriers=hard)
+    config = dataclasses.replace(config, controller=dataclasses.replace(config.controller, limits=limits))
+    program = trace.arrays["program"].copy()
+    place = places(program_template(config.controller).model.parameters)["tilt_state"]
+    program[tick, place] = 0.0, 0.0, 0.0, rate
+    return dataclasses.replace(trace, arrays=trace.arrays | {"program": program}, preset=dump_toml(config))
+
+
+def test_what_slack_costs_is_told_with_bound_and_unit(
+    run: tuple[Path, Trace], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder, trace = run
+    tick = int(np.flatnonzero(trace.contact_weight > 0.9)[0])
+    config, explanation = explain_tick(turning(trace, tick, 0.3), tick)
+    assert explanation is not None
+    by_name = {limit.name: place for place, limit in enumerate(explanation.active_limits)}
+    at = by_name["tilt_pitch"]
+    limit, row, paid = (
+        part[at] for part in (explanation.active_limits, explanation.limit_rows, explanation.limit_cost)
+    )
+    assert limit.side == "upper" and limit.slack > 0.01 and row.name == limit.name and row.unit == "rad/s^2"
+    bound = 64.0 * np.deg2rad(1.0) - 2.0 * 8.0 * 0.3  # p^2 phi_max - 2 p rate, with p = 8 1/s
+    assert row.upper == pytest.approx(bound, abs=1e-6) and row.value - row.upper == pytest.approx(limit.slack)
+    price = config.controller.limits.tilt_price
+    assert paid * explanation.total_cost == pytest.approx(0.5 * price * limit.slack**2)
+    assert sum(explanation.limit_cost) == pytest.approx(explanation.slack_cost, rel=1e-6)
+    told = shown(explanation_tables(trace, tick, explanation, config), capsys)
+    line = next(line for line in told.splitlines() if "tilt_pitch" in line)
+    assert f"{bound:.4g}" in line and "rad/s^2" in line and f"({paid:.0%})" in line
+    assert "Slack takes" in told and "per squared unit" in told
+    (tmp_path / "scene.toml").write_text((folder / "scene.toml").read_text())
+    save_log(tmp_path / "log.npz", {"qp": turning(trace, tick, 0.3)})
+    assert main(["explain", str(tmp_path), "--at", f"{trace.t[tick]:.3f}", "--json"]) == 0
+    table = json.loads(capsys.readouterr().out)
+    (entry,) = [entry for entry in table["active_limits"] if entry["name"] == "tilt_pitch"]
+    assert entry["cost_share"] == pytest.approx(paid) and entry["upper"] == pytest.approx(bound, abs=1e-6)
+    assert table["slack_cost_share"] == pytest.approx(explanation.slack_cost) and table["conflict"] == []
+
+
+def test_hard_limits_in_conflict_are_told_instead_of_refused(
+    run: tuple[Path, Trace], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Turning at 3 rad/s, more pitch moment is needed than the rotors have within their rate limit."""
+    folder, trace = run
+    tick = int(np.flatnonzero(trace.contact_weight > 0.9)[0])
+    (tmp_path / "scene.toml").write_text((folder / "scene.toml").read_text())
+    save_log(tmp_path / "log.npz", {"qp": turning(trace, tick, 3.0, hard=True)})
+    words = ["explain", str(tmp_path), "--at", f"{trace.t[tick]:.3f}"]
+    assert main(words) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "No thrusts keep these" in told and "tilt_pitch" in told and "hard_barriers = false" in told
+    assert "Tasks" not in told and "exact" not in told
+    assert main([*words, "--json"]) == 0
+    table = json.loads(capsys.readouterr().out)
+    rows = {row["name"]: row for row in table["conflict"]}
+    assert rows["tilt_pitch"]["value"] > rows["tilt_pitch"]["upper"]  # the flown thrusts break it
+    rotors = {name: row for name, row in rows.items() if name.startswith("thrust_")}
+    names = flown_config(trace).controller.vehicle.geometry.names
+    for name, row in rotors.items():
+        place = names.index(name.removeprefix("thrust_"))
+        assert row["unit"] == "N" and row["lower"] == pytest.approx(table["thrust_lower"][place])
+        assert row["value"] == pytest.approx(trace.thrusts[tick][place])
+    assert rotors and table["tasks"] == [] and table["total_cost"] is None
 
 
 def shown(parts: list[object], capsys: pytest.CaptureFixture[str]) -> str:

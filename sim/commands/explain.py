@@ -16,7 +16,7 @@ from sim.commands.options import optional
 
 if TYPE_CHECKING:
     from ibvs_qp.pilot import PilotConfig
-    from ibvs_qp.qp.replay import Explanation
+    from ibvs_qp.qp.replay import Explanation, LimitValue
     from sim.trace import Trace
 
 
@@ -56,28 +56,33 @@ class Explain:
         """
         from rich.console import Console
 
-        from sim.explanation import explain_tick, explanation_tables, flown_config, held, held_tables, loop_margin_line
+        from sim import explanation as told
 
         trace = self._flight()
         tick = self._tick(trace)
-        explanation = None
-        if held(trace, tick):
-            config = flown_config(trace)
-        else:
-            config, explanation = explain_tick(trace, tick, self.solver)
+        explanation, conflict, config = None, (), told.flown_config(trace)
+        if not told.held(trace, tick):
+            config, explanation = told.explain_tick(trace, tick, self.solver)
             if explanation is None:
-                raise ExplainError(f"the program at {self.at:g} s has no solution: hard barriers contradict each other")
+                conflict = told.explain_conflict(trace, tick)
+                if not conflict:
+                    solver = self.solver or "the exact solver"
+                    raise ExplainError(
+                        f"{solver} finds no solution at {self.at:g} s, though no hard limits are in conflict"
+                    )
         if self.json:
-            print(json.dumps(_table(trace, tick, explanation, config), allow_nan=False))
+            print(json.dumps(_table(trace, tick, explanation, conflict, config), allow_nan=False))
             return 0
         console = Console()
-        if explanation is None:
-            parts = held_tables(trace, tick, config)
+        if explanation is not None:
+            parts = told.explanation_tables(trace, tick, explanation, config)
+        elif conflict:
+            parts = told.conflict_tables(trace, tick, conflict, config)
         else:
-            parts = explanation_tables(trace, tick, explanation, config)
+            parts = told.held_tables(trace, tick, config)
         for part in parts:
             console.print(part)
-        console.print(loop_margin_line(config))
+        console.print(told.loop_margin_line(config))
         return 0
 
     def _flight(self) -> Trace:
@@ -99,8 +104,10 @@ class Explain:
         return int(np.argmin(np.abs(trace.t - self.at)))
 
 
-def _table(trace: Trace, tick: int, explanation: Explanation | None, config: PilotConfig) -> dict[str, Any]:
-    """One tick as JSON; without a program (a held tick) no tasks, no limits and no window."""
+def _table(
+    trace: Trace, tick: int, explanation: Explanation | None, conflict: tuple[LimitValue, ...], config: PilotConfig
+) -> dict[str, Any]:
+    """One tick as JSON; without a program (a held tick) no window either, without a solution no tasks and no limits."""
     from dataclasses import asdict
 
     from sim.explanation import refused, thrust_window
@@ -121,17 +128,24 @@ def _table(trace: Trace, tick: int, explanation: Explanation | None, config: Pil
         "thrust_upper": None,
         "tasks": [],
         "active_limits": [],
+        "total_cost": None,
+        "slack_cost_share": None,
+        "conflict": [asdict(row) for row in conflict],
         "unallocated_wrench": trace.unallocated[tick].tolist(),
     }
-    if explanation is None:
+    if explanation is None and not conflict:
         return table
     lower, upper = thrust_window(trace, tick, config)
+    table |= {"thrust_lower": lower.tolist(), "thrust_upper": upper.tolist()}
+    if explanation is None:
+        return table
+    limits = zip(explanation.active_limits, explanation.limit_rows, explanation.limit_cost, strict=True)
     tasks = zip(explanation.tasks, explanation.cost, strict=True)
     return table | {
         "thrusts": explanation.thrusts.tolist(),
-        "thrust_lower": lower.tolist(),
-        "thrust_upper": upper.tolist(),
         "tasks": [asdict(task) | {"cost_share": cost} for task, cost in tasks],
-        "active_limits": [asdict(limit) for limit in explanation.active_limits],
+        "active_limits": [asdict(limit) | asdict(row) | {"cost_share": cost} for limit, row, cost in limits],
+        "total_cost": explanation.total_cost,
+        "slack_cost_share": explanation.slack_cost,
         "unallocated_wrench": explanation.unallocated_wrench.tolist(),
     }
