@@ -139,9 +139,7 @@ def test_what_slack_costs_is_told_with_bound_and_unit(
     assert explanation is not None
     by_name = {limit.name: place for place, limit in enumerate(explanation.active_limits)}
     at = by_name["tilt_pitch"]
-    limit, row, paid = (
-        part[at] for part in (explanation.active_limits, explanation.limit_rows, explanation.limit_cost)
-    )
+    limit, row, paid = explanation.active_limits[at], explanation.limit_rows[at], explanation.limit_cost[at]
     assert limit.side == "upper" and limit.slack > 0.01 and row.name == limit.name and row.unit == "rad/s^2"
     bound = 64.0 * np.deg2rad(1.0) - 2.0 * 8.0 * 0.3  # p^2 phi_max - 2 p rate, with p = 8 1/s
     assert row.upper == pytest.approx(bound, abs=1e-6) and row.value - row.upper == pytest.approx(limit.slack)
