@@ -1,4 +1,4 @@
-"""Switches of phase, lines, limits and reach: thrusts bend, they do not jump; integrators rest where limits bind."""
+"""Switches of phase, lines, limits and reach: thrusts bend, they do not jump."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from closed_loop_rigs import short_scene
 from controller_scenes import line_references
 from small_vehicle import SmallVehicle
 
@@ -14,6 +15,8 @@ from ibvs_qp.analytic import PaperController
 from ibvs_qp.command import Outcome
 from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import Reference
+from sim.closed_loop import FlightOptions, fly
+from sim.faults import Derate
 
 LAWS = [HybridController, PaperController]
 #: Largest thrust step that the vehicle's rate limit allows in a tick [N]: 500 N/s.
@@ -70,25 +73,22 @@ def test_no_switch_makes_the_thrusts_jump(steps: dict[str, float], switch: str, 
     assert steps[switch] <= bound + 1e-9
 
 
-INTEGRALS = ("force_integral", "search_force", "line_0_integral", "velocity_integral_0", "velocity_integral_1")
+#: Largest thrust step within 0.2 s of entering a phase [N]; starting to move and letting go may use the whole rate.
+PHASES = {"approach": RATE_STEP, "align": 0.6, "press": 1.5, "paint": 0.6, "retreat": RATE_STEP, "done": 0.3}
 
 
-@pytest.mark.parametrize("distance", [0.005, -0.002])  # before the touch, and in contact
-def test_every_integrator_rests_while_limits_take_what_it_asks_for(distance: float) -> None:
-    """Rotors so weak that no tick goes as wanted, errors everywhere: what the integrators hold stays as it is."""
-    controller = HybridController()
-    vehicle = SmallVehicle(controller.config, distance=0.005)
-    states, wanted = controller.setpoints.tick.states, replace(PRESS, push_force=8.0, velocity=np.array([0.2, 0.2]))
-    for _ in range(SETTLE):
-        vehicle.fly(controller.step(vehicle.measure(count=1), PRESS).thrusts)
-        if vehicle.distance < distance:
-            break
-    held = None
-    for tick in range(200):  # the vehicle stays where it is
-        command = controller.step(vehicle.measure(count=1, thrust_max=np.full(6, 10.5)), wanted)
-        vehicle.tick += 1
-        if tick > 50:
-            assert np.abs(command.unallocated_wrench).max() > 0.5
-            now = np.array([states[name][0] for name in INTEGRALS])
-            held = now if held is None else held
-            np.testing.assert_array_equal(now, held)
+@pytest.mark.parametrize("law", ["qp", "paper"])
+def test_no_phase_and_no_fault_of_a_whole_flight_makes_the_thrusts_jump(law: str) -> None:
+    """Free flight, approach, contact, slide with a rotor that weakens on the way, and off the wall again."""
+    fault = Derate(after="paint", delay_s=1.5, rotor="front_left", share=0.25)
+    options = FlightOptions(law=law, features="geometric", video=False)
+    trace = fly(short_scene(0.25, rows=1), options, faults=(fault,))
+    assert [event.kind for event in trace.events].count("fault") == 1 and trace.completed
+    steps = np.abs(np.diff(trace.thrusts, axis=0)).max(axis=1)
+    assert steps[1:].max() <= RATE_STEP + 1e-6  # the first command comes from nowhere
+    for tick in np.flatnonzero(np.diff(trace.phase)):
+        name = trace.phases[int(trace.phase[tick + 1])]
+        assert steps[tick : tick + 50].max() <= PHASES[name] + 1e-6, name
+    struck = next(event.t for event in trace.events if event.kind == "fault")
+    after = (trace.t[1:] > struck) & (trace.t[1:] < struck + 0.2)
+    assert steps[after].max() <= 0.6  # the press needs less than what is left of that rotor
