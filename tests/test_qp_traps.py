@@ -311,10 +311,15 @@ def test_buffers_are_contiguous_doubles_of_fixed_length() -> None:
     assert sizes[:2] == (template.p_pattern.nnz, template.a_pattern.nnz)
 
 
-def test_reset_restores_the_first_solve_to_the_bit() -> None:
-    """The adapted step size survives in OSQP; a reset has to forget it with everything else."""
+@pytest.mark.parametrize("shortcut", [True, False])
+def test_reset_restores_the_first_solve_to_the_bit(shortcut: bool) -> None:
+    """The adapted step size survives in OSQP; a reset has to forget it with everything else.
+
+    Without the shortcut and the polish OSQP's own iterates fly, and its step size shows in their last bits.
+    """
     ticks = [random_tick(np.random.default_rng(tick), tick % 3, tick) for tick in range(60)]
-    controller = HybridController()
+    config = ControllerConfig(solver=SolverSettings(shortcut=shortcut, polish=shortcut))
+    controller = HybridController(config)
     first = [controller.step(*tick) for tick in ticks]
     controller.reset()
     second = [controller.step(*tick) for tick in ticks]
@@ -322,7 +327,7 @@ def test_reset_restores_the_first_solve_to_the_bit() -> None:
         np.testing.assert_array_equal(one.thrusts, two.thrusts)
         assert (one.outcome, one.iterations, one.mode) == (two.outcome, two.iterations, two.mode)
         np.testing.assert_array_equal(one.unallocated_wrench, two.unallocated_wrench)
-    np.testing.assert_array_equal(HybridController().step(*ticks[0]).thrusts, first[0].thrusts)
+    np.testing.assert_array_equal(HybridController(config).step(*ticks[0]).thrusts, first[0].thrusts)
 
 
 # ------------------------------------------------------------------------------------------------- every way out
