@@ -1,4 +1,25 @@
-"""Traps of OSQP, each shown on the bare solver first and then caught by its guard; and every named way out."""
+"""Traps of OSQP, each shown on the bare solver first and then caught by its guard; and every named way out.
+
+Each guard was taken out once, and the test beside it failed:
+
+===================================================  ================================================================
+trap, and what guards against it                     test that fails without the guard
+===================================================  ================================================================
+no solution is a finite number: status is asked      garbage_with_a_good_status_does_not_fly_either
+a result that is no number: x and y must be finite   garbage_with_a_good_status_does_not_fly_either
+a result beyond its bounds: hard rows are judged     an_iterate_that_breaks_a_hard_row_does_not_fly
+one NaN poisons the warm start: data must be finite  data_that_is_not_finite_never_reaches_the_workspace
+an update with l > u is dropped: refused before      crossed_bounds_are_refused_and_leave_no_trace
+strided arrays are misread: copied contiguous        strided_arrays_and_other_types_are_read_as_meant
+lengths are not checked: refused                     an_array_of_another_length_is_refused
+updates write into what was handed over: copies      nothing_handed_to_the_set_up_is_shared_with_the_caller
+of values, and of patterns                           arrays_handed_to_the_solver_stay_as_they_were
+adapted rho outlives a warm start from nothing:      reset_restores_the_first_solve_to_the_bit
+a reset sets up anew
+bounds within 1e-4 turn a row into an equality:      bounds_of_thrusts_stay_a_millinewton_apart
+a millinewton is kept between them
+===================================================  ================================================================
+"""
 
 from __future__ import annotations
 
@@ -163,6 +184,8 @@ def test_garbage_with_a_good_status_does_not_fly_either() -> None:
     assert engine._judge(SOLVED, np.full(9, 20.0), np.full(rows, math.nan)) is None
     inside = np.append(0.5 * (engine.data.lower + engine.data.upper)[:6], np.zeros(3))
     assert engine._judge(SOLVED, inside, np.zeros(rows)) is Outcome.SOLVED
+    assert engine._judge(SOLVED, inside, np.full(rows, math.nan)) is None  # prices and slacks are read as well
+    assert engine._judge(SOLVED, np.append(inside[:-1], math.inf), np.zeros(rows)) is None
     for status in (3, 4, 5, 6, 8, 9, 10, 11):  # infeasible, unbounded, interrupted, unsolved: the number is chance
         assert engine._judge(status, inside, np.zeros(rows)) is None
 
