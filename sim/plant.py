@@ -21,6 +21,7 @@ from sim.mujoco_frames import FLIP, FLIP_QUATERNION
 from sim.readings import PlantReadings
 from sim.readout import PLACES, SIZE, drive, readout
 from sim.scene import Scene
+from sim.step_clock import stop_step_clock
 from sim.streams import stream
 from sim.trim import hover_thrusts, start_pose, true_limits
 from sim.wind import Wind
@@ -59,6 +60,7 @@ class Plant(PlantReadings):
     ) -> None:
         self._translate = machine_code if to_machine_code else lambda function: function
         self.scene, self.vehicle = scene, vehicle or VehicleParams()
+        stop_step_clock()
         self.model, self._ids = build_model(scene, self.vehicle)
         self.data = mujoco.MjData(self.model)
         self._lower, self._upper = true_limits(scene, self.vehicle)
