@@ -32,7 +32,7 @@ _NO_LIMITS: tuple[list[float] | None, list[float] | None] = (None, None)
 
 def _number(name: str, index: int, text: str) -> property:
     """Read-only result of the last tick as a plain number."""
-    return property(lambda terms: float(terms.tick.outputs[name][index]), doc=text)
+    return property(lambda terms: terms.result(terms.tick.starts[name] + index), doc=text)
 
 
 class Setpoints:
@@ -42,6 +42,7 @@ class Setpoints:
         contact: Contact estimator; everything else lives in the compiled tick (`ibvs_qp.setpoints.model`).
         tick: The compiled function; with a program its `extra` arrays are those of
             `ProgramData`.
+        result: A result of the last tick by its place in the column of all of them.
     """
 
     def __init__(self, config: ControllerConfig, template: QpTemplate | None = None) -> None:
@@ -55,6 +56,7 @@ class Setpoints:
         self.tick = TickFunction(signals, program, config.machine_code)
         self._inputs = TickInputs(self.tick, config.line_slots)
         self._twist = camera_twist_matrix(np.array(vehicle.camera_position_m))
+        self.result = self.tick.results.item
         self._values, out = self.tick.inputs, self.tick.outputs
         self.normal, self.right, self.down = out["normal"], out["axis_right"], out["axis_down"]
         self.bias_wrench, self.angular = out["bias_wrench"], out["angular"]
