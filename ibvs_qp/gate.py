@@ -105,7 +105,7 @@ class MeasurementGate:
             return False
         if not surely_good_lines(measurement.lines):
             return False
-        if not (measurement.thrust_min is measurement.thrust_max is None or self._good_limits(measurement)):
+        if not self._good_limits(measurement):
             return False
         attitude, rate = entries(measurement.attitude, _FOUR), entries(measurement.angular_velocity, _THREE)
         wrench = entries(measurement.contact_wrench, _SIX)

@@ -86,6 +86,7 @@ class Plant(PlantReadings):
             (self.truth,),
         )
         self._wanted, self._air, self._lags = np.zeros(model.nu), np.zeros(3), np.zeros(model.nu)
+        self._air_memory = self._air.data
         self._lag = model.actuator_dynprm[:, 0]
         lags = np.array((truth.motor_lag_up_s, truth.motor_lag_down_s))
         # Moment arm from the bare vehicle's centre of mass, where MuJoCo applies forces, to the whole one's.
@@ -121,12 +122,12 @@ class Plant(PlantReadings):
             self.crashed, self.time_ns = self.crashed or NOT_FINITE, self.time_ns + TICK_NS
             return
         self._wanted[:] = thrusts
-        _put_three(self._air.data, 0, *self.wind.force(self._centre_velocity.tolist()))
-        self._drive()
+        _put_three(self._air_memory, 0, *self.wind.force(self._centre_velocity.tolist()))
+        self._drive.evaluate()
         self._lag[:] = self._lags
         mujoco.mj_step(self.model, self.data, STEPS_PER_TICK)
         self.time_ns += TICK_NS
-        self._read()
+        self._read.evaluate()
         if self.truth.item(_SAFE) != 1.0 and self.crashed is None:
             self.crashed = crash_reason(self.position.tolist(), self.rotation.tolist(), self.clearance)
 

@@ -65,6 +65,8 @@ class Setpoints:
             out["thrust_lower"],
             out["thrust_upper"],
         )
+        self._change, self._thrusts = self._values["thrust_change"], self._values["thrust_last"]
+        self._given_up = self._values["given_up"].data
         self._values["thrust_floor"][:], self._values["thrust_ceiling"][:] = vehicle.thrust_min, vehicle.thrust_max
         self.reset()
 
@@ -105,17 +107,21 @@ class Setpoints:
         """Take in one checked measurement and reference."""
         config, values = self.config, self._values
         stamp = measurement.stamp_ns
-        dt = config.tick_s if self._stamp < 0 else min(max((stamp - self._stamp) * 1e-9, 0.0), LONGEST_TICK)
+        dt = config.tick_s
+        if self._stamp >= 0:
+            dt = (stamp - self._stamp) * 1e-9
+            dt = LONGEST_TICK if dt > LONGEST_TICK else dt if dt > 0.0 else 0.0
         self._stamp = stamp
         self.contact.update(measurement, down_in_body(measurement.attitude))
         self._inputs.write(measurement, reference, self.contact, dt)
         if self.last is None:
             values["thrust_last"][:] = hold_thrusts(config, measurement)
         low, high = measurement.thrust_min, measurement.thrust_max
-        limits = (None if low is None else low.tolist(), None if high is None else high.tolist())
-        if limits != self._limits:
-            self._limits = limits
-            self._narrow(low, high)
+        if low is not None or high is not None or self._limits is not _NO_LIMITS:
+            limits = (None if low is None else low.tolist(), None if high is None else high.tolist())
+            if limits != self._limits:
+                self._limits = _NO_LIMITS if limits == _NO_LIMITS else limits
+                self._narrow(low, high)
         self.tick()
 
     def _narrow(self, low: np.ndarray | None, high: np.ndarray | None) -> None:
@@ -128,14 +134,14 @@ class Setpoints:
 
     def note(self, thrusts: np.ndarray, given_up: float) -> None:
         """Take note of what was commanded and of the largest force or moment given up (anti-windup)."""
-        values = self._values
         if self.last is None:
+            values = self._values
             values["commanded"][0] = 1.0
             values["thrust_step"][0] = self.config.vehicle.thrust_rate_n_s * self.config.tick_s
         else:
-            np.subtract(thrusts, self.last, out=values["thrust_change"])
-        values["thrust_last"][:] = thrusts
-        values["given_up"][0] = given_up
+            np.subtract(thrusts, self.last, self._change)
+        self._thrusts[:] = thrusts
+        self._given_up[0] = given_up
         self.last = thrusts
 
     roll = _number("angles", 0, "Roll [rad].")
