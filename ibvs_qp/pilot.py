@@ -195,7 +195,7 @@ class Pilot:
         contact = self.controller.setpoints.contact
         free = not contact.in_contact and contact.distance > estimation.tare_distance_m
         wrench = self.tare.update(frame.wrench, frame.wrench_stamp_ns, force, free)
-        axes = WallAxes.of(contact.normal.tolist(), down_row(*attitude))
+        axes = WallAxes.of(contact.direction, down_row(*attitude))
         self.motion.predict(stamp, axes, force, rate, dt)
         self._remember(attitude, rate, dt)
         # Without a rotor the vehicle turns away from the wall: what it sees then is not what the strategy knows.
@@ -232,7 +232,7 @@ class Pilot:
         if expected is None or not contact.known:
             return ()
         offset, side = expected
-        axes = WallAxes.of(contact.normal.tolist(), down_row(*self._history_attitude[self._slot(stamp_ns)]))
+        axes = WallAxes.of(contact.direction, down_row(*self._history_attitude[self._slot(stamp_ns)]))
         rho, theta, _ = image_line(offset, 0.5 * math.pi, axes, self._tip_from_camera, contact.distance)
         near, far = HINT_SPAN
         span = (near, far) if side > 0.0 else (-far, -near)
@@ -293,7 +293,7 @@ class Pilot:
             normal = x / length, y / length, z / length
             distance = (1.0 - x * tip_x - y * tip_y - z * tip_z) / length
         elif contact.known:
-            normal, distance = contact.normal.tolist(), contact.distance
+            normal, distance = contact.direction, contact.distance
         else:
             return
         gravity = down_row(*self._history_attitude[self._slot(features.stamp_ns)])

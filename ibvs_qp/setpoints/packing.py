@@ -57,7 +57,7 @@ class TickInputs:
             *measurement.contact_wrench.tolist(),
             *(_NOTHING if force is None else force.tolist()),
             *(_NOTHING if velocity is None else velocity.tolist()),
-            *contact.normal.tolist(),
+            *contact.direction,
             dt,
             force is not None,
             velocity is not None,

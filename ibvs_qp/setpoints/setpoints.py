@@ -7,7 +7,7 @@ import numpy as np
 
 from allocation.effectiveness import control_effectiveness
 from ibvs_qp.config import ControllerConfig
-from ibvs_qp.estimation.contact import ContactEstimator
+from ibvs_qp.estimation.contact import LONGEST_TICK, ContactEstimator
 from ibvs_qp.frames import camera_twist_matrix, down_in_body
 from ibvs_qp.hold import hold_thrusts
 from ibvs_qp.limits.thrust import thrust_window
@@ -22,8 +22,6 @@ from ibvs_qp.setpoints.reach import UNBOUNDED
 from ibvs_qp.setpoints.signals import Signals
 from ibvs_qp.setpoints.tick_function import TickFunction
 
-#: A tick is never taken to last longer than this [s]: after a pause the filters begin where they were.
-LONGEST_TICK = 0.02
 #: Thrust step that stands for "no rate limit" before the first command [N].
 ANY_STEP = 1e6
 
