@@ -49,7 +49,8 @@ class ContactEstimator:
         direction: Unit vector into the wall, in B, as plain numbers; known: whether the wall was ever seen.
         distance: Tip to wall [m]; rate: its rate [m/s]; acceleration: the rate's own, filtered [m/s^2].
         depth: Camera to wall along the normal [m].
-        push: Filtered push [N]; push_raw: of the last sample.
+        push: Filtered push [N]; push_raw: of the last sample; push_noise: deviation of push in free flight [N].
+        across_noise: Deviation of the filtered moments in free flight, as a force across the tip [N].
         in_contact: Whether the tip touches; touch_ns: since when.
         ramp: 0 at touch to 1 after the ramp time; 0 while free.
         contact_weight: Lambda (paper, corrected), 0 far away to 1.
@@ -84,6 +85,7 @@ class ContactEstimator:
         self.push = self.push_raw = 0.0
         self._push_mean, self._push_variance = 0.0, 0.02
         self._moment, self._moment_variance = (0.0, 0.0, 0.0), 0.0
+        self._note_noise()
         self.in_contact, self.touch_ns, self._touch_count, self._doubt_ns = False, -1, 0, -1
         self._ramped, self._lost_ns = 0.0, -1
         self.stiffness = StiffnessEstimator()
@@ -208,6 +210,7 @@ class ContactEstimator:
             self._push_mean += share * (self.push - self._push_mean)
             self._push_variance += share * ((self.push - self._push_mean) ** 2 - self._push_variance)
             self._moment_variance += share * (0.5 * (x * x + y * y + z * z) - self._moment_variance)
+            self._note_noise()
         self._touch_count = self._touch_count + 1 if self.push > self.touch_threshold else 0
         if self.in_contact:
             self.stiffness.add(self.push, -self.distance, dt)
@@ -217,21 +220,15 @@ class ContactEstimator:
         """Speed of the centre of mass into the wall [m/s], whatever the tip does by turning."""
         return -self.rate - self._lever_speed
 
-    @property
-    def push_noise(self) -> float:
-        """Deviation of the filtered push in free flight [N]."""
-        return math.sqrt(self._push_variance)
-
-    @property
-    def across_noise(self) -> float:
-        """Deviation of the filtered moments in free flight, as a force across the tip [N]."""
-        return math.sqrt(self._moment_variance) / self._tip_list[0]
+    def _note_noise(self) -> None:
+        self.push_noise = math.sqrt(self._push_variance)
+        self.across_noise = math.sqrt(self._moment_variance) / self._tip_list[0]
 
     @property
     def touch_threshold(self) -> float:
         """Filtered push that counts as touch [N]."""
         settings = self._config.contact
-        return max(settings.touch_force_n, settings.touch_sigmas * math.sqrt(self._push_variance))
+        return max(settings.touch_force_n, settings.touch_sigmas * self.push_noise)
 
     def _update_contact(self, stamp: int) -> None:
         settings = self._config.contact
