@@ -127,7 +127,7 @@ class World:
         if self._rendered and options.camera_process and options.camera in ("plane", "gl"):
             # first of all: it sets itself up meanwhile
             camera = RemoteCamera(scene, vehicle, options.seed, lambda: self.canvas.take(), options.camera)
-        self.plant = Plant(scene, vehicle, options.seed, options.machine_code)
+        self.plant = Plant(scene, vehicle, options.seed, options.machine_code, options.view)
         self.sensors = SensorSuite(scene, vehicle, options.seed, options.machine_code)
         self.canvas = Canvas(scene, options.seed)
         self._miscalibration = Miscalibration(scene.camera, vehicle, self._rendered)

@@ -53,15 +53,21 @@ class Plant(PlantReadings):
         vehicle: Geometry and nominal parameters.
         seed: Varies start pose and gusts.
         to_machine_code: Whether a C compiler translates the arithmetic around the physics; the same bits, sooner.
+        drawn: Whether MuJoCo's model holds what a window shows; likewise.
     """
 
     def __init__(
-        self, scene: Scene, vehicle: VehicleParams | None = None, seed: int = 0, to_machine_code: bool = False
+        self,
+        scene: Scene,
+        vehicle: VehicleParams | None = None,
+        seed: int = 0,
+        to_machine_code: bool = False,
+        drawn: bool = True,
     ) -> None:
         self._translate = machine_code if to_machine_code else lambda function: function
         self.scene, self.vehicle = scene, vehicle or VehicleParams()
         stop_step_clock()
-        self.model, self._ids = build_model(scene, self.vehicle)
+        self.model, self._ids = build_model(scene, self.vehicle, drawn)
         self.data = mujoco.MjData(self.model)
         self._lower, self._upper = true_limits(scene, self.vehicle)
         self.clearance = PropellerClearance(BoardGeometry(scene), self.vehicle)
