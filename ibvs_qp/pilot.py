@@ -22,7 +22,7 @@ from ibvs_qp.estimation.tare import WrenchTare
 from ibvs_qp.estimation.wall_lines import WallAxes, image_line
 from ibvs_qp.frames import to_camera
 from ibvs_qp.loop_margin import require_margin
-from ibvs_qp.made import filled, made
+from ibvs_qp.made import filled
 from ibvs_qp.measurement import (
     HORIZONTAL,
     FeatureFrame,
@@ -318,21 +318,23 @@ class Pilot:
                 )
             )
             covariance = self._covariance
-        return made(
+        return filled(
             Measurement,
-            stamp_ns=frame.stamp_ns,
-            attitude=frame.attitude,
-            angular_velocity=frame.angular_velocity,
-            specific_force=frame.specific_force,
-            contact_wrench=wrench,
-            wrench_stamp_ns=frame.wrench_stamp_ns,
-            lines=tuple([self.motion.feature(line, axes, distance, frame.stamp_ns) for line, _ in wish.guides]),
-            plane=self._plane,
-            plane_stamp_ns=self._plane_stamp,
-            velocity=velocity,
-            velocity_covariance=covariance,
-            thrust_min=low,
-            thrust_max=high,
+            {
+                "stamp_ns": frame.stamp_ns,
+                "attitude": frame.attitude,
+                "angular_velocity": frame.angular_velocity,
+                "specific_force": frame.specific_force,
+                "contact_wrench": wrench,
+                "wrench_stamp_ns": frame.wrench_stamp_ns,
+                "lines": tuple([self.motion.feature(line, axes, distance, frame.stamp_ns) for line, _ in wish.guides]),
+                "plane": self._plane,
+                "plane_stamp_ns": self._plane_stamp,
+                "velocity": velocity,
+                "velocity_covariance": covariance,
+                "thrust_min": low,
+                "thrust_max": high,
+            },
         )
 
     def _scenery(self, frame: SensorFrame) -> Scenery:
@@ -363,13 +365,15 @@ class Pilot:
             else:
                 rho, theta = offset / depth, 0.0
             references.append(filled(LineReference, {"rho": rho, "theta": theta, "role": line.role}))
-        return made(
+        return filled(
             Reference,
-            push_force=wish.push,
-            standoff=wish.standoff,
-            lines=tuple(references),
-            velocity=wish.velocity,
-            contact=wish.contact,
-            tilt=wish.tilt,
-            travel=wish.travel,
+            {
+                "push_force": wish.push,
+                "standoff": wish.standoff,
+                "lines": tuple(references),
+                "velocity": wish.velocity,
+                "contact": wish.contact,
+                "tilt": wish.tilt,
+                "travel": wish.travel,
+            },
         )

@@ -13,7 +13,7 @@ import numpy as np
 
 from ibvs_qp.bound_function import BoundFunction
 from ibvs_qp.machine_code import machine_code
-from ibvs_qp.made import made
+from ibvs_qp.made import filled
 from ibvs_qp.measurement import FeatureFrame, RgbdFrame, SensorFrame
 from ibvs_qp.vehicle import VehicleParams
 from sim.plant import Plant
@@ -171,14 +171,16 @@ class SensorSuite:
         imu, force_torque = self.imu, self.force_torque
         imu.sample(plant)
         force_torque.sample(plant)
-        return made(
+        return filled(
             SensorFrame,
-            stamp_ns=plant.time_ns,
-            attitude=imu.attitude,
-            angular_velocity=imu.angular_velocity,
-            specific_force=imu.specific_force,
-            wrench=force_torque.wrench,
-            wrench_stamp_ns=force_torque.stamp_ns,
-            image=image,
-            features=features,
+            {
+                "stamp_ns": plant.time_ns,
+                "attitude": imu.attitude,
+                "angular_velocity": imu.angular_velocity,
+                "specific_force": imu.specific_force,
+                "wrench": force_torque.wrench,
+                "wrench_stamp_ns": force_torque.stamp_ns,
+                "image": image,
+                "features": features,
+            },
         )
