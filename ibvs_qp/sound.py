@@ -9,7 +9,6 @@ entry beyond that bound, and not-a-number is within nothing.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from math import hypot
 from typing import Any
 
@@ -30,12 +29,12 @@ THRUST_BOUND = 1e4
 #: A quaternion whose squared length is this far from 1 is no attitude.
 UNIT_SLIP = 0.02
 
-_NO_NUMBERS = (float("nan"),)
+_NO_NUMBERS = [float("nan")]
 _ARRAY, _FLOAT, _ROLES = np.ndarray, np.dtype(np.float64), (HORIZONTAL, VERTICAL)
 _PAIR, _SQUARE = (2,), (2, 2)
 
 
-def entries(value: Any, shape: tuple[int]) -> Sequence[float]:
+def entries(value: Any, shape: tuple[int, ...]) -> list[float]:
     """Numbers of a float64 vector of that shape; for anything else not-a-number, which no bound lets pass."""
     if type(value) is _ARRAY and value.dtype is _FLOAT and value.shape == shape:
         return value.tolist()

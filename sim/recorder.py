@@ -90,7 +90,7 @@ class Recorder:
             command.reach_margin,
         )
         row = numbers, *self._standing, command.thrusts, self._actual, command.unallocated_wrench
-        self._log.add(b"".join(row))
+        self._log.add(b"".join(row))  # type: ignore[arg-type]
         if self._program is not None:
             self._programs.add(self._program.tobytes())
         active = command.active_limits

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import casadi as ca
 import numpy as np
 
@@ -64,7 +66,7 @@ class Setpoints:
             out["thrust_upper"],
         )
         self._change, self._thrusts = self._values["thrust_change"], self._values["thrust_last"]
-        self._given_up = self._values["given_up"].data
+        self._given_up: Any = self._values["given_up"].data
         self._values["thrust_floor"][:], self._values["thrust_ceiling"][:] = vehicle.thrust_min, vehicle.thrust_max
         self.reset()
 
