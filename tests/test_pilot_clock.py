@@ -134,8 +134,9 @@ def test_a_stamp_that_surely_goes_on_is_one_that_is_accepted() -> None:
     rng, quick, thorough = np.random.default_rng(4), StampFollower(), StampFollower()
     steps = TICK_NS * rng.choice([1, 5, 0, -1, 750, -2500], 4000, p=[0.96, 0.02, 0.01, 0.005, 0.0025, 0.0025])
     stamps = (10**13 + np.cumsum(steps)).tolist()
-    at_once = 0
-    for stamp in (*stamps, 2**62, -1, 1.5, None, True, stamps[-1] + TICK_NS):
+    end, leap, at_once = stamps[-1], 10**11, 0
+    torn = [end + TICK_NS, end + leap, end + 2 * TICK_NS, end + leap + TICK_NS]  # two leaps with a good one between
+    for stamp in (*stamps, 2**62, -1, 1.5, None, True, *torn):
         passed = quick.goes_on(stamp)
         refused = thorough.refuse(stamp)
         assert not (passed and refused), stamp
