@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ibvs_qp.shared_library import compiler, shared_library
+from ibvs_qp.shared_library import compiler, shared_library, wide_registers
 from sim.cameras.arm import shade_propellers
 from sim.cameras.finish import FAR_M, PictureFinish
 from sim.cameras.outline import Box, CutLine
@@ -41,7 +41,7 @@ def native() -> ctypes.CDLL | None:
     try:
         folder = Path(__file__).with_name("native")
         code = "".join((folder / name).read_text() for name in FILES)
-        return ctypes.CDLL(str(shared_library("drawing", code, command, FLAGS)))
+        return ctypes.CDLL(str(shared_library("drawing", code, command, (*FLAGS, *wide_registers()))))
     except (OSError, subprocess.SubprocessError) as error:
         log.warning("pictures are drawn by OpenCV: %s", error)
         return None

@@ -5,18 +5,8 @@
 #include <string.h>
 
 /* The same bits from plain and from wide registers: whole numbers, and divisions that are rounded as IEEE asks. */
-#if defined(__x86_64__) && defined(__gnu_linux__) && defined(__has_attribute)
-#if __has_attribute(target_clones)
-#define WIDE __attribute__((target_clones("avx2", "default")))
-#endif
-#endif
-#ifndef WIDE
-#define WIDE
-#endif
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(PLAIN)
+#ifdef __AVX2__
 #include <immintrin.h>
-#define AVX2
-#define FAST __attribute__((target("avx2"), always_inline)) static inline
 #endif
 
 enum { MOST_CUTS = 6, HOLE_PX = 4, HOLE_STEP_PX = 6, SPARE = 8 };

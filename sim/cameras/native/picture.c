@@ -1,8 +1,8 @@
 /* A whole picture: colours and depths, row by row. */
 
 /* Depths [low, high) of a row of a plane; a factor of NULL is one. */
-WIDE static void plane_row(const double *plane, double v, int64_t low, int64_t high, float farthest,
-                           const float *restrict factor, float *restrict depth)
+static void plane_row(const double *plane, double v, int64_t low, int64_t high, float farthest,
+                      const float *restrict factor, float *restrict depth)
 {
     const float slope = (float)plane[0], constant = (float)(plane[1] * v + plane[2]);
     for (int32_t u = (int32_t)low; u < (int32_t)high; u++) {

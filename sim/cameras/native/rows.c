@@ -59,8 +59,8 @@ static void vehicle_row(const struct camera *camera, int64_t v, uint8_t *rgb)
 }
 
 /* Binomial blur of three rows, with sensor noise if there is a bank. */
-WIDE static void blurred_row(const uint8_t *above, const uint8_t *here, const uint8_t *below, const int8_t *noise,
-                             int64_t size, uint16_t *sums, uint8_t *out)
+static void blurred_row(const uint8_t *above, const uint8_t *here, const uint8_t *below, const int8_t *noise,
+                        int64_t size, uint16_t *sums, uint8_t *out)
 {
     above -= 3, here -= 3, below -= 3;
     for (int64_t i = 0; i < size + 6; i++)

@@ -8,8 +8,8 @@ enum { AHEAD = 3 };
 static const float LIFT = 1048576.0f;
 
 /* Where each pixel reads: byte offset of the upper left sample, and its place in 256ths of a texture pixel. */
-WIDE static void places(const double *back, double v, int64_t low, int64_t high, int64_t rows, int64_t columns,
-                        int32_t *restrict at, int32_t *restrict across, int32_t *restrict down)
+static void places(const double *back, double v, int64_t low, int64_t high, int64_t rows, int64_t columns,
+                   int32_t *restrict at, int32_t *restrict across, int32_t *restrict down)
 {
     const double x1 = back[0], y1 = back[3], w1 = back[6], start = (double)low;
     const double w0 = w1 * start + (back[7] * v + back[8]);
@@ -33,31 +33,16 @@ WIDE static void places(const double *back, double v, int64_t low, int64_t high,
     }
 }
 
-static void sample_plainly(const uint8_t *texture, int64_t stride, const int32_t *at, const int32_t *across,
-                           const int32_t *down, int64_t count, uint8_t *out)
-{
-    for (int64_t i = 0; i < count; i++) {
-        const uint8_t *from = texture + at[i];
-        const uint32_t right_weight = 128u * (across[i] & 255), left_weight = 32768u - right_weight;
-        const int32_t fall = down[i] & 255;
-        for (int64_t c = 0; c < 3; c++) {
-            const uint32_t left = (uint32_t)(from[c] * 256 + (from[stride + c] - from[c]) * fall);
-            const uint32_t right = (uint32_t)(from[c + 4] * 256 + (from[stride + c + 4] - from[c + 4]) * fall);
-            out[3 * i + c] = (uint8_t)(((left * left_weight >> 16) + (right * right_weight >> 16) + 65) >> 7);
-        }
-    }
-}
-
-#ifdef AVX2
+#ifdef __AVX2__
 /* Two neighbours of each of two pixels, as numbers of 16 bits. */
-FAST __m256i neighbours(const uint8_t *one, const uint8_t *other)
+static inline __m256i neighbours(const uint8_t *one, const uint8_t *other)
 {
     const __m128i low = _mm_loadl_epi64((const __m128i *)one);
     return _mm256_cvtepu8_epi16(_mm_castpd_si128(_mm_loadh_pd(_mm_castsi128_pd(low), (const double *)other)));
 }
 
 /* The lowest byte of two numbers, eight times each, as numbers of 16 bits. */
-FAST __m256i spread(const int32_t *two)
+static inline __m256i spread(const int32_t *two)
 {
     const __m256i one = _mm256_set1_epi16((short)0x8000), other = _mm256_set1_epi16((short)0x8004);
     int64_t both;
@@ -66,8 +51,8 @@ FAST __m256i spread(const int32_t *two)
 }
 
 /* Two pixels: the left and the right neighbours' parts, times 128. */
-FAST __m256i halves(const uint8_t *texture, int64_t stride, const int32_t *at, const int32_t *across,
-                    const int32_t *down)
+static inline __m256i halves(const uint8_t *texture, int64_t stride, const int32_t *at, const int32_t *across,
+                             const int32_t *down)
 {
     const uint8_t *one = texture + at[0], *other = texture + at[1];
     const __m256i upper = neighbours(one, other), lower = neighbours(one + stride, other + stride);
@@ -78,9 +63,9 @@ FAST __m256i halves(const uint8_t *texture, int64_t stride, const int32_t *at, c
     return _mm256_mulhi_epu16(_mm256_add_epi16(_mm256_slli_epi16(upper, 8), change), weights);
 }
 
-/* The same bits, four pixels at a time. */
-FAST void sample_widely(const uint8_t *texture, int64_t stride, const int32_t *at, const int32_t *across,
-                        const int32_t *down, int64_t count, uint8_t *out)
+/* Pixels of three channels at those places; up to 13 bytes more than asked for are written. */
+static void sample(const uint8_t *texture, int64_t stride, const int32_t *at, const int32_t *across,
+                   const int32_t *down, int64_t count, uint8_t *out)
 {
     const __m128i three = _mm_set_epi8(-1, -1, -1, -1, 14, 13, 12, 6, 5, 4, 10, 9, 8, 2, 1, 0);
     for (int64_t i = 0; i < count; i += 4) {
@@ -93,27 +78,23 @@ FAST void sample_widely(const uint8_t *texture, int64_t stride, const int32_t *a
         _mm_storeu_si128((__m128i *)(out + 3 * i), _mm_shuffle_epi8(pixels, three));
     }
 }
-
-__attribute__((target("avx2"))) static void sample_with_avx2(const uint8_t *texture, int64_t stride, const int32_t *at,
-                                                             const int32_t *across, const int32_t *down, int64_t count,
-                                                             uint8_t *out)
-{
-    sample_widely(texture, stride, at, across, down, count, out);
-}
-#endif
-
-/* Pixels of three channels at those places; up to 13 bytes more than asked for are written. */
+#else
+/* The same bits without wide registers. */
 static void sample(const uint8_t *texture, int64_t stride, const int32_t *at, const int32_t *across,
                    const int32_t *down, int64_t count, uint8_t *out)
 {
-#ifdef AVX2
-    if (__builtin_cpu_supports("avx2")) {
-        sample_with_avx2(texture, stride, at, across, down, count, out);
-        return;
+    for (int64_t i = 0; i < count; i++) {
+        const uint8_t *from = texture + at[i];
+        const uint32_t right_weight = 128u * (across[i] & 255), left_weight = 32768u - right_weight;
+        const int32_t fall = down[i] & 255;
+        for (int64_t c = 0; c < 3; c++) {
+            const uint32_t left = (uint32_t)(from[c] * 256 + (from[stride + c] - from[c]) * fall);
+            const uint32_t right = (uint32_t)(from[c + 4] * 256 + (from[stride + c + 4] - from[c + 4]) * fall);
+            out[3 * i + c] = (uint8_t)(((left * left_weight >> 16) + (right * right_weight >> 16) + 65) >> 7);
+        }
     }
-#endif
-    sample_plainly(texture, stride, at, across, down, count, out);
 }
+#endif
 
 /* Columns [low, high) of a row of the picture, with a plain colour where the texture ends. */
 static void sheet_row(const struct camera *camera, const struct sheet *sheet, const uint8_t *texture, int64_t rows,
