@@ -115,6 +115,6 @@ def test_a_lent_picture_stays_while_two_more_come_and_cannot_be_written() -> Non
         assert [develop().stamp_ns for develop in waiting] == [2, 3, 4]  # all are drawn, so none lies on the first two
         assert all(np.array_equal(frame.depth, depth) for frame, depth in zip(seen, depths, strict=True))
         with pytest.raises(ValueError, match="read-only"):
-            seen[-1][0].rgb[0, 0] = 0
+            seen[-1].rgb[0, 0] = 0
     finally:
         camera.close()
