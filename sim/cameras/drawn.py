@@ -53,10 +53,10 @@ class _Camera(ctypes.Structure):
     _fields_ = [
         *((name, ctypes.c_int64) for name in ("rows", "columns", "board_rows", "board_columns", "wall_rows")),
         *((name, ctypes.c_int64) for name in ("wall_columns", "depth_stride", "holes")),
-        *((name, 4 * ctypes.c_int64) for name in ("arm_box", "propeller_box")),
+        ("propeller_box", 4 * ctypes.c_int64),
         *((name, ctypes.c_void_p) for name in ("board", "wall", "plain", "arm", "mask", "propellers", "dimmed")),
         *((name, ctypes.c_void_p) for name in ("arm_inverse", "color_bank", "depth_bank", "no_depth", "widths")),
-        ("scratch", ctypes.c_void_p),
+        *((name, ctypes.c_void_p) for name in ("starts", "runs", "scratch")),
         ("farthest", ctypes.c_double),
     ]
 
@@ -79,6 +79,7 @@ class Drawing:
         dimmed = np.arange(256, dtype=np.uint8)[None]
         shade_propellers(dimmed, np.full_like(dimmed, 255))
         self._widths = np.zeros((_MOST_CUTS, max(shape)), np.int64)
+        starts, runs = _runs(finish.mask)
         arrays = {
             "board": board,
             "wall": wall,
@@ -92,6 +93,8 @@ class Drawing:
             "depth_bank": noise and noise.factors,
             "no_depth": finish.no_depth,
             "widths": self._widths,
+            "starts": starts,
+            "runs": runs,
             "scratch": np.empty(_SCRATCH_BYTES * (width + _SPARE), np.uint8),
         }
         self._kept = arrays
@@ -107,7 +110,6 @@ class Drawing:
             wall_columns=wall.shape[1],
             depth_stride=noise.factors.shape[1] if noise else 0,
             holes=len(finish.no_depth),
-            arm_box=finish.arm_box or nothing,
             propeller_box=finish.propeller_box or nothing,
             farthest=1.0 / FAR_M,
             **{name: _address(array) for name, array in arrays.items()},
@@ -144,6 +146,14 @@ class Drawing:
         rgb, depth = into or (np.empty((height, width, 3), np.uint8), np.empty((height, width), np.float32))
         self._draw(ctypes.byref(self._camera), _address(view), _address(rgb), _address(depth))
         return rgb, depth
+
+
+def _runs(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Runs of a mask (H, W): index of every row's first, int64 (H + 1,), and their columns [from, to), int64 (n, 2)."""
+    edges = np.diff((mask > 0).astype(np.int8), axis=1, prepend=0, append=0)
+    rows, first = np.nonzero(edges > 0)
+    runs = np.column_stack((first, np.nonzero(edges < 0)[1])).astype(np.int64)
+    return np.searchsorted(rows, np.arange(len(mask) + 1)).astype(np.int64), np.ascontiguousarray(runs)
 
 
 def _address(array: np.ndarray | None) -> ctypes.c_void_p:

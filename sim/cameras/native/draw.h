@@ -29,15 +29,16 @@ struct view {
     int64_t count, color_noise, depth_noise;
 };
 
-/* What does not. Boxes are (row, row end, column, column end); banks are NULL without noise. */
+/* What does not. Arm and brush cover columns [runs[2 k], runs[2 k + 1]) of row v for k in
+   [starts[v], starts[v + 1]). The box is (row, row end, column, column end); banks are NULL without noise. */
 struct camera {
     int64_t rows, columns, board_rows, board_columns, wall_rows, wall_columns, depth_stride, holes;
-    int64_t arm_box[4], propeller_box[4];
+    int64_t propeller_box[4];
     const uint8_t *board, *wall, *plain, *arm, *mask, *propellers, *dimmed;
     const float *arm_inverse;
     const int8_t *color_bank;
     const float *depth_bank;
-    const int64_t *no_depth, *widths;
+    const int64_t *no_depth, *widths, *starts, *runs;
     uint8_t *scratch;
     double farthest;
 };

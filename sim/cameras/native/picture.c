@@ -13,7 +13,8 @@ static void plane_row(const double *plane, double v, int64_t low, int64_t high, 
 
 static void depth_row(const struct camera *camera, const struct view *view, int64_t v, float *depth)
 {
-    const int64_t width = camera->columns, *arm = camera->arm_box;
+    const int64_t width = camera->columns;
+    const float *arm = camera->arm_inverse + v * width;
     const float farthest = (float)camera->farthest, *factor = camera->depth_bank;
     int64_t low = 0, high = width;
     factor = factor == NULL ? NULL : factor + view->depth_noise + v * camera->depth_stride;
@@ -21,10 +22,9 @@ static void depth_row(const struct camera *camera, const struct view *view, int6
     plane_row(view->wall.plane, (double)v, 0, low, farthest, factor, depth);
     plane_row(view->board.plane, (double)v, low, high, farthest, factor, depth);
     plane_row(view->wall.plane, (double)v, high, width, farthest, factor, depth);
-    if (v >= arm[0] && v < arm[1])
-        for (int64_t u = arm[2]; u < arm[3]; u++)
-            if (camera->mask[v * width + u])
-                depth[u] = (factor == NULL ? 1.0f : factor[u]) / camera->arm_inverse[v * width + u];
+    for (int64_t k = camera->starts[v]; k < camera->starts[v + 1]; k++)
+        for (int64_t u = camera->runs[2 * k]; u < camera->runs[2 * k + 1]; u++)
+            depth[u] = (factor == NULL ? 1.0f : factor[u]) / arm[u];
 }
 
 /* No reading along one edge of the board, ragged, except where arm and brush hide it. */

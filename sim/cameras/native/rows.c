@@ -44,16 +44,15 @@ static void scene_row(const struct camera *camera, const struct view *view, doub
 /* The vehicle's parts before them, and one pixel more at both ends as in a mirror. */
 static void vehicle_row(const struct camera *camera, int64_t v, uint8_t *rgb)
 {
-    const int64_t width = camera->columns, *propellers = camera->propeller_box, *arm = camera->arm_box;
+    const int64_t width = camera->columns, *propellers = camera->propeller_box, *runs = camera->runs;
     if (v >= propellers[0] && v < propellers[1])
         for (int64_t u = propellers[2]; u < propellers[3]; u++)
             if (camera->propellers[v * width + u])
                 for (int64_t c = 3 * u; c < 3 * u + 3; c++)
                     rgb[c] = camera->dimmed[rgb[c]];
-    if (v >= arm[0] && v < arm[1])
-        for (int64_t u = arm[2]; u < arm[3]; u++)
-            if (camera->mask[v * width + u])
-                memcpy(rgb + 3 * u, camera->arm + 3 * (v * width + u), 3);
+    for (int64_t k = camera->starts[v]; k < camera->starts[v + 1]; k++)
+        memcpy(rgb + 3 * runs[2 * k], camera->arm + 3 * (v * width + runs[2 * k]),
+               (size_t)(3 * (runs[2 * k + 1] - runs[2 * k])));
     memcpy(rgb - 3, rgb + 3, 3);
     memcpy(rgb + 3 * width, rgb + 3 * width - 6, 3);
 }
