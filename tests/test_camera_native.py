@@ -30,6 +30,15 @@ PLACES = (
 needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler on this machine")
 
 
+@pytest.fixture(autouse=True)
+def fresh(monkeypatch: pytest.MonkeyPatch):
+    """Translates with the system's compiler, whatever the environment asks for."""
+    monkeypatch.delenv("CC", raising=False)
+    drawn.native.cache_clear()
+    yield
+    drawn.native.cache_clear()
+
+
 def pictures(noise: bool = True, places=PLACES) -> tuple[list[RgbdFrame], PlaneCamera]:
     """Pictures of a board that is painted between them, and the camera that took them."""
     canvas = Canvas(SCENE, 3)
