@@ -126,7 +126,7 @@ class World:
         camera = None
         if self._rendered and options.camera_process and options.camera in ("plane", "gl"):
             # first of all: it sets itself up meanwhile
-            camera = RemoteCamera(scene, vehicle, options.seed, lambda: self.canvas.take(), options.camera)
+            camera = RemoteCamera(scene, vehicle, options.seed, lambda: self.canvas.take(), options.camera, lend=True)
         self.plant = Plant(scene, vehicle, options.seed, options.machine_code, options.view)
         self.sensors = SensorSuite(scene, vehicle, options.seed, options.machine_code)
         self.canvas = Canvas(scene, options.seed)

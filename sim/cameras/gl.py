@@ -66,9 +66,14 @@ class GLCamera:
         return self.develop(position_ned, quaternion_b_in_i, stamp_ns, self.canvas.take())
 
     def develop(
-        self, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, stamp_ns: int, fresh: FreshPaint | None
+        self,
+        position_ned: np.ndarray,
+        quaternion_b_in_i: np.ndarray,
+        stamp_ns: int,
+        fresh: FreshPaint | None,
+        into: tuple[np.ndarray, np.ndarray] | None = None,
     ) -> RgbdFrame:
-        """Draw a picture from a pose and what is new of the paint; pictures are drawn in the order of exposure."""
+        """Draw a picture from a pose and what is new of the paint; as `PlaneCamera.develop`, ``into`` is not used."""
         view = View.of_vehicle(position_ned, quaternion_b_in_i, self.vehicle.camera_position_m, self.intrinsics)
         face = _face(self.canvas.draw(fresh))
         if fresh is not None:

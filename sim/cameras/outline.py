@@ -85,15 +85,23 @@ class CutLine:
         indices = other * width + places if self.flat else other + places * width
         return indices.ravel(), distance.astype(np.uint32).ravel()
 
+    def extent(self) -> tuple[int, int]:
+        """First place of the edge along its longer direction within the picture, and the one behind its last [px]."""
+        along = 1 - int(self.flat)
+        first, last = sorted((float(self.start[along]), float(self.stop[along])))
+        return max(0, math.ceil(first)), min(self.shape[int(self.flat)], math.floor(last) + 1)
+
+    def hole_widths(self, rng: np.random.Generator) -> np.ndarray:
+        """How far the depth holes reach beyond the edge [px], for every few places along it."""
+        return rng.integers(1, _HOLE_PX + 1, max(self.shape) // _HOLE_STEP_PX + 1)
+
     def holes(self, rng: np.random.Generator) -> np.ndarray:
         """Flat indices of pixels beyond the edge that give no depth, ragged at random, (n,)."""
-        along = 1 - int(self.flat)
-        limit_along, limit = self.shape[::-1] if self.flat else self.shape
-        first, last = sorted((float(self.start[along]), float(self.stop[along])))
-        first, end = max(0, math.ceil(first)), min(limit_along, math.floor(last) + 1)
+        limit = self.shape[1 - int(self.flat)]
+        first, end = self.extent()
         places = np.arange(first, max(first, end))
         towards = 1 if self.normal[int(self.flat)] > 0 else -1  # the board
-        widths = rng.integers(1, _HOLE_PX + 1, max(self.shape) // _HOLE_STEP_PX + 1)
+        widths = self.hole_widths(rng)
         steps = np.arange(-_HOLE_PX, 2)[:, None]
         taken = -steps <= widths[places // _HOLE_STEP_PX]
         other = np.floor(self._across(places)).astype(np.intp) + steps * towards

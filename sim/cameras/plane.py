@@ -15,6 +15,7 @@ import numpy as np
 
 from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.vehicle import VehicleParams
+from sim.cameras.drawn import Drawing, native
 from sim.cameras.finish import PictureFinish
 from sim.cameras.outline import Box, CutLine
 from sim.cameras.view import View, board_corners, board_steps
@@ -23,6 +24,8 @@ from sim.scene import Scene
 
 _SHIFT = 6  # sub-pixel bits of polygon corners
 _EVEN, _HALF = np.uint32(0x00FF00FF), np.uint32(0x00800080)  # every other byte of a pixel, and its rounding
+#: Numbers of a sheet that is out of view.
+_NO_SHEET = (0.0,) * 12
 _WARP = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
 
 
@@ -78,6 +81,7 @@ class PlaneCamera:
         self._plain_wall = (*(float(entry) for entry in scene.wall.color), 255.0)
         self._picture, self._behind = np.empty((*shape, 4), np.uint8), np.empty((*shape, 4), np.uint8)
         self._mask = np.zeros(shape, np.uint8)
+        self._drawing: Drawing | None = None
         self._inverse, self._inverse_behind = np.empty(shape, np.float32), np.empty(shape, np.float32)
         self._rgb = np.empty((*shape, 3), np.uint8)
         self._v, self._u = np.indices(shape, np.float32)
@@ -92,27 +96,53 @@ class PlaneCamera:
         return functools.partial(self.develop, *pose, stamp_ns, self.canvas.take())
 
     def develop(
-        self, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, stamp_ns: int, paint: FreshPaint | None
+        self,
+        position_ned: np.ndarray,
+        quaternion_b_in_i: np.ndarray,
+        stamp_ns: int,
+        paint: FreshPaint | None,
+        into: tuple[np.ndarray, np.ndarray] | None = None,
     ) -> RgbdFrame:
-        """Draw a picture from a pose and what is new of the paint; pictures are drawn in the order of exposure."""
+        """Draw a picture from a pose and what is new of the paint; pictures are drawn in the order of exposure.
+
+        Args:
+            position_ned: As in `sim.cameras.protocol.Camera.capture`.
+            quaternion_b_in_i: Likewise.
+            stamp_ns: Likewise.
+            paint: What is new, see `Canvas.take`.
+            into: Where colours, uint8 (H, W, 3), and depths, float32 (H, W), are best drawn; they may lie elsewhere.
+        """
         view = View.of_vehicle(position_ned, quaternion_b_in_i, self.vehicle.camera_position_m, self.intrinsics)
-        cuts = self._compose(view, self.canvas.draw(paint))
+        texture = self.canvas.draw(paint)
+        cuts, board_box = self.finish.outline(view, self._corners)
+        common = self.finish.common_error(view)
+        wall = _Sheet.seen(view, self.canvas.wall, self._wall_steps, common)
+        board = None if board_box is None else _Sheet.seen(view, texture, self._board_steps, common)
+        drawn = self._drawn(board, wall, cuts, into)
+        if drawn is not None:
+            rgb, depth = drawn
+            return RgbdFrame(rgb=rgb, depth=depth, intrinsics=self.intrinsics, stamp_ns=stamp_ns)
+        if board is not None and board_box is not None:
+            self._draw(board, board_box, self._picture, self._inverse)
+        for cut in cuts:
+            self._cut(wall, cut)
         cv2.cvtColor(self._picture, cv2.COLOR_RGBA2RGB, self._rgb)
         rgb = self.finish.color(self._rgb)
         depth = self.finish.depth(self._inverse, cuts)
         return RgbdFrame(rgb=rgb, depth=depth, intrinsics=self.intrinsics, stamp_ns=stamp_ns)
 
-    def _compose(self, view: View, texture: np.ndarray) -> list[CutLine]:
-        """Colours and inverse depths of board and wall; returns the outline lines in view."""
-        cuts, board_box = self.finish.outline(view, self._corners)
-        common = self.finish.common_error(view)
-        if board_box is not None:
-            board = _Sheet.seen(view, texture, self._board_steps, common)
-            self._draw(board, board_box, self._picture, self._inverse)
-        wall = _Sheet.seen(view, self.canvas.wall, self._wall_steps, common)
-        for cut in cuts:
-            self._cut(wall, cut)
-        return cuts
+    def _drawn(
+        self, board: _Sheet | None, wall: _Sheet, cuts: list[CutLine], into: tuple[np.ndarray, np.ndarray] | None
+    ) -> tuple[np.ndarray, np.ndarray] | None:
+        """Colours and depths by machine code, or None where there is none."""
+        if self._drawing is None:
+            library = native()
+            if library is None:
+                return None
+            texture, plain = self.canvas.draw(None), np.array(self._plain_wall, np.uint8)
+            self._drawing = Drawing(library.draw_picture, self.finish, texture, self.canvas.wall, plain)
+        numbers = _NO_SHEET if board is None else (*board.back.ravel().tolist(), *board.plane)
+        return self._drawing.picture([*numbers, *wall.back.ravel().tolist(), *wall.plane], cuts, into)
 
     def _draw(self, sheet: _Sheet, box: Box, picture: np.ndarray, inverse: np.ndarray) -> None:
         """Colours and inverse depths of a sheet within a box."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import multiprocessing
 import os
@@ -44,6 +45,7 @@ class RemoteCamera:
         seed: Seed of canvas and noise.
         take: `Canvas.take` of the board that is painted here; the process draws its own of the same scene and seed.
         back_end: "plane" or "gl".
+        lend: Whether a picture is lent, not given: read it in place before two more have come, it is then overwritten.
     """
 
     def __init__(
@@ -53,14 +55,17 @@ class RemoteCamera:
         seed: int,
         take: Callable[[], FreshPaint | None],
         back_end: str = "plane",
+        lend: bool = False,
     ) -> None:
-        self.intrinsics, self._take = camera_intrinsics(scene.camera), take
+        self.intrinsics, self._take, self._lend = camera_intrinsics(scene.camera), take, lend
         shape = (scene.camera.height, scene.camera.width)
-        # every picture under way has its place, and one is being read
-        places = math.ceil(scene.camera.latency_s * scene.camera.rate_hz) + 2
+        # every picture under way has its place, one is being read, and the one before may still be looked at
+        places = math.ceil(scene.camera.latency_s * scene.camera.rate_hz) + 3
         context = multiprocessing.get_context("spawn")
         memory = context.RawArray("B", places * _bytes(shape))
         self._places = _views(memory, places, shape)
+        for part in itertools.chain(*self._places):
+            part.flags.writeable = False
         self._begun = self._done = 0
         self._pipe, there = context.Pipe()
         self._process = context.Process(
@@ -84,7 +89,8 @@ class RemoteCamera:
         Raises:
             RuntimeError: When more pictures are under way than the latency allows, or the process has failed.
         """
-        if self._begun - self._done >= len(self._places):
+        kept = 2 if self._lend else 1  # places of pictures that somebody may still read
+        if self._begun - self._done >= len(self._places) - kept:
             raise RuntimeError("more pictures under way than the camera's latency allows")
         place = self._begun % len(self._places)
         pose = np.array(position_ned, float), np.array(quaternion_b_in_i, float)
@@ -103,7 +109,9 @@ class RemoteCamera:
                 raise RuntimeError(f"the drawing process failed:\n{answer}")
             self._done += 1
             rgb, depth = self._places[place]
-            return RgbdFrame(rgb=rgb.copy(), depth=depth.copy(), intrinsics=self.intrinsics, stamp_ns=stamp_ns)
+            if not self._lend:
+                rgb, depth = rgb.copy(), depth.copy()
+            return RgbdFrame(rgb=rgb, depth=depth, intrinsics=self.intrinsics, stamp_ns=stamp_ns)
 
         return develop
 
@@ -179,8 +187,10 @@ def _draw(
                 pipe.send((peak if sys.platform == "darwin" else 1024 * peak,))
                 return
             place, position, quaternion, stamp_ns, paint = order
-            frame = camera.develop(position, quaternion, stamp_ns, paint)
-            views[place][0][:], views[place][1][:] = frame.rgb, frame.depth
+            frame = camera.develop(position, quaternion, stamp_ns, paint, views[place])
+            for drawn, wanted in zip((frame.rgb, frame.depth), views[place], strict=True):
+                if drawn is not wanted:
+                    wanted[:] = drawn
             pipe.send(place)
     except (EOFError, BrokenPipeError):  # the flight is over, or was never
         return

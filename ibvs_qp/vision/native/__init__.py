@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ibvs_qp.shared_library import compiler, shared_library
+from ibvs_qp.shared_library import compiler, shared_library, wide_registers
 
 #: The files, in the order in which they are joined.
 FILES = (
@@ -46,7 +46,7 @@ def native() -> ctypes.CDLL | None:
     try:
         folder = Path(__file__).parent
         code = "".join((folder / name).read_text() for name in FILES)
-        return ctypes.CDLL(str(shared_library("vision", code, command, FLAGS)))
+        return ctypes.CDLL(str(shared_library("vision", code, command, (*FLAGS, *wide_registers()))))
     except (OSError, subprocess.SubprocessError) as error:
         log.warning("vision runs on numpy: %s", error)
         return None
