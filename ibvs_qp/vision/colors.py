@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import ctypes
-from functools import cached_property
+import math
 
 import numpy as np
 
 from ibvs_qp.vision.grid import CoarseGrid
+from ibvs_qp.vision.light import STEP, LightField, fit_light
 from ibvs_qp.vision.native import native, place
 
 #: Share of a new sample in the board's running colour.
@@ -18,6 +19,8 @@ _JUDGED = 500
 _TABLE_BITS, _TABLE_SHIFT, _TABLE_DRIFT = 5, 3, 1.5
 _TABLE_STEPS = np.array((1 << 2 * _TABLE_BITS, 1 << _TABLE_BITS, 1), np.float32)
 _SUM = np.ones(3, np.float32)
+#: Even light: one level, that of the reference. No channel is brighter than white.
+_EVEN, _WHITE = (0,), 255.0
 #: Labels of `SurfaceColors.label`.
 OTHER, BOARD, PAINT = 0, 1, 2
 #: Colours nearer to each other than this share of the gate cannot be told apart.
@@ -37,12 +40,17 @@ class SurfaceColors:
     def reset(self) -> None:
         """Forget the sampled colour of the board."""
         self.board = None if self._given is None else self._given.copy()
-        self._table = np.zeros(0, np.uint8)
-        self._table_board = np.zeros(3, np.float32)
+        self._table, self._table_board = np.zeros(0, np.uint8), np.zeros(3, np.float32)
+        self._tables: dict[int, np.ndarray] = {}
+        self._joined: tuple[int, ...] = ()
+        self.light: LightField | None = None
 
     def learn(self, samples: np.ndarray) -> None:
-        """Sample the board: median of the unpainted colours among (n, 3) samples; few samples change nothing."""
-        if self._given is not None:
+        """Sample the board: median of the unpainted colours among (n, 3) samples; few samples change nothing.
+
+        In uneven light `learn_light` samples it.
+        """
+        if self._given is not None or self.light is not None:
             return
         samples = samples.astype(np.float32)
         if self.paint is not None and len(samples):
@@ -56,53 +64,89 @@ class SurfaceColors:
         median = ordered[len(ordered) // 2]
         self.board = median if self.board is None else self.board + _BLEND * (median - self.board)
 
-    def label(self, colors: np.ndarray) -> np.ndarray:
-        """OTHER, BOARD or PAINT for colours uint8 (..., 3); all OTHER while the board is unknown."""
+    def learn_light(
+        self,
+        samples: np.ndarray,
+        places: np.ndarray,
+        shape: tuple[int, int],
+        intrinsics: tuple[float, float, float, float],
+    ) -> bool:
+        """Find how the light falls on the board; True where it is uneven.
+
+        Args:
+            samples: Colours on the board by depth, RGB (n, 3).
+            places: Where they lie, normalised, (n, 2).
+            shape: (height, width) of the picture [px].
+            intrinsics: Of the picture [px].
+        """
+        if self.board is None:
+            return False
+        if self.paint is not None:
+            bare = self._distance(samples.astype(np.float32), self.paint) > self._gate**2
+            samples, places = samples[bare], places[bare]
+        fixed = self._given is not None
+        found = fit_light(samples, places, self.board, self._gate, shape, intrinsics, self.light, anchored=fixed)
+        self.light = None if found is None else found[0]
+        if found is not None and not fixed:
+            self.board = found[1]
+        return found is not None
+
+    def levels_at(self, u: np.ndarray, v: np.ndarray) -> np.ndarray | None:
+        """Level of light at pixels, for `label`; None where the light is even."""
+        return None if self.light is None else self.light.levels_at(u, v)
+
+    @property
+    def levels(self) -> np.ndarray | None:
+        """Level of light in every cell of the picture, uint8 (rows, columns); None where the light is even."""
+        return None if self.light is None else self.light.levels
+
+    def label(self, colors: np.ndarray, levels: np.ndarray | None = None) -> np.ndarray:
+        """OTHER, BOARD or PAINT for colours uint8 (..., 3) in light of some level; all OTHER for an unknown board."""
         if self.board is None:
             return np.zeros(colors.shape[:-1], np.uint8)
         library = native()
         if library is not None:
             colors, labels = np.ascontiguousarray(colors), np.empty(colors.shape[:-1], np.uint8)
-            parts = (self.table(), labels)
+            lit = None if levels is None else np.ascontiguousarray(np.broadcast_to(levels, labels.shape))
+            parts = (lit, self.table(), labels)
             count = ctypes.c_long(labels.size)
             library.labels_of(place(colors), count, *(place(part) for part in parts))
             return labels
         # single precision holds the place exactly, and has the only fast product
-        return self.table().take(((colors >> _TABLE_SHIFT).astype(np.float32) @ _TABLE_STEPS).astype(np.intp))
+        places = ((colors >> _TABLE_SHIFT).astype(np.float32) @ _TABLE_STEPS).astype(np.intp)
+        return self.table().take(places if levels is None else places + (levels.astype(np.intp) << 3 * _TABLE_BITS))
 
     def table(self) -> np.ndarray:
-        """Labels of all colours in steps of eight grey levels, red first, uint8 (32768,); the board must be known."""
+        """Labels of all colours in steps of eight grey levels, red first, uint8 (levels * 32768,); one level if even.
+
+        The board must be known.
+        """
         assert self.board is not None
-        if len(self._table) == 0 or np.abs(self.board - self._table_board).max() > _TABLE_DRIFT:
-            self._make_table(self.board)
+        if np.abs(self.board - self._table_board).max() > _TABLE_DRIFT:
+            self._tables.clear()
+        steps = _EVEN if self.light is None else self.light.steps
+        if not self._tables:
+            self._table_board, self._joined = self.board.copy(), ()
+        if self._joined != steps:
+            for step in steps:
+                if step not in self._tables:
+                    self._tables[step] = self._make_table(math.exp(STEP * step))
+            tables = [self._tables[step] for step in steps]
+            self._table, self._joined = tables[0] if len(tables) == 1 else np.concatenate(tables), steps
         return self._table
 
-    def _make_table(self, board: np.ndarray) -> None:
-        """Labels of all colours in steps of eight grey levels: thousands of colours are looked up per picture."""
-        library, self._table_board = native(), board.copy()
+    def _make_table(self, light: float) -> np.ndarray:
+        """Labels of all colours in one light: thousands of colours are looked up per picture."""
+        library, gate = native(), np.float32((self._gate * light) ** 2)
+        board, paint = (
+            None if color is None else np.minimum(np.float32(light) * color, np.float32(_WHITE))
+            for color in (self._table_board, self.paint if self.paint_distinct else None)
+        )
         if library is None:
-            self._table = self._table_with_numpy(board)
-            return
-        self._table = np.empty(1 << 3 * _TABLE_BITS, np.uint8)
-        paint = self.paint if self.paint_distinct else None
-        library.label_table(place(self._table_board), place(paint), ctypes.c_float(self._gate**2), place(self._table))
-
-    def _table_with_numpy(self, board: np.ndarray) -> np.ndarray:
-        """The same where there is no machine code."""
-        to_board = _distances(board)
-        table = (to_board < self._gate**2).view(np.uint8)  # true is BOARD, false OTHER
-        if self.paint_distinct:
-            places, to_paint = self._paint_colors
-            table[places[to_paint < to_board.take(places)]] = PAINT
+            return _table_with_numpy(board, paint, gate)
+        table = np.empty(1 << 3 * _TABLE_BITS, np.uint8)
+        library.label_table(place(board), place(paint), ctypes.c_float(gate), place(table))
         return table
-
-    @cached_property
-    def _paint_colors(self) -> tuple[np.ndarray, np.ndarray]:
-        """Places in the label table that look like paint, and how far they are from it."""
-        assert self.paint is not None
-        to_paint = _distances(self.paint)
-        places = np.flatnonzero(to_paint < self._gate**2)
-        return places, to_paint.take(places)
 
     def like_around(self, grid: CoarseGrid, colors: np.ndarray, seed: tuple[int, int], radius: int) -> np.ndarray:
         """Labels of samples by the colour around a seed: BOARD for what looks like it, uint8 (rows, columns)."""
@@ -156,6 +200,16 @@ class SurfaceColors:
         """Squared RGB distance, (...)."""
         # differences of rows of three cost many times as much as the two products
         return np.square(colors) @ _SUM + (colors @ (-2.0 * reference) + float(reference @ reference))
+
+
+def _table_with_numpy(board: np.ndarray, paint: np.ndarray | None, gate: np.floating) -> np.ndarray:
+    """Label table where there is no machine code."""
+    to_board = _distances(board)
+    table = (to_board < gate).view(np.uint8)  # true is BOARD, false OTHER
+    if paint is not None:
+        to_paint = _distances(paint)
+        table[(to_paint < gate) & (to_paint < to_board)] = PAINT
+    return table
 
 
 def _distances(reference: np.ndarray) -> np.ndarray:
