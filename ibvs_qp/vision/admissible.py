@@ -22,8 +22,8 @@ def _fits(kind: int, surface_behind: bool, labels: tuple[int, int], off: tuple[b
     if kind == _PAINT_EDGE:
         return surface == BOARD and other == PAINT
     if kind == _BORDER:
-        # joints of a wall may have the board's colour, but not its depth; lines on the board have both
-        return surface != 0 and not off[near] and (other == 0 or (other == surface and off[far]))
+        # a wall may have the board's colour or the paint's, but not their depth; lines on the board have both
+        return surface != 0 and not off[near] and (other == 0 or off[far])
     return True
 
 
@@ -115,7 +115,10 @@ class Admissible:
         if not self._judges:
             return allowed
         one, three = _LABEL_STEPS.astype(np.uint8)
-        labels = self._colors.label(strips.colors.reshape(-1, pixels, 3).take(rows, axis=0), None if self._levels is None else self._levels[rows, None])
+        labels = self._colors.label(
+            strips.colors.reshape(-1, pixels, 3).take(rows, axis=0),
+            None if self._levels is None else self._levels[rows, None],
+        )
         keys = one * labels[:, :-far] + three * labels[:, far:]
         if self._depth is not None:
             nine, eighteen = _OFF_STEPS.astype(np.uint8)

@@ -3,26 +3,24 @@
 from __future__ import annotations
 
 import ctypes
-import math
 
 import numpy as np
 
 from ibvs_qp.vision.grid import CoarseGrid
-from ibvs_qp.vision.light import STEP, LightField, fit_light
+from ibvs_qp.vision.label_tables import BOARD, OTHER, PAINT, TABLE_SIZE, LabelTables, places_in_table
+from ibvs_qp.vision.light import LightField, fit_light
 from ibvs_qp.vision.native import native, place
+from ibvs_qp.vision.paint_light import paint_as_lit
+
+__all__ = ["BOARD", "OTHER", "PAINT", "SurfaceColors"]
 
 #: Share of a new sample in the board's running colour.
 _BLEND = 0.2
 #: Samples whose median is taken; more cost time and change nothing.
 _JUDGED = 500
-#: Bits per channel of the label table, the shift that leaves them, and the board's drift that renews it.
-_TABLE_BITS, _TABLE_SHIFT, _TABLE_DRIFT = 5, 3, 1.5
-_TABLE_STEPS = np.array((1 << 2 * _TABLE_BITS, 1 << _TABLE_BITS, 1), np.float32)
 _SUM = np.ones(3, np.float32)
-#: Even light: one level, that of the reference. No channel is brighter than white.
-_EVEN, _WHITE = (0,), 255.0
-#: Labels of `SurfaceColors.label`.
-OTHER, BOARD, PAINT = 0, 1, 2
+#: Even light: one level, that of the reference.
+_EVEN = (0,)
 #: Colours nearer to each other than this share of the gate cannot be told apart.
 _DISTINCT = 0.8
 
@@ -33,16 +31,15 @@ class SurfaceColors:
     def __init__(self, board: tuple[int, int, int] | None, paint: tuple[int, int, int] | None, gate: float) -> None:
         """Take the known colours (RGB 0..255) and the distance within which a colour matches."""
         self._given = None if board is None else np.asarray(board, np.float32)
-        self.paint = None if paint is None else np.asarray(paint, np.float32)
+        self._named = None if paint is None else np.asarray(paint, np.float32)
         self._gate = gate
         self.reset()
 
     def reset(self) -> None:
         """Forget the sampled colour of the board."""
         self.board = None if self._given is None else self._given.copy()
-        self._table, self._table_board = np.zeros(0, np.uint8), np.zeros(3, np.float32)
-        self._tables: dict[int, np.ndarray] = {}
-        self._joined: tuple[int, ...] = ()
+        self.paint = self._named
+        self._tables = LabelTables(self._gate)
         self.light: LightField | None = None
 
     def learn(self, samples: np.ndarray) -> None:
@@ -91,6 +88,16 @@ class SurfaceColors:
             self.board = found[1]
         return found is not None
 
+    def learn_paint(self, samples: np.ndarray, places: np.ndarray) -> None:
+        """See how bright the paint is, among colours (n, 3) at normalised places (n, 2) beside the brush."""
+        if self.board is None or self._named is None:
+            return
+        colors = samples.astype(np.float32)
+        if self.light is not None:
+            colors = colors / np.exp(self.light.at(places)).astype(np.float32)[:, None]
+        seen = paint_as_lit(colors, self._named, self.board, self._gate)
+        self.paint = self.paint if seen is None else seen
+
     def levels_at(self, u: np.ndarray, v: np.ndarray) -> np.ndarray | None:
         """Level of light at pixels, for `label`; None where the light is even."""
         return None if self.light is None else self.light.levels_at(u, v)
@@ -112,41 +119,14 @@ class SurfaceColors:
             count = ctypes.c_long(labels.size)
             library.labels_of(place(colors), count, *(place(part) for part in parts))
             return labels
-        # single precision holds the place exactly, and has the only fast product
-        places = ((colors >> _TABLE_SHIFT).astype(np.float32) @ _TABLE_STEPS).astype(np.intp)
-        return self.table().take(places if levels is None else places + (levels.astype(np.intp) << 3 * _TABLE_BITS))
+        places = places_in_table(colors)
+        return self.table().take(places if levels is None else places + levels.astype(np.intp) * TABLE_SIZE)
 
     def table(self) -> np.ndarray:
-        """Labels of all colours in steps of eight grey levels, red first, uint8 (levels * 32768,); one level if even.
-
-        The board must be known.
-        """
+        """Labels of all colours, one table after the other for every level of light; the board must be known."""
         assert self.board is not None
-        if np.abs(self.board - self._table_board).max() > _TABLE_DRIFT:
-            self._tables.clear()
         steps = _EVEN if self.light is None else self.light.steps
-        if not self._tables:
-            self._table_board, self._joined = self.board.copy(), ()
-        if self._joined != steps:
-            for step in steps:
-                if step not in self._tables:
-                    self._tables[step] = self._make_table(math.exp(STEP * step))
-            tables = [self._tables[step] for step in steps]
-            self._table, self._joined = tables[0] if len(tables) == 1 else np.concatenate(tables), steps
-        return self._table
-
-    def _make_table(self, light: float) -> np.ndarray:
-        """Labels of all colours in one light: thousands of colours are looked up per picture."""
-        library, gate = native(), np.float32((self._gate * light) ** 2)
-        board, paint = (
-            None if color is None else np.minimum(np.float32(light) * color, np.float32(_WHITE))
-            for color in (self._table_board, self.paint if self.paint_distinct else None)
-        )
-        if library is None:
-            return _table_with_numpy(board, paint, gate)
-        table = np.empty(1 << 3 * _TABLE_BITS, np.uint8)
-        library.label_table(place(board), place(paint), ctypes.c_float(gate), place(table))
-        return table
+        return self._tables.of(self.board, self.paint if self.paint_distinct else None, steps)
 
     def like_around(self, grid: CoarseGrid, colors: np.ndarray, seed: tuple[int, int], radius: int) -> np.ndarray:
         """Labels of samples by the colour around a seed: BOARD for what looks like it, uint8 (rows, columns)."""
@@ -200,20 +180,3 @@ class SurfaceColors:
         """Squared RGB distance, (...)."""
         # differences of rows of three cost many times as much as the two products
         return np.square(colors) @ _SUM + (colors @ (-2.0 * reference) + float(reference @ reference))
-
-
-def _table_with_numpy(board: np.ndarray, paint: np.ndarray | None, gate: np.floating) -> np.ndarray:
-    """Label table where there is no machine code."""
-    to_board = _distances(board)
-    table = (to_board < gate).view(np.uint8)  # true is BOARD, false OTHER
-    if paint is not None:
-        to_paint = _distances(paint)
-        table[(to_paint < gate) & (to_paint < to_board)] = PAINT
-    return table
-
-
-def _distances(reference: np.ndarray) -> np.ndarray:
-    """Squared RGB distance of all colours of the label table from one, float32 (32768,)."""
-    level = (np.arange(1 << _TABLE_BITS, dtype=np.float32) + np.float32(0.5)) * np.float32(1 << _TABLE_SHIFT)
-    red, green, blue = ((level - part) ** 2 for part in reference)
-    return (red[:, None, None] + green[:, None] + blue).reshape(-1)

@@ -90,9 +90,7 @@ class LightField:
         return self.levels[row, np.clip(np.asarray(u).astype(np.intp), 0, width - 1) >> CELL_BITS]
 
 
-def on_surface(
-    grid: CoarseGrid, depth: np.ndarray, plane: np.ndarray, gate: float
-) -> np.ndarray:
+def on_surface(grid: CoarseGrid, depth: np.ndarray, plane: np.ndarray, gate: float) -> np.ndarray:
     """Flat places of some samples of the grid that lie on a surface by depth alone, whatever their colour, (n,).
 
     Args:
@@ -150,6 +148,7 @@ def fit_light(
     cut = colors.max(axis=1) >= _CUT
     tinted = ((light > _DIMMEST) & (light < _BRIGHTEST) & (tint < (_TINT * gate * light) ** 2)) | cut
     even = tinted & (_distances(colors, board, np.ones(len(light), np.float32)) < (_SURE * gate) ** 2)
+    even &= np.abs(light - 1.0) < _UNEVEN  # a dark board's colour holds in much light, the paint's on it does not
     held, count = int(np.count_nonzero(even)), int(np.count_nonzero(tinted))
     if count < _LEAST or (before is None and held >= (1.0 - _LEFT_OUT) * count):
         return None

@@ -260,7 +260,11 @@ class Perception:
         shape = (frame.rgb.shape[0], frame.rgb.shape[1])
         near = on_surface(grid, frame.depth, surface.inverse_depth, config.fine_gate_high)
         places = grid.design[:, :2].take(near, axis=0)
-        if not self._colors.learn_light(coarse.reshape(-1, 3).take(near, axis=0), places, shape, frame.intrinsics):
+        assert self._layout is not None
+        uneven = self._colors.learn_light(coarse.reshape(-1, 3).take(near, axis=0), places, shape, frame.intrinsics)
+        beside = self._layout.beside_brush
+        self._colors.learn_paint(coarse.reshape(-1, 3).take(beside, axis=0), grid.design[:, :2].take(beside, axis=0))
+        if not uneven:
             return surface
         inverse = grid.inverse_depth(frame.depth, config.distance_min_m, config.distance_max_m)
         refit = self._fitter.track(grid, inverse, surface.inverse_depth, down, self._labels(coarse))
