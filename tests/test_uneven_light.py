@@ -50,14 +50,11 @@ def row_1(scene: str, kind: str, share: float, exposure: float = EXPOSURE) -> tu
     return world, right - 0.3, Flight(world, lines, settle=SETTLE)
 
 
+KINDS = ("left-right", "top-bottom", "vignette")
 CASES = [
-    *[
-        ("default", kind, share)
-        for kind in ("left-right", "top-bottom", "vignette")
-        for share in (0.1, -0.25, 0.4, -0.4)
-    ],
-    *[("dark_board", kind, 0.4) for kind in ("left-right", "top-bottom", "vignette")],
-    *[("low_contrast", kind, -0.4) for kind in ("left-right", "top-bottom", "vignette")],
+    *[("default", kind, share) for kind in KINDS for share in (0.1, -0.25, 0.4, -0.4)],
+    *[("dark_board", kind, 0.4) for kind in KINDS],
+    *[("low_contrast", kind, -0.4) for kind in KINDS],
 ]
 
 
