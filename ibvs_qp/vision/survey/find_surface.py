@@ -18,11 +18,11 @@ from ibvs_qp.vision.survey.grow import grown_plane
 from ibvs_qp.vision.survey.look import SurfaceLook, alike_colors
 
 #: Share of the surface that must have the colour around the seed for it to be the surface's.
-_GROUND_SHARE = 0.25
+_GROUND_SHARE = 0.15
 #: Samples next to the seed's colour among which the most common colour is sought, and colours tried.
 _NEAR, _TRIED = 300, 40
 #: Where more than this share of all readings lies on one plane, a wall may be part of it.
-_FLUSH_SHARE = 0.55
+_FLUSH_SHARE = 0.40
 #: Share of a new picture in the running colour of a followed surface.
 _COLOR_BLEND = 0.2
 
@@ -83,7 +83,11 @@ def find_surface(
         if isinstance(again, PlaneEstimate):
             plane = again
             cells = _on_plane(grid, inverse, plane, _middle_cell(own))
-    return SurfaceLook(grid=grid, plane=plane, cells=cells, colored=cells & alike, color=color)
+    if even is not None:  # what else has its depth is the wall
+        cells = cells & even
+    return SurfaceLook(
+        grid=grid, plane=plane, cells=cells, colored=cells & alike, color=color, by_light=even is not None
+    )
 
 
 def follow_surface(
