@@ -18,7 +18,7 @@ from ibvs_qp.vision.survey.grow import grown_plane
 from ibvs_qp.vision.survey.look import SurfaceLook, alike_colors
 
 #: Share of the surface that must have the colour around the seed for it to be the surface's.
-_GROUND_SHARE = 0.15
+_GROUND_SHARE = 0.25
 #: Samples next to the seed's colour among which the most common colour is sought, and colours tried.
 _NEAR, _TRIED = 300, 40
 #: Where more than this share of all readings lies on one plane, a wall may be part of it.
@@ -85,9 +85,8 @@ def find_surface(
             cells = _on_plane(grid, inverse, plane, _middle_cell(own))
     if even is not None:  # what else has its depth is the wall
         cells = cells & even
-    return SurfaceLook(
-        grid=grid, plane=plane, cells=cells, colored=cells & alike, color=color, by_light=even is not None
-    )
+    colored, by_light = cells & alike, even is not None
+    return SurfaceLook(grid=grid, plane=plane, cells=cells, colored=colored, color=color, by_light=by_light)
 
 
 def follow_surface(
