@@ -143,3 +143,14 @@ def test_a_guide_changes_hands_only_after_two_of_three_pictures() -> None:
         assert top is not None
         tops.append(top.line_id)
     assert tops == [1, 1, 1, 2, 2]
+
+
+@pytest.mark.parametrize("seed", [7, 12, 17, 19])
+def test_board_before_a_wall_of_its_depth_ends_where_its_light_does(seed: int) -> None:
+    errors = run("thin board", 1, seed)
+    assert not errors.wrong and not errors.missed, (errors.wrong, errors.missed)
+
+
+def test_print_under_the_seed_is_not_taken_for_the_surface() -> None:
+    errors = run("printed", 2, 3)
+    assert not errors.wrong and not errors.missed

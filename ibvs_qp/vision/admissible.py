@@ -22,8 +22,8 @@ def _fits(kind: int, surface_behind: bool, labels: tuple[int, int], off: tuple[b
     if kind == _PAINT_EDGE:
         return surface == BOARD and other == PAINT
     if kind == _BORDER:
-        # joints of a wall may have the board's colour, but not its depth; lines on the board have both
-        return surface != 0 and not off[near] and (other == 0 or (other == surface and off[far]))
+        # a wall may have the board's colour or the paint's, but not their depth; lines on the board have both
+        return surface != 0 and not off[near] and (other == 0 or off[far])
     return True
 
 
@@ -59,11 +59,20 @@ class Admissible:
         self._keys = np.array(keys).repeat(profiles)
         self._firsts = np.arange(0, strips.u.size * pixels, pixels)
         self.board = np.array([view.query.kind == "board" for view in strips.views]).repeat(profiles)
+        self._levels = self._light()
         self.depth_known = strips.picture.depth is not None and strips.picture.plane is not None
         if self.depth_known and _BORDER in kinds:
             self._prepare_depth()
         else:
             self._depth = None
+
+    def _light(self) -> np.ndarray | None:
+        """Level of light at the middle of every profile, uint8 (L K,); None where it is even."""
+        strips, found = self._strips, []
+        for view, u, base in zip(strips.views, strips.u, strips.base, strict=True):
+            v = np.clip(base, 0.0, view.view.height - 1.0)
+            found.append(self._colors.levels_at(v, u) if view.upright else self._colors.levels_at(u, v))
+        return None if self._colors.levels is None else np.concatenate(found)
 
     def _prepare_depth(self) -> None:
         """Place and expected 1/Z of the first pixel of every profile, and their steps from pixel to pixel."""
@@ -88,7 +97,7 @@ class Admissible:
         allowed = self._strips.hidden.reshape(-1).take(places).max(axis=0) == 0
         if not self._judges:
             return allowed
-        before, behind = self._colors.label(self._strips.colors.reshape(-1, 3).take(places[::2], axis=0))
+        before, behind = self._colors.label(self._strips.colors.reshape(-1, 3).take(places[::2], axis=0), self._levels)
         keys = self._keys + before
         keys += 3 * behind
         if self._depth is not None:
@@ -106,7 +115,10 @@ class Admissible:
         if not self._judges:
             return allowed
         one, three = _LABEL_STEPS.astype(np.uint8)
-        labels = self._colors.label(strips.colors.reshape(-1, pixels, 3).take(rows, axis=0))
+        labels = self._colors.label(
+            strips.colors.reshape(-1, pixels, 3).take(rows, axis=0),
+            None if self._levels is None else self._levels[rows, None],
+        )
         keys = one * labels[:, :-far] + three * labels[:, far:]
         if self._depth is not None:
             nine, eighteen = _OFF_STEPS.astype(np.uint8)

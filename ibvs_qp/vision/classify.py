@@ -119,7 +119,10 @@ def look_with_numpy(
 ) -> list[Evidence]:
     """Both sides of every line where there is no machine code, and to say what it computes."""
     labels = np.split(
-        colors.label(np.concatenate([line.sides for line in lines], axis=1)),
+        colors.label(
+            np.concatenate([line.sides for line in lines], axis=1),
+            colors.levels_at(*np.concatenate([line.pixels for line in lines]).T),
+        ),
         np.cumsum([len(line.pixels) for line in lines[:-1]]),
         axis=1,
     )

@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 import ctypes
-from functools import cached_property
 
 import numpy as np
 
 from ibvs_qp.vision.grid import CoarseGrid
+from ibvs_qp.vision.label_tables import BOARD, OTHER, PAINT, TABLE_SIZE, LabelTables, places_in_table
+from ibvs_qp.vision.light import LightField, fit_light
 from ibvs_qp.vision.native import native, place
+from ibvs_qp.vision.paint_light import paint_as_lit
+
+__all__ = ["BOARD", "OTHER", "PAINT", "SurfaceColors"]
 
 #: Share of a new sample in the board's running colour.
 _BLEND = 0.2
 #: Samples whose median is taken; more cost time and change nothing.
 _JUDGED = 500
-#: Bits per channel of the label table, the shift that leaves them, and the board's drift that renews it.
-_TABLE_BITS, _TABLE_SHIFT, _TABLE_DRIFT = 5, 3, 1.5
-_TABLE_STEPS = np.array((1 << 2 * _TABLE_BITS, 1 << _TABLE_BITS, 1), np.float32)
 _SUM = np.ones(3, np.float32)
-#: Labels of `SurfaceColors.label`.
-OTHER, BOARD, PAINT = 0, 1, 2
+#: Even light: one level, that of the reference.
+_EVEN = (0,)
 #: Colours nearer to each other than this share of the gate cannot be told apart.
 _DISTINCT = 0.8
 
@@ -30,19 +31,23 @@ class SurfaceColors:
     def __init__(self, board: tuple[int, int, int] | None, paint: tuple[int, int, int] | None, gate: float) -> None:
         """Take the known colours (RGB 0..255) and the distance within which a colour matches."""
         self._given = None if board is None else np.asarray(board, np.float32)
-        self.paint = None if paint is None else np.asarray(paint, np.float32)
+        self._named = None if paint is None else np.asarray(paint, np.float32)
         self._gate = gate
         self.reset()
 
     def reset(self) -> None:
         """Forget the sampled colour of the board."""
         self.board = None if self._given is None else self._given.copy()
-        self._table = np.zeros(0, np.uint8)
-        self._table_board = np.zeros(3, np.float32)
+        self.paint = self._named
+        self._tables = LabelTables(self._gate)
+        self.light: LightField | None = None
 
     def learn(self, samples: np.ndarray) -> None:
-        """Sample the board: median of the unpainted colours among (n, 3) samples; few samples change nothing."""
-        if self._given is not None:
+        """Sample the board: median of the unpainted colours among (n, 3) samples; few samples change nothing.
+
+        In uneven light `learn_light` samples it.
+        """
+        if self._given is not None or self.light is not None:
             return
         samples = samples.astype(np.float32)
         if self.paint is not None and len(samples):
@@ -56,53 +61,72 @@ class SurfaceColors:
         median = ordered[len(ordered) // 2]
         self.board = median if self.board is None else self.board + _BLEND * (median - self.board)
 
-    def label(self, colors: np.ndarray) -> np.ndarray:
-        """OTHER, BOARD or PAINT for colours uint8 (..., 3); all OTHER while the board is unknown."""
+    def learn_light(
+        self,
+        samples: np.ndarray,
+        places: np.ndarray,
+        shape: tuple[int, int],
+        intrinsics: tuple[float, float, float, float],
+    ) -> bool:
+        """Find how the light falls on the board; True where it is uneven.
+
+        Args:
+            samples: Colours on the board by depth, RGB (n, 3).
+            places: Where they lie, normalised, (n, 2).
+            shape: (height, width) of the picture [px].
+            intrinsics: Of the picture [px].
+        """
+        if self.board is None:
+            return False
+        if self.paint is not None:
+            bare = self._distance(samples.astype(np.float32), self.paint) > self._gate**2
+            samples, places = samples[bare], places[bare]
+        fixed = self._given is not None
+        found = fit_light(samples, places, self.board, self._gate, shape, intrinsics, self.light, anchored=fixed)
+        self.light = None if found is None else found[0]
+        if found is not None and not fixed:
+            self.board = found[1]
+        return found is not None
+
+    def learn_paint(self, samples: np.ndarray, places: np.ndarray) -> None:
+        """See how bright the paint is, among colours (n, 3) at normalised places (n, 2) beside the brush."""
+        if self.board is None or self._named is None:
+            return
+        colors = samples.astype(np.float32)
+        if self.light is not None:
+            colors = colors / np.exp(self.light.at(places)).astype(np.float32)[:, None]
+        seen = paint_as_lit(colors, self._named, self.board, self._gate)
+        self.paint = self.paint if seen is None else seen
+
+    def levels_at(self, u: np.ndarray, v: np.ndarray) -> np.ndarray | None:
+        """Level of light at pixels, for `label`; None where the light is even."""
+        return None if self.light is None else self.light.levels_at(u, v)
+
+    @property
+    def levels(self) -> np.ndarray | None:
+        """Level of light in every cell of the picture, uint8 (rows, columns); None where the light is even."""
+        return None if self.light is None else self.light.levels
+
+    def label(self, colors: np.ndarray, levels: np.ndarray | None = None) -> np.ndarray:
+        """OTHER, BOARD or PAINT for colours uint8 (..., 3) in light of some level; all OTHER for an unknown board."""
         if self.board is None:
             return np.zeros(colors.shape[:-1], np.uint8)
         library = native()
         if library is not None:
             colors, labels = np.ascontiguousarray(colors), np.empty(colors.shape[:-1], np.uint8)
-            parts = (self.table(), labels)
+            lit = None if levels is None else np.ascontiguousarray(np.broadcast_to(levels, labels.shape))
+            parts = (lit, self.table(), labels)
             count = ctypes.c_long(labels.size)
             library.labels_of(place(colors), count, *(place(part) for part in parts))
             return labels
-        # single precision holds the place exactly, and has the only fast product
-        return self.table().take(((colors >> _TABLE_SHIFT).astype(np.float32) @ _TABLE_STEPS).astype(np.intp))
+        places = places_in_table(colors)
+        return self.table().take(places if levels is None else places + levels.astype(np.intp) * TABLE_SIZE)
 
     def table(self) -> np.ndarray:
-        """Labels of all colours in steps of eight grey levels, red first, uint8 (32768,); the board must be known."""
+        """Labels of all colours, one table after the other for every level of light; the board must be known."""
         assert self.board is not None
-        if len(self._table) == 0 or np.abs(self.board - self._table_board).max() > _TABLE_DRIFT:
-            self._make_table(self.board)
-        return self._table
-
-    def _make_table(self, board: np.ndarray) -> None:
-        """Labels of all colours in steps of eight grey levels: thousands of colours are looked up per picture."""
-        library, self._table_board = native(), board.copy()
-        if library is None:
-            self._table = self._table_with_numpy(board)
-            return
-        self._table = np.empty(1 << 3 * _TABLE_BITS, np.uint8)
-        paint = self.paint if self.paint_distinct else None
-        library.label_table(place(self._table_board), place(paint), ctypes.c_float(self._gate**2), place(self._table))
-
-    def _table_with_numpy(self, board: np.ndarray) -> np.ndarray:
-        """The same where there is no machine code."""
-        to_board = _distances(board)
-        table = (to_board < self._gate**2).view(np.uint8)  # true is BOARD, false OTHER
-        if self.paint_distinct:
-            places, to_paint = self._paint_colors
-            table[places[to_paint < to_board.take(places)]] = PAINT
-        return table
-
-    @cached_property
-    def _paint_colors(self) -> tuple[np.ndarray, np.ndarray]:
-        """Places in the label table that look like paint, and how far they are from it."""
-        assert self.paint is not None
-        to_paint = _distances(self.paint)
-        places = np.flatnonzero(to_paint < self._gate**2)
-        return places, to_paint.take(places)
+        steps = _EVEN if self.light is None else self.light.steps
+        return self._tables.of(self.board, self.paint if self.paint_distinct else None, steps)
 
     def like_around(self, grid: CoarseGrid, colors: np.ndarray, seed: tuple[int, int], radius: int) -> np.ndarray:
         """Labels of samples by the colour around a seed: BOARD for what looks like it, uint8 (rows, columns)."""
@@ -156,10 +180,3 @@ class SurfaceColors:
         """Squared RGB distance, (...)."""
         # differences of rows of three cost many times as much as the two products
         return np.square(colors) @ _SUM + (colors @ (-2.0 * reference) + float(reference @ reference))
-
-
-def _distances(reference: np.ndarray) -> np.ndarray:
-    """Squared RGB distance of all colours of the label table from one, float32 (32768,)."""
-    level = (np.arange(1 << _TABLE_BITS, dtype=np.float32) + np.float32(0.5)) * np.float32(1 << _TABLE_SHIFT)
-    red, green, blue = ((level - part) ** 2 for part in reference)
-    return (red[:, None, None] + green[:, None] + blue).reshape(-1)

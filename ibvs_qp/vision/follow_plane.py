@@ -56,6 +56,7 @@ class PlaneFollower:
         self._between = np.full(grid.shape, _HALFWAY, np.uint16)
         rows, columns = (size // _BLOCK for size in grid.shape)
         self._blocks = rows, columns
+        self._pixels = grid.pixels
         library = native()
         self._native = (
             None if library is None else NativePlane(library, config, grid, design, self._least, _BLOCK, _PAINT_GATES)
@@ -84,7 +85,7 @@ class PlaneFollower:
             The surface, its component on this grid, or the reason why there is none.
         """
         if self._native is not None:
-            labels = None if colors.board is None else self._native.labels(rgb, colors.table())
+            labels = None if colors.board is None else self._native.labels(rgb, colors)
             refit = self._native.refit(self._native.means(depth), labels, predicted, sigma=sigma)
             if refit is not None:
                 return estimate_of(refit, down, self._config) if isinstance(refit, Refit) else refit
@@ -105,7 +106,7 @@ class PlaneFollower:
         usable = self._free & (z > config.distance_min_m) & (z < config.distance_max_m)  # false for NaN too
         board = paint = None
         if colors.board is not None:
-            labels = colors.label(grid.sample(rgb)).reshape(-1)
+            labels = colors.label(grid.sample(rgb), colors.levels_at(*self._pixels)).reshape(-1)
             board, paint = labels == BOARD, labels == PAINT
         z[~usable] = 1.0
         inverse = 1.0 / z

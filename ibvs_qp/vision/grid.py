@@ -27,6 +27,7 @@ class CoarseGrid:
         shape: (rows, columns) of the grid.
         free: Samples the vehicle does not hide, bool (rows, columns).
         places: (u, v) of the samples [px], int16 (rows, columns, 2).
+        pixels: The same, columns and rows apart, (rows, columns) each.
         design: Columns x, y, 1 in normalised coordinates, (rows * columns, 3).
     """
 
@@ -43,6 +44,7 @@ class CoarseGrid:
         self.design = np.column_stack((x.ravel(), y.ravel(), np.ones(x.size)))
         along, across = np.meshgrid(u, v)
         self.places = np.stack((along, across), axis=2).astype(np.int16)
+        self.pixels = along, across
         self.free = self.sample(mask) == 0
         self._windows = functools.lru_cache(maxsize=_REMEMBERED)(self._make_windows)
 

@@ -77,7 +77,7 @@ def fit_natively(
         float,
     )
     labels = None if colors.board is None else colors.table()
-    parts = (picture.rgb, picture.mask, depth, labels, _FITS)
+    parts = (picture.rgb, picture.mask, depth, labels, colors.levels, _FITS)
     scene = (ctypes.c_void_p * len(parts))(*(None if part is None else part.ctypes.data for part in parts))
     found, u = np.empty((count, _FIT)), np.empty((count, profiles))
     support, visible = np.empty((2, count, profiles), np.uint8)

@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 
+from ibvs_qp.vision.colors import SurfaceColors
 from ibvs_qp.vision.config import PlaneConfig
 from ibvs_qp.vision.grid import CoarseGrid
 from ibvs_qp.vision.native import place
@@ -113,15 +114,16 @@ class NativePlane:
         )
         return inverse
 
-    def labels(self, rgb: np.ndarray, table: np.ndarray) -> np.ndarray:
-        """Labels of the samples' colours, uint8 (rows, columns)."""
+    def labels(self, rgb: np.ndarray, colors: SurfaceColors) -> np.ndarray:
+        """Labels of the samples' colours, uint8 (rows, columns); the board must be known."""
         rgb, labels = np.ascontiguousarray(rgb), np.empty(self._shape, np.uint8)
         self._library.sample_labels(
             place(rgb),
             ctypes.c_long(rgb.shape[1]),
             place(self._places),
             ctypes.c_long(labels.size),
-            place(table),
+            place(colors.levels),
+            place(colors.table()),
             place(labels),
         )
         return labels

@@ -80,7 +80,7 @@ def look_natively(
         len(lines),
         *(place(part) for part in (pixels, sides)),
         ctypes.c_long(len(pixels)),
-        *(place(part) for part in (labels, depth, picture.mask, grid.design, component, found)),
+        *(place(part) for part in (labels, colors.levels, depth, picture.mask, grid.design, component, found)),
     )
     if not done:
         raise MemoryError("no memory for the sides of lines")

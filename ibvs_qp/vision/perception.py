@@ -17,6 +17,7 @@ from ibvs_qp.vision.config import VisionConfig
 from ibvs_qp.vision.detect import Candidate, detect_lines
 from ibvs_qp.vision.flow import SparseFlow
 from ibvs_qp.vision.layout import PictureLayout
+from ibvs_qp.vision.light import on_surface
 from ibvs_qp.vision.make_percept import make_percept
 from ibvs_qp.vision.motion import CameraMotion
 from ibvs_qp.vision.percept import LineHint, Percept
@@ -178,7 +179,7 @@ class Perception:
                 self._plane = tracked
                 return None
         coarse = self._grid.sample(frame.rgb)
-        prefer = None if self._colors.board is None else self._colors.label(coarse)
+        prefer = None if self._colors.board is None else self._labels(coarse)
         inverse = self._grid.inverse_depth(frame.depth, config.distance_min_m, config.distance_max_m)
         seeds = self._layout.seeds
         if seed_pixel is not None:
@@ -230,7 +231,8 @@ class Perception:
         coarse = self._grid.sample(frame.rgb)
         surface = self._whole_surface(frame, coarse, down)
         self._colors.learn(coarse[surface.component])
-        labels = np.where(surface.component, np.maximum(self._colors.label(coarse), 1), 0)
+        surface = self._in_its_light(surface, frame, coarse, down)
+        labels = np.where(surface.component, np.maximum(self._labels(coarse), 1), 0)
         candidates = detect_lines(
             picture,
             frame.depth,
@@ -246,6 +248,28 @@ class Perception:
         self._tracker.offer(candidates, picture)
         return candidates
 
+    def _labels(self, coarse: np.ndarray) -> np.ndarray:
+        """Colour labels of the samples in the light that falls on them."""
+        return self._colors.label(coarse, self._colors.levels_at(*self._grid.pixels))
+
+    def _in_its_light(
+        self, surface: PlaneEstimate, frame: RgbdFrame, coarse: np.ndarray, down: np.ndarray | None
+    ) -> PlaneEstimate:
+        """Learn how light falls on the surface; where it is uneven, all of the surface instead of its well-lit part."""
+        grid, config = self._grid, self._config.plane
+        shape = (frame.rgb.shape[0], frame.rgb.shape[1])
+        near = on_surface(grid, frame.depth, surface.inverse_depth, config.fine_gate_high)
+        places = grid.design[:, :2].take(near, axis=0)
+        assert self._layout is not None
+        uneven = self._colors.learn_light(coarse.reshape(-1, 3).take(near, axis=0), places, shape, frame.intrinsics)
+        beside = self._layout.beside_brush
+        self._colors.learn_paint(coarse.reshape(-1, 3).take(beside, axis=0), grid.design[:, :2].take(beside, axis=0))
+        if not uneven:
+            return surface
+        inverse = grid.inverse_depth(frame.depth, config.distance_min_m, config.distance_max_m)
+        refit = self._fitter.track(grid, inverse, surface.inverse_depth, down, self._labels(coarse))
+        return refit if isinstance(refit, PlaneEstimate) else surface
+
     def _whole_surface(self, frame: RgbdFrame, coarse: np.ndarray, down: np.ndarray | None) -> PlaneEstimate:
         """The surface on the full coarse grid, for a search of lines; followed on a coarser one between searches."""
         assert self._plane is not None
@@ -253,7 +277,7 @@ class Perception:
             return self._plane
         config = self._config.plane
         inverse = self._grid.inverse_depth(frame.depth, config.distance_min_m, config.distance_max_m)
-        prefer = None if self._colors.board is None else self._colors.label(coarse)
+        prefer = None if self._colors.board is None else self._labels(coarse)
         refit = self._fitter.track(self._grid, inverse, self._plane.inverse_depth, down, prefer)
         if isinstance(refit, PlaneEstimate):
             return refit

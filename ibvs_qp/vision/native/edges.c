@@ -45,6 +45,17 @@ static int off_surface(const Strip *strip, int k, int pixel) {
     return relative > 0.0 && fabs(relative - 1.0) > OFF_PLANE;
 }
 
+/* The labels that hold in the light at the middle of a profile. */
+static const uint8_t *labels_of_profile(const Strip *strip, int k) {
+    const Query *q = strip->query;
+    const Scene *scene = strip->scene;
+    if (scene->levels == NULL) return scene->labels;
+    long width = (long)fmax(q->row_step, q->column_step);
+    long at = (long)q->row_step * (long)fmin(fmax(strip->base[k], 0.0), q->height - 1.0);
+    at += (long)q->column_step * (long)strip->u[k];
+    return labels_at(scene->labels, scene->levels, width, at % width, at / width);
+}
+
 /* Whether an edge of the line may lie at a place of a profile. */
 static int admissible(const Strip *strip, int k, int index) {
     const Query *q = strip->query;
@@ -52,7 +63,7 @@ static int admissible(const Strip *strip, int k, int index) {
     int side = strip->side, kind = (int)q->kind;
     if (hidden[0] | hidden[side] | hidden[2 * side]) return 0;
     if (kind == 0) return 1;
-    const uint8_t *color = strip->colors + 3 * (k * strip->pixels + index), *labels = strip->scene->labels;
+    const uint8_t *color = strip->colors + 3 * (k * strip->pixels + index), *labels = labels_of_profile(strip, k);
     int key = 72 * kind + 36 * (int)q->behind + label_of(labels, color) + 3 * label_of(labels, color + 6 * side);
     if (kind == 2 && strip->depth_known)
         key += 9 * off_surface(strip, k, index) + 18 * off_surface(strip, k, index + 2 * side);

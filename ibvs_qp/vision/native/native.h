@@ -31,7 +31,8 @@ typedef struct {
 typedef struct {
     const uint8_t *rgb, *mask;
     const float *depth; /* or NULL */
-    const uint8_t *labels; /* 32 x 32 x 32, or NULL */
+    const uint8_t *labels; /* levels x 32 x 32 x 32, or NULL */
+    const uint8_t *levels; /* of light, in cells of the picture; NULL where it is even */
     const uint8_t *fits; /* ibvs_qp/vision/admissible.py */
 } Scene;
 
@@ -56,6 +57,14 @@ static double upper_median(double *values, int n) {
         else break;
     }
     return values[middle];
+}
+
+/* The labels that hold in the light at a pixel of a picture. */
+static inline const uint8_t *labels_at(const uint8_t *labels, const uint8_t *levels, long width, long u, long v) {
+    enum { CELL_BITS = 4, TABLE_BITS = 15 };
+    long columns = (width + (1 << CELL_BITS) - 1) >> CELL_BITS;
+    if (levels == NULL) return labels;
+    return labels + ((long)levels[(v >> CELL_BITS) * columns + (u >> CELL_BITS)] << TABLE_BITS);
 }
 
 static inline int label_of(const uint8_t *labels, const uint8_t *color) {

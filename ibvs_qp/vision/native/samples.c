@@ -14,14 +14,18 @@ void sample_means(const float *depth, long height, long width, const int16_t *co
 }
 
 /* Labels of the colours at places of a picture. */
-void sample_labels(const uint8_t *rgb, long width, const int16_t *places, long n, const uint8_t *table,
-                   uint8_t *labels) {
-    for (long i = 0; i < n; i++) labels[i] = (uint8_t)label_of(table, rgb + 3 * (places[2 * i + 1] * width + places[2 * i]));
+void sample_labels(const uint8_t *rgb, long width, const int16_t *places, long n, const uint8_t *levels,
+                   const uint8_t *table, uint8_t *labels) {
+    for (long i = 0; i < n; i++) {
+        long u = places[2 * i], v = places[2 * i + 1];
+        labels[i] = (uint8_t)label_of(labels_at(table, levels, width, u, v), rgb + 3 * (v * width + u));
+    }
 }
 
-/* Labels of n colours. */
-void labels_of(const uint8_t *colors, long n, const uint8_t *table, uint8_t *labels) {
-    for (long i = 0; i < n; i++) labels[i] = (uint8_t)label_of(table, colors + 3 * i);
+/* Labels of n colours, each in light of its level; `levels` is NULL where light is even. */
+void labels_of(const uint8_t *colors, long n, const uint8_t *levels, const uint8_t *table, uint8_t *labels) {
+    for (long i = 0; i < n; i++)
+        labels[i] = (uint8_t)label_of(levels == NULL ? table : table + ((long)levels[i] << 15), colors + 3 * i);
 }
 
 /* 1/Z at places of a picture, 0 where absent or out of range. */

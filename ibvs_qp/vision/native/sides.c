@@ -37,10 +37,11 @@ static int beside(const Look *look, const Edge *edge, const double *pixels, cons
     return held;
 }
 
-/* Look at all lines; `colors` are those before all lines and then those behind, `labels` may be NULL. 0 if out of
+/* Look at all lines; `colors` are those before all lines and then those behind, `labels` and
+   `levels` may be NULL. 0 if out of
    memory. */
 int identify(const Look *look, const Edge *edges, int lines, const double *pixels, const uint8_t *colors, long total,
-             const uint8_t *labels, const float *depth, const uint8_t *mask, const double *design,
+             const uint8_t *labels, const uint8_t *levels, const float *depth, const uint8_t *mask, const double *design,
              const uint8_t *component, Evidence *found) {
     double *values = malloc((total + 1) * sizeof(double));
     if (values == NULL) return 0;
@@ -50,7 +51,9 @@ int identify(const Look *look, const Edge *edges, int lines, const double *pixel
         for (int side = 0; side < 2; side++) {
             const uint8_t *color = colors + 3 * total * side;
             for (int k = 0; k < n && labels != NULL; k++) {
-                int label = label_of(labels, color + 3 * k);
+                long u = (long)fmin(fmax(pixels[2 * k], 0.0), look->width - 1.0);
+                long v = (long)fmin(fmax(pixels[2 * k + 1], 0.0), look->height - 1.0);
+                int label = label_of(labels_at(labels, levels, (long)look->width, u, v), color + 3 * k);
                 found->board[side] += label == BOARD;
                 found->paint[side] += label == PAINT;
             }

@@ -22,6 +22,10 @@ _COLOR_ONLY = 0.75
 _DEPTH_ONLY = 0.5
 #: Samples of the surface beyond a border count from this distance on [cells], and this share of them rules it out.
 _CELLS_BEYOND, _SHARE_BEYOND = 2.0, 0.25
+#: Distance from a line at which the surface's samples must lie beside it [cells], and places looked at along it.
+_CELLS_BESIDE, _PLACES = 1.5, 16
+#: Share of a line beside which they must lie: prints, holes and corners are no samples.
+_MOSTLY = 0.75
 #: Length that earns half of what a long line earns [px at 640].
 _HALF_LENGTH_PX = 12.0
 #: A border this long, as a share of the surface's size along it, earns all.
@@ -66,6 +70,9 @@ def judge_borders(
     grown = length / (length + _HALF_LENGTH_PX * picture.scale)
     grown = grown * np.sqrt(np.minimum(length / np.maximum(_FULL_SHARE * size, 1.0), 1.0))
     scores = []
+    if look.by_light:  # a wall has the surface's depth, its joints the surface's colour
+        inside = (_beside(pixels, side * normals, look) for side in (1, -1))
+        one, two = ((share * score, *rest) for share, (score, *rest) in zip(inside, (one, two), strict=True))
     for (score, _, _), out in ((one, out_one), (two, out_two)):
         scores.append(score * grown * np.maximum(0.0, 1.0 - out / _SHARE_BEYOND))
     first = scores[0] >= scores[1]
@@ -96,6 +103,16 @@ def _one_sided(
     by_color = (changes & ~goes_on).mean(axis=1) * belongs
     ends = np.maximum(by_depth * (_DEPTH_ONLY + (1.0 - _DEPTH_ONLY) * by_color), _COLOR_ONLY * by_color)
     return inner.surface_share * ends * (1.0 - outer.covered_share), by_depth, by_color
+
+
+def _beside(pixels: np.ndarray, normals: np.ndarray, look: SurfaceLook) -> np.ndarray:
+    """How much of the lines has the surface's samples beside it, on the side of the normals, 0..1, (n,)."""
+    grid = look.grid
+    share = np.linspace(0.05, 0.95, _PLACES)[:, None]
+    places = pixels[:, :1] + share * (pixels[:, 1:] - pixels[:, :1]) + _CELLS_BESIDE * grid.stride * normals[:, None]
+    cells = np.rint((places - grid.offset) / grid.stride).astype(np.intp)
+    rows, columns = np.clip(cells[..., 1], 0, grid.shape[0] - 1), np.clip(cells[..., 0], 0, grid.shape[1] - 1)
+    return np.minimum(look.cells[rows, columns].mean(axis=1) / _MOSTLY, 1.0)
 
 
 def _middle(colors: np.ndarray) -> np.ndarray:

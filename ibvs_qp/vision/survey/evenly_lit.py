@@ -12,7 +12,7 @@ _STEP = 9
 #: A part smaller than this many samples, or than this share of what has the surface's colour, tells nothing.
 _LEAST, _LEAST_SHARE = 150, 0.10
 #: Nor does one that is nearly all of it.
-_ALL = 0.85
+_ALL = 0.985
 #: Share of the samples just beyond the part that must have the surface's colour in some light: beyond prints they do
 #: not, beyond an edge towards a wall of nearly the same colour they do.
 _ALIKE_BEYOND = 0.4

@@ -22,7 +22,7 @@ _GROUND_SHARE = 0.25
 #: Samples next to the seed's colour among which the most common colour is sought, and colours tried.
 _NEAR, _TRIED = 300, 40
 #: Where more than this share of all readings lies on one plane, a wall may be part of it.
-_FLUSH_SHARE = 0.55
+_FLUSH_SHARE = 0.40
 #: Share of a new picture in the running colour of a followed surface.
 _COLOR_BLEND = 0.2
 
@@ -83,7 +83,10 @@ def find_surface(
         if isinstance(again, PlaneEstimate):
             plane = again
             cells = _on_plane(grid, inverse, plane, _middle_cell(own))
-    return SurfaceLook(grid=grid, plane=plane, cells=cells, colored=cells & alike, color=color)
+    if even is not None:  # what else has its depth is the wall
+        cells = cells & even
+    colored, by_light = cells & alike, even is not None
+    return SurfaceLook(grid=grid, plane=plane, cells=cells, colored=colored, color=color, by_light=by_light)
 
 
 def follow_surface(

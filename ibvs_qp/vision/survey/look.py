@@ -25,6 +25,7 @@ class SurfaceLook:
         cells: Samples on it by depth, bool (rows, columns).
         colored: Those of them that have its colour, bool (rows, columns).
         color: Its colour where nothing is printed or painted on it, RGB (3,).
+        by_light: Whether light tells it from a wall that depth cannot tell it from; `cells` are without the wall then.
     """
 
     grid: CoarseGrid
@@ -32,6 +33,7 @@ class SurfaceLook:
     cells: np.ndarray
     colored: np.ndarray
     color: np.ndarray
+    by_light: bool = False
 
 
 def alike_colors(colors: np.ndarray, color: np.ndarray) -> np.ndarray:
