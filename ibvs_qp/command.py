@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ibvs_qp.made import made
+from ibvs_qp.made import filled
 
 
 class Outcome(StrEnum):
@@ -79,29 +79,25 @@ class Command:
     solve_time_s: float = 0.0
 
     @classmethod
-    def explained_later(
-        cls,
-        *,
-        tasks: Callable[[], tuple[TaskReport, ...]],
-        active_limits: Callable[[], tuple[ActiveLimit, ...]],
-        **fields: Any,
-    ) -> Command:
-        """A command whose reports are made when somebody reads them: the tick does not pay for them.
+    def explained_later(cls, explain: dict[str, Callable[[], Any]], fields: dict[str, Any]) -> Command:
+        """A command some of whose fields are made when somebody reads them: the tick does not pay for them.
 
-        The other fields must be given, all of them.
+        Args:
+            explain: What makes `wrench`, `tasks` and `active_limits`, or those of them that come later.
+            fields: The other fields by name, all of them; the command keeps the dictionary.
         """
-        fields["_explain"] = {"tasks": tasks, "active_limits": active_limits}
-        return made(cls, **fields)
+        fields["_explain"] = explain
+        return filled(cls, fields)
 
     def __getattr__(self, name: str) -> Any:
-        """Make the task and limit reports at their first reading."""
+        """Make what comes later at its first reading."""
         explain = self.__dict__.get("_explain", {})
         if name not in explain:
             raise AttributeError(name)
-        self.__dict__[name] = explain[name]()
-        return self.__dict__[name]
+        self.__dict__[name] = value = explain[name]()
+        return value
 
     def __getstate__(self) -> dict[str, Any]:
-        """Pickle with the reports made."""
-        made = {"tasks": self.tasks, "active_limits": self.active_limits}
+        """Pickle with everything made."""
+        made = {name: getattr(self, name) for name in self.__dict__.get("_explain", ())}
         return {name: value for name, value in self.__dict__.items() if name != "_explain"} | made

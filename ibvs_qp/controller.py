@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -33,6 +34,10 @@ from ibvs_qp.tasks import (
     VelocityTask,
     YawTask,
 )
+
+#: Wrench given up by a tick that no limit touches; shared by all of them.
+_NOTHING = np.zeros(6)
+_NOTHING.flags.writeable = False
 
 
 def default_tasks(config: ControllerConfig) -> list[Task]:
@@ -125,27 +130,32 @@ class HybridController:
         return self._finish(checked, solution, rejected)
 
     def _finish(self, measurement: Measurement, solution: AcceptedSolution, rejected: tuple[str, ...]) -> Command:
-        thrusts, terms = solution.thrusts, self.setpoints
-        unallocated, given_up, limited = np.zeros(6), 0.0, solution.limited
+        thrusts, terms, reference, limited = solution.thrusts, self.setpoints, self._reference, solution.limited
+        unallocated, given_up, data = _NOTHING, 0.0, self.engine.data
+        stacked = data.stacked.copy()
+        later: dict[str, Callable[[], Any]] = {
+            "wrench": lambda: terms.effectiveness.dot(thrusts),
+            "tasks": lambda: task_reports(self.template, data, stacked, thrusts),
+        }
         if limited:
-            unallocated = terms.effectiveness.dot(self.engine.data.free - thrusts)
+            unallocated = terms.effectiveness.dot(data.free - thrusts)
             given_up = max(map(abs, unallocated.tolist()))
+            later["active_limits"] = lambda: active_limits(self.template, solution.x, solution.y)
         terms.note(thrusts, given_up)
-        stacked = self.engine.data.stacked.copy()
-        return Command.explained_later(
-            tasks=lambda: task_reports(self.template, self.engine.data, stacked, thrusts),
-            active_limits=lambda: active_limits(self.template, solution.x, solution.y) if limited else (),
-            stamp_ns=int(measurement.stamp_ns),
-            thrusts=thrusts,
-            wrench=terms.effectiveness.dot(thrusts),  # half the time of @ on six numbers
-            outcome=solution.outcome,
-            mode=contact_mode(self.setpoints, self._reference),
-            rejected=rejected + reach_note(terms, self._reference),
-            unallocated_wrench=unallocated,
-            reach_margin=reach_margin(terms),
-            iterations=solution.iterations,
-            solve_time_s=solution.seconds,
-        )
+        fields = {
+            "stamp_ns": int(measurement.stamp_ns),
+            "thrusts": thrusts,
+            "outcome": solution.outcome,
+            "mode": contact_mode(terms, reference),
+            "rejected": rejected + reach_note(terms, reference),
+            "unallocated_wrench": unallocated,
+            "reach_margin": reach_margin(terms),
+            "iterations": solution.iterations,
+            "solve_time_s": solution.seconds,
+        }
+        if not limited:
+            fields["active_limits"] = ()
+        return Command.explained_later(later, fields)
 
     def _fallback(self, measurement: Measurement, rejected: tuple[str, ...]) -> Command:
         """The analytic law answers when no solver did."""

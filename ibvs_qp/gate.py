@@ -34,6 +34,7 @@ RESTART_STAMPS = 25
 STAMP_END = 2**62
 #: A sensor's stamp may lead the tick's by this much [ns].
 LEAD_NS = 20_000_000
+_THREE, _FOUR, _SIX = (3,), (4,), (6,)
 
 
 def is_stamp(value: Any) -> bool:
@@ -98,23 +99,24 @@ class MeasurementGate:
             return False
         if self._stamp is None or self._odd_count or not 0 < stamp - self._stamp <= LEAP_NS or stamp >= STAMP_END:
             return False
-        if plane is not None and not (_past(measurement.plane_stamp_ns, stamp) and self._known_plane(plane)):
+        if plane is not None and not (plane is self._plane or self._known_plane(plane)):
             return False
-        if not (surely_good_lines(measurement.lines) and self._good_limits(measurement)):
+        if plane is not None and not _past(measurement.plane_stamp_ns, stamp):
             return False
-        attitude, rate = entries(measurement.attitude, (4,)), entries(measurement.angular_velocity, (3,))
-        wrench, force, velocity = (
-            entries(measurement.contact_wrench, (6,)),
-            measurement.specific_force,
-            measurement.velocity,
-        )
+        if not surely_good_lines(measurement.lines):
+            return False
+        if not self._good_limits(measurement):
+            return False
+        attitude, rate = entries(measurement.attitude, _FOUR), entries(measurement.angular_velocity, _THREE)
+        wrench = entries(measurement.contact_wrench, _SIX)
+        force, velocity = measurement.specific_force, measurement.velocity
         length = hypot(*attitude)
         if not (
             abs(length * length - 1.0) <= UNIT_SLIP
             and hypot(*rate) <= RATE_BOUND
             and hypot(*wrench) <= WRENCH_BOUND
-            and (force is None or hypot(*entries(force, (3,))) <= ACCELERATION_BOUND)
-            and (velocity is None or hypot(*entries(velocity, (3,))) <= VELOCITY_BOUND)
+            and (force is None or hypot(*entries(force, _THREE)) <= ACCELERATION_BOUND)
+            and (velocity is None or hypot(*entries(velocity, _THREE)) <= VELOCITY_BOUND)
         ):
             return False
         self._attitude, self._rate, self._wrench = attitude, rate, wrench

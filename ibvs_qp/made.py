@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 
 T = TypeVar("T")
 
-_set = object.__setattr__
+_new, _set = object.__new__, object.__setattr__
 
 
 def made(kind: type[T], /, **fields: Any) -> T:
@@ -19,6 +19,13 @@ def made(kind: type[T], /, **fields: Any) -> T:
         kind: The dataclass.
         **fields: Its fields by name.
     """
-    instance = object.__new__(kind)
+    instance = _new(kind)
+    _set(instance, "__dict__", fields)
+    return instance
+
+
+def filled(kind: type[T], fields: dict[str, Any]) -> T:
+    """The same from a dictionary, which the instance keeps as its own."""
+    instance = _new(kind)
     _set(instance, "__dict__", fields)
     return instance

@@ -22,7 +22,7 @@ from ibvs_qp.estimation.tare import WrenchTare
 from ibvs_qp.estimation.wall_lines import WallAxes, image_line
 from ibvs_qp.frames import to_camera
 from ibvs_qp.loop_margin import require_margin
-from ibvs_qp.made import made
+from ibvs_qp.made import filled
 from ibvs_qp.measurement import (
     HORIZONTAL,
     FeatureFrame,
@@ -123,6 +123,8 @@ class Pilot:
         self.painter = painter or Painter(self.config.painting)
         self._seen_as = seen_as
         self._tick_s = settings.tick_s
+        self._tare_distance_m = self.config.estimation.tare_distance_m
+        self._velocity_life_s = self.config.estimation.velocity_life_s
         self._gate = SensorGate()
         self._tip = np.array(vehicle.tip_position_m)
         self._camera = np.array(vehicle.camera_position_m)
@@ -181,7 +183,7 @@ class Pilot:
         return command if not refused else dataclasses.replace(command, rejected=command.rejected + refused)
 
     def _fly(self, frame: SensorFrame) -> Command:
-        stamp, estimation = frame.stamp_ns, self.config.estimation
+        stamp = frame.stamp_ns
         if self._first < 0:
             self._first = stamp
         dt = self._tick_s if self._stamp < 0 else (stamp - self._stamp) * 1e-9
@@ -190,9 +192,9 @@ class Pilot:
         now = self._gate.last
         attitude, force, rate = now["attitude"], now["specific_force"], now["angular_velocity"]
         contact = self.controller.setpoints.contact
-        free = not contact.in_contact and contact.distance > estimation.tare_distance_m
+        free = not contact.in_contact and contact.distance > self._tare_distance_m
         wrench = self.tare.update(frame.wrench, frame.wrench_stamp_ns, force, free)
-        axes = WallAxes.of(contact.normal.tolist(), down_row(*attitude))
+        axes = WallAxes.of(contact.direction, down_row(*attitude))
         self.motion.predict(stamp, axes, force, rate, dt)
         self._remember(attitude, rate, dt)
         # Without a rotor the vehicle turns away from the wall: what it sees then is not what the strategy knows.
@@ -201,7 +203,7 @@ class Pilot:
         if features is not None and self._fresh(features.stamp_ns):
             self._take(features)
         scenery = self._scenery(frame)
-        if self.supervisor.consider(self.thrust_limits):
+        if self.thrust_limits is not None and self.supervisor.consider(self.thrust_limits):
             self.painter.abandon(scenery, "no level hover is left")
         wish = self.painter.step(scenery)
         if self.supervisor.lost:
@@ -229,7 +231,7 @@ class Pilot:
         if expected is None or not contact.known:
             return ()
         offset, side = expected
-        axes = WallAxes.of(contact.normal.tolist(), down_row(*self._history_attitude[self._slot(stamp_ns)]))
+        axes = WallAxes.of(contact.direction, down_row(*self._history_attitude[self._slot(stamp_ns)]))
         rho, theta, _ = image_line(offset, 0.5 * math.pi, axes, self._tip_from_camera, contact.distance)
         near, far = HINT_SPAN
         span = (near, far) if side > 0.0 else (-far, -near)
@@ -290,7 +292,7 @@ class Pilot:
             normal = x / length, y / length, z / length
             distance = (1.0 - x * tip_x - y * tip_y - z * tip_z) / length
         elif contact.known:
-            normal, distance = contact.normal.tolist(), contact.distance
+            normal, distance = contact.direction, contact.distance
         else:
             return
         gravity = down_row(*self._history_attitude[self._slot(features.stamp_ns)])
@@ -302,7 +304,7 @@ class Pilot:
         contact = self.terms.contact
         distance = contact.distance if contact.known else 0.5
         low, high = self.thrust_limits or (None, None)
-        if self.supervisor.lost or self.motion.velocity_age_s < self.config.estimation.velocity_life_s:
+        if self.supervisor.lost or self.motion.velocity_age_s < self._velocity_life_s:
             right, down, *_ = self.motion.state
             (nx, ny, nz), (rx, ry, rz), (dx, dy, dz), rate = axes.normal, axes.right, axes.down, contact.rate
             velocity = np.array(
@@ -313,21 +315,23 @@ class Pilot:
                 )
             )
             covariance = self._covariance
-        return made(
+        return filled(
             Measurement,
-            stamp_ns=frame.stamp_ns,
-            attitude=frame.attitude,
-            angular_velocity=frame.angular_velocity,
-            specific_force=frame.specific_force,
-            contact_wrench=wrench,
-            wrench_stamp_ns=frame.wrench_stamp_ns,
-            lines=tuple([self.motion.feature(line, axes, distance, frame.stamp_ns) for line, _ in wish.guides]),
-            plane=self._plane,
-            plane_stamp_ns=self._plane_stamp,
-            velocity=velocity,
-            velocity_covariance=covariance,
-            thrust_min=low,
-            thrust_max=high,
+            {
+                "stamp_ns": frame.stamp_ns,
+                "attitude": frame.attitude,
+                "angular_velocity": frame.angular_velocity,
+                "specific_force": frame.specific_force,
+                "contact_wrench": wrench,
+                "wrench_stamp_ns": frame.wrench_stamp_ns,
+                "lines": tuple([self.motion.feature(line, axes, distance, frame.stamp_ns) for line, _ in wish.guides]),
+                "plane": self._plane,
+                "plane_stamp_ns": self._plane_stamp,
+                "velocity": velocity,
+                "velocity_covariance": covariance,
+                "thrust_min": low,
+                "thrust_max": high,
+            },
         )
 
     def _scenery(self, frame: SensorFrame) -> Scenery:
@@ -357,14 +361,16 @@ class Pilot:
                 rho, theta = (offset + self._tip_camera[1]) / depth, 0.5 * math.pi
             else:
                 rho, theta = offset / depth, 0.0
-            references.append(made(LineReference, rho=rho, theta=theta, role=line.role))
-        return made(
+            references.append(filled(LineReference, {"rho": rho, "theta": theta, "role": line.role}))
+        return filled(
             Reference,
-            push_force=wish.push,
-            standoff=wish.standoff,
-            lines=tuple(references),
-            velocity=wish.velocity,
-            contact=wish.contact,
-            tilt=wish.tilt,
-            travel=wish.travel,
+            {
+                "push_force": wish.push,
+                "standoff": wish.standoff,
+                "lines": tuple(references),
+                "velocity": wish.velocity,
+                "contact": wish.contact,
+                "tilt": wish.tilt,
+                "travel": wish.travel,
+            },
         )

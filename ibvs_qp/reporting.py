@@ -25,14 +25,18 @@ def contact_mode(terms: Setpoints, reference: Reference) -> str:
 
 def reach_margin(terms: Setpoints) -> float:
     """Further push possible at the present contact [N]; NaN while no wall is known, or no push can be held."""
-    held = terms.contact.known and terms.least_push <= terms.reach
-    return terms.reach - max(terms.contact.push, 0.0) if held else math.nan
+    contact, reach = terms.contact, terms.reach
+    if not contact.known or terms.least_push > reach:
+        return math.nan
+    return reach - contact.push if contact.push > 0.0 else reach
 
 
 def reach_note(terms: Setpoints, reference: Reference) -> tuple[str, ...]:
     """Says that the push was reduced, or is less than can be held, and why; empty if neither."""
+    if not reference.contact:
+        return ()
     asked, least = reference.push_force, terms.least_push
-    if not reference.contact or max(asked - terms.push_reference, least - asked) < REDUCED:
+    if asked - terms.push_reference < REDUCED and least - asked < REDUCED:
         return ()
     friction = terms.reach_friction  # of the travel commanded, or planned at this push
     how = f"against friction {friction:.2f} along the travel" if friction > 0.0 else "standing still"

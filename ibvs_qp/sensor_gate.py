@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-import math
+from math import hypot
 from typing import Any
 
 import numpy as np
 
 from ibvs_qp.gate import is_stamp
 from ibvs_qp.measurement import SensorFrame
-from ibvs_qp.sound import ACCELERATION_BOUND, RATE_BOUND, WRENCH_BOUND
+from ibvs_qp.sound import ACCELERATION_BOUND, RATE_BOUND, WRENCH_BOUND, entries
 from ibvs_qp.stamp_follower import StampFollower
 
 #: Name, size and largest believable entry of every raw vector.
@@ -22,7 +22,6 @@ _VECTORS = (
 )
 #: A quaternion whose squared length is this far from 1 is no attitude.
 _UNIT_SLIP = 0.02
-_FLOAT = np.dtype(np.float64)
 _THREE, _FOUR, _SIX = (3,), (4,), (6,)
 
 
@@ -53,33 +52,31 @@ class SensorGate:
 
     def check(self, frame: Any) -> tuple[SensorFrame | None, tuple[str, ...]]:
         """A frame that is safe to filter, or None when it has no sound time, and the names of what was refused."""
-        why = self.clock.refuse(frame.stamp_ns) if isinstance(frame, SensorFrame) else "not in a sensor frame"
-        if why:
-            return None, (f"sensor frame: stamp_ns {why}",)
-        if self.clock.shift_ns:
-            frame = _shifted(frame, self.clock.shift_ns)
-        if _dated(frame.image) and _dated(frame.features) and self._sound(frame):
+        clock = self.clock
+        if not (type(frame) is SensorFrame and clock.goes_on(frame.stamp_ns)):
+            why = clock.refuse(frame.stamp_ns) if isinstance(frame, SensorFrame) else "not in a sensor frame"
+            if why:
+                return None, (f"sensor frame: stamp_ns {why}",)
+        if clock.shift_ns:
+            frame = _shifted(frame, clock.shift_ns)
+        image, features = frame.image, frame.features
+        if (image is None or _dated(image)) and (features is None or _dated(features)) and self._sound(frame):
             return frame, ()
         return self._mend(frame)
 
     def _sound(self, frame: SensorFrame) -> bool:
         """Whether surely nothing is to refuse; where it is not sure, `_mend` finds out name by name."""
-        attitude, rate, force, wrench = frame.attitude, frame.angular_velocity, frame.specific_force, frame.wrench
-        if not (
-            _is_row(attitude, _FOUR) and _is_row(rate, _THREE) and _is_row(force, _THREE) and _is_row(wrench, _SIX)
-        ):
+        turn, turning = entries(frame.attitude, _FOUR), entries(frame.angular_velocity, _THREE)
+        felt, load, stamp = entries(frame.specific_force, _THREE), entries(frame.wrench, _SIX), frame.wrench_stamp_ns
+        if type(stamp) is not int or not 0 <= stamp <= frame.stamp_ns or len(turn) != 4:
             return False
-        stamp = frame.wrench_stamp_ns
-        if type(stamp) is not int or not 0 <= stamp <= frame.stamp_ns:
-            return False
-        w, x, y, z = turn = attitude.tolist()
-        turning, felt, load = rate.tolist(), force.tolist(), wrench.tolist()
+        w, x, y, z = turn
         # A vector within the bound has no entry beyond it; NaN is within nothing.
         if not (
             abs(w * w + x * x + y * y + z * z - 1.0) <= _UNIT_SLIP
-            and math.hypot(*turning) <= RATE_BOUND
-            and math.hypot(*felt) <= ACCELERATION_BOUND
-            and math.hypot(*load) <= WRENCH_BOUND
+            and hypot(*turning) <= RATE_BOUND
+            and hypot(*felt) <= ACCELERATION_BOUND
+            and hypot(*load) <= WRENCH_BOUND
         ):
             return False
         self.last = {"attitude": turn, "angular_velocity": turning, "specific_force": felt, "wrench": load}
@@ -125,10 +122,6 @@ def _shifted(frame: SensorFrame, shift_ns: int) -> SensorFrame:
             moved["velocity_stamp_ns"] = part.velocity_stamp_ns + shift_ns  # type: ignore[union-attr]
         changes[name] = dataclasses.replace(part, **moved)
     return dataclasses.replace(frame, **changes)
-
-
-def _is_row(value: Any, shape: tuple[int, ...]) -> bool:
-    return type(value) is np.ndarray and value.dtype is _FLOAT and value.shape == shape
 
 
 def _sound(value: Any, size: int, bound: float) -> list[float] | None:

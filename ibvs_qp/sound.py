@@ -9,7 +9,6 @@ entry beyond that bound, and not-a-number is within nothing.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from math import hypot
 from typing import Any
 
@@ -30,12 +29,14 @@ THRUST_BOUND = 1e4
 #: A quaternion whose squared length is this far from 1 is no attitude.
 UNIT_SLIP = 0.02
 
-_NO_NUMBERS = (float("nan"),)
+_NO_NUMBERS = [float("nan")]
+_ARRAY, _FLOAT, _ROLES = np.ndarray, np.dtype(np.float64), (HORIZONTAL, VERTICAL)
+_PAIR, _SQUARE = (2,), (2, 2)
 
 
-def entries(value: Any, shape: tuple[int]) -> Sequence[float]:
+def entries(value: Any, shape: tuple[int, ...]) -> list[float]:
     """Numbers of a float64 vector of that shape; for anything else not-a-number, which no bound lets pass."""
-    if type(value) is np.ndarray and value.dtype.char == "d" and value.shape == shape:
+    if type(value) is _ARRAY and value.dtype is _FLOAT and value.shape == shape:
         return value.tolist()
     return _NO_NUMBERS
 
@@ -50,10 +51,12 @@ def surely_good_lines(lines: Any) -> bool:
         rho, theta, role, weight, spread = line.rho, line.theta, line.role, line.weight, line.covariance
         if not (isinstance(rho, float) and isinstance(theta, float) and isinstance(weight, float)):
             return False
-        if type(spread) is not np.ndarray or spread.dtype.char != "d" or spread.shape != (2, 2):
+        if not (isinstance(role, str) and role in _ROLES):
+            return False
+        if type(spread) is not _ARRAY or spread.dtype is not _FLOAT or spread.shape != _SQUARE:
             return False
         (a, b), (c, d) = spread.tolist()
-        if not (hypot(rho, theta, a, b, c, d) <= LINE_BOUND and 0.0 <= weight <= 1.0 and good_role(role)):
+        if not (hypot(rho, theta, a, b, c, d) <= LINE_BOUND and 0.0 <= weight <= 1.0):
             return False
     return True
 
@@ -69,17 +72,17 @@ def surely_good_reference(reference: Any) -> bool:
     for line in reference.lines:
         if type(line) is not LineReference:
             return False
-        rho, theta = line.rho, line.theta
-        if not (isinstance(rho, float) and isinstance(theta, float) and good_role(line.role)):
+        rho, theta, role = line.rho, line.theta, line.role
+        if not (isinstance(rho, float) and isinstance(theta, float) and isinstance(role, str) and role in _ROLES):
             return False
         if not hypot(rho, theta) <= LINE_BOUND:
             return False
     return (
         0.0 <= push <= PUSH_BOUND
         and nearest <= standoff <= farthest
-        and hypot(*entries(reference.velocity, (2,))) <= VELOCITY_BOUND
-        and hypot(*entries(reference.travel, (2,))) <= VELOCITY_BOUND
-        and hypot(*entries(reference.tilt, (2,))) <= TILT_BOUND
+        and hypot(*entries(reference.velocity, _PAIR)) <= VELOCITY_BOUND
+        and hypot(*entries(reference.travel, _PAIR)) <= VELOCITY_BOUND
+        and hypot(*entries(reference.tilt, _PAIR)) <= TILT_BOUND
     )
 
 
@@ -120,4 +123,4 @@ def is_array(value: Any, shape: tuple[int, ...]) -> bool:
 
 def good_role(role: Any) -> bool:
     """Whether a value names a role of a line."""
-    return isinstance(role, str) and role in (HORIZONTAL, VERTICAL)
+    return isinstance(role, str) and role in _ROLES

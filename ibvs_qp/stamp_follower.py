@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ibvs_qp.gate import LEAP_NS, RESTART_STAMPS, is_stamp
+from ibvs_qp.gate import LEAP_NS, RESTART_STAMPS, STAMP_END, is_stamp
 
 
 class StampFollower:
@@ -27,6 +27,16 @@ class StampFollower:
         self.shift_ns, self.last_ns = 0, -1
         self._odd_first = self._odd_last = -1
         self._odd_count = 0
+
+    def goes_on(self, stamp: Any) -> bool:
+        """Whether a stamp surely follows the last one and is accepted; where it is not sure, `refuse` finds out."""
+        if type(stamp) is not int or stamp >= STAMP_END or self._odd_count or self.last_ns < 0:
+            return False
+        time = stamp + self.shift_ns
+        if not (stamp >= 0 and 0 < time - self.last_ns <= LEAP_NS):
+            return False
+        self.last_ns = time
+        return True
 
     def refuse(self, stamp: Any) -> str:
         """Why a stamp is refused; empty if it is not, and then `last_ns` is its time."""

@@ -127,7 +127,7 @@ class World:
         if self._rendered and options.camera_process and options.camera in ("plane", "gl"):
             # first of all: it sets itself up meanwhile
             camera = RemoteCamera(scene, vehicle, options.seed, lambda: self.canvas.take(), options.camera)
-        self.plant = Plant(scene, vehicle, options.seed, options.machine_code)
+        self.plant = Plant(scene, vehicle, options.seed, options.machine_code, options.view)
         self.sensors = SensorSuite(scene, vehicle, options.seed, options.machine_code)
         self.canvas = Canvas(scene, options.seed)
         self._miscalibration = Miscalibration(scene.camera, vehicle, self._rendered)
@@ -158,21 +158,25 @@ class World:
             pose = self._miscalibration.pose(plant.position, plant.quaternion)
             image = self._stream.tick(plant.time_ns, *pose)
             return self.sensors.sample(plant, image=None if image is None else self._miscalibration.picture(image))
+        features, now = self._features, plant.time_ns
+        if features.rests(now):
+            return self.sensors.sample(plant)
         position, quaternion, velocity = self._seen_from  # read at once, not kept
         pose = self._miscalibration.pose(position, quaternion)
-        return self.sensors.sample(plant, None, self._features.tick(plant.time_ns, *pose, velocity))
+        return self.sensors.sample(plant, None, features.tick(now, *pose, velocity))
 
     def act(self, thrusts: np.ndarray) -> None:
         """Advance one control tick and paint where the brush presses."""
-        self.plant.step(thrusts)
-        pressing = self.plant.contact_normal_force > PAINTING_FORCE
-        self._pressed += pressing
+        plant = self.plant
+        plant.step(thrusts)
+        pressing = plant.contact_normal_force > PAINTING_FORCE
         if self.viewer is not None:
             self.viewer.show(pressing)
-        if pressing and self._brush is not None and self._pressed % STROKE_TICKS:
-            return
         if pressing:
-            point = self.geometry.spot(*self.plant.tip_on_wall)
+            self._pressed += 1
+            if self._brush is not None and self._pressed % STROKE_TICKS:
+                return
+            point = self.geometry.spot(*plant.tip_on_wall)
             self.canvas.stroke(self._brush, point)
             self._brush = point
         else:

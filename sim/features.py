@@ -110,6 +110,10 @@ class GeometricFeatures:
             translated(painted_edge_view()), (self._board, self._piece, half), (self._edge,)
         )
 
+    def rests(self, now_ns: int) -> bool:
+        """Whether nothing is seen nor delivered at this time: `tick` would do nothing."""
+        return self._schedule.rests(now_ns)
+
     def tick(
         self, now_ns: int, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, velocity_body: np.ndarray
     ) -> FeatureFrame | None:

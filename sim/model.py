@@ -68,10 +68,10 @@ def _inertial_xml(body: RigidBody) -> str:
     )
 
 
-def _rotors_xml(vehicle: VehicleParams) -> tuple[str, str]:
-    """Rotor sites (z = thrust axis) and their actuators: force along z, drag torque against the spin."""
+def _rotors_xml(vehicle: VehicleParams) -> tuple[str, str, str]:
+    """Rotor sites (z = thrust axis), their actuators (force along z, drag torque against the spin), and their discs."""
     geometry = vehicle.geometry
-    sites, actuators = [], []
+    sites, actuators, discs = [], [], []
     for name, position, axis, spin in zip(
         geometry.names, geometry.positions, geometry.axes, geometry.spins, strict=True
     ):
@@ -82,21 +82,18 @@ def _rotors_xml(vehicle: VehicleParams) -> tuple[str, str]:
         frame = f'pos="{_numbers(place)}" quat="{_numbers(quaternion)}"'
         sites.append(f'<site name="{name}" {frame} size="0.01"/>')
         size = _numbers(vehicle.propeller_radius_m, 0.004)
-        sites.append(
+        discs.append(
             f'<geom type="cylinder" size="{size}" {frame} contype="0" conaffinity="0" rgba=".2 .2 .2 .4" mass="0"/>'
         )
         actuators.append(
             f'<general name="{name}" site="{name}" dyntype="filterexact" dynprm="{_numbers(vehicle.motor_lag_up_s)}" '
             f'gainprm="1" gear="0 0 1 0 0 {_numbers(-spin * geometry.torque_ratio_m)}"/>'
         )
-    return "\n".join(sites), "\n".join(actuators)
+    return "\n".join(sites), "\n".join(actuators), "\n".join(discs)
 
 
 def _surroundings_xml(scene: Scene) -> str:
-    """Contact plane and, for pictures only, board and wall.
-
-    The contact plane is infinite: a box would push the tip out sideways near its rim and bound the penetration.
-    """
+    """Board and wall, for pictures only."""
     board, slope = scene.board, math.radians(scene.board.slope_deg)
     along, up = np.array([0, -math.cos(slope), -math.sin(slope)]), np.array([0, -math.sin(slope), math.cos(slope)])
     centre = np.array([0.5 * BOARD_THICKNESS_M, 0, board.bottom_m]) + 0.5 * (
@@ -105,35 +102,42 @@ def _surroundings_xml(scene: Scene) -> str:
     half = _numbers(0.5 * board.width_m, 0.5 * board.height_m, 0.5 * BOARD_THICKNESS_M)
     board_colour = _numbers(np.array(board.color) / 255.0, 1.0)
     wall_colour = _numbers(np.array(scene.wall.color) / 255.0, 1.0)
-    return f"""
-    <geom name="face" type="plane" size="0 0 1" zaxis="-1 0 0" contype="0" conaffinity="0" group="3"/>
-    <geom name="board" type="box" pos="{_numbers(centre)}" xyaxes="{_numbers(along, up)}" size="{half}"
+    return f"""<geom name="board" type="box" pos="{_numbers(centre)}" xyaxes="{_numbers(along, up)}" size="{half}"
       rgba="{board_colour}" contype="0" conaffinity="0"/>
     <geom name="wall" type="box" pos="{_numbers(board.gap_m + 0.5, 0, 0)}" size="0.5 20 20" rgba="{wall_colour}"
       contype="0" conaffinity="0"/>"""
 
 
-def build_xml(scene: Scene, vehicle: VehicleParams) -> str:
-    """MJCF text of the world; contact numbers follow after compilation, see `build_model`."""
-    sites, actuators = _rotors_xml(vehicle)
+def build_xml(scene: Scene, vehicle: VehicleParams, drawn: bool = True) -> str:
+    """MJCF text of the world; contact numbers follow after compilation, see `build_model`.
+
+    The contact plane is infinite: a box would push the tip out sideways near its rim and bound the penetration.
+    """
+    sites, actuators, discs = _rotors_xml(vehicle)
     tip, sensor = FLIP * vehicle.tip_position_m, FLIP * vehicle.force_torque_position_m
     sphere = tip - np.array([TIP_RADIUS_M, 0.0, 0.0])
+    ends, radius = _numbers(sensor, sphere), _numbers(vehicle.arm_radius_m)
+    shape = f'name="arm" type="capsule" fromto="{ends}" size="{radius}"'
+    arm = f'<geom {shape} contype="0" conaffinity="0" rgba=".1 .1 .1 1"/>'
+    # Nothing collides with what is there for pictures only, but MuJoCo would place it at every step.
+    surroundings, discs, arm = (_surroundings_xml(scene), discs, arm) if drawn else ("", "", "")
     return f"""<mujoco model="ibvs_qp">
   <compiler angle="radian" balanceinertia="true" autolimits="true"/>
   {OPTION_XML.format(gravity=_numbers(GRAVITY))}
   <statistic extent="1"/>
   <worldbody>
-    {_surroundings_xml(scene)}
+    <geom name="face" type="plane" size="0 0 1" zaxis="-1 0 0" contype="0" conaffinity="0" group="3"/>
+    {surroundings}
     <body name="vehicle">
       <freejoint/>
       {_inertial_xml(bare_body(scene, vehicle))}
       <site name="imu"/>
       {sites}
+      {discs}
       <body name="tool">
         {_inertial_xml(tool_body(vehicle))}
         <site name="force_torque" pos="{_numbers(sensor)}"/>
-        <geom name="arm" type="capsule" fromto="{_numbers(sensor, sphere)}" size="{_numbers(vehicle.arm_radius_m)}"
-          contype="0" conaffinity="0" rgba=".1 .1 .1 1"/>
+        {arm}
         <geom name="tip" type="sphere" pos="{_numbers(sphere)}" size="{_numbers(TIP_RADIUS_M)}" contype="0"
           conaffinity="0"/>
       </body>
@@ -151,13 +155,18 @@ def build_xml(scene: Scene, vehicle: VehicleParams) -> str:
 </mujoco>"""
 
 
-def build_model(scene: Scene, vehicle: VehicleParams) -> tuple[mujoco.MjModel, ModelIds]:
+def build_model(scene: Scene, vehicle: VehicleParams, drawn: bool = True) -> tuple[mujoco.MjModel, ModelIds]:
     """Compile the world.
+
+    Args:
+        scene: The truth.
+        vehicle: Geometry and nominal parameters.
+        drawn: Whether to put in what is there for pictures only; it moves as well without, sooner.
 
     Raises:
         ConfigError: When vehicle and tool cannot make up the scene's mass and inertia.
     """
-    model = mujoco.MjModel.from_xml_string(build_xml(scene, vehicle))
+    model = mujoco.MjModel.from_xml_string(build_xml(scene, vehicle, drawn))
     ids = {name: mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name) for name in ("vehicle", "tool")}
     # The compiler evens out moments that break the triangle inequality; the scene's numbers are meant literally.
     model.body_inertia[ids["vehicle"]] = principal_axes(bare_body(scene, vehicle))[0]

@@ -21,6 +21,7 @@ from sim.mujoco_frames import FLIP, FLIP_QUATERNION
 from sim.readings import PlantReadings
 from sim.readout import PLACES, SIZE, drive, readout
 from sim.scene import Scene
+from sim.step_clock import stop_step_clock
 from sim.streams import stream
 from sim.trim import hover_thrusts, start_pose, true_limits
 from sim.wind import Wind
@@ -52,14 +53,21 @@ class Plant(PlantReadings):
         vehicle: Geometry and nominal parameters.
         seed: Varies start pose and gusts.
         to_machine_code: Whether a C compiler translates the arithmetic around the physics; the same bits, sooner.
+        drawn: Whether MuJoCo's model holds what a window shows; likewise.
     """
 
     def __init__(
-        self, scene: Scene, vehicle: VehicleParams | None = None, seed: int = 0, to_machine_code: bool = False
+        self,
+        scene: Scene,
+        vehicle: VehicleParams | None = None,
+        seed: int = 0,
+        to_machine_code: bool = False,
+        drawn: bool = True,
     ) -> None:
         self._translate = machine_code if to_machine_code else lambda function: function
         self.scene, self.vehicle = scene, vehicle or VehicleParams()
-        self.model, self._ids = build_model(scene, self.vehicle)
+        stop_step_clock()
+        self.model, self._ids = build_model(scene, self.vehicle, drawn)
         self.data = mujoco.MjData(self.model)
         self._lower, self._upper = true_limits(scene, self.vehicle)
         self.clearance = PropellerClearance(BoardGeometry(scene), self.vehicle)
@@ -84,6 +92,7 @@ class Plant(PlantReadings):
             (self.truth,),
         )
         self._wanted, self._air, self._lags = np.zeros(model.nu), np.zeros(3), np.zeros(model.nu)
+        self._air_memory = self._air.data
         self._lag = model.actuator_dynprm[:, 0]
         lags = np.array((truth.motor_lag_up_s, truth.motor_lag_down_s))
         # Moment arm from the bare vehicle's centre of mass, where MuJoCo applies forces, to the whole one's.
@@ -119,12 +128,12 @@ class Plant(PlantReadings):
             self.crashed, self.time_ns = self.crashed or NOT_FINITE, self.time_ns + TICK_NS
             return
         self._wanted[:] = thrusts
-        _put_three(self._air.data, 0, *self.wind.force(self._centre_velocity.tolist()))
-        self._drive()
+        _put_three(self._air_memory, 0, *self.wind.force(self._centre_velocity.tolist()))
+        self._drive.evaluate()
         self._lag[:] = self._lags
         mujoco.mj_step(self.model, self.data, STEPS_PER_TICK)
         self.time_ns += TICK_NS
-        self._read()
+        self._read.evaluate()
         if self.truth.item(_SAFE) != 1.0 and self.crashed is None:
             self.crashed = crash_reason(self.position.tolist(), self.rotation.tolist(), self.clearance)
 

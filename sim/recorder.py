@@ -77,8 +77,9 @@ class Recorder:
 
     def tick(self, frame: SensorFrame, command: Command) -> None:
         """Log one tick, after the plant has moved."""
-        pilot = self._pilot
-        painter, time_s, phase = pilot.painter, frame.stamp_ns * 1e-9, pilot.painter.phase
+        pilot, time_s = self._pilot, frame.stamp_ns * 1e-9
+        painter = pilot.painter
+        phase = painter.phase
         numbers = self._pack(
             time_s,
             _PHASE_INDEX[phase],
@@ -88,8 +89,8 @@ class Recorder:
             command.iterations,
             command.reach_margin,
         )
-        thrusts, unallocated = command.thrusts.data, command.unallocated_wrench.data
-        self._log.add(b"".join((numbers, *self._standing, thrusts, self._actual, unallocated)))
+        row = numbers, *self._standing, command.thrusts, self._actual, command.unallocated_wrench
+        self._log.add(b"".join(row))  # type: ignore[arg-type]
         if self._program is not None:
             self._programs.add(self._program.tobytes())
         active = command.active_limits

@@ -13,7 +13,7 @@ import numpy as np
 
 from ibvs_qp.bound_function import BoundFunction
 from ibvs_qp.machine_code import machine_code
-from ibvs_qp.made import made
+from ibvs_qp.made import filled
 from ibvs_qp.measurement import FeatureFrame, RgbdFrame, SensorFrame
 from ibvs_qp.vehicle import VehicleParams
 from sim.plant import Plant
@@ -29,19 +29,22 @@ class SampleClock:
     """Says when a sensor of a given rate samples; integer nanoseconds, so that no rounding drifts.
 
     A sample falls on the first control tick at or after its time; a sensor faster than the ticks samples on each.
+
+    Attributes:
+        next_ns: Before this time no sample is due.
     """
 
     def __init__(self, rate_hz: float) -> None:
         self._rate = rate_hz
-        self._count = self._next = 0
+        self._count = self.next_ns = 0
 
     def due(self, now_ns: int) -> bool:
         """Whether a sample is due at this tick."""
-        if now_ns < self._next:
+        if now_ns < self.next_ns:
             return False
-        while self._next <= now_ns:
+        while self.next_ns <= now_ns:
             self._count += 1
-            self._next = round(self._count * NS / self._rate)
+            self.next_ns = round(self._count * NS / self._rate)
         return True
 
 
@@ -82,6 +85,7 @@ class Imu:
         self._settings = np.array((*sigmas, *tilt, math.cos(0.5 * yaw), math.sin(0.5 * yaw), 1.0))
         self._noise = NormalRows((attitude, stream(seed, "gyro"), stream(seed, "accelerometer")), 3)
         self._kick, self._sample = np.zeros(9), np.zeros(10)
+        self._kick_memory = memoryview(self._kick)  # type: ignore[arg-type]
         self._plant: Plant | None = None
         self.attitude = self.angular_velocity = self.specific_force = np.zeros(0)
 
@@ -93,12 +97,13 @@ class Imu:
 
     def sample(self, plant: Plant) -> None:
         """Take a sample if one is due."""
-        if not self._clock.due(plant.time_ns):
+        clock, now = self._clock, plant.time_ns
+        if now < clock.next_ns or not clock.due(now):
             return
         if plant is not self._plant:
             self._look_at(plant)
-        self._kick[:] = self._noise.take()
-        self._read()
+        self._noise.take_into(self._kick_memory)
+        self._read.evaluate()
         sample = self._sample.copy()
         self.attitude, self.angular_velocity, self.specific_force = sample[:4], sample[4:7], sample[7:]
 
@@ -137,11 +142,11 @@ class ForceTorque:
 
     def sample(self, plant: Plant) -> None:
         """Take a sample if one is due, and deliver those whose delay is over."""
-        now = plant.time_ns
-        if self._clock.due(now):
-            self._line.append((now, plant.truth[_WRENCH] + self.bias + self._sigma * self._noise.take(6)))
-        while self._line and (self._line[0][0] + self._latency_ns <= now or not self.wrench.size):
-            self.stamp_ns, self.wrench = self._line.popleft()
+        now, line, clock = plant.time_ns, self._line, self._clock
+        if now >= clock.next_ns and clock.due(now):
+            line.append((now, plant.truth[_WRENCH] + self.bias + self._sigma * self._noise.take(6)))
+        while line and (line[0][0] + self._latency_ns <= now or not self.wrench.size):
+            self.stamp_ns, self.wrench = line.popleft()
 
 
 class SensorSuite:
@@ -166,14 +171,16 @@ class SensorSuite:
         imu, force_torque = self.imu, self.force_torque
         imu.sample(plant)
         force_torque.sample(plant)
-        return made(
+        return filled(
             SensorFrame,
-            stamp_ns=plant.time_ns,
-            attitude=imu.attitude,
-            angular_velocity=imu.angular_velocity,
-            specific_force=imu.specific_force,
-            wrench=force_torque.wrench,
-            wrench_stamp_ns=force_torque.stamp_ns,
-            image=image,
-            features=features,
+            {
+                "stamp_ns": plant.time_ns,
+                "attitude": imu.attitude,
+                "angular_velocity": imu.angular_velocity,
+                "specific_force": imu.specific_force,
+                "wrench": force_torque.wrench,
+                "wrench_stamp_ns": force_torque.stamp_ns,
+                "image": image,
+                "features": features,
+            },
         )

@@ -47,13 +47,16 @@ class NormalRows:
 
     def __init__(self, generators: Sequence[np.random.Generator], each: int) -> None:
         self._generators, self._each = tuple(generators), each
-        self._next, self._rows = 0, np.zeros((0, each * len(self._generators)))
+        self._width = each * len(self._generators)
+        self._next, self._rows = 0, memoryview(b"").cast("d")
 
-    def take(self) -> np.ndarray:
-        """The next row, not to be written, (numbers,)."""
-        if self._next == len(self._rows):
+    def take_into(self, row: memoryview) -> None:
+        """Write the next row into memory, (numbers,)."""
+        start = self._next
+        if start == len(self._rows):
             count = BLOCK // self._each
             blocks = [source.standard_normal(count * self._each) for source in self._generators]
-            self._next, self._rows = 0, np.hstack([block.reshape(count, self._each) for block in blocks])
-        self._next += 1
-        return self._rows[self._next - 1]
+            rows = np.hstack([block.reshape(count, self._each) for block in blocks])
+            start, self._rows = 0, memoryview(rows.reshape(-1))  # type: ignore[arg-type]
+        self._next = end = start + self._width
+        row[:] = self._rows[start:end]

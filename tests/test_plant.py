@@ -222,3 +222,18 @@ def test_forces_of_a_tick_are_those_of_its_physics_steps_in_order():
         np.testing.assert_array_equal(plant.truth, single.truth)
         np.testing.assert_allclose(plant.contact_1khz, pushes, atol=1e-12)
         np.testing.assert_allclose(FLIP * np.mean(felt, axis=0), plant.specific_force, atol=1e-12)
+
+
+def test_what_is_there_for_pictures_changes_no_bit_of_the_motion():
+    drawn, bare = (Plant(Scene(), seed=3, drawn=shown) for shown in (True, False))
+    assert drawn.model.ngeom > bare.model.ngeom
+    push, pressed = drawn.thrusts_actual + np.array([0.3, 0.3, 0.6, -0.6, 0.6, -0.6]), 0
+    for place in ([-0.9, 1.0, -1.5], [-0.698, 1.0, -1.5]):
+        for plant in (drawn, bare):
+            at_rest(plant, np.array(place))
+        for _ in range(20):
+            for plant in (drawn, bare):
+                plant.step(push)
+            assert drawn.truth.tobytes() == bare.truth.tobytes()
+            pressed += drawn.contact_normal_force > 0.0
+    assert pressed > 10, "in contact as well"

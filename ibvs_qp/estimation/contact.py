@@ -7,6 +7,7 @@ accelerometer and is only corrected by depth (design section 4.2).
 from __future__ import annotations
 
 import math
+import struct
 
 import numpy as np
 
@@ -34,16 +35,22 @@ LEAP, LEAP_FRAMES = 0.05, 5
 SHORT_LOSS, RESUMED = 0.5, 0.4
 #: Free-flight noise of the push is averaged over this time [s].
 NOISE_TIME = 1.0
+#: A tick is never taken to last longer than this [s]: after a pause the filters begin where they were.
+LONGEST_TICK = 0.02
+
+_three = struct.Struct("3d")
+_put_three, _ROW_BYTES = _three.pack_into, _three.size
 
 
 class ContactEstimator:
     """Wall normal, tip distance and rate, push, contact state and lambda; one instance per controller.
 
     Attributes:
-        normal: Unit vector into the wall, in B, (3,); known: whether the wall was ever seen.
+        direction: Unit vector into the wall, in B, as plain numbers; known: whether the wall was ever seen.
         distance: Tip to wall [m]; rate: its rate [m/s]; acceleration: the rate's own, filtered [m/s^2].
         depth: Camera to wall along the normal [m].
-        push: Filtered push [N]; push_raw: of the last sample.
+        push: Filtered push [N]; push_raw: of the last sample; push_noise: deviation of push in free flight [N].
+        across_noise: Deviation of the filtered moments in free flight, as a force across the tip [N].
         in_contact: Whether the tip touches; touch_ns: since when.
         ramp: 0 at touch to 1 after the ramp time; 0 while free.
         contact_weight: Lambda (paper, corrected), 0 far away to 1.
@@ -66,15 +73,19 @@ class ContactEstimator:
         """Forget everything, as before the first measurement."""
         self._filter.reset()
         self._normal_history = np.zeros((HISTORY, 3))
+        self._normal_memory = self._normal_history.data
+        self._state: tuple[float, ...] | None = None  # of the filter as last asked; None once it was corrected
+        self._share_of = (math.nan, 0.0)  # share of a new acceleration in a tick of that length [s]
         self._ticks = 0
         self._plane_stamp = self._wrench_stamp = self._stamp = -1
-        self.normal = np.array([1.0, 0.0, 0.0])
+        self.direction = (1.0, 0.0, 0.0)
         self.known, self._leaps = False, 0
         self.distance, self.rate, self.acceleration, self._lever_speed = math.inf, 0.0, 0.0, 0.0
         self.depth = math.inf
         self.push = self.push_raw = 0.0
         self._push_mean, self._push_variance = 0.0, 0.02
         self._moment, self._moment_variance = (0.0, 0.0, 0.0), 0.0
+        self._note_noise()
         self.in_contact, self.touch_ns, self._touch_count, self._doubt_ns = False, -1, 0, -1
         self._ramped, self._lost_ns = 0.0, -1
         self.stiffness = StiffnessEstimator()
@@ -83,33 +94,42 @@ class ContactEstimator:
     def update(self, measurement: Measurement, down: tuple[float, float, float]) -> None:
         """Take in one measurement; ``down`` is the unit gravity direction in B."""
         stamp = measurement.stamp_ns
-        dt = self._config.tick_s if self._stamp < 0 else min(max((stamp - self._stamp) * 1e-9, 0.0), LONGEST_TICK)
+        dt = self._config.tick_s
+        if self._stamp >= 0:
+            dt = (stamp - self._stamp) * 1e-9
+            dt = LONGEST_TICK if dt > LONGEST_TICK else dt if dt > 0.0 else 0.0
         self._stamp = stamp
-        omega = measurement.angular_velocity
-        self._predict(measurement, down, omega, dt)
+        self._predict(measurement, down, dt)
         if measurement.plane is not None and measurement.plane_stamp_ns > self._plane_stamp:
             self._correct_plane(measurement.plane, measurement.plane_stamp_ns)
         if self.known:
-            self.distance, speed, _ = self._filter.state.tolist()
+            state = self._state
+            if state is None:  # corrected meanwhile
+                state = self._state = tuple(self._filter.state.tolist())
+            self.distance, speed, _ = state
             self.rate = -speed - self._lever_speed
-            self._update_depth()
-        self._update_push(measurement)
+            (nx, ny, nz), (cx, cy, cz) = self.direction, self._tip_from_camera
+            self.depth = self.distance + nx * cx + ny * cy + nz * cz
+        if measurement.wrench_stamp_ns > self._wrench_stamp:
+            self._update_push(measurement)
         self._update_contact(stamp)
         self._update_weight()
 
-    def _predict(
-        self, measurement: Measurement, down: tuple[float, float, float], omega: np.ndarray, dt: float
-    ) -> None:
+    @property
+    def normal(self) -> np.ndarray:
+        """Unit vector into the wall, in B, (3,)."""
+        return np.array(self.direction)
+
+    def _predict(self, measurement: Measurement, down: tuple[float, float, float], dt: float) -> None:
         """Turn the normal with the gyro and integrate the accelerometer along it."""
         # Plain numbers: this runs every tick, and arrays of three cost ten times their arithmetic.
-        wx, wy, wz = omega.tolist()
-        nx, ny, nz = self.normal.tolist()
+        wx, wy, wz = measurement.angular_velocity.tolist()
+        nx, ny, nz = self.direction
         nx, ny, nz = nx + dt * (ny * wz - nz * wy), ny + dt * (nz * wx - nx * wz), nz + dt * (nx * wy - ny * wx)
         length = math.sqrt(nx * nx + ny * ny + nz * nz)
-        nx, ny, nz = nx / length, ny / length, nz / length
-        self.normal = np.array((nx, ny, nz))
+        self.direction = nx, ny, nz = nx / length, ny / length, nz / length
         self._ticks += 1
-        self._normal_history[self._ticks % HISTORY] = self.normal
+        _put_three(self._normal_memory, self._ticks % HISTORY * _ROW_BYTES, nx, ny, nz)
         # The tip moves with the body's turn as well; the chain integrates only the centre of mass.
         tx, ty, tz = self._tip_list
         lever = nx * (wy * tz - wz * ty) + ny * (wz * tx - wx * tz) + nz * (wx * ty - wy * tx)
@@ -119,10 +139,11 @@ class ContactEstimator:
             fx, fy, fz = measurement.specific_force.tolist()
             gx, gy, gz = down
             acceleration = nx * (fx + GRAVITY * gx) + ny * (fy + GRAVITY * gy) + nz * (fz + GRAVITY * gz)
-        distance, speed, bias = self._filter.state.tolist()
-        share = 1.0 - math.exp(-dt / ACCELERATION_FILTER)
-        self.acceleration += share * (bias - acceleration - self.acceleration)
-        state = (distance - dt * (speed + lever), speed + dt * (acceleration - bias), bias)
+        distance, speed, bias = self._state or self._filter.state.tolist()
+        if dt != self._share_of[0]:
+            self._share_of = dt, 1.0 - math.exp(-dt / ACCELERATION_FILTER)
+        self.acceleration += self._share_of[1] * (bias - acceleration - self.acceleration)
+        self._state = state = distance - dt * (speed + lever), speed + dt * (acceleration - bias), bias
         self._filter.remember(measurement.stamp_ns, state, dt)
 
     def _correct_plane(self, plane: tuple[float, float, float, float], stamp: int) -> None:
@@ -132,10 +153,10 @@ class ContactEstimator:
         tip_x, tip_y, tip_z = self._tip_from_camera
         distance = (1.0 - x * tip_x - y * tip_y - z * tip_z) / length
         x, y, z = x / length, y / length, z / length
-        self._plane_stamp = stamp
+        self._plane_stamp, self._state = stamp, None
         if not self.known:
-            self.normal = np.array((x, y, z))
-            self._normal_history[:] = self.normal
+            self.direction = x, y, z
+            self._normal_history[:] = x, y, z
             self._filter.set_entry(0, distance, 0.01)
             self.known = True
             return
@@ -147,10 +168,10 @@ class ContactEstimator:
         dx, dy, dz = NORMAL_GAIN * (x - past_x), NORMAL_GAIN * (y - past_y), NORMAL_GAIN * (z - past_z)
         for part in (slice(start, end),) if start < end else (slice(start, None), slice(0, end)):
             history[part] += (dx, dy, dz)
-        nx, ny, nz = self.normal.tolist()
+        nx, ny, nz = self.direction
         nx, ny, nz = nx + dx, ny + dy, nz + dz
         length = math.sqrt(nx * nx + ny * ny + nz * nz)
-        self.normal = np.array((nx / length, ny / length, nz / length))
+        self.direction = nx / length, ny / length, nz / length
 
     def _believe(self, stamp: int, distance: float) -> bool:
         """Correct with a measured distance: a jump is believed slowly, a leap only when the next frames repeat it."""
@@ -174,12 +195,11 @@ class ContactEstimator:
         return True
 
     def _update_push(self, measurement: Measurement) -> None:
-        if measurement.wrench_stamp_ns <= self._wrench_stamp:
-            return
+        """Filter a new force sample."""
         settings = self._config.contact
         dt = 0.01 if self._wrench_stamp < 0 else min((measurement.wrench_stamp_ns - self._wrench_stamp) * 1e-9, 0.1)
         self._wrench_stamp = measurement.wrench_stamp_ns
-        (fx, fy, fz, mx, my, mz), (nx, ny, nz) = measurement.contact_wrench.tolist(), self.normal.tolist()
+        (fx, fy, fz, mx, my, mz), (nx, ny, nz) = measurement.contact_wrench.tolist(), self.direction
         self.push_raw = -(fx * nx + fy * ny + fz * nz)
         gain = 1.0 - math.exp(-2.0 * math.pi * settings.force_filter_hz * dt)
         self.push += gain * (self.push_raw - self.push)
@@ -190,6 +210,7 @@ class ContactEstimator:
             self._push_mean += share * (self.push - self._push_mean)
             self._push_variance += share * ((self.push - self._push_mean) ** 2 - self._push_variance)
             self._moment_variance += share * (0.5 * (x * x + y * y + z * z) - self._moment_variance)
+            self._note_noise()
         self._touch_count = self._touch_count + 1 if self.push > self.touch_threshold else 0
         if self.in_contact:
             self.stiffness.add(self.push, -self.distance, dt)
@@ -199,21 +220,15 @@ class ContactEstimator:
         """Speed of the centre of mass into the wall [m/s], whatever the tip does by turning."""
         return -self.rate - self._lever_speed
 
-    @property
-    def push_noise(self) -> float:
-        """Deviation of the filtered push in free flight [N]."""
-        return math.sqrt(self._push_variance)
-
-    @property
-    def across_noise(self) -> float:
-        """Deviation of the filtered moments in free flight, as a force across the tip [N]."""
-        return math.sqrt(self._moment_variance) / self._tip_list[0]
+    def _note_noise(self) -> None:
+        self.push_noise = math.sqrt(self._push_variance)
+        self.across_noise = math.sqrt(self._moment_variance) / self._tip_list[0]
 
     @property
     def touch_threshold(self) -> float:
         """Filtered push that counts as touch [N]."""
         settings = self._config.contact
-        return max(settings.touch_force_n, settings.touch_sigmas * math.sqrt(self._push_variance))
+        return max(settings.touch_force_n, settings.touch_sigmas * self.push_noise)
 
     def _update_contact(self, stamp: int) -> None:
         settings = self._config.contact
@@ -237,12 +252,6 @@ class ContactEstimator:
         """Seconds since touch, 0 while free."""
         return (self._stamp - self.touch_ns) * 1e-9 if self.in_contact else 0.0
 
-    def _update_depth(self) -> None:
-        """Camera to wall along the normal [m]."""
-        nx, ny, nz = self.normal.tolist()
-        cx, cy, cz = self._tip_from_camera
-        self.depth = self.distance + nx * cx + ny * cy + nz * cz
-
     def _update_weight(self) -> None:
         r"""Ramp and lambda, :math:`\tfrac12(1+\cos(\pi (d-d_{min})/(d_{max}-d_{min})))` times the ramp (corrected).
 
@@ -252,7 +261,8 @@ class ContactEstimator:
         if not self._config.touch_ramp:
             self.ramp = 1.0
         elif self.in_contact:
-            self.ramp = min(1.0, (self._ramped + self.time_since_touch) / settings.ramp_s)
+            ramp = (self._ramped + self.time_since_touch) / settings.ramp_s
+            self.ramp = ramp if ramp < 1.0 else 1.0
         else:
             self.ramp = 0.0
         share = (self.depth - settings.depth_min_m) / (settings.depth_max_m - settings.depth_min_m)

@@ -108,8 +108,9 @@ class DelayedKalman:
             self._settle()
         slot = self.ticks.add(stamp_ns)
         self._put(self._bytes, slot * self._row_bytes, *state)
-        self._lengths[slot] = self.tick if dt is None else dt
-        if dt is not None and abs(dt - self.tick) > UNEVEN_S:
+        tick = self.tick
+        self._lengths[slot] = dt = tick if dt is None else dt
+        if not -UNEVEN_S <= dt - tick <= UNEVEN_S:
             self._uneven = self.ticks.now
 
     def set_entry(self, index: int, value: float, std: float) -> None:

@@ -14,9 +14,8 @@ from ibvs_qp.estimation.stamps import StampRing
 from ibvs_qp.estimation.tracked_line import TrackedLine
 from ibvs_qp.estimation.wall_lines import WallAxes, image_line, wall_line
 from ibvs_qp.frames import GRAVITY
-from ibvs_qp.made import made
+from ibvs_qp.made import filled
 from ibvs_qp.measurement import FeatureFrame, LineFeature
-from ibvs_qp.vectors import cross_product
 
 #: Lines followed at once.
 SLOTS = 8
@@ -42,6 +41,7 @@ class WallMotion:
         to_machine_code: bool = False,
     ) -> None:
         self._config = config = config or EstimationConfig()
+        self._fading_after = min(config.fade_start_s, config.fade_end_s)
         self._tip = np.asarray(tip, float).tolist()
         self._tip_from_camera = (np.asarray(tip, float) - np.asarray(camera, float)).tolist()
         size = _LINES + SLOTS
@@ -104,7 +104,8 @@ class WallMotion:
         (rx, ry, rz), (dx, dy, dz), (gx, gy, gz) = axes.right, axes.down, axes.gravity
         fx, fy, fz = specific_force
         ax, ay, az = fx + GRAVITY * gx, fy + GRAVITY * gy, fz + GRAVITY * gz
-        lx, ly, lz = cross_product(omega, self._tip)
+        (wx, wy, wz), (tx, ty, tz) = omega, self._tip
+        lx, ly, lz = wy * tz - wz * ty, wz * tx - wx * tz, wx * ty - wy * tx
         right, down = dt * (rx * lx + ry * ly + rz * lz), dt * (dx * lx + dy * ly + dz * lz)
         state = self.state.copy()
         vr, vd, br, bd, *_ = state
@@ -113,14 +114,17 @@ class WallMotion:
         state[4] += dt * vr + right
         state[5] += dt * vd + down
         right, down = right + dt * vr, down + dt * vd
+        fading = False
         for line in self.lines.values():
             c, s = line.rates
             slot = _LINES + line.slot
-            line.offset = offset = state[slot] + (c * right + s * down)
-            state[slot] = offset
+            line.offset = state[slot] = state[slot] + (c * right + s * down)
+            line.weight = line.fresh_weight
+            fading = fading or (stamp_ns - line.news_ns) * 1e-9 > self._fading_after
         self._filter.remember(stamp_ns, state, dt)
         self.state, self._stamp = state, stamp_ns
-        self._fade(stamp_ns)
+        if fading:
+            self._fade(stamp_ns)
         self.velocity_age_s = (stamp_ns - self._velocity_stamp) * 1e-9 if self._velocity_stamp >= 0 else math.inf
 
     def _fade(self, stamp_ns: int) -> None:
@@ -128,12 +132,10 @@ class WallMotion:
         start, end, old = self._config.fade_start_s, self._config.fade_end_s, []
         for key, line in self.lines.items():
             age = (stamp_ns - line.news_ns) * 1e-9
-            if age <= start and age <= end:
-                line.weight = line.fresh_weight
-            elif age <= end:
-                line.weight = line.fresh_weight * ((end - age) / (end - start))
-            else:
+            if age > end:
                 old.append(key)
+            elif age > start:
+                line.weight = line.fresh_weight * ((end - age) / (end - start))
         for key in old:
             self._drop(key)
 
@@ -274,16 +276,18 @@ class WallMotion:
         variance = max(self._filter.covariance.item(slot, slot), 1e-10) / (scale * scale)
         covariance = _NOTHING.copy()
         covariance[0, 0], covariance[1, 1] = variance, line.theta_variance
-        return made(
+        return filled(
             LineFeature,
-            rho=rho,
-            theta=theta,
-            covariance=covariance,
-            role=line.role,
-            weight=line.weight,
-            stamp_ns=stamp_ns,
-            track_id=line.track_id,
-            segment=None,
-            surface_side=line.surface_side,
-            kind=line.kind,
+            {
+                "rho": rho,
+                "theta": theta,
+                "covariance": covariance,
+                "role": line.role,
+                "weight": line.weight,
+                "stamp_ns": stamp_ns,
+                "track_id": line.track_id,
+                "segment": None,
+                "surface_side": line.surface_side,
+                "kind": line.kind,
+            },
         )

@@ -23,6 +23,9 @@ ACTIVE_PRICE = 1e-3
 #: Largest violation of a hard row in a solved program [N of thrust]; that of a thrust is clipped away.
 BOUND_SLIP = 1e-2
 
+#: An enumeration's member is looked up by name; every tick ends with this one.
+_SOLVED = Outcome.SOLVED
+
 
 @dataclass(slots=True)
 class AcceptedSolution:
@@ -114,7 +117,7 @@ class QpEngine:
             x = self._no_slack.copy()
             thrusts = x[: self._rotors]
             thrusts[:] = data.free
-            return AcceptedSolution(thrusts, x, self._no_price, Outcome.SOLVED, 0, 0.0, limited=False)
+            return AcceptedSolution(thrusts, x, self._no_price, _SOLVED, 0, 0.0, False)
         exact = self.active_set.solve(data)
         return None if exact is None else self._accept(*exact, Outcome.SOLVED, 0, 0.0)
 

@@ -57,7 +57,7 @@ class TickInputs:
             *measurement.contact_wrench.tolist(),
             *(_NOTHING if force is None else force.tolist()),
             *(_NOTHING if velocity is None else velocity.tolist()),
-            *contact.normal.tolist(),
+            *contact.direction,
             dt,
             force is not None,
             velocity is not None,
@@ -88,13 +88,14 @@ class TickInputs:
         for slot in self._pairing.assign(reference.lines):
             for kind in ("integral", "last"):
                 self._tick.states[f"line_{slot}_{kind}"][:] = 0.0
+        packed = self._lines
         for slot, _ in self.present:
-            self._lines[slot * SLOT_INPUTS] = 0.0
-        self.present = []
+            packed[slot * SLOT_INPUTS] = 0.0
+        self.present = present = []
         if not wall_known:
             return
         for slot, entry, vertical in self._pairing.pairs(measurement.lines, reference.lines):
             start = slot * SLOT_INPUTS
-            self._lines[start : start + SLOT_INPUTS] = entry
+            packed[start : start + SLOT_INPUTS] = entry
             self._vertical[slot] = vertical
-            self.present.append((slot, VERTICAL if vertical else HORIZONTAL))
+            present.append((slot, VERTICAL if vertical else HORIZONTAL))

@@ -82,7 +82,7 @@ class LinePairing:
         found = []
         for reference, (role, place), (slot, vertical) in zip(references, self.keys, self._places, strict=False):
             line = _nth(lines, role, place)
-            if line is None or not abs(line.rho) < RHO_BOUND:
+            if line is None or not -RHO_BOUND < line.rho < RHO_BOUND:
                 continue
             wanted = reference.theta
             rho, theta = align_line(line.rho, line.theta, wanted)

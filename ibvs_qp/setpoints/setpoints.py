@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import casadi as ca
 import numpy as np
 
@@ -30,7 +32,7 @@ _NO_LIMITS: tuple[list[float] | None, list[float] | None] = (None, None)
 
 def _number(name: str, index: int, text: str) -> property:
     """Read-only result of the last tick as a plain number."""
-    return property(lambda terms: float(terms.tick.outputs[name][index]), doc=text)
+    return property(lambda terms: terms.result(terms.tick.starts[name] + index), doc=text)
 
 
 class Setpoints:
@@ -40,6 +42,7 @@ class Setpoints:
         contact: Contact estimator; everything else lives in the compiled tick (`ibvs_qp.setpoints.model`).
         tick: The compiled function; with a program its `extra` arrays are those of
             `ProgramData`.
+        result: A result of the last tick by its place in the column of all of them.
     """
 
     def __init__(self, config: ControllerConfig, template: QpTemplate | None = None) -> None:
@@ -53,6 +56,7 @@ class Setpoints:
         self.tick = TickFunction(signals, program, config.machine_code)
         self._inputs = TickInputs(self.tick, config.line_slots)
         self._twist = camera_twist_matrix(np.array(vehicle.camera_position_m))
+        self.result = self.tick.results.item
         self._values, out = self.tick.inputs, self.tick.outputs
         self.normal, self.right, self.down = out["normal"], out["axis_right"], out["axis_down"]
         self.bias_wrench, self.angular = out["bias_wrench"], out["angular"]
@@ -61,6 +65,8 @@ class Setpoints:
             out["thrust_lower"],
             out["thrust_upper"],
         )
+        self._change, self._thrusts = self._values["thrust_change"], self._values["thrust_last"]
+        self._given_up: Any = self._values["given_up"].data
         self._values["thrust_floor"][:], self._values["thrust_ceiling"][:] = vehicle.thrust_min, vehicle.thrust_max
         self.reset()
 
@@ -101,17 +107,21 @@ class Setpoints:
         """Take in one checked measurement and reference."""
         config, values = self.config, self._values
         stamp = measurement.stamp_ns
-        dt = config.tick_s if self._stamp < 0 else min(max((stamp - self._stamp) * 1e-9, 0.0), LONGEST_TICK)
+        dt = config.tick_s
+        if self._stamp >= 0:
+            dt = (stamp - self._stamp) * 1e-9
+            dt = LONGEST_TICK if dt > LONGEST_TICK else dt if dt > 0.0 else 0.0
         self._stamp = stamp
         self.contact.update(measurement, down_in_body(measurement.attitude))
         self._inputs.write(measurement, reference, self.contact, dt)
         if self.last is None:
             values["thrust_last"][:] = hold_thrusts(config, measurement)
         low, high = measurement.thrust_min, measurement.thrust_max
-        limits = (None if low is None else low.tolist(), None if high is None else high.tolist())
-        if limits != self._limits:
-            self._limits = limits
-            self._narrow(low, high)
+        if low is not None or high is not None or self._limits is not _NO_LIMITS:
+            limits = (None if low is None else low.tolist(), None if high is None else high.tolist())
+            if limits != self._limits:
+                self._limits = _NO_LIMITS if limits == _NO_LIMITS else limits
+                self._narrow(low, high)
         self.tick()
 
     def _narrow(self, low: np.ndarray | None, high: np.ndarray | None) -> None:
@@ -124,14 +134,14 @@ class Setpoints:
 
     def note(self, thrusts: np.ndarray, given_up: float) -> None:
         """Take note of what was commanded and of the largest force or moment given up (anti-windup)."""
-        values = self._values
         if self.last is None:
+            values = self._values
             values["commanded"][0] = 1.0
             values["thrust_step"][0] = self.config.vehicle.thrust_rate_n_s * self.config.tick_s
         else:
-            np.subtract(thrusts, self.last, out=values["thrust_change"])
-        values["thrust_last"][:] = thrusts
-        values["given_up"][0] = given_up
+            np.subtract(thrusts, self.last, self._change)
+        self._thrusts[:] = thrusts
+        self._given_up[0] = given_up
         self.last = thrusts
 
     roll = _number("angles", 0, "Roll [rad].")

@@ -79,6 +79,10 @@ class Schedule:
         self._next_ns = self._start_ns + round(captures * NS_PER_S / self._rate_hz)
         return True
 
+    def rests(self, now_ns: int) -> bool:
+        """Whether neither a capture nor a delivery is due now; counts nothing."""
+        return now_ns < self._next_ns and not (self._queue and self._queue[0][0] <= now_ns)
+
     def push(self, stamp_ns: int, item: object) -> None:
         """Send off what was captured at ``stamp_ns``."""
         self._queue.append((stamp_ns + self._latency_ns, item))
