@@ -35,8 +35,6 @@ LEAP, LEAP_FRAMES = 0.05, 5
 SHORT_LOSS, RESUMED = 0.5, 0.4
 #: Free-flight noise of the push is averaged over this time [s].
 NOISE_TIME = 1.0
-#: A tick is never taken to last longer than this [s]: after a pause the filters begin where they were.
-LONGEST_TICK = 0.02
 
 _three = struct.Struct("3d")
 _put_three, _ROW_BYTES = _three.pack_into, _three.size
