@@ -383,7 +383,7 @@ def test_a_capped_solution_that_flies_is_as_near_as_promised() -> None:
     settings = SolverSettings(max_iterations=10, check_interval=5, polish=False, shortcut=False)
     controller = HybridController(ControllerConfig(solver=settings))
     vehicle, capped = SmallVehicle(controller.config), 0
-    rng = np.random.default_rng(2)
+    rng, reference = np.random.default_rng(2), Reference()
     for tick in range(400):
         if tick % 40 == 0:
             reference = Reference(velocity=rng.uniform(-0.1, 0.1, 2), standoff=0.1)
