@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import ibvs_qp
+from ibvs_qp.errors import out_of_range
 from ibvs_qp.measurement import SensorFrame
 from ibvs_qp.pilot import Pilot, PilotConfig
 from sim import controller_pool
@@ -85,9 +86,15 @@ def pilot_config(scene: Scene, options: FlightOptions, config: PilotConfig | Non
         scene: Only its paint job is read.
         options: Law and preset file.
         config: Takes the place of the preset.
+
+    Raises:
+        ConfigError: If the controller expects another period than the one that is simulated.
     """
     if config is None:
         config = PilotConfig.from_toml(options.preset) if options.preset else default_preset(options.law)
+    if round(config.controller.tick_s * 1e9) != TICK_NS:
+        allowed = f"the simulated loop ticks every {TICK_NS * 1e-9:g} s"
+        raise out_of_range("controller.tick_s", config.controller.tick_s, "s", allowed)
     paint = scene.paint
     painting = dataclasses.replace(
         config.painting,

@@ -8,6 +8,9 @@ import numpy as np
 import pytest
 from closed_loop_rigs import fly_geometric, hold, short_scene, wall
 
+from ibvs_qp.errors import ConfigError
+from ibvs_qp.pilot import PilotConfig
+from sim.closed_loop import FlightOptions, fly
 from sim.scene import CameraScene, ForceTorqueScene, VehicleScene
 
 
@@ -69,3 +72,11 @@ def test_same_seed_same_thrusts_to_the_bit() -> None:
     other, _ = fly_geometric(short_scene(stroke_m=0.2, rows=1), seed=4)
     assert np.array_equal(first.thrusts, second.thrusts)
     assert first.thrusts.shape != other.thrusts.shape or not np.array_equal(first.thrusts, other.thrusts)
+
+
+def test_a_controller_of_another_period_is_not_flown() -> None:
+    """Its thrust window would allow a rate that is not the vehicle's."""
+    config = PilotConfig()
+    config = dataclasses.replace(config, controller=dataclasses.replace(config.controller, tick_s=0.002))
+    with pytest.raises(ConfigError, match=r"controller\.tick_s = 0\.002 s is refused: the simulated loop ticks every"):
+        fly(short_scene(), FlightOptions(law="qp", features="geometric"), config=config)
