@@ -47,7 +47,7 @@ def stage_medians(config: ControllerConfig, ticks: list[Tick]) -> dict[str, floa
     """Median time of every stage of a step with OSQP at every tick [us]; the clocks' own time is in them."""
     controller, clock, last = HybridController(config), _Clock(), -1
     tick, solver = controller.setpoints.tick, controller.engine.osqp
-    tick._call = clock.around("evaluate", tick._call)
+    tick._evaluate = clock.around("evaluate", tick._evaluate)
     table: dict[str, list[float]] = {name: [] for name in ("pack", "evaluate", "update", "solve", "unpack")}
     engine = controller.engine.solve
     controller.engine.solve = clock.around("engine", engine)  # type: ignore[method-assign]
