@@ -213,8 +213,13 @@ def _paint(out: Path, *words: str) -> list[str]:
 
 
 def test_ctrl_c_ends_both_processes_with_a_partial_run(tmp_path):
-    """The signal goes to the parent alone, as a terminal's does once the children have their own group."""
-    process = subprocess.Popen(_paint(tmp_path / "run", "--no-video"), stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    """The signal goes to the parent alone, as a terminal's does once the children have their own group.
+
+    Eight rows, for a flight that no machine has finished before the signal.
+    """
+    (tmp_path / "long.toml").write_text("[paint]\nrows = 8\n")
+    words = _paint(tmp_path / "run", "--no-video", "--scene", str(tmp_path / "long.toml"))
+    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     while not (tmp_path / "run").exists() and process.poll() is None:
         time.sleep(0.1)
     time.sleep(4.0)
