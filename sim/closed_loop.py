@@ -226,7 +226,12 @@ def fly(
         The trace; incomplete with a reason when the flight crashed, timed out or was interrupted.
     """
     config, job = pilot_config(scene, options, config), job or PaintJob()
-    pilot, world = make_pilot(scene, options, config, job), World(scene, options, config)
+    world = World(scene, options, config)
+    try:
+        pilot = make_pilot(scene, options, config, job)  # after the world, whose camera sets itself up meanwhile
+    except BaseException:
+        world.close()
+        raise
     recorder, schedule = Recorder(scene, options, world, pilot), FaultSchedule(faults)
     limit = BASE_TIME + STROKE_FACTOR * job.expected_s(config.painting)
     start, reason, tick = time.perf_counter(), "", 0

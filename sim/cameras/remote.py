@@ -12,7 +12,6 @@ import sys
 import traceback
 from collections.abc import Callable
 from multiprocessing import resource_tracker
-from multiprocessing.connection import Connection
 from typing import NoReturn
 
 import numpy as np
@@ -20,6 +19,7 @@ import numpy as np
 from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.vehicle import VehicleParams
 from sim.cameras.protocol import camera_intrinsics
+from sim.cameras.rung_pipe import RungPipe
 from sim.canvas import Canvas, FreshPaint
 from sim.memory import keep_memory
 from sim.scene import Scene
@@ -67,7 +67,7 @@ class RemoteCamera:
         for part in itertools.chain(*self._places):
             part.flags.writeable = False
         self._begun = self._done = 0
-        self._pipe, there = context.Pipe()
+        self._pipe, there = RungPipe.pair(context)
         self._process = context.Process(
             target=_draw, args=(back_end, scene, vehicle, seed, memory, places, there), name="camera", daemon=True
         )
@@ -169,7 +169,7 @@ def _open(back_end: str, scene: Scene, vehicle: VehicleParams, seed: int):
 
 
 def _draw(
-    back_end: str, scene: Scene, vehicle: VehicleParams, seed: int, memory, places: int, pipe: Connection
+    back_end: str, scene: Scene, vehicle: VehicleParams, seed: int, memory, places: int, pipe: RungPipe
 ) -> None:
     """Draw what is asked for until None comes or the other end closes."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the flight decides what Ctrl-C means
