@@ -16,6 +16,7 @@ import ibvs_qp
 from ibvs_qp.errors import out_of_range
 from ibvs_qp.measurement import SensorFrame
 from ibvs_qp.pilot import Pilot, PilotConfig
+from ibvs_qp.vision.flow_ahead import FlowAhead
 from sim import controller_pool
 from sim.board import BoardGeometry
 from sim.cameras import CameraStream, RemoteCamera, open_camera
@@ -134,6 +135,7 @@ class World:
         if self._rendered and options.camera_process and options.camera in ("plane", "gl"):
             # first of all: it sets itself up meanwhile
             camera = RemoteCamera(scene, vehicle, options.seed, lambda: self.canvas.take(), options.camera, lend=True)
+        self._remote = camera
         self.plant = Plant(scene, vehicle, options.seed, options.machine_code, options.view)
         self.sensors = SensorSuite(scene, vehicle, options.seed, options.machine_code)
         self.canvas = Canvas(scene, options.seed)
@@ -150,6 +152,10 @@ class World:
         self.viewer = self._open_viewer() if options.view else None
         self._brush: tuple[float, float] | None = None
         self._pressed = 0
+
+    def flow(self, config: PilotConfig) -> FlowAhead | None:
+        """Who works out the flow beside the pilot: the drawing process where there is one."""
+        return None if self._remote is None else FlowAhead(self._remote, config.vision.flow)
 
     def _open_viewer(self) -> FlightViewer:
         from sim.viewer import FlightViewer
@@ -196,12 +202,15 @@ class World:
         return self._stream.close() if self._rendered else 0
 
 
-def make_pilot(scene: Scene, options: FlightOptions, config: PilotConfig, job: Job) -> Pilot:
+def make_pilot(
+    scene: Scene, options: FlightOptions, config: PilotConfig, job: Job, flow: FlowAhead | None = None
+) -> Pilot:
     """The pilot of one flight; with the scene's extra feature noise after its own perception."""
     sigma, noise = scene.features.sigma_vs, stream(options.seed, "sigma_vs")
     rendered = options.features == "rendered"  # the sensor model of lines adds the same noise itself
     seen_as = (lambda frame: add_sigma_vs(frame, sigma, noise)) if rendered and sigma > 0.0 else None
-    return Pilot(config, job.strategy(config.painting), seen_as, controller_pool.take(config.law, config.controller))
+    controller = controller_pool.take(config.law, config.controller)
+    return Pilot(config, job.strategy(config.painting), seen_as, controller, flow)
 
 
 def fly(
@@ -228,7 +237,8 @@ def fly(
     config, job = pilot_config(scene, options, config), job or PaintJob()
     world = World(scene, options, config)
     try:
-        pilot = make_pilot(scene, options, config, job)  # after the world, whose camera sets itself up meanwhile
+        # after the world, whose camera sets itself up meanwhile
+        pilot = make_pilot(scene, options, config, job, world.flow(config))
     except BaseException:
         world.close()
         raise

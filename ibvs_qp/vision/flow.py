@@ -8,6 +8,7 @@ import numpy as np
 from ibvs_qp.frames import R_BODY_CAMERA
 from ibvs_qp.vision.config import FlowConfig
 from ibvs_qp.vision.flow_solve import (
+    FlowSurface,
     FlowVelocity,
     expected_points,
     half_resolution,
@@ -77,6 +78,22 @@ class SparseFlow:
         Returns:
             The velocity, or the reason why there is none.
         """
+        result = self.follow(rgb, excluded, intrinsics, stamp_ns, rotation, camera_rotation, camera_position)
+        surface = None if plane is None else FlowSurface(plane.inverse_depth, plane.residual_sigma)
+        self.settle(depth, excluded, intrinsics, surface, busy)
+        return result
+
+    def follow(
+        self,
+        rgb: np.ndarray,
+        excluded: np.ndarray,
+        intrinsics: Intrinsics,
+        stamp_ns: int,
+        rotation: np.ndarray,
+        camera_rotation: np.ndarray,
+        camera_position: np.ndarray,
+    ) -> FlowVelocity | str:
+        """First half of `update`, which asks for nothing that the rest of vision finds in this picture."""
         config, half = self._config, half_resolution(intrinsics)
         grey = cv2.resize(  # grey first: one channel is shrunk eight times as fast as three
             cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY), (rgb.shape[1] // 2, rgb.shape[0] // 2), interpolation=cv2.INTER_AREA
@@ -100,12 +117,24 @@ class SparseFlow:
             result = FlowVelocity(
                 velocity=result.velocity, covariance=result.covariance, stamp_ns=middle, points=result.points
             )
-        self._frames += 1
-        if len(self._points) < config.points_low or (self._frames >= config.redetect and not busy):
-            self._find(grey, excluded, half)
-        self._inverse = inverse_depths(self._bearings, depth, intrinsics, plane)
         self._grey, self._stamp_ns = grey, stamp_ns
         return result
+
+    def settle(
+        self,
+        depth: np.ndarray,
+        excluded: np.ndarray,
+        intrinsics: Intrinsics,
+        surface: FlowSurface | None,
+        busy: bool,
+    ) -> None:
+        """Second half of `update`: makes the points of the followed picture ready for the next one."""
+        config = self._config
+        assert self._grey is not None
+        self._frames += 1
+        if len(self._points) < config.points_low or (self._frames >= config.redetect and not busy):
+            self._find(self._grey, excluded, half_resolution(intrinsics))
+        self._inverse = inverse_depths(self._bearings, depth, intrinsics, surface)
 
     def _find(self, grey: np.ndarray, excluded: np.ndarray, half: Intrinsics) -> None:
         """New points where the picture has structure, with the information each carries."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,7 +15,6 @@ from ibvs_qp.vision.flow_numpy import depths_with_numpy, root_with_numpy, solve_
 from ibvs_qp.vision.mask import Intrinsics
 from ibvs_qp.vision.native import native
 from ibvs_qp.vision.native_flow import depths_natively, root_natively, solve_natively
-from ibvs_qp.vision.plane import PlaneEstimate
 
 #: A point within this many residual sigmas of the surface takes the surface's depth, which is far less noisy.
 _ON_PLANE_SIGMAS = 4.0
@@ -43,6 +43,18 @@ class FlowVelocity:
     points: int
 
 
+class FlowSurface(NamedTuple):
+    """What flow asks of the working surface.
+
+    Attributes:
+        inverse_depth: (a, b, c) of 1/Z = a x + b y + c, (3,).
+        residual_sigma: Standard deviation of its residuals, share of depth.
+    """
+
+    inverse_depth: np.ndarray
+    residual_sigma: float
+
+
 def half_resolution(intrinsics: Intrinsics) -> Intrinsics:
     """Camera of the picture at half resolution (2x2 means: pixel centres shift by half a pixel)."""
     fx, fy, cx, cy = intrinsics
@@ -64,7 +76,7 @@ def information_root(grey: np.ndarray, points: np.ndarray, config: FlowConfig) -
 
 
 def inverse_depths(
-    bearings: np.ndarray, depth: np.ndarray, intrinsics: Intrinsics, plane: PlaneEstimate | None
+    bearings: np.ndarray, depth: np.ndarray, intrinsics: Intrinsics, plane: FlowSurface | None
 ) -> np.ndarray:
     """1/Z of normalised points (n, 2): the surface's where they lie on it, else their own, 0 if unknown, (n,)."""
     if len(bearings) == 0:

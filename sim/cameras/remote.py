@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
+import collections
 import itertools
 import math
 import multiprocessing
 import os
-import resource
 import signal
-import sys
-import traceback
 from collections.abc import Callable
 from multiprocessing import resource_tracker
 from typing import NoReturn
@@ -18,10 +16,11 @@ import numpy as np
 
 from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.vehicle import VehicleParams
+from ibvs_qp.vision.flow_task import FlowAnswer, FlowTask
+from sim.cameras.drawing_process import draw, picture_bytes, picture_views
 from sim.cameras.protocol import camera_intrinsics
 from sim.cameras.rung_pipe import RungPipe
-from sim.canvas import Canvas, FreshPaint
-from sim.memory import keep_memory
+from sim.canvas import FreshPaint
 from sim.scene import Scene
 
 #: Time given to the process to end by itself [s].
@@ -37,7 +36,8 @@ def spare_core(processes: int = 1) -> bool:
 class RemoteCamera:
     """`PlaneCamera` or `GLCamera` in another process: the same pictures to the bit, handed over in shared memory.
 
-    Pose and fresh paint of a capture are sent to the process, which draws in order. Close it after use.
+    Pose and fresh paint of a capture are sent to the process, which draws in order. It also follows the flow from
+    picture to picture for who asks (`ibvs_qp.vision.flow_ahead.FlowLink`), of lent pictures. Close it after use.
 
     Args:
         scene: Board, wall and camera.
@@ -62,14 +62,18 @@ class RemoteCamera:
         # every picture under way has its place, one is being read, and the one before may still be looked at
         places = math.ceil(scene.camera.latency_s * scene.camera.rate_hz) + 3
         context = multiprocessing.get_context("spawn")
-        memory = context.RawArray("B", places * _bytes(shape))
-        self._places = _views(memory, places, shape)
+        memory = context.RawArray("B", places * picture_bytes(shape))
+        self._places = picture_views(memory, places, shape)
         for part in itertools.chain(*self._places):
             part.flags.writeable = False
         self._begun = self._done = 0
+        self._taken: collections.deque[tuple[int, int]] = collections.deque(maxlen=places)  # place and stamp
+        self._drawn: collections.deque[int] = collections.deque()
+        self._followed: collections.deque[FlowAnswer] = collections.deque()
+        self._failure = "died without a word; was it out of memory?"
         self._pipe, there = RungPipe.pair(context)
         self._process = context.Process(
-            target=_draw, args=(back_end, scene, vehicle, seed, memory, places, there), name="camera", daemon=True
+            target=draw, args=(back_end, scene, vehicle, seed, memory, places, there), name="camera", daemon=True
         )
         resource_tracker.ensure_running()  # its own start lets Ctrl-C through again
         signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # Ctrl-C must not hit its imports
@@ -94,19 +98,15 @@ class RemoteCamera:
             raise RuntimeError("more pictures under way than the camera's latency allows")
         place = self._begun % len(self._places)
         pose = np.array(position_ned, float), np.array(quaternion_b_in_i, float)
-        try:
-            self._pipe.send((place, *pose, stamp_ns, self._take()))
-        except OSError:
-            self._failed()
+        self._send((place, *pose, stamp_ns, self._take()))
+        self._taken.append((place, stamp_ns))
         self._begun += 1
 
         def develop() -> RgbdFrame:
-            try:
-                answer = self._pipe.recv()
-            except (EOFError, OSError):
-                self._failed()
-            if answer != place:
-                raise RuntimeError(f"the drawing process failed:\n{answer}")
+            while not self._drawn:
+                self._receive()
+            if self._drawn.popleft() != place:
+                raise RuntimeError("pictures must be developed in the order of exposure")
             self._done += 1
             rgb, depth = self._places[place]
             if not self._lend:
@@ -115,8 +115,55 @@ class RemoteCamera:
 
         return develop
 
+    def place(self, rgb: np.ndarray) -> int:
+        """Where a lent picture lies, see `ibvs_qp.vision.flow_ahead.FlowLink`."""
+        for place, (own, _) in enumerate(self._places):
+            if own is rgb:
+                return place
+        raise RuntimeError("this picture was not lent by this camera")
+
+    def following(self, place: int) -> tuple[int, int] | None:
+        """Place of the picture taken after that one, and the time between both [ns]; None if there is none yet."""
+        for (before, stamp), (behind, later) in itertools.pairwise(self._taken):
+            if before == place:
+                return behind, later - stamp
+        return None
+
+    def ask(self, task: FlowTask) -> None:
+        """Have points followed."""
+        self._send(task)
+
+    def answer(self, number: int) -> FlowAnswer:
+        """Wait for the answer to a task; those to earlier ones are dropped."""
+        while True:
+            while not self._followed:
+                self._receive()
+            answer = self._followed.popleft()
+            if answer.number == number:
+                return answer
+
+    def _send(self, order: object) -> None:
+        try:
+            self._pipe.send(order)
+        except OSError:
+            self._failed()
+
+    def _receive(self) -> None:
+        """Wait for one answer of the process and put it where it is looked for."""
+        try:
+            answer = self._pipe.recv()
+        except (EOFError, OSError):
+            self._failed()
+        if isinstance(answer, FlowAnswer):
+            self._followed.append(answer)
+        elif isinstance(answer, int):
+            self._drawn.append(answer)
+        else:
+            self._failure = f"failed:\n{answer}"
+            self._failed()
+
     def _failed(self) -> NoReturn:
-        raise RuntimeError("the drawing process died without a word; was it out of memory?") from None
+        raise RuntimeError(f"the drawing process {self._failure}") from None
 
     def close(self) -> int:
         """End the process.
@@ -139,60 +186,3 @@ class RemoteCamera:
         if self._process.is_alive():
             self._process.terminate()
         return peak
-
-
-def _bytes(shape: tuple[int, int]) -> int:
-    """Size of one picture: three bytes of colour and four of depth a pixel."""
-    return 7 * shape[0] * shape[1]
-
-
-def _views(memory, places: int, shape: tuple[int, int]) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Colour (H, W, 3) and depth (H, W) of every place in shared memory; depth first, as it must lie aligned."""
-    flat, size, pixels = np.frombuffer(memory, np.uint8), _bytes(shape), shape[0] * shape[1]
-    views = []
-    for place in range(places):
-        part = flat[place * size : (place + 1) * size]
-        views.append((part[4 * pixels :].reshape(*shape, 3), part[: 4 * pixels].view(np.float32).reshape(shape)))
-    return views
-
-
-def _open(back_end: str, scene: Scene, vehicle: VehicleParams, seed: int):
-    """The camera that draws; OpenGL is loaded only where it is used."""
-    canvas = Canvas(scene, seed)
-    if back_end == "gl":
-        from sim.cameras.gl import GLCamera
-
-        return GLCamera(scene, vehicle, canvas, seed)
-    from sim.cameras.plane import PlaneCamera
-
-    return PlaneCamera(scene, vehicle, canvas, seed)
-
-
-def _draw(
-    back_end: str, scene: Scene, vehicle: VehicleParams, seed: int, memory, places: int, pipe: RungPipe
-) -> None:
-    """Draw what is asked for until None comes or the other end closes."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the flight decides what Ctrl-C means
-    import cv2
-
-    cv2.setNumThreads(1)
-    keep_memory()
-    try:
-        camera = _open(back_end, scene, vehicle, seed)
-        views = _views(memory, places, (scene.camera.height, scene.camera.width))
-        while True:
-            order = pipe.recv()
-            if order is None:
-                peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-                pipe.send((peak if sys.platform == "darwin" else 1024 * peak,))
-                return
-            place, position, quaternion, stamp_ns, paint = order
-            frame = camera.develop(position, quaternion, stamp_ns, paint, views[place])
-            for drawn, wanted in zip((frame.rgb, frame.depth), views[place], strict=True):
-                if drawn is not wanted:
-                    wanted[:] = drawn
-            pipe.send(place)
-    except (EOFError, BrokenPipeError):  # the flight is over, or was never
-        return
-    except Exception:
-        pipe.send(traceback.format_exc())

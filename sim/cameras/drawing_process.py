@@ -1,0 +1,79 @@
+"""What the process of a `RemoteCamera` does: draws pictures into shared memory and follows points through them."""
+
+from __future__ import annotations
+
+import resource
+import signal
+import sys
+import traceback
+
+import numpy as np
+
+from ibvs_qp.vehicle import VehicleParams
+from ibvs_qp.vision.flow_task import FlowTask
+from ibvs_qp.vision.flow_worker import FlowWorker
+from sim.cameras.rung_pipe import RungPipe
+from sim.canvas import Canvas
+from sim.memory import keep_memory
+from sim.scene import Scene
+
+
+def picture_bytes(shape: tuple[int, int]) -> int:
+    """Size of one picture: three bytes of colour and four of depth a pixel."""
+    return 7 * shape[0] * shape[1]
+
+
+def picture_views(memory, places: int, shape: tuple[int, int]) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Colour (H, W, 3) and depth (H, W) of every place in shared memory; depth first, as it must lie aligned."""
+    flat, size, pixels = np.frombuffer(memory, np.uint8), picture_bytes(shape), shape[0] * shape[1]
+    views = []
+    for place in range(places):
+        part = flat[place * size : (place + 1) * size]
+        views.append((part[4 * pixels :].reshape(*shape, 3), part[: 4 * pixels].view(np.float32).reshape(shape)))
+    return views
+
+
+def _open(back_end: str, scene: Scene, vehicle: VehicleParams, seed: int):
+    """The camera that draws; OpenGL is loaded only where it is used."""
+    canvas = Canvas(scene, seed)
+    if back_end == "gl":
+        from sim.cameras.gl import GLCamera
+
+        return GLCamera(scene, vehicle, canvas, seed)
+    from sim.cameras.plane import PlaneCamera
+
+    return PlaneCamera(scene, vehicle, canvas, seed)
+
+
+def draw(back_end: str, scene: Scene, vehicle: VehicleParams, seed: int, memory, places: int, pipe: RungPipe) -> None:
+    """Draw what is asked for until None comes or the other end closes."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the flight decides what Ctrl-C means
+    import cv2
+
+    cv2.setNumThreads(1)
+    keep_memory()
+    try:
+        camera = _open(back_end, scene, vehicle, seed)
+        views = picture_views(memory, places, (scene.camera.height, scene.camera.width))
+        worker = FlowWorker()
+        while True:
+            order = pipe.recv()
+            if order is None:
+                peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+                pipe.send((peak if sys.platform == "darwin" else 1024 * peak,))
+                return
+            if isinstance(order, FlowTask):
+                followed = worker.run(order, views)
+                if followed is not None:
+                    pipe.send(followed)
+                continue
+            place, position, quaternion, stamp_ns, paint = order
+            frame = camera.develop(position, quaternion, stamp_ns, paint, views[place])
+            for drawn, wanted in zip((frame.rgb, frame.depth), views[place], strict=True):
+                if drawn is not wanted:
+                    wanted[:] = drawn
+            pipe.send(place)
+    except (EOFError, BrokenPipeError):  # the flight is over, or was never
+        return
+    except Exception:
+        pipe.send(traceback.format_exc())
