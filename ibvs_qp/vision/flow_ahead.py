@@ -13,7 +13,6 @@ from ibvs_qp.vision.config import FlowConfig
 from ibvs_qp.vision.flow_solve import FlowVelocity
 from ibvs_qp.vision.flow_task import FlowLink, FlowTask, Lens, Step
 from ibvs_qp.vision.mask import Intrinsics
-from ibvs_qp.vision.motion import CameraMotion
 from ibvs_qp.vision.plane import PlaneEstimate
 
 
@@ -52,12 +51,12 @@ class FlowAhead:
         camera_position: np.ndarray,
         busy: bool = False,
     ) -> FlowVelocity | str:
-        """As `SparseFlow.update`, of a picture that the link has handed out."""
+        """As `SparseFlow.update`, of a picture that the link has handed out; the turn as a matrix is made there."""
         lens = None
         if self._lens is None or self._lens.excluded is not excluded:
             lens = self._lens = Lens(self._config, excluded, intrinsics, camera_position)
             self.reset()
-        step = Step(self._link.place(rgb), stamp_ns, rotation.tolist(), camera_rotation.ravel().tolist())
+        step = Step(self._link.place(rgb), stamp_ns, rotation.tolist())
         if self._asked != step:
             self._ask(step, lens)
         self._asked = None
@@ -82,9 +81,7 @@ class FlowAhead:
         step, following = None, self._link.following(self._link.place(rgb))
         if stamp_ns is not None and following is not None and self._lens is not None:
             turn = finite_vector(rotation, 3)
-            turn = np.zeros(3) if turn is None else turn
-            camera = CameraMotion.of_body(turn, None, 0.0, self._lens.camera_position).rotation
-            step = Step(following[0], stamp_ns, turn.tolist(), camera.ravel().tolist())
+            step = Step(following[0], stamp_ns, [0.0] * 3 if turn is None else turn.tolist())
         if step is not None or self._settle[1] is not None:
             self._ask(step, None)
 

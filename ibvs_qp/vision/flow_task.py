@@ -30,13 +30,11 @@ class Step:
         place: Where the picture lies in the memory of the process.
         stamp_ns: Capture time.
         rotation: Turn of the body since the picture before [rad], (3).
-        camera_rotation: The same as a matrix in camera frames, by rows, (9).
     """
 
     place: int
     stamp_ns: int
     rotation: list[float]
-    camera_rotation: list[float]
 
 
 @dataclass(frozen=True)

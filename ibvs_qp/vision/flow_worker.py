@@ -10,6 +10,7 @@ import numpy as np
 from ibvs_qp.vision.flow import SparseFlow
 from ibvs_qp.vision.flow_solve import FlowSurface
 from ibvs_qp.vision.flow_task import FlowAnswer, FlowTask, Lens
+from ibvs_qp.vision.motion import CameraMotion
 
 
 class FlowWorker:
@@ -43,13 +44,9 @@ class FlowWorker:
             self._flow.reset()
         self._before = copy.copy(self._flow)  # what it holds is replaced, never changed
         rgb, self._depth = pictures[step.place]
+        turn = np.array(step.rotation)
+        camera = CameraMotion.of_body(turn, None, 0.0, lens.camera_position).rotation
         result = self._flow.follow(
-            rgb,
-            lens.excluded,
-            lens.intrinsics,
-            step.stamp_ns,
-            np.array(step.rotation),
-            np.array(step.camera_rotation).reshape(3, 3),
-            lens.camera_position,
+            rgb, lens.excluded, lens.intrinsics, step.stamp_ns, turn, camera, lens.camera_position
         )
         return FlowAnswer(task.number, result, 1e3 * (time.perf_counter() - begin))

@@ -10,12 +10,14 @@ import traceback
 import numpy as np
 
 from ibvs_qp.vehicle import VehicleParams
-from ibvs_qp.vision.flow_task import FlowTask
 from ibvs_qp.vision.flow_worker import FlowWorker
 from sim.cameras.rung_pipe import RungPipe
-from sim.canvas import Canvas
+from sim.canvas import Canvas, FreshPaint
 from sim.memory import keep_memory
 from sim.scene import Scene
+
+#: A picture to draw: place in the shared memory, position, quaternion, stamp [ns] and what is new of the paint.
+Order = tuple[int, np.ndarray, np.ndarray, int, FreshPaint | None]
 
 
 def picture_bytes(shape: tuple[int, int]) -> int:
@@ -46,7 +48,7 @@ def _open(back_end: str, scene: Scene, vehicle: VehicleParams, seed: int):
 
 
 def draw(back_end: str, scene: Scene, vehicle: VehicleParams, seed: int, memory, places: int, pipe: RungPipe) -> None:
-    """Draw what is asked for until None comes or the other end closes."""
+    """Do what is asked for, each time flow tasks and then a picture (or None), until None comes or the pipe closes."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the flight decides what Ctrl-C means
     import cv2
 
@@ -57,15 +59,17 @@ def draw(back_end: str, scene: Scene, vehicle: VehicleParams, seed: int, memory,
         views = picture_views(memory, places, (scene.camera.height, scene.camera.width))
         worker = FlowWorker()
         while True:
-            order = pipe.recv()
-            if order is None:
+            message = pipe.recv()
+            if message is None:
                 peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
                 pipe.send((peak if sys.platform == "darwin" else 1024 * peak,))
                 return
-            if isinstance(order, FlowTask):
-                followed = worker.run(order, views)
+            tasks, order = message
+            for task in tasks:
+                followed = worker.run(task, views)
                 if followed is not None:
                     pipe.send(followed)
+            if order is None:
                 continue
             place, position, quaternion, stamp_ns, paint = order
             frame = camera.develop(position, quaternion, stamp_ns, paint, views[place])

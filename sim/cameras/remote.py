@@ -17,7 +17,7 @@ import numpy as np
 from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.vehicle import VehicleParams
 from ibvs_qp.vision.flow_task import FlowAnswer, FlowTask
-from sim.cameras.drawing_process import draw, picture_bytes, picture_views
+from sim.cameras.drawing_process import Order, draw, picture_bytes, picture_views
 from sim.cameras.protocol import camera_intrinsics
 from sim.cameras.rung_pipe import RungPipe
 from sim.canvas import FreshPaint
@@ -68,6 +68,7 @@ class RemoteCamera:
             part.flags.writeable = False
         self._begun = self._done = 0
         self._taken: collections.deque[tuple[int, int]] = collections.deque(maxlen=places)  # place and stamp
+        self._tasks: list[FlowTask] = []
         self._drawn: collections.deque[int] = collections.deque()
         self._followed: collections.deque[FlowAnswer] = collections.deque()
         self._failure = "died without a word; was it out of memory?"
@@ -130,11 +131,13 @@ class RemoteCamera:
         return None
 
     def ask(self, task: FlowTask) -> None:
-        """Have points followed."""
-        self._send(task)
+        """Have points followed; told with the next picture or when the answer is wanted: each message wakes a core."""
+        self._tasks.append(task)
 
     def answer(self, number: int) -> FlowAnswer:
         """Wait for the answer to a task; those to earlier ones are dropped."""
+        if self._tasks:
+            self._send(None)
         while True:
             while not self._followed:
                 self._receive()
@@ -142,9 +145,10 @@ class RemoteCamera:
             if answer.number == number:
                 return answer
 
-    def _send(self, order: object) -> None:
+    def _send(self, order: Order | None) -> None:
+        tasks, self._tasks = self._tasks, []
         try:
-            self._pipe.send(order)
+            self._pipe.send((tasks, order))
         except OSError:
             self._failed()
 
