@@ -157,6 +157,11 @@ class World:
         """Who works out the flow beside the pilot: the drawing process where there is one."""
         return None if self._remote is None else FlowAhead(self._remote, config.vision.flow)
 
+    def wait(self) -> None:
+        """Wait until all is set up: a drawing process begins as long before a flight as a camera in this one."""
+        if self._remote is not None:
+            self._remote.wait()
+
     def _open_viewer(self) -> FlightViewer:
         from sim.viewer import FlightViewer
 
@@ -239,6 +244,7 @@ def fly(
     try:
         # after the world, whose camera sets itself up meanwhile
         pilot = make_pilot(scene, options, config, job, world.flow(config))
+        world.wait()
     except BaseException:
         world.close()
         raise

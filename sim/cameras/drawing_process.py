@@ -19,6 +19,9 @@ from sim.scene import Scene
 #: A picture to draw: place in the shared memory, position, quaternion, stamp [ns] and what is new of the paint.
 Order = tuple[int, np.ndarray, np.ndarray, int, FreshPaint | None]
 
+#: Sent when everything is set up, where pictures are answered by their place.
+READY = -1
+
 
 def picture_bytes(shape: tuple[int, int]) -> int:
     """Size of one picture: three bytes of colour and four of depth a pixel."""
@@ -58,6 +61,7 @@ def draw(back_end: str, scene: Scene, vehicle: VehicleParams, seed: int, memory,
         camera = _open(back_end, scene, vehicle, seed)
         views = picture_views(memory, places, (scene.camera.height, scene.camera.width))
         worker = FlowWorker()
+        pipe.send(READY)
         while True:
             message = pipe.recv()
             if message is None:

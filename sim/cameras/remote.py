@@ -17,7 +17,7 @@ import numpy as np
 from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.vehicle import VehicleParams
 from ibvs_qp.vision.flow_task import FlowAnswer, FlowTask
-from sim.cameras.drawing_process import Order, draw, picture_bytes, picture_views
+from sim.cameras.drawing_process import READY, Order, draw, picture_bytes, picture_views
 from sim.cameras.protocol import camera_intrinsics
 from sim.cameras.rung_pipe import RungPipe
 from sim.canvas import FreshPaint
@@ -66,7 +66,7 @@ class RemoteCamera:
         self._places = picture_views(memory, places, shape)
         for part in itertools.chain(*self._places):
             part.flags.writeable = False
-        self._begun = self._done = 0
+        self._begun, self._done, self._set_up = 0, 0, False
         self._taken: collections.deque[tuple[int, int]] = collections.deque(maxlen=places)  # place and stamp
         self._tasks: list[FlowTask] = []
         self._drawn: collections.deque[int] = collections.deque()
@@ -83,6 +83,15 @@ class RemoteCamera:
         finally:
             signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
         there.close()
+
+    def wait(self) -> None:
+        """Wait until the process is set up.
+
+        Raises:
+            RuntimeError: When it has failed.
+        """
+        while not self._set_up:
+            self._receive()
 
     def capture(self, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, stamp_ns: int) -> RgbdFrame:
         """Take a picture and wait for it, see `sim.cameras.protocol.Camera`."""
@@ -160,6 +169,8 @@ class RemoteCamera:
             self._failed()
         if isinstance(answer, FlowAnswer):
             self._followed.append(answer)
+        elif answer == READY:
+            self._set_up = True
         elif isinstance(answer, int):
             self._drawn.append(answer)
         else:
