@@ -1,5 +1,7 @@
 """What notebooks 03, 05 and 06 compute beside what their own test cells hold."""
 
+import dataclasses
+
 import numpy as np
 import polars as pl
 import pytest
@@ -51,6 +53,8 @@ def test_a_difference_is_sure_from_six_pairs_on():
     words = differences_table(made_table(1.0, 0.0, seeds=6), FIGURES[0])
     # where a flight failed, five pairs are left
     assert words.count("QP better") == 6 and words.count("sure from 6 pairs on") == 3
+    shares = dataclasses.replace(FIGURES[0], more_is_better=True)
+    assert differences_table(made_table(1.0, 0.0, seeds=6), shares).count("analytic law better") == 6
 
 
 def test_a_wrong_file_is_named_and_the_sample_stands_in(tmp_path):

@@ -14,7 +14,7 @@ from sim.notebook.noise.table import FIGURES, FORCE, VS, Figure, grid_of, reason
 from sim.sweep.paired import needed, paired_differences, sign
 
 _PATH, _PUSH = FIGURES[:2]
-#: Of an error: smaller is better.
+#: By the sign of analytic law minus QP law in what shall be small.
 _VERDICTS = {1: "QP better", 0: "no difference shown", -1: "analytic law better"}
 
 
@@ -76,12 +76,12 @@ def differences_table(table: pl.DataFrame, figure: Figure) -> str:
         if found is None:
             continue
         low, middle, high = (figure.scale * found[name] for name in ("sure_low", "median", "sure_high"))
-        verdict = _VERDICTS[sign(found)] if math.isfinite(low) else f"sure from {needed()} pairs on"
+        better = -sign(found) if figure.more_is_better else sign(found)
+        verdict = _VERDICTS[better] if math.isfinite(low) else f"sure from {needed()} pairs on"
         span = f"{low:+.2f} to {high:+.2f}" if math.isfinite(low) else "–"
         params = cell["params"]
         lines.append(
-            f"| {params['sigma_vs']:g} | {params['sigma_f_n']:g} | {cell['n']} | {middle:+.2f} | "
-            f"{span} | {verdict} |"
+            f"| {params['sigma_vs']:g} | {params['sigma_f_n']:g} | {cell['n']} | {middle:+.2f} | {span} | {verdict} |"
         )
     return "\n".join(lines)
 
