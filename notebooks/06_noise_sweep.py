@@ -170,7 +170,7 @@ def _(table):
 
     Below one picture's worth of averaging a line noise would go straight into the path. Tens of pictures are a second
     or more of memory, which only works because the accelerometer and the gyro carry the estimate from picture to
-    picture. The push cannot be averaged as long: 50 force samples at 100 Hz are a bandwidth of 0.6 Hz, and a slower
+    picture. The push cannot be averaged as long: 40 force samples at 100 Hz are a bandwidth of 0.8 Hz, and a slower
     force loop would no longer follow its wall.
     """
     )
