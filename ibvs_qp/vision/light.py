@@ -36,10 +36,11 @@ _DIMMEST, _BRIGHTEST = 0.4, 2.5
 _CUT, _WHITE = 250.0, np.float32(255.0)
 #: Share of the gate within which a colour is the surface's however coarse its label: labels are in steps of 8.
 _SURE = 0.75
-#: What a field may leave unexplained, rms of the colour over the gate. Light on one surface leaves 0.06 to 0.13, up to
-#: 0.26 where much of it is cut off; a grey board beside a grey wall is a step, which no polynomial follows, and leaves
-#: 0.15 to 0.50. Taken for light it costs the edge: flights before the faint board stopped there.
-_UNEXPLAINED = 0.15
+#: What a field may leave of what two materials in even light leave, see `_left_by_two_materials`. Light on a board
+#: leaves 0.1 to 0.35 of it, up to 0.6 on a dark one, whose gate holds that light anyway; a grey board beside a grey
+#: wall is a step, which no polynomial follows, and leaves 0.6 to 2.9, in flights before the faint board 0.7 at least.
+#: Taken for light a step costs the edge.
+_UNEXPLAINED = 0.5
 #: The field is not continued farther than this beyond the light it was fitted to [ln].
 _BEYOND = 0.06
 
@@ -174,7 +175,8 @@ def fit_light(
         part = design[telling]
         solution = np.linalg.solve(part.T @ part + len(part) * np.diag(_PULL), part.T @ logarithm[telling])
         expected = design @ solution
-    if float(np.std((logarithm - expected)[telling])) * size**0.5 > _UNEXPLAINED * gate:
+    left = float(np.abs((logarithm - expected)[telling]).sum())
+    if left > _UNEXPLAINED * _left_by_two_materials(logarithm[telling], _SURE * gate / size**0.5):
         return None
     if not anchored:
         expected, solution[0] = expected - solution[0], 0.0
@@ -187,6 +189,22 @@ def fit_light(
     if int(np.count_nonzero(whole)) >= _LEAST:
         board = np.median(colors[whole] / np.exp(expected[whole])[:, None], axis=0).astype(np.float32)
     return LightField(solution, (low - _BEYOND, high + _BEYOND), reach, shape, intrinsics), board
+
+
+def _left_by_two_materials(logarithm: np.ndarray, band: float) -> float:
+    """Sum of distances of samples (n,) from the level of their material, the surface's or another one beyond the gate.
+
+    The other is darker or brighter by more than the band, whichever leaves less. Smooth light has every level in
+    between, so that this leaves its slope; materials have one level each, and leave noise alone.
+    """
+    left = []
+    for split in (-band, band):
+        above = logarithm > split
+        count = int(np.count_nonzero(above))
+        total, bright = float(logarithm.sum()), float(logarithm @ above)
+        levels = np.array(((total - bright) / max(len(logarithm) - count, 1), bright / max(count, 1)))
+        left.append(float(np.abs(logarithm - levels[above.view(np.int8)]).sum()))
+    return min(left)
 
 
 def _distances(colors: np.ndarray, board: np.ndarray, light: np.ndarray) -> np.ndarray:
