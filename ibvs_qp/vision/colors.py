@@ -8,9 +8,10 @@ import numpy as np
 
 from ibvs_qp.vision.grid import CoarseGrid
 from ibvs_qp.vision.label_tables import BOARD, OTHER, PAINT, TABLE_SIZE, LabelTables, places_in_table
-from ibvs_qp.vision.light import LightField, fit_light
+from ibvs_qp.vision.light import LightField, fit_light, gates_of, is_even
 from ibvs_qp.vision.native import native, place
-from ibvs_qp.vision.paint_light import paint_as_lit
+from ibvs_qp.vision.native_colors import board_natively, even_natively, seeds_natively
+from ibvs_qp.vision.paint_light import paint_as_lit, paint_seen_natively
 
 __all__ = ["BOARD", "OTHER", "PAINT", "SurfaceColors"]
 
@@ -18,6 +19,8 @@ __all__ = ["BOARD", "OTHER", "PAINT", "SurfaceColors"]
 _BLEND = 0.2
 #: Samples whose median is taken; more cost time and change nothing.
 _JUDGED = 500
+#: Fewer samples tell nothing of the board.
+_LEAST = 8
 _SUM = np.ones(3, np.float32)
 #: Even light: one level, that of the reference.
 _EVEN = (0,)
@@ -42,24 +45,48 @@ class SurfaceColors:
         self._tables = LabelTables(self._gate)
         self.light: LightField | None = None
 
-    def learn(self, samples: np.ndarray) -> None:
-        """Sample the board: median of the unpainted colours among (n, 3) samples; few samples change nothing.
+    def learn(self, colors: np.ndarray, component: np.ndarray) -> None:
+        """Sample the board: median of the unpainted colours of the surface's samples; few samples change nothing.
 
         In uneven light `learn_light` samples it.
+
+        Args:
+            colors: Colours of the grid's samples, uint8 (rows, columns, 3).
+            component: Samples of the surface, bool (rows, columns).
         """
         if self._given is not None or self.light is not None:
             return
+        library = native()
+        if library is None:
+            median = self._median_with_numpy(colors[component])
+        else:
+            count, median = board_natively(library, colors, component, self.paint, self.board, self._gate**2, _JUDGED)
+            median = median if count >= _LEAST else None
+        if median is not None:
+            self.board = median if self.board is None else self.board + _BLEND * (median - self.board)
+
+    def _median_with_numpy(self, samples: np.ndarray) -> np.ndarray | None:
+        """Median colour where there is no machine code, None of few samples (n, 3)."""
         samples = samples.astype(np.float32)
         if self.paint is not None and len(samples):
             samples = samples[self._distance(samples, self.paint) > self._gate**2]
         if self.board is not None and len(samples):
             near = samples[self._distance(samples, self.board) < self._gate**2]
             samples = near if len(near) > len(samples) // 4 else samples[:0]
-        if len(samples) < 8:
-            return
+        if len(samples) < _LEAST:
+            return None
         ordered = np.sort(samples[:: max(1, len(samples) // _JUDGED)], axis=0)
-        median = ordered[len(ordered) // 2]
-        self.board = median if self.board is None else self.board + _BLEND * (median - self.board)
+        return ordered[len(ordered) // 2]
+
+    def surely_even(self, colors: np.ndarray, places: np.ndarray) -> bool:
+        """Whether light has been even and is, by colours uint8 (rows, columns, 3) at flat places on the surface.
+
+        False also where only `learn_light` can tell.
+        """
+        library = native()
+        if library is None or self.light is not None or self.board is None:
+            return False
+        return is_even(*even_natively(library, colors, places, self.paint, self.board, gates_of(self._gate))[::-1])
 
     def learn_light(
         self,
@@ -88,14 +115,19 @@ class SurfaceColors:
             self.board = found[1]
         return found is not None
 
-    def learn_paint(self, samples: np.ndarray, places: np.ndarray) -> None:
-        """See how bright the paint is, among colours (n, 3) at normalised places (n, 2) beside the brush."""
+    def learn_paint(self, grid: CoarseGrid, colors: np.ndarray, places: np.ndarray) -> None:
+        """See how bright the paint is, among colours uint8 (rows, columns, 3) at flat places beside the brush, (n,)."""
         if self.board is None or self._named is None:
             return
-        colors = samples.astype(np.float32)
-        if self.light is not None:
-            colors = colors / np.exp(self.light.at(places)).astype(np.float32)[:, None]
-        seen = paint_as_lit(colors, self._named, self.board, self._gate)
+        library = native()
+        if library is not None and self.light is None:
+            seen = paint_seen_natively(library, colors, places, self._named, self.board, self._gate)
+        else:
+            samples = colors.reshape(-1, 3).take(places, axis=0).astype(np.float32)
+            if self.light is not None:
+                light = self.light.at(grid.design[:, :2].take(places, axis=0))
+                samples = samples / np.exp(light).astype(np.float32)[:, None]
+            seen = paint_as_lit(samples, self._named, self.board, self._gate)
         self.paint = self.paint if seen is None else seen
 
     def levels_at(self, u: np.ndarray, v: np.ndarray) -> np.ndarray | None:
@@ -165,7 +197,10 @@ class SurfaceColors:
     @staticmethod
     def _around(grid: CoarseGrid, colors: np.ndarray, seeds: list[tuple[int, int]], radius: int) -> np.ndarray:
         """Median colours of the samples around seeds, float32 (n, 3)."""
-        windows = np.sort(colors.reshape(-1, 3).take(grid.windows(seeds, radius), axis=0), axis=1)
+        library, places = native(), grid.windows(seeds, radius)
+        if library is not None:
+            return seeds_natively(library, colors, places)
+        windows = np.sort(colors.reshape(-1, 3).take(places, axis=0), axis=1)
         return windows[:, windows.shape[1] // 2].astype(np.float32)
 
     @property

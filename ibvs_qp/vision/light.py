@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import ctypes
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from ibvs_qp.vision.grid import CoarseGrid
+from ibvs_qp.vision.native import native, place
+from ibvs_qp.vision.native_colors import Gates
 
 #: Side of the cells of constant light [px, as a power of two], and the step between two levels of light [ln]: half of
 #: it is a seventh of the gate of a white board.
@@ -104,12 +107,27 @@ def on_surface(grid: CoarseGrid, depth: np.ndarray, plane: np.ndarray, gate: flo
         plane: (a, b, c) of 1/Z = a x + b y + c [1/m], (3,).
         gate: Distance from the surface within which a sample is on it, share of depth.
     """
-    places = np.flatnonzero(grid.free)
-    places = places[:: max(1, len(places) // JUDGED)]
-    u, v = grid.pixels
-    z = depth[v.take(places), u.take(places)]
-    near = np.abs(z * (grid.design.take(places, axis=0) @ plane) - 1.0) < gate  # false for NaN and for no reading
-    return places[near]
+    places, pixels, design = grid.some(JUDGED)
+    library = native()
+    if library is not None and depth.dtype == np.float32 and depth.flags.c_contiguous:
+        near, plane, sizes = np.empty_like(places), np.ascontiguousarray(plane, float), ctypes.c_long(len(places))
+        parts = (depth, pixels, design, places)
+        count = library.on_surface(
+            *(place(part) for part in parts), sizes, place(plane), ctypes.c_double(gate), place(near)
+        )
+        return near[:count]
+    z = depth.reshape(-1).take(pixels)
+    return places[np.abs(z * (design @ plane) - 1.0) < gate]  # false for NaN and for no reading
+
+
+def is_even(held: int, count: int) -> bool:
+    """Whether light is even, by the samples with the surface's colour in the reference's light, and with its tint."""
+    return count < _LEAST or held >= (1.0 - _LEFT_OUT) * count
+
+
+def gates_of(gate: float) -> Gates:
+    """When a colour is the surface's, by the distance within which it is in the light of the reference."""
+    return Gates(gate**2, (_SURE * gate) ** 2, _TINT * gate, _DIMMEST, _BRIGHTEST, _CUT, _UNEVEN)
 
 
 def products(places: np.ndarray) -> np.ndarray:
@@ -155,7 +173,7 @@ def fit_light(
     even = tinted & (_distances(colors, board, np.ones(len(light), np.float32)) < (_SURE * gate) ** 2)
     even &= np.abs(light - 1.0) < _UNEVEN  # a dark board's colour holds in much light, the paint's on it does not
     held, count = int(np.count_nonzero(even)), int(np.count_nonzero(tinted))
-    if count < _LEAST or (before is None and held >= (1.0 - _LEFT_OUT) * count):
+    if count < _LEAST or (before is None and is_even(held, count)):
         return None
     colors, light, places, cut = colors[tinted], light[tinted], places[tinted], cut[tinted]
     fx, fy, cx, cy = intrinsics

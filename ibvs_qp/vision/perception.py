@@ -230,7 +230,7 @@ class Perception:
         followed = tuple(track.line for track in self._tracker.tracks if calm and track.settled)
         coarse = self._grid.sample(frame.rgb)
         surface = self._whole_surface(frame, coarse, down)
-        self._colors.learn(coarse[surface.component])
+        self._colors.learn(coarse, surface.component)
         surface = self._in_its_light(surface, frame, coarse, down)
         labels = np.where(surface.component, np.maximum(self._labels(coarse), 1), 0)
         candidates = detect_lines(
@@ -259,11 +259,13 @@ class Perception:
         grid, config = self._grid, self._config.plane
         shape = (frame.rgb.shape[0], frame.rgb.shape[1])
         near = on_surface(grid, frame.depth, surface.inverse_depth, config.fine_gate_high)
-        places = grid.design[:, :2].take(near, axis=0)
+        uneven = False
+        if not self._colors.surely_even(coarse, near):
+            places = grid.design[:, :2].take(near, axis=0)
+            samples = coarse.reshape(-1, 3).take(near, axis=0)
+            uneven = self._colors.learn_light(samples, places, shape, frame.intrinsics)
         assert self._layout is not None
-        uneven = self._colors.learn_light(coarse.reshape(-1, 3).take(near, axis=0), places, shape, frame.intrinsics)
-        beside = self._layout.beside_brush
-        self._colors.learn_paint(coarse.reshape(-1, 3).take(beside, axis=0), grid.design[:, :2].take(beside, axis=0))
+        self._colors.learn_paint(grid, coarse, self._layout.beside_brush)
         if not uneven:
             return surface
         inverse = grid.inverse_depth(frame.depth, config.distance_min_m, config.distance_max_m)

@@ -23,6 +23,7 @@ FILES = (
     "line_fit.c",
     "fit_lines.c",
     "samples.c",
+    "board.c",
     "planes.c",
     "hypotheses.c",
     "thin.c",
