@@ -26,7 +26,8 @@ from ibvs_qp.vision import native as native_module
 from ibvs_qp.vision.colors import SurfaceColors
 from ibvs_qp.vision.config import PlaneConfig
 from ibvs_qp.vision.grid import CoarseGrid
-from ibvs_qp.vision.light import on_surface
+from ibvs_qp.vision.light_samples import gates_of, on_surface, tinted_and_even
+from ibvs_qp.vision.native_colors import even_natively
 from ibvs_qp.vision.native_plane import NativePlane, Refit
 from ibvs_qp.vision.percept import Percept
 from ibvs_qp.vision.surface import connected_samples
@@ -202,8 +203,12 @@ def test_board_light_and_paint_are_learned_as_numpy_does(shots: list[Shot], fres
             results += [near, colors.bare(grid, coarse, seeds, 2), colors.like_around(grid, coarse, seeds[0], 2)]
             colors.learn(coarse, component)
             samples, places = coarse.reshape(-1, 3)[near], grid.design[near, :2]
-            even = colors.surely_even(coarse, near)
-            assert compiler is None or not even  # it takes machine code to be sure early
+            even, library = colors.surely_even(coarse, near), native_module.native()
+            assert library is not None or not even  # it takes machine code to be sure early
+            if library is not None and colors.board is not None:
+                counts = even_natively(library, coarse, near, None, colors.board, gates_of(42.0))
+                parts = tinted_and_even(samples.astype(np.float32), colors.board, 42.0)
+                assert counts == tuple(int(part.sum()) for part in parts[2:])
             uneven = not even and colors.learn_light(samples, places, shape, frame.intrinsics)
             colors.light = None
             colors.learn_paint(grid, coarse, near)

@@ -6,22 +6,19 @@ import ctypes
 
 import numpy as np
 
+from ibvs_qp.vision.board_samples import board_median, squared_distances
 from ibvs_qp.vision.grid import CoarseGrid
 from ibvs_qp.vision.label_tables import BOARD, OTHER, PAINT, TABLE_SIZE, LabelTables, places_in_table
-from ibvs_qp.vision.light import LightField, fit_light, gates_of, is_even
+from ibvs_qp.vision.light import LightField, fit_light
+from ibvs_qp.vision.light_samples import gates_of, is_even
 from ibvs_qp.vision.native import native, place
-from ibvs_qp.vision.native_colors import board_natively, even_natively, seeds_natively
+from ibvs_qp.vision.native_colors import even_natively, seeds_natively
 from ibvs_qp.vision.paint_light import paint_as_lit, paint_seen_natively
 
 __all__ = ["BOARD", "OTHER", "PAINT", "SurfaceColors"]
 
 #: Share of a new sample in the board's running colour.
 _BLEND = 0.2
-#: Samples whose median is taken; more cost time and change nothing.
-_JUDGED = 500
-#: Fewer samples tell nothing of the board.
-_LEAST = 8
-_SUM = np.ones(3, np.float32)
 #: Even light: one level, that of the reference.
 _EVEN = (0,)
 #: Colours nearer to each other than this share of the gate cannot be told apart.
@@ -56,27 +53,9 @@ class SurfaceColors:
         """
         if self._given is not None or self.light is not None:
             return
-        library = native()
-        if library is None:
-            median = self._median_with_numpy(colors[component])
-        else:
-            count, median = board_natively(library, colors, component, self.paint, self.board, self._gate**2, _JUDGED)
-            median = median if count >= _LEAST else None
+        median = board_median(colors, component, self.paint, self.board, self._gate)
         if median is not None:
             self.board = median if self.board is None else self.board + _BLEND * (median - self.board)
-
-    def _median_with_numpy(self, samples: np.ndarray) -> np.ndarray | None:
-        """Median colour where there is no machine code, None of few samples (n, 3)."""
-        samples = samples.astype(np.float32)
-        if self.paint is not None and len(samples):
-            samples = samples[self._distance(samples, self.paint) > self._gate**2]
-        if self.board is not None and len(samples):
-            near = samples[self._distance(samples, self.board) < self._gate**2]
-            samples = near if len(near) > len(samples) // 4 else samples[:0]
-        if len(samples) < _LEAST:
-            return None
-        ordered = np.sort(samples[:: max(1, len(samples) // _JUDGED)], axis=0)
-        return ordered[len(ordered) // 2]
 
     def surely_even(self, colors: np.ndarray, places: np.ndarray) -> bool:
         """Whether light has been even and is, by colours uint8 (rows, columns, 3) at flat places on the surface.
@@ -106,7 +85,7 @@ class SurfaceColors:
         if self.board is None:
             return False
         if self.paint is not None:
-            bare = self._distance(samples.astype(np.float32), self.paint) > self._gate**2
+            bare = squared_distances(samples.astype(np.float32), self.paint) > self._gate**2
             samples, places = samples[bare], places[bare]
         fixed = self._given is not None
         found = fit_light(samples, places, self.board, self._gate, shape, intrinsics, self.light, anchored=fixed)
@@ -170,7 +149,7 @@ class SurfaceColors:
 
     def _like_natively(self, library: ctypes.CDLL, colors: np.ndarray, around: np.ndarray) -> np.ndarray:
         paint, apart = self.paint, self._gate**2
-        if paint is not None and float(self._distance(paint, around)) <= apart:
+        if paint is not None and float(squared_distances(paint, around)) <= apart:
             paint = None
         colors, labels = np.ascontiguousarray(colors), np.empty(colors.shape[:-1], np.uint8)
         gate, count = ctypes.c_float(apart), ctypes.c_long(labels.size)
@@ -180,9 +159,9 @@ class SurfaceColors:
     def _like_with_numpy(self, colors: np.ndarray, around: np.ndarray) -> np.ndarray:
         """The same where there is no machine code."""
         samples = colors.reshape(-1, 3).astype(np.float32)
-        labels = (self._distance(samples, around) < self._gate**2).view(np.uint8)
-        if self.paint is not None and float(self._distance(self.paint, around)) > self._gate**2:
-            labels[(self._distance(samples, self.paint) < self._gate**2) & (labels == OTHER)] = PAINT
+        labels = (squared_distances(samples, around) < self._gate**2).view(np.uint8)
+        if self.paint is not None and float(squared_distances(self.paint, around)) > self._gate**2:
+            labels[(squared_distances(samples, self.paint) < self._gate**2) & (labels == OTHER)] = PAINT
         return labels.reshape(colors.shape[:-1])
 
     def bare(
@@ -191,7 +170,7 @@ class SurfaceColors:
         """Those of the seeds that do not lie on paint; all of them if every one does, or if the paint is unknown."""
         if self.paint is None or not seeds:
             return seeds
-        painted = self._distance(self._around(grid, colors, seeds, radius), self.paint) < self._gate**2
+        painted = squared_distances(self._around(grid, colors, seeds, radius), self.paint) < self._gate**2
         return [seed for seed, paint in zip(seeds, painted.tolist(), strict=True) if not paint] or seeds
 
     @staticmethod
@@ -208,10 +187,4 @@ class SurfaceColors:
         """Whether paint and board are both known and differ."""
         if self.board is None or self.paint is None:
             return False
-        return float(self._distance(self.paint, self.board)) > (_DISTINCT * self._gate) ** 2
-
-    @staticmethod
-    def _distance(colors: np.ndarray, reference: np.ndarray) -> np.ndarray:
-        """Squared RGB distance, (...)."""
-        # differences of rows of three cost many times as much as the two products
-        return np.square(colors) @ _SUM + (colors @ (-2.0 * reference) + float(reference @ reference))
+        return float(squared_distances(self.paint, self.board)) > (_DISTINCT * self._gate) ** 2

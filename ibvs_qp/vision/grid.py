@@ -80,7 +80,7 @@ class CoarseGrid:
         )
 
     def some(self, most: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Up to twice as many evenly spread samples that nothing hides: places in grid and picture, and their design."""
+        """Up to twice as many evenly spread samples that nothing hides: places in grid and picture, design."""
         return self._some(most)
 
     def _make_some(self, most: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

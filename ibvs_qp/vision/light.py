@@ -2,44 +2,35 @@
 
 from __future__ import annotations
 
-import ctypes
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from ibvs_qp.vision.grid import CoarseGrid
-from ibvs_qp.vision.native import native, place
-from ibvs_qp.vision.native_colors import Gates
+from ibvs_qp.vision.light_samples import (
+    LEAST,
+    LEFT_OUT,
+    SURE,
+    UNEVEN,
+    distances,
+    is_even,
+    left_by_two_materials,
+    tinted_and_even,
+)
 
 #: Side of the cells of constant light [px, as a power of two], and the step between two levels of light [ln]: half of
 #: it is a seventh of the gate of a white board.
 CELL_BITS, STEP = 4, 0.03
 #: Light is held between these levels [steps]: 0.4 to 2.5 times the light of the reference.
 _LEVELS = 30
-#: Samples that are judged; more cost time and change nothing.
-JUDGED = 600
-#: Light that differs by less than this over the surface is even [ln]: the gate holds +-0.1 on a white board. A field
-#: that is already known is kept down to the second.
-_UNEVEN, _KEPT = 0.10, 0.07
-#: Light is uneven only where one level leaves out this share of what has the surface's tint.
-_LEFT_OUT = 0.02
+#: A field that is already known is kept down to this difference of light, less than what makes a new one [ln].
+_KEPT = 0.07
 #: Rounds in which the field grows from where it is known: each reaches as far again as the gate allows.
 _ROUNDS, _ROUNDS_KNOWN = 8, 2
-#: Fewer samples tell nothing of the light.
-_LEAST = 40
 #: Pull of the field's coefficients to zero, as variances of its terms: a band of the surface tells a slope, only much
 #: of it a curvature.
 _PULL = np.array((0.0, 1e-3, 1e-3, 4e-3, 4e-3, 4e-3))
-#: Share of the surface's colour by which the tint may be off, in units of the gate.
-_TINT = 0.7
-#: Light of samples in which the surface could be at all, times the reference's.
-_DIMMEST, _BRIGHTEST = 0.4, 2.5
-#: A channel this high is cut off: it tells neither light nor tint.
-_CUT, _WHITE = 250.0, np.float32(255.0)
-#: Share of the gate within which a colour is the surface's however coarse its label: labels are in steps of 8.
-_SURE = 0.75
-#: What a field may leave of what two materials in even light leave, see `_left_by_two_materials`. Light on a board
+#: What a field may leave of what two materials in even light leave, see `left_by_two_materials`. Light on a board
 #: leaves 0.1 to 0.35 of it, up to 0.6 on a dark one, whose gate holds that light anyway; a grey board beside a grey
 #: wall is a step, which no polynomial follows, and leaves 0.6 to 2.9, in flights before the faint board 0.7 at least.
 #: Taken for light a step costs the edge.
@@ -98,38 +89,6 @@ class LightField:
         return self.levels[row, np.clip(np.asarray(u).astype(np.intp), 0, width - 1) >> CELL_BITS]
 
 
-def on_surface(grid: CoarseGrid, depth: np.ndarray, plane: np.ndarray, gate: float) -> np.ndarray:
-    """Flat places of some samples of the grid that lie on a surface by depth alone, whatever their colour, (n,).
-
-    Args:
-        grid: Coarse grid of the picture.
-        depth: Depth [m], (H, W).
-        plane: (a, b, c) of 1/Z = a x + b y + c [1/m], (3,).
-        gate: Distance from the surface within which a sample is on it, share of depth.
-    """
-    places, pixels, design = grid.some(JUDGED)
-    library = native()
-    if library is not None and depth.dtype == np.float32 and depth.flags.c_contiguous:
-        near, plane, sizes = np.empty_like(places), np.ascontiguousarray(plane, float), ctypes.c_long(len(places))
-        parts = (depth, pixels, design, places)
-        count = library.on_surface(
-            *(place(part) for part in parts), sizes, place(plane), ctypes.c_double(gate), place(near)
-        )
-        return near[:count]
-    z = depth.reshape(-1).take(pixels)
-    return places[np.abs(z * (design @ plane) - 1.0) < gate]  # false for NaN and for no reading
-
-
-def is_even(held: int, count: int) -> bool:
-    """Whether light is even, by the samples with the surface's colour in the reference's light, and with its tint."""
-    return count < _LEAST or held >= (1.0 - _LEFT_OUT) * count
-
-
-def gates_of(gate: float) -> Gates:
-    """When a colour is the surface's, by the distance within which it is in the light of the reference."""
-    return Gates(gate**2, (_SURE * gate) ** 2, _TINT * gate, _DIMMEST, _BRIGHTEST, _CUT, _UNEVEN)
-
-
 def products(places: np.ndarray) -> np.ndarray:
     """1, x, y, x^2, x y, y^2 of places (..., 2), (..., 6)."""
     x, y = places[..., 0], places[..., 1]
@@ -166,14 +125,9 @@ def fit_light(
         The field and the surface's colour in its reference light; None where the light is even, or cannot be told.
     """
     colors, size = colors.astype(np.float32), max(float(board @ board), 1.0)
-    light = colors @ (board / size).astype(np.float32)
-    tint = np.maximum(np.vecdot(colors, colors) - light**2 * size, 0.0)  # squared distance from the surface's tint
-    cut = colors.max(axis=1) >= _CUT
-    tinted = ((light > _DIMMEST) & (light < _BRIGHTEST) & (tint < (_TINT * gate * light) ** 2)) | cut
-    even = tinted & (_distances(colors, board, np.ones(len(light), np.float32)) < (_SURE * gate) ** 2)
-    even &= np.abs(light - 1.0) < _UNEVEN  # a dark board's colour holds in much light, the paint's on it does not
+    light, cut, tinted, even = tinted_and_even(colors, board, gate)
     held, count = int(np.count_nonzero(even)), int(np.count_nonzero(tinted))
-    if count < _LEAST or (before is None and is_even(held, count)):
+    if count < LEAST or (before is None and is_even(held, count)):
         return None
     colors, light, places, cut = colors[tinted], light[tinted], places[tinted], cut[tinted]
     fx, fy, cx, cy = intrinsics
@@ -183,10 +137,10 @@ def fit_light(
     near, telling, solution = np.zeros(0, bool), np.zeros(0, bool), np.zeros(6)
     for _ in range(_ROUNDS if before is None else _ROUNDS_KNOWN):
         gain = np.exp(expected).astype(np.float32)
-        near = _distances(colors, board, gain) < (gate * gain) ** 2
+        near = distances(colors, board, gain) < (gate * gain) ** 2
         # what is cut off is at least as bright as it looks: it tells something only where less was expected
         telling, told = near & (~cut | (expected < logarithm)), telling
-        if int(np.count_nonzero(telling)) < _LEAST:
+        if int(np.count_nonzero(telling)) < LEAST:
             return None
         if np.array_equal(telling, told):
             break
@@ -194,38 +148,16 @@ def fit_light(
         solution = np.linalg.solve(part.T @ part + len(part) * np.diag(_PULL), part.T @ logarithm[telling])
         expected = design @ solution
     left = float(np.abs((logarithm - expected)[telling]).sum())
-    if left > _UNEXPLAINED * _left_by_two_materials(logarithm[telling], _SURE * gate / size**0.5):
+    if left > _UNEXPLAINED * left_by_two_materials(logarithm[telling], SURE * gate / size**0.5):
         return None
     if not anchored:
         expected, solution[0] = expected - solution[0], 0.0
     low, high = np.percentile(expected[near], (2.0, 98.0)).tolist()
-    if high - low < (_UNEVEN if before is None else _KEPT):
+    if high - low < (UNEVEN if before is None else _KEPT):
         return None
-    if before is None and int(np.count_nonzero(near)) * (1.0 - _LEFT_OUT) <= held:
+    if before is None and int(np.count_nonzero(near)) * (1.0 - LEFT_OUT) <= held:
         return None
     whole = near & ~cut
-    if int(np.count_nonzero(whole)) >= _LEAST:
+    if int(np.count_nonzero(whole)) >= LEAST:
         board = np.median(colors[whole] / np.exp(expected[whole])[:, None], axis=0).astype(np.float32)
     return LightField(solution, (low - _BEYOND, high + _BEYOND), reach, shape, intrinsics), board
-
-
-def _left_by_two_materials(logarithm: np.ndarray, band: float) -> float:
-    """Sum of distances of samples (n,) from the level of their material, the surface's or another one beyond the gate.
-
-    The other is darker or brighter by more than the band, whichever leaves less. Smooth light has every level in
-    between, so that this leaves its slope; materials have one level each, and leave noise alone.
-    """
-    left = []
-    for split in (-band, band):
-        above = logarithm > split
-        count = int(np.count_nonzero(above))
-        total, bright = float(logarithm.sum()), float(logarithm @ above)
-        levels = np.array(((total - bright) / max(len(logarithm) - count, 1), bright / max(count, 1)))
-        left.append(float(np.abs(logarithm - levels[above.view(np.int8)]).sum()))
-    return min(left)
-
-
-def _distances(colors: np.ndarray, board: np.ndarray, light: np.ndarray) -> np.ndarray:
-    """Squared distances of colours (n, 3) from the surface's in light (n,), as far as the picture can show it."""
-    difference = colors - np.minimum(light[:, None] * board, _WHITE)
-    return np.vecdot(difference, difference)

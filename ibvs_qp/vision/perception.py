@@ -17,7 +17,7 @@ from ibvs_qp.vision.config import VisionConfig
 from ibvs_qp.vision.detect import Candidate, detect_lines
 from ibvs_qp.vision.flow import SparseFlow
 from ibvs_qp.vision.layout import PictureLayout
-from ibvs_qp.vision.light import on_surface
+from ibvs_qp.vision.light_samples import on_surface
 from ibvs_qp.vision.make_percept import make_percept
 from ibvs_qp.vision.motion import CameraMotion
 from ibvs_qp.vision.percept import LineHint, Percept
