@@ -149,7 +149,7 @@ class SurfaceColors:
 
     def _like_natively(self, library: ctypes.CDLL, colors: np.ndarray, around: np.ndarray) -> np.ndarray:
         paint, apart = self.paint, self._gate**2
-        if paint is not None and float(squared_distances(paint, around)) <= apart:
+        if paint is not None and _apart(paint, around) <= apart:
             paint = None
         colors, labels = np.ascontiguousarray(colors), np.empty(colors.shape[:-1], np.uint8)
         gate, count = ctypes.c_float(apart), ctypes.c_long(labels.size)
@@ -160,7 +160,7 @@ class SurfaceColors:
         """The same where there is no machine code."""
         samples = colors.reshape(-1, 3).astype(np.float32)
         labels = (squared_distances(samples, around) < self._gate**2).view(np.uint8)
-        if self.paint is not None and float(squared_distances(self.paint, around)) > self._gate**2:
+        if self.paint is not None and _apart(self.paint, around) > self._gate**2:
             labels[(squared_distances(samples, self.paint) < self._gate**2) & (labels == OTHER)] = PAINT
         return labels.reshape(colors.shape[:-1])
 
@@ -170,8 +170,10 @@ class SurfaceColors:
         """Those of the seeds that do not lie on paint; all of them if every one does, or if the paint is unknown."""
         if self.paint is None or not seeds:
             return seeds
-        painted = squared_distances(self._around(grid, colors, seeds, radius), self.paint) < self._gate**2
-        return [seed for seed, paint in zip(seeds, painted.tolist(), strict=True) if not paint] or seeds
+        around = self._around(grid, colors, seeds, radius)
+        return [
+            seed for seed, color in zip(seeds, around, strict=True) if _apart(color, self.paint) >= self._gate**2
+        ] or seeds
 
     @staticmethod
     def _around(grid: CoarseGrid, colors: np.ndarray, seeds: list[tuple[int, int]], radius: int) -> np.ndarray:
@@ -187,4 +189,10 @@ class SurfaceColors:
         """Whether paint and board are both known and differ."""
         if self.board is None or self.paint is None:
             return False
-        return float(squared_distances(self.paint, self.board)) > (_DISTINCT * self._gate) ** 2
+        return _apart(self.paint, self.board) > (_DISTINCT * self._gate) ** 2
+
+
+def _apart(one: np.ndarray, two: np.ndarray) -> float:
+    """Squared distance of two colours (3,)."""
+    (red, green, blue), (other_red, other_green, other_blue) = one.tolist(), two.tolist()
+    return (red - other_red) ** 2 + (green - other_green) ** 2 + (blue - other_blue) ** 2
