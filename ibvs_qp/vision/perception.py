@@ -131,6 +131,7 @@ class Perception:
         motion = CameraMotion.of_body(turn, velocity, interval, self._camera_position)
         self._stamp_ns = frame.stamp_ns
         before = None if self._plane is None else self._plane.inverse_depth
+        self._coarse: np.ndarray | None = None  # the picture's colours on the grid, where the surface was searched
         refused = self._fit_plane(frame, motion, down, seed_pixel)
         clock.lap("plane")
         surface = None if self._plane is None else self._plane.inverse_depth
@@ -178,7 +179,7 @@ class Perception:
             ):
                 self._plane = tracked
                 return None
-        coarse = self._grid.sample(frame.rgb)
+        coarse = self._coarse = self._grid.sample(frame.rgb)
         prefer = None if self._colors.board is None else self._labels(coarse)
         inverse = self._grid.inverse_depth(frame.depth, config.distance_min_m, config.distance_max_m)
         seeds = self._layout.seeds
@@ -228,11 +229,11 @@ class Perception:
         self._upright_next = not self._upright_next
         directions = (self._upright_next,) if calm else (False, True)
         followed = tuple(track.line for track in self._tracker.tracks if calm and track.settled)
-        coarse = self._grid.sample(frame.rgb)
+        coarse = self._grid.sample(frame.rgb) if self._coarse is None else self._coarse
         surface = self._whole_surface(frame, coarse, down)
         self._colors.learn(coarse, surface.component)
         surface = self._in_its_light(surface, frame, coarse, down)
-        labels = np.where(surface.component, np.maximum(self._labels(coarse), 1), 0)
+        labels = np.maximum(self._labels(coarse), 1) * surface.component
         candidates = detect_lines(
             picture,
             frame.depth,

@@ -102,10 +102,7 @@ class LineView:
     @property
     def surface(self) -> tuple[float, float, float]:
         """(p, q, r) of the surface over pixels of the view, 1/Z = p u + q v + r; zero if it is unknown."""
-        if self.view.plane is None:
-            return 0.0, 0.0, 0.0
-        (a, b, c), (fx, fy, cx, cy) = self.view.plane, self.view.intrinsics
-        return a / fx, b / fy, c - a * cx / fx - b * cy / fy
+        return self.view.surface
 
     @property
     def side(self) -> int:

@@ -101,12 +101,8 @@ def _ballot(view: Picture, low: float, high: float, grid: CoarseGrid, config: Vi
     width, height = 0.5 * view.width, 0.5 * view.height
     reach = width * max(abs(math.cos(low)) / max(math.sin(low), 0.1), abs(math.cos(high)) / max(math.sin(high), 0.1))
     moved = height + reach + SAME_PX
-    rhos = [
-        u * math.cos(angle) + v * math.sin(angle)
-        for u in (0.0, width)
-        for v in (0.0, moved + height)
-        for angle in (low, high)
-    ]
+    normals = (math.cos(low), math.sin(low)), (math.cos(high), math.sin(high))
+    rhos = [u * cos + v * sin for u in (0.0, width) for v in (0.0, moved + height) for cos, sin in normals]
     least = max(3, round(0.5 * config.detect.min_length * POINTS))
     faint = _FAINT * least * full_vote(config.detect.gradient_min)
     step, scale = math.radians(config.detect.angle_step_deg), 2.0 / grid.stride
