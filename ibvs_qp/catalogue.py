@@ -30,7 +30,8 @@ _TASKS = """
 
 A row costs `weight * (does - asked)^2 / 2`, so a weight is per squared unit of its row and the cost has no unit. Given
 is what a row weighs in full. Lambda and 1 - lambda blend push and stand-off, a line's weight falls with its fit and is
-zero without the line, and what a line fixes is taken from the velocity rows (`ibvs_qp/setpoints/program.py`).
+zero without the line, what a line fixes is taken from the velocity rows, and while friction holds the tip
+`velocity_right` weighs as `height` (`ibvs_qp/setpoints/program.py`).
 
 """
 

@@ -6,6 +6,7 @@ travel; never by "topmost" or "first vertical". All offsets are in metres around
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 
 from ibvs_qp.estimation.motion import TrackedLine
@@ -13,6 +14,9 @@ from ibvs_qp.measurement import HORIZONTAL, VERTICAL
 
 #: A guide may differ from where it must be by this much [m]: at the start, and from row to row.
 START_GATE, ROW_GATE = 0.15, 0.018
+#: A fresh edge may lean by this much against the board's [rad]. It is seen 0.05 to 0.25 m ahead of the tip and followed
+#: as a straight line: that of a stroke that gusts have bent says 16 mm too much or too little at 6 degrees.
+FRESH_LEAN = math.radians(6.0)
 #: A gate says nothing of a line known less well than this share of it.
 GATE_SHARE = 1.0 / 3.0
 #: The right board edge is trusted as start mark only this near to its expected place [m].
@@ -41,11 +45,18 @@ def bottom_edge(lines: Lines, expected: float, gate: float) -> TrackedLine | Non
     return _nearest(lines, accept, expected, gate)
 
 
-def fresh_edge(lines: Lines, expected: float) -> TrackedLine | None:
-    """The upper edge of the last row: paint below, bare surface above; arguments as for `bottom_edge`."""
+def fresh_edge(lines: Lines, expected: float, level: float) -> TrackedLine | None:
+    """The upper edge of the last row: paint below, bare surface above.
+
+    Args:
+        lines: Tracked lines.
+        expected: Offset at which it must be [m].
+        level: Angle of the rows [rad], see `TrackedLine.angle`.
+    """
 
     def accept(line: TrackedLine) -> bool:
-        return line.role == HORIZONTAL and line.kind != "board" and line.surface_side <= 0
+        fresh = line.role == HORIZONTAL and line.kind != "board" and line.surface_side <= 0
+        return fresh and abs(line.angle - level) < FRESH_LEAN
 
     return _nearest(lines, accept, expected, ROW_GATE)
 

@@ -12,6 +12,7 @@ import numpy as np
 from ibvs_qp.estimation.motion import TrackedLine
 from ibvs_qp.guides import (
     FIRST_STOP_GATE,
+    FRESH_LEAN,
     ROW_GATE,
     START_GATE,
     STOP_GATE,
@@ -63,7 +64,8 @@ class Painter:
         self._calm: tuple[float, ...] | None = None
         self.finished = self.failed = self._given_up = False
         self.reason = ""
-        self._guide_id = self._edge_id = -1
+        self._guide_id = self._board_id = self._edge_id = -1
+        self._level = 0.5 * math.pi  # angle of the board's edge
         self._guide_target = self.config.edge_margin_m
         self._edge_target: float | None = None
         self._speed = 0.0
@@ -190,10 +192,12 @@ class Painter:
         config = self.config
         if seen.time_s - self.entered > config.timeout_s + 2.0 * config.stroke_m / config.speed_m_s:
             self._fail(seen, f"time-out in row {self.row}")
-        chooser = self._bottom_edge if self.row == 1 else self._fresh_edge
-        self._keep_guide(seen, chooser)
-        nominal = config.edge_margin_m if self.row == 1 else config.fresh_edge_m
-        self._slide_guide(nominal if self._follows_nominal(seen) else self._guide_target, dt)
+        if self.row == 1:
+            self._keep_guide(seen, self._bottom_edge)
+            self._board_id = self._guide_id
+        else:
+            self._keep_row_guide(seen)
+        self._slide_guide(self._nominal(), dt)
         travel = -1.0 if self.row % 2 == 1 else 1.0
         remaining, edge = self._remaining(seen, travel)
         self._check_contact(seen)
@@ -225,7 +229,7 @@ class Painter:
         self._enter(seen, "climb", f"row {self.row - 1} ended {how}")
 
     def _climb(self, seen: Scenery, dt: float) -> Wish:
-        config = self.config
+        config, edge = self.config, self._climb_edge(seen)
         self._check_contact(seen)
         left = config.pitch_m - self._climbed
         speed = min(config.climb_speed_m_s, math.sqrt(2.0 * config.acceleration_m_s2 * max(left, 0.0)) + 0.002)
@@ -246,8 +250,19 @@ class Painter:
                 if good and fresh is not None:
                     self._guide_id, self._guide_target = fresh.track_id, fresh.offset
                 self._begin_row(seen, f"climbed {self._climbed * 1e3:.0f} mm, {why}")
-        edge = seen.lines.get(self._edge_id)
+                edge = None
         return self._wish(seen, contact=True, climb=self._speed if left > 0.0 else 0.0, edge=edge, hold=edge is None)
+
+    def _climb_edge(self, seen: Scenery) -> TrackedLine | None:
+        """The edge at which the last row ended; brush and paint may have hidden it for a while."""
+        edge = seen.lines.get(self._edge_id)
+        if edge is not None and edge.weight >= 0.05:
+            return edge
+        travel = 1.0 if self.row % 2 == 1 else -1.0  # of the row that ended
+        margin = self.config.edge_margin_m if travel < 0 else self._right_edge
+        edge = None if margin is None else stop_edge(seen.lines.values(), travel, travel * margin, STOP_GATE)
+        self._edge_id = -1 if edge is None else edge.track_id
+        return edge
 
     def _retreat(self, seen: Scenery, dt: float) -> Wish:
         if self._given_up:
@@ -281,7 +296,22 @@ class Painter:
         return bottom_edge(seen.lines.values(), expected, START_GATE if far else ROW_GATE)
 
     def _fresh_edge(self, seen: Scenery) -> TrackedLine | None:
-        return fresh_edge(seen.lines.values(), self.config.fresh_edge_m)
+        board = seen.lines.get(self._board_id)
+        if board is not None and board.weight > 0.5:
+            self._level = board.angle
+        return fresh_edge(seen.lines.values(), self.config.fresh_edge_m, self._level)
+
+    def _board_edge(self, seen: Scenery) -> TrackedLine | None:
+        """The board's edge that guided row 1, from a later row."""
+        line = seen.lines.get(self._board_id)
+        if line is not None and line.weight > 0.5:
+            return line
+        return bottom_edge(seen.lines.values(), self._board_nominal, 0.5 * self.config.pitch_m)
+
+    @property
+    def _board_nominal(self) -> float:
+        """Where the board's edge lies below the present row [m]."""
+        return self.config.edge_margin_m + (self.row - 1) * self.config.pitch_m
 
     def _start_mark(self, seen: Scenery) -> TrackedLine | None:
         return start_mark(seen.lines.values(), self.config.edge_margin_m)
@@ -296,12 +326,29 @@ class Painter:
             self.log.append((seen.time_s, "guide", f"track {found.track_id} at {found.offset * 1e3:+.1f} mm"))
             self._guide_id = found.track_id
 
-    def _follows_nominal(self, seen: Scenery) -> bool:
-        """Whether the present guide is the row's own (row 1: bottom edge; later rows: the fresh edge)."""
-        line = seen.lines.get(self._guide_id)
-        if self.row == 1 or line is None:
-            return self.row == 1
-        return abs(self._guide_target - self.config.fresh_edge_m) < 2.0 * ROW_GATE
+    def _keep_row_guide(self, seen: Scenery) -> None:
+        """Stay with the fresh edge while it lives and runs level; else the board's edge leads to the end of the row."""
+        line, fresh = seen.lines.get(self._guide_id), self._fresh_edge(seen)
+        if line is not None and line.weight > 0.05:
+            if self._guide_id == self._board_id or abs(line.angle - self._level) < FRESH_LEAN:
+                return
+        if fresh is not None:
+            found = fresh
+        else:
+            found = self._board_edge(seen)
+            if found is not None:
+                # From where it is to where it belongs at the pace of `_slide_guide`: what led until now has misled.
+                self._board_id, self._guide_target = found.track_id, found.offset
+        if found is not None and found.track_id != self._guide_id:
+            self.log.append((seen.time_s, "guide", f"track {found.track_id} at {found.offset * 1e3:+.1f} mm"))
+            self._guide_id = found.track_id
+
+    def _nominal(self) -> float:
+        """Where the present guide shall be: the row's own, or one of the rows before, which stays where it was put."""
+        if self._guide_id == self._board_id:
+            return self._board_nominal
+        near = abs(self._guide_target - self.config.fresh_edge_m) < 2.0 * ROW_GATE
+        return self.config.fresh_edge_m if near else self._guide_target
 
     def _slide_guide(self, nominal: float, dt: float) -> None:
         gap = nominal - self._guide_target

@@ -8,21 +8,28 @@ import numpy as np
 import pytest
 
 from ibvs_qp.config import ControllerConfig
-from ibvs_qp.setpoints import wall
+from ibvs_qp.setpoints import program, wall
 from sim.closed_loop import FlightOptions, fly, pilot_config
 from sim.experiments.scenes import near_wall
 from sim.jobs import PressJob
+from sim.scene import Scene
 from sim.trace import Trace
 
 #: Nothing upright in the picture: the brush is half a metre off the right edge.
-SCENE = near_wall(paint={"push_n": 20.0}, start={"right_m": -0.5})
+SCENE = near_wall(start={"right_m": -0.5})
+#: Push that the nominal vehicle can hold standing still [N].
+REACH_N = 30.4
 
 
-def press(tick_s: float = 0.004) -> Trace:
-    options = FlightOptions(law="qp", seed=1, features="geometric", video=False)
-    pilot = pilot_config(SCENE, options)
-    pilot = replace(pilot, controller=replace(pilot.controller, tick_s=tick_s))
-    return fly(SCENE, options, config=pilot, job=PressJob(hold_s=9.0))
+def press(push: float = 20.0, reach_check: bool = True, tick_s: float = 0.004) -> Trace:
+    options, scene = FlightOptions(law="qp", seed=1, features="geometric", video=False), changed(SCENE, push)
+    pilot = pilot_config(scene, options)
+    pilot = replace(pilot, controller=replace(pilot.controller, tick_s=tick_s, reach_check=reach_check))
+    return fly(scene, options, config=pilot, job=PressJob(hold_s=9.0))
+
+
+def changed(scene: Scene, push: float) -> Scene:
+    return replace(scene, paint=replace(scene.paint, push_n=push))
 
 
 def held(trace: Trace) -> np.ndarray:
@@ -45,6 +52,20 @@ def test_a_held_tip_is_no_pivot_to_rock_about() -> None:
 def test_without_the_softer_yaw_it_would_be(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(wall, "HELD_SHARE", 1e3)
     assert rocking(press(tick_s=0.004 + 1e-12)) > 1.0  # another configuration: controllers are kept by theirs
+
+
+def test_a_push_beyond_reach_takes_no_damping_from_a_held_tip() -> None:
+    trace = press(35.0, reach_check=False)
+    assert trace.completed
+    assert rocking(trace) < 0.5
+    assert trace.push_true[held(trace)].mean() >= 0.97 * REACH_N
+
+
+def test_at_the_weight_of_a_sliding_vehicle_it_would(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(program, "held_sideways_weight", lambda weights: weights.velocity)
+    trace = press(35.0, reach_check=False, tick_s=0.004 + 1e-12)
+    assert rocking(trace) > 2.0
+    assert trace.push_true[held(trace)].mean() < 0.95 * REACH_N
 
 
 def test_the_gain_of_a_held_vehicle_is_a_third_of_the_stability_limit() -> None:

@@ -30,6 +30,7 @@ class Edge:
     kind: str = "board"
     span: tuple[float, float] = (-9.0, 9.0)
     weight: float = 1.0
+    lean: float = 0.0
 
 
 @dataclass
@@ -80,7 +81,7 @@ class World:
                     track_id=edge.identity,
                     role=edge.role,
                     slot=0,
-                    angle=0.5 * math.pi if axis else 0.0,
+                    angle=(0.5 * math.pi if axis else 0.0) + edge.lean,
                     deviation=1e-3,
                     seen_ns=0,
                     frames=9,
@@ -357,6 +358,52 @@ def test_without_fresh_edge_the_old_guide_stays() -> None:
     assert world.painter.finished and not world.painter.failed
     assert any(phase == "paint" and "the old guide stays" in reason for _, phase, reason in world.painter.log)
     assert world.ends[1][2] == pytest.approx(-world.config.pitch_m, abs=0.004)
+
+
+@pytest.mark.parametrize("misleads", ["leans from the start", "leans in the row", "lost in the row"])
+def test_where_the_fresh_edge_misleads_the_board_leads(misleads: str) -> None:
+    """A stroke that gusts have bent is no straight edge: followed as one it led 100 mm away."""
+    world, lean = World(short(rows=2)), math.radians(9.0)
+    world.fly(100.0, until="climb")
+    fresh = next(edge for edge in world.edges if edge.identity == 101)
+    fresh.lean = lean if misleads == "leans from the start" else math.radians(4.0)
+    world.fly(10.0, until="paint")
+    world.fly(1.0)
+    if misleads == "lost in the row":
+        world.hidden.add(101)
+    elif misleads == "leans in the row":
+        assert world.painter._guide_id == 101  # four degrees are none
+        fresh.lean, fresh.place = lean, fresh.place - 0.015
+    world.fly(1.0)
+    assert world.painter._guide_id == 1
+    world.fly(100.0)
+    assert world.painter.finished and not world.painter.failed
+    assert world.ends[1][2] == pytest.approx(-world.config.pitch_m, abs=0.004)
+
+
+def test_a_sloped_row_does_not_lean() -> None:
+    world = World(short(rows=2))
+    for edge in world.edges:
+        edge.lean = math.radians(8.0) if edge.role == HORIZONTAL else 0.0
+    world.fly(100.0, until="climb")
+    next(edge for edge in world.edges if edge.identity == 101).lean = math.radians(8.0)
+    world.fly(10.0, until="paint")
+    world.fly(1.0)
+    assert world.painter._guide_id == 101
+
+
+def test_the_edge_of_a_climb_is_found_again_under_another_name() -> None:
+    """The brush paints over the edge at which the row ended; it reappears as another track."""
+    world = World(short(rows=2))
+    world.fly(100.0, until="climb")
+    stop = next(edge for edge in world.edges if edge.identity == 3)
+    world.hidden.add(3)
+    world.fly(0.3)
+    assert not any(line.role == VERTICAL for line, _ in world.step().guides)
+    stop.identity = 34
+    assert [line.track_id for line, _ in world.step().guides if line.role == VERTICAL] == [34]
+    world.fly(10.0, until="paint")
+    assert not any(line.role == VERTICAL for line, _ in world.step().guides)
 
 
 def test_a_guide_that_is_lost_is_found_again_under_another_name() -> None:

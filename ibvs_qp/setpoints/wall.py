@@ -50,7 +50,7 @@ def held_yaw_gain(config: ControllerConfig) -> float:
     return HELD_SHARE * gains.yaw_kd * (vehicle.inertia_kg_m2[2] / max(swing, 1e-9) + gains.velocity_kp)
 
 
-def _yaw_gain(signals: Signals, config: ControllerConfig, touch: Touch, wish: Wish) -> ca.SX:
+def _yaw_gain(signals: Signals, config: ControllerConfig, still: ca.SX) -> ca.SX:
     """Yaw stiffness: the configured one, softer while friction alone holds the tip sideways."""
     gain = config.gains.yaw_kp
     if not config.contact_feedforward:
@@ -59,17 +59,19 @@ def _yaw_gain(signals: Signals, config: ControllerConfig, touch: Touch, wish: Wi
     for slot in range(config.line_slots):
         present, *_, weight, _ = ca.vertsplit(signals.input(f"line_{slot}", SLOT_INPUTS))
         fixed = ca.fmax(fixed, vertical[slot] * present * weight)
-    held = ca.logic_and(touch.touching, ca.norm_2(wish.velocity) <= SLIDING_COMMAND) * (1.0 - fixed)
+    held = still * (1.0 - fixed)
     return gain + held * (min(gain, held_yaw_gain(config)) - gain)
 
 
 def wanted_turn(signals: Signals, config: ControllerConfig, body: Body, touch: Touch, wish: Wish) -> None:
     r"""Angles and wanted accelerations :math:`-K_p \varphi - K_d \dot\varphi` of roll, pitch and yaw [rad/s^2]."""
     gains = config.gains
+    still = ca.logic_and(touch.touching, ca.norm_2(wish.velocity) <= SLIDING_COMMAND)
+    still = signals.output("held", ca.SX(still))
     roll = ca.atan2(body.down[1], body.down[2])
     pitch = ca.asin(clamp(-body.down[0], -1.0, 1.0))
     yaw = ca.if_else(touch.known, -ca.atan2(touch.normal[1], touch.normal[0]), 0.0)
-    level, turn = (gains.attitude_kp, gains.attitude_kd), (_yaw_gain(signals, config, touch, wish), gains.yaw_kd)
+    level, turn = (gains.attitude_kp, gains.attitude_kd), (_yaw_gain(signals, config, still), gains.yaw_kd)
     tilt = signals.output("tilt_error", ca.vertcat(roll, pitch) - wish.tilt)
     lost = signals.output("tilted", ca.norm_2(wish.tilt) > 0.0)
     # A tilted vehicle that turns about the vertical has roll and pitch rates without changing either angle.
