@@ -121,8 +121,8 @@ def _finish(
     rho, theta, covariance = _polar(view, line.level, line.slope, line.center, variance, line.slope_variance)
     if abs(rho) > config.rho_max:
         return None
-    columns = strips.u[index].take(run).tolist()
-    ends = [(u, line.level + line.slope * (u - line.center)) for u in columns]
+    row = strips.u[index]
+    ends = [(u, line.level + line.slope * (u - line.center)) for u in (row.item(run[0]), row.item(run[1]))]
     fx, fy, cx, cy = view.view.intrinsics
     normal = [((along - cx) / fx, (across - cy) / fy) for along, across in ends]
     (x, y, z), sign = step, view.sign
