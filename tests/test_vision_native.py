@@ -20,6 +20,7 @@ from ibvs_qp.vision import (
     hypotheses,
     lines,
     plane,
+    seeds,
     vote,
 )
 from ibvs_qp.vision import native as native_module
@@ -125,11 +126,12 @@ def test_every_function_computes_what_numpy_does(shots: list[Shot], fresh: pytes
     compare(classify, "look_natively", look, told)
     compare(hypotheses, "_near_natively", hypotheses.near_with_numpy, np.array_equal)
     compare(hypotheses, "_judge_natively", hypotheses.judge_with_numpy, exact)
+    compare(seeds, "values_natively", seeds.values_with_numpy, exact)
     compare(flow_solve, "depths_natively", flow_solve.depths_with_numpy, exact)
     compare(flow_solve, "root_natively", flow_solve.root_with_numpy, lambda a, b: close(a, b, 1e-6))
     compare(flow_solve, "solve_natively", flow_solve.solve_with_numpy, lambda a, b: close(a, b, 1e-6))
     see(shots)
-    assert len(calls) == 9 and min(calls.values()) > 20, calls
+    assert len(calls) == 10 and min(calls.values()) > 20, calls
 
 
 @needs_compiler
@@ -199,8 +201,8 @@ def test_board_light_and_paint_are_learned_as_numpy_does(shots: list[Shot], fres
             near = on_surface(grid, shot.frame.depth, surface.inverse_depth, 0.05)
             component = np.zeros(grid.shape, bool)
             component.reshape(-1)[near] = True
-            seeds = [(10, 20), (25, 60), (40, 10)]
-            results += [near, colors.bare(grid, coarse, seeds, 2), colors.like_around(grid, coarse, seeds[0], 2)]
+            cells = [(10, 20), (25, 60), (40, 10)]
+            results += [near, colors.bare(grid, coarse, cells, 2), colors.like_around(grid, coarse, cells[0], 2)]
             colors.learn(coarse, component)
             samples, places = coarse.reshape(-1, 3)[near], grid.design[near, :2]
             even, library = colors.surely_even(coarse, near), native_module.native()

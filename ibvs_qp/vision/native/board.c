@@ -1,5 +1,5 @@
-/* What samples of the coarse grid tell of the board's, the light's and the paint's colour: the machine code of colors.py,
-   light.py and paint_light.py. */
+/* What samples of the coarse grid tell of board, light and paint: the machine code of board_samples.py,
+   light_samples.py, colors.py and paint_light.py. */
 
 enum { WINDOW_MAX = 441 }; /* the largest window around a seed: 21 by 21 samples */
 
