@@ -34,38 +34,43 @@ def analytic_wrench(terms: Setpoints) -> np.ndarray:
     """
     config = terms.config
     gains, vehicle = config.gains, config.vehicle
-    mass = np.concatenate((np.full(3, vehicle.mass_kg), np.asarray(vehicle.inertia_kg_m2)))
-    complementary = np.zeros(6)
-    complementary[:3] = (
-        terms.normal * (terms.standoff_command / vehicle.mass_kg)
-        + terms.right * terms.velocity_command[0]
-        + terms.down * terms.velocity_command[1]
-    )
-    complementary[3:] = terms.angular
+    standoff, (right, down) = terms.standoff_command / vehicle.mass_kg, terms.velocity_command.tolist()
+    axes = zip(terms.normal.tolist(), terms.right.tolist(), terms.down.tolist(), strict=True)
+    complementary = np.array([n * standoff + r * right + d * down for n, r, d in axes] + terms.angular.tolist())
     acceleration = complementary
-    if terms.lines:
-        rows, wanted = [], []
-        for line in terms.lines:
-            rows.append(line.matrix[0])
+    lines = terms.lines  # made anew whenever they are read, and so are their matrices
+    if lines:
+        matrices, wanted = [line.matrix for line in lines], []
+        for line in lines:
             wanted.append(
                 -(gains.line_kp * line.rho_error + gains.line_kd * line.rho_rate + gains.line_ki * line.integral)
             )
-        level = min(terms.lines, key=lambda line: abs(line.rho))
-        rows.append(level.matrix[1])
+        nearest = min(range(len(lines)), key=lambda index: abs(lines[index].rho))
+        level = lines[nearest]
         wanted.append(-(gains.theta_kp * level.angle_error + gains.theta_kd * level.angle_rate))
-        matrix = np.vstack(rows)
-        inverse = np.linalg.pinv(matrix, rcond=RANK_TOLERANCE)
-        acceleration = inverse @ np.array(wanted) + complementary - inverse @ (matrix @ complementary)
-    motion = mass * acceleration
-    share = terms.contact_weight
-    along = float(terms.normal @ motion[:3])
-    motion[:3] += terms.normal * share * (terms.push_command - along)
+        matrix = np.array([*(rows[0] for rows in matrices), matrices[nearest][1]])
+        inverse = _pseudo_inverse(matrix)
+        acceleration = inverse.dot(np.array(wanted)) + complementary - inverse.dot(matrix.dot(complementary))
+    mass = vehicle.mass_kg
+    motion = np.array((mass, mass, mass, *vehicle.inertia_kg_m2)) * acceleration
+    share, force = terms.contact_weight, motion[:3]
+    along = float(terms.normal.dot(force))
+    force += terms.normal * share * (terms.push_command - along)
     return motion
+
+
+def _pseudo_inverse(matrix: np.ndarray) -> np.ndarray:
+    """`numpy.linalg.pinv` of a small matrix to the bit, without its handling of stacks: half the time."""
+    left, singular, right = np.linalg.svd(matrix, full_matrices=False)
+    values = singular.tolist()  # the largest first
+    least = RANK_TOLERANCE * values[0]
+    inverted = np.array([[1.0 / value if value > least else 0.0] for value in values])
+    return np.matmul(right.T, inverted * left.T)
 
 
 def analytic_thrusts(terms: Setpoints) -> np.ndarray:
     """Unclipped thrusts of the analytic law: feedback linearisation and pseudo-inverse allocation [N], (n,)."""
-    return terms.inverse @ (analytic_wrench(terms) - terms.bias_wrench)
+    return terms.inverse.dot(analytic_wrench(terms) - terms.bias_wrench)
 
 
 class PaperController:

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from ibvs_qp.command import ActiveLimit, Command, Outcome
+from ibvs_qp.made import made
 from ibvs_qp.measurement import Reference
 from ibvs_qp.setpoints import Setpoints
 
@@ -63,27 +64,41 @@ def clipped_command(
         rejected: Inputs refused.
     """
     thrusts = np.minimum(np.maximum(free, terms.lower), terms.upper)
-    unallocated = terms.effectiveness @ (free - thrusts)
-    terms.note(thrusts, float(np.abs(unallocated).max()))
+    beyond = free - thrusts
+    unallocated = terms.effectiveness.dot(beyond)
+    terms.note(thrusts, max(map(abs, unallocated.tolist())))
+    fields = {
+        "stamp_ns": stamp_ns,
+        "thrusts": thrusts,
+        "outcome": outcome,
+        "mode": mode,
+        "rejected": rejected,
+        "tasks": (),
+        "active_limits": _clipped_rotors(terms, beyond.tolist()),
+        "unallocated_wrench": unallocated,
+        "reach_margin": math.nan if mode == "hold" else reach_margin(terms),
+        "iterations": 0,
+        "solve_time_s": 0.0,
+    }
+    return Command.explained_later({"wrench": lambda: terms.effectiveness @ thrusts}, fields)
+
+
+def _clipped_rotors(terms: Setpoints, beyond: list[float]) -> tuple[ActiveLimit, ...]:
+    """Rotors whose thrust was clipped, with what was taken away [N]."""
+    if not any(beyond):
+        return ()
     names = terms.config.vehicle.geometry.names
-    clipped = tuple(
-        ActiveLimit(
-            name=f"thrust_{names[i]}",
-            side="upper" if free[i] > thrusts[i] else "lower",
-            price=math.nan,
-            slack=abs(float(free[i] - thrusts[i])),
-            unit="N",
-        )
-        for i in np.flatnonzero(np.abs(free - thrusts) > CLIPPED)
-    )
-    return Command(
-        stamp_ns=stamp_ns,
-        thrusts=thrusts,
-        wrench=terms.effectiveness @ thrusts,
-        outcome=outcome,
-        mode=mode,
-        rejected=rejected,
-        active_limits=clipped,
-        unallocated_wrench=unallocated,
-        reach_margin=math.nan if mode == "hold" else reach_margin(terms),
+    return tuple(
+        [
+            made(
+                ActiveLimit,
+                name=f"thrust_{name}",
+                side="upper" if over > 0.0 else "lower",
+                price=math.nan,
+                slack=abs(over),
+                unit="N",
+            )
+            for name, over in zip(names, beyond, strict=True)
+            if abs(over) > CLIPPED
+        ]
     )

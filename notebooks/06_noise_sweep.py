@@ -113,7 +113,8 @@ def _(chosen, table):
     ## Is one law better?
 
     Both laws fly the same seeds, so compare them **pair by pair**: what a seed brings is in both flights and cancels in
-    the difference. An interval (bootstrap of the median) that does not contain zero says that the sign is no accident.
+    the difference. The interval is the exact one of the median, whatever the distribution: of six pairs it reaches from
+    the least to the greatest, so a sign is sure only if all six have it. Fewer pairs make nothing sure.
 
     """
         + differences_table(table, figure_named(chosen.value))
@@ -169,7 +170,7 @@ def _(table):
 
     Below one picture's worth of averaging a line noise would go straight into the path. Tens of pictures are a second
     or more of memory, which only works because the accelerometer and the gyro carry the estimate from picture to
-    picture. The push cannot be averaged as long: 25 force samples at 100 Hz are a bandwidth of 1.3 Hz, and a slower
+    picture. The push cannot be averaged as long: 40 force samples at 100 Hz are a bandwidth of 0.8 Hz, and a slower
     force loop would no longer follow its wall.
     """
     )

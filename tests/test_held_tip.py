@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from ibvs_qp.config import ControllerConfig
+from ibvs_qp.estimation.motion import WallMotion
+from ibvs_qp.measurement import FeatureFrame
 from ibvs_qp.setpoints import program, wall
 from sim.closed_loop import FlightOptions, fly, pilot_config
 from sim.experiments.scenes import near_wall
@@ -19,13 +22,17 @@ from sim.trace import Trace
 SCENE = near_wall(start={"right_m": -0.5})
 #: Push that the nominal vehicle can hold standing still [N].
 REACH_N = 30.4
+#: The tip is held by then [ns].
+LINES_LOST_NS = 8_000_000_000
 
 
-def press(push: float = 20.0, reach_check: bool = True, tick_s: float = 0.004) -> Trace:
-    options, scene = FlightOptions(law="qp", seed=1, features="geometric", video=False), changed(SCENE, push)
+def press(
+    push: float = 20.0, reach_check: bool = True, tick_s: float = 0.004, law: str = "qp", hold_s: float = 9.0
+) -> Trace:
+    options, scene = FlightOptions(law=law, seed=1, features="geometric", video=False), changed(SCENE, push)
     pilot = pilot_config(scene, options)
     pilot = replace(pilot, controller=replace(pilot.controller, tick_s=tick_s, reach_check=reach_check))
-    return fly(scene, options, config=pilot, job=PressJob(hold_s=9.0))
+    return fly(scene, options, config=pilot, job=PressJob(hold_s=hold_s))
 
 
 def changed(scene: Scene, push: float) -> Scene:
@@ -68,10 +75,43 @@ def test_at_the_weight_of_a_sliding_vehicle_it_would(monkeypatch: pytest.MonkeyP
     assert trace.push_true[held(trace)].mean() < 0.95 * REACH_N
 
 
-def test_the_gain_of_a_held_vehicle_is_a_third_of_the_stability_limit() -> None:
+def nodding(trace: Trace) -> float:
+    """Largest pitch while held [deg]."""
+    return float(np.degrees(np.abs(trace.euler[held(trace), 1])).max())
+
+
+@pytest.fixture
+def lines_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing level in the picture either from the press on: the wall is blank."""
+    correct = WallMotion.correct
+
+    def blind(motion: WallMotion, frame: FeatureFrame, *rest: Any) -> None:
+        lost = frame.stamp_ns > LINES_LOST_NS
+        correct(motion, replace(frame, lines=()) if lost else frame, *rest)
+
+    monkeypatch.setattr(WallMotion, "correct", blind)
+
+
+@pytest.mark.parametrize("law", ["qp", "paper"])
+@pytest.mark.usefixtures("lines_lost")
+def test_nor_is_it_one_to_nod_about_on_a_blank_wall(law: str) -> None:
+    trace = press(law=law, hold_s=12.0)
+    assert trace.completed
+    assert nodding(trace) < 0.5
+    assert trace.push_true[held(trace)].mean() == pytest.approx(20.0, abs=0.5)
+
+
+@pytest.mark.usefixtures("lines_lost")
+def test_without_the_softer_pitch_it_would_be(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(wall, "HELD_SHARE", 1e3)
+    assert nodding(press(tick_s=0.004 + 1e-12, hold_s=12.0)) > 1.0
+
+
+def test_the_gains_of_a_held_vehicle_are_a_third_of_the_stability_limits() -> None:
     config = ControllerConfig()
     vehicle, gains = config.vehicle, config.gains
     swing = vehicle.mass_kg * 0.7**2 * (0.0575 + 1.0 / (16.0 * np.pi))
-    limit = gains.yaw_kd * (vehicle.inertia_kg_m2[2] / swing + gains.velocity_kp)
-    assert wall.held_yaw_gain(config) == pytest.approx(limit / 3.0)
-    assert wall.held_yaw_gain(config) < gains.yaw_kp
+    pitch, yaw = wall.held_gains(config)
+    assert yaw == pytest.approx(gains.yaw_kd * (vehicle.inertia_kg_m2[2] / swing + gains.velocity_kp) / 3.0)
+    assert pitch == pytest.approx(gains.attitude_kd * (vehicle.inertia_kg_m2[1] / swing + gains.velocity_kp) / 3.0)
+    assert yaw < gains.yaw_kp and pitch < gains.attitude_kp

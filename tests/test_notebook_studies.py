@@ -1,5 +1,7 @@
 """What notebooks 03, 05 and 06 compute beside what their own test cells hold."""
 
+import dataclasses
+
 import numpy as np
 import polars as pl
 import pytest
@@ -44,7 +46,15 @@ def test_averaged_samples_undo_the_root_of_n():
 def test_pairs_and_completion_are_told():
     table = made_table(1.0, 0.0)
     assert success(table).filter((pl.col("law") == "qp") & (pl.col(VS) == 0.12))["completed"].to_list() == [0.75] * 3
-    assert "3 of 4" in success_table(table) and differences_table(table, FIGURES[0]).count("QP better") == 9
+    assert "3 of 4" in success_table(table) and "QP better" not in differences_table(table, FIGURES[0])
+
+
+def test_a_difference_is_sure_from_six_pairs_on():
+    words = differences_table(made_table(1.0, 0.0, seeds=6), FIGURES[0])
+    # where a flight failed, five pairs are left
+    assert words.count("QP better") == 6 and words.count("sure from 6 pairs on") == 3
+    shares = dataclasses.replace(FIGURES[0], more_is_better=True)
+    assert differences_table(made_table(1.0, 0.0, seeds=6), shares).count("analytic law better") == 6
 
 
 def test_a_wrong_file_is_named_and_the_sample_stands_in(tmp_path):

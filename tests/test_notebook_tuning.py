@@ -1,18 +1,25 @@
 """What stands behind the sliders of notebook 02: knobs, comparisons, and the preset that the command line flies."""
 
 import dataclasses
+import io
 import json
 
+import cv2
+import matplotlib
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from ibvs_qp.errors import ConfigError
 from sim import cli
+from sim.figures.style import new_figure, styled
+from sim.notebook.picture import DOTS_PER_INCH, picture
 from sim.notebook.short import SHORT_VARIABLE
 from sim.notebook.tuning import KNOBS, Setting, TuningBench, comparison_table, knob_values, load_setting, save_setting
+from sim.notebook.tuning import bench as tuning_bench
 from sim.notebook.tuning.comparison import figures
 from sim.notebook.tuning.knobs import turned
-from sim.notebook.tuning.snippet import analytic_setting
+from sim.notebook.tuning.snippet import analytic_setting, fly_snippet
 
 
 @pytest.fixture(autouse=True)
@@ -51,6 +58,32 @@ def test_a_comparison_tells_what_changed_and_what_it_did():
     assert comparison_table(changed).count("\n") >= 10
     refused = bench.compare({"pilot.controller.vehicle.thrust_max_n": 1.0})
     assert "thrust_max_n" in refused.refusal and refused.now is changed.now
+
+
+def test_the_helper_flies_the_same_as_this_process(monkeypatch):
+    monkeypatch.delenv(SHORT_VARIABLE)
+    assert tuning_bench._helper_ready().result().law == "paper"
+    setting = turned(Setting(), {"scene.paint.push_n": 6.0})
+    analytic = analytic_setting(setting)
+    now, beside = tuning_bench._side_by_side(setting, analytic)
+    assert now is fly_snippet(setting)
+    here = fly_snippet(analytic, "paper")
+    assert beside is not here and np.array_equal(beside.thrusts, here.thrusts)
+
+
+def test_a_picture_is_what_matplotlib_saves():
+    def draw() -> Figure:
+        """A curve."""
+        figure = new_figure(2.0)
+        figure.subplots().plot([0.0, 1.0], [0.0, 2.0])
+        return figure
+
+    shown = picture(draw)
+    with styled(), matplotlib.rc_context({"figure.dpi": DOTS_PER_INCH, "savefig.dpi": DOTS_PER_INCH}):
+        saved = io.BytesIO()
+        draw().savefig(saved, format="png")
+    pixels, wanted = (cv2.imdecode(np.frombuffer(png, np.uint8), 1) for png in (shown.png, saved.getvalue()))
+    assert shown.text == "A curve." and np.array_equal(pixels, wanted)  # type: ignore[arg-type]
 
 
 def test_force_ceiling_halves_the_peak_of_a_bad_force_law():

@@ -20,12 +20,15 @@ from ibvs_qp.vision import (
     hypotheses,
     lines,
     plane,
+    seeds,
     vote,
 )
 from ibvs_qp.vision import native as native_module
 from ibvs_qp.vision.colors import SurfaceColors
 from ibvs_qp.vision.config import PlaneConfig
 from ibvs_qp.vision.grid import CoarseGrid
+from ibvs_qp.vision.light_samples import gates_of, on_surface, tinted_and_even
+from ibvs_qp.vision.native_colors import even_natively
 from ibvs_qp.vision.native_plane import NativePlane, Refit
 from ibvs_qp.vision.percept import Percept
 from ibvs_qp.vision.surface import connected_samples
@@ -123,11 +126,12 @@ def test_every_function_computes_what_numpy_does(shots: list[Shot], fresh: pytes
     compare(classify, "look_natively", look, told)
     compare(hypotheses, "_near_natively", hypotheses.near_with_numpy, np.array_equal)
     compare(hypotheses, "_judge_natively", hypotheses.judge_with_numpy, exact)
+    compare(seeds, "values_natively", seeds.values_with_numpy, exact)
     compare(flow_solve, "depths_natively", flow_solve.depths_with_numpy, exact)
     compare(flow_solve, "root_natively", flow_solve.root_with_numpy, lambda a, b: close(a, b, 1e-6))
     compare(flow_solve, "solve_natively", flow_solve.solve_with_numpy, lambda a, b: close(a, b, 1e-6))
     see(shots)
-    assert len(calls) == 9 and min(calls.values()) > 20, calls
+    assert len(calls) == 10 and min(calls.values()) > 20, calls
 
 
 @needs_compiler
@@ -177,6 +181,44 @@ def test_samples_and_their_colours_are_read_as_numpy_does(shots: list[Shot], fre
     for ours, numpys in zip(*found, strict=True):
         np.testing.assert_array_equal(ours, numpys)
     assert len({part.tobytes() for part in found[0]}) > 8
+
+
+@needs_compiler
+def test_board_light_and_paint_are_learned_as_numpy_does(shots: list[Shot], fresh: pytest.MonkeyPatch) -> None:
+    paint, seen = Scene().paint.color, []
+    frame = shots[0].frame
+    shape = (frame.rgb.shape[0], frame.rgb.shape[1])
+    grid = CoarseGrid(shape, frame.intrinsics, np.zeros(shape, np.uint8), 80)
+    surfaces = [percept.plane for percept in see(shots)[::2]]
+    for compiler in (None, "none"):
+        if compiler is not None:
+            fresh.setenv("CC", compiler)
+        native_module.native.cache_clear()
+        colors, results = SurfaceColors(None, paint, 42.0), []
+        for (shot, surface), dimmed in itertools.product(zip(shots[::2], surfaces[::2], strict=True), (1.0, 0.7)):
+            assert surface is not None
+            coarse = grid.sample((shot.frame.rgb * dimmed).astype(np.uint8))
+            near = on_surface(grid, shot.frame.depth, surface.inverse_depth, 0.05)
+            component = np.zeros(grid.shape, bool)
+            component.reshape(-1)[near] = True
+            cells = [(10, 20), (25, 60), (40, 10)]
+            results += [near, colors.bare(grid, coarse, cells, 2), colors.like_around(grid, coarse, cells[0], 2)]
+            colors.learn(coarse, component)
+            samples, places = coarse.reshape(-1, 3)[near], grid.design[near, :2]
+            even, library = colors.surely_even(coarse, near), native_module.native()
+            assert library is not None or not even  # it takes machine code to be sure early
+            if library is not None and colors.board is not None:
+                counts = even_natively(library, coarse, near, None, colors.board, gates_of(42.0))
+                parts = tinted_and_even(samples.astype(np.float32), colors.board, 42.0)
+                assert counts == tuple(int(part.sum()) for part in parts[2:])
+            uneven = not even and colors.learn_light(samples, places, shape, frame.intrinsics)
+            colors.light = None
+            colors.learn_paint(grid, coarse, near)
+            results += [colors.board, uneven, colors.paint]
+        seen.append(results)
+    assert len({part.tobytes() for part in seen[0][5::6]}) > 2  # the paint was seen in several lights
+    for one, two in zip(*seen, strict=True):
+        np.testing.assert_allclose(one, two, rtol=SINGLE)
 
 
 @needs_compiler

@@ -34,33 +34,42 @@ def wall_axes(signals: Signals, body: Body, touch: Touch) -> Wall:
     return Wall(normal=signals.output("normal", touch.normal), right=right, down=down)
 
 
-def held_yaw_gain(config: ControllerConfig) -> float:
-    r"""Stiffest yaw of a vehicle whose tip is held by friction while no line fixes its place sideways [1/s^2].
+def held_gains(config: ControllerConfig) -> tuple[float, float]:
+    r"""Stiffest pitch and yaw of a vehicle whose tip is held by friction while no line fixes its place [1/s^2].
 
     It turns about the tip, L ahead. The fed-forward contact moment comes T late, and what is late of it is the moment
-    of the vehicle's own mass: :math:`J\ddot\psi = J\alpha + T \, d/dt (m L^2 \ddot\psi + L F_y)`. With
-    :math:`\alpha = -K_p \psi - K_d \dot\psi` and :math:`F_y = -m K_v v_y`, :math:`v_y = -L \dot\psi`, Routh asks for
+    of the vehicle's own mass: :math:`J\ddot\psi = J\alpha + T \, d/dt (m L^2 \ddot\psi + L F)`. With
+    :math:`\alpha = -K_p \psi - K_d \dot\psi` and :math:`F = -m K_v v`, :math:`v = -L \dot\psi`, Routh asks for
 
     .. math:: K_p < K_d \Big(\frac{J}{m L^2 T} + K_v\Big),
 
-    31 for the shipped vehicle. A third of it is taken. Stiffer, the vehicle rocks about its tip until it slips.
+    26 in pitch and 31 in yaw for the shipped vehicle. A third of it is taken. Stiffer, the vehicle rocks about its tip
+    until it slips.
     """
     vehicle, gains = config.vehicle, config.gains
-    swing = vehicle.mass_kg * vehicle.tip_position_m[0] ** 2 * moment_lag(config)
-    return HELD_SHARE * gains.yaw_kd * (vehicle.inertia_kg_m2[2] / max(swing, 1e-9) + gains.velocity_kp)
+    swing = max(vehicle.mass_kg * vehicle.tip_position_m[0] ** 2 * moment_lag(config), 1e-9)
+    _, pitch, yaw = vehicle.inertia_kg_m2
+    return (
+        HELD_SHARE * gains.attitude_kd * (pitch / swing + gains.velocity_kp),
+        HELD_SHARE * gains.yaw_kd * (yaw / swing + gains.velocity_kp),
+    )
 
 
-def _yaw_gain(signals: Signals, config: ControllerConfig, still: ca.SX) -> ca.SX:
-    """Yaw stiffness: the configured one, softer while friction alone holds the tip sideways."""
-    gain = config.gains.yaw_kp
+def _stiffness(signals: Signals, config: ControllerConfig, still: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """Stiffness of pitch and yaw: the configured ones, softer while friction alone holds the tip up or sideways."""
+    gains = config.gains
+    pitch, yaw = ca.SX(gains.attitude_kp), ca.SX(gains.yaw_kp)
     if not config.contact_feedforward:
-        return ca.SX(gain)
-    vertical, fixed = signals.input("vertical", config.line_slots), ca.SX(0.0)
+        return pitch, yaw
+    vertical, level, upright = signals.input("vertical", config.line_slots), ca.SX(0.0), ca.SX(0.0)
     for slot in range(config.line_slots):
         present, *_, weight, _ = ca.vertsplit(signals.input(f"line_{slot}", SLOT_INPUTS))
-        fixed = ca.fmax(fixed, vertical[slot] * present * weight)
-    held = still * (1.0 - fixed)
-    return gain + held * (min(gain, held_yaw_gain(config)) - gain)
+        level = ca.fmax(level, (1.0 - vertical[slot]) * present * weight)
+        upright = ca.fmax(upright, vertical[slot] * present * weight)
+    soft_pitch, soft_yaw = held_gains(config)
+    pitch = pitch + still * (1.0 - level) * (min(gains.attitude_kp, soft_pitch) - gains.attitude_kp)
+    yaw = yaw + still * (1.0 - upright) * (min(gains.yaw_kp, soft_yaw) - gains.yaw_kp)
+    return pitch, yaw
 
 
 def wanted_turn(signals: Signals, config: ControllerConfig, body: Body, touch: Touch, wish: Wish) -> None:
@@ -71,7 +80,9 @@ def wanted_turn(signals: Signals, config: ControllerConfig, body: Body, touch: T
     roll = ca.atan2(body.down[1], body.down[2])
     pitch = ca.asin(clamp(-body.down[0], -1.0, 1.0))
     yaw = ca.if_else(touch.known, -ca.atan2(touch.normal[1], touch.normal[0]), 0.0)
-    level, turn = (gains.attitude_kp, gains.attitude_kd), (_yaw_gain(signals, config, still), gains.yaw_kd)
+    pitch_kp, yaw_kp = _stiffness(signals, config, still)
+    stiffness = (gains.attitude_kp, pitch_kp, yaw_kp)
+    damping = (gains.attitude_kd, gains.attitude_kd, gains.yaw_kd)
     tilt = signals.output("tilt_error", ca.vertcat(roll, pitch) - wish.tilt)
     lost = signals.output("tilted", ca.norm_2(wish.tilt) > 0.0)
     # A tilted vehicle that turns about the vertical has roll and pitch rates without changing either angle.
@@ -80,8 +91,8 @@ def wanted_turn(signals: Signals, config: ControllerConfig, body: Body, touch: T
     rates = signals.output("tilt_rate", ca.if_else(lost, swept, body.rate[:2]))
     wanted = [
         -kp * angle - kd * rate
-        for angle, rate, (kp, kd) in zip(
-            (tilt[0], tilt[1], yaw), (rates[0], rates[1], body.rate[2]), (level, level, turn), strict=True
+        for angle, rate, kp, kd in zip(
+            (tilt[0], tilt[1], yaw), (rates[0], rates[1], body.rate[2]), stiffness, damping, strict=True
         )
     ]
     signals.output("angles", ca.vertcat(roll, pitch, yaw))

@@ -6,19 +6,19 @@ import ctypes
 
 import numpy as np
 
+from ibvs_qp.vision.board_samples import board_median, squared_distances
 from ibvs_qp.vision.grid import CoarseGrid
 from ibvs_qp.vision.label_tables import BOARD, OTHER, PAINT, TABLE_SIZE, LabelTables, places_in_table
 from ibvs_qp.vision.light import LightField, fit_light
+from ibvs_qp.vision.light_samples import gates_of, is_even
 from ibvs_qp.vision.native import native, place
-from ibvs_qp.vision.paint_light import paint_as_lit
+from ibvs_qp.vision.native_colors import even_natively, seeds_natively
+from ibvs_qp.vision.paint_light import paint_as_lit, paint_seen_natively
 
 __all__ = ["BOARD", "OTHER", "PAINT", "SurfaceColors"]
 
 #: Share of a new sample in the board's running colour.
 _BLEND = 0.2
-#: Samples whose median is taken; more cost time and change nothing.
-_JUDGED = 500
-_SUM = np.ones(3, np.float32)
 #: Even light: one level, that of the reference.
 _EVEN = (0,)
 #: Colours nearer to each other than this share of the gate cannot be told apart.
@@ -42,24 +42,30 @@ class SurfaceColors:
         self._tables = LabelTables(self._gate)
         self.light: LightField | None = None
 
-    def learn(self, samples: np.ndarray) -> None:
-        """Sample the board: median of the unpainted colours among (n, 3) samples; few samples change nothing.
+    def learn(self, colors: np.ndarray, component: np.ndarray) -> None:
+        """Sample the board: median of the unpainted colours of the surface's samples; few samples change nothing.
 
         In uneven light `learn_light` samples it.
+
+        Args:
+            colors: Colours of the grid's samples, uint8 (rows, columns, 3).
+            component: Samples of the surface, bool (rows, columns).
         """
         if self._given is not None or self.light is not None:
             return
-        samples = samples.astype(np.float32)
-        if self.paint is not None and len(samples):
-            samples = samples[self._distance(samples, self.paint) > self._gate**2]
-        if self.board is not None and len(samples):
-            near = samples[self._distance(samples, self.board) < self._gate**2]
-            samples = near if len(near) > len(samples) // 4 else samples[:0]
-        if len(samples) < 8:
-            return
-        ordered = np.sort(samples[:: max(1, len(samples) // _JUDGED)], axis=0)
-        median = ordered[len(ordered) // 2]
-        self.board = median if self.board is None else self.board + _BLEND * (median - self.board)
+        median = board_median(colors, component, self.paint, self.board, self._gate)
+        if median is not None:
+            self.board = median if self.board is None else self.board + _BLEND * (median - self.board)
+
+    def surely_even(self, colors: np.ndarray, places: np.ndarray) -> bool:
+        """Whether light has been even and is, by colours uint8 (rows, columns, 3) at flat places on the surface.
+
+        False also where only `learn_light` can tell.
+        """
+        library = native()
+        if library is None or self.light is not None or self.board is None:
+            return False
+        return is_even(*even_natively(library, colors, places, self.paint, self.board, gates_of(self._gate))[::-1])
 
     def learn_light(
         self,
@@ -79,7 +85,7 @@ class SurfaceColors:
         if self.board is None:
             return False
         if self.paint is not None:
-            bare = self._distance(samples.astype(np.float32), self.paint) > self._gate**2
+            bare = squared_distances(samples.astype(np.float32), self.paint) > self._gate**2
             samples, places = samples[bare], places[bare]
         fixed = self._given is not None
         found = fit_light(samples, places, self.board, self._gate, shape, intrinsics, self.light, anchored=fixed)
@@ -88,14 +94,19 @@ class SurfaceColors:
             self.board = found[1]
         return found is not None
 
-    def learn_paint(self, samples: np.ndarray, places: np.ndarray) -> None:
-        """See how bright the paint is, among colours (n, 3) at normalised places (n, 2) beside the brush."""
+    def learn_paint(self, grid: CoarseGrid, colors: np.ndarray, places: np.ndarray) -> None:
+        """See how bright the paint is, among colours uint8 (rows, columns, 3) at flat places beside the brush, (n,)."""
         if self.board is None or self._named is None:
             return
-        colors = samples.astype(np.float32)
-        if self.light is not None:
-            colors = colors / np.exp(self.light.at(places)).astype(np.float32)[:, None]
-        seen = paint_as_lit(colors, self._named, self.board, self._gate)
+        library = native()
+        if library is not None and self.light is None:
+            seen = paint_seen_natively(library, colors, places, self._named, self.board, self._gate)
+        else:
+            samples = colors.reshape(-1, 3).take(places, axis=0).astype(np.float32)
+            if self.light is not None:
+                light = self.light.at(grid.design[:, :2].take(places, axis=0))
+                samples = samples / np.exp(light).astype(np.float32)[:, None]
+            seen = paint_as_lit(samples, self._named, self.board, self._gate)
         self.paint = self.paint if seen is None else seen
 
     def levels_at(self, u: np.ndarray, v: np.ndarray) -> np.ndarray | None:
@@ -138,7 +149,7 @@ class SurfaceColors:
 
     def _like_natively(self, library: ctypes.CDLL, colors: np.ndarray, around: np.ndarray) -> np.ndarray:
         paint, apart = self.paint, self._gate**2
-        if paint is not None and float(self._distance(paint, around)) <= apart:
+        if paint is not None and _apart(paint, around) <= apart:
             paint = None
         colors, labels = np.ascontiguousarray(colors), np.empty(colors.shape[:-1], np.uint8)
         gate, count = ctypes.c_float(apart), ctypes.c_long(labels.size)
@@ -148,9 +159,9 @@ class SurfaceColors:
     def _like_with_numpy(self, colors: np.ndarray, around: np.ndarray) -> np.ndarray:
         """The same where there is no machine code."""
         samples = colors.reshape(-1, 3).astype(np.float32)
-        labels = (self._distance(samples, around) < self._gate**2).view(np.uint8)
-        if self.paint is not None and float(self._distance(self.paint, around)) > self._gate**2:
-            labels[(self._distance(samples, self.paint) < self._gate**2) & (labels == OTHER)] = PAINT
+        labels = (squared_distances(samples, around) < self._gate**2).view(np.uint8)
+        if self.paint is not None and _apart(self.paint, around) > self._gate**2:
+            labels[(squared_distances(samples, self.paint) < self._gate**2) & (labels == OTHER)] = PAINT
         return labels.reshape(colors.shape[:-1])
 
     def bare(
@@ -159,13 +170,18 @@ class SurfaceColors:
         """Those of the seeds that do not lie on paint; all of them if every one does, or if the paint is unknown."""
         if self.paint is None or not seeds:
             return seeds
-        painted = self._distance(self._around(grid, colors, seeds, radius), self.paint) < self._gate**2
-        return [seed for seed, paint in zip(seeds, painted.tolist(), strict=True) if not paint] or seeds
+        around = self._around(grid, colors, seeds, radius)
+        return [
+            seed for seed, color in zip(seeds, around, strict=True) if _apart(color, self.paint) >= self._gate**2
+        ] or seeds
 
     @staticmethod
     def _around(grid: CoarseGrid, colors: np.ndarray, seeds: list[tuple[int, int]], radius: int) -> np.ndarray:
         """Median colours of the samples around seeds, float32 (n, 3)."""
-        windows = np.sort(colors.reshape(-1, 3).take(grid.windows(seeds, radius), axis=0), axis=1)
+        library, places = native(), grid.windows(seeds, radius)
+        if library is not None:
+            return seeds_natively(library, colors, places)
+        windows = np.sort(colors.reshape(-1, 3).take(places, axis=0), axis=1)
         return windows[:, windows.shape[1] // 2].astype(np.float32)
 
     @property
@@ -173,10 +189,10 @@ class SurfaceColors:
         """Whether paint and board are both known and differ."""
         if self.board is None or self.paint is None:
             return False
-        return float(self._distance(self.paint, self.board)) > (_DISTINCT * self._gate) ** 2
+        return _apart(self.paint, self.board) > (_DISTINCT * self._gate) ** 2
 
-    @staticmethod
-    def _distance(colors: np.ndarray, reference: np.ndarray) -> np.ndarray:
-        """Squared RGB distance, (...)."""
-        # differences of rows of three cost many times as much as the two products
-        return np.square(colors) @ _SUM + (colors @ (-2.0 * reference) + float(reference @ reference))
+
+def _apart(one: np.ndarray, two: np.ndarray) -> float:
+    """Squared distance of two colours (3,)."""
+    (red, green, blue), (other_red, other_green, other_blue) = one.tolist(), two.tolist()
+    return (red - other_red) ** 2 + (green - other_green) ** 2 + (blue - other_blue) ** 2

@@ -35,7 +35,7 @@ class CoarseGrid:
         """Lay the grid over a picture of (height, width) [px] with its vehicle mask."""
         height, width = shape
         self.stride = max(1, round(width / columns))
-        self.offset = self.stride // 2
+        self.offset, self._width = self.stride // 2, width
         self.intrinsics = intrinsics
         fx, fy, cx, cy = intrinsics
         u, v = np.arange(self.offset, width, self.stride), np.arange(self.offset, height, self.stride)
@@ -46,6 +46,7 @@ class CoarseGrid:
         self.places = np.stack((along, across), axis=2).astype(np.int16)
         self.pixels = along, across
         self.free = self.sample(mask) == 0
+        self._some = functools.lru_cache(maxsize=1)(self._make_some)
         self._windows = functools.lru_cache(maxsize=_REMEMBERED)(self._make_windows)
 
     def sample(self, picture: np.ndarray) -> np.ndarray:
@@ -77,6 +78,16 @@ class CoarseGrid:
         return slice(max(row - radius, 0), max(row + radius + 1, 0)), slice(
             max(column - radius, 0), max(column + radius + 1, 0)
         )
+
+    def some(self, most: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Up to twice as many evenly spread samples that nothing hides: places in grid and picture, design."""
+        return self._some(most)
+
+    def _make_some(self, most: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        places = np.flatnonzero(self.free)
+        places = np.ascontiguousarray(places[:: max(1, len(places) // most)])
+        u, v = self.pixels
+        return places, v.take(places) * self._width + u.take(places), self.design.take(places, axis=0)
 
     def windows(self, cells: list[tuple[int, int]], radius: int) -> np.ndarray:
         """Flat places of the windows around cells, those beyond the border moved to it, (n, (2 radius + 1)^2).

@@ -21,7 +21,6 @@ class PictureLayout:
         excluded: Where no flow points may lie, at half resolution, uint8.
         grid: Coarse grid.
         beside_brush: Flat places of the grid's samples around the brush, where fresh paint lies.
-        beside_brush: Flat places of the grid's samples around the brush, where fresh paint lies.
         follower: Follows the surface on a still coarser one.
         seeds: Cells beside the brush.
     """
@@ -34,8 +33,6 @@ class PictureLayout:
         zone = brush_zone(vehicle, config.brush_width_m, config.mask, frame.intrinsics, shape)
         self.excluded = np.ascontiguousarray((self.mask | zone)[: shape[0] // 2 * 2 : 2, : shape[1] // 2 * 2 : 2])
         self.grid = CoarseGrid(shape, frame.intrinsics, self.mask, config.plane.grid_columns)
-        beside = self.grid.free & (self.grid.sample(zone) > 0)
-        self.beside_brush = np.flatnonzero(beside)
         self.beside_brush = np.flatnonzero(self.grid.free & (self.grid.sample(zone) > 0))
         self.follower = PlaneFollower(config.plane, shape, frame.intrinsics, self.mask)
         self.seeds = seed_cells(self.grid, vehicle, config.brush_width_m)

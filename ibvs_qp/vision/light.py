@@ -7,39 +7,34 @@ from functools import cached_property
 
 import numpy as np
 
-from ibvs_qp.vision.grid import CoarseGrid
+from ibvs_qp.vision.light_samples import (
+    LEAST,
+    LEFT_OUT,
+    SURE,
+    UNEVEN,
+    distances,
+    is_even,
+    left_by_two_materials,
+    tinted_and_even,
+)
 
 #: Side of the cells of constant light [px, as a power of two], and the step between two levels of light [ln]: half of
 #: it is a seventh of the gate of a white board.
 CELL_BITS, STEP = 4, 0.03
 #: Light is held between these levels [steps]: 0.4 to 2.5 times the light of the reference.
 _LEVELS = 30
-#: Samples that are judged; more cost time and change nothing.
-JUDGED = 600
-#: Light that differs by less than this over the surface is even [ln]: the gate holds +-0.1 on a white board. A field
-#: that is already known is kept down to the second.
-_UNEVEN, _KEPT = 0.10, 0.07
-#: Light is uneven only where one level leaves out this share of what has the surface's tint.
-_LEFT_OUT = 0.02
+#: A field that is already known is kept down to this difference of light, less than what makes a new one [ln].
+_KEPT = 0.07
 #: Rounds in which the field grows from where it is known: each reaches as far again as the gate allows.
 _ROUNDS, _ROUNDS_KNOWN = 8, 2
-#: Fewer samples tell nothing of the light.
-_LEAST = 40
 #: Pull of the field's coefficients to zero, as variances of its terms: a band of the surface tells a slope, only much
 #: of it a curvature.
 _PULL = np.array((0.0, 1e-3, 1e-3, 4e-3, 4e-3, 4e-3))
-#: Share of the surface's colour by which the tint may be off, in units of the gate.
-_TINT = 0.7
-#: Light of samples in which the surface could be at all, times the reference's.
-_DIMMEST, _BRIGHTEST = 0.4, 2.5
-#: A channel this high is cut off: it tells neither light nor tint.
-_CUT, _WHITE = 250.0, np.float32(255.0)
-#: Share of the gate within which a colour is the surface's however coarse its label: labels are in steps of 8.
-_SURE = 0.75
-#: What a field may leave unexplained, rms of the colour over the gate. Light on one surface leaves 0.06 to 0.13, up to
-#: 0.26 where much of it is cut off; a grey board beside a grey wall is a step, which no polynomial follows, and leaves
-#: 0.15 to 0.50. Taken for light it costs the edge: flights before the faint board stopped there.
-_UNEXPLAINED = 0.15
+#: What a field may leave of what two materials in even light leave, see `left_by_two_materials`. Light on a board
+#: leaves 0.1 to 0.35 of it, up to 0.6 on a dark one, whose gate holds that light anyway; a grey board beside a grey
+#: wall is a step, which no polynomial follows, and leaves 0.6 to 2.9, in flights before the faint board 0.7 at least.
+#: Taken for light a step costs the edge.
+_UNEXPLAINED = 0.5
 #: The field is not continued farther than this beyond the light it was fitted to [ln].
 _BEYOND = 0.06
 
@@ -94,23 +89,6 @@ class LightField:
         return self.levels[row, np.clip(np.asarray(u).astype(np.intp), 0, width - 1) >> CELL_BITS]
 
 
-def on_surface(grid: CoarseGrid, depth: np.ndarray, plane: np.ndarray, gate: float) -> np.ndarray:
-    """Flat places of some samples of the grid that lie on a surface by depth alone, whatever their colour, (n,).
-
-    Args:
-        grid: Coarse grid of the picture.
-        depth: Depth [m], (H, W).
-        plane: (a, b, c) of 1/Z = a x + b y + c [1/m], (3,).
-        gate: Distance from the surface within which a sample is on it, share of depth.
-    """
-    places = np.flatnonzero(grid.free)
-    places = places[:: max(1, len(places) // JUDGED)]
-    u, v = grid.pixels
-    z = depth[v.take(places), u.take(places)]
-    near = np.abs(z * (grid.design.take(places, axis=0) @ plane) - 1.0) < gate  # false for NaN and for no reading
-    return places[near]
-
-
 def products(places: np.ndarray) -> np.ndarray:
     """1, x, y, x^2, x y, y^2 of places (..., 2), (..., 6)."""
     x, y = places[..., 0], places[..., 1]
@@ -147,14 +125,9 @@ def fit_light(
         The field and the surface's colour in its reference light; None where the light is even, or cannot be told.
     """
     colors, size = colors.astype(np.float32), max(float(board @ board), 1.0)
-    light = colors @ (board / size).astype(np.float32)
-    tint = np.maximum(np.vecdot(colors, colors) - light**2 * size, 0.0)  # squared distance from the surface's tint
-    cut = colors.max(axis=1) >= _CUT
-    tinted = ((light > _DIMMEST) & (light < _BRIGHTEST) & (tint < (_TINT * gate * light) ** 2)) | cut
-    even = tinted & (_distances(colors, board, np.ones(len(light), np.float32)) < (_SURE * gate) ** 2)
-    even &= np.abs(light - 1.0) < _UNEVEN  # a dark board's colour holds in much light, the paint's on it does not
+    light, cut, tinted, even = tinted_and_even(colors, board, gate)
     held, count = int(np.count_nonzero(even)), int(np.count_nonzero(tinted))
-    if count < _LEAST or (before is None and held >= (1.0 - _LEFT_OUT) * count):
+    if count < LEAST or (before is None and is_even(held, count)):
         return None
     colors, light, places, cut = colors[tinted], light[tinted], places[tinted], cut[tinted]
     fx, fy, cx, cy = intrinsics
@@ -164,32 +137,27 @@ def fit_light(
     near, telling, solution = np.zeros(0, bool), np.zeros(0, bool), np.zeros(6)
     for _ in range(_ROUNDS if before is None else _ROUNDS_KNOWN):
         gain = np.exp(expected).astype(np.float32)
-        near = _distances(colors, board, gain) < (gate * gain) ** 2
+        near = distances(colors, board, gain) < (gate * gain) ** 2
         # what is cut off is at least as bright as it looks: it tells something only where less was expected
         telling, told = near & (~cut | (expected < logarithm)), telling
-        if int(np.count_nonzero(telling)) < _LEAST:
+        if int(np.count_nonzero(telling)) < LEAST:
             return None
         if np.array_equal(telling, told):
             break
         part = design[telling]
         solution = np.linalg.solve(part.T @ part + len(part) * np.diag(_PULL), part.T @ logarithm[telling])
         expected = design @ solution
-    if float(np.std((logarithm - expected)[telling])) * size**0.5 > _UNEXPLAINED * gate:
+    left = float(np.abs((logarithm - expected)[telling]).sum())
+    if left > _UNEXPLAINED * left_by_two_materials(logarithm[telling], SURE * gate / size**0.5):
         return None
     if not anchored:
         expected, solution[0] = expected - solution[0], 0.0
     low, high = np.percentile(expected[near], (2.0, 98.0)).tolist()
-    if high - low < (_UNEVEN if before is None else _KEPT):
+    if high - low < (UNEVEN if before is None else _KEPT):
         return None
-    if before is None and int(np.count_nonzero(near)) * (1.0 - _LEFT_OUT) <= held:
+    if before is None and int(np.count_nonzero(near)) * (1.0 - LEFT_OUT) <= held:
         return None
     whole = near & ~cut
-    if int(np.count_nonzero(whole)) >= _LEAST:
+    if int(np.count_nonzero(whole)) >= LEAST:
         board = np.median(colors[whole] / np.exp(expected[whole])[:, None], axis=0).astype(np.float32)
     return LightField(solution, (low - _BEYOND, high + _BEYOND), reach, shape, intrinsics), board
-
-
-def _distances(colors: np.ndarray, board: np.ndarray, light: np.ndarray) -> np.ndarray:
-    """Squared distances of colours (n, 3) from the surface's in light (n,), as far as the picture can show it."""
-    difference = colors - np.minimum(light[:, None] * board, _WHITE)
-    return np.vecdot(difference, difference)

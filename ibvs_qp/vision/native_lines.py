@@ -78,7 +78,7 @@ def fit_natively(
     )
     labels = None if colors.board is None else colors.table()
     parts = (picture.rgb, picture.mask, depth, labels, colors.levels, _FITS)
-    scene = (ctypes.c_void_p * len(parts))(*(None if part is None else part.ctypes.data for part in parts))
+    scene = (ctypes.c_void_p * len(parts))(*(place(part) for part in parts))
     found, u = np.empty((count, _FIT)), np.empty((count, profiles))
     support, visible = np.empty((2, count, profiles), np.uint8)
     sides = np.empty((2, count, profiles, 3), np.uint8) if contents else None

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import ctypes
 import math
 
 import numpy as np
+
+from ibvs_qp.vision.native_colors import Gates, paint_natively
 
 #: Light in which paint is looked for, times the light in which its colour was named.
 _DIMMEST, _BRIGHTEST = 0.4, 2.5
@@ -32,7 +35,20 @@ def paint_as_lit(colors: np.ndarray, paint: np.ndarray, board: np.ndarray, gate:
     off, apart = colors - light[:, None] * paint, colors - board
     painted = (light > _DIMMEST) & (light < _BRIGHTEST) & (np.vecdot(off, off) < (_TINT * gate * light) ** 2)
     painted &= np.vecdot(apart, apart) > gate**2
-    if int(np.count_nonzero(painted)) < _LEAST:
+    count = int(np.count_nonzero(painted))
+    return _as_lit(paint, count, float(np.median(light[painted])) if count else 1.0)
+
+
+def paint_seen_natively(
+    library: ctypes.CDLL, colors: np.ndarray, places: np.ndarray, paint: np.ndarray, board: np.ndarray, gate: float
+) -> np.ndarray | None:
+    """The same by machine code in even light, of samples at flat places (n,) of colours uint8 (rows, columns, 3)."""
+    gates = Gates(gate**2, 0.0, _TINT * gate, _DIMMEST, _BRIGHTEST, 0.0, 0.0)
+    return _as_lit(paint, *paint_natively(library, colors, places, paint, board, gates))
+
+
+def _as_lit(paint: np.ndarray, count: int, found: float) -> np.ndarray | None:
+    """The paint in the light that was found among so many samples."""
+    if count < _LEAST:
         return None
-    found = float(np.median(light[painted]))
     return paint if abs(math.log(found)) < _AS_NAMED else np.float32(found) * paint

@@ -18,7 +18,7 @@ from ibvs_qp.vision.detect import Candidate, detect_lines
 from ibvs_qp.vision.flow import SparseFlow
 from ibvs_qp.vision.flow_ahead import FlowAhead
 from ibvs_qp.vision.layout import PictureLayout
-from ibvs_qp.vision.light import on_surface
+from ibvs_qp.vision.light_samples import on_surface
 from ibvs_qp.vision.make_percept import make_percept
 from ibvs_qp.vision.motion import CameraMotion
 from ibvs_qp.vision.percept import LineHint, Percept
@@ -132,6 +132,7 @@ class Perception:
         motion = CameraMotion.of_body(turn, velocity, interval, self._camera_position)
         self._stamp_ns = frame.stamp_ns
         before = None if self._plane is None else self._plane.inverse_depth
+        self._coarse: np.ndarray | None = None  # the picture's colours on the grid, where the surface was searched
         refused = self._fit_plane(frame, motion, down, seed_pixel)
         clock.lap("plane")
         surface = None if self._plane is None else self._plane.inverse_depth
@@ -181,7 +182,7 @@ class Perception:
             ):
                 self._plane = tracked
                 return None
-        coarse = self._grid.sample(frame.rgb)
+        coarse = self._coarse = self._grid.sample(frame.rgb)
         prefer = None if self._colors.board is None else self._labels(coarse)
         inverse = self._grid.inverse_depth(frame.depth, config.distance_min_m, config.distance_max_m)
         seeds = self._layout.seeds
@@ -231,11 +232,11 @@ class Perception:
         self._upright_next = not self._upright_next
         directions = (self._upright_next,) if calm else (False, True)
         followed = tuple(track.line for track in self._tracker.tracks if calm and track.settled)
-        coarse = self._grid.sample(frame.rgb)
+        coarse = self._grid.sample(frame.rgb) if self._coarse is None else self._coarse
         surface = self._whole_surface(frame, coarse, down)
-        self._colors.learn(coarse[surface.component])
+        self._colors.learn(coarse, surface.component)
         surface = self._in_its_light(surface, frame, coarse, down)
-        labels = np.where(surface.component, np.maximum(self._labels(coarse), 1), 0)
+        labels = np.maximum(self._labels(coarse), 1) * surface.component
         candidates = detect_lines(
             picture,
             frame.depth,
@@ -262,11 +263,13 @@ class Perception:
         grid, config = self._grid, self._config.plane
         shape = (frame.rgb.shape[0], frame.rgb.shape[1])
         near = on_surface(grid, frame.depth, surface.inverse_depth, config.fine_gate_high)
-        places = grid.design[:, :2].take(near, axis=0)
+        uneven = False
+        if not self._colors.surely_even(coarse, near):
+            places = grid.design[:, :2].take(near, axis=0)
+            samples = coarse.reshape(-1, 3).take(near, axis=0)
+            uneven = self._colors.learn_light(samples, places, shape, frame.intrinsics)
         assert self._layout is not None
-        uneven = self._colors.learn_light(coarse.reshape(-1, 3).take(near, axis=0), places, shape, frame.intrinsics)
-        beside = self._layout.beside_brush
-        self._colors.learn_paint(coarse.reshape(-1, 3).take(beside, axis=0), grid.design[:, :2].take(beside, axis=0))
+        self._colors.learn_paint(grid, coarse, self._layout.beside_brush)
         if not uneven:
             return surface
         inverse = grid.inverse_depth(frame.depth, config.distance_min_m, config.distance_max_m)

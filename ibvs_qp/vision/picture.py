@@ -78,6 +78,14 @@ class Picture:
             plane=None if self.plane is None else (self.plane[1], self.plane[0], self.plane[2]),
         )
 
+    @cached_property
+    def surface(self) -> tuple[float, float, float]:
+        """(p, q, r) of the surface over pixels of the view, 1/Z = p u + q v + r; zero if it is unknown."""
+        if self.plane is None:
+            return 0.0, 0.0, 0.0
+        (a, b, c), (fx, fy, cx, cy) = self.plane, self.intrinsics
+        return a / fx, b / fy, c - a * cx / fx - b * cy / fy
+
 
 def pixel_line(rho: float, theta: float, intrinsics: Intrinsics) -> tuple[float, float, float]:
     """Coefficients (p, q, r) of the line p u + q v + r = 0 in pixels."""

@@ -14,6 +14,7 @@ from ibvs_qp.vision.hypotheses import judged_planes
 from ibvs_qp.vision.native import native
 from ibvs_qp.vision.native_plane import NativePlane, Refit, estimate_of
 from ibvs_qp.vision.robust import median
+from ibvs_qp.vision.seeds import seed_values
 from ibvs_qp.vision.surface import BLOCK, PlaneEstimate, connected_samples, plane_covariance, surface_problem
 
 #: Samples used to judge the spread of residuals; more cost time and change nothing.
@@ -69,7 +70,7 @@ class PlaneFitter:
         Returns:
             The surface, or the reason why there is none.
         """
-        values = self._seed_values(grid, inverse, seeds)
+        values = seed_values(grid, inverse, seeds, self._config.seed_radius)
         order = sorted((index for index, value in enumerate(values) if value > 0), key=lambda index: -values[index])
         reason = "no valid depth around the seed"
         for index in order:
@@ -95,20 +96,6 @@ class PlaneFitter:
     ) -> PlaneEstimate | str:
         """Follow the surface from predicted (a, b, c), without random search; it is the part around a seed if given."""
         return self._refine(grid, inverse, predicted, seed, down, prefer)
-
-    def _seed_values(self, grid: CoarseGrid, inverse: np.ndarray, seeds: list[tuple[int, int]]) -> list[float]:
-        """Median 1/Z around every seed [1/m], 0 where too few samples have one."""
-        if not seeds:
-            return []
-        radius = self._config.seed_radius
-        places = grid.windows(seeds, radius)
-        known = inverse.reshape(-1).take(places)
-        known[~grid.free.reshape(-1).take(places) | ~(known > 0.0)] = np.inf
-        known.sort(axis=1)
-        counts = np.count_nonzero(known < np.inf, axis=1).tolist()
-        return [
-            float(row[count // 2]) if count >= 2 * radius + 1 else 0.0 for row, count in zip(known, counts, strict=True)
-        ]
 
     def _hypothesis(
         self,

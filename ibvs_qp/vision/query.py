@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ibvs_qp.made import made
 from ibvs_qp.vision.picture import Picture, pixel_line
 
 
@@ -72,7 +73,17 @@ class LineView:
             columns = (fx * query.span[0] + cx, fx * query.span[1] + cx)
         coefficients = pixel_line(query.rho, angle, view.intrinsics)
         first, last = max(columns[0], 0.0), min(columns[1], view.width - 1.0)
-        return cls(query, view, upright, sign, coefficients, columns, first, last)
+        return made(
+            cls,
+            query=query,
+            view=view,
+            upright=upright,
+            sign=sign,
+            coefficients=coefficients,
+            columns=columns,
+            first=first,
+            last=last,
+        )
 
     @property
     def extent(self) -> tuple[float, float]:
@@ -91,10 +102,7 @@ class LineView:
     @property
     def surface(self) -> tuple[float, float, float]:
         """(p, q, r) of the surface over pixels of the view, 1/Z = p u + q v + r; zero if it is unknown."""
-        if self.view.plane is None:
-            return 0.0, 0.0, 0.0
-        (a, b, c), (fx, fy, cx, cy) = self.view.plane, self.view.intrinsics
-        return a / fx, b / fy, c - a * cx / fx - b * cy / fy
+        return self.view.surface
 
     @property
     def side(self) -> int:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ibvs_qp.frames import align_line
+from ibvs_qp.made import made
 from ibvs_qp.vision.config import LineConfig
 from ibvs_qp.vision.fit_lines import LineFit
 from ibvs_qp.vision.query import LineView
@@ -120,12 +121,13 @@ def _finish(
     rho, theta, covariance = _polar(view, line.level, line.slope, line.center, variance, line.slope_variance)
     if abs(rho) > config.rho_max:
         return None
-    columns = strips.u[index].take(run).tolist()
-    ends = [(u, line.level + line.slope * (u - line.center)) for u in columns]
+    row = strips.u[index]
+    ends = [(u, line.level + line.slope * (u - line.center)) for u in (row.item(run[0]), row.item(run[1]))]
     fx, fy, cx, cy = view.view.intrinsics
     normal = [((along - cx) / fx, (across - cy) / fy) for along, across in ends]
     (x, y, z), sign = step, view.sign
-    return RefinedLine(
+    return made(
+        RefinedLine,
         rho=rho,
         theta=theta,
         covariance=covariance,
@@ -142,7 +144,7 @@ def _finish(
 
 def _contents(index: int, fits: Fits, strips: Profiles, sides: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Colours on both sides of a line at its profiles, (2, n, 3), and the places of these, (n, 2) [px]."""
-    view, line, held = strips.views[index], fits.lines[index], np.flatnonzero(fits.support[index])
+    view, line, held = strips.views[index], fits.lines[index], fits.support[index].nonzero()[0]
     u = strips.u[index].take(held)
     pixels = np.empty((len(held), 2))
     pixels[:, int(view.upright)], pixels[:, 1 - int(view.upright)] = u, line.level + line.slope * (u - line.center)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from ibvs_qp.made import made
 from ibvs_qp.vision.config import VisionConfig
 from ibvs_qp.vision.edge_points import POINTS, edge_points, full_vote
 from ibvs_qp.vision.grid import CoarseGrid
@@ -87,7 +88,8 @@ def _voted(
         # half-resolution row v covers the full-resolution rows 2 v and 2 v + 1 around 2 v - 0.5
         at_zero = 2.0 * left - 0.5 + 0.5 * slope
         at_last = at_zero + slope * (view.width - 1.0)
-        result.append(VotedLine(upright, -1 if falls else 1, at_zero, at_last, own * (0.1 + difference)))
+        polarity, rank = -1 if falls else 1, own * (0.1 + difference)
+        result.append(made(VotedLine, upright=upright, polarity=polarity, left=at_zero, right=at_last, rank=rank))
     return result
 
 
@@ -99,12 +101,8 @@ def _ballot(view: Picture, low: float, high: float, grid: CoarseGrid, config: Vi
     width, height = 0.5 * view.width, 0.5 * view.height
     reach = width * max(abs(math.cos(low)) / max(math.sin(low), 0.1), abs(math.cos(high)) / max(math.sin(high), 0.1))
     moved = height + reach + SAME_PX
-    rhos = [
-        u * math.cos(angle) + v * math.sin(angle)
-        for u in (0.0, width)
-        for v in (0.0, moved + height)
-        for angle in (low, high)
-    ]
+    normals = (math.cos(low), math.sin(low)), (math.cos(high), math.sin(high))
+    rhos = [u * cos + v * sin for u in (0.0, width) for v in (0.0, moved + height) for cos, sin in normals]
     least = max(3, round(0.5 * config.detect.min_length * POINTS))
     faint = _FAINT * least * full_vote(config.detect.gradient_min)
     step, scale = math.radians(config.detect.angle_step_deg), 2.0 / grid.stride

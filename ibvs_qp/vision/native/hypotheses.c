@@ -1,5 +1,20 @@
 /* The first guess of a surface through a seed: the machine code of hypotheses.py. */
 
+/* Upper median 1/Z of windows of samples, hidden ones and those without a reading left out; 0 where fewer than `least`
+   are left. */
+void seed_values(const double *inverse, const uint8_t *free_of, const int64_t *windows, long seeds, long width,
+                 long least, double *values) {
+    double held[WINDOW_MAX];
+    for (long seed = 0; seed < seeds; seed++, windows += width) {
+        int count = 0;
+        for (long k = 0; k < width; k++) {
+            double value = inverse[windows[k]];
+            if (free_of[windows[k]] && value > 0.0) held[count++] = value;
+        }
+        values[seed] = count >= least ? upper_median(held, count) : 0.0;
+    }
+}
+
 /* Samples with a reading that lie near the seed, of the board's colour if enough are; returns how many. */
 int near_seed(const double *design, const double *inverse, const uint8_t *labels, const uint8_t *free_of, int size,
               int seed, double reach, int least, int32_t *near) {

@@ -94,8 +94,12 @@ static void strongest_steps(const Thin *thin, const uint8_t *rgb, const int *tab
         steps_between(row, row + 2, columns - 2, columns, step, back);
         for (int falls = 0; falls < 2; falls++, step = back) {
             keep_strongest(step, step - 1, step + 1, columns - 2, threshold, found);
-            for (int c = 0; c < columns - 2; c++)
-                if (found[c]) strong[falls * view + (long)c * rows + r] = found[c];
+            for (int first = 0; first < columns - 2; first += 8) { /* most places are flat */
+                uint64_t eight;
+                memcpy(&eight, found + first, sizeof eight);
+                for (int c = first; eight && c < columns - 2; c++, eight >>= 8)
+                    if (eight & 0xFF) strong[falls * view + (long)c * rows + r] = (uint8_t)eight;
+            }
         }
     }
     for (int r = 1; r < rows - 1 && !upright; r++)
@@ -135,7 +139,8 @@ static int points_of(const Thin *thin, const uint8_t *strong, const uint8_t *mas
             memcpy(&eight, row + first, sizeof eight);
             for (int c = first; eight; c++, eight >>= 8) {
                 if (!(eight & 0xFF) || c >= columns) continue;
-                int free_of = hidden[pixel[c]] == 0 && (wanted == NULL || wanted[cell[c]] != 0);
+                /* the mask is as large as the picture: it is asked last */
+                int free_of = (wanted == NULL || wanted[cell[c]] != 0) && hidden[pixel[c]] == 0;
                 levels[row[c] < full ? row[c] : full] += free_of;
                 held[count] = r * columns + c, count += free_of;
             }
@@ -145,12 +150,13 @@ static int points_of(const Thin *thin, const uint8_t *strong, const uint8_t *mas
         while (above + levels[cut] < most) above += levels[cut--];
     } else cut = 0;
     for (int k = 0; k < count; k++) {
-        int r = held[k] / columns, c = held[k] - r * columns, strength = strong[held[k]] < full ? strong[held[k]] : full;
+        int strength = strong[held[k]] < full ? strong[held[k]] : full;
         if (strength < cut) continue;
         if (cut && strength == cut) {
             long room = most - above, all = levels[cut], before = seen++ * room / all;
             if (seen * room / all == before) continue;
         }
+        int r = held[k] / columns, c = held[k] - r * columns;
         float *point = points + 3 * kept++;
         point[0] = 0.5f * ((c + 0.5f) * along), point[1] = 0.5f * ((r + 1.5f) * across), point[2] = (float)strength;
     }

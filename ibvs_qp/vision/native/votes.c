@@ -23,6 +23,19 @@ static int by_votes(const void *one, const void *two) {
     return a->votes != b->votes ? b->votes - a->votes : a->at - b->at;
 }
 
+/* Drop peaks that are surely not among the highest `most`; returns how many are left. `levels` has room for the n votes
+   that a peak can have. */
+static int highest(Peak *peaks, int count, int most, int32_t *levels, int n) {
+    int cut = n, above = 0, kept = 0;
+    if (count <= most) return count;
+    memset(levels, 0, n * sizeof *levels);
+    for (int k = 0; k < count; k++) levels[peaks[k].votes - 1]++;
+    while (cut > 1 && above + levels[cut - 1] < most) above += levels[--cut];
+    for (int k = 0; k < count; k++)
+        if (peaks[k].votes >= cut) peaks[kept++] = peaks[k];
+    return kept;
+}
+
 /* Peaks of the vote of n points, rho and theta of the `most` highest; returns how many, -1 if out of memory. It finds
    what cv2.HoughLinesPointSet finds with a distance step of 1. */
 static int hough(const Vote *vote, const float *u, const float *v, int n, float *rho, float *theta) {
@@ -58,6 +71,7 @@ static int hough(const Vote *vote, const float *u, const float *v, int n, float 
             if (*at > vote->least && at[0] > at[-1] && at[0] >= at[1] && at[0] > at[-wide] && at[0] >= at[wide])
                 peaks[count++] = (Peak){*at, k * wide + r};
         }
+    count = highest(peaks, count, (int)vote->most, place, n);
     qsort(peaks, count, sizeof *peaks, by_votes);
     count = count < vote->most ? count : (int)vote->most;
     for (int k = 0; k < count; k++) {

@@ -67,10 +67,11 @@ def draw_difference(flight: ShadowFlight) -> Figure:
     grid[2].set(ylabel="moments [N m]", xlabel="time [s]")
     for axes in grid:
         _tint(axes, flight)
-        axes.legend(loc="upper right", ncols=3, fontsize=7)
+        axes.legend(loc="lower right" if axes is grid[0] else "upper right", ncols=3, fontsize=7)
     grid[0].set_xlim(min(BEGIN_S, float(flight.t[-1]) / 2), float(flight.t[-1]))
     for axes, most in ((grid[1], 2.0), (grid[2], 0.2)):
         axes.set_ylim(-most / 2, most)
+    figure.align_ylabels(grid)
     return figure
 
 
@@ -91,8 +92,10 @@ def draw_given_up(flight: ShadowFlight) -> Figure:
         grid[0, 0].set_xlim(float(flight.t[late][0]) - 0.1, float(flight.t[-1]))
     grid[0, 0].set_ylabel("forces given up [N]")
     grid[1, 0].set_ylabel("moments given up [N m]")
-    grid[0, 1].legend(loc="lower right", fontsize=7)
-    grid[1, 1].legend(loc="lower right", fontsize=7)
+    # Where the program gives up nothing but push there is room; both columns have the same colours.
+    grid[0, 0].legend(loc="center right", ncols=3, fontsize=7)
+    grid[1, 0].legend(loc="lower right", ncols=3, fontsize=7)
+    figure.align_ylabels(grid[:, 0])
     return figure
 
 
@@ -117,6 +120,7 @@ def draw_flown(flights: Mapping[str, Trace], panels: Sequence[str]) -> Figure:
     grid[-1].margins(x=0.0)
     handles, labels = grid[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=4)
+    figure.align_ylabels(grid)
     return figure
 
 

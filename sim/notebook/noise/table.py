@@ -22,11 +22,12 @@ DEPTH_M = 0.5
 
 @dataclass(frozen=True, kw_only=True)
 class Figure:
-    """A column to look at: words with unit, factor into that unit."""
+    """A column to look at: words with unit, factor into that unit, and whether more of it is better."""
 
     column: str
     words: str
     scale: float = 1.0
+    more_is_better: bool = False
 
 
 FIGURES = (
@@ -36,7 +37,7 @@ FIGURES = (
     Figure(column="tilt_rms_deg", words="tilt, rms [deg]"),
     Figure(column="yaw_rms_deg", words="yaw, rms [deg]"),
     Figure(column="velocity_rms_m_s", words="error of the estimated velocity, rms [mm/s]", scale=1e3),
-    Figure(column="coverage", words="painted share of the intended band [%]", scale=1e2),
+    Figure(column="coverage", words="painted share of the intended band [%]", scale=1e2, more_is_better=True),
     Figure(column="limited_share", words="ticks with an active limit [%]", scale=1e2),
     Figure(column="duration_s", words="duration [s]"),
 )

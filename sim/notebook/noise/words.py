@@ -11,9 +11,11 @@ from sim.figures.style import law_name
 from sim.notebook.noise.again import Again
 from sim.notebook.noise.effects import averaged_samples, effects
 from sim.notebook.noise.table import FIGURES, FORCE, VS, Figure, grid_of, reasons, success
-from sim.sweep.paired import paired_differences
+from sim.sweep.paired import needed, paired_differences, sign
 
 _PATH, _PUSH = FIGURES[:2]
+#: By the sign of analytic law minus QP law in what shall be small.
+_VERDICTS = {1: "QP better", 0: "no difference shown", -1: "analytic law better"}
 
 
 def _number(value: float, digits: int = 2) -> str:
@@ -65,7 +67,7 @@ def averages_table(table: pl.DataFrame) -> str:
 
 
 def differences_table(table: pl.DataFrame, figure: Figure) -> str:
-    """Analytic law minus QP law, seed by seed: median with interval per cell."""
+    """Analytic law minus QP law, seed by seed: median with its exact interval per cell."""
     lines = [f"| sigma_vs | sigma_f [N] | pairs | analytic − QP, {figure.words} | 95 % interval | |"]
     lines.append("|---:|---:|---:|---:|---:|---|")
     completed = table.filter(pl.col("completed"))
@@ -73,12 +75,13 @@ def differences_table(table: pl.DataFrame, figure: Figure) -> str:
         found = cell["differences"].get(figure.column)
         if found is None:
             continue
-        low, middle, high = (figure.scale * found[name] for name in ("low", "median", "high"))
-        verdict = "QP better" if low > 0.0 else "analytic law better" if high < 0.0 else "no difference shown"
+        low, middle, high = (figure.scale * found[name] for name in ("sure_low", "median", "sure_high"))
+        better = -sign(found) if figure.more_is_better else sign(found)
+        verdict = _VERDICTS[better] if math.isfinite(low) else f"sure from {needed()} pairs on"
+        span = f"{low:+.2f} to {high:+.2f}" if math.isfinite(low) else "–"
         params = cell["params"]
         lines.append(
-            f"| {params['sigma_vs']:g} | {params['sigma_f_n']:g} | {cell['n']} | {middle:+.2f} | "
-            f"{low:+.2f} to {high:+.2f} | {verdict if cell['n'] > 1 else 'one pair says nothing'} |"
+            f"| {params['sigma_vs']:g} | {params['sigma_f_n']:g} | {cell['n']} | {middle:+.2f} | {span} | {verdict} |"
         )
     return "\n".join(lines)
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import functools
+from concurrent.futures import Executor, Future
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any
 
-import joblib
+from joblib.externals.loky import get_reusable_executor
 
 from ibvs_qp.errors import ConfigError
 from sim.notebook.short import short_form
@@ -14,8 +16,10 @@ from sim.notebook.tuning.knobs import KNOBS, knob_values, turned
 from sim.notebook.tuning.snippet import KEPT_FLIGHTS, Setting, analytic_setting, fly_snippet
 from sim.trace import Trace
 
-#: Processes that fly beside each other while both laws have to, and how long they wait for the next change [s].
-WORKERS, IDLE_S = 2, 1800
+#: How long the helper, which flies beside this process when both laws have to, waits for the next change [s].
+IDLE_S = 1800
+#: What keeps linear algebra in the helper from taking this process's core.
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,7 +128,23 @@ def compare_pair(before: dict[str, Any], change: dict[str, Any]) -> Comparison:
 
 @functools.lru_cache(maxsize=KEPT_FLIGHTS)
 def _side_by_side(setting: Setting, analytic: Setting) -> tuple[Trace, Trace]:
-    jobs = [joblib.delayed(fly_snippet)(setting), joblib.delayed(fly_snippet)(analytic, "paper")]
-    with joblib.parallel_config("loky", n_jobs=WORKERS, inner_max_num_threads=1, idle_worker_timeout=IDLE_S):
-        now, paper = joblib.Parallel()(jobs)
-    return cast(Trace, now), cast(Trace, paper)
+    """The analytic law flies in the helper while this process flies the program; here too until the helper is ready."""
+    if not _helper_ready().done():
+        return fly_snippet(setting), fly_snippet(analytic, "paper")
+    beside = _helper().submit(fly_snippet, analytic, "paper")
+    now = fly_snippet(setting)
+    try:
+        return now, beside.result()
+    except BrokenProcessPool:
+        return now, fly_snippet(analytic, "paper")
+
+
+def _helper() -> Executor:
+    """One process beside this one, started where there is none."""
+    return get_reusable_executor(max_workers=1, timeout=IDLE_S, env=dict.fromkeys(THREADS, "1"))
+
+
+@functools.cache
+def _helper_ready() -> Future[Trace]:
+    """Done when the helper has loaded everything, and created its controller, by a first flight."""
+    return _helper().submit(fly_snippet, analytic_setting(Setting()), "paper")

@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from matplotlib import rcParams
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
 
 from sim.figures.style import REFERENCE, law_colour
 from sim.measures.window import tilt_deg
@@ -33,6 +35,8 @@ EVERY = 2
 TICKS = 5
 #: Room for the time under the second panel at the right, in shares of the figure's height.
 CLOCK_ROOM = 0.03
+#: Where a grid is drawn: over the ground, under everything else.
+GRID_LAYER = 0.5
 #: Places of the axes' labels, in shares of their axes.
 X_LABEL, Y_LABEL = (0.5, -0.17), (-0.075, 0.5)
 
@@ -56,6 +60,7 @@ def draw_dashboard(comparison: Comparison) -> Figure:
     _set_time(end, [*grid[:2, 1]])
     for axes in figure.axes:
         # Places that are given need no search through every tick's extent: a third of the drawing.
+        axes.set_title(axes.get_title(loc="left"), y=1.0)
         axes.xaxis.set_label_coords(*X_LABEL)
         if axes in grid:
             axes.yaxis.set_label_coords(*Y_LABEL)
@@ -71,12 +76,15 @@ def draw_dashboard(comparison: Comparison) -> Figure:
 def _set_time(end: float, column: list[Axes]) -> None:
     """Whole seconds for all axes of a column, written under the lowest."""
     seconds = list(range(math.floor(end) + 1))
-    for axes in column:
+    *upper, lowest = column
+    for axes in upper:
+        # One artist for all lines of the grid: a tick is five, and half of all that is drawn.
+        axes.xaxis.set_major_locator(NullLocator())
+        axes.vlines(seconds, 0.0, 1.0, transform=axes.get_xaxis_transform(), zorder=GRID_LAYER,
+                    colors=rcParams["grid.color"], linewidths=rcParams["grid.linewidth"])  # fmt: skip
         axes.set_xlim(0.0, end)
-        lowest = axes is column[-1]
-        axes.set_xticks(seconds)
-        axes.tick_params(labelbottom=lowest)
-    column[-1].set_xlabel("time [s]")
+    lowest.set_xticks(seconds)
+    lowest.set(xlim=(0.0, end), xlabel="time [s]")
 
 
 def _curve(axes: Axes, flights: dict[str, Trace], values: dict[str, np.ndarray]) -> None:

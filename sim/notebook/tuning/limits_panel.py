@@ -15,6 +15,13 @@ from sim.trace import Trace
 MOST_ROWS = 7
 #: Colour scale of the prices: decades below the dearest, its greatest end at least this.
 DECADES, LEAST_TOP = 4.0, 1.0
+#: Colours of the prices, and how many of them their scale shows.
+COLOURS, SHADES = "viridis_r", 128
+#: Rows of the picture per limit, and those of them that show the flight now and the flight before.
+FINE_ROWS = 50
+NOW_STRIP, LAST_STRIP = slice(4, 35), slice(37, 46)
+#: Digits of an exponent.
+RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 #: Ticks in one column of the picture; the dearest of them shows.
 TICKS_PER_COLUMN = 5
 
@@ -38,25 +45,41 @@ def draw_prices(axes: Axes, now: Trace, last: Trace) -> None:
         return
     top = max([LEAST_TOP, *(float(row.max(initial=0.0)) for table, _ in flights for row in table.values())])
     # Logarithms under a linear scale: a logarithmic one draws thirty small ticks.
-    norm, image = Normalize(math.log10(top) - DECADES, math.log10(top), clip=True), None
-    for (table, trace), (above, below) in zip(flights, ((-0.42, 0.2), (0.24, 0.42)), strict=True):
-        for place, name in enumerate(names):
-            if name in table:
-                strip = np.ma.log10(np.ma.masked_less_equal(table[name][None, :], 0.0))
-                extent = (float(trace.t[0]), float(trace.t[-1]), place + below, place + above)
-                image = axes.imshow(strip, extent=extent, aspect="auto", norm=norm, cmap="viridis_r",
-                                    interpolation="nearest")  # fmt: skip
+    norm = Normalize(math.log10(top) - DECADES, math.log10(top), clip=True)
+    for (table, trace), strip in zip(flights, (NOW_STRIP, LAST_STRIP), strict=True):
+        if any(name in table for name in names):
+            extent = (float(trace.t[0]), float(trace.t[-1]), len(names) - 0.5, -0.5)
+            axes.imshow(_strips(table, names, strip), extent=extent, aspect="auto", norm=norm, cmap=COLOURS,
+                        interpolation="nearest")  # fmt: skip
     axes.set_ylim(len(names) - 0.5, -0.5)
-    axes.set_yticks([])
     for place, name in enumerate(names):
         share = float(now.active[:, now.limits.index(name)].mean()) if name in now.limits else 0.0
         axes.text(0.005, place - 0.1, f"{name.replace('_', ' ')}  {100 * share:.1f} %", va="center", fontsize=6.8,
                   transform=axes.get_yaxis_transform(),
                   path_effects=[withStroke(linewidth=2.0, foreground="white")])  # fmt: skip
-    if image is not None and axes.figure is not None:
-        decades = range(math.ceil(norm.vmin or 0.0), math.floor(norm.vmax or 0.0) + 1)
-        place = axes.get_position()
-        beside = axes.figure.add_axes((place.x1 + 0.004, place.y0, 0.008, place.height))  # keeps the axes' width
-        bar = axes.figure.colorbar(image, cax=beside, ticks=list(decades))
-        bar.ax.set_yticklabels([f"$10^{{{decade}}}$" for decade in decades], fontsize=6.5)
-        bar.set_label("|d cost / d bound|", fontsize=7)
+    _draw_scale(axes, norm)
+
+
+def _strips(table: dict[str, np.ndarray], names: list[str], strip: slice) -> np.ma.MaskedArray:
+    """Logarithms of the prices as one picture of `FINE_ROWS` rows per limit, of which `strip` are coloured."""
+    prices = np.zeros((len(names), FINE_ROWS, len(next(iter(table.values())))))
+    for row, name in zip(prices, names, strict=True):
+        row[strip] = table.get(name, 0.0)
+    return np.ma.log10(np.ma.masked_less_equal(prices.reshape(-1, prices.shape[2]), 0.0))
+
+
+def _draw_scale(axes: Axes, norm: Normalize) -> None:
+    """The colours' scale beside the axes, whose width stays; matplotlib's own bar takes three times as long."""
+    assert axes.figure is not None and norm.vmin is not None and norm.vmax is not None
+    place, low, high = axes.get_position(), norm.vmin, norm.vmax
+    bar = axes.figure.add_axes((place.x1 + 0.004, place.y0, 0.008, place.height))
+    shades = np.linspace(low, high, SHADES)[:, None]
+    bar.imshow(shades, extent=(0.0, 1.0, low, high), origin="lower", aspect="auto", norm=norm, cmap=COLOURS)
+    bar.grid(visible=False)
+    bar.yaxis.tick_right()
+    bar.yaxis.set_label_position("right")
+    decades = range(math.ceil(low), math.floor(high) + 1)
+    # Raised digits of the font: formulas are set by a parser.
+    bar.set_yticks(list(decades), [f"10{str(decade).translate(RAISED)}" for decade in decades], fontsize=6.5)
+    bar.set_xticks([])
+    bar.set_ylabel("|d cost / d bound|", fontsize=7)

@@ -87,7 +87,8 @@ def fly_snippet(setting: Setting, law: str = "qp") -> Trace:
 def _fly(pilot: PilotConfig, scene: Scene, seed: int, law: str, job: SnippetJob) -> Trace:
     options = FlightOptions(law=law, seed=seed, features="geometric", video=False)
     trace = fly(scene, options, config=pilot_config(scene, options, pilot), job=job)
-    trace.canvas = None  # nobody looks at the board here, and a trace that changes the process would draw it
+    # Nobody looks at the board here; a trace that changes the process would draw it, and carry it along.
+    trace.canvas = trace.coverage_mask = None
     return trace
 
 
