@@ -36,20 +36,16 @@ def evenly_lit(rgb: np.ndarray, grid: CoarseGrid, own: np.ndarray, seed: tuple[i
     rows, columns = grid.shape
     if not own.any():
         return None
-    size = (columns * grid.stride, rows * grid.stride)
-    padded = cv2.copyMakeBorder(
-        rgb, 0, max(size[1] - rgb.shape[0], 0), 0, max(size[0] - rgb.shape[1], 0), cv2.BORDER_REPLICATE
-    )
-    smooth = cv2.resize(padded[: size[1], : size[0]], (columns, rows), interpolation=cv2.INTER_AREA)
-    places = np.argwhere(own)
+    smooth = averaged(rgb, grid)
+    # beside other things, such as paint under the seed, a sample's square has part of their colour
+    inner = cv2.erode(own.astype(np.uint8), np.ones((3, 3), np.uint8))
+    places = np.argwhere(inner if inner.any() else own)
     start = places[int(np.argmin(((places - seed) ** 2).sum(axis=1)))]
     blocked = np.ones((rows + 2, columns + 2), np.uint8)
     blocked[1:-1, 1:-1] = ~own
     step = (_STEP, _STEP, _STEP)
     point = (int(start[1]), int(start[0]))
-    cv2.floodFill(
-        np.ascontiguousarray(smooth), blocked, point, (0, 0, 0), step, step, 4 | cv2.FLOODFILL_MASK_ONLY | (2 << 8)
-    )
+    cv2.floodFill(smooth, blocked, point, (0, 0, 0), step, step, 4 | cv2.FLOODFILL_MASK_ONLY | (2 << 8))
     part = blocked[1:-1, 1:-1] == 2
     count, total = int(part.sum()), int(own.sum())
     if count < max(_LEAST, _LEAST_SHARE * total) or count > _ALL * total:
@@ -65,3 +61,19 @@ def evenly_lit(rgb: np.ndarray, grid: CoarseGrid, own: np.ndarray, seed: tuple[i
     if solid or (ring.any() and float(own[ring].mean()) >= _ALIKE_BEYOND):
         return (closed > 0) & own
     return None
+
+
+def even_places(rgb: np.ndarray, grid: CoarseGrid) -> np.ndarray:
+    """Samples around which light and colour change slowly, bool (rows, columns)."""
+    smooth, kernel = averaged(rgb, grid), np.ones((3, 3), np.uint8)
+    return (cv2.dilate(smooth, kernel) - cv2.erode(smooth, kernel)).max(axis=2) <= 2 * _STEP
+
+
+def averaged(rgb: np.ndarray, grid: CoarseGrid) -> np.ndarray:
+    """Mean colours of the squares around samples, uint8 (rows, columns, 3)."""
+    rows, columns = grid.shape
+    size = (columns * grid.stride, rows * grid.stride)
+    padded = cv2.copyMakeBorder(
+        rgb, 0, max(size[1] - rgb.shape[0], 0), 0, max(size[0] - rgb.shape[1], 0), cv2.BORDER_REPLICATE
+    )
+    return np.ascontiguousarray(cv2.resize(padded[: size[1], : size[0]], (columns, rows), interpolation=cv2.INTER_AREA))

@@ -14,13 +14,10 @@ from ibvs_qp.vision.plane import PlaneEstimate, PlaneFitter
 from ibvs_qp.vision.surface import connected_samples
 from ibvs_qp.vision.survey.evenly_lit import evenly_lit
 from ibvs_qp.vision.survey.evidence import depth_gate
+from ibvs_qp.vision.survey.ground import connected, ground_color
 from ibvs_qp.vision.survey.grow import grown_plane
 from ibvs_qp.vision.survey.look import SurfaceLook, alike_colors
 
-#: Share of the surface that must have the colour around the seed for it to be the surface's.
-_GROUND_SHARE = 0.25
-#: Samples next to the seed's colour among which the most common colour is sought, and colours tried.
-_NEAR, _TRIED = 300, 40
 #: Where more than this share of all readings lies on one plane, a wall may be part of it.
 _FLUSH_SHARE = 0.40
 #: Share of a new picture in the running colour of a followed surface.
@@ -57,7 +54,7 @@ def find_surface(
     coarse = grid.sample(frame.rgb)
     inverse = grid.inverse_depth(frame.depth, config.distance_min_m, config.distance_max_m)
     like_seed = colors.like_around(grid, coarse, seed, config.seed_radius) == BOARD
-    prefer = np.where(_connected(like_seed, grid, seed), np.uint8(BOARD), np.uint8(OTHER))
+    prefer = np.where(connected(like_seed, grid, seed), np.uint8(BOARD), np.uint8(OTHER))
     plane = fitter.search(grid, inverse, [seed], None, [prefer])
     if isinstance(plane, str):
         return depth_problem(frame.depth, grid, seed, config) or plane
@@ -67,12 +64,11 @@ def find_surface(
     grown = fitter.track(grid, inverse, start, None, prefer, seed)
     plane = grown if isinstance(grown, PlaneEstimate) else plane
     cells = _on_plane(grid, inverse, plane, seed)
-    color = _ground_color(grid, coarse, cells, seed)
+    color = ground_color(frame.rgb, grid, coarse, cells, seed)
     alike = alike_colors(coarse, color)
     own = cells & alike
     # where depth does not tell the surface from a wall close behind it, its light has to
-    flush = int(cells.sum()) > _FLUSH_SHARE * int(np.count_nonzero(inverse))
-    even = evenly_lit(frame.rgb, grid, own, seed) if flush else None
+    even = evenly_lit(frame.rgb, grid, own, seed) if _flush(cells, inverse) else None
     if even is not None:
         alike = even
         own = cells & even
@@ -83,6 +79,9 @@ def find_surface(
         if isinstance(again, PlaneEstimate):
             plane = again
             cells = _on_plane(grid, inverse, plane, _middle_cell(own))
+    if even is None and _flush(cells, inverse):  # noise may hide the wall until the plane is exact
+        even = evenly_lit(frame.rgb, grid, cells & alike, seed)
+        alike = alike if even is None else even
     if even is not None:  # what else has its depth is the wall
         cells = cells & even
     colored, by_light = cells & alike, even is not None
@@ -116,6 +115,11 @@ def follow_surface(
     return SurfaceLook(grid=grid, plane=plane, cells=cells, colored=cells & alike_colors(coarse, color), color=color)
 
 
+def _flush(cells: np.ndarray, inverse: np.ndarray) -> bool:
+    """Whether so much lies on the surface's plane that a wall may be part of it."""
+    return int(cells.sum()) > _FLUSH_SHARE * int(np.count_nonzero(inverse))
+
+
 def _middle_cell(cells: np.ndarray) -> tuple[int, int]:
     """The sample of a region that lies deepest within it."""
     depth = cv2.distanceTransform(cells.astype(np.uint8), cv2.DIST_L1, 3)
@@ -131,42 +135,17 @@ def _on_plane(grid: CoarseGrid, inverse: np.ndarray, plane: PlaneEstimate, seed:
     return cells if cells.any() else plane.component
 
 
-def _ground_color(grid: CoarseGrid, coarse: np.ndarray, cells: np.ndarray, seed: tuple[int, int]) -> np.ndarray:
-    """Colour of the bare surface: that around the seed where it covers much, else the most common one near by.
-
-    A seed may lie on something printed or painted, and a wall close behind the surface may outnumber it.
-    """
-    rows, columns = grid.window(seed, 1)
-    around = np.median(coarse[rows, columns].reshape(-1, 3).astype(float), axis=0)
-    alike = cells & alike_colors(coarse, around)
-    region = _connected(alike, grid, seed)
-    if int(region.sum()) >= _GROUND_SHARE * int(cells.sum()):
-        return np.median(coarse[region].astype(float), axis=0)
-    others = np.argwhere(cells & ~region)
-    near = others[np.argsort(((others - seed) ** 2).sum(axis=1), kind="stable")[:_NEAR]]
-    colors = coarse[tuple(near.T)].astype(float) if len(near) else coarse[cells].astype(float)
-    tried = colors[:: max(1, len(colors) // _TRIED)]
-    counts = [int(alike_colors(colors, color).sum()) for color in tried]
-    return np.median(colors[alike_colors(colors, tried[int(np.argmax(counts))])], axis=0)
-
-
-def _connected(region: np.ndarray, grid: CoarseGrid, seed: tuple[int, int]) -> np.ndarray:
-    """The part of a region of samples that hangs together with a seed, gaps of one sample bridged."""
-    closed = cv2.morphologyEx(region.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8)) > 0
-    return connected_samples(closed, grid, seed) & region
-
-
 def end_band(look: SurfaceLook, width: int) -> np.ndarray:
     """Samples near the end of the surface, by depth or by colour, bool (rows, columns)."""
     kernel = np.ones((2 * width + 1, 2 * width + 1), np.uint8)
     band = np.zeros(look.cells.shape, bool)
     for region in (look.cells, look.colored):
-        filled = _filled(region)
-        band |= (cv2.dilate(filled, kernel) > 0) & (cv2.erode(filled, kernel, borderValue=1) == 0)
+        whole = filled(region)
+        band |= (cv2.dilate(whole, kernel) > 0) & (cv2.erode(whole, kernel, borderValue=1) == 0)
     return band
 
 
-def _filled(region: np.ndarray) -> np.ndarray:
+def filled(region: np.ndarray) -> np.ndarray:
     """The region without the holes that prints and missing depth leave in it, uint8."""
     closed = cv2.morphologyEx(region.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
     outlines, _ = cv2.findContours(closed, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)

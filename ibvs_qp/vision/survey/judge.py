@@ -14,8 +14,11 @@ from ibvs_qp.vision.survey.detection import DetectedLine
 from ibvs_qp.vision.survey.find_surface import end_band
 from ibvs_qp.vision.survey.guides import same_edge
 from ibvs_qp.vision.survey.look import SurfaceLook
-from ibvs_qp.vision.survey.outline_lines import fit_segments, outline_segments
+from ibvs_qp.vision.survey.outline_lines import FIT_BEYOND, fit_segments, outline_segments
+from ibvs_qp.vision.survey.trim import trimmed
 
+#: Shortest piece of a segment that is looked at where the surface ends before the segment does [px at 640].
+_SHORTEST_PX = 40.0
 #: Lines nearer than this are one [px at 640].
 _SAME_PX = 2.5
 #: Score from which a line is said to border the surface.
@@ -29,10 +32,13 @@ def find_lines(
     segments = outline_segments(picture, look.grid, end_band(look, config.band_cells))
     if len(segments) == 0:
         return ()
+    pieces = trimmed(segments, look, _SHORTEST_PX * picture.scale)
+    beyond = np.repeat((FIT_BEYOND, 0.0), (len(segments), len(pieces)))
+    segments = np.vstack((segments, pieces))
     pixels = segments.reshape(-1, 2, 2)
     rough = judge_borders(pixels, _normals(pixels), picture, depth, look)
-    best = np.argsort(-rough.score, kind="stable")[: config.fitted]
-    fits = fit_segments(segments[np.sort(best)], picture, config.line, colors)
+    best = np.sort(np.argsort(-rough.score, kind="stable")[: config.fitted])
+    fits = fit_segments(segments[best], picture, config.line, colors, beyond[best])
     lines = judge_lines([fit for fit in fits if fit is not None], picture, depth, look)
     kept: list[DetectedLine] = []
     for line in sorted(lines, key=lambda entry: -entry.score):

@@ -19,7 +19,7 @@ from ibvs_qp.vision.survey.segments import find_segments
 #: Half width of the strip in which a segment is fitted [px at 640].
 _REFINE_PX = 4.0
 #: A segment is fitted beyond its ends by this share of its length: detectors stop short.
-_BEYOND = 0.15
+FIT_BEYOND = 0.15
 #: Segments fitted in one batch: those of a batch share the number of profiles.
 _BATCH = 8
 #: Distance at which the change of brightness across a segment is read [px].
@@ -52,11 +52,27 @@ def outline_segments(picture: Picture, grid: CoarseGrid, band: np.ndarray) -> np
 
 
 def fit_segments(
-    segments: np.ndarray, picture: Picture, config: LineConfig, colors: SurfaceColors
+    segments: np.ndarray,
+    picture: Picture,
+    config: LineConfig,
+    colors: SurfaceColors,
+    beyond: np.ndarray | None = None,
 ) -> list[RefinedLine | None]:
-    """Sub-pixel fits of segments (n, 4) [px], None where nothing supports one."""
+    """Sub-pixel fits of segments.
+
+    Args:
+        segments: End points (u1, v1, u2, v2) [px], (n, 4).
+        picture: Colour and camera.
+        config: Settings of the fit.
+        colors: Of the surface.
+        beyond: Share of its length by which each is fitted beyond its ends, (n,); `FIT_BEYOND` unless given.
+
+    Returns:
+        One fit for every segment, None where nothing supports one.
+    """
+    shares = np.full(len(segments), FIT_BEYOND) if beyond is None else beyond
     fits: list[RefinedLine | None] = []
-    queries = [_query(segment, picture) for segment in segments]
+    queries = [_query(segment, picture, share) for segment, share in zip(segments, shares.tolist(), strict=True)]
     for start in range(0, len(queries), _BATCH):
         fits += refine_lines(
             picture,
@@ -68,13 +84,13 @@ def fit_segments(
     return fits
 
 
-def _query(segment: np.ndarray, picture: Picture) -> LineQuery:
+def _query(segment: np.ndarray, picture: Picture, beyond: float) -> LineQuery:
     u1, v1, u2, v2 = segment.tolist()
     fx, fy, cx, cy = picture.intrinsics
     rho, theta = normalised_line(v1 - v2, u2 - u1, u1 * v2 - u2 * v1, picture.intrinsics)
     upright = abs(math.cos(theta)) > abs(math.sin(theta))
     low, high = sorted(((v1 - cy) / fy, (v2 - cy) / fy) if upright else ((u1 - cx) / fx, (u2 - cx) / fx))
-    more = _BEYOND * (high - low)
+    more = beyond * (high - low)
     return LineQuery(rho=rho, theta=theta, polarity=_polarity(segment, theta, picture), span=(low - more, high + more))
 
 
