@@ -145,10 +145,18 @@ def test_a_guide_changes_hands_only_after_two_of_three_pictures() -> None:
     assert tops == [1, 1, 1, 2, 2]
 
 
-@pytest.mark.parametrize("seed", [7, 12, 17, 19])
+# 16: a board a fifth the size of its wall; 20: noise parts board and wall until the plane is exact, seed on paint
+@pytest.mark.parametrize("seed", [7, 12, 16, 17, 19, 20])
 def test_board_before_a_wall_of_its_depth_ends_where_its_light_does(seed: int) -> None:
     errors = run("thin board", 1, seed)
     assert not errors.wrong and not errors.missed, (errors.wrong, errors.missed)
+
+
+def test_edge_that_a_joint_of_the_wall_prolongs_ends_with_the_surface() -> None:
+    truth = render_frame(sample_scene(FAMILIES["thin board"], 8))
+    guide, edge = SurveyPipeline().detect(truth.frame, truth.seed).guides["bottom"], truth.edges["bottom"]
+    assert guide is not None and guide.confidence >= 0.5
+    assert abs(np.sort(guide.pixels[:, 0]) - np.sort(edge.pixels[:, 0])).max() < 16.0  # two samples
 
 
 def test_print_under_the_seed_is_not_taken_for_the_surface() -> None:
