@@ -296,10 +296,14 @@ class Painter:
         return bottom_edge(seen.lines.values(), expected, START_GATE if far else ROW_GATE)
 
     def _fresh_edge(self, seen: Scenery) -> TrackedLine | None:
+        self._mind_level(seen)
+        return fresh_edge(seen.lines.values(), self.config.fresh_edge_m, self._level)
+
+    def _mind_level(self, seen: Scenery) -> None:
+        """Remember how the board's edge runs, for when it is out of sight."""
         board = seen.lines.get(self._board_id)
         if board is not None and board.weight > 0.5:
             self._level = board.angle
-        return fresh_edge(seen.lines.values(), self.config.fresh_edge_m, self._level)
 
     def _board_edge(self, seen: Scenery) -> TrackedLine | None:
         """The board's edge that guided row 1, from a later row."""
@@ -328,13 +332,13 @@ class Painter:
 
     def _keep_row_guide(self, seen: Scenery) -> None:
         """Stay with the fresh edge while it lives and runs level; else the board's edge leads to the end of the row."""
-        line, fresh = seen.lines.get(self._guide_id), self._fresh_edge(seen)
+        self._mind_level(seen)
+        line = seen.lines.get(self._guide_id)
         if line is not None and line.weight > 0.05:
             if self._guide_id == self._board_id or abs(line.angle - self._level) < FRESH_LEAN:
                 return
-        if fresh is not None:
-            found = fresh
-        else:
+        found = self._fresh_edge(seen)
+        if found is None:
             found = self._board_edge(seen)
             if found is not None:
                 # From where it is to where it belongs at the pace of `_slide_guide`: what led until now has misled.
