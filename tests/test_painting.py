@@ -363,16 +363,16 @@ def test_without_fresh_edge_the_old_guide_stays() -> None:
 @pytest.mark.parametrize("misleads", ["leans from the start", "leans in the row", "lost in the row"])
 def test_where_the_fresh_edge_misleads_the_board_leads(misleads: str) -> None:
     """A stroke that gusts have bent is no straight edge: followed as one it led 100 mm away."""
-    world, lean = World(short(rows=2)), math.radians(9.0)
+    world, lean = World(short(rows=2)), math.radians(4.5)
     world.fly(100.0, until="climb")
     fresh = next(edge for edge in world.edges if edge.identity == 101)
-    fresh.lean = lean if misleads == "leans from the start" else math.radians(4.0)
+    fresh.lean = lean if misleads == "leans from the start" else math.radians(2.0)
     world.fly(10.0, until="paint")
     world.fly(1.0)
     if misleads == "lost in the row":
         world.hidden.add(101)
     elif misleads == "leans in the row":
-        assert world.painter._guide_id == 101  # four degrees are none
+        assert world.painter._guide_id == 101  # two degrees are none
         fresh.lean, fresh.place = lean, fresh.place - 0.015
     world.fly(1.0)
     assert world.painter._guide_id == 1

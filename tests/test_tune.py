@@ -136,19 +136,19 @@ def test_failed_flights_count_with_the_worst():
 
 
 def test_the_rule_of_choice():
-    shipped = Score((1.0, 1.0, 1.0, 1.0), 0.0)
+    shipped = Score((1.0, 1.0, 1.0, 1.0, 1.0), 0.0)
     scores = {
         0: shipped,
-        1: Score((0.5, 0.5, 0.5, 1.2), 0.0),  # clearly worse in one
-        2: Score((0.9, 0.9, 0.9, 1.05), 0.0),
-        3: Score((0.8, 0.9, 0.9, 1.0), 0.0),
-        4: Score((0.1, 0.1, 0.1, 0.1), 0.1),  # fails flights
-        5: Score((1.0, 1.0, 1.0, 1.01), 0.0),
+        1: Score((0.5, 0.5, 0.5, 0.5, 1.2), 0.0),  # clearly worse in one
+        2: Score((0.9, 0.9, 0.9, 0.9, 1.05), 0.0),
+        3: Score((0.8, 0.9, 0.9, 0.9, 1.0), 0.0),
+        4: Score((0.1, 0.1, 0.1, 0.1, 0.1), 0.1),  # fails flights
+        5: Score((1.0, 1.0, 1.0, 1.0, 1.01), 0.0),
     }
     assert ranked(scores, shipped) == [3, 2]
     assert not allowed(scores[1], shipped) and not allowed(scores[4], shipped)
     assert front(scores) == [1, 3]
-    assert gain_over(Score((math.e,) * 4, 0.0), shipped) == pytest.approx(1.0)
+    assert gain_over(Score((math.e,) * 5, 0.0), shipped) == pytest.approx(1.0)
 
 
 def test_command_writes_preset_trials_figures_and_verdict(flown, capsys):

@@ -22,15 +22,18 @@ _MARKERS, _SHADES = ("o", "s", "^", "D"), ("#222222", "#8a8a8a", "#c0a000")
 def draw_front(law: str, scores: dict[int, Score], shipped: Score, chosen: int | None) -> Figure:
     """Every pair of objectives: trials, those that no other betters, the shipped and the chosen preset."""
     able = {number: each for number, each in scores.items() if not each.failed}
-    best = front(scores)
-    figure = new_figure(4.8)
-    grid = figure.subplots(2, 3).ravel()
-    pairs = itertools.combinations(range(len(OBJECTIVES)), 2)
-    for axes, (i, j) in zip(grid, pairs, strict=True):
+    best, last = front(scores), len(OBJECTIVES) - 1
+    figure = new_figure(7.0)
+    grid = figure.subplots(last, last, sharex="col", sharey="row", squeeze=False)
+    for i, j in itertools.product(range(last), range(1, last + 1)):
+        axes = grid[j - 1, i]
+        if i >= j:
+            axes.remove()
+            continue
         x, y = OBJECTIVES[i], OBJECTIVES[j]
         for numbers, colour, size, label in (
             ([number for number in able if number not in best], FAINT, 9, "trial"),
-            (best, law_colour(law), 14, "on the front of all four"),
+            (best, law_colour(law), 14, "on the front of all objectives"),
         ):
             points = np.array([able[number].values for number in numbers]).reshape(-1, len(OBJECTIVES))
             axes.scatter(x.scale * points[:, i], y.scale * points[:, j], s=size, color=colour, label=label, linewidth=0)
@@ -43,9 +46,11 @@ def draw_front(law: str, scores: dict[int, Score], shipped: Score, chosen: int |
         for axis, objective, place in ((axes.set_xlim, x, i), (axes.set_ylim, y, j)):
             seen = [each.values[place] for each in [*able.values(), shipped]]
             axis(0.9 * objective.scale * min(seen), objective.scale * min(1.05 * max(seen), _SHOWN_TO * start[place]))
-        axes.set_xlabel(x.label)
-        axes.set_ylabel(y.label)
-    handles, labels = grid[0].get_legend_handles_labels()
+        if j == last:
+            axes.set_xlabel(x.label)
+        if i == 0:
+            axes.set_ylabel(y.label)
+    handles, labels = grid[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper right", ncols=4)
     figure.suptitle(f"{law_name(law)}, {len(scores)} trials", x=0.01, ha="left",
                     fontsize=9, fontweight="bold")  # fmt: skip

@@ -1,4 +1,4 @@
-"""What is minimised: push, path, tilt and nervousness of the rotors, each a mean over the flights of a trial."""
+"""What is minimised: push, path, tilt, yaw and nervousness of the rotors, each a mean over the flights of a trial."""
 
 from __future__ import annotations
 
@@ -36,6 +36,7 @@ OBJECTIVES = (
     Objective("force_rms_n", "push error, rms", 1.0, "N", 3.0),
     Objective("path_rms_m", "path error, rms", 1e3, "mm", 0.05),
     Objective("tilt_peak_deg", "tilt, peak", 1.0, "deg", 20.0),
+    Objective("yaw_peak_deg", "yaw, peak", 1.0, "deg", 20.0),
     Objective("jitter_n_s", "thrust rate, rms", 1.0, "N/s", 1000.0),
 )
 
