@@ -1,6 +1,6 @@
 """Painting strategy: from what is seen and felt to the reference of the controller, row by row.
 
-Everything is in metres around the tip's wall point (see `TrackedLine`). Which line is which: `ibvs_qp.guides`.
+Everything is in metres around the tip's wall point (see `TrackedLine`). The line that leads: `ibvs_qp.guide_keeping`.
 """
 
 from __future__ import annotations
@@ -10,14 +10,13 @@ import math
 import numpy as np
 
 from ibvs_qp.estimation.motion import TrackedLine
+from ibvs_qp.guide_keeping import Guide
 from ibvs_qp.guides import (
     FIRST_STOP_GATE,
-    FRESH_LEAN,
     ROW_GATE,
     START_GATE,
     STOP_GATE,
     bottom_edge,
-    fresh_edge,
     start_mark,
     stop_edge,
 )
@@ -26,8 +25,6 @@ from ibvs_qp.painting_job import NONE, PaintingConfig, Scenery, Wish
 
 #: Nobody sets out for a guide known less well than this [m].
 START_DEVIATION = 0.01
-#: A guide's reference slides to its nominal offset at this speed [m/s].
-SLIDE_SPEED = 0.01
 #: Share of a stroke after which its end may come.
 LEAST_STROKE = 0.5
 #: How far past its nominal length row 1 may run in search of its end [m].
@@ -40,8 +37,6 @@ MOST_OPENING = 5.0
 SETTLE_TIME = 0.8
 #: Position hold along the wall by the odometer [1/s], speed-limited [m/s].
 HOLD_GAIN, HOLD_SPEED = 0.8, 0.03
-
-
 #: Vertical speed of a vehicle that gives up the wall [m/s], down: slow, because nothing measures the height.
 DESCENT_M_S = 0.15
 
@@ -64,9 +59,8 @@ class Painter:
         self._calm: tuple[float, ...] | None = None
         self.finished = self.failed = self._given_up = False
         self.reason = ""
-        self._guide_id = self._board_id = self._edge_id = -1
-        self._level = 0.5 * math.pi  # angle of the board's edge
-        self._guide_target = self.config.edge_margin_m
+        self._guide = Guide(self.config)
+        self._edge_id = -1
         self._edge_target: float | None = None
         self._speed = 0.0
         self._since = math.nan
@@ -124,24 +118,24 @@ class Painter:
         self._enter(seen, "done", reason)
 
     def _start(self, seen: Scenery, dt: float) -> Wish:
-        guide = self._bottom_edge(seen)
+        guide = bottom_edge(seen.lines.values(), self.config.edge_margin_m, START_GATE)
         sure = guide is not None and guide.weight > 0.9 and guide.deviation < START_DEVIATION
         if guide is not None and sure and seen.wall_known and seen.tared:
-            self._guide_id, self._guide_target = guide.track_id, self.config.edge_margin_m
+            self._guide.take(guide, self.config.edge_margin_m)
             self._enter(seen, "approach", f"guide {guide.offset * 1e3:+.0f} mm below the tip, wall known, wrench tared")
         distance = seen.distance if seen.wall_known else self.config.retreat_m
         return self._wish(seen, contact=False, standoff=max(distance, self.config.standoff_m), guided=False)
 
     def _approach(self, seen: Scenery, dt: float) -> Wish:
-        self._keep_guide(seen, self._bottom_edge)
+        self._keep_guide(seen, START_GATE)
         if abs(seen.distance - self.config.standoff_m) < 0.01:
             self._enter(seen, "align", f"stand-off {seen.distance * 1e3:.0f} mm reached")
         return self._wish(seen, contact=False, standoff=self.config.standoff_m, hold=True, mark=True)
 
     def _align(self, seen: Scenery, dt: float) -> Wish:
-        self._keep_guide(seen, self._bottom_edge)
-        line, mark = seen.lines.get(self._guide_id), self._start_mark(seen)
-        high = math.inf if line is None else line.offset - self._guide_target
+        self._keep_guide(seen)
+        line, mark = self._guide.line(seen), self._start_mark(seen)
+        high = math.inf if line is None else line.offset - self._guide.target
         aside = 0.0 if mark is None else mark.offset - self.config.edge_margin_m
         error, speed = self._without_sway((high, aside, *seen.velocity[:2]), dt)
         # Gusts and noisy pictures may never let the vehicle stand still: what counts as aligned opens with time.
@@ -175,7 +169,7 @@ class Painter:
             self._since, self._anchor = seen.time_s, float(seen.odometer[0])
 
     def _press(self, seen: Scenery, dt: float) -> Wish:
-        self._keep_guide(seen, self._bottom_edge)
+        self._keep_guide(seen)
         self._hold_where_it_touched(seen)
         settled = seen.in_contact and seen.time_since_touch > 1.2
         if settled and abs(seen.push - seen.push_wanted) < 0.15 * max(seen.push_wanted, 1.0):
@@ -192,12 +186,8 @@ class Painter:
         config = self.config
         if seen.time_s - self.entered > config.timeout_s + 2.0 * config.stroke_m / config.speed_m_s:
             self._fail(seen, f"time-out in row {self.row}")
-        if self.row == 1:
-            self._keep_guide(seen, self._bottom_edge)
-            self._board_id = self._guide_id
-        else:
-            self._keep_row_guide(seen)
-        self._slide_guide(self._nominal(), dt)
+        self._keep_guide(seen)
+        self._guide.slide(self.row, dt)
         travel = -1.0 if self.row % 2 == 1 else 1.0
         remaining, edge = self._remaining(seen, travel)
         self._check_contact(seen)
@@ -238,17 +228,17 @@ class Painter:
         self._speed += clipped(speed - self._speed, -2.0 * step, step)
         move = min(self._speed * dt, max(left, 0.0))
         self._climbed += move
-        self._guide_target += move
+        self._guide.target += move
         if left <= 0.0:
             self._speed = 0.0
             self._since = seen.time_s if math.isnan(self._since) else self._since
             waited = seen.time_s - self._since
-            fresh = self._fresh_edge(seen)
+            fresh = self._guide.fresh(seen)
             good = fresh is not None and fresh.weight > 0.9
-            if waited > 0.3 and (good or waited > 2.0) and (self._guide_error(seen) < 0.004 or waited > 1.0):
+            if waited > 0.3 and (good or waited > 2.0) and (self._guide.error(seen) < 0.004 or waited > 1.0):
                 why = "fresh edge found" if good else "no fresh edge; the old guide stays"
                 if good and fresh is not None:
-                    self._guide_id, self._guide_target = fresh.track_id, fresh.offset
+                    self._guide.take(fresh, fresh.offset)
                 self._begin_row(seen, f"climbed {self._climbed * 1e3:.0f} mm, {why}")
                 edge = None
         return self._wish(seen, contact=True, climb=self._speed if left > 0.0 else 0.0, edge=edge, hold=edge is None)
@@ -283,84 +273,24 @@ class Painter:
         """
         if self.row < 2 or self.phase not in ("climb", "paint"):
             return None
-        line = lines.get(self._guide_id)
+        line = lines.get(self._guide.identity)
         followed = line is not None and line.weight > 0.5 and line.kind == "paint"
         if followed and self.phase == "paint":
             return None
         left = self.config.pitch_m - self._climbed if self.phase == "climb" else 0.0
         return self.config.fresh_edge_m - left, -1.0 if self.row % 2 == 1 else 1.0
 
-    def _bottom_edge(self, seen: Scenery) -> TrackedLine | None:
-        far = self.phase in ("start", "approach")
-        expected = self.config.edge_margin_m if self.phase == "start" else self._guide_target
-        return bottom_edge(seen.lines.values(), expected, START_GATE if far else ROW_GATE)
-
-    def _fresh_edge(self, seen: Scenery) -> TrackedLine | None:
-        self._mind_level(seen)
-        return fresh_edge(seen.lines.values(), self.config.fresh_edge_m, self._level)
-
-    def _mind_level(self, seen: Scenery) -> None:
-        """Remember how the board's edge runs, for when it is out of sight."""
-        board = seen.lines.get(self._board_id)
-        if board is not None and board.weight > 0.5:
-            self._level = board.angle
-
-    def _board_edge(self, seen: Scenery) -> TrackedLine | None:
-        """The board's edge that guided row 1, from a later row."""
-        line = seen.lines.get(self._board_id)
-        if line is not None and line.weight > 0.5:
-            return line
-        return bottom_edge(seen.lines.values(), self._board_nominal, 0.5 * self.config.pitch_m)
-
-    @property
-    def _board_nominal(self) -> float:
-        """Where the board's edge lies below the present row [m]."""
-        return self.config.edge_margin_m + (self.row - 1) * self.config.pitch_m
-
     def _start_mark(self, seen: Scenery) -> TrackedLine | None:
         return start_mark(seen.lines.values(), self.config.edge_margin_m)
 
-    def _keep_guide(self, seen: Scenery, chooser) -> None:
-        """Stay with the guide while it lives; when it is gone, look for it where it must be."""
-        line = seen.lines.get(self._guide_id)
-        if line is not None and line.weight > 0.05:
-            return
-        found = chooser(seen)
-        if found is not None and found.track_id != self._guide_id:
-            self.log.append((seen.time_s, "guide", f"track {found.track_id} at {found.offset * 1e3:+.1f} mm"))
-            self._guide_id = found.track_id
-
-    def _keep_row_guide(self, seen: Scenery) -> None:
-        """Stay with the fresh edge while it lives and runs level; else the board's edge leads to the end of the row."""
-        self._mind_level(seen)
-        line = seen.lines.get(self._guide_id)
-        if line is not None and line.weight > 0.05:
-            if self._guide_id == self._board_id or abs(line.angle - self._level) < FRESH_LEAN:
-                return
-        found = self._fresh_edge(seen)
-        if found is None:
-            found = self._board_edge(seen)
-            if found is not None:
-                # From where it is to where it belongs at the pace of `_slide_guide`: what led until now has misled.
-                self._board_id, self._guide_target = found.track_id, found.offset
-        if found is not None and found.track_id != self._guide_id:
-            self.log.append((seen.time_s, "guide", f"track {found.track_id} at {found.offset * 1e3:+.1f} mm"))
-            self._guide_id = found.track_id
-
-    def _nominal(self) -> float:
-        """Where the present guide shall be: the row's own, or one of the rows before, which stays where it was put."""
-        if self._guide_id == self._board_id:
-            return self._board_nominal
-        near = abs(self._guide_target - self.config.fresh_edge_m) < 2.0 * ROW_GATE
-        return self.config.fresh_edge_m if near else self._guide_target
-
-    def _slide_guide(self, nominal: float, dt: float) -> None:
-        gap = nominal - self._guide_target
-        self._guide_target += clipped(gap, -SLIDE_SPEED * dt, SLIDE_SPEED * dt)
-
-    def _guide_error(self, seen: Scenery) -> float:
-        line = seen.lines.get(self._guide_id)
-        return math.inf if line is None else abs(line.offset - self._guide_target)
+    def _keep_guide(self, seen: Scenery, gate: float = ROW_GATE) -> None:
+        """Stay with the guide, or take the line that has to lead now."""
+        if self.row < 2:
+            new = self._guide.keep_board(seen, self._guide.target, gate, leads=self.row == 1)
+        else:
+            new = self._guide.keep_row(seen, self.row)
+        if new is not None:
+            self.log.append((seen.time_s, "guide", f"track {new.track_id} at {new.offset * 1e3:+.1f} mm"))
 
     def _remaining(self, seen: Scenery, travel: float) -> tuple[float, TrackedLine | None]:
         """Way left in this row [m] and the vertical edge that ends it, once accepted."""
@@ -411,10 +341,10 @@ class Painter:
     ) -> Wish:
         guides: list[tuple[TrackedLine, float]] = []
         right = 0.0
-        line = seen.lines.get(self._guide_id) if guided else None
+        line = self._guide.line(seen) if guided else None
         slope = 0.0
         if line is not None:
-            guides.append((line, self._guide_target))
+            guides.append((line, self._guide.target))
             slope = line.angle - 0.5 * math.pi
         if mark:
             start = self._start_mark(seen)
