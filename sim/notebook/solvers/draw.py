@@ -28,8 +28,11 @@ LIMITED = "#f1ead9"
 FELT_N = 1e-2
 #: Places of a name beside its dot [points] and its alignment, in order of preference.
 _BESIDE = (
-    ((0, 8), "left"), ((0, -8), "left"), ((-6, 0), "right"), ((0, 17), "left"), ((0, -17), "left"), ((0, 26), "left"),
+    ((0, 8), "left"), ((0, -8), "left"), ((-6, 0), "right"), ((0, 8), "right"), ((0, -8), "right"), ((0, 17), "left"),
+    ((0, -17), "left"), ((0, 17), "right"), ((0, -17), "right"), ((0, 26), "left"),
 )  # fmt: skip
+#: Half the height that a line or a dot takes from the names [pixels].
+_DOT_PX = 2.0
 
 
 def draw_race(results: Sequence[Result], tick_us: float = 4000.0) -> Figure:
@@ -57,9 +60,11 @@ def draw_race(results: Sequence[Result], tick_us: float = 4000.0) -> Figure:
 
 
 def _name(figure: Figure, axes: Axes, results: Sequence[Result]) -> None:
-    """Write the names beside the dots where they do not cover each other."""
+    """Write the names beside the dots where they cover neither each other nor a dot or its line."""
     figure.draw_without_rendering()
-    taken: list[Bbox] = []
+    points = [line.get_xydata() for line in axes.lines if line.get_transform() == axes.transData]
+    pixels = [axes.transData.transform(np.asarray(each)) for each in points]
+    taken = [Bbox((each.min(axis=0) - _DOT_PX, each.max(axis=0) + _DOT_PX)) for each in pixels]
     for one in results:
         error, middle = float(np.nanpercentile(one.errors_n, 99.0)), float(np.median(one.times_us))
         for offset, side in _BESIDE:
