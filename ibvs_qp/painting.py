@@ -1,6 +1,7 @@
 """Painting strategy: from what is seen and felt to the reference of the controller, row by row.
 
-Everything is in metres around the tip's wall point (see `TrackedLine`). The line that leads: `ibvs_qp.guide_keeping`.
+Everything is in metres around the tip's wall point (see `TrackedLine`). The line that leads:
+`ibvs_qp.guide_keeping`; where a row ends: `ibvs_qp.row_end`.
 """
 
 from __future__ import annotations
@@ -11,24 +12,13 @@ import numpy as np
 
 from ibvs_qp.estimation.motion import TrackedLine
 from ibvs_qp.guide_keeping import Guide
-from ibvs_qp.guides import (
-    FIRST_STOP_GATE,
-    ROW_GATE,
-    START_GATE,
-    STOP_GATE,
-    bottom_edge,
-    start_mark,
-    stop_edge,
-)
+from ibvs_qp.guides import ROW_GATE, START_GATE, bottom_edge, start_mark
 from ibvs_qp.measurement import VERTICAL
 from ibvs_qp.painting_job import NONE, PaintingConfig, Scenery, Wish
+from ibvs_qp.row_end import RowEnd, travel_of
 
 #: Nobody sets out for a guide known less well than this [m].
 START_DEVIATION = 0.01
-#: Share of a stroke after which its end may come.
-LEAST_STROKE = 0.5
-#: How far past its nominal length row 1 may run in search of its end [m].
-OVERRUN = 0.10
 #: Errors and speed of the alignment are averaged over this time [s]: half a period of the sway in hover.
 SWAY_TIME = 0.4
 #: Farthest that the alignment's tolerances open: 15 mm and 25 mm/s, what 3 N rms of gusts leave.
@@ -60,13 +50,10 @@ class Painter:
         self.finished = self.failed = self._given_up = False
         self.reason = ""
         self._guide = Guide(self.config)
-        self._edge_id = -1
-        self._edge_target: float | None = None
+        self._row_end = RowEnd(self.config)
         self._speed = 0.0
         self._since = math.nan
         self._anchor = 0.0  # row 1 begins where the tip was at the start, before the vehicle turned to the wall
-        self._stroke_start = self._stroke_end = math.nan
-        self._right_edge: float | None = None
         self._last_time = math.nan
         self._paused = False
         self._climbed = 0.0
@@ -145,7 +132,7 @@ class Painter:
         if error < opening * self.config.align_error_m and still:
             self._since = seen.time_s if math.isnan(self._since) else self._since
             if seen.time_s - self._since >= self.config.align_time_s:
-                self._right_edge = mark.offset if mark is not None else None
+                self._row_end.right_margin = mark.offset if mark is not None else None
                 self._anchor = float(seen.odometer[0])
                 self._enter(seen, "press", f"aligned within {error * 1e3:.1f} mm")
         else:
@@ -174,12 +161,13 @@ class Painter:
         settled = seen.in_contact and seen.time_since_touch > 1.2
         if settled and abs(seen.push - seen.push_wanted) < 0.15 * max(seen.push_wanted, 1.0):
             self.row = 1
-            self._stroke_start = float(seen.odometer[0])
+            self._row_end.begin_first_row(float(seen.odometer[0]))
             self._begin_row(seen, f"push {seen.push:.1f} N held")
         return self._wish(seen, contact=True, hold=True, mark=True)
 
     def _begin_row(self, seen: Scenery, reason: str) -> None:
-        self._speed, self._edge_id, self._edge_target = 0.0, -1, None
+        self._speed = 0.0
+        self._row_end.forget()
         self._enter(seen, "paint", f"row {self.row}: {reason}")
 
     def _paint(self, seen: Scenery, dt: float) -> Wish:
@@ -188,8 +176,8 @@ class Painter:
             self._fail(seen, f"time-out in row {self.row}")
         self._keep_guide(seen)
         self._guide.slide(self.row, dt)
-        travel = -1.0 if self.row % 2 == 1 else 1.0
-        remaining, edge = self._remaining(seen, travel)
+        travel = travel_of(self.row)
+        remaining, edge = self._row_end.remaining(seen, self.row)
         self._check_contact(seen)
         left = remaining if remaining > 0.0 else 0.0
         speed = min(config.speed_m_s, math.sqrt(2.0 * config.acceleration_m_s2 * left), 2.0 * left + 0.005)
@@ -208,7 +196,7 @@ class Painter:
 
     def _end_row(self, seen: Scenery, edge: TrackedLine | None) -> None:
         if self.row == 1:
-            self._stroke_end = float(seen.odometer[0])
+            self._row_end.end_first_row(float(seen.odometer[0]))
         how = f"at {edge.kind or 'unknown'} edge {edge.offset * 1e3:+.0f} mm" if edge is not None else "by the odometer"
         if self.row >= self.config.rows:
             self._enter(seen, "retreat", f"row {self.row} ended {how}; all rows done")
@@ -219,7 +207,7 @@ class Painter:
         self._enter(seen, "climb", f"row {self.row - 1} ended {how}")
 
     def _climb(self, seen: Scenery, dt: float) -> Wish:
-        config, edge = self.config, self._climb_edge(seen)
+        config, edge = self.config, self._row_end.beside_climb(seen, self.row - 1)
         self._check_contact(seen)
         left = config.pitch_m - self._climbed
         speed = min(config.climb_speed_m_s, math.sqrt(2.0 * config.acceleration_m_s2 * max(left, 0.0)) + 0.002)
@@ -242,17 +230,6 @@ class Painter:
                 self._begin_row(seen, f"climbed {self._climbed * 1e3:.0f} mm, {why}")
                 edge = None
         return self._wish(seen, contact=True, climb=self._speed if left > 0.0 else 0.0, edge=edge, hold=edge is None)
-
-    def _climb_edge(self, seen: Scenery) -> TrackedLine | None:
-        """The edge at which the last row ended; brush and paint may have hidden it for a while."""
-        edge = seen.lines.get(self._edge_id)
-        if edge is not None and edge.weight >= 0.05:
-            return edge
-        travel = 1.0 if self.row % 2 == 1 else -1.0  # of the row that ended
-        margin = self.config.edge_margin_m if travel < 0 else self._right_edge
-        edge = None if margin is None else stop_edge(seen.lines.values(), travel, travel * margin, STOP_GATE)
-        self._edge_id = -1 if edge is None else edge.track_id
-        return edge
 
     def _retreat(self, seen: Scenery, dt: float) -> Wish:
         if self._given_up:
@@ -278,7 +255,7 @@ class Painter:
         if followed and self.phase == "paint":
             return None
         left = self.config.pitch_m - self._climbed if self.phase == "climb" else 0.0
-        return self.config.fresh_edge_m - left, -1.0 if self.row % 2 == 1 else 1.0
+        return self.config.fresh_edge_m - left, travel_of(self.row)
 
     def _start_mark(self, seen: Scenery) -> TrackedLine | None:
         return start_mark(seen.lines.values(), self.config.edge_margin_m)
@@ -291,29 +268,6 @@ class Painter:
             new = self._guide.keep_row(seen, self.row)
         if new is not None:
             self.log.append((seen.time_s, "guide", f"track {new.track_id} at {new.offset * 1e3:+.1f} mm"))
-
-    def _remaining(self, seen: Scenery, travel: float) -> tuple[float, TrackedLine | None]:
-        """Way left in this row [m] and the vertical edge that ends it, once accepted."""
-        config = self.config
-        place = float(seen.odometer[0])
-        travelled = abs(place - self._stroke_start)
-        if self.row == 1:
-            ahead = config.stroke_m - travelled
-        else:
-            ahead = place - self._stroke_end if travel < 0 else self._stroke_start - place
-        wanted = travel * (config.edge_margin_m if travel < 0 else (self._right_edge or config.edge_margin_m))
-        edge = seen.lines.get(self._edge_id)
-        if (edge is None or edge.weight < 0.05) and travelled > LEAST_STROKE * config.stroke_m * (self.row == 1):
-            known = travel < 0 or self._right_edge is not None
-            gate, expected = FIRST_STOP_GATE if self.row == 1 else STOP_GATE, wanted + travel * max(ahead, 0.0)
-            edge = stop_edge(seen.lines.values(), travel, expected, gate) if known else None
-        if edge is not None:
-            self._edge_id = edge.track_id
-            return travel * (edge.offset - wanted), edge
-        self._edge_id, self._edge_target = -1, None
-        if self.row == 1:
-            return ahead + OVERRUN, None  # the stroke ends at the edge, which may come a little late
-        return ahead, None
 
     def _check_contact(self, seen: Scenery) -> None:
         if not seen.in_contact and not self._paused:
@@ -351,25 +305,15 @@ class Painter:
             if start is not None:
                 guides.append((start, self.config.edge_margin_m))
         if edge is not None and edge.weight > 0.0:
-            guides.append((edge, self._edge_reference(edge, edge_rate)))
+            climbs = self.phase == "climb"  # beside the edge at which the row before ended
+            wanted = self._row_end.reference(edge, edge_rate, self.row - climbs, reached=climbs)
+            guides.append((edge, wanted))
         if hold and not any([entry.role == VERTICAL for entry, _ in guides]):
             right = clipped(HOLD_GAIN * (self._anchor - seen.odometer[0]), -HOLD_SPEED, HOLD_SPEED)
         c, s = math.cos(slope), math.sin(slope)
         velocity = np.array((right + along * c + climb * s, along * s - climb * c))
         travel = self._travel if contact and self._slides else NONE
         return Wish(contact, standoff, velocity, guides, self.config.push_n, NONE, travel)
-
-    def _edge_reference(self, edge: TrackedLine, edge_rate: float) -> float:
-        """The stop edge's wanted offset: from where it was first seen to the margin, at the stroke's own speed."""
-        painted = self.row - 1 if self.phase == "climb" else self.row  # a climb keeps the edge at which its row ended
-        travel = -1.0 if painted % 2 == 1 else 1.0
-        margin = travel * (self.config.edge_margin_m if travel < 0 else (self._right_edge or self.config.edge_margin_m))
-        if self._edge_target is None:
-            self._edge_target = edge.offset
-        self._edge_target += edge_rate
-        if self.phase == "climb" or travel * (self._edge_target - margin) < 0.0:
-            self._edge_target = margin
-        return self._edge_target
 
 
 def clipped(value: float, low: float, high: float) -> float:

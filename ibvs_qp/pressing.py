@@ -40,21 +40,20 @@ class Presser(Painter):
         super()._time_out(seen)
 
     def _press(self, seen: Scenery, dt: float) -> Wish:
-        self._keep_guide(seen, self._bottom_edge)
+        self._keep_guide(seen)
         self._hold_where_it_touched(seen)
         if math.isnan(self._touched) and seen.in_contact:
             self._touched = seen.time_s
         if seen.time_s - self._touched > self._hold_s:
             if self._slide_s > 0.0:
                 self.row, self._speed = 1, 0.0
-                self._stroke_start = float(seen.odometer[0])
                 self._enter(seen, "paint", f"held for {self._hold_s:g} s, sliding")
             else:
                 self._enter(seen, "retreat", f"held for {self._hold_s:g} s")
         return self._wish(seen, contact=True, hold=True, mark=True)
 
     def _paint(self, seen: Scenery, dt: float) -> Wish:
-        self._keep_guide(seen, self._bottom_edge)
+        self._keep_guide(seen)
         self._check_contact(seen)
         step = self.config.acceleration_m_s2 * dt
         wanted = 0.0 if self._paused else self.config.speed_m_s

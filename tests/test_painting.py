@@ -322,7 +322,7 @@ def test_the_right_edge_in_view_at_the_start_does_not_end_row_one() -> None:
     world.fly(60.0, until="paint")
     assert 2 in world.seen()
     world.fly(1.0)
-    assert world.painter.phase == "paint" and world.painter._edge_id == -1
+    assert world.painter.phase == "paint" and world.painter._row_end._identity == -1
 
 
 def test_only_an_edge_with_the_surface_on_our_side_ends_a_row() -> None:
