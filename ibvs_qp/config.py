@@ -31,7 +31,7 @@ class Gains:
     theta_kd: float = setting(6.896, "line angle rate", unit="1/s", low=0.0, high=100.0)
     line_turn_share: float = setting(
         0.6702,
-        "share of the body's turn that line rows count on while the tip slides",
+        "share of the body's turn that line rows count on in contact, once the tip shall travel",
         low=0.0,
         high=1.0,
     )

@@ -15,10 +15,11 @@ LEAST_SHARE = 0.1
 
 
 def turn_share(signals: Signals, config: ControllerConfig) -> ca.SX:
-    r"""Share of the body's turn that line rows count on: :math:`1 - \lambda (1 - r)`, r the gain, in a slide.
+    r"""Share of the body's turn that line rows count on: :math:`1 - \lambda (1 - r)`, r the gain, where it travels.
 
-    A tip that friction holds turns with the body and goes nowhere, as the rows in full say. Counting on less, the
-    level line moves the vehicle where nothing is to move: 35 N asked for beyond reach then swing the yaw by 1 degree.
+    A tip that shall stay is held by friction as the rows in full say. Counting on less, the level line moves the
+    vehicle where nothing is to move: 35 N asked for beyond reach then swing the yaw by 1 degree. A tip that shall
+    travel may be held all the same; there the full row subtracts from the wish what the turn never brings.
     """
     less = 1.0 - config.gains.line_turn_share
     return 1.0 - signals.input("contact_weight") * (1.0 - signals.outputs["held"]) * less

@@ -74,7 +74,7 @@ def draw_unseen(law: str, table: pl.DataFrame) -> Figure:
         axes.set_xlim(0.0, reach)
         axes.set_ylim(0.0, reach)
         axes.set_aspect("equal")
-        axes.set_title(each.label, fontsize=8)
+        axes.set_title(each.label.replace(", ", ",\n"), fontsize=8)
         axes.set_xlabel("shipped")
     grid[0].set_ylabel("tuned")
     figure.legend(*grid[0].get_legend_handles_labels(), loc="outside upper right", ncols=len(names))
