@@ -100,7 +100,7 @@ def ringing(push: np.ndarray, dt: float, order: int = 8) -> tuple[float, float]:
     return -pole.real / abs(pole), abs(pole) / (2.0 * math.pi)
 
 
-@pytest.mark.parametrize("force_kfp", [0.8, 1.6])  # the shipped 0.35 is damped 0.45: nothing rings
+@pytest.mark.parametrize("force_kfp", [0.8, 1.6])  # less is damped so well that nothing rings
 def test_predicts_the_ringing_of_the_flown_contact(force_kfp: float, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(push_law, "RISE", 1e3)  # a step that is slewed in is no step
     # From farther away: the estimator of distance and rate has settled, as the model of the loop assumes.
