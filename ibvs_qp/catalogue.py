@@ -23,7 +23,6 @@ _HEAD = """\
 Written by `python -m ibvs_qp.catalogue` from the classes and their settings; a test compares. What the rows mean and
 how they work together is told in [control.md](control.md), how to add one in [extending.md](extending.md). Rows are
 those of the shipped vehicle; settings are named as in a preset's TOML, below `[controller]` where it is a pilot's.
-What the reasons say of flights was measured with the gains of [start_qp.toml](tuning/start_qp.toml).
 """
 
 _TASKS = """

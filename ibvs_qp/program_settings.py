@@ -1,8 +1,7 @@
 """Weights of the tasks, and bounds, prices and switches of the limits: unit, range and reason of every number.
 
 ``python -m ibvs_qp.catalogue`` writes them out beside the classes that they belong to (docs/tasks_and_limits.md).
-Rows are in their own units, so a weight or a price is per squared unit of its row, and the cost has none. What the
-reasons say of flights was measured with the gains of docs/tuning/start_qp.toml.
+Rows are in their own units, so a weight or a price is per squared unit of its row, and the cost has none.
 """
 
 from __future__ import annotations

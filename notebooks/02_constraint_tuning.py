@@ -143,9 +143,9 @@ def _():
     and cuts the reference to 97 % of what it finds. Standing still that would be 29.7 N. But a slide is to follow, on
     a wall whose friction nobody has felt yet, so $d$ leans sideways by the most friction that a brush has, 0.8, and
     8.5 N are left until the slide has shown less. Switched off, rotor limits bind from the end of the ramp on, and
-    the program chooses what to give up: the push, which has the lightest weight. It ends 4 N short standing and ever
-    more as friction takes its share, while tilt stays below half a degree and the tip within a millimetre of its row.
-    The analytic law, which clips, holds the push and loses the attitude: it leans by 40 degrees.
+    the program chooses what to give up: the push, which has the lightest weight. It ends 3 N short standing and ever
+    more as friction takes its share, while tilt stays below one degree and the tip within a millimetre of its row.
+    The analytic law, which clips, holds the push and loses the attitude: it leans by 14 degrees and more.
     """)
     return
 
@@ -168,8 +168,8 @@ def _():
     mo.md(r"""
     **Turn the priorities round: the weight of the push from 0.5 to 5000, at the same 34 N, still without the check.**
     The flight before is the same at the shipped weight. Nothing but one weight says who gives way: now the vehicle
-    leans into the wall by up to 18 degrees, because leaning turns lift into push, and gets its 34 N. The prices tell
-    it as well, they rise about a thousandfold: a newton of thrust is worth more when what it buys is
+    leans into the wall by up to 19 degrees, because leaning turns lift into push, and gets its 34 N. The prices tell
+    it as well, they rise from some ten to some ten thousand: a newton of thrust is worth more when what it buys is
     weighted more. The analytic law has no such choice; clipped thrusts lose whatever the geometry makes them lose.
     """)
     return
@@ -194,7 +194,7 @@ def _(push_first):
 @app.cell(hide_code=True)
 def _():
     mo.md(r"""
-    **A bad force law: nearly three times the force gain, no damping, no ramp.** The contact is a spring $k$ and a damper under
+    **A bad force law: six times the force gain, no damping, no ramp.** The contact is a spring $k$ and a damper under
     the mass $m$, and this force law alone would drive it into ringing. The *force ceiling* bounds the push by the
     contact's own poles,
 
@@ -203,10 +203,10 @@ def _():
     $$
 
     with $\dot e_s < 0$ while the tip closes in, so that it is braked before the spring is compressed. The flight
-    before is the same without the ceiling: 15 N instead of 7 N at the peak, and a tip that leaves the wall again and
-    again. Switch off the approach barrier as well, and the tip strikes with 34 N. Note how busy the limits are: in
-    four of ten ticks one of them mends what the force law spoils, and the push still swings. The shipped gains hardly
-    ever ask for it.
+    before is the same without the ceiling: 16 N instead of 7 N at the peak, and a tip that leaves the wall again and
+    again. Switch off the approach barrier as well, and the tip strikes with 33 N. Note how busy the ceiling is: in
+    every sixth tick it mends what the force law spoils, and the push still swings. The shipped gains never ask for
+    it.
     """)
     return
 

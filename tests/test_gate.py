@@ -364,10 +364,10 @@ def test_fuzz(controller: Any, steps: list[tuple[dict[str, Any], Any]]) -> None:
     ],
 )
 def test_one_believable_lie_does_not_bring_the_vehicle_down(law: Callable[[], Any], lie: dict[str, Any]) -> None:
-    """What passes the gate and is wrong all the same: the vehicle is back at its hover two and a half seconds later."""
+    """What passes the gate and is wrong all the same: the vehicle is back at its hover two seconds later."""
     controller = law()
     vehicle = SmallVehicle(controller.config, distance=0.3)
-    for tick in range(725):
+    for tick in range(450):
         seen = vehicle.measure(**(lie if tick == 100 else {}))
         command = controller.step(seen, Reference(standoff=0.3, lines=line_references(2, 0.8)))
         vehicle.fly(command.thrusts)

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from firm_gains import FIRM
 
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.estimation.motion import WallMotion
@@ -25,20 +24,14 @@ SCENE = near_wall(start={"right_m": -0.5})
 REACH_N = 30.4
 #: The tip is held by then [ns].
 LINES_LOST_NS = 8_000_000_000
-#: Makes another configuration: controllers are kept by theirs [s].
-OTHER = 0.004 + 1e-12
 
 
 def press(
-    push: float = 20.0,
-    *,
-    law: str = "qp",
-    hold_s: float = 9.0,
-    **settings: Any,
+    push: float = 20.0, reach_check: bool = True, tick_s: float = 0.004, law: str = "qp", hold_s: float = 9.0
 ) -> Trace:
     options, scene = FlightOptions(law=law, seed=1, features="geometric", video=False), changed(SCENE, push)
     pilot = pilot_config(scene, options)
-    pilot = replace(pilot, controller=replace(pilot.controller, **settings))
+    pilot = replace(pilot, controller=replace(pilot.controller, tick_s=tick_s, reach_check=reach_check))
     return fly(scene, options, config=pilot, job=PressJob(hold_s=hold_s))
 
 
@@ -65,7 +58,7 @@ def test_a_held_tip_is_no_pivot_to_rock_about() -> None:
 
 def test_without_the_softer_yaw_it_would_be(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(wall, "HELD_SHARE", 1e3)
-    assert rocking(press(gains=FIRM, tick_s=OTHER)) > 1.0
+    assert rocking(press(tick_s=0.004 + 1e-12)) > 1.0  # another configuration: controllers are kept by theirs
 
 
 def test_a_push_beyond_reach_takes_no_damping_from_a_held_tip() -> None:
@@ -77,7 +70,7 @@ def test_a_push_beyond_reach_takes_no_damping_from_a_held_tip() -> None:
 
 def test_at_the_weight_of_a_sliding_vehicle_it_would(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(program, "held_sideways_weight", lambda weights: weights.velocity)
-    trace = press(35.0, gains=FIRM, reach_check=False, tick_s=OTHER)
+    trace = press(35.0, reach_check=False, tick_s=0.004 + 1e-12)
     assert rocking(trace) > 2.0
     assert trace.push_true[held(trace)].mean() < 0.95 * REACH_N
 
@@ -111,7 +104,7 @@ def test_nor_is_it_one_to_nod_about_on_a_blank_wall(law: str) -> None:
 @pytest.mark.usefixtures("lines_lost")
 def test_without_the_softer_pitch_it_would_be(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(wall, "HELD_SHARE", 1e3)
-    assert nodding(press(gains=FIRM, tick_s=OTHER, hold_s=12.0)) > 1.0
+    assert nodding(press(tick_s=0.004 + 1e-12, hold_s=12.0)) > 1.0
 
 
 def test_the_gains_of_a_held_vehicle_are_a_third_of_the_stability_limits() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -70,23 +69,6 @@ def test_every_number_agrees_with_its_source(file: Path) -> None:
 def test_round_trip(file: Path) -> None:
     config = PilotConfig.from_toml(file)
     assert from_dict(PilotConfig, tomllib.loads(config.to_toml())) == config
-
-
-@pytest.mark.parametrize("law", ["qp", "paper"])
-def test_the_gains_are_those_that_the_kept_search_chose(law: str) -> None:
-    """One search for both laws (docs/tuning.md), from the gains before it; the octorotor flies the program's."""
-    kept = Path(__file__).parents[1] / "docs" / "tuning"
-    search = json.loads((kept / f"{law}_trials.json").read_text(encoding="utf-8"))
-    assert search["trials"] == len(search["all_trials"]) == 200 and search["features"] == "rendered"
-    assert "--trials 200 --unseen 10" in search["command"]
-    for file in (file for file in FILES if file.stem.endswith(law)):
-        gains = written(file)["controller"]["gains"]
-        assert gains == search["gains"], file.stem
-    start = written(kept / f"start_{law}.toml")["controller"]["gains"]
-    first = search["all_trials"][0]
-    assert all(first[name] == value for name, value in start.items())
-    if law == "qp":
-        assert {name: getattr(ControllerConfig().gains, name) for name in start} == search["gains"]
 
 
 def test_the_presets_of_the_laws_are_those_that_fly_by_default() -> None:

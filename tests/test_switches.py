@@ -22,7 +22,7 @@ LAWS = [HybridController, PaperController]
 #: Largest thrust step that the vehicle's rate limit allows in a tick [N]: 500 N/s.
 RATE_STEP = 500.0 * 0.004
 #: Until the press has settled, how long a switch lasts, and the time to settle again [ticks].
-SETTLE, SWITCHED, REST = 900, 100, 300
+SETTLE, SWITCHED, REST = 900, 100, 150
 PRESS = Reference(push_force=5.0, standoff=0.02, contact=True, lines=line_references(1))
 WEAK_ROTOR = np.array([52.56, 52.56, 9.0, 52.56, 52.56, 52.56])
 

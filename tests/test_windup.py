@@ -23,7 +23,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 from controller_scenes import line_references
-from firm_gains import FIRM
 from small_vehicle import SmallVehicle
 
 from ibvs_qp.analytic import PaperController
@@ -100,7 +99,7 @@ def test_every_integrator_rests_while_limits_take_what_it_asks_for(law: type, di
 @pytest.mark.parametrize("law", LAWS)
 def test_a_speed_out_of_reach_is_forgotten_with_the_wish(law: type) -> None:
     """Half a metre a second asked of rotors that cannot: released, the vehicle stops instead of making up for it."""
-    loop = Loop(law(ControllerConfig(gains=FIRM)), distance=0.1)
+    loop = Loop(law(), distance=0.1)
     loop.fly(SETTLE, FREE)
     weak = loop.fly(SATURATED, replace(FREE, velocity=np.array([0.5, 0.0])), WEAK)
     assert np.median(weak[:, 3]) > 0.5
@@ -127,7 +126,7 @@ def test_lines_out_of_reach_are_come_back_to_without_overshoot() -> None:
 @pytest.mark.parametrize("law", LAWS)
 def test_a_push_out_of_reach_leaves_no_debt(law: type) -> None:
     """Asked for 40 N of 30.4 N without the reach check: what is missing is not collected afterwards."""
-    loop = Loop(law(ControllerConfig(reach_check=False, gains=FIRM)), distance=0.005)
+    loop = Loop(law(ControllerConfig(reach_check=False)), distance=0.005)
     loop.fly(PRESSED, PRESS)
     loop.fly(SATURATED, replace(PRESS, push_force=29.0))
     loop.fly(250, replace(PRESS, push_force=40.0))  # the push asked for rises by 10 N/s

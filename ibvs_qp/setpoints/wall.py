@@ -43,8 +43,8 @@ def held_gains(config: ControllerConfig) -> tuple[float, float]:
 
     .. math:: K_p < K_d \Big(\frac{J}{m L^2 T} + K_v\Big),
 
-    39 in pitch and 27 in yaw for the shipped preset of the program. A third of it is taken. Stiffer, the vehicle rocks
-    about its tip until it slips.
+    26 in pitch and 31 in yaw for the shipped vehicle. A third of it is taken. Stiffer, the vehicle rocks about its tip
+    until it slips.
     """
     vehicle, gains = config.vehicle, config.gains
     swing = max(vehicle.mass_kg * vehicle.tip_position_m[0] ** 2 * moment_lag(config), 1e-9)
