@@ -8,13 +8,13 @@ from __future__ import annotations
 import math
 
 from ibvs_qp.estimation.motion import TrackedLine
-from ibvs_qp.guides import FRESH_LEAN, ROW_GATE, bottom_edge, fresh_edge
-from ibvs_qp.painting_job import PaintingConfig, Scenery
+from ibvs_qp.guides import FRESH_LEAN, LOST_WEIGHT, ROW_GATE, bottom_edge, fresh_edge
+from ibvs_qp.painting_job import PaintingConfig, Scenery, clipped
 
 #: A guide's reference slides to its nominal offset at this speed [m/s].
 SLIDE_SPEED = 0.01
-#: A line of less weight is lost, and one of more is surely in view.
-LOST_WEIGHT, SURE_WEIGHT = 0.05, 0.5
+#: A line of more weight is surely in view.
+SURE_WEIGHT = 0.5
 
 
 class Guide:
@@ -46,16 +46,15 @@ class Guide:
 
     def slide(self, row: int, dt: float) -> None:
         """Let the wanted offset slide towards the nominal one of the row."""
-        gap, step = self._nominal(row) - self.target, SLIDE_SPEED * dt
-        self.target += -step if gap < -step else step if gap > step else gap
+        step = SLIDE_SPEED * dt
+        self.target += clipped(self._nominal(row) - self.target, -step, step)
 
-    def keep_board(self, seen: Scenery, expected: float, gate: float, *, leads: bool) -> TrackedLine | None:
+    def keep_board(self, seen: Scenery, gate: float, *, leads: bool) -> TrackedLine | None:
         """Stay with the guide while it lives; when it is gone, look for the board's edge where it must be.
 
         Args:
             seen: What is seen.
-            expected: Offset at which the edge must be [m].
-            gate: Farthest that it may be from there [m].
+            gate: Farthest that it may be from its wanted offset [m].
             leads: Whether this is row 1, which the board's edge leads: later rows come back to it.
 
         Returns:
@@ -63,7 +62,7 @@ class Guide:
         """
         line, new = self.line(seen), None
         if line is None or line.weight <= LOST_WEIGHT:
-            new = self._change(bottom_edge(seen.lines.values(), expected, gate))
+            new = self._change(bottom_edge(seen.lines.values(), self.target, gate))
         if leads:
             self._board = self.identity
         return new

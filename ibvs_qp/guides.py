@@ -18,6 +18,8 @@ START_GATE, ROW_GATE = 0.15, 0.018
 #: as a straight line: at 3 degrees that of a bent stroke says 8 mm too much or too little. Its short end, too, leans as
 #: a row ends; a gate of 6 degrees let it roll the vehicle (the analytic law by 0.30 degrees rms instead of 0.16).
 FRESH_LEAN = math.radians(3.0)
+#: A line of less weight is lost.
+LOST_WEIGHT = 0.05
 #: A gate says nothing of a line known less well than this share of it.
 GATE_SHARE = 1.0 / 3.0
 #: The right board edge is trusted as start mark only this near to its expected place [m].

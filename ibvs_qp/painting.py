@@ -14,7 +14,7 @@ from ibvs_qp.estimation.motion import TrackedLine
 from ibvs_qp.guide_keeping import Guide
 from ibvs_qp.guides import ROW_GATE, START_GATE, bottom_edge, start_mark
 from ibvs_qp.measurement import VERTICAL
-from ibvs_qp.painting_job import NONE, PaintingConfig, Scenery, Wish
+from ibvs_qp.painting_job import NONE, PaintingConfig, Scenery, Wish, clipped
 from ibvs_qp.row_end import RowEnd, travel_of
 
 #: Nobody sets out for a guide known less well than this [m].
@@ -263,7 +263,7 @@ class Painter:
     def _keep_guide(self, seen: Scenery, gate: float = ROW_GATE) -> None:
         """Stay with the guide, or take the line that has to lead now."""
         if self.row < 2:
-            new = self._guide.keep_board(seen, self._guide.target, gate, leads=self.row == 1)
+            new = self._guide.keep_board(seen, gate, leads=self.row == 1)
         else:
             new = self._guide.keep_row(seen, self.row)
         if new is not None:
@@ -314,8 +314,3 @@ class Painter:
         velocity = np.array((right + along * c + climb * s, along * s - climb * c))
         travel = self._travel if contact and self._slides else NONE
         return Wish(contact, standoff, velocity, guides, self.config.push_n, NONE, travel)
-
-
-def clipped(value: float, low: float, high: float) -> float:
-    """The value within its bounds; plain comparisons, because calls of min and max cost several times as much."""
-    return low if value < low else high if value > high else value

@@ -87,3 +87,8 @@ class Wish:
     push: float
     tilt: np.ndarray = field(default_factory=lambda: NONE)
     travel: np.ndarray = field(default_factory=lambda: NONE)
+
+
+def clipped(value: float, low: float, high: float) -> float:
+    """The value within its bounds; plain comparisons, because calls of min and max cost several times as much."""
+    return low if value < low else high if value > high else value

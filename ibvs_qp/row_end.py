@@ -8,15 +8,13 @@ from __future__ import annotations
 import math
 
 from ibvs_qp.estimation.motion import TrackedLine
-from ibvs_qp.guides import FIRST_STOP_GATE, STOP_GATE, stop_edge
+from ibvs_qp.guides import FIRST_STOP_GATE, LOST_WEIGHT, STOP_GATE, stop_edge
 from ibvs_qp.painting_job import PaintingConfig, Scenery
 
 #: Share of a stroke after which its end may come.
 LEAST_STROKE = 0.5
 #: How far past its nominal length row 1 may run in search of its end [m].
 OVERRUN = 0.10
-#: An edge of less weight is lost.
-LOST_WEIGHT = 0.05
 
 
 class RowEnd:
