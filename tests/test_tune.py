@@ -14,8 +14,9 @@ import sim.tune.flights
 from ibvs_qp.pilot import PilotConfig
 from sim.cli import main
 from sim.closed_loop import default_preset
-from sim.tune.choice import allowed, front, gain_over, ranked
-from sim.tune.flights import CHOICE_SEED, REPORT_SEED, SEARCH_SEED, flights, scenes, seeds
+from sim.tune.choice import allowed, contact_damping, front, gain_over, ranked
+from sim.tune.finalists import Finalist, choose
+from sim.tune.flights import CHOICE_SEED, REPORT_SEED, SEARCH_SEED, checks, flights, scenes, seeds
 from sim.tune.objectives import OBJECTIVES, Score, refused, score
 from sim.tune.search import STARTUP, SearchPlan, finished, open_study, search
 from sim.tune.space import RANGES, searched_gains, with_gains
@@ -119,11 +120,11 @@ def test_search_choice_and_report_fly_seeds_of_their_own(flown):
     spans = [set(seeds(first, seed, 500)) for first in (SEARCH_SEED, CHOICE_SEED, REPORT_SEED) for seed in (0, 1)]
     assert sum(map(len, spans)) == len(set().union(*spans))
     config = with_gains(default_preset("paper"), {"line_kp": 11.0})
-    runs = flights(config, "tuned", (5,), "geometric")
+    runs = flights(scenes() | checks(), config, "tuned", (5,), "geometric")
     assert {run.law for run in runs} == {"paper"} and {run.plan.config.controller.gains.line_kp for run in runs} == {
         11.0
     }
-    assert len({run.params["scene"] for run in runs}) == len({run.plan.scene for run in runs}) == 3
+    assert len({run.params["scene"] for run in runs}) == len({run.plan.scene for run in runs}) == 6
 
 
 def test_failed_flights_count_with_the_worst():
@@ -165,7 +166,7 @@ def test_command_writes_preset_trials_figures_and_verdict(flown, capsys):
     )
     everywhere = [each for each in content["unseen"] if each["scene"] == "all"]
     assert [each["objective"] for each in everywhere] == [each.column for each in OBJECTIVES]
-    assert all(each["n"] == 12 and each["verdict"] == "better" for each in everywhere)
+    assert all(each["n"] == 24 and each["verdict"] == "better" for each in everywhere)
     assert all(each["difference"]["high"] < 0.0 for each in everywhere)
     assert {seed // 1000 for seed in flown} == {1, 2, 3}
     for name in ("qp-front.png", "qp-unseen.png"):
@@ -188,6 +189,67 @@ def test_nothing_better_keeps_the_shipped_preset(flown, monkeypatch, capsys):
     assert "shipped preset stays" in Path("run/report_paper.md").read_text()
 
 
+def test_a_kept_record_gives_the_same_choice_without_the_flights_of_the_search(flown, capsys):
+    assert main(["tune", "--trials", "24", "--unseen", "4", "--json", "--out", "run"]) == 0
+    once = json.loads(capsys.readouterr().out)
+    flown.clear()
+    words = ["tune", "--trials-of", "run/qp_trials.json", "--unseen", "4", "--json", "--out", "again"]
+    assert main(words) == 0
+    again = json.loads(capsys.readouterr().out)
+    assert {seed // 1000 for seed in flown} == {2, 3}
+    same = ("law", "seed", "features", "trials", "front", "finalists", "chosen", "gains", "unseen")
+    assert {name: again[name] for name in same} == {name: once[name] for name in same}
+    assert "`ibvs-qp tune --law qp --unseen 4 --trials-of run/qp_trials.json`" in Path("again/qp.toml").read_text()
+
+
+def test_a_trial_that_rings_more_is_no_finalist(flown, monkeypatch, tmp_path):
+    trials = searched(24, "a.log")
+    wanted = plan(24, "a.log")
+
+    def chosen(folder: str) -> int | None:
+        return choose(wanted, trials, 2, tmp_path / folder, lambda *_: None).chosen
+
+    first = chosen("first")
+    assert first is not None
+    # The same figures, but the best finalist rings a little more: it does not come as far as to fly.
+    best, firm = trials[first][0]["line_kp"], contact_damping(wanted.shipped)
+    with monkeypatch.context() as patch:
+        ringing = lambda config: (0.9 if config.controller.gains.line_kp == best else 1.0) * firm  # noqa: E731
+        patch.setattr("sim.tune.finalists.contact_damping", ringing)
+        assert chosen("ringing") not in (first, None)
+
+
+def test_a_finalist_clearly_worse_in_one_scene_may_not_replace_the_shipped():
+    def finalist(**scenes: float) -> Finalist:
+        by_scene = {name: Score((value,) * len(OBJECTIVES), 0.0) for name, value in scenes.items()}
+        return Finalist(Score((sum(scenes.values()) / len(scenes),) * len(OBJECTIVES), 0.0), by_scene, 0.3)
+
+    shipped = finalist(job=1.0, sticking=1.0, gusts=1.0)
+    assert finalist(job=0.7, sticking=1.2, gusts=0.7).may_replace(shipped)
+    assert not finalist(job=0.7, sticking=1.3, gusts=0.7).may_replace(shipped)
+    assert not finalist(job=1.0, sticking=1.1, gusts=1.0).may_replace(shipped)
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        ({"law": "paper"}, "law paper"),
+        ({"features": "rendered"}, "features rendered"),
+        ({"all_trials": []}, "no trial of the preset"),
+        ({"all_trials": [{"failed": 0.0}]}, "KeyError"),
+        ({"all_trials": 3}, "TypeError"),
+    ],
+)
+def test_a_record_of_another_search_is_refused(flown, capsys, change, named):
+    assert main(["tune", "--trials", "2", "--json", "--out", "run"]) == 0
+    capsys.readouterr()
+    record = json.loads(Path("run/qp_trials.json").read_text())
+    Path("other.json").write_text(json.dumps(record | change))
+    assert main(["tune", "--json", "--out", "again", "--trials-of", "other.json"]) == 2
+    out, err = capsys.readouterr()
+    assert out == "" and err.count("\n") == 1 and named in err
+
+
 def test_ctrl_c_says_how_to_go_on(flown, monkeypatch, capsys):
     def stops(*_, **__):
         raise KeyboardInterrupt
@@ -205,6 +267,7 @@ def test_ctrl_c_says_how_to_go_on(flown, monkeypatch, capsys):
         (["--jobs", "0"], "--jobs"),
         (["--seed", "-2"], "--seed"),
         (["--preset", "nowhere.toml"], "nowhere.toml"),
+        (["--trials-of", "nowhere.json"], "nowhere.json"),
         (["--law", "both"], "qp"),
         (["--storage", "sqlite:////nowhere/at/all.db", "--trials", "1"], "sqlite:////nowhere/at/all.db"),
         (["--storage", "mysterious://x", "--trials", "1"], "mysterious://x"),

@@ -13,6 +13,7 @@ from sim.commands.options import check_count, flag, go_on, optional
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from sim.tune.finalists import Trials
     from sim.tune.search import SearchPlan
 
 
@@ -39,6 +40,8 @@ class Tune:
     """Preset to start from; default: the shipped one."""
     jobs: int = 1
     """Trials side by side; the search depends on their number, not on what is faster."""
+    trials_of: Annotated[Path | None, optional("FILE")] = None
+    """Record of an earlier search (LAW_trials.json): choose anew from its trials, and search no further."""
     storage: Annotated[str | None, optional("FILE_OR_URL")] = None
     """Journal file or database that several processes or computers may share; default: in --out."""
     out: Annotated[Path | None, optional("DIR")] = None
@@ -82,6 +85,7 @@ class Tune:
         for name in ("trials", "flights", "unseen", "jobs"):
             check_count(f"--{name}", getattr(self, name))
         check_readable("--preset", self.preset)
+        check_readable("--trials-of", self.trials_of)
         check_preset(self.preset)
 
     def _plan(self, folder: Path) -> SearchPlan:
@@ -102,15 +106,11 @@ class Tune:
 
     def _search(self, plan: SearchPlan, folder: Path, words: list[str], notes: Console) -> dict[str, Any]:
         from sim.sweep.progress import sweep_progress
+        from sim.tune.finalists import choose
         from sim.tune.record import Outcome, write
-        from sim.tune.search import finished, open_study, search
-        from sim.tune.verdict import choose, unseen
+        from sim.tune.verdict import unseen
 
-        study = open_study(plan)
-        before = len(finished(study))
-        with sweep_progress(notes, f"{self.law}: trials") as progress:
-            search(plan, study, lambda done: progress(done, plan.trials, before))
-        trials, parts = finished(study), folder / "parts"
+        trials, parts = self._trials(plan, notes), folder / "parts"
         with sweep_progress(notes, f"{self.law}: choice") as progress:
             choice = choose(plan, trials, -(-self.unseen // 2), parts, progress)
         table = None
@@ -121,11 +121,25 @@ class Tune:
         outcome = Outcome(plan=plan, trials=trials, choice=choice, table=table, command=command, again=self._again())
         return write(outcome, folder)
 
+    def _trials(self, plan: SearchPlan, notes: Console) -> Trials:
+        """Searched for, or read back."""
+        from sim.sweep.progress import sweep_progress
+        from sim.tune.kept import kept_trials
+        from sim.tune.search import finished, open_study, search
+
+        if self.trials_of:
+            return kept_trials(self.trials_of, plan)
+        study = open_study(plan)
+        before = len(finished(study))
+        with sweep_progress(notes, f"{self.law}: trials") as progress:
+            search(plan, study, lambda done: progress(done, plan.trials, before))
+        return finished(study)
+
     def _again(self) -> str:
         """The command that gives the same on any computer."""
         default = type(self)()
-        words = ["ibvs-qp", "tune", "--law", self.law, "--trials", str(self.trials)]
-        for name in ("seed", "flights", "unseen", "features", "preset", "jobs"):
+        words = ["ibvs-qp", "tune", "--law", self.law, *([] if self.trials_of else ["--trials", str(self.trials)])]
+        for name in ("seed", "flights", "unseen", "features", "preset", "trials_of", "jobs"):
             if getattr(self, name) != getattr(default, name):
-                words += [f"--{name}", str(getattr(self, name))]
+                words += [f"--{name.replace('_', '-')}", str(getattr(self, name))]
         return shlex.join(words)

@@ -16,7 +16,8 @@ from sim.tune.verdict import TUNED, paired
 
 #: Trials worse than this many times the shipped preset lie outside the picture.
 _SHOWN_TO = 4.0
-_MARKERS, _SHADES = ("o", "s", "^", "D"), ("#222222", "#8a8a8a", "#c0a000")
+_MARKERS = ("o", "s", "^", "D", "v", "P")
+_SHADES = ("#222222", "#8a8a8a", "#c0a000", "#7a5195", "#5a8f3c")
 
 
 def draw_front(law: str, scores: dict[int, Score], shipped: Score, chosen: int | None) -> Figure:
@@ -64,7 +65,7 @@ def draw_unseen(law: str, table: pl.DataFrame) -> Figure:
     figure = new_figure(2.5)
     grid = figure.subplots(1, len(OBJECTIVES))
     for axes, each in zip(grid, OBJECTIVES, strict=True):
-        for scene, marker, shade in zip(names, _MARKERS, (law_colour(law), *_SHADES), strict=False):
+        for scene, marker, shade in zip(names, _MARKERS, (law_colour(law), *_SHADES), strict=True):
             rows = both.filter(pl.col(PARAM + "scene") == scene)
             before, after = (each.scale * rows[name].to_numpy() for name in (each.column, f"{each.column}.{TUNED}"))
             axes.scatter(before, after, s=16, marker=marker, alpha=0.75, linewidth=0, label=scene,

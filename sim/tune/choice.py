@@ -5,10 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+from ibvs_qp.loop_margin import least_margin
+from ibvs_qp.pilot import PilotConfig
 from sim.tune.objectives import OBJECTIVES, Score
 
 #: A preset may be this much worse than the shipped one in any objective: a tenth is about what seeds do.
 ALLOWED_WORSE = 1.1
+#: It may be this much worse in any objective of a single scene: fewer flights, more luck.
+ALLOWED_WORSE_SCENE = 1.25
+#: It keeps this much of the shipped preset's contact damping: stability is worth as much as an objective.
+DAMPING_KEPT = 1.0 / ALLOWED_WORSE
 #: Presets of a search that fly again on other seeds before one is chosen: the best of many trials is partly luck.
 FINALISTS = 4
 
@@ -20,10 +26,21 @@ def gain_over(score: Score, shipped: Score) -> float:
     )
 
 
-def allowed(score: Score, shipped: Score) -> bool:
-    """Whether it may take the shipped preset's place."""
-    near = all(value <= ALLOWED_WORSE * base for value, base in zip(score.values, shipped.values, strict=True))
+def allowed(score: Score, shipped: Score, worse: float = ALLOWED_WORSE) -> bool:
+    """Whether it may take the shipped preset's place.
+
+    Args:
+        score: Its own.
+        shipped: The shipped preset's.
+        worse: Greatest ratio of any objective.
+    """
+    near = all(value <= worse * base for value, base in zip(score.values, shipped.values, strict=True))
     return near and score.failed <= shipped.failed
+
+
+def contact_damping(config: PilotConfig) -> float:
+    """Least damping ratio of the contact over the stiffness range of the preset's brush (docs/loop_margin.md)."""
+    return least_margin(config.controller, config.controller.brush).least_damping_ratio
 
 
 def ranked(scores: Mapping[int, Score], shipped: Score) -> list[int]:

@@ -1,12 +1,12 @@
-"""What a trial flies: short paint jobs on three scenes; search, choice and report each have seeds of their own."""
+"""What is flown: short paint jobs on three scenes in a trial, and three harder ones more before a preset is chosen."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping
 
 from ibvs_qp.pilot import PilotConfig
 from sim.closed_loop import FlightOptions, pilot_config
-from sim.experiments.scenes import changed, short_job
+from sim.experiments.scenes import changed, near_wall, short_job
 from sim.jobs import PaintJob
 from sim.measures.effort import paint_row
 from sim.scene import Scene
@@ -35,17 +35,30 @@ def scenes() -> dict[str, Scene]:
     }
 
 
-def flights(config: PilotConfig, variant: str, seeds: Iterable[int], features: str) -> list[Run]:
+def checks() -> dict[str, Scene]:
+    """What finalists fly beside it, as no trial does: the whole job, a wall to which the tip sticks, strong gusts."""
+    nominal = short_job(STROKE_M)
+    return {
+        "job": near_wall(),
+        "sticking": changed(nominal, wall={"friction": 0.8}),
+        "gusts": changed(nominal, wind={"gust_n_rms": 2.0}),
+    }
+
+
+def flights(
+    scenes: Mapping[str, Scene], config: PilotConfig, variant: str, seeds: Iterable[int], features: str
+) -> list[Run]:
     """Every scene with every seed under a preset.
 
     Args:
+        scenes: By name.
         config: The preset; its law flies.
         variant: Name under which its rows go.
         seeds: Seeds.
         features: "geometric" or "rendered".
     """
     runs = []
-    for name, scene in scenes().items():
+    for name, scene in scenes.items():
         for seed in seeds:
             options = FlightOptions(law=config.law, seed=seed, features=features, video=False)
             flown = pilot_config(scene, options, config)
@@ -62,6 +75,6 @@ def flights(config: PilotConfig, variant: str, seeds: Iterable[int], features: s
     return runs
 
 
-def seeds(first: int, seed: int, count: int) -> Sequence[int]:
+def seeds(first: int, seed: int, count: int) -> range:
     """Seeds of one purpose: searches with different seeds fly different ones."""
     return range(first + 10_000 * seed, first + 10_000 * seed + count)

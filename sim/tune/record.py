@@ -13,11 +13,12 @@ from sim.figures.style import law_name, save, styled
 from sim.figures.tune import draw_front, draw_unseen
 from sim.rundir import as_json
 from sim.sweep.parts import write_table
-from sim.tune.choice import allowed, front, gain_over
+from sim.tune.choice import front, gain_over
+from sim.tune.finalists import SHIPPED, Choice, Finalist, Trials, shipped_score
 from sim.tune.objectives import OBJECTIVES, Score
 from sim.tune.search import SearchPlan
 from sim.tune.space import RANGES, with_gains
-from sim.tune.verdict import SHIPPED, Choice, Trials, differences, shipped_score
+from sim.tune.verdict import differences
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,7 +69,7 @@ def content(outcome: Outcome, folder: Path) -> dict[str, Any]:
         "trials": len(found),
         "completed_trials": sum(not each.failed for each in found.values()),
         "front": front(found),
-        "finalists": {name: _objectives(each) for name, each in outcome.choice.scores.items()},
+        "finalists": {name: _finalist(each) for name, each in outcome.choice.finalists.items()},
         "chosen": outcome.chosen,
         "gains": None if outcome.chosen is None else outcome.trials[outcome.chosen][0],
         "unseen": [] if outcome.table is None else differences(outcome.table),
@@ -105,18 +106,24 @@ def _objectives(score: Score) -> dict[str, float]:
     return dict(zip((each.column for each in OBJECTIVES), score.values, strict=True)) | {"failed": score.failed}
 
 
-def _finalists(scores: dict[str, Score]) -> list[str]:
+def _finalist(each: Finalist) -> dict[str, Any]:
+    by_scene = {name: _objectives(score) for name, score in each.scenes.items()}
+    return {**_objectives(each.score), "damping": each.damping, "scenes": by_scene}
+
+
+def _finalists(finalists: dict[str, Finalist]) -> list[str]:
     """Table of the finalists beside the shipped preset."""
-    if not scores:
+    if not finalists:
         return []
-    heads = ["on the seeds of the choice", *(each.label for each in OBJECTIVES), "flights failed", "may take its place"]
+    objectives = [each.label for each in OBJECTIVES]
+    heads = ["on the seeds of the choice", *objectives, "flights failed", "contact damping", "may take its place"]
     lines = ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
-    for name, each in scores.items():
-        values = (f"{one.scale * value:.3g}" for one, value in zip(OBJECTIVES, each.values, strict=True))
-        good = allowed(each, scores[SHIPPED]) and gain_over(each, scores[SHIPPED]) < 0.0
-        words = "" if name == SHIPPED else "yes" if good else "no"
+    for name, each in finalists.items():
+        values = (f"{one.scale * value:.3g}" for one, value in zip(OBJECTIVES, each.score.values, strict=True))
+        words = "" if name == SHIPPED else "yes" if each.may_replace(finalists[SHIPPED]) else "no"
         title = name if name == SHIPPED else f"trial {name}"
-        lines.append(f"| {title} | {' | '.join(values)} | {100.0 * each.failed:.0f} % | {words} |")
+        failed = f"{100.0 * each.score.failed:.0f} %"
+        lines.append(f"| {title} | {' | '.join(values)} | {failed} | {each.damping:.2f} | {words} |")
     return [*lines, ""]
 
 
@@ -130,13 +137,13 @@ def _page(outcome: Outcome, summary: dict[str, Any]) -> list[str]:
         "",
         f"![Front](figures/{law}-front.png)",
         "",
-        *_finalists(outcome.choice.scores),
+        *_finalists(outcome.choice.finalists),
     ]
     if outcome.chosen is None:
         return [
             *lines,
-            "No trial betters the shipped preset on the whole without being clearly worse in one objective, in the "
-            "search and on the seeds of the choice: the shipped preset stays.",
+            "No trial betters the shipped preset on the whole without being clearly worse in one objective or scene or "
+            "in the contact's damping, in the search and on the seeds of the choice: the shipped preset stays.",
         ]
     share = 100.0 * (1.0 - math.exp(gain_over(outcome.scores[outcome.chosen], shipped)))
     lines += [

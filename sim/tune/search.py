@@ -15,7 +15,7 @@ from ibvs_qp.loop_margin import require_margin
 from ibvs_qp.pilot import PilotConfig
 from sim.sweep.design import ListedBlock
 from sim.sweep.flying import Row, fly_block
-from sim.tune.flights import SEARCH_SEED, flights, seeds
+from sim.tune.flights import SEARCH_SEED, flights, scenes, seeds
 from sim.tune.objectives import OBJECTIVES, Score, refused, score
 from sim.tune.space import RANGES, rounded, searched_gains, with_gains
 
@@ -143,7 +143,7 @@ def evaluate(gains: Sequence[dict[str, float]], plan: SearchPlan, parallel: jobl
         except ConfigError:
             scores[place] = refused()
             continue
-        jobs[place] = flights(config, "trial", seeds(SEARCH_SEED, plan.seed, plan.flights), plan.features)
+        jobs[place] = flights(scenes(), config, "trial", seeds(SEARCH_SEED, plan.seed, plan.flights), plan.features)
     calls = [(place, ListedBlock((run,))) for place, runs in jobs.items() for run in runs]
     rows: dict[int, list[Row]] = {place: [] for place in jobs}
     results: Any = parallel(joblib.delayed(fly_block)(block, "trial", Path()) for _, block in calls)
