@@ -14,6 +14,17 @@ from ibvs_qp.tasks.line import symbolic_line_rows
 LEAST_SHARE = 0.1
 
 
+def turn_share(signals: Signals, config: ControllerConfig) -> ca.SX:
+    r"""Share of the body's turn that line rows count on: :math:`1 - \lambda (1 - r)`, r the gain, where it travels.
+
+    A tip that shall stay is held by friction as the rows in full say. Counting on less, the level line moves the
+    vehicle where nothing is to move: 35 N asked for beyond reach then swing the yaw by 1 degree. A tip that shall
+    travel may be held all the same; there the full row subtracts from the wish what the turn never brings.
+    """
+    less = 1.0 - config.gains.line_turn_share
+    return 1.0 - signals.input("contact_weight") * (1.0 - signals.outputs["held"]) * less
+
+
 def height_wish(signals: Signals, config: ControllerConfig) -> ca.SX:
     r"""Acceleration along down [m/s^2] and weight of `HeightTask`, (2,).
 
@@ -26,12 +37,12 @@ def height_wish(signals: Signals, config: ControllerConfig) -> ca.SX:
     so the height row agrees with the line row wherever nothing is limited. Lines and free velocity share by weight.
     In the paper profile the row has no weight: the published law knows no such priority.
     """
-    out, gains = signals.outputs, config.gains
+    out = signals.outputs
     if config.line_profile == "paper":
         return ca.SX.zeros(2)
     twist = ca.DM(camera_twist_matrix(np.array(config.vehicle.camera_position_m)))
     vertical = signals.input("vertical", config.line_slots)
-    turn = (1.0 - signals.input("contact_weight") * (1.0 - gains.line_turn_share)) * out["angular"]
+    turn = turn_share(signals, config) * out["angular"]
     sideways = out["free"][0] * out["velocity_command"][0]
     wish, total = out["free"][1] * out["velocity_command"][1], out["free"][1]
     for slot in range(config.line_slots):

@@ -6,7 +6,7 @@ import casadi as ca
 
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.program_settings import Weights
-from ibvs_qp.setpoints.height import height_wish
+from ibvs_qp.setpoints.height import height_wish, turn_share
 from ibvs_qp.setpoints.signals import Signals
 
 
@@ -22,11 +22,11 @@ def held_sideways_weight(weights: Weights) -> float:
 def program_parameters(signals: Signals, config: ControllerConfig) -> dict[str, ca.SX]:
     """Values of the program's parameters by name, as the shipped tasks and limits ask for them.
 
-    Lambda blends linearly: the push row counts with lambda, the stand-off row with 1 - lambda, and the lines count
-    on the body's turn with 1 - lambda (1 - r). In the paper profile the lines lose the pushing direction with lambda
+    Lambda blends linearly: the push row counts with lambda, the stand-off row with 1 - lambda; how far the lines count
+    on the body's turn is `turn_share`. In the paper profile the lines lose the pushing direction with lambda
     instead of always, and the velocity rows count in full beside them, as a null-space wish does.
     """
-    out, gains, weights = signals.outputs, config.gains, config.weights
+    out, weights = signals.outputs, config.weights
     share, rate = signals.input("contact_weight"), signals.input("angular_velocity", 3)
     yaw = out["angles"][2]
     paper = config.line_profile == "paper"
@@ -34,7 +34,7 @@ def program_parameters(signals: Signals, config: ControllerConfig) -> dict[str, 
     held = 0.0 if paper else out["held"] * (held_sideways_weight(weights) - weights.velocity)
     own = 1.0 - out["tilted"]  # a vehicle that lost a rotor moves by tilting, and cannot hold yaw
     values = {
-        "turn_share": ca.SX(1.0) if paper else 1.0 - share * (1.0 - gains.line_turn_share),
+        "turn_share": ca.SX(1.0) if paper else turn_share(signals, config),
         "normal_share": share if paper else ca.SX(1.0),
         "push": ca.vertcat(out["push_command"], weights.push * share),
         "standoff": ca.vertcat(out["standoff_command"], weights.push * (1.0 - share) * own),
