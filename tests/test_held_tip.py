@@ -5,13 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+import casadi as ca
 import numpy as np
 import pytest
 
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.estimation.motion import WallMotion
 from ibvs_qp.measurement import FeatureFrame
-from ibvs_qp.setpoints import program, wall
+from ibvs_qp.setpoints import height, program, wall
+from ibvs_qp.setpoints.signals import Signals
 from sim.closed_loop import FlightOptions, fly, pilot_config
 from sim.experiments.scenes import near_wall
 from sim.jobs import PressJob
@@ -27,11 +29,17 @@ LINES_LOST_NS = 8_000_000_000
 
 
 def press(
-    push: float = 20.0, reach_check: bool = True, tick_s: float = 0.004, law: str = "qp", hold_s: float = 9.0
+    push: float = 20.0,
+    reach_check: bool = True,
+    tick_s: float = 0.004,
+    law: str = "qp",
+    hold_s: float = 9.0,
+    **gains: float,
 ) -> Trace:
     options, scene = FlightOptions(law=law, seed=1, features="geometric", video=False), changed(SCENE, push)
     pilot = pilot_config(scene, options)
-    pilot = replace(pilot, controller=replace(pilot.controller, tick_s=tick_s, reach_check=reach_check))
+    gained = replace(pilot.controller.gains, **gains)
+    pilot = replace(pilot, controller=replace(pilot.controller, tick_s=tick_s, reach_check=reach_check, gains=gained))
     return fly(scene, options, config=pilot, job=PressJob(hold_s=hold_s))
 
 
@@ -72,6 +80,22 @@ def test_at_the_weight_of_a_sliding_vehicle_it_would(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(program, "held_sideways_weight", lambda weights: weights.velocity)
     trace = press(35.0, reach_check=False, tick_s=0.004 + 1e-12)
     assert rocking(trace) > 2.0
+    assert trace.push_true[held(trace)].mean() < 0.95 * REACH_N
+
+
+def test_a_held_tip_turns_with_the_body_whatever_a_slide_counts_on() -> None:
+    trace = press(35.0, reach_check=False, line_turn_share=0.3)
+    assert rocking(trace) < 0.5
+    assert trace.push_true[held(trace)].mean() >= 0.97 * REACH_N
+
+
+def test_counted_on_as_in_a_slide_it_would_lose_push(monkeypatch: pytest.MonkeyPatch) -> None:
+    def as_in_a_slide(signals: Signals, config: ControllerConfig) -> ca.SX:
+        return 1.0 - signals.input("contact_weight") * (1.0 - config.gains.line_turn_share)
+
+    monkeypatch.setattr(program, "turn_share", as_in_a_slide)
+    monkeypatch.setattr(height, "turn_share", as_in_a_slide)
+    trace = press(35.0, reach_check=False, tick_s=0.004 + 1e-12, line_turn_share=0.3)
     assert trace.push_true[held(trace)].mean() < 0.95 * REACH_N
 
 
