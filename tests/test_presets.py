@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -69,6 +70,17 @@ def test_every_number_agrees_with_its_source(file: Path) -> None:
 def test_round_trip(file: Path) -> None:
     config = PilotConfig.from_toml(file)
     assert from_dict(PilotConfig, tomllib.loads(config.to_toml())) == config
+
+
+@pytest.mark.parametrize("law", ["qp", "paper"])
+def test_the_gains_are_those_that_the_kept_search_chose(law: str) -> None:
+    """One search for both laws (docs/tuning.md); where no trial bettered the gains that it began at, these stay."""
+    kept = Path(__file__).parents[1] / "docs" / "tuning"
+    search = json.loads((kept / f"rendered_{law}_trials.json").read_text(encoding="utf-8"))
+    assert search["trials"] == len(search["all_trials"]) == 200 and search["features"] == "rendered"
+    start = written(kept / f"start_{law}.toml")["controller"]["gains"]
+    assert all(search["all_trials"][0][name] == value for name, value in start.items())
+    assert written(PRESETS / f"tarot_t960_{law}.toml")["controller"]["gains"] == (search["gains"] or start)
 
 
 def test_the_presets_of_the_laws_are_those_that_fly_by_default() -> None:
