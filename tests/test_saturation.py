@@ -75,19 +75,11 @@ def test_within_reach_the_laws_push_alike(push: float) -> None:
         assert height <= 2e-3 and np.abs(np.degrees(trace.euler[ticks])).max() <= 0.3
 
 
-def test_at_the_reach_clipping_loses_the_attitude_and_beyond_it_the_vehicle() -> None:
+def test_at_the_reach_clipping_loses_the_wall_and_the_program_does_not() -> None:
     """30 N unchecked, 0.4 N below the reach: noise clips rotors, and what clipping leaves is no level flight."""
     program, clipped = (press(30.0, 0.3, reach_check=False, law=law) for law in ("qp", "paper"))
     assert program.completed and program.push_true[settled(program)].mean() >= 0.95 * 30.0
-    assert tilt_peak(program) < 1.0 and tilt_peak(clipped) > 5.0
-    program, clipped = (press(35.0, 0.3, reach_check=False, law=law) for law in ("qp", "paper"))
-    assert program.completed and tilt_peak(program) < 1.0
     assert not clipped.completed and "crash" in clipped.reason
-
-
-def tilt_peak(trace: Trace) -> float:
-    """Largest roll or pitch [deg]."""
-    return float(np.degrees(np.abs(trace.euler[:, :2])).max())
 
 
 @pytest.mark.parametrize(
