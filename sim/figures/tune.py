@@ -7,6 +7,7 @@ import itertools
 import numpy as np
 import polars as pl
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, StrMethodFormatter
 
 from sim.figures.style import FAINT, REFERENCE, law_colour, law_name, new_figure
 from sim.sweep.parts import PARAM
@@ -16,6 +17,8 @@ from sim.tune.verdict import TUNED, paired
 
 #: Trials worse than this many times the shipped preset lie outside the picture.
 _SHOWN_TO = 4.0
+#: Logarithmic axes that span less have no two of 1, 2, 5, 10 on them.
+_NARROW = 3.0
 _MARKERS = ("o", "s", "^", "D", "v", "P")
 _SHADES = ("#222222", "#8a8a8a", "#c0a000", "#7a5195", "#5a8f3c")
 
@@ -59,7 +62,7 @@ def draw_front(law: str, scores: dict[int, Score], shipped: Score, chosen: int |
 
 
 def draw_unseen(law: str, table: pl.DataFrame) -> Figure:
-    """Shipped against tuned, a mark per flight; below the diagonal the tuned preset is better."""
+    """Shipped against tuned, a mark per flight, logarithmic; below the diagonal the tuned preset is better."""
     both = paired(table)
     names = both[PARAM + "scene"].unique(maintain_order=True).to_list()
     figure = new_figure(2.5)
@@ -70,11 +73,15 @@ def draw_unseen(law: str, table: pl.DataFrame) -> Figure:
             before, after = (each.scale * rows[name].to_numpy() for name in (each.column, f"{each.column}.{TUNED}"))
             axes.scatter(before, after, s=16, marker=marker, alpha=0.75, linewidth=0, label=scene,
                          color=shade)  # fmt: skip
-        reach = 1.08 * max(*axes.get_xlim(), *axes.get_ylim())
-        axes.plot((0.0, reach), (0.0, reach), **REFERENCE)
-        axes.set_xlim(0.0, reach)
-        axes.set_ylim(0.0, reach)
-        axes.set_aspect("equal")
+        both_ways = each.scale * both.select(each.column, f"{each.column}.{TUNED}").to_numpy()
+        reach = (0.85 * np.nanmin(both_ways), 1.15 * np.nanmax(both_ways))
+        axes.plot(reach, reach, **REFERENCE)
+        axes.set(xscale="log", yscale="log", xlim=reach, ylim=reach, aspect="equal")
+        for axis in (axes.xaxis, axes.yaxis):
+            narrow = reach[1] < _NARROW * reach[0]
+            axis.set_major_locator(MaxNLocator(3) if narrow else LogLocator(subs=(1.0, 2.0, 5.0), numticks=6))
+            axis.set_major_formatter(StrMethodFormatter("{x:g}"))
+            axis.set_minor_formatter(NullFormatter())
         axes.set_title(each.label.replace(", ", ",\n"), fontsize=8)
         axes.set_xlabel("shipped")
     grid[0].set_ylabel("tuned")
