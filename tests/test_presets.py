@@ -21,6 +21,8 @@ from ibvs_qp.settings import from_dict
 from ibvs_qp.vehicle import VehicleParams
 from sim.closed_loop import PRESETS, FlightOptions, default_preset, fly
 from sim.metrics import compute_metrics
+from sim.tune.finalists import Finalist, best_of
+from sim.tune.objectives import OBJECTIVES, Score
 
 FILES = sorted(PRESETS.glob("*.toml"))
 #: What differs from the nominal vehicle, by the beginning of the file's name.
@@ -80,7 +82,18 @@ def test_the_gains_are_those_that_the_kept_search_chose(law: str) -> None:
     assert search["trials"] == len(search["all_trials"]) == 200 and search["features"] == "rendered"
     start = written(kept / f"start_{law}.toml")["controller"]["gains"]
     assert all(search["all_trials"][0][name] == value for name, value in start.items())
-    assert written(PRESETS / f"tarot_t960_{law}.toml")["controller"]["gains"] == (search["gains"] or start)
+    finalists = {name: finalist(each) for name, each in search["finalists"].items()}
+    assert best_of(finalists) == search["chosen"]
+    numbers = {row["number"]: row for row in search["all_trials"]}
+    chosen = start if search["chosen"] is None else {name: numbers[search["chosen"]][name] for name in start}
+    assert written(PRESETS / f"tarot_t960_{law}.toml")["controller"]["gains"] == chosen
+
+
+def finalist(row: dict[str, Any]) -> Finalist:
+    def read(each: dict[str, Any]) -> Score:
+        return Score(tuple(each[objective.column] for objective in OBJECTIVES), each["failed"])
+
+    return Finalist(read(row), {name: read(each) for name, each in row["scenes"].items()}, row["damping"])
 
 
 def test_the_presets_of_the_laws_are_those_that_fly_by_default() -> None:

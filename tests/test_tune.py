@@ -197,9 +197,31 @@ def test_a_kept_record_gives_the_same_choice_without_the_flights_of_the_search(f
     assert main(words) == 0
     again = json.loads(capsys.readouterr().out)
     assert {seed // 1000 for seed in flown} == {2, 3}
-    same = ("law", "seed", "features", "trials", "front", "finalists", "chosen", "gains", "unseen")
+    same = ("law", "seed", "features", "trials", "front", "finalists", "chosen", "gains", "unseen", "searched_by")
     assert {name: again[name] for name in same} == {name: once[name] for name in same}
     assert "`ibvs-qp tune --law qp --unseen 4 --trials-of run/qp_trials.json`" in Path("again/qp.toml").read_text()
+
+
+def test_a_killed_trial_does_not_shift_the_numbers_of_a_kept_record(flown, capsys):
+    assert main(["tune", "--trials", "24", "--unseen", "4", "--json", "--out", "run"]) == 0
+    once = json.loads(capsys.readouterr().out)
+    record = json.loads(Path("run/qp_trials.json").read_text())
+    loser = next(place for place, row in enumerate(record["all_trials"]) if row["failed"])
+    assert 0 < loser < once["chosen"]
+    del record["all_trials"][loser]
+    Path("gap.json").write_text(json.dumps(record))
+    assert main(["tune", "--trials-of", "gap.json", "--unseen", "4", "--json", "--out", "again"]) == 0
+    again = json.loads(capsys.readouterr().out)
+    assert (again["chosen"], again["gains"]) == (once["chosen"], once["gains"])
+
+
+@pytest.mark.parametrize("words", [["--trials", "10"], ["--flights", "2"], ["--storage", "a.log"]])
+def test_options_of_a_search_are_refused_beside_a_kept_one(flown, capsys, words):
+    assert main(["tune", "--trials", "2", "--json", "--out", "run"]) == 0
+    capsys.readouterr()
+    assert main(["tune", "--trials-of", "run/qp_trials.json", "--json", "--out", "again", *words]) == 2
+    out, err = capsys.readouterr()
+    assert out == "" and err.count("\n") == 1 and words[0] in err
 
 
 def test_a_trial_that_rings_more_is_no_finalist(flown, monkeypatch, tmp_path):

@@ -19,7 +19,9 @@ if TYPE_CHECKING:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Tune:
-    """Tune the gains of a law: push, path, tilt and thrust rate at once, over three scenes; needs the extra tune.
+    """Tune the gains of a law: push, path, tilt, yaw and thrust rate at once; needs the extra tune.
+
+    Trials fly three scenes, the best of them three harder ones more.
 
     Example: ibvs-qp tune --law qp --trials 200 --out runs/tune
     """
@@ -33,7 +35,7 @@ class Tune:
     flights: int = 1
     """Seeds per scene in every trial."""
     unseen: int = 6
-    """Seeds per scene on which shipped and tuned are compared; the best few trials fly half of that to be chosen."""
+    """Seeds on which shipped and tuned are compared, six scenes each; the best few trials fly half of that before."""
     features: Literal["geometric", "rendered"] = "geometric"
     """Perception: a sensor model of lines, or rendered pictures, which take five times as long."""
     preset: Annotated[Path | None, optional("FILE")] = None
@@ -73,12 +75,14 @@ class Tune:
             summary = self._search(plan, folder, words, notes)
         except KeyboardInterrupt:
             again = go_on(words, folder)
-            print(f"ibvs-qp: interrupted; finished trials are in {plan.storage}; go on with: {again}", file=sys.stderr)
+            kept = f"flights are in {folder / 'parts'}" if self.trials_of else f"finished trials are in {plan.storage}"
+            print(f"ibvs-qp: interrupted; {kept}; go on with: {again}", file=sys.stderr)
             return 130
         print(as_json(summary) if self.json else f"Report: {summary['report']}\nPreset: {summary['preset']}")
         return 0
 
     def _check(self) -> None:
+        from ibvs_qp.errors import ConfigError
         from sim.checks import check_preset, check_readable, check_seed
 
         check_seed(self.seed)
@@ -87,6 +91,9 @@ class Tune:
         check_readable("--preset", self.preset)
         check_readable("--trials-of", self.trials_of)
         check_preset(self.preset)
+        for name in ("trials", "flights", "storage"):
+            if self.trials_of and getattr(self, name) != getattr(type(self)(), name):
+                raise ConfigError(f"--{name} is of a search, and --trials-of makes none; leave one of them out")
 
     def _plan(self, folder: Path) -> SearchPlan:
         from ibvs_qp.pilot import PilotConfig
@@ -110,19 +117,28 @@ class Tune:
         from sim.tune.record import Outcome, write
         from sim.tune.verdict import unseen
 
-        trials, parts = self._trials(plan, notes), folder / "parts"
+        command = shlex.join(["ibvs-qp", *words])
+        trials, searched_by = self._trials(plan, command, notes)
+        parts = folder / "parts"
         with sweep_progress(notes, f"{self.law}: choice") as progress:
             choice = choose(plan, trials, -(-self.unseen // 2), parts, progress)
         table = None
         if choice.chosen is not None:
             with sweep_progress(notes, f"{self.law}: unseen seeds") as progress:
                 table = unseen(plan, trials[choice.chosen][0], self.unseen, parts, progress)
-        command = shlex.join(["ibvs-qp", *words])
-        outcome = Outcome(plan=plan, trials=trials, choice=choice, table=table, command=command, again=self._again())
+        outcome = Outcome(
+            plan=plan,
+            trials=trials,
+            choice=choice,
+            table=table,
+            command=command,
+            searched_by=searched_by,
+            again=self._again(),
+        )
         return write(outcome, folder)
 
-    def _trials(self, plan: SearchPlan, notes: Console) -> Trials:
-        """Searched for, or read back."""
+    def _trials(self, plan: SearchPlan, command: str, notes: Console) -> tuple[Trials, str]:
+        """Searched for, or read back; with the command of the search."""
         from sim.sweep.progress import sweep_progress
         from sim.tune.kept import kept_trials
         from sim.tune.search import finished, open_study, search
@@ -133,7 +149,7 @@ class Tune:
         before = len(finished(study))
         with sweep_progress(notes, f"{self.law}: trials") as progress:
             search(plan, study, lambda done: progress(done, plan.trials, before))
-        return finished(study)
+        return finished(study), command
 
     def _again(self) -> str:
         """The command that gives the same on any computer."""

@@ -65,10 +65,11 @@ def draw_unseen(law: str, table: pl.DataFrame) -> Figure:
     """Shipped against tuned, a mark per flight, logarithmic; below the diagonal the tuned preset is better."""
     both = paired(table)
     names = both[PARAM + "scene"].unique(maintain_order=True).to_list()
+    assert len(names) <= len(_MARKERS)
     figure = new_figure(2.5)
     grid = figure.subplots(1, len(OBJECTIVES))
     for axes, each in zip(grid, OBJECTIVES, strict=True):
-        for scene, marker, shade in zip(names, _MARKERS, (law_colour(law), *_SHADES), strict=True):
+        for scene, marker, shade in zip(names, _MARKERS, (law_colour(law), *_SHADES), strict=False):
             rows = both.filter(pl.col(PARAM + "scene") == scene)
             before, after = (each.scale * rows[name].to_numpy() for name in (each.column, f"{each.column}.{TUNED}"))
             axes.scatter(before, after, s=16, marker=marker, alpha=0.75, linewidth=0, label=scene,

@@ -22,8 +22,8 @@ from sim.tune.choice import (
 )
 from sim.tune.flights import CHOICE_SEED, checks, flights, scenes, seeds
 from sim.tune.objectives import Score, score
-from sim.tune.search import SearchPlan
-from sim.tune.space import searched_gains, with_gains
+from sim.tune.search import SearchPlan, start_gains
+from sim.tune.space import with_gains
 
 #: Name under which the shipped preset flies.
 SHIPPED = "shipped"
@@ -78,20 +78,24 @@ def choose(plan: SearchPlan, trials: Trials, count: int, parts: Path, progress: 
         KeyboardInterrupt: On Ctrl-C; what was flown is kept.
     """
     shipped = contact_damping(plan.shipped)
-    damped = {number: contact_damping(with_gains(plan.shipped, gains)) for number, (gains, _) in trials.items()}
-    firm = {number: each for number, (_, each) in trials.items() if damped[number] >= DAMPING_KEPT * shipped}
-    best = ranked(firm, shipped_score(plan, trials))[:FINALISTS]
+    better = ranked({number: each for number, (_, each) in trials.items()}, shipped_score(plan, trials))
+    damped = {number: contact_damping(with_gains(plan.shipped, trials[number][0])) for number in better}
+    best = [number for number in better if damped[number] >= DAMPING_KEPT * shipped][:FINALISTS]
     if not best:
         return Choice(None, {})
     presets = {SHIPPED: {}} | {str(number): trials[number][0] for number in best}
     table = fly_presets(plan, presets, seeds(CHOICE_SEED, plan.seed, count), parts, progress)
     dampings = {SHIPPED: shipped} | {str(number): damped[number] for number in best}
     finalists = {name: _finalist(table.filter(pl.col("variant") == name), each) for name, each in dampings.items()}
-    good = [number for number in best if finalists[str(number)].may_replace(finalists[SHIPPED])]
-    best_of = min(
-        good, key=lambda number: gain_over(finalists[str(number)].score, finalists[SHIPPED].score), default=None
-    )
-    return Choice(best_of, finalists)
+    return Choice(best_of(finalists), finalists)
+
+
+def best_of(finalists: Mapping[str, Finalist]) -> int | None:
+    """Number of the best finalist that may replace the shipped preset; None when none may."""
+    shipped = finalists[SHIPPED]
+    good = [name for name, each in finalists.items() if name != SHIPPED and each.may_replace(shipped)]
+    best = min(good, key=lambda name: gain_over(finalists[name].score, shipped.score), default=None)
+    return None if best is None else int(best)
 
 
 def _finalist(rows: pl.DataFrame, damping: float) -> Finalist:
@@ -102,7 +106,7 @@ def _finalist(rows: pl.DataFrame, damping: float) -> Finalist:
 
 def shipped_score(plan: SearchPlan, trials: Trials) -> Score:
     """Score of the shipped gains; they are the first trial of every search."""
-    gains = searched_gains(plan.shipped)
+    gains = start_gains(plan)
     return next((each for found, each in trials.values() if found == gains), trials[min(trials)][1])
 
 

@@ -46,30 +46,30 @@ def checks() -> dict[str, Scene]:
 
 
 def flights(
-    scenes: Mapping[str, Scene], config: PilotConfig, variant: str, seeds: Iterable[int], features: str
+    flown: Mapping[str, Scene], config: PilotConfig, variant: str, seeds: Iterable[int], features: str
 ) -> list[Run]:
     """Every scene with every seed under a preset.
 
     Args:
-        scenes: By name.
+        flown: Scenes by name.
         config: The preset; its law flies.
         variant: Name under which its rows go.
         seeds: Seeds.
         features: "geometric" or "rendered".
     """
     runs = []
-    for name, scene in scenes.items():
+    for name, scene in flown.items():
         for seed in seeds:
             options = FlightOptions(law=config.law, seed=seed, features=features, video=False)
-            flown = pilot_config(scene, options, config)
+            pilot = pilot_config(scene, options, config)
             runs.append(
                 Run(
                     experiment="tune",
                     variant=variant,
                     params={"scene": name},
-                    plan=FlightPlan(scene=scene, config=flown, options=options),
+                    plan=FlightPlan(scene=scene, config=pilot, options=options),
                     measure=paint_row,
-                    expected_s=_AROUND_S + PaintJob().expected_s(flown.painting),
+                    expected_s=_AROUND_S + PaintJob().expected_s(pilot.painting),
                 )
             )
     return runs

@@ -9,12 +9,15 @@ from typing import Any
 from ibvs_qp.errors import ConfigError
 from sim.tune.finalists import Trials
 from sim.tune.objectives import OBJECTIVES, Score
-from sim.tune.search import SearchPlan
-from sim.tune.space import RANGES, searched_gains
+from sim.tune.search import SearchPlan, start_gains
+from sim.tune.space import RANGES
+
+#: Key of a trial's number: a killed trial leaves a gap.
+NUMBER = "number"
 
 
-def kept_trials(file: Path, plan: SearchPlan) -> Trials:
-    """Gains and score of every trial in a ``LAW_trials.json``, by number.
+def kept_trials(file: Path, plan: SearchPlan) -> tuple[Trials, str]:
+    """Gains and score of every trial in a ``LAW_trials.json``, by number, and the command of their search.
 
     Args:
         file: The record of a search.
@@ -25,8 +28,16 @@ def kept_trials(file: Path, plan: SearchPlan) -> Trials:
     """
     try:
         record: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
-        trials = {number: _trial(row) for number, row in enumerate(record["all_trials"])}
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError, ValueError) as error:
+        trials = {row.get(NUMBER, place): _trial(row) for place, row in enumerate(record["all_trials"])}
+    except (
+        OSError,
+        UnicodeDecodeError,
+        json.JSONDecodeError,
+        AttributeError,
+        KeyError,
+        TypeError,
+        ValueError,
+    ) as error:
         reason = f"{type(error).__name__}: {error}"
         raise ConfigError(
             f"{file} is no record of a search ({reason}); give a LAW_trials.json with --trials-of"
@@ -36,11 +47,11 @@ def kept_trials(file: Path, plan: SearchPlan) -> Trials:
     if held != wanted:
         other = ", ".join(f"{name} {value}" for name, value in held.items())
         raise ConfigError(f"{file} holds a search with {other}; give the same options")
-    if not any(gains == searched_gains(plan.shipped) for gains, _ in trials.values()):
+    if not any(gains == start_gains(plan) for gains, _ in trials.values()):
         raise ConfigError(
             f"{file} holds no trial of the preset to compare with; give the one it began at with --preset"
         )
-    return trials
+    return trials, record.get("searched_by") or record.get("command", "")
 
 
 def _trial(row: dict[str, float]) -> tuple[dict[str, float], Score]:

@@ -15,6 +15,7 @@ from sim.rundir import as_json
 from sim.sweep.parts import write_table
 from sim.tune.choice import front, gain_over
 from sim.tune.finalists import SHIPPED, Choice, Finalist, Trials, shipped_score
+from sim.tune.kept import NUMBER
 from sim.tune.objectives import OBJECTIVES, Score
 from sim.tune.search import SearchPlan
 from sim.tune.space import RANGES, with_gains
@@ -31,6 +32,7 @@ class Outcome:
         choice: What the finalists did, and the number of the chosen one.
         table: Flights of shipped and chosen on unseen seeds; None when nothing was chosen.
         command: The command line.
+        searched_by: The command line of the search, where its trials were kept.
         again: The command that gives the same on any computer.
     """
 
@@ -39,6 +41,7 @@ class Outcome:
     choice: Choice
     table: pl.DataFrame | None
     command: str
+    searched_by: str
     again: str
 
     @property
@@ -63,6 +66,7 @@ def content(outcome: Outcome, folder: Path) -> dict[str, Any]:
     return {
         "schema": 1,
         "command": outcome.command,
+        "searched_by": outcome.searched_by,
         "law": outcome.law,
         "seed": outcome.plan.seed,
         "features": outcome.plan.features,
@@ -89,7 +93,7 @@ def write(outcome: Outcome, folder: Path) -> dict[str, Any]:
     head = "# The shipped preset: no trial of the search may take its place.\n" if outcome.chosen is None else head
     preset = with_gains(outcome.plan.shipped, gains).to_toml()
     (folder / f"{law}.toml").write_text(head + preset, encoding="utf-8")
-    rows = [{**_objectives(score), **params} for params, score in outcome.trials.values()]
+    rows = [{NUMBER: number, **_objectives(score), **params} for number, (params, score) in outcome.trials.items()]
     record = {**summary, "ranges": RANGES, "all_trials": rows}
     (folder / f"{law}_trials.json").write_text(as_json(record, indent=1) + "\n", encoding="utf-8")
     with styled():

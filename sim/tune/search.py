@@ -121,6 +121,11 @@ def _ask(plan: SearchPlan, study: optuna.Study, number: int) -> tuple[optuna.Tri
     return trial, {name: trial.suggest_float(name, *span, log=True) for name, span in RANGES.items()}
 
 
+def start_gains(plan: SearchPlan) -> dict[str, float]:
+    """Gains of trial 0: the shipped ones, within the range of the search."""
+    return rounded(_near_shipped(plan, 0))
+
+
 def _near_shipped(plan: SearchPlan, number: int) -> dict[str, float]:
     """The shipped gains first, then each of them times a random factor, within the range of the search."""
     factors = (
