@@ -31,7 +31,7 @@ class Gains:
     theta_kd: float = setting(12.03, "line angle rate", unit="1/s", low=0.0, high=100.0)
     line_turn_share: float = setting(
         0.882,
-        "share of the body's turn that line rows count on in contact, where friction may hold the tip",
+        "share of the body's turn that line rows count on in contact, where the tip shall travel",
         low=0.0,
         high=1.0,
     )

@@ -57,8 +57,9 @@ def rocking(trace: Trace) -> float:
     return float(np.degrees(np.abs(trace.euler[held(trace), 2])).max())
 
 
-def test_a_held_tip_is_no_pivot_to_rock_about() -> None:
-    trace = press()
+@pytest.mark.parametrize("law", ["qp", "paper"])
+def test_a_held_tip_is_no_pivot_to_rock_about(law: str) -> None:
+    trace = press(law=law)
     assert trace.completed
     assert rocking(trace) < 0.5
     assert trace.push_true[held(trace)].mean() == pytest.approx(20.0, abs=0.5)

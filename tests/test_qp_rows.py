@@ -75,9 +75,9 @@ CASES = [
 
 @pytest.mark.parametrize("case", CASES)
 @pytest.mark.parametrize("flip", [False, True])
-@pytest.mark.parametrize("share", [0.0, 1.0])
+@pytest.mark.parametrize(("share", "held"), [(0.0, False), (1.0, False), (1.0, True)])
 def test_line_rows_are_the_motion_of_the_line_at_the_tip(
-    controller: HybridController, case: tuple, flip: bool, share: float
+    controller: HybridController, case: tuple, flip: bool, share: float, held: bool
 ) -> None:
     roll, pitch, turn, offset, slope, role = case
     angle = slope + (0.5 * math.pi if role == HORIZONTAL else 0.0)
@@ -88,9 +88,12 @@ def test_line_rows_are_the_motion_of_the_line_at_the_tip(
     controller.reset()
     tick = measured(0, attitude=quaternion, plane=wall.plane, lines=(seen,))
     pack(controller, tick, reference, share=share)
+    if held:  # touching, and no speed is asked for: friction holds the tip, which turns with the body as it is
+        controller.setpoints.tick.inputs["touch"][TOUCH.index("touching")] = 1.0
+        controller.setpoints.tick()
     slot = 0 if role == HORIZONTAL else 1  # a slot belongs to a reference, found or not
     rng = np.random.default_rng(5)
-    turn_share = 1.0 - share * (1.0 - controller.config.gains.line_turn_share)
+    turn_share = 1.0 if held else 1.0 - share * (1.0 - controller.config.gains.line_turn_share)
     for _ in range(3):
         thrusts = rng.uniform(5.0, 20.0, 6)
         motion = accelerations(controller, thrusts)

@@ -80,8 +80,8 @@ class SymbolicModel:
         r"""S nu_dot with S = blockdiag(I - s n n^T, r I) and s = 1: the image never uses the pushing direction.
 
         The paper's profile takes s = lambda and r = 1.
-        r is 1 in free flight and falls to 0 in contact: a tip that friction holds does not follow the body's turn,
-        and a line row that counts on it trades the vertical force for pitch.
+        r is 1 in free flight and for a tip that shall stay, and falls in contact where the tip shall travel: held by
+        friction it does not follow the body's turn, and a line row that counts on it trades vertical force for pitch.
         """
         linear = self.acceleration[:3]
         turn = self.parameter("turn_share") * self.acceleration[3:]
