@@ -92,7 +92,8 @@ class OsqpSolver:
         p, q, a, lower, upper = arrays = [np.ascontiguousarray(array, float) for array in (p, q, a, lower, upper)]
         if tuple(map(len, arrays)) != self._lengths:
             raise ValueError(f"P, q, A, l, u need {self._lengths} entries, not {tuple(map(len, arrays))}")
-        finite = math.isfinite(q.sum() + p.sum() + a.sum() + lower.sum() + upper.sum())
+        with np.errstate(invalid="ignore"):  # infinities of both signs: refused below, no warning
+            finite = math.isfinite(q.sum() + p.sum() + a.sum() + lower.sum() + upper.sum())
         if not finite or (lower > upper).any():
             return None
         if self._reset_pending:
