@@ -87,8 +87,8 @@ def _():
     Along the wall's normal the vehicle blends a stand-off controller with the force law
 
     $$
-    F_f = F_\text{ref} + K_{sp}\,e_s + K_{sd}\,\dot e_s
-    + K_{fp}\,(F_\text{ref} - f) + K_{fi}\!\int (F_\text{ref} - f)\,dt ,
+    F_f = F_\text{ref} + K_{sp}\,e_s + K_{sd}\,\dot e_s +
+    K_{fp}\,(F_\text{ref} - f) + K_{fi}\!\int (F_\text{ref} - f)\,dt ,
     $$
 
     weighted with $1-\lambda$ and $\lambda$. At the first touch both $\lambda$ and $F_\text{ref}$ ramp up within a

@@ -2,6 +2,7 @@
 
 import ast
 import functools
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -78,6 +79,13 @@ def test_notebooks_are_well_formed():
     words = [sys.executable, "-m", "marimo", "-q", "check", "--strict", *map(str, FILES)]
     done = subprocess.run(words, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+@each
+def test_no_line_of_a_formula_reads_as_a_list(file):
+    """A browser takes a line that begins with a sign and a space for a list, and shows the formula as it is typed."""
+    formulas = re.findall(r"\$\$(.*?)\$\$", file.read_text(encoding="utf-8"), re.DOTALL)
+    assert not [line for formula in formulas for line in formula.split("\n") if re.match(r"\s*[-+*] ", line)]
 
 
 def test_unknown_notebook_is_named():
