@@ -1,6 +1,8 @@
 """What notebooks 03, 05 and 06 compute beside what their own test cells hold."""
 
 import dataclasses
+import itertools
+from typing import Any
 
 import numpy as np
 import polars as pl
@@ -12,9 +14,10 @@ from sim.notebook.noise.effects import averaged_samples, effects
 from sim.notebook.noise.sample import SEEDS, sample_runs
 from sim.notebook.noise.table import FIGURES, FORCE, VS, read_sweep, success, sweep_or_sample
 from sim.notebook.noise.words import differences_table, success_table
-from sim.notebook.solvers.contenders import kept_osqp
+from sim.notebook.solvers.contenders import Contender, kept_osqp
+from sim.notebook.solvers.draw import draw_race
 from sim.notebook.solvers.programs import packed
-from sim.notebook.solvers.race import exact_solutions, optimality_residual, race
+from sim.notebook.solvers.race import Result, exact_solutions, optimality_residual, race
 from sim.notebook.solvers.words import race_table
 
 
@@ -103,3 +106,50 @@ def test_a_busy_stretch_is_half_limited(stretch):
     assert len(part.t) == 10 and abs(part.limited.mean() - 0.5) <= abs(stretch.limited.mean() - 0.5) + 1e-9
     with pytest.raises(ValueError, match="61 ticks asked for, 60 recorded"):
         stretch.busy(61)
+
+
+#: Time of a tick [us], its 99 %, and thrust error [N] of the contenders of notebook 05 on one computer.
+RACE = {
+    "DAQP, kept": (11.5, 12.0, 1.4e-11),
+    "OSQP 1e-3": (20.2, 22.1, 2.2),
+    "OSQP 1e-4": (21.6, 26.6, 1.5),
+    "OSQP 1e-5": (23.5, 33.3, 1.9e-2),
+    "OSQP defaults": (24.6, 25.5, 1.6e-2),
+    "OSQP 1e-6": (26.3, 60.5, 1.9e-3),
+    "shipped": (28.0, 48.4, 1.0e-14),
+    "OSQP 1e-8": (30.0, 74.5, 1.9e-5),
+    "shipped, always OSQP": (74.2, 98.0, 5.0e-6),
+    "DAQP in CasADi": (168.0, 176.0, 1.2e-11),
+    "qpsolvers daqp": (293.0, 318.0, 1.3e-11),
+    "qpsolvers proxqp": (326.0, 373.0, 2.8e-6),
+    "qpsolvers piqp": (387.0, 425.0, 9.2e-4),
+    "qpsolvers clarabel": (473.0, 507.0, 6.8e-3),
+    "qpsolvers osqp": (712.0, 782.0, 4.9e-2),
+    "qpsolvers quadprog": (290.0, 302.0, 1.2e-11),
+}
+
+
+def test_names_in_the_race_of_solvers_cover_neither_each_other_nor_a_dot() -> None:
+    def never(_: object) -> Any:
+        pytest.fail("nobody is timed")
+
+    families = {"DAQP": "active set", "OSQP": "OSQP, kept", "qpso": "qpsolvers", "ship": "ours"}
+    results = [
+        Result(
+            contender=Contender(name=name, family=families[name[:4]], make=never),
+            times_us=np.r_[np.full(99, middle), np.full(2, late)],
+            errors_n=np.full(101, error),
+            iterations=np.zeros(101),
+        )
+        for name, (middle, late, error) in RACE.items()
+    ]
+    figure = draw_race(results)
+    figure.draw_without_rendering()
+    (axes,) = figure.axes
+    boxes = {text.get_text(): text.get_window_extent() for text in axes.texts if text.get_text() in RACE}
+    assert boxes.keys() == RACE.keys()
+    for first, second in itertools.combinations(boxes, 2):
+        assert not boxes[first].padded(4.0, 0.0).overlaps(boxes[second]), (first, second)
+    for name, (middle, _, error) in RACE.items():
+        place = axes.transData.transform((middle, error))
+        assert not any(box.contains(*place) for box in boxes.values()), name

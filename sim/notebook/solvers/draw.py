@@ -31,6 +31,8 @@ _BESIDE = (
     ((0, 8), "left"), ((0, -8), "left"), ((-6, 0), "right"), ((0, 8), "right"), ((0, -8), "right"), ((0, 17), "left"),
     ((0, -17), "left"), ((0, 17), "right"), ((0, -17), "right"), ((0, 26), "left"),
 )  # fmt: skip
+#: Room between two names [pixels].
+_GAP_PX = 8.0
 #: Half the height that a line or a dot takes from the names [pixels].
 _DOT_PX = 2.0
 
@@ -80,7 +82,7 @@ def _name(figure: Figure, axes: Axes, results: Sequence[Result]) -> None:
             )
             box = text.get_window_extent()
             if not any(box.overlaps(other) for other in taken) or (offset, side) == _BESIDE[-1]:
-                taken.append(box)
+                taken.append(box.padded(_GAP_PX, 0.0))
                 break
             text.remove()
 
