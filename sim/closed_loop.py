@@ -75,7 +75,7 @@ class FlightOptions:
 
 @functools.lru_cache(maxsize=4)
 def default_preset(law: str) -> PilotConfig:
-    """The shipped preset of a law; each was tuned by the same search (docs/tuning.md)."""
+    """The shipped preset of a law; both were tuned by the same search (docs/tuning.md)."""
     file = PRESETS / f"tarot_t960_{law}.toml"
     return PilotConfig.from_toml(file) if file.exists() else PilotConfig(law=law)
 
