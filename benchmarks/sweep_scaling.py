@@ -1,9 +1,10 @@
 """What a sweep costs, and how much faster two processes fly it than one; prints one line of JSON.
 
 Run as ``python benchmarks/sweep_scaling.py --runs 1000``; a run is a flight of about seven seconds that touches the
-board, a second of processor time. Blocks and parts are those of ``ibvs-qp sweep``. Start-up of the processes is
-left out, so that few runs tell what many cost. On a computer that others use as well, `cpu_ratio` is the figure to
-trust: the processor time of one process over that of several for the same runs, 1 when nothing is lost to sharing.
+board, 0.25 s of processor time on a quiet core. Blocks and parts are those of ``ibvs-qp sweep``. Start-up of the
+processes is left out, so that few runs tell what many cost. On a computer that others use as well, `cpu_ratio` is the
+figure to trust: the processor time of one process over that of several for the same runs, 1 when nothing is lost to
+sharing.
 """
 
 from __future__ import annotations
