@@ -16,7 +16,7 @@ from sim.tune.objectives import OBJECTIVES, Score
 from sim.tune.verdict import TUNED, paired
 
 #: Trials worse than this many times the shipped preset lie outside the picture.
-_SHOWN_TO = 4.0
+_SHOWN_TO = 2.0
 #: Logarithmic axes that span less have no two of 1, 2, 5, 10 on them.
 _NARROW = 3.0
 _MARKERS = ("o", "s", "^", "D", "v", "P")
