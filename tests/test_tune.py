@@ -15,7 +15,7 @@ from ibvs_qp.pilot import PilotConfig
 from sim.cli import main
 from sim.closed_loop import default_preset
 from sim.tune.choice import allowed, contact_damping, front, gain_over, ranked
-from sim.tune.finalists import Finalist, choose
+from sim.tune.finalists import Finalist, best_of, fly_finalists
 from sim.tune.flights import CHOICE_SEED, REPORT_SEED, SEARCH_SEED, checks, flights, scenes, seeds
 from sim.tune.objectives import OBJECTIVES, Score, refused, score
 from sim.tune.search import STARTUP, SearchPlan, finished, open_study, search
@@ -229,7 +229,7 @@ def test_a_trial_that_rings_more_is_no_finalist(flown, monkeypatch, tmp_path):
     wanted = plan(24, "a.log")
 
     def chosen(folder: str) -> int | None:
-        return choose(wanted, trials, 2, tmp_path / folder, lambda *_: None).chosen
+        return best_of(fly_finalists(wanted, trials, 2, tmp_path / folder, lambda *_: None))
 
     first = chosen("first")
     assert first is not None

@@ -7,22 +7,12 @@ import numpy as np
 
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.frames import camera_twist_matrix
+from ibvs_qp.setpoints.lines import turn_share
 from ibvs_qp.setpoints.signals import Signals
 from ibvs_qp.tasks.line import symbolic_line_rows
 
 #: Image motion per vertical motion below which a line says nothing about height [1/m].
 LEAST_SHARE = 0.1
-
-
-def turn_share(signals: Signals, config: ControllerConfig) -> ca.SX:
-    r"""Share of the body's turn that line rows count on: :math:`1 - \lambda (1 - r)`, r the gain, where it travels.
-
-    A tip that shall stay is held by friction as the rows in full say. Counting on less, the level line moves the
-    vehicle where nothing is to move: 35 N asked for beyond reach then swing the yaw by 1 degree. A tip that shall
-    travel may be held all the same; there the full row subtracts from the wish what the turn never brings.
-    """
-    less = 1.0 - config.gains.line_turn_share
-    return 1.0 - signals.input("contact_weight") * (1.0 - signals.outputs["held"]) * less
 
 
 def height_wish(signals: Signals, config: ControllerConfig) -> ca.SX:

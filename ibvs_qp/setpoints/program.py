@@ -6,7 +6,8 @@ import casadi as ca
 
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.program_settings import Weights
-from ibvs_qp.setpoints.height import height_wish, turn_share
+from ibvs_qp.setpoints.height import height_wish
+from ibvs_qp.setpoints.lines import turn_share
 from ibvs_qp.setpoints.signals import Signals
 
 

@@ -113,7 +113,7 @@ class Tune:
 
     def _search(self, plan: SearchPlan, folder: Path, words: list[str], notes: Console) -> dict[str, Any]:
         from sim.sweep.progress import sweep_progress
-        from sim.tune.finalists import choose
+        from sim.tune.finalists import best_of, fly_finalists
         from sim.tune.record import Outcome, write
         from sim.tune.verdict import unseen
 
@@ -121,15 +121,15 @@ class Tune:
         trials, searched_by = self._trials(plan, command, notes)
         parts = folder / "parts"
         with sweep_progress(notes, f"{self.law}: choice") as progress:
-            choice = choose(plan, trials, -(-self.unseen // 2), parts, progress)
-        table = None
-        if choice.chosen is not None:
+            finalists = fly_finalists(plan, trials, -(-self.unseen // 2), parts, progress)
+        table, chosen = None, best_of(finalists)
+        if chosen is not None:
             with sweep_progress(notes, f"{self.law}: unseen seeds") as progress:
-                table = unseen(plan, trials[choice.chosen][0], self.unseen, parts, progress)
+                table = unseen(plan, trials[chosen][0], self.unseen, parts, progress)
         outcome = Outcome(
             plan=plan,
             trials=trials,
-            choice=choice,
+            finalists=finalists,
             table=table,
             command=command,
             searched_by=searched_by,

@@ -51,21 +51,10 @@ class Finalist:
         return near and allowed(self.score, shipped.score) and gain_over(self.score, shipped.score) < 0.0
 
 
-@dataclass(frozen=True)
-class Choice:
-    """The finalists on the seeds of the choice.
-
-    Attributes:
-        chosen: Trial that takes the shipped preset's place; None when that stays.
-        finalists: The shipped preset and every finalist, by name or number; empty when no trial came so far.
-    """
-
-    chosen: int | None
-    finalists: dict[str, Finalist]
-
-
-def choose(plan: SearchPlan, trials: Trials, count: int, parts: Path, progress: SweepProgress) -> Choice:
-    """Fly the best trials and the shipped preset on seeds of their own and choose one.
+def fly_finalists(
+    plan: SearchPlan, trials: Trials, count: int, parts: Path, progress: SweepProgress
+) -> dict[str, Finalist]:
+    """Fly the best trials and the shipped preset on seeds of their own.
 
     Args:
         plan: The search.
@@ -73,6 +62,9 @@ def choose(plan: SearchPlan, trials: Trials, count: int, parts: Path, progress: 
         count: Seeds per scene.
         parts: Where flights are kept.
         progress: Told about the flights.
+
+    Returns:
+        The shipped preset and every finalist, by name or number; empty when no trial came so far.
 
     Raises:
         KeyboardInterrupt: On Ctrl-C; what was flown is kept.
@@ -82,19 +74,17 @@ def choose(plan: SearchPlan, trials: Trials, count: int, parts: Path, progress: 
     damped = {number: contact_damping(with_gains(plan.shipped, trials[number][0])) for number in better}
     best = [number for number in better if damped[number] >= DAMPING_KEPT * shipped][:FINALISTS]
     if not best:
-        return Choice(None, {})
+        return {}
     presets = {SHIPPED: {}} | {str(number): trials[number][0] for number in best}
     table = fly_presets(plan, presets, seeds(CHOICE_SEED, plan.seed, count), parts, progress)
     dampings = {SHIPPED: shipped} | {str(number): damped[number] for number in best}
-    finalists = {name: _finalist(table.filter(pl.col("variant") == name), each) for name, each in dampings.items()}
-    return Choice(best_of(finalists), finalists)
+    return {name: _finalist(table.filter(pl.col("variant") == name), each) for name, each in dampings.items()}
 
 
 def best_of(finalists: Mapping[str, Finalist]) -> int | None:
     """Number of the best finalist that may replace the shipped preset; None when none may."""
-    shipped = finalists[SHIPPED]
-    good = [name for name, each in finalists.items() if name != SHIPPED and each.may_replace(shipped)]
-    best = min(good, key=lambda name: gain_over(finalists[name].score, shipped.score), default=None)
+    good = {name: each for name, each in finalists.items() if each.may_replace(finalists[SHIPPED])}
+    best = min(good, key=lambda name: gain_over(good[name].score, finalists[SHIPPED].score), default=None)
     return None if best is None else int(best)
 
 
@@ -111,14 +101,14 @@ def shipped_score(plan: SearchPlan, trials: Trials) -> Score:
 
 
 def fly_presets(
-    plan: SearchPlan, presets: Mapping[str, Mapping[str, float]], chosen: range, parts: Path, progress: SweepProgress
+    plan: SearchPlan, presets: Mapping[str, dict[str, float]], on_seeds: range, parts: Path, progress: SweepProgress
 ) -> pl.DataFrame:
     """Fly presets over all scenes, those of the search and the checks.
 
     Args:
         plan: The search.
         presets: Gains that differ from the shipped ones, by name of the preset.
-        chosen: Seeds.
+        on_seeds: Seeds.
         parts: Where flights are kept.
         progress: Told about the flights.
 
@@ -127,7 +117,7 @@ def fly_presets(
     """
     flown, runs = scenes() | checks(), []
     for name, gains in presets.items():
-        runs += flights(flown, with_gains(plan.shipped, dict(gains)), name, chosen, plan.features)
+        runs += flights(flown, with_gains(plan.shipped, gains), name, on_seeds, plan.features)
     result = run_sweep(runs, parts, workers=plan.jobs, progress=progress)
     if result.interrupted:
         raise KeyboardInterrupt

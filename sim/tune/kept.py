@@ -23,21 +23,16 @@ def kept_trials(file: Path, plan: SearchPlan) -> tuple[Trials, str]:
         file: The record of a search.
         plan: What is to be chosen for; law, seed, features and shipped gains must be those of the search.
 
+    Returns:
+        The trials, and the command.
+
     Raises:
         ConfigError: When the file is no such record, or of another search.
     """
     try:
         record: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
         trials = {row.get(NUMBER, place): _trial(row) for place, row in enumerate(record["all_trials"])}
-    except (
-        OSError,
-        UnicodeDecodeError,
-        json.JSONDecodeError,
-        AttributeError,
-        KeyError,
-        TypeError,
-        ValueError,
-    ) as error:
+    except (OSError, AttributeError, KeyError, TypeError, ValueError) as error:
         reason = f"{type(error).__name__}: {error}"
         raise ConfigError(
             f"{file} is no record of a search ({reason}); give a LAW_trials.json with --trials-of"
@@ -47,7 +42,8 @@ def kept_trials(file: Path, plan: SearchPlan) -> tuple[Trials, str]:
     if held != wanted:
         other = ", ".join(f"{name} {value}" for name, value in held.items())
         raise ConfigError(f"{file} holds a search with {other}; give the same options")
-    if not any(gains == start_gains(plan) for gains, _ in trials.values()):
+    start = start_gains(plan)
+    if not any(gains == start for gains, _ in trials.values()):
         raise ConfigError(
             f"{file} holds no trial of the preset to compare with; give the one it began at with --preset"
         )

@@ -14,7 +14,7 @@ from sim.figures.tune import draw_front, draw_unseen
 from sim.rundir import as_json
 from sim.sweep.parts import write_table
 from sim.tune.choice import front, gain_over
-from sim.tune.finalists import SHIPPED, Choice, Finalist, Trials, shipped_score
+from sim.tune.finalists import SHIPPED, Finalist, Trials, best_of, shipped_score
 from sim.tune.kept import NUMBER
 from sim.tune.objectives import OBJECTIVES, Score
 from sim.tune.search import SearchPlan
@@ -29,7 +29,7 @@ class Outcome:
     Attributes:
         plan: What was searched.
         trials: Gains and score by number.
-        choice: What the finalists did, and the number of the chosen one.
+        finalists: What they did.
         table: Flights of shipped and chosen on unseen seeds; None when nothing was chosen.
         command: The command line.
         searched_by: The command line of the search, where its trials were kept.
@@ -38,7 +38,7 @@ class Outcome:
 
     plan: SearchPlan
     trials: Trials
-    choice: Choice
+    finalists: dict[str, Finalist]
     table: pl.DataFrame | None
     command: str
     searched_by: str
@@ -52,7 +52,7 @@ class Outcome:
     @property
     def chosen(self) -> int | None:
         """Number of the chosen trial; None keeps the shipped preset."""
-        return self.choice.chosen
+        return best_of(self.finalists)
 
     @property
     def scores(self) -> dict[int, Score]:
@@ -73,7 +73,7 @@ def content(outcome: Outcome, folder: Path) -> dict[str, Any]:
         "trials": len(found),
         "completed_trials": sum(not each.failed for each in found.values()),
         "front": front(found),
-        "finalists": {name: _finalist(each) for name, each in outcome.choice.finalists.items()},
+        "finalists": {name: _finalist(each) for name, each in outcome.finalists.items()},
         "chosen": outcome.chosen,
         "gains": None if outcome.chosen is None else outcome.trials[outcome.chosen][0],
         "unseen": [] if outcome.table is None else differences(outcome.table),
@@ -141,7 +141,7 @@ def _page(outcome: Outcome, summary: dict[str, Any]) -> list[str]:
         "",
         f"![Front](figures/{law}-front.png)",
         "",
-        *_finalists(outcome.choice.finalists),
+        *_finalists(outcome.finalists),
     ]
     if outcome.chosen is None:
         return [
