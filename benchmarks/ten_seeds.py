@@ -11,9 +11,9 @@ from typing import Any
 import joblib
 import numpy as np
 
-from sim.closed_loop import FlightOptions, fly
-from sim.metrics import compute_metrics
-from sim.scene import Scene
+from sim.evaluate.metrics import compute_metrics
+from sim.flight.closed_loop import FlightOptions, fly
+from sim.world.scene import Scene
 
 #: Figure, words, factor to the shown unit, unit, and what the QP law is held to.
 FIGURES = (

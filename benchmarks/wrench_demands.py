@@ -25,9 +25,9 @@ from allocation import (
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.frames import GRAVITY
 from ibvs_qp.limits import ThrustLimit
-from ibvs_qp.qp.acceptance import QpEngine
-from ibvs_qp.qp.assembly import QpTemplate
-from ibvs_qp.qp.model import SymbolicModel
+from ibvs_qp.model.rows import SymbolicModel
+from ibvs_qp.qp.accept import QpEngine
+from ibvs_qp.qp.problem import QpTemplate
 from ibvs_qp.tasks import EffortTask, HeightTask, LevelTask, PushTask, SmoothnessTask, VelocityTask, YawTask
 
 #: Half widths of the uniform demands about hover: lateral, vertical, roll and pitch, yaw [N, N m].

@@ -13,7 +13,7 @@ import numpy as np
 from allocation import Rotor
 from ibvs_qp import ControllerConfig, HybridController, Measurement, Reference, RotorGeometry, VehicleParams
 from ibvs_qp.limits import Limit
-from ibvs_qp.qp.model import LimitRow, SymbolicModel, TaskRow
+from ibvs_qp.model.rows import LimitRow, SymbolicModel, TaskRow
 from ibvs_qp.tasks import Task
 
 

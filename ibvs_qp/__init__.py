@@ -13,8 +13,9 @@ if TYPE_CHECKING:
     from ibvs_qp.analytic import PaperController
     from ibvs_qp.command import ActiveLimit, Command, Outcome, TaskReport
     from ibvs_qp.config import ControllerConfig
+    from ibvs_qp.config.errors import ConfigError, IbvsQpError
+    from ibvs_qp.config.vehicle import VehicleParams
     from ibvs_qp.controller import HybridController
-    from ibvs_qp.errors import ConfigError, IbvsQpError
     from ibvs_qp.measurement import (
         FeatureFrame,
         LineFeature,
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
         SensorFrame,
     )
     from ibvs_qp.pilot import Pilot, PilotConfig
-    from ibvs_qp.vehicle import VehicleParams
 
 __all__ = [
     "TAROT_T960",
@@ -56,11 +56,11 @@ _HOMES = {
     "allocation": ("TAROT_T960", "RotorGeometry", "control_effectiveness"),
     "ibvs_qp.analytic": ("PaperController",),
     "ibvs_qp.command": ("ActiveLimit", "Command", "Outcome", "TaskReport"),
-    "ibvs_qp.config": ("ControllerConfig",),
+    "ibvs_qp.config.controller": ("ControllerConfig",),
     "ibvs_qp.controller": ("HybridController",),
-    "ibvs_qp.errors": ("ConfigError", "IbvsQpError"),
+    "ibvs_qp.config.errors": ("ConfigError", "IbvsQpError"),
     "ibvs_qp.pilot": ("Pilot", "PilotConfig"),
-    "ibvs_qp.vehicle": ("VehicleParams",),
+    "ibvs_qp.config.vehicle": ("VehicleParams",),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 

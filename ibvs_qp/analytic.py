@@ -6,12 +6,12 @@ import numpy as np
 
 from ibvs_qp.command import Command, Outcome
 from ibvs_qp.config import ControllerConfig
-from ibvs_qp.gate import MeasurementGate, answered_stamp
-from ibvs_qp.hold import hold_thrusts
 from ibvs_qp.measurement import Measurement, Reference
-from ibvs_qp.reference_gate import check_reference
-from ibvs_qp.reporting import clipped_command, contact_mode, reach_note
-from ibvs_qp.setpoints import Setpoints
+from ibvs_qp.model.reporting import clipped_command, contact_mode, reach_note
+from ibvs_qp.model.step_function import Setpoints
+from ibvs_qp.safety.hover import hold_thrusts
+from ibvs_qp.validation.measurement import MeasurementGate, answered_stamp
+from ibvs_qp.validation.reference import check_reference
 
 #: Singular values below this share of the largest are dropped in the pseudo-inverse of L.
 RANK_TOLERANCE = 0.05

@@ -9,19 +9,17 @@ import numpy as np
 
 from ibvs_qp.command import Command, Outcome
 from ibvs_qp.config import ControllerConfig
-from ibvs_qp.gate import MeasurementGate, answered_stamp
-from ibvs_qp.hold import hold_thrusts
 from ibvs_qp.limits import ApproachLimit, Limit, PushCeiling, ThrustLimit, TiltLimit, ViewLimit, YawLimit
 from ibvs_qp.measurement import Measurement, Reference
-from ibvs_qp.qp.acceptance import AcceptedSolution, QpEngine
-from ibvs_qp.qp.assembly import QpTemplate
+from ibvs_qp.model.reporting import clipped_command, contact_mode, reach_margin, reach_note
+from ibvs_qp.model.rows import SymbolicModel
+from ibvs_qp.model.step_function import Setpoints
+from ibvs_qp.qp.accept import AcceptedSolution, QpEngine
 from ibvs_qp.qp.evaluator import ProgramData
+from ibvs_qp.qp.explain import active_limits, task_reports
 from ibvs_qp.qp.faults import program_faults
-from ibvs_qp.qp.model import SymbolicModel
-from ibvs_qp.qp.replay import active_limits, task_reports
-from ibvs_qp.reference_gate import check_reference
-from ibvs_qp.reporting import clipped_command, contact_mode, reach_margin, reach_note
-from ibvs_qp.setpoints import Setpoints
+from ibvs_qp.qp.problem import QpTemplate
+from ibvs_qp.safety.hover import hold_thrusts
 from ibvs_qp.tasks import (
     EffortTask,
     HeightTask,
@@ -34,6 +32,8 @@ from ibvs_qp.tasks import (
     VelocityTask,
     YawTask,
 )
+from ibvs_qp.validation.measurement import MeasurementGate, answered_stamp
+from ibvs_qp.validation.reference import check_reference
 
 #: Wrench given up by a tick that no limit touches; shared by all of them.
 _NOTHING = np.zeros(6)

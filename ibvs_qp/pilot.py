@@ -15,14 +15,15 @@ import numpy as np
 from ibvs_qp.analytic import PaperController
 from ibvs_qp.command import Command
 from ibvs_qp.config import LONGEST_TICK, ControllerConfig
+from ibvs_qp.config.contact_margin import require_margin
+from ibvs_qp.config.settings import choice, dump_toml, load_toml, setting, validate
 from ibvs_qp.controller import HybridController
 from ibvs_qp.estimation.config import EstimationConfig
-from ibvs_qp.estimation.motion import WallMotion
 from ibvs_qp.estimation.stamps import HISTORY
-from ibvs_qp.estimation.tare import WrenchTare
 from ibvs_qp.estimation.wall_lines import WallAxes, image_line
+from ibvs_qp.estimation.wall_motion import WallMotion
+from ibvs_qp.estimation.wrench_tare import WrenchTare
 from ibvs_qp.frames import to_camera
-from ibvs_qp.loop_margin import require_margin
 from ibvs_qp.made import filled
 from ibvs_qp.measurement import (
     HORIZONTAL,
@@ -33,10 +34,9 @@ from ibvs_qp.measurement import (
     RgbdFrame,
     SensorFrame,
 )
-from ibvs_qp.painting import Painter, PaintingConfig, Scenery, Wish
-from ibvs_qp.sensor_gate import SensorGate
-from ibvs_qp.settings import choice, dump_toml, load_toml, setting, validate
-from ibvs_qp.supervisor import Supervisor
+from ibvs_qp.painting.painter import Painter, PaintingConfig, Scenery, Wish
+from ibvs_qp.safety.rotor_loss import Supervisor
+from ibvs_qp.validation.sensor_frame import SensorGate
 from ibvs_qp.vectors import Row, down_row
 from ibvs_qp.vision.config import VisionConfig
 from ibvs_qp.vision.paper.config import PaperConfig

@@ -263,7 +263,7 @@ def _():
     mo.md(r"""
     **What this does not say.** The set is static: it knows no motor lag and no thrust rate, which decide how fast the
     border is reached, and no sensor noise, which decides how near to it one dares to fly. The controller therefore cuts
-    an asked push to 97 % of the reach with the limits in force (`ibvs_qp/setpoints/reach.py`) and reports the rest as
+    an asked push to 97 % of the reach with the limits in force (`ibvs_qp/model/reach.py`) and reports the rest as
     `Command.reach_margin`. Power is the ideal induced one; a real propeller needs about half as much again.
     """)
     return

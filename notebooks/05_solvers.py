@@ -111,7 +111,7 @@ def _(results):
       controller it is the exact fallback. What speaks for OSQP here is not the median: every iteration costs the
       same, so a cap on iterations is a deadline. Which rows contradict each other where there is no solution does not
       come from the solver: an iterate that was cut short holds no certificate, so a smallest set of rows in conflict is
-      sought by itself (Farkas' lemma by non-negative least squares, `ibvs_qp/qp/conflict.py`).
+      sought by itself (Farkas' lemma by non-negative least squares, `ibvs_qp/qp/infeasible.py`).
     """
     )
     return

@@ -40,7 +40,7 @@ def test_imports_run_one_way(package):
 
 
 def test_the_check_sees_every_kind_of_import():
-    text = "import osqp as o, sim.plant\ndef f():\n    from mujoco.x import y\n    from ..frames import skew\n"
+    text = "import osqp as o, sim.world.plant\ndef f():\n    from mujoco.x import y\n    from ..frames import skew\n"
     assert imported_names(text, "ibvs_qp") == {"osqp", "sim", "mujoco", "ibvs_qp"}
 
 

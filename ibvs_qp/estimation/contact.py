@@ -11,11 +11,11 @@ import struct
 
 import numpy as np
 
+from ibvs_qp.analysis.contact_loop import ACCELERATION_FILTER, ACCELERATION_NOISE, HELD_SPEED_STD
 from ibvs_qp.config import LONGEST_TICK, ControllerConfig
-from ibvs_qp.contact_loop import ACCELERATION_FILTER, ACCELERATION_NOISE, HELD_SPEED_STD
-from ibvs_qp.estimation.delayed import DelayedKalman
+from ibvs_qp.estimation.kalman import DelayedKalman
 from ibvs_qp.estimation.stamps import HISTORY
-from ibvs_qp.estimation.surface import StiffnessEstimator
+from ibvs_qp.estimation.stiffness import StiffnessEstimator
 from ibvs_qp.frames import GRAVITY
 from ibvs_qp.measurement import Measurement
 

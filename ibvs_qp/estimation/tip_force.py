@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.estimation.config import EstimationConfig
 from ibvs_qp.estimation.line_noise import WhiteNoise
-from ibvs_qp.vehicle import VehicleParams
 
 #: Levers shorter than this tell nothing about a force [m].
 LEAST_LEVER = 0.05

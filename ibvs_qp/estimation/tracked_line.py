@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from ibvs_qp.estimation.delayed import GATE
+from ibvs_qp.estimation.kalman import GATE
 from ibvs_qp.estimation.line_noise import SteadyValue, WhiteNoise
 
 #: So many offsets in a row that agree with each other, not with the prediction, are another line.

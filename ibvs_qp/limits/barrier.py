@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as ca
 
 from ibvs_qp.limits.limit import Limit
-from ibvs_qp.qp.model import LimitRow, SymbolicModel
+from ibvs_qp.model.rows import LimitRow, SymbolicModel
 
 
 def barrier_bounds(angle: ca.SX, rate: ca.SX, bound: float, pole: float) -> tuple[ca.SX, ca.SX]:

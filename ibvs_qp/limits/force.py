@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as ca
 
 from ibvs_qp.limits.limit import WIDE, Limit
-from ibvs_qp.qp.model import LimitRow, SymbolicModel
+from ibvs_qp.model.rows import LimitRow, SymbolicModel
 
 
 class PushCeiling(Limit):

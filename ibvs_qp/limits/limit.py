@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import ClassVar
 
-from ibvs_qp.qp.model import LimitRow, SymbolicModel
+from ibvs_qp.model.rows import LimitRow, SymbolicModel
 
 #: Bound of a row that does not limit now: finite, so that OSQP never sees the row change its type.
 WIDE = 1e4

@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 
 from ibvs_qp.limits.limit import Limit
-from ibvs_qp.qp.model import LimitRow, SymbolicModel
+from ibvs_qp.model.rows import LimitRow, SymbolicModel
 
 #: Least distance between lower and upper bound [N]: OSQP takes a row for an equality below 1e-4 and refactorises.
 LEAST_GAP = 1e-3

@@ -9,7 +9,7 @@ from ibvs_qp.frames import camera_twist_matrix
 from ibvs_qp.limits.barrier import barrier_bounds
 from ibvs_qp.limits.limit import WIDE, Limit
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL
-from ibvs_qp.qp.model import LimitRow, SymbolicModel
+from ibvs_qp.model.rows import LimitRow, SymbolicModel
 from ibvs_qp.tasks.line import symbolic_line_rows
 
 

@@ -7,8 +7,8 @@ import math
 import casadi as ca
 import numpy as np
 
-from ibvs_qp.qp.assembly import QpTemplate
 from ibvs_qp.qp.evaluator import BufferedFunction, ProgramData
+from ibvs_qp.qp.problem import QpTemplate
 
 #: A row may lie outside its bounds by this much, and a multiplier on the wrong side of zero, relative to the largest.
 TOLERANCE = 1e-7

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import casadi as ca
 import numpy as np
 
-from ibvs_qp.bound_function import BoundFunction
-from ibvs_qp.machine_code import machine_code
-from ibvs_qp.qp.assembly import QpTemplate
+from ibvs_qp.model.bound_function import BoundFunction
+from ibvs_qp.model.machine_code import machine_code
+from ibvs_qp.qp.problem import QpTemplate
 
 
 class BufferedFunction(BoundFunction):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ibvs_qp.qp.assembly import QpTemplate
 from ibvs_qp.qp.evaluator import ProgramData
+from ibvs_qp.qp.problem import QpTemplate
 
 
 def program_faults(template: QpTemplate, data: ProgramData) -> tuple[str, ...]:

@@ -9,9 +9,9 @@ import numpy as np
 import qpsolvers
 from scipy import sparse
 
-from ibvs_qp.errors import IbvsQpError
-from ibvs_qp.qp.assembly import QpTemplate
+from ibvs_qp.config.errors import IbvsQpError
 from ibvs_qp.qp.evaluator import ProgramData
+from ibvs_qp.qp.problem import QpTemplate
 
 #: Back ends that take dense matrices only.
 DENSE = ("daqp", "quadprog")

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 import casadi as ca
 
-from ibvs_qp.errors import ConfigError
-from ibvs_qp.qp.model import LimitRow, SymbolicModel, TaskRow
+from ibvs_qp.config.errors import ConfigError
+from ibvs_qp.model.rows import LimitRow, SymbolicModel, TaskRow
 
 
 def check_rows(model: SymbolicModel, tasks: Sequence[TaskRow], limits: Sequence[LimitRow]) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ibvs_qp.qp.model import SymbolicModel, TaskRow
+from ibvs_qp.model.rows import SymbolicModel, TaskRow
 from ibvs_qp.tasks.task import Task
 
 

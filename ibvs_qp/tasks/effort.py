@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ibvs_qp.qp.model import SymbolicModel, TaskRow
+from ibvs_qp.model.rows import SymbolicModel, TaskRow
 from ibvs_qp.tasks.task import Task
 
 

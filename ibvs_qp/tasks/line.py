@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 
 from ibvs_qp.frames import camera_twist_matrix
-from ibvs_qp.qp.model import SymbolicModel, TaskRow
+from ibvs_qp.model.rows import SymbolicModel, TaskRow
 from ibvs_qp.tasks.task import Task
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import ClassVar
 
-from ibvs_qp.qp.model import SymbolicModel, TaskRow
+from ibvs_qp.model.rows import SymbolicModel, TaskRow
 
 
 class Task(ABC):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from ibvs_qp.settings import setting, validate
+from ibvs_qp.config.settings import setting, validate
 
 #: Width of the picture for which pixel settings are stated [px].
 REFERENCE_WIDTH = 640.0

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.measurement import RgbdFrame
-from ibvs_qp.vehicle import VehicleParams
 from ibvs_qp.vision.config import VisionConfig
 from ibvs_qp.vision.follow_plane import PlaneFollower
 from ibvs_qp.vision.grid import CoarseGrid

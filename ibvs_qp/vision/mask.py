@@ -7,8 +7,8 @@ import itertools
 import cv2
 import numpy as np
 
+from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import R_BODY_CAMERA
-from ibvs_qp.vehicle import VehicleParams
 from ibvs_qp.vision.config import REFERENCE_WIDTH, MaskConfig
 
 #: Parts nearer to the camera plane than this are cut off [m]; their image runs out of any picture.

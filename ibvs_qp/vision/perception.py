@@ -8,9 +8,9 @@ from collections.abc import Callable
 import cv2
 import numpy as np
 
+from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import R_BODY_CAMERA, down_in_body
 from ibvs_qp.measurement import FeatureFrame, RgbdFrame
-from ibvs_qp.vehicle import VehicleParams
 from ibvs_qp.vision.checks import StageClock, finite_vector, frame_problem
 from ibvs_qp.vision.colors import SurfaceColors
 from ibvs_qp.vision.config import VisionConfig

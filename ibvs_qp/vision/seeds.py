@@ -7,8 +7,8 @@ import functools
 
 import numpy as np
 
+from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import to_camera
-from ibvs_qp.vehicle import VehicleParams
 from ibvs_qp.vision.grid import CoarseGrid
 from ibvs_qp.vision.native import native, place
 

@@ -10,13 +10,13 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import rotation_from_quaternion
 from ibvs_qp.measurement import RgbdFrame
-from ibvs_qp.vehicle import VehicleParams
-from sim.cameras import PlaneCamera
-from sim.canvas import Canvas
-from sim.scene import Scene
-from sim.streams import stream
+from sim.sensors.cameras import PlaneCamera
+from sim.world.canvas import Canvas
+from sim.world.random_streams import stream
+from sim.world.scene import Scene
 
 #: Camera period [ns], and its frequency of sway [Hz] with the amplitudes about roll, pitch and yaw [deg].
 PERIOD_NS, _SWAY_HZ, _SWAY_DEG = 33_333_333, 0.4, (0.3, 0.3, 0.6)

@@ -10,7 +10,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from ibvs_qp.errors import IbvsQpError
+from ibvs_qp.config.errors import IbvsQpError
 from ibvs_qp.measurement import RgbdFrame
 
 #: Files of the folder and the columns that are read.

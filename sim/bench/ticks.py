@@ -7,10 +7,10 @@ from collections.abc import Iterator
 
 from allocation.geometry import TAROT_T960
 from ibvs_qp.measurement import Measurement, Reference
-from sim.closed_loop import FlightOptions, World, make_pilot, pilot_config
-from sim.faults import Derate, Fault, FaultSchedule
-from sim.jobs import Job, PaintJob, PressJob
-from sim.scene import Scene
+from sim.flight.closed_loop import FlightOptions, World, make_pilot, pilot_config
+from sim.flight.faults import Derate, Fault, FaultSchedule
+from sim.flight.jobs import Job, PaintJob, PressJob
+from sim.world.scene import Scene
 
 #: A flight that lasts longer is cut [ticks]: two minutes.
 LONGEST_FLIGHT = 30_000

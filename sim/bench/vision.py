@@ -11,15 +11,15 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.measurement import RgbdFrame
-from ibvs_qp.vehicle import VehicleParams
 from ibvs_qp.vision import Percept, Perception, VisionConfig, checks
 from ibvs_qp.vision.layout import PictureLayout
 from ibvs_qp.vision.paper import PaperPipeline
 from sim.bench.mission import Shot, mission_shots
 from sim.bench.real_frames import real_frames
 from sim.bench.timing import Bench, Row
-from sim.scene import Scene
+from sim.world.scene import Scene
 
 #: Picture sizes measured; the ratios and stages are those of the first.
 SIZES = ((640, 480), (424, 240))

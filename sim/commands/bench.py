@@ -51,9 +51,9 @@ class Bench:
         """
         from rich.console import Console
 
-        from ibvs_qp.errors import IbvsQpError
-        from sim.checks import check_seed
-        from sim.rundir import as_json
+        from ibvs_qp.config.errors import IbvsQpError
+        from sim.commands.checks import check_seed
+        from sim.report.rundir import as_json
 
         check_seed(self.seed)
         if not LEAST_FRAMES <= self.frames <= MOST_FRAMES:

@@ -64,8 +64,8 @@ class Compare:
         Raises:
             IbvsQpError: When a run or a preset is refused.
         """
-        from sim.comparison import compare, read_run
-        from sim.rundir import as_json
+        from sim.report.comparison import compare, read_run
+        from sim.report.rundir import as_json
 
         folder, interrupted = None, False
         if self._presets():
@@ -101,7 +101,7 @@ class Compare:
         Raises:
             ConfigError: When one is a preset and the other a folder, or one does not exist.
         """
-        from ibvs_qp.errors import ConfigError
+        from ibvs_qp.config.errors import ConfigError
 
         for path in (self.run_a, self.run_b):
             if not path.exists():
@@ -118,9 +118,9 @@ class Compare:
         import polars as pl
         from rich.console import Console
 
-        from sim.checks import check_preset, check_readable, check_seed
-        from sim.preset_flights import preset_runs
-        from sim.rundir import RunFolder
+        from sim.commands.checks import check_preset, check_readable, check_seed
+        from sim.experiments.preset_flights import preset_runs
+        from sim.report.rundir import RunFolder
         from sim.sweep import run_sweep
         from sim.sweep.progress import sweep_progress
 

@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from ibvs_qp.errors import ConfigError
+from ibvs_qp.config.errors import ConfigError
 from sim.commands.options import flag, optional
 from sim.detection.methods import METHODS
 
@@ -77,7 +77,7 @@ class Detect:
         import cv2
         from rich.console import Console
 
-        from sim.checks import check_seed
+        from sim.commands.checks import check_seed
         from sim.detection.overlay import write_overlay
         from sim.detection.report import as_json, frame_table, refusals
         from sim.detection.run import detect_frames

@@ -77,12 +77,12 @@ class ExperimentCommand:
 
         from rich.console import Console
 
-        from sim.checks import check_seed
+        from sim.commands.checks import check_seed
         from sim.experiments import chosen, designs
         from sim.experiments.base import Choice
         from sim.experiments.record import PARTS, write_page, write_summary, write_tables
         from sim.experiments.record import summary as summarise
-        from sim.rundir import RunFolder, as_json
+        from sim.report.rundir import RunFolder, as_json
         from sim.sweep import run_sweep
         from sim.sweep.progress import sweep_progress
 

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 import tyro
 
-from ibvs_qp.errors import IbvsQpError
+from ibvs_qp.config.errors import IbvsQpError
 from sim.commands.options import optional
 
 if TYPE_CHECKING:
     from ibvs_qp.pilot import PilotConfig
-    from ibvs_qp.qp.replay import Explanation, LimitValue
-    from sim.trace import Trace
+    from ibvs_qp.qp.explain import Explanation, LimitValue
+    from sim.flight.trace import Trace
 
 
 class ExplainError(IbvsQpError):
@@ -56,7 +56,7 @@ class Explain:
         """
         from rich.console import Console
 
-        from sim import explanation as told
+        from sim.evaluate import explanation as told
 
         trace = self._flight()
         tick = self._tick(trace)
@@ -86,7 +86,7 @@ class Explain:
         return 0
 
     def _flight(self) -> Trace:
-        from sim.flight_log import load_run
+        from sim.flight.flight_log import load_run
 
         if not (self.run_dir / "log.npz").exists():
             raise ExplainError(f"{self.run_dir} is no run folder: it has no log.npz; give the folder that paint wrote")
@@ -110,7 +110,7 @@ def _table(
     """One tick as JSON; without a program (a held tick) no window either, without a solution no tasks and no limits."""
     from dataclasses import asdict
 
-    from sim.explanation import refused, thrust_window
+    from sim.evaluate.explanation import refused, thrust_window
 
     flown, margin = trace.thrusts[tick].tolist(), float(trace.reach_margin[tick])
     table = {

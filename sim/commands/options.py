@@ -24,7 +24,7 @@ def check_count(option: str, value: int | None) -> None:
     Raises:
         ConfigError: Names the option, the value and what is allowed.
     """
-    from ibvs_qp.errors import out_of_range
+    from ibvs_qp.config.errors import out_of_range
 
     if value is not None and value < 1:
         raise out_of_range(option, value, "", "allowed are 1, 2, 3, ...")

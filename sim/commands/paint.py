@@ -14,8 +14,8 @@ from sim.commands.options import flag, optional
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from sim.flights import Flight
-    from sim.rundir import RunFolder
+    from sim.flight.side_by_side import Flight
+    from sim.report.rundir import RunFolder
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -64,16 +64,16 @@ class Paint:
         """
         from rich.console import Console
 
-        from sim.cameras import resolve_camera, spare_core
-        from sim.checks import check_mujoco, check_readable, check_seed
+        from sim.commands.checks import check_mujoco, check_readable, check_seed
+        from sim.sensors.cameras import resolve_camera, spare_core
 
         check_mujoco()
-        from sim.closed_loop import FlightOptions, pilot_config
-        from sim.flights import fly_laws
-        from sim.progress import flight_progress
-        from sim.rundir import RunFolder
-        from sim.scene import Scene, load_scene
-        from sim.viewer import check_display
+        from sim.flight.closed_loop import FlightOptions, pilot_config
+        from sim.flight.progress import flight_progress
+        from sim.flight.side_by_side import fly_laws
+        from sim.flight.viewer import check_display
+        from sim.report.rundir import RunFolder
+        from sim.world.scene import Scene, load_scene
 
         started = time.perf_counter()
         check_seed(self.seed)
@@ -125,10 +125,10 @@ class Paint:
     ) -> int:
         from rich.console import Console
 
-        from sim.flights import INTERRUPTED
-        from sim.metrics import compute_metrics
-        from sim.rundir import as_json, peak_memory, summary
-        from sim.table import figure_table
+        from sim.evaluate.metrics import compute_metrics
+        from sim.evaluate.table import figure_table
+        from sim.flight.side_by_side import INTERRUPTED
+        from sim.report.rundir import as_json, peak_memory, summary
 
         traces = {law: flight.trace for law, flight in flights.items()}
         metrics = {law: compute_metrics(trace) for law, trace in traces.items()}

@@ -70,7 +70,7 @@ class Sweep:
         """
         from rich.console import Console
 
-        from ibvs_qp.errors import ConfigError
+        from ibvs_qp.config.errors import ConfigError
 
         if (self.spec is None) == (self.report is None):
             raise ConfigError("give a spec to fly, or --report with a table to draw (see ibvs-qp sweep --help)")
@@ -80,9 +80,9 @@ class Sweep:
         return self._fly(words, notes)
 
     def _report(self, path: Path) -> int:
-        from sim.figures.sweep import write_report
-        from sim.figures.sweep.page import read_table
-        from sim.rundir import RunFolder, as_json
+        from sim.report.rundir import RunFolder, as_json
+        from sim.sweep.figures import write_report
+        from sim.sweep.figures.page import read_table
 
         table, folder = read_table(path)
         out = RunFolder.create(self.out or folder).path
@@ -91,9 +91,9 @@ class Sweep:
         return 0
 
     def _fly(self, words: list[str], notes: Console) -> int:
-        from sim.figures.sweep import write_report
-        from sim.rundir import RunFolder, as_json
+        from sim.report.rundir import RunFolder, as_json
         from sim.sweep import run_sweep
+        from sim.sweep.figures import write_report
         from sim.sweep.parts import write_table
         from sim.sweep.progress import sweep_progress
 
@@ -143,8 +143,8 @@ class Sweep:
         return 0
 
     def _design(self) -> Planned:
-        from ibvs_qp.errors import ConfigError
-        from sim.checks import check_seed
+        from ibvs_qp.config.errors import ConfigError
+        from sim.commands.checks import check_seed
         from sim.sweep import Planned, load_spec
 
         check_count("--jobs", self.jobs)

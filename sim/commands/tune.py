@@ -65,7 +65,7 @@ class Tune:
         """
         from rich.console import Console
 
-        from sim.rundir import RunFolder, as_json
+        from sim.report.rundir import RunFolder, as_json
 
         self._check()
         notes = Console(stderr=True, quiet=self.json)
@@ -82,8 +82,8 @@ class Tune:
         return 0
 
     def _check(self) -> None:
-        from ibvs_qp.errors import ConfigError
-        from sim.checks import check_preset, check_readable, check_seed
+        from ibvs_qp.config.errors import ConfigError
+        from sim.commands.checks import check_preset, check_readable, check_seed
 
         check_seed(self.seed)
         for name in ("trials", "flights", "unseen", "jobs"):
@@ -97,7 +97,7 @@ class Tune:
 
     def _plan(self, folder: Path) -> SearchPlan:
         from ibvs_qp.pilot import PilotConfig
-        from sim.closed_loop import default_preset
+        from sim.flight.closed_loop import default_preset
         from sim.tune.search import SearchPlan
 
         start = PilotConfig.from_toml(self.preset) if self.preset else default_preset(self.law)

@@ -8,7 +8,7 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from ibvs_qp.errors import IbvsQpError
+from ibvs_qp.config.errors import IbvsQpError
 
 #: Columns that must be there; seed_u, seed_v and depth may be empty in a row.
 COLUMNS = ("color", "depth", "fx", "fy", "cx", "cy", "depth_units_per_m", "seed_u", "seed_v")

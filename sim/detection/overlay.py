@@ -8,7 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from ibvs_qp.errors import IbvsQpError
+from ibvs_qp.config.errors import IbvsQpError
 from ibvs_qp.vision.survey.draw import draw_detection
 from sim.detection.run import SeenFrame
 

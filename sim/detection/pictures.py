@@ -7,7 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from ibvs_qp.errors import IbvsQpError
+from ibvs_qp.config.errors import IbvsQpError
 from ibvs_qp.measurement import RgbdFrame
 
 #: Files of arrays instead of pictures.

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from sim.evaluate.measures import press_figures
 from sim.experiments.base import Choice, Column, Criterion, Experiment, runs
+from sim.experiments.figures.curves import Panel, curves
 from sim.experiments.scenes import changed
-from sim.figures.experiments.curves import Panel, curves
-from sim.jobs import PressJob
-from sim.measures import press_figures
-from sim.scene import Scene
+from sim.flight.jobs import PressJob
 from sim.sweep.design import Run
+from sim.world.scene import Scene
 
 NAME = "approach"
 STIFFNESS_N_M, QUICK_N_M = (1000.0, 1500.0, 3000.0, 5000.0, 10000.0), (5000.0,)

@@ -10,12 +10,12 @@ import polars as pl
 from matplotlib.figure import Figure
 
 from ibvs_qp.pilot import PilotConfig
-from sim.closed_loop import FlightOptions, default_preset, pilot_config
 from sim.experiments.variants import VARIANTS
-from sim.faults import Fault
-from sim.jobs import Job, PaintJob
-from sim.scene import Scene
+from sim.flight.closed_loop import FlightOptions, default_preset, pilot_config
+from sim.flight.faults import Fault
+from sim.flight.jobs import Job, PaintJob
 from sim.sweep.design import FlightPlan, Measure, Parameter, Run
+from sim.world.scene import Scene
 
 LAWS = ("qp", "paper")
 #: Start, approach, alignment, touch and retreat of a flight that starts near the wall [s]; sizes plan and bar only.

@@ -5,11 +5,11 @@ from __future__ import annotations
 import dataclasses
 
 from ibvs_qp.pilot import PilotConfig
+from sim.evaluate.measures import press_figures
 from sim.experiments.base import Choice, Column, Criterion, Experiment, runs
+from sim.experiments.figures.force_hold import draw_force_hold
 from sim.experiments.scenes import near_wall
-from sim.figures.experiments.force_hold import draw_force_hold
-from sim.jobs import PressJob
-from sim.measures import press_figures
+from sim.flight.jobs import PressJob
 from sim.sweep.design import Run
 
 NAME = "force-hold"

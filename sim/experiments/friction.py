@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from sim.evaluate.measures import slide_figures
 from sim.experiments.base import Choice, Column, Criterion, Experiment, runs
+from sim.experiments.figures.curves import Panel, curves
 from sim.experiments.scenes import near_wall
-from sim.figures.experiments.curves import Panel, curves
-from sim.jobs import PressJob
-from sim.measures import slide_figures
+from sim.flight.jobs import PressJob
 from sim.sweep.design import Run
 
 NAME = "friction"

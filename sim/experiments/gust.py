@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from sim.evaluate.measures import paint_figures, press_figures
 from sim.experiments.base import Choice, Column, Criterion, Experiment, runs
+from sim.experiments.figures.curves import Panel, curves
 from sim.experiments.scenes import near_wall, short_job
-from sim.faults import WindStep
-from sim.figures.experiments.curves import Panel, curves
-from sim.jobs import PressJob
-from sim.measures import paint_figures, press_figures
+from sim.flight.faults import WindStep
+from sim.flight.jobs import PressJob
 from sim.sweep.design import Run
 
 NAME = "gust"

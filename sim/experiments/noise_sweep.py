@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from sim.evaluate.measures import paint_figures
 from sim.experiments.base import Choice, Criterion, Experiment, runs
+from sim.experiments.figures.noise_sweep import draw_noise_sweep
 from sim.experiments.paint import PATH_COLUMNS
 from sim.experiments.scenes import short_job
-from sim.figures.experiments.noise_sweep import draw_noise_sweep
-from sim.measures import paint_figures
 from sim.sweep.design import Run
 
 NAME = "noise-sweep"

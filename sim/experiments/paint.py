@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from sim.evaluate.measures import paint_figures
 from sim.experiments.base import Choice, Column, Criterion, Experiment, runs
+from sim.experiments.figures.paint import draw_paint
 from sim.experiments.scenes import near_wall, short_job
 from sim.experiments.variants import VARIANTS
-from sim.figures.experiments.paint import draw_paint
-from sim.measures import paint_figures
 from sim.sweep.design import Run
 
 NAME = "paint"

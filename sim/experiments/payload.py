@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+from sim.evaluate.measures import paint_figures
 from sim.experiments.base import Choice, Criterion, Experiment, runs
+from sim.experiments.figures.bars import draw_payload
 from sim.experiments.paint import PATH_COLUMNS
 from sim.experiments.scenes import short_job
-from sim.figures.experiments.bars import draw_payload
-from sim.measures import paint_figures
 from sim.sweep.design import Run
 
 NAME = "payload"

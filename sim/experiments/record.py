@@ -14,7 +14,7 @@ from sim.experiments.page import results_page
 from sim.experiments.variants import REFERENCES
 from sim.experiments.verdict import telling, verdicts
 from sim.figures.style import save, styled
-from sim.rundir import as_json
+from sim.report.rundir import as_json
 from sim.sweep.paired import paired_differences, variant_differences
 from sim.sweep.parts import write_table
 from sim.sweep.statistics import cells

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from sim.evaluate.measures import press_figures
+from sim.evaluate.measures.loss import loss_figures
 from sim.experiments.base import Choice, Column, Criterion, Experiment, runs
+from sim.experiments.figures.derate import draw_derate
 from sim.experiments.scenes import near_wall
-from sim.faults import Derate
-from sim.figures.experiments.derate import draw_derate
-from sim.jobs import PressJob
-from sim.measures import press_figures
-from sim.measures.loss import loss_figures
+from sim.flight.faults import Derate
+from sim.flight.jobs import PressJob
 from sim.sweep.design import Run
 
 NAME = "rotor-derate"

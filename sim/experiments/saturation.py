@@ -5,12 +5,12 @@ from __future__ import annotations
 import dataclasses
 
 from ibvs_qp.pilot import PilotConfig
+from sim.evaluate.measures import press_figures, slide_figures
 from sim.experiments.base import Choice, Column, Criterion, Experiment, runs
+from sim.experiments.figures.saturation import draw_saturation
 from sim.experiments.scenes import near_wall
 from sim.experiments.variants import VARIANTS
-from sim.figures.experiments.saturation import draw_saturation
-from sim.jobs import PressJob
-from sim.measures import press_figures, slide_figures
+from sim.flight.jobs import PressJob
 from sim.sweep.design import Run
 
 NAME = "saturation"

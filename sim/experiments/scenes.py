@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
-from sim.scene import Scene
+from sim.world.scene import Scene
 
 #: Start of flights in which the approach is not the subject: tip to board [m].
 NEAR_START_M = 0.15

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from sim.evaluate.measures import paint_figures
 from sim.experiments.base import Choice, Column, Criterion, Experiment, runs
+from sim.experiments.figures.curves import Panel, curves
 from sim.experiments.scenes import short_job
-from sim.figures.experiments.curves import Panel, curves
-from sim.measures import paint_figures
 from sim.sweep.design import Run
 
 NAME = "sloped-edge"

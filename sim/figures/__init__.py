@@ -13,7 +13,7 @@ from sim.figures.overview import draw_overview
 from sim.figures.path import draw_path
 from sim.figures.style import save, styled
 from sim.figures.thrusts import draw_thrusts
-from sim.trace import Trace
+from sim.flight.trace import Trace
 
 #: Every figure of a run: file name, caption, function.
 FIGURES = {

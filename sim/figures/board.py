@@ -6,11 +6,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
-from sim.board import BoardGeometry
+from sim.evaluate.metrics import coverage
+from sim.evaluate.paint_plan import band_mask, nominal_plan
 from sim.figures.style import REFERENCE, law_name, new_figure, thin
-from sim.metrics import coverage
-from sim.paint_plan import band_mask, nominal_plan
-from sim.trace import Trace
+from sim.flight.trace import Trace
+from sim.world.board import BoardGeometry
 
 
 def draw_board(traces: dict[str, Trace]) -> Figure:

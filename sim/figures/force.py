@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
+from sim.evaluate.path_error import CONTACT_N
 from sim.figures.style import FAINT, REFERENCE, law_colour, law_name, legend_above, new_figure, shade_phases, thin
-from sim.path_error import CONTACT_N
-from sim.trace import Trace
+from sim.flight.trace import Trace
 
 #: The close-up shows this much before and after the first touch [s].
 BEFORE_TOUCH_S, AFTER_TOUCH_S = 0.3, 2.7

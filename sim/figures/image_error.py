@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from sim.figures.style import law_name, legend_above, new_figure, shade_phases, thin
-from sim.trace import Trace
+from sim.flight.trace import Trace
 
 _GUIDES = (("horizontal guide", "#2f7d4f"), ("vertical guide", "#8a4fa3"))
 #: The scale shows this share of all errors; the first sight of a guide may lie far off.

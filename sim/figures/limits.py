@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from sim.figures.style import law_colour, law_name, new_figure, shade_phases
-from sim.trace import Trace
+from sim.flight.trace import Trace
 
 #: An active stretch is drawn at least this long, so that a single tick can be seen [s].
 LEAST_WIDTH_S = 0.05

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from sim.figures.style import law_colour, law_name, legend_above, new_figure, shade_phases, thin
-from sim.trace import Trace
+from sim.flight.trace import Trace
 
 _VELOCITY = ("forward", "right", "down")
 _ATTITUDE = ("roll", "pitch", "yaw")

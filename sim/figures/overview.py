@@ -6,8 +6,8 @@ from matplotlib.figure import Figure
 
 from sim.figures.board import draw_canvas
 from sim.figures.style import REFERENCE, law_colour, law_name, legend_above, new_figure, shade_phases, thin
-from sim.trace import Trace
-from sim.video import unpack_picture
+from sim.flight.trace import Trace
+from sim.flight.video import unpack_picture
 
 #: The picture shown is taken at this share of the last row.
 SHARE_OF_ROW = 0.35

@@ -6,11 +6,11 @@ import numpy as np
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-from sim.board import BoardGeometry
+from sim.evaluate.paint_plan import nominal_plan
+from sim.evaluate.path_error import CORNER_M, path_error
 from sim.figures.style import REFERENCE, law_colour, law_name, new_figure, thin
-from sim.paint_plan import nominal_plan
-from sim.path_error import CORNER_M, path_error
-from sim.trace import Trace
+from sim.flight.trace import Trace
+from sim.world.board import BoardGeometry
 
 
 def draw_path(traces: dict[str, Trace]) -> Figure:

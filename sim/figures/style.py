@@ -13,7 +13,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.transforms import blended_transform_factory
 
-from sim.trace import Trace
+from sim.flight.trace import Trace
 
 STYLE_FILE = Path(__file__).with_name("ibvs_qp.mplstyle")
 #: Colours that stay apart for colour-blind readers (Okabe and Ito), one per law.

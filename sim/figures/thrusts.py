@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from sim.figures.style import law_name, new_figure, shade_phases, thin
-from sim.trace import Trace
+from sim.flight.trace import Trace
 
 #: Below this lower limit a logarithmic scale shows nothing but its own floor [N].
 LEAST_LOG_N = 0.1

@@ -13,7 +13,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from ibvs_qp.errors import ConfigError
+from ibvs_qp.config.errors import ConfigError
 from sim.notebook.short import SHORT_VARIABLE
 
 #: Folder of the notebooks, of a source tree; an installed wheel has none.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ibvs_qp.errors import ConfigError
+from ibvs_qp.config.errors import ConfigError
 
 _FOLDER = Path(__file__).parent
 
@@ -15,7 +15,7 @@ def scene_names() -> tuple[str, ...]:
 
 
 def scene_path(name: str) -> Path:
-    """File of a shipped scene, for `sim.scene.load_scene`.
+    """File of a shipped scene, for `sim.world.scene.load_scene`.
 
     Args:
         name: Its name, with or without ``.toml``.

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ibvs_qp.errors import ConfigError
-from ibvs_qp.settings import choice, from_dict, setting, validate
+from ibvs_qp.config.errors import ConfigError
+from ibvs_qp.config.settings import choice, from_dict, setting, validate
 from sim.sweep.design import Parameter
 
 SCALES = ("linear", "log")

@@ -7,7 +7,7 @@ import logging
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from ibvs_qp.errors import ConfigError
+from ibvs_qp.config.errors import ConfigError
 from sim.sweep.fingerprint import code_hash
 from sim.sweep.pools import Pool, dask_pool
 

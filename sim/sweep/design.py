@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from ibvs_qp.pilot import PilotConfig
-from sim.closed_loop import FlightOptions
-from sim.faults import Fault
-from sim.jobs import Job, PaintJob
-from sim.scene import Scene
-from sim.trace import Trace
+from sim.flight.closed_loop import FlightOptions
+from sim.flight.faults import Fault
+from sim.flight.jobs import Job, PaintJob
+from sim.flight.trace import Trace
+from sim.world.scene import Scene
 
 #: Value of a parameter of a cell: what a table can hold.
 Parameter = float | int | str | bool

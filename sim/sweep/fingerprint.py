@@ -13,7 +13,7 @@ from typing import Any
 import allocation
 import ibvs_qp
 import sim
-from ibvs_qp.settings import to_dict
+from ibvs_qp.config.settings import to_dict
 from sim.sweep.design import Run
 
 #: Folders of `sim` whose code only words or draws results: a change there needs no new flight.

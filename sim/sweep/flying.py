@@ -9,15 +9,15 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from ibvs_qp.errors import IbvsQpError
-from ibvs_qp.settings import dump_toml
-from sim.closed_loop import fly
-from sim.flight_log import save_log
-from sim.flights import INTERRUPTED
+from ibvs_qp.config.errors import IbvsQpError
+from ibvs_qp.config.settings import dump_toml
+from sim.flight.closed_loop import fly
+from sim.flight.flight_log import save_log
+from sim.flight.side_by_side import INTERRUPTED
+from sim.flight.trace import Trace
 from sim.sweep.design import Block, Refusal, Run
 from sim.sweep.fingerprint import code_hash, configuration_hash
 from sim.sweep.parts import PARAM
-from sim.trace import Trace
 
 #: A row of the table: column to value.
 Row = dict[str, Any]
@@ -81,7 +81,7 @@ def _row(run: Run | Refusal, name: str, folder: Path) -> Row:
 
 
 def _keep(trace: Trace, folder: Path) -> str:
-    """Write the log of a flight where `sim.flight_log.load_run` reads it."""
+    """Write the log of a flight where `sim.flight.flight_log.load_run` reads it."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "scene.toml").write_text(dump_toml(trace.scene), encoding="utf-8")
     trace.canvas = None  # a picture of the board is the run folder's affair, and large

@@ -9,10 +9,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from ibvs_qp.errors import ConfigError
-from ibvs_qp.settings import to_dict
-from sim.jobs import PaintJob
-from sim.measures.effort import paint_row, press_row
+from ibvs_qp.config.errors import ConfigError
+from ibvs_qp.config.settings import to_dict
+from sim.evaluate.measures.effort import paint_row, press_row
+from sim.flight.jobs import PaintJob
 from sim.sweep.axes import shares
 from sim.sweep.design import FlightPlan, Parameter, Refusal, Run
 from sim.sweep.fingerprint import code_hash, digest

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from ibvs_qp.errors import IbvsQpError
+from ibvs_qp.config.errors import IbvsQpError
 from sim.sweep.design import Block
 from sim.sweep.flying import Row, fly_block
 

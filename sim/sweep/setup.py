@@ -9,12 +9,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from ibvs_qp.errors import ConfigError
+from ibvs_qp.config.errors import ConfigError
+from ibvs_qp.config.settings import from_dict, to_dict
 from ibvs_qp.pilot import PilotConfig
-from ibvs_qp.settings import from_dict, to_dict
-from sim.closed_loop import FlightOptions, pilot_config
-from sim.jobs import PaintJob, PressJob
-from sim.scene import Scene
+from sim.flight.closed_loop import FlightOptions, pilot_config
+from sim.flight.jobs import PaintJob, PressJob
+from sim.world.scene import Scene
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,14 +9,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ibvs_qp.errors import ConfigError, out_of_range
+from ibvs_qp.config.errors import ConfigError, out_of_range
+from ibvs_qp.config.settings import choice, from_dict, setting, validate
 from ibvs_qp.pilot import PilotConfig
-from ibvs_qp.settings import choice, from_dict, setting, validate
-from sim.closed_loop import FlightOptions, default_preset
-from sim.jobs import PaintJob, PressJob
-from sim.scene import Scene, load_scene
+from sim.flight.closed_loop import FlightOptions, default_preset
+from sim.flight.jobs import PaintJob, PressJob
 from sim.sweep.axes import Axis, grid_axis, random_axis
 from sim.sweep.setup import Setup, changed, flown_by, value_at
+from sim.world.scene import Scene, load_scene
 
 LAWS = ("qp", "paper")
 JOBS = {"paint": PaintJob, "press": PressJob}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from ibvs_qp.loop_margin import least_margin
+from ibvs_qp.config.contact_margin import least_margin
 from ibvs_qp.pilot import PilotConfig
 from sim.tune.objectives import OBJECTIVES, Score
 

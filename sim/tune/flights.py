@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from ibvs_qp.pilot import PilotConfig
-from sim.closed_loop import FlightOptions, pilot_config
+from sim.evaluate.measures.effort import paint_row
 from sim.experiments.scenes import changed, near_wall, short_job
-from sim.jobs import PaintJob
-from sim.measures.effort import paint_row
-from sim.scene import Scene
+from sim.flight.closed_loop import FlightOptions, pilot_config
+from sim.flight.jobs import PaintJob
 from sim.sweep.design import FlightPlan, Run
+from sim.world.scene import Scene
 
 #: Length of a row [m]: touch, both corners and a climb in about 17 s of flight.
 STROKE_M = 0.2

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from ibvs_qp.errors import ConfigError
+from ibvs_qp.config.errors import ConfigError
 from sim.tune.finalists import Trials
 from sim.tune.objectives import OBJECTIVES, Score
 from sim.tune.search import SearchPlan, start_gains

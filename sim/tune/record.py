@@ -10,10 +10,10 @@ from typing import Any
 import polars as pl
 
 from sim.figures.style import law_name, save, styled
-from sim.figures.tune import draw_front, draw_unseen
-from sim.rundir import as_json
+from sim.report.rundir import as_json
 from sim.sweep.parts import write_table
 from sim.tune.choice import front, gain_over
+from sim.tune.figures import draw_front, draw_unseen
 from sim.tune.finalists import SHIPPED, Finalist, Trials, best_of, shipped_score
 from sim.tune.kept import NUMBER
 from sim.tune.objectives import OBJECTIVES, Score

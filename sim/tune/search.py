@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import joblib
 import numpy as np
 
-from ibvs_qp.errors import ConfigError
-from ibvs_qp.loop_margin import require_margin
+from ibvs_qp.config.contact_margin import require_margin
+from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.pilot import PilotConfig
 from sim.sweep.design import ListedBlock
 from sim.sweep.flying import Row, fly_block

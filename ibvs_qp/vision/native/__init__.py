@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ibvs_qp.shared_library import compiler, shared_library, wide_registers
+from ibvs_qp.model.shared_library import compiler, shared_library, wide_registers
 
 #: The files, in the order in which they are joined.
 FILES = (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ibvs_qp.settings import setting, validate
+from ibvs_qp.config.settings import setting, validate
 
 
 @dataclass(frozen=True, kw_only=True)

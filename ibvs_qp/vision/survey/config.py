@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from ibvs_qp.settings import setting, validate
+from ibvs_qp.config.settings import setting, validate
 from ibvs_qp.vision.config import LineConfig, PlaneConfig, TrackConfig
 
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from allocation import WrenchFacets, control_effectiveness
+from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import GRAVITY
-from ibvs_qp.vehicle import VehicleParams
 
 #: Density of the air [kg/m^3], sea level, 15 degrees (ISO 2533).
 AIR_DENSITY = 1.225

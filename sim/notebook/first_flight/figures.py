@@ -9,10 +9,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from sim.evaluate.metrics import compute_metrics
 from sim.figures.style import new_figure
-from sim.metrics import compute_metrics
-from sim.trace import Trace
-from sim.video import unpack_picture
+from sim.flight.trace import Trace
+from sim.flight.video import unpack_picture
 
 #: Moments shown of the camera: name of the phase, and where in it.
 MOMENTS = (("approach", 0.5), ("press", 0.7), ("paint", 0.35), ("paint", 0.9))

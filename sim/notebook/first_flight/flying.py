@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import functools
 
-from sim.cameras import spare_core
-from sim.closed_loop import FlightOptions, fly
 from sim.experiments.scenes import changed, short_job
+from sim.flight.closed_loop import FlightOptions, fly
+from sim.flight.trace import Trace
 from sim.notebook.short import unless_short
-from sim.scene import Scene
-from sim.trace import Trace
+from sim.sensors.cameras import spare_core
+from sim.world.scene import Scene
 
 #: Stroke of the short form [m], and its pictures [px].
 SHORT_STROKE_M, SHORT_SIZE = 0.12, (424, 240)

@@ -7,10 +7,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from allocation import TAROT_T960
-from sim.explanation import explain_tick
+from sim.evaluate.explanation import explain_tick
 from sim.figures.style import law_colour, new_figure
+from sim.flight.trace import Trace
 from sim.notebook.first_flight.figures import nearest_picture, show_picture
-from sim.trace import Trace
 
 #: Tasks that only regularise; they are left out of the table.
 REGULAR = ("effort", "smooth")

@@ -11,7 +11,7 @@ from ibvs_qp.analytic import RANK_TOLERANCE, analytic_thrusts
 from ibvs_qp.config import ControllerConfig, Weights
 from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import Measurement, Reference
-from ibvs_qp.setpoints import Setpoints
+from ibvs_qp.model.step_function import Setpoints
 
 #: Lambda from which a tick counts as full contact, and below which as free flight.
 FULL, FREE = 0.999, 0.001

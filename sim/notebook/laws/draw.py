@@ -8,11 +8,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from sim.evaluate.measures.window import board_tip, phase_window, tilt_deg
 from sim.figures.style import REFERENCE, law_colour, law_name, new_figure
-from sim.measures.window import board_tip, phase_window, tilt_deg
+from sim.flight.trace import Trace
 from sim.notebook.laws.agreement import Agreement
 from sim.notebook.laws.shadow import ShadowFlight
-from sim.trace import Trace
 
 #: Differences below this are rounding and drawn as this [N].
 ROUNDING_N = 1e-9

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ibvs_qp.pilot import PilotConfig
-from sim.closed_loop import FlightOptions, default_preset, fly, pilot_config
+from sim.evaluate.measures.window import board_tip, mean, peak, phase_window, rms, tilt_deg
 from sim.experiments.scenes import near_wall
-from sim.measures.window import board_tip, mean, peak, phase_window, rms, tilt_deg
+from sim.flight.closed_loop import FlightOptions, default_preset, fly, pilot_config
+from sim.flight.trace import Trace
 from sim.notebook.tuning.snippet import SnippetJob
-from sim.scene import Scene
-from sim.trace import Trace
+from sim.world.scene import Scene
 
 #: Figures begin this long after the touch or after the slide began [s]: ramps are over.
 SETTLED_S = 1.5

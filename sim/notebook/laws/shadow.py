@@ -10,7 +10,7 @@ import numpy as np
 from ibvs_qp.analytic import analytic_thrusts
 from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import Measurement, Reference
-from sim.closed_loop import FlightOptions, World, make_pilot, pilot_config
+from sim.flight.closed_loop import FlightOptions, World, make_pilot, pilot_config
 from sim.notebook.laws.flights import WallTask
 
 #: A flight that lasts longer is cut [ticks].

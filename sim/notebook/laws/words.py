@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+from sim.flight.trace import Trace
 from sim.notebook.laws.flights import task_figures
-from sim.trace import Trace
 
 #: Figures of `task_figures` in words, with digits.
 _ROWS = {

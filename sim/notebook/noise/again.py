@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from sim.closed_loop import fly
 from sim.experiments import noise_sweep
 from sim.experiments.base import Choice
+from sim.flight.closed_loop import fly
+from sim.flight.trace import Trace
 from sim.notebook.noise.sample import sample_runs
 from sim.notebook.noise.table import FORCE, VS
 from sim.sweep.design import Run
 from sim.sweep.fingerprint import code_hash, configuration_hash
-from sim.trace import Trace
 
 #: More seeds per cell than any sweep of this design has.
 _MOST_SEEDS = 10

@@ -9,10 +9,10 @@ from matplotlib.figure import Figure as Drawing
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from sim.evaluate.path_error import path_error
 from sim.figures.style import REFERENCE, law_colour, law_name, new_figure, shade_phases
+from sim.flight.trace import Trace
 from sim.notebook.noise.table import FIGURES, FORCE, VS, Figure, cell_values, grid_of, success
-from sim.path_error import path_error
-from sim.trace import Trace
 
 LAWS = ("qp", "paper")
 #: Width of a box; a cell is one wide.

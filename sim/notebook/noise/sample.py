@@ -9,10 +9,10 @@ import sys
 import tempfile
 from pathlib import Path
 
+from sim.evaluate.measures import paint_figures
 from sim.experiments.base import Choice, runs
 from sim.experiments.noise_sweep import NAME, QUICK_STROKE_M, SIGMA_F, SIGMA_VS
 from sim.experiments.scenes import short_job
-from sim.measures import paint_figures
 from sim.sweep import run_sweep
 from sim.sweep.design import Run
 from sim.sweep.parts import write_table

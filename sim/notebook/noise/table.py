@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from ibvs_qp.errors import ConfigError
+from ibvs_qp.config.errors import ConfigError
 from sim.notebook.noise.sample import SAMPLE
 from sim.sweep.parts import PARAM
 

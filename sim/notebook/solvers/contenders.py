@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 
 from ibvs_qp.config import SolverSettings
-from ibvs_qp.qp.acceptance import QpEngine
+from ibvs_qp.qp.accept import QpEngine
 from ibvs_qp.qp.active_set import ActiveSet
-from ibvs_qp.qp.assembly import QpTemplate
 from ibvs_qp.qp.evaluator import ProgramData
-from ibvs_qp.qp.exact_solver import ExactSolver
+from ibvs_qp.qp.exact import ExactSolver
 from ibvs_qp.qp.offline import installed_solvers, solve_offline
-from ibvs_qp.qp.osqp_solver import OsqpSolver
+from ibvs_qp.qp.osqp import OsqpSolver
+from ibvs_qp.qp.problem import QpTemplate
 
 #: One tick: the solution x, (variables,), or None; and iterations, 0 where a solver does not say.
 Answer = tuple[np.ndarray | None, int]

@@ -11,8 +11,8 @@ import numpy as np
 
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.controller import HybridController
-from ibvs_qp.qp.assembly import QpTemplate
 from ibvs_qp.qp.evaluator import Evaluator
+from ibvs_qp.qp.problem import QpTemplate
 from sim.bench.ticks import Tick, flown_ticks
 from sim.experiments.scenes import near_wall
 from sim.notebook.tuning.snippet import SnippetJob

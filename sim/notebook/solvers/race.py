@@ -11,7 +11,7 @@ import numpy as np
 
 from ibvs_qp.qp.active_set import ActiveSet
 from ibvs_qp.qp.evaluator import ProgramData
-from ibvs_qp.qp.exact_solver import ExactSolver
+from ibvs_qp.qp.exact import ExactSolver
 from sim.notebook.solvers.contenders import Contender
 from sim.notebook.solvers.programs import Stretch
 

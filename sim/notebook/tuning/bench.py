@@ -10,11 +10,11 @@ from typing import Any
 
 from joblib.externals.loky import get_reusable_executor
 
-from ibvs_qp.errors import ConfigError
+from ibvs_qp.config.errors import ConfigError
+from sim.flight.trace import Trace
 from sim.notebook.short import short_form
 from sim.notebook.tuning.knobs import KNOBS, knob_values, turned
 from sim.notebook.tuning.snippet import KEPT_FLIGHTS, Setting, analytic_setting, fly_snippet
-from sim.trace import Trace
 
 #: How long the helper, which flies beside this process when both laws have to, waits for the next change [s].
 IDLE_S = 1800

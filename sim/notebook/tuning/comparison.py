@@ -7,10 +7,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from sim.measures.window import board_tip, peak, phase_window, rms, tilt_deg
+from sim.evaluate.measures.window import board_tip, peak, phase_window, rms, tilt_deg
+from sim.evaluate.path_error import CONTACT_N
+from sim.flight.trace import Trace
 from sim.notebook.tuning.bench import Comparison
-from sim.path_error import CONTACT_N
-from sim.trace import Trace
 
 #: The hold is judged after the ramp of the reference, the slide after its start [s].
 SETTLED_S, SLIDING_S = 1.1, 0.3

@@ -10,13 +10,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
+from sim.evaluate.measures.window import tilt_deg
 from sim.figures.style import REFERENCE, law_colour
-from sim.measures.window import tilt_deg
+from sim.flight.trace import Trace
 from sim.notebook.tuning.bench import Comparison
 from sim.notebook.tuning.comparison import thrust_room
 from sim.notebook.tuning.limits_panel import draw_prices
 from sim.notebook.tuning.reach_panel import draw_reach
-from sim.trace import Trace
 
 #: Size [in] and place of the panels in it; a fixed layout is drawn in half the time of a fitted one.
 SIZE_IN = (11.0, 7.2)

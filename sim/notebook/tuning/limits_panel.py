@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.patheffects import withStroke
 
-from sim.trace import Trace
+from sim.flight.trace import Trace
 
 #: Limits shown at most, the dearest first.
 MOST_ROWS = 7

@@ -5,12 +5,12 @@ from __future__ import annotations
 import shlex
 from pathlib import Path
 
-from ibvs_qp.errors import ConfigError
-from ibvs_qp.loop_margin import require_margin
+from ibvs_qp.config.contact_margin import require_margin
+from ibvs_qp.config.errors import ConfigError
+from ibvs_qp.config.settings import dump_toml
 from ibvs_qp.pilot import PilotConfig
-from ibvs_qp.settings import dump_toml
 from sim.notebook.tuning.snippet import Setting
-from sim.scene import load_scene
+from sim.world.scene import load_scene
 
 #: Ending of the scene's file beside the preset's.
 SCENE_ENDING = ".scene.toml"

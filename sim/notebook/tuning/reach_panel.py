@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 
 from allocation import TAROT_T960, WrenchSet, control_effectiveness, level_polygon
 from ibvs_qp.frames import GRAVITY
-from sim.path_error import CONTACT_N
-from sim.trace import Trace
+from sim.evaluate.path_error import CONTACT_N
+from sim.flight.trace import Trace
 
 #: One dot in so many ticks.
 EVERY = 8

@@ -6,15 +6,15 @@ import dataclasses
 import functools
 from dataclasses import dataclass, field
 
-from ibvs_qp.painting import Painter
-from ibvs_qp.painting_job import PaintingConfig, Scenery, Wish
+from ibvs_qp.painting.job import PaintingConfig, Scenery, Wish
+from ibvs_qp.painting.painter import Painter
+from ibvs_qp.painting.presser import Presser
 from ibvs_qp.pilot import PilotConfig
-from ibvs_qp.pressing import Presser
-from sim.closed_loop import FlightOptions, default_preset, fly, pilot_config
 from sim.experiments.scenes import near_wall
+from sim.flight.closed_loop import FlightOptions, default_preset, fly, pilot_config
+from sim.flight.trace import Trace
 from sim.notebook.short import unless_short
-from sim.scene import Scene
-from sim.trace import Trace
+from sim.world.scene import Scene
 
 #: Pressing at one place, then sliding along the edge [s]: the push settles within a second, a line within two.
 HOLD_S, SLIDE_S = 1.6, 1.4

@@ -1,0 +1,195 @@
+"""Whether a controller and a brush go together: least damping ratio of the contact mode, and the check of a preset."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+
+from ibvs_qp.analysis.contact_loop import FULL_GAIN_STIFFNESS, ContactLoop
+from ibvs_qp.config.brush import BrushSettings
+from ibvs_qp.config.contact import ContactSettings
+from ibvs_qp.config.errors import out_of_range
+from ibvs_qp.config.gains import Gains
+from ibvs_qp.config.vehicle import VehicleParams
+
+#: A preset whose contact mode is damped less than this is refused: a tenth overshoots by 73 % and rings for seconds.
+LEAST_DAMPING_RATIO = 0.1
+#: Stiffnesses looked at over a brush's range, evenly spaced in their logarithm.
+STIFFNESS_SAMPLES = 7
+#: Relative width at which the search for an allowed value stops.
+SEARCH_TOLERANCE = 1e-3
+#: Gains that a refusal may name, the likeliest culprit first.
+GAIN_NAMES = ("force_kfp", "force_kfi", "force_ksd", "force_ksp")
+
+
+class PressingConfig(Protocol):
+    """The part of `ibvs_qp.config.ControllerConfig` that shapes the contact."""
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    @property
+    def vehicle(self) -> VehicleParams:
+        """Mass, drag and motor lags."""
+        ...
+
+    @property
+    def gains(self) -> Gains:
+        """Force feedback and impedance."""
+        ...
+
+    @property
+    def contact(self) -> ContactSettings:
+        """Force filter."""
+        ...
+
+    @property
+    def tick_s(self) -> float:
+        """Control period [s]."""
+        ...
+
+    @property
+    def impedance(self) -> bool:
+        """Whether the force law has its impedance terms."""
+        ...
+
+    @property
+    def contact_feedforward(self) -> bool:
+        """Whether the observer of gusts learns in contact."""
+        ...
+
+
+def contact_loop(config: PressingConfig, stiffness: float, damping: float, force_delay_s: float) -> ContactLoop:
+    """The linear contact loop of a controller against a wall; arguments as in `contact_mode_damping`."""
+    gains, vehicle, hold = config.gains, config.vehicle, 0.5 * config.tick_s
+    spring, damper = (gains.force_ksp, gains.force_ksd) if config.impedance else (0.0, 0.0)
+    return ContactLoop(
+        mass=vehicle.mass_kg,
+        lag=0.5 * (vehicle.motor_lag_up_s + vehicle.motor_lag_down_s),
+        drag=vehicle.linear_drag_n_s_m,
+        stiffness=stiffness,
+        damping=damping,
+        proportional=gains.force_kfp * min(1.0, FULL_GAIN_STIFFNESS / stiffness),
+        integral=gains.force_kfi,
+        filter_lag=1.0 / (2.0 * math.pi * config.contact.force_filter_hz),
+        spring=spring,
+        damper=damper,
+        observer=1.0 if config.contact_feedforward else 0.0,  # without feed-forward it rests at the wall
+        force_delay=force_delay_s + hold,
+        rate_delay=2.0 * hold,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoopMargin:
+    """Damping of the least damped mode of the contact.
+
+    Attributes:
+        least_damping_ratio: Of all oscillating modes; negative when one grows, -1 when something grows without
+            oscillating, 1 when nothing oscillates.
+        frequency_hz: Natural frequency of that mode [Hz], 0 when nothing oscillates.
+        stiffness_n_m: Wall and brush stiffness it holds for [N/m].
+        passive_damping_ratio: What vehicle and wall alone have, without any feedback.
+    """
+
+    least_damping_ratio: float
+    frequency_hz: float
+    stiffness_n_m: float
+    passive_damping_ratio: float
+
+
+def contact_mode_damping(config: PressingConfig, stiffness: float, damping: float, force_delay_s: float) -> LoopMargin:
+    """Least damping ratio of the contact under a controller; `ContactLoop` derives the loop.
+
+    Args:
+        config: Gains, filter, tick, mass and motor lags.
+        stiffness: Of wall and brush together [N/m].
+        damping: Of wall and brush together [N s/m].
+        force_delay_s: Mean age of the force sample in use: latency plus half a sample period [s].
+    """
+    loop = contact_loop(config, stiffness, damping, force_delay_s)
+    ratio, frequency = 1.0, 0.0
+    for pole in loop.poles():
+        oscillates = abs(pole.imag) > 1e-6 * abs(pole)
+        if oscillates or pole.real > 0.0:
+            own = -pole.real / abs(pole) if oscillates else -1.0
+            if own < ratio:
+                ratio, frequency = own, abs(pole) / (2.0 * math.pi)
+    return LoopMargin(
+        least_damping_ratio=ratio,
+        frequency_hz=frequency,
+        stiffness_n_m=stiffness,
+        passive_damping_ratio=loop.passive_damping_ratio,
+    )
+
+
+def least_margin(config: PressingConfig, brush: BrushSettings | None = None) -> LoopMargin:
+    """Least damped contact over the stiffness range of a brush."""
+    brush = brush or BrushSettings()
+    low, high = brush.stiffness_min_n_m, brush.stiffness_max_n_m
+    samples = {float(entry) for entry in np.geomspace(low, high, STIFFNESS_SAMPLES)}
+    # The gain begins to fall there: a corner, possibly the least damped point of all.
+    samples |= {FULL_GAIN_STIFFNESS} if low < FULL_GAIN_STIFFNESS < high else set()
+    margins = (contact_mode_damping(config, k, brush.damping_n_s_m, brush.force_delay_s) for k in sorted(samples))
+    return min(margins, key=lambda margin: margin.least_damping_ratio)
+
+
+def require_margin(config: PressingConfig, brush: BrushSettings | None = None, place: str = "") -> LoopMargin:
+    """Refuse a controller whose contact would ring.
+
+    Args:
+        config: The controller.
+        brush: What it shall press with and against; the default brush if None.
+        place: Where the controller was found, before the field's name: "preset.toml: controller.".
+
+    Returns:
+        The least margin over the brush's stiffness range.
+
+    Raises:
+        ConfigError: Naming the gain (or, where no gain helps, the stiffness or the damping), its value and what is
+            allowed while everything else stays.
+    """
+    brush = brush or BrushSettings()
+    margin = least_margin(config, brush)
+    if margin.least_damping_ratio >= LEAST_DAMPING_RATIO:
+        return margin
+    reason = (
+        f"for a contact damped at least {LEAST_DAMPING_RATIO:g}; it is {margin.least_damping_ratio:.3f} at "
+        f"{margin.stiffness_n_m:.0f} N/m and {margin.frequency_hz:.1f} Hz, {margin.passive_damping_ratio:.3f} without "
+        "feedback"
+    )
+
+    def good(changed: PressingConfig, pressed: BrushSettings) -> bool:
+        return least_margin(changed, pressed).least_damping_ratio >= LEAST_DAMPING_RATIO
+
+    def with_gain(name: str, value: float) -> bool:
+        return good(dataclasses.replace(config, gains=dataclasses.replace(config.gains, **{name: value})), brush)
+
+    units = {field.name: field.metadata["unit"] for field in dataclasses.fields(config.gains)}
+    for name in GAIN_NAMES:
+        value = getattr(config.gains, name)
+        if value > 0.0 and with_gain(name, 0.0):
+            allowed = _search(0.0, value, lambda entry, name=name: with_gain(name, entry))
+            unit = units[name]
+            words = " ".join(filter(None, (f"allowed is [0, {allowed:.4g}]", unit, reason)))
+            raise out_of_range(f"{place}gains.{name}", value, unit, words)
+    low, high = brush.stiffness_min_n_m, brush.stiffness_max_n_m
+    if good(config, dataclasses.replace(brush, stiffness_max_n_m=low)):
+        allowed = _search(low, high, lambda k: good(config, dataclasses.replace(brush, stiffness_max_n_m=k)))
+        words = f"allowed is [{low:g}, {allowed:.0f}] N/m {reason}"
+        raise out_of_range(f"{place}brush.stiffness_max_n_m", high, "N/m", words)
+    words = f"too little {reason}; no one gain mends it"
+    raise out_of_range(f"{place}brush.damping_n_s_m", brush.damping_n_s_m, "N s/m", words)
+
+
+def _search(good: float, bad: float, holds: Callable[[float], bool]) -> float:
+    """Largest value between a good and a bad one that holds, by halving."""
+    width = SEARCH_TOLERANCE * abs(bad - good)
+    while abs(bad - good) > width:
+        middle = 0.5 * (good + bad)
+        good, bad = (middle, bad) if holds(middle) else (good, middle)
+    return good

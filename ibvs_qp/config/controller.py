@@ -1,0 +1,77 @@
+"""Configuration of a controller: frozen, validated, with a TOML round trip.
+
+Every number states its unit, allowed range and reason. The switches at the end of `ControllerConfig` are the
+ablations of the experiments. Gains and switches are shared by both laws; weights, limits and solver belong to the
+quadratic program.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ibvs_qp.config.brush import BrushSettings
+from ibvs_qp.config.contact import ContactSettings
+from ibvs_qp.config.contact_margin import require_margin
+from ibvs_qp.config.errors import out_of_range
+from ibvs_qp.config.gains import Gains
+from ibvs_qp.config.limits import LimitSettings
+from ibvs_qp.config.settings import choice, dump_toml, load_toml, setting, validate
+from ibvs_qp.config.solver import SolverSettings
+from ibvs_qp.config.vehicle import VehicleParams
+from ibvs_qp.config.weights import Weights
+
+#: No estimator or filter takes a tick to last longer than this [s]: after a pause they go on from where they were.
+LONGEST_TICK = 0.02
+
+
+@dataclass(frozen=True, kw_only=True)
+class ControllerConfig:
+    """Everything a controller needs; the default flies the Tarot T960."""
+
+    vehicle: VehicleParams = field(default_factory=VehicleParams)
+    gains: Gains = field(default_factory=Gains)
+    contact: ContactSettings = field(default_factory=ContactSettings)
+    weights: Weights = field(default_factory=Weights)
+    limits: LimitSettings = field(default_factory=LimitSettings)
+    solver: SolverSettings = field(default_factory=SolverSettings)
+    brush: BrushSettings = field(default_factory=BrushSettings)
+    line_profile: str = choice(
+        "tip",
+        "error of the line rows: at the point where the tip meets the wall, or the paper's, rho at the image centre",
+        ("tip", "paper"),
+    )
+    line_slots: int = setting(3, "lines the fixed program has room for; each costs 500 instructions", low=1, high=16)
+    tick_s: float = setting(
+        0.004, "control period; a longer tick than 0.02 s is taken for a pause", unit="s", low=0.0005, high=LONGEST_TICK
+    )
+    impedance: bool = setting(True, "impedance terms of the force law (False: direct force control)")
+    contact_feedforward: bool = setting(True, "feed the measured contact moment and expected friction forward")
+    touch_ramp: bool = setting(True, "ramp lambda and the force reference after touch")
+    reach_check: bool = setting(True, "reduce a push that the vehicle cannot hold")
+    barriers: bool = setting(True, "all barriers; each has its own switch in limits")
+    thrust_rows: bool = setting(
+        True, "the program knows the rotors' limits (False: it does not, and its thrusts are clipped afterwards)"
+    )
+    machine_code: bool = setting(
+        False, "translate the tick with the C compiler, if there is one: the same bits, 1 s once, 25 us less per tick"
+    )
+
+    def __post_init__(self) -> None:
+        """Validate; the depths at which the push begins against the arm's length too."""
+        validate(self)
+        arm = round(self.vehicle.tip_position_m[0] - self.vehicle.camera_position_m[0], 9)
+        if self.contact.depth_min_m < arm:
+            allowed = f"allowed is at least {arm:g} m, where the camera is when the tip touches"
+            raise out_of_range("contact.depth_min_m", self.contact.depth_min_m, "m", allowed)
+
+    @classmethod
+    def from_toml(cls, file: str | Path) -> ControllerConfig:
+        """Read a preset; ConfigError names field, value, unit and allowed range, also where the contact would ring."""
+        config = load_toml(cls, file)
+        require_margin(config, config.brush, f"{file}: ")
+        return config
+
+    def to_toml(self) -> str:
+        """Write the configuration as TOML text."""
+        return dump_toml(self)

@@ -1,0 +1,189 @@
+"""Validated settings: dataclass fields that carry unit, allowed range and meaning, and their TOML form.
+
+Every configuration of the project (controller, pilot, scene) is a tree of frozen dataclasses whose fields are
+made by `setting`. The same metadata validates a value, words its error, and documents it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import math
+import numbers
+import tomllib
+import types
+import typing
+from pathlib import Path
+from typing import Any, TypeVar
+
+import tomli_w
+
+from ibvs_qp.config.errors import ConfigError, out_of_range
+
+T = TypeVar("T")
+
+
+def setting(
+    default: Any, doc: str, *, unit: str = "", why: str = "", low: float = -math.inf, high: float = math.inf
+) -> Any:
+    """Declare a settings field with its unit and closed allowed range [low, high].
+
+    Args:
+        default: Default value; numbers, booleans, strings, or tuples of numbers.
+        doc: What it is, and where its value comes from unless ``why`` says so.
+        unit: SI unit, empty for a pure number.
+        why: Reason for the default.
+        low: Smallest allowed value (each entry, for tuples).
+        high: Largest allowed value.
+    """
+    return dataclasses.field(default=default, metadata={"doc": doc, "unit": unit, "why": why, "low": low, "high": high})
+
+
+def choice(default: str, doc: str, options: tuple[str, ...]) -> Any:
+    """Declare a settings field that takes one of a few words."""
+    return dataclasses.field(default=default, metadata={"doc": doc, "unit": "", "options": options})
+
+
+def validate(instance: Any, prefix: str = "") -> None:
+    """Check every field of a settings dataclass against its metadata.
+
+    Raises:
+        ConfigError: Naming field, value, unit and allowed range.
+    """
+    for field in dataclasses.fields(instance):
+        meta, value, name = field.metadata, getattr(instance, field.name), prefix + field.name
+        if "options" in meta:
+            if value not in meta["options"]:
+                raise out_of_range(name, value, "", "allowed are " + ", ".join(meta["options"]))
+        elif "low" in meta:
+            _check_number(name, value, field.default, meta)
+
+
+def require_order(instance: Any, smaller: str, larger: str, reason: str) -> None:
+    """Refuse two fields of a settings dataclass unless the first lies below the second.
+
+    Args:
+        instance: The settings.
+        smaller: Name of the field that must be smaller, in the same unit as the other.
+        larger: Name of the other.
+        reason: What goes wrong otherwise.
+
+    Raises:
+        ConfigError: Naming both fields, their values and their unit.
+    """
+    low, high = getattr(instance, smaller), getattr(instance, larger)
+    if not low < high:
+        unit = next(field.metadata["unit"] for field in dataclasses.fields(instance) if field.name == larger)
+        raise out_of_range(smaller, low, unit, f"must lie below {larger} = {high!r} {unit}: {reason}")
+
+
+def _check_number(name: str, value: Any, default: Any, meta: typing.Mapping[str, Any]) -> None:
+    if isinstance(default, (bool, str)) or (value is None and default is None):
+        return
+    low, high, unit = meta["low"], meta["high"], meta["unit"]
+    number = numbers.Integral if isinstance(default, int) else numbers.Real
+    for entry in value if isinstance(value, tuple) else (value,):
+        right_type = isinstance(entry, number) and not isinstance(entry, bool)
+        if not (right_type and math.isfinite(typing.cast(float, entry)) and low <= entry <= high):
+            raise out_of_range(name, value, unit, f"allowed is [{low:g}, {high:g}] {unit}".rstrip())
+
+
+def from_dict(kind: type[T], table: dict[str, Any], path: str = "") -> T:
+    """Build a settings dataclass from a (TOML) table; unknown keys and wrong types are errors.
+
+    Args:
+        kind: The dataclass to build.
+        table: Keys and values; nested tables become nested dataclasses, lists become tuples.
+        path: Dotted place of this table, for messages.
+
+    Raises:
+        ConfigError: On an unknown key, a value of the wrong type or out of range.
+    """
+    hints = typing.get_type_hints(kind)
+    known = {field.name: hints[field.name] for field in dataclasses.fields(kind) if field.init}  # type: ignore[arg-type]
+    values: dict[str, Any] = {}
+    for key, value in table.items():
+        place = f"{path}.{key}" if path else key
+        if key not in known:
+            near = difflib.get_close_matches(key, known, n=1)
+            hint = f"; did you mean {near[0]!r}?" if near else f"; known keys: {', '.join(known)}"
+            raise ConfigError(f"unknown key {place!r}{hint}")
+        values[key] = _convert(known[key], value, place)
+    try:
+        return kind(**values)
+    except ConfigError as error:
+        raise ConfigError(f"{path}.{error}" if path and not str(error).startswith(path + ".") else str(error)) from None
+    except (TypeError, ValueError) as error:  # a dataclass of another package, or a field without default left out
+        raise ConfigError(f"{path or 'table'}: {error}") from None
+
+
+def _convert(hint: Any, value: Any, place: str) -> Any:
+    origin = typing.get_origin(hint)
+    if origin in (typing.Union, types.UnionType):
+        problems = []
+        for option in typing.get_args(hint):
+            try:
+                return _convert(option, value, place)
+            except ConfigError as error:
+                problems.append(str(error))
+        raise ConfigError(problems[0])
+    if dataclasses.is_dataclass(hint) and isinstance(hint, type):
+        if not isinstance(value, dict):
+            raise ConfigError(f"{place} must be a table, got {value!r}")
+        return from_dict(hint, value, place)
+    if origin is tuple:
+        return _convert_tuple(hint, value, place)
+    wanted = {float: (int, float), int: (int,), bool: (bool,), str: (str,), type(None): (type(None),)}.get(hint)
+    if wanted is None or not isinstance(value, wanted) or (hint in (int, float) and isinstance(value, bool)):
+        raise ConfigError(f"{place} = {value!r} is refused: a {getattr(hint, '__name__', hint)} is needed")
+    return float(value) if hint is float else value
+
+
+def _convert_tuple(hint: Any, value: Any, place: str) -> tuple[Any, ...]:
+    arguments = typing.get_args(hint)
+    if not isinstance(value, (list, tuple)):
+        raise ConfigError(f"{place} = {value!r} is refused: a list is needed")
+    if len(arguments) == 2 and arguments[1] is Ellipsis:
+        return tuple(_convert(arguments[0], entry, place) for entry in value)
+    if len(arguments) != len(value):
+        raise ConfigError(f"{place} = {value!r} is refused: a list of {len(arguments)} is needed")
+    return tuple(_convert(kind, entry, place) for kind, entry in zip(arguments, value, strict=True))
+
+
+def to_dict(instance: Any) -> dict[str, Any]:
+    """Turn a settings tree into plain tables (None entries are left out, as TOML has no null)."""
+    table: dict[str, Any] = {}
+    for field in dataclasses.fields(instance):
+        value = getattr(instance, field.name)
+        if value is not None:
+            table[field.name] = _plain(value)
+    return table
+
+
+def _plain(value: Any) -> Any:
+    if dataclasses.is_dataclass(value):
+        return to_dict(value)
+    return [_plain(entry) for entry in value] if isinstance(value, tuple) else value
+
+
+def load_toml(kind: type[T], file: str | Path) -> T:
+    """Read a settings tree from a TOML file.
+
+    Raises:
+        ConfigError: When the file is missing, is no TOML, or holds a refused value.
+    """
+    try:
+        table = tomllib.loads(Path(file).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ConfigError(f"cannot read {file}: {error.strerror or error}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{file} is not valid TOML: {error}") from None
+    try:
+        return from_dict(kind, table)
+    except ConfigError as error:
+        raise ConfigError(f"{file}: {error}") from None
+
+
+def dump_toml(instance: Any) -> str:
+    """Write a settings tree as TOML text that `load_toml` reads back equal."""
+    return tomli_w.dumps(to_dict(instance))

@@ -1,0 +1,96 @@
+"""Physical parameters of the vehicle: one object feeds the controller's model, the limits and the simulated plant."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from allocation.geometry import TAROT_T960, RotorGeometry
+from ibvs_qp.config.settings import require_order, setting, validate
+
+
+@dataclass(frozen=True, kw_only=True)
+class VehicleParams:
+    """The tilted hexarotor with its arm, tool, force/torque sensor and camera (positions FRD from the centre of mass).
+
+    Nominal values: the Tarot T960 of the paper, with the arm and tool assumed here.
+    """
+
+    geometry: RotorGeometry = TAROT_T960
+    mass_kg: float = setting(6.0, "all-up mass, tool included", unit="kg", low=0.5, high=50.0)
+    inertia_kg_m2: tuple[float, float, float] = setting(
+        (0.22, 0.30, 0.48), "principal inertia about the centre of mass", unit="kg m^2", low=1e-3, high=50.0
+    )
+    thrust_min_n: float | tuple[float, ...] = setting(
+        1.2,
+        "idle thrust of a rotor",
+        unit="N",
+        why="15 % of full speed, 2.25 % of full thrust: a stopped propeller starts late; it, not full thrust, bounds "
+        "push",
+        low=0.0,
+        high=200.0,
+    )
+    thrust_max_n: float | tuple[float, ...] = setting(
+        52.56,
+        "full thrust of a rotor",
+        unit="N",
+        why="KDE 4215XF with a 15 inch propeller at full throttle, as published with the vehicle",
+        low=0.0,
+        high=200.0,
+    )
+    thrust_rate_n_s: float = setting(
+        500.0,
+        "fastest commanded thrust change",
+        unit="N/s",
+        why="2 N a tick: hover to idle in 20 ms, faster than the motors' 57 ms follow, so it costs no performance, and "
+        "no tick jumps",
+        low=1.0,
+        high=1e5,
+    )
+    motor_lag_up_s: float = setting(0.045, "first-order lag of rising thrust", unit="s", low=1e-3, high=0.5)
+    motor_lag_down_s: float = setting(0.070, "first-order lag of falling thrust", unit="s", low=1e-3, high=0.5)
+    propeller_radius_m: float = setting(0.19, "propeller disc (15 inch)", unit="m", low=0.01, high=1.0)
+    linear_drag_n_s_m: float = setting(0.9, "drag per airspeed", unit="N s/m", low=0.0, high=20.0)
+    tip_position_m: tuple[float, float, float] = setting((0.70, 0.0, 0.0), "brush tip", unit="m", low=-3.0, high=3.0)
+    force_torque_position_m: tuple[float, float, float] = setting(
+        (0.25, 0.0, 0.0), "force/torque sensor", unit="m", low=-3.0, high=3.0
+    )
+    tool_mass_kg: float = setting(0.35, "mass beyond the force/torque sensor", unit="kg", low=0.0, high=5.0)
+    tool_position_m: tuple[float, float, float] = setting(
+        (0.50, 0.0, 0.0), "centre of mass of the tool", unit="m", low=-3.0, high=3.0
+    )
+    arm_radius_m: float = setting(0.015, "radius of the arm", unit="m", low=0.001, high=0.2)
+    camera_position_m: tuple[float, float, float] = setting(
+        (0.20, 0.0, 0.08), "camera centre, looking along +x", unit="m", low=-3.0, high=3.0
+    )
+
+    def __post_init__(self) -> None:
+        """Refuse values out of range."""
+        validate(self)
+        require_order(self, "tool_mass_kg", "mass_kg", "the tool is part of the vehicle")
+        for field in ("thrust_min_n", "thrust_max_n"):
+            value = getattr(self, field)
+            if isinstance(value, tuple) and len(value) != self.geometry.count:
+                from ibvs_qp.config.errors import out_of_range
+
+                raise out_of_range(field, value, "N", f"one number or {self.geometry.count} (one per rotor)")
+        if np.any(self.thrust_min >= self.thrust_max):
+            from ibvs_qp.config.errors import out_of_range
+
+            raise out_of_range("thrust_min_n", self.thrust_min_n, "N", "must lie below thrust_max_n on every rotor")
+
+    @property
+    def thrust_min(self) -> np.ndarray:
+        """Lower thrust limits [N], (n,)."""
+        return np.broadcast_to(np.asarray(self.thrust_min_n, float), (self.geometry.count,)).copy()
+
+    @property
+    def thrust_max(self) -> np.ndarray:
+        """Upper thrust limits [N], (n,)."""
+        return np.broadcast_to(np.asarray(self.thrust_max_n, float), (self.geometry.count,)).copy()
+
+    @property
+    def mass_matrix(self) -> np.ndarray:
+        """Rigid-body mass matrix diag(m I, J), (6, 6)."""
+        return np.diag(np.concatenate((np.full(3, self.mass_kg), np.asarray(self.inertia_kg_m2))))

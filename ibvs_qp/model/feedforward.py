@@ -1,0 +1,93 @@
+"""Contact feed-forward: moments, and friction only along the commanded travel (design section 4.3).
+
+Cancelling the whole measured wrench is wrong: a stuck tip returns our own push (an integrator), and friction across
+the travel is damping that a delayed cancellation turns negative.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import casadi as ca
+
+from ibvs_qp.config import ContactSettings, ControllerConfig
+from ibvs_qp.model.inputs import Body, Touch
+from ibvs_qp.model.signals import Signals
+
+#: Commanded speed above which the tip is meant to slide [m/s].
+SLIDING_COMMAND = 0.01
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContactFeedforward:
+    """What the contact does to the vehicle, as far as it may be compensated.
+
+    Attributes:
+        force: To be expected once the rotors answer [N], (3,).
+        moment: To be expected then [N m], (3,).
+        felt_moment: The moment as it was measured [N m], (3,): the one that acts now.
+    """
+
+    force: ca.SX
+    moment: ca.SX
+    felt_moment: ca.SX
+
+
+def contact_feedforward(
+    signals: Signals,
+    config: ControllerConfig,
+    body: Body,
+    touch: Touch,
+    travel: ca.SX,
+    friction: ca.SX,
+) -> ContactFeedforward:
+    r"""Wrench that the contact will put on the vehicle.
+
+    Force: :math:`F = -g \mu f t` along the commanded travel t while sliding, slew-limited; nothing across the travel.
+    Moment: the measured one, its share falling with the noise of the force sensor, low-passed; it comes late by the
+    motors' lag and that filter, T, so what the force above is about to add comes from the model,
+
+    .. math:: M = \hat M + \frac{T s}{T s + 1}\, p \times F,
+
+    with p the tip. Without it a tip that sticks turns the vehicle by a degree before the moment is felt, and leaps
+    when it breaks away.
+
+    Args:
+        signals: Keeps the filters' states.
+        config: Contact gains, filter and slew; the vehicle's tip and motor lags.
+        body: Measured wrench and time step.
+        touch: Push and whether the tip touches.
+        travel: Commanded velocity in the wall plane, in B [m/s], (3,).
+        friction: Estimated Coulomb coefficient.
+    """
+    settings = config.contact
+    force = signals.remember("feedforward_friction", _friction(signals, settings, body, touch, travel, friction))
+    share = 1.0 - ca.exp(-2.0 * ca.pi * settings.force_filter_hz * body.dt)
+    gain = touch.touching * settings.moment_gain / (1.0 + (touch.across_noise / settings.moment_noise_n) ** 2)
+    old = signals.state("feedforward_moment", 3)
+    felt = signals.remember("feedforward_moment", old + share * (gain * body.wrench[3:] - old))
+    model = settings.moment_gain * ca.cross(ca.DM(config.vehicle.tip_position_m), force)
+    known = signals.state("feedforward_known", 3)
+    late = 1.0 - ca.exp(-body.dt / moment_lag(config))
+    known = signals.remember("feedforward_known", known + late * (model - known))
+    return ContactFeedforward(force=force, moment=felt + model - known, felt_moment=felt)
+
+
+def moment_lag(config: ControllerConfig) -> float:
+    """How late a measured moment is when the rotors answer to it: their mean lag and the filter's [s]."""
+    vehicle = config.vehicle
+    motors = 0.5 * (vehicle.motor_lag_up_s + vehicle.motor_lag_down_s)
+    return motors + 1.0 / (2.0 * math.pi * config.contact.force_filter_hz)
+
+
+def _friction(
+    signals: Signals, settings: ContactSettings, body: Body, touch: Touch, travel: ca.SX, friction: ca.SX
+) -> ca.SX:
+    speed = ca.norm_2(travel)
+    sliding = ca.logic_and(speed > SLIDING_COMMAND, touch.touching)
+    size = -settings.friction_gain * friction * ca.fmax(touch.push, 0.0) / ca.fmax(speed, SLIDING_COMMAND)
+    last = signals.state("feedforward_friction", 3)
+    step = ca.if_else(sliding, size * travel, 0.0) - last
+    allowed = ca.if_else(touch.touching, settings.friction_slew_n_s * body.dt, ca.inf)
+    return last + step * ca.fmin(1.0, allowed / ca.fmax(ca.norm_2(step), 1e-12))

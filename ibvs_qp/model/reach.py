@@ -1,0 +1,54 @@
+"""How far the vehicle can push, and how little: a ray in wrench space from where the rotors' limits let it in."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+
+from allocation.wrench_facets import ON_PLANE, RELATIVE_ZERO, WrenchFacets
+from ibvs_qp.config.vehicle import VehicleParams
+from ibvs_qp.model.signals import Signals
+
+#: Share of the reach that a push may ask for: the rest is left for holding place, whatever the vehicle can do.
+REACH_SHARE = 0.97
+#: Reach given out when nothing bounds it [N].
+UNBOUNDED = 1e6
+#: Least push given out when no push, not even zero, can be held [N].
+NO_PUSH = 2.0 * UNBOUNDED
+#: Commanded speed below which the tip counts as standing still [m/s]: what a drifting odometer wishes is no slide.
+STANDING_SPEED = 1e-2
+
+
+def push_reach(
+    signals: Signals,
+    vehicle: VehicleParams,
+    normal: ca.SX,
+    travel: ca.SX,
+    friction: ca.SX,
+    static_wrench: ca.SX,
+) -> ca.SX:
+    r"""Largest push that the limits in force can hold, level, against friction along the commanded travel [N].
+
+    The ray :math:`w(f) = f [d; p \times d] - h`, :math:`d = n + \mu t`, meets the facets of the attainable wrench set
+    (`allocation.wrench_facets`): the reach is the first f at which it leaves, the output `least_push` the last at which
+    it enters, which is above zero where only pushing relieves a weak rotor, and `NO_PUSH` where no push, not even
+    zero, can be held. Exact for any number of rotors.
+    """
+    facets, count = WrenchFacets(vehicle.geometry), vehicle.geometry.count
+    low, high = signals.input("thrust_low", count), signals.input("thrust_high", count)
+    speed = ca.norm_2(travel)
+    signals.output("reach_friction", ca.if_else(speed > STANDING_SPEED, friction, 0.0))
+    direction = normal + ca.if_else(speed > STANDING_SPEED, friction / ca.fmax(speed, STANDING_SPEED), 0.0) * travel
+    lever = ca.cross(ca.DM(vehicle.tip_position_m), direction)
+    slope = ca.DM(facets.normals) @ ca.vertcat(direction, lever)
+    rising, falling = ca.DM(np.maximum(facets.shares, 0.0)), ca.DM(np.minimum(facets.shares, 0.0))
+    held = -(ca.DM(facets.normals) @ static_wrench)
+    upper, lower = rising @ high + falling @ low - held, rising @ low + falling @ high - held
+    along, safe = ca.fabs(slope) > RELATIVE_ZERO, ca.if_else(ca.fabs(slope) > RELATIVE_ZERO, slope, 1.0)
+    room = ca.if_else(along, ca.if_else(slope > 0.0, upper, lower) / safe, UNBOUNDED)
+    outside = ca.logic_or(lower > ON_PLANE, upper < -ON_PLANE)  # of a pair of planes that the push does not move in
+    entry = ca.if_else(along, ca.if_else(slope > 0.0, lower, upper) / safe, ca.if_else(outside, NO_PUSH, 0.0))
+    leave, enter = ca.mmin(room), ca.fmax(ca.mmax(entry), 0.0)
+    reach = ca.fmax(leave, 0.0)
+    signals.output("least_push", ca.if_else(leave >= enter - ON_PLANE, ca.fmin(enter, reach), NO_PUSH))
+    return signals.output("reach", reach)

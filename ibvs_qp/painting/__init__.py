@@ -1,0 +1,1 @@
+"""The painting strategy: what to do next, as references for the controller."""

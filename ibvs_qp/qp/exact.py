@@ -1,0 +1,56 @@
+"""DAQP through CasADi: the exact fallback in flight and the oracle of the tests."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+
+from ibvs_qp.qp.problem import QpTemplate
+
+#: Violation of a row above which a reported success is not believed: DAQP skips rows that are all zero.
+FEASIBLE = 1e-4
+
+
+class ExactSolver:
+    """Dual active-set solver of the same program; exact to rounding, called only when OSQP is not accepted."""
+
+    def __init__(self, template: QpTemplate) -> None:
+        self._template = template
+        p_sparsity = _casadi_sparsity(template.p_pattern + template.p_pattern.T)
+        self._p_sparsity, self._a_sparsity = p_sparsity, _casadi_sparsity(template.a_pattern)
+        self._solver = ca.conic("exact", "daqp", {"h": p_sparsity, "a": self._a_sparsity}, {"error_on_fail": False})
+
+    def solve(
+        self, p: np.ndarray, q: np.ndarray, a: np.ndarray, lower: np.ndarray, upper: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray] | None:
+        """Solution and multipliers (y > 0 at an upper bound), or None without success."""
+        upper_triangle = self._template.p_pattern.copy()
+        upper_triangle.data = p.copy()
+        full = upper_triangle.toarray()
+        full = full + np.triu(full, 1).T
+        matrix = self._template.a_pattern.copy()
+        matrix.data = a.copy()
+        arguments = {
+            "h": ca.project(ca.DM(full), self._p_sparsity),
+            "g": q,
+            "a": ca.project(ca.DM(matrix.toarray()), self._a_sparsity),
+            "lba": lower,
+            "uba": upper,
+        }
+        try:
+            result = self._solver(**arguments)
+        except RuntimeError:
+            return None
+        x = np.array(result["x"]).ravel()
+        y = np.array(result["lam_a"]).ravel()
+        if not self._solver.stats().get("success", False) or not np.isfinite(x.sum() + y.sum()):
+            return None
+        rows = matrix @ x
+        return (x, y) if float(np.maximum(lower - rows, rows - upper).max()) <= FEASIBLE else None
+
+
+def _casadi_sparsity(pattern: object) -> ca.Sparsity:
+    matrix = pattern.tocsc()  # type: ignore[attr-defined]
+    matrix.sort_indices()
+    rows, columns = matrix.shape
+    return ca.Sparsity(rows, columns, matrix.indptr.tolist(), matrix.indices.tolist())

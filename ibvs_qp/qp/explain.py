@@ -1,0 +1,181 @@
+"""One recorded tick again: the program from its parameters, solved exactly, with every task and limit in words."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from ibvs_qp.command import ActiveLimit, TaskReport
+from ibvs_qp.qp.accept import ACTIVE_PRICE
+from ibvs_qp.qp.evaluator import Evaluator, ProgramData
+from ibvs_qp.qp.exact import ExactSolver
+from ibvs_qp.qp.infeasible import conflicting_rows
+from ibvs_qp.qp.problem import AffineRows, QpTemplate
+
+
+@dataclass(frozen=True, kw_only=True)
+class LimitValue:
+    """One limit row of a tick: its bounds, and what the thrusts make of it, in the row's unit."""
+
+    name: str
+    unit: str
+    lower: float
+    upper: float
+    value: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Explanation:
+    """What a tick wanted, got and paid.
+
+    Attributes:
+        thrusts: Of the exact solution [N], (n,).
+        tasks: Every task row with a weight; `cost` are their shares of the cost, in the same order.
+        total_cost: What the tick costs in all, without unit: weights and prices are per squared unit of their rows.
+        slack_cost: Share of the cost that is paid for slack of limits; with those of the tasks it makes one.
+        active_limits: Limits that bind, dearest first; `limit_cost` are the shares of the cost that their slack takes,
+            zero for a hard one, and `limit_rows` their bounds and values, in the same order.
+        unallocated_wrench: Wrench of the same tick without limits minus the wrench [N, N m], (6,).
+    """
+
+    thrusts: np.ndarray
+    tasks: tuple[TaskReport, ...]
+    cost: tuple[float, ...]
+    total_cost: float
+    slack_cost: float
+    active_limits: tuple[ActiveLimit, ...]
+    limit_cost: tuple[float, ...]
+    limit_rows: tuple[LimitValue, ...]
+    unallocated_wrench: np.ndarray
+
+
+def task_reports(
+    template: QpTemplate, data: ProgramData, stacked: np.ndarray, thrusts: np.ndarray
+) -> tuple[TaskReport, ...]:
+    """Asked, achieved and residual of every task row that has a weight."""
+    achieved, asked, weights = data.report(stacked, thrusts)
+    return tuple(
+        TaskReport(
+            name=row.name,
+            unit=row.unit,
+            weight=float(weights[i]),
+            asked=float(asked[i]),
+            achieved=float(achieved[i]),
+            residual=float(achieved[i] - asked[i]),
+        )
+        for i, row in enumerate(template.task_rows)
+        if weights[i] > 0.0
+    )
+
+
+def active_limits(template: QpTemplate, x: np.ndarray, y: np.ndarray) -> tuple[ActiveLimit, ...]:
+    """Limits with a price: name, side, |dJ*/d bound| and slack taken."""
+    active = []
+    for i in np.flatnonzero(np.abs(y) > ACTIVE_PRICE):
+        slot = template.row_slack[i]
+        active.append(
+            ActiveLimit(
+                name=template.row_names[i],
+                side="upper" if y[i] > 0 else "lower",
+                price=abs(float(y[i])),
+                slack=abs(float(x[slot])) if slot >= 0 else 0.0,
+                unit=template.row_units[i],
+            )
+        )
+    return tuple(active)
+
+
+class TickReplay:
+    """Explains recorded ticks of one program.
+
+    Args:
+        template: The program.
+        solver: Back end of qpsolvers that solves it; None for the exact solver.
+
+    Attributes:
+        conflict: Names of the rows that contradict each other, where the last tick explained has no solution.
+    """
+
+    def __init__(self, template: QpTemplate, solver: str | None = None) -> None:
+        self._template, self._solver = template, solver
+        self._data = Evaluator(template)
+        self._exact = ExactSolver(template)
+        self.conflict: tuple[str, ...] = ()
+
+    def explain(self, stacked: np.ndarray) -> Explanation | None:
+        """Solve and explain the program of these parameters; None if it has no solution, see `conflict`.
+
+        Args:
+            stacked: Parameters as `ProgramData.stacked` held them in flight, (parameters,).
+        """
+        data, template = self._data, self._template
+        data.stacked[:] = stacked
+        data.evaluate()
+        solution, self.conflict = self._solve(), ()
+        if solution is None:
+            self.conflict = conflicting_rows(template, data)
+            return None
+        x, y = solution
+        thrusts = x[: template.model.rotors]
+        tasks = task_reports(template, data, stacked, thrusts)
+        cost = np.array([0.5 * task.weight * task.residual**2 for task in tasks])
+        slack = x[len(thrusts) :]
+        slack_cost = 0.5 * float(slack @ (data.hessian().diagonal()[len(thrusts) :] * slack))
+        total = float(cost.sum()) + slack_cost or 1.0
+        limits = sorted(active_limits(template, x, y), key=lambda limit: -limit.price)
+        prices = {row.name: row.price or 0.0 for row in template.limit_rows}
+        paid = (0.5 * prices[limit.name] * limit.slack**2 / total for limit in limits)
+        effectiveness = template.model.effectiveness
+        return Explanation(
+            thrusts=thrusts,
+            tasks=tasks,
+            cost=tuple((cost / total).tolist()),
+            total_cost=total,
+            slack_cost=slack_cost / total,
+            active_limits=tuple(limits),
+            limit_cost=tuple(paid),
+            limit_rows=self.limit_values([limit.name for limit in limits], thrusts),
+            unallocated_wrench=effectiveness @ (data.free - thrusts) if limits else np.zeros(6),
+        )
+
+    def limit_values(self, names: Sequence[str], thrusts: np.ndarray) -> tuple[LimitValue, ...]:
+        """Bounds and values of some limit rows at the tick explained last.
+
+        Args:
+            names: Of the rows.
+            thrusts: What was commanded, or would be [N], (n,).
+        """
+        template, data = self._template, self._data
+        rows = [template.row_names.index(name) for name in names]
+        values, lower, upper = (side.full().ravel() for side in self._bounds(data.stacked, thrusts))
+        return tuple(
+            LimitValue(
+                name=template.row_names[row],
+                unit=template.row_units[row],
+                lower=float(lower[row]),
+                upper=float(upper[row]),
+                value=float(values[row]),
+            )
+            for row in rows
+        )
+
+    @functools.cached_property
+    def _bounds(self) -> ca.Function:
+        """Value, lower and upper bound of every limit row as it was written, with what does not depend on thrusts."""
+        model, rows = self._template.model, self._template.limit_rows
+        values = AffineRows(model, ca.vertcat(*(row.expression for row in rows))).at(model.thrust)
+        bounds = (ca.vertcat(*(row.lower for row in rows)), ca.vertcat(*(row.upper for row in rows)))
+        stacked = ca.vertcat(*model.parameters.values())
+        return ca.Function("limit_values", [stacked, model.thrust], [values, *bounds])
+
+    def _solve(self) -> tuple[np.ndarray, np.ndarray] | None:
+        data = self._data
+        if self._solver is None:
+            return self._exact.solve(data.p, data.q, data.a, data.lower, data.upper)
+        from ibvs_qp.qp.offline import solve_offline
+
+        return solve_offline(self._template, data, self._solver)

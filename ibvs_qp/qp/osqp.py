@@ -1,0 +1,124 @@
+"""OSQP with one persistent workspace: values updated in place, warm started, every trap guarded."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+
+import numpy as np
+import osqp
+
+from ibvs_qp.config import SolverSettings
+from ibvs_qp.qp.problem import QpTemplate
+
+#: Status values of OSQP 1.x whose iterate means something.
+SOLVED, SOLVED_INACCURATE, MAX_ITERATIONS = 1, 2, 7
+
+
+@dataclass(slots=True)
+class RawSolution:
+    """What a solver returned, before anybody believes it."""
+
+    x: np.ndarray
+    y: np.ndarray
+    status: int
+    iterations: int
+    seconds: float
+
+
+class OsqpSolver:
+    """The per-tick solver.
+
+    Guards (each reproduced on OSQP 1.1): non-finite data never reaches the workspace, because one NaN poisons the
+    warm start for good; l <= u is enforced, because an update with l > u is dropped silently; strided arrays are copied
+    and wrong lengths refused, because neither is checked; what is handed to set-up are private copies, because updates
+    write into the matrices; a reset sets up anew, because the adapted rho survives. That bounds never come within 1e-4
+    of each other, where a row would change its type and the matrix be factorised anew, is the limits' part.
+    """
+
+    def __init__(self, template: QpTemplate, settings: SolverSettings) -> None:
+        self._template, self._settings = template, settings
+        variables, rows = len(template.variable_names), len(template.row_names)
+        self._lengths = (template.p_pattern.nnz, variables, template.a_pattern.nnz, rows, rows)
+        self._reset_pending = True
+
+    def reset(self) -> None:
+        """Forget the iterate and the adapted step size: the next solve is as after construction."""
+        self._reset_pending = True
+
+    @property
+    def ready(self) -> bool:
+        """Whether the workspace is set up: the first tick does that, so that no later one pays for it."""
+        return not self._reset_pending
+
+    def _setup(self, p: np.ndarray, q: np.ndarray, a: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> None:
+        settings, p_matrix, a_matrix = (
+            self._settings,
+            self._template.p_pattern.copy(),
+            self._template.a_pattern.copy(),
+        )
+        p_matrix.data, a_matrix.data = p.copy(), a.copy()
+        self._solver = osqp.OSQP()
+        self._solver.setup(
+            p_matrix,
+            q.copy(),
+            a_matrix,
+            lower.copy(),
+            upper.copy(),
+            verbose=False,
+            eps_abs=settings.tolerance,
+            eps_rel=settings.relative_tolerance,
+            max_iter=settings.max_iterations,
+            check_termination=settings.check_interval,
+            adaptive_rho_interval=settings.adaptive_rho_interval,
+            scaling=settings.scaling,
+            warm_starting=True,
+        )
+        self._reset_pending = False
+        # The wrapper copies twenty fields of information per solve; its own solver object is half as much work.
+        # It is private, so without it (another release) the public way serves.
+        self._inner = getattr(self._solver, "_solver", None) if settings.direct else None
+
+    def solve(
+        self, p: np.ndarray, q: np.ndarray, a: np.ndarray, lower: np.ndarray, upper: np.ndarray
+    ) -> RawSolution | None:
+        """Solve with new values; None when the data is not finite or a bound pair is crossed.
+
+        Raises:
+            ValueError: When an array has another length than the program.
+        """
+        start = time.perf_counter()
+        p, q, a, lower, upper = arrays = [np.ascontiguousarray(array, float) for array in (p, q, a, lower, upper)]
+        if tuple(map(len, arrays)) != self._lengths:
+            raise ValueError(f"P, q, A, l, u need {self._lengths} entries, not {tuple(map(len, arrays))}")
+        with np.errstate(invalid="ignore"):  # infinities of both signs: refused below, no warning
+            finite = math.isfinite(q.sum() + p.sum() + a.sum() + lower.sum() + upper.sum())
+        if not finite or (lower > upper).any():
+            return None
+        if self._reset_pending:
+            self._setup(p, q, a, lower, upper)
+        elif self._inner is not None:
+            if self._inner.update_data_vec(q, lower, upper) or self._inner.update_data_mat(p, None, a, None):
+                return None
+        else:
+            self._solver.update(q=q, l=lower, u=upper, Px=p, Ax=a)
+        if self._inner is None:
+            result = self._solver.solve(raise_error=False)
+            x, y, info = result.x, result.y, result.info
+        else:
+            self._inner.solve()
+            solution, info = self._inner.solution, self._inner.info
+            x, y = np.array(solution.x), np.array(solution.y)
+        return RawSolution(
+            x=x,
+            y=y,
+            status=int(info.status_val),
+            iterations=int(info.iter),
+            seconds=time.perf_counter() - start,
+        )
+
+    def warm_start(self, x: np.ndarray, y: np.ndarray) -> None:
+        """Replace the iterate, after a solve that was not accepted."""
+        if not self._reset_pending:
+            self._solver.warm_start(x=np.ascontiguousarray(x, float), y=np.ascontiguousarray(y, float))

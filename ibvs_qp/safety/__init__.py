@@ -1,0 +1,1 @@
+"""What remains when something fails: hover on inertial data, flight after a lost rotor."""

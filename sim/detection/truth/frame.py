@@ -1,0 +1,154 @@
+"""A truth frame: supersampled picture, noisy depth, and the exact lines and plane behind them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ibvs_qp.config.vehicle import VehicleParams
+from ibvs_qp.measurement import RgbdFrame
+from sim.detection.truth.picture import paint_picture
+from sim.detection.truth.range import measure_depth
+from sim.detection.truth.scenes import TruthScene
+from sim.sensors.cameras.arm import vehicle_layer
+from sim.world.scene import CameraScene, Scene
+
+#: Shortest visible piece of an edge that counts as being in the picture, and margin from the picture's border [px].
+_SHORTEST_PX, _MARGIN_PX = 40.0, 8.0
+#: Steps along an edge at which its visibility is asked.
+_STEPS = 200
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrueLine:
+    """An edge as it truly is.
+
+    Attributes:
+        rho: Distance from the image centre, normalised.
+        theta: Angle of the normal [rad].
+        pixels: Ends of its visible piece [px], (2, 2); empty where too little is seen.
+    """
+
+    rho: float
+    theta: float
+    pixels: np.ndarray
+
+
+@dataclass(frozen=True, kw_only=True)
+class TruthFrame:
+    """A rendered frame and the truth.
+
+    Attributes:
+        frame: The pictures.
+        edges: Edges of the board by name (top, bottom, left, right), those that are in view.
+        strokes: Upper and lower edge of every stroke in view, as "0 top", "0 bottom", ...
+        plane: (a, b, c) of 1/Z = a x + b y + c of the board.
+        seed: (u, v) of a place on the board [px].
+        mask: Where the vehicle hides the view, bool (H, W).
+    """
+
+    frame: RgbdFrame
+    edges: dict[str, TrueLine]
+    strokes: dict[str, TrueLine]
+    plane: np.ndarray
+    seed: tuple[float, float]
+    mask: np.ndarray
+
+
+def render_frame(scene: TruthScene, stamp_ns: int = 0, noise_seed: int | None = None) -> TruthFrame:
+    """Render a scene.
+
+    Args:
+        scene: What stands before the camera.
+        stamp_ns: Time of capture.
+        noise_seed: Seed of the noise where it shall differ from the scene's: frames of one sequence.
+    """
+    rng = np.random.default_rng(np.random.SeedSequence([scene.seed if noise_seed is None else noise_seed, 0x6E6F]))
+    width, height, _ = scene.camera
+    rgb = paint_picture(scene, rng)
+    inverse = _inverse_depths(scene)
+    mask, layer = np.zeros((height, width), bool), None
+    if scene.arm:
+        flight = Scene(camera=CameraScene(width=width, height=height))
+        layer = vehicle_layer(flight, VehicleParams(), scene.intrinsics, rng)
+        mask = layer.mask > 0
+        rgb[mask] = layer.picture[mask, :3]
+    depth = measure_depth(scene, inverse, rng)
+    if layer is not None:
+        depth[mask] = 1.0 / layer.inverse_depth[mask]
+        depth[(layer.holes > 0) & ~mask] = 0.0
+    half_w, half_h = 0.5 * scene.size_m[0], 0.5 * scene.size_m[1]
+    corners = {
+        "top": ((-half_w, -half_h), (half_w, -half_h)),
+        "bottom": ((-half_w, half_h), (half_w, half_h)),
+        "left": ((-half_w, -half_h), (-half_w, half_h)),
+        "right": ((half_w, -half_h), (half_w, half_h)),
+    }
+    edges = {name: true_line(scene, *ends, mask) for name, ends in corners.items()}
+    strokes: dict[str, TrueLine] = {}
+    for number, ((left, top, right, bottom), _) in enumerate(scene.strokes):
+        strokes[f"{number} top"] = true_line(scene, (left, top), (right, top), mask)
+        strokes[f"{number} bottom"] = true_line(scene, (left, bottom), (right, bottom), mask)
+    return TruthFrame(
+        frame=RgbdFrame(rgb=rgb, depth=depth, intrinsics=scene.intrinsics, stamp_ns=stamp_ns),
+        edges={name: line for name, line in edges.items() if len(line.pixels)},
+        strokes={name: line for name, line in strokes.items() if len(line.pixels)},
+        plane=plane_of(scene, 0.0),
+        seed=_seed(scene, mask),
+        mask=mask,
+    )
+
+
+def plane_of(scene: TruthScene, behind_m: float) -> np.ndarray:
+    """(a, b, c) of the plane `behind_m` behind the board."""
+    normal = scene.rotation[:, 2]
+    return normal / float(normal @ (scene.translation + behind_m * normal))
+
+
+def project(scene: TruthScene, points: np.ndarray) -> np.ndarray:
+    """Pixels of board points (right, down) [m], (..., 2)."""
+    at = points @ scene.rotation[:, :2].T + scene.translation
+    fx, fy, cx, cy = scene.intrinsics
+    return at[..., :2] / at[..., 2:] * (fx, fy) + (cx, cy)
+
+
+def true_line(scene: TruthScene, first: tuple[float, float], second: tuple[float, float], mask: np.ndarray) -> TrueLine:
+    """The line through two points of the board, exact in (rho, theta)."""
+    rays = np.array([first, second]) @ scene.rotation[:, :2].T + scene.translation
+    a, b, c = np.cross(rays[0], rays[1])
+    length = math.hypot(a, b)
+    share = np.linspace(0.0, 1.0, _STEPS)[:, None]
+    pixels = project(scene, np.array(first) + share * (np.array(second) - np.array(first)))
+    height, width = mask.shape
+    margin = _MARGIN_PX * width / 640.0
+    inside = (pixels[:, 0] > margin) & (pixels[:, 0] < width - 1 - margin)
+    inside &= (pixels[:, 1] > margin) & (pixels[:, 1] < height - 1 - margin)
+    at = np.clip(np.rint(pixels), 0, (width - 1, height - 1)).astype(np.intp)
+    seen = pixels[inside & ~mask[at[:, 1], at[:, 0]]]
+    long = len(seen) > 1 and np.hypot(*(seen[-1] - seen[0])) > _SHORTEST_PX * width / 640.0
+    return TrueLine(rho=-c / length, theta=math.atan2(b, a), pixels=seen[[0, -1]] if long else np.zeros((0, 2)))
+
+
+def _inverse_depths(scene: TruthScene) -> tuple[np.ndarray, np.ndarray]:
+    """1/Z of board and wall at every pixel, (H, W) each."""
+    width, height, _ = scene.camera
+    fx, fy, cx, cy = scene.intrinsics
+    x, y = np.meshgrid((np.arange(width) - cx) / fx, (np.arange(height) - cy) / fy)
+    board, wall = ((p[0] * x + p[1] * y + p[2]) for p in (plane_of(scene, 0.0), plane_of(scene, scene.gap_m)))
+    return board, wall
+
+
+def _seed(scene: TruthScene, mask: np.ndarray) -> tuple[float, float]:
+    """A place on the board that is in view: the one nearest to the picture's middle of a few."""
+    half = 0.5 * np.array(scene.size_m)
+    share = np.linspace(-0.7, 0.7, 15)
+    pixels = project(scene, np.stack(np.meshgrid(share * half[0], share * half[1]), axis=-1).reshape(-1, 2))
+    height, width = mask.shape
+    inside = (pixels > 20.0).all(axis=1) & (pixels < (width - 20, height - 20)).all(axis=1)
+    pixels = pixels[inside]
+    free = ~mask[np.rint(pixels[:, 1]).astype(int), np.rint(pixels[:, 0]).astype(int)]
+    pixels = pixels[free]
+    best = np.argmin(np.linalg.norm(pixels - 0.5 * np.array([width, height]), axis=1))
+    return float(pixels[best, 0]), float(pixels[best, 1])

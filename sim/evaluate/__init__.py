@@ -1,0 +1,1 @@
+"""Figures of merit of a flight, from its trace and the truth."""

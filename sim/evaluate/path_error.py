@@ -1,0 +1,82 @@
+"""Error of the true tip's path against the nominal polyline, tick by tick."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sim.evaluate.paint_plan import PaintPlan, distance_to_polyline, plan_as_painted
+from sim.flight.trace import Trace
+from sim.world.board import BoardGeometry
+
+#: Normal force above which brush and board count as touching [N].
+CONTACT_N = 0.05
+#: Distance from a vertex of the polyline within which a sample belongs to the corner [m].
+CORNER_M = 0.10
+#: Phases in which paint is laid, and the kind of segment that each one follows.
+PAINTING_PHASES = {"paint": "row", "climb": "climb"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class PathError:
+    """Tick by tick; NaN or False outside painting.
+
+    Attributes:
+        plan: The polyline that the errors refer to.
+        tip: Tip in board coordinates (along, up), (N, 2) [m].
+        painting: A row or a climb is being painted, (N,) bool.
+        corner: Painting within 0.10 m of a vertex, (N,) bool.
+        distance: Unsigned distance to the polyline, (N,) [m].
+        height: Tip above (+) or below (-) its row, while a row is painted, (N,) [m].
+    """
+
+    plan: PaintPlan
+    tip: np.ndarray
+    painting: np.ndarray
+    corner: np.ndarray
+    distance: np.ndarray
+    height: np.ndarray
+
+
+def in_phase(trace: Trace, *names: str) -> np.ndarray:
+    """Ticks of a trace in one of the named phases, (N,) bool."""
+    wanted = [index for index, name in enumerate(trace.phases) if name in names]
+    return np.isin(trace.phase, wanted)
+
+
+def painted_rows(trace: Trace, tip: np.ndarray) -> dict[int, np.ndarray]:
+    """Tip path of every row while painting in contact, board coordinates, (S, 2) each [m]."""
+    touching = in_phase(trace, "paint") & (trace.push_true > CONTACT_N)
+    rows = {int(row) for row in np.unique(trace.row[touching]) if row > 0}
+    return {row: tip[touching & (trace.row == row)] for row in sorted(rows)}
+
+
+def path_error(trace: Trace) -> PathError:
+    """Compare the true tip with the nominal polyline of its scene.
+
+    The error is the distance to the nearest point of the segment being painted or of its neighbours, never a lag
+    in time: a corner may be cut, but a row cannot be mistaken for another.
+    """
+    tip = BoardGeometry(trace.scene).board_coordinates(trace.tip[:, 1:])
+    plan = plan_as_painted(trace.scene, painted_rows(trace, tip))
+    painting = np.zeros(len(tip), bool)
+    distance, height = np.full(len(tip), np.nan), np.full(len(tip), np.nan)
+    for segment in plan.segments:
+        phases = [phase for phase, kind in PAINTING_PHASES.items() if kind == segment.kind]
+        ticks = np.flatnonzero(in_phase(trace, *phases) & (trace.row == segment.row))
+        near = plan.near(segment.kind, segment.row)
+        distance[ticks] = np.min([distance_to_polyline(tip[ticks], other.points) for other in near], axis=0)
+        painting[ticks] = True
+        if segment.kind == "row":
+            order = np.argsort(segment.points[:, 0])
+            height[ticks] = tip[ticks, 1] - np.interp(tip[ticks, 0], *segment.points[order].T)
+    to_vertex = np.min(np.linalg.norm(tip[:, None] - plan.vertices[None], axis=2), axis=1)
+    return PathError(
+        plan=plan,
+        tip=tip,
+        painting=painting,
+        corner=painting & (to_vertex <= CORNER_M),
+        distance=distance,
+        height=height,
+    )

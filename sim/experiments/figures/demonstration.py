@@ -1,0 +1,131 @@
+"""The six panels of the complete demonstration: board, path of the tip, push, visual target, velocity, attitude."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.gridspec import GridSpec
+from matplotlib.patches import Patch, Rectangle
+
+from sim.experiments.figures.snapshots import painted_board
+from sim.figures.board import draw_canvas
+from sim.figures.style import PHASE_TINTS, REFERENCE, law_colour, new_figure, shade_phases, thin
+from sim.flight.trace import Trace
+from sim.world.board import BoardGeometry
+
+#: Colours of quantities beside the law's own: true values under estimates, and the second and third axis.
+TRUE, SECOND, THIRD = "#f0a94b", "#333333", "#9a4f8f"
+#: The attitude is shown at least to this angle [deg]; greater ones widen the axis.
+LEAST_ANGLE_DEG = 1.0
+#: Where a metre off the wall is drawn, along and up [m]: the height has a scale of its own and shows its millimetres.
+OBLIQUE = (1.2, -0.3)
+#: A longer board gets fewer ticks [m].
+LONG_M = 1.5
+#: Free space above the curves for their legend, as a share of their range.
+HEADROOM = 0.2
+_WORDS = {"press": "touch and press", "paint": "painting a row", "climb": "climb to the next row"}
+
+
+def draw_demonstration(trace: Trace) -> Figure:
+    """Six panels of one paint job; tints say what is done.
+
+    Args:
+        trace: A paint job flown with rendered pictures.
+    """
+    figure = new_figure(7.6)
+    grid = GridSpec(4, 2, figure, height_ratios=(1.12, 1.3, 1.0, 0.85))
+    _board(figure.add_subplot(grid[0, :]), trace)
+    _trajectory(figure.add_subplot(grid[1, 0]), trace)
+    force, visual = figure.add_subplot(grid[1, 1]), figure.add_subplot(grid[2, 0])
+    speed, attitude = figure.add_subplot(grid[2, 1]), figure.add_subplot(grid[3, :])
+    for axes in (force, visual, speed, attitude):
+        shade_phases(axes, trace, labels=False)
+    _force(force, trace)
+    _visual(visual, trace)
+    _speed(speed, trace)
+    _attitude(attitude, trace)
+    for axes in (visual, speed, attitude):
+        low, high = axes.get_ylim()
+        below = HEADROOM if axes is visual else 0.0  # for its note
+        axes.set_ylim(low - below * (high - low), high + HEADROOM * (high - low))
+        axes.legend(loc="upper center", ncols=3, borderaxespad=0.2, handlelength=1.4, columnspacing=1.0, fontsize=7)
+    attitude.set_xlabel("time [s]")
+    flown = [name for name in PHASE_TINTS if name in trace.phases]
+    tints = [Patch(facecolor=PHASE_TINTS[name], edgecolor="#bbbbbb", linewidth=0.4) for name in flown]
+    figure.legend(tints, [_WORDS[name] for name in flown], loc="outside lower center", ncols=len(flown))
+    return figure
+
+
+def _board(axes: Axes, trace: Trace) -> None:
+    scene = trace.scene
+    axes.imshow(painted_board(trace), extent=(0.0, scene.board.width_m, 0.0, scene.board.height_m))
+    draw_canvas(axes, trace)
+    paint = scene.paint
+    top = paint.edge_margin_m + (paint.rows - 1) * paint.pitch_m + paint.brush_width_m
+    axes.set(ylim=(0.0, min(scene.board.height_m, top)), title="(a) the board afterwards; white: path of the tip")
+    axes.set_ylabel("up [m]")
+    axes.set_xlabel("along the board [m]", labelpad=1.0)
+
+
+def _trajectory(axes: Axes, trace: Trace) -> None:
+    """Oblique view: the wall lies in the page, what is off the wall goes down to the right."""
+    along, up = BoardGeometry(trace.scene).board_coordinates(trace.tip[:, 1:]).T
+    off = np.maximum(-trace.tip[:, 0], 0.0)
+    width = trace.scene.board.width_m
+    top = float(np.max(up)) + trace.scene.paint.edge_margin_m
+    deepest = float(np.max(off))
+    axes.add_patch(Rectangle((0.0, 0.0), width, top, facecolor="#f0efe9", edgecolor="#aaaaaa", linewidth=0.6))
+    corner = np.array([0.0, deepest])
+    axes.plot(width + OBLIQUE[0] * corner, OBLIQUE[1] * corner, color="#888888", linewidth=0.6)
+    for mark in np.arange(0.1, deepest, 0.1):
+        axes.plot(width + OBLIQUE[0] * mark, OBLIQUE[1] * mark, "|", color="#888888", markersize=4)
+        axes.annotate(f"{mark:g}", (width + OBLIQUE[0] * mark, OBLIQUE[1] * mark), (5, 2), color="#555555",
+                      textcoords="offset points", fontsize=7)  # fmt: skip
+    axes.text(width + OBLIQUE[0] * deepest, OBLIQUE[1] * deepest, "off the wall [m]   ", ha="right", va="center",
+              fontsize=7, color="#333333")  # fmt: skip
+    x, y = along + OBLIQUE[0] * off, up + OBLIQUE[1] * off
+    axes.plot(x[::10], y[::10], color=law_colour(trace.law), linewidth=1.1)
+    for tick, marker, words, drop in ((0, "o", "start", -9), (-1, "s", "end", 0)):
+        axes.plot(x[tick], y[tick], marker, color=SECOND, markersize=4)
+        axes.annotate(words, (x[tick], y[tick]), (5, drop), textcoords="offset points", fontsize=7, va="center")
+    axes.set(title="(b) path of the tip, not to scale", xlabel="along the board [m]", ylabel="up [m]")
+    axes.set_xticks(np.arange(0.0, width + 1e-9, 0.2 if width < LONG_M else 0.5))
+    axes.set_xlim(0.0, 1.06 * (width + OBLIQUE[0] * deepest))
+    axes.set_yticks(np.arange(0.0, top, 0.1))
+    axes.grid(False)
+
+
+def _force(axes: Axes, trace: Trace) -> None:
+    t, true, wanted = thin(trace.t, trace.push_true, trace.push_reference)
+    axes.plot(t, true, color=law_colour(trace.law), linewidth=0.8, label="true push")
+    axes.plot(t, wanted, **REFERENCE, label="reference")
+    axes.set(title="(c) push", ylabel="[N]")
+    axes.legend(loc="lower center", ncols=1)
+
+
+def _visual(axes: Axes, trace: Trace) -> None:
+    edges = ((0, law_colour(trace.law), "level edge"), (1, THIRD, "upright edge"))
+    for axis, colour, words in edges:
+        t, error = thin(trace.t, trace.line_error_px[:, axis])
+        axes.plot(t, error, color=colour, linewidth=0.9, label=words)
+    axes.set(title="(d) visual target: edge error at the tip", ylabel="[px]")
+    note = "steps at a climb: the reference moves to the next row"
+    axes.text(0.99, 0.03, note, transform=axes.transAxes, ha="right", va="bottom", fontsize=7, color="#555555")
+
+
+def _speed(axes: Axes, trace: Trace) -> None:
+    for axis, words, shade in ((1, "right", law_colour(trace.law)), (2, "down", SECOND)):
+        t, estimate, truth = thin(trace.t, trace.velocity_estimate[:, axis], trace.velocity[:, axis])
+        axes.plot(t, estimate, color=shade, linewidth=1.8, alpha=0.55, label=f"{words}, estimated")
+        axes.plot(t, truth, color=TRUE, linewidth=0.6, label="true" if axis == 2 else None)
+    axes.set(title="(e) velocity along the wall", ylabel="[m/s]")
+
+
+def _attitude(axes: Axes, trace: Trace) -> None:
+    angles = np.degrees(np.unwrap(trace.euler, axis=0))
+    for axis, words, colour in ((0, "roll", SECOND), (1, "pitch", law_colour(trace.law)), (2, "yaw", THIRD)):
+        t, angle = thin(trace.t, angles[:, axis])
+        axes.plot(t, angle, color=colour, linewidth=0.9, label=words)
+    widest = max(LEAST_ANGLE_DEG, 1.05 * float(np.nanmax(np.abs(angles))))
+    axes.set(title="(f) attitude", ylabel="[deg]", ylim=(-widest, widest))

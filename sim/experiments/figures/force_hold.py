@@ -1,0 +1,68 @@
+"""Force holding with and without impedance, and the map of where direct force control oscillates."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from sim.evaluate.measures.window import CONTACT_N, PHYSICS_RATE_HZ
+from sim.experiments.figures.common import kept_trace, select
+from sim.experiments.figures.force_map import VARIANT_WORDS as _VARIANTS
+from sim.experiments.figures.force_map import draw_map, map_verdict
+from sim.figures.style import REFERENCE, law_colour, law_name, new_figure
+
+if TYPE_CHECKING:
+    from sim.experiments.base import Results
+
+#: Shown before and after the first touch [s].
+BEFORE_S, AFTER_S = 3.0, 9.0
+
+
+def draw_force_hold(results: Results) -> dict[str, tuple[str, Figure]]:
+    """Force and visual target with and without impedance, per wall; the map of both."""
+    figures = {}
+    holds = select(results.table, kind="hold")
+    for stiffness in holds["param.stiffness_n_m"].unique(maintain_order=True) if holds.height else ():
+        name = f"force-hold-{stiffness / 1000:g}kNm"
+        caption = f"Push and visual target with and without impedance, wall of {stiffness / 1000:g} kN/m"
+        figures[name] = (caption, _hold(results, stiffness))
+    table = select(results.table, kind="map")
+    if table.height:
+        figures["force-hold-map"] = (map_verdict(table, holds), draw_map(table))
+    return figures
+
+
+def _hold(results: Results, stiffness: float) -> Figure:
+    figure = new_figure(4.3)
+    grid = figure.subplots(2, 2, sharex=True, sharey="row")
+    for (variant, words), (above, below) in zip(_VARIANTS.items(), grid.T, strict=True):
+        reference = None
+        for law in ("paper", "qp"):
+            rows = select(results.table, law=law, variant=variant, kind="hold", stiffness_n_m=stiffness)
+            trace = kept_trace(results, rows)
+            if trace is None or not np.any(trace.contact_1khz > CONTACT_N):
+                continue
+            touch = float(np.argmax(trace.contact_1khz > CONTACT_N)) / PHYSICS_RATE_HZ
+            t = trace.t - trace.t[0] - touch
+            near = (t > -BEFORE_S) & (t < AFTER_S)
+            above.plot(t[near], trace.push_true[near], color=law_colour(law), label=law_name(law), linewidth=0.9)
+            below.plot(t[near], trace.line_error_px[near, 0], color=law_colour(law), linewidth=0.9)
+            reference = t[near], trace.push_reference[near]
+        if reference is not None:
+            above.plot(*reference, **REFERENCE, label="reference")
+            below.axhline(0.0, **REFERENCE)
+        else:
+            for axes in (above, below):
+                axes.text(0.5, 0.5, "not flown", transform=axes.transAxes, ha="center", color="#777777")
+        above.set_title(words)
+        below.set_xlabel("time since touch [s]")
+    grid[0][0].set_ylabel("true push [N]")
+    grid[1][0].set_ylabel("edge error at the tip [px]")
+    grid[0][0].set_xlim(-BEFORE_S, AFTER_S)
+    for axes in grid[0]:
+        if axes.get_legend_handles_labels()[0]:
+            axes.legend(loc="lower right")
+            break
+    return figure

@@ -1,0 +1,166 @@
+"""The map of force gain, wall and sensor delay: where the push oscillates, with and without impedance, and why."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import polars as pl
+from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from ibvs_qp.config.contact_margin import contact_mode_damping
+from sim.experiments.figures.common import select
+from sim.experiments.variants import VARIANTS
+from sim.figures.style import law_name, new_figure
+from sim.flight.closed_loop import default_preset
+from sim.sweep.parts import PARAM
+from sim.world.scene import ForceTorqueScene, WallScene
+
+VARIANT_WORDS = {"standard": "impedance", "direct": "direct force control"}
+#: A hold whose steady part has less contact than this has lost the wall; one that deviates more [N] oscillates.
+KEPT_SHARE, OSCILLATES_N = 0.995, 0.5
+#: Cells with a smaller deviation are dark on the colour scale [N].
+DARK_BELOW_N = 0.3
+#: Where the scale of deviations ends [N].
+SCALE_N = (0.005, 1.0)
+_LIMIT = "#ff5a36"
+_CELL = [PARAM + name for name in ("force_gain", "stiffness_n_m", "delay_s")]
+
+
+@functools.lru_cache(maxsize=4096)
+def predicted_damping(law: str, variant: str, gain: float, stiffness: float, delay_s: float) -> float:
+    """Least damping ratio of the contact that the linear loop predicts; below zero the push oscillates ever more.
+
+    Args:
+        law: Whose shipped gains.
+        variant: Key of `VARIANTS`.
+        gain: Factor on K_fp and K_fi.
+        stiffness: Of the wall [N/m].
+        delay_s: Latency of the force/torque sensor [s]; half a sample period comes on top.
+    """
+    from sim.experiments.force_hold import with_force_gain
+
+    config = VARIANTS[variant].apply(with_force_gain(default_preset(law), gain)).controller
+    age = delay_s + 0.5 / ForceTorqueScene().rate_hz
+    return contact_mode_damping(config, stiffness, WallScene().damping_n_s_m, age).least_damping_ratio
+
+
+def judged_cells(table: pl.DataFrame) -> pl.DataFrame:
+    """One row per law, variant and cell: deviation [N], lost, bad (oscillates or lost), predicted to be unstable.
+
+    Args:
+        table: Flights of the map; a flight that did not end as planned counts as lost.
+    """
+    lost = (pl.col("contact_share").fill_null(0.0).median() < KEPT_SHARE) | ~pl.col("completed").all()
+    cells = table.group_by("law", "variant", *_CELL, maintain_order=True).agg(
+        pl.col("force_std_n").median().alias("deviation"), lost.alias("lost"), pl.len().alias("flights")
+    )
+    damping = [predicted_damping(*key) for key in cells.select("law", "variant", *_CELL).iter_rows()]
+    oscillates = (pl.col("deviation") > OSCILLATES_N).fill_null(False)
+    return cells.with_columns((oscillates | pl.col("lost")).alias("bad"), pl.Series("unstable", damping) < 0.0)
+
+
+def map_verdict(table: pl.DataFrame, holds: pl.DataFrame) -> str:
+    """What the map says about direct force control against impedance, counted, as the figure's caption.
+
+    Args:
+        table: Flights of the map.
+        holds: Flights of the holds at shipped gains.
+    """
+    cells = judged_cells(table)
+    counts, parts = {}, []
+    for variant, words in VARIANT_WORDS.items():
+        own = cells.filter(pl.col("variant") == variant)
+        counts[variant] = bad = int(own["bad"].sum())
+        lost = int(own["lost"].sum())
+        right = int((own["bad"] == own["unstable"]).sum())
+        gains = own.filter(pl.col("bad"))[PARAM + "force_gain"]
+        least = f", none below {gains.min():g} times the force gain" if gains.len() else ""
+        parts.append(
+            f"{words} oscillates above {OSCILLATES_N:g} N or loses the wall in {bad} of {own.height} cells (lost in "
+            f"{lost}{least}), as the predicted margin says in {right} of them"
+        )
+    calm = _calmer(holds)
+    head, tail = "Refuted that direct force control oscillates where impedance holds", ""
+    if counts["direct"] > counts["standard"]:
+        shipped = cells.filter((pl.col("variant") == "direct") & (pl.col(PARAM + "force_gain") == 1.0))
+        head = "Shown that direct force control oscillates in a region where impedance holds"
+        if shipped.height and not shipped["bad"].any():
+            head += ", refuted for the shipped gains"
+    if "efuted" in head:
+        tail = (
+            "; ramp, scheduled approach and the loop's lag margin keep direct control calm there (docs/loop_margin.md)"
+        )
+    return f"{head}: {'; '.join(parts)}{calm}{tail}"
+
+
+def _calmer(holds: pl.DataFrame) -> str:
+    """Push deviation of both at shipped gains, per wall."""
+    found = []
+    for wall in sorted(holds[PARAM + "stiffness_n_m"].unique()) if holds.height else ():
+        rows = [select(holds, variant=variant, stiffness_n_m=wall)["force_std_n"].median() for variant in VARIANT_WORDS]
+        if None not in rows:
+            found.append(f"{rows[1]:.3f} against {rows[0]:.3f} N at {wall / 1000:g} kN/m")
+    return f"; at shipped gains direct control deviates by {', '.join(found)}" if found else ""
+
+
+def draw_map(table: pl.DataFrame) -> Figure:
+    """Steady deviation of the push per law, variant and delay; the predicted limit over it.
+
+    Args:
+        table: Flights of the map.
+    """
+    cells = judged_cells(table)
+    laws = [law for law in ("qp", "paper") if select(table, law=law).height]
+    delays, walls, gains = (sorted(table[name].unique()) for name in (_CELL[2], _CELL[1], _CELL[0]))
+    rows = [(law, variant) for law in laws for variant in VARIANT_WORDS]
+    figure = new_figure(0.9 + 1.45 * len(rows))
+    grid = figure.subplots(len(rows), len(delays), squeeze=False, sharex=True, sharey=True)
+    image = None
+    for (law, variant), line in zip(rows, grid, strict=True):
+        own = select(cells, law=law, variant=variant)
+        for axes, delay in zip(line, delays, strict=True):
+            image = _panel(axes, select(own, delay_s=delay), gains, walls)
+            margin = np.array([[predicted_damping(law, variant, g, w, delay) for w in walls] for g in gains])
+            _limit(axes, margin)
+            axes.set_xticks(range(len(walls)), [f"{wall / 1000:g}" for wall in walls])
+            axes.set_yticks(range(len(gains)), [f"{gain:g}" for gain in gains])
+            axes.grid(False)
+        line[0].set_ylabel(f"{law_name(law)}\n{VARIANT_WORDS[variant]}\nforce gain [×]", fontsize=7.5)
+    for axes, below, delay in zip(grid[0], grid[-1], delays, strict=True):
+        axes.set_title(f"F/T delay {delay * 1e3:.0f} ms")
+        below.set_xlabel("wall [kN/m], in steps")
+    assert image is not None
+    figure.colorbar(image, ax=grid, label="steady deviation of the push [N]", shrink=0.7, extend="both")
+    seeds = sorted(set(cells["flights"]))
+    many = f"{seeds[0]}" if len(seeds) == 1 else f"{seeds[0]} to {seeds[-1]}"
+    keys = [
+        Line2D([], [], color=_LIMIT, linewidth=1.4, label="predicted limit"),
+        Line2D([], [], color=_LIMIT, marker=".", linestyle="none", label="predicted unstable"),
+        Line2D([], [], linestyle="none", label=f"flights per cell: {many}"),
+    ]
+    figure.legend(handles=keys, loc="outside lower center", ncols=3)
+    return figure
+
+
+def _panel(axes: Axes, cells: pl.DataFrame, gains: list[float], walls: list[float]):
+    values = np.full((len(gains), len(walls)), np.nan)
+    for cell in cells.iter_rows(named=True):
+        i, j = gains.index(cell[PARAM + "force_gain"]), walls.index(cell[PARAM + "stiffness_n_m"])
+        if cell["deviation"] is not None:
+            values[i, j] = cell["deviation"]
+        if cell["lost"]:
+            ink = "white" if values[i, j] <= DARK_BELOW_N else "black"
+            axes.text(j, i + 0.2, "lost", ha="center", va="center", color=ink, fontsize=7)
+    return axes.imshow(values, origin="lower", aspect="auto", norm=LogNorm(*SCALE_N), cmap="viridis")
+
+
+def _limit(axes: Axes, margin: np.ndarray) -> None:
+    """Line of no damping, and a dot in each cell on the unstable side of it."""
+    i, j = np.nonzero(margin < 0.0)
+    axes.plot(j, i - 0.25, ".", color=_LIMIT, markersize=4)
+    if min(margin.shape) > 1 and margin.min() < 0.0 < margin.max():
+        axes.contour(margin, levels=[0.0], colors=_LIMIT, linewidths=1.4)

@@ -1,0 +1,68 @@
+"""The attainable forces in level flight, with the forces that were flown inside it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import polars as pl
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from allocation import WrenchSet, control_effectiveness, level_polygon
+from ibvs_qp.config.vehicle import VehicleParams
+from ibvs_qp.frames import GRAVITY
+from sim.evaluate.measures.window import phase_window
+from sim.experiments.figures.common import kept_trace
+from sim.figures.style import law_name, new_figure
+from sim.sweep.parts import PARAM
+
+if TYPE_CHECKING:
+    from sim.experiments.base import Results
+
+#: One dot in so many ticks.
+EVERY = 12
+#: Lightest colour used, as a share of the map's.
+LIGHTEST = 0.9
+
+
+def draw_wrench_set(results: Results, rows: pl.DataFrame) -> Figure:
+    """Level, moment-free forces that the rotors can make, and those flown while pressing, per law.
+
+    Dots are the horizontal part of B u with the thrusts after the motor lag; the polygon is the cut of the attainable
+    wrench set at full lift and no moment. A flown wrench with a moment may lie outside it.
+
+    Args:
+        results: For its logs.
+        rows: Flights to show; the first kept log of each push and law is drawn.
+    """
+    vehicle = VehicleParams()
+    rotors = WrenchSet(vehicle.geometry, vehicle.thrust_min, vehicle.thrust_max)
+    corners = level_polygon(rotors, vehicle.mass_kg * GRAVITY)
+    laws = [law for law in ("qp", "paper") if rows.filter(pl.col("law") == law).height]
+    figure = new_figure(3.7)
+    colours = colormaps["viridis"]
+    for axes, law in zip(figure.subplots(1, len(laws), sharex=True, sharey=True, squeeze=False)[0], laws, strict=True):
+        axes.fill(corners[:, 1], corners[:, 0], facecolor="#e9eef1", edgecolor="#888888", linewidth=0.8)
+        flown = rows.filter(pl.col("law") == law)
+        pushes = sorted(flown[PARAM + "push_n"].unique(), reverse=True)  # smaller ones lie on the way to greater ones
+        for push, shade in zip(pushes, np.linspace(LIGHTEST, 0.0, max(len(pushes), 1)), strict=True):
+            trace = kept_trace(results, flown.filter(pl.col(PARAM + "push_n") == push))
+            if trace is not None:
+                begin, end = phase_window(trace, "press")
+                wrench = trace.thrusts_actual[(trace.t >= begin) & (trace.t <= end)][::EVERY]
+                wrench = wrench @ control_effectiveness(vehicle.geometry).T
+                axes.plot(wrench[:, 1], wrench[:, 0], ".", color=colours(float(shade)), markersize=2.5,
+                          label=f"{push:g} N asked")  # fmt: skip
+        _dress(axes, law_name(law))
+    figure.axes[0].set_ylabel("force to the front [N]")
+    return figure
+
+
+def _dress(axes: Axes, title: str) -> None:
+    axes.set(title=title, xlabel="force to the right [N]", xlim=(-32, 32), ylim=(-18, 37))
+    axes.set_aspect("equal")
+    if axes.lines:
+        handles, labels = axes.get_legend_handles_labels()
+        axes.legend(handles[::-1], labels[::-1], loc="upper left", fontsize=7, markerscale=3, handletextpad=0.2)

@@ -1,5 +1,0 @@
-"""Figures of a sweep, drawn from its table alone: boxes, heat maps, success-rate maps, what depends on what."""
-
-from sim.figures.sweep.page import write_report
-
-__all__ = ["write_report"]

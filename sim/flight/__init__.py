@@ -1,0 +1,1 @@
+"""One closed-loop flight: world, sensors and pilot, its faults, log and trace."""

@@ -1,0 +1,57 @@
+"""What a flight does at the wall: paint, or press and slide; a job makes the strategy that the pilot follows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from ibvs_qp.config.settings import setting, validate
+from ibvs_qp.painting.job import PaintingConfig
+from ibvs_qp.painting.painter import Painter
+from ibvs_qp.painting.presser import Presser
+
+
+class Job(Protocol):
+    """Makes a strategy; frozen, so that it can be sent to another process and told apart by its repr."""
+
+    def strategy(self, config: PaintingConfig) -> Painter:
+        """The strategy of one flight."""
+        ...
+
+    def expected_s(self, config: PaintingConfig) -> float:
+        """Flying time at the wall to expect [s]."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class PaintJob:
+    """Paint the rows of the scene."""
+
+    def strategy(self, config: PaintingConfig) -> Painter:
+        """The painter."""
+        return Painter(config)
+
+    def expected_s(self, config: PaintingConfig) -> float:
+        """Strokes and climbs at their speed."""
+        return (config.rows * config.stroke_m + (config.rows - 1) * config.pitch_m) / config.speed_m_s
+
+
+@dataclass(frozen=True, kw_only=True)
+class PressJob:
+    """Press for `hold_s`, then slide for `slide_s`; after a lost rotor descend for `descend_s` [s]."""
+
+    hold_s: float = setting(8.0, "time at one place after the touch", unit="s", low=0.0, high=600.0)
+    slide_s: float = setting(0.0, "time of sliding after that", unit="s", low=0.0, high=600.0)
+    descend_s: float = setting(5.0, "time of the descent after a lost rotor", unit="s", low=0.0, high=600.0)
+
+    def __post_init__(self) -> None:
+        """Validate."""
+        validate(self)
+
+    def strategy(self, config: PaintingConfig) -> Painter:
+        """The presser."""
+        return Presser(config, self.hold_s, self.slide_s, self.descend_s)
+
+    def expected_s(self, config: PaintingConfig) -> float:
+        """Hold and slide."""
+        return self.hold_s + self.slide_s

@@ -1,0 +1,51 @@
+"""Progress of the flights on standard error: one bar per law with phase and real-time factor."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterator
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
+
+from sim.world.scene import Scene
+
+#: Flying time that does not grow with the job: approach, alignment, press, retreat [s]; only sizes the bar.
+OVERHEAD_S = 25.0
+LAW_TITLES = {"qp": "QP law", "paper": "analytic law"}
+
+
+def expected_duration(scene: Scene) -> float:
+    """Rough length of a flight [s]; only sizes the bar."""
+    paint = scene.paint
+    return (paint.rows * paint.stroke_m + (paint.rows - 1) * paint.pitch_m) / paint.speed_m_s + OVERHEAD_S
+
+
+@contextlib.contextmanager
+def flight_progress(
+    console: Console, scene: Scene, laws: tuple[str, ...]
+) -> Iterator[Callable[[str, float, str, float], None]]:
+    """Show a bar per law while the context is open.
+
+    Yields:
+        A function of law, simulated time [s], phase and real-time factor.
+    """
+    columns = (
+        TextColumn("{task.description:<12}"),
+        BarColumn(),
+        TaskProgressColumn(),
+        TextColumn("{task.fields[note]}"),
+    )
+    total = expected_duration(scene)
+    with Progress(*columns, console=console, disable=console.quiet) as bars:
+        tasks = {law: bars.add_task(LAW_TITLES[law], total=total, note="starting") for law in laws}
+
+        def update(law: str, t: float, phase: str, rtf: float) -> None:
+            done = phase == "done"
+            bars.update(
+                tasks[law],
+                completed=total if done else min(t, 0.99 * total),
+                note=f"{t:5.1f} s  {phase:<9} {rtf:4.1f} x real time",
+            )
+
+        yield update

@@ -1,0 +1,209 @@
+"""Log of a flight: truth beside what the pilot believed, gathered tick by tick into a trace."""
+
+from __future__ import annotations
+
+import math
+import struct
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ibvs_qp.command import Command, Outcome
+from ibvs_qp.controller import HybridController
+from ibvs_qp.measurement import SensorFrame
+from ibvs_qp.model.inputs import TOUCH
+from ibvs_qp.model.lines import LINE_TERMS
+from ibvs_qp.pilot import Pilot
+from ibvs_qp.vision.overlay import draw_overlay
+from sim.flight.columns import Columns
+from sim.flight.flight_truth import euler_angles, in_body, rotations
+from sim.flight.trace import Event, Trace
+from sim.flight.video import pack_picture
+from sim.sensors.cameras.protocol import camera_intrinsics
+from sim.world.plant import STEPS_PER_TICK
+from sim.world.readout import PLACES
+
+if TYPE_CHECKING:
+    from sim.flight.closed_loop import FlightOptions, World
+    from sim.world.scene import Scene
+
+#: Names of the strategy's phases, in the order of a flight.
+PHASES = ("start", "approach", "align", "press", "paint", "climb", "retreat", "done")
+#: The propeller clearance is taken once in so many ticks; it moves slowly (a strike is checked every tick).
+CLEARANCE_TICKS = 5
+#: Pictures kept for the video per second.
+VIDEO_RATE = 10.0
+#: Columns that are one number a tick, in the order in which `Recorder.tick` fills them in; "error" for every line slot
+#: follows the last of them.
+NUMBERS = "t phase row outcome step_us iterations reach_margin push_reference".split()
+#: Columns of integers.
+INTEGERS = ("phase", "row", "outcome", "iterations")
+_ERROR = LINE_TERMS.index("error")
+_PHASE_INDEX = {phase: index for index, phase in enumerate(PHASES)}
+_PRESSED = [_PHASE_INDEX[phase] for phase in ("paint", "climb")]
+_OUTCOME_INDEX = {outcome: float(index) for index, outcome in enumerate(Outcome)}
+
+
+class Recorder:
+    """Rows of the log: whole arrays copied as they stand at the end of a tick; `trace` picks them apart."""
+
+    def __init__(self, scene: Scene, options: FlightOptions, world: World, pilot: Pilot) -> None:
+        self._scene, self._options, self._world, self._pilot = scene, options, world, pilot
+        rotors, tick = pilot.config.controller.vehicle.geometry.count, pilot.terms.tick
+        self._slots = range(pilot.config.controller.line_slots)
+        given = next(iter(tick.inputs.values())).base
+        assert given is not None, "the inputs are views of one array"
+        self._given = given
+        wide = {"truth": len(world.plant.truth), "given": len(self._given)}
+        wide |= {"thrusts": rotors, "thrusts_actual": rotors, "unallocated": 6}
+        self._log = Columns({name: 1 for name in NUMBERS} | {"error": len(self._slots)} | wide)
+        self._pack = struct.Struct(f"{len(NUMBERS) - 1}d").pack
+        # What stays where it is; a view of the memory is copied faster than an array.
+        errors = [tick.outputs[f"line_{slot}_terms"][_ERROR : _ERROR + 1].data for slot in self._slots]
+        self._standing = tick.outputs["push_reference"].data, *errors, world.plant.truth.data, given.data
+        self._actual = world.plant.motor_thrusts.data
+        self._focal = camera_intrinsics(scene.camera)[0]
+        self._limits: dict[str, int] = {}
+        self._active: dict[int, list[tuple[int, float]]] = {}
+        # Single precision: 1e-7 of a parameter is nothing that a person reads, and half the log.
+        self._program = pilot.controller.engine.data.stacked if isinstance(pilot.controller, HybridController) else None
+        self._programs = Columns({"program": 0 if self._program is None else len(self._program)}, np.float32)
+        self._vision: list[float] = []
+        self._events: list[Event] = []
+        self._pictures: list[tuple[float, np.ndarray, str]] = []
+        self._next_picture = 0.0
+        self._rejected: set[str] = set()
+        self._logged = self._ticks = 0
+
+    def tick(self, frame: SensorFrame, command: Command) -> None:
+        """Log one tick, after the plant has moved."""
+        pilot, time_s = self._pilot, frame.stamp_ns * 1e-9
+        painter = pilot.painter
+        phase = painter.phase
+        numbers = self._pack(
+            time_s,
+            _PHASE_INDEX[phase],
+            painter.row,
+            _OUTCOME_INDEX[command.outcome],
+            pilot.controller_time_s * 1e6,
+            command.iterations,
+            command.reach_margin,
+        )
+        row = numbers, *self._standing, command.thrusts, self._actual, command.unallocated_wrench
+        self._log.add(b"".join(row))  # type: ignore[arg-type]
+        if self._program is not None:
+            self._programs.add(self._program.tobytes())
+        active = command.active_limits
+        if active:
+            places = self._limits
+            paid = [(places.setdefault(limit.name, len(places)), limit.price) for limit in active]
+            self._active[self._ticks] = paid
+        if command.rejected or len(painter.log) != self._logged:
+            self._note_events(time_s, command)
+        if frame.image is not None and pilot.percept is not None:
+            self._vision.append(sum(pilot.percept.time_ms.values()))
+            if self._options.video and time_s >= self._next_picture:
+                self._next_picture = time_s + 1.0 / VIDEO_RATE
+                picture = pack_picture(draw_overlay(frame.image.rgb, pilot.percept))
+                self._pictures.append((time_s, picture, phase))
+        self._ticks += 1
+
+    def _note_events(self, time_s: float, command: Command) -> None:
+        log = self._pilot.painter.log
+        for when, kind, text in log[self._logged :]:
+            self._events.append(Event(t=when, kind=kind, text=text))
+        self._logged = len(log)
+        for name in command.rejected:
+            kind = name.split(":")[0]  # its numbers may change from tick to tick
+            if kind not in self._rejected:
+                self._rejected.add(kind)
+                self._events.append(Event(t=time_s, kind="rejected", text=name))
+
+    def note(self, time_s: float, kind: str, text: str) -> None:
+        """Log an event that the pilot does not know of."""
+        self._events.append(Event(t=time_s, kind=kind, text=text))
+
+    def trace(self) -> Trace:
+        """Everything logged so far as a trace."""
+        # Ctrl-C may strike in the middle of a tick: its half-written row is dropped. The count comes last.
+        ticks = self._ticks
+        arrays = {name: column[:ticks] for name, column in self._log.arrays().items()}
+        arrays |= {name: arrays[name].astype(np.int32) for name in INTEGERS}
+        pressed = np.isin(arrays["phase"], _PRESSED)
+        arrays["row"][~pressed] = 0
+        given = arrays.pop("given")
+        arrays["line_error_px"] = self._line_errors(given, arrays.pop("error").reshape(ticks, len(self._slots)))
+        arrays |= self._believed(given, arrays["push_reference"]) | self._truth(arrays.pop("truth"))
+        active, price = np.zeros((ticks, len(self._limits)), dtype=bool), np.zeros((ticks, len(self._limits)))
+        for tick, paid in self._active.items():
+            columns, prices = zip(*paid, strict=True)
+            active[tick : tick + 1, columns], price[tick : tick + 1, columns] = True, prices
+        arrays["active"], arrays["limit_price"] = active, price
+        if len(self._programs):
+            arrays |= {name: column[:ticks] for name, column in self._programs.arrays().items()}
+        vehicle = self._pilot.config.controller.vehicle
+        arrays["thrust_min"], arrays["thrust_max"] = vehicle.thrust_min, vehicle.thrust_max
+        arrays["true_thrust_min"], arrays["true_thrust_max"] = self._world.plant.thrust_limits
+        arrays["vision_ms"] = np.array(self._vision, float)
+        arrays["painting_1khz"] = np.repeat(pressed, STEPS_PER_TICK)
+        canvas = self._world.canvas
+        trace = Trace(
+            scene=self._world.scene,
+            seed=self._options.seed,
+            law=self._options.law,
+            arrays=arrays,
+            phases=PHASES,
+            outcomes=tuple(str(outcome) for outcome in Outcome),
+            limits=tuple(self._limits),
+            events=self._events,
+            canvas_px_per_m=canvas.pixels_per_m,
+            coverage_mask=canvas.coverage,
+            pictures=self._pictures,
+            preset=self._pilot.config.to_toml(),
+        )
+        trace.draw_later(lambda: canvas.rgb)
+        return trace
+
+    def _input(self, given: np.ndarray, name: str) -> np.ndarray:
+        """One input of the compiled tick in all rows, (N, size)."""
+        view = self._pilot.terms.tick.inputs[name]
+        start = (view.ctypes.data - self._given.ctypes.data) // view.itemsize
+        return given[:, start : start + len(view)]
+
+    def _line_errors(self, given: np.ndarray, errors: np.ndarray) -> np.ndarray:
+        """Error of the horizontal and the vertical guide at the tip [px], (N, 2), NaN where absent."""
+        found = np.full((len(given), 2), math.nan)
+        for slot, vertical in zip(self._slots, self._input(given, "vertical").T, strict=True):
+            present = np.flatnonzero(self._input(given, f"line_{slot}")[:, 0] > 0.0)
+            found[present, (vertical[present] > 0.0).astype(int)] = self._focal * errors[present, slot]
+        return found
+
+    def _believed(self, given: np.ndarray, push_reference: np.ndarray) -> dict[str, np.ndarray]:
+        """What the controller was told or has estimated."""
+        touch = dict(zip(TOUCH, self._input(given, "touch").T, strict=True))
+        return {
+            "push_measured": touch["push"].copy(),
+            "push_reference": push_reference * touch["ramp"],
+            "standoff_estimate": np.where(touch["known"] > 0.0, touch["distance"], math.inf),
+            "contact_weight": self._input(given, "contact_weight")[:, 0].copy(),
+            "velocity_estimate": np.where(self._input(given, "moving") > 0.0, self._input(given, "velocity"), math.nan),
+        }
+
+    def _truth(self, truth: np.ndarray) -> dict[str, np.ndarray]:
+        """Truth from the plant's readings at every tick, (N, numbers), see `sim.world.readout`."""
+        plant, (position, attitude) = self._world.plant, (truth[:, PLACES[name]] for name in ("position", "quaternion"))
+        rotation = rotations(attitude)
+        rare = slice(None, None, CLEARANCE_TICKS)
+        clearance = plant.clearance.distances(position[rare], rotation[rare])
+        pushes = truth[:, PLACES["pushes"]]
+        return {
+            "position": position.copy(),
+            "attitude": attitude.copy(),
+            "velocity": in_body(rotation, truth[:, PLACES["velocity"]]),
+            "euler": euler_angles(rotation),
+            "tip": position + rotation @ np.array(plant.vehicle.tip_position_m),
+            "push_true": pushes[:, -1].copy(),
+            "contact_1khz": pushes.reshape(-1),
+            "friction_true": truth[:, PLACES["friction"]].copy(),
+            "propeller_clearance": np.repeat(clearance, CLEARANCE_TICKS)[: len(truth)],
+        }

@@ -1,0 +1,130 @@
+"""What one flight leaves behind: arrays at the control rate, contact force at the physics rate, pictures, events."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sim.world.scene import Scene
+
+#: Meaning of every array of a trace (N control ticks, M physics steps, F pictures).
+FIELDS = {
+    "t": "(N,) time since start [s]",
+    "position": "(N,3) true centre of mass, world NED, x into the wall [m]",
+    "velocity": "(N,3) true velocity of the centre of mass in B [m/s]",
+    "attitude": "(N,4) true quaternion (w,x,y,z) of B in I",
+    "euler": "(N,3) true roll, pitch, yaw [rad]; yaw 0 faces the wall",
+    "tip": "(N,3) true tip position, world NED; x = 0 is the board's face [m]",
+    "thrusts": "(N,n) commanded thrusts [N]",
+    "thrusts_actual": "(N,n) thrusts after motor lag [N]",
+    "thrust_min": "(n,) lower limits [N]",
+    "thrust_max": "(n,) upper limits [N]",
+    "true_thrust_min": "(n,) lower limits of the real rotors at the end of the flight [N]",
+    "true_thrust_max": "(n,) upper limits of the real rotors at the end of the flight [N]",
+    "push_true": "(N,) true normal contact force, > 0 pressing [N]",
+    "push_measured": "(N,) tared, filtered push that the controller used [N]",
+    "push_reference": "(N,) commanded push [N], 0 while free",
+    "friction_true": "(N,2) true tangential force on the tip, world (y, z) [N]",
+    "velocity_estimate": "(N,3) estimated velocity in B [m/s]; NaN where not known",
+    "standoff_estimate": "(N,) estimated tip distance, positive in free air [m]",
+    "line_error_px": "(N,2) error of the horizontal and the vertical guide at the tip [px]; NaN where absent",
+    "contact_weight": "(N,) lambda [-]",
+    "phase": "(N,) index into phases",
+    "row": "(N,) row being painted, 1 based; 0 outside rows, climbs carry the row they lead to",
+    "outcome": "(N,) index into outcomes",
+    "active": "(N,L) bool, limit active, columns named by limits",
+    "limit_price": "(N,L) price |d cost / d bound| of every active limit per unit, 0 where inactive, NaN where unknown",
+    "reach_margin": "(N,) further push that the rotors can hold at the present contact [N]; NaN where not known",
+    "unallocated": "(N,6) unallocated wrench [N, N m]",
+    "step_us": "(N,) duration of the controller step [us]",
+    "iterations": "(N,) solver iterations",
+    "vision_ms": "(F,) duration of perception of every picture [ms]",
+    "propeller_clearance": "(N,) smallest distance of any propeller disc to wall or board [m]",
+    "program": "(N,P) parameters of the quadratic program (QP law), for `ibvs-qp explain`",
+    "contact_1khz": "(M,) true normal contact force at every physics step [N]",
+    "painting_1khz": "(M,) bool, true while a row or a climb is being painted (phase demands contact)",
+}
+
+
+@dataclass(kw_only=True)
+class Event:
+    """Something that happened: a phase change with its reason, a touch, a loss, a rejected input."""
+
+    t: float
+    kind: str
+    text: str
+
+
+@dataclass(kw_only=True)
+class Trace:
+    """One flight under one law.
+
+    Attributes:
+        scene: The scene flown.
+        seed: Its seed.
+        law: "qp" or "paper".
+        arrays: See `FIELDS`.
+        phases: Names of the phases, e.g. approach, align, press, paint, climb, retreat, done.
+        outcomes: Names of the outcomes.
+        limits: Names of the limits, columns of ``active``.
+        events: Phase changes and other events in order.
+        completed: Rows, climbs and retreat done without time-out or crash.
+        reason: Why the flight ended, in words.
+        wall_time_s: Wall-clock time of the simulation.
+        camera_memory_bytes: Peak resident memory of the process that drew the pictures; 0 if it was the same one.
+        canvas: Painted board as the camera would see it, uint8 RGB, with `canvas_px_per_m`.
+        coverage_mask: Paint coverage of the canvas 0..1, float32, same size.
+        preset: Configuration of the pilot, TOML.
+        pictures: Video material: (t, RGB picture with detections drawn, phase name), thinned out.
+    """
+
+    scene: Scene
+    seed: int
+    law: str
+    arrays: dict[str, np.ndarray] = field(default_factory=dict)
+    phases: tuple[str, ...] = ()
+    outcomes: tuple[str, ...] = ()
+    limits: tuple[str, ...] = ()
+    events: list[Event] = field(default_factory=list)
+    completed: bool = False
+    reason: str = ""
+    wall_time_s: float = 0.0
+    camera_memory_bytes: int = 0
+    canvas: np.ndarray | None = field(default_factory=lambda: None)  # no class attribute: see `draw_later`
+    canvas_px_per_m: float = 0.0
+    canvas_origin_m: tuple[float, float] = (0.0, 0.0)
+    coverage_mask: np.ndarray | None = None
+    pictures: list[tuple[float, np.ndarray, str]] = field(default_factory=list)
+    preset: str = ""
+
+    def draw_later(self, draw: Callable[[], np.ndarray]) -> None:
+        """Have `canvas` drawn when somebody looks at it: a sweep or a search for gains never does."""
+        self.__dict__.pop("canvas", None)
+        self.__dict__["_draw"] = draw
+
+    def __getattr__(self, name: str) -> Any:
+        """Arrays read as attributes: ``trace.push_true``."""
+        own = self.__dict__
+        if name == "canvas" and "_draw" in own:
+            own["canvas"] = own.pop("_draw")()
+            return own["canvas"]
+        arrays = own.get("arrays", {})
+        if name in arrays:
+            return arrays[name]
+        raise AttributeError(name)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Pickled with the canvas drawn."""
+        state = self.__dict__ | {"canvas": self.canvas}
+        state.pop("_draw", None)
+        return state
+
+    def save(self, file: str | Path, prefix: str = "") -> None:
+        """Write every array to a compressed npz file; load with ``numpy.load``."""
+        names = {"phases": self.phases, "outcomes": self.outcomes, "limits": self.limits}
+        words = {prefix + key: np.array(value, dtype=str) for key, value in names.items()}
+        np.savez_compressed(file, **{prefix + key: value for key, value in self.arrays.items()}, **words)  # type: ignore[arg-type]

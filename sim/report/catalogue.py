@@ -1,0 +1,170 @@
+"""Every task and limit of the program as a page: rows, units, weights, prices, bounds, switches and their reasons.
+
+``python -m sim.report.catalogue`` prints docs/tasks_and_limits.md. All of it is read from the classes and the settings
+that they name, so it is true of the program as it is built.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from ibvs_qp.config import ControllerConfig
+from ibvs_qp.controller import default_limits, default_tasks
+from ibvs_qp.limits import Limit
+from ibvs_qp.model.rows import LimitRow, SymbolicModel, TaskRow
+from ibvs_qp.tasks import Task
+
+_HEAD = """\
+# Tasks and limits of the program
+
+Written by `python -m sim.report.catalogue` from the classes and their settings; a test compares. What the rows mean and
+how they work together is told in [control.md](control.md), how to add one in [extending.md](extending.md). Rows are
+those of the shipped vehicle; settings are named as in a preset's TOML, below `[controller]` where it is a pilot's.
+"""
+
+_TASKS = """
+## Tasks
+
+A row costs `weight * (does - asked)^2 / 2`, so a weight is per squared unit of its row and the cost has no unit. Given
+is what a row weighs in full. Lambda and 1 - lambda blend push and stand-off, a line's weight falls with its fit and is
+zero without the line, what a line fixes is taken from the velocity rows, and while friction holds the tip
+`velocity_right` weighs as `height` (`ibvs_qp/model/program.py`).
+
+"""
+
+_LIMITS = """
+## Limits
+
+A soft row costs `price * slack^2 / 2`. `limits.hard_barriers = true` makes all of them hard, `barriers = false` takes
+all soft ones out.
+
+"""
+
+_BOUNDS = "\n## Bounds\n\n"
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Setting:
+    """A field of the configuration with its documentation.
+
+    Attributes:
+        place: Dotted name as in TOML.
+        value: Its value.
+        unit, doc, why: What it is measured in, what it is, and the reason for its default.
+    """
+
+    place: str
+    value: Any
+    unit: str
+    doc: str
+    why: str
+
+    @classmethod
+    def of(cls, config: ControllerConfig, place: str) -> Setting:
+        """The field at a dotted name; AttributeError or KeyError where there is none."""
+        owner: Any = config
+        *path, name = place.split(".")
+        for part in path:
+            owner = getattr(owner, part)
+        meta: Mapping[str, Any] = {field.name: field.metadata for field in dataclasses.fields(owner)}[name]
+        return cls(place=place, value=getattr(owner, name), unit=meta["unit"], doc=meta["doc"], why=meta.get("why", ""))
+
+    @property
+    def amount(self) -> str:
+        """Value with its unit."""
+        value = str(self.value).lower() if isinstance(self.value, bool) else f"{self.value:g}"
+        return f"{value} {_superscript(self.unit.replace('1/', 'per '))}".rstrip()
+
+
+def settings_of_rows(part: Task, rows: Sequence[TaskRow]) -> list[str]:
+    """Name of the weight of every row of a task: one for all, or one a row."""
+    names = part.weighed_by
+    return [names[0]] * len(rows) if len(names) == 1 else list(names)
+
+
+def catalogue(config: ControllerConfig | None = None) -> str:
+    """The page in Markdown.
+
+    Args:
+        config: Whose program; the default one.
+    """
+    config = config or ControllerConfig()
+    model = SymbolicModel(config)
+    tasks, limits = default_tasks(config), default_limits(config)
+    weighed = [line for task in tasks for line in _weighed(task, task.rows(model), config)]
+    parts = [_HEAD, _TASKS, _table(("class", "asks for", "rows", "weight", "why so much"), _joined(weighed))]
+    kept = [_kept(limit, limit.rows(model), config) for limit in limits]
+    parts += [_LIMITS, _table(("class", "keeps", "rows", "price", "why so much", "switch"), _joined(kept))]
+    bounds = [_bound(limit, Setting.of(config, place)) for limit in limits for place in limit.bounded_by]
+    parts += [_BOUNDS, _table(("class", "setting", "value", "what it is", "why so much"), bounds)]
+    return "".join(parts)
+
+
+def _weighed(task: Task, rows: Sequence[TaskRow], config: ControllerConfig) -> list[list[str]]:
+    lines: dict[str, list[TaskRow]] = {}
+    for row, place in zip(rows, settings_of_rows(task, rows), strict=True):
+        lines.setdefault(place, []).append(row)
+    told = []
+    for place, weighed in lines.items():
+        weight = Setting.of(config, place)
+        told.append([_name(task), _summary(task), _rows(weighed), f"`{place}` {weight.amount}", weight.why])
+    return told
+
+
+def _kept(limit: Limit, rows: Sequence[LimitRow], config: ControllerConfig) -> list[str]:
+    price, why = "hard", "thrusts cannot leave them; their intersection is never empty"
+    if limit.priced_by is not None:
+        setting = Setting.of(config, limit.priced_by)
+        price, why = f"`{setting.place}` {setting.amount}", setting.why
+    switch = f"`{limit.switched_by}`" if limit.switched_by else ""
+    return [_name(limit), _summary(limit), _rows(rows), price, why, switch]
+
+
+def _bound(limit: Limit, setting: Setting) -> list[str]:
+    return [_name(limit), f"`{setting.place}`", setting.amount, setting.doc, setting.why]
+
+
+def _joined(lines: Iterable[list[str]]) -> list[list[str]]:
+    """Lines that differ in their rows only (slots of lines), as one."""
+    found: dict[tuple[str, ...], list[str]] = {}
+    for line in lines:
+        key = tuple(line[:2] + line[3:])
+        if key in found:
+            found[key][2] = _merge(found[key][2], line[2])
+        else:
+            found[key] = line
+    return list(found.values())
+
+
+def _merge(first: str, second: str) -> str:
+    names, unit = first.rsplit(" [", 1)
+    return f"{names}, {second.rsplit(' [', 1)[0]} [{unit}"
+
+
+def _rows(rows: Sequence[TaskRow] | Sequence[LimitRow]) -> str:
+    names = ", ".join(f"`{row.name}`" for row in rows)
+    return f"{names} [{_superscript(rows[0].unit)}]"
+
+
+def _name(part: Task | Limit) -> str:
+    return f"`{type(part).__name__}`"
+
+
+def _summary(part: Task | Limit) -> str:
+    return (inspect.getdoc(type(part)) or "").split("\n")[0]
+
+
+def _superscript(unit: str) -> str:
+    return unit.replace("^2", "²").replace("^3", "³").replace("^4", "⁴")
+
+
+def _table(head: Sequence[str], lines: Iterable[Sequence[str]]) -> str:
+    lines = [head, ["---"] * len(head), *([cell.replace("|", "\\|") for cell in line] for line in lines)]
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+
+if __name__ == "__main__":
+    print(catalogue(), end="")

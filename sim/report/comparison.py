@@ -1,0 +1,125 @@
+"""Compare two runs: what each is, what flights they share, and the differences of their figures."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import polars as pl
+
+from ibvs_qp.config.errors import ConfigError
+from sim.sweep.paired import exact_interval
+from sim.sweep.parts import PARAM, frame
+from sim.sweep.statistics import figure_names, median_interval
+
+#: Columns that make two rows the same flight, beside the parameters.
+_SAME = ("experiment", "law", "variant", "seed")
+
+
+def read_run(path: Path) -> pl.DataFrame:
+    """Rows of a run folder: of an experiment's tables, or one per law of a `paint` run.
+
+    Raises:
+        ConfigError: When it is neither.
+    """
+    if (path / "summary.json").is_file():
+        return _paint_rows(path)
+    names = [file.stem for file in sorted(path.glob("*.parquet"))]
+    names = [name for name in names if name != "all"] or names
+    if not names:
+        mend = "give the folder of `ibvs-qp paint` or `ibvs-qp experiment`, or a preset (TOML)"
+        raise ConfigError(f"{path} is no run: it has neither summary.json nor a table; {mend}")
+    return pl.concat([pl.read_parquet(path / f"{name}.parquet") for name in names], how="diagonal_relaxed")
+
+
+def _paint_rows(path: Path) -> pl.DataFrame:
+    try:
+        content = json.loads((path / "summary.json").read_text(encoding="utf-8"))
+        rows = []
+        for law, metrics in content["laws"].items():
+            row: dict[str, Any] = {"experiment": "paint", "law": law, "variant": "run", "seed": content["seed"]}
+            row |= {"completed": metrics["completed"], "reason": metrics["reason"], "version": content["version"]}
+            rows.append(row | {name: value for name, value in metrics.items() if _is_number(value)})
+        return frame(rows)
+    except (OSError, KeyError, TypeError, ValueError) as error:
+        raise ConfigError(f"{path / 'summary.json'} is not the summary of a run: {error}") from None
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Difference:
+    """One figure of one cell in two runs.
+
+    Attributes:
+        figure: Its name.
+        a: Median of run A over the shared flights.
+        b: Median of run B.
+        median: Median of the differences B - A, flight by flight.
+        low: Lower end of its bootstrap interval.
+        high: Upper end.
+        sure_low: Lower end of the exact interval of six pairs or more, see `sim.sweep.paired`; else NaN.
+        sure_high: Upper end.
+    """
+
+    figure: str
+    a: float
+    b: float
+    median: float
+    low: float
+    high: float
+    sure_low: float
+    sure_high: float
+
+    @property
+    def sure(self) -> bool:
+        """Whether the exact interval excludes zero."""
+        return self.sure_low > 0.0 or self.sure_high < 0.0
+
+
+def compare(a: pl.DataFrame, b: pl.DataFrame) -> list[dict[str, Any]]:
+    """Pair the flights of two runs by experiment, law, variant, parameters and seed, and compare each cell.
+
+    Two `paint` runs of different seeds still compare, law by law: what is paired is then said by ``seeds``.
+
+    Returns:
+        Per cell: experiment, law, variant, params, n, completed of both, and the differences.
+
+    Raises:
+        ConfigError: When they share no flight.
+    """
+    if set(a["variant"]) == {"run"} and set(b["variant"]) == {"run"}:
+        b = b.with_columns(pl.lit(a["seed"][0]).alias("seed"))
+    params = [name for name in a.columns if name.startswith(PARAM) and name in b.columns]
+    both = a.join(b, on=[*_SAME, *params], suffix=".b", nulls_equal=True, maintain_order="left")
+    if not both.height:
+        raise ConfigError("the two runs share no flight (same experiment, law, variant, parameters and seed)")
+    shared = [name for name in figure_names(a) if name in b.columns]
+    cells = []
+    for key, rows in both.group_by(["experiment", "law", "variant", *params], maintain_order=True):
+        values = dict(zip(["experiment", "law", "variant", *params], key, strict=True))
+        cells.append(
+            {
+                **{name: values[name] for name in ("experiment", "law", "variant")},
+                "params": {name.removeprefix(PARAM): values[name] for name in params if values[name] is not None},
+                "n": rows.height,
+                "completed": [int(rows["completed"].sum()), int(rows["completed.b"].sum())],
+                "differences": [found for name in shared if (found := _difference(rows, name)) is not None],
+            }
+        )
+    return cells
+
+
+def _difference(rows: pl.DataFrame, name: str) -> Difference | None:
+    first, second = (rows[column].cast(pl.Float64).to_numpy() for column in (name, f"{name}.b"))
+    change = median_interval(second - first)
+    if not math.isfinite(change["median"]):
+        return None
+    low, high = exact_interval(second - first)
+    medians = {"a": median_interval(first)["median"], "b": median_interval(second)["median"]}
+    return Difference(figure=name, **medians, **change, sure_low=low, sure_high=high)

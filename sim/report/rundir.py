@@ -1,0 +1,184 @@
+"""The run folder: what a flight leaves on disk, and how it is read back."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ibvs_qp.config.errors import IbvsQpError
+from ibvs_qp.config.settings import dump_toml
+from sim.flight.flight_log import save_log
+from sim.flight.side_by_side import Flight, own_peak_memory
+from sim.flight.trace import FIELDS, Trace
+
+SCHEMA = 1
+#: Files of a run, beside its figures.
+_FILES = ("report.html", "summary.json", "video.mp4", "scene.toml", "log.npz", "README.txt")
+_README = """One run of ibvs-qp.
+
+report.html   everything at a glance; open it in a browser, it needs nothing else
+summary.json  all figures (docs/metrics.md of the project defines them)
+figures/      the report's figures as PNG
+video.mp4     camera view, phase and force
+scene.toml    the scene flown; fly it again with: ibvs-qp paint --scene scene.toml --seed {seed}
+preset_*.toml the pilot's configuration under each law
+log.npz       every array, named <law>/<array>; load it with
+
+    import numpy as np
+    log = np.load("log.npz")
+    t, push = log["qp/t"], log["qp/push_true"]
+    phase = log["qp/phases"][log["qp/phase"]]   # the name of the phase at every tick
+
+  or as traces, ready for sim.evaluate.metrics and sim.figures, with
+
+    from sim.flight.flight_log import load_run
+    traces = load_run("{path}")
+    traces["qp"].push_true
+
+  N control ticks, M physics steps at 1 kHz, F pictures, n rotors, L limits; SI units:
+
+{fields}
+"""
+
+
+class RunFolderError(IbvsQpError):
+    """The run folder cannot be written."""
+
+
+@dataclass(frozen=True)
+class RunFolder:
+    """Paths of one run."""
+
+    path: Path
+
+    @property
+    def report(self) -> Path:
+        """The report for people."""
+        return self.path / "report.html"
+
+    @classmethod
+    def create(cls, out: Path | None) -> RunFolder:
+        """Make the folder, ``runs/<UTC stamp>`` by default, and prove that it can be written.
+
+        Raises:
+            RunFolderError: When it cannot.
+        """
+        path = _stamped(Path("runs")) if out is None else out
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+            probe = path / ".write-test"
+            probe.write_bytes(b"")
+            probe.unlink()
+        except OSError as error:
+            reason = error.strerror or str(error)
+            mend = "give a writable folder with --out"
+            raise RunFolderError(f"cannot write run folder {path}: {reason}; {mend}") from None
+        return cls(path)
+
+    def discard_if_empty(self) -> None:
+        """Remove the folder if nothing was written into it."""
+        if self.path.exists() and not any(self.path.iterdir()):
+            self.path.rmdir()
+
+    def write_record(self, traces: dict[str, Trace], summary_table: dict[str, Any]) -> None:
+        """Write what must not be lost: log, scene, summary and the text that explains them.
+
+        What an earlier run left in the same folder goes first, so that nothing stale is taken for this run's.
+        """
+        for name in _FILES:
+            (self.path / name).unlink(missing_ok=True)
+        for trace in traces.values():
+            (self.path / "scene.toml").write_text(dump_toml(trace.scene), encoding="utf-8")
+        for law, trace in traces.items():
+            (self.path / f"preset_{law}.toml").write_text(trace.preset, encoding="utf-8")
+        save_log(self.path / "log.npz", traces)
+        fields = "\n".join(f"  {name:<20} {text}" for name, text in FIELDS.items())
+        text = _README.format(seed=summary_table["seed"], path=self.path, fields=fields)
+        (self.path / "README.txt").write_text(text, encoding="utf-8")
+        self.write_summary(summary_table)
+
+    def write_summary(self, summary_table: dict[str, Any]) -> None:
+        """Write summary.json."""
+        (self.path / "summary.json").write_text(as_json(summary_table, indent=1) + "\n", encoding="utf-8")
+
+    def write_report(self, traces: dict[str, Trace], summary_table: dict[str, Any], video: bool) -> None:
+        """Draw the figures, the video and the report."""
+        from sim.figures import draw_all
+        from sim.flight.video import write_video
+        from sim.report.report import write_report
+
+        flown = {law: trace for law, trace in traces.items() if len(trace.t)}
+        figures = draw_all(flown, self.path / "figures") if flown else {}
+        film = self.path / "video.mp4"
+        if video and any(trace.pictures for trace in flown.values()):
+            write_video(flown, film)
+        write_report(self.report, flown, summary_table, figures, film if film.exists() else None)
+
+
+def _stamped(parent: Path) -> Path:
+    stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
+    path, number = parent / stamp, 1
+    while path.exists():
+        number += 1
+        path = parent / f"{stamp}-{number}"
+    return path
+
+
+def summary(
+    facts: dict[str, Any],
+    folder: RunFolder,
+    metrics: dict[str, dict[str, Any]],
+    interrupted: bool,
+    wall_time_s: float,
+    peak_memory_bytes: int,
+) -> dict[str, Any]:
+    """Assemble summary.json.
+
+    Args:
+        facts: command, seed, scene, preset, camera, image_size, features, vision.
+        folder: Where the run is written.
+        metrics: M of every law flown.
+        interrupted: Whether Ctrl-C ended the run.
+        wall_time_s: Time since the command began [s].
+        peak_memory_bytes: Of all processes together.
+    """
+    return {
+        "schema": SCHEMA,
+        "command": facts["command"],
+        "version": version("ibvs-qp"),
+        **{key: facts[key] for key in ("seed", "scene", "preset")},
+        "run_dir": str(folder.path),
+        **{key: facts[key] for key in ("camera", "image_size", "features", "vision")},
+        "interrupted": interrupted,
+        "wall_time_s": wall_time_s,
+        "peak_memory_bytes": peak_memory_bytes,
+        "laws": metrics,
+    }
+
+
+def peak_memory(flights: Iterable[Flight]) -> int:
+    """Peak resident memory of this process and of those that flew [bytes]: an upper bound of the common peak."""
+    return own_peak_memory() + sum(flight.process_memory_bytes for flight in flights)
+
+
+def as_json(value: Any, indent: int | None = None) -> str:
+    """JSON text; numbers that are not finite become null."""
+    return json.dumps(_finite(value), indent=indent, allow_nan=False)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(entry) for entry in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,145 @@
+"""What of the vehicle itself the camera sees: arm, brush and propellers, constant because all are rigid."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from ibvs_qp.config.vehicle import VehicleParams
+from ibvs_qp.frames import R_BODY_CAMERA
+from sim.world.scene import Scene
+
+#: Length of the brush along the arm [m] and of the step between the slices it is drawn in.
+BRUSH_LENGTH_M, _SLICE_M = 0.04, 0.002
+#: Nothing nearer than this is drawn [m].
+_NEAR_M = 0.05
+#: Share of the light that a spinning propeller takes away.
+_PROPELLER_SHADE = 0.35
+_ARM_COLOR = (58, 60, 64)
+_BRUSH_COLORS = ((240, 190, 40), (70, 180, 90), (205, 70, 170), (60, 190, 210))
+_SHIFT, _ONE = 4, 16
+
+
+@dataclass(frozen=True, kw_only=True)
+class VehicleLayer:
+    """Constant picture of the vehicle's own parts.
+
+    Attributes:
+        picture: uint8 (H, W, 4), valid under the mask.
+        mask: 255 where arm or brush hide the scene, uint8 (H, W).
+        inverse_depth: 1/Z of arm and brush under the mask [1/m], float32 (H, W).
+        holes: 255 where the depth step along the outline leaves no reading, uint8 (H, W).
+        propellers: 255 where a propeller disc lies in front of the scene, uint8 (H, W).
+    """
+
+    picture: np.ndarray
+    mask: np.ndarray
+    inverse_depth: np.ndarray
+    holes: np.ndarray
+    propellers: np.ndarray
+
+
+def brush_color(scene: Scene) -> tuple[int, int, int]:
+    """A brush colour that differs clearly from board, paint and wall."""
+    others = np.array([scene.board.color, scene.paint.color, scene.wall.color], float)
+    return max(_BRUSH_COLORS, key=lambda color: float(np.linalg.norm(others - color, axis=1).min()))
+
+
+def vehicle_layer(
+    scene: Scene, vehicle: VehicleParams, intrinsics: tuple[float, float, float, float], rng: np.random.Generator
+) -> VehicleLayer:
+    """Draw arm, brush and propellers as the camera sees them.
+
+    Args:
+        scene: Gives picture size, brush width and colours.
+        vehicle: Gives every position and size.
+        intrinsics: (fx, fy, cx, cy) [px].
+        rng: Raggedness of the depth holes along the outline.
+    """
+    shape = (scene.camera.height, scene.camera.width)
+    picture, mask = np.zeros((*shape, 4), np.uint8), np.zeros(shape, np.uint8)
+    inverse_depth, propellers = np.zeros(shape, np.float32), np.zeros(shape, np.uint8)
+    camera = np.asarray(vehicle.camera_position_m)
+    tip, base = np.asarray(vehicle.tip_position_m), np.asarray(vehicle.force_torque_position_m)
+    ferrule = tip - np.array([BRUSH_LENGTH_M, 0.0, 0.0])
+    color = np.array(brush_color(scene), float)
+    slices: list[tuple[np.ndarray, float, np.ndarray]] = []  # centre in C, radius, colour; far to near
+    count = round(BRUSH_LENGTH_M / _SLICE_M)
+    for k in range(count + 1):
+        tone = 1.0 if k == count else 0.55 + 0.25 * k / count
+        center = tip + (ferrule - tip) * k / count
+        slices.append((center, 0.5 * scene.paint.brush_width_m, color * tone))
+    steps = max(2, round(float(np.linalg.norm(ferrule - base)) / _SLICE_M))
+    for k in range(steps + 1):
+        slices.append((ferrule + (base - ferrule) * k / steps, vehicle.arm_radius_m, np.array(_ARM_COLOR, float)))
+    fx, fy, cx, cy = intrinsics
+    for center, radius, tone in slices:
+        x, y, z = R_BODY_CAMERA.T @ (center - camera)
+        if z < _NEAR_M:
+            continue
+        place = (round((fx * x / z + cx) * _ONE), round((fy * y / z + cy) * _ONE))
+        size = round(fx * radius / z * _ONE)
+        cv2.circle(picture, place, size, (*tone.tolist(), 255.0), -1, cv2.LINE_8, _SHIFT)
+        cv2.circle(mask, place, size, 255.0, -1, cv2.LINE_8, _SHIFT)
+        cv2.circle(inverse_depth, place, size, 1.0 / z, -1, cv2.LINE_8, _SHIFT)
+    for hub, axis in zip(vehicle.geometry.positions, vehicle.geometry.axes, strict=True):
+        _draw_disc(propellers, hub - camera, axis, vehicle.propeller_radius_m, intrinsics)
+    return VehicleLayer(
+        picture=picture, mask=mask, inverse_depth=inverse_depth, holes=_ragged_outline(mask, rng), propellers=propellers
+    )
+
+
+#: Masks drawn so far, by all that they depend on; every flight without pictures needs one and takes 30 ms to draw it.
+_masks: dict[Hashable, np.ndarray] = {}
+
+
+def vehicle_mask(scene: Scene, vehicle: VehicleParams, intrinsics: tuple[float, float, float, float]) -> np.ndarray:
+    """255 where arm or brush hide the scene, uint8 (H, W), not to be written; arguments as for `vehicle_layer`."""
+    key = scene.camera.height, scene.camera.width, scene.paint.brush_width_m, vehicle, intrinsics
+    if key not in _masks:
+        _masks[key] = vehicle_layer(scene, vehicle, intrinsics, np.random.default_rng(0)).mask
+        _masks[key].flags.writeable = False
+    return _masks[key]
+
+
+def shade_propellers(picture: np.ndarray, propellers: np.ndarray) -> None:
+    """Darken a picture, uint8 (H, W, C), in place under the propeller mask, as blades too fast to see do."""
+    dimmed = cv2.convertScaleAbs(picture, alpha=1.0 - _PROPELLER_SHADE, beta=12.0)
+    cv2.copyTo(dimmed, propellers, picture)
+
+
+def _draw_disc(
+    mask: np.ndarray, center: np.ndarray, axis: np.ndarray, radius: float, intrinsics: tuple[float, float, float, float]
+) -> None:
+    side = np.cross(axis, [1.0, 0.0, 0.0])
+    side /= np.linalg.norm(side)
+    angle = np.linspace(0.0, 2.0 * np.pi, 180, endpoint=False)[:, None]
+    rim = center + radius * (np.cos(angle) * side + np.sin(angle) * np.cross(axis, side))
+    points = clip_near(rim @ R_BODY_CAMERA, _NEAR_M)
+    if len(points) < 3:
+        return
+    fx, fy, cx, cy = intrinsics
+    pixels = np.column_stack((fx * points[:, 0] / points[:, 2] + cx, fy * points[:, 1] / points[:, 2] + cy))
+    cv2.fillConvexPoly(mask, np.rint(pixels * _ONE).astype(np.int32), 255.0, cv2.LINE_8, _SHIFT)
+
+
+def clip_near(points: np.ndarray, near_m: float) -> np.ndarray:
+    """The part of a polygon in camera coordinates, (n, 3), that lies at depth ``near_m`` or beyond."""
+    kept = []
+    for start, stop in zip(points, np.roll(points, -1, axis=0), strict=True):
+        if start[2] >= near_m:
+            kept.append(start)
+        if (start[2] >= near_m) != (stop[2] >= near_m):
+            kept.append(start + (near_m - start[2]) / (stop[2] - start[2]) * (stop - start))
+    return np.array(kept).reshape(-1, 3)
+
+
+def _ragged_outline(mask: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """A band one to three pixels wide around the mask, narrower and wider at random."""
+    near = cv2.dilate(mask, np.ones((3, 3), np.uint8))
+    far = cv2.dilate(mask, np.ones((7, 7), np.uint8))
+    patches = cv2.GaussianBlur(rng.standard_normal(mask.shape, np.float32), (0, 0), 3.0) > 0.0
+    return np.where((near > 0) | ((far > 0) & patches), np.uint8(255), np.uint8(0)) & ~mask

@@ -1,0 +1,106 @@
+"""What every back end does to a drawn picture of board and wall: vehicle, lens blur, noise and depth holes."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from ibvs_qp.config.vehicle import VehicleParams
+from sim.sensors.cameras.arm import clip_near, shade_propellers, vehicle_layer
+from sim.sensors.cameras.noise import NoiseBank
+from sim.sensors.cameras.outline import Box, CutLine, cut_lines
+from sim.sensors.cameras.protocol import camera_intrinsics
+from sim.sensors.cameras.view import View
+from sim.world.scene import Scene
+
+#: Nearest depth at which anything is drawn, and farthest that a reading exists [m].
+NEAR_M, FAR_M = 0.05, 20.0
+
+
+class PictureFinish:
+    """Turns drawn colours and inverse depths into those of the camera; the same noise of one seed for all back ends.
+
+    For one picture call `common_error`, `color` and `depth`, in this order: each draws from one generator.
+
+    Args:
+        scene: Camera and paint.
+        vehicle: Where camera, arm and propellers are.
+        seed: Seed of the noise.
+        noise: Whether to add colour and depth noise and depth holes.
+
+    Attributes:
+        intrinsics: (fx, fy, cx, cy) [px].
+        propeller_box: Rows and columns that hold what is seen of the propellers, or None.
+        arm_box: Those that hold what is seen of arm and brush, or None.
+        arm: Colours of arm and brush, uint8 (H, W, 3), under the mask.
+        arm_inverse: Their inverse depths [1/m], float32 (H, W).
+        mask: 255 where arm or brush hide the scene, uint8 (H, W).
+        propellers: 255 where a propeller lies before the scene, uint8 (H, W).
+        no_depth: Flat indices of pixels that never give a depth.
+        noise: Banks of noise, or None.
+        rng: Source of the ragged holes.
+    """
+
+    def __init__(self, scene: Scene, vehicle: VehicleParams, seed: int, noise: bool) -> None:
+        self.intrinsics = camera_intrinsics(scene.camera)
+        bank, ragged = np.random.SeedSequence([seed, 0xCA3E]).spawn(2)
+        self.rng = np.random.default_rng(ragged)
+        shape = (scene.camera.height, scene.camera.width)
+        relative = scene.camera.depth_noise_relative
+        self.noise = NoiseBank(shape, relative, np.random.default_rng(bank)) if noise else None
+        layer = vehicle_layer(scene, vehicle, self.intrinsics, self.rng)
+        self.arm_box, self.propeller_box = _bounding_box(layer.mask), _bounding_box(layer.propellers)
+        self.arm, self.arm_inverse = np.ascontiguousarray(layer.picture[..., :3]), layer.inverse_depth
+        self.mask, self.propellers = layer.mask, layer.propellers
+        self.no_depth = np.flatnonzero((layer.holes | layer.propellers) & ~layer.mask)
+        self._soft, self._ones = np.empty((*shape, 3), np.uint8), np.ones(shape, np.float32)
+
+    def common_error(self, view: View) -> float:
+        """Depth error common to one picture, as a share of the depth at its centre."""
+        return self.noise.depth_common() * float(view.plane(0.0)[2]) if self.noise else 0.0
+
+    def outline(self, view: View, corners: np.ndarray) -> tuple[list[CutLine], Box | None]:
+        """Lines along which the board's outline, corners (4, 3) in the world, cuts the picture, and the board's box."""
+        polygon = view.to_camera(corners)
+        if polygon[:, 2].min() < NEAR_M:
+            polygon = clip_near(polygon, NEAR_M)
+        fx, fy, cx, cy = self.intrinsics
+        height, width = self.mask.shape
+        return cut_lines(polygon[:, :2] / polygon[:, 2:] * (fx, fy) + (cx, cy), width, height)
+
+    def color(self, rgb: np.ndarray) -> np.ndarray:
+        """A new picture from a drawn one, uint8 (H, W, 3), into which the vehicle is drawn: lens blur, sensor noise."""
+        if self.propeller_box is not None:
+            r0, r1, c0, c1 = self.propeller_box
+            shade_propellers(rgb[r0:r1, c0:c1], self.propellers[r0:r1, c0:c1])
+        if self.arm_box is not None:
+            r0, r1, c0, c1 = self.arm_box
+            cv2.copyTo(self.arm[r0:r1, c0:c1], self.mask[r0:r1, c0:c1], rgb[r0:r1, c0:c1])
+        cv2.GaussianBlur(rgb, (3, 3), 0.0, self._soft)  # binomial kernel: sigma 0.71 px
+        return self.noise.add_color(self._soft) if self.noise else self._soft.copy()
+
+    def depth(self, inverse: np.ndarray, cuts: list[CutLine]) -> np.ndarray:
+        """Depth [m] from drawn inverse depths (H, W), which the vehicle overwrites: noise, and holes along steps."""
+        depth = np.empty(inverse.shape, np.float32)
+        farthest = 1.0 / FAR_M
+        if inverse[:: len(inverse) - 1, :: inverse.shape[1] - 1].min() < farthest:  # only when a horizon comes near
+            np.maximum(inverse, np.float32(farthest), out=inverse)
+        if self.arm_box is not None:  # the vehicle takes no part in the scene's common error
+            r0, r1, c0, c1 = self.arm_box
+            cv2.copyTo(self.arm_inverse[r0:r1, c0:c1], self.mask[r0:r1, c0:c1], inverse[r0:r1, c0:c1])
+        cv2.divide(self.noise.depth_factor() if self.noise else self._ones, inverse, depth)
+        if self.noise is None:
+            return depth
+        flat, hidden = depth.reshape(-1), self.mask.reshape(-1)
+        for cut in cuts:
+            places = cut.holes(self.rng)
+            flat[places[hidden.take(places) == 0]] = 0.0  # arm and brush hide the step
+        flat[self.no_depth] = 0.0
+        return depth
+
+
+def _bounding_box(mask: np.ndarray) -> Box | None:
+    if not mask.any():
+        return None
+    left, top, width, height = cv2.boundingRect(mask)
+    return top, top + height, left, left + width

@@ -1,0 +1,198 @@
+"""The default camera: board and wall are planes, so one homography each makes the picture; no GL anywhere.
+
+The board is drawn as a sheet at the wall's gap in front of it (its thin side faces are left out). Its outline cuts
+the picture along straight lines: `_cut` replaces what lies beyond one of them by the wall, with an antialiased rim.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from ibvs_qp.config.vehicle import VehicleParams
+from ibvs_qp.measurement import RgbdFrame
+from sim.sensors.cameras.drawn import Drawing, native
+from sim.sensors.cameras.finish import PictureFinish
+from sim.sensors.cameras.outline import Box, CutLine
+from sim.sensors.cameras.view import View, board_corners, board_steps
+from sim.world.canvas import TEXTURE_PAD_PX, Canvas, FreshPaint
+from sim.world.scene import Scene
+
+_SHIFT = 6  # sub-pixel bits of polygon corners
+_EVEN, _HALF = np.uint32(0x00FF00FF), np.uint32(0x00800080)  # every other byte of a pixel, and its rounding
+#: Numbers of a sheet that is out of view.
+_NO_SHEET = (0.0,) * 12
+_WARP = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+
+
+class _Sheet(NamedTuple):
+    """Board or wall as one view sees it.
+
+    Attributes:
+        texture: Its picture, uint8 (h, w, 4).
+        back: Homography from picture to texture pixels, (3, 3).
+        plane: (p, q, r) of 1/Z = p u + q v + r as measured.
+    """
+
+    texture: np.ndarray
+    back: np.ndarray
+    plane: tuple[float, float, float]
+
+    @staticmethod
+    def seen(
+        view: View, texture: np.ndarray, steps: tuple[np.ndarray, np.ndarray, np.ndarray], common: float
+    ) -> _Sheet:
+        """A sheet whose texture has the (corner, column step, row step) ``steps`` in the world.
+
+        The common-mode depth error is applied as the scale 1 + ``common``, equal to the offset at the picture's centre.
+        """
+        corner = steps[0]
+        p, q, r = view.pixel_plane(float(corner[0]))
+        scale = 1.0 / (1.0 + common)
+        plane = float(p * scale), float(q * scale), float(r * scale)
+        return _Sheet(texture, _inverse(view.from_texture(*steps)), plane)
+
+
+class PlaneCamera:
+    """RGB-D camera by homography of the painted board and the wall, with analytic depth.
+
+    Args:
+        scene: Board, wall and camera.
+        vehicle: Where camera, arm and propellers are.
+        canvas: The board's and the wall's pictures; read at every capture.
+        seed: Seed of the noise.
+        noise: Whether to add colour and depth noise and depth holes.
+    """
+
+    def __init__(self, scene: Scene, vehicle: VehicleParams, canvas: Canvas, seed: int, noise: bool = True) -> None:
+        self.scene, self.vehicle, self.canvas = scene, vehicle, canvas
+        self.finish = PictureFinish(scene, vehicle, seed, noise)
+        self.intrinsics = self.finish.intrinsics
+        shape = (scene.camera.height, scene.camera.width)
+        self._corners = board_corners(canvas.geometry)
+        self._board_steps = board_steps(canvas.geometry, canvas.pixels_per_m, TEXTURE_PAD_PX)
+        step = 1.0 / canvas.wall_pixels_per_m
+        corner = np.append(scene.board.gap_m, canvas.wall_origin + 0.5 * step)
+        self._wall_steps = corner, np.array([0.0, step, 0.0]), np.array([0.0, 0.0, step])
+        self._plain_wall = (*(float(entry) for entry in scene.wall.color), 255.0)
+        self._picture, self._behind = np.empty((*shape, 4), np.uint8), np.empty((*shape, 4), np.uint8)
+        self._mask = np.zeros(shape, np.uint8)
+        self._drawing: Drawing | None = None
+        self._inverse, self._inverse_behind = np.empty(shape, np.float32), np.empty(shape, np.float32)
+        self._rgb = np.empty((*shape, 3), np.uint8)
+        self._v, self._u = np.indices(shape, np.float32)
+
+    def capture(self, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, stamp_ns: int) -> RgbdFrame:
+        """Take a picture, see `sim.sensors.cameras.protocol.Camera`; the frame owns its arrays."""
+        return self.expose(position_ned, quaternion_b_in_i, stamp_ns)()
+
+    def expose(self, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, stamp_ns: int) -> Callable[[], RgbdFrame]:
+        """Take in pose and paint, see `sim.sensors.cameras.protocol.DeferredCamera`."""
+        pose = np.array(position_ned, float), np.array(quaternion_b_in_i, float)
+        return functools.partial(self.develop, *pose, stamp_ns, self.canvas.take())
+
+    def develop(
+        self,
+        position_ned: np.ndarray,
+        quaternion_b_in_i: np.ndarray,
+        stamp_ns: int,
+        paint: FreshPaint | None,
+        into: tuple[np.ndarray, np.ndarray] | None = None,
+    ) -> RgbdFrame:
+        """Draw a picture from a pose and what is new of the paint; pictures are drawn in the order of exposure.
+
+        Args:
+            position_ned: As in `sim.sensors.cameras.protocol.Camera.capture`.
+            quaternion_b_in_i: Likewise.
+            stamp_ns: Likewise.
+            paint: What is new, see `Canvas.take`.
+            into: Where colours, uint8 (H, W, 3), and depths, float32 (H, W), are best drawn; they may lie elsewhere.
+        """
+        view = View.of_vehicle(position_ned, quaternion_b_in_i, self.vehicle.camera_position_m, self.intrinsics)
+        texture = self.canvas.draw(paint)
+        cuts, board_box = self.finish.outline(view, self._corners)
+        common = self.finish.common_error(view)
+        wall = _Sheet.seen(view, self.canvas.wall, self._wall_steps, common)
+        board = None if board_box is None else _Sheet.seen(view, texture, self._board_steps, common)
+        drawn = self._drawn(board, wall, cuts, into)
+        if drawn is not None:
+            rgb, depth = drawn
+            return RgbdFrame(rgb=rgb, depth=depth, intrinsics=self.intrinsics, stamp_ns=stamp_ns)
+        if board is not None and board_box is not None:
+            self._draw(board, board_box, self._picture, self._inverse)
+        for cut in cuts:
+            self._cut(wall, cut)
+        cv2.cvtColor(self._picture, cv2.COLOR_RGBA2RGB, self._rgb)
+        rgb = self.finish.color(self._rgb)
+        depth = self.finish.depth(self._inverse, cuts)
+        return RgbdFrame(rgb=rgb, depth=depth, intrinsics=self.intrinsics, stamp_ns=stamp_ns)
+
+    def _drawn(
+        self, board: _Sheet | None, wall: _Sheet, cuts: list[CutLine], into: tuple[np.ndarray, np.ndarray] | None
+    ) -> tuple[np.ndarray, np.ndarray] | None:
+        """Colours and depths by machine code, or None where there is none."""
+        if self._drawing is None:
+            library = native()
+            if library is None:
+                return None
+            texture, plain = self.canvas.draw(None), np.array(self._plain_wall, np.uint8)
+            self._drawing = Drawing(library.draw_picture, self.finish, texture, self.canvas.wall, plain)
+        numbers = _NO_SHEET if board is None else (*board.back.ravel().tolist(), *board.plane)
+        return self._drawing.picture([*numbers, *wall.back.ravel().tolist(), *wall.plane], cuts, into)
+
+    def _draw(self, sheet: _Sheet, box: Box, picture: np.ndarray, inverse: np.ndarray) -> None:
+        """Colours and inverse depths of a sheet within a box."""
+        r0, r1, c0, c1 = box
+        if r0 >= r1 or c0 >= c1:
+            return
+        back = sheet.back.copy()
+        back[:, 2] += back[:, 0] * c0 + back[:, 1] * r0
+        # A constant border is the only fast one: the others cost five times as much wherever they are needed.
+        border, size = self._plain_wall, (c1 - c0, r1 - r0)
+        cv2.warpPerspective(sheet.texture, back, size, picture[r0:r1, c0:c1], _WARP, cv2.BORDER_CONSTANT, border)
+        along_u, along_v, constant = sheet.plane
+        u, v = self._u[r0:r1, c0:c1], self._v[r0:r1, c0:c1]
+        cv2.addWeighted(u, along_u, v, along_v, constant, inverse[r0:r1, c0:c1])
+
+    def _cut(self, wall: _Sheet, cut: CutLine) -> None:
+        """Replace what lies beyond one line of the board's outline by the wall."""
+        beyond, band = cut.split()
+        self._draw(wall, beyond, self._picture, self._inverse)
+        r0, r1, c0, c1 = band
+        if r0 >= r1 or c0 >= c1:
+            return
+        self._draw(wall, band, self._behind, self._inverse_behind)
+        places, share = cut.rim(band)
+        picture = self._picture.view(np.uint32).reshape(-1)
+        mixed = _mix(picture.take(places), self._behind.view(np.uint32).reshape(-1).take(places), share)
+        mask = self._mask[r0:r1, c0:c1]
+        mask[:] = 0
+        if len(cut.beyond):
+            corners = np.rint((cut.beyond - (c0, r0)) * (1 << _SHIFT)).astype(np.int32)
+            cv2.fillConvexPoly(mask, corners, 255.0, cv2.LINE_8, _SHIFT)
+        cv2.copyTo(self._behind[r0:r1, c0:c1], mask, self._picture[r0:r1, c0:c1])
+        cv2.copyTo(self._inverse_behind[r0:r1, c0:c1], mask, self._inverse[r0:r1, c0:c1])
+        picture[places] = mixed
+
+
+def _inverse(matrix: np.ndarray) -> np.ndarray:
+    """Inverse of a 3 x 3 matrix by cofactors, in a fraction of the general one's time."""
+    (a, b, c), (d, e, f), (g, h, i) = matrix.tolist()
+    rows = (
+        (e * i - f * h, c * h - b * i, b * f - c * e),
+        (f * g - d * i, a * i - c * g, c * d - a * f),
+        (d * h - e * g, b * g - a * h, a * e - b * d),
+    )
+    return np.array(rows) / (a * rows[0][0] + b * rows[1][0] + c * rows[2][0])
+
+
+def _mix(front: np.ndarray, behind: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """Pixels, uint32 of four bytes, mixed by the share of the front one in 256ths; two bytes at a time."""
+    rest = np.uint32(256) - share
+    even = ((front & _EVEN) * share + (behind & _EVEN) * rest + _HALF) >> np.uint32(8)
+    odd = ((front >> np.uint32(8)) & _EVEN) * share + ((behind >> np.uint32(8)) & _EVEN) * rest + _HALF
+    return (even & _EVEN) | (odd & ~_EVEN)

@@ -1,0 +1,102 @@
+"""What a camera back end offers, and when its pictures are taken and delivered."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+
+from ibvs_qp.measurement import RgbdFrame
+from sim.world.scene import CameraScene
+
+NS_PER_S = 1_000_000_000
+
+
+def camera_intrinsics(camera: CameraScene) -> tuple[float, float, float, float]:
+    """Square-pixel intrinsics (fx, fy, cx, cy) [px] with pixel centres at integers: f = (H / 2) / tan(fov / 2)."""
+    focal = 0.5 * camera.height / math.tan(0.5 * math.radians(camera.vertical_fov_deg))
+    return focal, focal, 0.5 * (camera.width - 1), 0.5 * (camera.height - 1)
+
+
+class Camera(Protocol):
+    """An RGB-D camera on the vehicle.
+
+    Attributes:
+        intrinsics: (fx, fy, cx, cy) [px], pixel centres at integers.
+    """
+
+    intrinsics: tuple[float, float, float, float]
+
+    def capture(self, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, stamp_ns: int) -> RgbdFrame:
+        """Take a picture.
+
+        Args:
+            position_ned: World position of the body frame's origin [m], (3,).
+            quaternion_b_in_i: Attitude (w, x, y, z), (4,).
+            stamp_ns: Time of capture.
+        """
+        ...
+
+
+@runtime_checkable
+class DeferredCamera(Camera, Protocol):
+    """A camera whose picture may be drawn later, in another thread, than it was taken."""
+
+    def expose(self, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, stamp_ns: int) -> Callable[[], RgbdFrame]:
+        """Take in all that the picture depends on; arguments as in `Camera.capture`.
+
+        Returns:
+            Draws the picture. Called once, from one thread at a time, in the order of exposure.
+        """
+        ...
+
+
+class Schedule:
+    """When to capture and when to deliver: a fixed rate and a fixed latency in integer nanoseconds.
+
+    Args:
+        rate_hz: Captures per second.
+        latency_s: Capture to delivery [s].
+    """
+
+    def __init__(self, rate_hz: float, latency_s: float) -> None:
+        self._rate_hz, self._latency_ns = rate_hz, round(latency_s * NS_PER_S)
+        self._start_ns: int | None = None
+        self._next_ns = -1
+        self._queue: deque[tuple[int, object]] = deque()
+
+    def due(self, now_ns: int) -> bool:
+        """Whether a capture is due now; counts it. The first call starts the clock and captures."""
+        if self._start_ns is None:
+            self._start_ns = self._next_ns = now_ns
+        if now_ns < self._next_ns:
+            return False
+        # Slots that a slow caller missed are lost, as in a camera; their pictures do not pile up.
+        captures = math.floor((now_ns - self._start_ns) * self._rate_hz / NS_PER_S + 1e-6) + 1
+        self._next_ns = self._start_ns + round(captures * NS_PER_S / self._rate_hz)
+        return True
+
+    def rests(self, now_ns: int) -> bool:
+        """Whether neither a capture nor a delivery is due now; counts nothing."""
+        return now_ns < self._next_ns and not (self._queue and self._queue[0][0] <= now_ns)
+
+    def push(self, stamp_ns: int, item: object) -> None:
+        """Send off what was captured at ``stamp_ns``."""
+        self._queue.append((stamp_ns + self._latency_ns, item))
+
+    def arrived(self, now_ns: int) -> list[object]:
+        """All items that have arrived since the last call, oldest first."""
+        items = []
+        while self._queue and self._queue[0][0] <= now_ns:
+            items.append(self._queue.popleft()[1])
+        return items
+
+    def pop(self, now_ns: int) -> object | None:
+        """The newest item that has arrived since the last call, or None."""
+        if not self._queue or self._queue[0][0] > now_ns:
+            return None
+        items = self.arrived(now_ns)
+        return items[-1] if items else None

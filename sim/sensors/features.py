@@ -1,0 +1,218 @@
+"""A perfect eye with honest noise: true lines projected and clipped, late like the camera's pictures.
+
+It stands in for perception where the controller alone is studied (``--features geometric``).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+
+import casadi as ca
+import numpy as np
+
+from ibvs_qp.config.vehicle import VehicleParams
+from ibvs_qp.made import made
+from ibvs_qp.measurement import HORIZONTAL, VERTICAL, FeatureFrame
+from ibvs_qp.model.bound_function import BoundFunction
+from ibvs_qp.model.machine_code import machine_code
+from sim.sensors.cameras.arm import vehicle_mask
+from sim.sensors.cameras.protocol import Schedule, camera_intrinsics
+from sim.sensors.edge_view import (
+    BOARD_EDGES,
+    BOARD_VIEW,
+    EDGE_NUMBERS,
+    PER_METRE,
+    PLANE,
+    board_view,
+    painted_edge_view,
+)
+from sim.sensors.line_projection import moved_line, seen_line
+from sim.sensors.painted_pieces import PaintedPieces
+from sim.world.board import BoardGeometry
+from sim.world.canvas import Canvas
+from sim.world.painted_edges import PaintedEdges
+from sim.world.random_streams import Normals
+from sim.world.scene import Scene
+
+#: Noise of the plane: distance [m] and direction of the normal [rad].
+SIGMA_DISTANCE_M, SIGMA_NORMAL = 0.001, math.radians(0.1)
+#: Noise of the velocity per axis [m/s].
+SIGMA_VELOCITY_M_S = 0.003
+_VELOCITY_COVARIANCE = SIGMA_VELOCITY_M_S**2 * np.eye(3)
+_VELOCITY_COVARIANCE.flags.writeable = False  # shared by all frames
+#: Track identities: board edges by name, rows from `_FIRST_ROW_TRACK`.
+BOARD_TRACKS = {"bottom": 1, "right": 2, "top": 3, "left": 4}
+_FIRST_ROW_TRACK = 10
+_BOARD_LINES = [
+    (slice(start, start + EDGE_NUMBERS), VERTICAL if upright else HORIZONTAL, "board", BOARD_TRACKS[name])
+    for start, (name, (*_, upright)) in zip(
+        range(PLANE.stop, BOARD_VIEW, EDGE_NUMBERS), BOARD_EDGES.items(), strict=True
+    )
+]
+#: What a line is before its noise: its numbers, role, kind and track.
+_Line = tuple[list[float], str, str, int]
+#: How far above an edge a point lies for certain on its upper side [m].
+_ABOVE_M = 0.02
+
+
+class GeometricFeatures:
+    """Sensor model of line perception: rate, latency, field of view and noise of a camera, but no pictures.
+
+    Lines: the board's edges (kind "board") and the upper edges of the painted rows where no later row and no brush
+    covers them (kind "paint"; their surface side is the unpainted board).
+
+    Args:
+        scene: Board, paint job, camera, and ``features.sigma_vs``.
+        vehicle: Where camera, arm and brush are.
+        painted: The canvas, or the painted edges alone.
+        seed: Seed of the noise.
+        noise: Whether to add any noise at all.
+        to_machine_code: Whether a C compiler translates the projection; the same bits, sooner.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        vehicle: VehicleParams,
+        painted: Canvas | PaintedEdges,
+        seed: int,
+        noise: bool = True,
+        to_machine_code: bool = False,
+    ) -> None:
+        self.scene, self.vehicle, self._noise = scene, vehicle, noise
+        self._edges = painted.edges if isinstance(painted, Canvas) else painted
+        self._geometry = BoardGeometry(scene)
+        self.intrinsics = camera_intrinsics(scene.camera)
+        own, extra = np.random.SeedSequence([seed, 0xFEA7]).spawn(2)
+        self._normals, self._extra = Normals(np.random.default_rng(own)), np.random.default_rng(extra)
+        self._schedule = Schedule(scene.camera.rate_hz, scene.camera.latency_s)
+        self._bind(machine_code if to_machine_code else lambda function: function)
+        hidden = vehicle_mask(scene, vehicle, self.intrinsics)
+        self._pieces = PaintedPieces(self._edges, self._board, self.intrinsics, hidden, to_machine_code)
+
+    def _bind(self, translated: Callable[[ca.Function], ca.Function]) -> None:
+        """Compiled projection on memory that holds its arguments."""
+        scene = self.scene
+        half = 0.5 * np.array((scene.camera.width, scene.camera.height)) / self.intrinsics[:2]
+        self._half = half.tolist()
+        width, height = scene.board.width_m, scene.board.height_m
+        corners = np.array([(0.0, 0.0), (width, 0.0), (width, height), (0.0, height), (0.5 * width, 0.5 * height)])
+        outline = self._world(corners[:, 0], corners[:, 1]).reshape(-1)
+        unit = self._world(np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])).reshape(-1)
+        self._position, self._quaternion, camera = np.zeros(3), np.zeros(4), np.array(self.vehicle.camera_position_m)
+        self._board, self._piece, self._edge = np.zeros(BOARD_VIEW), np.zeros(6), np.zeros(EDGE_NUMBERS)
+        self._look = BoundFunction(
+            translated(board_view()), (self._position, self._quaternion, camera, outline, unit, half), (self._board,)
+        )
+        self._look_at_piece = BoundFunction(
+            translated(painted_edge_view()), (self._board, self._piece, half), (self._edge,)
+        )
+
+    def rests(self, now_ns: int) -> bool:
+        """Whether nothing is seen nor delivered at this time: `tick` would do nothing."""
+        return self._schedule.rests(now_ns)
+
+    def tick(
+        self, now_ns: int, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, velocity_body: np.ndarray
+    ) -> FeatureFrame | None:
+        """Advance to ``now_ns``; the newest frame that has just become due, or None.
+
+        Args:
+            now_ns: Present time.
+            position_ned: World position of the body frame's origin [m], (3,).
+            quaternion_b_in_i: Attitude (w, x, y, z), (4,).
+            velocity_body: True velocity of the centre of mass in B [m/s], (3,).
+        """
+        if self._schedule.due(now_ns):
+            self._schedule.push(now_ns, self.capture(position_ned, quaternion_b_in_i, velocity_body, now_ns))
+        frame = self._schedule.pop(now_ns)
+        assert frame is None or isinstance(frame, FeatureFrame)
+        return frame
+
+    def capture(
+        self, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, velocity_body: np.ndarray, stamp_ns: int
+    ) -> FeatureFrame:
+        """What perception would report about a picture taken now; arguments as for `tick`."""
+        self._position[:], self._quaternion[:] = position_ned, quaternion_b_in_i
+        self._look()
+        board = self._board.tolist()
+        found = [(board[at], role, kind, track) for at, role, kind, track in _BOARD_LINES if board[at.start]]
+        found += self._paint_lines(board)
+        a, b, c = self._plane(*board[PLANE])
+        velocity = np.array(velocity_body, float)
+        take = self._normals.take
+        if self._noise:
+            lines = [seen_line(*line, stamp_ns, take(2)) for line in found]
+            velocity += SIGMA_VELOCITY_M_S * np.array(take(3))
+        else:
+            lines = [seen_line(*line, stamp_ns) for line in found]
+        frame = made(
+            FeatureFrame,
+            lines=tuple(lines),
+            plane=(a, b, c, -1.0),
+            stamp_ns=stamp_ns,
+            velocity=velocity,
+            velocity_covariance=_VELOCITY_COVARIANCE,
+            velocity_stamp_ns=stamp_ns,
+        )
+        return add_sigma_vs(frame, self.scene.features.sigma_vs, self._extra) if self._noise else frame
+
+    def _world(self, along: np.ndarray, up: np.ndarray) -> np.ndarray:
+        yz = self._geometry.point(along, up)
+        return np.concatenate((np.zeros((*yz.shape[:-1], 1)), yz), axis=-1)
+
+    def _paint_lines(self, board: list[float]) -> list[_Line]:
+        low, high = self._edges.heights
+        if low > high:
+            return []
+        lines: list[_Line] = []
+        span = self._in_view(board, low, high)
+        for row, left, low, right, high in self._pieces.seen(*span):
+            self._piece[:] = left, low, right, high, 0.5 * (left + right), 0.5 * (low + high) + _ABOVE_M
+            self._look_at_piece()
+            numbers = self._edge.tolist()
+            if numbers[0]:
+                lines.append((numbers, HORIZONTAL, "paint", _FIRST_ROW_TRACK + row))
+        return lines
+
+    def _in_view(self, board: list[float], low: float, high: float) -> tuple[float, float]:
+        """Between which places along the board all in the picture from one height to another lies [m]."""
+        x, _, z, along_x, _, along_z, up_x, _, up_z = board[: PER_METRE.stop]
+        half, first, last = self._half[0], -math.inf, math.inf
+        for sign in (1.0, -1.0):  # half z +- x >= 0, which is linear along the board and up
+            at, rate, rise = half * z + sign * x, half * along_z + sign * along_x, half * up_z + sign * up_x
+            if rate == 0.0:
+                continue
+            meets = -(at + low * rise) / rate, -(at + high * rise) / rate
+            if rate > 0.0:
+                first = max(first, min(meets))
+            else:
+                last = min(last, max(meets))
+        return first, last
+
+    def _plane(self, a: float, b: float, c: float) -> tuple[float, float, float]:
+        if not self._noise:
+            return a, b, c
+        size = math.sqrt(a * a + b * b + c * c)
+        x, y, z, distance = a / size, b / size, c / size, 1.0 / size
+        i, j, k, far = self._normals.take(4)
+        along = x * i + y * j + z * k  # a tilt leaves the length of the normal
+        x, y, z = (n + SIGMA_NORMAL * (tilt - n * along) for n, tilt in ((x, i), (y, j), (z, k)))
+        scale = math.sqrt(x * x + y * y + z * z) * (distance + SIGMA_DISTANCE_M * far)
+        return x / scale, y / scale, z / scale
+
+
+def add_sigma_vs(frame: FeatureFrame, sigma: float, rng: np.random.Generator) -> FeatureFrame:
+    """Add noise to rho [-] and theta [rad] of each line, told to nobody: the covariances stay as they are.
+
+    Args:
+        frame: What perception saw.
+        sigma: Standard deviation, the paper's sigma_vs.
+        rng: Source of the noise.
+    """
+    if sigma <= 0.0:
+        return frame
+    lines = (moved_line(line, *(sigma * rng.standard_normal(2))) for line in frame.lines)
+    return dataclasses.replace(frame, lines=tuple(lines))

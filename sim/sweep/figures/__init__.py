@@ -1,0 +1,5 @@
+"""Figures of a sweep, drawn from its table alone: boxes, heat maps, success-rate maps, what depends on what."""
+
+from sim.sweep.figures.page import write_report
+
+__all__ = ["write_report"]

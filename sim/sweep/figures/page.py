@@ -1,0 +1,123 @@
+"""The report of a sweep: a page with a table, the reasons of what failed, and the figures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import polars as pl
+from matplotlib.figure import Figure as Canvas
+
+from ibvs_qp.config.errors import ConfigError
+from sim.figures.style import law_name, save, styled
+from sim.sweep.figures.boxes import draw_boxes
+from sim.sweep.figures.maps import draw_dependence, draw_figure_maps, draw_success_maps
+from sim.sweep.figures.shown import Figure, chosen_figures, telling, varied
+from sim.sweep.parts import HEAD
+
+#: Parameters in the box plots and in the maps: those on which most depends.
+MOST_BOXES, MOST_MAPS = 4, 3
+#: Reasons of failure that are listed.
+_REASONS = 8
+
+
+def read_table(path: Path) -> tuple[pl.DataFrame, Path]:
+    """The table of a sweep or an experiment, and the folder beside which a report goes.
+
+    Args:
+        path: A Parquet file, or a folder with one or with its parts.
+
+    Raises:
+        ConfigError: When there is no such table.
+    """
+    if path.is_dir():
+        files = sorted(path.glob("*.parquet")) or sorted((path / "parts").glob("part-*.parquet"))
+        folder = path
+    else:
+        files, folder = [path] if path.is_file() else [], path.parent
+    mend = "give the folder or the Parquet file of `ibvs-qp sweep` or `experiment`"
+    if not files:
+        raise ConfigError(f"no table in {path}; {mend}")
+    try:
+        table = pl.concat([pl.read_parquet(file) for file in files], how="diagonal_relaxed")
+    except (pl.exceptions.PolarsError, OSError) as error:
+        raise ConfigError(f"{path} cannot be read: {str(error).splitlines()[0]}; {mend}") from None
+    if missing := {"law", "seed", "completed", "reason"} - set(table.columns):
+        raise ConfigError(f"{path} is no table of flights: it lacks {', '.join(sorted(missing))}; {mend}")
+    if not table.height:
+        raise ConfigError(f"{path} has no rows yet; fly the sweep first")
+    head = [name for name in HEAD if name in table.columns]
+    return table.unique(subset=[name for name in table.columns if name not in ("log",)], maintain_order=True)[
+        [*head, *(name for name in table.columns if name not in head)]
+    ], folder
+
+
+def write_report(table: pl.DataFrame, folder: Path, title: str, wanted: tuple[str, ...] = ()) -> Path:
+    """Draw the figures and write ``report.md``; returns its file.
+
+    Args:
+        table: Rows of flights.
+        folder: Where page and ``figures/`` go.
+        title: Heading.
+        wanted: Figures of merit by column; empty takes the usual ones.
+
+    Raises:
+        ConfigError: On a figure that the table does not have.
+    """
+    figures, columns = chosen_figures(table, wanted), varied(table)
+    lines = [
+        f"# {title}",
+        "",
+        f"{table.height} flights, {table['version'].drop_nulls().max() or 'version unknown'}.",
+        "",
+    ]
+    lines += [*_summary(table, figures), "", *_reasons(table)]
+    with styled():
+        for name, (caption, canvas) in _draw_all(table, figures, columns).items():
+            save(canvas, folder / "figures" / f"{name}.png")
+            lines += [f"## {caption}", "", f"![{caption}](figures/{name}.png)", ""]
+    page = folder / "report.md"
+    page.write_text("\n".join(lines).rstrip() + "\n", encoding="utf-8")
+    return page
+
+
+def _draw_all(table: pl.DataFrame, figures: list[Figure], columns: list[str]) -> dict[str, tuple[str, Canvas]]:
+    drawn: dict[str, tuple[str, Canvas]] = {}
+    if not columns:
+        return drawn
+    boxed = telling(table, figures, columns, MOST_BOXES)
+    mapped = telling(table, figures, columns, MOST_MAPS)
+    which = "" if len(mapped) == len(columns) else f", the {len(mapped)} parameters on which most depends"
+    drawn["success"] = (f"Share of flights that ended as planned{which}", draw_success_maps(table, mapped))
+    for figure in figures:
+        drawn[f"boxes-{figure.column}"] = (f"{figure.words.capitalize()}: boxes", draw_boxes(table, figure, boxed))
+        drawn[f"map-{figure.column}"] = (
+            f"{figure.words.capitalize()}: medians{which}", draw_figure_maps(table, figure, mapped)
+        )  # fmt: skip
+    if len(columns) > 1 and (canvas := draw_dependence(table, figures, columns)) is not None:
+        drawn["dependence"] = ("What depends on what: rank correlation", canvas)
+    return drawn
+
+
+def _summary(table: pl.DataFrame, figures: list[Figure]) -> list[str]:
+    heads = ["law", "flights", "ended as planned", *(f"{figure.label}: median (5 % to 95 %)" for figure in figures)]
+    lines = ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
+    for law in table["law"].unique(maintain_order=True):
+        rows = table.filter(pl.col("law") == law)
+        cells = [law_name(law), str(rows.height), f"{100.0 * float(rows['completed'].mean()):.1f} %"]  # type: ignore[arg-type]
+        for figure in figures:
+            values = figure.scale * rows[figure.column].drop_nulls().drop_nans()
+            low, middle, high = (values.quantile(share, "linear") for share in (0.05, 0.5, 0.95))
+            cells.append("–" if middle is None else f"{middle:.3g} ({low:.3g} to {high:.3g})")
+        lines.append("| " + " | ".join(cells) + " |")
+    return lines
+
+
+def _reasons(table: pl.DataFrame) -> list[str]:
+    failed = table.filter(~pl.col("completed"))
+    if not failed.height:
+        return []
+    counted = failed.group_by("law", "reason").len().sort("len", "law", "reason", descending=[True, False, False])
+    lines = ["| did not end as planned | law | flights |", "|---|---|---|"]
+    lines += [f"| {reason} | {law_name(law)} | {count} |" for law, reason, count in counted.head(_REASONS).rows()]
+    hidden = counted.height - _REASONS
+    return [*lines, *([f"| {hidden} further reasons | | |"] if hidden > 0 else []), ""]

@@ -1,0 +1,1 @@
+"""The true world: board, wall, wind, vehicle and contact in MuJoCo, and the canvas that is painted."""

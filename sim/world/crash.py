@@ -1,0 +1,36 @@
+"""What ends a flight: a propeller at the wall, the ground, a flip, or numbers that are none."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from sim.world.clearance import PropellerClearance
+
+#: A vehicle whose origin is lower than this has hit the ground [m]: legs and half a tilted frame.
+GROUND_CLEARANCE_M = 0.15
+
+#: Tilt at which a vehicle counts as flipped [deg].
+FLIP_DEG = 60.0
+
+#: The same as the least cosine of the tilt.
+FLIP_COSINE = math.cos(math.radians(FLIP_DEG))
+
+
+def crash_reason(
+    position: Sequence[float], rotation: Sequence[Sequence[float]], clearance: PropellerClearance
+) -> str | None:
+    """Why a vehicle at this pose has crashed, or None; plain floats, it is asked every tick.
+
+    Args:
+        position: Body origin, world NED [m], (3,).
+        rotation: Rows of the rotation B to I, (3, 3).
+        clearance: Its propeller discs before board and wall.
+    """
+    if not math.isfinite(sum(position) + sum(map(sum, rotation))):
+        return "non-finite state"
+    if rotation[2][2] < FLIP_COSINE:
+        return f"flip: tilted by more than {FLIP_DEG:g} deg"
+    if position[2] > -GROUND_CLEARANCE_M:
+        return "hit the ground"
+    return "propeller strike" if clearance.strikes(position, rotation) else None

@@ -1,0 +1,183 @@
+"""The simulated world as MuJoCo model, generated from the vehicle's parameters and the scene's truth.
+
+Body frame: origin at the ASSUMED centre of mass, axes front-left-up. The vehicle is one body without its tool, and
+the tool beyond the force/torque sensor is a rigid child, so that the sensor reads exactly the tool's load; together
+they have the scene's mass, centre of mass and inertia. World: x into the wall, y left, z up; the board's face is
+the plane x = 0, its bottom left corner lies at y = 0 (see `sim.world.board`).
+"""
+
+# MuJoCo's bindings carry no types.
+# pyright: reportAttributeAccessIssue=false
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from ibvs_qp.config.vehicle import VehicleParams
+from ibvs_qp.frames import GRAVITY
+from sim.world.contact import OPTION_XML, pair_xml, set_contact
+from sim.world.mujoco_frames import FLIP, quaternion_of_axes
+from sim.world.rigid_body import RigidBody, bare_body, principal_axes, tool_body
+from sim.world.scene import Scene
+
+#: Radius of the tip's contact sphere [m]; its foremost point is the tip. Small: the contact point stays at the tip.
+TIP_RADIUS_M = 0.005
+
+#: Thickness of the board drawn [m].
+BOARD_THICKNESS_M = 0.004
+
+#: Physics steps of 1 ms in one control tick; MuJoCo remembers what its sensors read at each of them.
+STEPS_PER_TICK = 4
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModelIds:
+    """Where things are in the compiled model.
+
+    Attributes:
+        vehicle: Body of the vehicle without tool.
+        tool: Body of the tool.
+        accelerometer: Slice of ``sensordata``: specific force at the body origin, front-left-up [m/s^2].
+        force: Slice: force of the vehicle on the tool, front-left-up [N].
+        torque: Slice: the moment at the force/torque sensor [N m].
+        contact: Slice: found flag, then force (normal, tangents) and the normal and first tangent axes.
+        remembered: Where in ``history`` the samples of those four sensors at the steps of a tick begin, oldest first.
+    """
+
+    vehicle: int
+    tool: int
+    accelerometer: slice
+    force: slice
+    torque: slice
+    contact: slice
+    remembered: tuple[int, int, int, int]
+
+
+def _numbers(*values: float | np.ndarray) -> str:
+    return " ".join(f"{float(entry):.17g}" for value in values for entry in np.atleast_1d(value))
+
+
+def _inertial_xml(body: RigidBody) -> str:
+    moments, quaternion = principal_axes(body)
+    return (
+        f'<inertial mass="{_numbers(body.mass)}" pos="{_numbers(FLIP * body.centre)}" quat="{_numbers(quaternion)}" '
+        f'diaginertia="{_numbers(np.maximum(moments, 1e-9))}"/>'
+    )
+
+
+def _rotors_xml(vehicle: VehicleParams) -> tuple[str, str, str]:
+    """Rotor sites (z = thrust axis), their actuators (force along z, drag torque against the spin), and their discs."""
+    geometry = vehicle.geometry
+    sites, actuators, discs = [], [], []
+    for name, position, axis, spin in zip(
+        geometry.names, geometry.positions, geometry.axes, geometry.spins, strict=True
+    ):
+        up, place = FLIP * axis, FLIP * position
+        side = np.cross(up, [1.0, 0.0, 0.0])
+        side /= np.linalg.norm(side)
+        quaternion = quaternion_of_axes(np.column_stack((np.cross(side, up), side, up)))
+        frame = f'pos="{_numbers(place)}" quat="{_numbers(quaternion)}"'
+        sites.append(f'<site name="{name}" {frame} size="0.01"/>')
+        size = _numbers(vehicle.propeller_radius_m, 0.004)
+        discs.append(
+            f'<geom type="cylinder" size="{size}" {frame} contype="0" conaffinity="0" rgba=".2 .2 .2 .4" mass="0"/>'
+        )
+        actuators.append(
+            f'<general name="{name}" site="{name}" dyntype="filterexact" dynprm="{_numbers(vehicle.motor_lag_up_s)}" '
+            f'gainprm="1" gear="0 0 1 0 0 {_numbers(-spin * geometry.torque_ratio_m)}"/>'
+        )
+    return "\n".join(sites), "\n".join(actuators), "\n".join(discs)
+
+
+def _surroundings_xml(scene: Scene) -> str:
+    """Board and wall, for pictures only."""
+    board, slope = scene.board, math.radians(scene.board.slope_deg)
+    along, up = np.array([0, -math.cos(slope), -math.sin(slope)]), np.array([0, -math.sin(slope), math.cos(slope)])
+    centre = np.array([0.5 * BOARD_THICKNESS_M, 0, board.bottom_m]) + 0.5 * (
+        board.width_m * along + board.height_m * up
+    )
+    half = _numbers(0.5 * board.width_m, 0.5 * board.height_m, 0.5 * BOARD_THICKNESS_M)
+    board_colour = _numbers(np.array(board.color) / 255.0, 1.0)
+    wall_colour = _numbers(np.array(scene.wall.color) / 255.0, 1.0)
+    return f"""<geom name="board" type="box" pos="{_numbers(centre)}" xyaxes="{_numbers(along, up)}" size="{half}"
+      rgba="{board_colour}" contype="0" conaffinity="0"/>
+    <geom name="wall" type="box" pos="{_numbers(board.gap_m + 0.5, 0, 0)}" size="0.5 20 20" rgba="{wall_colour}"
+      contype="0" conaffinity="0"/>"""
+
+
+def build_xml(scene: Scene, vehicle: VehicleParams, drawn: bool = True) -> str:
+    """MJCF text of the world; contact numbers follow after compilation, see `build_model`.
+
+    The contact plane is infinite: a box would push the tip out sideways near its rim and bound the penetration.
+    """
+    sites, actuators, discs = _rotors_xml(vehicle)
+    tip, sensor = FLIP * vehicle.tip_position_m, FLIP * vehicle.force_torque_position_m
+    sphere = tip - np.array([TIP_RADIUS_M, 0.0, 0.0])
+    ends, radius = _numbers(sensor, sphere), _numbers(vehicle.arm_radius_m)
+    shape = f'name="arm" type="capsule" fromto="{ends}" size="{radius}"'
+    arm = f'<geom {shape} contype="0" conaffinity="0" rgba=".1 .1 .1 1"/>'
+    # Nothing collides with what is there for pictures only, but MuJoCo would place it at every step.
+    surroundings, discs, arm = (_surroundings_xml(scene), discs, arm) if drawn else ("", "", "")
+    return f"""<mujoco model="ibvs_qp">
+  <compiler angle="radian" balanceinertia="true" autolimits="true"/>
+  {OPTION_XML.format(gravity=_numbers(GRAVITY))}
+  <statistic extent="1"/>
+  <worldbody>
+    <geom name="face" type="plane" size="0 0 1" zaxis="-1 0 0" contype="0" conaffinity="0" group="3"/>
+    {surroundings}
+    <body name="vehicle">
+      <freejoint/>
+      {_inertial_xml(bare_body(scene, vehicle))}
+      <site name="imu"/>
+      {sites}
+      {discs}
+      <body name="tool">
+        {_inertial_xml(tool_body(vehicle))}
+        <site name="force_torque" pos="{_numbers(sensor)}"/>
+        {arm}
+        <geom name="tip" type="sphere" pos="{_numbers(sphere)}" size="{_numbers(TIP_RADIUS_M)}" contype="0"
+          conaffinity="0"/>
+      </body>
+    </body>
+  </worldbody>
+  {pair_xml("tip", "face")}
+  <actuator>{actuators}</actuator>
+  <sensor>
+    <accelerometer name="accelerometer" site="imu" nsample="{STEPS_PER_TICK}"/>
+    <force name="force" site="force_torque" nsample="{STEPS_PER_TICK}"/>
+    <torque name="torque" site="force_torque" nsample="{STEPS_PER_TICK}"/>
+    <contact name="contact" geom1="tip" geom2="face" num="1" data="found force normal tangent"
+      nsample="{STEPS_PER_TICK}"/>
+  </sensor>
+</mujoco>"""
+
+
+def build_model(scene: Scene, vehicle: VehicleParams, drawn: bool = True) -> tuple[mujoco.MjModel, ModelIds]:
+    """Compile the world.
+
+    Args:
+        scene: The truth.
+        vehicle: Geometry and nominal parameters.
+        drawn: Whether to put in what is there for pictures only; it moves as well without, sooner.
+
+    Raises:
+        ConfigError: When vehicle and tool cannot make up the scene's mass and inertia.
+    """
+    model = mujoco.MjModel.from_xml_string(build_xml(scene, vehicle, drawn))
+    ids = {name: mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name) for name in ("vehicle", "tool")}
+    # The compiler evens out moments that break the triangle inequality; the scene's numbers are meant literally.
+    model.body_inertia[ids["vehicle"]] = principal_axes(bare_body(scene, vehicle))[0]
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+    wall = scene.wall
+    set_contact(model, stiffness=wall.stiffness_n_m, damping=wall.damping_n_s_m, friction=wall.friction)
+    slices, remembered = {}, []
+    for name in ("accelerometer", "force", "torque", "contact"):
+        sensor = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SENSOR, name)
+        start = int(model.sensor_adr[sensor])
+        slices[name] = slice(start, start + int(model.sensor_dim[sensor]))
+        # A ring of samples behind two numbers of MuJoCo's own and the stamps; whole ticks leave its oldest first.
+        remembered.append(int(model.sensor_historyadr[sensor]) + 2 + STEPS_PER_TICK)
+    return model, ModelIds(**ids, **slices, remembered=tuple(remembered))

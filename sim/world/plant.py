@@ -1,0 +1,147 @@
+"""The truth: vehicle, air and contact, advanced one control tick at a time; NED and FRD on every face."""
+
+# MuJoCo's bindings carry no types.
+# pyright: reportAttributeAccessIssue=false
+from __future__ import annotations
+
+import math
+import struct
+
+import mujoco
+import numpy as np
+
+from ibvs_qp.config.vehicle import VehicleParams
+from ibvs_qp.model.bound_function import BoundFunction
+from ibvs_qp.model.machine_code import machine_code
+from sim.world.board import BoardGeometry
+from sim.world.clearance import PropellerClearance
+from sim.world.crash import crash_reason
+from sim.world.mjcf import STEPS_PER_TICK, build_model
+from sim.world.mujoco_frames import FLIP, FLIP_QUATERNION
+from sim.world.random_streams import stream
+from sim.world.readings import PlantReadings
+from sim.world.readout import PLACES, SIZE, drive, readout
+from sim.world.scene import Scene
+from sim.world.step_clock import stop_step_clock
+from sim.world.trim import hover_thrusts, start_pose, true_limits
+from sim.world.wind import Wind
+
+#: The control tick in nanoseconds.
+TICK_NS = 4_000_000
+
+#: End of a flight whose controller commands something that is no number; physics stands still from then on.
+NOT_FINITE = "non-finite thrust command"
+_SAFE = PLACES["safe"].start
+_put_three = struct.Struct("3d").pack_into
+
+
+class Plant(PlantReadings):
+    """The simulated vehicle in its scene.
+
+    The body frame has its origin at the ASSUMED centre of mass (positions of `VehicleParams`); the true one lies
+    ``scene.vehicle.com_offset_m`` away. Starts level and at rest with the rotors at hover, at the scene's start pose
+    varied by the seed. Same scene, seed and thrusts: same bits.
+
+    Attributes:
+        time_ns: Simulated time since the start [ns].
+        crashed: Why the flight is over (propeller strike, ground, flip, non-finite state), or None.
+        wind: The air; its mean may be changed in flight.
+        truth: What can be read of it now, laid out as `sim.world.readout.PLACES`; neither to be kept nor written.
+
+    Args:
+        scene: The truth.
+        vehicle: Geometry and nominal parameters.
+        seed: Varies start pose and gusts.
+        to_machine_code: Whether a C compiler translates the arithmetic around the physics; the same bits, sooner.
+        drawn: Whether MuJoCo's model holds what a window shows; likewise.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        vehicle: VehicleParams | None = None,
+        seed: int = 0,
+        to_machine_code: bool = False,
+        drawn: bool = True,
+    ) -> None:
+        self._translate = machine_code if to_machine_code else lambda function: function
+        self.scene, self.vehicle = scene, vehicle or VehicleParams()
+        stop_step_clock()
+        self.model, self._ids = build_model(scene, self.vehicle, drawn)
+        self.data = mujoco.MjData(self.model)
+        self._lower, self._upper = true_limits(scene, self.vehicle)
+        self.clearance = PropellerClearance(BoardGeometry(scene), self.vehicle)
+        drag = self.vehicle.linear_drag_n_s_m
+        self.wind = Wind(scene.wind, drag, TICK_NS * 1e-9, stream(seed, "wind"))
+        self.time_ns = 0
+        self.crashed: str | None = None
+        self._bind()
+        self._start(*start_pose(scene, self.vehicle, seed), hover_thrusts(scene, self.vehicle))
+
+    def _bind(self) -> None:
+        """Compiled arithmetic on MuJoCo's own memory: fetching its arrays each time costs more than reading them."""
+        model, data, ids, truth = self.model, self.data, self._ids, self.scene.vehicle
+        self._act = data.act
+        centre = np.array(truth.com_offset_m)
+        points = np.concatenate((centre, self.vehicle.tip_position_m, [self.clearance.reach]))
+        self.truth = np.zeros(SIZE)
+        self._centre_velocity = self.truth[PLACES["centre_velocity"]]
+        self._read = BoundFunction(
+            self._translate(readout(model.nhistory, *ids.remembered, STEPS_PER_TICK)),
+            (data.qpos, data.qvel, data.history, points),
+            (self.truth,),
+        )
+        self._wanted, self._air, self._lags = np.zeros(model.nu), np.zeros(3), np.zeros(model.nu)
+        self._air_memory = self._air.data
+        self._lag = model.actuator_dynprm[:, 0]
+        lags = np.array((truth.motor_lag_up_s, truth.motor_lag_down_s))
+        # Moment arm from the bare vehicle's centre of mass, where MuJoCo applies forces, to the whole one's.
+        arm = centre - FLIP * model.body_ipos[ids.vehicle]
+        self._drive = BoundFunction(
+            self._translate(drive(model.nu)),
+            (self._wanted, self._lower, self._upper, data.act, lags, self._air, self.truth[PLACES["rotation"]], arm),
+            (data.ctrl, self._lags, data.xfrc_applied[ids.vehicle]),
+        )
+
+    def _start(self, position: np.ndarray, yaw: float, thrusts: np.ndarray) -> None:
+        self.data.qpos[:3] = FLIP * position
+        self.data.qpos[3:7] = FLIP_QUATERNION * (math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw))
+        self.data.act[:] = self.data.ctrl[:] = thrusts
+        mujoco.mj_forward(self.model, self.data)
+        ids, sensed, history = self._ids, self.data.sensordata, self.data.history
+        for start, place in zip(ids.remembered, (ids.accelerometer, ids.force, ids.torque, ids.contact), strict=True):
+            now = sensed[place]
+            history[start : start + STEPS_PER_TICK * len(now)] = np.tile(now, STEPS_PER_TICK)
+        self._refresh()
+
+    def _refresh(self) -> None:
+        """Read the state; once per tick."""
+        self._read()
+
+    def step(self, thrusts: np.ndarray) -> None:
+        """Advance one control tick of 4 ms under constant commanded thrusts.
+
+        Args:
+            thrusts: Commanded thrusts [N], (n,); clipped to the true limits. One that is no number ends the flight.
+        """
+        if self.crashed == NOT_FINITE or not math.isfinite(sum(thrusts.tolist())):
+            self.crashed, self.time_ns = self.crashed or NOT_FINITE, self.time_ns + TICK_NS
+            return
+        self._wanted[:] = thrusts
+        _put_three(self._air_memory, 0, *self.wind.force(self._centre_velocity.tolist()))
+        self._drive.evaluate()
+        self._lag[:] = self._lags
+        mujoco.mj_step(self.model, self.data, STEPS_PER_TICK)
+        self.time_ns += TICK_NS
+        self._read.evaluate()
+        if self.truth.item(_SAFE) != 1.0 and self.crashed is None:
+            self.crashed = crash_reason(self.position.tolist(), self.rotation.tolist(), self.clearance)
+
+    @property
+    def thrust_limits(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper limits of the real rotors now [N], (n,) each; a fault may set new ones."""
+        return self._lower.copy(), self._upper.copy()
+
+    @thrust_limits.setter
+    def thrust_limits(self, limits: tuple[np.ndarray, np.ndarray]) -> None:
+        self._lower[:], self._upper[:] = limits

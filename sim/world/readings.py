@@ -1,0 +1,102 @@
+"""What can be read of the plant at a control tick: truth, in NED and FRD."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ibvs_qp.config.vehicle import VehicleParams
+from ibvs_qp.vectors import cross_product, turned
+from sim.world.clearance import PropellerClearance
+from sim.world.readout import MOTION, PLACES
+from sim.world.scene import Scene
+
+_PUSH, _TIP = PLACES["pushes"].stop - 1, PLACES["tip"]
+
+
+def _reading(name: str, text: str) -> property:
+    """A reading as an array of the reader's own."""
+    place = PLACES[name]
+    return property(lambda plant: plant.truth[place].copy(), doc=text)
+
+
+class PlantReadings:
+    """Pose, motion, forces and contact of a plant, each an array of the reader's own."""
+
+    truth: np.ndarray
+    scene: Scene
+    vehicle: VehicleParams
+    clearance: PropellerClearance
+    _act: np.ndarray
+
+    position = _reading("position", "Body origin (assumed centre of mass), world NED [m], (3,).")
+    quaternion = _reading("quaternion", "Attitude (w, x, y, z) of B in I, (4,).")
+    velocity = _reading("body_velocity", "Velocity of the body origin in B [m/s], (3,).")
+    angular_velocity = _reading("rate", "Angular velocity in B [rad/s], (3,).")
+    tip = _reading("tip", "Undeformed tip, world NED [m], (3,); x > 0 is the penetration.")
+    specific_force = _reading(
+        "felt", "What a perfect accelerometer at the body origin reads, mean over the last tick, FRD [m/s^2], (3,)."
+    )
+    ft_wrench = _reading(
+        "ft_wrench",
+        "Perfect force/torque sensor: vehicle on tool, at the sensor, FRD, at the last physics step [N, N m], (6,).",
+    )
+    contact_1khz = _reading("pushes", "Normal contact force at the four physics steps of the last tick [N], (4,).")
+    contact_friction = _reading("friction", "Force of the board on the tip along it, world NED (y, z) [N], (2,).")
+
+    @property
+    def motion(self) -> np.ndarray:
+        """Position (3) and velocity (3) in the world [m, m/s], quaternion (4), rate in B (3) [rad/s], (13,)."""
+        return self.truth[MOTION].copy()
+
+    @property
+    def rotation(self) -> np.ndarray:
+        """Rotation B to I, (3, 3)."""
+        return self.truth[PLACES["rotation"]].reshape(3, 3).copy()
+
+    @property
+    def centre_of_mass(self) -> np.ndarray:
+        """True centre of mass, world NED [m], (3,)."""
+        return self.position + self.rotation @ np.array(self.scene.vehicle.com_offset_m)
+
+    @property
+    def euler(self) -> np.ndarray:
+        """Roll, pitch, yaw [rad], (3,); yaw 0 faces the wall, + to the right."""
+        (forward_x, _, _), (forward_y, _, _), (forward_z, right_z, down_z) = self.rotation.tolist()
+        pitch = math.asin(max(-1.0, min(1.0, -forward_z)))
+        return np.array([math.atan2(right_z, down_z), pitch, math.atan2(forward_y, forward_x)])
+
+    @property
+    def tip_velocity(self) -> np.ndarray:
+        """Velocity of the tip, world NED [m/s], (3,)."""
+        swing = cross_product(self.angular_velocity.tolist(), self.vehicle.tip_position_m)
+        world = self.truth[PLACES["velocity"]]
+        (a, b, c) = self.rotation.tolist()
+        return world + turned((tuple(a), tuple(b), tuple(c)), swing)
+
+    @property
+    def tip_on_wall(self) -> tuple[float, float]:
+        """World (y, z) of the tip [m] as plain numbers."""
+        _, y, z = self.truth[_TIP].tolist()
+        return y, z
+
+    @property
+    def thrusts_actual(self) -> np.ndarray:
+        """Thrusts after the motor lag [N], (n,)."""
+        return self._act.copy()
+
+    @property
+    def motor_thrusts(self) -> np.ndarray:
+        """`thrusts_actual` as MuJoCo holds it: not to be kept nor written."""
+        return self._act
+
+    @property
+    def contact_normal_force(self) -> float:
+        """Normal contact force now [N], >= 0; pushing is positive."""
+        return self.truth.item(_PUSH)
+
+    @property
+    def propeller_clearance(self) -> float:
+        """Smallest distance of any propeller disc to the board's face or, beside the board, to the wall [m]."""
+        return self.clearance.distance(self.position, self.rotation)

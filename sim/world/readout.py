@@ -1,0 +1,131 @@
+"""The plant's arithmetic as compiled functions: what can be read after a tick, and what goes in before one.
+
+Written with symbols once, evaluated where MuJoCo keeps its numbers: one call instead of a hundred small steps.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import Any
+
+import casadi as ca
+
+from ibvs_qp.vectors import cross_product, rotation_rows, turned, turned_back
+from sim.world.crash import FLIP_COSINE, GROUND_CLEARANCE_M
+
+#: What `readout` yields and how many numbers each has; arrays in NED and FRD.
+READINGS = {
+    "position": 3,  # of the body origin, world [m]
+    "velocity": 3,  # of the body origin, world [m/s]
+    "quaternion": 4,
+    "rate": 3,  # in B [rad/s]
+    "rotation": 9,  # B to I, row by row
+    "body_velocity": 3,  # in B [m/s]
+    "centre_velocity": 3,  # of the true centre of mass, world [m/s]
+    "tip": 3,  # world [m]
+    "felt": 3,  # specific force in B, mean of the tick [m/s^2]
+    "ft_wrench": 6,  # vehicle on tool, FRD, at the last physics step [N, N m]
+    "pushes": 4,  # normal contact force at every physics step [N]
+    "friction": 2,  # on the tip, world (y, z), at the last physics step [N]
+    "safe": 1,  # 1 where no crash is possible
+}
+_STARTS = [sum(list(READINGS.values())[:index]) for index in range(len(READINGS) + 1)]
+#: Where each reading lies; the first four are the motion, 13 numbers.
+PLACES = {name: slice(*_STARTS[index : index + 2]) for index, name in enumerate(READINGS)}
+MOTION = slice(0, PLACES["rate"].stop)
+SIZE = _STARTS[-1]
+#: A sum that is no number, or none to speak of, is above this.
+_FINITE = 1e300
+
+
+def _entries(symbol: ca.SX) -> list[Any]:
+    """Entries of a symbol; of any type, so that they go where plain numbers go."""
+    return [symbol[index] for index in range(symbol.numel())]
+
+
+@functools.lru_cache(maxsize=8)
+def readout(size: int, accelerometer: int, force: int, torque: int, contact: int, steps: int) -> ca.Function:
+    """Function of (qpos, qvel, history, points) yielding `READINGS`.
+
+    Args:
+        size: Numbers of ``history``, MuJoCo's memory of what its sensors read at every physics step.
+        accelerometer: Where its samples begin, three numbers each, oldest first; likewise force, torque and contact
+            (ten numbers: found, force, normal, tangent).
+        force: See there.
+        torque: See there.
+        contact: See there.
+        steps: Physics steps in a tick.
+
+    Points are the true centre of mass (3) and the tip (3) in B [m], and how far forward of the origin anything of the
+    vehicle but the tool reaches [m].
+    """
+    place, speed = ca.SX.sym("qpos", 7), ca.SX.sym("qvel", 6)
+    history, points = ca.SX.sym("history", size), ca.SX.sym("points", 7)
+
+    def sensed(start: int, width: int, step: int) -> list[Any]:
+        begin = start + width * (step % steps)
+        return _entries(history[begin : begin + width])
+
+    x, y, z, qw, qx, qy, qz = _entries(place)
+    vx, vy, vz, wx, wy, wz = _entries(speed)
+    position, quaternion = (x, -y, -z), (qw, qx, -qy, -qz)
+    velocity, rate = (vx, -vy, -vz), (wx, -wy, -wz)
+    rotation = rotation_rows(*quaternion)
+    numbers = _entries(points)
+    centre, tip, reach = numbers[:3], numbers[3:6], numbers[6]
+    swing = turned(rotation, cross_product(rate, centre))
+    felts = zip(*(sensed(accelerometer, 3, step) for step in range(steps)), strict=True)
+    felt = [sum(samples[1:], samples[0]) for samples in felts]
+    share = 1.0 / steps
+    fx, fy, fz, mx, my, mz = (*sensed(force, 3, -1), *sensed(torque, 3, -1))
+    touches = [sensed(contact, 10, step) for step in range(steps)]
+    pushes = [ca.if_else(touch[0] > 0.0, touch[1], 0.0) for touch in touches]
+    found, _, first, second, *axes = touches[-1]
+    (_, ty, tz), (_, sy, sz) = axes[3:6], cross_product(axes[:3], axes[3:6])
+    # Minus the force on the board, in NED: the two signs of y and z cancel.
+    friction = [ca.if_else(found < 1.0, 0.0, value) for value in (first * ty + second * sy, first * tz + second * sz)]
+    total = sum(position[1:], position[0]) + sum(sum(row[1:], row[0]) for row in rotation)
+    upright, high = rotation[2][2] >= FLIP_COSINE, position[2] <= -GROUND_CLEARANCE_M
+    safe = ca.logic_and(ca.logic_and(upright, high), ca.logic_and(position[0] + reach <= 0.0, ca.fabs(total) < _FINITE))
+    values = {
+        "position": position,
+        "velocity": velocity,
+        "quaternion": quaternion,
+        "rate": rate,
+        "rotation": [entry for row in rotation for entry in row],
+        "body_velocity": turned_back(rotation, velocity),
+        "centre_velocity": [a + b for a, b in zip(velocity, swing, strict=True)],
+        "tip": [a + b for a, b in zip(position, turned(rotation, tip), strict=True)],
+        "felt": (share * felt[0], -share * felt[1], -share * felt[2]),
+        "ft_wrench": (fx, -fy, -fz, mx, -my, -mz),
+        "pushes": pushes,
+        "friction": friction,
+        "safe": (safe,),
+    }
+    row = ca.vertcat(*(entry for name in READINGS for entry in values[name]))
+    return ca.Function("readout", [place, speed, history, points], [ca.densify(row)])
+
+
+@functools.lru_cache(maxsize=8)
+def drive(rotors: int) -> ca.Function:
+    """What goes into MuJoCo before a tick, as a function of what is wanted and of the air.
+
+    Of (wanted, lower, upper, actual thrusts, lags, air, rotation, arm) it yields the commanded thrusts [N], the time
+    constant of every rotor [s], and force and moment of the air, front-left-up [N, N m]. ``air`` is its force at the
+    true centre of mass in the world [N], ``arm`` the way there from the bare vehicle's centre of mass, where MuJoCo
+    applies forces, in B [m]. Under a constant command a first-order lag never crosses it, so one choice between the
+    lags up and down holds for the tick.
+    """
+    wanted, lower, upper, actual = (ca.SX.sym(name, rotors) for name in ("wanted", "lower", "upper", "actual"))
+    lags, air, rotation, arm = ca.SX.sym("lags", 2), ca.SX.sym("air", 3), ca.SX.sym("rotation", 9), ca.SX.sym("arm", 3)
+    command = ca.fmin(ca.fmax(wanted, lower), upper)
+    lag = ca.vertcat(*(ca.if_else(command[index] >= actual[index], lags[0], lags[1]) for index in range(rotors)))
+    a, b, c, d, e, f, g, h, i = _entries(rotation)
+    rows = (a, b, c), (d, e, f), (g, h, i)
+    force = tuple(_entries(air))
+    mx, my, mz = turned(rows, cross_product(_entries(arm), turned_back(rows, force)))
+    fx, fy, fz = force
+    applied = ca.vertcat(fx, -fy, -fz, mx, -my, -mz)
+    return ca.Function(
+        "drive", [wanted, lower, upper, actual, lags, air, rotation, arm], [command, lag, ca.densify(applied)]
+    )

@@ -1,0 +1,180 @@
+"""A scene: board, wall, paint job, start, and the plant's truth, as one TOML file (unknown key = error)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ibvs_qp.config.settings import load_toml, setting, validate
+from ibvs_qp.config.vehicle import VehicleParams
+
+Color = tuple[int, int, int]
+
+
+class _Checked:
+    """A settings section that refuses values out of range at construction."""
+
+    def __post_init__(self) -> None:
+        """Validate every field."""
+        validate(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class BoardScene(_Checked):
+    """The board that is painted, in front of the wall."""
+
+    width_m: float = setting(1.40, "width of the board", unit="m", low=0.2, high=20.0)
+    height_m: float = setting(0.60, "height of the board", unit="m", low=0.1, high=10.0)
+    bottom_m: float = setting(1.20, "height of the bottom edge above the ground", unit="m", low=0.5, high=50.0)
+    slope_deg: float = setting(
+        0.0, "turn in its own plane, + clockwise as the camera sees it", unit="deg", low=-10.0, high=10.0
+    )
+    gap_m: float = setting(0.05, "distance of the board's face in front of the wall", unit="m", low=0.005, high=1.0)
+    color: Color = setting((236, 236, 230), "board colour", low=0, high=255)
+    clutter: int = setting(4, "distracting objects on and around the board", low=0, high=100)
+    texture_seed: int = setting(0, "seed of textures and clutter, mixed with the flight's seed", low=0, high=2**31 - 1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class WallScene(_Checked):
+    """The wall and the contact between brush and board."""
+
+    color: Color = setting((150, 120, 100), "wall colour", low=0, high=255)
+    texture_seed: int = setting(0, "seed of the wall texture", low=0, high=2**31 - 1)
+    friction: float = setting(0.3, "Coulomb friction of the brush", low=0.0, high=1.5)
+    stiffness_n_m: float = setting(1500.0, "contact stiffness of brush and board", unit="N/m", low=200.0, high=50000.0)
+    damping_n_s_m: float = setting(30.0, "contact damping of brush and board", unit="N s/m", low=0.0, high=500.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PaintScene(_Checked):
+    """The paint job; known to the painting strategy."""
+
+    color: Color = setting((40, 90, 200), "paint colour", low=0, high=255)
+    brush_width_m: float = setting(0.08, "diameter of the round brush", unit="m", low=0.02, high=0.3)
+    edge_margin_m: float = setting(0.05, "brush centre to the guiding or stopping edge", unit="m", low=0.01, high=0.5)
+    rows: int = setting(2, "number of rows", low=1, high=20)
+    stroke_m: float = setting(1.30, "length of every row", unit="m", low=0.1, high=20.0)
+    overlap_m: float = setting(0.008, "overlap of neighbouring rows", unit="m", low=0.0, high=0.1)
+    speed_m_s: float = setting(0.10, "painting speed", unit="m/s", low=0.01, high=0.5)
+    push_n: float = setting(5.0, "push force", unit="N", low=0.5, high=40.0)
+
+    @property
+    def pitch_m(self) -> float:
+        """Distance between rows: brush width minus overlap [m]."""
+        return self.brush_width_m - self.overlap_m
+
+
+@dataclass(frozen=True, kw_only=True)
+class StartScene(_Checked):
+    """Start pose as offsets from facing the right end of row 1."""
+
+    distance_m: float = setting(0.45, "tip to board", unit="m", low=0.15, high=2.0)
+    right_m: float = setting(0.0, "offset to the right", unit="m", low=-0.5, high=0.5)
+    down_m: float = setting(0.0, "offset downwards", unit="m", low=-0.5, high=0.5)
+    yaw_deg: float = setting(0.0, "yaw away from the wall normal, + to the right", unit="deg", low=-20.0, high=20.0)
+
+
+_NOMINAL = VehicleParams()
+
+
+@dataclass(frozen=True, kw_only=True)
+class VehicleScene(_Checked):
+    """The plant's truth about the vehicle; never told to the controller."""
+
+    mass_kg: float = setting(_NOMINAL.mass_kg, "all-up mass", unit="kg", low=2.0, high=20.0)
+    inertia_kg_m2: tuple[float, float, float] = setting(
+        _NOMINAL.inertia_kg_m2, "principal inertia", unit="kg m^2", low=0.01, high=10.0
+    )
+    com_offset_m: tuple[float, float, float] = setting(
+        (0.0, 0.0, 0.0), "true centre of mass from the assumed one, FRD", unit="m", low=-0.1, high=0.1
+    )
+    thrust_min_n: float | tuple[float, ...] = setting(
+        _NOMINAL.thrust_min_n, "idle thrust", unit="N", low=0.0, high=100.0
+    )
+    thrust_max_n: float | tuple[float, ...] = setting(
+        _NOMINAL.thrust_max_n, "full thrust", unit="N", low=0.0, high=100.0
+    )
+    motor_lag_up_s: float = setting(_NOMINAL.motor_lag_up_s, "lag of rising thrust", unit="s", low=0.001, high=0.5)
+    motor_lag_down_s: float = setting(_NOMINAL.motor_lag_down_s, "lag of falling thrust", unit="s", low=0.001, high=0.5)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CameraScene(_Checked):
+    """The RGB-D camera."""
+
+    width: int = setting(640, "picture width", unit="px", low=160, high=1920)
+    height: int = setting(480, "picture height", unit="px", low=120, high=1080)
+    vertical_fov_deg: float = setting(42.0, "vertical field of view", unit="deg", low=20.0, high=100.0)
+    rate_hz: float = setting(30.0, "frame rate", unit="Hz", low=5.0, high=120.0)
+    latency_s: float = setting(0.060, "capture to delivery", unit="s", low=0.0, high=0.3)
+    depth_noise_relative: float = setting(0.005, "white and correlated depth noise per depth", low=0.0, high=0.05)
+    mount_error_m: tuple[float, float, float] = setting(
+        (0.0, 0.0, 0.0), "true camera position from the believed one, FRD; told to nobody", unit="m", low=-0.1, high=0.1
+    )
+    mount_error_deg: tuple[float, float, float] = setting(
+        (0.0, 0.0, 0.0), "true camera attitude from the believed one, roll pitch yaw", unit="deg", low=-5.0, high=5.0
+    )
+    focal_error: float = setting(0.0, "focal length told to the pilot over the true one, minus 1", low=-0.2, high=0.2)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ForceTorqueScene(_Checked):
+    """The force/torque sensor at the arm's base."""
+
+    rate_hz: float = setting(100.0, "sample rate", unit="Hz", low=20.0, high=1000.0)
+    sigma_n: float = setting(0.1, "force noise per sample and axis", unit="N", low=0.0, high=10.0)
+    sigma_nm: float = setting(0.005, "moment noise per sample and axis", unit="N m", low=0.0, high=1.0)
+    bias_n: float = setting(0.05, "size of the force bias of a flight", unit="N", low=0.0, high=20.0)
+    latency_s: float = setting(0.004, "sampling to delivery", unit="s", low=0.0, high=0.1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImuScene(_Checked):
+    """Gyro, accelerometer and attitude estimate."""
+
+    rate_hz: float = setting(250.0, "sample rate", unit="Hz", low=50.0, high=1000.0)
+    gyro_density: float = setting(3.4e-4, "gyro noise density", unit="rad/s/sqrt(Hz)", low=0.0, high=0.1)
+    accel_density: float = setting(4e-3, "accelerometer noise density", unit="m/s^2/sqrt(Hz)", low=0.0, high=1.0)
+    attitude_bias_deg: float = setting(0.1, "size of the attitude bias of a flight", unit="deg", low=0.0, high=5.0)
+    attitude_noise_deg: float = setting(0.05, "attitude noise per sample", unit="deg", low=0.0, high=5.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class FeaturesScene(_Checked):
+    """Extra noise on line features, after vision; told to nobody."""
+
+    sigma_vs: float = setting(0.0, "noise added to rho and theta of each line per frame", low=0.0, high=0.5)
+
+
+@dataclass(frozen=True, kw_only=True)
+class WindScene(_Checked):
+    """Mean wind (world NED, wall to the north) and Dryden-like gusts."""
+
+    mean_m_s: tuple[float, float, float] = setting((0.0, 0.0, 0.0), "mean wind", unit="m/s", low=-20.0, high=20.0)
+    gust_n_rms: float = setting(0.0, "gust force per axis", unit="N", low=0.0, high=20.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scene(_Checked):
+    """One complete scene; every section and key has a default."""
+
+    board: BoardScene = field(default_factory=BoardScene)
+    wall: WallScene = field(default_factory=WallScene)
+    paint: PaintScene = field(default_factory=PaintScene)
+    start: StartScene = field(default_factory=StartScene)
+    vehicle: VehicleScene = field(default_factory=VehicleScene)
+    camera: CameraScene = field(default_factory=CameraScene)
+    force_torque: ForceTorqueScene = field(default_factory=ForceTorqueScene)
+    imu: ImuScene = field(default_factory=ImuScene)
+    features: FeaturesScene = field(default_factory=FeaturesScene)
+    wind: WindScene = field(default_factory=WindScene)
+
+
+def load_scene(file: str | Path) -> Scene:
+    """Read a scene file.
+
+    Raises:
+        ConfigError: When the file is missing, is no TOML, has an unknown key or a refused value.
+    """
+    return load_toml(Scene, file)

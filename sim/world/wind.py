@@ -1,0 +1,52 @@
+"""Wind: a mean airspeed that drags on the vehicle, and gusts as a random force."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from sim.world.random_streams import Normals
+from sim.world.scene import WindScene
+
+#: Correlation time of the gusts [s], Dryden-like (design, section 5).
+GUST_TIME_CONSTANT_S = 1.0
+
+
+class Wind:
+    r"""Drag in a mean wind plus a first-order Gauss-Markov gust force per world axis.
+
+    The gust is :math:`g_{k+1} = a g_k + \sigma \sqrt{1 - a^2}\, n_k`, a = exp(-dt / tau); it starts in its
+    stationary distribution. Attribute ``mean`` (world NED [m/s]) may be changed at any time.
+
+    Args:
+        scene: Mean wind [m/s] (NED) and gust force [N rms per axis].
+        linear_drag: Force per airspeed [N s/m].
+        tick_s: Time between calls of `force` [s].
+        generator: Source of the gusts.
+    """
+
+    def __init__(self, scene: WindScene, linear_drag: float, tick_s: float, generator: np.random.Generator) -> None:
+        self.mean = np.array(scene.mean_m_s)
+        self._drag = linear_drag
+        self._rms = scene.gust_n_rms
+        self._decay = math.exp(-tick_s / GUST_TIME_CONSTANT_S)
+        self._kick = self._rms * math.sqrt(1.0 - self._decay**2)
+        self._normals = Normals(generator)
+        self._gust = [self._rms * number for number in self._normals.take(3)]
+
+    def force(self, velocity: Sequence[float]) -> tuple[float, float, float]:
+        """Advance the gusts by one tick and return the force of the air, world NED [N].
+
+        Args:
+            velocity: Velocity of the centre of mass, world NED [m/s], (3,).
+        """
+        mx, my, mz = self.mean.tolist()
+        vx, vy, vz = velocity
+        drag = self._drag
+        if self._rms == 0.0:
+            return drag * (mx - vx), drag * (my - vy), drag * (mz - vz)
+        (a, b, c), (i, j, k), decay, kick = self._gust, self._normals.take(3), self._decay, self._kick
+        self._gust = gx, gy, gz = decay * a + kick * i, decay * b + kick * j, decay * c + kick * k
+        return gx + drag * (mx - vx), gy + drag * (my - vy), gz + drag * (mz - vz)

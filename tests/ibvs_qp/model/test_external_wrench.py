@@ -1,0 +1,179 @@
+"""The observer of unmodelled wrenches: wrong mass, shifted centre of mass, wind, and what contact freezes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from symbolic_block import Block
+
+from allocation import control_effectiveness
+from ibvs_qp.analysis.contact_loop import GUST_BANDWIDTH
+from ibvs_qp.config.vehicle import VehicleParams
+from ibvs_qp.model.external_wrench import FORCE_BOUND, MOMENT_BOUND, external_wrench
+from ibvs_qp.model.inputs import Body, Touch
+
+VEHICLE = VehicleParams()
+MATRIX = control_effectiveness(VEHICLE.geometry)
+TICK, WEIGHT, STILL = 0.004, VEHICLE.mass_kg * 9.81, np.array([0.0, 0.0, -9.81])
+
+
+def observer(adapt_in_contact: bool = True) -> Block:
+    """The observer on its own; the moment fed forward is the measured contact moment."""
+
+    def build(signals):
+        body, touch = Body.of(signals), Touch.of(signals)
+        return external_wrench(
+            signals,
+            VEHICLE,
+            MATRIX,
+            body,
+            body.wrench[3:],
+            touch.normal,
+            touch.touching,
+            touch.noise,
+            adapt_in_contact,
+        )
+
+    return Block(build)
+
+
+def hover(
+    external: np.ndarray, seconds: float = 5.0, contact: np.ndarray | None = None, touching: bool = False
+) -> Block:
+    """A vehicle that stands still because its rotors balance weight, contact and an unknown wrench."""
+    contact = np.zeros(6) if contact is None else contact
+    thrusts = np.linalg.solve(MATRIX, -np.array([0, 0, WEIGHT, 0, 0, 0]) - external - contact)
+    block = observer()
+    block.touch(touching=touching)
+    for _ in range(round(seconds / TICK)):
+        block(thrust_last=thrusts, commanded=1.0, specific_force=STILL, contact_wrench=contact)
+    return block
+
+
+def wrench(block: Block) -> np.ndarray:
+    return block.tick.outputs["value"].copy()
+
+
+def without_lag(block: Block, thrusts: np.ndarray, **inputs: np.ndarray) -> None:
+    """One tick with rotors that follow at once."""
+    block.tick.states["motor_thrust"][:] = thrusts
+    block(thrust_last=thrusts, commanded=1.0, **inputs)
+
+
+def test_a_wrong_mass_is_a_weight() -> None:
+    """One kilogram more than the model thinks: 9.81 N downwards."""
+    found = wrench(hover(np.array([0, 0, 9.81, 0, 0, 0])))
+    np.testing.assert_allclose(found, [0, 0, 9.81, 0, 0, 0], atol=0.02)
+
+
+def test_a_shifted_centre_of_mass_is_a_moment() -> None:
+    shift = np.array([0.01, -0.02, 0.0])
+    moment = np.cross(shift, [0, 0, VEHICLE.mass_kg * 9.81])
+    found = wrench(hover(np.concatenate((np.zeros(3), moment))))
+    np.testing.assert_allclose(found[3:], moment, atol=0.01)
+    np.testing.assert_allclose(found[:3], 0.0, atol=0.02)
+
+
+def test_wind_and_contact_are_told_apart() -> None:
+    contact = np.array([-5.0, 1.0, 0, 0, 0, 0.7])
+    found = wrench(hover(np.array([0.0, 3.0, 1.0, 0, 0, 0]), contact=contact, touching=True, seconds=8.0))
+    np.testing.assert_allclose(found[1:3], [3.0, 1.0], atol=0.05)
+    np.testing.assert_allclose(found[3:], 0.0, atol=0.01)
+
+
+def test_a_gust_onto_the_wall_is_told_from_what_the_wall_returns() -> None:
+    """4 N of wind along n while the wall returns 5 N; what the wall returns is no load, however much it changes."""
+    for push in (5.0, 9.0):
+        contact = np.array([-push, 0, 0, 0, 0, 0])
+        found = hover(np.array([4.0, 0, 0, 0, 0, 0]), touching=True, contact=contact)
+        assert wrench(found)[0] == pytest.approx(4.0, abs=0.02)
+
+
+def test_a_noisy_force_sensor_slows_the_observer_in_contact() -> None:
+    """Its noise would become push: with 1 N of filtered noise a gust is learnt ten times slower, not faster."""
+    found = []
+    for noise in (0.0, 1.0):
+        block = hover(np.zeros(6), seconds=1.0)
+        block.touch(touching=True, noise=noise)
+        gust = np.array([2.0, 0, 0, 0, 0, 0])
+        thrusts = np.linalg.solve(MATRIX, -np.array([0, 0, WEIGHT, 0, 0, 0]))
+        for _ in range(25):
+            block.tick.states["gust_power"][:] = 1.0  # amid gusts
+            without_lag(block, thrusts, specific_force=STILL + gust[:3] / VEHICLE.mass_kg)
+        found.append(float(wrench(block)[0]))
+    assert found[0] == pytest.approx(2.0 * (1.0 - np.exp(-0.1 * GUST_BANDWIDTH)), rel=0.02)
+    assert found[1] < 0.1 * found[0]
+
+
+def test_in_calm_air_sensor_noise_is_not_handed_on_and_a_gust_wakes_the_observer() -> None:
+    rng, block = np.random.default_rng(3), observer()
+    block.touch(touching=True)
+    thrusts = np.linalg.solve(MATRIX, -np.array([0, 0, WEIGHT, 0, 0, 0]))
+
+    def fly(gust: float, seconds: float) -> np.ndarray:
+        found = []
+        for _ in range(round(seconds / TICK)):
+            noise = rng.normal(0.0, 0.25)  # 6 kg x 4e-3 m/s^2/sqrt(Hz) at 250 Hz, and the force sensor's
+            force = np.array([(gust + noise) / VEHICLE.mass_kg, 0.0, 0.0])
+            without_lag(block, thrusts, specific_force=STILL + force)
+            found.append(float(wrench(block)[0]))
+        return np.array(found)
+
+    calm = fly(0.0, 6.0)[500:]
+    fixed = 0.25 * np.sqrt(GUST_BANDWIDTH * TICK / 2.0)  # what a first-order filter leaves of white noise
+    assert np.std(calm) < 0.4 * fixed
+    assert fly(1.0, 0.5)[-1] > 0.8  # 1 N that comes at once is learnt within half a second
+
+
+def test_acceleration_is_not_taken_for_a_load() -> None:
+    block = observer()
+    for k in range(2000):
+        push = 3.0 * np.sin(0.01 * k)
+        thrusts = np.linalg.solve(MATRIX, [push, 0, -WEIGHT, 0, 0, 0])
+        without_lag(block, thrusts, specific_force=np.array([push / VEHICLE.mass_kg, 0.0, -9.81]))
+    np.testing.assert_allclose(wrench(block), 0.0, atol=1e-9)
+
+
+def test_a_turn_by_the_rotors_is_not_taken_for_a_moment() -> None:
+    """Momentum observer: spinning up about all axes, gyroscopic moment included."""
+    block, inertia = observer(), np.array(VEHICLE.inertia_kg_m2)
+    omega = np.zeros(3)
+    for k in range(2000):
+        moment = 0.3 * np.array([np.sin(0.01 * k), np.cos(0.013 * k), np.sin(0.007 * k)])
+        thrusts = np.linalg.solve(MATRIX, [0, 0, -WEIGHT, *moment])
+        without_lag(block, thrusts, specific_force=STILL, angular_velocity=omega)
+        omega = omega + TICK * (moment - np.cross(omega, inertia * omega)) / inertia
+    np.testing.assert_allclose(wrench(block)[3:], 0.0, atol=0.01)
+
+
+def test_rotors_lag_as_modelled() -> None:
+    block = observer()
+    block(thrust_last=10.0, commanded=1.0)
+    block(thrust_last=20.0, dt=VEHICLE.motor_lag_up_s)
+    np.testing.assert_allclose(block.tick.states["motor_thrust"], 20.0 - 10.0 * np.exp(-1.0))
+    block(thrust_last=0.0, dt=VEHICLE.motor_lag_down_s)
+    np.testing.assert_allclose(block.tick.states["motor_thrust"], (20.0 - 10.0 * np.exp(-1.0)) * np.exp(-1.0))
+
+
+def test_bounds_hold_and_nothing_moves_before_the_first_command() -> None:
+    found = wrench(hover(np.array([500.0, -500.0, 0, 50.0, 0, -50.0])))
+    assert np.abs(found[:3]).max() <= FORCE_BOUND and np.abs(found[3:]).max() <= MOMENT_BOUND
+    np.testing.assert_array_equal(observer()(commanded=0.0, specific_force=np.ones(3)), 0.0)
+
+
+def test_no_accelerometer_freezes_the_force_only() -> None:
+    block = hover(np.array([0, 0, 5.0, 0, 0, 0]))
+    before = wrench(block)[:3]
+    for _ in range(500):
+        block(felt=0.0, specific_force=0.0)
+    np.testing.assert_array_equal(wrench(block)[:3], before)
+
+
+def test_without_feedforward_contact_moments_are_not_learnt() -> None:
+    """The observer rests at the wall then: it would take the contact's moment for a load."""
+    block = observer(adapt_in_contact=False)
+    block.touch(touching=True)
+    thrusts = np.linalg.solve(MATRIX, [0, 0, -WEIGHT, 0, 0, 0.5])
+    for _ in range(1000):
+        block(thrust_last=thrusts, commanded=1.0, specific_force=STILL)
+    np.testing.assert_array_equal(wrench(block), 0.0)

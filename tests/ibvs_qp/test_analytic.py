@@ -1,0 +1,180 @@
+"""The paper's law, corrected: against the law written out by hand, and the details that decide whether it flies."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from controller_scenes import CEILING, FLOOR, TICK_NS, Wall, attitude, line_references, measured, random_tick
+from small_vehicle import SmallVehicle
+
+from allocation import control_effectiveness
+from ibvs_qp.analytic import PaperController, analytic_thrusts, analytic_wrench
+from ibvs_qp.command import Outcome
+from ibvs_qp.config import ControllerConfig
+from ibvs_qp.frames import camera_twist_matrix
+from ibvs_qp.measurement import HORIZONTAL, VERTICAL, Reference
+from ibvs_qp.model.step_function import Setpoints
+from ibvs_qp.vision.interaction import line_interaction_matrix
+
+CONFIG = ControllerConfig()
+MASS = CONFIG.vehicle.mass_kg
+MASSES = np.array([MASS] * 3 + list(CONFIG.vehicle.inertia_kg_m2))
+
+
+def terms_of(seed: int, lines: int, share: float) -> Setpoints:
+    terms = Setpoints(CONFIG)
+    terms.update(*random_tick(np.random.default_rng(seed), lines))
+    terms.contact_weight = share
+    return terms
+
+
+def stacked(terms: Setpoints) -> tuple[np.ndarray, np.ndarray]:
+    """L in body axes and K_p e + K_d de + K_i int e: a rho row per line and one angle row."""
+    gains, rows, feedback = CONFIG.gains, [], []
+    twist = camera_twist_matrix(np.array(CONFIG.vehicle.camera_position_m))
+    for line in terms.lines:
+        rows.append(line_interaction_matrix(line.rho, line.theta, terms.plane)[0] @ twist)
+        feedback.append(gains.line_kp * line.rho_error + gains.line_kd * line.rho_rate + gains.line_ki * line.integral)
+    level = sorted(terms.lines, key=lambda line: abs(line.rho))[0]
+    rows.append(line_interaction_matrix(level.rho, level.theta, terms.plane)[1] @ twist)
+    feedback.append(gains.theta_kp * level.angle_error + gains.theta_kd * level.angle_rate)
+    return np.array(rows), np.array(feedback)
+
+
+@pytest.mark.parametrize("lines", [0, 1, 2])
+@pytest.mark.parametrize("share", [0.0, 0.4, 1.0])
+def test_the_wrench_is_the_law_by_hand(lines: int, share: float) -> None:
+    for seed in range(15):
+        terms = terms_of(seed, lines, share)
+        normal = terms.normal
+        null = np.concatenate(
+            (
+                normal * terms.standoff_command / MASS
+                + terms.right * terms.velocity_command[0]
+                + terms.down * terms.velocity_command[1],
+                terms.angular,
+            )
+        )
+        acceleration = null
+        if lines:
+            matrix, feedback = stacked(terms)
+            inverse = np.linalg.pinv(matrix, rcond=0.05)
+            acceleration = -inverse @ feedback + (np.eye(6) - inverse @ matrix) @ null
+        servo = MASSES * acceleration
+        selection = np.zeros((6, 6))
+        selection[:3, :3] = share * np.outer(normal, normal)
+        force = np.concatenate((normal * terms.push_command, np.zeros(3)))
+        expected = (np.eye(6) - selection) @ servo + selection @ force
+        np.testing.assert_allclose(analytic_wrench(terms), expected, atol=1e-8)
+
+
+def test_full_contact_keeps_the_force_command() -> None:
+    """Lambda' = lambda n n^T: along n exactly the push remains. The printed R diag(0,0,lambda) would cancel it."""
+    for seed in range(10):
+        terms = terms_of(seed, 2, 1.0)
+        assert terms.normal @ analytic_wrench(terms)[:3] == pytest.approx(terms.push_command, abs=1e-9)
+        none = terms_of(seed, 0, 0.0)
+        assert none.normal @ analytic_wrench(none)[:3] == pytest.approx(none.standoff_command, abs=1e-9)
+
+
+def test_one_angle_row_only() -> None:
+    """Two lines that disagree about the roll by a degree do not pitch the vehicle; stacked as printed they would."""
+    wall = Wall(attitude(), 0.0)
+    seen = (
+        wall.line(0.05, 0.5 * math.pi + 0.02, HORIZONTAL),
+        wall.line(-0.12, -0.02, VERTICAL),
+    )
+    terms = Setpoints(CONFIG)
+    terms.update(measured(0, plane=wall.plane, lines=seen), Reference(lines=line_references(2), contact=True))
+    assert len(terms.lines) == 2
+    matrix, feedback = stacked(terms)
+    assert matrix.shape == (3, 6)
+    both = np.vstack((matrix, terms.lines[1].matrix[1]))
+    gains = CONFIG.gains
+    doubled = np.append(feedback, gains.theta_kp * terms.lines[1].angle_error + gains.theta_kd * 0.0)
+    printed = -np.linalg.pinv(both) @ doubled
+    assert abs(analytic_wrench(terms)[4] / MASSES[4]) < 0.1 * abs(printed[4])
+
+
+def test_thrusts_are_the_pseudo_inverse_of_the_whole_wrench() -> None:
+    matrix = control_effectiveness(CONFIG.vehicle.geometry)
+    for seed in range(10):
+        terms = terms_of(seed, seed % 3, 0.5)
+        wrench = matrix @ analytic_thrusts(terms)
+        np.testing.assert_allclose(wrench + terms.bias_wrench, analytic_wrench(terms), atol=1e-8)
+
+
+def test_line_rates_are_those_of_the_rows() -> None:
+    """The rates, written out without arrays, against the interaction matrix times the twist."""
+    for seed in range(10):
+        measurement, reference = random_tick(np.random.default_rng(seed), 2)
+        terms = Setpoints(CONFIG)
+        terms.update(measurement, reference)
+        velocity = measurement.velocity - terms.normal * float(terms.normal @ measurement.velocity)
+        wanted = reference.velocity[0] * terms.right + reference.velocity[1] * terms.down
+        twist = np.concatenate((velocity, measurement.angular_velocity))
+        for line in terms.lines:
+            matrix = line.matrix
+            row = matrix[0] + (line.tip_x * math.sin(line.theta) - line.tip_y * math.cos(line.theta)) * matrix[1]
+            assert line.error_rate == pytest.approx(row @ twist - row[:3] @ wanted, abs=1e-9)
+            assert line.rho_rate == pytest.approx(matrix[0] @ twist - matrix[0][:3] @ wanted, abs=1e-9)
+            assert line.angle_rate == pytest.approx(matrix[1] @ twist, abs=1e-9)
+
+
+def test_clipping_is_reported_with_rotor_side_and_amount() -> None:
+    controller, limit = PaperController(), np.full(6, CEILING)
+    limit[3] = 9.0
+    vehicle = SmallVehicle(controller.config)
+    for _ in range(30):
+        command = controller.step(vehicle.measure(thrust_max=limit), Reference(standoff=0.1))
+        vehicle.fly(command.thrusts)
+    (active,) = command.active_limits
+    assert active.name == f"thrust_{CONFIG.vehicle.geometry.names[3]}" and active.side == "upper"
+    assert command.thrusts[3] == pytest.approx(9.0, abs=2e-3)
+    matrix = control_effectiveness(CONFIG.vehicle.geometry)
+    np.testing.assert_allclose(command.unallocated_wrench, matrix[:, 3] * active.slack, atol=1e-9)
+    assert command.outcome is Outcome.SOLVED
+
+
+def test_free_commands_clip_nothing_and_respect_box_and_rate() -> None:
+    controller, vehicle = PaperController(), SmallVehicle(CONFIG)
+    last = None
+    for tick in range(400):
+        jump = np.array([0.3, -0.3]) * (tick > 200)
+        command = controller.step(vehicle.measure(0), Reference(standoff=0.1, velocity=jump))
+        assert (command.thrusts >= FLOOR).all() and (command.thrusts <= CEILING).all()
+        if last is not None:
+            assert np.abs(command.thrusts - last).max() <= 500.0 * 0.004 + 1e-9
+        if 100 < tick < 200:
+            assert command.active_limits == () and np.abs(command.unallocated_wrench).max() < 1e-9
+        last = command.thrusts
+        vehicle.fly(command.thrusts)
+
+
+def test_holds_a_push_in_a_small_closed_loop() -> None:
+    controller, vehicle = PaperController(), SmallVehicle(CONFIG, distance=0.05)
+    pushes = []
+    for tick in range(2000):
+        wish = Reference(push_force=5.0, contact=tick > 200, standoff=0.05, lines=line_references(2))
+        command = controller.step(vehicle.measure(), wish)
+        vehicle.fly(command.thrusts)
+        pushes.append(-vehicle.contact[0])
+    assert command.mode == "contact"
+    assert np.mean(pushes[-250:]) == pytest.approx(5.0, abs=0.3)
+    assert np.linalg.norm(vehicle.attitude.as_rotvec()) < math.radians(1.0)
+
+
+def test_reset_repeats_to_the_bit_and_modes_are_named() -> None:
+    controller = PaperController()
+    ticks = [random_tick(np.random.default_rng(tick), tick % 3, tick) for tick in range(40)]
+    first = [controller.step(*tick).thrusts for tick in ticks]
+    controller.reset()
+    np.testing.assert_array_equal(first, [controller.step(*tick).thrusts for tick in ticks])
+    controller.reset()
+    assert controller.step(measured(0), Reference()).mode == "free"
+    assert controller.step(measured(1), Reference(contact=True)).mode == "approach"
+    broken = controller.step(replace(measured(2), stamp_ns=TICK_NS), Reference())
+    assert broken.mode == "hold" and broken.outcome is Outcome.HOLD

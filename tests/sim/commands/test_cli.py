@@ -1,0 +1,254 @@
+"""The console script: what it prints, writes and returns, with a made-up flight in place of the simulation."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from contract_schema import check_summary
+from made_up_flights import fake_fly
+
+import sim.flight.side_by_side
+from ibvs_qp.config.errors import ConfigError
+from sim.commands.cli import main
+from sim.flight.closed_loop import FlightOptions
+from sim.flight.flight_log import load_run
+from sim.world.scene import PaintScene, Scene
+
+
+@pytest.fixture
+def flown(monkeypatch, tmp_path):
+    """Flights are made up, one after the other, and run folders go to a temporary directory."""
+    monkeypatch.setattr(sim.flight.side_by_side, "fly", fake_fly)
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0}, raising=False)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_paint_writes_the_run_folder_and_prints_a_table(flown, capsys):
+    assert main(["paint", "--out", "run"]) == 0
+    out, _ = capsys.readouterr()
+    assert "QP law" in out and "analytic law" in out and "report.html" in out
+    names = {path.name for path in (flown / "run").iterdir()}
+    files = {"report.html", "summary.json", "video.mp4", "log.npz", "scene.toml", "README.txt", "figures"}
+    assert names == files | {"preset_qp.toml", "preset_paper.toml"}
+    figures = {path.stem for path in (flown / "run" / "figures").iterdir()}
+    assert {"force", "image_error", "path", "velocity", "attitude", "thrusts", "board"} <= figures
+    assert (flown / "run" / "video.mp4").stat().st_size > 10_000
+
+
+def test_json_is_one_line_and_equals_the_file(flown, capsys):
+    assert main(["paint", "--json", "--no-video", "--seed", "3", "--image-size", "424x240"]) == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    assert out.count("\n") == 1
+    summary = json.loads(out)
+    check_summary(summary, {"qp", "paper"})
+    assert summary["command"] == "ibvs-qp paint --json --no-video --seed 3 --image-size 424x240"
+    assert (summary["seed"], summary["image_size"]) == (3, [424, 240])
+    run = Path(summary["run_dir"])
+    assert run.parent == Path("runs") and run.name.endswith("Z")
+    assert json.loads((run / "summary.json").read_text()) == summary
+    assert not (run / "video.mp4").exists()
+
+
+def test_log_reads_back_equal(flown, capsys):
+    assert main(["paint", "--law", "qp", "--out", "run", "--no-video"]) == 0
+    trace = fake_fly(Scene(), FlightOptions())
+    back = load_run(flown / "run")["qp"]
+    assert (back.scene, back.seed, back.phases, back.reason) == (trace.scene, 0, trace.phases, trace.reason)
+    assert set(back.arrays) == set(trace.arrays)
+    assert all(np.array_equal(back.arrays[name], trace.arrays[name], equal_nan=True) for name in trace.arrays)
+    assert [event.text for event in back.events] == [event.text for event in trace.events]
+
+
+def test_second_run_leaves_nothing_stale(flown, capsys):
+    assert main(["paint", "--law", "qp", "--out", "run"]) == 0
+    assert main(["paint", "--law", "qp", "--out", "run", "--no-video"]) == 0
+    assert not (flown / "run" / "video.mp4").exists()
+
+
+def test_law_that_does_not_complete_is_still_reported(flown, capsys, monkeypatch):
+    def crash(scene, options, progress=None):
+        return dataclasses.replace(fake_fly(scene, options), completed=False, reason="propeller touched the wall")
+
+    monkeypatch.setattr(sim.flight.side_by_side, "fly", crash)
+    assert main(["paint", "--json", "--no-video"]) == 0
+    assert json.loads(capsys.readouterr().out)["laws"]["qp"]["reason"] == "propeller touched the wall"
+
+
+def test_interrupt_keeps_what_was_flown(flown, capsys, monkeypatch):
+    def cut_short(scene, options, progress=None):
+        return dataclasses.replace(fake_fly(scene, options), completed=False, reason="interrupted")
+
+    monkeypatch.setattr(sim.flight.side_by_side, "fly", cut_short)
+    assert main(["paint", "--json", "--out", "run", "--no-video"]) == 130
+    out, err = capsys.readouterr()
+    summary = json.loads(out)
+    check_summary(summary, {"qp"})  # the analytic law never began
+    assert summary["interrupted"] is True
+    assert (flown / "run" / "log.npz").exists() and (flown / "run" / "report.html").exists()
+    assert err.strip() == "ibvs-qp: interrupted; what was flown is in run"
+
+
+def test_interrupt_while_drawing_keeps_the_log(flown, capsys, monkeypatch):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("sim.figures.draw_all", interrupted)
+    assert main(["paint", "--json", "--out", "run"]) == 130
+    assert json.loads((flown / "run" / "summary.json").read_text())["interrupted"] is True
+    assert (flown / "run" / "log.npz").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "needles"),
+    [
+        (["paint", "--scene", "missing.toml"], ["missing.toml", "--scene"]),
+        (["paint", "--scene", "unknown.toml"], ["unknown.toml", "friktion", "friction"]),
+        (["paint", "--scene", "range.toml"], ["range.toml", "wall.friction", "[0, 1.5]"]),
+        (["paint", "--scene", "kind.toml"], ["kind.toml", "paint.rows"]),
+        (["paint", "--scene", "broken.toml"], ["broken.toml", "not valid TOML"]),
+        (["paint", "--scene", "."], ["--scene"]),
+        (["paint", "--preset", "missing.toml"], ["missing.toml", "--preset"]),
+        (["paint", "--preset", "broken.toml"], ["broken.toml", "not valid TOML"]),
+        (["paint", "--preset", "key.toml"], ["key.toml: unknown key 'controller.gains.line_pk'", "line_kp"]),
+        (["paint", "--preset", "value.toml"], ["value.toml: controller.tick_s = 9.0 s", "[0.0005, 0.02] s"]),
+        (["paint", "--preset", "rings.toml"], ["rings.toml: controller.gains.force_ksp = 4000.0 N/m", "] N/m for a"]),
+        (["paint", "--out", "file"], ["file", "--out"]),
+        (["paint", "--out", "file/below"], ["file/below", "--out"]),
+        (["paint", "--seed", "-1"], ["--seed", "-1"]),
+        (["paint", "--seed", "one"], ["--seed", "one", "paint --help"]),
+        (["paint", "--law", "pid"], ["--law", "pid", "both"]),
+        (["paint", "--image-size", "3x3"], ["--image-size", "3x3", "640x480"]),
+        (["paint", "--camera", "filament"], ["--camera", "filament", "plane", "gl"]),
+        (["paint", "--vision", "new"], ["--vision", "new", "own", "paper"]),
+        (["paint", "--sead", "3"], ["--sead", "--seed"]),
+        (["compare"], ["compare", "paint"]),
+        ([], ["paint", "--help"]),
+    ],
+)
+def test_user_errors_are_one_line(flown, capsys, words, needles):
+    (flown / "unknown.toml").write_text("[wall]\nfriktion = 0.3\n")
+    (flown / "range.toml").write_text("[wall]\nfriction = 7.0\n")
+    (flown / "kind.toml").write_text('[paint]\nrows = "two"\n')
+    (flown / "broken.toml").write_text("[wall\n")
+    (flown / "key.toml").write_text("[controller.gains]\nline_pk = 1.0\n")
+    (flown / "value.toml").write_text("[controller]\ntick_s = 9.0\n")
+    (flown / "rings.toml").write_text("[controller.gains]\nforce_ksp = 4000.0\n")
+    (flown / "file").write_text("")
+    before = sorted(flown.rglob("*"))
+    assert main(words) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.startswith("ibvs-qp: error: ") and err.count("\n") == 1
+    for needle in needles:
+        assert needle in err
+    assert "Traceback" not in err
+    assert sorted(flown.rglob("*")) == before, "a refused command leaves nothing behind"
+
+
+def test_unwritable_folder(flown, capsys, monkeypatch):
+    """Refused even where the tests run as root, who may write anywhere."""
+
+    def refuse(self, _data):
+        raise PermissionError(13, "Permission denied", str(self))
+
+    monkeypatch.setattr(Path, "write_bytes", refuse)
+    assert main(["paint", "--out", "locked"]) == 2
+    err = capsys.readouterr().err
+    assert "locked" in err and "Permission denied" in err and "--out" in err and err.count("\n") == 1
+
+
+def test_error_found_in_flight_is_the_users_too(flown, capsys, monkeypatch):
+    def refuse(*_):
+        raise ConfigError("preset x.toml: unknown key 'gain'")
+
+    monkeypatch.setattr(sim.flight.side_by_side, "fly", refuse)
+    assert main(["paint", "--out", "run"]) == 2
+    assert not (flown / "run").exists()
+
+
+def test_internal_error_keeps_its_traceback(flown, capsys, monkeypatch):
+    def fail(*_):
+        raise ZeroDivisionError("seven")
+
+    monkeypatch.setattr(sim.flight.side_by_side, "fly", fail)
+    assert main(["paint", "--json"]) == 1
+    assert "ZeroDivisionError: seven" in capsys.readouterr().err
+
+
+def test_help_shows_an_example_and_imports_nothing_heavy():
+    code = (
+        "import sys; from sim.commands.cli import main; code = main(['paint', '--help']);"
+        "heavy = {'mujoco', 'cv2', 'matplotlib', 'scipy', 'casadi', 'osqp'} & set(sys.modules);"
+        "print('HEAVY', sorted(heavy)); sys.exit(code)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0
+    assert "Example: ibvs-qp paint" in done.stdout
+    assert "HEAVY []" in done.stdout
+
+
+def _paint(out: Path, *words: str) -> list[str]:
+    program = "import sys; from sim.commands.cli import main; sys.exit(main())"
+    return [sys.executable, "-c", program, "paint", "--features", "geometric", "--json", "--out", str(out), *words]
+
+
+def test_ctrl_c_ends_both_processes_with_a_partial_run(tmp_path):
+    """The signal goes to the parent alone, as a terminal's does once the children have their own group.
+
+    Eight rows, for a flight that no machine has finished before the signal.
+    """
+    (tmp_path / "long.toml").write_text("[paint]\nrows = 8\n")
+    words = _paint(tmp_path / "run", "--no-video", "--scene", str(tmp_path / "long.toml"))
+    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    while not (tmp_path / "run").exists() and process.poll() is None:
+        time.sleep(0.1)
+    time.sleep(4.0)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=120)
+    assert process.returncode == 130, err.decode()
+    summary = json.loads(out)
+    assert summary["interrupted"] is True
+    assert b"Traceback" not in err
+    assert (tmp_path / "run" / "summary.json").exists()
+
+
+@pytest.mark.slow
+def test_one_process_or_two_fly_the_same(tmp_path):
+    """Same seed, same thrusts to the bit, whether the laws share a process or not."""
+    from sim.flight.side_by_side import fly_laws
+
+    scene = Scene(paint=PaintScene(rows=1, stroke_m=0.4))
+    options = FlightOptions(features="geometric", seed=4, video=False)
+
+    def quiet(*_):
+        pass
+
+    together = fly_laws(scene, options, ("qp", "paper"), quiet, workers=1)
+    apart = fly_laws(scene, options, ("qp", "paper"), quiet, workers=2)
+    timing = {"step_us", "vision_ms"}
+    for law in ("qp", "paper"):
+        one, two = together[law].trace.arrays, apart[law].trace.arrays
+        assert set(one) == set(two)
+        assert len(one["t"]) > 1000
+        for name in set(one) - timing:
+            assert np.array_equal(one[name], two[name], equal_nan=one[name].dtype.kind == "f"), (law, name)
+
+
+@pytest.mark.slow
+def test_paint_on_geometric_features_end_to_end(tmp_path):
+    done = subprocess.run(_paint(tmp_path / "run"), capture_output=True, text=True, timeout=900)
+    assert done.returncode == 0, done.stderr
+    summary = json.loads(done.stdout)
+    check_summary(summary, {"qp", "paper"})
+    assert summary["laws"]["qp"]["completed"], summary["laws"]["qp"]["reason"]

@@ -1,0 +1,160 @@
+"""``ibvs-qp experiment`` and ``compare`` with made-up flights: contract, files, resume, interrupt, refusals."""
+
+from __future__ import annotations
+
+import json
+from itertools import accumulate
+
+import polars as pl
+import pytest
+from press_trace import press_trace
+from synthetic_trace import Errors, synthetic_trace
+
+import sim.sweep.flying
+from sim.commands.cli import main
+from sim.experiments import experiment
+from sim.experiments.base import Choice
+from sim.experiments.figures.force_map import predicted_damping
+from sim.flight.jobs import PressJob
+from sim.sweep import run_sweep
+
+
+@pytest.fixture
+def flown(monkeypatch, tmp_path):
+    """Flights are made up and counted; runs go to a temporary directory."""
+    flights: list[str] = []
+
+    def fly(scene, options, *, config, job, faults):
+        flights.append(options.law)
+        if isinstance(job, PressJob):
+            trace = press_trace(scene=scene, bias_n=0.05 if options.law == "qp" else 0.2)
+            trace.law = options.law
+            for name, width in (("line_error_px", 2), ("friction_true", 2)):
+                trace.arrays[name] = 0.0 * trace.t[:, None].repeat(width, 1)
+            return trace
+        return synthetic_trace(Errors(push_error_n=0.1), scene, options.law, options.seed)
+
+    monkeypatch.setattr(sim.sweep.flying, "fly", fly)
+    monkeypatch.chdir(tmp_path)
+    return flights
+
+
+def test_json_follows_the_contract(flown, tmp_path, capsys):
+    assert main(["experiment", "force-hold", "--quick", "--jobs", "1", "--json", "--out", "run"]) == 0
+    out, err = capsys.readouterr()
+    assert err == "" and out.count("\n") == 1
+    content = json.loads(out)
+    assert (content["schema"], content["name"], content["quick"]) == (1, "force-hold", True)
+    table = pl.read_parquet(content["data_file"])
+    assert table.height == len(flown) == sum(cell["n"] for cell in content["cells"])
+    for cell in content["cells"]:
+        assert {"law", "variant", "params", "n", "completed", "metrics"} <= set(cell)
+        assert cell["law"] in ("qp", "paper") and cell["completed"] == cell["n"]
+        assert {"median", "low", "high"} == set(cell["metrics"]["settle_s"])
+    assert json.loads((tmp_path / "run" / "force-hold.json").read_text()) == content
+    assert (tmp_path / "run" / "figures" / "force-hold-1.5kNm.png").stat().st_size > 10_000
+    page = (tmp_path / "run" / "results.md").read_text()
+    assert "0.050" in page and "figures/force-hold-map.png" in page
+
+
+def test_the_same_folder_flies_nothing_twice(flown, capsys):
+    main(["experiment", "approach", "--quick", "--jobs", "1", "--json", "--out", "run"])
+    count = len(flown)
+    main(["experiment", "approach", "--quick", "--jobs", "1", "--json", "--out", "run"])
+    first, second = (json.loads(line) for line in capsys.readouterr().out.splitlines())
+    assert len(flown) == count > 0
+    assert first["cells"] == second["cells"]
+
+
+def test_interrupt_keeps_what_was_flown_and_says_how_to_go_on(flown, monkeypatch, capsys):
+    whole = sim.sweep.flying.fly
+
+    def fly(*arguments, **named):
+        if len(flown) == 2:
+            raise KeyboardInterrupt
+        return whole(*arguments, **named)
+
+    monkeypatch.setattr(sim.sweep.flying, "fly", fly)
+    assert main(["experiment", "approach", "--quick", "--jobs", "1", "--json", "--out", "run"]) == 130
+    out, err = capsys.readouterr()
+    content = json.loads(out)
+    assert content["interrupted"] and sum(cell["n"] for cell in content["cells"]) == 2
+    assert err.count("\n") == 1 and "go on with: ibvs-qp experiment approach" in err
+    monkeypatch.setattr(sim.sweep.flying, "fly", whole)
+    assert main(["experiment", "approach", "--quick", "--jobs", "1", "--json", "--out", "run"]) == 0
+    assert len(flown) == 4
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (["experiment", "nope"], "force-hold"),
+        (["experiment", "paint", "--jobs", "0"], "--jobs"),
+        (["experiment", "paint", "--seed", "-1"], "--seed"),
+        (["compare", "nowhere", "nowhere"], "nowhere"),
+    ],
+)
+def test_refusals_are_one_line(flown, capsys, words, named):
+    assert main(words) == 2
+    out, err = capsys.readouterr()
+    assert out == "" and err.count("\n") == 1 and named in err and err.startswith("ibvs-qp: error: ")
+    assert not flown
+
+
+def test_all_cut_short_still_reports_what_was_flown(flown, monkeypatch, capsys):
+    whole = sim.sweep.flying.fly
+
+    def fly(*arguments, **named):
+        if len(flown) == 2:
+            raise KeyboardInterrupt
+        return whole(*arguments, **named)
+
+    monkeypatch.setattr(sim.sweep.flying, "fly", fly)
+    assert main(["experiment", "all", "--quick", "--jobs", "1", "--json", "--out", "run"]) == 130
+    content = json.loads(capsys.readouterr().out)
+    assert sum(cell["n"] for cell in content["cells"]) == 2
+    assert {entry["experiment"] for entry in content["verdicts"]} == {"force-hold"}
+
+
+def test_the_time_left_goes_by_expected_flying_time(flown, tmp_path):
+    flights = (
+        experiment("friction").design(Choice(quick=True)) + experiment("force-hold").design(Choice(quick=True))[:1]
+    )
+    told: list[tuple[float, float]] = []
+    run_sweep(flights, tmp_path, timed=lambda *times: told.append(times))
+    assert [entry[0] for entry in told] == pytest.approx(list(accumulate(run.expected_s for run in flights)))
+    assert told[-1][0] == told[-1][1] and len({run.expected_s for run in flights}) > 1
+
+
+def test_the_page_says_how_to_redo_it_with_the_same_choices(flown, tmp_path):
+    words = ["experiment", "approach", "--quick", "--seed", "3", "--features", "geometric"]
+    assert main([*words, "--jobs", "1", "--json", "--out", "run"]) == 0
+    page = (tmp_path / "run" / "results.md").read_text()
+    assert "To redo it: `ibvs-qp experiment approach --quick --features geometric --seed 3`" in page
+    assert "too few to tell" in page and "-0.00" not in page and "_n_m" not in page
+
+
+def test_plan_flies_nothing(flown, tmp_path, capsys):
+    assert main(["experiment", "all", "--plan"]) == 0
+    assert "all: " in capsys.readouterr().out
+    assert not flown and not list(tmp_path.iterdir())
+
+
+def test_compare_pairs_two_folders(flown, capsys):
+    for seed, folder in (("0", "a"), ("0", "b")):
+        main(["experiment", "approach", "--quick", "--jobs", "1", "--json", "--seed", seed, "--out", folder])
+    capsys.readouterr()
+    assert main(["compare", "a", "b", "--json"]) == 0
+    content = json.loads(capsys.readouterr().out)
+    assert content["cells"] and all(cell["differences"]["settle_s"]["median"] == 0.0 for cell in content["cells"])
+    assert main(["compare", "a", "b"]) == 0
+
+
+def test_gain_and_delay_take_damping_and_impedance_gives_it():
+    assert predicted_damping("qp", "direct", 3.0, 1500.0, 0.024) < 0.0
+    assert predicted_damping("qp", "standard", 1.0, 1500.0, 0.024) > predicted_damping(
+        "qp", "direct", 1.0, 1500.0, 0.024
+    )
+    assert predicted_damping("qp", "standard", 2.0, 1500.0, 0.048) < predicted_damping(
+        "qp", "standard", 2.0, 1500.0, 0.004
+    )

@@ -1,0 +1,214 @@
+"""`ibvs-qp explain`: a recorded tick is solved again and told in words; the log gives back what was flown."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from closed_loop_rigs import short_scene
+
+from ibvs_qp.config.settings import dump_toml
+from ibvs_qp.controller import program_template
+from ibvs_qp.model.signals import places
+from sim.commands.cli import main
+from sim.evaluate.explanation import explain_tick, explanation_tables, flown_config
+from sim.flight.closed_loop import FlightOptions, fly
+from sim.flight.flight_log import load_run, save_log
+from sim.flight.trace import Event, Trace
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Trace]:
+    """The start of a flight under both laws, as `paint` leaves it."""
+    folder = tmp_path_factory.mktemp("run")
+    scene = short_scene(0.1, rows=1)
+    traces = {}
+    for law in ("qp", "paper"):
+        trace = fly(scene, FlightOptions(law=law, features="geometric", video=False))
+        traces[law] = trace
+    (folder / "scene.toml").write_text(dump_toml(scene))
+    save_log(folder / "log.npz", traces)
+    return folder, traces["qp"]
+
+
+def test_recorded_ticks_solve_to_the_thrusts_that_flew(run: tuple[Path, Trace]) -> None:
+    trace = load_run(run[0])["qp"]
+    for tick in range(0, len(trace.t), len(trace.t) // 25):
+        _, explanation = explain_tick(trace, tick)
+        assert explanation is not None
+        np.testing.assert_allclose(explanation.thrusts, trace.thrusts[tick], atol=2e-2)
+        assert sum(explanation.cost) + explanation.slack_cost == pytest.approx(1.0)
+        for name in {limit.name for limit in explanation.active_limits if limit.price > 1.0}:
+            assert trace.active[tick, trace.limits.index(name)], name
+
+
+def test_for_a_person_and_as_json(run: tuple[Path, Trace], capsys: pytest.CaptureFixture[str]) -> None:
+    folder, trace = run
+    at = float(trace.t[np.flatnonzero(trace.contact_weight > 0.9)[0]])
+    assert main(["explain", str(folder), "--at", f"{at:.3f}"]) == 0
+    told = capsys.readouterr().out
+    for word in ("push", "line_0", "pitch", "mid_right", "Thrusts", "damping ratio"):
+        assert word in told
+    assert main(["explain", str(folder), "--at", f"{at:.3f}", "--json"]) == 0
+    table = json.loads(capsys.readouterr().out)
+    assert table["schema"] == 1 and table["t"] == pytest.approx(at, abs=0.002)
+    names = [task["name"] for task in table["tasks"]]
+    assert "push" in names and len(table["thrusts"]) == 6
+
+
+def test_rotors_have_the_names_and_the_window_of_the_tick(
+    run: tuple[Path, Trace], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What the program knew: the rate limit around the last thrusts, not the box of the data sheet."""
+    folder, trace = run
+    tick = int(np.flatnonzero(trace.contact_weight > 0.9)[0])
+    assert main(["explain", str(folder), "--at", f"{trace.t[tick]:.3f}", "--json"]) == 0
+    table = json.loads(capsys.readouterr().out)
+    step = 500.0 * 0.004
+    before = trace.thrusts[tick - 1]
+    np.testing.assert_allclose(table["thrust_lower"], np.maximum(before - step, 1.2), atol=1e-4)
+    np.testing.assert_allclose(table["thrust_upper"], np.minimum(before + step, 52.56), atol=1e-4)
+    assert table["reach_margin"] == pytest.approx(float(trace.reach_margin[tick]))
+    assert table["push_asked"] == trace.scene.paint.push_n
+    config, explanation = explain_tick(trace, tick)
+    assert explanation is not None
+    vehicle = config.controller.vehicle
+    renamed = tuple(dataclasses.replace(rotor, name=f"own_{i}") for i, rotor in enumerate(vehicle.geometry.rotors))
+    vehicle = dataclasses.replace(vehicle, geometry=dataclasses.replace(vehicle.geometry, rotors=renamed))
+    own = dataclasses.replace(config, controller=dataclasses.replace(config.controller, vehicle=vehicle))
+    told = shown(explanation_tables(trace, tick, explanation, own), capsys)
+    assert "own_0" in told and "own_5" in told and "mid_right" not in told
+    assert f"{table['thrust_upper'][0]:.3f}" in told and "52.56" not in told
+
+
+def test_a_held_tick_is_not_explained_by_the_program_of_an_earlier_one(
+    run: tuple[Path, Trace], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder, trace = run
+    tick = int(np.flatnonzero(trace.contact_weight > 0.9)[0])
+    outcome = trace.outcome.copy()
+    outcome[tick] = trace.outcomes.index("hold")
+    at = float(trace.t[tick])
+    rejected = Event(t=at, kind="rejected", text="measurement.specific_force: not finite")
+    late = Event(t=at + 1.0, kind="rejected", text="measurement.plane: not finite")
+    held = dataclasses.replace(trace, arrays=trace.arrays | {"outcome": outcome}, events=[rejected, late])
+    (tmp_path / "scene.toml").write_text((folder / "scene.toml").read_text())
+    save_log(tmp_path / "log.npz", {"qp": held})
+    assert main(["explain", str(tmp_path), "--at", f"{at:.3f}"]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "held" in told and "no program was solved" in told and "Tasks" not in told and "residual" not in told
+    assert "specific_force: not finite" in told and "measurement.plane" not in told
+    assert main(["explain", str(tmp_path), "--at", f"{at:.3f}", "--json"]) == 0
+    table = json.loads(capsys.readouterr().out)
+    assert table["outcome"] == "hold" and table["tasks"] == [] and table["active_limits"] == []
+    assert table["thrusts"] == table["flown_thrusts"] and table["thrust_upper"] is None
+    assert table["rejected"] == [{"t": at, "text": rejected.text}]
+
+
+def test_a_push_below_the_jobs_is_told_beside_it(run: tuple[Path, Trace], capsys: pytest.CaptureFixture[str]) -> None:
+    _, trace = run
+    tick = int(np.flatnonzero(trace.push_reference >= trace.scene.paint.push_n)[0])
+    config, explanation = explain_tick(trace, tick)
+    assert explanation is not None
+    greedy = dataclasses.replace(config, painting=dataclasses.replace(config.painting, push_n=35.0))
+    told = shown(explanation_tables(trace, tick, explanation, greedy), capsys)
+    assert "35.00 N by the job" in told and f"{trace.reach_margin[tick]:.2f} N further" in told
+    assert "by the job" not in shown(explanation_tables(trace, tick, explanation, config), capsys)
+
+
+def turning(trace: Trace, tick: int, rate: float, hard: bool = False) -> Trace:
+    """The flight with a pitch rate of its own [rad/s] in the program of a tick, barriers hard or soft."""
+    config = flown_config(trace)
+    limits = dataclasses.replace(config.controller.limits, hard_barriers=hard)
+    config = dataclasses.replace(config, controller=dataclasses.replace(config.controller, limits=limits))
+    program = trace.arrays["program"].copy()
+    place = places(program_template(config.controller).model.parameters)["tilt_state"]
+    program[tick, place] = 0.0, 0.0, 0.0, rate
+    return dataclasses.replace(trace, arrays=trace.arrays | {"program": program}, preset=dump_toml(config))
+
+
+def test_what_slack_costs_is_told_with_bound_and_unit(
+    run: tuple[Path, Trace], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder, trace = run
+    tick = int(np.flatnonzero(trace.contact_weight > 0.9)[0])
+    config, explanation = explain_tick(turning(trace, tick, 0.3), tick)
+    assert explanation is not None
+    by_name = {limit.name: place for place, limit in enumerate(explanation.active_limits)}
+    at = by_name["tilt_pitch"]
+    limit, row, paid = explanation.active_limits[at], explanation.limit_rows[at], explanation.limit_cost[at]
+    assert limit.side == "upper" and limit.slack > 0.01 and row.name == limit.name and row.unit == "rad/s^2"
+    bound = 64.0 * np.deg2rad(1.0) - 2.0 * 8.0 * 0.3  # p^2 phi_max - 2 p rate, with p = 8 1/s
+    assert row.upper == pytest.approx(bound, abs=1e-6) and row.value - row.upper == pytest.approx(limit.slack)
+    price = config.controller.limits.tilt_price
+    assert paid * explanation.total_cost == pytest.approx(0.5 * price * limit.slack**2)
+    assert sum(explanation.limit_cost) == pytest.approx(explanation.slack_cost, rel=1e-6)
+    told = shown(explanation_tables(trace, tick, explanation, config), capsys)
+    line = next(line for line in told.splitlines() if "tilt_pitch" in line)
+    assert f"{bound:.4g}" in line and "rad/s^2" in line and f"({paid:.0%})" in line
+    assert "Slack takes" in told and "per squared unit" in told
+    (tmp_path / "scene.toml").write_text((folder / "scene.toml").read_text())
+    save_log(tmp_path / "log.npz", {"qp": turning(trace, tick, 0.3)})
+    assert main(["explain", str(tmp_path), "--at", f"{trace.t[tick]:.3f}", "--json"]) == 0
+    table = json.loads(capsys.readouterr().out)
+    (entry,) = [entry for entry in table["active_limits"] if entry["name"] == "tilt_pitch"]
+    assert entry["cost_share"] == pytest.approx(paid) and entry["upper"] == pytest.approx(bound, abs=1e-6)
+    assert table["slack_cost_share"] == pytest.approx(explanation.slack_cost) and table["conflict"] == []
+
+
+def test_hard_limits_in_conflict_are_told_instead_of_refused(
+    run: tuple[Path, Trace], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Turning at 3 rad/s, more pitch moment is needed than the rotors have within their rate limit."""
+    folder, trace = run
+    tick = int(np.flatnonzero(trace.contact_weight > 0.9)[0])
+    (tmp_path / "scene.toml").write_text((folder / "scene.toml").read_text())
+    save_log(tmp_path / "log.npz", {"qp": turning(trace, tick, 3.0, hard=True)})
+    words = ["explain", str(tmp_path), "--at", f"{trace.t[tick]:.3f}"]
+    assert main(words) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "No thrusts keep these" in told and "tilt_pitch" in told and "hard_barriers = false" in told
+    assert "Tasks" not in told and "exact" not in told
+    assert main([*words, "--json"]) == 0
+    table = json.loads(capsys.readouterr().out)
+    rows = {row["name"]: row for row in table["conflict"]}
+    assert rows["tilt_pitch"]["value"] > rows["tilt_pitch"]["upper"]  # the flown thrusts break it
+    rotors = {name: row for name, row in rows.items() if name.startswith("thrust_")}
+    names = flown_config(trace).controller.vehicle.geometry.names
+    for name, row in rotors.items():
+        place = names.index(name.removeprefix("thrust_"))
+        assert row["unit"] == "N" and row["lower"] == pytest.approx(table["thrust_lower"][place])
+        assert row["value"] == pytest.approx(trace.thrusts[tick][place])
+    assert rotors and table["tasks"] == [] and table["total_cost"] is None
+
+
+def shown(parts: list[object], capsys: pytest.CaptureFixture[str]) -> str:
+    """What a person reads."""
+    from rich.console import Console
+
+    capsys.readouterr()
+    for part in parts:
+        Console(width=160).print(part)
+    return capsys.readouterr().out
+
+
+def test_what_cannot_be_explained_is_said_in_one_line(
+    run: tuple[Path, Trace], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder, trace = run
+    only_paper = tmp_path / "paper"
+    only_paper.mkdir()
+    (only_paper / "scene.toml").write_text((folder / "scene.toml").read_text())
+    save_log(only_paper / "log.npz", {"paper": dataclasses.replace(trace, law="paper")})
+    for words, why in (
+        ([str(folder), "--at", "1e4"], "the flight lasts from"),
+        ([str(tmp_path), "--at", "1"], "no run folder"),
+        ([str(only_paper), "--at", "1"], "no flight under the QP law"),
+        ([str(folder), "--at", "1", "--seed", "7"], "flown with seed 0"),
+    ):
+        assert main(["explain", *words]) == 2
+        said = capsys.readouterr().err
+        assert why in said and said.count("\n") == 1

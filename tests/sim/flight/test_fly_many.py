@@ -1,0 +1,106 @@
+"""Create once, fly many: what is shared between flights changes none of them, and what nobody sees is not drawn."""
+
+from __future__ import annotations
+
+import dataclasses
+import pickle
+
+import casadi as ca
+import numpy as np
+import pytest
+from closed_loop_rigs import short_scene
+
+from ibvs_qp.made import made
+from ibvs_qp.measurement import FeatureFrame, LineReference
+from ibvs_qp.model.bound_function import BoundFunction
+from sim.flight import controller_pool
+from sim.flight.closed_loop import FlightOptions, World, default_preset, make_pilot, pilot_config
+from sim.flight.jobs import PressJob
+from sim.flight.trace import Trace
+from sim.world.random_streams import NormalRows, stream
+
+
+def thrusts_of_a_flight(law: str, ticks: int = 120) -> np.ndarray:
+    """Begin a flight, end it early, and give the controller back as `fly` does."""
+    scene, options = short_scene(stroke_m=0.2, rows=1), FlightOptions(law=law, features="geometric", video=False)
+    config = pilot_config(scene, options)
+    pilot, world = make_pilot(scene, options, config, PressJob()), World(scene, options, config)
+    thrusts = []
+    for _ in range(ticks):
+        thrusts.append(pilot.step(world.sense()).thrusts)
+        world.act(thrusts[-1])
+    controller_pool.give_back(law, config.controller, pilot.controller)
+    return np.array(thrusts)
+
+
+@pytest.mark.parametrize("law", ["qp", "paper"])
+def test_a_controller_that_has_flown_flies_as_a_new_one(law: str) -> None:
+    config = default_preset(law).controller
+    controller_pool._waiting.clear()
+    new = thrusts_of_a_flight(law)
+    waiting = controller_pool._waiting[-1][2]
+    first = controller_pool.take(law, config)
+    assert first is waiting and controller_pool.take(law, config) is not first, "one flight at a time"
+    controller_pool.give_back(law, config, first)
+    np.testing.assert_array_equal(thrusts_of_a_flight(law), new)
+    assert controller_pool._waiting[-1][2] is first
+
+
+def test_another_configuration_gets_another_controller() -> None:
+    config = default_preset("qp").controller
+    controller = controller_pool.take("qp", config)
+    controller_pool.give_back("qp", config, controller)
+    heavier = dataclasses.replace(config, weights=dataclasses.replace(config.weights, push=2.0 * config.weights.push))
+    assert controller_pool.take("qp", heavier) is not controller
+    assert controller_pool.take("paper", config) is not controller
+
+
+def test_without_a_camera_nothing_is_drawn_until_somebody_looks() -> None:
+    scene, options = short_scene(stroke_m=0.2, rows=1), FlightOptions(features="geometric", video=False)
+    world = World(scene, options, pilot_config(scene, options))
+    for _ in range(20):
+        world.sense()
+        world.act(world.plant.thrusts_actual)
+    world.canvas.stroke(None, (0.1, 0.1))
+    assert not {"_blank", "_fresh", "_texture", "_wall"} & set(world.canvas.__dict__)
+    trace = Trace(scene=scene, seed=0, law="qp")
+    assert trace.canvas is None
+    trace.draw_later(lambda: world.canvas.rgb)
+    copy = pickle.loads(pickle.dumps(trace))
+    np.testing.assert_array_equal(copy.canvas, world.canvas.rgb)
+    assert trace.canvas is trace.canvas, "drawn once"
+
+
+def test_noise_in_rows_is_the_noise_one_by_one() -> None:
+    rows = NormalRows((stream(3, "a"), stream(3, "b")), 3)
+    a, b = stream(3, "a"), stream(3, "b")
+    row = np.zeros(6)
+    for _ in range(400):
+        expected = np.concatenate(([a.standard_normal() for _ in range(3)], [b.standard_normal() for _ in range(3)]))
+        rows.take_into(row.data)
+        np.testing.assert_array_equal(row, expected)
+
+
+def test_made_at_once_equals_made_by_the_constructor() -> None:
+    quick, slow = (
+        made(LineReference, rho=0.1, theta=1.5, role="vertical"),
+        LineReference(rho=0.1, theta=1.5, role="vertical"),
+    )
+    assert quick == slow and pickle.loads(pickle.dumps(quick)) == slow and hash(quick) == hash(slow)
+    assert dataclasses.replace(quick, rho=0.2).rho == 0.2
+    assert made(FeatureFrame, lines=(), plane=None, stamp_ns=1).velocity is None, "plain defaults hold"
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        quick.rho = 0.3  # type: ignore[misc]
+
+
+def test_a_bound_function_works_in_place_and_refuses_what_would_be_a_copy() -> None:
+    x = ca.SX.sym("x", 3)
+    function = ca.Function("twice", [x], [2.0 * x])
+    memory, out = np.arange(8.0), np.zeros(3)
+    twice = BoundFunction(function, (memory[2:5],), (out,))
+    memory[2] = 10.0
+    twice()
+    assert out.tolist() == [20.0, 6.0, 8.0]
+    for wrong in (memory[::2][:3], np.arange(3), np.zeros(4)):
+        with pytest.raises(ValueError, match="array"):
+            BoundFunction(function, (wrong,), (out,))

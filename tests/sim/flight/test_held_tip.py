@@ -1,0 +1,142 @@
+"""A tip that friction holds where no line fixes its place sideways: the vehicle must not rock about it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from ibvs_qp.config import ControllerConfig
+from ibvs_qp.estimation.wall_motion import WallMotion
+from ibvs_qp.measurement import FeatureFrame
+from ibvs_qp.model import height, program, wall
+from ibvs_qp.model.signals import Signals
+from sim.experiments.scenes import near_wall
+from sim.flight.closed_loop import FlightOptions, fly, pilot_config
+from sim.flight.jobs import PressJob
+from sim.flight.trace import Trace
+from sim.world.scene import Scene
+
+#: Nothing upright in the picture: the brush is half a metre off the right edge.
+SCENE = near_wall(start={"right_m": -0.5})
+#: Push that the nominal vehicle can hold standing still [N].
+REACH_N = 30.4
+#: The tip is held by then [ns].
+LINES_LOST_NS = 8_000_000_000
+
+
+def press(
+    push: float = 20.0,
+    reach_check: bool = True,
+    tick_s: float = 0.004,
+    law: str = "qp",
+    hold_s: float = 9.0,
+    **gains: float,
+) -> Trace:
+    options, scene = FlightOptions(law=law, seed=1, features="geometric", video=False), changed(SCENE, push)
+    pilot = pilot_config(scene, options)
+    gained = replace(pilot.controller.gains, **gains)
+    pilot = replace(pilot, controller=replace(pilot.controller, tick_s=tick_s, reach_check=reach_check, gains=gained))
+    return fly(scene, options, config=pilot, job=PressJob(hold_s=hold_s))
+
+
+def changed(scene: Scene, push: float) -> Scene:
+    return replace(scene, paint=replace(scene.paint, push_n=push))
+
+
+def held(trace: Trace) -> np.ndarray:
+    """Ticks of the last 3 s of the press."""
+    return np.flatnonzero(np.array(trace.phases)[trace.phase] == "press")[-750:]
+
+
+def rocking(trace: Trace) -> float:
+    """Largest yaw while held [deg]."""
+    return float(np.degrees(np.abs(trace.euler[held(trace), 2])).max())
+
+
+@pytest.mark.parametrize("law", ["qp", "paper"])
+def test_a_held_tip_is_no_pivot_to_rock_about(law: str) -> None:
+    trace = press(law=law)
+    assert trace.completed
+    assert rocking(trace) < 0.5
+    assert trace.push_true[held(trace)].mean() == pytest.approx(20.0, abs=0.5)
+
+
+def test_without_the_softer_yaw_it_would_be(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(wall, "HELD_SHARE", 1e3)
+    assert rocking(press(tick_s=0.004 + 1e-12)) > 1.0  # another configuration: controllers are kept by theirs
+
+
+def test_a_push_beyond_reach_takes_no_damping_from_a_held_tip() -> None:
+    trace = press(35.0, reach_check=False)
+    assert trace.completed
+    assert rocking(trace) < 0.5
+    assert trace.push_true[held(trace)].mean() >= 0.97 * REACH_N
+
+
+def test_at_the_weight_of_a_sliding_vehicle_it_would(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(program, "held_sideways_weight", lambda weights: weights.velocity)
+    trace = press(35.0, reach_check=False, tick_s=0.004 + 1e-12)
+    assert rocking(trace) > 2.0
+    assert trace.push_true[held(trace)].mean() < 0.95 * REACH_N
+
+
+def test_a_held_tip_turns_with_the_body_whatever_a_slide_counts_on() -> None:
+    trace = press(35.0, reach_check=False, line_turn_share=0.3)
+    assert rocking(trace) < 0.5
+    assert trace.push_true[held(trace)].mean() >= 0.97 * REACH_N
+
+
+def test_counted_on_as_in_a_slide_it_would_lose_push(monkeypatch: pytest.MonkeyPatch) -> None:
+    def as_in_a_slide(signals: Signals, config: ControllerConfig) -> ca.SX:
+        return 1.0 - signals.input("contact_weight") * (1.0 - config.gains.line_turn_share)
+
+    monkeypatch.setattr(program, "turn_share", as_in_a_slide)
+    monkeypatch.setattr(height, "turn_share", as_in_a_slide)
+    trace = press(35.0, reach_check=False, tick_s=0.004 + 1e-12, line_turn_share=0.3)
+    assert trace.push_true[held(trace)].mean() < 0.95 * REACH_N
+
+
+def nodding(trace: Trace) -> float:
+    """Largest pitch while held [deg]."""
+    return float(np.degrees(np.abs(trace.euler[held(trace), 1])).max())
+
+
+@pytest.fixture
+def lines_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing level in the picture either from the press on: the wall is blank."""
+    correct = WallMotion.correct
+
+    def blind(motion: WallMotion, frame: FeatureFrame, *rest: Any) -> None:
+        lost = frame.stamp_ns > LINES_LOST_NS
+        correct(motion, replace(frame, lines=()) if lost else frame, *rest)
+
+    monkeypatch.setattr(WallMotion, "correct", blind)
+
+
+@pytest.mark.parametrize("law", ["qp", "paper"])
+@pytest.mark.usefixtures("lines_lost")
+def test_nor_is_it_one_to_nod_about_on_a_blank_wall(law: str) -> None:
+    trace = press(law=law, hold_s=12.0)
+    assert trace.completed
+    assert nodding(trace) < 0.5
+    assert trace.push_true[held(trace)].mean() == pytest.approx(20.0, abs=0.5)
+
+
+@pytest.mark.usefixtures("lines_lost")
+def test_without_the_softer_pitch_it_would_be(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(wall, "HELD_SHARE", 1e3)
+    assert nodding(press(tick_s=0.004 + 1e-12, hold_s=12.0)) > 1.0
+
+
+def test_the_gains_of_a_held_vehicle_are_a_third_of_the_stability_limits() -> None:
+    config = ControllerConfig()
+    vehicle, gains = config.vehicle, config.gains
+    swing = vehicle.mass_kg * 0.7**2 * (0.0575 + 1.0 / (16.0 * np.pi))
+    pitch, yaw = wall.held_gains(config)
+    assert yaw == pytest.approx(gains.yaw_kd * (vehicle.inertia_kg_m2[2] / swing + gains.velocity_kp) / 3.0)
+    assert pitch == pytest.approx(gains.attitude_kd * (vehicle.inertia_kg_m2[1] / swing + gains.velocity_kp) / 3.0)
+    assert yaw < gains.yaw_kp and pitch < gains.attitude_kp

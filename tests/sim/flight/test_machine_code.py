@@ -1,0 +1,129 @@
+"""The tick as machine code: the same bits, and the interpreted tick wherever a compiler or its code fails."""
+
+from __future__ import annotations
+
+import math
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import pytest
+from references import good_reference
+from small_vehicle import SmallVehicle
+
+from ibvs_qp.analytic import PaperController
+from ibvs_qp.config import ControllerConfig
+from ibvs_qp.controller import HybridController
+from ibvs_qp.model import machine_code as module
+from ibvs_qp.model.machine_code import machine_code
+from sim.sensors.features import GeometricFeatures
+from sim.sensors.imu_ft import SensorSuite
+from sim.world.painted_edges import PaintedEdges
+from sim.world.plant import Plant
+from sim.world.scene import Scene, VehicleScene, WindScene
+
+needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler on this machine")
+
+
+@pytest.fixture(autouse=True)
+def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("IBVS_QP_CACHE", str(tmp_path))
+    monkeypatch.delenv("CC", raising=False)
+    return tmp_path
+
+
+def small() -> ca.Function:
+    x = ca.SX.sym("x", 2)
+    return ca.Function("small", [x], [ca.sin(x[0]) * x[1] + x[0] / 3.0])
+
+
+@needs_compiler
+@pytest.mark.parametrize("law", [HybridController, PaperController])
+def test_a_flight_on_machine_code_is_the_same_flight_to_the_bit(law: type, own_cache: Path) -> None:
+    thrusts = []
+    for compiled in (False, True):
+        controller = law(replace(ControllerConfig(), machine_code=compiled))
+        vehicle = SmallVehicle(controller.config)
+        for _ in range(300):
+            command = controller.step(vehicle.measure(), good_reference())
+            vehicle.fly(command.thrusts)
+            thrusts.append(command.thrusts)
+    np.testing.assert_array_equal(thrusts[:300], thrusts[300:])
+    assert list(own_cache.glob("tick-*.so"))
+
+
+@needs_compiler
+def test_it_is_translated_once(own_cache: Path) -> None:
+    machine_code(small())
+    (library,) = own_cache.glob("*.so")
+    before = library.stat().st_mtime_ns
+    found = machine_code(small())
+    assert found.class_name() == "External" and library.stat().st_mtime_ns == before
+    assert [entry.name for entry in own_cache.iterdir()] == [library.name]
+
+
+def test_without_a_compiler_the_function_itself_serves(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CC", "no-such-compiler")
+    function = small()
+    assert machine_code(function) is function
+    controller = HybridController(replace(ControllerConfig(), machine_code=True))
+    assert controller.step(SmallVehicle(controller.config).measure(), good_reference()).outcome == "solved"
+
+
+@needs_compiler
+def test_a_broken_cache_and_a_failing_compiler_cost_speed_and_nothing_else(
+    own_cache: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    machine_code(small())
+    (library,) = own_cache.glob("*.so")
+    library.write_bytes(b"no library")
+    function = small()
+    assert machine_code(function) is function and "interpreted" in caplog.text
+    monkeypatch.setenv("CC", "false")
+    assert machine_code(function) is function
+    (own_cache / "file").write_text("")
+    monkeypatch.delenv("CC")
+    monkeypatch.setenv("IBVS_QP_CACHE", str(own_cache / "file"))
+    assert machine_code(function) is function
+
+
+@needs_compiler
+def test_machine_code_with_other_numbers_is_not_flown(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    x = ca.SX.sym("x", 2)
+    other = ca.Function("small", [x], [ca.sin(x[0]) * x[1] + x[0] / 3.0000001])
+    library = module._library(other, ["cc"])
+    monkeypatch.setattr(module, "_library", lambda function, command: library)
+    function = small()
+    assert machine_code(function) is function and "other numbers" in caplog.text
+
+
+@needs_compiler
+def test_the_plant_and_its_sensors_on_machine_code_are_the_same_to_the_bit() -> None:
+    """Also in contact, under wind and with unequal lags: every branch of the plant's arithmetic."""
+    scene = Scene(
+        vehicle=VehicleScene(com_offset_m=(0.01, -0.01, 0.02)),
+        wind=WindScene(mean_m_s=(2.0, 1.0, 0.0), gust_n_rms=1.0),
+    )
+    readings = []
+    for compiled in (False, True):
+        plant, sensors = Plant(scene, seed=1, to_machine_code=compiled), SensorSuite(scene, None, 1, compiled)
+        plant.data.qpos[0] += 0.002 - plant.tip[0]  # the tip 2 mm inside the wall, so that it bounces off
+        edges = PaintedEdges(scene)
+        features = GeometricFeatures(scene, plant.vehicle, edges, 1, to_machine_code=compiled)
+        edges.stroke((1.4, 0.05), (0.8, 0.05))
+        rows, most = [], 0.0
+        for tick in range(250):
+            plant.step(plant.thrusts_actual * (1.0 + 0.02 * math.sin(0.1 * tick)))
+            frame = sensors.sample(plant)
+            lines = features.capture(plant.position, plant.quaternion, plant.velocity, plant.time_ns).lines
+            numbers = [number for line in lines for number in (line.rho, line.theta)]
+            parts = (plant.truth, frame.attitude, frame.angular_velocity, frame.specific_force, frame.wrench, numbers)
+            rows.append(np.concatenate(parts).tobytes())
+            most = max(most, plant.contact_1khz.max())
+        readings.append(rows)
+        assert most > 1.0
+    assert readings[0] == readings[1]

@@ -1,0 +1,76 @@
+"""The main job on rendered pictures, held to its figures: ten seeds, the shipped scenes and their variants."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import joblib
+import pytest
+
+from sim.evaluate.metrics import compute_metrics
+from sim.flight.closed_loop import FlightOptions, fly
+from sim.scenes import scene_path
+from sim.world.scene import PaintScene, Scene, WallScene, load_scene
+
+#: Seeds of the record.
+SEEDS = range(10)
+
+
+def paint(scene: Scene, seed: int = 0, image_size: tuple[int, int] | None = None) -> tuple[bool, str, dict[str, Any]]:
+    trace = fly(scene, FlightOptions(law="qp", seed=seed, image_size=image_size, video=False))
+    return trace.completed, trace.reason, compute_metrics(trace)
+
+
+def check(completed: bool, reason: str, figures: dict[str, Any]) -> None:
+    assert completed, reason
+    assert figures["path_rms_straight_m"] <= 0.005
+    assert figures["path_rms_corner_m"] <= 0.015
+    assert figures["force_rms_straight_n"] <= 0.35
+    assert figures["force_peak_n"] <= 7.5
+    assert figures["contact_share"] >= 0.99
+    assert figures["tilt_rms_deg"] <= 1.0
+    assert figures["tilt_peak_deg"] <= 3.0
+    assert figures["yaw_peak_deg"] <= 3.0
+    assert figures["coverage"] >= 0.97
+    outcomes = figures["outcomes"]
+    assert outcomes["solved"] >= 0.999 * sum(outcomes.values())
+    assert outcomes["exact_fallback"] == outcomes["analytic_fallback"] == outcomes["hold"] == 0
+
+
+@pytest.mark.slow
+def test_ten_seeds_of_the_default_scene() -> None:
+    flights = joblib.Parallel(n_jobs=2)(joblib.delayed(paint)(Scene(), seed) for seed in SEEDS)
+    for flight in flights:
+        check(*flight)
+        assert flight[2]["stroke_m"] >= 1.2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["low_contrast", "dark_board"])
+def test_shipped_scenes(name: str) -> None:
+    check(*paint(load_scene(scene_path(name))))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rows", [1, 4])
+def test_rows(rows: int) -> None:
+    check(*paint(Scene(paint=dataclasses.replace(PaintScene(), rows=rows))))
+
+
+@pytest.mark.slow
+def test_small_pictures() -> None:
+    check(*paint(Scene(), image_size=(424, 240)))
+
+
+@pytest.mark.slow
+def test_rough_wall() -> None:
+    check(*paint(Scene(wall=dataclasses.replace(WallScene(), friction=0.6))))
+
+
+def test_a_short_job_on_rendered_pictures() -> None:
+    """The whole pilot in the default run: 0.4 m strokes, two rows."""
+    job = dataclasses.replace(PaintScene(), stroke_m=0.4)
+    scene = Scene(paint=job)
+    board = dataclasses.replace(scene.board, width_m=job.stroke_m + 2.0 * job.edge_margin_m)
+    check(*paint(dataclasses.replace(scene, board=board)))

@@ -1,0 +1,38 @@
+"""Painting with noise that nobody tells the pilot: the corners of the noise sweep, in closed loop."""
+
+from __future__ import annotations
+
+import pytest
+
+from sim.evaluate.measures import paint_figures
+from sim.experiments.noise_sweep import FORCE_N, PATH_M, SIGMA_F, SIGMA_VS, STROKE_M
+from sim.experiments.scenes import short_job
+from sim.flight.closed_loop import FlightOptions, fly
+from sim.world.scene import Scene
+
+
+def noisy(sigma_vs: float, sigma_f: float, sigma_nm: float = 0.005) -> Scene:
+    force_torque = {"sigma_n": sigma_f, "sigma_nm": sigma_nm}
+    return short_job(STROKE_M, features={"sigma_vs": sigma_vs}, force_torque=force_torque)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", ["qp", "paper"])
+@pytest.mark.parametrize(("vs", "force"), [(0.02, 3.0), (0.12, 1.0), (0.12, 3.0)])
+def test_corners_of_the_noise_sweep(vs: float, force: float, law: str) -> None:
+    """Held for the QP law; the analytic law has the same lines and forces and must come home as well."""
+    trace = fly(noisy(vs, force), FlightOptions(law=law, video=False))
+    assert trace.completed, trace.reason
+    figures = paint_figures(trace)
+    assert figures["contact_share"] >= 0.995
+    if law == "qp":
+        assert figures["path_rms_m"] <= PATH_M[SIGMA_VS.index(vs)]
+        assert figures["force_rms_n"] <= FORCE_N[SIGMA_F.index(force)]
+
+
+@pytest.mark.slow
+def test_moments_as_noisy_as_the_forces() -> None:
+    """Moments noisy in the same proportion, 0.15 N m at 3 N, still tell the force across the tool better."""
+    trace = fly(noisy(0.02, 3.0, sigma_nm=0.15), FlightOptions(law="qp", video=False))
+    assert trace.completed, trace.reason
+    assert paint_figures(trace)["path_rms_m"] <= PATH_M[0]

@@ -1,0 +1,146 @@
+"""Clocks that are set back, leap or stumble: the pilot's own time runs on, and late pictures find their tick."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+from closed_loop_rigs import short_scene
+
+from ibvs_qp.command import Outcome
+from ibvs_qp.estimation.kalman import HISTORY, DelayedKalman
+from ibvs_qp.estimation.stamps import StampRing
+from ibvs_qp.measurement import SensorFrame
+from ibvs_qp.pilot import Pilot
+from ibvs_qp.validation.clock import StampFollower
+from sim.flight.closed_loop import FlightOptions, World, pilot_config
+
+TICK_NS = 4_000_000
+SECOND = 1_000_000_000
+CHAIN = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [0.0, 0.0, 0.0]])  # distance, speed, bias
+
+
+def moved(frame: SensorFrame, by_ns: int) -> SensorFrame:
+    """The frame on a clock that differs."""
+    changes: dict[str, Any] = {"stamp_ns": frame.stamp_ns + by_ns, "wrench_stamp_ns": frame.wrench_stamp_ns + by_ns}
+    seen = frame.features
+    if seen is not None:
+        later = {"stamp_ns": seen.stamp_ns + by_ns, "velocity_stamp_ns": seen.velocity_stamp_ns + by_ns}
+        changes["features"] = dataclasses.replace(seen, **later)
+    return dataclasses.replace(frame, **changes)
+
+
+def test_a_clock_set_back_is_followed_and_nothing_is_forgotten() -> None:
+    """A tenth of a second of holding, then lines, wall and phase go on; commands answer in the frames' own time."""
+    scene = short_scene(stroke_m=0.2, rows=1)
+    options = FlightOptions(features="geometric", video=False)
+    config = pilot_config(scene, options)
+    pilot, world = Pilot(config), World(scene, options, config)
+    outcomes, clock = [], 60 * SECOND
+    for _ in range(300):
+        world.act(pilot.step(moved(world.sense(), clock)).thrusts)
+    known, begun = set(pilot.motion.lines), world.plant.position
+    assert pilot.painter.phase == "approach" and known
+    clock = 5 * SECOND
+    for _ in range(120):
+        frame = moved(world.sense(), clock)
+        command = pilot.step(frame)
+        outcomes.append(command.outcome)
+        if command.outcome is Outcome.SOLVED:
+            assert command.stamp_ns == frame.stamp_ns and not command.rejected
+        world.act(command.thrusts)
+    assert set(outcomes[:24]) == {Outcome.HOLD} and set(outcomes[26:]) == {Outcome.SOLVED}
+    assert pilot.painter.phase in ("approach", "align")
+    assert known <= set(pilot.motion.lines), "the same lines as before"
+    assert np.linalg.norm(world.plant.position - begun) < 0.2
+    newest = max(line.seen_ns for line in pilot.motion.lines.values())
+    assert pilot.measurement is not None
+    assert 0 <= pilot.measurement.stamp_ns - newest < 0.12 * SECOND, "pictures are taken in again"
+
+
+@pytest.mark.parametrize("law", ["qp", "paper"])
+def test_one_stamp_far_ahead_blinds_nobody(law: str) -> None:
+    scene = short_scene(stroke_m=0.2, rows=1)
+    options = FlightOptions(law=law, features="geometric", video=False)
+    config = pilot_config(scene, options)
+    pilot, world = Pilot(config), World(scene, options, config)
+    for tick in range(60):
+        frame = world.sense()
+        command = pilot.step(moved(frame, 3600 * SECOND) if tick == 40 else frame)
+        assert bool(command.rejected) == (tick == 40)
+        world.act(command.thrusts)
+
+
+def test_own_time_runs_on_over_every_set_back() -> None:
+    clock, last = StampFollower(), -1
+    stamps = [k * TICK_NS for k in (*range(1000, 1100), *range(10, 110), *range(5, 105))]
+    taken = []
+    for stamp in stamps:
+        if not clock.refuse(stamp):
+            assert clock.last_ns > last
+            taken.append(clock.last_ns)
+            last = clock.last_ns
+    assert len(taken) == 300 - 2 * 24
+    assert clock.last_ns == (1099 + 200) * TICK_NS, "the ticks that were refused count as time"
+    for odd in (None, 1.5, -3, "now", 2**70, True):
+        assert clock.refuse(odd)
+
+
+def test_a_stamp_finds_the_nearest_tick_whatever_the_ticks_lengths() -> None:
+    rng, ring = np.random.default_rng(0), StampRing(0.004)
+    assert ring.age(0) is None
+    stamps: list[int] = []
+    for _ in range(3 * HISTORY):
+        gap = int(rng.choice([TICK_NS // 4, TICK_NS, 3 * TICK_NS, 40 * TICK_NS], p=[0.7, 0.2, 0.08, 0.02]))
+        stamps.append((stamps[-1] if stamps else 0) + gap + int(rng.integers(-500_000, 500_000)))
+        ring.add(stamps[-1])
+    kept = np.array(stamps[-HISTORY:])
+    for wanted in rng.integers(kept[0], kept[-1], 200):
+        age = ring.age(int(wanted))
+        assert age is not None
+        assert abs(kept[-1 - age] - wanted) == np.abs(kept - wanted).min()
+    assert ring.age(int(kept[0]) - TICK_NS) is None and ring.age(stamps[-1] + 2 * TICK_NS) is None
+
+
+def test_a_late_correction_over_uneven_ticks_equals_the_replay() -> None:
+    """Frames dropped on the way: corrected at the capture's own time, moved on by the ticks' own lengths."""
+    rng = np.random.default_rng(1)
+    lengths = rng.choice([1, 1, 1, 2, 5], 60)
+    stamps = np.cumsum(lengths) * TICK_NS
+    inputs = rng.normal(0.0, 0.01, (60, 3))
+
+    def fly(at: int) -> DelayedKalman:
+        """Correct tick 40 once tick `at` has been predicted."""
+        f = DelayedKalman(CHAIN, np.array([1e-10, 1e-6, 1e-7]), np.array([0.1, 0.1, 0.1]), 0.004)
+        for k in range(60):
+            f.predict(int(stamps[k]), inputs[k], lengths[k] * 0.004)
+            if k in (5, 15, 25):  # so that distance, speed and bias are correlated
+                f.correct(int(stamps[k]), np.eye(3)[:1], np.array([0.01]), np.array([[1e-4]]), 1e6)
+            if k == at:
+                assert f.correct(int(stamps[40]), np.eye(3)[:1], np.array([0.02]), np.array([[1e-4]]), 1e6)
+        return f
+
+    late, replay = fly(59), fly(40)
+    np.testing.assert_allclose(late.state, replay.state, atol=1e-12)
+    one, other = late.at(int(stamps[50])), replay.at(int(stamps[50]))
+    assert one is not None and other is not None
+    np.testing.assert_allclose(one, other, atol=1e-12)
+
+
+def test_a_stamp_that_surely_goes_on_is_one_that_is_accepted() -> None:
+    """The quick question and the thorough one answer alike on a clock that drops, stops, leaps and is set back."""
+    rng, quick, thorough = np.random.default_rng(4), StampFollower(), StampFollower()
+    steps = TICK_NS * rng.choice([1, 5, 0, -1, 750, -2500], 4000, p=[0.96, 0.02, 0.01, 0.005, 0.0025, 0.0025])
+    stamps = (10**13 + np.cumsum(steps)).tolist()
+    end, leap, at_once = stamps[-1], 10**11, 0
+    torn = [end + TICK_NS, end + leap, end + 2 * TICK_NS, end + leap + TICK_NS]  # two leaps with a good one between
+    for stamp in (*stamps, 2**62, -1, 1.5, None, True, *torn):
+        passed = quick.goes_on(stamp)
+        refused = thorough.refuse(stamp)
+        assert not (passed and refused), stamp
+        assert passed or quick.refuse(stamp) == refused
+        assert (quick.shift_ns, quick.last_ns) == (thorough.shift_ns, thorough.last_ns)
+        at_once += passed
+    assert quick.shift_ns > 0 and 2000 < at_once < 4000

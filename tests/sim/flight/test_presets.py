@@ -1,0 +1,113 @@
+"""The shipped presets: vehicle and brush written out in full, every number the same as its one source."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+from closed_loop_rigs import short_scene
+from rotor_layouts import OCTOROTOR
+
+from allocation import TAROT_T960, Rotor, RotorGeometry
+from ibvs_qp.config import ControllerConfig
+from ibvs_qp.config.contact_margin import BrushSettings
+from ibvs_qp.config.settings import from_dict
+from ibvs_qp.config.vehicle import VehicleParams
+from ibvs_qp.painting.painter import PaintingConfig
+from ibvs_qp.pilot import PilotConfig
+from sim.evaluate.metrics import compute_metrics
+from sim.flight.closed_loop import PRESETS, FlightOptions, default_preset, fly
+from sim.tune.finalists import Finalist, best_of
+from sim.tune.objectives import OBJECTIVES, Score
+
+FILES = sorted(PRESETS.glob("*.toml"))
+#: What differs from the nominal vehicle, by the beginning of the file's name.
+OCTO_VEHICLE = VehicleParams(geometry=OCTOROTOR, thrust_max_n=35.0, propeller_radius_m=0.165)
+VEHICLES = {"tarot_t960": VehicleParams(), "octorotor": OCTO_VEHICLE}
+every_preset = pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
+
+
+def keys(kind: type) -> set[str]:
+    return {field.name for field in dataclasses.fields(kind)}
+
+
+def written(file: Path) -> dict[str, Any]:
+    return tomllib.loads(file.read_text(encoding="utf-8"))
+
+
+def test_a_preset_for_each_law_and_an_octorotor() -> None:
+    assert [file.stem for file in FILES] == ["octorotor_qp", "tarot_t960_paper", "tarot_t960_qp"]
+
+
+@every_preset
+def test_vehicle_and_brush_are_written_out_in_full(file: Path) -> None:
+    table = written(file)["controller"]
+    assert set(table["vehicle"]) == keys(VehicleParams)
+    assert set(table["vehicle"]["geometry"]) == keys(RotorGeometry)
+    assert all(set(rotor) == keys(Rotor) for rotor in table["vehicle"]["geometry"]["rotors"])
+    assert set(table["brush"]) == keys(BrushSettings)
+
+
+@every_preset
+def test_every_number_agrees_with_its_source(file: Path) -> None:
+    vehicle, law = file.stem.rsplit("_", 1)
+    config = PilotConfig.from_toml(file)
+    assert config.law == law
+    assert config.controller.vehicle == VEHICLES[vehicle]
+    assert config.controller.brush == BrushSettings()
+    tuned = dataclasses.replace(
+        PilotConfig(law=law), controller=ControllerConfig(vehicle=VEHICLES[vehicle], gains=config.controller.gains)
+    )
+    assert config == tuned, "vehicle, brush and gains are all that a preset says"
+    if law == "qp":
+        assert config.controller.gains == ControllerConfig().gains, "the defaults are the tuned gains of the program"
+    assert config.painting.brush_width_m == PaintingConfig().brush_width_m
+
+
+@every_preset
+def test_round_trip(file: Path) -> None:
+    config = PilotConfig.from_toml(file)
+    assert from_dict(PilotConfig, tomllib.loads(config.to_toml())) == config
+
+
+@pytest.mark.parametrize("law", ["qp", "paper"])
+def test_the_gains_are_those_that_the_kept_search_chose(law: str) -> None:
+    """One search for both laws (docs/tuning.md); where no trial bettered the gains that it began at, these stay."""
+    kept = Path(__file__).parents[3] / "docs" / "tuning"
+    search = json.loads((kept / f"rendered_{law}_trials.json").read_text(encoding="utf-8"))
+    assert search["trials"] == len(search["all_trials"]) == 200 and search["features"] == "rendered"
+    start = written(kept / f"start_{law}.toml")["controller"]["gains"]
+    assert all(search["all_trials"][0][name] == value for name, value in start.items())
+    finalists = {name: finalist(each) for name, each in search["finalists"].items()}
+    assert best_of(finalists) == search["chosen"]
+    numbers = {row["number"]: row for row in search["all_trials"]}
+    chosen = start if search["chosen"] is None else {name: numbers[search["chosen"]][name] for name in start}
+    assert written(PRESETS / f"tarot_t960_{law}.toml")["controller"]["gains"] == chosen
+
+
+def finalist(row: dict[str, Any]) -> Finalist:
+    def read(each: dict[str, Any]) -> Score:
+        return Score(tuple(each[objective.column] for objective in OBJECTIVES), each["failed"])
+
+    return Finalist(read(row), {name: read(each) for name, each in row["scenes"].items()}, row["damping"])
+
+
+def test_the_presets_of_the_laws_are_those_that_fly_by_default() -> None:
+    assert VEHICLES["tarot_t960"].geometry == TAROT_T960
+    for law in ("qp", "paper"):
+        assert default_preset(law) == PilotConfig.from_toml(PRESETS / f"tarot_t960_{law}.toml")
+
+
+def test_the_octorotor_paints() -> None:
+    scene = short_scene(stroke_m=0.3, rows=1)
+    config = PilotConfig.from_toml(PRESETS / "octorotor_qp.toml")
+    full = config.controller.vehicle.thrust_max_n
+    scene = dataclasses.replace(scene, vehicle=dataclasses.replace(scene.vehicle, thrust_max_n=full))
+    options = FlightOptions(features="geometric", video=False, preset=str(PRESETS / "octorotor_qp.toml"))
+    trace = fly(scene, options)
+    assert trace.completed and trace.thrusts.shape[1] == 8
+    assert compute_metrics(trace)["force_rms_straight_n"] <= 0.35

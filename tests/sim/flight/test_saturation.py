@@ -1,0 +1,108 @@
+"""Static push at and beyond what the rotors can hold: who pays, and what the commands say."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from closed_loop_rigs import wall
+
+from sim.flight.closed_loop import FlightOptions, fly, pilot_config
+from sim.flight.jobs import PressJob
+from sim.flight.trace import Trace
+from sim.world.scene import Scene
+
+#: Push that the nominal vehicle can hold standing still [N].
+REACH_N = 30.4
+
+
+def press(push: float, friction: float, reach_check: bool = True, law: str = "qp", slide_s: float = 0.0) -> Trace:
+    """Press at one place, and slide to the left if asked to."""
+    scene = Scene(wall=wall(friction=friction))
+    scene = dataclasses.replace(scene, paint=dataclasses.replace(scene.paint, push_n=push))
+    options = FlightOptions(law=law, features="geometric", video=False)
+    config = pilot_config(scene, options)
+    config = dataclasses.replace(config, controller=dataclasses.replace(config.controller, reach_check=reach_check))
+    return fly(scene, options, config=config, job=PressJob(hold_s=2.5 if slide_s else 8.0, slide_s=slide_s))
+
+
+def settled(trace: Trace) -> np.ndarray:
+    """The hold after the first three seconds of full weight: ticks."""
+    holding = np.flatnonzero((trace.contact_weight > 0.99) & (trace.phase == trace.phases.index("press")))
+    return holding[trace.t[holding] > trace.t[holding[0]] + 3.0]
+
+
+def notes(trace: Trace) -> list[str]:
+    """What was said about inputs."""
+    return [event.text for event in trace.events if event.kind == "rejected"]
+
+
+STATIC = [(15.0, 0.3), (15.0, 0.05), (20.0, 0.3), (25.0, 0.3), (25.0, 0.05), (30.0, 0.3), (30.0, 0.05)]
+
+
+@pytest.mark.parametrize(("push", "friction"), [*STATIC, pytest.param(20.0, 0.05, marks=pytest.mark.slow)])
+def test_a_static_push_within_reach_is_delivered(push: float, friction: float) -> None:
+    trace = press(push, friction, reach_check=True)
+    ticks = settled(trace)
+    delivered = float(trace.push_true[ticks].mean())
+    print(f"{push:g} N at mu {friction:g}: {delivered:.2f} N")
+    assert trace.completed and delivered == pytest.approx(push, rel=0.05)
+
+
+@pytest.mark.parametrize("reach_check", [True, False])
+def test_a_push_beyond_reach_is_given_up_and_nothing_else(reach_check: bool) -> None:
+    trace = press(35.0, 0.3, reach_check)
+    ticks = settled(trace)
+    delivered, tilt = float(trace.push_true[ticks].mean()), np.degrees(trace.euler[ticks, :2])
+    height = float(np.ptp(trace.position[ticks, 2]))
+    print(f"35 N: {delivered:.2f} N, height {1e3 * height:.1f} mm, tilt {np.abs(tilt).max():.2f} deg peak")
+    assert trace.completed and delivered >= 0.95 * REACH_N
+    assert height <= 0.05 and np.sqrt((tilt**2).mean()) <= 1.0 and np.abs(tilt).max() <= 2.0
+    assert any("reduced" in text and "reach standing still" in text for text in notes(trace)) is reach_check
+
+
+@pytest.mark.parametrize("push", [*(pytest.param(push, marks=pytest.mark.slow) for push in (25.0, 26.0, 27.0)), 28.0])
+def test_within_reach_the_laws_push_alike(push: float) -> None:
+    """Nothing is clipped in a quiet hold below the reach: there neither law has an advantage."""
+    for law in ("qp", "paper"):
+        trace = press(push, 0.3, reach_check=False, law=law)
+        ticks = settled(trace)
+        error = trace.push_true[ticks] - push
+        height = float(np.ptp(trace.position[ticks, 2]))
+        print(f"{law} {push:g} N: {error.mean():+.3f} N, {error.std():.3f} N, height {1e3 * height:.1f} mm")
+        assert trace.completed and abs(error.mean()) <= 0.01 * push and error.std() <= 0.2
+        assert height <= 2e-3 and np.abs(np.degrees(trace.euler[ticks])).max() <= 0.3
+
+
+def test_at_the_reach_clipping_loses_the_wall_and_the_program_does_not() -> None:
+    """30 N unchecked, 0.4 N below the reach: noise clips rotors, and what clipping leaves is no level flight."""
+    program, clipped = (press(30.0, 0.3, reach_check=False, law=law) for law in ("qp", "paper"))
+    assert program.completed and program.push_true[settled(program)].mean() >= 0.95 * 30.0
+    assert not clipped.completed and "crash" in clipped.reason
+
+
+@pytest.mark.parametrize(
+    ("law", "push", "friction", "slide_s", "limit"),
+    [
+        ("qp", 22.0, 0.3, 5.0, 15.8),
+        ("qp", 16.0, 0.8, 9.0, 8.7),
+        pytest.param("paper", 22.0, 0.3, 5.0, 15.8, marks=pytest.mark.slow),
+        pytest.param("paper", 16.0, 0.8, 9.0, 8.7, marks=pytest.mark.slow),
+    ],
+)
+def test_a_sliding_push_beyond_reach_is_reduced_with_the_reason(
+    law: str, push: float, friction: float, slide_s: float, limit: float
+) -> None:
+    trace = press(push, friction, law=law, slide_s=slide_s)
+    ticks = np.flatnonzero(trace.phase == trace.phases.index("paint"))
+    last = ticks[-250:]
+    yaw = np.degrees(trace.euler[ticks, 2])
+    rms, delivered = float(np.sqrt((yaw**2).mean())), float(trace.push_true[last].mean())
+    speed = 250.0 / (len(last) - 1) * float(trace.position[last[0], 1] - trace.position[last[-1], 1])
+    print(f"{law} mu {friction:g}: {delivered:.2f} N, yaw {rms:.2f} deg rms, {1e3 * speed:.0f} mm/s at the end")
+    assert trace.completed and 0.9 * limit <= delivered <= limit
+    assert any("reduced" in text and "friction" in text and "along the travel" in text for text in notes(trace))
+    assert rms <= 1.0
+    if law == "qp":
+        assert speed == pytest.approx(0.1, abs=0.02), "it slides in the end, and at the speed that was asked"

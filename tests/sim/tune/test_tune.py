@@ -1,0 +1,307 @@
+"""``ibvs-qp tune`` with made-up flights: search, resume, choice, verdict on unseen seeds, files, refusals."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+import sim.sweep.flying
+import sim.tune.flights
+from ibvs_qp.pilot import PilotConfig
+from sim.commands.cli import main
+from sim.flight.closed_loop import default_preset
+from sim.tune.choice import allowed, contact_damping, front, gain_over, ranked
+from sim.tune.finalists import Finalist, best_of, fly_finalists
+from sim.tune.flights import CHOICE_SEED, REPORT_SEED, SEARCH_SEED, checks, flights, scenes, seeds
+from sim.tune.objectives import OBJECTIVES, Score, refused, score
+from sim.tune.search import STARTUP, SearchPlan, finished, open_study, search
+from sim.tune.space import RANGES, searched_gains, with_gains
+
+pytest.importorskip("optuna", reason="tuning needs the extra tune")
+
+#: Where the made-up flights are best.
+BEST = {"line_kp": 15.0, "force_kfi": 1.0, "attitude_kp": 45.0}
+
+
+def made_up_flight(scene, options, *, config, **_):
+    """Every objective grows with the distance from `BEST`, a little with the seed; a very stiff line loop fails."""
+    gains = config.controller.gains
+    off = sum(math.log(getattr(gains, name) / best) ** 2 for name, best in BEST.items())
+    wobble = 1.0 + 0.01 * math.sin(options.seed + len(scene.wind.mean_m_s) * scene.wall.friction)
+    figures = {each.column: 0.05 * each.failed * (0.2 + off) * wobble for each in OBJECTIVES}
+    return SimpleNamespace(completed=gains.line_kp < 35.0, reason="", figures=figures)
+
+
+@pytest.fixture
+def flown(monkeypatch, tmp_path):
+    """Flights are made up; the list holds their seeds."""
+    count: list[int] = []
+
+    def fly(scene, options, **named):
+        count.append(options.seed)
+        return made_up_flight(scene, options, **named)
+
+    monkeypatch.setattr(sim.sweep.flying, "fly", fly)
+    monkeypatch.setattr(sim.tune.flights, "paint_row", made_up_figures)
+    monkeypatch.setattr("sim.tune.search.require_margin", lambda *_: None)
+    monkeypatch.chdir(tmp_path)
+    return count
+
+
+def made_up_figures(trace):
+    return trace.figures
+
+
+def plan(trials: int, storage: str, **changes) -> SearchPlan:
+    settings = {"seed": 0, "flights": 1, "features": "geometric", "jobs": 1} | changes
+    return SearchPlan(shipped=default_preset("qp"), trials=trials, storage=storage, **settings)
+
+
+def searched(trials: int, storage: str, **changes):
+    wanted = plan(trials, storage, **changes)
+    study = open_study(wanted)
+    search(wanted, study, lambda _: None)
+    return finished(study)
+
+
+def test_the_search_begins_at_the_shipped_gains_and_betters_them(flown):
+    trials = searched(30, "a.log")
+    gains, shipped = trials[0]
+    assert gains == searched_gains(default_preset("qp")) and len(trials) == 30
+    best = ranked({number: each for number, (_, each) in trials.items()}, shipped)
+    assert best and gain_over(trials[best[0]][1], shipped) < -0.3
+    for gains, _ in trials.values():
+        assert all(0.999 * low <= gains[name] <= 1.001 * high for name, (low, high) in RANGES.items())
+
+
+def test_the_same_seed_is_the_same_search_and_a_resumed_one_too(flown):
+    once, again = searched(STARTUP + 4, "a.log"), searched(STARTUP + 4, "b.log")
+    assert once == again
+    searched(STARTUP + 1, "c.log")
+    before = len(flown)
+    assert searched(STARTUP + 4, "c.log") == once
+    assert len(flown) - before == 3 * len(scenes())
+    assert searched(3, "d.log", seed=1)[1] != once[1]
+
+
+def test_a_killed_trial_leaves_no_trace_in_the_search(flown, monkeypatch):
+    whole, once = sim.sweep.flying.fly, searched(STARTUP + 3, "a.log")
+
+    def dies(*arguments, **named):
+        if len(flown) % 3 == 2:
+            raise KeyboardInterrupt
+        return whole(*arguments, **named)
+
+    searched(STARTUP + 1, "b.log")
+    flown.clear()
+    monkeypatch.setattr(sim.sweep.flying, "fly", dies)
+    with pytest.raises(KeyboardInterrupt):
+        searched(STARTUP + 3, "b.log")
+    monkeypatch.setattr(sim.sweep.flying, "fly", whole)
+    assert list(searched(STARTUP + 3, "b.log").values()) == list(once.values())
+
+
+def test_a_preset_whose_contact_would_ring_is_not_flown(flown, monkeypatch):
+    from ibvs_qp.config.errors import ConfigError
+
+    def ringing(*_):
+        raise ConfigError("rings")
+
+    monkeypatch.setattr("sim.tune.search.require_margin", ringing)
+    trials = searched(2, "a.log")
+    assert not flown and all(each == refused() for _, each in trials.values())
+
+
+def test_search_choice_and_report_fly_seeds_of_their_own(flown):
+    spans = [set(seeds(first, seed, 500)) for first in (SEARCH_SEED, CHOICE_SEED, REPORT_SEED) for seed in (0, 1)]
+    assert sum(map(len, spans)) == len(set().union(*spans))
+    config = with_gains(default_preset("paper"), {"line_kp": 11.0})
+    runs = flights(scenes() | checks(), config, "tuned", (5,), "geometric")
+    assert {run.law for run in runs} == {"paper"} and {run.plan.config.controller.gains.line_kp for run in runs} == {
+        11.0
+    }
+    assert len({run.params["scene"] for run in runs}) == len({run.plan.scene for run in runs}) == 6
+
+
+def test_failed_flights_count_with_the_worst():
+    row = {"completed": True, **{each.column: 0.5 * each.failed for each in OBJECTIVES}}
+    lost = {**row, "completed": False}
+    unknown = {**row, "path_rms_m": None}
+    assert score([row, lost]).failed == 0.5
+    assert score([row, lost]).values == pytest.approx([0.75 * each.failed for each in OBJECTIVES])
+    assert score([unknown]).values[1] == OBJECTIVES[1].failed
+
+
+def test_the_rule_of_choice():
+    shipped = Score((1.0, 1.0, 1.0, 1.0, 1.0), 0.0)
+    scores = {
+        0: shipped,
+        1: Score((0.5, 0.5, 0.5, 0.5, 1.2), 0.0),  # clearly worse in one
+        2: Score((0.9, 0.9, 0.9, 0.9, 1.05), 0.0),
+        3: Score((0.8, 0.9, 0.9, 0.9, 1.0), 0.0),
+        4: Score((0.1, 0.1, 0.1, 0.1, 0.1), 0.1),  # fails flights
+        5: Score((1.0, 1.0, 1.0, 1.0, 1.01), 0.0),
+    }
+    assert ranked(scores, shipped) == [3, 2]
+    assert not allowed(scores[1], shipped) and not allowed(scores[4], shipped)
+    assert front(scores) == [1, 3]
+    assert gain_over(Score((math.e,) * 5, 0.0), shipped) == pytest.approx(1.0)
+
+
+def test_command_writes_preset_trials_figures_and_verdict(flown, capsys):
+    words = ["tune", "--trials", "24", "--unseen", "4", "--json", "--out", "run"]
+    assert main(words) == 0
+    content = json.loads(capsys.readouterr().out)
+    assert (content["schema"], content["law"], content["trials"]) == (1, "qp", 24)
+    preset = PilotConfig.from_toml(content["preset"]) if content["chosen"] else None
+    assert preset is not None and searched_gains(preset) == content["gains"]
+    assert (
+        Path(content["preset"])
+        .read_text()
+        .startswith("# Gains found by `ibvs-qp tune --law qp --trials 24 --unseen 4`")
+    )
+    everywhere = [each for each in content["unseen"] if each["scene"] == "all"]
+    assert [each["objective"] for each in everywhere] == [each.column for each in OBJECTIVES]
+    assert all(each["n"] == 24 and each["verdict"] == "better" for each in everywhere)
+    assert all(each["difference"]["high"] < 0.0 for each in everywhere)
+    assert {seed // 1000 for seed in flown} == {1, 2, 3}
+    for name in ("qp-front.png", "qp-unseen.png"):
+        assert Path("run/figures", name).stat().st_size > 10_000
+    assert len(json.loads(Path("run/qp_trials.json").read_text())["all_trials"]) == 24
+    page = Path("run/report_qp.md").read_text()
+    assert "verdict" in page and "better" in page
+    flown.clear()
+    assert main(words) == 0 and not flown
+
+
+def test_nothing_better_keeps_the_shipped_preset(flown, monkeypatch, capsys):
+    shipped = default_preset("paper").controller.gains
+    for name in BEST:
+        monkeypatch.setitem(BEST, name, getattr(shipped, name))
+    assert main(["tune", "--law", "paper", "--trials", "4", "--json", "--out", "run"]) == 0
+    content = json.loads(capsys.readouterr().out)
+    assert content["chosen"] is None and content["unseen"] == []
+    assert PilotConfig.from_toml(content["preset"]) == default_preset("paper")
+    assert "shipped preset stays" in Path("run/report_paper.md").read_text()
+
+
+def test_a_kept_record_gives_the_same_choice_without_the_flights_of_the_search(flown, capsys):
+    assert main(["tune", "--trials", "24", "--unseen", "4", "--json", "--out", "run"]) == 0
+    once = json.loads(capsys.readouterr().out)
+    flown.clear()
+    words = ["tune", "--trials-of", "run/qp_trials.json", "--unseen", "4", "--json", "--out", "again"]
+    assert main(words) == 0
+    again = json.loads(capsys.readouterr().out)
+    assert {seed // 1000 for seed in flown} == {2, 3}
+    same = ("law", "seed", "features", "trials", "front", "finalists", "chosen", "gains", "unseen", "searched_by")
+    assert {name: again[name] for name in same} == {name: once[name] for name in same}
+    assert "`ibvs-qp tune --law qp --unseen 4 --trials-of run/qp_trials.json`" in Path("again/qp.toml").read_text()
+
+
+def test_a_killed_trial_does_not_shift_the_numbers_of_a_kept_record(flown, capsys):
+    assert main(["tune", "--trials", "24", "--unseen", "4", "--json", "--out", "run"]) == 0
+    once = json.loads(capsys.readouterr().out)
+    record = json.loads(Path("run/qp_trials.json").read_text())
+    loser = next(place for place, row in enumerate(record["all_trials"]) if row["failed"])
+    assert 0 < loser < once["chosen"]
+    del record["all_trials"][loser]
+    Path("gap.json").write_text(json.dumps(record))
+    assert main(["tune", "--trials-of", "gap.json", "--unseen", "4", "--json", "--out", "again"]) == 0
+    again = json.loads(capsys.readouterr().out)
+    assert (again["chosen"], again["gains"]) == (once["chosen"], once["gains"])
+
+
+@pytest.mark.parametrize("words", [["--trials", "10"], ["--flights", "2"], ["--storage", "a.log"]])
+def test_options_of_a_search_are_refused_beside_a_kept_one(flown, capsys, words):
+    assert main(["tune", "--trials", "2", "--json", "--out", "run"]) == 0
+    capsys.readouterr()
+    assert main(["tune", "--trials-of", "run/qp_trials.json", "--json", "--out", "again", *words]) == 2
+    out, err = capsys.readouterr()
+    assert out == "" and err.count("\n") == 1 and words[0] in err
+
+
+def test_a_trial_that_rings_more_is_no_finalist(flown, monkeypatch, tmp_path):
+    trials = searched(24, "a.log")
+    wanted = plan(24, "a.log")
+
+    def chosen(folder: str) -> int | None:
+        return best_of(fly_finalists(wanted, trials, 2, tmp_path / folder, lambda *_: None))
+
+    first = chosen("first")
+    assert first is not None
+    # The same figures, but the best finalist rings a little more: it does not come as far as to fly.
+    best, firm = trials[first][0]["line_kp"], contact_damping(wanted.shipped)
+    with monkeypatch.context() as patch:
+        ringing = lambda config: (0.9 if config.controller.gains.line_kp == best else 1.0) * firm  # noqa: E731
+        patch.setattr("sim.tune.finalists.contact_damping", ringing)
+        assert chosen("ringing") not in (first, None)
+
+
+def test_a_finalist_clearly_worse_in_one_scene_may_not_replace_the_shipped():
+    def finalist(**scenes: float) -> Finalist:
+        by_scene = {name: Score((value,) * len(OBJECTIVES), 0.0) for name, value in scenes.items()}
+        return Finalist(Score((sum(scenes.values()) / len(scenes),) * len(OBJECTIVES), 0.0), by_scene, 0.3)
+
+    shipped = finalist(job=1.0, sticking=1.0, gusts=1.0)
+    assert finalist(job=0.7, sticking=1.2, gusts=0.7).may_replace(shipped)
+    assert not finalist(job=0.7, sticking=1.3, gusts=0.7).may_replace(shipped)
+    assert not finalist(job=1.0, sticking=1.1, gusts=1.0).may_replace(shipped)
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        ({"law": "paper"}, "law paper"),
+        ({"features": "rendered"}, "features rendered"),
+        ({"all_trials": []}, "no trial of the preset"),
+        ({"all_trials": [{"failed": 0.0}]}, "KeyError"),
+        ({"all_trials": 3}, "TypeError"),
+    ],
+)
+def test_a_record_of_another_search_is_refused(flown, capsys, change, named):
+    assert main(["tune", "--trials", "2", "--json", "--out", "run"]) == 0
+    capsys.readouterr()
+    record = json.loads(Path("run/qp_trials.json").read_text())
+    Path("other.json").write_text(json.dumps(record | change))
+    assert main(["tune", "--json", "--out", "again", "--trials-of", "other.json"]) == 2
+    out, err = capsys.readouterr()
+    assert out == "" and err.count("\n") == 1 and named in err
+
+
+def test_ctrl_c_says_how_to_go_on(flown, monkeypatch, capsys):
+    def stops(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(sim.sweep.flying, "fly", stops)
+    assert main(["tune", "--trials", "4", "--json", "--out", "run"]) == 130
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1 and "go on with: ibvs-qp tune --trials 4" in err
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (["--trials", "0"], "--trials"),
+        (["--jobs", "0"], "--jobs"),
+        (["--seed", "-2"], "--seed"),
+        (["--preset", "nowhere.toml"], "nowhere.toml"),
+        (["--trials-of", "nowhere.json"], "nowhere.json"),
+        (["--law", "both"], "qp"),
+        (["--storage", "sqlite:////nowhere/at/all.db", "--trials", "1"], "sqlite:////nowhere/at/all.db"),
+        (["--storage", "mysterious://x", "--trials", "1"], "mysterious://x"),
+    ],
+)
+def test_refusals_are_one_line(flown, capsys, words, named):
+    assert main(["tune", "--json", "--out", "run", *words]) == 2
+    out, err = capsys.readouterr()
+    assert out == "" and err.count("\n") == 1 and named in err and err.startswith("ibvs-qp: error: ")
+
+
+def test_a_storage_of_another_search_is_refused(flown, capsys):
+    assert main(["tune", "--trials", "1", "--json", "--out", "run"]) == 0
+    assert main(["tune", "--trials", "1", "--json", "--out", "run", "--flights", "2"]) == 2
+    assert "another --out" in capsys.readouterr().err

@@ -1,0 +1,175 @@
+"""Perception on rendered frames with exact truth: approach, both rows, the left edge, other scenes and sizes."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from rendered_scenes import (
+    INTERVAL_NS,
+    SETTLE,
+    VEHICLE,
+    Flight,
+    Score,
+    World,
+    board_edge,
+    nearest,
+    perceive,
+    quaternion,
+    row_edge,
+    scene_of,
+    stroke_row,
+)
+
+from ibvs_qp.vision import LineHint, Perception, VisionConfig
+
+SCENES = [
+    ("default", {}),
+    ("default", {"gap_m": 0.02}),
+    ("default", {"slope_deg": 2.0}),
+    ("dark_board", {}),
+    ("low_contrast", {}),
+]
+FRAMES = 40
+
+
+@pytest.mark.parametrize(("name", "board"), SCENES)
+def test_approach(name: str, board: dict) -> None:
+    world = World(scene_of(name, **board), 1)
+    right = world.geometry.row_ends[1]
+    flight = Flight(world, {"bottom": board_edge(world, "bottom")})
+    flight.run(np.full(FRAMES, right - 0.1), world.geometry.row_height(1), np.linspace(0.5, 0.2, FRAMES), 1)
+    flight.check(normal_deg=0.6)
+
+
+@pytest.mark.parametrize(("name", "board"), SCENES)
+def test_row_1_in_contact(name: str, board: dict) -> None:
+    world = World(scene_of(name, **board), 2)
+    right = world.geometry.row_ends[1]
+    stroke_row(world, 1, right, right - 0.3)
+    flight = Flight(world, {"bottom": board_edge(world, "bottom"), "fresh": row_edge(world, 1, 1)}, settle=8)
+    flight.run(right - 0.3 - 0.1 / 30.0 * np.arange(FRAMES), world.geometry.row_height(1), np.zeros(FRAMES), 2, 1)
+    flight.check()
+
+
+@pytest.mark.parametrize(("name", "board"), SCENES[:2])
+def test_left_edge_in_view(name: str, board: dict) -> None:
+    world = World(scene_of(name, **board), 1)
+    left, right = world.geometry.row_ends
+    stroke_row(world, 1, right, left + 0.18)
+    flight = Flight(world, {"bottom": board_edge(world, "bottom"), "left": board_edge(world, "left")}, settle=8)
+    path = np.maximum(left + 0.18 - 0.1 / 30.0 * np.arange(60), left)
+    flight.run(path, world.geometry.row_height(1), np.zeros(60), 1, 1)
+    flight.check()
+
+
+def guide_hint(world: World):
+    """What the strategy expects of row 2: the upper edge of row 1, ahead of the brush only."""
+    below = world.scene.paint.pitch_m - 0.5 * world.scene.paint.brush_width_m
+    return LineHint(
+        name="guide",
+        rho=(-0.08 + below) / 0.5,
+        theta=0.5 * math.pi,
+        kind="paint",
+        surface_side=-1,
+        gate_px=14.0,
+        span=(0.1, 0.5),
+    )
+
+
+@pytest.mark.parametrize("name", ["default", "low_contrast"])
+def test_row_2_guide_is_never_its_own_edge(name: str) -> None:
+    world = World(scene_of(name), 3)
+    left, right = world.geometry.row_ends
+    stroke_row(world, 1, right, left)
+    truth = row_edge(world, 1, 1)
+    right_ones, wrong, frames = 0, 0, 0
+    score = Score(world.focal)
+    path = left + 0.1 / 30.0 * np.arange(90)
+    told = (guide_hint(world),)
+    for percept, position, attitude, _ in perceive(
+        world, path, world.geometry.row_height(2), np.zeros(90), 3, 2, 0.4, told
+    ):
+        frames += 1
+        if frames <= SETTLE:
+            continue
+        guides = [track for track in percept.tracks if track.hint == "guide"]
+        target = world.line(truth[0], truth[1], position, attitude)
+        for track in guides:
+            middle = track.segment.mean(axis=0)
+            offset = middle @ np.array([math.cos(target[1]), math.sin(target[1])]) - target[0]
+            good = abs(offset) * world.focal < 2.0 and track.confirmed
+            right_ones += good
+            wrong += not good
+            assert track.segment[:, 0].max() > 0.3, "the guide lies ahead of the brush"
+        score.add(percept, target, "paint")
+    assert wrong == 0
+    assert right_ones == frames - SETTLE
+    score.check()
+
+
+def test_climb_keeps_the_bottom_edge_and_ends_on_the_guide() -> None:
+    world = World(scene_of("default"), 4)
+    left, right = world.geometry.row_ends
+    low, high = world.geometry.row_height(1), world.geometry.row_height(2)
+    stroke_row(world, 1, right, left + 0.05)
+    still, steps = 4, np.arange(1, 22) / 21.0
+    along = np.concatenate(
+        (left + 0.05 * (1.0 - np.arange(15) / 14.0), np.full(21, left), left + 0.1 / 30.0 * np.arange(30))
+    )
+    up = np.concatenate((np.full(15, low), low + (high - low) * steps, np.full(30, high)))
+    truth, bottom = row_edge(world, 1, 1), board_edge(world, "bottom")
+    told, identities, guides = (guide_hint(world),), set(), 0
+    flight = perceive(world, along, up, np.zeros(len(along)), 4, 1, 0.4, told)
+    for k, (percept, position, attitude, _) in enumerate(flight):
+        if k < still:
+            continue
+        found = nearest(percept, world.line(bottom[0], bottom[1], position, attitude), "board")
+        assert found is not None and abs(found[1]) * world.focal < 1.0
+        identities.add(found[0].track_id)
+        target = world.line(truth[0], truth[1], position, attitude)
+        for track in percept.tracks:
+            if track.hint == "guide" and k >= 38:
+                middle = track.segment.mean(axis=0)
+                offset = middle @ np.array([math.cos(target[1]), math.sin(target[1])]) - target[0]
+                assert abs(offset) * world.focal < 1.0
+                guides += track.confirmed
+    assert len(identities) == 1
+    assert guides == len(along) - 38
+
+
+def test_small_pictures() -> None:
+    scene = scene_of("default")
+    scene = dataclasses.replace(scene, camera=dataclasses.replace(scene.camera, width=424, height=240))
+    world = World(scene, 1)
+    right = world.geometry.row_ends[1]
+    stroke_row(world, 1, right, right - 0.3)
+    flight = Flight(world, {"bottom": board_edge(world, "bottom"), "fresh": row_edge(world, 1, 1)}, settle=8)
+    flight.run(right - 0.3 - 0.1 / 30.0 * np.arange(FRAMES), world.geometry.row_height(1), np.zeros(FRAMES), 1, 1)
+    flight.check(normal_deg=0.6, angle=0.04)
+
+
+def test_same_pictures_same_bits() -> None:
+    world = World(scene_of("default"), 1)
+    right = world.geometry.row_ends[1]
+    frames = []
+    for k in range(15):
+        attitude = quaternion(0.0, 0.0, 0.002 * k)
+        position = world.body_position(right - 0.1 - 0.003 * k, 0.05, 0.2, attitude)
+        frames.append((world.camera.capture(position, attitude, (k + 1) * INTERVAL_NS), attitude))
+    perception = Perception(VisionConfig(paint_color=world.scene.paint.color), VEHICLE)
+    results = []
+    for _ in range(2):
+        perception.reset()
+        rows = []
+        for frame, attitude in frames:
+            features = perception.process(frame, attitude=attitude, rotation=np.array([0.0, 0.0, 0.002])).features
+            rows.append(
+                (features.plane, [(line.rho, line.theta, line.weight, line.track_id) for line in features.lines])
+            )
+            rows.append(None if features.velocity is None else features.velocity.tolist())
+        results.append(rows)
+    assert results[0] == results[1]
+    assert any(row and row[1] for row in results[0][::2])
