@@ -1,0 +1,55 @@
+"""Recorded flights through pilot and controller, open loop: same thrusts, programs, percepts and refusals as before."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from replay.cases import CASES, DATA
+from replay.compare import compare, reference_outputs, report
+from replay.recordings import load
+from replay.replayer import replay
+from replay.tolerances import TOLERANCES, Tolerance
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_replays_as_recorded(name: str) -> None:
+    over = [entry for entry in compare(reference_outputs(name), replay(name)) if entry.first_over is not None]
+    if over:
+        pytest.fail(f"{name}\n{report(over)}", pytrace=False)
+
+
+def test_the_cases_cover_every_phase() -> None:
+    seen: set[str] = set()
+    for name, case in CASES.items():
+        outputs = reference_outputs(name)
+        seen |= {f"{route} {mode}" for route in ("pilot", "controller") for mode in outputs[f"{route}.mode"]}
+        seen |= {f"{route} limited" for route in ("pilot", "controller") if outputs[f"{route}.active_limits"].any()}
+        if case.inputs_of is None:
+            recording = load(DATA / f"{name}.inputs.npz")
+            seen |= {
+                f"{name} slides" for wanted in recording.references if wanted.contact and wanted.velocity[0] < -0.05
+            }
+            seen |= {
+                f"{name} lost" for limits in recording.thrust_limits if limits is not None and min(limits[1]) <= 0.0
+            }
+    modes = {f"{route} {mode}" for route in ("pilot", "controller") for mode in ("free", "approach", "contact")}
+    slides = {f"{name} slides" for name in ("paint_qp", "paint_paper_law", "heavy_noise", "octorotor")}
+    assert seen >= modes | slides | {"pilot limited", "controller limited", "controller hold", "rotor_loss lost"}
+
+
+def test_a_difference_is_found() -> None:
+    """In the right quantity, at the right tick, by the bound of that tick."""
+    reference = reference_outputs("press_beyond_reach")
+    limited = np.flatnonzero(reference["pilot.active_limits"] != "")[0]
+    changed = {name: values.copy() for name, values in reference.items()}
+    changed["pilot.thrusts"][limited, 2] += 1e-3
+    changed["controller.rejected"] = changed["controller.rejected"].astype("U20")
+    changed["controller.rejected"][7] = "velocity: not sound"
+    for bound, expected in (
+        (5e-4, {"pilot.thrusts": limited, "controller.rejected": 7}),
+        (2e-3, {"controller.rejected": 7}),
+    ):
+        tolerances = TOLERANCES | {"thrusts": Tolerance(free=1e-9, limited=bound)}
+        found = {entry.quantity: entry.first_over for entry in compare(reference, changed, tolerances)}
+        assert {quantity: tick for quantity, tick in found.items() if tick is not None} == expected
