@@ -8,7 +8,6 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -31,7 +30,6 @@ from ibvs_qp.measurement import (
     LineReference,
     Measurement,
     Reference,
-    RgbdFrame,
     SensorFrame,
 )
 from ibvs_qp.painting.painter import Painter, PaintingConfig, Scenery, Wish
@@ -41,9 +39,6 @@ from ibvs_qp.vectors import Row, down_row
 from ibvs_qp.vision.config import VisionConfig
 from ibvs_qp.vision.paper.config import PaperConfig
 from ibvs_qp.vision.percept import LineHint
-
-if TYPE_CHECKING:
-    from ibvs_qp.vision.flow_ahead import FlowAhead
 
 #: Where the fresh edge exists ahead of the brush, normalised image x from the tip's side to the border.
 HINT_SPAN = (0.10, 0.50)
@@ -102,8 +97,6 @@ class Pilot:
         config: Everything a flight needs.
         painter: Strategy to follow; None paints.
         seen_as: Applied to what perception saw in a picture, for studies of its errors.
-        controller: A controller of the configuration's law and settings that has flown before; None creates one.
-        flow: Works out the flow beside the pilot, where the camera offers it; None does it here, to the same bits.
     """
 
     def __init__(
@@ -111,13 +104,11 @@ class Pilot:
         config: PilotConfig | None = None,
         painter: Painter | None = None,
         seen_as: Callable[[FeatureFrame], FeatureFrame] | None = None,
-        controller: HybridController | PaperController | None = None,
-        flow: FlowAhead | None = None,
     ) -> None:
         self.config = config or PilotConfig()
         settings, vehicle = self.config.controller, self.config.controller.vehicle
         kind = HybridController if self.config.law == "qp" else PaperController
-        self.controller = kind(settings) if controller is None else controller
+        self.controller = kind(settings)
         self.motion = WallMotion(
             np.array(vehicle.tip_position_m),
             np.array(vehicle.camera_position_m),
@@ -137,7 +128,7 @@ class Pilot:
         self._camera = np.array(vehicle.camera_position_m)
         self._tip_camera = to_camera(self._tip, self._camera).tolist()
         self._tip_from_camera = (self._tip - self._camera).tolist()
-        self._perception, self._flow = None, flow
+        self._perception = None
         self.reset()
 
     def reset(self) -> None:
@@ -273,18 +264,8 @@ class Pilot:
             velocity=self.measurement.velocity if self.measurement is not None else None,
             hints=self._hints(image.stamp_ns),
         )
-        if self._flow is not None:
-            self._look_ahead(self._flow, image, slot)
         seen = self.percept.features
         return seen if self._seen_as is None or seen is None else self._seen_as(seen)
-
-    def _look_ahead(self, flow: FlowAhead, image: RgbdFrame, slot: int) -> None:
-        """Tell who works out the flow how the vehicle has turned from this picture's tick to that of the next."""
-        stamp = flow.next_stamp(image.rgb, image.stamp_ns)
-        turn = None
-        if stamp is not None:
-            turn = np.subtract(self._history_turn[self._slot(stamp)], self._history_turn[slot])
-        flow.look_ahead(image.rgb, stamp, turn)
 
     def _open_eyes(self):
         """The configured perception, loaded when the first picture comes."""
@@ -292,10 +273,10 @@ class Pilot:
         if self.config.perception == "paper":
             from ibvs_qp.vision.paper import PaperPerception
 
-            return PaperPerception(self.config.paper_vision, self.config.vision, vehicle, self._flow)
+            return PaperPerception(self.config.paper_vision, self.config.vision, vehicle)
         from ibvs_qp.vision.perception import Perception
 
-        return Perception(self.config.vision, vehicle, self._flow)
+        return Perception(self.config.vision, vehicle)
 
     def _take(self, features: FeatureFrame) -> None:
         """Correct motion and lines at the time of capture."""

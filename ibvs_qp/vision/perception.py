@@ -16,7 +16,6 @@ from ibvs_qp.vision.colors import SurfaceColors
 from ibvs_qp.vision.config import VisionConfig
 from ibvs_qp.vision.detect import Candidate, detect_lines
 from ibvs_qp.vision.flow import SparseFlow
-from ibvs_qp.vision.flow_ahead import FlowAhead
 from ibvs_qp.vision.layout import PictureLayout
 from ibvs_qp.vision.light_samples import on_surface
 from ibvs_qp.vision.make_percept import make_percept
@@ -48,14 +47,14 @@ class Perception:
     tracked, both at once.
     """
 
-    def __init__(self, config: VisionConfig, vehicle: VehicleParams, flow: FlowAhead | None = None) -> None:
-        """Take settings, geometry and who works out the flow if somebody else does; start without memory."""
+    def __init__(self, config: VisionConfig, vehicle: VehicleParams) -> None:
+        """Take settings and geometry; start without memory."""
         self._config, self._vehicle = config, vehicle
         self._camera_position = np.asarray(vehicle.camera_position_m, float)
         self._fitter, self._tracker, self._flow = (
             PlaneFitter(config.plane),
             LineTracker(config),
-            flow or SparseFlow(config.flow),
+            SparseFlow(config.flow),
         )
         self._colors = SurfaceColors(config.board_color, config.paint_color, config.line.color_gate)
         self._layout: PictureLayout | None = None
@@ -155,8 +154,6 @@ class Perception:
             busy=self._since_detection == 0,
         )
         clock.lap("flow")
-        if isinstance(self._flow, FlowAhead):
-            clock.times["flow"] = max(clock.times["flow"], self._flow.spent_ms)
         return make_percept(
             frame, self._tracker.tracks, self._plane, flow, tuple(candidates), refused, self._layout.mask, clock.times
         )

@@ -16,7 +16,6 @@ import traceback
 from typing import Any
 
 from ibvs_qp.config.errors import IbvsQpError
-from sim.flight.memory import keep_memory
 
 #: Commands by name, for hints.
 COMMANDS = ("paint", "experiment", "compare", "explain", "bench", "detect", "sweep", "tune")
@@ -39,7 +38,6 @@ def main(arguments: list[str] | None = None) -> int:
     """
     for variable in _THREAD_VARIABLES:
         os.environ.setdefault(variable, "1")
-    keep_memory()
     words = sys.argv[1:] if arguments is None else arguments
     try:
         return _parse(words).run(words)

@@ -16,13 +16,11 @@ import ibvs_qp
 from ibvs_qp.config.errors import out_of_range
 from ibvs_qp.measurement import SensorFrame
 from ibvs_qp.pilot import Pilot, PilotConfig
-from ibvs_qp.vision.flow_ahead import FlowAhead
-from sim.flight import controller_pool
 from sim.flight.faults import Fault, FaultSchedule
 from sim.flight.jobs import Job, PaintJob
 from sim.flight.recorder import Recorder
 from sim.flight.trace import Event, Trace
-from sim.sensors.cameras import CameraStream, RemoteCamera, open_camera
+from sim.sensors.cameras import CameraStream, open_camera
 from sim.sensors.features import GeometricFeatures, add_sigma_vs
 from sim.sensors.imu_ft import SensorSuite
 from sim.sensors.miscalibration import Miscalibration
@@ -56,8 +54,8 @@ BASE_TIME, STROKE_FACTOR = 90.0, 2.0
 class FlightOptions:
     """How to fly a scene; the defaults are the main job.
 
-    With `camera_process` another process draws the pictures, with `machine_code` the C compiler translates the
-    controller's tick, where there is one: both are the same flight to the bit, sooner.
+    With `machine_code` the C compiler, where there is one, compiles the controller's tick: the same flight to the bit,
+    faster.
     """
 
     law: str = "qp"
@@ -68,7 +66,6 @@ class FlightOptions:
     image_size: tuple[int, int] | None = None
     preset: str | None = None
     video: bool = True
-    camera_process: bool = False
     machine_code: bool = False
     view: bool = False
 
@@ -131,19 +128,13 @@ class World:
         self.scene, self.geometry = scene, BoardGeometry(scene)
         vehicle = config.controller.vehicle
         self._rendered = options.features == "rendered"
-        camera = None
-        if self._rendered and options.camera_process and options.camera in ("plane", "gl"):
-            # first of all: it sets itself up meanwhile
-            camera = RemoteCamera(scene, vehicle, options.seed, lambda: self.canvas.take(), options.camera, lend=True)
-        self._remote = camera
         self.plant = Plant(scene, vehicle, options.seed, options.machine_code, options.view)
         self.sensors = SensorSuite(scene, vehicle, options.seed, options.machine_code)
         self.canvas = Canvas(scene, options.seed)
         self._miscalibration = Miscalibration(scene.camera, vehicle, self._rendered)
         if self._rendered:
-            camera = camera or open_camera(options.camera, scene, vehicle, self.canvas, options.seed)
-            # A drawing thread would hand the interpreter's lock to and fro: measured 10 % slower on two cores.
-            self._stream = CameraStream(camera, scene.camera.rate_hz, scene.camera.latency_s, threaded=False)
+            camera = open_camera(options.camera, scene, vehicle, self.canvas, options.seed)
+            self._stream = CameraStream(camera, scene.camera.rate_hz, scene.camera.latency_s)
         else:
             self._features = GeometricFeatures(
                 scene, vehicle, self.canvas, options.seed, to_machine_code=options.machine_code
@@ -152,15 +143,6 @@ class World:
         self.viewer = self._open_viewer() if options.view else None
         self._brush: tuple[float, float] | None = None
         self._pressed = 0
-
-    def flow(self, config: PilotConfig) -> FlowAhead | None:
-        """Who works out the flow beside the pilot: the drawing process where there is one."""
-        return None if self._remote is None else FlowAhead(self._remote, config.vision.flow)
-
-    def wait(self) -> None:
-        """Wait until all is set up: a drawing process begins as long before a flight as a camera in this one."""
-        if self._remote is not None:
-            self._remote.wait()
 
     def _open_viewer(self) -> FlightViewer:
         from sim.flight.viewer import FlightViewer
@@ -200,22 +182,18 @@ class World:
         else:
             self._brush = None
 
-    def close(self) -> int:
-        """End window and drawing process; returns the peak resident memory of the latter [bytes], 0 without one."""
+    def close(self) -> None:
+        """Close the window."""
         if self.viewer is not None:
             self.viewer.close()
-        return self._stream.close() if self._rendered else 0
 
 
-def make_pilot(
-    scene: Scene, options: FlightOptions, config: PilotConfig, job: Job, flow: FlowAhead | None = None
-) -> Pilot:
+def make_pilot(scene: Scene, options: FlightOptions, config: PilotConfig, job: Job) -> Pilot:
     """The pilot of one flight; with the scene's extra feature noise after its own perception."""
     sigma, noise = scene.features.sigma_vs, stream(options.seed, "sigma_vs")
     rendered = options.features == "rendered"  # the sensor model of lines adds the same noise itself
     seen_as = (lambda frame: add_sigma_vs(frame, sigma, noise)) if rendered and sigma > 0.0 else None
-    controller = controller_pool.take(config.law, config.controller)
-    return Pilot(config, job.strategy(config.painting), seen_as, controller, flow)
+    return Pilot(config, job.strategy(config.painting), seen_as)
 
 
 def fly(
@@ -240,14 +218,7 @@ def fly(
         The trace; incomplete with a reason when the flight crashed, timed out or was interrupted.
     """
     config, job = pilot_config(scene, options, config), job or PaintJob()
-    world = World(scene, options, config)
-    try:
-        # after the world, whose camera sets itself up meanwhile
-        pilot = make_pilot(scene, options, config, job, world.flow(config))
-        world.wait()
-    except BaseException:
-        world.close()
-        raise
+    pilot, world = make_pilot(scene, options, config, job), World(scene, options, config)
     recorder, schedule = Recorder(scene, options, world, pilot), FaultSchedule(faults)
     limit = BASE_TIME + STROKE_FACTOR * job.expected_s(config.painting)
     start, reason, tick = time.perf_counter(), "", 0
@@ -272,11 +243,9 @@ def fly(
     except KeyboardInterrupt:
         reason = "interrupted"
     finally:
-        memory = world.close()
+        world.close()
     trace = recorder.trace()
     trace.wall_time_s = time.perf_counter() - start  # with what was put off until the end
-    controller_pool.give_back(config.law, config.controller, pilot.controller)
-    trace.camera_memory_bytes = memory
     trace.completed = not reason and pilot.painter.finished and not pilot.painter.failed
     trace.reason = reason or pilot.painter.reason
     if reason:

@@ -68,7 +68,7 @@ def fly_laws(
     flights: dict[str, Flight] = {}
     for law, job in jobs.items():
         trace = fly(scene, job, functools.partial(progress, law))
-        flights[law] = Flight(trace=pack_pictures(trace), process_memory_bytes=trace.camera_memory_bytes)
+        flights[law] = Flight(trace=pack_pictures(trace))
         _tell_end(law, trace, progress)
         if trace.reason == INTERRUPTED:
             break

@@ -75,7 +75,6 @@ class Trace:
         completed: Rows, climbs and retreat done without time-out or crash.
         reason: Why the flight ended, in words.
         wall_time_s: Wall-clock time of the simulation.
-        camera_memory_bytes: Peak resident memory of the process that drew the pictures; 0 if it was the same one.
         canvas: Painted board as the camera would see it, uint8 RGB, with `canvas_px_per_m`.
         coverage_mask: Paint coverage of the canvas 0..1, float32, same size.
         preset: Configuration of the pilot, TOML.
@@ -93,7 +92,6 @@ class Trace:
     completed: bool = False
     reason: str = ""
     wall_time_s: float = 0.0
-    camera_memory_bytes: int = 0
     canvas: np.ndarray | None = field(default_factory=lambda: None)  # no class attribute: see `draw_later`
     canvas_px_per_m: float = 0.0
     canvas_origin_m: tuple[float, float] = (0.0, 0.0)

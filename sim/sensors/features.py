@@ -87,7 +87,7 @@ class GeometricFeatures:
         self.intrinsics = camera_intrinsics(scene.camera)
         own, extra = np.random.SeedSequence([seed, 0xFEA7]).spawn(2)
         self._normals, self._extra = Normals(np.random.default_rng(own)), np.random.default_rng(extra)
-        self._schedule = Schedule(scene.camera.rate_hz, scene.camera.latency_s)
+        self._schedule: Schedule[FeatureFrame] = Schedule(scene.camera.rate_hz, scene.camera.latency_s)
         self._bind(machine_code if to_machine_code else lambda function: function)
         hidden = vehicle_mask(scene, vehicle, self.intrinsics)
         self._pieces = PaintedPieces(self._edges, self._board, self.intrinsics, hidden, to_machine_code)
@@ -127,9 +127,7 @@ class GeometricFeatures:
         """
         if self._schedule.due(now_ns):
             self._schedule.push(now_ns, self.capture(position_ned, quaternion_b_in_i, velocity_body, now_ns))
-        frame = self._schedule.pop(now_ns)
-        assert frame is None or isinstance(frame, FeatureFrame)
-        return frame
+        return self._schedule.pop(now_ns)
 
     def capture(
         self, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, velocity_body: np.ndarray, stamp_ns: int

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import functools
 import math
-from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -33,24 +32,14 @@ _PHASES, _STAMP_STEP_PX = 16, 2.0
 _STAMPS_AT_ONCE = 64
 
 
-@dataclass(frozen=True)
-class FreshPaint:
-    """What strokes have changed since somebody last looked; a copy, so later strokes do not show in it.
-
-    Attributes:
-        box: (row, row end, column, column end) in the padded texture.
-        coverage: Painted share of every pixel of the box in 255ths, uint8.
-    """
-
-    box: tuple[int, int, int, int]
-    coverage: np.ndarray
+#: Rows and columns of the padded texture: (row, row end, column, column end).
+Box = tuple[int, int, int, int]
 
 
 class Canvas:
     """Board and wall pictures of one flight.
 
-    Strokes only change the painted share of the pixels. The texture made from it may be drawn in another thread:
-    `take` what is new where the strokes are made, `draw` it where the texture is read, in the same order.
+    Strokes change the paint coverage of the pixels; `refresh` mixes the texture from it when a camera needs it.
 
     Args:
         scene: The scene.
@@ -71,7 +60,7 @@ class Canvas:
         self._coverage, self._drawn = np.zeros(padded, np.uint8), np.zeros(padded, np.uint8)
         self._stamps = _brush_stamps(0.5 * paint.brush_width_m * self.pixels_per_m)
         self._coming: list[tuple[float, float]] = []  # (column, row) of stamps that are still to be drawn
-        self._dirty: tuple[int, int, int, int] | None = None
+        self._dirty: Box | None = None
         self.edges = PaintedEdges(scene)
 
     def _surface_source(self) -> tuple[np.random.Generator, int]:
@@ -93,8 +82,8 @@ class Canvas:
         return cv2.copyMakeBorder(face, pad, pad, pad, pad, cv2.BORDER_REPLICATE)
 
     @functools.cached_property
-    def _texture(self) -> np.ndarray:
-        """The board as painted so far, padded, uint8 (h, w, 4)."""
+    def texture(self) -> np.ndarray:
+        """The board as painted at the last `refresh`, `TEXTURE_PAD_PX` pixels larger on every side, uint8 (h, w, 4)."""
         return self._blank.copy()
 
     @functools.cached_property
@@ -137,7 +126,7 @@ class Canvas:
     @property
     def rgb(self) -> np.ndarray:
         """The painted board, uint8 RGB (height, width, 3), a copy."""
-        # Made afresh: the texture may be in use by a thread that draws a picture.
+        # Not from `texture`: its refresh reports the changed box, which a camera needs.
         self._draw_stamps()
         coverage, fresh, blank = _inner(self._coverage), _inner(self._fresh), _inner(self._blank)
         picture = blank[..., :3].copy()
@@ -200,37 +189,28 @@ class Canvas:
             (r0, r1, c0, c1) if old is None else (min(old[0], r0), max(old[1], r1), min(old[2], c0), max(old[3], c1))
         )
 
-    def take(self) -> FreshPaint | None:
-        """What strokes have changed since the last call, or None."""
+    def refresh(self) -> Box | None:
+        """Bring `texture` up to date with all strokes; returns what may have changed in it, or None."""
         self._draw_stamps()
-        if self._dirty is None:
+        box, self._dirty = self._dirty, None
+        if box is None:
             return None
-        r0, r1, c0, c1 = box = self._dirty
-        self._dirty = None
-        return FreshPaint(box, self._coverage[r0:r1, c0:c1].copy())
-
-    def draw(self, paint: FreshPaint | None) -> np.ndarray:
-        """Bring the texture up to date with what `take` has returned, and return it.
-
-        Returns:
-            The board with `TEXTURE_PAD_PX` pixels more on every side, uint8 (h, w, 4); shared, not to be written.
-        """
-        if paint is not None:
-            r0, r1, c0, c1 = paint.box
-            drawn = self._drawn[r0:r1, c0:c1]
-            changed = np.flatnonzero(paint.coverage != drawn)  # a brush's front is narrow
-            rows, columns = np.divmod(changed, c1 - c0)
-            place = (rows + r0) * self._drawn.shape[1] + (columns + c0)
-            fresh, blank = _pixels(self._fresh).take(place), _pixels(self._blank).take(place)
-            share = paint.coverage.reshape(-1).take(changed)
-            mixed = _mix(share, fresh.view(np.uint8).reshape(-1, 4), blank.view(np.uint8).reshape(-1, 4))
-            _pixels(self._texture)[place] = mixed.view(np.uint32).reshape(-1)
-            drawn[:] = paint.coverage
-        return self._texture
+        r0, r1, c0, c1 = box
+        coverage, drawn = self._coverage[r0:r1, c0:c1], self._drawn[r0:r1, c0:c1]
+        changed = np.flatnonzero(coverage != drawn)  # a brush's front is narrow
+        rows, columns = np.divmod(changed, c1 - c0)
+        place = (rows + r0) * self._drawn.shape[1] + (columns + c0)
+        fresh, blank = _pixels(self._fresh).take(place), _pixels(self._blank).take(place)
+        share = coverage[rows, columns]
+        mixed = _mix(share, fresh.view(np.uint8).reshape(-1, 4), blank.view(np.uint8).reshape(-1, 4))
+        _pixels(self.texture)[place] = mixed.view(np.uint32).reshape(-1)
+        drawn[:] = coverage
+        return box
 
     def flush(self) -> np.ndarray:
-        """Bring the texture up to date with all strokes and return it, see `draw`."""
-        return self.draw(self.take())
+        """The up-to-date `texture`."""
+        self.refresh()
+        return self.texture
 
 
 def _pixels(picture: np.ndarray) -> np.ndarray:

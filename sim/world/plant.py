@@ -22,7 +22,6 @@ from sim.world.random_streams import stream
 from sim.world.readings import PlantReadings
 from sim.world.readout import PLACES, SIZE, drive, readout
 from sim.world.scene import Scene
-from sim.world.step_clock import stop_step_clock
 from sim.world.trim import hover_thrusts, start_pose, true_limits
 from sim.world.wind import Wind
 
@@ -66,7 +65,6 @@ class Plant(PlantReadings):
     ) -> None:
         self._translate = machine_code if to_machine_code else lambda function: function
         self.scene, self.vehicle = scene, vehicle or VehicleParams()
-        stop_step_clock()
         self.model, self._ids = build_model(scene, self.vehicle, drawn)
         self.data = mujoco.MjData(self.model)
         self._lower, self._upper = true_limits(scene, self.vehicle)

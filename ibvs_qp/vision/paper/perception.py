@@ -10,7 +10,6 @@ from ibvs_qp.vision.checks import StageClock, finite_vector, frame_problem
 from ibvs_qp.vision.config import VisionConfig
 from ibvs_qp.vision.detect import Candidate
 from ibvs_qp.vision.flow import SparseFlow
-from ibvs_qp.vision.flow_ahead import FlowAhead
 from ibvs_qp.vision.layout import PictureLayout
 from ibvs_qp.vision.make_percept import make_percept
 from ibvs_qp.vision.motion import CameraMotion
@@ -36,15 +35,12 @@ class PaperPerception:
         config: Settings of the pipeline.
         vision: Settings shared with the own perception: brush width, masks, flow.
         vehicle: Geometry.
-        flow: Who works out the flow if somebody else does.
     """
 
-    def __init__(
-        self, config: PaperConfig, vision: VisionConfig, vehicle: VehicleParams, flow: FlowAhead | None = None
-    ) -> None:
+    def __init__(self, config: PaperConfig, vision: VisionConfig, vehicle: VehicleParams) -> None:
         self._config, self._vision, self._vehicle = config, vision, vehicle
         self._camera_position = np.asarray(vehicle.camera_position_m, float)
-        self._flow = flow or SparseFlow(vision.flow)
+        self._flow = SparseFlow(vision.flow)
         self._layout: PictureLayout | None = None
         self.reset()
 
@@ -114,8 +110,6 @@ class PaperPerception:
         )
         times = dict(found.time_ms)
         clock.lap("flow")
-        if isinstance(self._flow, FlowAhead):
-            clock.times["flow"] = max(clock.times["flow"], self._flow.spent_ms)
         followed = [
             self._track(track_id, entry)
             for track_id, entry in ((TOPMOST_TRACK, found.horizontal), (FIRST_TRACK, found.vertical))

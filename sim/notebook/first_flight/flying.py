@@ -8,7 +8,6 @@ from sim.experiments.scenes import changed, short_job
 from sim.flight.closed_loop import FlightOptions, fly
 from sim.flight.trace import Trace
 from sim.notebook.short import unless_short
-from sim.sensors.cameras import spare_core
 from sim.world.scene import Scene
 
 #: Stroke of the short form [m], and its pictures [px].
@@ -30,7 +29,7 @@ def fly_first(seed: int = 0, push_n: float = 5.0, slope_deg: float = 0.0) -> Tra
     scene = unless_short(Scene(), short_job(SHORT_STROKE_M, rows=1))
     scene = changed(scene, paint={"push_n": push_n}, board={"slope_deg": slope_deg})
     size = unless_short(None, SHORT_SIZE)
-    options = FlightOptions(seed=seed, image_size=size, camera_process=unless_short(spare_core(), False))
+    options = FlightOptions(seed=seed, image_size=size)
     return fly(scene, options)
 
 

@@ -4,7 +4,6 @@ from sim.sensors.cameras.choose import open_camera, resolve_camera
 from sim.sensors.cameras.gl_context import CameraUnavailable
 from sim.sensors.cameras.plane import PlaneCamera
 from sim.sensors.cameras.protocol import Camera, camera_intrinsics
-from sim.sensors.cameras.remote import RemoteCamera, spare_core
 from sim.sensors.cameras.stream import CameraStream
 
 __all__ = [
@@ -12,9 +11,7 @@ __all__ = [
     "CameraStream",
     "CameraUnavailable",
     "PlaneCamera",
-    "RemoteCamera",
     "camera_intrinsics",
     "open_camera",
     "resolve_camera",
-    "spare_core",
 ]

@@ -115,15 +115,12 @@ class Drawing:
             **{name: _address(array) for name, array in arrays.items()},
         )
 
-    def picture(
-        self, sheets: list[float], cuts: list[CutLine], into: tuple[np.ndarray, np.ndarray] | None = None
-    ) -> tuple[np.ndarray, np.ndarray] | None:
+    def picture(self, sheets: list[float], cuts: list[CutLine]) -> tuple[np.ndarray, np.ndarray] | None:
         """Colours, uint8 (H, W, 3), and depths [m], float32 (H, W), or None for a view that only OpenCV draws.
 
         Args:
             sheets: Homography from picture to texture (9 numbers, by rows) and plane (3) of the board, and of the wall.
             cuts: Lines of the board's outline.
-            into: Where to, C-contiguous; new arrays without it.
         """
         view, whole = self._view, self._whole
         view[: 2 * _SHEET] = sheets
@@ -143,7 +140,7 @@ class Drawing:
             if noise is not None:
                 widths = cut.hole_widths(self.finish.rng)
                 self._widths[k, : len(widths)] = widths
-        rgb, depth = into or (np.empty((height, width, 3), np.uint8), np.empty((height, width), np.float32))
+        rgb, depth = (np.empty((height, width, 3), np.uint8), np.empty((height, width), np.float32))
         self._draw(ctypes.byref(self._camera), _address(view), _address(rgb), _address(depth))
         return rgb, depth
 

@@ -11,7 +11,7 @@ from sim.sensors.cameras.finish import PictureFinish
 from sim.sensors.cameras.gl_scene import GlScene
 from sim.sensors.cameras.outline import CutLine
 from sim.sensors.cameras.view import View, board_corners
-from sim.world.canvas import TEXTURE_PAD_PX, Canvas, FreshPaint
+from sim.world.canvas import TEXTURE_PAD_PX, Canvas
 from sim.world.scene import Scene
 
 #: Neighbours of a rim pixel that certainly lie on the board and on the wall [px].
@@ -63,21 +63,11 @@ class GLCamera:
 
     def capture(self, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, stamp_ns: int) -> RgbdFrame:
         """Take a picture, see `sim.sensors.cameras.protocol.Camera`; the frame owns its arrays."""
-        return self.develop(position_ned, quaternion_b_in_i, stamp_ns, self.canvas.take())
-
-    def develop(
-        self,
-        position_ned: np.ndarray,
-        quaternion_b_in_i: np.ndarray,
-        stamp_ns: int,
-        fresh: FreshPaint | None,
-        into: tuple[np.ndarray, np.ndarray] | None = None,
-    ) -> RgbdFrame:
-        """Draw a picture from a pose and what is new of the paint; as `PlaneCamera.develop`, ``into`` is not used."""
         view = View.of_vehicle(position_ned, quaternion_b_in_i, self.vehicle.camera_position_m, self.intrinsics)
-        face = _face(self.canvas.draw(fresh))
-        if fresh is not None:
-            box = _within(fresh.box, face.shape)
+        changed = self.canvas.refresh()
+        face = _face(self.canvas.texture)
+        if changed is not None:
+            box = _within(changed, face.shape)
             if box is not None:
                 self._drawn.paint(face, box)
         rgb, inverse = self._drawn.draw(view)

@@ -6,8 +6,6 @@ the picture along straight lines: `_cut` replaces what lies beyond one of them b
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Callable
 from typing import NamedTuple
 
 import cv2
@@ -19,7 +17,7 @@ from sim.sensors.cameras.drawn import Drawing, native
 from sim.sensors.cameras.finish import PictureFinish
 from sim.sensors.cameras.outline import Box, CutLine
 from sim.sensors.cameras.view import View, board_corners, board_steps
-from sim.world.canvas import TEXTURE_PAD_PX, Canvas, FreshPaint
+from sim.world.canvas import TEXTURE_PAD_PX, Canvas
 from sim.world.scene import Scene
 
 _SHIFT = 6  # sub-pixel bits of polygon corners
@@ -88,37 +86,13 @@ class PlaneCamera:
 
     def capture(self, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, stamp_ns: int) -> RgbdFrame:
         """Take a picture, see `sim.sensors.cameras.protocol.Camera`; the frame owns its arrays."""
-        return self.expose(position_ned, quaternion_b_in_i, stamp_ns)()
-
-    def expose(self, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, stamp_ns: int) -> Callable[[], RgbdFrame]:
-        """Take in pose and paint, see `sim.sensors.cameras.protocol.DeferredCamera`."""
-        pose = np.array(position_ned, float), np.array(quaternion_b_in_i, float)
-        return functools.partial(self.develop, *pose, stamp_ns, self.canvas.take())
-
-    def develop(
-        self,
-        position_ned: np.ndarray,
-        quaternion_b_in_i: np.ndarray,
-        stamp_ns: int,
-        paint: FreshPaint | None,
-        into: tuple[np.ndarray, np.ndarray] | None = None,
-    ) -> RgbdFrame:
-        """Draw a picture from a pose and what is new of the paint; pictures are drawn in the order of exposure.
-
-        Args:
-            position_ned: As in `sim.sensors.cameras.protocol.Camera.capture`.
-            quaternion_b_in_i: Likewise.
-            stamp_ns: Likewise.
-            paint: What is new, see `Canvas.take`.
-            into: Where colours, uint8 (H, W, 3), and depths, float32 (H, W), are best drawn; they may lie elsewhere.
-        """
         view = View.of_vehicle(position_ned, quaternion_b_in_i, self.vehicle.camera_position_m, self.intrinsics)
-        texture = self.canvas.draw(paint)
+        texture = self.canvas.flush()
         cuts, board_box = self.finish.outline(view, self._corners)
         common = self.finish.common_error(view)
         wall = _Sheet.seen(view, self.canvas.wall, self._wall_steps, common)
         board = None if board_box is None else _Sheet.seen(view, texture, self._board_steps, common)
-        drawn = self._drawn(board, wall, cuts, into)
+        drawn = self._drawn(board, wall, cuts)
         if drawn is not None:
             rgb, depth = drawn
             return RgbdFrame(rgb=rgb, depth=depth, intrinsics=self.intrinsics, stamp_ns=stamp_ns)
@@ -131,18 +105,16 @@ class PlaneCamera:
         depth = self.finish.depth(self._inverse, cuts)
         return RgbdFrame(rgb=rgb, depth=depth, intrinsics=self.intrinsics, stamp_ns=stamp_ns)
 
-    def _drawn(
-        self, board: _Sheet | None, wall: _Sheet, cuts: list[CutLine], into: tuple[np.ndarray, np.ndarray] | None
-    ) -> tuple[np.ndarray, np.ndarray] | None:
-        """Colours and depths by machine code, or None where there is none."""
+    def _drawn(self, board: _Sheet | None, wall: _Sheet, cuts: list[CutLine]) -> tuple[np.ndarray, np.ndarray] | None:
+        """Colours and depths by compiled C, or None without a compiler."""
         if self._drawing is None:
             library = native()
             if library is None:
                 return None
-            texture, plain = self.canvas.draw(None), np.array(self._plain_wall, np.uint8)
+            texture, plain = self.canvas.flush(), np.array(self._plain_wall, np.uint8)
             self._drawing = Drawing(library.draw_picture, self.finish, texture, self.canvas.wall, plain)
         numbers = _NO_SHEET if board is None else (*board.back.ravel().tolist(), *board.plane)
-        return self._drawing.picture([*numbers, *wall.back.ravel().tolist(), *wall.plane], cuts, into)
+        return self._drawing.picture([*numbers, *wall.back.ravel().tolist(), *wall.plane], cuts)
 
     def _draw(self, sheet: _Sheet, box: Box, picture: np.ndarray, inverse: np.ndarray) -> None:
         """Colours and inverse depths of a sheet within a box."""

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable
-from typing import Protocol, runtime_checkable
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
@@ -13,6 +12,8 @@ from ibvs_qp.measurement import RgbdFrame
 from sim.world.scene import CameraScene
 
 NS_PER_S = 1_000_000_000
+#: What a sensor delivers.
+Item = TypeVar("Item")
 
 
 def camera_intrinsics(camera: CameraScene) -> tuple[float, float, float, float]:
@@ -41,20 +42,7 @@ class Camera(Protocol):
         ...
 
 
-@runtime_checkable
-class DeferredCamera(Camera, Protocol):
-    """A camera whose picture may be drawn later, in another thread, than it was taken."""
-
-    def expose(self, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, stamp_ns: int) -> Callable[[], RgbdFrame]:
-        """Take in all that the picture depends on; arguments as in `Camera.capture`.
-
-        Returns:
-            Draws the picture. Called once, from one thread at a time, in the order of exposure.
-        """
-        ...
-
-
-class Schedule:
+class Schedule(Generic[Item]):
     """When to capture and when to deliver: a fixed rate and a fixed latency in integer nanoseconds.
 
     Args:
@@ -66,7 +54,7 @@ class Schedule:
         self._rate_hz, self._latency_ns = rate_hz, round(latency_s * NS_PER_S)
         self._start_ns: int | None = None
         self._next_ns = -1
-        self._queue: deque[tuple[int, object]] = deque()
+        self._queue: deque[tuple[int, Item]] = deque()
 
     def due(self, now_ns: int) -> bool:
         """Whether a capture is due now; counts it. The first call starts the clock and captures."""
@@ -83,20 +71,13 @@ class Schedule:
         """Whether neither a capture nor a delivery is due now; counts nothing."""
         return now_ns < self._next_ns and not (self._queue and self._queue[0][0] <= now_ns)
 
-    def push(self, stamp_ns: int, item: object) -> None:
+    def push(self, stamp_ns: int, item: Item) -> None:
         """Send off what was captured at ``stamp_ns``."""
         self._queue.append((stamp_ns + self._latency_ns, item))
 
-    def arrived(self, now_ns: int) -> list[object]:
-        """All items that have arrived since the last call, oldest first."""
-        items = []
-        while self._queue and self._queue[0][0] <= now_ns:
-            items.append(self._queue.popleft()[1])
-        return items
-
-    def pop(self, now_ns: int) -> object | None:
+    def pop(self, now_ns: int) -> Item | None:
         """The newest item that has arrived since the last call, or None."""
-        if not self._queue or self._queue[0][0] > now_ns:
-            return None
-        items = self.arrived(now_ns)
-        return items[-1] if items else None
+        newest = None
+        while self._queue and self._queue[0][0] <= now_ns:
+            newest = self._queue.popleft()[1]
+        return newest

@@ -13,46 +13,9 @@ from closed_loop_rigs import short_scene
 from ibvs_qp.made import made
 from ibvs_qp.measurement import FeatureFrame, LineReference
 from ibvs_qp.model.bound_function import BoundFunction
-from sim.flight import controller_pool
-from sim.flight.closed_loop import FlightOptions, World, default_preset, make_pilot, pilot_config
-from sim.flight.jobs import PressJob
+from sim.flight.closed_loop import FlightOptions, World, pilot_config
 from sim.flight.trace import Trace
 from sim.world.random_streams import NormalRows, stream
-
-
-def thrusts_of_a_flight(law: str, ticks: int = 120) -> np.ndarray:
-    """Begin a flight, end it early, and give the controller back as `fly` does."""
-    scene, options = short_scene(stroke_m=0.2, rows=1), FlightOptions(law=law, features="geometric", video=False)
-    config = pilot_config(scene, options)
-    pilot, world = make_pilot(scene, options, config, PressJob()), World(scene, options, config)
-    thrusts = []
-    for _ in range(ticks):
-        thrusts.append(pilot.step(world.sense()).thrusts)
-        world.act(thrusts[-1])
-    controller_pool.give_back(law, config.controller, pilot.controller)
-    return np.array(thrusts)
-
-
-@pytest.mark.parametrize("law", ["qp", "paper"])
-def test_a_controller_that_has_flown_flies_as_a_new_one(law: str) -> None:
-    config = default_preset(law).controller
-    controller_pool._waiting.clear()
-    new = thrusts_of_a_flight(law)
-    waiting = controller_pool._waiting[-1][2]
-    first = controller_pool.take(law, config)
-    assert first is waiting and controller_pool.take(law, config) is not first, "one flight at a time"
-    controller_pool.give_back(law, config, first)
-    np.testing.assert_array_equal(thrusts_of_a_flight(law), new)
-    assert controller_pool._waiting[-1][2] is first
-
-
-def test_another_configuration_gets_another_controller() -> None:
-    config = default_preset("qp").controller
-    controller = controller_pool.take("qp", config)
-    controller_pool.give_back("qp", config, controller)
-    heavier = dataclasses.replace(config, weights=dataclasses.replace(config.weights, push=2.0 * config.weights.push))
-    assert controller_pool.take("qp", heavier) is not controller
-    assert controller_pool.take("paper", config) is not controller
 
 
 def test_without_a_camera_nothing_is_drawn_until_somebody_looks() -> None:
@@ -62,7 +25,7 @@ def test_without_a_camera_nothing_is_drawn_until_somebody_looks() -> None:
         world.sense()
         world.act(world.plant.thrusts_actual)
     world.canvas.stroke(None, (0.1, 0.1))
-    assert not {"_blank", "_fresh", "_texture", "_wall"} & set(world.canvas.__dict__)
+    assert not {"_blank", "_fresh", "texture", "_wall"} & set(world.canvas.__dict__)
     trace = Trace(scene=scene, seed=0, law="qp")
     assert trace.canvas is None
     trace.draw_later(lambda: world.canvas.rgb)

@@ -10,12 +10,11 @@ import pytest
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.model.shared_library import shared_library, wide_registers
-from sim.sensors.cameras import PlaneCamera, RemoteCamera, drawn, plane
+from sim.sensors.cameras import PlaneCamera, drawn, plane
 from sim.world.canvas import Canvas
 from sim.world.scene import BoardScene, CameraScene, Scene
 
 SCENE = Scene(camera=CameraScene(width=424, height=240), board=BoardScene(slope_deg=2.0))
-LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
 #: Place before the board (along, up), distance [m] and turn [rad]: inside, at edges and corners, beside, far, tilted.
 PLACES = (
     (0.7, 0.3, 0.7, 0.0),
@@ -99,31 +98,3 @@ def test_wide_registers_give_the_same_bits(monkeypatch: pytest.MonkeyPatch) -> N
     assert camera._drawing is not None
     for one, two in zip(wide, narrow, strict=True):
         assert np.array_equal(one.rgb, two.rgb) and np.array_equal(one.depth, two.depth)
-
-
-def test_a_picture_is_drawn_where_it_is_asked_for() -> None:
-    size = SCENE.camera.height, SCENE.camera.width
-    (expected,), _ = pictures(places=PLACES[:1])
-    _, camera = pictures(places=())
-    y, z = camera.canvas.geometry.point(*PLACES[0][:2])
-    camera.canvas.stroke((0.7, 0.05), (0.7, 0.05))
-    into = np.zeros((*size, 3), np.uint8), np.zeros(size, np.float32)
-    frame = camera.develop(np.array([-PLACES[0][2], y, z]), LEVEL, 0, camera.canvas.take(), into)
-    assert np.array_equal(frame.rgb, expected.rgb) and np.array_equal(frame.depth, expected.depth)
-    if camera._drawing is not None:
-        assert frame.rgb is into[0] and frame.depth is into[1]
-
-
-def test_a_lent_picture_stays_while_two_more_come_and_cannot_be_written() -> None:
-    canvas = Canvas(SCENE, 4)
-    camera = RemoteCamera(SCENE, VehicleParams(), 4, canvas.take, lend=True)
-    try:
-        seen = [camera.capture(np.array([-0.7 - 0.02 * k, 0.0, -1.5]), LEVEL, k) for k in range(2)]
-        depths = [frame.depth.copy() for frame in seen]
-        waiting = [camera.expose(np.array([-0.8 - 0.02 * k, 0.0, -1.5]), LEVEL, 2 + k) for k in range(3)]
-        assert [develop().stamp_ns for develop in waiting] == [2, 3, 4]  # all are drawn, so none lies on the first two
-        assert all(np.array_equal(frame.depth, depth) for frame, depth in zip(seen, depths, strict=True))
-        with pytest.raises(ValueError, match="read-only"):
-            seen[-1].rgb[0, 0] = 0
-    finally:
-        camera.close()
