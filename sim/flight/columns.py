@@ -1,53 +1,45 @@
-"""A table of numbers that grows row by row: bytes joined as they come, picked apart at the end."""
+"""A table of numbers that grows row by row."""
 
 from __future__ import annotations
 
 import numpy as np
 
-#: Rows kept as they came before they are made an array of the wanted type.
+#: Rows allocated at a time.
 BLOCK_ROWS = 1024
 
 
 class Columns:
-    """Named columns, each of one or more numbers.
-
-    Attributes:
-        places: Where each column lies in a row.
+    """Named columns of one or more numbers each.
 
     Args:
-        widths: Numbers per row of each column.
-        dtype: Of all of them once they are stored; rows come in double precision.
+        widths: Numbers per row of each column, in the order of a row.
+        dtype: Type of the stored numbers.
     """
 
     def __init__(self, widths: dict[str, int], dtype: type = np.float64) -> None:
-        self._dtype = dtype
-        self.places: dict[str, slice] = {}
-        self._width = 0
-        for name, width in widths.items():
-            self.places[name] = slice(self._width, self._width + width)
-            self._width += width
+        self._dtype, self._width = dtype, sum(widths.values())
+        ends = np.cumsum([0, *widths.values()]).tolist()
+        self._places = {name: slice(*ends[k : k + 2]) for k, name in enumerate(widths)}
         self._blocks: list[np.ndarray] = []
-        self._rows: list[bytes] = []
+        self._count = 0
 
     def __len__(self) -> int:
         """Rows so far."""
-        return sum(map(len, self._blocks)) + len(self._rows)
+        return self._count
 
-    def add(self, row: bytes) -> None:
-        """The next row, all its numbers in double precision."""
-        rows = self._rows
-        rows.append(row)
-        if len(rows) == BLOCK_ROWS:
-            self._blocks.append(self._block(rows))
-            self._rows = []
-
-    def _block(self, rows: list[bytes]) -> np.ndarray:
-        numbers = np.frombuffer(b"".join(rows)).reshape(len(rows), self._width)
-        return numbers.astype(self._dtype, copy=False)
+    def add(self, *parts: np.ndarray) -> None:
+        """Append a row: its numbers in the order of the columns, split into 1-D arrays at will."""
+        row = self._count % BLOCK_ROWS
+        if row == 0:
+            self._blocks.append(np.empty((BLOCK_ROWS, self._width), self._dtype))
+        np.concatenate(parts, out=self._blocks[-1][row])
+        self._count += 1  # last: an interrupt before it drops the row
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Every column so far, (N,) or (N, width)."""
-        blocks = [*self._blocks, self._block(self._rows)]
-        # Straight from the blocks: a table in between would be as many bytes again, of memory never touched before.
-        columns = {name: np.concatenate([block[:, place] for block in blocks]) for name, place in self.places.items()}
-        return {name: column[:, 0] if column.shape[1] == 1 else column for name, column in columns.items()}
+        return {name: self._column(place) for name, place in self._places.items()}
+
+    def _column(self, place: slice) -> np.ndarray:
+        parts = [block[:, place] for block in self._blocks] or [np.empty((0, place.stop - place.start), self._dtype)]
+        column = np.concatenate(parts)[: self._count]
+        return column[:, 0] if column.shape[1] == 1 else column

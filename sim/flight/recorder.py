@@ -1,9 +1,8 @@
-"""Log of a flight: truth beside what the pilot believed, gathered tick by tick into a trace."""
+"""Log of a flight: truth and the pilot's estimates of every tick, assembled into a trace at the end."""
 
 from __future__ import annotations
 
 import math
-import struct
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,40 +32,47 @@ PHASES = ("start", "approach", "align", "press", "paint", "climb", "retreat", "d
 CLEARANCE_TICKS = 5
 #: Pictures kept for the video per second.
 VIDEO_RATE = 10.0
-#: Columns that are one number a tick, in the order in which `Recorder.tick` fills them in; "error" for every line slot
-#: follows the last of them.
-NUMBERS = "t phase row outcome step_us iterations reach_margin push_reference".split()
+#: Columns of one number per tick, in the order in which `Recorder.tick` writes them.
+NUMBERS = "t phase row outcome step_us iterations reach_margin".split()
 #: Columns of integers.
 INTEGERS = ("phase", "row", "outcome", "iterations")
-_ERROR = LINE_TERMS.index("error")
+#: Inputs of the controller's tick that are logged, beside one for every line.
+INPUTS = ("touch", "contact_weight", "moving", "velocity", "vertical")
 _PHASE_INDEX = {phase: index for index, phase in enumerate(PHASES)}
 _PRESSED = [_PHASE_INDEX[phase] for phase in ("paint", "climb")]
 _OUTCOME_INDEX = {outcome: float(index) for index, outcome in enumerate(Outcome)}
 
 
+def controller_signals(pilot: Pilot) -> dict[str, np.ndarray]:
+    """Signals of the controller's tick that are logged, by name: 1-D views that hold after every step."""
+    tick, slots = pilot.terms.tick, range(pilot.config.controller.line_slots)
+    error = LINE_TERMS.index("error")
+    signals = {name: tick.inputs[name] for name in INPUTS}
+    signals |= {f"line_{slot}": tick.inputs[f"line_{slot}"] for slot in slots}
+    signals |= {f"line_{slot}_error": tick.outputs[f"line_{slot}_terms"][error : error + 1] for slot in slots}
+    return signals | {"push_reference": tick.outputs["push_reference"]}
+
+
+def program_parameters(pilot: Pilot) -> np.ndarray | None:
+    """Parameters of the quadratic program, a view that holds after every step; None under the analytic law."""
+    return pilot.controller.engine.data.stacked if isinstance(pilot.controller, HybridController) else None
+
+
 class Recorder:
-    """Rows of the log: whole arrays copied as they stand at the end of a tick; `trace` picks them apart."""
+    """Rows of the log, one per tick; `trace` turns them into named arrays."""
 
     def __init__(self, scene: Scene, options: FlightOptions, world: World, pilot: Pilot) -> None:
         self._scene, self._options, self._world, self._pilot = scene, options, world, pilot
-        rotors, tick = pilot.config.controller.vehicle.geometry.count, pilot.terms.tick
-        self._slots = range(pilot.config.controller.line_slots)
-        given = next(iter(tick.inputs.values())).base
-        assert given is not None, "the inputs are views of one array"
-        self._given = given
-        wide = {"truth": len(world.plant.truth), "given": len(self._given)}
-        wide |= {"thrusts": rotors, "thrusts_actual": rotors, "unallocated": 6}
-        self._log = Columns({name: 1 for name in NUMBERS} | {"error": len(self._slots)} | wide)
-        self._pack = struct.Struct(f"{len(NUMBERS) - 1}d").pack
-        # What stays where it is; a view of the memory is copied faster than an array.
-        errors = [tick.outputs[f"line_{slot}_terms"][_ERROR : _ERROR + 1].data for slot in self._slots]
-        self._standing = tick.outputs["push_reference"].data, *errors, world.plant.truth.data, given.data
-        self._actual = world.plant.motor_thrusts.data
+        rotors = pilot.config.controller.vehicle.geometry.count
+        signals = controller_signals(pilot) | {"truth": world.plant.truth, "thrusts_actual": world.plant.motor_thrusts}
+        widths = {name: len(view) for name, view in signals.items()}
+        self._log = Columns(dict.fromkeys(NUMBERS, 1) | widths | {"thrusts": rotors, "unallocated": 6})
+        self._signals = tuple(signals.values())
         self._focal = camera_intrinsics(scene.camera)[0]
         self._limits: dict[str, int] = {}
         self._active: dict[int, list[tuple[int, float]]] = {}
-        # Single precision: 1e-7 of a parameter is nothing that a person reads, and half the log.
-        self._program = pilot.controller.engine.data.stacked if isinstance(pilot.controller, HybridController) else None
+        self._program = program_parameters(pilot)
+        # Single precision halves the log; its rounding of 1e-7 does not change what `ibvs-qp explain` prints.
         self._programs = Columns({"program": 0 if self._program is None else len(self._program)}, np.float32)
         self._vision: list[float] = []
         self._events: list[Event] = []
@@ -80,7 +86,7 @@ class Recorder:
         pilot, time_s = self._pilot, frame.stamp_ns * 1e-9
         painter = pilot.painter
         phase = painter.phase
-        numbers = self._pack(
+        numbers = (
             time_s,
             _PHASE_INDEX[phase],
             painter.row,
@@ -89,10 +95,9 @@ class Recorder:
             command.iterations,
             command.reach_margin,
         )
-        row = numbers, *self._standing, command.thrusts, self._actual, command.unallocated_wrench
-        self._log.add(b"".join(row))  # type: ignore[arg-type]
+        self._log.add(np.array(numbers), *self._signals, command.thrusts, command.unallocated_wrench)
         if self._program is not None:
-            self._programs.add(self._program.tobytes())
+            self._programs.add(self._program)
         active = command.active_limits
         if active:
             places = self._limits
@@ -114,13 +119,13 @@ class Recorder:
             self._events.append(Event(t=when, kind=kind, text=text))
         self._logged = len(log)
         for name in command.rejected:
-            kind = name.split(":")[0]  # its numbers may change from tick to tick
+            kind = name.split(":")[0]  # the numbers after it may change from tick to tick
             if kind not in self._rejected:
                 self._rejected.add(kind)
                 self._events.append(Event(t=time_s, kind="rejected", text=name))
 
     def note(self, time_s: float, kind: str, text: str) -> None:
-        """Log an event that the pilot does not know of."""
+        """Log an event from outside the pilot."""
         self._events.append(Event(t=time_s, kind=kind, text=text))
 
     def trace(self) -> Trace:
@@ -131,9 +136,9 @@ class Recorder:
         arrays |= {name: arrays[name].astype(np.int32) for name in INTEGERS}
         pressed = np.isin(arrays["phase"], _PRESSED)
         arrays["row"][~pressed] = 0
-        given = arrays.pop("given")
-        arrays["line_error_px"] = self._line_errors(given, arrays.pop("error").reshape(ticks, len(self._slots)))
-        arrays |= self._believed(given, arrays["push_reference"]) | self._truth(arrays.pop("truth"))
+        signals = {name: arrays.pop(name) for name in controller_signals(self._pilot)}
+        arrays["line_error_px"] = self._line_errors(signals)
+        arrays |= _estimates(signals) | self._truth(arrays.pop("truth"))
         active, price = np.zeros((ticks, len(self._limits)), dtype=bool), np.zeros((ticks, len(self._limits)))
         for tick, paid in self._active.items():
             columns, prices = zip(*paid, strict=True)
@@ -164,30 +169,14 @@ class Recorder:
         trace.draw_later(lambda: canvas.rgb)
         return trace
 
-    def _input(self, given: np.ndarray, name: str) -> np.ndarray:
-        """One input of the compiled tick in all rows, (N, size)."""
-        view = self._pilot.terms.tick.inputs[name]
-        start = (view.ctypes.data - self._given.ctypes.data) // view.itemsize
-        return given[:, start : start + len(view)]
-
-    def _line_errors(self, given: np.ndarray, errors: np.ndarray) -> np.ndarray:
+    def _line_errors(self, signals: dict[str, np.ndarray]) -> np.ndarray:
         """Error of the horizontal and the vertical guide at the tip [px], (N, 2), NaN where absent."""
-        found = np.full((len(given), 2), math.nan)
-        for slot, vertical in zip(self._slots, self._input(given, "vertical").T, strict=True):
-            present = np.flatnonzero(self._input(given, f"line_{slot}")[:, 0] > 0.0)
-            found[present, (vertical[present] > 0.0).astype(int)] = self._focal * errors[present, slot]
+        found = np.full((len(signals["vertical"]), 2), math.nan)
+        for slot in range(self._pilot.config.controller.line_slots):
+            vertical, error = signals["vertical"][:, slot], signals[f"line_{slot}_error"]
+            present = np.flatnonzero(signals[f"line_{slot}"][:, 0] > 0.0)
+            found[present, (vertical[present] > 0.0).astype(int)] = self._focal * error[present]
         return found
-
-    def _believed(self, given: np.ndarray, push_reference: np.ndarray) -> dict[str, np.ndarray]:
-        """What the controller was told or has estimated."""
-        touch = dict(zip(TOUCH, self._input(given, "touch").T, strict=True))
-        return {
-            "push_measured": touch["push"].copy(),
-            "push_reference": push_reference * touch["ramp"],
-            "standoff_estimate": np.where(touch["known"] > 0.0, touch["distance"], math.inf),
-            "contact_weight": self._input(given, "contact_weight")[:, 0].copy(),
-            "velocity_estimate": np.where(self._input(given, "moving") > 0.0, self._input(given, "velocity"), math.nan),
-        }
 
     def _truth(self, truth: np.ndarray) -> dict[str, np.ndarray]:
         """Truth from the plant's readings at every tick, (N, numbers), see `sim.world.readout`."""
@@ -207,3 +196,16 @@ class Recorder:
             "friction_true": truth[:, PLACES["friction"]].copy(),
             "propeller_clearance": np.repeat(clearance, CLEARANCE_TICKS)[: len(truth)],
         }
+
+
+def _estimates(signals: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Measured and estimated quantities that the controller used, from its logged signals (N, ...)."""
+    touch = dict(zip(TOUCH, signals["touch"].T, strict=True))
+    moving = signals["moving"][:, None] > 0.0
+    return {
+        "push_measured": touch["push"].copy(),
+        "push_reference": signals["push_reference"] * touch["ramp"],
+        "standoff_estimate": np.where(touch["known"] > 0.0, touch["distance"], math.inf),
+        "contact_weight": signals["contact_weight"],
+        "velocity_estimate": np.where(moving, signals["velocity"], math.nan),
+    }

@@ -27,7 +27,7 @@ def test_rows_come_back_in_order_over_many_blocks(monkeypatch: pytest.MonkeyPatc
     table = columns.Columns({"one": 1, "three": 3})
     assert table.arrays()["one"].shape == (0,) and table.arrays()["three"].shape == (0, 3)
     for k in range(20):
-        table.add(np.array((k, 10.0 * k, 20.0 * k, 30.0 * k)).tobytes())
+        table.add(np.array((k, 10.0 * k)), np.array((20.0 * k, 30.0 * k)))
     arrays = table.arrays()
     np.testing.assert_array_equal(arrays["one"], np.arange(20))
     np.testing.assert_array_equal(arrays["three"], np.outer(np.arange(20), (10, 20, 30)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from sim.evaluate.metrics import compute_metrics
@@ -15,12 +16,12 @@ def test_a_half_written_tick_is_dropped(monkeypatch: pytest.MonkeyPatch, entry: 
     """Once between the log's row and the program's, once before the log's row was there."""
     add, count = Columns.add, 0
 
-    def interrupted(self: Columns, row: bytes):
+    def interrupted(self: Columns, *parts: np.ndarray):
         nonlocal count
         count += 1
         if count == entry:
             raise KeyboardInterrupt
-        return add(self, row)
+        return add(self, *parts)
 
     monkeypatch.setattr(Columns, "add", interrupted)
     trace = fly(Scene(), FlightOptions(features="geometric", video=False))
