@@ -37,6 +37,8 @@ if TYPE_CHECKING:
 #: Called now and then with simulated time [s], phase name and real-time factor.
 Progress = Callable[[float, str, float], None]
 
+#: Reason of a flight that Ctrl-C ended.
+INTERRUPTED = "interrupted"
 #: Shipped presets, one per law.
 PRESETS = Path(ibvs_qp.__file__).parent / "presets"
 #: Normal force above which the brush leaves paint [N].
@@ -241,7 +243,7 @@ def fly(
                 flown = tick * TICK_NS * 1e-9
                 progress(flown, pilot.painter.phase, flown / max(time.perf_counter() - start, 1e-9))
     except KeyboardInterrupt:
-        reason = "interrupted"
+        reason = INTERRUPTED
     finally:
         world.close()
     trace = recorder.trace()

@@ -1,40 +1,31 @@
-"""Fly several laws over one scene, in a process each when there are cores for it; the results are the same."""
+"""Fly several laws over one scene, each in its own process where there are cores for it; the results are the same."""
 
 from __future__ import annotations
 
 import contextlib
 import dataclasses
 import functools
-import multiprocessing
 import os
 import resource
 import signal
 import sys
 import threading
-import traceback
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from multiprocessing import resource_tracker
-from multiprocessing.connection import Connection, wait
-from multiprocessing.process import BaseProcess
 from typing import Any
 
-from ibvs_qp.config.errors import IbvsQpError
-from sim.flight.closed_loop import FlightOptions, fly
+from sim.flight.closed_loop import INTERRUPTED, FlightOptions, fly
 from sim.flight.trace import Trace
 from sim.flight.video import pack_pictures
 from sim.world.scene import Scene
 
 #: Called with law, simulated time [s], phase and real-time factor.
 LawProgress = Callable[[str, float, str, float], None]
-#: Reason of a trace that Ctrl-C ended.
-INTERRUPTED = "interrupted"
-_SIGINT = {signal.SIGINT}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Flight:
-    """A trace and the peak memory of the processes that flew it beside this one [bytes]."""
+    """A trace, and the peak memory of the process that flew it if it was not this one [bytes]."""
 
     trace: Trace
     process_memory_bytes: int = 0
@@ -55,7 +46,7 @@ def fly_laws(
         scene: The scene.
         options: How to fly it; its law is replaced.
         laws: Laws to fly.
-        progress: Told about every law's progress.
+        progress: Called with the progress of every law.
         workers: Processes at a time; None takes one per law if there are cores for all, else one.
 
     Returns:
@@ -67,114 +58,103 @@ def fly_laws(
         return _fly_apart(scene, jobs, progress)
     flights: dict[str, Flight] = {}
     for law, job in jobs.items():
-        trace = fly(scene, job, functools.partial(progress, law))
-        flights[law] = Flight(trace=pack_pictures(trace))
-        _tell_end(law, trace, progress)
+        trace = _fly_one(scene, job, functools.partial(progress, law))
+        flights[law] = Flight(trace=trace)
         if trace.reason == INTERRUPTED:
             break
     return flights
 
 
-def _tell_end(law: str, trace: Trace, progress: LawProgress) -> None:
+def _fly_one(scene: Scene, options: FlightOptions, progress: Callable[[float, str, float], None]) -> Trace:
+    """Fly one law and report its end."""
+    trace = pack_pictures(fly(scene, options, progress))
     duration = float(trace.t[-1]) if len(trace.t) else 0.0
     phase = INTERRUPTED if trace.reason == INTERRUPTED else "done"
-    progress(law, duration, phase, duration / trace.wall_time_s if trace.wall_time_s > 0 else 0.0)
+    progress(duration, phase, duration / trace.wall_time_s if trace.wall_time_s > 0 else 0.0)
+    return trace
 
 
 def _fly_apart(scene: Scene, jobs: dict[str, FlightOptions], progress: LawProgress) -> dict[str, Flight]:
-    """One process per law. Ctrl-C reaches this process alone, which passes it on once and collects what was flown."""
-    pipes: dict[Connection, str] = {}
-    processes: list[BaseProcess] = []
-    flights: dict[str, Flight] = {}
-    try:
-        with _interrupt_passed_on(processes):
-            _start(scene, jobs, pipes, processes)
-            while pipes:
-                for pipe in wait(list(pipes)):
-                    _receive(pipe, pipes, flights, progress)  # type: ignore[arg-type]
-    finally:
-        for process in processes:
-            if pipes:
-                process.terminate()
-            process.join()
-    return {law: flights[law] for law in jobs if law in flights}
+    """One process per law. The first Ctrl-C ends the flights and returns what was flown, the second one stops at once.
+
+    Raises:
+        RuntimeError: When a process died.
+    """
+    import joblib
+    from joblib.externals.loky import get_reusable_executor
+    from joblib.externals.loky.process_executor import BrokenProcessPool
+
+    with _Link(progress) as link:
+        calls = [joblib.delayed(_fly_in_worker)(scene, job, link.news, link.stop) for job in jobs.values()]
+        try:
+            with (
+                joblib.parallel_config(backend="loky", inner_max_num_threads=1),
+                _sigint(signal.SIG_IGN),  # workers inherit it, so Ctrl-C cannot hit their imports
+            ):
+                parallel = joblib.Parallel(n_jobs=len(jobs), batch_size=1, return_as="generator")  # type: ignore[arg-type]
+                results: Any = parallel(calls)
+            with _sigint(link.stop_flights):
+                return dict(zip(jobs, results, strict=True))
+        except BrokenProcessPool:
+            raise RuntimeError("a process that flew a law died; was it out of memory?") from None
+        finally:
+            get_reusable_executor().shutdown(wait=False, kill_workers=True)
 
 
-def _start(
-    scene: Scene, jobs: dict[str, FlightOptions], pipes: dict[Connection, str], processes: list[BaseProcess]
-) -> None:
-    """Start a process per job; Ctrl-C is blocked so that it cannot hit their imports."""
-    context = multiprocessing.get_context("spawn")
-    resource_tracker.ensure_running()  # its own start lets Ctrl-C through again
-    signal.pthread_sigmask(signal.SIG_BLOCK, _SIGINT)
-    try:
-        for law, job in jobs.items():
-            here, there = context.Pipe(duplex=False)
-            process = context.Process(target=_child, args=(scene, job, there), daemon=True)
-            process.start()
-            there.close()
-            pipes[here] = law
-            processes.append(process)
-    finally:
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, _SIGINT)
+def _fly_in_worker(scene: Scene, options: FlightOptions, news: Any, stop: Any) -> Flight:
+    import cv2
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # `stop` ends the flight
+    cv2.setNumThreads(1)  # the laws share the cores as processes
+
+    def report(flown_s: float, phase: str, real_time_factor: float) -> None:
+        news.put((options.law, flown_s, phase, real_time_factor))
+        if stop.is_set() and phase not in ("done", INTERRUPTED):
+            raise KeyboardInterrupt
+
+    return Flight(trace=_fly_one(scene, options, report), process_memory_bytes=own_peak_memory())
+
+
+class _Link:
+    """Progress from the workers and the order to stop to them, by a manager process; a thread passes progress on."""
+
+    def __init__(self, progress: LawProgress) -> None:
+        from multiprocessing import get_context
+        from multiprocessing.managers import SyncManager
+
+        self._progress, self._manager = progress, SyncManager(ctx=get_context("spawn"))
+
+    def __enter__(self) -> _Link:
+        with _sigint(signal.SIG_IGN):
+            self._manager.start()
+        self.news, self.stop = self._manager.Queue(), self._manager.Event()
+        self._reader = threading.Thread(target=self._pass_on, daemon=True)
+        self._reader.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.news.put(None)
+        self._reader.join()
+        self._manager.shutdown()
+
+    def _pass_on(self) -> None:
+        while (news := self.news.get()) is not None:
+            self._progress(*news)
+
+    def stop_flights(self, *_: Any) -> None:
+        """Signal handler: end the flights; the next Ctrl-C raises."""
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        self.stop.set()
 
 
 @contextlib.contextmanager
-def _interrupt_passed_on(processes: list[BaseProcess]) -> Iterator[None]:
-    """Let the first Ctrl-C end the children's flights; an exception here could tear a message in two."""
-    previous = signal.getsignal(signal.SIGINT)
-
-    def pass_on(*_: Any) -> None:
-        signal.signal(signal.SIGINT, previous)
-        for process in processes:
-            if process.is_alive() and process.pid:
-                os.kill(process.pid, signal.SIGINT)
-
+def _sigint(handler: Any) -> Iterator[None]:
+    """Handle Ctrl-C by a handler meanwhile, in the main thread; signals reach no other."""
     if threading.current_thread() is not threading.main_thread():
-        yield  # signals belong to the main thread
+        yield
         return
-    signal.signal(signal.SIGINT, pass_on)
+    previous = signal.signal(signal.SIGINT, handler)
     try:
         yield
     finally:
         signal.signal(signal.SIGINT, previous)
-
-
-def _receive(pipe: Connection, pipes: dict[Connection, str], flights: dict[str, Flight], progress: LawProgress) -> None:
-    law = pipes[pipe]
-    try:
-        kind, content = pipe.recv()
-    except EOFError:
-        raise RuntimeError(f"the process flying law {law} died without a word; was it out of memory?") from None
-    if kind == "progress":
-        progress(law, *content)
-        return
-    del pipes[pipe]
-    if kind == "done":
-        flights[law] = content
-        _tell_end(law, content.trace, progress)
-    elif kind == "refused":
-        raise content
-    elif kind == "failed":
-        raise RuntimeError(f"law {law} failed in its process:\n{content}")
-
-
-def _child(scene: Scene, options: FlightOptions, pipe: Connection) -> None:
-    def tell(*news: Any) -> None:
-        pipe.send(("progress", news))
-
-    os.setpgrp()  # the terminal's Ctrl-C goes to the parent, which decides
-    try:
-        signal.signal(signal.SIGINT, signal.default_int_handler)  # a parent started in the background ignores it
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, _SIGINT)
-        trace = pack_pictures(fly(scene, options, tell))
-        signal.pthread_sigmask(signal.SIG_BLOCK, _SIGINT)
-        answer = ("done", Flight(trace=trace, process_memory_bytes=own_peak_memory()))
-    except KeyboardInterrupt:
-        answer = ("interrupted", None)
-    except IbvsQpError as error:
-        answer = ("refused", error)
-    except Exception:
-        answer = ("failed", traceback.format_exc())
-    pipe.send(answer)
-    pipe.close()

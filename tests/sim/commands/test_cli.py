@@ -203,24 +203,32 @@ def _paint(out: Path, *words: str) -> list[str]:
     return [sys.executable, "-c", program, "paint", "--features", "geometric", "--json", "--out", str(out), *words]
 
 
-def test_ctrl_c_ends_both_processes_with_a_partial_run(tmp_path):
-    """The signal goes to the parent alone, as a terminal's does once the children have their own group.
-
-    Eight rows, for a flight that no machine has finished before the signal.
-    """
+@pytest.mark.parametrize("group", [False, True], ids=["parent alone", "whole group, as a terminal does"])
+def test_ctrl_c_ends_both_processes_with_a_partial_run(tmp_path, group):
+    """Eight rows, for a flight that no machine has finished before the signal."""
     (tmp_path / "long.toml").write_text("[paint]\nrows = 8\n")
     words = _paint(tmp_path / "run", "--no-video", "--scene", str(tmp_path / "long.toml"))
-    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True)
     while not (tmp_path / "run").exists() and process.poll() is None:
         time.sleep(0.1)
     time.sleep(4.0)
-    process.send_signal(signal.SIGINT)
+    (os.killpg if group else os.kill)(process.pid, signal.SIGINT)
     out, err = process.communicate(timeout=120)
     assert process.returncode == 130, err.decode()
     summary = json.loads(out)
-    assert summary["interrupted"] is True
+    assert summary["interrupted"] is True and set(summary["laws"]) == {"qp", "paper"}
     assert b"Traceback" not in err
     assert (tmp_path / "run" / "summary.json").exists()
+
+
+def test_error_found_by_a_worker_is_one_line(tmp_path):
+    """The number of rotors is compared with the scene where the plant is built, in the process that flies."""
+    (tmp_path / "scene.toml").write_text("[vehicle]\nthrust_min_n = [1.0, 2.0]\n")
+    words = _paint(tmp_path / "run", "--no-video", "--scene", str(tmp_path / "scene.toml"))
+    done = subprocess.run(words, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 2
+    assert done.stderr.startswith("ibvs-qp: error: vehicle.thrust_min_n") and done.stderr.count("\n") == 1
+    assert not (tmp_path / "run").exists()
 
 
 @pytest.mark.slow
