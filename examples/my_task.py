@@ -13,26 +13,32 @@ import numpy as np
 from allocation import Rotor
 from ibvs_qp import ControllerConfig, HybridController, Measurement, Reference, RotorGeometry, VehicleParams
 from ibvs_qp.limits import Limit
-from ibvs_qp.model.rows import LimitRow, SymbolicModel, TaskRow
+from ibvs_qp.model.model import Model
+from ibvs_qp.model.parameter import Parameter
+from ibvs_qp.model.rows import LimitRow, TaskRow
 from ibvs_qp.tasks import Task
 
 
 class QuietRotors(Task):
-    """Named rotors stay near a low thrust [N]; the parameter "quiet" holds that thrust and the weight."""
+    """Named rotors stay near a low thrust."""
 
-    def __init__(self, *names: str) -> None:
+    def __init__(self, *names: str, weight: float = 0.1) -> None:
         self.names = names
+        self._thrust, self._weight = Parameter("quiet_thrust", 0.0), Parameter("quiet_weight", weight)
 
-    def rows(self, model: SymbolicModel) -> list[TaskRow]:
+    def set_target(self, thrust_n: float, weight: float | None = None) -> None:
+        """Target thrust [N] from the next step on, and its weight [1/N^2]; weight 0 makes the task absent."""
+        self._thrust.value[:] = thrust_n
+        if weight is not None:
+            self._weight.value[:] = weight
+
+    def rows(self, model: Model) -> list[TaskRow]:
         """One row per named rotor in newtons."""
-        quiet, order = model.parameter("quiet", 2), model.config.vehicle.geometry.names
+        target, weight = model.parameter(self._thrust), model.parameter(self._weight)
+        order = model.config.vehicle.geometry.names
         return [
             TaskRow(
-                name=f"quiet_{name}",
-                unit="N",
-                expression=model.thrust[order.index(name)],
-                target=quiet[0],
-                weight=quiet[1],
+                name=f"quiet_{name}", unit="N", expression=model.thrust[order.index(name)], target=target, weight=weight
             )
             for name in self.names
         ]
@@ -41,10 +47,10 @@ class QuietRotors(Task):
 class ClimbLimit(Limit):
     """Upward acceleration stays below a bound [m/s^2]; soft, so that it can never make the program infeasible."""
 
-    def __init__(self, bound: float, price: float = 4e4) -> None:
-        self.bound, self.price_of_slack = bound, price
+    def __init__(self, bound: float, weight: float = 4e4) -> None:
+        self.bound, self.weight = bound, weight
 
-    def rows(self, model: SymbolicModel) -> list[LimitRow]:
+    def rows(self, model: Model) -> list[LimitRow]:
         """One soft row in m/s^2; body z points down."""
         return [
             LimitRow(
@@ -53,7 +59,7 @@ class ClimbLimit(Limit):
                 expression=-model.acceleration[2],
                 lower=ca.SX(-1e3),  # finite, and never reached: row types must not change
                 upper=ca.SX(self.bound),
-                price=self.price_of_slack,
+                slack_weight=self.weight,
             )
         ]
 
@@ -92,7 +98,7 @@ def main() -> None:
         controller = HybridController(CONFIG, tasks=tasks, limits=limits)
         if tasks:
             # 4 N, and a weight of 1 / (3 N)^2: three newtons more are worth as much as half a newton of push.
-            controller.setpoints.tick.inputs["quiet"][:] = 4.0, 0.1
+            quiet.set_target(4.0)
         command = controller.step(HOVER, RISE)
         up = -command.wrench[2] / CONFIG.vehicle.mass_kg - 9.81
         price = sum(limit.price for limit in command.active_limits if limit.name == "climb")

@@ -7,9 +7,11 @@ import numpy as np
 from ibvs_qp.command import Command, Outcome
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.measurement import Measurement, Reference
+from ibvs_qp.model.model import Model
 from ibvs_qp.model.reporting import clipped_command, contact_mode, reach_note
-from ibvs_qp.model.step_function import Setpoints
+from ibvs_qp.model.setpoints import Setpoints
 from ibvs_qp.safety.hover import hold_thrusts
+from ibvs_qp.tasks import LevelTask, LineTask, PushTask, StandoffTask, VelocityTask, YawTask
 from ibvs_qp.validation.measurement import MeasurementGate, answered_stamp
 from ibvs_qp.validation.reference import check_reference
 
@@ -73,12 +75,21 @@ def analytic_thrusts(terms: Setpoints) -> np.ndarray:
     return terms.inverse.dot(analytic_wrench(terms) - terms.bias_wrench)
 
 
+def analytic_setpoints(config: ControllerConfig) -> Setpoints:
+    """Targets of the tasks without a program: the analytic law combines them itself."""
+    model = Model(config)
+    lines = [LineTask(index) for index in range(config.line_slots)]
+    for task in (*lines, PushTask(), StandoffTask(), LevelTask(), YawTask(), VelocityTask()):
+        task.rows(model)
+    return Setpoints(model)
+
+
 class PaperController:
     """The paper's law with the same measurement, reference and command as the program."""
 
     def __init__(self, config: ControllerConfig | None = None) -> None:
         self.config = config or ControllerConfig()
-        self.setpoints = Setpoints(self.config)
+        self.setpoints = analytic_setpoints(self.config)
         self._gate = MeasurementGate(self.config.vehicle.geometry.count)
         self.reset()
 

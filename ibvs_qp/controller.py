@@ -11,20 +11,21 @@ from ibvs_qp.command import Command, Outcome
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.limits import ApproachLimit, Limit, PushCeiling, ThrustLimit, TiltLimit, ViewLimit, YawLimit
 from ibvs_qp.measurement import Measurement, Reference
+from ibvs_qp.model.model import Model
 from ibvs_qp.model.reporting import clipped_command, contact_mode, reach_margin, reach_note
-from ibvs_qp.model.rows import SymbolicModel
-from ibvs_qp.model.step_function import Setpoints
+from ibvs_qp.model.setpoints import Setpoints
 from ibvs_qp.qp.accept import AcceptedSolution, QpEngine
 from ibvs_qp.qp.evaluator import ProgramData
 from ibvs_qp.qp.explain import active_limits, task_reports
 from ibvs_qp.qp.faults import program_faults
-from ibvs_qp.qp.problem import QpTemplate
+from ibvs_qp.qp.problem import QpProblem
 from ibvs_qp.safety.hover import hold_thrusts
 from ibvs_qp.tasks import (
     EffortTask,
     HeightTask,
     LevelTask,
     LineTask,
+    PaperLineTask,
     PushTask,
     SmoothnessTask,
     StandoffTask,
@@ -42,9 +43,10 @@ _NOTHING.flags.writeable = False
 
 def default_tasks(config: ControllerConfig) -> list[Task]:
     """The tasks of the program, in the order of their rows."""
-    lines: list[Task] = [LineTask(slot) for slot in range(config.line_slots)]
+    paper = config.line_profile == "paper"
+    lines: list[Task] = [(PaperLineTask if paper else LineTask)(index) for index in range(config.line_slots)]
     along: list[Task] = [PushTask(), StandoffTask()]
-    height: list[Task] = [] if config.line_profile == "paper" else [HeightTask()]
+    height: list[Task] = [] if paper else [HeightTask()]
     return [*lines, *along, LevelTask(), YawTask(), VelocityTask(), *height, EffortTask(), SmoothnessTask()]
 
 
@@ -61,9 +63,9 @@ def default_limits(config: ControllerConfig) -> list[Limit]:
     return [ThrustLimit(), *(limit for wanted, limit in barriers if config.barriers and wanted)]
 
 
-def program_template(config: ControllerConfig, tasks: Sequence[Task] = (), limits: Sequence[Limit] = ()) -> QpTemplate:
+def program_template(config: ControllerConfig, tasks: Sequence[Task] = (), limits: Sequence[Limit] = ()) -> QpProblem:
     """The program of a configuration: shipped tasks and limits and further ones, assembled."""
-    return QpTemplate(SymbolicModel(config), [*default_tasks(config), *tasks], [*default_limits(config), *limits])
+    return QpProblem(Model(config), [*default_tasks(config), *tasks], [*default_limits(config), *limits])
 
 
 class HybridController:
@@ -83,8 +85,8 @@ class HybridController:
     ) -> None:
         self.config = config or ControllerConfig()
         self.template = program_template(self.config, tasks, limits)
-        self.setpoints = Setpoints(self.config, self.template)
-        data = ProgramData(self.template, self.setpoints.tick.extra)
+        self.setpoints = Setpoints(self.template.model, self.template.values)
+        data = ProgramData(self.template, self.setpoints.step)
         self.engine = QpEngine(self.template, self.config.solver, data, self.config.machine_code)
         self._gate = MeasurementGate(self.config.vehicle.geometry.count)
         self.reset()
@@ -132,10 +134,10 @@ class HybridController:
     def _finish(self, measurement: Measurement, solution: AcceptedSolution, rejected: tuple[str, ...]) -> Command:
         thrusts, terms, reference, limited = solution.thrusts, self.setpoints, self._reference, solution.limited
         unallocated, given_up, data = _NOTHING, 0.0, self.engine.data
-        stacked = data.stacked.copy()
+        point = data.point.copy()
         later: dict[str, Callable[[], Any]] = {
             "wrench": lambda: terms.effectiveness.dot(thrusts),
-            "tasks": lambda: task_reports(self.template, data, stacked, thrusts),
+            "tasks": lambda: task_reports(self.template, data, point, thrusts),
         }
         if limited:
             unallocated = terms.effectiveness.dot(data.free - thrusts)

@@ -16,7 +16,7 @@ class Gains:
     line_ki: float = setting(1.12, "integral of the line error", unit="1/s^3", low=0.0, high=100.0)
     theta_kp: float = setting(46.51, "line angle error", unit="1/s^2", low=0.0, high=400.0)
     theta_kd: float = setting(12.03, "line angle rate", unit="1/s", low=0.0, high=100.0)
-    line_turn_share: float = setting(
+    body_rotation_gain: float = setting(
         0.882,
         "share of the body's turn that line rows count on in contact, where the tip shall travel",
         low=0.0,

@@ -9,11 +9,11 @@ from ibvs_qp.config.settings import setting, validate
 
 @dataclass(frozen=True, kw_only=True)
 class LimitSettings:
-    """Bounds of the soft limits, prices of their slack per squared unit, and switches.
+    """Bounds of the soft limits, weights of their slack per squared unit, and switches.
 
-    What a row asks beyond a bound is let through by the share weight / (weight + price), so a price means something
-    only beside the weights of the rows that pull against it. Figures quoted are from flights of the small vehicle in
-    `tests/ibvs_qp/limits/test_barriers.py`, which holds the main ones.
+    The program lets a demand beyond a bound pass by the fraction weight / (weight + slack weight), so compare a slack
+    weight with the weights of the rows that pull against it. Quoted figures are from flights of the small vehicle in
+    `tests/ibvs_qp/limits/test_barriers.py`, which asserts the main ones.
     """
 
     tilt_deg: float = setting(
@@ -24,12 +24,12 @@ class LimitSettings:
         low=0.05,
         high=45.0,
     )
-    tilt_price: float = setting(
+    tilt_slack_weight: float = setting(
         4000.0,
-        "slack price of the tilt barriers",
+        "slack weight of the tilt barriers",
         unit="s^4/rad^2",
         why="ten times the level rows. A pitch rate of 0.25 rad/s before two lines peaks at 1.08 deg; at a tenth of "
-        "the price at 1.15, at ten times at 1.06",
+        "the weight at 1.15, at ten times at 1.06",
         low=1e-3,
         high=1e8,
     )
@@ -50,12 +50,12 @@ class LimitSettings:
         low=0.5,
         high=45.0,
     )
-    yaw_price: float = setting(
+    yaw_slack_weight: float = setting(
         1000.0,
-        "slack price of the yaw barrier",
+        "slack weight of the yaw barrier",
         unit="s^4/rad^2",
         why="above every row that turns the vehicle; the yaw row itself pulls back, so the value hardly matters: a "
-        "turn of 0.7 rad/s peaks at 7.7 deg for any price from 33 to 1e5",
+        "turn of 0.7 rad/s peaks at 7.7 deg for any weight from 33 to 1e5",
         low=1e-3,
         high=1e8,
     )
@@ -74,12 +74,12 @@ class LimitSettings:
     view_right: float = setting(
         0.48, "largest |rho| of an upright guide", why="the picture ends at 0.512", low=0.01, high=10.0
     )
-    view_price: float = setting(
+    view_slack_weight: float = setting(
         4e4,
-        "slack price of the line-in-view barriers",
+        "slack weight of the line-in-view barriers",
         unit="s^4",
         why="400 times the line rows that pull a guide out. Told to take it to 0.60 they hold it at 0.356; at a tenth "
-        "of the price at 0.417, out of the picture, at ten times at 0.350",
+        "of the weight at 0.417, out of the picture, at ten times at 0.350",
         low=1e-3,
         high=1e8,
     )
@@ -92,7 +92,7 @@ class LimitSettings:
         low=0.1,
         high=100.0,
     )
-    push_share: float = setting(
+    push_ceiling_ratio: float = setting(
         1.5,
         "push ceiling over the push reference",
         why="2.5 N above a push of 5 N are three times what gusts of 2 N rms leave, 0.87 N rms",
@@ -108,16 +108,16 @@ class LimitSettings:
         low=0.0,
         high=1.0,
     )
-    push_price: float = setting(
+    push_slack_weight: float = setting(
         40.0,
-        "slack price of the push ceiling",
+        "slack weight of the push ceiling",
         unit="1/N^2",
         why="80 times the push row. With a force gain six times too high 5 N asked peak at 7.07 N; at a tenth of the "
-        "price at 7.14, at ten times at 7.06",
+        "weight at 7.14, at ten times at 7.06",
         low=1e-3,
         high=1e8,
     )
-    approach_share: float = setting(
+    approach_speed_ratio: float = setting(
         1.5,
         "closing speed over that of the approach",
         why="with 1.0 the barrier binds in 82 % of the first 3 s from 0.12 m away and the tip has not arrived by then, "
@@ -134,12 +134,12 @@ class LimitSettings:
         low=0.1,
         high=100.0,
     )
-    approach_price: float = setting(
+    approach_slack_weight: float = setting(
         4000.0,
-        "slack price of the approach-speed barrier",
+        "slack weight of the approach-speed barrier",
         unit="s^4/m^2",
         why="220 times the stand-off row, 0.5 per N^2 at 6 kg. Thrown at the wall with 0.3 m/s the tip does not "
-        "strike, at a thirtieth of the price with 0.6 N",
+        "strike, at a thirtieth of the weight with 0.6 N",
         low=1e-3,
         high=1e8,
     )

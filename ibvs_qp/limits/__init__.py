@@ -1,9 +1,11 @@
-"""Limits: the bounds of the program, one class each, hard or soft with a price."""
+"""Limits: one file each, with bounds, slack weight and row."""
 
-from ibvs_qp.limits.barrier import TiltLimit, YawLimit
-from ibvs_qp.limits.force import ApproachLimit, PushCeiling
+from ibvs_qp.limits.approach import ApproachLimit
 from ibvs_qp.limits.limit import Limit
+from ibvs_qp.limits.push_ceiling import PushCeiling
 from ibvs_qp.limits.thrust import ThrustLimit
+from ibvs_qp.limits.tilt import TiltLimit
 from ibvs_qp.limits.view import ViewLimit
+from ibvs_qp.limits.yaw import YawLimit
 
 __all__ = ["ApproachLimit", "Limit", "PushCeiling", "ThrustLimit", "TiltLimit", "ViewLimit", "YawLimit"]

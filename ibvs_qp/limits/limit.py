@@ -1,37 +1,38 @@
-"""What a limit is: a named set of two-sided rows, hard or soft with a price."""
+"""A limit: a named set of two-sided rows, hard or soft."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from typing import ClassVar
 
-from ibvs_qp.model.rows import LimitRow, SymbolicModel
+from ibvs_qp.model.model import Model
+from ibvs_qp.model.rows import LimitRow
 
-#: Bound of a row that does not limit now: finite, so that OSQP never sees the row change its type.
+#: Bound of an inactive row: finite, so that OSQP never sees the row change its type.
 WIDE = 1e4
 
 
 class Limit(ABC):
-    """A bound the program keeps: hard, or soft with a price per squared unit of slack.
+    """A bound of the program: hard, or soft with a weight per squared unit of slack.
 
     Only thrust and thrust rate are hard and their intersection is never empty, so the program is feasible by
-    construction. Row types never change from tick to tick.
+    construction. Row types never change from step to step.
 
     Attributes:
-        bounded_by: Fields of `ibvs_qp.config.ControllerConfig` that set its bounds, with unit, default and reason.
-        priced_by: Field that holds the price of its slack; none where it is hard.
-        switched_by: Field that takes it out of the program.
+        bound_settings: Fields of `ibvs_qp.config.ControllerConfig` with its bounds, units, defaults and reasons.
+        slack_weight_setting: Field with the weight of its slack; None for a hard limit.
+        switch_setting: Field that removes it from the program.
     """
 
-    bounded_by: ClassVar[tuple[str, ...]] = ()
-    priced_by: ClassVar[str | None] = None
-    switched_by: ClassVar[str | None] = None
+    bound_settings: ClassVar[tuple[str, ...]] = ()
+    slack_weight_setting: ClassVar[str | None] = None
+    switch_setting: ClassVar[str | None] = None
 
     @abstractmethod
-    def rows(self, model: SymbolicModel) -> list[LimitRow]:
-        """Rows of the limit, affine in ``model.thrust``."""
+    def rows(self, model: Model) -> list[LimitRow]:
+        """Rows of the limit, affine in ``model.thrust`` and ``model.acceleration``."""
 
     @staticmethod
-    def price(model: SymbolicModel, price: float) -> float | None:
-        """Price of the slack, None where the user wants barriers without slack."""
-        return None if model.config.limits.hard_barriers else price
+    def slack_weight(model: Model, weight: float) -> float | None:
+        """Weight of the slack; None with `limits.hard_barriers`."""
+        return None if model.config.limits.hard_barriers else weight

@@ -113,7 +113,7 @@ def _force(
     average = ca.if_else(time < START_TIME, body.dt / ca.fmax(time, 1e-9), 0.0)
     step = ca.if_else(touching, learnt, ca.fmax(_share(FORCE_BANDWIDTH_FREE, body.dt), average) * free)
     new = clamp(old + step, -FORCE_BOUND, FORCE_BOUND)
-    return signals.remember("external_force", ca.if_else(ca.logic_and(active, body.felt), new, old))
+    return signals.remember("external_force", ca.if_else(ca.logic_and(active, body.specific_force_known), new, old))
 
 
 def _windy(signals: Signals, dt: ca.SX, unlearnt: ca.SX) -> ca.SX:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from ibvs_qp.config import ContactSettings, ControllerConfig
-from ibvs_qp.model.inputs import Body, Touch
+from ibvs_qp.model.inputs import Body, Contact
 from ibvs_qp.model.signals import Signals
 
 #: Commanded speed above which the tip is meant to slide [m/s].
@@ -38,7 +38,7 @@ def contact_feedforward(
     signals: Signals,
     config: ControllerConfig,
     body: Body,
-    touch: Touch,
+    contact: Contact,
     travel: ca.SX,
     friction: ca.SX,
 ) -> ContactFeedforward:
@@ -57,14 +57,14 @@ def contact_feedforward(
         signals: Keeps the filters' states.
         config: Contact gains, filter and slew; the vehicle's tip and motor lags.
         body: Measured wrench and time step.
-        touch: Push and whether the tip touches.
+        contact: Push and whether the tip touches.
         travel: Commanded velocity in the wall plane, in B [m/s], (3,).
         friction: Estimated Coulomb coefficient.
     """
     settings = config.contact
-    force = signals.remember("feedforward_friction", _friction(signals, settings, body, touch, travel, friction))
+    force = signals.remember("feedforward_friction", _friction(signals, settings, body, contact, travel, friction))
     share = 1.0 - ca.exp(-2.0 * ca.pi * settings.force_filter_hz * body.dt)
-    gain = touch.touching * settings.moment_gain / (1.0 + (touch.across_noise / settings.moment_noise_n) ** 2)
+    gain = contact.touching * settings.moment_gain / (1.0 + (contact.moment_noise / settings.moment_noise_n) ** 2)
     old = signals.state("feedforward_moment", 3)
     felt = signals.remember("feedforward_moment", old + share * (gain * body.wrench[3:] - old))
     model = settings.moment_gain * ca.cross(ca.DM(config.vehicle.tip_position_m), force)
@@ -82,12 +82,12 @@ def moment_lag(config: ControllerConfig) -> float:
 
 
 def _friction(
-    signals: Signals, settings: ContactSettings, body: Body, touch: Touch, travel: ca.SX, friction: ca.SX
+    signals: Signals, settings: ContactSettings, body: Body, contact: Contact, travel: ca.SX, friction: ca.SX
 ) -> ca.SX:
     speed = ca.norm_2(travel)
-    sliding = ca.logic_and(speed > SLIDING_COMMAND, touch.touching)
-    size = -settings.friction_gain * friction * ca.fmax(touch.push, 0.0) / ca.fmax(speed, SLIDING_COMMAND)
+    sliding = ca.logic_and(speed > SLIDING_COMMAND, contact.touching)
+    size = -settings.friction_gain * friction * ca.fmax(contact.push, 0.0) / ca.fmax(speed, SLIDING_COMMAND)
     last = signals.state("feedforward_friction", 3)
     step = ca.if_else(sliding, size * travel, 0.0) - last
-    allowed = ca.if_else(touch.touching, settings.friction_slew_n_s * body.dt, ca.inf)
+    allowed = ca.if_else(contact.touching, settings.friction_slew_n_s * body.dt, ca.inf)
     return last + step * ca.fmin(1.0, allowed / ca.fmax(ca.norm_2(step), 1e-12))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ibvs_qp.model.inputs import Body, Touch, clamp
+from ibvs_qp.model.inputs import Body, Contact, clamp
 from ibvs_qp.model.signals import Signals
 
 #: Friction assumed while nothing is known (the plant's nominal brush) and plausible range.
@@ -29,7 +29,13 @@ def cautious_friction(signals: Signals, friction: ca.SX) -> ca.SX:
 
 
 def estimated_friction(
-    signals: Signals, body: Body, touch: Touch, tip: ca.SX, travel: ca.SX, sliding_command: float, stuck_speed: float
+    signals: Signals,
+    body: Body,
+    contact: Contact,
+    tip: ca.SX,
+    travel: ca.SX,
+    sliding_command: float,
+    stuck_speed: float,
 ) -> tuple[ca.SX, ca.SX]:
     r"""Friction coefficient believed before and after this tick.
 
@@ -38,7 +44,7 @@ def estimated_friction(
     Args:
         signals: Keeps the estimate.
         body: Velocity and measured force.
-        touch: Push and whether the tip touches.
+        contact: Push and whether the tip touches.
         tip: Velocity of the tip, in B [m/s], (3,): a vehicle that turns about a held tip moves, its tip does not.
         travel: Commanded velocity in the wall plane, in B [m/s], (3,).
         sliding_command: Commanded speed above which the tip is meant to slide [m/s].
@@ -49,14 +55,14 @@ def estimated_friction(
     direction = travel / ca.fmax(speed, 1e-9)
     # Both must move: a vehicle that turns about a held tip moves, and its tip's velocity is the noisier one.
     along = ca.fmin(ca.dot(direction, body.velocity), ca.dot(direction, tip))
-    watching = ca.logic_and(ca.logic_and(touch.touching, body.moving), speed > 0.0)
+    watching = ca.logic_and(ca.logic_and(contact.touching, body.velocity_known), speed > 0.0)
     still = ca.logic_and(speed > sliding_command, along < stuck_speed)
     waited = ca.if_else(still, held + body.dt, 0.0)
     signals.remember("friction_held", ca.if_else(watching, waited, held))
     raised = ca.fmin(before + RISE * body.dt, FRICTION_RANGE[1])
     value = ca.if_else(ca.logic_and(watching, waited > PATIENCE), raised, before)
-    ratio = clamp(-ca.dot(direction, body.wrench[:3]) / ca.fmax(touch.push, LEAST_PUSH), *FRICTION_RANGE)
-    sound = ca.logic_and(ca.logic_and(watching, touch.push >= LEAST_PUSH), along >= LEAST_SPEED)
+    ratio = clamp(-ca.dot(direction, body.wrench[:3]) / ca.fmax(contact.push, LEAST_PUSH), *FRICTION_RANGE)
+    sound = ca.logic_and(ca.logic_and(watching, contact.push >= LEAST_PUSH), along >= LEAST_SPEED)
     slid = signals.state("friction_slid")
     signals.remember("friction_slid", slid + ca.if_else(sound, body.dt, 0.0))
     value = value + ca.if_else(sound, ca.fmin(1.0, body.dt / AVERAGING_TIME), 0.0) * (ratio - value)

@@ -1,72 +1,54 @@
-"""What the blocks of a tick read: the body, the contact and the wish, as symbols."""
+"""What the step function reads: body, contact, reference and lines, as symbols in the order of packing."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import casadi as ca
 
 from ibvs_qp.model.signals import Signals
 
-#: Inputs that come as arrays, in the order in which a tick is packed.
+#: Inputs that are arrays, and their sizes, in the order of packing (`ibvs_qp.model.packing`).
 ARRAYS = {"attitude": 4, "angular_velocity": 3, "contact_wrench": 6, "specific_force": 3, "velocity": 3, "normal": 3}
-#: Entries of the input "touch", in this order.
-TOUCH = ("known", "distance", "rate", "acceleration", "push", "noise", "across_noise", "touching", "ramp")
-TOUCH += ("stiffness", "stiffness_known")
-#: Entries of the input "reference": push, stand-off, velocity (2), press, roll, pitch, travel (2).
-REFERENCE_INPUTS = 9
-#: Entries of a line slot's input: present, rho, theta, its reference's rho and theta, weight, variance of rho.
-SLOT_INPUTS = 7
-
-
-def packed_inputs(signals: Signals, line_slots: int) -> None:
-    """Ask for everything that is packed every tick, arrays first, then single numbers: one block."""
-    for name, size in ARRAYS.items():
-        signals.input(name, size)
-    for name in ("dt", "felt", "moving", "contact_weight"):
-        signals.input(name)
-    signals.input("touch", len(TOUCH))
-    signals.input("reference", REFERENCE_INPUTS)
-    signals.input("vertical", line_slots)
-    for slot in range(line_slots):
-        signals.input(f"line_{slot}", SLOT_INPUTS)
+#: Scalars that follow the arrays: time step [s], whether specific force and velocity are known, lambda.
+SCALARS = ("dt", "specific_force_known", "velocity_known", "contact_weight")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Body:
-    """Inertial state and forces at this tick, in B.
+    """Inertial state and forces, in B.
 
     Attributes:
-        dt: Time since the last tick [s].
+        dt: Time since the last step [s].
         down: Unit gravity.
         rate: Angular velocity [rad/s].
-        specific_force: Accelerometer [m/s^2]; felt: 1 if there is one.
+        specific_force: Accelerometer [m/s^2]; specific_force_known: 1 if measured.
         wrench: Tared contact wrench on the vehicle [N, N m].
-        velocity: Linear velocity [m/s]; moving: 1 if it is known.
+        velocity: Linear velocity [m/s]; velocity_known: 1 if estimated.
     """
 
     dt: ca.SX
     down: ca.SX
     rate: ca.SX
     specific_force: ca.SX
-    felt: ca.SX
+    specific_force_known: ca.SX
     wrench: ca.SX
     velocity: ca.SX
-    moving: ca.SX
+    velocity_known: ca.SX
 
     @classmethod
     def of(cls, signals: Signals) -> Body:
-        """Ask for the inputs."""
+        """Declare the inputs."""
         w, x, y, z = ca.vertsplit(signals.input("attitude", 4))
         return cls(
             dt=signals.input("dt"),
             down=ca.vertcat(2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
             rate=signals.input("angular_velocity", 3),
             specific_force=signals.input("specific_force", 3),
-            felt=signals.input("felt"),
+            specific_force_known=signals.input("specific_force_known"),
             wrench=signals.input("contact_wrench", 6),
             velocity=signals.input("velocity", 3),
-            moving=signals.input("moving"),
+            velocity_known=signals.input("velocity_known"),
         )
 
     def velocity_of(self, point: tuple[float, float, float]) -> ca.SX:
@@ -79,64 +61,117 @@ class Body:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Touch:
-    """The wall and the contact as estimated (`ibvs_qp.estimation.contact`).
+class Contact:
+    """Wall and contact as estimated (`ibvs_qp.estimation.contact`).
 
     Attributes:
         known: 1 once the wall was seen.
-        normal: Unit vector into the wall, in B.
-        distance: Tip to wall [m]; rate: its rate [m/s]; acceleration: the rate's own [m/s^2].
-        push: Filtered push [N]; noise: its deviation in free flight [N].
-        across_noise: Deviation of the moments in free flight, as a force across the tip [N].
+        distance: Tip to wall [m]; rate: its rate [m/s]; acceleration: its second derivative [m/s^2].
+        push: Filtered push [N]; push_noise: its standard deviation in free flight [N].
+        moment_noise: Standard deviation of the moments in free flight, as a force across the tip [N].
         touching: 1 in contact.
         ramp: 0 at touch to 1.
-        stiffness: [N/m]; stiffness_known: 1 once it was measured.
+        stiffness: [N/m]; stiffness_known: 1 once measured.
+        normal: Unit vector into the wall, in B.
     """
 
     known: ca.SX
-    normal: ca.SX
     distance: ca.SX
     rate: ca.SX
     acceleration: ca.SX
     push: ca.SX
-    noise: ca.SX
-    across_noise: ca.SX
+    push_noise: ca.SX
+    moment_noise: ca.SX
     touching: ca.SX
     ramp: ca.SX
     stiffness: ca.SX
     stiffness_known: ca.SX
+    normal: ca.SX
 
     @classmethod
-    def of(cls, signals: Signals) -> Touch:
-        """Ask for the inputs."""
-        symbols = ca.vertsplit(signals.input("touch", len(TOUCH)))
-        return cls(normal=signals.input("normal", 3), **dict(zip(TOUCH, symbols, strict=True)))
+    def of(cls, signals: Signals) -> Contact:
+        """Declare the inputs."""
+        scalars = {name: signals.input(f"contact.{name}") for name in CONTACT}
+        return cls(normal=signals.input("normal", 3), **scalars)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Wish:
+class Target:
     """The reference.
 
     Attributes:
-        push: [N]; press: whether to; standoff: [m].
-        velocity: Right and down [m/s]; plan: the one that is planned.
-        tilt: Roll and pitch [rad].
+        push: Push force [N].
+        standoff: Tip to wall out of contact [m].
+        velocity_right, velocity_down: In the wall plane [m/s].
+        press: 1 to press the wall.
+        roll, pitch: Attitude [rad]; zero but for a vehicle that lost a rotor.
+        travel_right, travel_down: Velocity planned at this push [m/s].
     """
 
     push: ca.SX
     standoff: ca.SX
-    velocity: ca.SX
+    velocity_right: ca.SX
+    velocity_down: ca.SX
     press: ca.SX
-    tilt: ca.SX
-    plan: ca.SX
+    roll: ca.SX
+    pitch: ca.SX
+    travel_right: ca.SX
+    travel_down: ca.SX
 
     @classmethod
-    def of(cls, signals: Signals) -> Wish:
-        """Ask for the inputs."""
-        entries = ca.vertsplit(signals.input("reference", REFERENCE_INPUTS))
-        push, standoff, right, down, press, roll, pitch, *plan = entries
-        velocity, tilt = ca.vertcat(right, down), ca.vertcat(roll, pitch)
-        return cls(push=push, standoff=standoff, velocity=velocity, press=press, tilt=tilt, plan=ca.vertcat(*plan))
+    def of(cls, signals: Signals) -> Target:
+        """Declare the inputs."""
+        return cls(**{name: signals.input(f"reference.{name}") for name in TARGET})
+
+
+@dataclass(frozen=True, kw_only=True)
+class Line:
+    """One measured line and its reference; rows of an absent line have weight zero.
+
+    Attributes:
+        index: Of the line; its reference keeps it from step to step.
+        present: 1 if measured; vertical: 1 for a vertical line, 0 for a horizontal one.
+        rho, theta: Of the line, its sign aligned with the reference.
+        rho_reference, theta_reference: Of the reference.
+        confidence: Weight of the feature, 0 to 1; variance: of rho.
+    """
+
+    index: int
+    present: ca.SX
+    vertical: ca.SX
+    rho: ca.SX
+    theta: ca.SX
+    rho_reference: ca.SX
+    theta_reference: ca.SX
+    confidence: ca.SX
+    variance: ca.SX
+
+    @classmethod
+    def of(cls, signals: Signals, index: int) -> Line:
+        """Declare the inputs of one line."""
+        return cls(index=index, **{name: signals.input(f"line_{index}.{name}") for name in LINE})
+
+
+def _names(kind: type, but: str = "") -> tuple[str, ...]:
+    return tuple(field.name for field in fields(kind) if field.name != but)
+
+
+#: Scalar inputs of contact, reference and every line, in the order of packing.
+CONTACT, TARGET, LINE = _names(Contact, "normal"), _names(Target), _names(Line, "index")
+#: Outputs of every line, "line_0.error" and so on (`ibvs_qp.tasks.line.LineState`).
+LINE_OUTPUTS = "error rate integral rho_error rho_rate angle_error angle_rate weight".split()
+
+
+def declare_inputs(signals: Signals, lines: int) -> None:
+    """Declare everything that is packed at every step, first of all inputs, so that it is one block."""
+    for name, size in ARRAYS.items():
+        signals.input(name, size)
+    for name in SCALARS:
+        signals.input(name)
+    Contact.of(signals)
+    Target.of(signals)
+    for index in range(lines):
+        Line.of(signals, index)
 
 
 def clamp(value: ca.SX, low: float | ca.SX, high: float | ca.SX) -> ca.SX:

@@ -1,67 +1,65 @@
-"""One tick's measured numbers into the inputs of the compiled tick, all of them in one call."""
+"""Measurement, reference and contact into the inputs of the step function, in one block."""
 
 from __future__ import annotations
 
-import struct
-
 from ibvs_qp.estimation.contact import ContactEstimator
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL, Measurement, Reference
-from ibvs_qp.model.inputs import ARRAYS, REFERENCE_INPUTS, SLOT_INPUTS, TOUCH
+from ibvs_qp.model.inputs import ARRAYS, CONTACT, LINE, SCALARS, TARGET
 from ibvs_qp.model.pairing import LinePairing
-from ibvs_qp.model.tick_function import TickFunction
+from ibvs_qp.model.step_function import StepFunction
 
-#: Distance given to the equations while the wall is unknown [m].
+#: Distance while the wall is unknown [m]; finite, for the equations.
 FAR_AWAY = 1e3
 
-_NOTHING = (0.0, 0.0, 0.0)
+_ZERO = (0.0, 0.0, 0.0)
 
 
-class TickInputs:
-    """Packs what `ibvs_qp.model.inputs` asks for; writing input by input costs four times as much.
+class StepInputs:
+    """Packs the inputs that `ibvs_qp.model.inputs` declares; entry by entry it would cost four times as much.
 
     Attributes:
-        present: Slots with a line at this tick, and the roles of their lines.
+        present: Indices of the lines present at this step, and their roles.
     """
 
-    def __init__(self, tick: TickFunction, slots: int) -> None:
-        self._tick, self._slots, self._pairing = tick, slots, LinePairing(slots)
-        count = sum(ARRAYS.values()) + 4 + len(TOUCH) + REFERENCE_INPUTS + slots + slots * SLOT_INPUTS
-        self._pack = struct.Struct(f"{count}d").pack_into
-        self._memory = memoryview(tick.values).cast("B")  # type: ignore[arg-type]
+    def __init__(self, step: StepFunction, lines: int) -> None:
+        self._step, self._pairing = step, LinePairing(lines)
+        self._lines = [[0.0] * len(LINE) for _ in range(lines)]
+        count = sum(ARRAYS.values()) + len(SCALARS) + len(CONTACT) + len(TARGET) + lines * len(LINE)
+        self._block = step.values[:count]
         self.reset()
 
     def reset(self) -> None:
-        """As before the first tick."""
+        """Forget all pairs of lines and references."""
         self._pairing.reset()
         self.present: list[tuple[int, str]] = []
-        self._vertical = [0.0] * self._slots
-        self._lines = [0.0] * (self._slots * SLOT_INPUTS)
+        for line in self._lines:
+            line[:] = [0.0] * len(LINE)
 
     def write(self, measurement: Measurement, reference: Reference, contact: ContactEstimator, dt: float) -> None:
-        """Pack one checked measurement, its reference and the contact as estimated.
+        """Pack one validated measurement, its reference and the contact.
 
         Args:
-            measurement: All of it but the thrust limits.
-            reference: What is wanted.
-            contact: Already brought up to date with the measurement.
-            dt: Time since the last tick [s].
+            measurement: All but the thrust limits.
+            reference: Targets.
+            contact: Updated with this measurement.
+            dt: Time since the last step [s].
         """
         force, velocity = measurement.specific_force, measurement.velocity
         press, known, stiffness = reference.contact, contact.known, contact.stiffness
         self._pair(measurement, reference, known)
-        self._pack(
-            self._memory,
-            0,
+        self._block[:] = (
             *measurement.attitude.tolist(),
             *measurement.angular_velocity.tolist(),
             *measurement.contact_wrench.tolist(),
-            *(_NOTHING if force is None else force.tolist()),
-            *(_NOTHING if velocity is None else velocity.tolist()),
+            *(_ZERO if force is None else force.tolist()),
+            *(_ZERO if velocity is None else velocity.tolist()),
             *contact.direction,
+            # SCALARS
             dt,
             force is not None,
             velocity is not None,
             contact.contact_weight if press else 0.0,
+            # CONTACT
             known,
             contact.distance if known else FAR_AWAY,
             contact.rate,
@@ -73,29 +71,26 @@ class TickInputs:
             contact.ramp,
             stiffness.value,
             stiffness.known,
+            # TARGET
             reference.push_force,
             reference.standoff,
             *reference.velocity.tolist(),
             press,
             *reference.tilt.tolist(),
             *reference.travel.tolist(),
-            *self._vertical,
-            *self._lines,
+            # LINE, for every line
+            *(entry for line in self._lines for entry in line),
         )
 
     def _pair(self, measurement: Measurement, reference: Reference, wall_known: bool) -> None:
-        """Lines into their slots; what a slot remembers goes when it changes hands."""
-        for slot in self._pairing.assign(reference.lines):
-            for kind in ("integral", "last"):
-                self._tick.states[f"line_{slot}_{kind}"][:] = 0.0
-        packed = self._lines
-        for slot, _ in self.present:
-            packed[slot * SLOT_INPUTS] = 0.0
-        self.present = present = []
-        if not wall_known:
-            return
-        for slot, entry, vertical in self._pairing.pairs(measurement.lines, reference.lines):
-            start = slot * SLOT_INPUTS
-            packed[start : start + SLOT_INPUTS] = entry
-            self._vertical[slot] = vertical
-            present.append((slot, VERTICAL if vertical else HORIZONTAL))
+        """Assign lines to indices; an index that changes its reference loses integral and rate."""
+        for index in self._pairing.assign(reference.lines):
+            for state in ("integral", "last"):
+                self._step.states[f"line_{index}_{state}"][:] = 0.0
+        for line in self._lines:
+            line[0] = 0.0  # absent; the other entries stay, so that its equations stay finite
+        self.present = []
+        if wall_known:
+            for index, entries in self._pairing.pairs(measurement.lines, reference.lines):
+                self._lines[index][:] = entries
+                self.present.append((index, VERTICAL if entries[1] else HORIZONTAL))

@@ -9,8 +9,6 @@ from allocation.wrench_facets import ON_PLANE, RELATIVE_ZERO, WrenchFacets
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.model.signals import Signals
 
-#: Share of the reach that a push may ask for: the rest is left for holding place, whatever the vehicle can do.
-REACH_SHARE = 0.97
 #: Reach given out when nothing bounds it [N].
 UNBOUNDED = 1e6
 #: Least push given out when no push, not even zero, can be held [N].

@@ -9,7 +9,7 @@ import numpy as np
 from ibvs_qp.command import ActiveLimit, Command, Outcome
 from ibvs_qp.made import made
 from ibvs_qp.measurement import Reference
-from ibvs_qp.model.step_function import Setpoints
+from ibvs_qp.model.setpoints import Setpoints
 
 #: A thrust this far outside its window counts as clipped [N].
 CLIPPED = 1e-9

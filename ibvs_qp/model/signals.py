@@ -1,4 +1,4 @@
-"""Named inputs, states and outputs of one tick, gathered while the blocks write down their equations."""
+"""Named inputs, states and outputs of the step function, as symbols."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 
 
 class Signals:
-    """What a tick reads, remembers and yields, as symbols.
+    """Registry of the symbols of one step.
 
-    A block asks for inputs, holds states from tick to tick and names outputs; asking twice gives the same symbol.
-    Everything is then one `casadi.Function`: the tick costs one call, however many blocks there are.
+    Every equation reads inputs and states and writes next states and outputs under a name. The same name returns the
+    same symbol. All of them together become one `casadi.Function`, so a step costs one call.
     """
 
     def __init__(self) -> None:
@@ -27,32 +27,32 @@ class Signals:
         return self.inputs.setdefault(name, ca.SX.sym(name, size))
 
     def state(self, name: str, size: int = 1, start: float | Sequence[float] = 0.0) -> ca.SX:
-        """Symbol of what was remembered under a name; ``start`` is its value after a reset."""
+        """Symbol of a state, (size,); ``start`` is its value after a reset."""
         self.starts[name] = np.broadcast_to(np.asarray(start, float), (size,)).copy()
         return self.states.setdefault(name, ca.SX.sym(name, size))
 
     def remember(self, name: str, value: ca.SX) -> ca.SX:
-        """Set what the next tick finds under a name; returns the value."""
+        """Set the value of a state at the next step; returns it."""
         self._next[name] = value
         return value
 
     def next_state(self, name: str) -> ca.SX:
-        """What `remember` set under a name."""
+        """Value that `remember` set for the next step."""
         return self._next[name]
 
     def output(self, name: str, value: ca.SX) -> ca.SX:
-        """Name a result of the tick; returns the value."""
+        """Name a result of the step; returns it."""
         self.outputs[name] = value
         return value
 
     @property
     def next_states(self) -> ca.SX:
-        """States of the next tick, stacked in the order of `states`; what nobody sets stays."""
+        """States at the next step, stacked in the order of `states`; a state without an update stays constant."""
         return ca.vertcat(*(self._next.get(name, symbol) for name, symbol in self.states.items()))
 
 
 def places(symbols: dict[str, ca.SX]) -> dict[str, slice]:
-    """Where each named symbol lies in the stack of all of them."""
+    """Place of each named symbol in the stack of all of them."""
     layout, start = {}, 0
     for name, symbol in symbols.items():
         layout[name] = slice(start, start + symbol.numel())

@@ -10,11 +10,11 @@ import numpy as np
 from ibvs_qp.command import Outcome
 from ibvs_qp.config import SolverSettings
 from ibvs_qp.qp.active_set import ActiveSet
-from ibvs_qp.qp.evaluator import Evaluator, ProgramData
+from ibvs_qp.qp.evaluator import ProgramData
 from ibvs_qp.qp.exact import ExactSolver
 from ibvs_qp.qp.infeasible import conflicting_rows
 from ibvs_qp.qp.osqp import MAX_ITERATIONS, SOLVED, SOLVED_INACCURATE, OsqpSolver, RawSolution
-from ibvs_qp.qp.problem import QpTemplate
+from ibvs_qp.qp.problem import QpProblem
 
 #: Status values whose iterate means something.
 USABLE = (SOLVED, SOLVED_INACCURATE, MAX_ITERATIONS)
@@ -53,12 +53,12 @@ class QpEngine:
 
     def __init__(
         self,
-        template: QpTemplate,
+        template: QpProblem,
         settings: SolverSettings,
-        data: ProgramData | None = None,
+        data: ProgramData,
         to_machine_code: bool = False,
     ) -> None:
-        self.template, self.settings, self.data = template, settings, data or Evaluator(template)
+        self.template, self.settings, self.data = template, settings, data
         self.osqp = OsqpSolver(template, settings)
         self.active_set = ActiveSet(template, to_machine_code)
         self.exact = ExactSolver(template)
@@ -77,7 +77,6 @@ class QpEngine:
     def solve(self) -> AcceptedSolution | None:
         """Solve the program as its data stands; None when nobody found a solution."""
         data, self.conflict = self.data, ()
-        data.evaluate()
         known = self._without_iterating() if self.settings.shortcut and self.osqp.ready else None
         if known is not None:
             return known

@@ -7,8 +7,21 @@ import math
 import casadi as ca
 import numpy as np
 
-from ibvs_qp.qp.evaluator import BufferedFunction, ProgramData
-from ibvs_qp.qp.problem import QpTemplate
+from ibvs_qp.model.bound_function import BoundFunction
+from ibvs_qp.model.machine_code import machine_code
+from ibvs_qp.qp.evaluator import ProgramData
+
+
+class BufferedFunction(BoundFunction):
+    def __init__(self, function: ca.Function, to_machine_code: bool = False) -> None:
+        if to_machine_code:
+            function = machine_code(function)
+        self.inputs = [np.zeros(function.numel_in(i)) for i in range(function.n_in())]
+        self.outputs = [np.zeros(function.numel_out(i)) for i in range(function.n_out())]
+        super().__init__(function, self.inputs, self.outputs)
+
+
+from ibvs_qp.qp.problem import QpProblem
 
 #: A row may lie outside its bounds by this much, and a multiplier on the wrong side of zero, relative to the largest.
 TOLERANCE = 1e-7
@@ -32,7 +45,7 @@ class ActiveSet:
     Source: Nocedal and Wright, Numerical Optimization, 2nd edition, sections 16.2 and 16.5.
     """
 
-    def __init__(self, template: QpTemplate, to_machine_code: bool = False) -> None:
+    def __init__(self, template: QpProblem, to_machine_code: bool = False) -> None:
         self._dual = BufferedFunction(_dual_function(template), to_machine_code)
         rows, self._rotors = len(template.row_names), template.model.rotors
         _, self._coupling, self._per_row = self._dual.outputs
@@ -129,7 +142,7 @@ def _next_guess(outside: dict[int, float], stays: dict[int, float]) -> dict[int,
     return {row: sides[row] for row in sorted(sides) if sides[row]}
 
 
-def _dual_function(template: QpTemplate) -> ca.Function:
+def _dual_function(template: QpProblem) -> ca.Function:
     """(P, A, free thrusts) to rows at the free optimum, A P^-1 A' and A P^-1, P being block diagonal."""
     n = template.model.rotors
     p, a = (

@@ -1,56 +1,37 @@
-"""Program data through CasADi's buffer interface: nothing is allocated in the loop."""
+"""Values of one step's program, in flight or from a recorded step."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
-import casadi as ca
 import numpy as np
 
 from ibvs_qp.model.bound_function import BoundFunction
-from ibvs_qp.model.machine_code import machine_code
-from ibvs_qp.qp.problem import QpTemplate
-
-
-class BufferedFunction(BoundFunction):
-    """A CasADi function bound to arrays of its own; calling it fills the output arrays in place.
-
-    Attributes:
-        inputs, outputs: The arrays, one per argument and result.
-    """
-
-    def __init__(self, function: ca.Function, to_machine_code: bool = False) -> None:
-        if to_machine_code:
-            function = machine_code(function)
-        self.inputs = [np.zeros(function.numel_in(i)) for i in range(function.n_in())]
-        self.outputs = [np.zeros(function.numel_out(i)) for i in range(function.n_out())]
-        super().__init__(function, self.inputs, self.outputs)
+from ibvs_qp.model.step_function import StepFunction
+from ibvs_qp.qp.problem import QpProblem
 
 
 class ProgramData:
-    """Values of one tick's program, where the compiled tick leaves them.
+    """Values of one step's program, where the step function writes them.
 
     Attributes:
         p: Non-zeros of the upper triangle of P. Likewise q, a, lower, upper.
-        stacked: Parameters of the program; `parameters` are views of it by name.
-        free: Thrusts of the same tick without any limit [N], (n,).
-        violation: By how much they break the worst row, (1,); < 0 where they are the solution, infinite where a number
-            is missing.
+        free: Thrusts of the same step without any limit [N], (n,).
+        point: Inputs and states of the step; `inputs` are views of it by name.
     """
 
-    def __init__(self, template: QpTemplate, arrays: Sequence[np.ndarray]) -> None:
-        self.p, self.q, self.a, self.lower, self.upper, self.stacked, self.free, self.violation = arrays
-        self.parameters = {name: self.stacked[place] for name, place in template.layout.items()}
-        self._report = BufferedFunction(template.report)
-        self._rotors = template.model.rotors
-        pattern = template.p_pattern.tocoo()
+    def __init__(self, problem: QpProblem, step: StepFunction) -> None:
+        self.p, self.q, self.a, self.lower, self.upper, self.free, self.violation = step.extra
+        self.point, self.inputs = step.point, step.inputs
+        report, inputs = problem.report, len(step.values)
+        self._problem, self._inputs = problem, inputs
+        self._point, self._thrusts = np.zeros(len(step.point)), np.zeros(problem.model.rotors)
+        self._rows_reported = [np.zeros(report.numel_out(index)) for index in range(report.n_out())]
+        arguments = [self._point[:inputs], self._point[inputs:], self._thrusts]
+        self._report = BoundFunction(report, arguments, self._rows_reported)
+        pattern = problem.p_pattern.tocoo()
         self._rows, self._columns = pattern.row, pattern.col
-        pattern = template.a_pattern.tocoo()
+        pattern = problem.a_pattern.tocoo()
         self._row_of, self._column_of = pattern.row, pattern.col
-        self._size = len(template.variable_names)
-
-    def evaluate(self) -> None:
-        """Bring the data up to date with the parameters; the compiled tick has done so already."""
+        self._size = len(problem.variable_names)
 
     def hessian(self) -> np.ndarray:
         """P in full, (variables, variables)."""
@@ -65,24 +46,24 @@ class ProgramData:
         full[self._row_of, self._column_of] = self.a
         return full
 
-    def report(self, stacked: np.ndarray, thrusts: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Achieved and asked values and weights of every task row at given parameters and thrusts."""
-        self._report.inputs[0][:] = stacked
-        self._report.inputs[1][:] = thrusts
+    def limit_values(self, thrusts: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Value, lower and upper bound of every limit row at given thrusts, in the row's own unit."""
+        at = self._problem.limit_values(self.point[: self._inputs], self.point[self._inputs :], thrusts)
+        value, lower, upper = (np.array(entry).ravel() for entry in at)
+        return value, lower, upper
+
+    def report(self, point: np.ndarray, thrusts: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Achieved and target values and weights of every task row at the inputs and states of a step."""
+        self._point[:], self._thrusts[:] = point, thrusts
         self._report()
-        achieved, asked, weights = self._report.outputs
-        return achieved, asked, weights
+        achieved, targets, weights = self._rows_reported
+        return achieved, targets, weights
 
 
-class Evaluator(ProgramData):
-    """A program on its own: write `parameters` with ``[name][:] =``, evaluate, read the data."""
+class RecordedProgram(ProgramData):
+    """The program of recorded steps: set `point`, evaluate, read the values."""
 
-    def __init__(self, template: QpTemplate) -> None:
-        self._values, self._free = BufferedFunction(template.values), BufferedFunction(template.free)
-        super().__init__(template, [*self._values.outputs, self._values.inputs[0], *self._free.outputs])
-
-    def evaluate(self) -> None:
-        """Fill p, q, a, lower, upper and the free optimum from the parameters."""
-        self._values()
-        self._free.inputs[0][:] = self.stacked
-        self._free()
+    def __init__(self, problem: QpProblem) -> None:
+        step = StepFunction(problem.model.signals, problem.values)
+        super().__init__(problem, step)
+        self.evaluate = step.evaluate

@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
-from ibvs_qp.qp.problem import QpTemplate
+from ibvs_qp.qp.problem import QpProblem
 
 #: Violation of a row above which a reported success is not believed: DAQP skips rows that are all zero.
 FEASIBLE = 1e-4
@@ -14,7 +14,7 @@ FEASIBLE = 1e-4
 class ExactSolver:
     """Dual active-set solver of the same program; exact to rounding, called only when OSQP is not accepted."""
 
-    def __init__(self, template: QpTemplate) -> None:
+    def __init__(self, template: QpProblem) -> None:
         self._template = template
         p_sparsity = _casadi_sparsity(template.p_pattern + template.p_pattern.T)
         self._p_sparsity, self._a_sparsity = p_sparsity, _casadi_sparsity(template.a_pattern)

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import casadi as ca
 import numpy as np
 
 from ibvs_qp.command import ActiveLimit, TaskReport
 from ibvs_qp.qp.accept import ACTIVE_PRICE
-from ibvs_qp.qp.evaluator import Evaluator, ProgramData
+from ibvs_qp.qp.evaluator import ProgramData, RecordedProgram
 from ibvs_qp.qp.exact import ExactSolver
 from ibvs_qp.qp.infeasible import conflicting_rows
-from ibvs_qp.qp.problem import AffineRows, QpTemplate
+from ibvs_qp.qp.problem import QpProblem
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,10 +52,10 @@ class Explanation:
 
 
 def task_reports(
-    template: QpTemplate, data: ProgramData, stacked: np.ndarray, thrusts: np.ndarray
+    template: QpProblem, data: ProgramData, point: np.ndarray, thrusts: np.ndarray
 ) -> tuple[TaskReport, ...]:
     """Asked, achieved and residual of every task row that has a weight."""
-    achieved, asked, weights = data.report(stacked, thrusts)
+    achieved, asked, weights = data.report(point, thrusts)
     return tuple(
         TaskReport(
             name=row.name,
@@ -72,7 +70,7 @@ def task_reports(
     )
 
 
-def active_limits(template: QpTemplate, x: np.ndarray, y: np.ndarray) -> tuple[ActiveLimit, ...]:
+def active_limits(template: QpProblem, x: np.ndarray, y: np.ndarray) -> tuple[ActiveLimit, ...]:
     """Limits with a price: name, side, |dJ*/d bound| and slack taken."""
     active = []
     for i in np.flatnonzero(np.abs(y) > ACTIVE_PRICE):
@@ -100,20 +98,20 @@ class TickReplay:
         conflict: Names of the rows that contradict each other, where the last tick explained has no solution.
     """
 
-    def __init__(self, template: QpTemplate, solver: str | None = None) -> None:
+    def __init__(self, template: QpProblem, solver: str | None = None) -> None:
         self._template, self._solver = template, solver
-        self._data = Evaluator(template)
+        self._data = RecordedProgram(template)
         self._exact = ExactSolver(template)
         self.conflict: tuple[str, ...] = ()
 
-    def explain(self, stacked: np.ndarray) -> Explanation | None:
-        """Solve and explain the program of these parameters; None if it has no solution, see `conflict`.
+    def explain(self, point: np.ndarray) -> Explanation | None:
+        """Solve and explain the program of a recorded step; None if it has no solution, see `conflict`.
 
         Args:
-            stacked: Parameters as `ProgramData.stacked` held them in flight, (parameters,).
+            point: Inputs and states of the step as in `ProgramData.point`.
         """
         data, template = self._data, self._template
-        data.stacked[:] = stacked
+        data.point[:] = point
         data.evaluate()
         solution, self.conflict = self._solve(), ()
         if solution is None:
@@ -121,14 +119,14 @@ class TickReplay:
             return None
         x, y = solution
         thrusts = x[: template.model.rotors]
-        tasks = task_reports(template, data, stacked, thrusts)
+        tasks = task_reports(template, data, point, thrusts)
         cost = np.array([0.5 * task.weight * task.residual**2 for task in tasks])
         slack = x[len(thrusts) :]
         slack_cost = 0.5 * float(slack @ (data.hessian().diagonal()[len(thrusts) :] * slack))
         total = float(cost.sum()) + slack_cost or 1.0
         limits = sorted(active_limits(template, x, y), key=lambda limit: -limit.price)
-        prices = {row.name: row.price or 0.0 for row in template.limit_rows}
-        paid = (0.5 * prices[limit.name] * limit.slack**2 / total for limit in limits)
+        weights = {row.name: row.slack_weight or 0.0 for row in template.limit_rows}
+        paid = (0.5 * weights[limit.name] * limit.slack**2 / total for limit in limits)
         effectiveness = template.model.effectiveness
         return Explanation(
             thrusts=thrusts,
@@ -151,7 +149,7 @@ class TickReplay:
         """
         template, data = self._template, self._data
         rows = [template.row_names.index(name) for name in names]
-        values, lower, upper = (side.full().ravel() for side in self._bounds(data.stacked, thrusts))
+        values, lower, upper = data.limit_values(thrusts)
         return tuple(
             LimitValue(
                 name=template.row_names[row],
@@ -162,15 +160,6 @@ class TickReplay:
             )
             for row in rows
         )
-
-    @functools.cached_property
-    def _bounds(self) -> ca.Function:
-        """Value, lower and upper bound of every limit row as it was written, with what does not depend on thrusts."""
-        model, rows = self._template.model, self._template.limit_rows
-        values = AffineRows(model, ca.vertcat(*(row.expression for row in rows))).at(model.thrust)
-        bounds = (ca.vertcat(*(row.lower for row in rows)), ca.vertcat(*(row.upper for row in rows)))
-        stacked = ca.vertcat(*model.parameters.values())
-        return ca.Function("limit_values", [stacked, model.thrust], [values, *bounds])
 
     def _solve(self) -> tuple[np.ndarray, np.ndarray] | None:
         data = self._data

@@ -1,19 +1,19 @@
-"""Why a program cannot be solved at all: parameters, tasks and limits that are not what a program is made of."""
+"""Causes of a program without a solution: inputs, tasks and limits with invalid numbers."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ibvs_qp.qp.evaluator import ProgramData
-from ibvs_qp.qp.problem import QpTemplate
+from ibvs_qp.qp.problem import QpProblem
 
 
-def program_faults(template: QpTemplate, data: ProgramData) -> tuple[str, ...]:
-    """One sentence per broken parameter, or else per broken row; asked only where no solver answered.
+def program_faults(template: QpProblem, data: ProgramData) -> tuple[str, ...]:
+    """One sentence per invalid input, or else per invalid row; evaluated only if every solver failed.
 
-    A parameter that is no number breaks every row that uses it, so rows are looked at where all parameters are sound.
+    An input that is not finite breaks every row that uses it, so rows are checked only if all inputs are finite.
     """
-    broken = [_broken(name, values) for name, values in data.parameters.items() if not np.isfinite(values).all()]
+    broken = [_broken(name, values) for name, values in data.inputs.items() if not np.isfinite(values).all()]
     return tuple(broken) or (*_task_faults(template, data), *_limit_faults(template, data))
 
 
@@ -22,10 +22,10 @@ def _broken(name: str, values: np.ndarray) -> str:
     return f"parameter {name}: ({entries}) is not finite"
 
 
-def _task_faults(template: QpTemplate, data: ProgramData) -> list[str]:
+def _task_faults(template: QpProblem, data: ProgramData) -> list[str]:
     """Rows whose value, target or weight is no number, and weights below zero."""
     thrusts = np.ones(template.model.rotors)  # not zero, so that a factor that is no number shows in any case
-    achieved, asked, weights = data.report(data.stacked, thrusts)
+    achieved, asked, weights = data.report(data.point, thrusts)
     found = []
     for row, value, target, weight in zip(template.task_rows, achieved, asked, weights, strict=True):
         if not np.isfinite((value, target, weight)).all():
@@ -35,7 +35,7 @@ def _task_faults(template: QpTemplate, data: ProgramData) -> list[str]:
     return found
 
 
-def _limit_faults(template: QpTemplate, data: ProgramData) -> list[str]:
+def _limit_faults(template: QpProblem, data: ProgramData) -> list[str]:
     """Rows that hold a number that is none, and rows whose bounds leave no room between them."""
     found = []
     for i, row in enumerate(template.limit_rows):

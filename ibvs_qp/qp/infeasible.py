@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from ibvs_qp.qp.evaluator import ProgramData
-from ibvs_qp.qp.problem import QpTemplate
+from ibvs_qp.qp.problem import QpProblem
 
 #: Residual of the certificate below which there is no solution; one r long lies 1/r newtons away, so none this side
 #: of 10^8 N counts as none.
 NO_CERTIFICATE = 1e-8
 
 
-def conflicting_rows(template: QpTemplate, data: ProgramData) -> tuple[str, ...]:
+def conflicting_rows(template: QpProblem, data: ProgramData) -> tuple[str, ...]:
     r"""Names of hard rows without a common solution, none of which could be spared; () where there is a solution.
 
     By Farkas' lemma :math:`G x \le h` has no solution exactly if some :math:`y \ge 0` has :math:`G^T y = 0` and

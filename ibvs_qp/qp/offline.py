@@ -11,7 +11,7 @@ from scipy import sparse
 
 from ibvs_qp.config.errors import IbvsQpError
 from ibvs_qp.qp.evaluator import ProgramData
-from ibvs_qp.qp.problem import QpTemplate
+from ibvs_qp.qp.problem import QpProblem
 
 #: Back ends that take dense matrices only.
 DENSE = ("daqp", "quadprog")
@@ -22,7 +22,7 @@ def installed_solvers() -> tuple[str, ...]:
     return tuple(sorted(qpsolvers.available_solvers))
 
 
-def qpsolvers_problem(template: QpTemplate, data: ProgramData, dense: bool = False) -> qpsolvers.Problem:
+def qpsolvers_problem(template: QpProblem, data: ProgramData, dense: bool = False) -> qpsolvers.Problem:
     """One tick's program in the form of qpsolvers: full P, two-sided rows stacked as G x <= h.
 
     Args:
@@ -41,7 +41,7 @@ def qpsolvers_problem(template: QpTemplate, data: ProgramData, dense: bool = Fal
 
 
 def solve_offline(
-    template: QpTemplate, data: ProgramData, solver: str, **options: Any
+    template: QpProblem, data: ProgramData, solver: str, **options: Any
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """Solution and multipliers of one tick's program by a back end of qpsolvers.
 

@@ -10,7 +10,7 @@ import numpy as np
 import osqp
 
 from ibvs_qp.config import SolverSettings
-from ibvs_qp.qp.problem import QpTemplate
+from ibvs_qp.qp.problem import QpProblem
 
 #: Status values of OSQP 1.x whose iterate means something.
 SOLVED, SOLVED_INACCURATE, MAX_ITERATIONS = 1, 2, 7
@@ -37,7 +37,7 @@ class OsqpSolver:
     of each other, where a row would change its type and the matrix be factorised anew, is the limits' part.
     """
 
-    def __init__(self, template: QpTemplate, settings: SolverSettings) -> None:
+    def __init__(self, template: QpProblem, settings: SolverSettings) -> None:
         self._template, self._settings = template, settings
         variables, rows = len(template.variable_names), len(template.row_names)
         self._lengths = (template.p_pattern.nnz, variables, template.a_pattern.nnz, rows, rows)

@@ -1,41 +1,36 @@
-"""Regularisation: stay near the last thrusts, and change them smoothly."""
+"""Regularisation: thrusts stay near the last ones and change smoothly."""
 
 from __future__ import annotations
 
 import casadi as ca
 
-from ibvs_qp.model.rows import SymbolicModel, TaskRow
+from ibvs_qp.model.model import Model
+from ibvs_qp.model.rows import TaskRow
 from ibvs_qp.tasks.task import Task
 
 
 class EffortTask(Task):
-    """Thrusts near the last ones; a pull to zero would be a steady push and height bias."""
+    """Thrusts near the last ones; a pull to zero would be a constant push and height bias."""
 
-    weighed_by = ("weights.effort",)
+    weight_settings = ("weights.effort",)
 
-    def rows(self, model: SymbolicModel) -> list[TaskRow]:
+    def rows(self, model: Model) -> list[TaskRow]:
         """One row per rotor in newtons."""
-        last, weight = model.parameter("last_thrust", model.rotors), ca.SX(model.config.weights.effort)
-        names = model.config.vehicle.geometry.names
-        return [
-            TaskRow(name=f"effort_{names[i]}", unit="N", expression=model.thrust[i], target=last[i], weight=weight)
-            for i in range(model.rotors)
-        ]
+        return _thrust_rows(model, "effort", model.last_thrust, model.config.weights.effort)
 
 
 class SmoothnessTask(Task):
-    """The thrust step repeats the last one: changes bend, they do not break."""
+    """The thrust step repeats the last one, so that thrusts bend without corners."""
 
-    weighed_by = ("weights.smoothness",)
+    weight_settings = ("weights.smoothness",)
 
-    def rows(self, model: SymbolicModel) -> list[TaskRow]:
+    def rows(self, model: Model) -> list[TaskRow]:
         """One row per rotor in newtons."""
-        next_thrust = model.parameter("extrapolated_thrust", model.rotors)
-        weight = ca.SX(model.config.weights.smoothness)
-        names = model.config.vehicle.geometry.names
-        return [
-            TaskRow(
-                name=f"smooth_{names[i]}", unit="N", expression=model.thrust[i], target=next_thrust[i], weight=weight
-            )
-            for i in range(model.rotors)
-        ]
+        return _thrust_rows(model, "smooth", model.extrapolated_thrust, model.config.weights.smoothness)
+
+
+def _thrust_rows(model: Model, name: str, target: ca.SX, weight: float) -> list[TaskRow]:
+    return [
+        TaskRow(name=f"{name}_{rotor}", unit="N", expression=model.thrust[i], target=target[i], weight=ca.SX(weight))
+        for i, rotor in enumerate(model.config.vehicle.geometry.names)
+    ]

@@ -1,50 +1,169 @@
-"""Image-based visual servoing of lines, at the point where the tip meets the wall."""
+"""Image-based visual servoing of a line, at the point where the tip meets the wall."""
 
 from __future__ import annotations
 
-import casadi as ca
-import numpy as np
+from dataclasses import dataclass
 
-from ibvs_qp.frames import camera_twist_matrix
-from ibvs_qp.model.rows import SymbolicModel, TaskRow
+import casadi as ca
+
+from ibvs_qp.model.inputs import LINE_OUTPUTS, Line, clamp
+from ibvs_qp.model.interaction_matrix import endpoint_line_row, symbolic_line_rows
+from ibvs_qp.model.model import Model
+from ibvs_qp.model.rows import TaskRow
 from ibvs_qp.tasks.task import Task
 
+#: Errors enter the law up to this size [normalised]: a far line is approached at a constant pace.
+ERROR_BOUND = 0.10
+#: Bound of the integral of a line error, as the image acceleration that it commands [1/s^2].
+INTEGRAL_BOUND = 0.6
+#: Filter of the differentiated error while no velocity is known [s].
+RATE_FILTER = 0.08
 
-def symbolic_line_rows(rho: ca.SX, theta: ca.SX, plane: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Rows (rho, theta) of the line interaction matrix for a wall plane (A, B, C) with D = -1 (design, section 3)."""
-    c, s = ca.cos(theta), ca.sin(theta)
-    a, b, depth = plane[0], plane[1], plane[2]
-    l_t = -(a * s - b * c)
-    l_r = -(a * rho * c + b * rho * s + depth)
-    row_rho = ca.horzcat(l_r * c, l_r * s, -l_r * rho, (1 + rho**2) * s, -(1 + rho**2) * c, 0)
-    row_theta = ca.horzcat(l_t * c, l_t * s, -l_t * rho, -rho * c, -rho * s, -1)
-    return row_rho, row_theta
+
+@dataclass(frozen=True, kw_only=True)
+class LineState:
+    r"""Errors and rates of one line; interaction matrix rows in C.
+
+    Attributes:
+        row_rho, row_theta: Rows of the interaction matrix, (1, 6).
+        error: :math:`\rho - (x_t\cos\theta + y_t\sin\theta)` minus its reference, bounded; rate: its rate [1/s].
+        integral: Of the error [s].
+        rho_error: rho minus its reference, bounded (paper); rho_rate: its rate [1/s].
+        angle_error: theta minus its reference [rad]; angle_rate: its rate [rad/s].
+        image_rate: Rate of rho in the picture, whatever its reference does [1/s].
+        weight: Of the rows, 0 to 1: presence, confidence and variance of the line.
+    """
+
+    row_rho: ca.SX
+    row_theta: ca.SX
+    error: ca.SX
+    rate: ca.SX
+    integral: ca.SX
+    rho_error: ca.SX
+    rho_rate: ca.SX
+    angle_error: ca.SX
+    angle_rate: ca.SX
+    image_rate: ca.SX
+    weight: ca.SX
 
 
 class LineTask(Task):
-    r"""A line of the picture goes where its reference is, as seen from the tip's wall point; one task a slot.
+    r"""One line of the picture converges to its reference, as seen from the tip's wall point.
 
-    Its rows ask for :math:`L S \dot\nu = -(K_p e + K_d \dot e + K_i \int e)`. The error row is
-    :math:`L_\rho + (x_t \sin\theta - y_t \cos\theta) L_\theta`, the motion of the line relative to the image
-    (x_t, y_t) of the tip's wall point: endpoint closed loop. The angle row yields to level flight.
+    .. math:: L S \dot\nu = -(K_p e + K_d \dot e + K_i \textstyle\int e), \qquad
+              e = \rho - (x_t\cos\theta + y_t\sin\theta) - (\rho_{ref} - y_0 \sin\theta_{ref})
+
+    with the row :math:`L = L_\rho + (x_t \sin\theta - y_t \cos\theta) L_\theta` and (x_t, y_t) the image of the point
+    where the tip meets the wall: endpoint closed loop. The angle row has no integral and yields to level flight.
     """
 
-    weighed_by = ("weights.line", "weights.line_angle")
+    weight_settings = ("weights.line", "weights.line_angle")
 
-    def __init__(self, slot: int) -> None:
-        self.slot = slot
+    def __init__(self, index: int) -> None:
+        self.index, self.name = index, f"line_{index}"
 
-    def rows(self, model: SymbolicModel) -> list[TaskRow]:
+    def rows(self, model: Model) -> list[TaskRow]:
         """Two rows: error at the tip [1/s^2] and angle [rad/s^2]."""
-        name = f"line_{self.slot}"
-        line = model.parameter(name, 8)  # rho, theta, x_t, y_t, wanted accelerations (2), weights (2)
-        twist = ca.DM(camera_twist_matrix(np.array(model.config.vehicle.camera_position_m)))
-        row_rho, row_theta = symbolic_line_rows(line[0], line[1], model.parameter("plane", 3))
-        tip = row_rho + (line[2] * ca.sin(line[1]) - line[3] * ca.cos(line[1])) * row_theta
-        motion = twist @ model.motion_acceleration
+        line, weights, acceleration = line_state(model, self.index), model.config.weights, model.camera_acceleration
         return [
-            TaskRow(name=name, unit="1/s^2", expression=tip @ motion, target=line[4], weight=line[6]),
             TaskRow(
-                name=f"{name}_angle", unit="rad/s^2", expression=row_theta @ motion, target=line[5], weight=line[7]
+                name=self.name,
+                unit="1/s^2",
+                expression=self.error_row(model) @ acceleration,
+                target=self.target(model),
+                weight=weights.line * line.weight,
+            ),
+            TaskRow(
+                name=f"{self.name}_angle",
+                unit="rad/s^2",
+                expression=line.row_theta @ acceleration,
+                target=self.angle_target(model),
+                weight=weights.line_angle * line.weight,
             ),
         ]
+
+    def error_row(self, model: Model) -> ca.SX:
+        """Row of the error, (1, 6)."""
+        line = line_state(model, self.index)
+        return endpoint_line_row((line.row_rho, line.row_theta), model.lines[self.index].theta, model.view.tip)
+
+    def target(self, model: Model) -> ca.SX:
+        """Image acceleration of the error [1/s^2]."""
+        gains, line = model.config.gains, line_state(model, self.index)
+        return -(gains.line_kp * line.error + gains.line_kd * line.rate + gains.line_ki * line.integral)
+
+    def angle_target(self, model: Model) -> ca.SX:
+        """Image acceleration of the angle [rad/s^2]."""
+        gains, line = model.config.gains, line_state(model, self.index)
+        return -(gains.theta_kp * line.angle_error + gains.theta_kd * line.angle_rate)
+
+
+def line_state(model: Model, index: int) -> LineState:
+    """Errors, rates and weight of a line."""
+    return model.once(("line", index), lambda: _line_state(model, model.lines[index]))
+
+
+def _line_state(model: Model, line: Line) -> LineState:
+    view, weights = model.view, model.config.weights
+    x_tip, y_tip = view.tip
+    cos, sin = ca.cos(line.theta), ca.sin(line.theta)
+    reference = line.rho_reference - view.tip_height / view.depth * ca.sin(line.theta_reference)
+    error = line.rho - (x_tip * cos + y_tip * sin) - reference
+    row_rho, row_theta = symbolic_line_rows(line.rho, line.theta, view.plane)
+    row = endpoint_line_row((row_rho, row_theta), line.theta, view.tip)
+    moving, filtered = model.body.velocity_known, _differentiated(model, line, error, row @ view.relative_twist)
+    bounded = clamp(error, -ERROR_BOUND, ERROR_BOUND)
+    state = LineState(
+        row_rho=row_rho,
+        row_theta=row_theta,
+        error=bounded,
+        rate=filtered,
+        integral=_integral(model, line, bounded),
+        rho_error=clamp(line.rho - line.rho_reference, -ERROR_BOUND, ERROR_BOUND),
+        rho_rate=ca.if_else(moving, row_rho @ view.relative_twist, filtered),
+        angle_error=line.theta - line.theta_reference,
+        angle_rate=ca.if_else(moving, row_theta @ view.twist, 0.0),
+        image_rate=ca.if_else(moving, row_rho @ view.twist, filtered),
+        weight=line.present * line.confidence / (1.0 + ca.fmax(line.variance, 0.0) / weights.line_sigma**2),
+    )
+    for name in LINE_OUTPUTS:
+        model.output(f"line_{line.index}.{name}", getattr(state, name))
+    return state
+
+
+def _differentiated(model: Model, line: Line, error: ca.SX, rate: ca.SX) -> ca.SX:
+    """Rate of the error: from the camera's motion, or differentiated and filtered while no velocity is known."""
+    name, dt = f"line_{line.index}_last", model.body.dt
+    last_error, last_rate, seen = ca.vertsplit(model.signals.state(name, 3))
+    step = (error - ca.if_else(seen, last_error, error)) / ca.fmax(dt, 1e-4)
+    filtered = last_rate + ca.fmin(1.0, dt / RATE_FILTER) * (step - last_rate)
+    rate = ca.if_else(model.body.velocity_known, rate, filtered)
+    now, before = ca.vertcat(error, rate, 1.0), ca.vertcat(last_error, last_rate, seen)
+    model.signals.remember(name, ca.if_else(line.present, now, before))
+    return rate
+
+
+def _integral(model: Model, line: Line, error: ca.SX) -> ca.SX:
+    """Integral of the bounded error; it stops while the line is absent, the tip stuck or a thrust limited."""
+    gain, name = model.config.gains.line_ki, f"line_{line.index}_integral"
+    integral = model.signals.state(name)
+    if gain <= 0.0:
+        return integral
+    bound = INTEGRAL_BOUND / gain
+    moved = clamp(integral + model.body.dt * error * line.confidence, -bound, bound)
+    integrate = ca.logic_and(line.present, model.integrate_in_plane)
+    return model.signals.remember(name, ca.if_else(integrate, moved, integral))
+
+
+def free_directions(model: Model) -> ca.SX:
+    """Fraction of the directions right and down that no line fixes, (2,)."""
+
+    def compute() -> ca.SX:
+        right = down = ca.SX(0.0)
+        for line in model.lines:
+            weight = line_state(model, line.index).weight
+            right = ca.fmax(right, line.vertical * weight)
+            down = ca.fmax(down, (1.0 - line.vertical) * weight)
+        return model.output("free", ca.vertcat(1.0 - right, 1.0 - down))
+
+    return model.once(("free directions",), compute)

@@ -1,49 +1,75 @@
-"""Force along the wall normal: push by impedance, or keep the stand-off; one quantity, two blended wishes."""
+"""Push force in contact: the paper's impedance force law as one row along the wall normal."""
 
 from __future__ import annotations
 
 import casadi as ca
 
-from ibvs_qp.model.rows import SymbolicModel, TaskRow
+from ibvs_qp.analysis.contact_loop import FULL_GAIN_STIFFNESS
+from ibvs_qp.config import VehicleParams
+from ibvs_qp.model.inputs import Contact, clamp
+from ibvs_qp.model.model import Model
+from ibvs_qp.model.rows import TaskRow
 from ibvs_qp.tasks.task import Task
+
+#: Bound of the force integral as a force [N].
+FORCE_INTEGRAL_BOUND = 8.0
 
 
 class PushTask(Task):
-    r"""Net non-contact force along n equals the force law [N], weight lambda.
+    r"""Net force along n equals the force law in contact [N], weight lambda.
 
-    :math:`F_f = F_{ref} + K_{sp} e_s + K_{sd} \dot e_s + K_{fp}(F_{ref} - f) + K_{fi}\int (F_{ref} - f)`.
+    .. math:: F = F_{ref} + K_{sp} e_s + K_{sd} \dot e_s + K_{fp} (F_{ref} - f) + K_{fi} \int (F_{ref} - f)
+
+    F_ref is the push reference within reach times the ramp after touch, f the measured push, e_s the distance of the
+    tip to the wall. (Paper, equation 14, with the sign of the force feedback corrected.)
     """
 
-    weighed_by = ("weights.push",)
+    weight_settings = ("weights.push",)
 
-    def rows(self, model: SymbolicModel) -> list[TaskRow]:
-        """One row in newtons."""
-        push = model.parameter("push", 2)
+    def rows(self, model: Model) -> list[TaskRow]:
+        """One row in newtons, so that the blend with the stand-off row is linear in lambda."""
         return [
             TaskRow(
                 name="push",
                 unit="N",
-                expression=ca.dot(model.normal, model.wrench[:3]),
-                target=push[0],
-                weight=push[1],
+                expression=model.force_along_normal,
+                target=model.output("push_command", self.force(model)),
+                weight=model.config.weights.push * model.contact_weight,
             )
         ]
 
+    def force(self, model: Model) -> ca.SX:
+        """The force law [N]."""
+        gains, contact = model.config.gains, model.contact
+        reference = model.push_reference * contact.ramp
+        error = reference - contact.push
+        # On stiff walls the loop gain rises with the stiffness; the proportional gain falls with it.
+        softness = ca.fmin(1.0, FULL_GAIN_STIFFNESS / contact.stiffness)
+        feedback = softness * gains.force_kfp * error + gains.force_kfi * self._integral(model, error)
+        return reference + feedback + self._impedance(model)
 
-class StandoffTask(Task):
-    """Net force along n equals mass times the wanted approach acceleration [N], weight 1 - lambda."""
+    def _integral(self, model: Model, error: ca.SX) -> ca.SX:
+        """Integral of the force error [N s]: zero out of contact, stopped while thrusts are limited."""
+        contact = model.contact
+        bound = FORCE_INTEGRAL_BOUND / max(model.config.gains.force_kfi, 1e-6)
+        step = ca.if_else(model.integrate, model.body.dt, 0.0) * model.contact_weight
+        moved = clamp(model.signals.state("force_integral") + step * error, -bound, bound)
+        pressing = ca.logic_and(contact.touching, model.target.press)
+        return model.signals.remember("force_integral", ca.if_else(pressing, moved, 0.0))
 
-    weighed_by = ("weights.push",)
+    def _impedance(self, model: Model) -> ca.SX:
+        """Spring and damper between tip and wall [N]; none in direct force control."""
+        config, contact = model.config, model.contact
+        if not config.impedance:
+            return ca.SX(0.0)
+        gains = config.gains
+        force = gains.force_ksp * contact.distance + gains.force_ksd * predicted_rate(config.vehicle, contact)
+        return ca.if_else(contact.known, force, 0.0)
 
-    def rows(self, model: SymbolicModel) -> list[TaskRow]:
-        """One row in newtons, so that the blend with the push row is linear in lambda."""
-        standoff = model.parameter("standoff", 2)
-        return [
-            TaskRow(
-                name="standoff",
-                unit="N",
-                expression=ca.dot(model.normal, model.wrench[:3]),
-                target=standoff[0],
-                weight=standoff[1],
-            )
-        ]
+
+def predicted_rate(vehicle: VehicleParams, contact: Contact) -> ca.SX:
+    r"""Rate of the distance one mean motor lag ahead, :math:`\dot e_s + \tau \ddot e_s` [m/s].
+
+    A touch on a stiff wall lasts 80 ms. Damping that comes one motor lag late arrives when the tip already leaves.
+    """
+    return contact.rate + 0.5 * (vehicle.motor_lag_up_s + vehicle.motor_lag_down_s) * contact.acceleration

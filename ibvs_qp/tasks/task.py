@@ -1,26 +1,28 @@
-"""What a task is: a named set of least-squares rows, symbolic in thrusts and parameters."""
+"""A task: a named set of least-squares rows, symbolic in the thrusts."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from typing import ClassVar
 
-from ibvs_qp.model.rows import SymbolicModel, TaskRow
+from ibvs_qp.model.model import Model
+from ibvs_qp.model.rows import TaskRow
 
 
 class Task(ABC):
-    """A wish the program weighs against others.
+    """Something the program trades against other tasks by weight.
 
-    A task writes its rows once, at construction of the program; each tick only the values of its named parameters
-    change. A task that is absent has weight zero: rows never come or go.
+    A task writes its rows once, when the program is built. Its file holds error, rate, gain, target, weight and row.
+    An absent task has weight zero: rows never come or go. A target that changes between steps is a
+    `ibvs_qp.model.parameter.Parameter` of the task (examples/my_task.py).
 
     Attributes:
-        weighed_by: Fields of `ibvs_qp.config.ControllerConfig` that weigh its rows and say unit, default and reason:
-            one for all rows, or one a row. A task of one's own needs none.
+        weight_settings: Fields of `ibvs_qp.config.ControllerConfig` with the weights of its rows: one for all rows,
+            or one a row. A user's own task needs none.
     """
 
-    weighed_by: ClassVar[tuple[str, ...]] = ()
+    weight_settings: ClassVar[tuple[str, ...]] = ()
 
     @abstractmethod
-    def rows(self, model: SymbolicModel) -> list[TaskRow]:
-        """Rows of the task, affine in ``model.thrust``."""
+    def rows(self, model: Model) -> list[TaskRow]:
+        """Rows of the task, affine in ``model.thrust`` and ``model.acceleration``."""

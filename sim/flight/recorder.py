@@ -10,8 +10,6 @@ import numpy as np
 from ibvs_qp.command import Command, Outcome
 from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import SensorFrame
-from ibvs_qp.model.inputs import TOUCH
-from ibvs_qp.model.lines import LINE_TERMS
 from ibvs_qp.pilot import Pilot
 from ibvs_qp.vision.overlay import draw_overlay
 from sim.flight.columns import Columns
@@ -36,26 +34,26 @@ VIDEO_RATE = 10.0
 NUMBERS = "t phase row outcome step_us iterations reach_margin".split()
 #: Columns of integers.
 INTEGERS = ("phase", "row", "outcome", "iterations")
-#: Inputs of the controller's tick that are logged, beside one for every line.
-INPUTS = ("touch", "contact_weight", "moving", "velocity", "vertical")
+#: Inputs of the controller's step that are logged, beside those of every line.
+CONTACT_INPUTS = tuple(f"contact.{name}" for name in ("known", "distance", "push", "ramp"))
+INPUTS = (*CONTACT_INPUTS, "contact_weight", "velocity_known", "velocity")
 _PHASE_INDEX = {phase: index for index, phase in enumerate(PHASES)}
 _PRESSED = [_PHASE_INDEX[phase] for phase in ("paint", "climb")]
 _OUTCOME_INDEX = {outcome: float(index) for index, outcome in enumerate(Outcome)}
 
 
 def controller_signals(pilot: Pilot) -> dict[str, np.ndarray]:
-    """Signals of the controller's tick that are logged, by name: 1-D views that hold after every step."""
-    tick, slots = pilot.terms.tick, range(pilot.config.controller.line_slots)
-    error = LINE_TERMS.index("error")
-    signals = {name: tick.inputs[name] for name in INPUTS}
-    signals |= {f"line_{slot}": tick.inputs[f"line_{slot}"] for slot in slots}
-    signals |= {f"line_{slot}_error": tick.outputs[f"line_{slot}_terms"][error : error + 1] for slot in slots}
-    return signals | {"push_reference": tick.outputs["push_reference"]}
+    """Signals of the controller's step that are logged, by name: 1-D views that hold after every step."""
+    step, lines = pilot.terms.step, [f"line_{index}" for index in range(pilot.config.controller.line_slots)]
+    signals = {name: step.inputs[name] for name in INPUTS}
+    signals |= {f"{line}.{name}": step.inputs[f"{line}.{name}"] for line in lines for name in ("present", "vertical")}
+    signals |= {f"{line}.error": step.outputs[f"{line}.error"] for line in lines}
+    return signals | {"push_reference": step.outputs["push_reference"]}
 
 
-def program_parameters(pilot: Pilot) -> np.ndarray | None:
-    """Parameters of the quadratic program, a view that holds after every step; None under the analytic law."""
-    return pilot.controller.engine.data.stacked if isinstance(pilot.controller, HybridController) else None
+def program_point(pilot: Pilot) -> np.ndarray | None:
+    """Inputs and states that reproduce the quadratic program, a view; None under the analytic law."""
+    return pilot.terms.step.point if isinstance(pilot.controller, HybridController) else None
 
 
 class Recorder:
@@ -71,7 +69,7 @@ class Recorder:
         self._focal = camera_intrinsics(scene.camera)[0]
         self._limits: dict[str, int] = {}
         self._active: dict[int, list[tuple[int, float]]] = {}
-        self._program = program_parameters(pilot)
+        self._program = program_point(pilot)
         # Single precision halves the log; its rounding of 1e-7 does not change what `ibvs-qp explain` prints.
         self._programs = Columns({"program": 0 if self._program is None else len(self._program)}, np.float32)
         self._vision: list[float] = []
@@ -171,10 +169,10 @@ class Recorder:
 
     def _line_errors(self, signals: dict[str, np.ndarray]) -> np.ndarray:
         """Error of the horizontal and the vertical guide at the tip [px], (N, 2), NaN where absent."""
-        found = np.full((len(signals["vertical"]), 2), math.nan)
-        for slot in range(self._pilot.config.controller.line_slots):
-            vertical, error = signals["vertical"][:, slot], signals[f"line_{slot}_error"]
-            present = np.flatnonzero(signals[f"line_{slot}"][:, 0] > 0.0)
+        found = np.full((self._ticks, 2), math.nan)
+        for index in range(self._pilot.config.controller.line_slots):
+            vertical, error = signals[f"line_{index}.vertical"], signals[f"line_{index}.error"]
+            present = np.flatnonzero(signals[f"line_{index}.present"] > 0.0)
             found[present, (vertical[present] > 0.0).astype(int)] = self._focal * error[present]
         return found
 
@@ -200,12 +198,12 @@ class Recorder:
 
 def _estimates(signals: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Measured and estimated quantities that the controller used, from its logged signals (N, ...)."""
-    touch = dict(zip(TOUCH, signals["touch"].T, strict=True))
-    moving = signals["moving"][:, None] > 0.0
+    known, distance, push, ramp = (signals[name] for name in CONTACT_INPUTS)
+    moving = signals["velocity_known"][:, None] > 0.0
     return {
-        "push_measured": touch["push"].copy(),
-        "push_reference": signals["push_reference"] * touch["ramp"],
-        "standoff_estimate": np.where(touch["known"] > 0.0, touch["distance"], math.inf),
+        "push_measured": push.copy(),
+        "push_reference": signals["push_reference"] * ramp,
+        "standoff_estimate": np.where(known > 0.0, distance, math.inf),
         "contact_weight": signals["contact_weight"],
         "velocity_estimate": np.where(moving, signals["velocity"], math.nan),
     }

@@ -13,7 +13,7 @@ RANGES = {
     "line_ki": (0.5, 15.0),
     "theta_kp": (4.0, 60.0),
     "theta_kd": (3.0, 16.0),
-    "line_turn_share": (0.1, 1.0),
+    "body_rotation_gain": (0.1, 1.0),
     "velocity_kp": (1.0, 8.0),
     "velocity_ki": (0.3, 6.0),
     "attitude_kp": (15.0, 80.0),

@@ -11,12 +11,12 @@ from controller_scenes import CEILING, FLOOR, TICK_NS, Wall, attitude, line_refe
 from small_vehicle import SmallVehicle
 
 from allocation import control_effectiveness
-from ibvs_qp.analytic import PaperController, analytic_thrusts, analytic_wrench
+from ibvs_qp.analytic import PaperController, analytic_setpoints, analytic_thrusts, analytic_wrench
 from ibvs_qp.command import Outcome
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.frames import camera_twist_matrix
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL, Reference
-from ibvs_qp.model.step_function import Setpoints
+from ibvs_qp.model.setpoints import Setpoints
 from ibvs_qp.vision.interaction import line_interaction_matrix
 
 CONFIG = ControllerConfig()
@@ -25,9 +25,10 @@ MASSES = np.array([MASS] * 3 + list(CONFIG.vehicle.inertia_kg_m2))
 
 
 def terms_of(seed: int, lines: int, share: float) -> Setpoints:
-    terms = Setpoints(CONFIG)
+    terms = analytic_setpoints(CONFIG)
     terms.update(*random_tick(np.random.default_rng(seed), lines))
-    terms.contact_weight = share
+    terms.step.inputs["contact_weight"][0] = share
+    terms.step.evaluate()
     return terms
 
 
@@ -87,7 +88,7 @@ def test_one_angle_row_only() -> None:
         wall.line(0.05, 0.5 * math.pi + 0.02, HORIZONTAL),
         wall.line(-0.12, -0.02, VERTICAL),
     )
-    terms = Setpoints(CONFIG)
+    terms = analytic_setpoints(CONFIG)
     terms.update(measured(0, plane=wall.plane, lines=seen), Reference(lines=line_references(2), contact=True))
     assert len(terms.lines) == 2
     matrix, feedback = stacked(terms)
@@ -111,15 +112,15 @@ def test_line_rates_are_those_of_the_rows() -> None:
     """The rates, written out without arrays, against the interaction matrix times the twist."""
     for seed in range(10):
         measurement, reference = random_tick(np.random.default_rng(seed), 2)
-        terms = Setpoints(CONFIG)
+        terms = analytic_setpoints(CONFIG)
         terms.update(measurement, reference)
         velocity = measurement.velocity - terms.normal * float(terms.normal @ measurement.velocity)
         wanted = reference.velocity[0] * terms.right + reference.velocity[1] * terms.down
         twist = np.concatenate((velocity, measurement.angular_velocity))
         for line in terms.lines:
             matrix = line.matrix
-            row = matrix[0] + (line.tip_x * math.sin(line.theta) - line.tip_y * math.cos(line.theta)) * matrix[1]
-            assert line.error_rate == pytest.approx(row @ twist - row[:3] @ wanted, abs=1e-9)
+            row = matrix[0] + (line.tip[0] * math.sin(line.theta) - line.tip[1] * math.cos(line.theta)) * matrix[1]
+            assert line.rate == pytest.approx(row @ twist - row[:3] @ wanted, abs=1e-9)
             assert line.rho_rate == pytest.approx(matrix[0] @ twist - matrix[0][:3] @ wanted, abs=1e-9)
             assert line.angle_rate == pytest.approx(matrix[1] @ twist, abs=1e-9)
 

@@ -90,11 +90,11 @@ def test_added_rows_are_named_and_absent_by_weight_zero() -> None:
     names = [row.name for row in controller.template.task_rows]
     assert names[-2:] == ["quiet_r0", "quiet_r7"] and controller.template.row_names[-1] == "climb"
     assert controller.template.variable_names[-1] == "slack_climb"
-    controller.setpoints.tick.inputs["quiet"][:] = 4.0, 0.1
+    quiet.set_target(4.0)
     command = controller.step(example["HOVER"], example["RISE"])
     assert {"quiet_r0", "quiet_r7"} <= {task.name for task in command.tasks}
     controller.reset()
-    controller.setpoints.tick.inputs["quiet"][:] = 4.0, 0.0
+    quiet.set_target(4.0, weight=0.0)
     ours, theirs = (one.step(example["HOVER"], example["RISE"]) for one in (controller, plain))
     np.testing.assert_allclose(ours.wrench, theirs.wrench, atol=5e-3)
     # Not the thrusts: what two redundant rotors share is left to the pull to the last thrusts, a thousand times weaker.

@@ -144,17 +144,15 @@ def pack(
     window: tuple[float, float] = (-1e4, 1e4),
 ) -> None:
     """Fill the program of one tick, with lambda, last thrusts and thrust window as the test wants them."""
-    terms, values = controller.setpoints, controller.setpoints.tick.inputs
-    terms.last = np.full(controller.config.vehicle.geometry.count, 11.3) if last is None else last
-    values["thrust_last"][:], values["thrust_step"][0] = terms.last, 1e6
-    values["thrust_floor"][:], values["thrust_ceiling"][:] = window
-    before = {name: state.copy() for name, state in terms.tick.states.items()}
-    terms.update(measurement, reference)
-    if share is not None:  # once more with that lambda, from the same states
-        for name, state in before.items():
-            terms.tick.states[name][:] = state
-        terms.contact_weight = share
-        terms.tick()
+    setpoints = controller.setpoints
+    setpoints.last = np.full(controller.config.vehicle.geometry.count, 11.3) if last is None else last
+    setpoints.floor[:], setpoints.ceiling[:] = window
+    setpoints.update(measurement, reference)
+    inputs = setpoints.step.inputs
+    inputs["thrust_step"][0], inputs["commanded"][0] = 1e6, 0.0
+    if share is not None:
+        inputs["contact_weight"][0] = share
+    setpoints.step.evaluate()  # once more, from the same states
 
 
 def exact_thrusts(controller: HybridController) -> np.ndarray:

@@ -12,6 +12,7 @@ from controller_scenes import TICK_NS, measured
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ibvs_qp.analytic import analytic_setpoints
 from ibvs_qp.config import (
     LONGEST_TICK,
     ContactSettings,
@@ -25,7 +26,6 @@ from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.settings import choice, dump_toml, from_dict, load_toml, setting, validate
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.measurement import Reference
-from ibvs_qp.model.step_function import Setpoints
 from ibvs_qp.painting.painter import PaintingConfig
 from ibvs_qp.pilot import PilotConfig
 
@@ -190,9 +190,9 @@ def test_the_longest_tick_allowed_is_integrated_in_full() -> None:
         == f"tick_s = 0.05 s is refused: allowed is [{low:g}, {high:g}] s"
     )
     config = ControllerConfig(tick_s=LONGEST_TICK)
-    terms, ticks, step = Setpoints(config), 12, round(LONGEST_TICK * 1e9)
+    terms, ticks, step = analytic_setpoints(config), 12, round(LONGEST_TICK * 1e9)
     for tick in range(ticks):  # carried along at 1 m/s, and the accelerometer says 1 m/s^2 towards the wall
         felt = np.array([1.0, 0.0, -9.81])
         terms.update(measured(0, stamp_ns=(tick + 1) * step, specific_force=felt, plane_stamp_ns=TICK_NS), Reference())
-    assert terms.tick.inputs["dt"][0] == pytest.approx(LONGEST_TICK)
+    assert terms.step.inputs["dt"][0] == pytest.approx(LONGEST_TICK)
     assert -terms.contact.rate == pytest.approx((ticks - 1) * LONGEST_TICK, rel=0.1)

@@ -139,10 +139,10 @@ def test_a_fast_approach_is_braked_before_it_touches() -> None:
 def test_prices_are_worth_what_the_settings_say(factor: float, tilt_deg: float, rho: float) -> None:
     """Figures of `ibvs_qp/config/program.py`: a tenth of the price is too cheap."""
     shipped = LimitSettings()
-    cheap = config(limits={"tilt_price": factor * shipped.tilt_price})
+    cheap = config(limits={"tilt_slack_weight": factor * shipped.tilt_slack_weight})
     pitched = fly(cheap, Reference(standoff=0.1, lines=line_references(2)), 1.5, lines=2, prepare=turning(1, 0.25))
     assert pitched.tilt_deg == pytest.approx(tilt_deg, abs=0.02)
-    cheap = config(limits={"view_price": factor * shipped.view_price})
+    cheap = config(limits={"view_slack_weight": factor * shipped.view_slack_weight})
     out = Reference(standoff=0.1, lines=(LineReference(rho=0.6, theta=0.5 * math.pi, role=HORIZONTAL),))
     assert fly(cheap, out, 4.0, lines=1).rho == pytest.approx(rho, abs=0.003)
 

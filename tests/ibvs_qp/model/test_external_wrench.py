@@ -10,7 +10,7 @@ from allocation import control_effectiveness
 from ibvs_qp.analysis.contact_loop import GUST_BANDWIDTH
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.model.external_wrench import FORCE_BOUND, MOMENT_BOUND, external_wrench
-from ibvs_qp.model.inputs import Body, Touch
+from ibvs_qp.model.inputs import Body, Contact
 
 VEHICLE = VehicleParams()
 MATRIX = control_effectiveness(VEHICLE.geometry)
@@ -21,16 +21,16 @@ def observer(adapt_in_contact: bool = True) -> Block:
     """The observer on its own; the moment fed forward is the measured contact moment."""
 
     def build(signals):
-        body, touch = Body.of(signals), Touch.of(signals)
+        body, contact = Body.of(signals), Contact.of(signals)
         return external_wrench(
             signals,
             VEHICLE,
             MATRIX,
             body,
             body.wrench[3:],
-            touch.normal,
-            touch.touching,
-            touch.noise,
+            contact.normal,
+            contact.touching,
+            contact.push_noise,
             adapt_in_contact,
         )
 
@@ -44,19 +44,19 @@ def hover(
     contact = np.zeros(6) if contact is None else contact
     thrusts = np.linalg.solve(MATRIX, -np.array([0, 0, WEIGHT, 0, 0, 0]) - external - contact)
     block = observer()
-    block.touch(touching=touching)
+    block.contact(touching=touching)
     for _ in range(round(seconds / TICK)):
         block(thrust_last=thrusts, commanded=1.0, specific_force=STILL, contact_wrench=contact)
     return block
 
 
 def wrench(block: Block) -> np.ndarray:
-    return block.tick.outputs["value"].copy()
+    return block.step.outputs["value"].copy()
 
 
 def without_lag(block: Block, thrusts: np.ndarray, **inputs: np.ndarray) -> None:
     """One tick with rotors that follow at once."""
-    block.tick.states["motor_thrust"][:] = thrusts
+    block.step.states["motor_thrust"][:] = thrusts
     block(thrust_last=thrusts, commanded=1.0, **inputs)
 
 
@@ -94,11 +94,11 @@ def test_a_noisy_force_sensor_slows_the_observer_in_contact() -> None:
     found = []
     for noise in (0.0, 1.0):
         block = hover(np.zeros(6), seconds=1.0)
-        block.touch(touching=True, noise=noise)
+        block.contact(touching=True, push_noise=noise)
         gust = np.array([2.0, 0, 0, 0, 0, 0])
         thrusts = np.linalg.solve(MATRIX, -np.array([0, 0, WEIGHT, 0, 0, 0]))
         for _ in range(25):
-            block.tick.states["gust_power"][:] = 1.0  # amid gusts
+            block.step.states["gust_power"][:] = 1.0  # amid gusts
             without_lag(block, thrusts, specific_force=STILL + gust[:3] / VEHICLE.mass_kg)
         found.append(float(wrench(block)[0]))
     assert found[0] == pytest.approx(2.0 * (1.0 - np.exp(-0.1 * GUST_BANDWIDTH)), rel=0.02)
@@ -107,7 +107,7 @@ def test_a_noisy_force_sensor_slows_the_observer_in_contact() -> None:
 
 def test_in_calm_air_sensor_noise_is_not_handed_on_and_a_gust_wakes_the_observer() -> None:
     rng, block = np.random.default_rng(3), observer()
-    block.touch(touching=True)
+    block.contact(touching=True)
     thrusts = np.linalg.solve(MATRIX, -np.array([0, 0, WEIGHT, 0, 0, 0]))
 
     def fly(gust: float, seconds: float) -> np.ndarray:
@@ -150,9 +150,9 @@ def test_rotors_lag_as_modelled() -> None:
     block = observer()
     block(thrust_last=10.0, commanded=1.0)
     block(thrust_last=20.0, dt=VEHICLE.motor_lag_up_s)
-    np.testing.assert_allclose(block.tick.states["motor_thrust"], 20.0 - 10.0 * np.exp(-1.0))
+    np.testing.assert_allclose(block.step.states["motor_thrust"], 20.0 - 10.0 * np.exp(-1.0))
     block(thrust_last=0.0, dt=VEHICLE.motor_lag_down_s)
-    np.testing.assert_allclose(block.tick.states["motor_thrust"], (20.0 - 10.0 * np.exp(-1.0)) * np.exp(-1.0))
+    np.testing.assert_allclose(block.step.states["motor_thrust"], (20.0 - 10.0 * np.exp(-1.0)) * np.exp(-1.0))
 
 
 def test_bounds_hold_and_nothing_moves_before_the_first_command() -> None:
@@ -165,14 +165,14 @@ def test_no_accelerometer_freezes_the_force_only() -> None:
     block = hover(np.array([0, 0, 5.0, 0, 0, 0]))
     before = wrench(block)[:3]
     for _ in range(500):
-        block(felt=0.0, specific_force=0.0)
+        block(specific_force_known=0.0, specific_force=0.0)
     np.testing.assert_array_equal(wrench(block)[:3], before)
 
 
 def test_without_feedforward_contact_moments_are_not_learnt() -> None:
     """The observer rests at the wall then: it would take the contact's moment for a load."""
     block = observer(adapt_in_contact=False)
-    block.touch(touching=True)
+    block.contact(touching=True)
     thrusts = np.linalg.solve(MATRIX, [0, 0, -WEIGHT, 0, 0, 0.5])
     for _ in range(1000):
         block(thrust_last=thrusts, commanded=1.0, specific_force=STILL)

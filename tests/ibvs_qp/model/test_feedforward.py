@@ -11,7 +11,7 @@ from symbolic_block import Block
 
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.model.feedforward import contact_feedforward
-from ibvs_qp.model.inputs import Body, Touch
+from ibvs_qp.model.inputs import Body, Contact
 
 CONFIG, TICK = ControllerConfig(), 0.004
 PUSH, FRICTION = 5.0, 0.3
@@ -22,12 +22,12 @@ def feedforward() -> Block:
     """The feed-forward on its own: force (3), moment (3), felt moment (3)."""
 
     def build(signals):
-        body, touch = Body.of(signals), Touch.of(signals)
+        body, touch = Body.of(signals), Contact.of(signals)
         made = contact_feedforward(signals, CONFIG, body, touch, signals.input("travel", 3), ca.SX(FRICTION))
         return ca.vertcat(made.force, made.moment, made.felt_moment)
 
     block = Block(build)
-    block.touch(touching=1.0, push=PUSH)
+    block.contact(touching=1.0, push=PUSH)
     return block
 
 
@@ -61,6 +61,6 @@ def test_the_measured_moment_has_the_last_word() -> None:
 
 def test_free_air_feeds_nothing_forward() -> None:
     block = feedforward()
-    block.touch(touching=0.0)
+    block.contact(touching=0.0)
     np.testing.assert_array_equal(block(travel=(0.0, 0.1, 0.0)), 0.0)
-    assert block.tick.outputs["value"][:3] == pytest.approx(np.zeros(3))
+    assert block.step.outputs["value"][:3] == pytest.approx(np.zeros(3))

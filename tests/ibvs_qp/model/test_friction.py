@@ -7,7 +7,7 @@ import pytest
 from symbolic_block import Block
 
 from ibvs_qp.model.friction import ASSUMED_FRICTION, FRICTION_RANGE, PATIENCE, RISE, estimated_friction
-from ibvs_qp.model.inputs import Body, Touch
+from ibvs_qp.model.inputs import Body, Contact
 
 #: Place of the tip, ahead of the centre of mass and above it [m].
 TIP = (0.6, 0.0, -0.1)
@@ -17,22 +17,22 @@ def estimator(travel: float = 0.1) -> Block:
     """The estimator on its own, travelling to the right against the wall."""
 
     def build(signals):
-        body, touch = Body.of(signals), Touch.of(signals)
+        body, touch = Body.of(signals), Contact.of(signals)
         tip = body.velocity_of(TIP)
         return estimated_friction(signals, body, touch, tip, signals.input("travel", 3), 0.01, 0.005)[1]
 
     block = Block(build)
-    block.touch(touching=1.0)
-    block.tick.inputs["travel"][:] = 0.0, travel, 0.0
+    block.contact(touching=1.0)
+    block.step.inputs["travel"][:] = 0.0, travel, 0.0
     return block
 
 
 def slide(block: Block, push: float, force: float, speed: float, ticks: int) -> float:
-    block.touch(push=push)
+    block.contact(push=push)
     wrench = np.array([-push, -force, 0.0, 0.0, 0.0, 0.0])
     for _ in range(ticks):
         block(contact_wrench=wrench, velocity=(0.0, speed, 0.0))
-    return float(block.tick.outputs["value"][0])
+    return float(block.step.outputs["value"][0])
 
 
 @pytest.mark.parametrize("friction", [0.1, 0.3, 0.8])
@@ -40,7 +40,7 @@ def test_friction_while_sliding(friction: float) -> None:
     rng, block = np.random.default_rng(1), estimator()
     for _ in range(1500):
         slide(block, 5.0 + rng.normal(0.0, 0.3), friction * 5.0 + rng.normal(0.0, 0.3), 0.1, 1)
-    assert float(block.tick.outputs["value"][0]) == pytest.approx(friction, abs=0.03)
+    assert float(block.step.outputs["value"][0]) == pytest.approx(friction, abs=0.03)
 
 
 def test_nothing_is_learnt_while_slow_or_barely_touching_or_free() -> None:
@@ -48,7 +48,7 @@ def test_nothing_is_learnt_while_slow_or_barely_touching_or_free() -> None:
     for push, speed in ((5.0, 0.0), (5.0, -0.1), (0.5, 0.1), (0.0, 0.1)):
         assert slide(block, push, 4.0, speed, 500) == ASSUMED_FRICTION
     free = estimator()
-    free.touch(touching=0.0)
+    free.contact(touching=0.0)
     assert slide(free, 5.0, 4.0, 0.1, 500) == ASSUMED_FRICTION
 
 
@@ -63,10 +63,10 @@ def test_a_vehicle_that_turns_about_a_held_tip_learns_nothing_from_its_growing_f
     """Its centre of mass moves to the right by 0.05 m/s, its tip stands: the force is what we push, not friction."""
     block, speed = estimator(), 0.05
     turn = (0.0, 0.0, -speed / TIP[0])
-    block.touch(push=5.0)
+    block.contact(push=5.0)
     for force in np.linspace(0.0, 1.5, 90):  # shorter than the patience
         block(contact_wrench=(-5.0, -force, 0.0, 0.0, 0.0, 0.0), velocity=(0.0, speed, 0.0), angular_velocity=turn)
-    assert float(block.tick.outputs["value"][0]) == ASSUMED_FRICTION
+    assert float(block.step.outputs["value"][0]) == ASSUMED_FRICTION
 
 
 def test_friction_stays_plausible() -> None:

@@ -67,10 +67,10 @@ class Loop:
     @property
     def held(self) -> np.ndarray:
         """What the integrators hold."""
-        return np.array([self.controller.setpoints.tick.states[name][0] for name in INTEGRALS])
+        return np.array([self.controller.setpoints.step.states[name][0] for name in INTEGRALS])
 
     def state(self, name: str) -> np.ndarray:
-        return self.controller.setpoints.tick.states[name]
+        return self.controller.setpoints.step.states[name]
 
 
 @pytest.mark.parametrize("law", LAWS)

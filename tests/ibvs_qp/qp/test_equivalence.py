@@ -47,12 +47,12 @@ def closed_form(controller: HybridController, share: float, last: np.ndarray) ->
     rows: list[tuple[np.ndarray, float, float]] = []  # row on the acceleration, wish, weight
     selection = np.eye(6)
     selection[:3, :3] -= np.outer(terms.normal, terms.normal)
-    selection[3:, 3:] *= 1.0 - share * (1.0 - gains.line_turn_share)
+    selection[3:, 3:] *= 1.0 - share * (1.0 - gains.body_rotation_gain)
     twist = camera_twist_matrix(np.array(vehicle.camera_position_m))
     for line in terms.lines:
         image = line_interaction_matrix(line.rho, line.theta, terms.plane)
-        at_tip = endpoint_line_row(image, line.theta, (line.tip_x, line.tip_y))
-        wanted = -(gains.line_kp * line.error + gains.line_kd * line.error_rate + gains.line_ki * line.integral)
+        at_tip = endpoint_line_row(image, line.theta, line.tip)
+        wanted = -(gains.line_kp * line.error + gains.line_kd * line.rate + gains.line_ki * line.integral)
         turn = -(gains.theta_kp * line.angle_error + gains.theta_kd * line.angle_rate)
         rows.append((at_tip @ twist @ selection, wanted, weights.line * line.weight))
         rows.append((image[1] @ twist @ selection, turn, weights.line_angle * line.weight))
@@ -62,15 +62,15 @@ def closed_form(controller: HybridController, share: float, last: np.ndarray) ->
     for axis, weight in ((0, weights.level), (1, weights.level), (2, weights.yaw)):
         rows.append((np.eye(6)[3 + axis], terms.angular[axis], weight))
     for direction, wish, fixed in (
-        (terms.right, terms.velocity_command[0], terms.free_right),
-        (terms.down, terms.velocity_command[1], terms.free_down),
+        (terms.right, terms.velocity_command[0], terms.free[0]),
+        (terms.down, terms.velocity_command[1], terms.free[1]),
     ):
         rows.append((np.concatenate((direction, np.zeros(3))), wish, weights.velocity * fixed))
-    height, weight = controller.engine.data.parameters["height"]
+    height, weight = terms.step.outputs["height_command"].item(), weights.height
     rows.append((np.concatenate((terms.down, np.zeros(3))), height, weight))
     jacobian = [math.sqrt(w) * (row @ per_thrust) for row, _, w in rows]
     target = [math.sqrt(w) * (wish - row @ drift) for row, wish, w in rows]
-    for weight, centre in ((weights.effort, last), (weights.smoothness, last + terms.tick.inputs["thrust_change"])):
+    for weight, centre in ((weights.effort, last), (weights.smoothness, last + terms.step.inputs["thrust_change"])):
         jacobian += list(math.sqrt(weight) * np.eye(6))
         target += list(math.sqrt(weight) * centre)
     return np.linalg.lstsq(np.array(jacobian), np.array(target), rcond=None)[0]
@@ -374,7 +374,7 @@ def optimal_cost(controller: HybridController, row: int, side: str, change: floa
     bounds[side][row] += change
     solution = controller.engine.exact.solve(data.p, data.q, data.a, bounds["lower"], bounds["upper"])
     assert solution is not None
-    achieved, asked, weights = data.report(data.stacked, solution[0][:6])
+    achieved, asked, weights = data.report(data.point, solution[0][:6])
     cost = 0.5 * float(weights @ (achieved - asked) ** 2)
     for limit, slot in zip(controller.template.limit_rows, controller.template.row_slack, strict=True):
         cost += 0.0 if limit.price is None else 0.5 * limit.price * solution[0][slot] ** 2

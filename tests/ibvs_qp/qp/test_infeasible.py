@@ -15,7 +15,8 @@ from ibvs_qp.config import ControllerConfig, LimitSettings, SolverSettings
 from ibvs_qp.controller import HybridController
 from ibvs_qp.limits import Limit
 from ibvs_qp.measurement import Reference
-from ibvs_qp.model.rows import LimitRow, SymbolicModel
+from ibvs_qp.model.model import Model
+from ibvs_qp.model.rows import LimitRow
 from ibvs_qp.qp.evaluator import ProgramData
 from ibvs_qp.qp.explain import TickReplay
 from ibvs_qp.qp.infeasible import conflicting_rows
@@ -77,7 +78,7 @@ class Acceleration(Limit):
     def __init__(self, name: str, axis: int, lower: float, upper: float) -> None:
         self.name, self.axis, self.lower, self.upper = name, axis, lower, upper
 
-    def rows(self, model: SymbolicModel) -> list[LimitRow]:
+    def rows(self, model: Model) -> list[LimitRow]:
         """One hard row."""
         wish = model.acceleration[self.axis]
         return [LimitRow(name=self.name, unit="", expression=wish, lower=ca.SX(self.lower), upper=ca.SX(self.upper))]
@@ -93,7 +94,7 @@ def test_two_rows_that_contradict_each_other_are_named_alone() -> None:
 
 def test_a_row_that_holds_no_thrust_conflicts_with_itself() -> None:
     class Never(Limit):
-        def rows(self, model: SymbolicModel) -> list[LimitRow]:
+        def rows(self, model: Model) -> list[LimitRow]:
             none = 0.0 * model.thrust[0]
             return [LimitRow(name="never", unit="", expression=none, lower=ca.SX(1.0), upper=ca.SX(2.0))]
 
@@ -123,9 +124,9 @@ def test_rows_that_a_solution_satisfies_are_no_conflict() -> None:
 def test_a_replay_names_the_conflict_of_a_tick_and_forgets_it() -> None:
     controller = HybridController(HARD)
     controller.step(measured(0), Reference())
-    sound = controller.engine.data.stacked.copy()
+    sound = controller.engine.data.point.copy()
     controller.step(measured(1, angular_velocity=np.array([0.0, 3.0, 0.0])), Reference())
     replay = TickReplay(controller.template)
-    assert replay.explain(controller.engine.data.stacked) is None
+    assert replay.explain(controller.engine.data.point) is None
     assert replay.conflict == controller.engine.conflict and "tilt_pitch" in replay.conflict
     assert replay.explain(sound) is not None and replay.conflict == ()

@@ -14,7 +14,8 @@ from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.controller import HybridController
 from ibvs_qp.limits import Limit
 from ibvs_qp.measurement import Reference
-from ibvs_qp.model.rows import LimitRow, SymbolicModel, TaskRow
+from ibvs_qp.model.model import Model
+from ibvs_qp.model.rows import LimitRow, TaskRow
 from ibvs_qp.tasks import Task
 
 
@@ -24,9 +25,9 @@ class LiftTask(Task):
     def __init__(self, target_over: bool = False) -> None:
         self.target_over = target_over
 
-    def rows(self, model: SymbolicModel) -> list[TaskRow]:
+    def rows(self, model: Model) -> list[TaskRow]:
         """One row in newtons; on demand its target is divided by the parameter."""
-        lift = model.parameter("lift", 2)
+        lift = model.signals.input("lift", 2)
         target = 1.0 / lift[0] if self.target_over else lift[0]
         return [TaskRow(name="lift", unit="N", expression=model.thrust[0], target=target, weight=lift[1])]
 
@@ -34,17 +35,17 @@ class LiftTask(Task):
 class ClimbLimit(Limit):
     """Vertical acceleration between the two entries of the parameter "climb"."""
 
-    def rows(self, model: SymbolicModel) -> list[LimitRow]:
+    def rows(self, model: Model) -> list[LimitRow]:
         """One soft row in m/s^2."""
-        climb = model.parameter("climb", 2)
+        climb = model.signals.input("climb", 2)
         up = -model.acceleration[2]
-        return [LimitRow(name="climb", unit="m/s^2", expression=up, lower=climb[0], upper=climb[1], price=10.0)]
+        return [LimitRow(name="climb", unit="m/s^2", expression=up, lower=climb[0], upper=climb[1], slack_weight=10.0)]
 
 
 def step(controller: HybridController, tick: int, **inputs: tuple[float, ...]) -> Command:
     """One tick with the parameters of tasks and limits of one's own."""
     for name, values in inputs.items():
-        controller.setpoints.tick.inputs[name][:] = values
+        controller.setpoints.step.inputs[name][:] = values
     command = controller.step(measured(tick), Reference(lines=line_references(2)))
     assert np.isfinite(command.thrusts).all()
     return command
@@ -116,7 +117,7 @@ def test_no_fallback_without_a_word(monkeypatch: pytest.MonkeyPatch) -> None:
 class CurvedTask(Task):
     """A sound row and one that is not affine in the thrusts."""
 
-    def rows(self, model: SymbolicModel) -> list[TaskRow]:
+    def rows(self, model: Model) -> list[TaskRow]:
         """Two rows in newtons."""
         u = model.thrust
         wishes = {"straight": u[0], "curved": u[0] * u[1]}
@@ -129,16 +130,18 @@ class CurvedTask(Task):
 class CurvedLimit(Limit):
     """A row that is not affine in the acceleration."""
 
-    def rows(self, model: SymbolicModel) -> list[LimitRow]:
+    def rows(self, model: Model) -> list[LimitRow]:
         """One soft row."""
         square = model.acceleration[2] ** 2
-        return [LimitRow(name="bent", unit="m^2/s^4", expression=square, lower=ca.SX(-1), upper=ca.SX(1), price=1.0)]
+        return [
+            LimitRow(name="bent", unit="m^2/s^4", expression=square, lower=ca.SX(-1), upper=ca.SX(1), slack_weight=1.0)
+        ]
 
 
 class MovingTarget(Task):
     """A target that depends on the thrusts: the row would cost something else than it says."""
 
-    def rows(self, model: SymbolicModel) -> list[TaskRow]:
+    def rows(self, model: Model) -> list[TaskRow]:
         """One row in newtons."""
         u = model.thrust
         return [TaskRow(name="moving", unit="N", expression=u[0], target=u[1], weight=ca.SX(1.0))]
@@ -147,9 +150,9 @@ class MovingTarget(Task):
 class WideLift(Task):
     """Asks for the parameter "lift" in another size."""
 
-    def rows(self, model: SymbolicModel) -> list[TaskRow]:
+    def rows(self, model: Model) -> list[TaskRow]:
         """One row in newtons."""
-        lift = model.parameter("lift", 3)
+        lift = model.signals.input("lift", 3)
         return [TaskRow(name="wide", unit="N", expression=model.thrust[0], target=lift[0], weight=lift[1])]
 
 
@@ -182,10 +185,12 @@ class FreeLimit(Limit):
     def __init__(self, price: float) -> None:
         self.slack_price = price
 
-    def rows(self, model: SymbolicModel) -> list[LimitRow]:
+    def rows(self, model: Model) -> list[LimitRow]:
         """One soft row in newtons."""
         u = model.thrust[0]
-        return [LimitRow(name="free", unit="N", expression=u, lower=ca.SX(0), upper=ca.SX(9), price=self.slack_price)]
+        return [
+            LimitRow(name="free", unit="N", expression=u, lower=ca.SX(0), upper=ca.SX(9), slack_weight=self.slack_price)
+        ]
 
 
 @pytest.mark.parametrize("price", [0.0, -1.0, math.nan, math.inf])

@@ -40,7 +40,7 @@ from ibvs_qp.config import ControllerConfig, LimitSettings, SolverSettings
 from ibvs_qp.controller import HybridController
 from ibvs_qp.limits.thrust import thrust_window
 from ibvs_qp.measurement import Reference
-from ibvs_qp.qp.evaluator import Evaluator
+from ibvs_qp.qp.evaluator import RecordedProgram
 from ibvs_qp.qp.osqp import MAX_ITERATIONS, SOLVED, SOLVED_INACCURATE, OsqpSolver
 
 #: What OSQP 1.1 writes into x when it found no solution: its NaN pattern read as a number.
@@ -325,7 +325,7 @@ def test_bounds_of_thrusts_stay_a_millinewton_apart() -> None:
 def test_buffers_are_contiguous_doubles_of_fixed_length() -> None:
     controller = flying()
     data, template = controller.engine.data, controller.template
-    for array in (data.p, data.q, data.a, data.lower, data.upper, data.stacked):
+    for array in (data.p, data.q, data.a, data.lower, data.upper, data.point):
         assert array.dtype == np.float64 and array.flags.c_contiguous
     sizes = len(data.p), len(data.a), len(data.q), len(data.lower)
     for tick in range(5, 25):
@@ -429,8 +429,8 @@ def test_a_free_optimum_that_is_no_number_never_flies(monkeypatch: pytest.Monkey
 
 def test_a_bound_that_is_no_number_is_never_stepped_over() -> None:
     controller = flying()
-    data = Evaluator(controller.template)
-    data.stacked[:] = controller.engine.data.stacked
+    data = RecordedProgram(controller.template)
+    data.point[:] = controller.engine.data.point
     data.evaluate()
     assert math.isfinite(data.violation[0])
     data.parameters["thrust_upper"][0] = math.nan

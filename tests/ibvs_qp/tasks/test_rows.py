@@ -25,7 +25,6 @@ from ibvs_qp.controller import HybridController
 from ibvs_qp.frames import R_BODY_CAMERA, align_line
 from ibvs_qp.limits.barrier import barrier_bounds
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL, Reference
-from ibvs_qp.model.inputs import TOUCH
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +35,7 @@ def controller() -> HybridController:
 def rows(controller: HybridController, thrusts: np.ndarray) -> dict[str, tuple[float, float, float]]:
     """(achieved, asked, weight) of every task row of the packed program."""
     data = controller.engine.data
-    achieved, asked, weights = (array.copy() for array in data.report(data.stacked.copy(), thrusts))
+    achieved, asked, weights = (array.copy() for array in data.report(data.point.copy(), thrusts))
     names = [row.name for row in controller.template.task_rows]
     assert len(set(names)) == len(names)
     return {name: (achieved[i], asked[i], weights[i]) for i, name in enumerate(names)}
@@ -89,11 +88,11 @@ def test_line_rows_are_the_motion_of_the_line_at_the_tip(
     tick = measured(0, attitude=quaternion, plane=wall.plane, lines=(seen,))
     pack(controller, tick, reference, share=share)
     if held:  # touching, and no speed is asked for: friction holds the tip, which turns with the body as it is
-        controller.setpoints.tick.inputs["touch"][TOUCH.index("touching")] = 1.0
-        controller.setpoints.tick()
+        controller.setpoints.step.inputs["contact.touching"][0] = 1.0
+        controller.setpoints.step.evaluate()
     slot = 0 if role == HORIZONTAL else 1  # a slot belongs to a reference, found or not
     rng = np.random.default_rng(5)
-    turn_share = 1.0 if held else 1.0 - share * (1.0 - controller.config.gains.line_turn_share)
+    turn_share = 1.0 if held else 1.0 - share * (1.0 - controller.config.gains.body_rotation_gain)
     for _ in range(3):
         thrusts = rng.uniform(5.0, 20.0, 6)
         motion = accelerations(controller, thrusts)
@@ -131,7 +130,7 @@ def test_every_other_task_row_by_hand(controller: HybridController, share: float
         last = rng.uniform(8.0, 14.0, 6)
         pack(controller, *random_tick(rng, 2), share=share, last=last)
         thrusts, terms = rng.uniform(2.0, 30.0, 6), controller.setpoints
-        right, down = weights.velocity * terms.free_right, weights.velocity * terms.free_down
+        right, down = weights.velocity * terms.free[0], weights.velocity * terms.free[1]
         motion = accelerations(controller, thrusts)
         force = motion[:3] * controller.config.vehicle.mass_kg
         found = rows(controller, thrusts)
@@ -144,7 +143,7 @@ def test_every_other_task_row_by_hand(controller: HybridController, share: float
             "velocity_right": (terms.right @ motion[:3], terms.velocity_command[0], right),
             "velocity_down": (terms.down @ motion[:3], terms.velocity_command[1], down),
         }
-        height = float(controller.engine.data.parameters["height"][0])
+        height = controller.setpoints.step.outputs["height_command"].item()
         expected["height"] = (terms.down @ motion[:3], height, weights.height)
         for i, name in enumerate(controller.config.vehicle.geometry.names):
             expected[f"effort_{name}"] = (thrusts[i], last[i], weights.effort)
@@ -152,7 +151,7 @@ def test_every_other_task_row_by_hand(controller: HybridController, share: float
         for name, values in expected.items():
             np.testing.assert_allclose(found[name], values, rtol=1e-9, atol=1e-9, err_msg=name)
         for slot, line in enumerate(terms.lines):
-            wanted = -(gains.line_kp * line.error + gains.line_kd * line.error_rate + gains.line_ki * line.integral)
+            wanted = -(gains.line_kp * line.error + gains.line_kd * line.rate + gains.line_ki * line.integral)
             angle = -(gains.theta_kp * line.angle_error + gains.theta_kd * line.angle_rate)
             np.testing.assert_allclose(found[f"line_{slot}"][1:], (wanted, weights.line * line.weight))
             np.testing.assert_allclose(found[f"line_{slot}_angle"][1:], (angle, weights.line_angle * line.weight))
@@ -268,23 +267,24 @@ def test_rows_of_view_push_and_approach_by_hand(controller: HybridController) ->
         for line, bound in zip(terms.lines, (limits.view_down, limits.view_right), strict=True):
             name, pole = f"view_{line.role}", limits.view_rate_1_s
             drift = value[name] - bounds[name][1]  # constants of the row live in its bounds
-            travel = controller.setpoints.tick.inputs["reference"][2:4]
-            wanted = line.matrix[0] @ np.append(travel[0] * terms.right + travel[1] * terms.down, np.zeros(3))
+            right, down = (terms.step.inputs[f"reference.velocity_{axis}"].item() for axis in ("right", "down"))
+            wanted = line.matrix[0] @ np.append(right * terms.right + down * terms.down, np.zeros(3))
             room = pole**2 * (bound - line.rho) - 2.0 * pole * (line.rho_rate + wanted)
             assert drift == pytest.approx(line.matrix[0] @ motion - room, abs=1e-8)
         name = "approach_speed"
-        allowed, rate, leaning, free = controller.engine.data.parameters["approach_state"]
-        assert free == 1.0 and leaning >= 0.0
-        room = limits.approach_rate_1_s * (limits.approach_share * allowed + rate) + leaning
+        inputs, outputs = terms.step.inputs, terms.step.outputs
+        allowed, rate = outputs["approach_speed"].item(), inputs["contact.rate"].item()
+        leaning = outputs["search_force"].item() / mass
+        assert leaning >= 0.0
+        room = limits.approach_rate_1_s * (limits.approach_speed_ratio * allowed + rate) + leaning
         assert value[name] - bounds[name][1] == pytest.approx(along - room, abs=1e-9)
         assert bounds["push_ceiling"][1] > 1e3  # in free air the ceiling is wide
-        contact = controller.setpoints.tick.inputs["touch"]
-        contact[TOUCH.index("touching")] = 1.0
-        controller.setpoints.tick()
+        inputs["contact.touching"][0] = 1.0
+        terms.step.evaluate()
         _, _, a, lower, upper = dense(controller)
         index = controller.template.row_names.index("push_ceiling")
-        stiffness, rate = contact[TOUCH.index("stiffness")], contact[TOUCH.index("rate")]
-        room = limits.push_share * terms.push_reference + 2.0 * math.sqrt(stiffness * mass) * min(
+        stiffness = inputs["contact.stiffness"].item()
+        room = limits.push_ceiling_ratio * terms.push_reference + 2.0 * math.sqrt(stiffness * mass) * min(
             rate + limits.push_quiet_m_s, 0.0
         )
         force = mass * (accelerations(controller, thrusts) @ np.append(terms.normal, np.zeros(3)))

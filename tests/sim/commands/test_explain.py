@@ -143,7 +143,7 @@ def test_what_slack_costs_is_told_with_bound_and_unit(
     assert limit.side == "upper" and limit.slack > 0.01 and row.name == limit.name and row.unit == "rad/s^2"
     bound = 64.0 * np.deg2rad(1.0) - 2.0 * 8.0 * 0.3  # p^2 phi_max - 2 p rate, with p = 8 1/s
     assert row.upper == pytest.approx(bound, abs=1e-6) and row.value - row.upper == pytest.approx(limit.slack)
-    price = config.controller.limits.tilt_price
+    price = config.controller.limits.tilt_slack_weight
     assert paid * explanation.total_cost == pytest.approx(0.5 * price * limit.slack**2)
     assert sum(explanation.limit_cost) == pytest.approx(explanation.slack_cost, rel=1e-6)
     told = shown(explanation_tables(trace, tick, explanation, config), capsys)

@@ -85,18 +85,18 @@ def test_at_the_weight_of_a_sliding_vehicle_it_would(monkeypatch: pytest.MonkeyP
 
 
 def test_a_held_tip_turns_with_the_body_whatever_a_slide_counts_on() -> None:
-    trace = press(35.0, reach_check=False, line_turn_share=0.3)
+    trace = press(35.0, reach_check=False, body_rotation_gain=0.3)
     assert rocking(trace) < 0.5
     assert trace.push_true[held(trace)].mean() >= 0.97 * REACH_N
 
 
 def test_counted_on_as_in_a_slide_it_would_lose_push(monkeypatch: pytest.MonkeyPatch) -> None:
     def as_in_a_slide(signals: Signals, config: ControllerConfig) -> ca.SX:
-        return 1.0 - signals.input("contact_weight") * (1.0 - config.gains.line_turn_share)
+        return 1.0 - signals.input("contact_weight") * (1.0 - config.gains.body_rotation_gain)
 
     monkeypatch.setattr(program, "turn_share", as_in_a_slide)
     monkeypatch.setattr(height, "turn_share", as_in_a_slide)
-    trace = press(35.0, reach_check=False, tick_s=0.004 + 1e-12, line_turn_share=0.3)
+    trace = press(35.0, reach_check=False, tick_s=0.004 + 1e-12, body_rotation_gain=0.3)
     assert trace.push_true[held(trace)].mean() < 0.95 * REACH_N
 
 

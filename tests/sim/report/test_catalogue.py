@@ -16,7 +16,7 @@ import ibvs_qp.tasks
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.controller import HybridController, default_limits, default_tasks
 from ibvs_qp.limits import Limit
-from ibvs_qp.model.rows import SymbolicModel
+from ibvs_qp.model.model import Model
 from ibvs_qp.tasks import Task
 from sim.report.catalogue import Setting, catalogue, settings_of_rows
 
@@ -54,7 +54,7 @@ def packed(config: ControllerConfig) -> HybridController:
 
 def rows_of(part: Task | Limit) -> list[str]:
     """Names of the rows of a class in the program: all slots of a line."""
-    model = SymbolicModel(CONFIG)
+    model = Model(CONFIG)
     parts = [*default_tasks(CONFIG), *default_limits(CONFIG)]
     return [row.name for other in parts if type(other) is type(part) for row in other.rows(model)]
 
@@ -75,7 +75,7 @@ def test_every_class_is_in_the_program_and_on_the_page() -> None:
 
 @pytest.mark.parametrize("kind", TASKS)
 def test_every_weight_has_the_unit_of_its_row_and_a_reason(kind: type[Task]) -> None:
-    rows = TASKS[kind].rows(SymbolicModel(CONFIG))
+    rows = TASKS[kind].rows(Model(CONFIG))
     for row, place in zip(rows, settings_of_rows(TASKS[kind], rows), strict=True):
         weight = Setting.of(CONFIG, place)
         assert weight.unit == PER_SQUARE[row.unit], row.name
@@ -88,7 +88,7 @@ def test_every_price_and_bound_has_a_unit_and_a_reason(kind: type[Limit]) -> Non
     assert limit.bounded_by and limit.switched_by
     for place in limit.bounded_by:
         assert Setting.of(CONFIG, place).why, place
-    for row in limit.rows(SymbolicModel(CONFIG)):
+    for row in limit.rows(Model(CONFIG)):
         assert (row.price is None) == (limit.priced_by is None)
         if limit.priced_by is not None:
             price = Setting.of(CONFIG, limit.priced_by)
@@ -98,7 +98,7 @@ def test_every_price_and_bound_has_a_unit_and_a_reason(kind: type[Limit]) -> Non
 
 def weights(controller: HybridController) -> dict[str, float]:
     data = controller.engine.data
-    _, _, values = data.report(data.stacked, np.zeros(6))
+    _, _, values = data.report(data.point, np.zeros(6))
     return {row.name: float(value) for row, value in zip(controller.template.task_rows, values, strict=True)}
 
 
@@ -106,7 +106,7 @@ def test_a_weight_weighs_the_rows_that_the_page_gives_it_and_no_other() -> None:
     before, belongs = weights(packed(CONFIG)), {}
     for kind, task in TASKS.items():
         for slot in [other for other in default_tasks(CONFIG) if type(other) is kind]:
-            rows = slot.rows(SymbolicModel(CONFIG))
+            rows = slot.rows(Model(CONFIG))
             for row, place in zip(rows, settings_of_rows(task, rows), strict=True):
                 belongs.setdefault(place, set()).add(row.name)
     for place, names in belongs.items():
@@ -141,7 +141,7 @@ def test_a_bound_moves_the_rows_that_the_page_gives_it_and_no_other() -> None:
             measurement, wanted = random_tick(np.random.default_rng(3), 2, k)
             controller.setpoints.update(measured(k, lines=measurement.lines), wanted)
             if tick:
-                touch = controller.setpoints.tick.inputs["touch"]
+                touch = controller.setpoints.step.inputs["touch"]
                 touch[7], touch[2] = 1.0, -0.02  # touching, and closing in
                 controller.setpoints.tick()
                 controller.setpoints.note(np.full(6, 11.3), 0.0)

@@ -1,0 +1,40 @@
+"""Limit of the approach speed."""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from ibvs_qp.limits.limit import WIDE, Limit
+from ibvs_qp.model.model import Model
+from ibvs_qp.model.rows import LimitRow
+from ibvs_qp.tasks.standoff import approach
+
+
+class ApproachLimit(Limit):
+    r"""The tip never closes in faster than the approach allows at its distance.
+
+    First-order barrier on :math:`h = v_{max}(e_s) + \dot e_s`: :math:`n^T \dot V \le p\,h`. The search force of the
+    approach leans on a wall that the force sensor does not feel yet: it accelerates nothing, so the bound rises by it.
+    """
+
+    bound_settings = ("limits.approach_speed_ratio", "limits.approach_rate_1_s")
+    slack_weight_setting = "limits.approach_slack_weight"
+    switch_setting = "limits.approach_barrier"
+
+    def rows(self, model: Model) -> list[LimitRow]:
+        """One soft row in m/s^2; wide in contact, while the wall is unknown, and after a lost rotor."""
+        settings, contact, motion = model.config.limits, model.contact, approach(model)
+        barrier = settings.approach_rate_1_s * (settings.approach_speed_ratio * motion.allowed + contact.rate)
+        bound = barrier + motion.search / model.config.vehicle.mass_kg
+        free = ca.logic_and(contact.known, ca.logic_not(contact.touching))
+        steady = ca.logic_and(free, ca.logic_not(model.attitude.tilted))  # a turning tip is no approach
+        return [
+            LimitRow(
+                name="approach_speed",
+                unit="m/s^2",
+                expression=ca.dot(model.normal, model.acceleration[:3]),
+                lower=ca.SX(-WIDE),
+                upper=ca.if_else(steady, bound, WIDE),
+                slack_weight=self.slack_weight(model, settings.approach_slack_weight),
+            )
+        ]

@@ -1,0 +1,34 @@
+"""Yaw barrier about the wall normal."""
+
+from __future__ import annotations
+
+import math
+
+from ibvs_qp.limits.barrier import barrier_bounds
+from ibvs_qp.limits.limit import Limit
+from ibvs_qp.model.model import Model
+from ibvs_qp.model.rows import LimitRow
+
+
+class YawLimit(Limit):
+    """Yaw away from the wall normal stays within `limits.yaw_deg`: the front propellers strike the wall at 19 deg."""
+
+    bound_settings = ("limits.yaw_deg", "limits.yaw_rate_1_s")
+    slack_weight_setting = "limits.yaw_slack_weight"
+    switch_setting = "limits.yaw_barrier"
+
+    def rows(self, model: Model) -> list[LimitRow]:
+        """One soft row in rad/s^2; inactive for a vehicle that lost a rotor and cannot hold yaw."""
+        settings, level = model.config.limits, 1.0 - model.attitude.tilted
+        angle, rate = model.attitude.yaw * level, model.body.rate[2] * level
+        lower, upper = barrier_bounds(angle, rate, math.radians(settings.yaw_deg), settings.yaw_rate_1_s)
+        return [
+            LimitRow(
+                name="yaw",
+                unit="rad/s^2",
+                expression=model.acceleration[5],
+                lower=lower,
+                upper=upper,
+                slack_weight=self.slack_weight(model, settings.yaw_slack_weight),
+            )
+        ]

@@ -1,0 +1,50 @@
+"""Roll and pitch errors and yaw away from the wall normal, with their rates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+
+from ibvs_qp.model.inputs import Body, Contact, Target, clamp
+
+
+@dataclass(frozen=True, kw_only=True)
+class Attitude:
+    """Attitude relative to gravity, wall and target.
+
+    Attributes:
+        roll, pitch: Tait-Bryan angles z-y-x [rad].
+        yaw: Of the body axis away from the wall normal [rad], 0 while no wall is known.
+        tilt_error: Roll and pitch minus their targets [rad], (2,).
+        tilt_rate: Rates of roll and pitch [rad/s], (2,).
+        tilted: 1 for a vehicle that lost a rotor: it flies tilted, and cannot hold yaw.
+    """
+
+    roll: ca.SX
+    pitch: ca.SX
+    yaw: ca.SX
+    tilt_error: ca.SX
+    tilt_rate: ca.SX
+    tilted: ca.SX
+
+
+def attitude(body: Body, contact: Contact, target: Target) -> Attitude:
+    """Angles and rates of a step."""
+    roll = ca.atan2(body.down[1], body.down[2])
+    pitch = ca.asin(clamp(-body.down[0], -1.0, 1.0))
+    yaw = ca.if_else(contact.known, -ca.atan2(contact.normal[1], contact.normal[0]), 0.0)
+    wanted = ca.vertcat(target.roll, target.pitch)
+    tilted = ca.norm_2(wanted) > 0.0
+    # Near level the body rates are the angle rates; a tilted vehicle that turns about the vertical has body rates
+    # in roll and pitch without changing either angle.
+    p, q, r = ca.vertsplit(body.rate)
+    swept = ca.vertcat(p + ca.tan(pitch) * (q * ca.sin(roll) + r * ca.cos(roll)), q * ca.cos(roll) - r * ca.sin(roll))
+    return Attitude(
+        roll=roll,
+        pitch=pitch,
+        yaw=yaw,
+        tilt_error=ca.vertcat(roll, pitch) - wanted,
+        tilt_rate=ca.if_else(tilted, swept, body.rate[:2]),
+        tilted=tilted,
+    )

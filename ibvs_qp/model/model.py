@@ -1,0 +1,218 @@
+"""Everything that tasks, limits and both laws share, as symbols: one object per controller."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeVar
+
+import casadi as ca
+import numpy as np
+
+from allocation.effectiveness import control_effectiveness
+from ibvs_qp.config import ControllerConfig
+from ibvs_qp.config.errors import ConfigError
+from ibvs_qp.frames import GRAVITY, camera_twist_matrix
+from ibvs_qp.model.attitude import attitude
+from ibvs_qp.model.camera_view import camera_view
+from ibvs_qp.model.external_wrench import external_wrench
+from ibvs_qp.model.feedforward import SLIDING_COMMAND, contact_feedforward
+from ibvs_qp.model.friction import cautious_friction, estimated_friction
+from ibvs_qp.model.inputs import Body, Contact, Line, Target, declare_inputs
+from ibvs_qp.model.parameter import Parameter
+from ibvs_qp.model.push_reference import push_reference
+from ibvs_qp.model.reach import STANDING_SPEED, push_reach
+from ibvs_qp.model.signals import Signals
+from ibvs_qp.model.thrust_window import thrust_window
+from ibvs_qp.model.wall_axes import wall_axes
+
+T = TypeVar("T")
+
+#: Force or moment given up in the last step above which integrals stop [N, N m].
+WINDUP_WRENCH = 0.5
+
+
+class Model:
+    r"""Thrusts u, the acceleration :math:`\dot\nu(u) = M^{-1}(B u + h)`, and the quantities of a step.
+
+    The bias wrench h is the sum of gravity, the gyroscopic moment, the observed external wrench and the contact
+    feed-forward. Rows are written in `thrust` and `acceleration`; `ibvs_qp.qp.problem` eliminates the acceleration.
+
+    Attributes:
+        thrust: u [N], (n,).
+        acceleration: nu_dot in B [m/s^2, rad/s^2], (6,).
+        wrench: M nu_dot, the net wrench without contact [N, N m], (6,).
+        body, contact, target, lines: Inputs (`ibvs_qp.model.inputs`).
+        wall: Axes of the wall in B.
+        attitude: Angles and rates.
+        view: Wall and tip as the camera sees them.
+        travel: Commanded velocity in the wall plane, in B [m/s], (3,).
+        contact_weight: Lambda, 0 in free air to 1 in contact.
+        tip_stationary: 1 for a tip in contact that is commanded to stay.
+        bias_wrench: h [N, N m], (6,).
+        reach: Largest push that the thrust limits allow [N].
+        push_reference: Push reference within reach [N].
+        integrate: 1 while no limit takes wrench away: anti-windup of all integrals.
+        integrate_in_plane: The same for integrals in the wall plane, which also stop while the tip is stuck.
+    """
+
+    def __init__(self, config: ControllerConfig) -> None:
+        self.config, self.signals, self.parameters = config, Signals(), list[Parameter]()
+        self._cache: dict[tuple[object, ...], object] = {}
+        vehicle, signals = config.vehicle, self.signals
+        declare_inputs(signals, config.line_slots)
+        self.body, self.contact, self.target = Body.of(signals), Contact.of(signals), Target.of(signals)
+        self.lines = [Line.of(signals, index) for index in range(config.line_slots)]
+        self.contact_weight = signals.input("contact_weight")
+
+        self.rotors = vehicle.geometry.count
+        self.effectiveness = control_effectiveness(vehicle.geometry)
+        self.thrust = ca.SX.sym("thrust", self.rotors)
+        self.acceleration = ca.SX.sym("acceleration", 6)
+        self.wrench = ca.DM(vehicle.mass_matrix.diagonal()) * self.acceleration
+
+        self.wall = wall_axes(self.body, self.contact)
+        self.attitude = attitude(self.body, self.contact, self.target)
+        target = self.target
+        velocity = ca.vertcat(target.velocity_right, target.velocity_down)
+        self.travel = self.wall.in_body(target.velocity_right, target.velocity_down)
+        self.tip_stationary = ca.logic_and(self.contact.touching, ca.norm_2(velocity) <= SLIDING_COMMAND)
+        self.view = camera_view(vehicle, self.body, self.contact, self.travel)
+        self.integrate = signals.input("given_up") < WINDUP_WRENCH
+        self.integrate_in_plane = ca.logic_and(ca.logic_not(self._stuck()), self.integrate)
+
+        static_wrench, friction = self._disturbances()
+        inverse_mass = np.linalg.inv(vehicle.mass_matrix)
+        self.acceleration_per_thrust = ca.DM(inverse_mass @ self.effectiveness)
+        self.free_acceleration = ca.DM(inverse_mass.diagonal()) * self.bias_wrench
+        self._rotor_limits()
+        planned = self.wall.in_body(target.travel_right, target.travel_down)
+        ahead = ca.if_else(ca.norm_2(self.travel) > STANDING_SPEED, self.travel, planned)
+        self.reach = push_reach(signals, vehicle, self.wall.normal, ahead, friction, static_wrench)
+        self.push_reference = push_reference(signals, config, self.body, self.contact, target, self.reach)
+        self._name_outputs()
+
+    def _stuck(self) -> ca.SX:
+        # The body's velocity, not the tip's: a tip creeping at high friction must not stop the integral that frees it.
+        body, normal = self.body, self.wall.normal
+        in_plane = body.velocity - normal * ca.dot(normal, body.velocity)
+        slow = ca.norm_2(in_plane) * body.velocity_known < self.config.contact.stuck_speed_m_s
+        return ca.logic_and(self.contact.touching, slow)
+
+    def _disturbances(self) -> tuple[ca.SX, ca.SX]:
+        """Bias wrench; returns its part without contact, and the friction coefficient that the reach assumes."""
+        signals, config, vehicle, body, contact = (
+            self.signals,
+            self.config,
+            self.config.vehicle,
+            self.body,
+            self.contact,
+        )
+        tip = body.velocity_of(vehicle.tip_position_m)
+        stuck_speed = config.contact.stuck_speed_m_s
+        before, friction = estimated_friction(signals, body, contact, tip, self.travel, SLIDING_COMMAND, stuck_speed)
+        signals.output("friction", friction)
+        expected, felt_moment = ca.SX.zeros(6), ca.SX.zeros(3)
+        if config.contact_feedforward:
+            forward = contact_feedforward(signals, config, body, contact, self.travel, before)
+            expected, felt_moment = ca.vertcat(forward.force, forward.moment), forward.felt_moment
+        near = ca.logic_or(contact.touching, contact.distance < config.contact.contact_distance_m)
+        external = external_wrench(
+            signals,
+            vehicle,
+            self.effectiveness,
+            body,
+            felt_moment,
+            self.wall.normal,
+            near,
+            contact.push_noise,
+            config.contact_feedforward,
+        )
+        gyroscopic = -ca.cross(body.rate, ca.DM(vehicle.inertia_kg_m2) * body.rate)
+        static = ca.vertcat(vehicle.mass_kg * GRAVITY * body.down, gyroscopic) + external
+        self.bias_wrench = static + expected
+        return static, cautious_friction(signals, friction)
+
+    def _rotor_limits(self) -> None:
+        """Thrust window of the step, and the last thrusts and where their last change would lead [N], (n,) each."""
+        signals, count = self.signals, self.rotors
+        self.last_thrust, change = signals.input("thrust_last", count), signals.input("thrust_change", count)
+        low, high, floor, ceiling = (
+            signals.input(f"thrust_{name}", count) for name in "low high floor ceiling".split()
+        )
+        step = signals.input("thrust_step")
+        self.thrust_lower, self.thrust_upper = thrust_window(self.last_thrust, low, high, step, floor, ceiling)
+        self.extrapolated_thrust = ca.fmin(ca.fmax(self.last_thrust + change, self.thrust_lower), self.thrust_upper)
+
+    def _name_outputs(self) -> None:
+        angles = ca.vertcat(self.attitude.roll, self.attitude.pitch, self.attitude.yaw)
+        for name, value in {
+            "normal": self.wall.normal,
+            "axis_right": self.wall.right,
+            "axis_down": self.wall.down,
+            "plane": self.view.plane,
+            "tip_image": ca.vertcat(*self.view.tip),
+            "angles": angles,
+            "bias_wrench": self.bias_wrench,
+            "thrust_lower": self.thrust_lower,
+            "thrust_upper": self.thrust_upper,
+            "contact_weight": self.contact_weight,
+        }.items():
+            self.output(name, value)
+
+    @property
+    def normal(self) -> ca.SX:
+        """Unit vector into the wall, in B, (3,)."""
+        return self.wall.normal
+
+    @property
+    def force_along_normal(self) -> ca.SX:
+        """Net force without contact along n, as a function of the thrusts [N]."""
+        return ca.dot(self.normal, self.wrench[:3])
+
+    @property
+    def body_rotation_gain(self) -> ca.SX:
+        r"""Fraction of the body's rotation in line rows: :math:`1 - \lambda (1 - r)` while the tip travels, r the gain.
+
+        Held by friction, the tip does not follow the body's rotation; a row that expects it trades vertical force for
+        pitch. While the tip is commanded to stay, use the full row: a reduced gain makes the horizontal line command
+        vertical motion (with r = 0.3, 35 N asked beyond reach lose 1.6 N of 30.1 N).
+        """
+        if self.config.line_profile == "paper":
+            return ca.SX(1.0)
+        reduction = 1.0 - self.config.gains.body_rotation_gain
+        return 1.0 - self.contact_weight * (1.0 - self.tip_stationary) * reduction
+
+    @property
+    def camera_acceleration(self) -> ca.SX:
+        r"""Acceleration of the camera that lines may use, :math:`T S \dot\nu`, S = blockdiag(I - s n n^T, r I), (6,).
+
+        s = 1: the image never uses the pushing direction (the paper's profile takes s = lambda);
+        r is `body_rotation_gain`; T maps body to camera twists.
+        """
+        along = self.contact_weight if self.config.line_profile == "paper" else ca.SX(1.0)
+        linear, angular = self.acceleration[:3], self.acceleration[3:]
+        linear = linear - self.normal * (along * ca.dot(self.normal, linear))
+        return self.camera_twist @ ca.vertcat(linear, self.body_rotation_gain * angular)
+
+    @property
+    def camera_twist(self) -> ca.DM:
+        """T, (6, 6): body twist to camera twist."""
+        return ca.DM(camera_twist_matrix(np.array(self.config.vehicle.camera_position_m)))
+
+    def parameter(self, parameter: Parameter) -> ca.SX:
+        """Symbol of a number that a task or limit of a user changes between steps; see `Parameter`."""
+        if parameter not in self.parameters:
+            if parameter.name in self.signals.inputs:
+                raise ConfigError(f"parameter {parameter.name!r} exists already: choose another name")
+            self.parameters.append(parameter)
+        return self.signals.input(parameter.name, parameter.value.size)
+
+    def output(self, name: str, value: ca.SX) -> ca.SX:
+        """Name a result of the step; returns it."""
+        return self.signals.output(name, value)
+
+    def once(self, key: tuple[object, ...], compute: Callable[[], T]) -> T:
+        """Result of an equation that several rows share; its states are declared once."""
+        if key not in self._cache:
+            self._cache[key] = compute()
+        return self._cache[key]  # type: ignore[return-value]

@@ -1,0 +1,180 @@
+"""Setpoints of one step, common to both laws: from measurement and reference to the compiled step function."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from ibvs_qp.config import LONGEST_TICK
+from ibvs_qp.estimation.contact import ContactEstimator
+from ibvs_qp.frames import camera_twist_matrix, down_in_body
+from ibvs_qp.measurement import Measurement, Reference
+from ibvs_qp.model.inputs import LINE_OUTPUTS
+from ibvs_qp.model.interaction_matrix import line_interaction_matrix
+from ibvs_qp.model.model import Model
+from ibvs_qp.model.packing import StepInputs
+from ibvs_qp.model.reach import UNBOUNDED
+from ibvs_qp.model.step_function import StepFunction
+from ibvs_qp.model.thrust_window import thrust_window
+from ibvs_qp.safety.hover import hold_thrusts
+
+#: Thrust step without a rate limit, before the first command [N].
+ANY_STEP = 1e6
+
+
+@dataclass(frozen=True, kw_only=True)
+class LineSetpoint:
+    """Errors and rates of one line at this step; see `ibvs_qp.tasks.line.LineState`.
+
+    Attributes:
+        matrix: Interaction matrix in body axes, (2, 6).
+        tip: Image of the tip's wall point, normalised.
+    """
+
+    role: str
+    rho: float
+    theta: float
+    tip: tuple[float, float]
+    matrix: np.ndarray
+    error: float
+    rate: float
+    integral: float
+    rho_error: float
+    rho_rate: float
+    angle_error: float
+    angle_rate: float
+    weight: float
+
+
+def _number(name: str, index: int, text: str) -> property:
+    """Read-only output of the last step as a plain number."""
+    return property(lambda setpoints: setpoints.result(setpoints.step.starts[name] + index), doc=text)
+
+
+class Setpoints:
+    """Targets, bias wrench, reach and thrust window of one step, and the data of the program built on the same model.
+
+    Attributes:
+        contact: Contact estimator.
+        step: The compiled function.
+        free: Fraction of the directions right and down that no line fixes, (2,).
+        last: Last commanded thrusts [N], (n,), None before the first.
+    """
+
+    def __init__(self, model: Model, extra: Sequence[ca.SX] = ()) -> None:
+        config = self.config = model.config
+        vehicle = config.vehicle
+        self.effectiveness = model.effectiveness
+        self.inverse = np.linalg.pinv(self.effectiveness)
+        self.contact = ContactEstimator(config)
+        self.step = StepFunction(model.signals, extra, config.machine_code)
+        self._parameters = [(self.step.inputs[entry.name], entry) for entry in model.parameters]
+        self._inputs = StepInputs(self.step, config.line_slots)
+        self._twist = camera_twist_matrix(np.array(vehicle.camera_position_m))
+        self.result, out = self.step.results.item, self.step.outputs
+        self.normal, self.right, self.down = out["normal"], out["axis_right"], out["axis_down"]
+        self.bias_wrench, self.velocity_command = out["bias_wrench"], out["velocity_command"]
+        self.free, self.lower, self.upper = out["free"], out["thrust_lower"], out["thrust_upper"]
+        self.floor, self.ceiling = np.array(vehicle.thrust_min), np.array(vehicle.thrust_max)
+        self._rate_step = vehicle.thrust_rate_n_s * config.tick_s
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything, as before the first measurement."""
+        self.contact.reset()
+        self.step.reset()
+        self.step.results[:] = 0.0
+        self._inputs.reset()
+        self._stamp = -1
+        self.last: np.ndarray | None = None
+        self._change, self._given_up = np.zeros(len(self.floor)), 0.0
+        self.normal[:], self.right[:], self.down[:] = np.eye(3)
+        self.step.outputs["reach"][0], self.step.outputs["least_push"][0] = UNBOUNDED, 0.0
+
+    def restart(self) -> None:
+        """Reset all but the rotors: the clock was set anew, the thrusts go on from where they are."""
+        last, change = self.last, self._change
+        self.reset()
+        self.last, self._change = last, change
+
+    def pause(self) -> None:
+        """Thrust window of a step without a measurement."""
+        if self.last is None:
+            self.lower[:], self.upper[:] = self.floor, self.ceiling
+        else:
+            low, high = self.floor, self.ceiling
+            self.lower[:], self.upper[:] = thrust_window(self.last, low, high, self._rate_step, low, high)
+
+    def update(self, measurement: Measurement, reference: Reference) -> None:
+        """Evaluate the step function for one validated measurement and reference."""
+        stamp, dt = measurement.stamp_ns, self.config.tick_s
+        if self._stamp >= 0:
+            dt = min(max((stamp - self._stamp) * 1e-9, 0.0), LONGEST_TICK)
+        self._stamp = stamp
+        self.contact.update(measurement, down_in_body(measurement.attitude))
+        self.step.advance()
+        self._inputs.write(measurement, reference, self.contact, dt)
+        self._write_rotors(measurement)
+        for view, parameter in self._parameters:
+            view[:] = parameter.value
+        self.step.evaluate()
+
+    def _write_rotors(self, measurement: Measurement) -> None:
+        """Last thrusts and limits; limits of a measurement hold within those of the vehicle."""
+        values, low, high = self.step.inputs, measurement.thrust_min, measurement.thrust_max
+        started = self.last is not None
+        values["thrust_last"][:] = self.last if started else hold_thrusts(self.config, measurement)
+        values["thrust_change"][:], values["commanded"][0] = self._change, started
+        values["given_up"][0] = self._given_up
+        values["thrust_step"][0] = self._rate_step if started else ANY_STEP
+        lowest = self.floor if low is None else np.maximum(low, self.floor)
+        values["thrust_low"][:] = lowest
+        values["thrust_high"][:] = self.ceiling if high is None else np.maximum(np.minimum(high, self.ceiling), lowest)
+        values["thrust_floor"][:], values["thrust_ceiling"][:] = self.floor, self.ceiling
+
+    def note(self, thrusts: np.ndarray, given_up: float) -> None:
+        """Store the commanded thrusts, and the largest force or moment given up (anti-windup), for the next step."""
+        if self.last is not None:
+            self._change = thrusts - self.last
+        self.last, self._given_up = thrusts, given_up
+
+    roll = _number("angles", 0, "Roll [rad].")
+    pitch = _number("angles", 1, "Pitch [rad].")
+    yaw = _number("angles", 2, "Yaw away from the wall normal [rad].")
+    push_reference = _number("push_reference", 0, "Push reference within reach [N].")
+    push_command = _number("push_command", 0, "Force along n of the push task [N].")
+    standoff_command = _number("standoff_command", 0, "Force along n of the stand-off task [N].")
+    friction = _number("friction", 0, "Estimated friction coefficient.")
+    reach = _number("reach", 0, "Largest push that the thrust limits allow [N].")
+    least_push = _number("least_push", 0, "Smallest push that they allow [N]; above the reach when they allow none.")
+    reach_friction = _number("reach_friction", 0, "Friction coefficient assumed by the reach; 0 standing still.")
+    contact_weight = _number("contact_weight", 0, "Lambda: 0 in free air or out of contact, 1 in contact.")
+
+    @property
+    def angular(self) -> np.ndarray:
+        """Targets of the roll, pitch and yaw accelerations [rad/s^2], (3,)."""
+        return np.concatenate((self.step.outputs["level_command"], self.step.outputs["yaw_command"]))
+
+    @property
+    def plane(self) -> tuple[float, float, float, float]:
+        """Wall plane (A, B, C, D) in C, D = -1."""
+        a, b, c = self.step.outputs["plane"].tolist()
+        return a, b, c, -1.0
+
+    @property
+    def lines(self) -> list[LineSetpoint]:
+        """Lines with a reference, in the order of their references."""
+        plane, (x, y) = self.plane, self.step.outputs["tip_image"].tolist()
+        return [self._line(index, role, plane, (x, y)) for index, role in self._inputs.present]
+
+    def _line(
+        self, index: int, role: str, plane: tuple[float, float, float, float], tip: tuple[float, float]
+    ) -> LineSetpoint:
+        inputs, outputs, name = self.step.inputs, self.step.outputs, f"line_{index}"
+        rho, theta = inputs[f"{name}.rho"].item(), inputs[f"{name}.theta"].item()
+        values = {entry: outputs[f"{name}.{entry}"].item() for entry in LINE_OUTPUTS}
+        matrix = line_interaction_matrix(rho, theta, plane) @ self._twist
+        return LineSetpoint(role=role, rho=rho, theta=theta, tip=tip, matrix=matrix, **values)
