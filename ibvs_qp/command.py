@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any
+from functools import cached_property
+from typing import overload
 
 import numpy as np
-
-from ibvs_qp.made import filled
 
 
 class Outcome(StrEnum):
@@ -35,9 +34,55 @@ class TaskReport:
     residual: float
 
 
+@dataclass(frozen=True, eq=False)
+class TaskReports(Sequence[TaskReport]):
+    """Reports of the task rows with a weight; built when read, because a tick has 4 ms and a report takes 1 us.
+
+    Attributes:
+        rows: Name and unit of every task row.
+        weights: Their weights, (rows,). Likewise asked and achieved values.
+    """
+
+    rows: tuple[tuple[str, str], ...]
+    weights: np.ndarray
+    asked: np.ndarray
+    achieved: np.ndarray
+
+    @cached_property
+    def _reports(self) -> tuple[TaskReport, ...]:
+        columns = zip(self.rows, self.weights.tolist(), self.asked.tolist(), self.achieved.tolist(), strict=True)
+        return tuple(
+            TaskReport(name=name, unit=unit, weight=weight, asked=asked, achieved=value, residual=value - asked)
+            for (name, unit), weight, asked, value in columns
+            if weight > 0.0
+        )
+
+    def __len__(self) -> int:
+        """Number of task rows with a weight."""
+        return len(self._reports)
+
+    @overload
+    def __getitem__(self, index: int) -> TaskReport: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> tuple[TaskReport, ...]: ...
+
+    def __getitem__(self, index: int | slice) -> TaskReport | tuple[TaskReport, ...]:
+        """One report, or a tuple of them."""
+        return self._reports[index]
+
+    def __eq__(self, other: object) -> bool:
+        """As tuples of reports are equal."""
+        return isinstance(other, Sequence) and self._reports == tuple(other)
+
+    def __hash__(self) -> int:
+        """As the tuple of reports."""
+        return hash(self._reports)
+
+
 @dataclass(frozen=True, kw_only=True)
 class ActiveLimit:
-    """A limit that binds: its side ("lower" or "upper"), price |dJ*/d bound| per unit, and slack taken."""
+    """An active limit: its side ("lower" or "upper"), multiplier |dJ*/d bound| per unit as price, and slack taken."""
 
     name: str
     side: str
@@ -58,7 +103,7 @@ class Command:
         mode: Contact phase: "free", "approach", "contact" or "hold".
         rejected: Names of the inputs that were refused, with the reason.
         tasks: Task reports (QP law).
-        active_limits: Limits that bind (QP law; rotor boxes for the analytic law).
+        active_limits: Active limits (QP law; clipped rotors for the analytic law).
         unallocated_wrench: Wrench of the same tick without limits minus the wrench [N, N m], (6,).
         reach_margin: Further push possible at the present contact [N], NaN if unknown.
         iterations: Solver iterations.
@@ -71,33 +116,9 @@ class Command:
     outcome: Outcome
     mode: str
     rejected: tuple[str, ...] = ()
-    tasks: tuple[TaskReport, ...] = field(default_factory=tuple)
-    active_limits: tuple[ActiveLimit, ...] = field(default_factory=tuple)
+    tasks: Sequence[TaskReport] = ()
+    active_limits: tuple[ActiveLimit, ...] = ()
     unallocated_wrench: np.ndarray
     reach_margin: float = float("nan")
     iterations: int = 0
     solve_time_s: float = 0.0
-
-    @classmethod
-    def explained_later(cls, explain: dict[str, Callable[[], Any]], fields: dict[str, Any]) -> Command:
-        """A command some of whose fields are made when somebody reads them: the tick does not pay for them.
-
-        Args:
-            explain: What makes `wrench`, `tasks` and `active_limits`, or those of them that come later.
-            fields: The other fields by name, all of them; the command keeps the dictionary.
-        """
-        fields["_explain"] = explain
-        return filled(cls, fields)
-
-    def __getattr__(self, name: str) -> Any:
-        """Make what comes later at its first reading."""
-        explain = self.__dict__.get("_explain", {})
-        if name not in explain:
-            raise AttributeError(name)
-        self.__dict__[name] = value = explain[name]()
-        return value
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Pickle with everything made."""
-        made = {name: getattr(self, name) for name in self.__dict__.get("_explain", ())}
-        return {name: value for name, value in self.__dict__.items() if name != "_explain"} | made

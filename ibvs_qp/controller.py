@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -85,7 +84,7 @@ class HybridController:
         self.template = program_template(self.config, tasks, limits)
         self.setpoints = Setpoints(self.config, self.template)
         data = ProgramData(self.template, self.setpoints.tick.extra)
-        self.engine = QpEngine(self.template, self.config.solver, data, self.config.machine_code)
+        self.engine = QpEngine(self.template, self.config.solver, data)
         self._gate = MeasurementGate(self.config.vehicle.geometry.count)
         self.reset()
 
@@ -130,32 +129,28 @@ class HybridController:
         return self._finish(checked, solution, rejected)
 
     def _finish(self, measurement: Measurement, solution: AcceptedSolution, rejected: tuple[str, ...]) -> Command:
-        thrusts, terms, reference, limited = solution.thrusts, self.setpoints, self._reference, solution.limited
-        unallocated, given_up, data = _NOTHING, 0.0, self.engine.data
-        stacked = data.stacked.copy()
-        later: dict[str, Callable[[], Any]] = {
-            "wrench": lambda: terms.effectiveness.dot(thrusts),
-            "tasks": lambda: task_reports(self.template, data, stacked, thrusts),
-        }
-        if limited:
+        thrusts, terms, data = solution.thrusts, self.setpoints, self.engine.data
+        unallocated, given_up, limits = _NOTHING, 0.0, ()
+        if solution.limited:
             unallocated = terms.effectiveness.dot(data.free - thrusts)
             given_up = max(map(abs, unallocated.tolist()))
-            later["active_limits"] = lambda: active_limits(self.template, solution.x, solution.y)
+            limits = active_limits(self.template, solution.x, solution.y)
+        tasks = task_reports(self.template, data, data.stacked, thrusts)
         terms.note(thrusts, given_up)
-        fields = {
-            "stamp_ns": int(measurement.stamp_ns),
-            "thrusts": thrusts,
-            "outcome": solution.outcome,
-            "mode": contact_mode(terms, reference),
-            "rejected": rejected + reach_note(terms, reference),
-            "unallocated_wrench": unallocated,
-            "reach_margin": reach_margin(terms),
-            "iterations": solution.iterations,
-            "solve_time_s": solution.seconds,
-        }
-        if not limited:
-            fields["active_limits"] = ()
-        return Command.explained_later(later, fields)
+        return Command(
+            stamp_ns=int(measurement.stamp_ns),
+            thrusts=thrusts,
+            wrench=terms.effectiveness.dot(thrusts),
+            outcome=solution.outcome,
+            mode=contact_mode(terms, self._reference),
+            rejected=rejected + reach_note(terms, self._reference),
+            tasks=tasks,
+            active_limits=limits,
+            unallocated_wrench=unallocated,
+            reach_margin=reach_margin(terms),
+            iterations=solution.iterations,
+            solve_time_s=solution.seconds,
+        )
 
     def _fallback(self, measurement: Measurement, rejected: tuple[str, ...]) -> Command:
         """The analytic law answers when no solver did."""

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from ibvs_qp.command import ActiveLimit, TaskReport
-from ibvs_qp.qp.accept import ACTIVE_PRICE
+from ibvs_qp.command import ActiveLimit, TaskReport, TaskReports
+from ibvs_qp.qp.accept import ACTIVE_MULTIPLIER
 from ibvs_qp.qp.evaluator import Evaluator, ProgramData
 from ibvs_qp.qp.exact import ExactSolver
 from ibvs_qp.qp.infeasible import conflicting_rows
@@ -43,7 +43,7 @@ class Explanation:
     """
 
     thrusts: np.ndarray
-    tasks: tuple[TaskReport, ...]
+    tasks: Sequence[TaskReport]
     cost: tuple[float, ...]
     total_cost: float
     slack_cost: float
@@ -53,29 +53,16 @@ class Explanation:
     unallocated_wrench: np.ndarray
 
 
-def task_reports(
-    template: QpTemplate, data: ProgramData, stacked: np.ndarray, thrusts: np.ndarray
-) -> tuple[TaskReport, ...]:
+def task_reports(template: QpTemplate, data: ProgramData, stacked: np.ndarray, thrusts: np.ndarray) -> TaskReports:
     """Asked, achieved and residual of every task row that has a weight."""
     achieved, asked, weights = data.report(stacked, thrusts)
-    return tuple(
-        TaskReport(
-            name=row.name,
-            unit=row.unit,
-            weight=float(weights[i]),
-            asked=float(asked[i]),
-            achieved=float(achieved[i]),
-            residual=float(achieved[i] - asked[i]),
-        )
-        for i, row in enumerate(template.task_rows)
-        if weights[i] > 0.0
-    )
+    return TaskReports(template.task_names, weights.copy(), asked.copy(), achieved.copy())
 
 
 def active_limits(template: QpTemplate, x: np.ndarray, y: np.ndarray) -> tuple[ActiveLimit, ...]:
     """Limits with a price: name, side, |dJ*/d bound| and slack taken."""
     active = []
-    for i in np.flatnonzero(np.abs(y) > ACTIVE_PRICE):
+    for i in np.flatnonzero(np.abs(y) > ACTIVE_MULTIPLIER):
         slot = template.row_slack[i]
         active.append(
             ActiveLimit(

@@ -66,6 +66,7 @@ class QpTemplate:
 
     Attributes:
         variable_names: Names of the entries of x.
+        task_names: Name and unit of every task row.
         row_names: Names of the rows of A.
         values: CasADi function of the stacked parameters giving (P, q, A, l, u) non-zeros, P as upper triangle.
         free: CasADi function of the stacked parameters giving the thrusts without limits and their worst violation.
@@ -107,6 +108,7 @@ class QpTemplate:
         self.p_pattern, self.a_pattern = _pattern(p_upper.sparsity()), _pattern(a.sparsity())
         names = model.config.vehicle.geometry.names
         self.variable_names = tuple(f"thrust_{name}" for name in names) + tuple(f"slack_{row.name}" for row in soft)
+        self.task_names = tuple((row.name, row.unit) for row in self.task_rows)
         self.row_names = tuple(row.name for row in self.limit_rows)
         self.row_units = tuple(row.unit for row in self.limit_rows)
         self.row_slack = np.full(len(self.limit_rows), -1)
