@@ -1,15 +1,12 @@
-"""What comes out: rotor thrusts and the explanation of how they came about."""
+"""Output of a controller: rotor thrusts and their explanation."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import functools
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any
 
 import numpy as np
-
-from ibvs_qp.made import filled
 
 
 class Outcome(StrEnum):
@@ -25,7 +22,7 @@ class Outcome(StrEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class TaskReport:
-    """What one task row asked for and got, in the task's own unit."""
+    """Target, achieved value and residual of one task row, in the task's own unit."""
 
     name: str
     unit: str
@@ -36,8 +33,36 @@ class TaskReport:
 
 
 @dataclass(frozen=True, kw_only=True)
+class TaskValues:
+    """Values of all task rows of one tick, in one array each: cheap to store at every tick.
+
+    Attributes:
+        rows: Name and unit of every task row.
+        weights: Their weights, (rows,). Likewise asked and achieved values.
+    """
+
+    rows: tuple[tuple[str, str], ...] = ()
+    weights: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    asked: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    achieved: np.ndarray = field(default_factory=lambda: np.zeros(0))
+
+    def reports(self) -> tuple[TaskReport, ...]:
+        """One report for every row with a weight."""
+        columns = zip(self.rows, self.weights.tolist(), self.asked.tolist(), self.achieved.tolist(), strict=True)
+        return tuple(
+            TaskReport(name=name, unit=unit, weight=weight, asked=asked, achieved=value, residual=value - asked)
+            for (name, unit), weight, asked, value in columns
+            if weight > 0.0
+        )
+
+
+#: Of a command without task rows.
+NO_TASKS = TaskValues()
+
+
+@dataclass(frozen=True, kw_only=True)
 class ActiveLimit:
-    """A limit that binds: its side ("lower" or "upper"), price |dJ*/d bound| per unit, and slack taken."""
+    """An active limit: its side ("lower" or "upper"), multiplier |dJ*/d bound| per unit as price, and slack taken."""
 
     name: str
     side: str
@@ -57,8 +82,8 @@ class Command:
         outcome: How it was found.
         mode: Contact phase: "free", "approach", "contact" or "hold".
         rejected: Names of the inputs that were refused, with the reason.
-        tasks: Task reports (QP law).
-        active_limits: Limits that bind (QP law; rotor boxes for the analytic law).
+        task_values: Values of the task rows (QP law); `tasks` are the same as reports.
+        active_limits: Active limits (QP law; clipped rotors for the analytic law).
         unallocated_wrench: Wrench of the same tick without limits minus the wrench [N, N m], (6,).
         reach_margin: Further push possible at the present contact [N], NaN if unknown.
         iterations: Solver iterations.
@@ -71,33 +96,14 @@ class Command:
     outcome: Outcome
     mode: str
     rejected: tuple[str, ...] = ()
-    tasks: tuple[TaskReport, ...] = field(default_factory=tuple)
-    active_limits: tuple[ActiveLimit, ...] = field(default_factory=tuple)
+    task_values: TaskValues = NO_TASKS
+    active_limits: tuple[ActiveLimit, ...] = ()
     unallocated_wrench: np.ndarray
     reach_margin: float = float("nan")
     iterations: int = 0
     solve_time_s: float = 0.0
 
-    @classmethod
-    def explained_later(cls, explain: dict[str, Callable[[], Any]], fields: dict[str, Any]) -> Command:
-        """A command some of whose fields are made when somebody reads them: the tick does not pay for them.
-
-        Args:
-            explain: What makes `wrench`, `tasks` and `active_limits`, or those of them that come later.
-            fields: The other fields by name, all of them; the command keeps the dictionary.
-        """
-        fields["_explain"] = explain
-        return filled(cls, fields)
-
-    def __getattr__(self, name: str) -> Any:
-        """Make what comes later at its first reading."""
-        explain = self.__dict__.get("_explain", {})
-        if name not in explain:
-            raise AttributeError(name)
-        self.__dict__[name] = value = explain[name]()
-        return value
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Pickle with everything made."""
-        made = {name: getattr(self, name) for name in self.__dict__.get("_explain", ())}
-        return {name: value for name, value in self.__dict__.items() if name != "_explain"} | made
+    @functools.cached_property
+    def tasks(self) -> tuple[TaskReport, ...]:
+        """Reports of the task rows with a weight."""
+        return self.task_values.reports()

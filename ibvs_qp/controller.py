@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from ibvs_qp.model.reporting import clipped_command, contact_mode, reach_margin,
 from ibvs_qp.model.setpoints import Setpoints
 from ibvs_qp.qp.accept import AcceptedSolution, QpEngine
 from ibvs_qp.qp.evaluator import ProgramData
-from ibvs_qp.qp.explain import active_limits, task_reports
+from ibvs_qp.qp.explain import active_limits, task_values
 from ibvs_qp.qp.faults import program_faults
 from ibvs_qp.qp.problem import QpProblem
 from ibvs_qp.safety.hover import hold_thrusts
@@ -87,7 +86,7 @@ class HybridController:
         self.template = program_template(self.config, tasks, limits)
         self.setpoints = Setpoints(self.template.model, self.template.values)
         data = ProgramData(self.template, self.setpoints.step)
-        self.engine = QpEngine(self.template, self.config.solver, data, self.config.machine_code)
+        self.engine = QpEngine(self.template, self.config.solver, data)
         self._gate = MeasurementGate(self.config.vehicle.geometry.count)
         self.reset()
 
@@ -132,32 +131,28 @@ class HybridController:
         return self._finish(checked, solution, rejected)
 
     def _finish(self, measurement: Measurement, solution: AcceptedSolution, rejected: tuple[str, ...]) -> Command:
-        thrusts, terms, reference, limited = solution.thrusts, self.setpoints, self._reference, solution.limited
-        unallocated, given_up, data = _NOTHING, 0.0, self.engine.data
-        point = data.point.copy()
-        later: dict[str, Callable[[], Any]] = {
-            "wrench": lambda: terms.effectiveness.dot(thrusts),
-            "tasks": lambda: task_reports(self.template, data, point, thrusts),
-        }
-        if limited:
+        thrusts, terms, data = solution.thrusts, self.setpoints, self.engine.data
+        unallocated, given_up, limits = _NOTHING, 0.0, ()
+        if solution.limited:
             unallocated = terms.effectiveness.dot(data.free - thrusts)
             given_up = max(map(abs, unallocated.tolist()))
-            later["active_limits"] = lambda: active_limits(self.template, solution.x, solution.y)
+            limits = active_limits(self.template, solution.x, solution.y)
+        tasks = task_values(self.template, data, thrusts)
         terms.note(thrusts, given_up)
-        fields = {
-            "stamp_ns": int(measurement.stamp_ns),
-            "thrusts": thrusts,
-            "outcome": solution.outcome,
-            "mode": contact_mode(terms, reference),
-            "rejected": rejected + reach_note(terms, reference),
-            "unallocated_wrench": unallocated,
-            "reach_margin": reach_margin(terms),
-            "iterations": solution.iterations,
-            "solve_time_s": solution.seconds,
-        }
-        if not limited:
-            fields["active_limits"] = ()
-        return Command.explained_later(later, fields)
+        return Command(
+            stamp_ns=int(measurement.stamp_ns),
+            thrusts=thrusts,
+            wrench=terms.effectiveness.dot(thrusts),
+            outcome=solution.outcome,
+            mode=contact_mode(terms, self._reference),
+            rejected=rejected + reach_note(terms, self._reference),
+            task_values=tasks,
+            active_limits=limits,
+            unallocated_wrench=unallocated,
+            reach_margin=reach_margin(terms),
+            iterations=solution.iterations,
+            solve_time_s=solution.seconds,
+        )
 
     def _fallback(self, measurement: Measurement, rejected: tuple[str, ...]) -> Command:
         """The analytic law answers when no solver did."""

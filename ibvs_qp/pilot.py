@@ -23,7 +23,6 @@ from ibvs_qp.estimation.wall_lines import WallAxes, image_line
 from ibvs_qp.estimation.wall_motion import WallMotion
 from ibvs_qp.estimation.wrench_tare import WrenchTare
 from ibvs_qp.frames import to_camera
-from ibvs_qp.made import filled
 from ibvs_qp.measurement import (
     HORIZONTAL,
     FeatureFrame,
@@ -175,9 +174,8 @@ class Pilot:
             command = self.controller.step(self.measurement, self.reference)  # type: ignore[arg-type]
         else:
             command = self._fly(sound)
-        if self._gate.clock.shift_ns and sound is not None:
-            # In the time of the frames; set in place, because a copy would have all reports made.
-            object.__setattr__(command, "stamp_ns", frame.stamp_ns)
+        if self._gate.clock.shift_ns and sound is not None:  # back to the time of the frames
+            command = dataclasses.replace(command, stamp_ns=frame.stamp_ns)
         return command if not refused else dataclasses.replace(command, rejected=command.rejected + refused)
 
     def _fly(self, frame: SensorFrame) -> Command:
@@ -313,23 +311,20 @@ class Pilot:
                 )
             )
             covariance = self._covariance
-        return filled(
-            Measurement,
-            {
-                "stamp_ns": frame.stamp_ns,
-                "attitude": frame.attitude,
-                "angular_velocity": frame.angular_velocity,
-                "specific_force": frame.specific_force,
-                "contact_wrench": wrench,
-                "wrench_stamp_ns": frame.wrench_stamp_ns,
-                "lines": tuple([self.motion.feature(line, axes, distance, frame.stamp_ns) for line, _ in wish.guides]),
-                "plane": self._plane,
-                "plane_stamp_ns": self._plane_stamp,
-                "velocity": velocity,
-                "velocity_covariance": covariance,
-                "thrust_min": low,
-                "thrust_max": high,
-            },
+        return Measurement(
+            stamp_ns=frame.stamp_ns,
+            attitude=frame.attitude,
+            angular_velocity=frame.angular_velocity,
+            specific_force=frame.specific_force,
+            contact_wrench=wrench,
+            wrench_stamp_ns=frame.wrench_stamp_ns,
+            lines=tuple([self.motion.feature(line, axes, distance, frame.stamp_ns) for line, _ in wish.guides]),
+            plane=self._plane,
+            plane_stamp_ns=self._plane_stamp,
+            velocity=velocity,
+            velocity_covariance=covariance,
+            thrust_min=low,
+            thrust_max=high,
         )
 
     def _scenery(self, frame: SensorFrame) -> Scenery:
@@ -359,16 +354,13 @@ class Pilot:
                 rho, theta = (offset + self._tip_camera[1]) / depth, 0.5 * math.pi
             else:
                 rho, theta = offset / depth, 0.0
-            references.append(filled(LineReference, {"rho": rho, "theta": theta, "role": line.role}))
-        return filled(
-            Reference,
-            {
-                "push_force": wish.push,
-                "standoff": wish.standoff,
-                "lines": tuple(references),
-                "velocity": wish.velocity,
-                "contact": wish.contact,
-                "tilt": wish.tilt,
-                "travel": wish.travel,
-            },
+            references.append(LineReference(rho=rho, theta=theta, role=line.role))
+        return Reference(
+            push_force=wish.push,
+            standoff=wish.standoff,
+            lines=tuple(references),
+            velocity=wish.velocity,
+            contact=wish.contact,
+            tilt=wish.tilt,
+            travel=wish.travel,
         )

@@ -14,7 +14,6 @@ from ibvs_qp.estimation.stamps import StampRing
 from ibvs_qp.estimation.tracked_line import TrackedLine
 from ibvs_qp.estimation.wall_lines import WallAxes, image_line, wall_line
 from ibvs_qp.frames import GRAVITY
-from ibvs_qp.made import filled
 from ibvs_qp.measurement import FeatureFrame, LineFeature
 
 #: Lines followed at once.
@@ -276,18 +275,15 @@ class WallMotion:
         variance = max(self._filter.covariance.item(slot, slot), 1e-10) / (scale * scale)
         covariance = _NOTHING.copy()
         covariance[0, 0], covariance[1, 1] = variance, line.theta_variance
-        return filled(
-            LineFeature,
-            {
-                "rho": rho,
-                "theta": theta,
-                "covariance": covariance,
-                "role": line.role,
-                "weight": line.weight,
-                "stamp_ns": stamp_ns,
-                "track_id": line.track_id,
-                "segment": None,
-                "surface_side": line.surface_side,
-                "kind": line.kind,
-            },
+        return LineFeature(
+            rho=rho,
+            theta=theta,
+            covariance=covariance,
+            role=line.role,
+            weight=line.weight,
+            stamp_ns=stamp_ns,
+            track_id=line.track_id,
+            segment=None,
+            surface_side=line.surface_side,
+            kind=line.kind,
         )

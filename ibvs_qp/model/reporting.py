@@ -7,7 +7,6 @@ import math
 import numpy as np
 
 from ibvs_qp.command import ActiveLimit, Command, Outcome
-from ibvs_qp.made import made
 from ibvs_qp.measurement import Reference
 from ibvs_qp.model.setpoints import Setpoints
 
@@ -67,20 +66,17 @@ def clipped_command(
     beyond = free - thrusts
     unallocated = terms.effectiveness.dot(beyond)
     terms.note(thrusts, max(map(abs, unallocated.tolist())))
-    fields = {
-        "stamp_ns": stamp_ns,
-        "thrusts": thrusts,
-        "outcome": outcome,
-        "mode": mode,
-        "rejected": rejected,
-        "tasks": (),
-        "active_limits": _clipped_rotors(terms, beyond.tolist()),
-        "unallocated_wrench": unallocated,
-        "reach_margin": math.nan if mode == "hold" else reach_margin(terms),
-        "iterations": 0,
-        "solve_time_s": 0.0,
-    }
-    return Command.explained_later({"wrench": lambda: terms.effectiveness @ thrusts}, fields)
+    return Command(
+        stamp_ns=stamp_ns,
+        thrusts=thrusts,
+        wrench=terms.effectiveness @ thrusts,
+        outcome=outcome,
+        mode=mode,
+        rejected=rejected,
+        active_limits=_clipped_rotors(terms, beyond.tolist()),
+        unallocated_wrench=unallocated,
+        reach_margin=math.nan if mode == "hold" else reach_margin(terms),
+    )
 
 
 def _clipped_rotors(terms: Setpoints, beyond: list[float]) -> tuple[ActiveLimit, ...]:
@@ -89,16 +85,13 @@ def _clipped_rotors(terms: Setpoints, beyond: list[float]) -> tuple[ActiveLimit,
         return ()
     names = terms.config.vehicle.geometry.names
     return tuple(
-        [
-            made(
-                ActiveLimit,
-                name=f"thrust_{name}",
-                side="upper" if over > 0.0 else "lower",
-                price=math.nan,
-                slack=abs(over),
-                unit="N",
-            )
-            for name, over in zip(names, beyond, strict=True)
-            if abs(over) > CLIPPED
-        ]
+        ActiveLimit(
+            name=f"thrust_{name}",
+            side="upper" if over > 0.0 else "lower",
+            price=math.nan,
+            slack=abs(over),
+            unit="N",
+        )
+        for name, over in zip(names, beyond, strict=True)
+        if abs(over) > CLIPPED
     )

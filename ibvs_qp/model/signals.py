@@ -7,6 +7,8 @@ from collections.abc import Sequence
 import casadi as ca
 import numpy as np
 
+from ibvs_qp.config.errors import ConfigError
+
 
 class Signals:
     """Registry of the symbols of one step.
@@ -23,8 +25,11 @@ class Signals:
         self._next: dict[str, ca.SX] = {}
 
     def input(self, name: str, size: int = 1) -> ca.SX:
-        """Symbol of an input, (size,)."""
-        return self.inputs.setdefault(name, ca.SX.sym(name, size))
+        """Symbol of an input, (size,); ConfigError when it exists with another size."""
+        symbol = self.inputs.setdefault(name, ca.SX.sym(name, size))
+        if symbol.numel() != size:
+            raise ConfigError(f"input {name!r} has {symbol.numel()} entries, {size} asked for")
+        return symbol
 
     def state(self, name: str, size: int = 1, start: float | Sequence[float] = 0.0) -> ca.SX:
         """Symbol of a state, (size,); ``start`` is its value after a reset."""

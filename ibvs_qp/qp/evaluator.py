@@ -19,7 +19,8 @@ class ProgramData:
     """
 
     def __init__(self, problem: QpProblem, step: StepFunction) -> None:
-        self.p, self.q, self.a, self.lower, self.upper, self.free, self.violation = step.extra
+        self.p, self.q, self.a, self.lower, self.upper, self.free = step.extra
+        self._step = step  # owns the memory that the compiled function writes
         self.point, self.inputs = step.point, step.inputs
         report, inputs = problem.report, len(step.values)
         self._problem, self._inputs = problem, inputs

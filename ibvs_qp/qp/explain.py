@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ibvs_qp.command import ActiveLimit, TaskReport
-from ibvs_qp.qp.accept import ACTIVE_PRICE
+from ibvs_qp.command import ActiveLimit, TaskReport, TaskValues
+from ibvs_qp.qp.accept import ACTIVE_MULTIPLIER
 from ibvs_qp.qp.evaluator import ProgramData, RecordedProgram
 from ibvs_qp.qp.exact import ExactSolver
 from ibvs_qp.qp.infeasible import conflicting_rows
@@ -41,7 +41,7 @@ class Explanation:
     """
 
     thrusts: np.ndarray
-    tasks: tuple[TaskReport, ...]
+    tasks: Sequence[TaskReport]
     cost: tuple[float, ...]
     total_cost: float
     slack_cost: float
@@ -51,29 +51,16 @@ class Explanation:
     unallocated_wrench: np.ndarray
 
 
-def task_reports(
-    template: QpProblem, data: ProgramData, point: np.ndarray, thrusts: np.ndarray
-) -> tuple[TaskReport, ...]:
-    """Asked, achieved and residual of every task row that has a weight."""
-    achieved, asked, weights = data.report(point, thrusts)
-    return tuple(
-        TaskReport(
-            name=row.name,
-            unit=row.unit,
-            weight=float(weights[i]),
-            asked=float(asked[i]),
-            achieved=float(achieved[i]),
-            residual=float(achieved[i] - asked[i]),
-        )
-        for i, row in enumerate(template.task_rows)
-        if weights[i] > 0.0
-    )
+def task_values(template: QpProblem, data: ProgramData, thrusts: np.ndarray) -> TaskValues:
+    """Weight, target and achieved value of every task row."""
+    achieved, asked, weights = data.report(data.point, thrusts)
+    return TaskValues(rows=template.task_names, weights=weights.copy(), asked=asked.copy(), achieved=achieved.copy())
 
 
 def active_limits(template: QpProblem, x: np.ndarray, y: np.ndarray) -> tuple[ActiveLimit, ...]:
     """Limits with a price: name, side, |dJ*/d bound| and slack taken."""
     active = []
-    for i in np.flatnonzero(np.abs(y) > ACTIVE_PRICE):
+    for i in np.flatnonzero(np.abs(y) > ACTIVE_MULTIPLIER):
         slot = template.row_slack[i]
         active.append(
             ActiveLimit(
@@ -119,7 +106,7 @@ class TickReplay:
             return None
         x, y = solution
         thrusts = x[: template.model.rotors]
-        tasks = task_reports(template, data, point, thrusts)
+        tasks = task_values(template, data, thrusts).reports()
         cost = np.array([0.5 * task.weight * task.residual**2 for task in tasks])
         slack = x[len(thrusts) :]
         slack_cost = 0.5 * float(slack @ (data.hessian().diagonal()[len(thrusts) :] * slack))

@@ -19,7 +19,7 @@ def program_faults(template: QpProblem, data: ProgramData) -> tuple[str, ...]:
 
 def _broken(name: str, values: np.ndarray) -> str:
     entries = ", ".join(f"{value:g}" for value in values.tolist())
-    return f"parameter {name}: ({entries}) is not finite"
+    return f"input {name}: ({entries}) is not finite"
 
 
 def _task_faults(template: QpProblem, data: ProgramData) -> list[str]:

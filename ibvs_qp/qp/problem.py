@@ -69,6 +69,7 @@ class QpProblem:
 
     Attributes:
         variable_names: Names of the entries of x.
+        task_names: Name and unit of every task row.
         row_names: Names of the rows of A.
         values: Expressions of the non-zeros of P (upper triangle), q, A, l, u, and of the thrusts without any limit;
             extra results of the step function.
@@ -105,9 +106,6 @@ class QpProblem:
 
         self.values = [p.nz[:], ca.densify(q), a.nz[:], ca.densify(lower), ca.densify(upper)]
         self.values.append(_unlimited_thrusts(hessian, gradient))
-        free = self.values[-1]
-        at = bounds.per_thrust @ free
-        self.values.append(ca.fmax(ca.mmax(at - upper), ca.mmax(lower - at)))
         self._step = [stack(model.signals.inputs), stack(model.signals.states)]
         self.report = ca.Function(
             "task_report", [*self._step, model.thrust], [achieved.at(model.thrust), targets, weights]
@@ -116,6 +114,7 @@ class QpProblem:
         names = model.config.vehicle.geometry.names
         slacks = (f"slack_{self.limit_rows[place].name}" for place in soft)
         self.variable_names = (*(f"thrust_{name}" for name in names), *slacks)
+        self.task_names = tuple((row.name, row.unit) for row in self.task_rows)
         self.row_names = tuple(row.name for row in self.limit_rows)
         self.row_units = tuple(row.unit for row in self.limit_rows)
         self.row_slack = np.full(rows, -1)

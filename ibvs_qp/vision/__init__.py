@@ -9,8 +9,8 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from ibvs_qp.model.interaction_matrix import endpoint_line_row, line_interaction_matrix
     from ibvs_qp.vision.config import VisionConfig
-    from ibvs_qp.vision.interaction import endpoint_line_row, line_interaction_matrix
     from ibvs_qp.vision.percept import LineHint, Percept, TrackState
     from ibvs_qp.vision.perception import Perception
     from ibvs_qp.vision.plane import PlaneEstimate
@@ -28,7 +28,7 @@ __all__ = [
 
 _HOMES = {
     "ibvs_qp.vision.config": ("VisionConfig",),
-    "ibvs_qp.vision.interaction": (
+    "ibvs_qp.model.interaction_matrix": (
         "endpoint_line_row",
         "line_interaction_matrix",
     ),

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ibvs_qp.made import made
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL
 from ibvs_qp.vision.classify import LineIdentity, identify_lines
 from ibvs_qp.vision.colors import SurfaceColors
@@ -110,8 +109,7 @@ def _query(entry: VotedLine, picture: Picture) -> LineQuery:
     slope = (entry.right - entry.left) / (view.width - 1.0)
     rho, angle = normalised_line(-slope, 1.0, -entry.left, view.intrinsics)
     theta = 0.5 * math.pi - angle if entry.upright else angle
-    return made(
-        LineQuery,
+    return LineQuery(
         rho=rho,
         theta=theta,
         step=None,
@@ -127,7 +125,7 @@ def _candidate(line: RefinedLine, identity: LineIdentity, picture: Picture, tilt
     """A fitted line with its score."""
     length = min(line.length_px / (_FULL_LENGTH * picture.mask.shape[1]), 1.0)
     score = identity.quality * (0.4 + 0.6 * length) * line.inlier_share
-    return made(Candidate, line=line, role=role_of(line.theta, tilt), identity=identity, score=score)
+    return Candidate(line=line, role=role_of(line.theta, tilt), identity=identity, score=score)
 
 
 def _covered(entry: VotedLine, line: RefinedLine, picture: Picture) -> bool:

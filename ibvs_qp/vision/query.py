@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ibvs_qp.made import made
 from ibvs_qp.vision.picture import Picture, pixel_line
 
 
@@ -73,8 +72,7 @@ class LineView:
             columns = (fx * query.span[0] + cx, fx * query.span[1] + cx)
         coefficients = pixel_line(query.rho, angle, view.intrinsics)
         first, last = max(columns[0], 0.0), min(columns[1], view.width - 1.0)
-        return made(
-            cls,
+        return cls(
             query=query,
             view=view,
             upright=upright,

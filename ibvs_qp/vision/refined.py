@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ibvs_qp.frames import align_line
-from ibvs_qp.made import made
 from ibvs_qp.vision.config import LineConfig
 from ibvs_qp.vision.fit_lines import LineFit
 from ibvs_qp.vision.query import LineView
@@ -126,8 +125,7 @@ def _finish(
     fx, fy, cx, cy = view.view.intrinsics
     normal = [((along - cx) / fx, (across - cy) / fy) for along, across in ends]
     (x, y, z), sign = step, view.sign
-    return made(
-        RefinedLine,
+    return RefinedLine(
         rho=rho,
         theta=theta,
         covariance=covariance,

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from ibvs_qp.made import made
 from ibvs_qp.vision.config import VisionConfig
 from ibvs_qp.vision.edge_points import POINTS, edge_points, full_vote
 from ibvs_qp.vision.grid import CoarseGrid
@@ -89,7 +88,7 @@ def _voted(
         at_zero = 2.0 * left - 0.5 + 0.5 * slope
         at_last = at_zero + slope * (view.width - 1.0)
         polarity, rank = -1 if falls else 1, own * (0.1 + difference)
-        result.append(made(VotedLine, upright=upright, polarity=polarity, left=at_zero, right=at_last, rank=rank))
+        result.append(VotedLine(upright=upright, polarity=polarity, left=at_zero, right=at_last, rank=rank))
     return result
 
 

@@ -34,7 +34,8 @@ def bench_qp(count: int, seed: int, sample: int, tell: Callable[[str], None]) ->
         tell: Told what is going on.
 
     Returns:
-        Rows, stages, ratios, and beside them iterations, outcomes and agreement with the exact solver.
+        Rows, stages, ratios, and notes: iterations, fraction of ticks on which OSQP iterates, outcomes, and thrust
+        differences to the exact solver on all, limited and unlimited ticks.
     """
     tell(f"{count} ticks of closed loops")
     ticks = recorded_ticks(count, seed)
@@ -44,27 +45,26 @@ def bench_qp(count: int, seed: int, sample: int, tell: Callable[[str], None]) ->
     few = ticks[: max(len(ticks) // 5, WARM_UP)]
     tell("the step without machine code")
     interpreted, _, _ = _steps(HybridController(), few, "step_interpreted")
-    tell("OSQP at every tick")
-    asked = dataclasses.replace(config, solver=dataclasses.replace(config.solver, shortcut=False))
-    every, every_iterations, _ = _steps(HybridController(asked), few, "step_osqp_every_tick")
     tell("rivals")
     rivals, differences = _rivals(ticks, sample)
     yardstick = mink_row(max(len(ticks) // sample, 1))
     if yardstick is not None:
         rivals.append(yardstick)
-    stages = stage_medians(asked, few)
-    ratios = {row.name: row.median_us / step.median_us for row in (interpreted, every, *rivals) if row.times_us}
+    stages = stage_medians(config, few)
+    ratios = {row.name: row.median_us / step.median_us for row in (interpreted, *rivals) if row.times_us}
     notes = {
         "ticks": len(ticks),
         "compiler": " ".join(compiler() or ("none",)),
         "rivals_see_every": sample,
         "iterations": _histogram(iterations),
-        "iterations_osqp_every_tick": _histogram(every_iterations),
+        "osqp_iterates_share": sum(count > 0 for count in iterations) / len(iterations),
         "outcomes": outcomes,
         "difference_to_exact_n": differences.pop("step", {}),
+        "difference_to_exact_limited_n": differences.pop("step_limited", {}),
+        "difference_to_exact_unlimited_n": differences.pop("step_unlimited", {}),
         "rivals_difference_to_exact_n": differences,
     }
-    return Bench(rows=[step, interpreted, every, *rivals], stages_us=stages, ratios=ratios, notes=notes)
+    return Bench(rows=[step, interpreted, *rivals], stages_us=stages, ratios=ratios, notes=notes)
 
 
 def _steps(controller: HybridController, ticks: list[Tick], name: str) -> tuple[Row, list[int], dict[str, int]]:
@@ -89,7 +89,7 @@ def _rivals(ticks: list[Tick], sample: int) -> tuple[list[Row], dict[str, dict[s
     rows = {name: Row(name=f"qpsolvers_{name}") for name in RIVALS if name in installed_solvers()}
     exact_row, exact = Row(name="casadi_daqp"), ExactSolver(controller.template)
     data, template, last = controller.engine.data, controller.template, -1
-    differences: dict[str, list[float]] = {name: [] for name in ("step", *rows)}
+    differences: dict[str, list[float]] = {name: [] for name in ("step", "step_limited", "step_unlimited", *rows)}
     for index, (measurement, reference) in enumerate(ticks):
         if measurement.stamp_ns <= last:
             controller.reset()
@@ -98,7 +98,8 @@ def _rivals(ticks: list[Tick], sample: int) -> tuple[list[Row], dict[str, dict[s
         if index % sample or index < WARM_UP:
             continue
         found = exact_row.measure(lambda: exact.solve(data.p, data.q, data.a, data.lower, data.upper))
-        answers = {"step": command.thrusts}
+        part = "step_limited" if command.active_limits else "step_unlimited"
+        answers = {"step": command.thrusts, part: command.thrusts}
         for name, row in rows.items():
             answer = row.measure(lambda: solve_offline(template, data, name))  # noqa: B023 - called at once
             if answer is not None:

@@ -13,7 +13,6 @@ import casadi as ca
 import numpy as np
 
 from ibvs_qp.config.vehicle import VehicleParams
-from ibvs_qp.made import made
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL, FeatureFrame
 from ibvs_qp.model.bound_function import BoundFunction
 from ibvs_qp.model.machine_code import machine_code
@@ -146,8 +145,7 @@ class GeometricFeatures:
             velocity += SIGMA_VELOCITY_M_S * np.array(take(3))
         else:
             lines = [seen_line(*line, stamp_ns) for line in found]
-        frame = made(
-            FeatureFrame,
+        frame = FeatureFrame(
             lines=tuple(lines),
             plane=(a, b, c, -1.0),
             stamp_ns=stamp_ns,

@@ -12,7 +12,6 @@ import casadi as ca
 import numpy as np
 
 from ibvs_qp.config.vehicle import VehicleParams
-from ibvs_qp.made import filled
 from ibvs_qp.measurement import FeatureFrame, RgbdFrame, SensorFrame
 from ibvs_qp.model.bound_function import BoundFunction
 from ibvs_qp.model.machine_code import machine_code
@@ -171,16 +170,13 @@ class SensorSuite:
         imu, force_torque = self.imu, self.force_torque
         imu.sample(plant)
         force_torque.sample(plant)
-        return filled(
-            SensorFrame,
-            {
-                "stamp_ns": plant.time_ns,
-                "attitude": imu.attitude,
-                "angular_velocity": imu.angular_velocity,
-                "specific_force": imu.specific_force,
-                "wrench": force_torque.wrench,
-                "wrench_stamp_ns": force_torque.stamp_ns,
-                "image": image,
-                "features": features,
-            },
+        return SensorFrame(
+            stamp_ns=plant.time_ns,
+            attitude=imu.attitude,
+            angular_velocity=imu.angular_velocity,
+            specific_force=imu.specific_force,
+            wrench=force_torque.wrench,
+            wrench_stamp_ns=force_torque.stamp_ns,
+            image=image,
+            features=features,
         )

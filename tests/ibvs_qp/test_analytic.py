@@ -16,8 +16,8 @@ from ibvs_qp.command import Outcome
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.frames import camera_twist_matrix
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL, Reference
+from ibvs_qp.model.interaction_matrix import line_interaction_matrix
 from ibvs_qp.model.setpoints import Setpoints
-from ibvs_qp.vision.interaction import line_interaction_matrix
 
 CONFIG = ControllerConfig()
 MASS = CONFIG.vehicle.mass_kg

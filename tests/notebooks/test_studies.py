@@ -92,11 +92,9 @@ def test_the_yardstick_meets_the_optimality_conditions_and_others_do_not(stretch
 
 def test_a_race_counts_errors_of_every_tick(stretch):
     exact = exact_solutions(stretch)
-    tight = race(kept_osqp("tight", SolverSettings(shortcut=False)), stretch, exact)
-    loose = race(
-        kept_osqp("loose", SolverSettings(tolerance=1e-1, relative_tolerance=1e-1, polish=False)), stretch, exact
-    )
-    assert tight.errors_n.max() < 1e-6 < loose.errors_n.max() and tight.unanswered == 0
+    tight = race(kept_osqp("tight", SolverSettings()), stretch, exact)
+    loose = race(kept_osqp("loose", SolverSettings(tolerance=1e-1, relative_tolerance=1e-1)), stretch, exact)
+    assert tight.errors_n.max() < 1e-3 < loose.errors_n.max() and tight.unanswered == 0
     assert len(tight.times_us) == len(stretch.t) and (tight.iterations > 0).all()
     assert race_table([tight, loose], reference="tight").count("\n") == 3
 
@@ -116,9 +114,8 @@ RACE = {
     "OSQP 1e-5": (23.5, 33.3, 1.9e-2),
     "OSQP defaults": (24.6, 25.5, 1.6e-2),
     "OSQP 1e-6": (26.3, 60.5, 1.9e-3),
-    "shipped": (28.0, 48.4, 1.0e-14),
+    "shipped": (28.0, 48.4, 5.0e-6),
     "OSQP 1e-8": (30.0, 74.5, 1.9e-5),
-    "shipped, always OSQP": (74.2, 98.0, 5.0e-6),
     "DAQP in CasADi": (168.0, 176.0, 1.2e-11),
     "qpsolvers daqp": (293.0, 318.0, 1.3e-11),
     "qpsolvers proxqp": (326.0, 373.0, 2.8e-6),

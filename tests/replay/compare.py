@@ -12,7 +12,7 @@ import numpy as np
 from .cases import CASES, DATA
 from .replayer import replay
 from .tables import Table
-from .tolerances import MAY_DIFFER, TOLERANCES, Tolerance
+from .tolerances import MAY_DIFFER, TOLERANCES, Tolerance, tolerances_of
 
 EXACT = {name: Tolerance() for name in TOLERANCES}
 
@@ -131,7 +131,7 @@ def main() -> int:
     parser.add_argument("--all", action="store_true", help="list what is equal, too")
     arguments, failed = parser.parse_args(), False
     for name in arguments.cases or CASES:
-        differences = compare(reference_outputs(name), replay(name), EXACT if arguments.exact else TOLERANCES)
+        differences = compare(reference_outputs(name), replay(name), EXACT if arguments.exact else tolerances_of(name))
         failed = failed or any(entry.first_over is not None for entry in differences)
         shown = [entry for entry in differences if arguments.all or entry.largest > 0.0]
         print(f"{name}: {report(shown)}\n" if shown else f"{name}: equal to the bit")

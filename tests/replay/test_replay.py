@@ -9,12 +9,13 @@ from replay.cases import CASES, DATA
 from replay.compare import compare, reference_outputs, report
 from replay.recordings import load
 from replay.replayer import replay
-from replay.tolerances import TOLERANCES, Tolerance
+from replay.tolerances import TOLERANCES, Tolerance, tolerances_of
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_replays_as_recorded(name: str) -> None:
-    over = [entry for entry in compare(reference_outputs(name), replay(name)) if entry.first_over is not None]
+    differences = compare(reference_outputs(name), replay(name), tolerances_of(name))
+    over = [entry for entry in differences if entry.first_over is not None]
     if over:
         pytest.fail(f"{name}\n{report(over)}", pytrace=False)
 

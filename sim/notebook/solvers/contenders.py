@@ -12,7 +12,6 @@ import numpy as np
 
 from ibvs_qp.config import SolverSettings
 from ibvs_qp.qp.accept import QpEngine
-from ibvs_qp.qp.active_set import ActiveSet
 from ibvs_qp.qp.evaluator import ProgramData
 from ibvs_qp.qp.exact import ExactSolver
 from ibvs_qp.qp.offline import installed_solvers, solve_offline
@@ -29,8 +28,6 @@ OSQP_DEFAULTS = SolverSettings(
     check_interval=25,
     adaptive_rho_interval=50,
     scaling=10,
-    polish=False,
-    shortcut=False,
 )
 #: Back ends of qpsolvers that take a dense or sparse program of this kind.
 BACK_ENDS = ("osqp", "daqp", "quadprog", "proxqp", "piqp", "clarabel")
@@ -52,20 +49,16 @@ class Contender:
 
 
 def kept_osqp(name: str, settings: SolverSettings, family: str = "OSQP, kept") -> Contender:
-    """One workspace for all ticks, values updated in place, warm started.
-
-    With `settings.polish` the rows that its iterates end on are solved exactly afterwards.
-    """
+    """One workspace for all ticks, values updated in place, warm started."""
 
     def make(template: QpTemplate) -> Callable[[ProgramData], Answer]:
-        solver, rows = OsqpSolver(template, settings), ActiveSet(template)
+        solver = OsqpSolver(template, settings)
 
         def answer(data: ProgramData) -> Answer:
             raw = solver.solve(data.p, data.q, data.a, data.lower, data.upper)
             if raw is None:
                 return None, 0
-            exact = rows.solve_near(data, raw.x, raw.y) if settings.polish else None
-            return (raw.x if exact is None else exact[0]), raw.iterations
+            return raw.x, raw.iterations
 
         return answer
 
@@ -73,7 +66,7 @@ def kept_osqp(name: str, settings: SolverSettings, family: str = "OSQP, kept") -
 
 
 def flown(name: str, settings: SolverSettings) -> Contender:
-    """What the controller does: no limits, last tick's rows, OSQP and its rows, DAQP, whichever answers first."""
+    """The controller's solve: OSQP, acceptance test, DAQP where the test fails."""
 
     def make(template: QpTemplate) -> Callable[[ProgramData], Answer]:
         engine = QpEngine(template, settings)
@@ -157,7 +150,6 @@ def field() -> list[Contender]:
     for power in (3, 4, 5, 6, 8):
         settings = dataclasses.replace(tight, tolerance=10.0**-power, relative_tolerance=10.0**-power)
         contenders.append(kept_osqp(f"OSQP 1e-{power}", settings))
-    contenders.append(flown("shipped, always OSQP", dataclasses.replace(SolverSettings(), shortcut=False)))
     contenders.append(flown("shipped", SolverSettings()))
     contenders.append(casadi_daqp())
     if importlib.util.find_spec("daqp") is not None:

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ibvs_qp.qp.active_set import ActiveSet
 from ibvs_qp.qp.evaluator import ProgramData
 from ibvs_qp.qp.exact import ExactSolver
 from sim.notebook.solvers.contenders import Contender
@@ -57,15 +56,14 @@ class Result:
 
 
 def exact_solutions(stretch: Stretch) -> Exact:
-    """Solutions by DAQP, solved once more on its active rows, and the proof: what is left of the optimality conditions.
+    """Solutions by DAQP, and the residual of the optimality conditions as proof.
 
     Raises:
         RuntimeError: When a tick has no solution, which the programs of this controller always have.
     """
-    solver, active, rows, residuals = ExactSolver(stretch.template), ActiveSet(stretch.template), [], []
+    solver, rows, residuals = ExactSolver(stretch.template), [], []
     for data in stretch.evaluators():
         found = solver.solve(data.p, data.q, data.a, data.lower, data.upper)
-        found = None if found is None else (active.solve_near(data, *found) or found)
         if found is None:
             raise RuntimeError("a recorded tick has no solution")
         rows.append(found[0])

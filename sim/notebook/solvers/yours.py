@@ -6,7 +6,7 @@ from ibvs_qp.config import SolverSettings
 
 
 def your_settings(
-    power: int, most: int, check_interval: int, adaptive_rho_interval: int, scaling: int, polish: bool
+    power: int, most: int, check_interval: int, adaptive_rho_interval: int, scaling: int
 ) -> SolverSettings:
     """Settings of a kept workspace that is asked at every tick.
 
@@ -16,7 +16,6 @@ def your_settings(
         check_interval: Iterations between termination tests.
         adaptive_rho_interval: Iterations between step-size updates.
         scaling: Equilibration passes.
-        polish: Solve exactly on the active rows afterwards.
     """
     return SolverSettings(
         tolerance=10.0**-power,
@@ -25,6 +24,4 @@ def your_settings(
         check_interval=check_interval,
         adaptive_rho_interval=adaptive_rho_interval,
         scaling=scaling,
-        polish=polish,
-        shortcut=False,
     )

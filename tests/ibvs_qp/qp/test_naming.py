@@ -64,7 +64,7 @@ def test_a_parameter_that_is_no_number_is_named(value: float, place: int) -> Non
     command = step(controller, 1, lift=tuple(broken))
     assert command.outcome is Outcome.ANALYTIC_FALLBACK
     (said,) = command.rejected
-    assert said.startswith("parameter lift: ") and "not finite" in said
+    assert said.startswith("input lift: ") and "not finite" in said
     after = step(controller, 2, lift=(10.0, 0.1))
     assert after.outcome is Outcome.SOLVED and after.rejected == ()
 
@@ -99,7 +99,7 @@ def test_crossed_bounds_are_named() -> None:
 def test_a_bound_without_end_is_named() -> None:
     command = step(HybridController(limits=[ClimbLimit()]), 0, climb=(-5.0, math.inf))
     assert command.outcome is Outcome.ANALYTIC_FALLBACK
-    assert command.rejected and command.rejected[0].startswith("parameter climb: ")
+    assert command.rejected and command.rejected[0].startswith("input climb: ")
 
 
 def test_no_fallback_without_a_word(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -194,8 +194,8 @@ class FreeLimit(Limit):
 
 
 @pytest.mark.parametrize("price", [0.0, -1.0, math.nan, math.inf])
-def test_a_price_that_is_none_is_refused(price: float) -> None:
-    with pytest.raises(ConfigError, match="limit free: price"):
+def test_a_slack_weight_out_of_range_is_refused(price: float) -> None:
+    with pytest.raises(ConfigError, match="limit free: slack_weight"):
         HybridController(limits=[FreeLimit(price)])
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import pickle
 
 import casadi as ca
@@ -10,8 +9,6 @@ import numpy as np
 import pytest
 from closed_loop_rigs import short_scene
 
-from ibvs_qp.made import made
-from ibvs_qp.measurement import FeatureFrame, LineReference
 from ibvs_qp.model.bound_function import BoundFunction
 from sim.flight.closed_loop import FlightOptions, World, pilot_config
 from sim.flight.trace import Trace
@@ -42,18 +39,6 @@ def test_noise_in_rows_is_the_noise_one_by_one() -> None:
         expected = np.concatenate(([a.standard_normal() for _ in range(3)], [b.standard_normal() for _ in range(3)]))
         rows.take_into(row.data)
         np.testing.assert_array_equal(row, expected)
-
-
-def test_made_at_once_equals_made_by_the_constructor() -> None:
-    quick, slow = (
-        made(LineReference, rho=0.1, theta=1.5, role="vertical"),
-        LineReference(rho=0.1, theta=1.5, role="vertical"),
-    )
-    assert quick == slow and pickle.loads(pickle.dumps(quick)) == slow and hash(quick) == hash(slow)
-    assert dataclasses.replace(quick, rho=0.2).rho == 0.2
-    assert made(FeatureFrame, lines=(), plane=None, stamp_ns=1).velocity is None, "plain defaults hold"
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        quick.rho = 0.3  # type: ignore[misc]
 
 
 def test_a_bound_function_works_in_place_and_refuses_what_would_be_a_copy() -> None:
