@@ -130,13 +130,14 @@ class World:
         self.scene, self.geometry = scene, BoardGeometry(scene)
         vehicle = config.controller.vehicle
         self._rendered = options.features == "rendered"
+        self.stream: CameraStream | None = None
         self.plant = Plant(scene, vehicle, options.seed, options.machine_code, options.view)
         self.sensors = SensorSuite(scene, vehicle, options.seed, options.machine_code)
         self.canvas = Canvas(scene, options.seed)
         self._miscalibration = Miscalibration(scene.camera, vehicle, self._rendered)
         if self._rendered:
             camera = open_camera(options.camera, scene, vehicle, self.canvas, options.seed)
-            self._stream = CameraStream(camera, scene.camera.rate_hz, scene.camera.latency_s)
+            self.stream = CameraStream(camera, scene.camera.rate_hz, scene.camera.latency_s)
         else:
             self._features = GeometricFeatures(
                 scene, vehicle, self.canvas, options.seed, to_machine_code=options.machine_code
@@ -156,9 +157,9 @@ class World:
     def sense(self) -> SensorFrame:
         """Sensor frame of the present tick."""
         plant = self.plant
-        if self._rendered:
+        if self.stream is not None:
             pose = self._miscalibration.pose(plant.position, plant.quaternion)
-            image = self._stream.tick(plant.time_ns, *pose)
+            image = self.stream.tick(plant.time_ns, *pose)
             return self.sensors.sample(plant, image=None if image is None else self._miscalibration.picture(image))
         features, now = self._features, plant.time_ns
         if features.rests(now):
