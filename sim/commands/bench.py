@@ -1,4 +1,4 @@
-"""``ibvs-qp bench``: what a tick or a picture costs beside its rivals, as ratios within one run."""
+"""``ibvs-qp bench``: what a tick or a picture costs beside its rivals, and where a flown second goes."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ class Bench:
     Example: ibvs-qp bench qp --json
     """
 
-    what: tyro.conf.Positional[Literal["qp", "vision"]]
-    """What is measured: a control tick, or a picture."""
+    what: tyro.conf.Positional[Literal["qp", "vision", "loop"]]
+    """What is measured: a control tick, a picture, or the stages of a short flight."""
     ticks: int = 100_000
     """bench qp: recorded ticks of closed loops."""
     sample: int = 50
@@ -69,6 +69,8 @@ class Bench:
             bench = self._measure(lambda text: status.update(f"Measuring {text} ..."))
         if self.json:
             print(as_json(bench.summary()))
+        elif self.what == "loop":
+            _show_loop(bench)
         else:
             _show(bench)
         return 0
@@ -78,6 +80,10 @@ class Bench:
             from sim.bench.qp import bench_qp
 
             return bench_qp(self.ticks, self.seed, self.sample, tell)
+        if self.what == "loop":
+            from sim.bench.loop import bench_loop
+
+            return bench_loop(self.seed, tell)
         from sim.bench.vision import bench_vision
 
         return bench_vision(self.frames, self.seed, self.real, tell)
@@ -85,6 +91,23 @@ class Bench:
 
 #: Fewest and most pictures per size.
 LEAST_FRAMES, MOST_FRAMES = 20, 5000
+
+
+def _show_loop(bench: BenchResult) -> None:
+    """Print where a flown second goes, one column per flight."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from sim.bench.loop import STAGES
+
+    table = Table("stage", title="Wall-clock time per flown second, in ms")
+    columns = {key.removesuffix("_real_time"): factor for key, factor in bench.ratios.items()}
+    for flight in columns:
+        table.add_column(flight, justify="right")
+    for stage in STAGES:
+        table.add_row(stage, *(f"{1e-3 * bench.stages_us[f'{flight}_{stage}']:.1f}" for flight in columns))
+    table.add_row("real-time factor", *(f"{factor:.1f}" for factor in columns.values()))
+    Console().print(table)
 
 
 def _show(bench: BenchResult) -> None:

@@ -35,7 +35,7 @@ def design(choice: Choice) -> list[Run]:
                     measure=press_figures,
                     params={"kind": "derate", "rotor": rotor, "share": share, "told": told},
                     seeds=1 if choice.quick else 2,
-                    faults=(Derate(delay_s=AFTER_S, rotor=rotor, share=share, told=told),),
+                    faults=(Derate(delay_s=AFTER_S, rotor=rotor, share=share, reported=told),),
                 )
     for rotor in LOST[1:2] if choice.quick else LOST:
         flights += runs(

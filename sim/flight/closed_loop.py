@@ -34,7 +34,7 @@ from sim.world.scene import Scene
 if TYPE_CHECKING:
     from sim.flight.viewer import FlightViewer
 
-#: Called now and then with simulated time [s], phase name and real-time factor.
+#: Called with simulated time [s], phase name and real-time factor.
 Progress = Callable[[float, str, float], None]
 
 #: Reason of a flight that Ctrl-C ended.
@@ -43,12 +43,12 @@ INTERRUPTED = "interrupted"
 PRESETS = Path(ibvs_qp.__file__).parent / "presets"
 #: Normal force above which the brush leaves paint [N].
 PAINTING_FORCE = 0.05
-#: The stroke is drawn once in so many pressed ticks: 1.2 mm at 0.1 m/s, below the stamps' own distance of 2 mm.
+#: Pressed ticks per drawn stroke: 1.2 mm at 0.1 m/s, below the 2 mm between stamps.
 STROKE_TICKS = 3
 #: Control ticks between calls of the progress function.
 PROGRESS_TICKS = 125
 _SEEN_FROM = [PLACES[name] for name in ("position", "quaternion", "body_velocity")]
-#: A flight that is not done by then is ended [s]: start and corners, plus the strokes at half speed.
+#: Time-out of a flight [s]: start and corners, plus the strokes at half speed.
 BASE_TIME, STROKE_FACTOR = 90.0, 2.0
 
 
@@ -80,12 +80,12 @@ def default_preset(law: str) -> PilotConfig:
 
 
 def pilot_config(scene: Scene, options: FlightOptions, config: PilotConfig | None = None) -> PilotConfig:
-    """The pilot's configuration: preset, law, and the paint job, which the strategy is told (and nothing else).
+    """The pilot's configuration: preset, law, and the scene's paint job; nothing else of the scene.
 
     Args:
         scene: Only its paint job is read.
         options: Law and preset file.
-        config: Takes the place of the preset.
+        config: Replaces the preset.
 
     Raises:
         ConfigError: If the controller expects another period than the one that is simulated.
@@ -121,7 +121,7 @@ def pilot_config(scene: Scene, options: FlightOptions, config: PilotConfig | Non
 
 
 class World:
-    """Plant, sensors, canvas and camera: everything that is not the pilot."""
+    """Plant, sensors, canvas and camera: everything but the pilot."""
 
     def __init__(self, scene: Scene, options: FlightOptions, config: PilotConfig) -> None:
         if options.image_size is not None:
@@ -130,18 +130,17 @@ class World:
         self.scene, self.geometry = scene, BoardGeometry(scene)
         vehicle = config.controller.vehicle
         self._rendered = options.features == "rendered"
-        self.plant = Plant(scene, vehicle, options.seed, options.machine_code, options.view)
-        self.sensors = SensorSuite(scene, vehicle, options.seed, options.machine_code)
+        self.stream: CameraStream | None = None
+        self.plant = Plant(scene, vehicle, options.seed, options.view)
+        self.sensors = SensorSuite(scene, vehicle, options.seed)
         self.canvas = Canvas(scene, options.seed)
         self._miscalibration = Miscalibration(scene.camera, vehicle, self._rendered)
         if self._rendered:
             camera = open_camera(options.camera, scene, vehicle, self.canvas, options.seed)
-            self._stream = CameraStream(camera, scene.camera.rate_hz, scene.camera.latency_s)
+            self.stream = CameraStream(camera, scene.camera.rate_hz, scene.camera.latency_s)
         else:
-            self._features = GeometricFeatures(
-                scene, vehicle, self.canvas, options.seed, to_machine_code=options.machine_code
-            )
-        self._seen_from = tuple(self.plant.truth[place] for place in _SEEN_FROM)  # the readings themselves
+            self._features = GeometricFeatures(scene, vehicle, self.canvas, options.seed)
+        self._seen_from = tuple(self.plant.truth[place] for place in _SEEN_FROM)  # views
         self.viewer = self._open_viewer() if options.view else None
         self._brush: tuple[float, float] | None = None
         self._pressed = 0
@@ -156,14 +155,14 @@ class World:
     def sense(self) -> SensorFrame:
         """Sensor frame of the present tick."""
         plant = self.plant
-        if self._rendered:
+        if self.stream is not None:
             pose = self._miscalibration.pose(plant.position, plant.quaternion)
-            image = self._stream.tick(plant.time_ns, *pose)
+            image = self.stream.tick(plant.time_ns, *pose)
             return self.sensors.sample(plant, image=None if image is None else self._miscalibration.picture(image))
         features, now = self._features, plant.time_ns
         if features.rests(now):
             return self.sensors.sample(plant)
-        position, quaternion, velocity = self._seen_from  # read at once, not kept
+        position, quaternion, velocity = self._seen_from
         pose = self._miscalibration.pose(position, quaternion)
         return self.sensors.sample(plant, None, features.tick(now, *pose, velocity))
 
@@ -206,15 +205,15 @@ def fly(
     job: Job | None = None,
     faults: tuple[Fault, ...] = (),
 ) -> Trace:
-    """Fly one scene under one law; Ctrl-C ends the flight and keeps what was flown.
+    """Fly one scene under one law; Ctrl-C ends the flight and returns the partial trace.
 
     Args:
         scene: The truth.
         options: Law, seed, features, picture size and so on.
-        progress: Told about time, phase and real-time factor now and then.
+        progress: Called every `PROGRESS_TICKS` with time, phase and real-time factor.
         config: Flown instead of the preset.
-        job: What is done at the wall; None paints.
-        faults: What goes wrong, and when.
+        job: Task at the wall; None paints.
+        faults: Faults and their times.
 
     Returns:
         The trace; incomplete with a reason when the flight crashed, timed out or was interrupted.
@@ -247,7 +246,7 @@ def fly(
     finally:
         world.close()
     trace = recorder.trace()
-    trace.wall_time_s = time.perf_counter() - start  # with what was put off until the end
+    trace.wall_time_s = time.perf_counter() - start  # includes the trace
     trace.completed = not reason and pilot.painter.finished and not pilot.painter.failed
     trace.reason = reason or pilot.painter.reason
     if reason:

@@ -1,4 +1,4 @@
-"""What goes wrong during a flight: timed events that change the plant, and tell the pilot only what it may know."""
+"""Faults during a flight: timed events that change the plant; the pilot receives only the reported limits."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ LEAST_WINDOW_N = 1e-3
 
 @dataclass(frozen=True, kw_only=True)
 class Fault(ABC):
-    """Something that happens once.
+    """A fault that occurs once.
 
     Attributes:
-        after: What starts the clock: "start", "touch", or the name of a phase of the strategy.
+        after: Event that starts the delay: "start", "touch", or the name of a phase of the strategy.
         delay_s: Time from then on [s].
     """
 
@@ -32,25 +32,25 @@ class Fault(ABC):
 
     @abstractmethod
     def strike(self, world: World, pilot: Pilot) -> str:
-        """Make it happen; returns what happened, in words."""
+        """Apply the fault; returns its description."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Derate(Fault):
-    """One rotor, or all, give only a share of the full thrust from now on; the drive reports it.
+    """One rotor, or all, give only a fraction of the full thrust from now on; the drive reports it.
 
     Attributes:
-        share: Of the nominal upper limit; 0 stops the rotor.
+        share: Fraction of the nominal upper limit; 0 stops the rotor.
         rotor: Its name; empty derates all.
-        told: Whether the pilot learns the new limits.
+        reported: Whether the drive reports the new limits to the pilot.
     """
 
     share: float = 0.5
     rotor: str = ""
-    told: bool = True
+    reported: bool = True
 
     def strike(self, world: World, pilot: Pilot) -> str:
-        """Lower the limits of the plant and, if told, those the pilot counts on."""
+        """Lower the limits of the plant and, if reported, those of the pilot."""
         plant, vehicle = world.plant, pilot.config.controller.vehicle
         names = vehicle.geometry.names
         hit = np.array([self.rotor in ("", name) for name in names])
@@ -59,7 +59,7 @@ class Derate(Fault):
         stopped = hit & (self.share <= 0.0)
         lower = np.where(stopped, 0.0, np.minimum(lower, upper - LEAST_WINDOW_N))
         plant.thrust_limits = lower, np.maximum(upper, 0.0)
-        if self.told:
+        if self.reported:
             pilot.thrust_limits = plant.thrust_limits
         return f"{self.rotor or 'every rotor'} derated to {100.0 * self.share:g} % of full thrust"
 
@@ -82,14 +82,14 @@ class WindStep(Fault):
 
 @dataclass
 class FaultSchedule:
-    """Lets each fault strike once, when its time has come."""
+    """Applies each fault once, at its time."""
 
     faults: tuple[Fault, ...]
     begun: dict[str, float] = dataclasses.field(default_factory=dict)
     struck: set[int] = dataclasses.field(default_factory=set)
 
     def tick(self, world: World, pilot: Pilot) -> list[str]:
-        """Strike what is due; returns what happened, in words."""
+        """Apply due faults; returns their descriptions."""
         if len(self.struck) == len(self.faults):
             return []
         now = world.plant.time_ns * 1e-9

@@ -1,4 +1,4 @@
-"""What follows from the logged motion of the vehicle, for all ticks at once: attitude angles, tip, body velocity."""
+"""Quantities derived from the logged motion, for all ticks at once: rotation, attitude angles, body velocity."""
 
 from __future__ import annotations
 

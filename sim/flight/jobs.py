@@ -1,4 +1,4 @@
-"""What a flight does at the wall: paint, or press and slide; a job makes the strategy that the pilot follows."""
+"""Task of a flight at the wall: paint, or press and slide."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ibvs_qp.painting.presser import Presser
 
 
 class Job(Protocol):
-    """Makes a strategy; frozen, so that it can be sent to another process and told apart by its repr."""
+    """Creates the pilot's strategy; frozen, so that it can be pickled and compared by its repr."""
 
     def strategy(self, config: PaintingConfig) -> Painter:
         """The strategy of one flight."""

@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 
 #: Names of the strategy's phases, in the order of a flight.
 PHASES = ("start", "approach", "align", "press", "paint", "climb", "retreat", "done")
-#: The propeller clearance is taken once in so many ticks; it moves slowly (a strike is checked every tick).
+#: Ticks per logged propeller clearance, which changes slowly (the plant checks for strikes at every tick).
 CLEARANCE_TICKS = 5
-#: Pictures kept for the video per second.
+#: Pictures per second of the video [Hz].
 VIDEO_RATE = 10.0
 #: Columns of one number per tick, in the order in which `Recorder.tick` writes them.
 NUMBERS = "t phase row outcome step_us iterations reach_margin".split()

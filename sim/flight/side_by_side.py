@@ -75,7 +75,7 @@ def _fly_one(scene: Scene, options: FlightOptions, progress: Callable[[float, st
 
 
 def _fly_apart(scene: Scene, jobs: dict[str, FlightOptions], progress: LawProgress) -> dict[str, Flight]:
-    """One process per law. The first Ctrl-C ends the flights and returns what was flown, the second one stops at once.
+    """One process per law. The first Ctrl-C ends the flights and returns the partial traces; the second one raises.
 
     Raises:
         RuntimeError: When a process died.
@@ -116,7 +116,7 @@ def _fly_in_worker(scene: Scene, options: FlightOptions, news: Any, stop: Any) -
 
 
 class _Link:
-    """Progress from the workers and the order to stop to them, by a manager process; a thread passes progress on."""
+    """Progress from the workers and the event that stops them, held by a manager process."""
 
     def __init__(self, progress: LawProgress) -> None:
         from multiprocessing import get_context

@@ -1,4 +1,4 @@
-"""What one flight leaves behind: arrays at the control rate, contact force at the physics rate, pictures, events."""
+"""Record of one flight: arrays at the control rate, contact force at the physics rate, pictures, events."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ FIELDS = {
 
 @dataclass(kw_only=True)
 class Event:
-    """Something that happened: a phase change with its reason, a touch, a loss, a rejected input."""
+    """A phase change with its reason, a touch, a loss, a rejected input."""
 
     t: float
     kind: str
@@ -100,7 +100,7 @@ class Trace:
     preset: str = ""
 
     def draw_later(self, draw: Callable[[], np.ndarray]) -> None:
-        """Have `canvas` drawn when somebody looks at it: a sweep or a search for gains never does."""
+        """Draw `canvas` on first access; sweeps and tuning never access it."""
         self.__dict__.pop("canvas", None)
         self.__dict__["_draw"] = draw
 

@@ -1,4 +1,4 @@
-"""The video: what the camera saw under every law, side by side, above the push force."""
+"""The video: camera pictures of every law side by side, above the push force."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _COLOURS = {"qp": (158, 111, 11), "paper": (26, 94, 213)}
 
 
 def pack_picture(rgb: np.ndarray) -> np.ndarray:
-    """JPEG bytes of an RGB picture, (K,) uint8: a flight's pictures would fill a gigabyte raw."""
+    """JPEG bytes of an RGB picture, (K,) uint8: raw pictures of a flight would fill a gigabyte."""
     good, data = cv2.imencode(".jpg", rgb[..., ::-1], (cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY))
     if not good:
         raise ValueError(f"a picture of shape {rgb.shape} cannot be encoded")
@@ -75,16 +75,16 @@ class _Panel:
         height, width = unpack_picture(trace.pictures[0][1]).shape[:2]
         self.picture_height = round(height * PANEL_WIDTH / width / 2) * 2
         self.height = TITLE_HEIGHT + self.picture_height + STRIP_HEIGHT
-        self.shown, self.scaled = -1, np.zeros(0)
+        self.visible, self.scaled = -1, np.zeros(0)
         self.top_n = FORCE_HEADROOM * max(float(np.max(trace.push_reference, initial=0.0)), 1.0)
         self.plot = self._force_plot()
 
     def draw(self, t: float, height: int) -> np.ndarray:
         index = max(int(np.searchsorted(self.times, t + 1e-9, side="right")) - 1, 0)
-        if index != self.shown:
+        if index != self.visible:
             picture = unpack_picture(self.trace.pictures[index][1])[..., ::-1]
             self.scaled = cv2.resize(picture, (PANEL_WIDTH, self.picture_height), interpolation=cv2.INTER_AREA)
-            self.shown = index
+            self.visible = index
         panel = np.full((height, PANEL_WIDTH, 3), _PAPER, np.uint8)
         panel[TITLE_HEIGHT : TITLE_HEIGHT + self.picture_height] = self.scaled
         tick = min(int(np.searchsorted(self.trace.t, t)), len(self.trace.t) - 1)
@@ -103,7 +103,7 @@ class _Panel:
         _text(panel, f"{t:6.1f} s", (PANEL_WIDTH - 110, 25), 0.6, _INK)
 
     def _force_plot(self) -> np.ndarray:
-        """The whole flight's push, drawn once; a cursor runs over it."""
+        """The whole flight's push, drawn once; a cursor marks the present tick."""
         plot = np.full((STRIP_HEIGHT, PANEL_WIDTH, 3), _PAPER, np.uint8)
         reference = float(np.max(self.trace.push_reference, initial=0.0))
         for value in (0.0, reference):
@@ -131,8 +131,8 @@ class _Panel:
         return np.asarray(MARGIN + (PANEL_WIDTH - 10 - MARGIN) * np.asarray(t) / span)
 
     def _y(self, push_n: float) -> int:
-        share = min(max(push_n / self.top_n, -0.05), 1.0)
-        return round(STRIP_HEIGHT - 18 - (STRIP_HEIGHT - 30) * share)
+        fraction = min(max(push_n / self.top_n, -0.05), 1.0)
+        return round(STRIP_HEIGHT - 18 - (STRIP_HEIGHT - 30) * fraction)
 
 
 def _text(

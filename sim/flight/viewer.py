@@ -1,4 +1,4 @@
-"""MuJoCo's own window on a flight, at real time, with the paint as it is laid."""
+"""Live view of a flight in MuJoCo's window, at real time, with the fresh paint."""
 
 # MuJoCo's bindings carry no types.
 # pyright: reportAttributeAccessIssue=false
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
 
 #: Pictures of the window per simulated second.
 _RATE_HZ = 50.0
-#: A dab of paint: distance between two, half thickness, and how far before the board's face it lies [m].
+#: A dab of paint: spacing, half thickness, and distance in front of the board's face [m].
 _DAB_STEP_M, _DAB_HALF_M, _DAB_LIFT_M = 0.01, 2e-4, 5e-4
-#: Where the window's camera looks, from the board's middle (NED) [m], from how far [m], and at which angles [deg].
+#: View of the window: target from the board's middle (NED) [m], distance [m], and angles [deg].
 _ASIDE_M, _DISTANCE_M, _AZIMUTH_DEG, _ELEVATION_DEG = (-0.45, 0.0, 0.2), 2.4, 35.0, -18.0
 #: Longest wait for the window to close [s].
 _CLOSE_S = 5.0
-#: Light from the camera: the model's own is made for nobody's eyes.
+#: Headlight of the window, brighter than the model's default [-].
 _AMBIENT, _DIFFUSE = 0.55, 0.45
 
 
@@ -36,7 +36,7 @@ class NoDisplay(IbvsQpError):
 
 
 def check_display() -> None:
-    """Refuse where no window can be opened.
+    """Raise if no window can be opened.
 
     Raises:
         NoDisplay: When there is no display, or it does not answer.
@@ -58,7 +58,7 @@ def check_display() -> None:
 
 
 class FlightViewer:
-    """A passive window: it shows what the plant does and changes nothing.
+    """A passive window: it displays the plant and does not change it.
 
     Args:
         plant: The plant shown.
@@ -86,7 +86,7 @@ class FlightViewer:
             self._window = mujoco.viewer.launch_passive(
                 plant.model, plant.data, show_left_ui=False, show_right_ui=False
             )
-        except RuntimeError as error:  # macOS wants its own interpreter
+        except RuntimeError as error:  # macOS needs the interpreter mjpython
             raise NoDisplay(f"--view: {error}") from None
         self._threads = set(threading.enumerate()) - before
         with self._window.lock():
@@ -96,7 +96,7 @@ class FlightViewer:
         self._started = time.perf_counter()
 
     def show(self, pressing: bool) -> None:
-        """Show the plant after a tick; waits where the flight runs faster than time. A closed window shows nothing.
+        """Show the plant after a tick; sleeps while the flight is ahead of real time. Does nothing once closed.
 
         Args:
             pressing: Whether the brush leaves paint.
@@ -115,7 +115,7 @@ class FlightViewer:
     def close(self) -> None:
         """Close the window."""
         self._window.close()
-        for thread in self._threads:  # one that still draws when the interpreter ends would take it down
+        for thread in self._threads:  # a thread that draws while the interpreter ends would crash it
             thread.join(_CLOSE_S)
 
     def _paint(self) -> None:

@@ -1,1 +1,1 @@
-"""Sensor models: truth in, what a real IMU, force/torque sensor and camera deliver out."""
+"""Sensor models of IMU, force/torque sensor, camera and line perception."""

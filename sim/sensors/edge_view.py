@@ -1,4 +1,4 @@
-"""Straight edges of the board as a camera sees them, as compiled functions: one call for all that is fixed."""
+"""Projection of the straight board edges into the camera, as CasADi functions."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ import casadi as ca
 
 from ibvs_qp.vectors import rotation_rows, turned, turned_back
 
-#: Nearest depth that is seen [m].
+#: Least visible depth [m].
 NEAR_M = 0.05
 #: Shortest visible piece that counts as a line, normalised (31 px at 640x480).
 _SHORTEST = 0.05
-#: Depth or offset that changes by less along an edge does not change [m].
+#: A smaller change of depth or offset along an edge counts as none [m].
 _PARALLEL = 1e-12
-#: What is found out about an edge: whether it is seen, the ends of what is seen of it (x1, y1, x2, y2), rho, theta, and
-#: on which side of it the given point of the surface lies (> 0: where the normal points); all normalised.
+#: Numbers of a projected edge: visible or not, ends of its visible part (x1, y1, x2, y2), rho, theta, and the side of
+#: the given surface point (> 0: the side of the normal); all normalised.
 EDGE_NUMBERS = 8
 #: Corners at the ends of every board edge, and whether it is upright: bottom left 0, bottom right 1, top right 2, top
 #: left 3; the fifth point lies on the surface.

@@ -1,21 +1,18 @@
-"""A perfect eye with honest noise: true lines projected and clipped, late like the camera's pictures.
+"""Sensor model of line perception: true lines projected and clipped, with noise and the camera's latency.
 
-It stands in for perception where the controller alone is studied (``--features geometric``).
+It replaces perception where the controller alone is studied (``--features geometric``).
 """
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable
 
-import casadi as ca
 import numpy as np
 
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL, FeatureFrame
 from ibvs_qp.model.bound_function import BoundFunction
-from ibvs_qp.model.machine_code import machine_code
 from sim.sensors.cameras.arm import vehicle_mask
 from sim.sensors.cameras.protocol import Schedule, camera_intrinsics
 from sim.sensors.edge_view import (
@@ -50,9 +47,9 @@ _BOARD_LINES = [
         range(PLANE.stop, BOARD_VIEW, EDGE_NUMBERS), BOARD_EDGES.items(), strict=True
     )
 ]
-#: What a line is before its noise: its numbers, role, kind and track.
+#: A line without noise: its numbers, role, kind and track.
 _Line = tuple[list[float], str, str, int]
-#: How far above an edge a point lies for certain on its upper side [m].
+#: A point this far above a painted edge lies on its upper side [m].
 _ABOVE_M = 0.02
 
 
@@ -68,7 +65,6 @@ class GeometricFeatures:
         painted: The canvas, or the painted edges alone.
         seed: Seed of the noise.
         noise: Whether to add any noise at all.
-        to_machine_code: Whether a C compiler translates the projection; the same bits, sooner.
     """
 
     def __init__(
@@ -78,7 +74,6 @@ class GeometricFeatures:
         painted: Canvas | PaintedEdges,
         seed: int,
         noise: bool = True,
-        to_machine_code: bool = False,
     ) -> None:
         self.scene, self.vehicle, self._noise = scene, vehicle, noise
         self._edges = painted.edges if isinstance(painted, Canvas) else painted
@@ -87,12 +82,12 @@ class GeometricFeatures:
         own, extra = np.random.SeedSequence([seed, 0xFEA7]).spawn(2)
         self._normals, self._extra = Normals(np.random.default_rng(own)), np.random.default_rng(extra)
         self._schedule: Schedule[FeatureFrame] = Schedule(scene.camera.rate_hz, scene.camera.latency_s)
-        self._bind(machine_code if to_machine_code else lambda function: function)
+        self._bind()
         hidden = vehicle_mask(scene, vehicle, self.intrinsics)
-        self._pieces = PaintedPieces(self._edges, self._board, self.intrinsics, hidden, to_machine_code)
+        self._pieces = PaintedPieces(self._edges, self._board, self.intrinsics, hidden)
 
-    def _bind(self, translated: Callable[[ca.Function], ca.Function]) -> None:
-        """Compiled projection on memory that holds its arguments."""
+    def _bind(self) -> None:
+        """Bind the compiled projection to the arrays that hold its arguments."""
         scene = self.scene
         half = 0.5 * np.array((scene.camera.width, scene.camera.height)) / self.intrinsics[:2]
         self._half = half.tolist()
@@ -102,15 +97,13 @@ class GeometricFeatures:
         unit = self._world(np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])).reshape(-1)
         self._position, self._quaternion, camera = np.zeros(3), np.zeros(4), np.array(self.vehicle.camera_position_m)
         self._board, self._piece, self._edge = np.zeros(BOARD_VIEW), np.zeros(6), np.zeros(EDGE_NUMBERS)
-        self._look = BoundFunction(
-            translated(board_view()), (self._position, self._quaternion, camera, outline, unit, half), (self._board,)
+        self._view_board = BoundFunction(
+            board_view(), (self._position, self._quaternion, camera, outline, unit, half), (self._board,)
         )
-        self._look_at_piece = BoundFunction(
-            translated(painted_edge_view()), (self._board, self._piece, half), (self._edge,)
-        )
+        self._view_piece = BoundFunction(painted_edge_view(), (self._board, self._piece, half), (self._edge,))
 
     def rests(self, now_ns: int) -> bool:
-        """Whether nothing is seen nor delivered at this time: `tick` would do nothing."""
+        """Whether neither a capture nor a delivery is due now, so that `tick` may be skipped."""
         return self._schedule.rests(now_ns)
 
     def tick(
@@ -131,9 +124,9 @@ class GeometricFeatures:
     def capture(
         self, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, velocity_body: np.ndarray, stamp_ns: int
     ) -> FeatureFrame:
-        """What perception would report about a picture taken now; arguments as for `tick`."""
+        """Report of perception on a picture taken now; arguments as for `tick`."""
         self._position[:], self._quaternion[:] = position_ned, quaternion_b_in_i
-        self._look()
+        self._view_board()
         board = self._board.tolist()
         found = [(board[at], role, kind, track) for at, role, kind, track in _BOARD_LINES if board[at.start]]
         found += self._paint_lines(board)
@@ -167,14 +160,14 @@ class GeometricFeatures:
         span = self._in_view(board, low, high)
         for row, left, low, right, high in self._pieces.seen(*span):
             self._piece[:] = left, low, right, high, 0.5 * (left + right), 0.5 * (low + high) + _ABOVE_M
-            self._look_at_piece()
+            self._view_piece()
             numbers = self._edge.tolist()
             if numbers[0]:
                 lines.append((numbers, HORIZONTAL, "paint", _FIRST_ROW_TRACK + row))
         return lines
 
     def _in_view(self, board: list[float], low: float, high: float) -> tuple[float, float]:
-        """Between which places along the board all in the picture from one height to another lies [m]."""
+        """Range along the board [m] that contains every visible point between two heights."""
         x, _, z, along_x, _, along_z, up_x, _, up_z = board[: PER_METRE.stop]
         half, first, last = self._half[0], -math.inf, math.inf
         for sign in (1.0, -1.0):  # half z +- x >= 0, which is linear along the board and up
@@ -201,7 +194,7 @@ class GeometricFeatures:
 
 
 def add_sigma_vs(frame: FeatureFrame, sigma: float, rng: np.random.Generator) -> FeatureFrame:
-    """Add noise to rho [-] and theta [rad] of each line, told to nobody: the covariances stay as they are.
+    """Add noise to rho [-] and theta [rad] of each line, unreported: the covariances stay as they are.
 
     Args:
         frame: What perception saw.

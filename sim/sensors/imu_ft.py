@@ -1,4 +1,4 @@
-"""IMU and force/torque sensor: rate, noise, bias and delay; truth comes in, what a vehicle delivers goes out."""
+"""IMU and force/torque sensor: the truth with rate, noise, bias and delay."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ import numpy as np
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.measurement import FeatureFrame, RgbdFrame, SensorFrame
 from ibvs_qp.model.bound_function import BoundFunction
-from ibvs_qp.model.machine_code import machine_code
 from sim.world.plant import Plant
 from sim.world.random_streams import NormalRows, Normals, stream
 from sim.world.readout import PLACES, SIZE
@@ -25,12 +24,12 @@ _WRENCH = PLACES["ft_wrench"]
 
 
 class SampleClock:
-    """Says when a sensor of a given rate samples; integer nanoseconds, so that no rounding drifts.
+    """Sample times of a sensor; integer nanoseconds, so that no rounding drifts.
 
     A sample falls on the first control tick at or after its time; a sensor faster than the ticks samples on each.
 
     Attributes:
-        next_ns: Before this time no sample is due.
+        next_ns: Time of the next sample [ns].
     """
 
     def __init__(self, rate_hz: float) -> None:
@@ -73,8 +72,8 @@ class Imu:
     by a constant tilt in a random direction and turned by an arbitrary yaw, both fixed by the seed.
     """
 
-    def __init__(self, scene: ImuScene, seed: int, to_machine_code: bool = False) -> None:
-        self._clock, self._to_machine_code = SampleClock(scene.rate_hz), to_machine_code
+    def __init__(self, scene: ImuScene, seed: int) -> None:
+        self._clock = SampleClock(scene.rate_hz)
         root = math.sqrt(scene.rate_hz)
         attitude = stream(seed, "attitude")
         direction, yaw = attitude.uniform(-math.pi, math.pi, 2).tolist()
@@ -84,15 +83,12 @@ class Imu:
         self._settings = np.array((*sigmas, *tilt, math.cos(0.5 * yaw), math.sin(0.5 * yaw), 1.0))
         self._noise = NormalRows((attitude, stream(seed, "gyro"), stream(seed, "accelerometer")), 3)
         self._kick, self._sample = np.zeros(9), np.zeros(10)
-        self._kick_memory = memoryview(self._kick)  # type: ignore[arg-type]
         self._plant: Plant | None = None
         self.attitude = self.angular_velocity = self.specific_force = np.zeros(0)
 
-    def _look_at(self, plant: Plant) -> None:
+    def _bind(self, plant: Plant) -> None:
         self._plant = plant
-        arguments = plant.truth, self._kick, self._settings
-        function = machine_code(imu_function()) if self._to_machine_code else imu_function()
-        self._read = BoundFunction(function, arguments, (self._sample,))
+        self._read = BoundFunction(imu_function(), (plant.truth, self._kick, self._settings), (self._sample,))
 
     def sample(self, plant: Plant) -> None:
         """Take a sample if one is due."""
@@ -100,9 +96,9 @@ class Imu:
         if now < clock.next_ns or not clock.due(now):
             return
         if plant is not self._plant:
-            self._look_at(plant)
-        self._noise.take_into(self._kick_memory)
-        self._read.evaluate()
+            self._bind(plant)
+        self._kick[:] = self._noise.take()
+        self._read()
         sample = self._sample.copy()
         self.attitude, self.angular_velocity, self.specific_force = sample[:4], sample[4:7], sample[7:]
 
@@ -111,7 +107,7 @@ class Imu:
 def imu_function() -> ca.Function:
     """Function of (readings, nine normal numbers, settings) yielding attitude, angular velocity and specific force."""
     truth, kick, settings = ca.SX.sym("truth", SIZE), ca.SX.sym("kick", 9), ca.SX.sym("settings", 8)
-    # The one is a symbol, because a literal's division would be drawn into the products: other rounding.
+    # The one is a symbol: CasADi folds a literal's division into the products, which rounds differently.
     spread, gyro, accel, tilt_x, tilt_y, yaw_w, yaw_z, one = (settings[index] for index in range(8))
     quaternion, rate, felt = (truth[PLACES[name]] for name in ("quaternion", "rate", "felt"))
     vector = tilt_x + spread * kick[0], tilt_y + spread * kick[1], spread * kick[2]
@@ -126,7 +122,7 @@ def imu_function() -> ca.Function:
 class ForceTorque:
     """Force/torque sensor with noise, a force bias of constant size and random direction, and a delivery delay.
 
-    The first sample of a flight is delivered at once, so that there is always one.
+    The first sample of a flight is delivered without delay, so that every frame has one.
     """
 
     def __init__(self, scene: ForceTorqueScene, seed: int) -> None:
@@ -155,18 +151,15 @@ class SensorSuite:
         scene: Rates, noise, biases and delays.
         vehicle: The vehicle that carries them.
         seed: Same seed, same noise to the bit; each sensor has its own stream.
-        to_machine_code: Whether a C compiler translates the arithmetic; the same bits, sooner.
     """
 
-    def __init__(
-        self, scene: Scene, vehicle: VehicleParams | None = None, seed: int = 0, to_machine_code: bool = False
-    ) -> None:
+    def __init__(self, scene: Scene, vehicle: VehicleParams | None = None, seed: int = 0) -> None:
         self.vehicle = vehicle or VehicleParams()
-        self.imu = Imu(scene.imu, seed, to_machine_code)
+        self.imu = Imu(scene.imu, seed)
         self.force_torque = ForceTorque(scene.force_torque, seed)
 
     def sample(self, plant: Plant, image: RgbdFrame | None = None, features: FeatureFrame | None = None) -> SensorFrame:
-        """What the vehicle delivers at this control tick, with the picture or the features that have come meanwhile."""
+        """What the vehicle delivers at this control tick, with the picture or the features that are due."""
         imu, force_torque = self.imu, self.force_torque
         imu.sample(plant)
         force_torque.sample(plant)

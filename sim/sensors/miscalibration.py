@@ -1,4 +1,4 @@
-"""A camera that is not where, or not as long, as the pilot believes: errors of its mount and of its focal length."""
+"""Calibration errors of the camera: mount position, mount attitude and focal length."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from sim.world.scene import CameraScene
 
 
 class Miscalibration:
-    """Turns the vehicle's pose into the one from which a nominal camera would see what the real one sees.
+    """Pose from which a nominal camera takes the picture of the miscalibrated one.
 
-    The camera's own view of arm and brush stays nominal: within a few degrees it moves by less than its outline blurs.
+    The camera's own view of arm and brush stays nominal: a few degrees move it by less than the blur of its outline.
 
     Args:
         scene: Errors of the mount (body axes) and of the focal length.
@@ -25,7 +25,7 @@ class Miscalibration:
         rendered: Whether there are pictures; only they have a focal length.
 
     Raises:
-        ConfigError: When a focal error is asked for without pictures.
+        ConfigError: When a focal error is set without pictures.
     """
 
     def __init__(self, scene: CameraScene, vehicle: VehicleParams, rendered: bool) -> None:
@@ -46,7 +46,7 @@ class Miscalibration:
         return real - rotation_from_quaternion(turned) @ self._camera, turned
 
     def picture(self, frame: RgbdFrame) -> RgbdFrame:
-        """The picture with the focal lengths that the pilot is told."""
+        """The picture with the reported focal lengths."""
         if self._focal == 1.0:
             return frame
         fx, fy, cx, cy = frame.intrinsics

@@ -1,46 +1,16 @@
-"""What of every painted edge a camera sees: its longest piece that neither paint, arm, brush nor border interrupts.
-
-The loop over the points is C where there is a compiler (painted_pieces.c), numpy elsewhere: the same bits, because
-both take sums in the order of the points.
-"""
+"""The longest visible piece of every painted edge: within the picture, not behind arm or brush, not painted over."""
 
 from __future__ import annotations
 
-import ctypes
-import functools
 import itertools
-import logging
-import subprocess
-from pathlib import Path
 
 import numpy as np
 
-from ibvs_qp.model.shared_library import compiler, shared_library
 from sim.sensors.edge_view import CORNER, NEAR_M, PER_METRE
 from sim.world.painted_edges import BIN_M, PaintedEdges
 
-#: No contraction of products and sums, so that the bits are those of numpy.
-FLAGS = ("-O2", "-fPIC", "-shared", "-ffp-contract=off")
-#: Numbers of a piece in C: its points, along and up of its left end, and of its right end.
-_NUMBERS = 5
-
 #: Row, and (along, up) of the left and of the right end of the least-squares line through the piece [m].
 Piece = tuple[int, float, float, float, float]
-
-log = logging.getLogger(__name__)
-
-
-@functools.cache
-def _library() -> ctypes.CDLL | None:
-    command = compiler()
-    if command is None:
-        return None
-    try:
-        code = Path(__file__).with_suffix(".c").read_text()
-        return ctypes.CDLL(str(shared_library("painted_pieces", code, command, FLAGS)))
-    except (OSError, subprocess.SubprocessError) as error:
-        log.warning("painted edges are looked for by numpy: %s", error)
-        return None
 
 
 class PaintedPieces:
@@ -51,7 +21,6 @@ class PaintedPieces:
         board: View of the board (`sim.sensors.edge_view.board_view`), read at every call.
         intrinsics: (fx, fy, cx, cy) [px].
         hidden: Where arm or brush hide the board, uint8 (H, W), 0 where they do not.
-        to_machine_code: Whether to have the loop translated by a C compiler.
     """
 
     def __init__(
@@ -60,23 +29,12 @@ class PaintedPieces:
         board: np.ndarray,
         intrinsics: tuple[float, float, float, float],
         hidden: np.ndarray,
-        to_machine_code: bool = False,
     ) -> None:
-        self._edges, self._hidden = edges, np.ascontiguousarray(hidden)
+        self._edges, self._hidden = edges, hidden
         self._corner, self._along, self._up = board[CORNER], *board[PER_METRE].reshape(2, 3)
         self._focal, self._centre = np.array(intrinsics[:2]), np.array(intrinsics[2:])
         height, width = hidden.shape
         self._last_pixel = np.array((width - 1.0, height - 1.0))
-        library = _library() if to_machine_code else None
-        self._find = None if library is None else library.painted_pieces
-        if self._find is not None:
-            rows, bins = edges.open.shape
-            self._camera = np.array((*intrinsics, *self._last_pixel, NEAR_M))
-            self._pieces = np.zeros((rows, _NUMBERS))
-            tables = [place(part) for part in (edges.open, edges.top, edges.middles)]
-            sizes = [ctypes.c_long(number) for number in (rows, bins)]
-            seen_by = place(board), place(self._camera), place(self._hidden), ctypes.c_long(width)
-            self._board, self._fixed, self._result = board, (*seen_by, *tables, *sizes), place(self._pieces)
 
     def seen(self, first_m: float, last_m: float) -> list[Piece]:
         """The piece of every row of which two points at least are seen.
@@ -85,15 +43,7 @@ class PaintedPieces:
             first_m: Points farther left along the board than this are not in the picture [m].
             last_m: Likewise farther right.
         """
-        if self._find is None:
-            return self._found(*self._edges.all_exposed(first_m, last_m))
-        start, end = self._edges.bins_between(first_m, last_m)
-        self._find(*self._fixed, ctypes.c_long(start), ctypes.c_long(end), self._result)
-        rows = enumerate(self._pieces.tolist())
-        return [(row, left, low, right, high) for row, (count, left, low, right, high) in rows if count > 1.0]
-
-    def _found(self, rows: np.ndarray, points: np.ndarray) -> list[Piece]:
-        """The same from the rows (n,) and places (n, 2) of all exposed points."""
+        rows, points = self._edges.all_exposed(first_m, last_m)
         along, up = points[:, :1], points[:, 1:]
         seen = self._unhidden(self._corner + (along * self._along + up * self._up))
         pieces = []
@@ -115,11 +65,6 @@ class PaintedPieces:
         return places[self._hidden[row, column] == 0]
 
 
-def place(array: np.ndarray) -> ctypes.c_void_p:
-    """Where a contiguous array lies in memory; it must outlive the use."""
-    return ctypes.c_void_p(array.__array_interface__["data"][0])
-
-
 def fitted_ends(points: np.ndarray) -> tuple[float, float, float, float]:
     """Least-squares line up(along) through points (n, 2), as (along, up) of its two ends."""
     along, up = points.T
@@ -131,7 +76,7 @@ def fitted_ends(points: np.ndarray) -> tuple[float, float, float, float]:
 
 
 def _total(numbers: np.ndarray) -> float:
-    """Sum in the order of the numbers, as a loop takes it; np.sum takes it in parts."""
+    """Sum in the order of the numbers; np.sum adds in pairs, which rounds differently between processors."""
     return np.add.accumulate(numbers).item(-1)
 
 

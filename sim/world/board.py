@@ -1,4 +1,4 @@
-"""Where the board and the nominal strokes lie in the world (truth; the controller never sees it).
+"""Position of board and nominal strokes in the world (truth; no input of the controller).
 
 World NED with the wall to the north: x points into the wall, y to the right as the vehicle sees it, z down. The
 board's face is the plane x = 0, its bottom left corner the point y = 0, z = -bottom_m; the wall's face lies at
@@ -44,7 +44,7 @@ class BoardGeometry:
         return (np.asarray(yz, float) - self._corner) @ self._axes
 
     def spot(self, y: float, z: float) -> tuple[float, float]:
-        """`board_coordinates` of one point in plain numbers: the brush asks for it all the time."""
+        """`board_coordinates` of one point in plain numbers, fast enough for every tick."""
         (corner_y, corner_z), (right_y, right_z), (up_y, up_z) = self._numbers
         y, z = y - corner_y, z - corner_z
         return y * right_y + z * right_z, y * up_y + z * up_z

@@ -21,14 +21,14 @@ from sim.world.scene import Scene
 
 #: Wall picture: resolution [px/m] and extent beyond the board's outline [m].
 WALL_PIXELS_PER_M, WALL_EXTENT_M = 500.0, 1.3
-#: Largest texture [px]; bigger boards get a coarser picture rather than fill the memory.
+#: Largest texture [px]; larger boards get a coarser picture, which bounds the memory.
 _MAX_PIXELS = 12e6
 _RIM_M = 0.006
 #: The texture goes on beyond the outline by this much, so that its rim can be drawn without samples from outside [px].
 TEXTURE_PAD_PX = 8
 #: Sub-pixel positions of the brush stamp per axis, and distance between stamps [px]: 2^2 / (8 r) = 0.01 px of scallop.
 _PHASES, _STAMP_STEP_PX = 16, 2.0
-#: Stamps drawn together: one by one each of them would wait for the memory of its pixels.
+#: Stamps drawn together: one by one, each would wait for its pixels' memory [-].
 _STAMPS_AT_ONCE = 64
 
 
@@ -68,7 +68,7 @@ class Canvas:
         rng = np.random.default_rng(self._seeds[0])
         return rng, int(rng.binomial(self.scene.board.clutter, 0.5))
 
-    # Pictures are made when somebody looks: a flight without a camera needs none of them.
+    # Pictures are lazy: a flight without a camera needs none of them.
 
     @functools.cached_property
     def _blank(self) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""How near the propeller discs come to board and wall."""
+"""Distance of the propeller discs to board and wall."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import numpy as np
 from ibvs_qp.config.vehicle import VehicleParams
 from sim.world.board import BoardGeometry
 
-#: Points on the rim of every disc, 17 mm apart: so exactly is known where a disc crosses the board's outline; its
+#: Points on the rim of every disc, 17 mm apart: the resolution with which a disc crosses the board's outline; its
 #: foremost point is exact.
 RIM_POINTS = 72
-#: Poses taken at once [-]: their rims fill less than a megabyte. Of four times as many, every intermediate result is
-#: fetched from the operating system anew, page by page, and a flight's clearance takes 37 ms instead of 7.
+#: Poses per block [-]: their rims fill less than a megabyte; blocks four times as large take 37 ms a flight instead of
+#: 7, because every intermediate result is allocated anew by the operating system.
 BLOCK = 64
 
 
@@ -22,7 +22,7 @@ class PropellerClearance:
     """Distance of the propeller discs to the board's face inside its outline and to the wall elsewhere.
 
     Attributes:
-        reach: No disc comes farther from the body's origin than this, whatever its attitude [m].
+        reach: Largest distance of any disc point from the body's origin [m].
 
     Args:
         board: Board and wall.
@@ -53,18 +53,18 @@ class PropellerClearance:
         return position[0] + self._positions @ rotation[0] + self._radius * np.sqrt(np.maximum(1.0 - axis * axis, 0.0))
 
     def foremost(self, position: np.ndarray, rotation: np.ndarray) -> float:
-        """Largest world x that any disc reaches [m], exact and quick; negative: clear of board and wall."""
+        """Largest world x that any disc reaches [m], exact; negative: clear of board and wall."""
         return float(self._fronts(position, rotation).max())
 
     def strikes(self, position: Sequence[float], rotation: Sequence[Sequence[float]]) -> bool:
-        """Whether any disc touches board or wall; costs next to nothing while the body keeps its distance."""
+        """Whether any disc touches board or wall."""
         if position[0] + self.reach <= 0.0:
             return False
         where, turn = np.array(position), np.array(rotation)
         return self.foremost(where, turn) > 0.0 and self.distance(where, turn) <= 0.0
 
     def distances(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
-        """`distance` of many poses at once [m], (N,); the numbers of one pose by itself are the same to rounding.
+        """`distance` of many poses at once [m], (N,), equal to rounding.
 
         Args:
             positions: (N, 3).

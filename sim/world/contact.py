@@ -22,8 +22,8 @@ IMPEDANCE = 0.002
 STICK_RATE = 100.0
 
 #: Solver options under which the recipe holds. The no-slip pass removes the creep of a sticking tip. No force here is
-#: implicit in the velocity and there is one contact: Euler steps without a search for islands cost a seventh less, and
-#: what the model has none of need not be looked for.
+#: implicit in the velocity and there is one contact, so Euler steps without a search for islands cost a seventh less;
+#: constraint types that the model lacks are disabled.
 OPTION_XML = (
     '<option timestep="0.001" gravity="0 0 -{gravity}" integrator="Euler" cone="elliptic" impratio="10" '
     'solver="Newton" jacobian="dense" noslip_iterations="3"><flag autoreset="disable" island="disable" '

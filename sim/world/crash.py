@@ -1,4 +1,4 @@
-"""What ends a flight: a propeller at the wall, the ground, a flip, or numbers that are none."""
+"""Crash conditions: propeller strike, ground contact, flip, non-finite state."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ FLIP_COSINE = math.cos(math.radians(FLIP_DEG))
 def crash_reason(
     position: Sequence[float], rotation: Sequence[Sequence[float]], clearance: PropellerClearance
 ) -> str | None:
-    """Why a vehicle at this pose has crashed, or None; plain floats, it is asked every tick.
+    """Why a vehicle at this pose has crashed, or None.
 
     Args:
         position: Body origin, world NED [m], (3,).

@@ -29,13 +29,13 @@ TIP_RADIUS_M = 0.005
 #: Thickness of the board drawn [m].
 BOARD_THICKNESS_M = 0.004
 
-#: Physics steps of 1 ms in one control tick; MuJoCo remembers what its sensors read at each of them.
+#: Physics steps of 1 ms in one control tick; MuJoCo stores its sensors' samples at each of them.
 STEPS_PER_TICK = 4
 
 
 @dataclass(frozen=True, kw_only=True)
 class ModelIds:
-    """Where things are in the compiled model.
+    """Indices of bodies and sensors in the compiled model.
 
     Attributes:
         vehicle: Body of the vehicle without tool.
@@ -44,7 +44,7 @@ class ModelIds:
         force: Slice: force of the vehicle on the tool, front-left-up [N].
         torque: Slice: the moment at the force/torque sensor [N m].
         contact: Slice: found flag, then force (normal, tangents) and the normal and first tangent axes.
-        remembered: Where in ``history`` the samples of those four sensors at the steps of a tick begin, oldest first.
+        remembered: Start in ``history`` of the samples of those four sensors at the steps of a tick, oldest first.
     """
 
     vehicle: int
@@ -119,7 +119,7 @@ def build_xml(scene: Scene, vehicle: VehicleParams, drawn: bool = True) -> str:
     ends, radius = _numbers(sensor, sphere), _numbers(vehicle.arm_radius_m)
     shape = f'name="arm" type="capsule" fromto="{ends}" size="{radius}"'
     arm = f'<geom {shape} contype="0" conaffinity="0" rgba=".1 .1 .1 1"/>'
-    # Nothing collides with what is there for pictures only, but MuJoCo would place it at every step.
+    # Geometry without contact costs MuJoCo time at every step.
     surroundings, discs, arm = (_surroundings_xml(scene), discs, arm) if drawn else ("", "", "")
     return f"""<mujoco model="ibvs_qp">
   <compiler angle="radian" balanceinertia="true" autolimits="true"/>
@@ -161,10 +161,10 @@ def build_model(scene: Scene, vehicle: VehicleParams, drawn: bool = True) -> tup
     Args:
         scene: The truth.
         vehicle: Geometry and nominal parameters.
-        drawn: Whether to put in what is there for pictures only; it moves as well without, sooner.
+        drawn: Whether to add geometry for display only; the motion is the same to the bit without it.
 
     Raises:
-        ConfigError: When vehicle and tool cannot make up the scene's mass and inertia.
+        ConfigError: When the tool alone exceeds the scene's mass or inertia.
     """
     model = mujoco.MjModel.from_xml_string(build_xml(scene, vehicle, drawn))
     ids = {name: mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name) for name in ("vehicle", "tool")}

@@ -1,4 +1,4 @@
-"""Where the upper edge of every painted row really runs, recorded from the strokes themselves."""
+"""True upper edge of every painted row, computed from the strokes."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class PaintedEdges:
     Attributes:
         top: That height [m], -inf without paint, (rows + 1, bins); row 0 is empty.
         open: Bins that are painted and that no later row lies over, bool (rows + 1, bins).
-        middles: Middle of each bin along the board [m], (bins,). All three are filled in when somebody asks below.
+        middles: Middle of each bin along the board [m], (bins,). `heights` and `all_exposed` update all three.
 
     Args:
         scene: Board and paint job.
@@ -34,13 +34,13 @@ class PaintedEdges:
         self._radius, self._rows = 0.5 * scene.paint.brush_width_m, scene.paint.rows
         self._bins = math.ceil(scene.board.width_m / BIN_M)
         self.top = np.full((self._rows + 1, self._bins), -math.inf)
-        # Bins of a row that some later row lies over, kept up to date as paint comes: they are asked for all the time.
+        # Bins of a row that a later row covers, updated by every stroke.
         self._covered = np.zeros((self._rows + 1, self._bins), dtype=bool)
         self._reach = math.ceil(self._radius / BIN_M)
         self.open = np.zeros((self._rows + 1, self._bins), dtype=bool)  # painted and not covered
         self.middles = (np.arange(self._bins) + 0.5) * BIN_M
         self._lowest, self._highest = math.inf, -math.inf
-        self._coming: list[tuple[BoardPoint, BoardPoint]] = []  # strokes that nobody has looked at yet
+        self._coming: list[tuple[BoardPoint, BoardPoint]] = []  # strokes not yet in the tables
 
     def stroke(self, previous: BoardPoint | None, current: BoardPoint) -> None:
         """Record a stroke between two tip positions (along, up) [m]; see `sim.world.canvas.Canvas.stroke`."""
@@ -48,7 +48,7 @@ class PaintedEdges:
             self._coming.append((previous, current))
 
     def _catch_up(self) -> None:
-        """Take in the strokes since somebody last looked; together they find everything at hand."""
+        """Add the strokes since the last call to the tables."""
         for previous, current in self._coming:
             self._add(previous, current)
         self._coming.clear()
@@ -77,7 +77,7 @@ class PaintedEdges:
 
     @property
     def heights(self) -> tuple[float, float]:
-        """Between which heights every point lies [m]; the lower one is above the other where nothing is painted."""
+        """Lowest and highest point [m]; (inf, -inf) without paint."""
         self._catch_up()
         return self._lowest, self._highest
 

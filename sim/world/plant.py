@@ -5,14 +5,12 @@
 from __future__ import annotations
 
 import math
-import struct
 
 import mujoco
 import numpy as np
 
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.model.bound_function import BoundFunction
-from ibvs_qp.model.machine_code import machine_code
 from sim.world.board import BoardGeometry
 from sim.world.clearance import PropellerClearance
 from sim.world.crash import crash_reason
@@ -28,10 +26,9 @@ from sim.world.wind import Wind
 #: The control tick in nanoseconds.
 TICK_NS = 4_000_000
 
-#: End of a flight whose controller commands something that is no number; physics stands still from then on.
+#: Crash reason after a non-finite command; physics stops from then on.
 NOT_FINITE = "non-finite thrust command"
 _SAFE = PLACES["safe"].start
-_put_three = struct.Struct("3d").pack_into
 
 
 class Plant(PlantReadings):
@@ -45,14 +42,13 @@ class Plant(PlantReadings):
         time_ns: Simulated time since the start [ns].
         crashed: Why the flight is over (propeller strike, ground, flip, non-finite state), or None.
         wind: The air; its mean may be changed in flight.
-        truth: What can be read of it now, laid out as `sim.world.readout.PLACES`; neither to be kept nor written.
+        truth: Present readings, see `sim.world.readout.PLACES`; a view, valid until the next tick, read-only.
 
     Args:
         scene: The truth.
         vehicle: Geometry and nominal parameters.
         seed: Varies start pose and gusts.
-        to_machine_code: Whether a C compiler translates the arithmetic around the physics; the same bits, sooner.
-        drawn: Whether MuJoCo's model holds what a window shows; likewise.
+        drawn: Whether the model holds the geometry that a window shows; the motion is the same to the bit.
     """
 
     def __init__(
@@ -60,10 +56,8 @@ class Plant(PlantReadings):
         scene: Scene,
         vehicle: VehicleParams | None = None,
         seed: int = 0,
-        to_machine_code: bool = False,
         drawn: bool = True,
     ) -> None:
-        self._translate = machine_code if to_machine_code else lambda function: function
         self.scene, self.vehicle = scene, vehicle or VehicleParams()
         self.model, self._ids = build_model(scene, self.vehicle, drawn)
         self.data = mujoco.MjData(self.model)
@@ -77,7 +71,7 @@ class Plant(PlantReadings):
         self._start(*start_pose(scene, self.vehicle, seed), hover_thrusts(scene, self.vehicle))
 
     def _bind(self) -> None:
-        """Compiled arithmetic on MuJoCo's own memory: fetching its arrays each time costs more than reading them."""
+        """Bind the CasADi functions to MuJoCo's arrays: fetching those at every tick costs more than reading them."""
         model, data, ids, truth = self.model, self.data, self._ids, self.scene.vehicle
         self._act = data.act
         centre = np.array(truth.com_offset_m)
@@ -85,18 +79,17 @@ class Plant(PlantReadings):
         self.truth = np.zeros(SIZE)
         self._centre_velocity = self.truth[PLACES["centre_velocity"]]
         self._read = BoundFunction(
-            self._translate(readout(model.nhistory, *ids.remembered, STEPS_PER_TICK)),
+            readout(model.nhistory, *ids.remembered, STEPS_PER_TICK),
             (data.qpos, data.qvel, data.history, points),
             (self.truth,),
         )
         self._wanted, self._air, self._lags = np.zeros(model.nu), np.zeros(3), np.zeros(model.nu)
-        self._air_memory = self._air.data
         self._lag = model.actuator_dynprm[:, 0]
         lags = np.array((truth.motor_lag_up_s, truth.motor_lag_down_s))
         # Moment arm from the bare vehicle's centre of mass, where MuJoCo applies forces, to the whole one's.
         arm = centre - FLIP * model.body_ipos[ids.vehicle]
         self._drive = BoundFunction(
-            self._translate(drive(model.nu)),
+            drive(model.nu),
             (self._wanted, self._lower, self._upper, data.act, lags, self._air, self.truth[PLACES["rotation"]], arm),
             (data.ctrl, self._lags, data.xfrc_applied[ids.vehicle]),
         )
@@ -120,18 +113,18 @@ class Plant(PlantReadings):
         """Advance one control tick of 4 ms under constant commanded thrusts.
 
         Args:
-            thrusts: Commanded thrusts [N], (n,); clipped to the true limits. One that is no number ends the flight.
+            thrusts: Commanded thrusts [N], (n,); clipped to the true limits. A non-finite one ends the flight.
         """
         if self.crashed == NOT_FINITE or not math.isfinite(sum(thrusts.tolist())):
             self.crashed, self.time_ns = self.crashed or NOT_FINITE, self.time_ns + TICK_NS
             return
         self._wanted[:] = thrusts
-        _put_three(self._air_memory, 0, *self.wind.force(self._centre_velocity.tolist()))
-        self._drive.evaluate()
+        self._air[:] = self.wind.force(self._centre_velocity.tolist())
+        self._drive()
         self._lag[:] = self._lags
         mujoco.mj_step(self.model, self.data, STEPS_PER_TICK)
         self.time_ns += TICK_NS
-        self._read.evaluate()
+        self._read()
         if self.truth.item(_SAFE) != 1.0 and self.crashed is None:
             self.crashed = crash_reason(self.position.tolist(), self.rotation.tolist(), self.clearance)
 

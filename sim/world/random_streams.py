@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-#: Normal numbers drawn at once: a call of the generator costs as much as a hundred numbers.
+#: Normal numbers drawn at once: a call of the generator costs as much as a hundred numbers [-].
 BLOCK = 512
 
 
@@ -20,7 +20,7 @@ class Normals:
     """Standard normal numbers of a generator, drawn in blocks: the same numbers in the same order as one by one.
 
     Args:
-        generator: Source; nobody else may draw from it any more.
+        generator: Source; no other code may draw from it.
     """
 
     def __init__(self, generator: np.random.Generator) -> None:
@@ -41,22 +41,19 @@ class NormalRows:
     """Rows of standard normal numbers, a few of each of several generators: the same numbers as one by one.
 
     Args:
-        generators: Sources; nobody else may draw from them any more.
+        generators: Sources; no other code may draw from them.
         each: Numbers of each generator in a row.
     """
 
     def __init__(self, generators: Sequence[np.random.Generator], each: int) -> None:
         self._generators, self._each = tuple(generators), each
-        self._width = each * len(self._generators)
-        self._next, self._rows = 0, memoryview(b"").cast("d")
+        self._rows: Iterator[np.ndarray] = iter(())
 
-    def take_into(self, row: memoryview) -> None:
-        """Write the next row into memory, (numbers,)."""
-        start = self._next
-        if start == len(self._rows):
-            count = BLOCK // self._each
-            blocks = [source.standard_normal(count * self._each) for source in self._generators]
-            rows = np.hstack([block.reshape(count, self._each) for block in blocks])
-            start, self._rows = 0, memoryview(rows.reshape(-1))  # type: ignore[arg-type]
-        self._next = end = start + self._width
-        row[:] = self._rows[start:end]
+    def take(self) -> np.ndarray:
+        """The next row, (numbers,)."""
+        row = next(self._rows, None)
+        if row is None:
+            shape = (BLOCK // self._each, self._each)
+            self._rows = iter(np.hstack([source.standard_normal(shape) for source in self._generators]))
+            row = next(self._rows)
+        return row

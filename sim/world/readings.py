@@ -1,4 +1,4 @@
-"""What can be read of the plant at a control tick: truth, in NED and FRD."""
+"""Readings of the plant at a control tick: truth, in NED and FRD."""
 
 from __future__ import annotations
 
@@ -10,22 +10,20 @@ from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.vectors import cross_product, turned
 from sim.world.clearance import PropellerClearance
 from sim.world.readout import MOTION, PLACES
-from sim.world.scene import Scene
 
 _PUSH, _TIP = PLACES["pushes"].stop - 1, PLACES["tip"]
 
 
 def _reading(name: str, text: str) -> property:
-    """A reading as an array of the reader's own."""
+    """A property that returns a copy of one reading."""
     place = PLACES[name]
     return property(lambda plant: plant.truth[place].copy(), doc=text)
 
 
 class PlantReadings:
-    """Pose, motion, forces and contact of a plant, each an array of the reader's own."""
+    """Pose, motion, forces and contact of a plant, each a copy."""
 
     truth: np.ndarray
-    scene: Scene
     vehicle: VehicleParams
     clearance: PropellerClearance
     _act: np.ndarray
@@ -36,7 +34,7 @@ class PlantReadings:
     angular_velocity = _reading("rate", "Angular velocity in B [rad/s], (3,).")
     tip = _reading("tip", "Undeformed tip, world NED [m], (3,); x > 0 is the penetration.")
     specific_force = _reading(
-        "felt", "What a perfect accelerometer at the body origin reads, mean over the last tick, FRD [m/s^2], (3,)."
+        "felt", "Reading of a perfect accelerometer at the body origin, mean over the last tick, FRD [m/s^2], (3,)."
     )
     ft_wrench = _reading(
         "ft_wrench",
@@ -54,11 +52,6 @@ class PlantReadings:
     def rotation(self) -> np.ndarray:
         """Rotation B to I, (3, 3)."""
         return self.truth[PLACES["rotation"]].reshape(3, 3).copy()
-
-    @property
-    def centre_of_mass(self) -> np.ndarray:
-        """True centre of mass, world NED [m], (3,)."""
-        return self.position + self.rotation @ np.array(self.scene.vehicle.com_offset_m)
 
     @property
     def euler(self) -> np.ndarray:
@@ -88,7 +81,7 @@ class PlantReadings:
 
     @property
     def motor_thrusts(self) -> np.ndarray:
-        """`thrusts_actual` as MuJoCo holds it: not to be kept nor written."""
+        """`thrusts_actual` in MuJoCo's own array: a view, read-only."""
         return self._act
 
     @property

@@ -1,6 +1,6 @@
-"""The plant's arithmetic as compiled functions: what can be read after a tick, and what goes in before one.
+"""The plant's arithmetic as CasADi functions: readings after a tick, actuator and wind inputs before one.
 
-Written with symbols once, evaluated where MuJoCo keeps its numbers: one call instead of a hundred small steps.
+Each is evaluated on MuJoCo's own arrays in one call.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import casadi as ca
 from ibvs_qp.vectors import cross_product, rotation_rows, turned, turned_back
 from sim.world.crash import FLIP_COSINE, GROUND_CLEARANCE_M
 
-#: What `readout` yields and how many numbers each has; arrays in NED and FRD.
+#: Results of `readout` and their sizes; arrays in NED and FRD.
 READINGS = {
     "position": 3,  # of the body origin, world [m]
     "velocity": 3,  # of the body origin, world [m/s]
@@ -30,11 +30,11 @@ READINGS = {
     "safe": 1,  # 1 where no crash is possible
 }
 _STARTS = [sum(list(READINGS.values())[:index]) for index in range(len(READINGS) + 1)]
-#: Where each reading lies; the first four are the motion, 13 numbers.
+#: Slice of each reading; the first four are the motion, 13 numbers.
 PLACES = {name: slice(*_STARTS[index : index + 2]) for index, name in enumerate(READINGS)}
 MOTION = slice(0, PLACES["rate"].stop)
 SIZE = _STARTS[-1]
-#: A sum that is no number, or none to speak of, is above this.
+#: A non-finite or overflowing sum exceeds this [-].
 _FINITE = 1e300
 
 
@@ -48,7 +48,7 @@ def readout(size: int, accelerometer: int, force: int, torque: int, contact: int
     """Function of (qpos, qvel, history, points) yielding `READINGS`.
 
     Args:
-        size: Numbers of ``history``, MuJoCo's memory of what its sensors read at every physics step.
+        size: Numbers of ``history``, MuJoCo's sensor samples at every physics step.
         accelerometer: Where its samples begin, three numbers each, oldest first; likewise force, torque and contact
             (ten numbers: found, force, normal, tangent).
         force: See there.
@@ -108,17 +108,17 @@ def readout(size: int, accelerometer: int, force: int, torque: int, contact: int
 
 @functools.lru_cache(maxsize=8)
 def drive(rotors: int) -> ca.Function:
-    """What goes into MuJoCo before a tick, as a function of what is wanted and of the air.
+    """MuJoCo's inputs of a tick from the commanded thrusts and the force of the air.
 
-    Of (wanted, lower, upper, actual thrusts, lags, air, rotation, arm) it yields the commanded thrusts [N], the time
-    constant of every rotor [s], and force and moment of the air, front-left-up [N, N m]. ``air`` is its force at the
-    true centre of mass in the world [N], ``arm`` the way there from the bare vehicle's centre of mass, where MuJoCo
+    Function of (commanded, lower, upper, actual thrusts, lags, air, rotation, arm) yielding the limited thrusts [N],
+    the time constant of every rotor [s], and force and moment of the air, front-left-up [N, N m]. ``air`` is its force at
+    the true centre of mass in the world [N], ``arm`` the way there from the bare vehicle's centre of mass, where MuJoCo
     applies forces, in B [m]. Under a constant command a first-order lag never crosses it, so one choice between the
     lags up and down holds for the tick.
     """
-    wanted, lower, upper, actual = (ca.SX.sym(name, rotors) for name in ("wanted", "lower", "upper", "actual"))
+    commanded, lower, upper, actual = (ca.SX.sym(name, rotors) for name in ("commanded", "lower", "upper", "actual"))
     lags, air, rotation, arm = ca.SX.sym("lags", 2), ca.SX.sym("air", 3), ca.SX.sym("rotation", 9), ca.SX.sym("arm", 3)
-    command = ca.fmin(ca.fmax(wanted, lower), upper)
+    command = ca.fmin(ca.fmax(commanded, lower), upper)
     lag = ca.vertcat(*(ca.if_else(command[index] >= actual[index], lags[0], lags[1]) for index in range(rotors)))
     a, b, c, d, e, f, g, h, i = _entries(rotation)
     rows = (a, b, c), (d, e, f), (g, h, i)
@@ -127,5 +127,5 @@ def drive(rotors: int) -> ca.Function:
     fx, fy, fz = force
     applied = ca.vertcat(fx, -fy, -fz, mx, -my, -mz)
     return ca.Function(
-        "drive", [wanted, lower, upper, actual, lags, air, rotation, arm], [command, lag, ca.densify(applied)]
+        "drive", [commanded, lower, upper, actual, lags, air, rotation, arm], [command, lag, ca.densify(applied)]
     )

@@ -35,7 +35,7 @@ def tool_body(vehicle: VehicleParams) -> RigidBody:
 
 
 def bare_body(scene: Scene, vehicle: VehicleParams) -> RigidBody:
-    """The vehicle without its tool: what is missing to the scene's mass, centre of mass and inertia.
+    """The vehicle without its tool: the scene's mass, centre of mass and inertia minus the tool's.
 
     Raises:
         ConfigError: When the tool alone has more mass or inertia than the whole vehicle.

@@ -80,7 +80,7 @@ _NOMINAL = VehicleParams()
 
 @dataclass(frozen=True, kw_only=True)
 class VehicleScene(_Checked):
-    """The plant's truth about the vehicle; never told to the controller."""
+    """The true vehicle of the plant; no input of the controller."""
 
     mass_kg: float = setting(_NOMINAL.mass_kg, "all-up mass", unit="kg", low=2.0, high=20.0)
     inertia_kg_m2: tuple[float, float, float] = setting(
@@ -110,12 +110,12 @@ class CameraScene(_Checked):
     latency_s: float = setting(0.060, "capture to delivery", unit="s", low=0.0, high=0.3)
     depth_noise_relative: float = setting(0.005, "white and correlated depth noise per depth", low=0.0, high=0.05)
     mount_error_m: tuple[float, float, float] = setting(
-        (0.0, 0.0, 0.0), "true camera position from the believed one, FRD; told to nobody", unit="m", low=-0.1, high=0.1
+        (0.0, 0.0, 0.0), "true minus configured camera position, FRD", unit="m", low=-0.1, high=0.1
     )
     mount_error_deg: tuple[float, float, float] = setting(
-        (0.0, 0.0, 0.0), "true camera attitude from the believed one, roll pitch yaw", unit="deg", low=-5.0, high=5.0
+        (0.0, 0.0, 0.0), "true minus configured camera attitude, roll pitch yaw", unit="deg", low=-5.0, high=5.0
     )
-    focal_error: float = setting(0.0, "focal length told to the pilot over the true one, minus 1", low=-0.2, high=0.2)
+    focal_error: float = setting(0.0, "reported focal length over the true one, minus 1", low=-0.2, high=0.2)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -142,7 +142,7 @@ class ImuScene(_Checked):
 
 @dataclass(frozen=True, kw_only=True)
 class FeaturesScene(_Checked):
-    """Extra noise on line features, after vision; told to nobody."""
+    """Extra noise on line features, after vision; not part of the reported covariance."""
 
     sigma_vs: float = setting(0.0, "noise added to rho and theta of each line per frame", low=0.0, high=0.5)
 

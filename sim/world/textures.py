@@ -1,4 +1,4 @@
-"""Seeded pictures of board, wall and the things that lie about on them."""
+"""Seeded textures of board, paint and wall."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def wall_surface(
     px_m: float,
     brick: bool | None = None,
 ) -> np.ndarray:
-    """Brick or plaster wall with visible texture, uint8 (height, width, 4); the seed decides which if nobody does."""
+    """Brick or plaster wall with visible texture, uint8 (height, width, 4); the seed chooses unless ``brick`` does."""
     picture = flat(*shape, color)
     fine = 3.0 * smooth_noise(rng, shape, 1.5) + 3.0 * smooth_noise(rng, shape, 0.01 * px_m)
     clouds = 6.0 * smooth_noise(rng, shape, 0.25 * px_m)

@@ -1,4 +1,4 @@
-"""Pose and thrusts with which a flight begins."""
+"""Pose and thrusts at the start of a flight."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from sim.world.board import BoardGeometry
 from sim.world.random_streams import stream
 from sim.world.scene import Scene
 
-#: Half widths of the uniform variation of the start pose that a seed makes.
+#: Half widths of the uniform variation of the start pose by the seed.
 START_RIGHT_M, START_DOWN_M, START_DISTANCE_M, START_YAW_DEG = 0.02, 0.03, 0.05, 3.0
 
 
@@ -39,14 +39,14 @@ def true_limits(scene: Scene, vehicle: VehicleParams) -> tuple[np.ndarray, np.nd
 def hover_thrusts(scene: Scene, vehicle: VehicleParams) -> np.ndarray:
     """Thrusts that come nearest to a level hover of the true vehicle within its true limits [N], (n,)."""
     weight = scene.vehicle.mass_kg * GRAVITY
-    wanted = np.array([0.0, 0.0, -weight, 0.0, 0.0, 0.0])
+    hover = np.array([0.0, 0.0, -weight, 0.0, 0.0, 0.0])
     # Rotors carry the weight at the true centre of mass; B counts moments about the assumed one.
-    wanted[3:] = np.cross(scene.vehicle.com_offset_m, wanted[:3])
-    return allocate_least_squares(wanted, control_effectiveness(vehicle.geometry), *true_limits(scene, vehicle))
+    hover[3:] = np.cross(scene.vehicle.com_offset_m, hover[:3])
+    return allocate_least_squares(hover, control_effectiveness(vehicle.geometry), *true_limits(scene, vehicle))
 
 
 def start_pose(scene: Scene, vehicle: VehicleParams, seed: int) -> tuple[np.ndarray, float]:
-    """Where the body origin starts, world NED [m] (3,), and its yaw [rad]; level, tip facing the wall."""
+    """Start position of the body origin, world NED [m] (3,), and yaw [rad]; level, tip facing the wall."""
     distance, right, down, turn = stream(seed, "start").uniform(-1.0, 1.0, 4)
     offset = np.array([-distance * START_DISTANCE_M, right * START_RIGHT_M, down * START_DOWN_M])
     tip = BoardGeometry(scene).start_tip + offset

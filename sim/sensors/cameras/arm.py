@@ -1,4 +1,4 @@
-"""What of the vehicle itself the camera sees: arm, brush and propellers, constant because all are rigid."""
+"""Picture of arm, brush and propellers in the camera, constant because all are rigid."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from sim.world.scene import Scene
 
 #: Length of the brush along the arm [m] and of the step between the slices it is drawn in.
 BRUSH_LENGTH_M, _SLICE_M = 0.04, 0.002
-#: Nothing nearer than this is drawn [m].
+#: Least depth drawn [m].
 _NEAR_M = 0.05
-#: Share of the light that a spinning propeller takes away.
+#: Fraction of the light that a spinning propeller blocks.
 _PROPELLER_SHADE = 0.35
 _ARM_COLOR = (58, 60, 64)
 _BRUSH_COLORS = ((240, 190, 40), (70, 180, 90), (205, 70, 170), (60, 190, 210))
@@ -92,7 +92,7 @@ def vehicle_layer(
     )
 
 
-#: Masks drawn so far, by all that they depend on; every flight without pictures needs one and takes 30 ms to draw it.
+#: Cache of masks by everything that they depend on: every geometric flight needs one, and drawing takes 30 ms.
 _masks: dict[Hashable, np.ndarray] = {}
 
 
@@ -128,13 +128,13 @@ def _draw_disc(
 
 def clip_near(points: np.ndarray, near_m: float) -> np.ndarray:
     """The part of a polygon in camera coordinates, (n, 3), that lies at depth ``near_m`` or beyond."""
-    kept = []
+    inside = []
     for start, stop in zip(points, np.roll(points, -1, axis=0), strict=True):
         if start[2] >= near_m:
-            kept.append(start)
+            inside.append(start)
         if (start[2] >= near_m) != (stop[2] >= near_m):
-            kept.append(start + (near_m - start[2]) / (stop[2] - start[2]) * (stop - start))
-    return np.array(kept).reshape(-1, 3)
+            inside.append(start + (near_m - start[2]) / (stop[2] - start[2]) * (stop - start))
+    return np.array(inside).reshape(-1, 3)
 
 
 def _ragged_outline(mask: np.ndarray, rng: np.random.Generator) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Which camera back end flies: the one asked for, or the plane camera where there is no OpenGL."""
+"""Choice of the camera back end: the requested one, or the plane camera where there is no OpenGL."""
 
 from __future__ import annotations
 
@@ -9,51 +9,51 @@ from sim.sensors.cameras.protocol import Camera
 from sim.world.canvas import Canvas
 from sim.world.scene import Scene
 
-#: Words of the option: plane needs no OpenGL; gl and auto take OpenGL where there is one.
+#: Values of the option: plane needs no OpenGL; gl and auto use OpenGL where there is one.
 BACK_ENDS = ("plane", "gl", "auto")
-#: Size of the picture of a trial [px].
+#: Picture size of the test context [px].
 _TRIAL_PX = 64
 
 
-def resolve_camera(wanted: str) -> tuple[str, str | None]:
-    """Find out what an option comes to on this machine.
+def resolve_camera(option: str) -> tuple[str, str | None]:
+    """Back end that an option selects on this machine.
 
     Args:
-        wanted: One of `BACK_ENDS`.
+        option: One of `BACK_ENDS`.
 
     Returns:
-        "plane" or "gl", and a line for the user where that is not what was asked for.
+        "plane" or "gl", and a line for the user where that differs from the option.
     """
-    if wanted == "plane":
+    if option == "plane":
         return "plane", None
     try:
         context, _ = open_context(_TRIAL_PX, _TRIAL_PX)
     except CameraUnavailable as reason:
-        return "plane", f"--camera {wanted}: {reason}; flying with plane"
+        return "plane", f"--camera {option}: {reason}; flying with plane"
     context.free()
     return "gl", None
 
 
-def open_camera(wanted: str, scene: Scene, vehicle: VehicleParams, canvas: Canvas, seed: int) -> Camera:
+def open_camera(option: str, scene: Scene, vehicle: VehicleParams, canvas: Canvas, seed: int) -> Camera:
     """The camera of a flight.
 
     Args:
-        wanted: "plane" or "gl"; "auto" takes gl where it works.
+        option: "plane" or "gl"; "auto" takes gl where it works.
         scene: Board, wall and camera.
         vehicle: Where camera and arm are.
-        canvas: What is painted on.
+        canvas: The painted board and the wall.
         seed: Of the noise.
 
     Raises:
-        CameraUnavailable: When gl is wanted and does not work; see `resolve_camera`.
+        CameraUnavailable: When gl is requested and does not work; see `resolve_camera`.
     """
-    if wanted == "plane":
+    if option == "plane":
         return PlaneCamera(scene, vehicle, canvas, seed)
     from sim.sensors.cameras.gl import GLCamera
 
     try:
         return GLCamera(scene, vehicle, canvas, seed)
     except CameraUnavailable:
-        if wanted == "gl":
+        if option == "gl":
             raise
         return PlaneCamera(scene, vehicle, canvas, seed)

@@ -1,4 +1,4 @@
-"""What every back end does to a drawn picture of board and wall: vehicle, lens blur, noise and depth holes."""
+"""Common last stage of every camera back end: vehicle, lens blur, noise and depth holes."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from sim.sensors.cameras.protocol import camera_intrinsics
 from sim.sensors.cameras.view import View
 from sim.world.scene import Scene
 
-#: Nearest depth at which anything is drawn, and farthest that a reading exists [m].
+#: Least depth drawn, and largest depth with a reading [m].
 NEAR_M, FAR_M = 0.05, 20.0
 
 
@@ -30,13 +30,13 @@ class PictureFinish:
 
     Attributes:
         intrinsics: (fx, fy, cx, cy) [px].
-        propeller_box: Rows and columns that hold what is seen of the propellers, or None.
-        arm_box: Those that hold what is seen of arm and brush, or None.
+        propeller_box: (row, row end, column, column end) around the visible propellers, or None.
+        arm_box: The same around arm and brush, or None.
         arm: Colours of arm and brush, uint8 (H, W, 3), under the mask.
         arm_inverse: Their inverse depths [1/m], float32 (H, W).
         mask: 255 where arm or brush hide the scene, uint8 (H, W).
         propellers: 255 where a propeller lies before the scene, uint8 (H, W).
-        no_depth: Flat indices of pixels that never give a depth.
+        no_depth: Flat indices of pixels without depth in every picture.
         noise: Banks of noise, or None.
         rng: Source of the ragged holes.
     """
@@ -56,7 +56,7 @@ class PictureFinish:
         self._soft, self._ones = np.empty((*shape, 3), np.uint8), np.ones(shape, np.float32)
 
     def common_error(self, view: View) -> float:
-        """Depth error common to one picture, as a share of the depth at its centre."""
+        """Depth error common to one picture, relative to the depth at its centre."""
         return self.noise.depth_common() * float(view.plane(0.0)[2]) if self.noise else 0.0
 
     def outline(self, view: View, corners: np.ndarray) -> tuple[list[CutLine], Box | None]:

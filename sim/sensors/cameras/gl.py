@@ -1,4 +1,4 @@
-"""The camera drawn by OpenGL: the pictures of MuJoCo's classic renderer, finished as those of the plane camera."""
+"""The OpenGL camera: MuJoCo's classic renderer, with the last stage of the plane camera."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ _SURE_PX = 1
 class GLCamera:
     """RGB-D camera by OpenGL, in one pass without shadows and multisampling.
 
-    What OpenGL draws is board and wall. Rim pixels, which it leaves jagged, are mixed of their two neighbours by the
-    share that the board's outline has in them. Vehicle, lens blur, noise and depth holes are those of `PlaneCamera`.
+    OpenGL draws board and wall. Rim pixels, which it leaves jagged, are mixed from their two neighbours with the
+    fraction that the board covers. Vehicle, lens blur, noise and depth holes are those of `PlaneCamera`.
 
     Args:
         scene: Board, wall and camera.
@@ -90,7 +90,7 @@ class GLCamera:
 
 
 def _face(texture: np.ndarray) -> np.ndarray:
-    """The board without what the texture adds beyond its outline; shared."""
+    """The texture without its padding; a view."""
     return texture[TEXTURE_PAD_PX:-TEXTURE_PAD_PX, TEXTURE_PAD_PX:-TEXTURE_PAD_PX]
 
 

@@ -1,4 +1,4 @@
-"""A headless OpenGL context: EGL if there is one, else OSMesa; nothing of it is loaded before it is asked for.
+"""A headless OpenGL context: EGL if there is one, else OSMesa; libraries are loaded on first use.
 
 MuJoCo picks its own context by the environment variable MUJOCO_GL when it is imported, and fails at import where the
 library is missing. So the variable is never set here: the context is made beside MuJoCo's choice.
@@ -17,7 +17,7 @@ from ibvs_qp.config.errors import IbvsQpError
 
 #: Platforms in the order in which they are tried.
 PLATFORMS = ("egl", "osmesa")
-#: What to install where there is none.
+#: Packages to install without a platform.
 _REMEDY = "install libegl1 and libgl1-mesa-dri for it"
 #: Which platform PyOpenGL binds to; it reads this once, at its import.
 _PLATFORM_VARIABLE = "PYOPENGL_PLATFORM"
@@ -39,9 +39,9 @@ def open_context(width: int, height: int, platforms: tuple[str, ...] = PLATFORMS
         MuJoCo's context object (``make_current``, ``free``) and the platform's name.
 
     Raises:
-        CameraUnavailable: When no platform works; says why for each and what to install.
+        CameraUnavailable: When no platform works, with the reason for each and the packages to install.
     """
-    os.environ.setdefault("LP_NUM_THREADS", "1")  # software rendering: other processes want the other cores
+    os.environ.setdefault("LP_NUM_THREADS", "1")  # software rendering: leaves the other cores to other processes
     reasons = []
     for platform in platforms:
         foreign = "OpenGL" in sys.modules or _PLATFORM_VARIABLE in os.environ

@@ -17,7 +17,7 @@ from sim.world.mujoco_frames import FLIP
 
 #: Half size of the plain wall beyond its picture [m], and how far it lies behind it [m]: below the depth's accuracy.
 _PLAIN_M, _BEHIND_M = 100.0, 2e-5
-#: Materials glow by themselves: what is drawn has exactly the colours of the pictures, whatever the light.
+#: Emissive materials: drawn colours equal those of the textures in any light.
 _GLOW = 'emission="1" specular="0" shininess="0" reflectance="0" texuniform="false" texrepeat="1 1"'
 
 
@@ -123,7 +123,7 @@ class GlScene:
         self._upload(board, box)
 
     def draw(self, view: View) -> tuple[np.ndarray, np.ndarray]:
-        """Draw what a camera sees.
+        """Draw the scene from a camera pose.
 
         Returns:
             Colour, uint8 (height, width, 3), and inverse depth [1/m], float32 (height, width), both with the LOWEST

@@ -1,4 +1,4 @@
-"""Noise made once and read from random places: a fresh draw for every pixel would cost more than the picture."""
+"""Noise drawn once and read from random offsets: a new draw for every pixel would cost more than the picture."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ import numpy as np
 
 #: Colour noise of the sensor [grey levels] (design, section 5: two grey levels).
 RGB_SIGMA = 2.0
-#: Length over which the correlated part of the depth noise holds together [px], and its common mode [m].
+#: Correlation length of the depth noise [px], and standard deviation of its common mode [m].
 DEPTH_CORRELATION_PX, DEPTH_COMMON_SIGMA_M = 20.0, 0.001
-#: Rows added to the banks; a frame starts at a random place within them.
+#: Rows added to the banks; a frame starts at a random offset within them [px].
 _SPARE_ROWS = 128
 
 
@@ -19,11 +19,7 @@ class NoiseBank:
     Args:
         shape: (height, width) of the picture [px].
         depth_relative: Standard deviation of the white, and again of the correlated, depth noise per depth.
-        rng: Source of the banks and of the places read from.
-
-    Attributes:
-        color: Colour noise [grey levels], int8 (n,).
-        factors: Factor 1 + white + correlated depth noise, float32 (rows, columns).
+        rng: Source of the banks and of the offsets.
     """
 
     def __init__(self, shape: tuple[int, int], depth_relative: float, rng: np.random.Generator) -> None:
@@ -31,32 +27,22 @@ class NoiseBank:
         height, width = shape
         rows = height + _SPARE_ROWS
         grey = np.rint(RGB_SIGMA * rng.standard_normal(rows * width * 3, np.float32)).astype(np.int8)
-        self.color = grey
-        # Unsigned saturating arithmetic is OpenCV's fast path, so the two signs live apart.
+        # OpenCV's saturating arithmetic is fast on unsigned numbers, so the two signs are stored separately.
         self._brighter, self._darker = np.maximum(grey, 0).astype(np.uint8), np.maximum(-grey, 0).astype(np.uint8)
         # White noise blurred with this Gaussian is correlated over DEPTH_CORRELATION_PX (1/e at 2 sigma).
         shape = (rows, 2 * width)
-        self.factors = rng.standard_normal(shape, np.float32)
-        self.factors *= np.float32(depth_relative)
+        self._factors = rng.standard_normal(shape, np.float32)
+        self._factors *= np.float32(depth_relative)
         blurred = cv2.GaussianBlur(rng.standard_normal(shape, np.float32), (0, 0), 0.5 * DEPTH_CORRELATION_PX)
-        self.factors += blurred * np.float32(depth_relative / float(blurred.std()))
-        self.factors += np.float32(1.0)
+        self._factors += blurred * np.float32(depth_relative / float(blurred.std()))
+        self._factors += np.float32(1.0)
         self._lifted = np.empty((height, width * 3), np.uint8)
-
-    def color_place(self) -> int:
-        """Where in `color` the noise of one frame begins."""
-        height, width = self._shape
-        return int(self._rng.integers(len(self.color) - height * width * 3))
-
-    def factor_place(self) -> tuple[int, int]:
-        """Row and column of `factors` where those of one frame begin."""
-        return int(self._rng.integers(_SPARE_ROWS)), int(self._rng.integers(self._shape[1]))
 
     def add_color(self, picture: np.ndarray) -> np.ndarray:
         """A new picture with noise added, uint8 (H, W, 3)."""
         height, width = self._shape
         size = height * width * 3
-        start = self.color_place()
+        start = int(self._rng.integers(len(self._brighter) - size))
         noisy = np.empty((height, width, 3), np.uint8)
         flat = noisy.reshape(height, -1)
         cv2.add(picture.reshape(height, -1), self._brighter[start : start + size].reshape(height, -1), self._lifted)
@@ -66,8 +52,8 @@ class NoiseBank:
     def depth_factor(self) -> np.ndarray:
         """Factor 1 + white + correlated noise of one frame, float32 (H, W), not to be written."""
         height, width = self._shape
-        row, column = self.factor_place()
-        return self.factors[row : row + height, column : column + width]
+        row, column = int(self._rng.integers(_SPARE_ROWS)), int(self._rng.integers(width))
+        return self._factors[row : row + height, column : column + width]
 
     def depth_common(self) -> float:
         """Common-mode depth error of one frame [m]."""

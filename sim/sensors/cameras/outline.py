@@ -1,4 +1,4 @@
-"""The outline of a convex board in the picture, taken apart into the straight lines that cut the view."""
+"""The straight lines along which the outline of a convex board cuts the picture."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-#: Margin around what is drawn, and widest depth hole beyond the rim [px].
+#: Margin around drawn areas, and widest depth hole beyond the rim [px].
 _BAND_PX, _HOLE_PX = 1, 4
 #: A line touches but the two pixels between whose centres it passes: at 45 degrees half a diagonal is 0.71 px.
 _RIM_STEPS = np.array([[0], [1]])
@@ -31,8 +31,8 @@ class CutLine:
         start: First end of the edge [px], (2,).
         stop: Other end [px], (2,).
         beyond: Part of the picture beyond the line, polygon (n, 2) [px].
-        box: (row, row end, column, column end) around what of it no earlier line has cut away, and the rim.
-            Outside of it the line changes nothing.
+        box: (row, row end, column, column end) around the part that no earlier line has cut away, and the rim; the
+            line changes no pixel outside.
         shape: (height, width) of the picture.
         flat: Whether the edge runs more across the picture than up it.
     """
@@ -52,7 +52,7 @@ class CutLine:
         return -(self.normal[1 - across] * places + self.offset) / self.normal[across]
 
     def split(self) -> tuple[Box, Box]:
-        """The box taken apart: all of the first part lies beyond the line, the second one holds the line."""
+        """Two parts of the box: the first lies entirely beyond the line, the second contains the line."""
         r0, r1, c0, c1 = self.box
         low, high, first, last = (r0, r1, c0, c1 - 1) if self.flat else (c0, c1, r0, r1 - 1)
         one, other = self._across(np.array([first, last])).tolist()
@@ -85,23 +85,15 @@ class CutLine:
         indices = other * width + places if self.flat else other + places * width
         return indices.ravel(), distance.astype(np.uint32).ravel()
 
-    def extent(self) -> tuple[int, int]:
-        """First place of the edge along its longer direction within the picture, and the one behind its last [px]."""
-        along = 1 - int(self.flat)
-        first, last = sorted((float(self.start[along]), float(self.stop[along])))
-        return max(0, math.ceil(first)), min(self.shape[int(self.flat)], math.floor(last) + 1)
-
-    def hole_widths(self, rng: np.random.Generator) -> np.ndarray:
-        """How far the depth holes reach beyond the edge [px], for every few places along it."""
-        return rng.integers(1, _HOLE_PX + 1, max(self.shape) // _HOLE_STEP_PX + 1)
-
     def holes(self, rng: np.random.Generator) -> np.ndarray:
         """Flat indices of pixels beyond the edge that give no depth, ragged at random, (n,)."""
         limit = self.shape[1 - int(self.flat)]
-        first, end = self.extent()
+        along = 1 - int(self.flat)
+        first, last = sorted((float(self.start[along]), float(self.stop[along])))
+        first, end = max(0, math.ceil(first)), min(self.shape[int(self.flat)], math.floor(last) + 1)
         places = np.arange(first, max(first, end))
         towards = 1 if self.normal[int(self.flat)] > 0 else -1  # the board
-        widths = self.hole_widths(rng)
+        widths = rng.integers(1, _HOLE_PX + 1, max(self.shape) // _HOLE_STEP_PX + 1)
         steps = np.arange(-_HOLE_PX, 2)[:, None]
         taken = -steps <= widths[places // _HOLE_STEP_PX]
         other = np.floor(self._across(places)).astype(np.intp) + steps * towards
@@ -117,16 +109,16 @@ def clip_polygon(polygon: np.ndarray, normal: np.ndarray, offset: float) -> np.n
     """The part of a convex polygon (n, 2) where normal . p + offset >= 0; plain floats, as there are four corners."""
     nx, ny = float(normal[0]), float(normal[1])
     points = polygon.tolist()
-    kept: list[tuple[float, float]] = []
+    inside: list[tuple[float, float]] = []
     for k, (x1, y1) in enumerate(points):
         x0, y0 = points[k - 1]
         before, value = nx * x0 + ny * y0 + offset, nx * x1 + ny * y1 + offset
         if (before >= 0.0) != (value >= 0.0):
             part = before / (before - value)
-            kept.append((x0 + part * (x1 - x0), y0 + part * (y1 - y0)))
+            inside.append((x0 + part * (x1 - x0), y0 + part * (y1 - y0)))
         if value >= 0.0:
-            kept.append((x1, y1))
-    return np.array(kept).reshape(-1, 2)
+            inside.append((x1, y1))
+    return np.array(inside).reshape(-1, 2)
 
 
 def _box(polygon: np.ndarray, width: int, height: int, margin: int) -> Box:
@@ -168,7 +160,7 @@ def cut_lines(polygon: np.ndarray, width: int, height: int) -> tuple[list[CutLin
             continue
         normal = np.array([nu, nv])
         board = clip_polygon(board, normal, offset)
-        # What an earlier line has cut away needs no second wall; the slack keeps its rim.
+        # The part that an earlier line has cut away is wall already; the slack preserves its rim.
         area = clip_polygon(left, -normal, _SLACK_PX - offset)
         if len(area) == 0:
             continue

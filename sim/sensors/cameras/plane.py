@@ -1,7 +1,7 @@
-"""The default camera: board and wall are planes, so one homography each makes the picture; no GL anywhere.
+"""The default camera: board and wall are planes, so one homography each draws the picture; no OpenGL.
 
 The board is drawn as a sheet at the wall's gap in front of it (its thin side faces are left out). Its outline cuts
-the picture along straight lines: `_cut` replaces what lies beyond one of them by the wall, with an antialiased rim.
+the picture along straight lines: `_cut` draws the wall beyond one of them, with an antialiased rim.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ import numpy as np
 
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.measurement import RgbdFrame
-from sim.sensors.cameras.drawn import Drawing, native
 from sim.sensors.cameras.finish import PictureFinish
 from sim.sensors.cameras.outline import Box, CutLine
 from sim.sensors.cameras.view import View, board_corners, board_steps
@@ -22,13 +21,11 @@ from sim.world.scene import Scene
 
 _SHIFT = 6  # sub-pixel bits of polygon corners
 _EVEN, _HALF = np.uint32(0x00FF00FF), np.uint32(0x00800080)  # every other byte of a pixel, and its rounding
-#: Numbers of a sheet that is out of view.
-_NO_SHEET = (0.0,) * 12
 _WARP = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
 
 
 class _Sheet(NamedTuple):
-    """Board or wall as one view sees it.
+    """Board or wall in one view.
 
     Attributes:
         texture: Its picture, uint8 (h, w, 4).
@@ -79,7 +76,6 @@ class PlaneCamera:
         self._plain_wall = (*(float(entry) for entry in scene.wall.color), 255.0)
         self._picture, self._behind = np.empty((*shape, 4), np.uint8), np.empty((*shape, 4), np.uint8)
         self._mask = np.zeros(shape, np.uint8)
-        self._drawing: Drawing | None = None
         self._inverse, self._inverse_behind = np.empty(shape, np.float32), np.empty(shape, np.float32)
         self._rgb = np.empty((*shape, 3), np.uint8)
         self._v, self._u = np.indices(shape, np.float32)
@@ -92,10 +88,6 @@ class PlaneCamera:
         common = self.finish.common_error(view)
         wall = _Sheet.seen(view, self.canvas.wall, self._wall_steps, common)
         board = None if board_box is None else _Sheet.seen(view, texture, self._board_steps, common)
-        drawn = self._drawn(board, wall, cuts)
-        if drawn is not None:
-            rgb, depth = drawn
-            return RgbdFrame(rgb=rgb, depth=depth, intrinsics=self.intrinsics, stamp_ns=stamp_ns)
         if board is not None and board_box is not None:
             self._draw(board, board_box, self._picture, self._inverse)
         for cut in cuts:
@@ -105,17 +97,6 @@ class PlaneCamera:
         depth = self.finish.depth(self._inverse, cuts)
         return RgbdFrame(rgb=rgb, depth=depth, intrinsics=self.intrinsics, stamp_ns=stamp_ns)
 
-    def _drawn(self, board: _Sheet | None, wall: _Sheet, cuts: list[CutLine]) -> tuple[np.ndarray, np.ndarray] | None:
-        """Colours and depths by compiled C, or None without a compiler."""
-        if self._drawing is None:
-            library = native()
-            if library is None:
-                return None
-            texture, plain = self.canvas.flush(), np.array(self._plain_wall, np.uint8)
-            self._drawing = Drawing(library.draw_picture, self.finish, texture, self.canvas.wall, plain)
-        numbers = _NO_SHEET if board is None else (*board.back.ravel().tolist(), *board.plane)
-        return self._drawing.picture([*numbers, *wall.back.ravel().tolist(), *wall.plane], cuts)
-
     def _draw(self, sheet: _Sheet, box: Box, picture: np.ndarray, inverse: np.ndarray) -> None:
         """Colours and inverse depths of a sheet within a box."""
         r0, r1, c0, c1 = box
@@ -123,7 +104,7 @@ class PlaneCamera:
             return
         back = sheet.back.copy()
         back[:, 2] += back[:, 0] * c0 + back[:, 1] * r0
-        # A constant border is the only fast one: the others cost five times as much wherever they are needed.
+        # A constant border is the fast one: OpenCV's others cost five times as much where the texture ends.
         border, size = self._plain_wall, (c1 - c0, r1 - r0)
         cv2.warpPerspective(sheet.texture, back, size, picture[r0:r1, c0:c1], _WARP, cv2.BORDER_CONSTANT, border)
         along_u, along_v, constant = sheet.plane
@@ -131,7 +112,7 @@ class PlaneCamera:
         cv2.addWeighted(u, along_u, v, along_v, constant, inverse[r0:r1, c0:c1])
 
     def _cut(self, wall: _Sheet, cut: CutLine) -> None:
-        """Replace what lies beyond one line of the board's outline by the wall."""
+        """Draw the wall beyond one line of the board's outline."""
         beyond, band = cut.split()
         self._draw(wall, beyond, self._picture, self._inverse)
         r0, r1, c0, c1 = band
@@ -163,7 +144,7 @@ def _inverse(matrix: np.ndarray) -> np.ndarray:
 
 
 def _mix(front: np.ndarray, behind: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """Pixels, uint32 of four bytes, mixed by the share of the front one in 256ths; two bytes at a time."""
+    """Pixels, uint32 of four bytes, mixed with the weight of the front one in 256ths; two bytes at a time."""
     rest = np.uint32(256) - share
     even = ((front & _EVEN) * share + (behind & _EVEN) * rest + _HALF) >> np.uint32(8)
     odd = ((front >> np.uint32(8)) & _EVEN) * share + ((behind >> np.uint32(8)) & _EVEN) * rest + _HALF

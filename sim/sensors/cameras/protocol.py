@@ -1,4 +1,4 @@
-"""What a camera back end offers, and when its pictures are taken and delivered."""
+"""Interface of a camera back end, and the schedule of capture and delivery."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class Schedule(Generic[Item]):
             self._start_ns = self._next_ns = now_ns
         if now_ns < self._next_ns:
             return False
-        # Slots that a slow caller missed are lost, as in a camera; their pictures do not pile up.
+        # Captures that a slow caller missed are lost, as in a camera; pictures do not pile up.
         captures = math.floor((now_ns - self._start_ns) * self._rate_hz / NS_PER_S + 1e-6) + 1
         self._next_ns = self._start_ns + round(captures * NS_PER_S / self._rate_hz)
         return True
@@ -72,7 +72,7 @@ class Schedule(Generic[Item]):
         return now_ns < self._next_ns and not (self._queue and self._queue[0][0] <= now_ns)
 
     def push(self, stamp_ns: int, item: Item) -> None:
-        """Send off what was captured at ``stamp_ns``."""
+        """Queue an item captured at ``stamp_ns``."""
         self._queue.append((stamp_ns + self._latency_ns, item))
 
     def pop(self, now_ns: int) -> Item | None:

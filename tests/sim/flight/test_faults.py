@@ -42,7 +42,7 @@ def test_a_fault_strikes_once_when_its_time_has_come():
 
 def test_an_untold_fault_changes_the_plant_alone():
     world, pilot = world_and_pilot()
-    Derate(rotor="mid_left", share=0.3, told=False).strike(world, pilot)
+    Derate(rotor="mid_left", share=0.3, reported=False).strike(world, pilot)
     assert pilot.thrust_limits is None
     assert world.plant.thrust_limits[1][1] == pytest.approx(0.3 * 52.56)
 

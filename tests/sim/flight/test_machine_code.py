@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -18,11 +17,6 @@ from ibvs_qp.config import ControllerConfig
 from ibvs_qp.controller import HybridController
 from ibvs_qp.model import machine_code as module
 from ibvs_qp.model.machine_code import machine_code
-from sim.sensors.features import GeometricFeatures
-from sim.sensors.imu_ft import SensorSuite
-from sim.world.painted_edges import PaintedEdges
-from sim.world.plant import Plant
-from sim.world.scene import Scene, VehicleScene, WindScene
 
 needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler on this machine")
 
@@ -99,31 +93,3 @@ def test_machine_code_with_other_numbers_is_not_flown(
     monkeypatch.setattr(module, "_library", lambda function, command: library)
     function = small()
     assert machine_code(function) is function and "other numbers" in caplog.text
-
-
-@needs_compiler
-def test_the_plant_and_its_sensors_on_machine_code_are_the_same_to_the_bit() -> None:
-    """Also in contact, under wind and with unequal lags: every branch of the plant's arithmetic."""
-    scene = Scene(
-        vehicle=VehicleScene(com_offset_m=(0.01, -0.01, 0.02)),
-        wind=WindScene(mean_m_s=(2.0, 1.0, 0.0), gust_n_rms=1.0),
-    )
-    readings = []
-    for compiled in (False, True):
-        plant, sensors = Plant(scene, seed=1, to_machine_code=compiled), SensorSuite(scene, None, 1, compiled)
-        plant.data.qpos[0] += 0.002 - plant.tip[0]  # the tip 2 mm inside the wall, so that it bounces off
-        edges = PaintedEdges(scene)
-        features = GeometricFeatures(scene, plant.vehicle, edges, 1, to_machine_code=compiled)
-        edges.stroke((1.4, 0.05), (0.8, 0.05))
-        rows, most = [], 0.0
-        for tick in range(250):
-            plant.step(plant.thrusts_actual * (1.0 + 0.02 * math.sin(0.1 * tick)))
-            frame = sensors.sample(plant)
-            lines = features.capture(plant.position, plant.quaternion, plant.velocity, plant.time_ns).lines
-            numbers = [number for line in lines for number in (line.rho, line.theta)]
-            parts = (plant.truth, frame.attitude, frame.angular_velocity, frame.specific_force, frame.wrench, numbers)
-            rows.append(np.concatenate(parts).tobytes())
-            most = max(most, plant.contact_1khz.max())
-        readings.append(rows)
-        assert most > 1.0
-    assert readings[0] == readings[1]

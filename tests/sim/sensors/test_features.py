@@ -12,7 +12,6 @@ import pytest
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import R_BODY_CAMERA, rotation_from_quaternion
 from ibvs_qp.measurement import FeatureFrame, LineFeature
-from ibvs_qp.model.shared_library import compiler
 from sim.sensors.features import BOARD_TRACKS, GeometricFeatures, add_sigma_vs
 from sim.world.board import BoardGeometry
 from sim.world.canvas import Canvas
@@ -261,19 +260,3 @@ def test_painted_edges_outside_the_picture_are_left_out_and_no_other(
     for ours, theirs in zip(asked_for.lines, everything.lines, strict=True):
         assert (ours.rho, ours.theta) == (theirs.rho, theirs.theta)
         np.testing.assert_array_equal(ours.segment, theirs.segment)
-
-
-@pytest.mark.skipif(compiler() is None, reason="no C compiler")
-@pytest.mark.parametrize(("along", "up", "roll", "yaw"), [
-    (0.2, ROW2, 0.0, 0.0), (0.7, ROW2, 8.0, -9.0), (1.3, 0.3, -8.0, 9.0),
-])  # fmt: skip
-def test_machine_code_finds_the_same_painted_pieces(along: float, up: float, roll: float, yaw: float) -> None:
-    painted, pose = painted_c(), facing(SCENE, along, up, 0.0, roll, yaw)
-    numpy, code = (GeometricFeatures(SCENE, VEHICLE, painted, 3, to_machine_code=way) for way in (False, True))
-    assert numpy._pieces._find is None and code._pieces._find is not None
-    ours, theirs = code.capture(*pose, STILL, 0), numpy.capture(*pose, STILL, 0)
-    assert any(line.kind == "paint" for line in ours.lines)
-    for one, other in zip(ours.lines, theirs.lines, strict=True):
-        assert (one.rho, one.theta, one.track_id) == (other.rho, other.theta, other.track_id)
-        np.testing.assert_array_equal(one.segment, other.segment)
-    assert code._pieces.seen(-math.inf, math.inf) == numpy._pieces.seen(-math.inf, math.inf) != []
