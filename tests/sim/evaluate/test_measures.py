@@ -9,7 +9,7 @@ import pytest
 from press_trace import press_trace
 
 from sim.evaluate.measures import loss_figures, press_figures
-from sim.evaluate.measures.reach import push_reach
+from sim.evaluate.measures.press import push_reach
 
 LOW, HIGH = (1.2,) * 6, (52.56,) * 6
 
