@@ -96,7 +96,7 @@ def test_interrupt_keeps_what_was_flown(flown, capsys, monkeypatch):
     check_summary(summary, {"qp"})  # the analytic law never began
     assert summary["interrupted"] is True
     assert (flown / "run" / "log.npz").exists() and (flown / "run" / "report.html").exists()
-    assert err.strip() == "ibvs-qp: interrupted; what was flown is in run"
+    assert err.strip() == "ibvs-qp: interrupted; the partial run is in run"
 
 
 def test_interrupt_while_drawing_keeps_the_log(flown, capsys, monkeypatch):

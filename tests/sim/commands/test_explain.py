@@ -14,7 +14,8 @@ from ibvs_qp.config.settings import dump_toml
 from ibvs_qp.controller import program_template
 from ibvs_qp.model.signals import places
 from sim.commands.cli import main
-from sim.evaluate.explanation import explain_tick, explanation_tables, flown_config
+from sim.evaluate.explanation import explain_tick, flown_config
+from sim.evaluate.explanation_text import explanation_tables
 from sim.flight.closed_loop import FlightOptions, fly
 from sim.flight.flight_log import load_run, save_log
 from sim.flight.trace import Event, Trace
@@ -99,7 +100,7 @@ def test_a_held_tick_is_not_explained_by_the_program_of_an_earlier_one(
     save_log(tmp_path / "log.npz", {"qp": held})
     assert main(["explain", str(tmp_path), "--at", f"{at:.3f}"]) == 0
     told = " ".join(capsys.readouterr().out.split())
-    assert "held" in told and "no program was solved" in told and "Tasks" not in told and "residual" not in told
+    assert "Outcome hold: no program was solved" in told and "Tasks" not in told and "residual" not in told
     assert "specific_force: not finite" in told and "measurement.plane" not in told
     assert main(["explain", str(tmp_path), "--at", f"{at:.3f}", "--json"]) == 0
     table = json.loads(capsys.readouterr().out)
@@ -115,8 +116,8 @@ def test_a_push_below_the_jobs_is_told_beside_it(run: tuple[Path, Trace], capsys
     assert explanation is not None
     greedy = dataclasses.replace(config, painting=dataclasses.replace(config.painting, push_n=35.0))
     told = shown(explanation_tables(trace, tick, explanation, greedy), capsys)
-    assert "35.00 N by the job" in told and f"{trace.reach_margin[tick]:.2f} N further" in told
-    assert "by the job" not in shown(explanation_tables(trace, tick, explanation, config), capsys)
+    assert "job: 35.00 N" in told and f"{trace.reach_margin[tick]:.2f} N further" in told
+    assert "job:" not in shown(explanation_tables(trace, tick, explanation, config), capsys)
 
 
 def turning(trace: Trace, tick: int, rate: float, hard: bool = False) -> Trace:
@@ -170,7 +171,7 @@ def test_hard_limits_in_conflict_are_told_instead_of_refused(
     words = ["explain", str(tmp_path), "--at", f"{trace.t[tick]:.3f}"]
     assert main(words) == 0
     told = " ".join(capsys.readouterr().out.split())
-    assert "No thrusts keep these" in told and "tilt_pitch" in told and "hard_barriers = false" in told
+    assert "No thrusts satisfy these" in told and "tilt_pitch" in told and "hard_barriers = false" in told
     assert "Tasks" not in told and "exact" not in told
     assert main([*words, "--json"]) == 0
     table = json.loads(capsys.readouterr().out)
