@@ -61,9 +61,7 @@ def hold_tables(trace: Trace, tick: int, config: PilotConfig) -> list[Any]:
     """The same for a tick with outcome ``hold``, which has no program and therefore no tasks and limits."""
     rows = zip(config.controller.vehicle.geometry.names, (f"{flown:.3f}" for flown in trace.thrusts[tick]), strict=True)
     table = terminal_table(("rotor", "flown"), rows, "Thrusts [N]")
-    words = (
-        "Outcome hold: no program was solved; the thrusts carry the weight and level the vehicle by IMU data."
-    )
+    words = "Outcome hold: no program was solved; the thrusts carry the weight and level the vehicle by IMU data."
     return [*_headline(trace, tick, config), words, table, _given_up(trace.unallocated[tick])]
 
 

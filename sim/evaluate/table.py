@@ -10,7 +10,12 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rich.table import Table
 
-LAW_HEADINGS = {"qp": "QP law", "paper": "analytic law"}
+LAW_NAMES = {"qp": "QP law", "paper": "analytic law"}
+
+
+def law_name(law: str) -> str:
+    """Name of a law in titles, headings and legends."""
+    return LAW_NAMES.get(law, law)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,7 +75,7 @@ LINES = (
 
 def figure_table(metrics: dict[str, dict[str, Any]]) -> Table:
     """Side-by-side table for the terminal."""
-    headings = ("figure", *(LAW_HEADINGS.get(law, law) for law in metrics), "unit")
+    headings = ("figure", *(law_name(law) for law in metrics), "unit")
     rows = [(line.label, *(line.show(figures) for figures in metrics.values()), line.unit) for line in LINES]
     return terminal_table(headings, rows, text=("figure", "unit"), wrap=headings[1:-1])
 
