@@ -33,8 +33,9 @@ def draw_thrusts(traces: dict[str, Trace]) -> Figure:
             axes.plot(t, thrusts[:, rotor], **line)
         for limit in np.unique(np.concatenate((trace.thrust_min, trace.thrust_max))):
             axes.axhline(limit, **_LIMIT)
-            place = {"xy": (1.0, limit), "xycoords": ("axes fraction", "data")}
-            text = {"xytext": (-2, 2), "textcoords": "offset points", "ha": "right", "va": "bottom"}
+            place = {"xy": (1.0, limit), "xycoords": ("axes fraction", "data"), "textcoords": "offset points"}
+            above = limit < trace.thrust_max.min()  # texts between the limits: above the panel stand the phases
+            text = {"xytext": (-2, 2 if above else -2), "ha": "right", "va": "bottom" if above else "top"}
             axes.annotate(f"{limit:g} N", **place, **text, fontsize=7, color=_LIMIT["color"])
         axes.set_ylabel("thrust [N]")
         _scale(axes, float(np.min(trace.thrust_min)), float(np.max(trace.thrust_max)))

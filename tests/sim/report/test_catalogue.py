@@ -1,4 +1,4 @@
-"""Every task and limit says unit, default and reason; the page of them is current, and true of the program."""
+"""Every task and limit has unit, default and reason; their page is current and describes the program."""
 
 from __future__ import annotations
 
