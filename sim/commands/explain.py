@@ -20,10 +20,6 @@ if TYPE_CHECKING:
     from sim.flight.trace import Trace
 
 
-class ExplainError(IbvsQpError):
-    """The run or the tick cannot be explained."""
-
-
 @dataclass(frozen=True, kw_only=True)
 class Explain:
     """Explain one tick of a flight: target and result of every task, active limits and their cost.
@@ -46,8 +42,8 @@ class Explain:
         """Print the explanation."""
         from rich.console import Console
 
-        from sim.evaluate import explanation_text as text
         from sim.evaluate.explanation import explain_conflict, explain_tick, flown_config, has_no_program
+        from sim.evaluate.explanation_text import explanation_tables
 
         trace = self._flight()
         tick = self._tick(trace)
@@ -58,39 +54,32 @@ class Explain:
                 conflict = explain_conflict(trace, tick)
                 if not conflict:
                     solver = self.solver or "the exact solver"
-                    raise ExplainError(
+                    raise IbvsQpError(
                         f"{solver} finds no solution at {self.at:g} s, though no hard limits are in conflict"
                     )
         if self.json:
             print(json.dumps(_table(trace, tick, explanation, conflict, config), allow_nan=False))
             return 0
-        console = Console()
-        if explanation is not None:
-            parts = text.explanation_tables(trace, tick, explanation, config)
-        elif conflict:
-            parts = text.conflict_tables(trace, tick, conflict, config)
-        else:
-            parts = text.hold_tables(trace, tick, config)
-        for part in (*parts, text.loop_margin_line(config)):
-            console.print(part)
+        for part in explanation_tables(trace, tick, explanation, config, conflict):
+            Console().print(part)
         return 0
 
     def _flight(self) -> Trace:
         from sim.flight.flight_log import load_run
 
         if not (self.run_dir / "log.npz").exists():
-            raise ExplainError(f"{self.run_dir} is no run folder: it has no log.npz; give the folder that paint wrote")
+            raise IbvsQpError(f"{self.run_dir} is no run folder: it has no log.npz; give the folder that paint wrote")
         trace = load_run(self.run_dir).get("qp")
         if trace is None or "program" not in trace.arrays:
-            raise ExplainError(f"{self.run_dir} has no flight under the QP law; fly one with: ibvs-qp paint --law qp")
+            raise IbvsQpError(f"{self.run_dir} has no flight under the QP law; fly one with: ibvs-qp paint --law qp")
         if self.seed is not None and self.seed != trace.seed:
-            raise ExplainError(f"--seed {self.seed}: the run was flown with seed {trace.seed}")
+            raise IbvsQpError(f"--seed {self.seed}: the run was flown with seed {trace.seed}")
         return trace
 
     def _tick(self, trace: Trace) -> int:
         first, last = float(trace.t[0]), float(trace.t[-1])
         if not first - 1e-6 <= self.at <= last + 1e-6:
-            raise ExplainError(f"--at {self.at:g} s: the flight lasts from {first:g} to {last:.2f} s")
+            raise IbvsQpError(f"--at {self.at:g} s: the flight lasts from {first:g} to {last:.2f} s")
         return int(np.argmin(np.abs(trace.t - self.at)))
 
 

@@ -29,51 +29,25 @@ _NO_BOUND = 9e3
 _ROUNDING = 1e-6
 
 
-def explanation_tables(trace: Trace, tick: int, explanation: Explanation, config: PilotConfig) -> list[Any]:
-    """Headline, rejected inputs, tasks, limits, rotors and wrench given up of a solved tick, for a console."""
-    rotors = _rotors(trace, tick, config, explanation.thrusts)
-    parts = [_tasks(explanation), *_limits(explanation), rotors, _given_up(explanation.unallocated_wrench)]
-    return [*_headline(trace, tick, config), *parts]
-
-
-def conflict_tables(trace: Trace, tick: int, conflict: tuple[LimitValue, ...], config: PilotConfig) -> list[Any]:
-    """The same for a tick whose hard limits contradict each other: the conflicting limits and the flown thrusts."""
-    words = (
-        f"[bold]No thrusts satisfy these {len(conflict)} hard limits together[/]; without any one of them a solution "
-        "exists. The vehicle flew the analytic law, clipped to the rotors' limits."
-    )
-    rows = []
-    for row in conflict:
-        violation = max(row.lower - row.value, row.value - row.upper)
-        text = f"{violation:.4g}" if violation > _ROUNDING else "satisfied"
-        rows.append((row.name, _number(row.lower), _number(row.upper), _number(row.value), text, row.unit))
-    headings = ("limit", "from", "to", "flown", "violation", "unit")
-    table = terminal_table(headings, rows, "Limits in conflict", text=("limit", "unit"))
-    advice = (
-        "With limits.hard_barriers = false the barriers take slack at their slack weights, "
-        "and a solution always exists."
-    )
-    parts = [words, table, advice, _rotors(trace, tick, config), _given_up(trace.unallocated[tick])]
-    return [*_headline(trace, tick, config), *parts]
-
-
-def hold_tables(trace: Trace, tick: int, config: PilotConfig) -> list[Any]:
-    """The same for a tick with outcome ``hold``, which has no program and therefore no tasks and limits."""
-    rows = zip(config.controller.vehicle.geometry.names, (f"{flown:.3f}" for flown in trace.thrusts[tick]), strict=True)
-    table = terminal_table(("rotor", "flown"), rows, "Thrusts [N]")
-    words = "Outcome hold: no program was solved; the thrusts carry the weight and level the vehicle by IMU data."
-    return [*_headline(trace, tick, config), words, table, _given_up(trace.unallocated[tick])]
-
-
-def loop_margin_line(config: PilotConfig) -> str:
-    """Smallest damping ratio of the contact mode over the stiffness range of the preset's brush."""
-    brush = config.controller.brush
-    margin = least_margin(config.controller, brush)
-    return (
-        f"Contact loop: smallest damping ratio {margin.least_damping_ratio:.2f} at {margin.frequency_hz:.1f} Hz and "
-        f"{margin.stiffness_n_m:.0f} N/m (brush {brush.stiffness_min_n_m:g} to {brush.stiffness_max_n_m:g} N/m; "
-        f"presets below {LEAST_DAMPING_RATIO:g} are rejected)"
-    )
+def explanation_tables(
+    trace: Trace,
+    tick: int,
+    explanation: Explanation | None,
+    config: PilotConfig,
+    conflict: tuple[LimitValue, ...] = (),
+) -> list[Any]:
+    """Strings and tables for a console: a solved tick, one with conflicting hard limits, or a hold with neither."""
+    rotors = _rotors(trace, tick, config, explanation, bool(explanation or conflict))
+    if explanation is not None:
+        parts = [_tasks(explanation), *_limits(explanation), rotors, _given_up(explanation.unallocated_wrench)]
+    elif conflict:
+        parts = [*_conflict(conflict), rotors, _given_up(trace.unallocated[tick])]
+    else:
+        parts = [
+            "Outcome hold: no program was solved; the thrusts carry the weight and level the vehicle by IMU data.",
+            *(rotors, _given_up(trace.unallocated[tick])),
+        ]
+    return [*_headline(trace, tick, config), *parts, _loop_margin(config)]
 
 
 def _headline(trace: Trace, tick: int, config: PilotConfig) -> list[str]:
@@ -124,12 +98,40 @@ def _limits(explanation: Explanation) -> list[Any]:
     return [terminal_table(headings, rows, title, text=("limit", "side", "unit")), words]
 
 
-def _rotors(trace: Trace, tick: int, config: PilotConfig, exact: np.ndarray | None = None) -> Any:
-    columns = {"flown": trace.thrusts[tick]} | ({} if exact is None else {"exact": exact})
-    columns |= dict(zip(("from", "to"), thrust_window(trace, tick, config), strict=True))
+def _conflict(conflict: tuple[LimitValue, ...]) -> list[Any]:
+    words = (
+        f"[bold]No thrusts satisfy these {len(conflict)} hard limits together[/]; without any one of them a solution "
+        "exists. The vehicle flew the analytic law, clipped to the rotors' limits."
+    )
+    rows = []
+    for row in conflict:
+        violation = max(row.lower - row.value, row.value - row.upper)
+        text = f"{violation:.4g}" if violation > _ROUNDING else "satisfied"
+        rows.append((row.name, _number(row.lower), _number(row.upper), _number(row.value), text, row.unit))
+    headings = ("limit", "from", "to", "flown", "violation", "unit")
+    advice = "With limits.hard_barriers = false the barriers have slack weights, and a solution always exists."
+    return [words, terminal_table(headings, rows, "Limits in conflict", text=("limit", "unit")), advice]
+
+
+def _rotors(trace: Trace, tick: int, config: PilotConfig, explanation: Explanation | None, window: bool) -> Any:
+    """Thrusts flown, those of the exact solution if there is one, and the thrust limits if there was a program."""
+    columns = {"flown": trace.thrusts[tick]} | ({} if explanation is None else {"exact": explanation.thrusts})
+    if window:
+        columns["from"], columns["to"] = thrust_window(trace, tick, config)
     names = config.controller.vehicle.geometry.names
     rows = [(name, *(f"{x:.3f}" for x in thrusts)) for name, *thrusts in zip(names, *columns.values(), strict=True)]
     return terminal_table(("rotor", *columns), rows, "Thrusts [N]")
+
+
+def _loop_margin(config: PilotConfig) -> str:
+    """Smallest damping ratio of the contact mode over the stiffness range of the preset's brush."""
+    brush = config.controller.brush
+    margin = least_margin(config.controller, brush)
+    return (
+        f"Contact loop: smallest damping ratio {margin.least_damping_ratio:.2f} at {margin.frequency_hz:.1f} Hz and "
+        f"{margin.stiffness_n_m:.0f} N/m (brush {brush.stiffness_min_n_m:g} to {brush.stiffness_max_n_m:g} N/m; "
+        f"presets below {LEAST_DAMPING_RATIO:g} are rejected)"
+    )
 
 
 def _given_up(wrench: np.ndarray) -> str:
