@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
-import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -44,6 +42,7 @@ class Explain:
 
         from sim.evaluate.explanation import explain_conflict, explain_tick, flown_config, has_no_program
         from sim.evaluate.explanation_text import explanation_tables
+        from sim.report.rundir import as_json
 
         trace = self._flight()
         tick = self._tick(trace)
@@ -58,7 +57,7 @@ class Explain:
                         f"{solver} finds no solution at {self.at:g} s, though no hard limits are in conflict"
                     )
         if self.json:
-            print(json.dumps(_table(trace, tick, explanation, conflict, config), allow_nan=False))
+            print(as_json(_table(trace, tick, explanation, conflict, config)))
             return 0
         for part in explanation_tables(trace, tick, explanation, config, conflict):
             Console().print(part)
@@ -87,11 +86,9 @@ def _table(
     trace: Trace, tick: int, explanation: Explanation | None, conflict: tuple[LimitValue, ...], config: PilotConfig
 ) -> dict[str, Any]:
     """One tick as JSON: without a program no thrust limits, without a solution no tasks and no active limits."""
-    from dataclasses import asdict
-
     from sim.evaluate.explanation import rejections, thrust_window
 
-    flown, margin = trace.thrusts[tick].tolist(), float(trace.reach_margin[tick])
+    flown = trace.thrusts[tick].tolist()
     table = {
         "schema": 1,
         "t": float(trace.t[tick]),
@@ -99,7 +96,7 @@ def _table(
         "outcome": trace.outcomes[int(trace.outcome[tick])],
         "push_asked": config.painting.push_n,
         "push_reference": float(trace.push_reference[tick]),
-        "reach_margin": None if math.isnan(margin) else margin,
+        "reach_margin": float(trace.reach_margin[tick]),
         "rejected": [{"t": event.t, "text": event.text} for event in rejections(trace, tick)],
         "thrusts": flown,
         "flown_thrusts": flown,

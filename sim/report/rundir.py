@@ -49,10 +49,6 @@ log.npz       every array, named <law>/<array>; load it with
 """
 
 
-class RunFolderError(IbvsQpError):
-    """The run folder cannot be written."""
-
-
 @dataclass(frozen=True)
 class RunFolder:
     """Paths of one run."""
@@ -69,7 +65,7 @@ class RunFolder:
         """Create the folder, ``runs/<UTC stamp>`` by default, and check that it can be written.
 
         Raises:
-            RunFolderError: If it cannot be written.
+            IbvsQpError: If it cannot be written.
         """
         path = _stamped(Path("runs")) if out is None else out
         try:
@@ -79,8 +75,7 @@ class RunFolder:
             probe.unlink()
         except OSError as error:
             reason = error.strerror or str(error)
-            mend = "give a writable folder with --out"
-            raise RunFolderError(f"cannot write run folder {path}: {reason}; {mend}") from None
+            raise IbvsQpError(f"cannot write run folder {path}: {reason}; give a writable folder with --out") from None
         return cls(path)
 
     def discard_if_empty(self) -> None:
@@ -140,14 +135,14 @@ def summary(
     wall_time_s: float,
     peak_memory_bytes: int,
 ) -> dict[str, Any]:
-    """Assemble summary.json.
+    """Content of summary.json.
 
     Args:
         facts: command, seed, scene, preset, camera, image_size, features, vision.
         folder: The run folder.
         metrics: M of every law flown.
         interrupted: Whether Ctrl-C ended the run.
-        wall_time_s: Time since the command began [s].
+        wall_time_s: Time since the start of the command [s].
         peak_memory_bytes: Of all processes together.
     """
     return {
@@ -165,12 +160,12 @@ def summary(
 
 
 def peak_memory(flights: Iterable[Flight]) -> int:
-    """Peak resident memory of this process and of those that flew [bytes]: an upper bound of the common peak."""
+    """Peak resident memory of this process plus the peaks of the flight processes [bytes], an upper bound."""
     return own_peak_memory() + sum(flight.process_memory_bytes for flight in flights)
 
 
 def as_json(value: Any, indent: int | None = None) -> str:
-    """JSON text; numbers that are not finite become null."""
+    """JSON text; non-finite numbers become null."""
     return json.dumps(_finite(value), indent=indent, allow_nan=False)
 
 

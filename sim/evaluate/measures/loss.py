@@ -16,9 +16,6 @@ DETACHED_M = 0.10
 def loss_figures(trace: Trace) -> dict[str, float]:
     """Figures from the loss to the end of the flight.
 
-    Args:
-        trace: A flight with a lost rotor.
-
     Returns:
         ``survived_s``: from the loss to the crash or the planned end. ``yaw_turned_deg``: largest turn from the heading
         at the loss, full turns included. ``push_spike_n``: largest push after the loss. Empty without a fault.

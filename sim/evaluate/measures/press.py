@@ -86,14 +86,7 @@ def push_figures(trace: Trace, push: np.ndarray, commanded: float, sliding_frict
 
 
 def press_figures(trace: Trace) -> dict[str, float]:
-    """Figures of the phase ``press`` of a flight with `sim.flight.jobs.PressJob`.
-
-    Args:
-        trace: The flight.
-
-    Returns:
-        Figures by name; NaN if the flight ended earlier.
-    """
+    """Figures of the phase ``press`` of a flight with `sim.flight.jobs.PressJob`; NaN if the flight ended earlier."""
     begin, end = phase_window(trace, "press")
     clock = contact_clock(trace)
     window = (clock >= begin) & (clock <= end)

@@ -30,11 +30,7 @@ _REDUCED = "reference.push_force"
 def slide_figures(trace: Trace) -> dict[str, float]:
     """Figures of the phase ``paint`` of a flight that slides, after those of the press before it.
 
-    Args:
-        trace: A flight with `sim.flight.jobs.PressJob` and a slide.
-
-    Returns:
-        Figures of `press_figures` under ``hold_*``, and of the slide under their plain names.
+    The flight has a `sim.flight.jobs.PressJob` with a slide. Figures of the press have the prefix ``hold_``.
     """
     hold = {f"hold_{name}": value for name, value in press_figures(trace).items()}
     begin, end = phase_window(trace, "paint")
