@@ -109,9 +109,7 @@ def test_a_hold_tick_is_not_explained_by_the_program_of_an_earlier_tick(
     assert table["rejected"] == [{"t": at, "text": rejected.text}]
 
 
-def test_a_lowered_push_is_printed_with_the_jobs(
-    run: tuple[Path, Trace], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_lowered_push_is_printed_with_the_jobs(run: tuple[Path, Trace], capsys: pytest.CaptureFixture[str]) -> None:
     _, trace = run
     tick = int(np.flatnonzero(trace.push_reference >= trace.scene.paint.push_n)[0])
     config, explanation = explain_tick(trace, tick)
