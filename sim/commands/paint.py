@@ -65,7 +65,7 @@ class Paint:
         """Fly, write the run folder, print the figures; an option is rejected before any flight."""
         from rich.console import Console
 
-        from sim.sensors.cameras import resolve_camera, spare_core
+        from sim.sensors.cameras import resolve_camera
 
         check_mujoco()
         from sim.flight.closed_loop import FlightOptions, pilot_config
@@ -94,7 +94,6 @@ class Paint:
             image_size=size,
             preset=str(self.preset) if self.preset else None,
             video=not self.no_video,
-            camera_process=self.law != "both" and spare_core(),
             machine_code=True,
             view=self.view,
         )

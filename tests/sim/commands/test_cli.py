@@ -204,9 +204,9 @@ def _paint(out: Path, *words: str) -> list[str]:
 
 
 def test_ctrl_c_ends_both_processes_with_a_partial_run(tmp_path):
-    """The signal goes to the parent alone, as a terminal's does if the children have their own group.
+    """The signal goes to the parent alone, as a terminal's does once the children have their own group.
 
-    Eight rows, so that no machine ends the flight before the signal.
+    Eight rows, for a flight that no machine has finished before the signal.
     """
     (tmp_path / "long.toml").write_text("[paint]\nrows = 8\n")
     words = _paint(tmp_path / "run", "--no-video", "--scene", str(tmp_path / "long.toml"))
