@@ -9,13 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ibvs_qp.command import Outcome
-from ibvs_qp.config import ControllerConfig
 from ibvs_qp.config.settings import from_dict
 from ibvs_qp.controller import program_template
-from ibvs_qp.model.signals import places
 from ibvs_qp.pilot import PilotConfig
 from ibvs_qp.qp.explain import Explanation, LimitValue, TickReplay
-from ibvs_qp.qp.problem import QpTemplate
 
 if TYPE_CHECKING:
     from sim.flight.trace import Event, Trace
@@ -24,21 +21,23 @@ if TYPE_CHECKING:
 _TIME_TOLERANCE_S = 1e-6
 
 
-@functools.lru_cache(maxsize=2)
-def _template(config: ControllerConfig) -> QpTemplate:
-    return program_template(config)
+#: Building the program of a configuration takes long; explanations need it several times.
+_program = functools.lru_cache(maxsize=2)(program_template)
 
 
-def _replay(trace: Trace, tick: int, solver: str | None = None) -> tuple[TickReplay, Explanation | None]:
-    """Solve the program of one tick again; the only access to the parameters of the program, with `thrust_window`."""
-    replay = TickReplay(_template(flown_config(trace).controller), solver)
+def _replay(
+    trace: Trace, tick: int, config: PilotConfig, solver: str | None = None
+) -> tuple[TickReplay, Explanation | None]:
+    """Solve the program of one tick again; the only access to the recorded inputs of the program."""
+    replay = TickReplay(_program(config.controller), solver)
     return replay, replay.explain(trace.arrays["program"][tick].astype(float))
 
 
 def thrust_window(trace: Trace, tick: int, config: PilotConfig) -> tuple[np.ndarray, np.ndarray]:
     """Lower and upper thrusts in the program of a tick: box, deratings and rate limit [N], (n,) each."""
-    layout, row = places(_template(config.controller).model.parameters), trace.arrays["program"][tick]
-    return row[layout["thrust_lower"]], row[layout["thrust_upper"]]
+    names = [f"thrust_{name}" for name in config.controller.vehicle.geometry.names]
+    rows = _replay(trace, tick, config)[0].limit_values(names, trace.thrusts[tick])
+    return np.array([row.lower for row in rows]), np.array([row.upper for row in rows])
 
 
 def flown_config(trace: Trace) -> PilotConfig:
@@ -48,12 +47,13 @@ def flown_config(trace: Trace) -> PilotConfig:
 
 def explain_tick(trace: Trace, tick: int, solver: str | None = None) -> tuple[PilotConfig, Explanation | None]:
     """Configuration flown and the explanation of one tick of a QP flight, by the exact solver or a named one."""
-    return flown_config(trace), _replay(trace, tick, solver)[1]
+    config = flown_config(trace)
+    return config, _replay(trace, tick, config, solver)[1]
 
 
 def explain_conflict(trace: Trace, tick: int) -> tuple[LimitValue, ...]:
     """A smallest set of hard limits that contradict each other, with their values at the flown thrusts; or ()."""
-    replay, _ = _replay(trace, tick)
+    replay, _ = _replay(trace, tick, flown_config(trace))
     return replay.limit_values(replay.conflict, trace.thrusts[tick])
 
 

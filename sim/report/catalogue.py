@@ -11,9 +11,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from ibvs_qp.config import ControllerConfig
-from ibvs_qp.controller import default_limits, default_tasks
+from ibvs_qp.controller import default_limits, default_tasks, program_template
 from ibvs_qp.limits import Limit
-from ibvs_qp.model.rows import LimitRow, SymbolicModel, TaskRow
+from ibvs_qp.model.rows import LimitRow, TaskRow
 from ibvs_qp.tasks import Task
 
 _HEAD = """\
@@ -91,7 +91,7 @@ def catalogue(config: ControllerConfig | None = None) -> str:
         config: Configuration of the program; None for the default.
     """
     config = config or ControllerConfig()
-    model = SymbolicModel(config)
+    model = program_template(config).model
     tasks, limits = default_tasks(config), default_limits(config)
     weighed = [line for task in tasks for line in _weighed(task, task.rows(model), config)]
     parts = [_HEAD, _TASKS, _table(("class", "purpose", "rows", "weight", "reason"), _joined(weighed))]
