@@ -1,1 +1,1 @@
-"""Benches: what a tick and a picture cost, beside their rivals, as ratios within one run."""
+"""Benchmarks: processor time of a tick and of a picture, and ratios to rivals within one run."""

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import rotation_from_quaternion
@@ -18,22 +19,22 @@ from sim.world.canvas import Canvas
 from sim.world.random_streams import stream
 from sim.world.scene import Scene
 
-#: Camera period [ns], and its frequency of sway [Hz] with the amplitudes about roll, pitch and yaw [deg].
+#: Camera period [ns]; frequency of the sway [Hz] and its amplitudes in roll, pitch and yaw [deg].
 PERIOD_NS, _SWAY_HZ, _SWAY_DEG = 33_333_333, 0.4, (0.3, 0.3, 0.6)
 #: Start of the approach: tip to board [m].
 _START_M = 0.4
-#: Error of the gyro's turn between two pictures [rad].
+#: Error of the integrated gyro between two pictures, per axis [rad].
 _GYRO_RAD = 6e-5
 
 
 @dataclass(frozen=True, kw_only=True)
 class Shot:
-    """One picture with what the vehicle's own sensors tell of it.
+    """One picture with the motion that the vehicle's sensors measure.
 
     Attributes:
         frame: Colour and depth.
         attitude: Quaternion B in I, (4,).
-        rotation: Turn of the body since the shot before, in B [rad], (3,).
+        rotation: Rotation of the body since the previous shot, in B [rad], (3,).
         velocity: Velocity of the body in B [m/s], (3,).
     """
 
@@ -44,16 +45,16 @@ class Shot:
 
 
 def mission_shots(size: tuple[int, int], count: int, seed: int, vehicle: VehicleParams) -> Iterator[Shot]:
-    """Shots at 30 Hz from four stretches of a mission, the same number from each.
+    """Shots at 30 Hz from four parts of a mission, the same number from each.
 
     Args:
         size: (width, height) of the pictures [px].
-        count: Shots in all.
+        count: Number of shots.
         seed: Of textures, clutter and noise.
-        vehicle: Where tip and camera are.
+        vehicle: Positions of tip and camera.
 
     Yields:
-        Shots; between two stretches the vehicle has moved on and the brush has painted what lies between.
+        Shots; between two parts the brush has painted the stretch between them.
     """
     scene = Scene()
     scene = dataclasses.replace(scene, camera=dataclasses.replace(scene.camera, width=size[0], height=size[1]))
@@ -64,7 +65,7 @@ def mission_shots(size: tuple[int, int], count: int, seed: int, vehicle: Vehicle
     brush: tuple[float, float] | None = None
     for k, (along, up, distance, painting) in enumerate(_path(scene, canvas, count)):
         angles = np.radians(_SWAY_DEG) * np.sin(2.0 * math.pi * _SWAY_HZ * k * PERIOD_NS * 1e-9 + phase)
-        attitude = _quaternion(*angles.tolist())
+        attitude = np.roll(Rotation.from_euler("ZYX", angles[::-1]).as_quat(), 1)
         rotation = rotation_from_quaternion(attitude)
         y, z = canvas.geometry.point(along, up)
         position = np.array([-distance, y, z]) - rotation @ np.array(vehicle.tip_position_m)
@@ -105,16 +106,3 @@ def _paint(canvas: Canvas, start: tuple[float, float], stop: tuple[float, float]
     """One straight stroke."""
     canvas.stroke(None, start)
     canvas.stroke(start, stop)
-
-
-def _quaternion(roll: float, pitch: float, yaw: float) -> np.ndarray:
-    """Attitude of z-y-x angles [rad]."""
-    (cr, sr), (cp, sp), (cy, sy) = ((math.cos(0.5 * a), math.sin(0.5 * a)) for a in (roll, pitch, yaw))
-    return np.array(
-        [
-            cr * cp * cy + sr * sp * sy,
-            sr * cp * cy - cr * sp * sy,
-            cr * sp * cy + sr * cp * sy,
-            cr * cp * sy - sr * sp * cy,
-        ]
-    )

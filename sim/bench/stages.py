@@ -1,4 +1,4 @@
-"""Where a tick's time goes: packing, evaluating, handing over, solving, judging and reporting."""
+"""Time of every stage of a tick: pack, evaluate, update of OSQP's data, solve, unpack."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import numpy as np
 
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.controller import HybridController
-from sim.bench.ticks import Tick
+from sim.bench.ticks import Tick, by_flight
 
 
-class _Clock:
-    """Wraps calls and notes how long they took in a tick."""
+class _Stopwatch:
+    """Wraps calls and sums the time that each stage takes in a tick [us]."""
 
     def __init__(self) -> None:
         self.spent: dict[str, float] = {}
@@ -31,44 +31,38 @@ class _Clock:
 
 
 class _TimedWorkspace:
-    """OSQP's extension object with a clock: handing data over is one stage, iterating another."""
+    """OSQP's extension object, which has no writable attributes, with its calls timed."""
 
-    def __init__(self, inner: Any, clock: _Clock) -> None:
+    def __init__(self, inner: Any, watch: _Stopwatch) -> None:
         self._inner = inner
-        self.update_data_vec = clock.around("update", inner.update_data_vec)
-        self.update_data_mat = clock.around("update", inner.update_data_mat)
-        self.solve = clock.around("solve", inner.solve)
+        self.update_data_vec = watch.around("update", inner.update_data_vec)
+        self.update_data_mat = watch.around("update", inner.update_data_mat)
+        self.solve = watch.around("solve", inner.solve)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._inner, name)
 
 
 def stage_medians(config: ControllerConfig, ticks: list[Tick]) -> dict[str, float]:
-    """Median time of every stage of a step with OSQP at every tick [us]; the clocks' own time is in them."""
-    controller, clock, last = HybridController(config), _Clock(), -1
-    tick, solver = controller.setpoints.tick, controller.engine.osqp
-    tick._evaluate = clock.around("evaluate", tick._evaluate)
+    """Median time of every stage of a step [us]; it includes the time of the measurement itself."""
+    controller, watch = HybridController(config), _Stopwatch()
+    engine, step = controller.engine, controller.setpoints.step
+    step.evaluate = watch.around("evaluate", step.evaluate)
+    engine.solve = watch.around("engine", engine.solve)  # type: ignore[method-assign]
     table: dict[str, list[float]] = {name: [] for name in ("pack", "evaluate", "update", "solve", "unpack")}
-    engine = controller.engine.solve
-    controller.engine.solve = clock.around("engine", engine)  # type: ignore[method-assign]
-    setpoints = controller.setpoints.update
-    controller.setpoints.update = clock.around("setpoints", setpoints)  # type: ignore[method-assign]
-    for measurement, reference in ticks:
-        if measurement.stamp_ns <= last:
-            controller.reset()
-        last = measurement.stamp_ns
-        inner = getattr(solver, "_inner", None)
-        if inner is not None and not isinstance(inner, _TimedWorkspace):
-            solver._inner = _TimedWorkspace(inner, clock)
-        clock.spent = {}
+    for measurement, reference in by_flight(controller, ticks):
+        inner = getattr(engine.osqp, "_inner", None)
+        if inner is not None and not isinstance(inner, _TimedWorkspace):  # a reset makes a new workspace
+            engine.osqp._inner = _TimedWorkspace(inner, watch)
+        watch.spent = {}
         start = time.perf_counter_ns()
         controller.step(measurement, reference)
-        total, spent = 1e-3 * (time.perf_counter_ns() - start), clock.spent
-        if "solve" not in spent:
+        total, spent = 1e-3 * (time.perf_counter_ns() - start), watch.spent
+        if "solve" not in spent:  # the first solve of a workspace
             continue
-        table["evaluate"].append(spent["evaluate"])
-        table["update"].append(spent["update"])
-        table["solve"].append(spent["solve"])
-        table["unpack"].append(spent["engine"] - spent["update"] - spent["solve"])
-        table["pack"].append(total - spent["engine"] - spent["evaluate"])
+        stages = {name: spent[name] for name in ("evaluate", "update", "solve")}
+        stages["unpack"] = spent["engine"] - spent["update"] - spent["solve"]
+        stages["pack"] = total - spent["engine"] - spent["evaluate"]
+        for name, duration in stages.items():
+            table[name].append(duration)
     return {name: float(np.median(times)) for name, times in table.items() if times}

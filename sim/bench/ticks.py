@@ -1,4 +1,4 @@
-"""Ticks of real closed loops, recorded as a controller sees them: painting, presses at the limit, lost thrust."""
+"""Measurements and references of closed loops: painting, a press at the limit, a loss of thrust."""
 
 from __future__ import annotations
 
@@ -6,16 +6,17 @@ import dataclasses
 from collections.abc import Iterator
 
 from allocation.geometry import TAROT_T960
+from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import Measurement, Reference
 from sim.flight.closed_loop import FlightOptions, World, make_pilot, pilot_config
 from sim.flight.faults import Derate, Fault, FaultSchedule
 from sim.flight.jobs import Job, PaintJob, PressJob
 from sim.world.scene import Scene
 
-#: A flight that lasts longer is cut [ticks]: two minutes.
+#: Longest flight [ticks]: two minutes.
 LONGEST_FLIGHT = 30_000
 
-#: Push asked for where it is beyond reach [N].
+#: Commanded push beyond reach [N].
 HARD_PUSH_N = 35.0
 
 Tick = tuple[Measurement, Reference]
@@ -25,11 +26,11 @@ def recorded_ticks(count: int, seed: int) -> list[Tick]:
     """Measurements and references of closed loops on geometric features, one flight after the other.
 
     Args:
-        count: How many ticks.
-        seed: Of the first flight; the next ones count on.
+        count: Number of ticks.
+        seed: Of the first flight; later flights use consecutive seeds.
 
     Returns:
-        The ticks, flight after flight; stamps begin anew with each.
+        The ticks, flight after flight; the stamps of every flight start again.
     """
     ticks: list[Tick] = []
     while True:
@@ -41,8 +42,18 @@ def recorded_ticks(count: int, seed: int) -> list[Tick]:
         seed += 1
 
 
+def by_flight(controller: HybridController, ticks: list[Tick]) -> Iterator[Tick]:
+    """The ticks one by one; the controller is reset before the first tick of every flight."""
+    last = -1
+    for measurement, reference in ticks:
+        if measurement.stamp_ns <= last:
+            controller.reset()
+        last = measurement.stamp_ns
+        yield measurement, reference
+
+
 def _flights(scene: Scene) -> Iterator[tuple[Scene, Job, tuple[Fault, ...], bool]]:
-    """The mix: a paint job, a press beyond reach, a paint job with a rotor that loses thrust on the way."""
+    """A paint job, a press beyond reach, a paint job during which a rotor loses thrust."""
     hard = dataclasses.replace(scene, paint=dataclasses.replace(scene.paint, push_n=HARD_PUSH_N))
     yield scene, PaintJob(), (), True
     yield hard, PressJob(hold_s=10.0), (), False
@@ -53,20 +64,17 @@ def flown_ticks(scene: Scene, seed: int, job: Job, faults: tuple[Fault, ...], re
     """Ticks of one flight of the QP law on geometric features.
 
     Args:
-        scene: The truth.
+        scene: The scene.
         seed: Of the flight.
-        job: What is done at the wall.
-        faults: What goes wrong.
-        reach_check: Whether a push beyond reach is reduced.
+        job: Job at the wall.
+        faults: Injected faults.
+        reach_check: Whether the controller reduces a push beyond reach.
     """
     options = FlightOptions(seed=seed, features="geometric", video=False)
     config = pilot_config(scene, options)
     config = dataclasses.replace(config, controller=dataclasses.replace(config.controller, reach_check=reach_check))
-    pilot, world, schedule = (
-        make_pilot(scene, options, config, job),
-        World(scene, options, config),
-        FaultSchedule(faults),
-    )
+    pilot, world = make_pilot(scene, options, config, job), World(scene, options, config)
+    schedule = FaultSchedule(faults)
     for _ in range(LONGEST_FLIGHT):
         if pilot.painter.finished or world.plant.crashed:
             return

@@ -1,4 +1,4 @@
-"""Times of one measured thing, and the table of a bench (schema 1)."""
+"""Times of one measured operation, and the result of a benchmark (schema 1)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 SCHEMA = 1
-#: Rates whose deadlines are watched [Hz].
+#: Rates whose missed deadlines are counted [Hz].
 DEADLINES_HZ = (250, 500, 1000)
 #: Percentiles of a row.
 _PERCENTILES = {"p50_us": 50.0, "p90_us": 90.0, "p99_us": 99.0, "p999_us": 99.9}
@@ -20,12 +20,12 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
-    """Times of one thing.
+    """Times of one operation.
 
     Attributes:
-        name: What was measured.
+        name: Of the operation.
         size: Picture size as in "640x480", or None.
-        times_us: Times of the measuring thread [us], in order: neighbours on the machine disturb them least.
+        times_us: Processor times of the measuring thread [us], in order; other processes disturb them least.
     """
 
     name: str
@@ -34,11 +34,11 @@ class Row:
 
     @property
     def median_us(self) -> float:
-        """Median time [us]; not a number without any."""
+        """Median time [us]; NaN without times."""
         return float(np.median(self.times_us)) if self.times_us else float("nan")
 
     def measure(self, work: Callable[[], Result]) -> Result:
-        """Do some work and note how long it took."""
+        """Call ``work``, record its time and return its result."""
         start = time.thread_time_ns()
         result = work()
         self.times_us.append(1e-3 * (time.thread_time_ns() - start))
@@ -47,14 +47,14 @@ class Row:
     def summary(self) -> dict[str, Any]:
         """The row as written to JSON."""
         times = np.array(self.times_us if self.times_us else [np.nan])
-        figures = {name: float(np.percentile(times, share)) for name, share in _PERCENTILES.items()}
+        figures = {name: float(np.percentile(times, percent)) for name, percent in _PERCENTILES.items()}
         misses = {str(rate): int(np.count_nonzero(times > 1e6 / rate)) for rate in DEADLINES_HZ}
         return {"name": self.name, "size": self.size, **figures, "max_us": float(times.max()), "misses": misses}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Bench:
-    """A whole bench: rows, medians of the stages [us], ratios of medians (rival to ours), and what else to know."""
+    """Result of a benchmark: rows, medians of the stages [us], ratios of medians (rival to ours), further notes."""
 
     rows: list[Row]
     stages_us: dict[str, float]

@@ -1,4 +1,4 @@
-"""What vision costs: tracked picture, detection, velocity, beside the paper's pipeline and cv2's LSD, one thread."""
+"""Processor time of tracked pictures, detection and velocity beside the paper's pipeline and cv2's LSD, one thread."""
 
 from __future__ import annotations
 
@@ -12,35 +12,33 @@ import cv2
 import numpy as np
 
 from ibvs_qp.config.vehicle import VehicleParams
-from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.vision import Percept, Perception, VisionConfig, checks
 from ibvs_qp.vision.layout import PictureLayout
 from ibvs_qp.vision.paper import PaperPipeline
-from sim.bench.mission import Shot, mission_shots
-from sim.bench.real_frames import real_frames
+from sim.bench.mission import PERIOD_NS, Shot, mission_shots
 from sim.bench.timing import Bench, Row
+from sim.detection.manifest import FrameEntry, read_manifest
+from sim.detection.pictures import read_frame
 from sim.world.scene import Scene
 
-#: Picture sizes measured; the ratios and stages are those of the first.
+#: Measured picture sizes; ratios and stages are those of the first.
 SIZES = ((640, 480), (424, 240))
-#: Pictures seen before any is timed: buffers, tables and caches are warm then.
+#: Pictures before the measurement, so that buffers, tables and caches are warm.
 _WARM = 12
-#: Times each real frame is seen at least, and real pictures seen in all at least.
-_REPEATS, _LEAST = 8, 3 * _WARM
-#: What a tracked picture consists of, and a detection from nothing.
+#: Smallest number of passes over the real frames of a camera, and of its pictures in all.
+_PASSES, _LEAST = 8, 3 * _WARM
+#: Stages of a tracked picture, and of a detection from nothing.
 _TRACKED, _DETECTION = ("plane", "tracks"), ("plane", "tracks", "detect")
-
-#: Pictures that each rival sees in turn.
+#: Pictures that each rival processes in turn.
 _TURN = 10
-#: A search for lines takes longer than this, the decision against one does not [ms].
+#: A picture whose stage "detect" takes longer contains a search for lines [ms].
 _SEARCH_MS = 0.3
 
 _Seed = tuple[float, float] | None
-Progress = Callable[[str], None]
 
 
 class _Rivals:
-    """All that is measured on pictures of one size and camera."""
+    """Every measured pipeline on pictures of one size and camera."""
 
     def __init__(self, config: VisionConfig, vehicle: VehicleParams, size: str, suffix: str = "") -> None:
         self._tracker, self._detector = Perception(config, vehicle), Perception(config, vehicle)
@@ -50,30 +48,30 @@ class _Rivals:
         names = ("tracked_frame", "detection", "velocity", "whole_frame", "paper", "lsd")
         self.rows = {name: Row(name=name + suffix, size=size) for name in names}
         self.stages: dict[str, list[float]] = {}
-        self._seen = 0
+        self._count = 0
 
-    def see(self, shots: Iterable[Shot], seeds: Iterable[_Seed] | None = None) -> None:
-        """Have all rivals see pictures, a few at a time each: every one finds its code and tables warm, in one run."""
+    def process(self, shots: Iterable[Shot], seeds: Iterable[_Seed] | None = None) -> None:
+        """Process pictures with every pipeline, a few at a time each, so that all run warm within one run."""
         pictures = zip(shots, itertools.repeat(None) if seeds is None else seeds, strict=False)
         for few in iter(lambda: list(itertools.islice(pictures, _TURN)), []):
-            self._prepare(*few[0])
-            first, self._seen = self._seen, self._seen + len(few)
-            for see in (self._see_tracker, self._see_detector, self._see_paper, self._see_segments):
+            if self._paper is None:
+                self._make_paper(*few[0])
+            first, self._count = self._count, self._count + len(few)
+            for pipeline in (self._track, self._detect, self._run_paper, self._run_lsd):
                 for number, (shot, seed) in enumerate(few, start=first):
                     counted = number >= _WARM
                     rows = self.rows if counted else {name: Row(name=name) for name in self.rows}
-                    times = see(rows, shot, seed, number)
+                    times = pipeline(rows, shot, seed, number)
                     for name, time_ms in times.items() if counted else ():
                         self.stages.setdefault(name, []).append(1e3 * time_ms)
 
-    def _prepare(self, shot: Shot, seed: tuple[float, float] | None) -> None:
-        if self._paper is None:
-            layout = PictureLayout(shot.frame, self._config, self._vehicle)
-            self._paper = PaperPipeline(mask=layout.mask if seed is None else None)
-            (row, column), grid = layout.seeds[0], layout.grid
-            self._seed = (float(grid.offset + grid.stride * column), float(grid.offset + grid.stride * row))
+    def _make_paper(self, shot: Shot, seed: _Seed) -> None:
+        layout = PictureLayout(shot.frame, self._config, self._vehicle)
+        self._paper = PaperPipeline(mask=layout.mask if seed is None else None)
+        (row, column), grid = layout.seeds[0], layout.grid
+        self._seed = (float(grid.offset + grid.stride * column), float(grid.offset + grid.stride * row))
 
-    def _see_tracker(self, rows: dict[str, Row], shot: Shot, seed: _Seed, number: int) -> dict[str, float]:
+    def _track(self, rows: dict[str, Row], shot: Shot, seed: _Seed, number: int) -> dict[str, float]:
         place = seed if number == 0 else None
         percept = rows["whole_frame"].measure(
             lambda: self._tracker.process(
@@ -88,27 +86,23 @@ class _Rivals:
             rows["velocity"].times_us.append(1e3 * times["flow"])
         return {name: times[name] for name in ("plane", "tracks", "flow") if name in times}
 
-    def _see_detector(self, rows: dict[str, Row], shot: Shot, seed: _Seed, number: int) -> dict[str, float]:
+    def _detect(self, rows: dict[str, Row], shot: Shot, seed: _Seed, number: int) -> dict[str, float]:
         self._detector.reset()
         percept = self._detector.process(shot.frame, attitude=shot.attitude, detect=True, seed_pixel=seed)
         rows["detection"].times_us.append(_sum_us(percept, _DETECTION))
         return {f"detection_{name}": percept.time_ms[name] for name in _DETECTION if name in percept.time_ms}
 
-    def _see_paper(self, rows: dict[str, Row], shot: Shot, seed: _Seed, number: int) -> dict[str, float]:
+    def _run_paper(self, rows: dict[str, Row], shot: Shot, seed: _Seed, number: int) -> dict[str, float]:
         paper = self._paper
         assert paper is not None
         found = rows["paper"].measure(lambda: paper.detect(shot.frame, seed or self._seed))
         return {f"paper_{name}": time_ms for name, time_ms in found.time_ms.items()}
 
-    def _see_segments(self, rows: dict[str, Row], shot: Shot, seed: _Seed, number: int) -> dict[str, float]:
+    def _run_lsd(self, rows: dict[str, Row], shot: Shot, seed: _Seed, number: int) -> dict[str, float]:
         segments = self._segments
         if segments is not None:
             rows["lsd"].measure(lambda: segments.detect(cv2.cvtColor(shot.frame.rgb, cv2.COLOR_RGB2GRAY)))
         return {}
-
-    def ratio(self, rival: str, ours: str) -> float:
-        """Median of a rival to the median of ours."""
-        return self.rows[rival].median_us / self.rows[ours].median_us
 
 
 def _sum_us(percept: Percept, stages: Iterable[str]) -> float:
@@ -119,23 +113,23 @@ def bench_vision(
     frames: int,
     seed: int,
     real: Path | None,
-    progress: Progress,
+    progress: Callable[[str], None],
     sizes: tuple[tuple[int, int], ...] = SIZES,
 ) -> Bench:
-    """Measure vision on rendered pictures of a mission, and on real ones where there is a folder of them.
+    """Measure vision on rendered pictures of a mission and, if given, on a folder of real frames.
 
     Args:
-        frames: Rendered pictures per size, those that warm up included.
+        frames: Rendered pictures per size, including those that warm up.
         seed: Of the rendered scene.
         real: Folder with a manifest.csv, or None.
-        progress: Told what is measured.
+        progress: Called with the name of the next measurement.
         sizes: Rendered picture sizes (width, height) [px].
 
     Returns:
-        Rows, the stages' medians and the ratios at the first size (real frames, where none is rendered).
+        Rows, medians of the stages and ratios at the first size (real frames if nothing is rendered).
 
     Raises:
-        IbvsQpError: When the folder of real frames cannot be used.
+        IbvsQpError: If the folder of real frames cannot be used.
     """
     threads, clock = cv2.getNumThreads(), checks.stage_time
     cv2.setNumThreads(1)
@@ -146,41 +140,50 @@ def bench_vision(
         measured, found = [], []
         if real is not None:
             progress("real frames")
-            found = _see_real(real, vehicle)  # first, so that a folder that cannot be used is refused at once
+            found = _measure_real(real, vehicle)  # first: an unusable folder raises at once
         for size in sizes:
             progress(f"rendered {size[0]}x{size[1]}")
             rivals = _Rivals(config, vehicle, f"{size[0]}x{size[1]}")
-            rivals.see(mission_shots(size, frames, seed, vehicle))
+            rivals.process(mission_shots(size, frames, seed, vehicle))
             measured.append(rivals)
     finally:
         cv2.setNumThreads(threads)
         checks.stage_time = clock
     measured += found
-    first = measured[0]
+    rows = measured[0].rows
     ratios = {
-        "track_vs_paper": first.ratio("paper", "tracked_frame"),
-        "detect_vs_paper": first.ratio("paper", "detection"),
-        "detect_vs_lsd": first.ratio("lsd", "detection"),
+        "track_vs_paper": rows["paper"].median_us / rows["tracked_frame"].median_us,
+        "detect_vs_paper": rows["paper"].median_us / rows["detection"].median_us,
+        "detect_vs_lsd": rows["lsd"].median_us / rows["detection"].median_us,
     }
-    stages = {name: float(np.median(times)) for name, times in first.stages.items()}
+    stages = {name: float(np.median(times)) for name, times in measured[0].stages.items()}
     return Bench(rows=[row for one in measured for row in one.rows.values()], stages_us=stages, ratios=ratios)
 
 
-def _see_real(folder: Path, vehicle: VehicleParams) -> list[_Rivals]:
-    """All rivals on real frames, each camera by itself; frames of one camera follow each other as they are listed."""
-    by_camera: dict[tuple, list[tuple[RgbdFrame, tuple[float, float]]]] = {}
-    for frame, seed in real_frames(folder):
-        by_camera.setdefault((frame.rgb.shape, frame.intrinsics), []).append((frame, seed))
+def _measure_real(folder: Path, vehicle: VehicleParams) -> list[_Rivals]:
+    """Every pipeline on the frames with a seed pixel, camera by camera, in the order of the manifest."""
+    by_camera: dict[tuple, list[tuple[Shot, _Seed]]] = {}
+    for number, entry in enumerate(read_manifest(folder), start=1):
+        if entry.seed is not None:
+            shot = _still(entry, number * PERIOD_NS)
+            by_camera.setdefault((shot.frame.rgb.shape, entry.intrinsics), []).append((shot, entry.seed))
     measured: dict[str, _Rivals] = {}
-    level, still = np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3)
     for (shape, _), frames in by_camera.items():
         size = f"{shape[1]}x{shape[0]}"
         rivals = _Rivals(VisionConfig(), vehicle, size, "_real")
-        shots = [Shot(frame=frame, attitude=level, rotation=still, velocity=still) for frame, _ in frames]
-        times = max(_REPEATS, math.ceil(_LEAST / len(frames)))
-        rivals.see(shots * times, [seed for _, seed in frames] * times)
+        passes = max(_PASSES, math.ceil(_LEAST / len(frames)))
+        rivals.process(*zip(*frames * passes, strict=True))
         known = measured.setdefault(size, rivals)
         if known is not rivals:
             for name, row in rivals.rows.items():
                 known.rows[name].times_us.extend(row.times_us)
     return list(measured.values())
+
+
+def _still(entry: FrameEntry, stamp_ns: int) -> Shot:
+    """A real frame of a level camera at rest."""
+    depth = entry.folder / entry.depth if entry.depth else None
+    color = entry.folder / entry.color
+    frame = read_frame(color, depth, entry.intrinsics, entry.depth_units_per_metre, stamp_ns)
+    level, still = np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3)
+    return Shot(frame=frame, attitude=level, rotation=still, velocity=still)

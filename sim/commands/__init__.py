@@ -1,1 +1,1 @@
-"""The commands of ``ibvs-qp``, one a file; heavy imports happen when a command runs, not when help is shown."""
+"""The commands of ``ibvs-qp``, one per file; heavy modules load when a command runs, so that help is fast."""

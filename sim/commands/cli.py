@@ -1,7 +1,7 @@
-"""The console script ``ibvs-qp``: parse, run a command, and turn every outcome into an exit code.
+"""The console script ``ibvs-qp``: parse the arguments, run a command, map every result to an exit code.
 
 Exit codes: 0 flown and reported (also if a law did not complete), 1 internal error, 2 an error that the user can
-mend (one line on standard error), 130 Ctrl-C with the partial run written.
+correct (one line on standard error), 130 Ctrl-C with the partial run written.
 """
 
 from __future__ import annotations
@@ -13,25 +13,42 @@ import os
 import re
 import sys
 import traceback
-from typing import Any
+from typing import Protocol
 
 from ibvs_qp.config.errors import IbvsQpError
 
-#: Commands by name, for hints.
-COMMANDS = ("paint", "experiment", "compare", "explain", "bench", "detect", "sweep", "tune")
 EXIT_INTERNAL, EXIT_USER, EXIT_INTERRUPTED = 1, 2, 130
 
-#: One thread each: the matrices are small, and the laws and their repeats share the cores as processes.
+#: One thread each: the matrices are small, and flights run side by side as processes.
 _THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
-_BOXES = re.compile(r"\x1b\[[0-9;]*m|[\u2500-\u257f]")
+#: Colours and frames in messages of the parser.
+_DECORATION = re.compile(r"\x1b\[[0-9;]*m|[\u2500-\u257f]")
+
+
+class Command(Protocol):
+    """Options of one command, filled in by the parser."""
+
+    def run(self, words: list[str]) -> int:
+        """Run the command.
+
+        Args:
+            words: Arguments after ``ibvs-qp``, for the record.
+
+        Returns:
+            The exit code.
+
+        Raises:
+            IbvsQpError: If an option, a file or a folder cannot be used.
+        """
+        ...
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run ``ibvs-qp``.
 
     Args:
-        arguments: Words after the program's name; None takes those of the process.
+        arguments: Arguments after the program's name; None reads those of the process.
 
     Returns:
         The exit code.
@@ -42,7 +59,7 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         return _parse(words).run(words)
     except IbvsQpError as error:
-        return _refuse(str(error))
+        return _user_error(str(error))
     except KeyboardInterrupt:
         print("ibvs-qp: interrupted", file=sys.stderr)
         return EXIT_INTERRUPTED
@@ -54,10 +71,7 @@ def main(arguments: list[str] | None = None) -> int:
         return EXIT_INTERNAL
 
 
-def _parse(words: list[str]) -> Any:
-    """Turn words into the options of a command; the parser's own complaint becomes one line."""
-    import tyro
-
+def _commands() -> dict[str, type[Command]]:
     from sim.commands.bench import Bench
     from sim.commands.compare import Compare
     from sim.commands.detect import Detect
@@ -67,46 +81,52 @@ def _parse(words: list[str]) -> Any:
     from sim.commands.sweep import Sweep
     from sim.commands.tune import Tune
 
-    app = tyro.extras.SubcommandApp()
-    app.command(name="paint")(Paint)
-    app.command(name="bench")(Bench)
-    app.command(name="experiment")(ExperimentCommand)
-    app.command(name="compare")(Compare)
-    app.command(name="detect")(Detect)
-    app.command(name="explain")(Explain)
-    app.command(name="sweep")(Sweep)
-    app.command(name="tune")(Tune)
-    complaint = io.StringIO()
+    return {
+        "paint": Paint,
+        "bench": Bench,
+        "experiment": ExperimentCommand,
+        "compare": Compare,
+        "detect": Detect,
+        "explain": Explain,
+        "sweep": Sweep,
+        "tune": Tune,
+    }
+
+
+def _parse(words: list[str]) -> Command:
+    """Parse the arguments; an error of the parser becomes one line on standard error."""
+    import tyro
+
+    commands = _commands()
+    message = io.StringIO()
     try:
-        with contextlib.redirect_stderr(complaint):
-            return app.cli(
+        with contextlib.redirect_stderr(message):
+            return tyro.extras.subcommand_cli_from_dict(
+                commands,
                 prog="ibvs-qp",
                 description="Aerial manipulation by one quadratic program per tick. Example: ibvs-qp paint",
                 args=words,
                 config=(tyro.conf.FlagCreatePairsOff,),
             )
     except SystemExit as stop:
-        if stop.code:
-            raise SystemExit(_refuse(_one_line(complaint.getvalue()), words)) from None
-        raise
+        if not stop.code:
+            raise
+        command = " ".join(["ibvs-qp", *(word for word in words[:1] if word in commands)])
+        raise SystemExit(_user_error(f"{_one_line(message.getvalue())} (see {command} --help)")) from None
 
 
 def _one_line(text: str) -> str:
-    """Strip frames and colours from the parser's message and keep what it says, as one line."""
-    lines = [_BOXES.sub("", line).strip() for line in text.splitlines()]
-    # The first line is a title; rulers, by now empty, part the complaint from advice that repeats the help.
+    """Message of the parser as one line, without frames and colours."""
+    lines = [_DECORATION.sub("", line).strip() for line in text.splitlines()]
+    # The first line is a title; an empty line separates the message from advice that repeats the help.
     body = list(itertools.takewhile(bool, lines[1:]))
     near = next((lines[i + 1 :] for i, line in enumerate(lines) if line.startswith("Perhaps you meant")), [])
     option = next((line.split()[0] for line in near if line), None)
     return " ".join(body) + (f"; did you mean {option}?" if option else "")
 
 
-def _refuse(message: str, words: list[str] | None = None) -> int:
-    hint = ""
-    if words is not None:
-        command = " ".join(["ibvs-qp", *[word for word in words[:1] if word in COMMANDS]])
-        hint = f" (see {command} --help)"
-    print("ibvs-qp: error: " + " ".join(message.split()) + hint, file=sys.stderr)
+def _user_error(message: str) -> int:
+    print("ibvs-qp: error: " + " ".join(message.split()), file=sys.stderr)
     return EXIT_USER
 
 

@@ -1,22 +1,28 @@
-"""``ibvs-qp compare``: two runs, or two presets flown alike, figure by figure."""
+"""``ibvs-qp compare``: differences between two runs, or between two presets flown on the same seeds."""
 
 from __future__ import annotations
 
 import dataclasses
-import os
-import shlex
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from sim.commands.options import check_count, flag, go_on, optional
+from sim.commands.options import (
+    check_count,
+    check_preset,
+    check_seed,
+    command_line,
+    flag,
+    interrupted,
+    optional,
+    usable_cores,
+)
 
 if TYPE_CHECKING:
     import polars as pl
 
-#: Figures shown first; the rest is in the JSON.
+#: Figures of the terminal table; the JSON line holds all.
 SHOWN = (
     "path_rms_straight_m", "path_rms_corner_m", "path_rms_m", "force_rms_straight_n", "force_rms_corner_n",
     "force_rms_n", "force_peak_n", "contact_share", "tilt_rms_deg", "tilt_peak_deg", "yaw_peak_deg",
@@ -26,7 +32,7 @@ SHOWN = (
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Compare:
-    """Compare two run folders, or fly two presets alike and compare them; B minus A, flight by flight.
+    """Compare two run folders, or fly two presets on the same seeds and compare them: B minus A, flight by flight.
 
     Example: ibvs-qp compare runs/before runs/after
     """
@@ -34,65 +40,53 @@ class Compare:
     run_a: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="RUN_A")]
     """Folder of `paint` or `experiment`, or a preset (TOML)."""
     run_b: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="RUN_B")]
-    """The other one, of the same kind."""
+    """The other run or preset, of the same kind."""
     law: Literal["qp", "paper", "own"] = "own"
-    """Presets only: which law flies them; own takes the one that each preset names."""
+    """Presets only: law to fly; own takes the law that each preset names."""
     seeds: int = 3
-    """Presets only: flights of each."""
+    """Presets only: flights of each preset."""
     seed: int = 0
     """Presets only: first seed."""
     features: Literal["rendered", "geometric"] = "rendered"
     """Presets only: perception."""
     quick: Annotated[bool, flag] = False
-    """Presets only: a short paint job instead of the whole one."""
+    """Presets only: fly a short paint job."""
     jobs: Annotated[int | None, optional("N")] = None
-    """Presets only: processes side by side; default: one per core."""
+    """Presets only: parallel processes; default: one per core."""
     out: Annotated[Path | None, optional("DIR")] = None
-    """Presets only: folder of the flights; default: runs/<UTC stamp>."""
+    """Presets only: run folder; default: runs/<UTC stamp>."""
     json: Annotated[bool, flag] = False
     """Print one line of JSON on standard output, and nothing else."""
 
     def run(self, words: list[str]) -> int:
-        """Read or fly both, and print the differences.
-
-        Args:
-            words: The command line, for the record.
-
-        Returns:
-            0, or 130 after Ctrl-C while presets fly.
-
-        Raises:
-            IbvsQpError: When a run or a preset is refused.
-        """
+        """Read or fly both, and print the differences."""
         from sim.report.comparison import compare, read_run
         from sim.report.rundir import as_json
 
-        folder, interrupted = None, False
+        folder, stopped = None, False
         if self._presets():
-            a, b, folder, interrupted = self._fly()
+            a, b, folder, stopped = self._fly()
         else:
             a, b = read_run(self.run_a), read_run(self.run_b)
-        cells = [] if interrupted else compare(a, b)
+        cells = [] if stopped else compare(a, b)
         if self.json:
             content: dict[str, Any] = {
                 "schema": 1,
-                "command": shlex.join(["ibvs-qp", *words]),
+                "command": command_line(words),
                 "run_a": str(self.run_a),
                 "run_b": str(self.run_b),
                 "run_dir": None if folder is None else str(folder),
-                "interrupted": interrupted,
+                "interrupted": stopped,
                 "cells": [
                     {**cell, "differences": {each.figure: _plain(each) for each in cell["differences"]}}
                     for cell in cells
                 ],
             }
             print(as_json(content))
-        elif not interrupted:
+        elif not stopped:
             _print(cells, self.run_a, self.run_b)
-        if interrupted and folder is not None:
-            again = go_on(words, folder)
-            print(f"ibvs-qp: interrupted; finished flights are in {folder}; go on with: {again}", file=sys.stderr)
-            return 130
+        if stopped and folder is not None:
+            return interrupted(words, folder, f"finished flights are in {folder}")
         return 0
 
     def _presets(self) -> bool:
@@ -118,7 +112,6 @@ class Compare:
         import polars as pl
         from rich.console import Console
 
-        from sim.commands.checks import check_preset, check_readable, check_seed
         from sim.experiments.preset_flights import preset_runs
         from sim.report.rundir import RunFolder
         from sim.sweep import run_sweep
@@ -127,9 +120,8 @@ class Compare:
         check_seed(self.seed)
         check_count("--seeds", self.seeds)
         check_count("--jobs", self.jobs)
-        for option, file in (("RUN_A", self.run_a), ("RUN_B", self.run_b)):
-            check_readable(option, file)
-            check_preset(file)
+        check_preset("RUN_A", self.run_a)
+        check_preset("RUN_B", self.run_b)
         runs = [
             run
             for name, file in (("a", self.run_a), ("b", self.run_b))
@@ -139,18 +131,14 @@ class Compare:
         ]
         folder = RunFolder.create(self.out).path
         with sweep_progress(Console(stderr=True, quiet=self.json), "compare") as progress:
-            result = run_sweep(runs, folder / "parts", workers=self.jobs or _cores(), progress=progress)
-        if "variant" not in result.table.columns:  # stopped before the first flight was done
+            result = run_sweep(runs, folder / "parts", workers=self.jobs or usable_cores(), progress=progress)
+        if "variant" not in result.table.columns:  # stopped before the first flight ended
             return result.table, result.table, folder, True
         variants = [result.table.filter(pl.col("variant") == name) for name in ("a", "b")]
-        # What is compared is preset against preset, whatever law each of them names.
+        # Preset against preset: with --law own the two flights pair although their laws may differ.
         alike = [pl.lit("preset").alias("variant"), *([pl.lit("own").alias("law")] if self.law == "own" else [])]
         a, b = (table.with_columns(alike) for table in variants)
         return a, b, folder, result.interrupted
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _plain(difference: Any) -> dict[str, float]:
@@ -158,20 +146,18 @@ def _plain(difference: Any) -> dict[str, float]:
 
 
 def _print(cells: list[dict[str, Any]], a: Path, b: Path) -> None:
-    from rich import box
     from rich.console import Console
-    from rich.table import Table
 
+    from sim.evaluate.table import terminal_table
+
+    headings = ("figure", f"A: {a.name}", f"B: {b.name}", "B - A", "95 % interval")
     for cell in cells:
-        params = ", ".join(f"{name} {value}" for name, value in cell["params"].items())
+        labels = [cell["experiment"], cell["law"], cell["variant"], *(f"{k} {v}" for k, v in cell["params"].items())]
         done = " and ".join(f"{count} of {cell['n']}" for count in cell["completed"])
-        title = f"{cell['experiment']}, {cell['law']}, {cell['variant']}{', ' + params if params else ''}: done {done}"
-        table = Table(box=box.SIMPLE_HEAD, pad_edge=False, title=title, title_justify="left")
-        for heading in ("figure", f"A: {a.name}", f"B: {b.name}", "B - A", "95 % interval"):
-            table.add_column(heading, justify="left" if heading == "figure" else "right", no_wrap=heading == "figure")
-        shown = {each.figure: each for each in cell["differences"]}
-        for name in (name for name in SHOWN if name in shown):
-            each = shown[name]
+        found = {each.figure: each for each in cell["differences"]}
+        rows = []
+        for each in (found[name] for name in SHOWN if name in found):
             interval = f"{each.low:+.4g} to {each.high:+.4g}" if each.low != each.high else "one flight"
-            table.add_row(name, f"{each.a:.4g}", f"{each.b:.4g}", f"{each.median:+.4g}", interval)
-        Console().print(table)
+            rows.append((each.figure, f"{each.a:.4g}", f"{each.b:.4g}", f"{each.median:+.4g}", interval))
+        title = f"{', '.join(labels)}: completed {done}"
+        Console().print(terminal_table(headings, rows, title, wrap=headings[1:]))

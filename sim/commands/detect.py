@@ -1,4 +1,4 @@
-"""``ibvs-qp detect``: plane, lines and guides in a frame or a folder of frames."""
+"""``ibvs-qp detect``: surface plane, lines and guides in one frame or a folder of frames."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from ibvs_qp.config.errors import ConfigError
-from sim.commands.options import flag, optional
+from sim.commands.options import check_seed, flag, optional
 from sim.detection.methods import METHODS
 
 if TYPE_CHECKING:
     from sim.detection.manifest import FrameEntry
 
 
-#: What a single frame needs, besides --rgb.
+#: Options that a single frame needs besides --rgb.
 _CAMERA = ("fx", "fy", "cx", "cy")
 
 
@@ -30,7 +30,7 @@ class Detect:
     rgb: Annotated[Path | None, optional("FILE")] = None
     """Colour picture of one frame (8 or 16 bits)."""
     depth: Annotated[Path | None, optional("FILE")] = None
-    """Depth picture registered to it (8 or 16 bits or floating point; 0 = invalid); without it nothing but lines."""
+    """Depth picture registered to colour (8 or 16 bits or floating point; 0 = invalid); without it: lines only."""
     fx: Annotated[float | None, optional("PX")] = None
     """Focal length along the rows."""
     fy: Annotated[float | None, optional("PX")] = None
@@ -42,42 +42,31 @@ class Detect:
     depth_units_per_metre: float = 1000.0
     """Depth values per metre: 1000 for millimetres, 5000 for TUM, 1 for metres."""
     distortion: Annotated[tuple[float, float, float, float, float] | None, optional("K1 K2 P1 P2 K3")] = None
-    """Lens distortion as OpenCV orders it; rho and theta are then those of the straightened lines."""
+    """Lens distortion in OpenCV's order; rho and theta then describe the undistorted lines."""
     seed_pixel: Annotated[tuple[float, float] | None, optional("U V")] = None
-    """A place on the surface; without it no surface and no guides, only lines."""
+    """A pixel on the surface; without it: lines only, no surface and no guides."""
     sequence: Annotated[Path | None, optional("DIR")] = None
-    """Folder of frames; frames named PREFIX_NUMBER_color whose numbers follow on by one are a motion sequence."""
+    """Folder of frames; frames named PREFIX_NUMBER_color with consecutive numbers are a motion sequence."""
     method: Literal[tuple(METHODS)] = "own"  # type: ignore[valid-type]
     """Pipeline."""
     all: Annotated[bool, flag] = False
-    """Candidates are every line of the whole picture, on the surface or not."""
+    """List every line of the whole picture as candidate, on the surface or not."""
     track: Annotated[bool, flag] = False
-    """Follow lines through a motion sequence (this is the default)."""
+    """Track lines through a motion sequence (default)."""
     no_track: Annotated[bool, flag] = False
-    """Look at every frame alone."""
+    """Process every frame on its own."""
     overlay: Annotated[Path | None, optional("DIR")] = None
-    """Write a picture of every frame with what was found."""
+    """Write a picture of every frame with the detections drawn in."""
     json: Annotated[bool, flag] = False
     """Print the result as one line of JSON on standard output, and nothing else."""
     seed: int = 0
-    """Accepted as by every command; the result depends on the pictures alone."""
+    """Accepted by every command; without effect here."""
 
     def run(self, words: list[str]) -> int:
-        """Look at the frames and print what was found.
-
-        Args:
-            words: The command line; not needed.
-
-        Returns:
-            0, also for frames refused with a reason.
-
-        Raises:
-            IbvsQpError: When options or files cannot be used.
-        """
+        """Process the frames and print the detections; the exit code is 0 also if a frame has no surface."""
         import cv2
         from rich.console import Console
 
-        from sim.commands.checks import check_seed
         from sim.detection.overlay import write_overlay
         from sim.detection.report import as_json, frame_table, refusals
         from sim.detection.run import detect_frames
@@ -87,14 +76,14 @@ class Detect:
         entries = self._entries()
         folder = None if self.overlay is None else _folder(self.overlay)
         notes = Console(stderr=True, quiet=self.json)
-        with notes.status("Looking ...") as status:
+        with notes.status("Detecting ...") as status:
             frames = detect_frames(
                 entries,
                 self.method,
                 every=self.all,
                 track=not self.no_track,
                 distortion=self.distortion,
-                started=lambda entry: status.update(f"Looking at {entry.color} ..."),
+                started=lambda entry: status.update(f"Detecting in {entry.color} ..."),
             )
         if folder is not None:
             for seen in frames:
@@ -110,7 +99,7 @@ class Detect:
         return 0
 
     def _entries(self) -> list[FrameEntry]:
-        """The frames asked for."""
+        """Frames of the command line, checked."""
         from sim.detection.manifest import FrameEntry, read_manifest
         from sim.detection.pictures import read_frame
 
@@ -119,7 +108,7 @@ class Detect:
         if self.track and self.no_track:
             raise ConfigError("--track and --no-track exclude each other")
         if (self.rgb is None) == (self.sequence is None):
-            raise ConfigError("give either --rgb FILE with its camera or --sequence DIR")
+            raise ConfigError("give either --rgb FILE with its camera, or --sequence DIR")
         if self.sequence is not None:
             return read_manifest(self.sequence)
         assert self.rgb is not None
@@ -128,7 +117,7 @@ class Detect:
             raise ConfigError(f"--{missing[0]} is missing: a single frame needs --fx --fy --cx --cy")
         camera = tuple(float(getattr(self, name)) for name in _CAMERA)
         if not all(map(math.isfinite, camera)) or min(camera[:2]) <= 1.0:
-            raise ConfigError("--fx and --fy must be above 1 px, and all four of the camera finite")
+            raise ConfigError("--fx and --fy must be above 1 px, and --fx --fy --cx --cy finite")
         if not (math.isfinite(self.depth_units_per_metre) and self.depth_units_per_metre > 0.0):
             raise ConfigError(f"--depth-units-per-metre {self.depth_units_per_metre:g} is refused: it must be above 0")
         entry = FrameEntry(
@@ -139,7 +128,9 @@ class Detect:
             depth_units_per_metre=self.depth_units_per_metre,
             seed=self.seed_pixel,
         )
-        read_frame(self.rgb, self.depth, entry.intrinsics, entry.depth_units_per_metre)  # refuse before any work
+        read_frame(
+            self.rgb, self.depth, entry.intrinsics, entry.depth_units_per_metre
+        )  # raises on unusable files before any work
         return [entry]
 
 

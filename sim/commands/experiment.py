@@ -1,12 +1,10 @@
-"""``ibvs-qp experiment``: fly one of the experiments, or all, under both laws and report it."""
+"""``ibvs-qp experiment``: fly one experiment or all of them under both laws, and report the results."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
-import os
 import shlex
-import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,7 +12,15 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from sim.commands.options import check_count, flag, go_on, optional
+from sim.commands.options import (
+    check_count,
+    check_seed,
+    command_line,
+    flag,
+    interrupted,
+    optional,
+    usable_cores,
+)
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -44,40 +50,29 @@ class ExperimentCommand:
     """
 
     name: Annotated[Name, tyro.conf.Positional, tyro.conf.arg(metavar="NAME")]
-    """Which: force-hold, paint, noise-sweep, saturation, sloped-edge, friction, gust, rotor-derate, approach, payload
-    or all."""
+    """Experiment: force-hold, paint, noise-sweep, saturation, sloped-edge, friction, gust, rotor-derate, approach,
+    payload or all."""
     quick: Annotated[bool, flag] = False
-    """Few cells and seeds: minutes, not the record."""
+    """Few cells and seeds: takes minutes, does not replace the record."""
     features: Literal["rendered", "geometric"] = "rendered"
-    """Perception: rendered pictures through the whole vision, or a sensor model of lines."""
+    """Perception: rendered pictures through the vision pipeline, or a sensor model of lines."""
     seed: int = 0
-    """First seed; flights of a cell take this and the following ones."""
+    """First seed; the flights of a cell use consecutive seeds."""
     jobs: Annotated[int | None, optional("N")] = None
-    """Processes side by side; default: one per core. The results do not depend on it."""
+    """Parallel processes; default: one per core. The results do not depend on it."""
     out: Annotated[Path | None, optional("DIR")] = None
-    """Folder; default: runs/<UTC stamp>. Given one with finished flights, only the others are flown."""
+    """Run folder; default: runs/<UTC stamp>. Finished flights in it are not flown again."""
     plan: Annotated[bool, flag] = False
-    """Print how many flights there are and how long they fly, and stop."""
+    """Print the number of flights and their flight time, and stop."""
     json: Annotated[bool, flag] = False
-    """Print the summary as one line on standard output, and nothing else."""
+    """Print the summary as one JSON line on standard output, and nothing else."""
 
     def run(self, words: list[str]) -> int:
-        """Fly what is not on disk yet, then write and print everything.
-
-        Args:
-            words: The command line, for the record.
-
-        Returns:
-            0, or 130 after Ctrl-C.
-
-        Raises:
-            IbvsQpError: When seed, jobs or folder is refused.
-        """
+        """Fly the missing flights, write tables, figures and page, print the criteria."""
         from importlib.metadata import version
 
         from rich.console import Console
 
-        from sim.commands.checks import check_seed
         from sim.experiments import chosen, designs
         from sim.experiments.base import Choice
         from sim.experiments.record import PARTS, write_page, write_summary, write_tables
@@ -98,10 +93,10 @@ class ExperimentCommand:
         folder = RunFolder.create(self.out).path
         with sweep_progress(notes, self.name) as progress:
             result = run_sweep(
-                runs, folder / PARTS, workers=self.jobs or _cores(), progress=progress, timed=progress.timed
+                runs, folder / PARTS, workers=self.jobs or usable_cores(), progress=progress, timed=progress.timed
             )
         facts: dict[str, Any] = {
-            "command": shlex.join(["ibvs-qp", *words]),
+            "command": command_line(words),
             "version": version("ibvs-qp"),
             "quick": self.quick,
             "seed": self.seed,
@@ -112,7 +107,7 @@ class ExperimentCommand:
         experiments, table = chosen(self.name), result.table
         write_tables(folder, self.name, experiments, table)
         content = summarise(self.name, experiments, table, folder, facts)
-        write_summary(folder, content)  # before the figures, so that no figure can cost the record
+        write_summary(folder, content)  # before the figures: an error there must not lose the record
         page = None
         if table.height and not result.interrupted:
             lead = f"{table.height} flights, {self.features} features, first seed {self.seed}, {facts['version']}."
@@ -128,60 +123,45 @@ class ExperimentCommand:
             if page is not None:
                 Console().print(f"Results: {page}", soft_wrap=True, highlight=False)
         if result.interrupted:
-            again = go_on(words, folder)
-            print(f"ibvs-qp: interrupted; finished flights are in {folder}; go on with: {again}", file=sys.stderr)
-            return 130
+            return interrupted(words, folder, f"finished flights are in {folder}")
         return 0
 
     def _again(self) -> str:
-        """The command that flies one experiment alike on any computer, with ``{name}`` where its name goes."""
+        """The command that repeats an experiment on any computer, with ``{name}`` in place of its name."""
         words = ["ibvs-qp", "experiment", "NAME", *(["--quick"] if self.quick else [])]
         words += ["--features", self.features] if self.features != "rendered" else []
         words += ["--seed", str(self.seed)] if self.seed else []
         return shlex.join(words).replace("NAME", "{name}")
 
 
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
 def _print_plan(console: Console, runs: Sequence[Run]) -> None:
-    totals: dict[str, list[float]] = {}
+    seconds: dict[str, list[float]] = {}
     for run in runs:
-        entry = totals.setdefault(run.experiment, [0, 0.0])
-        entry[0] += 1
-        entry[1] += run.expected_s
-    for name, (count, seconds) in totals.items():
-        console.print(f"{name}: {count:.0f} flights, about {seconds / 60.0:.0f} min in the air", highlight=False)
-    if len(totals) > 1:
-        minutes = sum(entry[1] for entry in totals.values()) / 60.0
-        console.print(f"all: {len(runs)} flights, about {minutes:.0f} min in the air", highlight=False)
+        seconds.setdefault(run.experiment, []).append(run.expected_s)
+    if len(seconds) > 1:
+        seconds["all"] = [run.expected_s for run in runs]
+    for name, times in seconds.items():
+        minutes = sum(times) / 60.0
+        console.print(f"{name}: {len(times)} flights, about {minutes:.0f} min of flight time", highlight=False)
 
 
 def _print_verdicts(console: Console, content: dict[str, Any]) -> None:
-    from rich import box
-    from rich.table import Table
+    from sim.evaluate.table import terminal_table
 
-    for name in dict.fromkeys(entry["experiment"] for entry in content["verdicts"]):
-        table = Table(box=box.SIMPLE_HEAD, pad_edge=False, title=f"{name}: QP law held to", title_justify="left")
-        for heading in ("figure", "bound", "median", "flights", "met"):
-            table.add_column(heading, no_wrap=heading != "figure")
-        for entry in (entry for entry in content["verdicts"] if entry["experiment"] == name):
-            words = [f"{key} {_short(value)}" for key, value in entry["cell"].items()]
-            words += [entry["variant"]] if entry["variant"] != "standard" else []
-            figure = entry["figure"] + (f" ({', '.join(words)})" if words else "")
-            sign, unit = ">=" if entry["least"] else "<=", f" {entry['unit']}" if entry["unit"] else ""
-            median = f"{entry['median']:.3g}{unit}" if math.isfinite(entry["median"]) else "–"
-            held = f"{entry['held']} of {entry['n']}"
-            table.add_row(
-                figure,
-                f"{sign} {entry['bound']:.4g}{unit}",
-                median,
-                held,
-                "NO" if entry["words"] == "no" else entry["words"],
-            )
-        console.print(table)
-
-
-def _short(value: Any) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value)
+    tables: dict[str, list[tuple[str, ...]]] = {}
+    for entry in content["verdicts"]:
+        words = [
+            f"{key} {value:g}" if isinstance(value, float) else f"{key} {value}" for key, value in entry["cell"].items()
+        ]
+        words += [entry["variant"]] if entry["variant"] != "standard" else []
+        figure = entry["figure"] + (f" ({', '.join(words)})" if words else "")
+        sign, unit = ">=" if entry["least"] else "<=", f" {entry['unit']}" if entry["unit"] else ""
+        median = f"{entry['median']:.3g}{unit}" if math.isfinite(entry["median"]) else "–"
+        met = "NO" if entry["words"] == "no" else entry["words"]
+        row = (figure, f"{sign} {entry['bound']:.4g}{unit}", median, f"{entry['held']} of {entry['n']}", met)
+        tables.setdefault(entry["experiment"], []).append(row)
+    headings = ("figure", "bound", "median", "flights", "met")
+    for name, rows in tables.items():
+        console.print(
+            terminal_table(headings, rows, f"{name}: criteria of the QP law", text=headings, wrap=("figure",))
+        )

@@ -1,10 +1,8 @@
-"""``ibvs-qp explain``: one tick of a recorded flight, in words and numbers for a person."""
+"""``ibvs-qp explain``: tasks, limits and thrusts at one tick of a recorded flight."""
 
 from __future__ import annotations
 
-import json
-import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,7 +10,7 @@ import numpy as np
 import tyro
 
 from ibvs_qp.config.errors import IbvsQpError
-from sim.commands.options import optional
+from sim.commands.options import flag, optional
 
 if TYPE_CHECKING:
     from ibvs_qp.pilot import PilotConfig
@@ -20,13 +18,9 @@ if TYPE_CHECKING:
     from sim.flight.trace import Trace
 
 
-class ExplainError(IbvsQpError):
-    """The run or the tick cannot be explained."""
-
-
 @dataclass(frozen=True, kw_only=True)
 class Explain:
-    """Explain one tick of a flight: what every task asked and got, which limits bound and what they cost.
+    """Explain one tick of a flight: target and result of every task, active limits and their cost.
 
     Example: ibvs-qp explain runs/2026-11-21T10-00-00 --at 12.3
     """
@@ -36,83 +30,65 @@ class Explain:
     at: float
     """Time of the tick since the start [s]."""
     seed: Annotated[int | None, optional("INT")] = None
-    """Checked against the run's, if given."""
+    """Must equal the run's seed, if given."""
     solver: Annotated[str | None, optional("NAME")] = None
-    """Back end of qpsolvers that solves the tick again; default: the exact solver."""
-    json: Annotated[bool, tyro.conf.arg(help_behavior_hint="")] = False
-    """Print one JSON line instead."""
+    """Back end of qpsolvers that solves the tick; default: the exact solver."""
+    json: Annotated[bool, flag] = False
+    """Print one JSON line on standard output, and nothing else."""
 
     def run(self, words: list[str]) -> int:
-        """Print the explanation.
-
-        Args:
-            words: The command line.
-
-        Returns:
-            0.
-
-        Raises:
-            IbvsQpError: Without such a run, flight or tick.
-        """
+        """Print the explanation."""
         from rich.console import Console
 
-        from sim.evaluate import explanation as told
+        from sim.evaluate.explanation import explain_conflict, explain_tick, flown_config, has_no_program
+        from sim.evaluate.explanation_text import explanation_tables
+        from sim.report.rundir import as_json
 
         trace = self._flight()
         tick = self._tick(trace)
-        explanation, conflict, config = None, (), told.flown_config(trace)
-        if not told.held(trace, tick):
-            config, explanation = told.explain_tick(trace, tick, self.solver)
+        explanation, conflict, config = None, (), flown_config(trace)
+        if not has_no_program(trace, tick):
+            config, explanation = explain_tick(trace, tick, self.solver)
             if explanation is None:
-                conflict = told.explain_conflict(trace, tick)
+                conflict = explain_conflict(trace, tick)
                 if not conflict:
                     solver = self.solver or "the exact solver"
-                    raise ExplainError(
+                    raise IbvsQpError(
                         f"{solver} finds no solution at {self.at:g} s, though no hard limits are in conflict"
                     )
         if self.json:
-            print(json.dumps(_table(trace, tick, explanation, conflict, config), allow_nan=False))
+            print(as_json(_table(trace, tick, explanation, conflict, config)))
             return 0
-        console = Console()
-        if explanation is not None:
-            parts = told.explanation_tables(trace, tick, explanation, config)
-        elif conflict:
-            parts = told.conflict_tables(trace, tick, conflict, config)
-        else:
-            parts = told.held_tables(trace, tick, config)
-        for part in parts:
-            console.print(part)
-        console.print(told.loop_margin_line(config))
+        for part in explanation_tables(trace, tick, explanation, config, conflict):
+            Console().print(part)
         return 0
 
     def _flight(self) -> Trace:
         from sim.flight.flight_log import load_run
 
         if not (self.run_dir / "log.npz").exists():
-            raise ExplainError(f"{self.run_dir} is no run folder: it has no log.npz; give the folder that paint wrote")
+            raise IbvsQpError(f"{self.run_dir} is no run folder: it has no log.npz; give the folder that paint wrote")
         trace = load_run(self.run_dir).get("qp")
         if trace is None or "program" not in trace.arrays:
-            raise ExplainError(f"{self.run_dir} holds no flight under the QP law; fly one with: ibvs-qp paint --law qp")
+            raise IbvsQpError(f"{self.run_dir} has no flight under the QP law; fly one with: ibvs-qp paint --law qp")
         if self.seed is not None and self.seed != trace.seed:
-            raise ExplainError(f"--seed {self.seed}: the run was flown with seed {trace.seed}")
+            raise IbvsQpError(f"--seed {self.seed}: the run was flown with seed {trace.seed}")
         return trace
 
     def _tick(self, trace: Trace) -> int:
         first, last = float(trace.t[0]), float(trace.t[-1])
         if not first - 1e-6 <= self.at <= last + 1e-6:
-            raise ExplainError(f"--at {self.at:g} s: the flight lasts from {first:g} to {last:.2f} s")
+            raise IbvsQpError(f"--at {self.at:g} s: the flight lasts from {first:g} to {last:.2f} s")
         return int(np.argmin(np.abs(trace.t - self.at)))
 
 
 def _table(
     trace: Trace, tick: int, explanation: Explanation | None, conflict: tuple[LimitValue, ...], config: PilotConfig
 ) -> dict[str, Any]:
-    """One tick as JSON; without a program (a held tick) no window either, without a solution no tasks and no limits."""
-    from dataclasses import asdict
+    """One tick as JSON: without a program no thrust limits, without a solution no tasks and no active limits."""
+    from sim.evaluate.explanation import rejections, thrust_window
 
-    from sim.evaluate.explanation import refused, thrust_window
-
-    flown, margin = trace.thrusts[tick].tolist(), float(trace.reach_margin[tick])
+    flown = trace.thrusts[tick].tolist()
     table = {
         "schema": 1,
         "t": float(trace.t[tick]),
@@ -120,8 +96,8 @@ def _table(
         "outcome": trace.outcomes[int(trace.outcome[tick])],
         "push_asked": config.painting.push_n,
         "push_reference": float(trace.push_reference[tick]),
-        "reach_margin": None if math.isnan(margin) else margin,
-        "rejected": [{"t": event.t, "text": event.text} for event in refused(trace, tick)],
+        "reach_margin": float(trace.reach_margin[tick]),
+        "rejected": [{"t": event.t, "text": event.text} for event in rejections(trace, tick)],
         "thrusts": flown,
         "flown_thrusts": flown,
         "thrust_lower": None,

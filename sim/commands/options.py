@@ -1,41 +1,101 @@
-"""What the options of several commands share: how help shows them, their checks, and the command that goes on."""
+"""Options that several commands share: help texts, checks before anything costs time, resuming after Ctrl-C."""
 
 from __future__ import annotations
 
+import os
 import shlex
+import sys
+import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import tyro
 
-#: Help text of a switch: it is off where it is not given, and help need not say so.
+from ibvs_qp.config.errors import ConfigError, out_of_range
+
+#: Exit code after Ctrl-C.
+EXIT_INTERRUPTED = 130
+
+#: Help of a switch: no default is printed.
 flag = tyro.conf.arg(help_behavior_hint="")
 
 
 def optional(metavar: str) -> Any:
-    """Help text of an option whose default is worded in its description."""
+    """Help of an option whose description states the default."""
     return tyro.conf.arg(metavar=metavar, help_behavior_hint="")
 
 
-def check_count(option: str, value: int | None) -> None:
-    """Refuse a count below one; None is the command's own choice.
-
-    Raises:
-        ConfigError: Names the option, the value and what is allowed.
-    """
-    from ibvs_qp.config.errors import out_of_range
-
-    if value is not None and value < 1:
-        raise out_of_range(option, value, "", "allowed are 1, 2, 3, ...")
+def check_seed(seed: int) -> None:
+    """Raise ConfigError for a negative seed."""
+    if seed < 0:
+        raise out_of_range("--seed", seed, "", "allowed are 0, 1, 2, ...")
 
 
-def go_on(words: Sequence[str], folder: Path) -> str:
-    """The command that goes on where this one stopped: the same, in the same folder.
+def check_count(option: str, value: int | None, low: int = 1, high: int | None = None) -> None:
+    """Raise ConfigError for a count outside its range; None means the command's default."""
+    if value is not None and not low <= value <= (value if high is None else high):
+        allowed = f"allowed are {low}, {low + 1}, {low + 2}, ..." if high is None else f"allowed is {low} to {high}"
+        raise out_of_range(option, value, "", allowed)
+
+
+def check_readable(option: str, file: Path | None) -> None:
+    """Raise ConfigError if a file is given and cannot be read."""
+    if file is None:
+        return
+    try:
+        file.open("rb").close()
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise ConfigError(f"cannot read {file}: {reason}; give an existing file with {option}") from None
+
+
+def check_preset(option: str, file: Path | None) -> None:
+    """Raise ConfigError if a preset is given and is no readable TOML file; its keys are checked on use."""
+    check_readable(option, file)
+    if file is None:
+        return
+    try:
+        tomllib.loads(file.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{file} is not valid TOML: {error}") from None
+
+
+def check_mujoco() -> None:
+    """Raise ConfigError if MUJOCO_GL keeps MuJoCo from loading; pictures here never depend on it."""
+    backend = os.environ.get("MUJOCO_GL")
+    if not backend:
+        return
+    try:
+        import mujoco  # noqa: F401
+    except Exception as error:  # a missing library surfaces as AttributeError
+        raise ConfigError(
+            f"MUJOCO_GL = {backend} keeps MuJoCo from loading ({error}); unset it, it is not needed"
+        ) from None
+
+
+def usable_cores() -> int:
+    """Number of processor cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def command_line(words: Sequence[str]) -> str:
+    """The command as typed, for the record."""
+    return shlex.join(["ibvs-qp", *words])
+
+
+def interrupted(words: Sequence[str], folder: Path, kept: str) -> int:
+    """Print how to resume after Ctrl-C: the same command with the same folder.
 
     Args:
-        words: What was given after ``ibvs-qp``.
-        folder: Where the results are.
+        words: Arguments after ``ibvs-qp``.
+        folder: Folder of the results.
+        kept: What the disk holds already.
+
+    Returns:
+        The exit code.
     """
     given = any(word.split("=")[0] == "--out" for word in words)
-    return shlex.join(["ibvs-qp", *words, *([] if given else ["--out", str(folder)])])
+    again = command_line([*words, *([] if given else ["--out", str(folder)])])
+    print(f"ibvs-qp: interrupted; {kept}; go on with: {again}", file=sys.stderr)
+    return EXIT_INTERRUPTED

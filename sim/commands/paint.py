@@ -1,15 +1,22 @@
-"""``ibvs-qp paint``: fly the paint job of a scene under one or both laws and report it."""
+"""``ibvs-qp paint``: fly the paint job of a scene under one law or both, and write a report."""
 
 from __future__ import annotations
 
 import dataclasses
-import shlex
 import sys
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from sim.commands.options import flag, optional
+from sim.commands.options import (
+    EXIT_INTERRUPTED,
+    check_mujoco,
+    check_readable,
+    check_seed,
+    command_line,
+    flag,
+    optional,
+)
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -18,9 +25,13 @@ if TYPE_CHECKING:
     from sim.report.rundir import RunFolder
 
 
+#: Values of --image-size as (width, height) [px].
+_SIZES = {"640x480": (640, 480), "424x240": (424, 240)}
+
+
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Paint:
-    """Fly a paint job from the vehicle's own camera, the QP law beside the analytic law, and write a report.
+    """Fly a paint job from the on-board camera under the QP law and the analytic law, and write a report.
 
     Example: ibvs-qp paint --seed 3 --image-size 424x240 --out runs/seed3
     """
@@ -30,41 +41,30 @@ class Paint:
     preset: Annotated[Path | None, optional("FILE")] = None
     """Controller preset (TOML): vehicle model, gains, weights, limits; default: the built-in one."""
     features: Literal["rendered", "geometric"] = "rendered"
-    """Perception: rendered pictures through the whole vision, or a sensor model of lines."""
+    """Perception: rendered pictures through the vision pipeline, or a sensor model of lines."""
     vision: Literal["own", "paper"] = "own"
-    """Vision pipeline: the own one, or the paper's as a baseline (topmost level line, first upright one)."""
+    """Vision pipeline: ours, or the paper's as a baseline (topmost horizontal line, first vertical line)."""
     image_size: Annotated[Literal["640x480", "424x240"] | None, optional("640x480|424x240")] = None
     """Picture size; default: the scene's."""
     camera: Literal["plane", "gl", "auto"] = "plane"
-    """Camera back end: plane needs no GL library; gl and auto draw with OpenGL where there is one, else with plane."""
+    """Camera back end: plane needs no GL library; gl and auto draw with OpenGL if it works, else with plane."""
     law: Literal["qp", "paper", "both"] = "both"
-    """Which law flies."""
+    """Law to fly."""
     seed: int = 0
-    """Varies start pose, textures, clutter, noise and biases; the same seed flies the same flight."""
+    """Varies start pose, textures, clutter, noise and biases; the same seed repeats the flight."""
     out: Annotated[Path | None, optional("DIR")] = None
     """Run folder; default: runs/<UTC stamp>."""
     json: Annotated[bool, flag] = False
     """Print summary.json as one line on standard output, and nothing else."""
     view: Annotated[bool, flag] = False
-    """Show the flight in MuJoCo's window at real time, one law after the other; needs a display."""
+    """Show the flight in MuJoCo's viewer in real time, one law after the other; needs a display."""
     no_video: Annotated[bool, flag] = False
-    """Write no video."""
+    """Do not write a video."""
 
     def run(self, words: list[str]) -> int:
-        """Fly, write the run folder, print the figures.
-
-        Args:
-            words: The command line, for the record.
-
-        Returns:
-            0, or 130 after Ctrl-C.
-
-        Raises:
-            IbvsQpError: When scene, preset, seed or run folder is refused; nothing was flown then.
-        """
+        """Fly, write the run folder, print the figures; an option is rejected before any flight."""
         from rich.console import Console
 
-        from sim.commands.checks import check_mujoco, check_readable, check_seed
         from sim.sensors.cameras import resolve_camera
 
         check_mujoco()
@@ -82,7 +82,7 @@ class Paint:
         scene = load_scene(self.scene) if self.scene else Scene()
         if self.view:
             check_display()
-        size = _size(self.image_size)
+        size = _SIZES[self.image_size] if self.image_size else None
         camera, note = resolve_camera(self.camera)
         if note is not None:
             print(f"ibvs-qp: {note}", file=sys.stderr)
@@ -97,7 +97,7 @@ class Paint:
             machine_code=True,
             view=self.view,
         )
-        pilot_config(scene, options)  # a preset is refused here, before anything is shown or written
+        pilot_config(scene, options)  # raises on an unusable preset before anything is shown or written
         laws = ("qp", "paper") if self.law == "both" else (self.law,)
         folder = RunFolder.create(self.out)
         notes = Console(stderr=True, quiet=self.json)
@@ -108,7 +108,7 @@ class Paint:
             folder.discard_if_empty()
             raise
         facts = {
-            "command": shlex.join(["ibvs-qp", *words]),
+            "command": command_line(words),
             "seed": self.seed,
             "scene": str(self.scene) if self.scene else "default",
             "preset": str(self.preset) if self.preset else None,
@@ -152,12 +152,5 @@ class Paint:
             if folder.report.exists():
                 Console().print(f"Report: {folder.report}", soft_wrap=True, highlight=False)
         if interrupted:
-            print(f"ibvs-qp: interrupted; what was flown is in {folder.path}", file=sys.stderr)
-        return 130 if interrupted else 0
-
-
-def _size(text: str | None) -> tuple[int, int] | None:
-    if text is None:
-        return None
-    width, height = text.split("x")
-    return int(width), int(height)
+            print(f"ibvs-qp: interrupted; the partial run is in {folder.path}", file=sys.stderr)
+        return EXIT_INTERRUPTED if interrupted else 0

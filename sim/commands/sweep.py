@@ -1,13 +1,10 @@
-"""``ibvs-qp sweep``: fly any grid or random design, on this computer or on a cluster, and report it."""
+"""``ibvs-qp sweep``: fly a grid or random design on this computer or a cluster, and report the results."""
 
 from __future__ import annotations
 
 import contextlib
 import dataclasses
-import os
-import shlex
 import shutil
-import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,7 +12,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from sim.commands.options import check_count, flag, go_on, optional
+from sim.commands.options import (
+    check_count,
+    check_seed,
+    command_line,
+    flag,
+    interrupted,
+    optional,
+    usable_cores,
+)
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -28,7 +33,7 @@ PARTS = "parts"
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Sweep:
-    """Fly a grid or random design over scene, vehicle, noise and controller parameters; docs/sweeps.md explains specs.
+    """Fly a grid or random design over scene, vehicle, noise and controller parameters; docs/sweeps.md defines specs.
 
     Example: ibvs-qp sweep sim/sweep/specs/friction_mass.toml --out runs/friction
 
@@ -38,42 +43,32 @@ class Sweep:
     spec: Annotated[Path | None, tyro.conf.Positional, optional("SPEC")] = None
     """The design (TOML)."""
     report: Annotated[Path | None, optional("DIR_OR_PARQUET")] = None
-    """Fly nothing: draw box plots, heat maps and success-rate maps of a table that is there."""
+    """Fly nothing: draw box plots, heat maps and success-rate maps of an existing table."""
     figures: Annotated[tuple[str, ...], optional("COLUMN ...")] = ()
     """Columns to report; default: path, push, tilt and thrust rate."""
     jobs: Annotated[int | None, optional("N")] = None
-    """Processes of this computer; default: one per core. The table does not depend on it."""
+    """Parallel processes; default: one per core. The table does not depend on it."""
     dask: Annotated[bool, flag] = False
-    """Fly on a Dask cluster started here for the time of the sweep."""
+    """Fly on a local Dask cluster, started for this sweep."""
     scheduler: Annotated[str | None, optional("ADDRESS")] = None
     """Fly on the Dask cluster of this scheduler, such as tcp://head:8786."""
     seed: Annotated[int | None, optional("N")] = None
-    """First seed, instead of the spec's."""
+    """First seed; default: the spec's."""
     out: Annotated[Path | None, optional("DIR")] = None
-    """Folder; default: runs/<UTC stamp>. Given one with finished blocks, only the others are flown."""
+    """Run folder; default: runs/<UTC stamp>. Finished blocks in it are not flown again."""
     plan: Annotated[bool, flag] = False
-    """Print how many flights there are and how long they fly, and stop."""
+    """Print the number of flights and their flight time, and stop."""
     json: Annotated[bool, flag] = False
     """Print one line of JSON on standard output, and nothing else."""
 
     def run(self, words: list[str]) -> int:
-        """Fly what is not on disk yet and report it, or report a table.
-
-        Args:
-            words: The command line, for the record.
-
-        Returns:
-            0, or 130 after Ctrl-C.
-
-        Raises:
-            IbvsQpError: When spec, table, cluster, jobs or folder is refused.
-        """
+        """Fly the missing flights and report them, or report an existing table."""
         from rich.console import Console
 
         from ibvs_qp.config.errors import ConfigError
 
         if (self.spec is None) == (self.report is None):
-            raise ConfigError("give a spec to fly, or --report with a table to draw (see ibvs-qp sweep --help)")
+            raise ConfigError("give either a spec to fly or --report with a table to draw (see ibvs-qp sweep --help)")
         if self.report is not None:
             return self._report(self.report)
         notes = Console(stderr=True, quiet=self.json)
@@ -108,7 +103,7 @@ class Sweep:
             result = run_sweep(
                 design,
                 folder / PARTS,
-                workers=self.jobs or _cores(),
+                workers=self.jobs or usable_cores(),
                 block_runs=settings.block_runs,
                 progress=progress,
                 pool=pool,
@@ -124,7 +119,7 @@ class Sweep:
                 page = write_report(result.table, folder, f"Sweep {settings.name}", self.figures)
         content = {
             "schema": 1,
-            "command": shlex.join(["ibvs-qp", *words]),
+            "command": command_line(words),
             **_facts(design, result),
             "data_file": str(table),
             "run_dir": str(folder),
@@ -137,19 +132,16 @@ class Sweep:
         elif page is not None:
             print(f"{content['completed']} of {content['flights']} flights ended as planned. Report: {page}")
         if result.interrupted:
-            again = go_on(words, folder)
-            print(f"ibvs-qp: interrupted; finished blocks are in {folder}; go on with: {again}", file=sys.stderr)
-            return 130
+            return interrupted(words, folder, f"finished blocks are in {folder}")
         return 0
 
     def _design(self) -> Planned:
         from ibvs_qp.config.errors import ConfigError
-        from sim.commands.checks import check_seed
         from sim.sweep import Planned, load_spec
 
         check_count("--jobs", self.jobs)
         if self.dask and self.scheduler:
-            raise ConfigError("--dask starts a cluster here, --scheduler uses one that runs; give one of them")
+            raise ConfigError("--dask starts a local cluster and --scheduler uses a running one; give one of them")
         assert self.spec is not None
         spec = load_spec(self.spec)
         if self.seed is not None:
@@ -166,12 +158,8 @@ class Sweep:
 
         with contextlib.ExitStack() as stack:
             with notes.status("Waiting for the cluster ..."):
-                pool = stack.enter_context(cluster_pool(self.scheduler, self.jobs or _cores()))
+                pool = stack.enter_context(cluster_pool(self.scheduler, self.jobs or usable_cores()))
             yield pool
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _facts(design: Planned, result: SweepResult) -> dict[str, object]:
@@ -193,9 +181,10 @@ def _print_plan(console: Console, design: Planned) -> None:
 
     settings, first = design.spec.settings, design.run(0)
     blocks = -(-len(design) // settings.block_runs)
-    air = f", about {len(design) * first.expected_s / 60.0:.0f} min in the air" if isinstance(first, Run) else ""
+    air = f", about {len(design) * first.expected_s / 60.0:.0f} min of flight time" if isinstance(first, Run) else ""
     varied = ", ".join(axis.path for axis in (*design.spec.grid, *design.spec.random)) or "seeds only"
     console.print(
-        f"{settings.name}: {len(design)} flights in {blocks} blocks{air}; varied: {varied}", soft_wrap=True,
+        f"{settings.name}: {len(design)} flights in {blocks} blocks{air}; varied: {varied}",
+        soft_wrap=True,
         highlight=False,
-    )  # fmt: skip
+    )

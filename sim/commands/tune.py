@@ -1,14 +1,22 @@
-"""``ibvs-qp tune``: search for gains, choose, and judge the choice on unseen seeds."""
+"""``ibvs-qp tune``: search for gains, choose, and compare the choice with the shipped gains on unseen seeds."""
 
 from __future__ import annotations
 
 import dataclasses
 import shlex
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from sim.commands.options import check_count, flag, go_on, optional
+from sim.commands.options import (
+    check_count,
+    check_preset,
+    check_readable,
+    check_seed,
+    command_line,
+    flag,
+    interrupted,
+    optional,
+)
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -19,9 +27,9 @@ if TYPE_CHECKING:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Tune:
-    """Tune the gains of a law: push, path, tilt, yaw and thrust rate at once; needs the extra tune.
+    """Tune the gains of a law for push, path, tilt, yaw and thrust rate together; needs the extra tune.
 
-    Trials fly three scenes, the best of them three harder ones more.
+    Trials fly three scenes, the best of them also three harder ones.
 
     Example: ibvs-qp tune --law qp --trials 200 --out runs/tune
     """
@@ -29,40 +37,30 @@ class Tune:
     law: Literal["qp", "paper"] = "qp"
     """Law to tune."""
     trials: int = 200
-    """Finished trials at which the search stops; the same --out goes on with what is there."""
+    """Finished trials at which the search stops; trials found in --out count."""
     seed: int = 0
     """Seed of sampler and flights."""
     flights: int = 1
     """Seeds per scene in every trial."""
     unseen: int = 6
-    """Seeds on which shipped and tuned are compared, six scenes each; the best few trials fly half of that before."""
+    """Seeds that compare shipped and tuned gains, six scenes each; the best trials first fly half as many."""
     features: Literal["geometric", "rendered"] = "geometric"
-    """Perception: a sensor model of lines, or rendered pictures, which take five times as long."""
+    """Perception: a sensor model of lines, or rendered pictures (five times slower)."""
     preset: Annotated[Path | None, optional("FILE")] = None
     """Preset to start from; default: the shipped one."""
     jobs: int = 1
-    """Trials side by side; the search depends on their number, not on what is faster."""
+    """Parallel trials; the search depends on this number, not on the speed of the computer."""
     trials_of: Annotated[Path | None, optional("FILE")] = None
-    """Record of an earlier search (LAW_trials.json): choose anew from its trials, and search no further."""
+    """Record of an earlier search (LAW_trials.json): choose again from its trials, without a search."""
     storage: Annotated[str | None, optional("FILE_OR_URL")] = None
     """Journal file or database that several processes or computers may share; default: in --out."""
     out: Annotated[Path | None, optional("DIR")] = None
-    """Folder; default: runs/<UTC stamp>."""
+    """Run folder; default: runs/<UTC stamp>."""
     json: Annotated[bool, flag] = False
     """Print one line of JSON on standard output, and nothing else."""
 
     def run(self, words: list[str]) -> int:
-        """Search, choose, judge and write.
-
-        Args:
-            words: The command line, for the record.
-
-        Returns:
-            0, or 130 after Ctrl-C.
-
-        Raises:
-            IbvsQpError: When an option, the storage or the folder is refused.
-        """
+        """Search, choose, compare on unseen seeds, and write."""
         from rich.console import Console
 
         from sim.report.rundir import RunFolder, as_json
@@ -74,26 +72,22 @@ class Tune:
         try:
             summary = self._search(plan, folder, words, notes)
         except KeyboardInterrupt:
-            again = go_on(words, folder)
             kept = f"flights are in {folder / 'parts'}" if self.trials_of else f"finished trials are in {plan.storage}"
-            print(f"ibvs-qp: interrupted; {kept}; go on with: {again}", file=sys.stderr)
-            return 130
+            return interrupted(words, folder, kept)
         print(as_json(summary) if self.json else f"Report: {summary['report']}\nPreset: {summary['preset']}")
         return 0
 
     def _check(self) -> None:
         from ibvs_qp.config.errors import ConfigError
-        from sim.commands.checks import check_preset, check_readable, check_seed
 
         check_seed(self.seed)
         for name in ("trials", "flights", "unseen", "jobs"):
             check_count(f"--{name}", getattr(self, name))
-        check_readable("--preset", self.preset)
+        check_preset("--preset", self.preset)
         check_readable("--trials-of", self.trials_of)
-        check_preset(self.preset)
         for name in ("trials", "flights", "storage"):
             if self.trials_of and getattr(self, name) != getattr(type(self)(), name):
-                raise ConfigError(f"--{name} is of a search, and --trials-of makes none; leave one of them out")
+                raise ConfigError(f"--{name} configures a search, and --trials-of runs none; give one of them")
 
     def _plan(self, folder: Path) -> SearchPlan:
         from ibvs_qp.pilot import PilotConfig
@@ -117,7 +111,7 @@ class Tune:
         from sim.tune.record import Outcome, write
         from sim.tune.verdict import unseen
 
-        command = shlex.join(["ibvs-qp", *words])
+        command = command_line(words)
         trials, searched_by = self._trials(plan, command, notes)
         parts = folder / "parts"
         with sweep_progress(notes, f"{self.law}: choice") as progress:
@@ -138,7 +132,7 @@ class Tune:
         return write(outcome, folder)
 
     def _trials(self, plan: SearchPlan, command: str, notes: Console) -> tuple[Trials, str]:
-        """Searched for, or read back; with the command of the search."""
+        """Trials of a search or of a record, and the command of the search."""
         from sim.sweep.progress import sweep_progress
         from sim.tune.kept import kept_trials
         from sim.tune.search import finished, open_study, search
@@ -152,7 +146,7 @@ class Tune:
         return finished(study), command
 
     def _again(self) -> str:
-        """The command that gives the same on any computer."""
+        """The command that repeats the result on any computer."""
         default = type(self)()
         words = ["ibvs-qp", "tune", "--law", self.law, *([] if self.trials_of else ["--trials", str(self.trials)])]
         for name in ("seed", "flights", "unseen", "features", "preset", "trials_of", "jobs"):

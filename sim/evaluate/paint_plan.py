@@ -1,4 +1,4 @@
-"""The nominal polyline of a paint job and the band that it shall cover (truth, for metrics and figures only).
+"""The nominal polyline of a paint job and its intended band (truth, for metrics and figures only).
 
 Everything is in board coordinates (along, up) [m] of `BoardGeometry`. Row 1 runs parallel to the bottom edge, the
 first climb parallel to the left edge, and row k follows the upper edge of row k - 1 as it was painted.
@@ -14,7 +14,7 @@ import numpy as np
 from sim.world.board import BoardGeometry
 from sim.world.scene import Scene
 
-#: Length of the pieces in which a painted row is averaged [m]; shorter than any bend a vehicle can paint.
+#: A painted row is averaged over pieces of this length [m], shorter than any bend that the vehicle can paint.
 BIN_M = 0.01
 
 
@@ -51,7 +51,7 @@ class PaintPlan:
         return np.concatenate([segment.points for segment in self.segments])
 
     def near(self, kind: str, row: int) -> list[Segment]:
-        """The segment of this kind and row with its neighbours; rows further off must not attract the tip."""
+        """The segment of this kind and row with its neighbours; rows further away must not count as nearest."""
         for index, segment in enumerate(self.segments):
             if (segment.kind, segment.row) == (kind, row):
                 return list(self.segments[max(index - 1, 0) : index + 2])
@@ -67,15 +67,15 @@ def plan_as_painted(scene: Scene, painted: dict[int, np.ndarray]) -> PaintPlan:
     """The polyline whose row k follows the upper edge of row k - 1 as painted.
 
     The tip of row k belongs ``pitch - brush_width / 2`` above that edge, and the edge lies half a brush width above
-    the path of the tip. Even rows end where the row below ends; the start of row 1 has no guide, so touching
-    further right than planned lengthens row 1.
+    the path of the tip. Even rows end where the row below ends. The start of row 1 has no guide, so a touch further
+    right than planned lengthens row 1.
 
     Args:
         scene: The scene flown.
         painted: Tip path of every row painted in contact, (S, 2) each, board coordinates; rows may be missing.
 
     Returns:
-        The plan; straight where no painted row tells otherwise.
+        The plan; rows without a painted path below them are straight.
     """
     paint, board = scene.paint, BoardGeometry(scene)
     left, right = board.row_ends
@@ -102,7 +102,7 @@ def _extreme(painted: dict[int, np.ndarray], row: int, default: float) -> float:
 
 
 def _upper_edge(path: np.ndarray | None, planned: np.ndarray, brush_width_m: float) -> np.ndarray:
-    """Upper edge of a row, (K, 2) with increasing first column: averaged over short pieces of the tip's path."""
+    """Upper edge of a row, (K, 2) with increasing first column: the tip's path averaged over pieces of `BIN_M`."""
     if path is None or not len(path):
         path = planned
         centres, heights = path[:, 0], path[:, 1]
@@ -136,8 +136,8 @@ def distance_to_polyline(points: np.ndarray, polyline: np.ndarray) -> np.ndarray
     best = np.full(len(points), np.inf)
     for begin, end in itertools.pairwise(polyline):
         leg = end - begin
-        share = np.clip((points - begin) @ leg / max(float(leg @ leg), 1e-18), 0.0, 1.0)
-        best = np.minimum(best, np.hypot(*(points - begin - share[:, None] * leg).T))
+        fraction = np.clip((points - begin) @ leg / max(float(leg @ leg), 1e-18), 0.0, 1.0)
+        best = np.minimum(best, np.hypot(*(points - begin - fraction[:, None] * leg).T))
     return best
 
 

@@ -1,4 +1,4 @@
-"""Error of the true tip's path against the nominal polyline, tick by tick."""
+"""Distance of the true tip to the nominal polyline at every control tick."""
 
 from __future__ import annotations
 
@@ -7,28 +7,26 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.evaluate.paint_plan import PaintPlan, distance_to_polyline, plan_as_painted
+from sim.evaluate.window import CONTACT_N, board_tip, in_phase
 from sim.flight.trace import Trace
-from sim.world.board import BoardGeometry
 
-#: Normal force above which brush and board count as touching [N].
-CONTACT_N = 0.05
 #: Distance from a vertex of the polyline within which a sample belongs to the corner [m].
 CORNER_M = 0.10
-#: Phases in which paint is laid, and the kind of segment that each one follows.
+#: Phases that paint, and the kind of segment that each one follows.
 PAINTING_PHASES = {"paint": "row", "climb": "climb"}
 
 
 @dataclass(frozen=True, kw_only=True)
 class PathError:
-    """Tick by tick; NaN or False outside painting.
+    """Path error of every control tick; NaN or False outside painting.
 
     Attributes:
-        plan: The polyline that the errors refer to.
+        plan: The reference polyline.
         tip: Tip in board coordinates (along, up), (N, 2) [m].
-        painting: A row or a climb is being painted, (N,) bool.
+        painting: The vehicle paints a row or a climb, (N,) bool.
         corner: Painting within 0.10 m of a vertex, (N,) bool.
         distance: Unsigned distance to the polyline, (N,) [m].
-        height: Tip above (+) or below (-) its row, while a row is painted, (N,) [m].
+        height: Tip above (+) or below (-) its row, in phase ``paint``, (N,) [m].
     """
 
     plan: PaintPlan
@@ -37,12 +35,6 @@ class PathError:
     corner: np.ndarray
     distance: np.ndarray
     height: np.ndarray
-
-
-def in_phase(trace: Trace, *names: str) -> np.ndarray:
-    """Ticks of a trace in one of the named phases, (N,) bool."""
-    wanted = [index for index, name in enumerate(trace.phases) if name in names]
-    return np.isin(trace.phase, wanted)
 
 
 def painted_rows(trace: Trace, tip: np.ndarray) -> dict[int, np.ndarray]:
@@ -55,10 +47,10 @@ def painted_rows(trace: Trace, tip: np.ndarray) -> dict[int, np.ndarray]:
 def path_error(trace: Trace) -> PathError:
     """Compare the true tip with the nominal polyline of its scene.
 
-    The error is the distance to the nearest point of the segment being painted or of its neighbours, never a lag
-    in time: a corner may be cut, but a row cannot be mistaken for another.
+    The error is the distance to the nearest point of the current segment or of its neighbours. It contains no time
+    lag, and another row is never the nearest segment.
     """
-    tip = BoardGeometry(trace.scene).board_coordinates(trace.tip[:, 1:])
+    tip = board_tip(trace)
     plan = plan_as_painted(trace.scene, painted_rows(trace, tip))
     painting = np.zeros(len(tip), bool)
     distance, height = np.full(len(tip), np.nan), np.full(len(tip), np.nan)

@@ -1,20 +1,26 @@
-"""The side-by-side table of both laws: which figures, in which unit and with how many digits."""
+"""Tables for the terminal, and the figures of merit that tables show with their units and digits."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-LAW_HEADINGS = {"qp": "QP law", "paper": "analytic law"}
+LAW_NAMES = {"qp": "QP law", "paper": "analytic law"}
+
+
+def law_name(law: str) -> str:
+    """Name of a law in titles, headings and legends."""
+    return LAW_NAMES.get(law, law)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Line:
-    """One line of the table: a figure of M, scaled into a unit that reads well."""
+    """One line of the table: a figure of M in a readable unit."""
 
     key: str
     label: str
@@ -23,7 +29,7 @@ class Line:
     digits: int = 2
 
     def show(self, metrics: dict[str, Any]) -> str:
-        """The figure as text; a dash where there is none."""
+        """The figure as text; a dash if it is missing."""
         value: Any = metrics
         for part in self.key.split("."):
             value = value.get(part) if isinstance(value, dict) else None
@@ -45,7 +51,7 @@ LINES = (
     Line(key="coverage", label="coverage of the intended band", unit="%", scale=100, digits=1),
     Line(key="path_rms_straight_m", label="path error, straights, rms", unit="mm", scale=1e3),
     Line(key="path_rms_corner_m", label="path error, corners, rms", unit="mm", scale=1e3),
-    Line(key="path_max_m", label="path error, greatest", unit="mm", scale=1e3),
+    Line(key="path_max_m", label="path error, largest", unit="mm", scale=1e3),
     Line(key="height_error_rms_m", label="height error, rms", unit="mm", scale=1e3),
     Line(key="force_rms_straight_n", label="push error, straights, rms", unit="N", digits=3),
     Line(key="force_rms_corner_n", label="push error, corners, rms", unit="N", digits=3),
@@ -59,7 +65,7 @@ LINES = (
     Line(key="yaw_rms_deg", label="yaw, rms", unit="deg"),
     Line(key="yaw_peak_deg", label="yaw, peak", unit="deg"),
     Line(key="velocity_rms_m_s", label="velocity estimate, error rms", unit="mm/s", scale=1e3, digits=1),
-    Line(key="propeller_clearance_min_m", label="propeller clearance, least", unit="m", digits=3),
+    Line(key="propeller_clearance_min_m", label="propeller clearance, smallest", unit="m", digits=3),
     Line(key="step_us.p50", label="controller step, median", unit="µs", digits=0),
     Line(key="step_us.p99", label="controller step, 99 %", unit="µs", digits=0),
     Line(key="vision_ms.p50", label="vision per picture, median", unit="ms"),
@@ -69,14 +75,35 @@ LINES = (
 
 def figure_table(metrics: dict[str, dict[str, Any]]) -> Table:
     """Side-by-side table for the terminal."""
+    headings = ("figure", *(law_name(law) for law in metrics), "unit")
+    rows = [(line.label, *(line.show(figures) for figures in metrics.values()), line.unit) for line in LINES]
+    return terminal_table(headings, rows, text=("figure", "unit"), wrap=headings[1:-1])
+
+
+def terminal_table(
+    headings: Sequence[str],
+    rows: Iterable[Sequence[str]],
+    title: str | None = None,
+    *,
+    text: Collection[str] | None = None,
+    wrap: Collection[str] = (),
+) -> Table:
+    """A table for the terminal.
+
+    Args:
+        headings: Of the columns.
+        rows: Cells of every row.
+        title: Above the table.
+        text: Headings of left-aligned columns; default: the first. All others are numbers.
+        wrap: Headings of the columns whose cells may take several lines.
+    """
     from rich import box
     from rich.table import Table
 
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    table.add_column("figure", no_wrap=True)
-    for law in metrics:
-        table.add_column(LAW_HEADINGS.get(law, law), justify="right")
-    table.add_column("unit", no_wrap=True)
-    for line in LINES:
-        table.add_row(line.label, *(line.show(figures) for figures in metrics.values()), line.unit)
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, title=title, title_justify="left")
+    left = headings[:1] if text is None else text
+    for heading in headings:
+        table.add_column(heading, justify="left" if heading in left else "right", no_wrap=heading not in wrap)
+    for row in rows:
+        table.add_row(*row)
     return table

@@ -1,4 +1,4 @@
-"""Figures of a run, drawn from traces alone."""
+"""Figures of a run, drawn from its traces."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from sim.flight.trace import Trace
 
 #: Every figure of a run: file name, caption, function.
 FIGURES = {
-    "overview": ("What was flown: camera view, painted board, push force", draw_overview),
+    "overview": ("Overview: camera view, painted board, push force", draw_overview),
     "force": ("Push force: reference, measured and true", draw_force),
-    "image_error": ("Error of the guiding edges in the picture, at the brush tip", draw_image_error),
+    "image_error": ("Image error of the guiding edges at the brush tip", draw_image_error),
     "path": ("Path of the brush tip and its distance to the nominal polyline", draw_path),
-    "velocity": ("Velocity in the body frame: estimated against true", draw_velocity),
+    "velocity": ("Velocity in the body frame, estimated and true", draw_velocity),
     "attitude": ("True attitude; yaw 0 faces the wall", draw_attitude),
     "thrusts": ("Commanded rotor thrusts and their limits", draw_thrusts),
-    "limits": ("Active limits over time, and the share of the flight in which each was active", draw_limits),
-    "board": ("The painted board; dashed: the intended band", draw_board),
+    "limits": ("Active limits over time; right: fraction of the flight in which each limit was active", draw_limits),
+    "board": ("Painted board; dashed: intended band", draw_board),
 }
 
 __all__ = ["FIGURES", "draw_all", "draw_board", "draw_force", "draw_image_error", "draw_path"]
@@ -35,8 +35,8 @@ def draw_all(traces: dict[str, Trace], folder: Path) -> dict[str, tuple[str, Pat
     """Draw every figure into a folder.
 
     Args:
-        traces: One flight per law; each must have flown at least a tick.
-        folder: Where the PNG files go.
+        traces: One flight per law, of at least one tick.
+        folder: For the PNG files.
 
     Returns:
         Caption and file of every figure, by name.

@@ -1,4 +1,4 @@
-"""The painted board with the outline of the intended band."""
+"""The painted board and the outline of the intended band."""
 
 from __future__ import annotations
 
@@ -8,25 +8,28 @@ from matplotlib.patheffects import withStroke
 
 from sim.evaluate.metrics import coverage
 from sim.evaluate.paint_plan import band_mask, nominal_plan
-from sim.figures.style import REFERENCE, law_name, new_figure, thin
+from sim.evaluate.table import law_name
+from sim.evaluate.window import board_tip
+from sim.figures.style import REFERENCE, law_panels, thin
 from sim.flight.trace import Trace
-from sim.world.board import BoardGeometry
+
+#: Width of the axes, height of a title, largest height of a panel [in].
+_WIDTH_IN, _TITLE_IN, _MOST_HEIGHT_IN = 7.4, 0.45, 2.9
 
 
 def draw_board(traces: dict[str, Trace]) -> Figure:
-    """One panel per law: the board as painted, the path of the tip, the intended band's outline."""
+    """One panel per law: painted board, path of the tip, outline of the intended band."""
     board = next(iter(traces.values())).scene.board
-    each = 7.4 * board.height_m / board.width_m + 0.45
-    figure = new_figure(min(each, 2.9) * len(traces))
-    panels = figure.subplots(len(traces), 1, squeeze=False)[:, 0]
-    for axes, (law, trace) in zip(panels, traces.items(), strict=True):
+    height = min(_WIDTH_IN * board.height_m / board.width_m + _TITLE_IN, _MOST_HEIGHT_IN)
+    figure, panels = law_panels(traces, height * len(traces))
+    for axes, law, trace in panels:
         draw_canvas(axes, trace)
         axes.set_title(f"{law_name(law)}: {100 * coverage(trace):.1f} % of the intended band covered")
     return figure
 
 
 def draw_canvas(axes: Axes, trace: Trace) -> None:
-    """The board in its own coordinates [m]."""
+    """Draw the board in its own coordinates [m]."""
     scene = trace.scene
     extent = (0.0, scene.board.width_m, 0.0, scene.board.height_m)
     if trace.canvas is not None:
@@ -35,8 +38,7 @@ def draw_canvas(axes: Axes, trace: Trace) -> None:
         band = band_mask(scene, nominal_plan(scene), shape, trace.canvas_px_per_m)
         axes.contour(band[::-1], levels=[0.5], extent=extent, colors=[REFERENCE["color"]],
                      linewidths=0.7, linestyles="dashed")  # fmt: skip
-    path = BoardGeometry(scene).board_coordinates(trace.tip[:, 1:])
-    along, up = thin(*path[trace.row > 0].T)
+    along, up = thin(*board_tip(trace)[trace.row > 0].T)
     axes.plot(along, up, color="white", linewidth=0.7, path_effects=[withStroke(linewidth=1.5, foreground="#444444")])
     axes.set(xlabel="along the board [m]", ylabel="up [m]", xlim=extent[:2], ylim=extent[2:])
     axes.set_aspect("equal")

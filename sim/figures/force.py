@@ -1,33 +1,32 @@
-"""Push force of every law against its reference, with the first touch close up."""
+"""Push force of every law and its reference; the first touch enlarged."""
 
 from __future__ import annotations
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from sim.evaluate.path_error import CONTACT_N
-from sim.figures.style import FAINT, REFERENCE, law_colour, law_name, legend_above, new_figure, shade_phases, thin
+from sim.evaluate.table import law_name
+from sim.evaluate.window import CONTACT_N, PHYSICS_RATE_HZ
+from sim.figures.style import FAINT, GREY, REFERENCE, law_colour, legend_above, new_figure, shade_phases, thin
 from sim.flight.trace import Trace
 
-#: The close-up shows this much before and after the first touch [s].
+#: Time before and after the first touch in the enlarged view [s].
 BEFORE_TOUCH_S, AFTER_TOUCH_S = 0.3, 2.7
-#: Physics rate of the contact force [Hz].
-PHYSICS_RATE_HZ = 1000.0
 
 
 def draw_force(traces: dict[str, Trace]) -> Figure:
-    """One row per law: whole flight at the left, first touch at the right."""
+    """One row per law: whole flight on the left, first touch on the right."""
     figure = new_figure(0.3 + 1.95 * len(traces))
     grid = figure.subplots(len(traces), 2, squeeze=False, sharey=True, gridspec_kw={"width_ratios": [3.2, 1]})
-    # The scale follows the commanded push; a harder first touch widens it as far as it must.
+    # The scale follows the commanded push and widens for a harder first touch.
     commanded = max(float(np.max(trace.push_reference, initial=1.0)) for trace in traces.values())
     greatest = max(float(np.max(trace.contact_1khz, initial=0.0)) for trace in traces.values())
     for (flight, touch), (law, trace) in zip(grid, traces.items(), strict=True):
-        t, true, measured, wanted = thin(trace.t, trace.push_true, trace.push_measured, trace.push_reference)
+        t, true, measured, reference = thin(trace.t, trace.push_true, trace.push_measured, trace.push_reference)
         shade_phases(flight, trace)
         flight.plot(t, measured, color=FAINT, linewidth=0.7, label="measured")
         flight.plot(t, true, color=law_colour(law), label="true")
-        flight.plot(t, wanted, **REFERENCE, label="reference")
+        flight.plot(t, reference, **REFERENCE, label="reference")
         flight.set(title=law_name(law), ylabel="push [N]")
         flight.set_ylim(-0.08 * commanded, max(1.45 * commanded, 1.15 * greatest))
         _draw_touch(touch, trace, law)
@@ -41,7 +40,7 @@ def draw_force(traces: dict[str, Trace]) -> Figure:
 def _draw_touch(axes, trace: Trace, law: str) -> None:
     contact = trace.contact_1khz
     if not np.any(contact > CONTACT_N):
-        axes.text(0.5, 0.5, "no touch", transform=axes.transAxes, ha="center", color="#777777")
+        axes.text(0.5, 0.5, "no touch", transform=axes.transAxes, ha="center", color=GREY)
         return
     touch = float(np.argmax(contact > CONTACT_N)) / PHYSICS_RATE_HZ
     clock = np.arange(len(contact)) / PHYSICS_RATE_HZ - touch
@@ -49,5 +48,5 @@ def _draw_touch(axes, trace: Trace, law: str) -> None:
     axes.plot(clock[near], contact[near], color=law_colour(law), linewidth=0.9)
     axes.plot(trace.t - trace.t[0] - touch, trace.push_reference, **REFERENCE)
     axes.set_xlim(-BEFORE_TOUCH_S, AFTER_TOUCH_S)
-    peak = float(contact.max())
-    axes.text(0.97, 0.04, f"peak {peak:.1f} N", transform=axes.transAxes, ha="right", fontsize=8, color=law_colour(law))
+    text = f"peak {float(contact.max()):.1f} N"
+    axes.text(0.97, 0.04, text, transform=axes.transAxes, ha="right", fontsize=8, color=law_colour(law))

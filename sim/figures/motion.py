@@ -1,15 +1,18 @@
-"""Velocity, estimated against true, and attitude."""
+"""Estimated and true velocity; true attitude."""
 
 from __future__ import annotations
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from sim.figures.style import law_colour, law_name, legend_above, new_figure, shade_phases, thin
+from sim.evaluate.table import law_name
+from sim.figures.style import ZERO, law_colour, legend_above, new_figure, shade_phases, thin
 from sim.flight.trace import Trace
 
 _VELOCITY = ("forward", "right", "down")
 _ATTITUDE = ("roll", "pitch", "yaw")
+#: Smallest half height of the attitude scale [deg].
+LEAST_ATTITUDE_DEG = 0.5
 _TRUE = {"color": "#333333", "linewidth": 0.9}
 
 
@@ -31,25 +34,25 @@ def draw_velocity(traces: dict[str, Trace]) -> Figure:
         legend_above(grid[0][column])
     for axes in grid[0]:
         low, high = axes.get_ylim()
-        axes.set_ylim(low, high + 0.12 * (high - low))  # room for the names of the phases
+        axes.set_ylim(low, high + 0.12 * (high - low))  # room for the labels of the phases
     return figure
 
 
 def draw_attitude(traces: dict[str, Trace]) -> Figure:
-    """True roll, pitch and yaw of all laws over one another."""
+    """True roll, pitch and yaw of all laws in common panels."""
     figure = new_figure(4.4)
     panels = figure.subplots(3, 1, sharex=True)
     longest = max(traces.values(), key=lambda trace: float(trace.t[-1]))
     for row, (axes, name) in enumerate(zip(panels, _ATTITUDE, strict=True)):
-        axes.axhline(0.0, color="#333333", linewidth=0.6)
+        axes.axhline(0.0, **ZERO)
         for law, trace in traces.items():
             t, euler = thin(trace.t, trace.euler)
             axes.plot(t, np.degrees(euler[:, row]), color=law_colour(law), label=law_name(law))
         shade_phases(axes, longest, labels=row == 0)
         axes.set_ylabel(f"{name} [deg]")
         low, high = axes.get_ylim()
-        reach = 1.2 * max(abs(low), abs(high), 0.5)
-        axes.set_ylim(-reach, reach)
+        scale = 1.2 * max(abs(low), abs(high), LEAST_ATTITUDE_DEG)
+        axes.set_ylim(-scale, scale)
     legend_above(panels[0])
     panels[-1].set_xlabel("time [s]")
     return figure

@@ -1,16 +1,18 @@
-"""One picture that shows what the software does: the camera's view, the painted board, the push."""
+"""Overview of a run: camera view, painted board, push."""
 
 from __future__ import annotations
 
+import numpy as np
 from matplotlib.figure import Figure
 
+from sim.evaluate.table import law_name
 from sim.figures.board import draw_canvas
-from sim.figures.style import REFERENCE, law_colour, law_name, legend_above, new_figure, shade_phases, thin
+from sim.figures.style import REFERENCE, law_colour, legend_above, new_figure, shade_phases, thin
 from sim.flight.trace import Trace
 from sim.flight.video import unpack_picture
 
-#: The picture shown is taken at this share of the last row.
-SHARE_OF_ROW = 0.35
+#: The camera view is taken at this fraction of the last row.
+FRACTION_OF_ROW = 0.35
 
 
 def draw_overview(traces: dict[str, Trace]) -> Figure:
@@ -24,9 +26,9 @@ def draw_overview(traces: dict[str, Trace]) -> Figure:
     if picture is not None:
         panels[0].imshow(unpack_picture(picture))
         panels[0].set_axis_off()
-        panels[0].set_title("what the camera sees")
+        panels[0].set_title("camera view")
     draw_canvas(panels[-1], trace)
-    panels[-1].set_title(f"what the {law_name(law)} painted")
+    panels[-1].set_title(f"painted board, {law_name(law)}")
     axes = lower.subplots()
     shade_phases(axes, trace)
     for name, flight in traces.items():
@@ -40,10 +42,10 @@ def draw_overview(traces: dict[str, Trace]) -> Figure:
     return figure
 
 
-def _picture(trace: Trace):
-    """A picture from the middle of the painting, the last row if it was reached; None without pictures."""
+def _picture(trace: Trace) -> np.ndarray | None:
+    """A picture of the last row, or the latest before it; None without pictures."""
     painting = [picture for _, picture, phase in trace.pictures if phase.startswith("paint")]
     if not painting:
         return trace.pictures[-1][1] if trace.pictures else None
     rows = max(trace.scene.paint.rows, 1)
-    return painting[min(int((rows - 1 + SHARE_OF_ROW) / rows * len(painting)), len(painting) - 1)]
+    return painting[min(int((rows - 1 + FRACTION_OF_ROW) / rows * len(painting)), len(painting) - 1)]

@@ -1,4 +1,4 @@
-"""Path of the brush tip: in space over the board, and its error along the job."""
+"""Path of the brush tip in space, and its error over the painted distance."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from sim.evaluate.paint_plan import nominal_plan
 from sim.evaluate.path_error import CORNER_M, path_error
-from sim.figures.style import REFERENCE, law_colour, law_name, new_figure, thin
+from sim.evaluate.table import law_name
+from sim.figures.style import REFERENCE, law_colour, new_figure, thin
 from sim.flight.trace import Trace
 from sim.world.board import BoardGeometry
 
 
 def draw_path(traces: dict[str, Trace]) -> Figure:
-    """Tip path in space with board and nominal polyline, above the path error over the distance painted."""
+    """Tip path in space with board and nominal polyline; below it the path error over the painted distance."""
     figure = new_figure(5.6)
     parts = figure.subfigures(2, 1, squeeze=False, height_ratios=[2.1, 1])
     _draw_space(parts[0, 0], traces)
@@ -23,7 +24,7 @@ def draw_path(traces: dict[str, Trace]) -> Figure:
 
 
 def _draw_space(figure, traces: dict[str, Trace]) -> None:
-    """Seen from behind the vehicle: right, into the wall, up [m]."""
+    """View from behind the vehicle; axes right, into the wall, up [m]."""
     scene = next(iter(traces.values())).scene
     board = BoardGeometry(scene)
     axes = figure.add_axes((0.0, -0.02, 1.0, 1.04), projection="3d")
@@ -49,12 +50,12 @@ def _draw_space(figure, traces: dict[str, Trace]) -> None:
         axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
     for artist in (*axes.lines, *axes.collections):
         artist.set_in_layout(False)
-        artist.set_clip_on(False)  # the frame of a 3-D axes is narrower than what it shows
+        artist.set_clip_on(False)  # the frame of 3-D axes is narrower than their content
     axes.legend(loc="upper left", bbox_to_anchor=(0.02, 0.97), bbox_transform=figure.transSubfigure)
 
 
 def _draw_error(axes, traces: dict[str, Trace]) -> None:
-    greatest = 1.0
+    largest = 1.0
     for law, trace in traces.items():
         path = path_error(trace)
         index = np.flatnonzero(path.painting)
@@ -63,10 +64,10 @@ def _draw_error(axes, traces: dict[str, Trace]) -> None:
         steps = np.linalg.norm(np.diff(path.tip[index], axis=0), axis=1)
         travelled = np.concatenate(([0.0], np.cumsum(steps)))
         error = 1e3 * path.distance[index]
-        greatest = max(greatest, float(error.max()))
+        largest = max(largest, float(error.max()))
         axes.plot(*thin(travelled, error), color=law_colour(law), label=law_name(law))
         axes.fill_between(travelled, 0, 1, where=path.corner[index], transform=axes.get_xaxis_transform(),
                           color="#efefef", linewidth=0, zorder=0)  # fmt: skip
-    axes.set(xlabel="distance painted [m]", ylabel="path error [mm]", ylim=(0.0, 1.15 * greatest))
+    axes.set(xlabel="painted distance [m]", ylabel="path error [mm]", ylim=(0.0, 1.15 * largest))
     axes.set_title(f"distance of the tip to the nominal polyline (grey: within {CORNER_M:.2f} m of a vertex)")
     axes.margins(x=0.0)

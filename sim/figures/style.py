@@ -1,10 +1,11 @@
-"""What all figures share: style sheet, colours of the laws, phase shading, saving."""
+"""Style sheet, colours, panels, phase shading and legends of all figures."""
 
 from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -13,25 +14,26 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.transforms import blended_transform_factory
 
+from sim.evaluate.table import law_name
 from sim.flight.trace import Trace
 
 STYLE_FILE = Path(__file__).with_name("ibvs_qp.mplstyle")
-#: Colours that stay apart for colour-blind readers (Okabe and Ito), one per law.
+#: One colour per law, distinguishable by colour-blind readers (Okabe and Ito).
 LAW_COLOURS = {"qp": "#0b6f9e", "paper": "#d55e1a"}
-LAW_NAMES = {"qp": "QP law", "paper": "analytic law"}
 REFERENCE = {"color": "#333333", "linestyle": (0, (4, 2)), "linewidth": 0.9}
-FAINT = "#b9c4cc"
-#: Phases in which the brush is on the board are tinted, each with its own tint.
+ZERO = {"color": "#333333", "linewidth": 0.6}
+FAINT, GREY = "#b9c4cc", "#777777"
+#: Tints of the phases with contact.
 PHASE_TINTS = {"press": "#f1ead9", "paint": "#e3eef5", "climb": "#cfe3d3"}
-#: Share of a page-wide axis that one letter of a phase's label takes; a phase too short for its label gets none.
-LETTER_SHARE = 0.0125
-#: Points drawn per curve at most; more only makes the file larger.
+#: Width of one letter of a phase's label as a fraction of a page-wide axis; shorter phases get no label.
+LETTER_FRACTION = 0.0125
+#: Largest number of points per curve; more would only enlarge the file.
 MOST_POINTS = 6000
 
 
 @contextlib.contextmanager
 def styled() -> Iterator[None]:
-    """Apply the style sheet for the duration of a context, without touching the user's settings."""
+    """Apply the style sheet within a context; the user's settings do not change."""
     with matplotlib.rc_context(fname=STYLE_FILE):
         yield
 
@@ -43,9 +45,24 @@ def new_figure(height_in: float) -> Figure:
     return figure
 
 
-def law_name(law: str) -> str:
-    """Name of a law in titles and legends."""
-    return LAW_NAMES.get(law, law)
+def law_panels(
+    traces: dict[str, Trace], height_in: float, **subplots: Any
+) -> tuple[Figure, list[tuple[Axes, str, Trace]]]:
+    """Figure with one panel per law, one above the other, titled with the law's name.
+
+    Args:
+        traces: One flight per law.
+        height_in: Height of the figure [in].
+        subplots: Further arguments of `Figure.subplots`.
+
+    Returns:
+        The figure, and the axes with law and flight of every panel.
+    """
+    figure = new_figure(height_in)
+    panels = figure.subplots(len(traces), 1, squeeze=False, **subplots)[:, 0]
+    for axes, law in zip(panels, traces, strict=True):
+        axes.set_title(law_name(law))
+    return figure, [(axes, law, trace) for axes, (law, trace) in zip(panels, traces.items(), strict=True)]
 
 
 def law_colour(law: str) -> str:
@@ -54,49 +71,42 @@ def law_colour(law: str) -> str:
 
 
 def thin(*columns: np.ndarray) -> list[np.ndarray]:
-    """The same columns with at most `MOST_POINTS` evenly chosen rows."""
+    """The same columns with at most `MOST_POINTS` evenly spaced rows."""
     step = max(1, len(columns[0]) // MOST_POINTS)
     return [column[::step] for column in columns]
 
 
-def phase_spans(trace: Trace) -> list[tuple[float, float, str, int]]:
-    """(begin, end, phase, row) of every stretch in one phase and row, in order [s]."""
-    if not len(trace.t):
-        return []
-    change = np.flatnonzero(np.diff(trace.phase) | np.diff(trace.row)) + 1
+def runs(*columns: np.ndarray) -> list[tuple[int, int]]:
+    """(first, last) index of every stretch in which no column changes, in order."""
+    change = np.flatnonzero(np.any([np.diff(column) != 0 for column in columns], axis=0)) + 1
     starts = np.concatenate(([0], change))
-    ends = np.concatenate((trace.t[change], trace.t[-1:]))
-    return [
-        (float(trace.t[i]), float(end), trace.phases[int(trace.phase[i])], int(trace.row[i]))
-        for i, end in zip(starts, ends, strict=True)
-    ]
+    return list(zip(starts.tolist(), [*(change - 1).tolist(), len(columns[0]) - 1], strict=True))
 
 
 def shade_phases(axes: Axes, trace: Trace, labels: bool = True, columns: int = 1) -> None:
-    """Tint the contact phases behind a time series and name the long ones at the top.
+    """Tint the contact phases behind a time series and label the long phases at the top.
 
     Args:
-        axes: Where.
-        trace: Whose phases.
-        labels: Whether to name them.
+        axes: Axes with time [s] along x.
+        trace: The flight.
+        labels: Whether to label the phases.
         columns: Number of axes side by side on the page.
     """
-    spans = phase_spans(trace)
-    whole = (spans[-1][1] - spans[0][0]) if spans else 0.0
+    t = trace.t
     place = blended_transform_factory(axes.transData, axes.transAxes)
-    for begin, end, phase, row in spans:
+    for first, last in runs(trace.phase, trace.row) if len(t) else ():
+        begin, end = float(t[first]), float(t[min(last + 1, len(t) - 1)])
+        phase = trace.phases[int(trace.phase[first])]
         if phase in PHASE_TINTS:
             axes.axvspan(begin, end, color=PHASE_TINTS[phase], linewidth=0, zorder=0)
-        text = f"row {row}" if phase == "paint" else phase
-        if labels and end - begin > LETTER_SHARE * columns * len(text) * whole:
-            axes.text(
-                (begin + end) / 2, 0.985, text, transform=place, ha="center", va="top", fontsize=7, color="#777777"
-            )
-    axes.set_xlim(0.0, max(float(trace.t[-1]) if len(trace.t) else 1.0, 1e-3))
+        text = f"row {int(trace.row[first])}" if phase == "paint" else phase
+        if labels and end - begin > LETTER_FRACTION * columns * len(text) * (t[-1] - t[0]):
+            axes.text((begin + end) / 2, 0.985, text, transform=place, ha="center", va="top", fontsize=7, color=GREY)
+    axes.set_xlim(0.0, max(float(t[-1]) if len(t) else 1.0, 1e-3))
 
 
 def legend_above(axes: Axes) -> None:
-    """Put the legend at the top right, outside, where it covers no data."""
+    """Put the legend above the axes at the right, where it covers no data."""
     count = len(axes.get_legend_handles_labels()[0])
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=count, borderaxespad=0.1)
 

@@ -1,1 +1,1 @@
-"""What a run leaves for people: run folder, HTML report, comparison of runs."""
+"""Output of a run: run folder, HTML report, comparison of runs."""

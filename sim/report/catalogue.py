@@ -1,7 +1,6 @@
-"""Every task and limit of the program as a page: rows, units, weights, prices, bounds, switches and their reasons.
+"""Page of all tasks and limits: rows, units, weights, slack weights, bounds, switches and their reasons.
 
-``python -m sim.report.catalogue`` prints docs/tasks_and_limits.md. All of it is read from the classes and the settings
-that they name, so it is true of the program as it is built.
+``python -m sim.report.catalogue`` prints docs/tasks_and_limits.md from the classes and the settings that they name.
 """
 
 from __future__ import annotations
@@ -12,34 +11,34 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from ibvs_qp.config import ControllerConfig
-from ibvs_qp.controller import default_limits, default_tasks
+from ibvs_qp.controller import default_limits, default_tasks, program_template
 from ibvs_qp.limits import Limit
-from ibvs_qp.model.rows import LimitRow, SymbolicModel, TaskRow
+from ibvs_qp.model.rows import LimitRow, TaskRow
 from ibvs_qp.tasks import Task
 
 _HEAD = """\
 # Tasks and limits of the program
 
-Written by `python -m sim.report.catalogue` from the classes and their settings; a test compares. What the rows mean and
-how they work together is told in [control.md](control.md), how to add one in [extending.md](extending.md). Rows are
-those of the shipped vehicle; settings are named as in a preset's TOML, below `[controller]` where it is a pilot's.
+Written by `python -m sim.report.catalogue` from the classes and their settings; a test compares the page with them.
+[control.md](control.md) explains the rows and how they work together, [extending.md](extending.md) how to add one. Rows
+are those of the shipped vehicle. Settings are named as in a preset's TOML, below `[controller]` in a pilot's preset.
 """
 
 _TASKS = """
 ## Tasks
 
-A row costs `weight * (does - asked)^2 / 2`, so a weight is per squared unit of its row and the cost has no unit. Given
-is what a row weighs in full. Lambda and 1 - lambda blend push and stand-off, a line's weight falls with its fit and is
-zero without the line, what a line fixes is taken from the velocity rows, and while friction holds the tip
-`velocity_right` weighs as `height` (`ibvs_qp/model/program.py`).
+A row costs `weight * (achieved - target)^2 / 2`, so a weight is per squared unit of its row and the cost has no unit.
+The table lists full weights. At a tick, lambda and 1 - lambda blend push and stand-off; the weight of a line decreases
+with the quality of its fit and is zero without the line; the velocity rows lose weight in directions that a line fixes;
+while friction holds the tip, `velocity_right` has the weight of `height` (`ibvs_qp/model/program.py`).
 
 """
 
 _LIMITS = """
 ## Limits
 
-A soft row costs `price * slack^2 / 2`. `limits.hard_barriers = true` makes all of them hard, `barriers = false` takes
-all soft ones out.
+A soft row costs `slack weight * slack^2 / 2`. `limits.hard_barriers = true` makes all rows hard, `barriers = false`
+removes all soft rows.
 
 """
 
@@ -53,7 +52,7 @@ class Setting:
     Attributes:
         place: Dotted name as in TOML.
         value: Its value.
-        unit, doc, why: What it is measured in, what it is, and the reason for its default.
+        unit, doc, why: Its unit, its meaning, and the reason for its default.
     """
 
     place: str
@@ -64,7 +63,7 @@ class Setting:
 
     @classmethod
     def of(cls, config: ControllerConfig, place: str) -> Setting:
-        """The field at a dotted name; AttributeError or KeyError where there is none."""
+        """The field at a dotted name; AttributeError or KeyError if it does not exist."""
         owner: Any = config
         *path, name = place.split(".")
         for part in path:
@@ -80,8 +79,8 @@ class Setting:
 
 
 def settings_of_rows(part: Task, rows: Sequence[TaskRow]) -> list[str]:
-    """Name of the weight of every row of a task: one for all, or one a row."""
-    names = part.weighed_by
+    """Name of the weight of every row of a task: a common one, or one per row."""
+    names = part.weight_settings
     return [names[0]] * len(rows) if len(names) == 1 else list(names)
 
 
@@ -89,17 +88,17 @@ def catalogue(config: ControllerConfig | None = None) -> str:
     """The page in Markdown.
 
     Args:
-        config: Whose program; the default one.
+        config: Configuration of the program; None for the default.
     """
     config = config or ControllerConfig()
-    model = SymbolicModel(config)
+    model = program_template(config).model
     tasks, limits = default_tasks(config), default_limits(config)
     weighed = [line for task in tasks for line in _weighed(task, task.rows(model), config)]
-    parts = [_HEAD, _TASKS, _table(("class", "asks for", "rows", "weight", "why so much"), _joined(weighed))]
-    kept = [_kept(limit, limit.rows(model), config) for limit in limits]
-    parts += [_LIMITS, _table(("class", "keeps", "rows", "price", "why so much", "switch"), _joined(kept))]
-    bounds = [_bound(limit, Setting.of(config, place)) for limit in limits for place in limit.bounded_by]
-    parts += [_BOUNDS, _table(("class", "setting", "value", "what it is", "why so much"), bounds)]
+    parts = [_HEAD, _TASKS, _table(("class", "purpose", "rows", "weight", "reason"), _joined(weighed))]
+    limited = [_limited(limit, limit.rows(model), config) for limit in limits]
+    parts += [_LIMITS, _table(("class", "purpose", "rows", "slack weight", "reason", "switch"), _joined(limited))]
+    bounds = [_bound(limit, Setting.of(config, place)) for limit in limits for place in limit.bound_settings]
+    parts += [_BOUNDS, _table(("class", "setting", "value", "meaning", "reason"), bounds)]
     return "".join(parts)
 
 
@@ -107,20 +106,20 @@ def _weighed(task: Task, rows: Sequence[TaskRow], config: ControllerConfig) -> l
     lines: dict[str, list[TaskRow]] = {}
     for row, place in zip(rows, settings_of_rows(task, rows), strict=True):
         lines.setdefault(place, []).append(row)
-    told = []
+    found = []
     for place, weighed in lines.items():
         weight = Setting.of(config, place)
-        told.append([_name(task), _summary(task), _rows(weighed), f"`{place}` {weight.amount}", weight.why])
-    return told
+        found.append([_name(task), _summary(task), _rows(weighed), f"`{place}` {weight.amount}", weight.why])
+    return found
 
 
-def _kept(limit: Limit, rows: Sequence[LimitRow], config: ControllerConfig) -> list[str]:
-    price, why = "hard", "thrusts cannot leave them; their intersection is never empty"
-    if limit.priced_by is not None:
-        setting = Setting.of(config, limit.priced_by)
-        price, why = f"`{setting.place}` {setting.amount}", setting.why
-    switch = f"`{limit.switched_by}`" if limit.switched_by else ""
-    return [_name(limit), _summary(limit), _rows(rows), price, why, switch]
+def _limited(limit: Limit, rows: Sequence[LimitRow], config: ControllerConfig) -> list[str]:
+    slack_weight, why = "hard", "physical limits of the rotors; their intersection is never empty"
+    if limit.slack_weight_setting is not None:
+        setting = Setting.of(config, limit.slack_weight_setting)
+        slack_weight, why = f"`{setting.place}` {setting.amount}", setting.why
+    switch = f"`{limit.switch_setting}`" if limit.switch_setting else ""
+    return [_name(limit), _summary(limit), _rows(rows), slack_weight, why, switch]
 
 
 def _bound(limit: Limit, setting: Setting) -> list[str]:
@@ -128,7 +127,7 @@ def _bound(limit: Limit, setting: Setting) -> list[str]:
 
 
 def _joined(lines: Iterable[list[str]]) -> list[list[str]]:
-    """Lines that differ in their rows only (slots of lines), as one."""
+    """Merge lines of the page that differ in their rows only (one class per image line)."""
     found: dict[tuple[str, ...], list[str]] = {}
     for line in lines:
         key = tuple(line[:2] + line[3:])

@@ -1,4 +1,4 @@
-"""Compare two runs: what each is, what flights they share, and the differences of their figures."""
+"""Compare two runs: pair their flights and list the differences of their figures."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from sim.sweep.paired import exact_interval
 from sim.sweep.parts import PARAM, frame
 from sim.sweep.statistics import figure_names, median_interval
 
-#: Columns that make two rows the same flight, beside the parameters.
+#: Columns that identify a flight, besides the parameters.
 _SAME = ("experiment", "law", "variant", "seed")
 
 
@@ -23,15 +23,15 @@ def read_run(path: Path) -> pl.DataFrame:
     """Rows of a run folder: of an experiment's tables, or one per law of a `paint` run.
 
     Raises:
-        ConfigError: When it is neither.
+        ConfigError: If it is neither.
     """
     if (path / "summary.json").is_file():
         return _paint_rows(path)
     names = [file.stem for file in sorted(path.glob("*.parquet"))]
     names = [name for name in names if name != "all"] or names
     if not names:
-        mend = "give the folder of `ibvs-qp paint` or `ibvs-qp experiment`, or a preset (TOML)"
-        raise ConfigError(f"{path} is no run: it has neither summary.json nor a table; {mend}")
+        advice = "give the folder of `ibvs-qp paint` or `ibvs-qp experiment`, or a preset (TOML)"
+        raise ConfigError(f"{path} is no run: it has neither summary.json nor a table; {advice}")
     return pl.concat([pl.read_parquet(path / f"{name}.parquet") for name in names], how="diagonal_relaxed")
 
 
@@ -54,7 +54,7 @@ def _is_number(value: Any) -> bool:
 
 @dataclass(frozen=True, kw_only=True)
 class Difference:
-    """One figure of one cell in two runs.
+    """Difference of one figure in one cell between runs A and B.
 
     Attributes:
         figure: Its name.
@@ -63,7 +63,7 @@ class Difference:
         median: Median of the differences B - A, flight by flight.
         low: Lower end of its bootstrap interval.
         high: Upper end.
-        sure_low: Lower end of the exact interval of six pairs or more, see `sim.sweep.paired`; else NaN.
+        sure_low: Lower end of the exact interval (six pairs or more, see `sim.sweep.paired`); else NaN.
         sure_high: Upper end.
     """
 
@@ -76,22 +76,17 @@ class Difference:
     sure_low: float
     sure_high: float
 
-    @property
-    def sure(self) -> bool:
-        """Whether the exact interval excludes zero."""
-        return self.sure_low > 0.0 or self.sure_high < 0.0
-
 
 def compare(a: pl.DataFrame, b: pl.DataFrame) -> list[dict[str, Any]]:
     """Pair the flights of two runs by experiment, law, variant, parameters and seed, and compare each cell.
 
-    Two `paint` runs of different seeds still compare, law by law: what is paired is then said by ``seeds``.
+    Two `paint` runs pair law by law, whatever their seeds.
 
     Returns:
         Per cell: experiment, law, variant, params, n, completed of both, and the differences.
 
     Raises:
-        ConfigError: When they share no flight.
+        ConfigError: If they share no flight.
     """
     if set(a["variant"]) == {"run"} and set(b["variant"]) == {"run"}:
         b = b.with_columns(pl.lit(a["seed"][0]).alias("seed"))

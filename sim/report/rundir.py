@@ -1,4 +1,4 @@
-"""The run folder: what a flight leaves on disk, and how it is read back."""
+"""The run folder: log, scene, presets, summary, figures, video and report of a run."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ from sim.flight.side_by_side import Flight, own_peak_memory
 from sim.flight.trace import FIELDS, Trace
 
 SCHEMA = 1
-#: Files of a run, beside its figures.
+#: Files of a run besides its figures.
 _FILES = ("report.html", "summary.json", "video.mp4", "scene.toml", "log.npz", "README.txt")
 _README = """One run of ibvs-qp.
 
-report.html   everything at a glance; open it in a browser, it needs nothing else
+report.html   all results on one page; open it in a browser, no other file is needed
 summary.json  all figures (docs/metrics.md of the project defines them)
 figures/      the report's figures as PNG
 video.mp4     camera view, phase and force
-scene.toml    the scene flown; fly it again with: ibvs-qp paint --scene scene.toml --seed {seed}
-preset_*.toml the pilot's configuration under each law
+scene.toml    the scene; repeat the flight with: ibvs-qp paint --scene scene.toml --seed {seed}
+preset_*.toml configuration of the pilot under each law
 log.npz       every array, named <law>/<array>; load it with
 
     import numpy as np
     log = np.load("log.npz")
     t, push = log["qp/t"], log["qp/push_true"]
-    phase = log["qp/phases"][log["qp/phase"]]   # the name of the phase at every tick
+    phase = log["qp/phases"][log["qp/phase"]]   # name of the phase at every tick
 
   or as traces, ready for sim.evaluate.metrics and sim.figures, with
 
@@ -49,10 +49,6 @@ log.npz       every array, named <law>/<array>; load it with
 """
 
 
-class RunFolderError(IbvsQpError):
-    """The run folder cannot be written."""
-
-
 @dataclass(frozen=True)
 class RunFolder:
     """Paths of one run."""
@@ -61,15 +57,15 @@ class RunFolder:
 
     @property
     def report(self) -> Path:
-        """The report for people."""
+        """The HTML report."""
         return self.path / "report.html"
 
     @classmethod
     def create(cls, out: Path | None) -> RunFolder:
-        """Make the folder, ``runs/<UTC stamp>`` by default, and prove that it can be written.
+        """Create the folder, ``runs/<UTC stamp>`` by default, and check that it can be written.
 
         Raises:
-            RunFolderError: When it cannot.
+            IbvsQpError: If it cannot be written.
         """
         path = _stamped(Path("runs")) if out is None else out
         try:
@@ -79,19 +75,18 @@ class RunFolder:
             probe.unlink()
         except OSError as error:
             reason = error.strerror or str(error)
-            mend = "give a writable folder with --out"
-            raise RunFolderError(f"cannot write run folder {path}: {reason}; {mend}") from None
+            raise IbvsQpError(f"cannot write run folder {path}: {reason}; give a writable folder with --out") from None
         return cls(path)
 
     def discard_if_empty(self) -> None:
-        """Remove the folder if nothing was written into it."""
+        """Remove the folder if it is empty."""
         if self.path.exists() and not any(self.path.iterdir()):
             self.path.rmdir()
 
     def write_record(self, traces: dict[str, Trace], summary_table: dict[str, Any]) -> None:
-        """Write what must not be lost: log, scene, summary and the text that explains them.
+        """Write log, scene, presets, summary and README before anything that could fail.
 
-        What an earlier run left in the same folder goes first, so that nothing stale is taken for this run's.
+        Files of an earlier run in the same folder are deleted first.
         """
         for name in _FILES:
             (self.path / name).unlink(missing_ok=True)
@@ -140,14 +135,14 @@ def summary(
     wall_time_s: float,
     peak_memory_bytes: int,
 ) -> dict[str, Any]:
-    """Assemble summary.json.
+    """Content of summary.json.
 
     Args:
         facts: command, seed, scene, preset, camera, image_size, features, vision.
-        folder: Where the run is written.
+        folder: The run folder.
         metrics: M of every law flown.
         interrupted: Whether Ctrl-C ended the run.
-        wall_time_s: Time since the command began [s].
+        wall_time_s: Time since the start of the command [s].
         peak_memory_bytes: Of all processes together.
     """
     return {
@@ -165,12 +160,12 @@ def summary(
 
 
 def peak_memory(flights: Iterable[Flight]) -> int:
-    """Peak resident memory of this process and of those that flew [bytes]: an upper bound of the common peak."""
+    """Peak resident memory of this process plus the peaks of the flight processes [bytes], an upper bound."""
     return own_peak_memory() + sum(flight.process_memory_bytes for flight in flights)
 
 
 def as_json(value: Any, indent: int | None = None) -> str:
-    """JSON text; numbers that are not finite become null."""
+    """JSON text; non-finite numbers become null."""
     return json.dumps(_finite(value), indent=indent, allow_nan=False)
 
 

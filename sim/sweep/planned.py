@@ -11,7 +11,7 @@ from typing import Any
 
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.settings import to_dict
-from sim.evaluate.measures.effort import paint_row, press_row
+from sim.evaluate.measures import paint_row, press_row
 from sim.flight.jobs import PaintJob
 from sim.sweep.axes import shares
 from sim.sweep.design import FlightPlan, Parameter, Refusal, Run

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from ibvs_qp.pilot import PilotConfig
-from sim.evaluate.measures.effort import paint_row
+from sim.evaluate.measures import paint_row
 from sim.experiments.scenes import changed, near_wall, short_job
 from sim.flight.closed_loop import FlightOptions, pilot_config
 from sim.flight.jobs import PaintJob

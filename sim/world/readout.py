@@ -111,8 +111,8 @@ def drive(rotors: int) -> ca.Function:
     """MuJoCo's inputs of a tick from the commanded thrusts and the force of the air.
 
     Function of (commanded, lower, upper, actual thrusts, lags, air, rotation, arm) yielding the limited thrusts [N],
-    the time constant of every rotor [s], and force and moment of the air, front-left-up [N, N m]. ``air`` is its force at
-    the true centre of mass in the world [N], ``arm`` the way there from the bare vehicle's centre of mass, where MuJoCo
+    the time constant of every rotor [s], and force and moment of the air, front-left-up [N, N m]. ``air`` is its force
+    at the true centre of mass in the world [N], ``arm`` the way there from the bare vehicle's centre of mass, where MuJoCo
     applies forces, in B [m]. Under a constant command a first-order lag never crosses it, so one choice between the
     lags up and down holds for the tick.
     """

@@ -1,4 +1,4 @@
-"""Figures of a flight that loses a rotor: does it live, does it leave the wall, how does it come down."""
+"""Figures of a flight that loses a rotor: survival, retreat from the wall, descent."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from sim.evaluate.measures.window import CONTACT_N, contact_clock, event_time, peak, tilt_deg
+from sim.evaluate.window import CONTACT_N, contact_clock, event_time, peak, tilt_deg
 from sim.flight.trace import Trace
 
 #: The vehicle counts as detached when its tip is this far from the board at the end [m].
@@ -16,13 +16,9 @@ DETACHED_M = 0.10
 def loss_figures(trace: Trace) -> dict[str, float]:
     """Figures from the loss to the end of the flight.
 
-    Args:
-        trace: A flight with a lost rotor.
-
     Returns:
-        ``survived_s`` counts from the loss to the crash or the planned end, ``yaw_turned_deg`` is the greatest turn
-        away from the heading at the loss, full turns included, ``push_spike_n`` the greatest push after the loss; empty
-        if the fault never came.
+        ``survived_s``: from the loss to the crash or the planned end. ``yaw_turned_deg``: largest turn from the heading
+        at the loss, full turns included. ``push_spike_n``: largest push after the loss. Empty without a fault.
     """
     fault = event_time(trace, "fault")
     after = trace.t >= fault if not math.isnan(fault) else np.zeros(len(trace.t), bool)

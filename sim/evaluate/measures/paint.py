@@ -1,30 +1,54 @@
-"""Figures of a paint job as a flat row: those of `sim.evaluate.metrics` without the machine-dependent timings."""
+"""Figures of a paint job as a flat row, without machine-dependent timings; effort of the rotors."""
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-from sim.evaluate.measures.window import rms
 from sim.evaluate.metrics import compute_metrics
 from sim.evaluate.path_error import path_error
+from sim.evaluate.window import limited_fraction, rms
 from sim.flight.trace import Trace
 
-#: Durations on this computer: not a result of the flight.
-_TIMINGS = ("real_time_factor",)
+#: The vehicle finds its hover within this time after release [s].
+SETTLED_S = 1.0
 
 
 def paint_figures(trace: Trace) -> dict[str, float]:
-    """Every number of M, path and push over straights and corners together, shares of ticks solved and limited."""
+    """Every number of M, rms of path and push over the whole painting, fractions of ticks solved and limited."""
     metrics = compute_metrics(trace)
     figures = {
         name: float(value)
         for name, value in metrics.items()
-        if isinstance(value, (int, float)) and not isinstance(value, bool) and name not in _TIMINGS
+        if isinstance(value, (int, float)) and not isinstance(value, bool) and name != "real_time_factor"
     }
     ticks = sum(metrics["outcomes"].values())
-    figures["solved_share"] = metrics["outcomes"].get("solved", 0) / ticks if ticks else float("nan")
-    figures["limited_share"] = float(np.mean(trace.active.any(axis=1))) if trace.active.size else 0.0
+    figures["solved_share"] = metrics["outcomes"].get("solved", 0) / ticks if ticks else math.nan
+    figures["limited_share"] = limited_fraction(trace, np.ones(len(trace.t), bool))
     path = path_error(trace)
     figures["path_rms_m"] = rms(path.distance[path.painting])
     figures["force_rms_n"] = rms((trace.push_true - trace.push_reference)[path.painting])
     return figures
+
+
+def effort_figures(trace: Trace) -> dict[str, float]:
+    """Thrust effort and thrust rate over the flight after its first second.
+
+    Returns:
+        ``effort_n``: thrusts minus their own mean, rms over rotors and ticks [N].
+        ``jitter_n_s``: rate of the commanded thrusts, rms over rotors and ticks [N/s].
+    """
+    thrusts = trace.thrusts[trace.t >= SETTLED_S]
+    if len(thrusts) < 2:
+        return {"effort_n": math.nan, "jitter_n_s": math.nan}
+    tick = float(np.median(np.diff(trace.t)))
+    return {
+        "effort_n": rms(thrusts - thrusts.mean(axis=0)),
+        "jitter_n_s": rms(np.diff(thrusts, axis=0) / tick),
+    }
+
+
+def paint_row(trace: Trace) -> dict[str, float]:
+    """Figures of a paint job with the effort."""
+    return paint_figures(trace) | effort_figures(trace)

@@ -1,163 +1,167 @@
-"""Figures of a static press: how it touches, settles, holds, and what it keeps of height and attitude."""
+"""Figures of a static press: touch, settling, steady push, height and attitude."""
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numpy as np
 
-from sim.evaluate.measures.reach import push_reach
-from sim.evaluate.measures.window import (
+import allocation
+from ibvs_qp.config.vehicle import VehicleParams
+from ibvs_qp.frames import GRAVITY
+from sim.evaluate.measures.paint import effort_figures
+from sim.evaluate.window import (
+    BOUNCE_WINDOW_S,
     CONTACT_N,
     PHYSICS_RATE_HZ,
+    attitude_figures,
     board_tip,
     contact_clock,
     event_time,
-    first_run,
+    limited_fraction,
     mean,
     peak,
     phase_window,
     rms,
-    tilt_deg,
+    touch_figures,
 )
 from sim.flight.trace import Trace
 
-#: The push has settled when it stays this near to what was asked [N] for this long [s].
-SETTLE_BAND_N, SETTLE_HOLD_S = 0.5, 0.5
-#: Losses of contact count as bounces within this time after the first touch [s].
-BOUNCE_WINDOW_S = 3.0
 #: Steady figures begin this long after the touch, or after a fault [s]: ramp and transients are over.
 STEADY_AFTER_S = 4.0
-#: Arrays of the true limits.
-LIMITS = ("true_thrust_min", "true_thrust_max")
-#: A disturbed hold has recovered when push and path stay within these bands for `SETTLE_HOLD_S` [N, m].
+#: The approach speed is read over this time before the first touch [s].
+APPROACH_WINDOW_S = 0.05
+#: A disturbed press has recovered when push and path stay within these bands [N, m].
 RECOVERY_BAND_N, RECOVERY_BAND_M = 0.5, 0.005
+#: Direction of travel of a sliding tip in B.
+_LEFT = np.array([0.0, -1.0, 0.0])
 
 
-def press_figures(trace: Trace) -> dict[str, float]:
-    """Figures of the phase ``press`` of a flight with `sim.flight.jobs.PressJob`.
+@functools.lru_cache(maxsize=256)
+def push_reach(
+    mass_kg: float, lower_n: tuple[float, ...], upper_n: tuple[float, ...], sliding_friction: float = 0.0
+) -> float:
+    """Largest push in level flight that the rotors can hold at full lift without turning the vehicle [N].
+
+    Args:
+        mass_kg: True mass.
+        lower_n: Lower thrust limits of the rotors.
+        upper_n: Upper thrust limits of the rotors.
+        sliding_friction: Coulomb coefficient of a tip that slides to the left; 0 for a tip at rest.
+    """
+    vehicle = VehicleParams()
+    return allocation.push_reach(
+        vehicle.geometry,
+        mass_kg * GRAVITY,
+        np.array(vehicle.tip_position_m),
+        np.array(lower_n),
+        np.array(upper_n),
+        friction=sliding_friction,
+        travel=_LEFT if sliding_friction > 0.0 else None,
+    ).push
+
+
+def push_figures(trace: Trace, push: np.ndarray, commanded: float, sliding_friction: float = 0.0) -> dict[str, float]:
+    """Delivered push beside the commanded one, the job's, and the reach of the true limits at the end of the flight.
 
     Args:
         trace: The flight.
-
-    Returns:
-        Figures by name; NaN where the flight never came so far.
+        push: True push over the steady part [N], (K,).
+        commanded: Mean commanded push over the same part [N].
+        sliding_friction: Coulomb coefficient if the tip slides, else 0.
     """
+    job, delivered = trace.scene.paint.push_n, mean(push)
+    lower, upper = (tuple(map(float, trace.arrays[f"true_thrust_{side}"])) for side in ("min", "max"))
+    reach = push_reach(trace.scene.vehicle.mass_kg, lower, upper, sliding_friction)
+    return {
+        "push_mean_n": delivered,
+        "push_commanded_n": commanded,
+        "force_error_rms_n": rms(push - job),
+        "force_std_n": float(np.std(push)) if len(push) else math.nan,
+        "delivered_share": delivered / job,
+        "reach_n": reach,
+        "reach_share": delivered / max(min(reach, job), 1e-9),
+    }
+
+
+def press_figures(trace: Trace) -> dict[str, float]:
+    """Figures of the phase ``press`` of a flight with `sim.flight.jobs.PressJob`; NaN if the flight ended earlier."""
     begin, end = phase_window(trace, "press")
-    asked = trace.scene.paint.push_n
-    clock, contact = contact_clock(trace), trace.contact_1khz
+    clock = contact_clock(trace)
     window = (clock >= begin) & (clock <= end)
-    clock, contact = clock[window], contact[window]
+    clock, contact = clock[window], trace.contact_1khz[window]
     touching = contact > CONTACT_N
     fault = event_time(trace, "fault")
     if not touching.any():
-        return {"touched": 0.0, **_attitude(trace, begin, end)}
+        return {"touched": 0.0, **attitude_figures(trace, (trace.t >= begin) & (trace.t <= end))}
     first = int(np.argmax(touching))
     touch = float(clock[first])
-    steady = clock >= (touch if math.isnan(fault) else fault) + STEADY_AFTER_S
-    ticks = (trace.t >= clock[0] + 0.0) & (trace.t <= end)
-    late = ticks & (trace.t >= (touch if math.isnan(fault) else fault) + STEADY_AFTER_S)
-    push = contact[steady]
-    commanded = mean(trace.push_reference[late])
+    steady_from = (touch if math.isnan(fault) else fault) + STEADY_AFTER_S
+    steady = clock >= steady_from
+    after_touch = (trace.t >= touch) & (trace.t <= end)
+    late = (trace.t >= clock[0]) & (trace.t <= end) & (trace.t >= steady_from)
+    push, commanded = contact[steady], mean(trace.push_reference[late])
     figures = {
         "touched": 1.0,
-        **_touch(contact[first:], trace, touch),
+        **{name: float(value) for name, value in touch_figures(trace, contact, clock).items()},
+        "touch_peak_n": peak(contact[first : first + round(BOUNCE_WINDOW_S * PHYSICS_RATE_HZ)]),
         "force_peak_n": peak(contact),
-        "contact_share": float(np.mean(touching[steady])) if steady.any() else math.nan,
-        "push_mean_n": mean(push),
-        "push_commanded_n": commanded,
-        "force_error_rms_n": rms(push - asked),
+        "contact_share": mean(touching[steady].astype(float)),
         "force_rms_n": rms(push - commanded),
-        "force_std_n": float(np.std(push)) if len(push) else math.nan,
-        "delivered_share": mean(push) / asked,
-        **_reach(trace, mean(push)),
-        "approach_speed_m_s": _touch_speed(trace, touch),
-        **_attitude(trace, touch, end),
-        **_place(trace, touch, end, late),
+        **push_figures(trace, push, commanded),
+        "approach_speed_m_s": _approach_speed(trace, touch),
+        **attitude_figures(trace, after_touch),
+        **_position(trace, after_touch, late),
         **_effort(trace, late),
     }
     return figures | (_recovery(trace, fault, end) if not math.isnan(fault) else {})
 
 
-def _touch(contact: np.ndarray, trace: Trace, touch: float) -> dict[str, float]:
-    """Settling and bounces; ``contact`` begins at the first touch."""
-    window = contact[: round(BOUNCE_WINDOW_S * PHYSICS_RATE_HZ)] > CONTACT_N
-    soon = (trace.t >= touch) & (trace.t <= touch + BOUNCE_WINDOW_S)
-    target = float(np.max(trace.push_reference[soon], initial=0.0))
-    start = first_run(np.abs(contact - target) <= SETTLE_BAND_N, round(SETTLE_HOLD_S * PHYSICS_RATE_HZ))
-    return {
-        "first_touch_s": touch,
-        "settle_s": math.nan if start is None else start / PHYSICS_RATE_HZ,
-        "bounces": float(np.count_nonzero(window[:-1] & ~window[1:])),
-        "touch_peak_n": peak(contact[: round(BOUNCE_WINDOW_S * PHYSICS_RATE_HZ)]),
-    }
+def press_row(trace: Trace) -> dict[str, float]:
+    """Figures of a press with the effort."""
+    return press_figures(trace) | effort_figures(trace)
 
 
-def _reach(trace: Trace, push: float) -> dict[str, float]:
-    """Push that the true limits allow at the end of the flight, and the delivered share of it or of what was asked."""
-    reach = push_reach(trace.scene.vehicle.mass_kg, *(tuple(map(float, trace.arrays[name])) for name in LIMITS))
-    return {"reach_n": reach, "reach_share": push / max(min(reach, trace.scene.paint.push_n), 1e-9)}
-
-
-def _touch_speed(trace: Trace, touch: float) -> float:
+def _approach_speed(trace: Trace, touch: float) -> float:
     """Speed towards the wall just before the first touch [m/s]."""
-    before = np.flatnonzero((trace.t < touch) & (trace.t > touch - 0.05))
+    before = np.flatnonzero((trace.t < touch) & (trace.t > touch - APPROACH_WINDOW_S))
     if len(before) < 2:
         return math.nan
     first, last = before[0], before[-1]
     return float((trace.tip[last, 0] - trace.tip[first, 0]) / (trace.t[last] - trace.t[first]))
 
 
-def _attitude(trace: Trace, begin: float, end: float) -> dict[str, float]:
-    inside = (trace.t >= begin) & (trace.t <= end)
-    tilt, yaw = tilt_deg(trace)[inside], np.degrees(trace.euler[inside, 2])
-    return {
-        "tilt_rms_deg": rms(tilt),
-        "tilt_peak_deg": peak(tilt),
-        "yaw_rms_deg": rms(yaw),
-        "yaw_peak_deg": peak(yaw),
-    }
-
-
-def _place(trace: Trace, touch: float, end: float, late: np.ndarray) -> dict[str, float]:
-    """Height over the guide's target, and how far the tip moved along the board after the touch."""
+def _position(trace: Trace, after_touch: np.ndarray, late: np.ndarray) -> dict[str, float]:
+    """Height above the guide's target, and motion of the tip along the board after the touch."""
     tip = board_tip(trace)
-    inside = (trace.t >= touch) & (trace.t <= end)
     height = tip[:, 1] - trace.scene.paint.edge_margin_m
-    along = tip[inside, 0] - tip[inside, 0][0] if inside.any() else np.array([])
+    along = tip[after_touch, 0] - tip[after_touch, 0][0] if after_touch.any() else np.array([])
     return {
-        "height_error_rms_m": rms(height[inside]),
-        "height_error_peak_m": peak(height[inside]),
+        "height_error_rms_m": rms(height[after_touch]),
+        "height_error_peak_m": peak(height[after_touch]),
         "height_error_steady_m": mean(height[late]),
         "slip_peak_m": peak(along),
-        "path_rms_m": rms(np.hypot(height[inside], along)),
+        "path_rms_m": rms(np.hypot(height[after_touch], along)),
     }
 
 
 def _effort(trace: Trace, late: np.ndarray) -> dict[str, float]:
-    """What the rotors did in the steady part: wrench in the body, share of ticks with a limit active."""
-    from allocation import TAROT_T960, control_effectiveness
-
-    wrench = trace.thrusts_actual[late] @ control_effectiveness(TAROT_T960).T
+    """Steady part: mean rotor force in B, fraction of ticks with an active limit."""
+    wrench = trace.thrusts_actual[late] @ allocation.control_effectiveness(allocation.TAROT_T960).T
     names = ("thrust_front_n", "thrust_right_n", "thrust_down_n")
-    figures = {name: mean(wrench[:, axis]) if late.any() else math.nan for axis, name in enumerate(names)}
-    active = trace.active[late]
-    return figures | {"limited_share": float(np.mean(active.any(axis=1))) if late.any() and active.size else 0.0}
+    figures = {name: mean(wrench[:, axis]) for axis, name in enumerate(names)}
+    return figures | {"limited_share": limited_fraction(trace, late)}
 
 
 def _recovery(trace: Trace, fault: float, end: float) -> dict[str, float]:
-    """Greatest deviation after a fault, and when push and place are back within their bands for good."""
+    """Largest deviation after a fault, and the time after which push and position stay within their bands."""
     inside = (trace.t >= fault) & (trace.t <= end)
     if not inside.any():
         return {}
     t, tip = trace.t[inside], board_tip(trace)[inside]
-    start = np.flatnonzero(inside)[0]
-    off = np.linalg.norm(tip - board_tip(trace)[start], axis=1)
+    offset = np.linalg.norm(tip - tip[0], axis=1)
     error = np.abs(trace.push_true[inside] - trace.push_reference[inside])
-    outside = np.flatnonzero((error > RECOVERY_BAND_N) | (off > RECOVERY_BAND_M))
-    back = 0.0 if not len(outside) else math.inf if outside[-1] == len(t) - 1 else float(t[outside[-1] + 1] - fault)
-    return {
-        "recovery_s": back if math.isfinite(back) else math.nan,
-        "fault_force_peak_n": peak(error),
-        "fault_path_peak_m": peak(off),
-    }
+    outside = np.flatnonzero((error > RECOVERY_BAND_N) | (offset > RECOVERY_BAND_M))
+    back = 0.0 if not len(outside) else math.nan if outside[-1] == len(t) - 1 else float(t[outside[-1] + 1] - fault)
+    return {"recovery_s": back, "fault_force_peak_n": peak(error), "fault_path_peak_m": peak(offset)}

@@ -1,4 +1,4 @@
-"""Figures of a slide along the edge under push: yaw, speed, height and force while friction holds the tip back."""
+"""Figures of a slide along the edge under push: yaw, speed, height and force while friction pulls at the tip."""
 
 from __future__ import annotations
 
@@ -6,26 +6,31 @@ import math
 
 import numpy as np
 
-from sim.evaluate.measures.press import LIMITS, press_figures
-from sim.evaluate.measures.reach import push_reach
-from sim.evaluate.measures.window import board_tip, mean, peak, phase_window, rms, tilt_deg
-from sim.evaluate.path_error import CONTACT_N
+from sim.evaluate.measures.press import press_figures, push_figures
+from sim.evaluate.window import (
+    CONTACT_N,
+    attitude_figures,
+    board_tip,
+    limited_fraction,
+    mean,
+    peak,
+    phase_window,
+    rms,
+)
 from sim.flight.trace import Trace
 
-#: Sliding figures begin this long after the slide was asked for [s]: the speed ramp is over.
+#: Sliding figures begin this long after the slide command [s]: the speed ramp is over.
 SLIDING_AFTER_S = 1.0
-#: How a command begins to say that the asked push is beyond reach.
+#: A tip slower than this fraction of the commanded speed counts as stuck.
+STUCK_FRACTION = 0.2
+#: Start of the text by which a command rejects a push beyond reach.
 _REDUCED = "reference.push_force"
 
 
 def slide_figures(trace: Trace) -> dict[str, float]:
     """Figures of the phase ``paint`` of a flight that slides, after those of the press before it.
 
-    Args:
-        trace: A flight with `sim.flight.jobs.PressJob` and a slide.
-
-    Returns:
-        Figures of `press_figures` under ``hold_*``, and of the slide under their plain names.
+    The flight has a `sim.flight.jobs.PressJob` with a slide. Figures of the press have the prefix ``hold_``.
     """
     hold = {f"hold_{name}": value for name, value in press_figures(trace).items()}
     begin, end = phase_window(trace, "paint")
@@ -33,35 +38,24 @@ def slide_figures(trace: Trace) -> dict[str, float]:
     after = whole & (trace.t >= begin + SLIDING_AFTER_S)
     if not after.any():
         return hold
-    tip, t = board_tip(trace), trace.t
-    yaw, push = np.degrees(trace.euler[:, 2]), trace.push_true
-    asked, wanted = trace.scene.paint.push_n, trace.scene.paint.speed_m_s
+    tip, t, push = board_tip(trace), trace.t, trace.push_true[after]
+    target_speed = trace.scene.paint.speed_m_s
     last, first = np.flatnonzero(after)[[-1, 0]]
     speed = float((tip[first, 0] - tip[last, 0]) / (t[last] - t[first])) if last > first else math.nan
     height = tip[:, 1] - trace.scene.paint.edge_margin_m
-    limits = (tuple(map(float, trace.arrays[name])) for name in LIMITS)
-    reach = push_reach(trace.scene.vehicle.mass_kg, *limits, trace.scene.wall.friction)
-    stuck = -np.gradient(tip[after, 0], t[after]) < 0.2 * wanted
+    reference = trace.push_reference[after]
+    reduced = any(event.kind == "rejected" and event.text.startswith(_REDUCED) for event in trace.events)
     return hold | {
-        "yaw_rms_deg": rms(yaw[after]),
-        "yaw_peak_deg": peak(yaw[whole]),
-        "tilt_rms_deg": rms(tilt_deg(trace)[after]),
-        "tilt_peak_deg": peak(tilt_deg(trace)[whole]),
+        **attitude_figures(trace, after, whole),
         "speed_m_s": speed,
-        "speed_error_share": abs(speed - wanted) / wanted,
-        "stuck_share": float(np.mean(stuck)),
+        "speed_error_share": abs(speed - target_speed) / target_speed,
+        "stuck_share": float(np.mean(-np.gradient(tip[after, 0], t[after]) < STUCK_FRACTION * target_speed)),
         "path_rms_m": rms(height[after]),
-        "push_mean_n": mean(push[after]),
-        "push_commanded_n": mean(trace.push_reference[after]),
-        "reduced_said": float(any(e.kind == "rejected" and e.text.startswith(_REDUCED) for e in trace.events)),
-        "force_rms_n": rms(push[after] - trace.push_reference[after]),
-        "force_error_rms_n": rms(push[after] - asked),
-        "delivered_share": mean(push[after]) / asked,
-        "reach_n": reach,
-        "reach_share": mean(push[after]) / max(min(reach, asked), 1e-9),
-        "force_std_n": float(np.std(push[after])),
+        "reduced_said": float(reduced),
+        "force_rms_n": rms(push - reference),
+        **push_figures(trace, push, mean(reference), trace.scene.wall.friction),
         "height_error_peak_m": peak(height[after]),
-        "contact_share": float(np.mean(push[after] > CONTACT_N)),
+        "contact_share": float(np.mean(push > CONTACT_N)),
         "friction_mean_n": mean(np.linalg.norm(trace.friction_true[after], axis=1)),
-        "limited_share": float(np.mean(trace.active[after].any(axis=1))) if trace.active.size else 0.0,
+        "limited_share": limited_fraction(trace, after),
     }

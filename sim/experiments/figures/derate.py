@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from sim.evaluate.measures.window import event_time, tilt_deg
+from sim.evaluate.window import event_time, tilt_deg
 from sim.experiments.figures.common import kept_trace, select
 from sim.figures.style import law_colour, law_name, new_figure
 from sim.sweep.parts import PARAM

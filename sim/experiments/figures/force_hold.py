@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from sim.evaluate.measures.window import CONTACT_N, PHYSICS_RATE_HZ
+from sim.evaluate.window import CONTACT_N, PHYSICS_RATE_HZ
 from sim.experiments.figures.common import kept_trace, select
 from sim.experiments.figures.force_map import VARIANT_WORDS as _VARIANTS
 from sim.experiments.figures.force_map import draw_map, map_verdict

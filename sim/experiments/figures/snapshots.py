@@ -13,8 +13,8 @@ from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.vision.config import VisionConfig
 from ibvs_qp.vision.overlay import draw_overlay
 from ibvs_qp.vision.perception import Perception
-from sim.evaluate.measures.window import phase_window
 from sim.evaluate.path_error import CONTACT_N
+from sim.evaluate.window import phase_window
 from sim.figures.style import new_figure
 from sim.flight.trace import Trace
 from sim.sensors.cameras import PlaneCamera

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from allocation import WrenchSet, control_effectiveness, level_polygon
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import GRAVITY
-from sim.evaluate.measures.window import phase_window
+from sim.evaluate.window import phase_window
 from sim.experiments.figures.common import kept_trace
 from sim.figures.style import law_name, new_figure
 from sim.sweep.parts import PARAM

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from sim.evaluate.measures.window import board_tip, phase_window, tilt_deg
+from sim.evaluate.window import board_tip, phase_window, tilt_deg
 from sim.figures.style import REFERENCE, law_colour, law_name, new_figure
 from sim.flight.trace import Trace
 from sim.notebook.laws.agreement import Agreement

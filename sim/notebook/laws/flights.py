@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ibvs_qp.pilot import PilotConfig
-from sim.evaluate.measures.window import board_tip, mean, peak, phase_window, rms, tilt_deg
+from sim.evaluate.window import board_tip, mean, peak, phase_window, rms, tilt_deg
 from sim.experiments.scenes import near_wall
 from sim.flight.closed_loop import FlightOptions, default_preset, fly, pilot_config
 from sim.flight.trace import Trace

@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from sim.evaluate.measures.window import board_tip, peak, phase_window, rms, tilt_deg
 from sim.evaluate.path_error import CONTACT_N
+from sim.evaluate.window import board_tip, peak, phase_window, rms, tilt_deg
 from sim.flight.trace import Trace
 from sim.notebook.tuning.bench import Comparison
 

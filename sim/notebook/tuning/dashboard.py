@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
-from sim.evaluate.measures.window import tilt_deg
+from sim.evaluate.window import tilt_deg
 from sim.figures.style import REFERENCE, law_colour
 from sim.flight.trace import Trace
 from sim.notebook.tuning.bench import Comparison

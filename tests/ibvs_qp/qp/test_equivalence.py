@@ -366,8 +366,9 @@ def test_the_price_of_every_kind_of_limit_is_the_slope_of_the_cost(name: str, si
     step = 1e-3
     slope = (optimal_cost(controller, row, side, step) - optimal_cost(controller, row, side, -step)) / (2.0 * step)
     assert active.price == pytest.approx(-sign * slope, rel=1e-4)
-    price = controller.template.limit_rows[row].price
-    assert active.slack * (price or 0.0) == pytest.approx(active.price if price else 0.0, rel=1e-6)
+    slack_weight = controller.template.limit_rows[row].slack_weight
+    expected = active.price if slack_weight else 0.0
+    assert active.slack * (slack_weight or 0.0) == pytest.approx(expected, rel=1e-6)
 
 
 newtons = st.floats(-100.0, 200.0)

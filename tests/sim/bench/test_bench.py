@@ -1,4 +1,4 @@
-"""The bench of vision: its table, its ratios, and what it refuses."""
+"""`ibvs-qp bench vision`: rows, ratios, rejected options and folders."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def test_one_json_line_with_rows_stages_and_ratios(tmp_path: Path, capsys: pytes
     write_folder(tmp_path)
     clock = checks.stage_time
     assert main(["bench", "vision", "--frames", str(FRAMES), "--real", str(tmp_path), "--json"]) == 0
-    assert checks.stage_time is clock, "flights go on by the wall"
+    assert checks.stage_time is clock, "flights measure wall-clock time"
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) == 1
     bench = json.loads(lines[0])
@@ -70,7 +70,7 @@ def test_pictures_of_the_mission_are_seeded_and_show_paint() -> None:
     assert painted[-1] > painted[0] + 1000
 
 
-def test_a_row_counts_what_it_measured() -> None:
+def test_a_row_records_times_and_missed_deadlines() -> None:
     row = Row(name="sleep", size=None)
     assert row.measure(lambda: 7) == 7 and len(row.times_us) == 1
     row = Row(name="given", times_us=[900.0, 1100.0, 2100.0, 4100.0])
@@ -82,9 +82,9 @@ def test_a_row_counts_what_it_measured() -> None:
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"color": "gone.png"}, "no pair of pictures"),
+        ({"color": "gone.png"}, "cannot read the colour picture"),
         ({"fx": "wide"}, "line 2"),
-        ({"depth_units_per_m": "0"}, "must be positive"),
+        ({"depth_units_per_m": "0"}, "a number above 0 is needed"),
     ],
 )
 def test_a_folder_that_cannot_be_used_is_refused(tmp_path: Path, changes: dict[str, str], words: str) -> None:
@@ -93,9 +93,9 @@ def test_a_folder_that_cannot_be_used_is_refused(tmp_path: Path, changes: dict[s
         bench_vision(20, 0, tmp_path, lambda _: None, sizes=())
 
 
-def test_what_cannot_be_measured_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+def test_an_unusable_option_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     assert main(["bench", "vision", "--frames", "3"]) == 2
-    assert "--frames 3 is refused" in capsys.readouterr().err
+    assert "--frames = 3 is refused" in capsys.readouterr().err
     assert main(["bench", "vision", "--real", str(tmp_path)]) == 2
-    assert "manifest.csv is missing" in capsys.readouterr().err
+    assert "manifest.csv: No such file" in capsys.readouterr().err
     assert main(["bench"]) == 2

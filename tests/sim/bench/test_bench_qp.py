@@ -1,4 +1,4 @@
-"""`ibvs-qp bench qp` on few ticks: the contract's names, what it counts, and ticks that come from real flights."""
+"""`ibvs-qp bench qp` on few ticks: the contract's names, counts, and ticks of closed loops."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The console script: what it prints, writes and returns, with a made-up flight in place of the simulation."""
+"""The console script: output, files and exit codes, with a synthetic flight in place of the simulation."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from sim.world.scene import PaintScene, Scene
 
 @pytest.fixture
 def flown(monkeypatch, tmp_path):
-    """Flights are made up, one after the other, and run folders go to a temporary directory."""
+    """Flights are synthetic, one after the other; run folders lie in a temporary directory."""
     monkeypatch.setattr(sim.flight.side_by_side, "fly", fake_fly)
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0}, raising=False)
     monkeypatch.chdir(tmp_path)
@@ -85,7 +85,7 @@ def test_law_that_does_not_complete_is_still_reported(flown, capsys, monkeypatch
     assert json.loads(capsys.readouterr().out)["laws"]["qp"]["reason"] == "propeller touched the wall"
 
 
-def test_interrupt_keeps_what_was_flown(flown, capsys, monkeypatch):
+def test_interrupt_writes_the_partial_run(flown, capsys, monkeypatch):
     def cut_short(scene, options, progress=None):
         return dataclasses.replace(fake_fly(scene, options), completed=False, reason="interrupted")
 
@@ -96,7 +96,7 @@ def test_interrupt_keeps_what_was_flown(flown, capsys, monkeypatch):
     check_summary(summary, {"qp"})  # the analytic law never began
     assert summary["interrupted"] is True
     assert (flown / "run" / "log.npz").exists() and (flown / "run" / "report.html").exists()
-    assert err.strip() == "ibvs-qp: interrupted; what was flown is in run"
+    assert err.strip() == "ibvs-qp: interrupted; the partial run is in run"
 
 
 def test_interrupt_while_drawing_keeps_the_log(flown, capsys, monkeypatch):
@@ -153,11 +153,11 @@ def test_user_errors_are_one_line(flown, capsys, words, needles):
     for needle in needles:
         assert needle in err
     assert "Traceback" not in err
-    assert sorted(flown.rglob("*")) == before, "a refused command leaves nothing behind"
+    assert sorted(flown.rglob("*")) == before, "a rejected command writes nothing"
 
 
 def test_unwritable_folder(flown, capsys, monkeypatch):
-    """Refused even where the tests run as root, who may write anywhere."""
+    """Rejected also if the tests run as root, which can write anywhere."""
 
     def refuse(self, _data):
         raise PermissionError(13, "Permission denied", str(self))
@@ -168,7 +168,7 @@ def test_unwritable_folder(flown, capsys, monkeypatch):
     assert "locked" in err and "Permission denied" in err and "--out" in err and err.count("\n") == 1
 
 
-def test_error_found_in_flight_is_the_users_too(flown, capsys, monkeypatch):
+def test_config_error_during_the_flight_is_a_user_error(flown, capsys, monkeypatch):
     def refuse(*_):
         raise ConfigError("preset x.toml: unknown key 'gain'")
 

@@ -19,7 +19,7 @@ SHORT = ["--quick", "--features", "geometric", "--seeds", "1", "--jobs", "1", "-
 
 @pytest.fixture
 def flown(monkeypatch, tmp_path):
-    """Flights are made up and counted."""
+    """Flights are synthetic and counted."""
     flights: list[str] = []
 
     def fly(scene, options, *, config, job, faults):

@@ -1,4 +1,4 @@
-"""`ibvs-qp explain`: a recorded tick is solved again and told in words; the log gives back what was flown."""
+"""`ibvs-qp explain`: solves a recorded tick again and prints it; the log restores the flight."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from ibvs_qp.config.settings import dump_toml
 from ibvs_qp.controller import program_template
 from ibvs_qp.model.signals import places
 from sim.commands.cli import main
-from sim.evaluate.explanation import explain_tick, explanation_tables, flown_config
+from sim.evaluate.explanation import explain_tick, flown_config
+from sim.evaluate.explanation_text import explanation_tables
 from sim.flight.closed_loop import FlightOptions, fly
 from sim.flight.flight_log import load_run, save_log
 from sim.flight.trace import Event, Trace
@@ -45,13 +46,13 @@ def test_recorded_ticks_solve_to_the_thrusts_that_flew(run: tuple[Path, Trace]) 
             assert trace.active[tick, trace.limits.index(name)], name
 
 
-def test_for_a_person_and_as_json(run: tuple[Path, Trace], capsys: pytest.CaptureFixture[str]) -> None:
+def test_text_and_json(run: tuple[Path, Trace], capsys: pytest.CaptureFixture[str]) -> None:
     folder, trace = run
     at = float(trace.t[np.flatnonzero(trace.contact_weight > 0.9)[0]])
     assert main(["explain", str(folder), "--at", f"{at:.3f}"]) == 0
-    told = capsys.readouterr().out
+    text = capsys.readouterr().out
     for word in ("push", "line_0", "pitch", "mid_right", "Thrusts", "damping ratio"):
-        assert word in told
+        assert word in text
     assert main(["explain", str(folder), "--at", f"{at:.3f}", "--json"]) == 0
     table = json.loads(capsys.readouterr().out)
     assert table["schema"] == 1 and table["t"] == pytest.approx(at, abs=0.002)
@@ -62,7 +63,7 @@ def test_for_a_person_and_as_json(run: tuple[Path, Trace], capsys: pytest.Captur
 def test_rotors_have_the_names_and_the_window_of_the_tick(
     run: tuple[Path, Trace], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """What the program knew: the rate limit around the last thrusts, not the box of the data sheet."""
+    """Limits of the program: the rate limit around the last thrusts, not the box of the data sheet."""
     folder, trace = run
     tick = int(np.flatnonzero(trace.contact_weight > 0.9)[0])
     assert main(["explain", str(folder), "--at", f"{trace.t[tick]:.3f}", "--json"]) == 0
@@ -79,12 +80,12 @@ def test_rotors_have_the_names_and_the_window_of_the_tick(
     renamed = tuple(dataclasses.replace(rotor, name=f"own_{i}") for i, rotor in enumerate(vehicle.geometry.rotors))
     vehicle = dataclasses.replace(vehicle, geometry=dataclasses.replace(vehicle.geometry, rotors=renamed))
     own = dataclasses.replace(config, controller=dataclasses.replace(config.controller, vehicle=vehicle))
-    told = shown(explanation_tables(trace, tick, explanation, own), capsys)
-    assert "own_0" in told and "own_5" in told and "mid_right" not in told
-    assert f"{table['thrust_upper'][0]:.3f}" in told and "52.56" not in told
+    text = shown(explanation_tables(trace, tick, explanation, own), capsys)
+    assert "own_0" in text and "own_5" in text and "mid_right" not in text
+    assert f"{table['thrust_upper'][0]:.3f}" in text and "52.56" not in text
 
 
-def test_a_held_tick_is_not_explained_by_the_program_of_an_earlier_one(
+def test_a_hold_tick_is_not_explained_by_the_program_of_an_earlier_tick(
     run: tuple[Path, Trace], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder, trace = run
@@ -98,9 +99,9 @@ def test_a_held_tick_is_not_explained_by_the_program_of_an_earlier_one(
     (tmp_path / "scene.toml").write_text((folder / "scene.toml").read_text())
     save_log(tmp_path / "log.npz", {"qp": held})
     assert main(["explain", str(tmp_path), "--at", f"{at:.3f}"]) == 0
-    told = " ".join(capsys.readouterr().out.split())
-    assert "held" in told and "no program was solved" in told and "Tasks" not in told and "residual" not in told
-    assert "specific_force: not finite" in told and "measurement.plane" not in told
+    text = " ".join(capsys.readouterr().out.split())
+    assert "Outcome hold: no program was solved" in text and "Tasks" not in text and "residual" not in text
+    assert "specific_force: not finite" in text and "measurement.plane" not in text
     assert main(["explain", str(tmp_path), "--at", f"{at:.3f}", "--json"]) == 0
     table = json.loads(capsys.readouterr().out)
     assert table["outcome"] == "hold" and table["tasks"] == [] and table["active_limits"] == []
@@ -108,15 +109,15 @@ def test_a_held_tick_is_not_explained_by_the_program_of_an_earlier_one(
     assert table["rejected"] == [{"t": at, "text": rejected.text}]
 
 
-def test_a_push_below_the_jobs_is_told_beside_it(run: tuple[Path, Trace], capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_lowered_push_is_printed_with_the_jobs(run: tuple[Path, Trace], capsys: pytest.CaptureFixture[str]) -> None:
     _, trace = run
     tick = int(np.flatnonzero(trace.push_reference >= trace.scene.paint.push_n)[0])
     config, explanation = explain_tick(trace, tick)
     assert explanation is not None
     greedy = dataclasses.replace(config, painting=dataclasses.replace(config.painting, push_n=35.0))
-    told = shown(explanation_tables(trace, tick, explanation, greedy), capsys)
-    assert "35.00 N by the job" in told and f"{trace.reach_margin[tick]:.2f} N further" in told
-    assert "by the job" not in shown(explanation_tables(trace, tick, explanation, config), capsys)
+    text = shown(explanation_tables(trace, tick, explanation, greedy), capsys)
+    assert "job: 35.00 N" in text and f"{trace.reach_margin[tick]:.2f} N further" in text
+    assert "job:" not in shown(explanation_tables(trace, tick, explanation, config), capsys)
 
 
 def turning(trace: Trace, tick: int, rate: float, hard: bool = False) -> Trace:
@@ -125,12 +126,12 @@ def turning(trace: Trace, tick: int, rate: float, hard: bool = False) -> Trace:
     limits = dataclasses.replace(config.controller.limits, hard_barriers=hard)
     config = dataclasses.replace(config, controller=dataclasses.replace(config.controller, limits=limits))
     program = trace.arrays["program"].copy()
-    place = places(program_template(config.controller).model.parameters)["tilt_state"]
-    program[tick, place] = 0.0, 0.0, 0.0, rate
+    place = places(program_template(config.controller).model.signals.inputs)
+    program[tick, place["attitude"]], program[tick, place["angular_velocity"]] = (1.0, 0.0, 0.0, 0.0), (0.0, rate, 0.0)
     return dataclasses.replace(trace, arrays=trace.arrays | {"program": program}, preset=dump_toml(config))
 
 
-def test_what_slack_costs_is_told_with_bound_and_unit(
+def test_cost_of_slack_has_bound_and_unit(
     run: tuple[Path, Trace], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder, trace = run
@@ -146,10 +147,10 @@ def test_what_slack_costs_is_told_with_bound_and_unit(
     price = config.controller.limits.tilt_slack_weight
     assert paid * explanation.total_cost == pytest.approx(0.5 * price * limit.slack**2)
     assert sum(explanation.limit_cost) == pytest.approx(explanation.slack_cost, rel=1e-6)
-    told = shown(explanation_tables(trace, tick, explanation, config), capsys)
-    line = next(line for line in told.splitlines() if "tilt_pitch" in line)
+    text = shown(explanation_tables(trace, tick, explanation, config), capsys)
+    line = next(line for line in text.splitlines() if "tilt_pitch" in line)
     assert f"{bound:.4g}" in line and "rad/s^2" in line and f"({paid:.0%})" in line
-    assert "Slack takes" in told and "per squared unit" in told
+    assert "Slack takes" in text and "per squared unit" in text
     (tmp_path / "scene.toml").write_text((folder / "scene.toml").read_text())
     save_log(tmp_path / "log.npz", {"qp": turning(trace, tick, 0.3)})
     assert main(["explain", str(tmp_path), "--at", f"{trace.t[tick]:.3f}", "--json"]) == 0
@@ -159,7 +160,7 @@ def test_what_slack_costs_is_told_with_bound_and_unit(
     assert table["slack_cost_share"] == pytest.approx(explanation.slack_cost) and table["conflict"] == []
 
 
-def test_hard_limits_in_conflict_are_told_instead_of_refused(
+def test_hard_limits_in_conflict_are_listed(
     run: tuple[Path, Trace], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Turning at 3 rad/s, more pitch moment is needed than the rotors have within their rate limit."""
@@ -169,9 +170,9 @@ def test_hard_limits_in_conflict_are_told_instead_of_refused(
     save_log(tmp_path / "log.npz", {"qp": turning(trace, tick, 3.0, hard=True)})
     words = ["explain", str(tmp_path), "--at", f"{trace.t[tick]:.3f}"]
     assert main(words) == 0
-    told = " ".join(capsys.readouterr().out.split())
-    assert "No thrusts keep these" in told and "tilt_pitch" in told and "hard_barriers = false" in told
-    assert "Tasks" not in told and "exact" not in told
+    text = " ".join(capsys.readouterr().out.split())
+    assert "No thrusts satisfy these" in text and "tilt_pitch" in text and "hard_barriers = false" in text
+    assert "Tasks" not in text and "exact" not in text
     assert main([*words, "--json"]) == 0
     table = json.loads(capsys.readouterr().out)
     rows = {row["name"]: row for row in table["conflict"]}
@@ -186,7 +187,7 @@ def test_hard_limits_in_conflict_are_told_instead_of_refused(
 
 
 def shown(parts: list[object], capsys: pytest.CaptureFixture[str]) -> str:
-    """What a person reads."""
+    """Console output."""
     from rich.console import Console
 
     capsys.readouterr()
@@ -195,7 +196,7 @@ def shown(parts: list[object], capsys: pytest.CaptureFixture[str]) -> str:
     return capsys.readouterr().out
 
 
-def test_what_cannot_be_explained_is_said_in_one_line(
+def test_an_unusable_run_or_tick_is_one_line(
     run: tuple[Path, Trace], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder, trace = run
@@ -210,5 +211,5 @@ def test_what_cannot_be_explained_is_said_in_one_line(
         ([str(folder), "--at", "1", "--seed", "7"], "flown with seed 0"),
     ):
         assert main(["explain", *words]) == 2
-        said = capsys.readouterr().err
-        assert why in said and said.count("\n") == 1
+        error = capsys.readouterr().err
+        assert why in error and error.count("\n") == 1

@@ -1,4 +1,4 @@
-"""Figures of presses and slides on made-up traces whose answers are known, and the reach they are held against."""
+"""Figures of presses and slides on synthetic traces with known results, and the reach of the rotors."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import pytest
 from press_trace import press_trace
 
 from sim.evaluate.measures import loss_figures, press_figures
-from sim.evaluate.measures.reach import push_reach
+from sim.evaluate.measures.press import push_reach
 
 LOW, HIGH = (1.2,) * 6, (52.56,) * 6
 
 
-def test_a_press_is_measured_as_it_was_made():
+def test_figures_of_a_known_press():
     figures = press_figures(press_trace(settle_s=1.2, bias_n=0.1, bounces=2, peak_n=7.0, drop_m=0.003, roll_deg=0.4))
     assert figures["settle_s"] == pytest.approx(1.2, abs=0.002)
     assert figures["bounces"] == 2.0
@@ -40,13 +40,13 @@ def test_recovery_counts_from_the_fault_for_good():
     assert math.isnan(press_figures(press_trace(fault_s=6.0, back_s=20.0))["recovery_s"])
 
 
-def test_a_press_that_never_touched_says_so():
+def test_a_press_without_touch():
     trace = press_trace()
     trace.arrays["contact_1khz"] = np.zeros_like(trace.contact_1khz)
     assert press_figures(trace)["touched"] == 0.0
 
 
-def test_reach_share_is_over_what_was_possible_or_asked():
+def test_reach_share_is_relative_to_reach_or_job():
     figures = press_figures(press_trace(bias_n=0.0))
     assert figures["reach_n"] == pytest.approx(30.4, abs=0.05)
     assert figures["reach_share"] == pytest.approx(1.0)
@@ -64,7 +64,7 @@ def test_reach_with_derated_rotors():
     assert push_reach(6.0, LOW, (20.0,) * 6) == pytest.approx(13.0, abs=0.05)
 
 
-def test_a_lost_rotor_is_followed_from_the_loss_on():
+def test_figures_of_a_lost_rotor_begin_at_the_loss():
     trace = press_trace(fault_s=6.0, roll_deg=3.0)
     trace.arrays["propeller_clearance"] = np.full(len(trace.t), 0.3)
     figures = loss_figures(trace)

@@ -1,4 +1,4 @@
-"""Every figure of M on a made-up flight whose errors are known."""
+"""Every figure of M on a synthetic flight with known errors."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def metrics():
     return compute_metrics(synthetic_trace())
 
 
-def test_path_errors_are_those_put_in(metrics):
+def test_path_errors_of_known_offsets(metrics):
     # Row 1 runs 2 mm too high; row 2 follows row 1 as painted and adds its own 3 mm.
     assert metrics["rows"][0]["path_rms_straight_m"] == pytest.approx(0.002, abs=1e-9)
     assert metrics["rows"][1]["path_rms_straight_m"] == pytest.approx(0.003, abs=1e-9)
@@ -33,7 +33,7 @@ def test_path_errors_are_those_put_in(metrics):
 
 
 def test_row_below_moves_the_reference_not_the_error():
-    """A row 1 that wanders does not charge row 2, whose guide is the paint."""
+    """An error of row 1 is no error of row 2, whose guide is the paint."""
     trace = synthetic_trace(Errors(row_offset_m=(0.010, 0.0)))
     rows = compute_metrics(trace)["rows"]
     assert rows[0]["path_rms_straight_m"] == pytest.approx(0.010, abs=1e-9)
@@ -80,13 +80,13 @@ def test_attitude_figures(metrics):
     assert metrics["yaw_peak_deg"] == pytest.approx(1.5, abs=1e-9)
 
 
-def test_first_second_is_not_held_against_the_attitude():
+def test_attitude_figures_skip_the_first_second():
     trace = synthetic_trace()
     trace.arrays["attitude"][:240] = [math.cos(0.2), math.sin(0.2), 0.0, 0.0]
     assert compute_metrics(trace)["tilt_peak_deg"] == pytest.approx(0.5, abs=1e-9)
 
 
-def test_velocity_ignores_what_nobody_estimated(metrics):
+def test_velocity_error_ignores_ticks_without_estimate(metrics):
     assert metrics["velocity_rms_m_s"] == pytest.approx(0.005, abs=1e-12)
 
 
@@ -172,21 +172,21 @@ def test_metrics_do_not_change_the_trace():
     assert all(np.array_equal(before[name], trace.arrays[name], equal_nan=True) for name in before)
 
 
-def test_force_error_is_taken_against_what_was_commanded():
-    """A push that the reach check lowered is no error if it was kept."""
+def test_force_error_is_relative_to_the_commanded_push():
+    """A push that the reach check lowered is no error if it was reached."""
     trace = synthetic_trace()
     for name in ("push_true", "push_reference"):
         trace.arrays[name] = trace.arrays[name] - 2.0 * (trace.row > 0)
     assert compute_metrics(trace)["force_rms_straight_n"] == pytest.approx(0.2, abs=1e-9)
 
 
-def test_velocity_counts_the_components_that_are_known():
+def test_velocity_error_counts_the_known_components():
     trace = synthetic_trace()
     trace.arrays["velocity_estimate"][:, 1] = np.nan
     assert compute_metrics(trace)["velocity_rms_m_s"] == pytest.approx(0.003, abs=1e-12)
 
 
-def test_canvas_has_its_top_first_and_its_left_first():
+def test_canvas_starts_at_the_top_left():
     scene = Scene(paint=PaintScene(rows=1, stroke_m=0.5))
     mask = band_mask(scene, nominal_plan(scene), (600, 1400), 1000.0)
     # The row runs from 0.05 m to 0.55 m, 0.05 m above the bottom edge: rows 510..590 of 600.

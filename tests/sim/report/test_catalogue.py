@@ -1,4 +1,4 @@
-"""Every task and limit says unit, default and reason; the page of them is current, and true of the program."""
+"""Every task and limit has unit, default and reason; their page is current and describes the program."""
 
 from __future__ import annotations
 
@@ -85,15 +85,15 @@ def test_every_weight_has_the_unit_of_its_row_and_a_reason(kind: type[Task]) -> 
 @pytest.mark.parametrize("kind", LIMITS)
 def test_every_price_and_bound_has_a_unit_and_a_reason(kind: type[Limit]) -> None:
     limit = LIMITS[kind]
-    assert limit.bounded_by and limit.switched_by
-    for place in limit.bounded_by:
+    assert limit.bound_settings and limit.switch_setting
+    for place in limit.bound_settings:
         assert Setting.of(CONFIG, place).why, place
     for row in limit.rows(Model(CONFIG)):
-        assert (row.price is None) == (limit.priced_by is None)
-        if limit.priced_by is not None:
-            price = Setting.of(CONFIG, limit.priced_by)
+        assert (row.slack_weight is None) == (limit.slack_weight_setting is None)
+        if limit.slack_weight_setting is not None:
+            price = Setting.of(CONFIG, limit.slack_weight_setting)
             assert price.unit == PER_SQUARE[row.unit] and price.why
-            assert price.value == row.price
+            assert price.value == row.slack_weight
 
 
 def weights(controller: HybridController) -> dict[str, float]:
@@ -120,13 +120,13 @@ def test_a_price_and_a_switch_are_those_of_their_rows() -> None:
     full = packed(CONFIG)
     for limit in LIMITS.values():
         names = rows_of(limit)
-        assert limit.switched_by is not None
-        off = packed(changed(limit.switched_by, 0.0))
-        if limit.priced_by is None:  # thrusts stay rows of the program, as wide as the sky
+        assert limit.switch_setting is not None
+        off = packed(changed(limit.switch_setting, 0.0))
+        if limit.slack_weight_setting is None:  # thrusts stay rows of the program, with wide bounds
             assert (off.engine.data.upper[:6] >= 1e4).all() and (full.engine.data.upper[:6] < 60.0).all()
             continue
         assert set(full.template.row_names) - set(off.template.row_names) == set(names)
-        doubled = packed(changed(limit.priced_by, 2.0))
+        doubled = packed(changed(limit.slack_weight_setting, 2.0))
         ratio = doubled.engine.data.hessian().diagonal()[6:] / full.engine.data.hessian().diagonal()[6:]
         for slack, value in zip(full.template.variable_names[6:], ratio, strict=True):
             assert value == pytest.approx(2.0 if slack.removeprefix("slack_") in names else 1.0)
@@ -141,15 +141,15 @@ def test_a_bound_moves_the_rows_that_the_page_gives_it_and_no_other() -> None:
             measurement, wanted = random_tick(np.random.default_rng(3), 2, k)
             controller.setpoints.update(measured(k, lines=measurement.lines), wanted)
             if tick:
-                touch = controller.setpoints.step.inputs["touch"]
-                touch[7], touch[2] = 1.0, -0.02  # touching, and closing in
-                controller.setpoints.tick()
+                inputs = controller.setpoints.step.inputs
+                inputs["contact.touching"][0], inputs["contact.rate"][0] = 1.0, -0.02  # closing in
+                controller.setpoints.step.evaluate()
                 controller.setpoints.note(np.full(6, 11.3), 0.0)
         return np.concatenate((controller.engine.data.lower, controller.engine.data.upper))
 
     names = np.array(packed(CONFIG).template.row_names * 2)
     for limit in LIMITS.values():
-        for place in limit.bounded_by:
+        for place in limit.bound_settings:
             moved = set()
             for tick in (0, 3):
                 was, now = bounds(CONFIG, tick), bounds(changed(place, 0.9), tick)

@@ -1,4 +1,4 @@
-"""Report and video: self-contained, complete, and readable by a machine that checks them."""
+"""Report and video: self-contained, complete, readable."""
 
 from __future__ import annotations
 
@@ -44,14 +44,14 @@ def page(traces, tmp_path_factory):
     return folder.report.read_text(encoding="utf-8")
 
 
-def test_report_loads_nothing_from_elsewhere(page):
+def test_report_loads_no_external_resource(page):
     assert not re.search(r"(?:src|href)\s*=\s*[\"'](?!data:|video\.mp4)", page)
     assert "http://" not in page and "https://" not in page and "<script" not in page and "@import" not in page
 
 
 def test_report_is_complete(page):
     assert page.count("data:image/png;base64,") == len(FIGURES)
-    assert "$" not in re.sub(r"base64,[^\"]*", "", page), "a placeholder was left"
+    assert "$" not in re.sub(r"base64,[^\"]*", "", page), "a placeholder remains"
     for text in ("QP law", "analytic law", "push error, straights, rms", "0.200", "0.400", "press: made up", "mujoco"):
         assert text in page
     assert "a&lt;b&gt;.toml" in page and "<b>.toml" not in page

@@ -152,7 +152,7 @@ def test_two_tables_compare_flight_by_flight(tmp_path):
     cell = compare(read_run(tmp_path / "a"), read_run(tmp_path / "b"))[0]
     difference = cell["differences"][0]
     assert (cell["n"], difference.a, difference.b, difference.median) == (3, 5.0, 6.0, 1.0)
-    assert not difference.sure  # three pairs are too few
+    assert math.isnan(difference.sure_low)  # three pairs are too few
 
 
 def test_two_paint_runs_compare_law_by_law_whatever_their_seeds(tmp_path):

@@ -1,4 +1,4 @@
-"""A yardstick from another field: one tick of mink's inverse kinematics on an arm with twelve joints."""
+"""Reference rival from another field: one tick of mink's inverse kinematics on an arm with twelve joints."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def mink_row(ticks: int) -> Row | None:
 
 
 def _arm() -> str:
-    """Links in a row, axes in turn about y and z."""
+    """A chain of links whose joint axes alternate between z and y."""
     head, tail = "", ""
     for i in range(JOINTS):
         axis = "0 1 0" if i % 2 else "0 0 1"
