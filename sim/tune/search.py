@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import joblib
@@ -13,8 +12,7 @@ import numpy as np
 from ibvs_qp.config.contact_margin import require_margin
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.pilot import PilotConfig
-from sim.sweep.design import ListedBlock
-from sim.sweep.flying import Row, fly_block
+from sim.sweep.flying import Row, fly_run
 from sim.tune.flights import SEARCH_SEED, flights, scenes, seeds
 from sim.tune.objectives import OBJECTIVES, Score, refused, score
 from sim.tune.space import RANGES, rounded, searched_gains, with_gains
@@ -149,11 +147,11 @@ def evaluate(gains: Sequence[dict[str, float]], plan: SearchPlan, parallel: jobl
             scores[place] = refused()
             continue
         jobs[place] = flights(scenes(), config, "trial", seeds(SEARCH_SEED, plan.seed, plan.flights), plan.features)
-    calls = [(place, ListedBlock((run,))) for place, runs in jobs.items() for run in runs]
+    calls = [(place, run) for place, runs in jobs.items() for run in runs]
     rows: dict[int, list[Row]] = {place: [] for place in jobs}
-    results: Any = parallel(joblib.delayed(fly_block)(block, "trial", Path()) for _, block in calls)
-    for (place, _), (_, flown) in zip(calls, results, strict=True):
-        rows[place] += flown
+    results: Any = parallel(joblib.delayed(fly_run)(run) for _, run in calls)
+    for (place, _), row in zip(calls, results, strict=True):
+        rows[place].append(row)
     return [scores[place] if place in scores else score(rows[place]) for place in range(len(gains))]
 
 
