@@ -13,8 +13,7 @@ from sim.commands.options import check_count, flag, go_on, optional
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from sim.tune.finalists import Trials
-    from sim.tune.search import SearchPlan
+    from sim.tune.search import SearchPlan, Trials
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -113,9 +112,8 @@ class Tune:
 
     def _search(self, plan: SearchPlan, folder: Path, words: list[str], notes: Console) -> dict[str, Any]:
         from sim.sweep.progress import sweep_progress
-        from sim.tune.finalists import best_of, fly_finalists
+        from sim.tune.finalists import best_of, fly_finalists, fly_unseen
         from sim.tune.record import Outcome, write
-        from sim.tune.verdict import unseen
 
         command = shlex.join(["ibvs-qp", *words])
         trials, searched_by = self._trials(plan, command, notes)
@@ -125,7 +123,7 @@ class Tune:
         table, chosen = None, best_of(finalists)
         if chosen is not None:
             with sweep_progress(notes, f"{self.law}: unseen seeds") as progress:
-                table = unseen(plan, trials[chosen][0], self.unseen, parts, progress)
+                table = fly_unseen(plan, trials[chosen][0], self.unseen, parts, progress)
         outcome = Outcome(
             plan=plan,
             trials=trials,
@@ -140,11 +138,11 @@ class Tune:
     def _trials(self, plan: SearchPlan, command: str, notes: Console) -> tuple[Trials, str]:
         """Searched for, or read back; with the command of the search."""
         from sim.sweep.progress import sweep_progress
-        from sim.tune.kept import kept_trials
         from sim.tune.search import finished, open_study, search
+        from sim.tune.stored import stored_trials
 
         if self.trials_of:
-            return kept_trials(self.trials_of, plan)
+            return stored_trials(self.trials_of, plan)
         study = open_study(plan)
         before = len(finished(study))
         with sweep_progress(notes, f"{self.law}: trials") as progress:
