@@ -142,8 +142,8 @@ def _page(outcome: Outcome, summary: dict[str, Any]) -> list[str]:
     if outcome.chosen is None:
         return [
             *lines,
-            "No trial is better than the shipped preset on the mean without being clearly worse in one objective or scene "
-            "or in contact damping, both in the search and on the seeds of the choice: the shipped preset stays.",
+            "No trial is better than the shipped preset on the mean without being clearly worse in an objective, a "
+            "scene or in contact damping, both in the search and on the seeds of the choice: the shipped preset stays.",
         ]
     percent = 100.0 * (1.0 - math.exp(gain_over(outcome.scores[outcome.chosen], shipped)))
     lines += [
