@@ -5,7 +5,7 @@ friction that opposes the travel. The rotors must make
 
 .. math:: w(f) = w_0 + f \begin{bmatrix} d \\ p \times d \end{bmatrix}, \quad d = n + \mu t,
 
-with w_0 the wrench that holds the vehicle (its weight). Standing still d = n. Sliding sideways costs twice: the lateral
+with w_0 the wrench of hover (the weight). Standing still d = n. Sliding sideways costs twice: the lateral
 force itself, and the yaw moment at the long lever of the tip. That is why the reach falls so fast with friction.
 """
 

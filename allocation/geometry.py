@@ -28,7 +28,7 @@ class RotorGeometry:
     """Rotors on a circle, each tilted sideways about its own arm (body frame FRD).
 
     The thrust axis of a rotor at azimuth ``a`` with spin ``s`` and tilt ``t`` is
-    ``(-s sin t sin a, s sin t cos a, -cos t)``: spin and tilt share their sign, so the drag torque adds to
+    ``(-s sin t sin a, s sin t cos a, -cos t)``: spin and tilt have the same sign, so the drag torque adds to
     the yaw moment of the tilt.
 
     Attributes:

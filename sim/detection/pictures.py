@@ -82,7 +82,7 @@ def read_depth(file: Path, units_per_metre: float) -> np.ndarray:
             raise PictureError(f"{file} has {picture.shape[2]} different channels: it is a colour picture, not depth")
         picture = picture[..., 0]
     if not (np.issubdtype(picture.dtype, np.integer) or np.issubdtype(picture.dtype, np.floating)):
-        raise PictureError(f"{file} holds {picture.dtype}: depth must be integer or floating point")
+        raise PictureError(f"{file} has type {picture.dtype}: depth must be integer or floating point")
     with np.errstate(invalid="ignore", over="ignore"):
         metres = (picture / units_per_metre).astype(np.float32)
     return np.where(np.isfinite(metres) & (metres > 0.0), metres, np.float32(0.0))

@@ -84,7 +84,7 @@ class Refusal:
 
 @dataclass(frozen=True, kw_only=True)
 class Block:
-    """Runs that fly in one go and share a part on disk; small, as it is sent to other processes.
+    """Runs that fly in one go and are one part on disk; small, as it is sent to other processes.
 
     Attributes:
         name: Hash of its runs and of the code: the same name has the same rows.

@@ -80,7 +80,7 @@ class Planned:
         return Place(settings.laws[law], settings.seed + seed, params)
 
     def block(self, start: int, stop: int) -> Block:
-        """Runs start, ..., stop - 1: only the spec and two numbers are sent, whatever the block holds."""
+        """Runs start, ..., stop - 1: only the spec and two numbers are sent, for any size of the block."""
         name = digest({"base": self.base, "rows": [self.place(index) for index in range(start, stop)]})
         make = functools.partial(_runs, self, start, stop)
         return Block(name=name, count=stop - start, expected_s=float(stop - start), make=make)
