@@ -11,7 +11,7 @@ import polars as pl
 
 from sim.sweep.design import Run
 from sim.sweep.fingerprint import listed_block
-from sim.sweep.parts import join, part_file, write_part
+from sim.sweep.parts import frame, join, part_file, write_table
 from sim.sweep.planned import Planned
 from sim.sweep.pools import Pool, fly_local
 
@@ -68,7 +68,7 @@ def run_sweep(
     try:
         fly = pool or functools.partial(fly_local, workers=workers)
         for name, rows in fly(list(missing.values()), folder):
-            write_part(part_file(folder, name), rows)
+            write_table(part_file(folder, name), frame(rows))
             done, flown_s = done + len(rows), flown_s + missing[name].expected_s
             report(done, count, reused, flown_s / expected_s)
     except KeyboardInterrupt:

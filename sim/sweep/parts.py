@@ -31,11 +31,6 @@ def part_file(folder: Path, name: str) -> Path:
     return folder / f"part-{name}.parquet"
 
 
-def write_part(file: Path, rows: Sequence[dict[str, Any]]) -> None:
-    """Write the rows of a block."""
-    write_table(file, frame(rows))
-
-
 def write_table(file: Path, table: pl.DataFrame) -> None:
     """Write a table by an atomic rename, so that neither a reader nor a crash sees half a file."""
     file.parent.mkdir(parents=True, exist_ok=True)
