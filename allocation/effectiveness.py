@@ -1,4 +1,4 @@
-"""Rotor thrusts to body wrench: the linear map every allocation method starts from."""
+"""Rotor thrusts to body wrench: the linear map that every allocation method starts from."""
 
 from __future__ import annotations
 
@@ -22,3 +22,8 @@ def control_effectiveness(geometry: RotorGeometry) -> np.ndarray:
     axes, positions = geometry.axes, geometry.positions
     moments = np.cross(positions, axes) - (geometry.spins * geometry.torque_ratio_m)[:, None] * axes
     return np.vstack((axes.T, moments.T))
+
+
+def as_matrix(rotors: RotorGeometry | np.ndarray) -> np.ndarray:
+    """Control effectiveness B of shape (6, n), of a geometry or given as such."""
+    return control_effectiveness(rotors) if isinstance(rotors, RotorGeometry) else np.asarray(rotors, float)

@@ -1,4 +1,4 @@
-"""Where the rotors sit, which way they push and how they turn: the one source of every rotor number."""
+"""Positions, thrust axes and spins of the rotors: the one source of every rotor number."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ class Rotor:
     """One fixed rotor.
 
     Attributes:
-        name: Human name, unique in its geometry.
+        name: Readable name, unique in its geometry.
         azimuth_deg: Angle of the rotor arm from body +x towards the right (+y), seen from above [deg].
         spin: +1 if the propeller turns counter-clockwise seen from above, -1 if clockwise.
     """
@@ -28,7 +28,7 @@ class RotorGeometry:
     """Rotors on a circle, each tilted sideways about its own arm (body frame FRD).
 
     The thrust axis of a rotor at azimuth ``a`` with spin ``s`` and tilt ``t`` is
-    ``(-s sin t sin a, s sin t cos a, -cos t)``: spin and tilt share their sign, so the drag torque adds to
+    ``(-s sin t sin a, s sin t cos a, -cos t)``: spin and tilt have the same sign, so the drag torque adds to
     the yaw moment of the tilt.
 
     Attributes:
@@ -46,7 +46,7 @@ class RotorGeometry:
     hub_height_m: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse geometries that cannot be built."""
+        """Refuse impossible geometries."""
         checks = (
             (len(self.rotors) >= 1, f"rotors: {len(self.rotors)} given, at least 1 is needed"),
             (self.circle_radius_m > 0, f"circle_radius_m: {self.circle_radius_m} m, must be > 0 m"),

@@ -1,10 +1,9 @@
-"""What a sweep costs, and how much faster two processes fly it than one; prints one line of JSON.
+"""Cost of a sweep, and speed-up of several processes over one; prints one line of JSON.
 
 Run as ``python benchmarks/sweep_scaling.py --runs 1000``; a run is a flight of about seven seconds that touches the
-board, 0.25 s of processor time on a quiet core. Blocks and parts are those of ``ibvs-qp sweep``. Start-up of the
-processes is left out, so that few runs tell what many cost. On a computer that others use as well, `cpu_ratio` is the
-figure to trust: the processor time of one process over that of several for the same runs, 1 when nothing is lost to
-sharing.
+board, 0.25 s of processor time on a quiet core. Blocks and parts are those of ``ibvs-qp sweep``. The start-up of the
+processes is subtracted, so that few runs suffice. On a busy computer trust `cpu_ratio`: the processor time of one
+process over that of several for the same runs, 1 for a perfect split.
 """
 
 from __future__ import annotations
@@ -19,6 +18,8 @@ import time
 import tomllib
 from pathlib import Path
 
+from joblib.externals.loky import get_reusable_executor
+
 from sim.sweep import Planned, run_sweep
 from sim.sweep.cluster import cluster_pool
 from sim.sweep.pools import Pool
@@ -32,21 +33,19 @@ seeds = {runs}
 scene.start.distance_m = 0.15
 job.hold_s = 0.2
 """
-#: Runs per block: what an interrupt may lose, here as in the shipped specs, but never so many that a process idles.
+#: Runs per block as in the shipped specs, but never so many that a process idles.
 BLOCK = 10
 
 
-def used_s() -> float:
-    """Processor time of this process and of those it waited for [s]."""
-    usages = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+def processor_s() -> float:
+    """Processor time of this process and of its finished children [s]."""
+    usages = map(resource.getrusage, (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
     return sum(usage.ru_utime + usage.ru_stime for usage in usages)
 
 
 def timed(runs: int, workers: int, folder: Path, dask: bool = False) -> tuple[float, float]:
     """Wall-clock time of a sweep by warm processes, and processor time from their start to their end [s]."""
-    from joblib.externals.loky import get_reusable_executor
-
-    before = used_s()
+    before = processor_s()
     with contextlib.ExitStack() as stack:
         pool = stack.enter_context(cluster_pool(None, workers)) if dask else None
         sweep(2 * workers, workers, folder / f"warm-{runs}-{workers}-{dask}", pool)
@@ -55,17 +54,16 @@ def timed(runs: int, workers: int, folder: Path, dask: bool = False) -> tuple[fl
         wall = time.perf_counter() - begin
     if workers > 1 and not dask:
         get_reusable_executor().shutdown(wait=True)
-    return wall, used_s() - before
+    return wall, processor_s() - before
 
 
 def sweep(runs: int, workers: int, folder: Path, pool: Pool | None) -> None:
-    """Fly a sweep of so many runs."""
-    if not runs:
-        return
-    block = max(1, min(BLOCK, runs // (4 * workers)))
-    design = Planned(parse_spec(tomllib.loads(SPEC.format(runs=runs)), folder))
-    table = run_sweep(design, folder, workers=workers, block_runs=block, pool=pool).table
-    assert table.height == runs and table["completed"].all()
+    """Fly a sweep of some runs."""
+    if runs:
+        design = Planned(parse_spec(tomllib.loads(SPEC.format(runs=runs)), folder))
+        block = max(1, min(BLOCK, runs // (4 * workers)))
+        table = run_sweep(design, folder, workers=workers, block_runs=block, pool=pool).table
+        assert table.height == runs and table["completed"].all()
 
 
 def main() -> None:
@@ -74,23 +72,23 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=2, help="processes side by side")
     parser.add_argument("--dask", action="store_true", help="fly on a local Dask cluster as well")
     options = parser.parse_args()
+    runs, many = options.runs, options.workers
     with tempfile.TemporaryDirectory() as name:
-        folder, many = Path(name), options.workers
-        start_one, start_many = timed(0, 1, folder)[1], timed(0, many, folder)[1]
-        wall_one, cpu_one = timed(options.runs, 1, folder)
-        wall_many, cpu_many = timed(options.runs, many, folder)
+        folder = Path(name)
+        start_one, start_many = (timed(0, workers, folder)[1] for workers in (1, many))
+        (wall_one, cpu_one), (wall_many, cpu_many) = (timed(runs, workers, folder) for workers in (1, many))
         result = {
-            "runs": options.runs,
+            "runs": runs,
             "workers": many,
             "load": os.getloadavg()[0],
             "wall_s": {"one": wall_one, "many": wall_many},
             "wall_ratio": wall_one / wall_many,
             "cpu_ratio": (cpu_one - start_one) / (cpu_many - start_many),
-            "cpu_per_run_s": (cpu_one - start_one) / options.runs,
+            "cpu_per_run_s": (cpu_one - start_one) / runs,
             "cpu_start_s": start_many / many,
         }
         if options.dask:
-            wall_dask, _ = timed(options.runs, many, folder, dask=True)
+            wall_dask, _ = timed(runs, many, folder, dask=True)
             result |= {"dask_wall_s": wall_dask, "dask_wall_ratio": wall_one / wall_dask}
     print(json.dumps(result))
 

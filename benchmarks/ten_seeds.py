@@ -15,7 +15,7 @@ from sim.evaluate.metrics import compute_metrics
 from sim.flight.closed_loop import FlightOptions, fly
 from sim.world.scene import Scene
 
-#: Figure, words, factor to the shown unit, unit, and what the QP law is held to.
+#: Figure, words, factor to the reported unit, unit, and bound of the QP law.
 FIGURES = (
     ("stroke_m", "shortest stroke", 1.0, "m", ">= 1.2"),
     ("path_rms_straight_m", "path error, straights, rms", 1e3, "mm", "<= 5"),
@@ -42,19 +42,19 @@ def flight(law: str, seed: int, camera: str) -> dict[str, Any]:
 
 def table(flights: list[dict[str, Any]]) -> str:
     rows = [
-        "| figure | QP: median (least to most) | analytic: median (least to most) | QP held to |",
+        "| figure | QP: median (least to most) | analytic: median (least to most) | bound of the QP |",
         "|---|---|---|---|",
     ]
-    by_law = {law: [one for one in flights if one["law"] == law] for law in LAWS}
-    done = [f"{sum(one['completed'] for one in by_law[law])} of {len(by_law[law])}" for law in LAWS]
+    by_law = {law: [each for each in flights if each["law"] == law] for law in LAWS}
+    done = [f"{sum(each['completed'] for each in by_law[law])} of {len(by_law[law])}" for law in LAWS]
     rows.append(f"| completed | {done[0]} | {done[1]} | all |")
     for name, words, factor, unit, bound in FIGURES:
         cells = []
         for law in LAWS:
-            values = factor * np.array([one[name] for one in by_law[law]], float)
+            values = factor * np.array([each[name] for each in by_law[law]], float)
             cells.append(f"{np.median(values):.2f} ({values.min():.2f} to {values.max():.2f}) {unit}")
         rows.append(f"| {words} | {cells[0]} | {cells[1]} | {bound} {unit if bound else ''} |")
-    solved = 100.0 * min(one["solved"] for one in by_law["qp"])
+    solved = 100.0 * min(each["solved"] for each in by_law["qp"])
     rows.append(f"| ticks with outcome solved, least | {solved:.2f} % | | >= 99.9 % |")
     return "\n".join(rows)
 
@@ -63,9 +63,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--jobs", type=int, default=2, help="processes side by side")
     parser.add_argument("--camera", choices=("plane", "gl"), default="plane", help="camera back end")
-    asked = parser.parse_args()
-    jobs = [joblib.delayed(flight)(law, seed, asked.camera) for seed in SEEDS for law in LAWS]
-    flights = joblib.Parallel(n_jobs=asked.jobs)(jobs)
+    options = parser.parse_args()
+    jobs = [joblib.delayed(flight)(law, seed, options.camera) for seed in SEEDS for law in LAWS]
+    flights = joblib.Parallel(n_jobs=options.jobs)(jobs)
     print(table(list(flights)))
 
 

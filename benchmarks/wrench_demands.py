@@ -1,7 +1,7 @@
-"""What each way of allocation gives up: random wrench demands beyond reach, error delivered minus demanded, rms.
+"""Errors of every allocation method on random wrench demands beyond reach: delivered minus demanded, rms.
 
 Run as ``python benchmarks/wrench_demands.py [--count 4000] [--json]``. The program is assembled from the controller's
-own tasks and limits with the controller's own weights; the demand is what its rows ask for.
+own tasks and limits with the controller's own weights; the demand is the target of its rows.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ WEIGHT = CONFIG.vehicle.mass_kg * GRAVITY
 
 
 def demands(count: int, seed: int = 0) -> np.ndarray:
-    """Random wrenches that the rotors cannot make, (count, 6) [N, N m]."""
+    """Random wrenches beyond the reach of the rotors, (count, 6) [N, N m]."""
     rng, inverse = np.random.default_rng(np.random.SeedSequence(seed)), np.linalg.inv(B)
     half = np.array([LATERAL, LATERAL, VERTICAL, TIP_OVER, TIP_OVER, TURN])
     found: list[np.ndarray] = []
@@ -55,8 +55,8 @@ class ProgramAllocation:
     """The controller's program without lines: push along front, velocity right and down, level, yaw, height.
 
     Attributes:
-        outcomes: How often the solver layer ended in which outcome.
-        given_up: Wrench that the last program would have made without limits, minus what it makes, (6,).
+        outcomes: Number of programs per outcome of the solver.
+        unallocated: Wrench of the last program without limits minus its wrench, (6,) [N, N m].
     """
 
     def __init__(self, height_weight: float | None = None) -> None:
@@ -79,7 +79,7 @@ class ProgramAllocation:
             values[name][:] = value
         self._height = CONFIG.weights.height if height_weight is None else height_weight
         self.outcomes: Counter[str] = Counter()
-        self.given_up = np.zeros(6)
+        self.unallocated = np.zeros(6)
 
     def __call__(self, wrench: np.ndarray) -> np.ndarray:
         """Thrusts for one demanded rotor wrench [N], (n,)."""
@@ -96,13 +96,13 @@ class ProgramAllocation:
         solution = self._engine.solve()
         assert solution is not None
         self.outcomes[str(solution.outcome)] += 1
-        self.given_up = B @ (self._data.free - solution.thrusts)
+        self.unallocated = B @ (self._data.free - solution.thrusts)
         return solution.thrusts
 
 
-def row(method: Callable[[np.ndarray], np.ndarray], wanted: np.ndarray) -> dict[str, float]:
+def row(method: Callable[[np.ndarray], np.ndarray], desired: np.ndarray) -> dict[str, float]:
     """Errors of one method, rms over all demands [N, N m]."""
-    error = np.array([B @ method(wrench) - wrench for wrench in wanted])
+    error = np.array([B @ method(wrench) - wrench for wrench in desired])
     front, right, lift, roll, pitch, yaw = np.sqrt((error**2).mean(axis=0)).tolist()
     return {
         "lateral_n": float(np.hypot(front, right)),
@@ -114,7 +114,7 @@ def row(method: Callable[[np.ndarray], np.ndarray], wanted: np.ndarray) -> dict[
 
 def table(count: int, seed: int = 0) -> dict[str, Any]:
     """Every method on the same demands."""
-    wanted = demands(count, seed)
+    desired = demands(count, seed)
     program, level = ProgramAllocation(), ProgramAllocation(height_weight=0.0)
     methods: dict[str, Callable[[np.ndarray], np.ndarray]] = {
         "pseudo-inverse, clipped": lambda wrench: allocate_pseudo_inverse(wrench, B, LOWER, UPPER)[0],
@@ -125,7 +125,7 @@ def table(count: int, seed: int = 0) -> dict[str, Any]:
         "program": program,
         "program without height row": level,
     }
-    rows = {name: row(method, wanted) for name, method in methods.items()}
+    rows = {name: row(method, desired) for name, method in methods.items()}
     return {"schema": 1, "count": count, "seed": seed, "rows": rows, "outcomes": dict(program.outcomes)}
 
 

@@ -39,7 +39,7 @@ def push_reach(
     direction = normal + ca.if_else(speed > STANDING_SPEED, friction / ca.fmax(speed, STANDING_SPEED), 0.0) * travel
     lever = ca.cross(ca.DM(vehicle.tip_position_m), direction)
     slope = ca.DM(facets.normals) @ ca.vertcat(direction, lever)
-    rising, falling = ca.DM(np.maximum(facets.shares, 0.0)), ca.DM(np.minimum(facets.shares, 0.0))
+    rising, falling = ca.DM(np.maximum(facets.coefficients, 0.0)), ca.DM(np.minimum(facets.coefficients, 0.0))
     held = -(ca.DM(facets.normals) @ static_wrench)
     upper, lower = rising @ high + falling @ low - held, rising @ low + falling @ high - held
     along, safe = ca.fabs(slope) > RELATIVE_ZERO, ca.if_else(ca.fabs(slope) > RELATIVE_ZERO, slope, 1.0)

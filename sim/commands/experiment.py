@@ -92,9 +92,7 @@ class ExperimentCommand:
             return 0
         folder = RunFolder.create(self.out).path
         with sweep_progress(notes, self.name) as progress:
-            result = run_sweep(
-                runs, folder / PARTS, workers=self.jobs or usable_cores(), progress=progress, timed=progress.timed
-            )
+            result = run_sweep(runs, folder / PARTS, workers=self.jobs or usable_cores(), progress=progress)
         facts: dict[str, Any] = {
             "command": command_line(words),
             "version": version("ibvs-qp"),

@@ -21,8 +21,7 @@ from sim.commands.options import (
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from sim.tune.finalists import Trials
-    from sim.tune.search import SearchPlan
+    from sim.tune.search import SearchPlan, Trials
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -107,9 +106,8 @@ class Tune:
 
     def _search(self, plan: SearchPlan, folder: Path, words: list[str], notes: Console) -> dict[str, Any]:
         from sim.sweep.progress import sweep_progress
-        from sim.tune.finalists import best_of, fly_finalists
+        from sim.tune.finalists import best_of, fly_finalists, fly_unseen
         from sim.tune.record import Outcome, write
-        from sim.tune.verdict import unseen
 
         command = command_line(words)
         trials, searched_by = self._trials(plan, command, notes)
@@ -119,7 +117,7 @@ class Tune:
         table, chosen = None, best_of(finalists)
         if chosen is not None:
             with sweep_progress(notes, f"{self.law}: unseen seeds") as progress:
-                table = unseen(plan, trials[chosen][0], self.unseen, parts, progress)
+                table = fly_unseen(plan, trials[chosen][0], self.unseen, parts, progress)
         outcome = Outcome(
             plan=plan,
             trials=trials,
@@ -134,11 +132,11 @@ class Tune:
     def _trials(self, plan: SearchPlan, command: str, notes: Console) -> tuple[Trials, str]:
         """Trials of a search or of a record, and the command of the search."""
         from sim.sweep.progress import sweep_progress
-        from sim.tune.kept import kept_trials
         from sim.tune.search import finished, open_study, search
+        from sim.tune.stored import stored_trials
 
         if self.trials_of:
-            return kept_trials(self.trials_of, plan)
+            return stored_trials(self.trials_of, plan)
         study = open_study(plan)
         before = len(finished(study))
         with sweep_progress(notes, f"{self.law}: trials") as progress:

@@ -1,4 +1,4 @@
-"""A picture of a frame with what was found in it, for people."""
+"""A picture of a frame with its surface, lines and guides."""
 
 from __future__ import annotations
 
@@ -8,31 +8,25 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from ibvs_qp.config.errors import IbvsQpError
+from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.vision.survey.draw import draw_detection
-from sim.detection.run import SeenFrame
+from sim.detection.run import FrameResult
 
 
-class OverlayError(IbvsQpError):
-    """A picture cannot be written."""
-
-
-def write_overlay(seen: SeenFrame, folder: Path) -> Path | None:
-    """Write NAME_overlay.png into a folder; returns its path, or None for a frame that could not be read.
+def write_overlay(result: FrameResult, folder: Path) -> Path | None:
+    """Write NAME_overlay.png into a folder; returns its path, or None for an unreadable frame.
 
     Raises:
-        OverlayError: When the file cannot be written.
+        ConfigError: When the file cannot be written.
     """
-    if seen.frame is None:
+    if result.frame is None:
         return None
-    name = re.sub(r"[^\w.-]+", "_", str(Path(seen.entry.color).with_suffix(""))).strip("_")
+    name = re.sub(r"[^\w.-]+", "_", str(Path(result.entry.color).with_suffix(""))).strip("_")
     file = folder / f"{name}_overlay.png"
-    drawn = draw_detection(seen.frame.rgb, seen.result, seen.entry.seed)
-    done, data = cv2.imencode(".png", cv2.cvtColor(drawn, cv2.COLOR_RGB2BGR))
+    drawn = draw_detection(result.frame.rgb, result.detection, result.entry.seed)
+    _, data = cv2.imencode(".png", cv2.cvtColor(drawn, cv2.COLOR_RGB2BGR))
     try:
-        if not done:
-            raise OSError("the picture cannot be coded")
         file.write_bytes(np.asarray(data).tobytes())
     except OSError as error:
-        raise OverlayError(f"cannot write {file}: {error.strerror or error}") from None
+        raise ConfigError(f"cannot write {file}: {error.strerror or error}") from None
     return file

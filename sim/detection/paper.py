@@ -8,31 +8,29 @@ from ibvs_qp.vision.paper import PaperPipeline
 from ibvs_qp.vision.picture import denormalise
 from ibvs_qp.vision.survey import DetectedLine, Detection
 
-#: The published pipeline rates no line; what it takes for a guide it is as sure of as of any other.
+#: The published pipeline rates no line: every line, guide or not, has this confidence [-].
 PAPER_CONFIDENCE = 0.5
 
 
 class PaperMethod:
-    """`ibvs_qp.vision.paper.PaperPipeline`, picture by picture; it neither follows nor knows a mask."""
+    """`ibvs_qp.vision.paper.PaperPipeline`, picture by picture, without tracking and without a mask."""
 
     def __init__(self) -> None:
         self._pipeline = PaperPipeline()
 
     def detect(self, frame: RgbdFrame, seed_pixel: tuple[float, float] | None) -> Detection:
-        """Surface, level and upright lines, topmost and first upright as guides."""
+        """Surface, horizontal and vertical lines, the topmost and the first vertical one as guides."""
         if seed_pixel is None:
-            return Detection(refused="no seed pixel: the bounding box is searched from one")
+            return Detection(refused="no seed pixel: the search of the bounding box starts from one")
         found = self._pipeline.detect(frame, seed_pixel)
-        lines = {id(line): _common(number, line, frame) for number, line in enumerate(found.candidates)}
-
-        def guide(line: Candidate | None) -> DetectedLine | None:
-            return None if line is None else lines.get(id(line), _common(len(lines), line, frame))
-
+        guides = [line for line in found.guides.values() if line is not None]
+        distinct = {id(line): line for line in (*found.candidates, *guides)}
+        lines = {key: _common(number, line, frame) for number, (key, line) in enumerate(distinct.items())}
         return Detection(
             plane=found.plane,
             refused=found.refused,
-            candidates=tuple(lines.values()),
-            guides={side: guide(line) for side, line in found.guides.items()},
+            candidates=tuple(lines[id(line)] for line in found.candidates),
+            guides={side: None if line is None else lines[id(line)] for side, line in found.guides.items()},
             time_ms=found.time_total_ms,
         )
 

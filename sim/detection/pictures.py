@@ -10,14 +10,14 @@ import numpy as np
 from ibvs_qp.config.errors import IbvsQpError
 from ibvs_qp.measurement import RgbdFrame
 
-#: Files of arrays instead of pictures.
+#: Suffixes of array files.
 _ARRAYS = (".npy", ".npz")
-#: Largest size of a picture's side [px]: beyond, a wrong file was given.
+#: Largest side of a picture [px]: a larger one is a wrong file.
 _LARGEST_PX = 8192
 
 
 class PictureError(IbvsQpError):
-    """A picture cannot be read or does not fit its partner."""
+    """An unreadable picture, or two that do not match."""
 
 
 def read_frame(
@@ -31,7 +31,7 @@ def read_frame(
 
     Args:
         color: Colour or grey picture, 8 or 16 bits.
-        depth: Depth, 8 or 16 bits or floating point (PNG, TIFF, npy, npz), or None if there is none: all invalid then.
+        depth: Depth, 8 or 16 bits or floating point (PNG, TIFF, npy, npz), or None for all invalid.
         intrinsics: (fx, fy, cx, cy) [px].
         depth_units_per_metre: Depth values per metre.
         stamp_ns: Time of capture.
@@ -40,22 +40,18 @@ def read_frame(
         PictureError: When a file cannot be read or both pictures differ in size.
     """
     rgb = read_color(color)
-    if depth is None:
-        metres: np.ndarray = np.zeros(rgb.shape[:2], np.float32)
-    else:
-        metres = read_depth(depth, depth_units_per_metre)
     height, width = rgb.shape[:2]
-    size: tuple[int, ...] = metres.shape
-    if size != (height, width):
+    metres = np.zeros((height, width), np.float32) if depth is None else read_depth(depth, depth_units_per_metre)
+    if metres.shape != (height, width):
         raise PictureError(
-            f"{depth} is {size[-1]} x {size[0]} px but {color} is {width} x {height} px: "
+            f"{depth} is {metres.shape[-1]} x {metres.shape[0]} px but {color} is {width} x {height} px: "
             "depth must be registered to colour"
         )
     return RgbdFrame(rgb=rgb, depth=metres, intrinsics=intrinsics, stamp_ns=stamp_ns)
 
 
 def read_color(file: Path) -> np.ndarray:
-    """RGB, uint8 (H, W, 3); 16 bits are brought to 8, grey is spread over the channels.
+    """RGB, uint8 (H, W, 3); 16 bits become 8, grey becomes three equal channels.
 
     Raises:
         PictureError: When the file is no such picture.
@@ -86,14 +82,14 @@ def read_depth(file: Path, units_per_metre: float) -> np.ndarray:
             raise PictureError(f"{file} has {picture.shape[2]} different channels: it is a colour picture, not depth")
         picture = picture[..., 0]
     if not (np.issubdtype(picture.dtype, np.integer) or np.issubdtype(picture.dtype, np.floating)):
-        raise PictureError(f"{file} holds {picture.dtype}: depth must be integer or floating point")
+        raise PictureError(f"{file} has type {picture.dtype}: depth must be integer or floating point")
     with np.errstate(invalid="ignore", over="ignore"):
         metres = (picture / units_per_metre).astype(np.float32)
     return np.where(np.isfinite(metres) & (metres > 0.0), metres, np.float32(0.0))
 
 
 def _read(file: Path, what: str) -> np.ndarray:
-    """Whatever a file holds, as an array of two or three dimensions."""
+    """Content of a file as an array of two or three dimensions."""
     try:
         file.open("rb").close()
     except OSError as error:

@@ -1,8 +1,7 @@
-"""What `ibvs-qp detect` prints: one JSON line, or a table for people."""
+"""Output of `ibvs-qp detect`: one JSON line, or a table."""
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ibvs_qp.vision.survey.detection import GUIDE_SIDES
-from sim.detection.run import SeenFrame
+from sim.detection.run import FrameResult
+from sim.report import rundir
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -18,30 +18,28 @@ if TYPE_CHECKING:
 SCHEMA = 1
 
 
-def as_json(frames: list[SeenFrame], method: str) -> str:
-    """All frames as one line of JSON; what is not finite becomes null."""
-    content = {"schema": SCHEMA, "frames": [frame_dict(frame, method) for frame in frames]}
-    return json.dumps(_finite(content), allow_nan=False)
+def as_json(results: list[FrameResult], method: str) -> str:
+    """All frames as one line of JSON; numbers that are not finite become null."""
+    return rundir.as_json({"schema": SCHEMA, "frames": [_frame_dict(result, method) for result in results]})
 
 
-def frame_dict(seen: SeenFrame, method: str) -> dict[str, Any]:
-    """One frame as plain values."""
-    result = seen.result
+def _frame_dict(result: FrameResult, method: str) -> dict[str, Any]:
+    found = result.detection
     return {
-        "color": seen.entry.color,
-        "depth": seen.entry.depth or None,
+        "color": result.entry.color,
+        "depth": result.entry.depth or None,
         "method": method,
-        "refused": result.refused,
-        "plane": None if result.plane is None else plane_dict(result.plane),
-        "candidates": [line_dict(line) for line in result.candidates],
-        "guides": {side: _guide(result.guides.get(side)) for side in GUIDE_SIDES},
-        "tracked": bool(result.tracked),
-        "time_ms": seen.time_ms,
+        "refused": found.refused,
+        "plane": None if found.plane is None else _plane_dict(found.plane),
+        "candidates": [_line_dict(line) for line in found.candidates],
+        "guides": {side: _line_dict(found.guides.get(side)) for side in GUIDE_SIDES},
+        "tracked": bool(found.tracked),
+        "time_ms": result.time_ms,
     }
 
 
-def plane_dict(plane: Any) -> dict[str, Any]:
-    """A surface: (A, B, C, D) with D = -1, outward normal, distance [m], share of inliers, covariance of (A, B, C)."""
+def _plane_dict(plane: Any) -> dict[str, Any]:
+    """A surface: (A, B, C, D) with D = -1, outward normal, distance [m], inlier ratio, covariance of (A, B, C)."""
     return {
         "abcd": [float(value) for value in plane.abcd],
         "normal": np.asarray(plane.normal, float).tolist(),
@@ -51,8 +49,10 @@ def plane_dict(plane: Any) -> dict[str, Any]:
     }
 
 
-def line_dict(line: Any) -> dict[str, Any]:
-    """A line: end points [px], (rho, theta) normalised, its covariance and how sure it is."""
+def _line_dict(line: Any) -> dict[str, Any] | None:
+    """A line: end points [px], (rho, theta) normalised, its covariance and its confidence."""
+    if line is None:
+        return None
     (x1, y1), (x2, y2) = np.asarray(line.pixels, float).tolist()
     return {
         "x1": x1,
@@ -70,48 +70,34 @@ def line_dict(line: Any) -> dict[str, Any]:
     }
 
 
-def _guide(line: Any) -> dict[str, Any] | None:
-    return None if line is None else line_dict(line)
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _finite(entry) for key, entry in value.items()}
-    if isinstance(value, list):
-        return [_finite(entry) for entry in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def frame_table(frames: list[SeenFrame]) -> Table:
-    """One row a guide: frame and surface, which edge, where, its slope and how sure it is."""
+def frame_table(results: list[FrameResult]) -> Table:
+    """One row per guide: frame, surface, side, position, slope, confidence and time."""
     from rich import box
     from rich.table import Table
 
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    words = ("frame", "guide")
     for heading in ("frame", "surface", "guide", "middle, px", "slope", "conf.", "ms"):
-        table.add_column(heading, no_wrap=True, justify="left" if heading in words else "right")
-    for seen in frames:
-        result = seen.result
-        surface = "none" if result.plane is None else f"{result.plane.distance_m:.3f} m"
-        found = {side: line for side in GUIDE_SIDES if (line := result.guides.get(side)) is not None}
-        rows = [_words(line, side) for side, line in found.items()] or [("none", "", "", "")]
-        tail = (f"{seen.time_ms:.0f}",)
-        table.add_row(Path(seen.entry.color).stem, surface, *rows[0], *tail)
+        table.add_column(heading, no_wrap=True, justify="left" if heading in ("frame", "guide") else "right")
+    for result in results:
+        found = result.detection
+        surface = "none" if found.plane is None else f"{found.plane.distance_m:.3f} m"
+        lines = {side: line for side in GUIDE_SIDES if (line := found.guides.get(side)) is not None}
+        rows = [_guide_row(line, side) for side, line in lines.items()] or [("none", "", "", "")]
+        table.add_row(Path(result.entry.color).stem, surface, *rows[0], f"{result.time_ms:.0f}")
         for row in rows[1:]:
             table.add_row("", "", *row)
     return table
 
 
-def refusals(frames: list[SeenFrame]) -> list[str]:
-    """One line for every frame without a surface: why."""
-    return [f"{Path(seen.entry.color).name}: {seen.result.refused}" for seen in frames if seen.result.refused]
+def refusals(results: list[FrameResult]) -> list[str]:
+    """One line with the reason for every frame without a surface."""
+    return [f"{Path(each.entry.color).name}: {each.detection.refused}" for each in results if each.detection.refused]
 
 
-def _words(line: Any, side: str) -> tuple[str, str, str, str]:
-    """A guide, the middle of its segment, its slope against level or upright, and its confidence."""
+def _guide_row(line: Any, side: str) -> tuple[str, str, str, str]:
+    """A guide, the middle of its segment, its slope against horizontal or vertical, and its confidence."""
     (x1, y1), (x2, y2) = np.asarray(line.pixels, float).tolist()
-    level = side in ("top", "bottom")
-    slope = math.degrees(math.atan2(y2 - y1, x2 - x1) if level else math.atan2(x1 - x2, y2 - y1))
+    horizontal = side in ("top", "bottom")
+    slope = math.degrees(math.atan2(y2 - y1, x2 - x1) if horizontal else math.atan2(x1 - x2, y2 - y1))
     middle = f"{0.5 * (x1 + x2):.1f}, {0.5 * (y1 + y2):.1f}"
     return side, middle, f"{math.remainder(slope, 180.0):+.2f}°", f"{line.confidence:.2f}"

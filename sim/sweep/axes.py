@@ -13,8 +13,6 @@ from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.settings import choice, from_dict, setting, validate
 from sim.sweep.design import Parameter
 
-SCALES = ("linear", "log")
-
 
 @dataclass(frozen=True, kw_only=True)
 class Span:
@@ -23,17 +21,17 @@ class Span:
     low: float = setting(math.nan, "lower end")
     high: float = setting(math.nan, "upper end")
     steps: int = setting(0, "number of values on a grid, both ends included", low=0, high=100000)
-    scale: str = choice("linear", "evenly spaced, or drawn, in the value or in its logarithm", SCALES)
+    scale: str = choice("linear", "evenly spaced, or drawn, in the value or in its logarithm", ("linear", "log"))
 
     def __post_init__(self) -> None:
         """Validate."""
         validate(self)
 
-    def at(self, share: float) -> float:
-        """Value at a share 0..1 of the way from low to high."""
+    def at(self, fraction: float) -> float:
+        """Value at a fraction 0..1 of the way from low to high."""
         if self.scale == "log":
-            return float(self.low * (self.high / self.low) ** share)
-        return float(self.low + (self.high - self.low) * share)
+            return float(self.low * (self.high / self.low) ** fraction)
+        return float(self.low + (self.high - self.low) * fraction)
 
 
 @dataclass(frozen=True)
@@ -52,56 +50,49 @@ class Axis:
     span: Span | None = None
     whole: bool = False
 
-    def draw(self, share: float) -> Parameter:
-        """The value that a uniform number 0..1 stands for."""
+    def draw(self, fraction: float) -> Parameter:
+        """The value at a uniform number 0..1."""
         if self.span is None:
-            return self.values[min(int(share * len(self.values)), len(self.values) - 1)]
-        value = self.span.at(share)
+            return self.values[min(int(fraction * len(self.values)), len(self.values) - 1)]
+        value = self.span.at(fraction)
         return round(value) if self.whole else value
 
     @property
     def ends(self) -> tuple[Parameter, ...]:
-        """Values that are checked before anything flies: all that are listed, or both ends of the range."""
+        """Values to check before the sweep: all listed ones, or both ends of the range."""
         return self.values or (self.draw(0.0), self.draw(1.0))
 
 
-def grid_axis(path: str, given: Any, present: Any) -> Axis:
-    """An axis of a grid.
+def make_axis(section: str, path: str, given: Any, present: Any) -> Axis:
+    """An axis of a grid or of a random design.
 
     Args:
+        section: "grid" or "random".
         path: Dotted path.
-        given: A list of values, or a table low, high, steps, scale.
-        present: The present value, which tells whole numbers.
+        given: A list of values, or a table low, high, scale, and on a grid steps.
+        present: The present value; an int makes whole numbers.
 
     Raises:
         ConfigError: When it is neither, or the range is refused.
     """
-    place = f"grid.{path}"
+    place = f"{section}.{path}"
     if isinstance(given, list):
         return Axis(path, _listed(place, given))
-    span = _span(place, given)
-    if span.steps < 1:
-        raise ConfigError(f"{place}.steps = {span.steps} is refused: a grid needs 1, 2, 3, ... values")
-    whole = _is_whole(present)
-    shares = np.linspace(0.0, 1.0, span.steps)
-    values = [round(span.at(share)) if whole else span.at(share) for share in shares]
-    return Axis(path, tuple(dict.fromkeys(values)), whole=whole)
-
-
-def random_axis(path: str, given: Any, present: Any) -> Axis:
-    """An axis that is drawn from: a list to choose from, or a table low, high, scale."""
-    place = f"random.{path}"
-    if isinstance(given, list):
-        return Axis(path, _listed(place, given))
-    span = _span(place, given)
-    if span.steps:
-        raise ConfigError(f"{place}.steps is refused: a drawn parameter has no steps; `samples` says how many")
-    return Axis(path, span=span, whole=_is_whole(present))
+    axis = Axis(path, span=_span(place, given), whole=isinstance(present, int) and not isinstance(present, bool))
+    assert axis.span is not None
+    steps = axis.span.steps
+    if section == "random":
+        if steps:
+            raise ConfigError(f"{place}.steps is refused: a drawn parameter has no steps, only `samples`")
+        return axis
+    if steps < 1:
+        raise ConfigError(f"{place}.steps = {steps} is refused: a grid needs 1, 2, 3, ... values")
+    return Axis(path, tuple(dict.fromkeys(axis.draw(fraction) for fraction in np.linspace(0.0, 1.0, steps))))
 
 
 @functools.lru_cache(maxsize=4)
-def shares(kind: str, samples: int, axes: int, seed: int) -> np.ndarray:
-    """Uniform numbers of a random design, (samples, axes); more samples begin with the same numbers.
+def fractions(kind: str, samples: int, axes: int, seed: int) -> np.ndarray:
+    """Uniform numbers 0..1 of a random design, (samples, axes); more samples begin with the same numbers.
 
     Args:
         kind: "random", or "sobol" for points that fill the box more evenly.
@@ -112,8 +103,7 @@ def shares(kind: str, samples: int, axes: int, seed: int) -> np.ndarray:
     if kind == "sobol":
         from scipy.stats import qmc
 
-        power = max(0, math.ceil(math.log2(samples))) if samples else 0
-        return qmc.Sobol(axes, rng=np.random.default_rng(seed)).random_base2(power)[:samples]
+        return qmc.Sobol(axes, rng=np.random.default_rng(seed)).random_base2((samples - 1).bit_length())[:samples]
     return np.random.default_rng(seed).random((samples, axes))
 
 
@@ -136,7 +126,3 @@ def _span(place: str, given: Any) -> Span:
         need = "low > 0 and low <= high on a logarithmic scale" if span.scale == "log" else "low <= high"
         raise ConfigError(f"{place} = [{span.low:g}, {span.high:g}] is refused: {need} is needed")
     return span
-
-
-def _is_whole(value: Any) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool)

@@ -1,10 +1,9 @@
-"""One run of a sweep, and a design of many: everything that decides a flight, and what is measured on it."""
+"""One run of a sweep, and a block of runs: everything that determines a flight, and the figures measured on it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from typing import Protocol
 
 from ibvs_qp.pilot import PilotConfig
 from sim.flight.closed_loop import FlightOptions
@@ -13,22 +12,22 @@ from sim.flight.jobs import Job, PaintJob
 from sim.flight.trace import Trace
 from sim.world.scene import Scene
 
-#: Value of a parameter of a cell: what a table can hold.
+#: Value of a parameter of a cell: the types of a table's columns.
 Parameter = float | int | str | bool
-#: Figures of one flight by name; what has no data is NaN.
+#: Figures of one flight by name; a figure without data is NaN.
 Measure = Callable[[Trace], dict[str, float]]
 
 
 @dataclass(frozen=True, kw_only=True)
 class FlightPlan:
-    """Everything that decides a flight to the bit.
+    """Everything that determines a flight to the bit.
 
     Attributes:
         scene: The truth.
-        config: The pilot, complete: no preset is looked up any more.
+        config: The complete pilot; no preset is read later.
         options: Law, seed, features, picture size.
-        job: What is done at the wall.
-        faults: What goes wrong, and when.
+        job: Task at the wall.
+        faults: Faults and their times.
     """
 
     scene: Scene
@@ -43,13 +42,13 @@ class Run:
     """One flight of a design: a row of its table.
 
     Attributes:
-        experiment: Name of the design it belongs to.
-        variant: What of the controller is switched differently; laws compare within a variant.
-        params: Settings of the cell, by name with unit.
+        experiment: Name of its design.
+        variant: Switched part of the controller; laws compare within a variant.
+        params: Parameters of the cell, by name with unit.
         plan: The flight.
-        measure: Module-level function that turns its trace into figures.
-        keep: Whether the whole log is kept, for figures of single flights.
-        expected_s: Flying time to expect [s]; sizes the plan and the bar.
+        measure: Module-level function from trace to figures.
+        keep: Whether the whole log is stored, for figures of single flights.
+        expected_s: Expected flying time [s]; sizes the plan and the progress bar.
     """
 
     experiment: str
@@ -62,18 +61,18 @@ class Run:
 
     @property
     def law(self) -> str:
-        """Law flown."""
+        """Control law of the flight."""
         return self.plan.options.law
 
     @property
     def seed(self) -> int:
-        """Seed flown."""
+        """Seed of the flight."""
         return self.plan.options.seed
 
 
 @dataclass(frozen=True, kw_only=True)
 class Refusal:
-    """A run whose values are refused together, though each alone is allowed: a row with the reason, never flown."""
+    """A run with single values in range that are refused together: a row with the reason and without a flight."""
 
     experiment: str
     variant: str
@@ -83,72 +82,18 @@ class Refusal:
     reason: str
 
 
-class Block(Protocol):
-    """Runs that are flown in one go and share a part on disk; sent to other processes, so it must be small."""
+@dataclass(frozen=True, kw_only=True)
+class Block:
+    """Runs that fly in one go and are one part on disk; small, as it is sent to other processes.
 
-    def __len__(self) -> int:
-        """Number of runs."""
-        ...
+    Attributes:
+        name: Hash of its runs and of the code: the same name has the same rows.
+        count: Number of runs.
+        expected_s: Expected flying time [s]; only ratios between blocks matter.
+        make: Lists the runs in order, in the process that flies them.
+    """
 
-    @property
-    def name(self) -> str:
-        """Identity: the same name has the same rows."""
-        ...
-
-    def runs(self) -> Iterable[Run | Refusal]:
-        """The runs, in order; made where they are flown."""
-        ...
-
-
-class Design(Protocol):
-    """A sequence of runs that are made when they are needed, so that a million of them fit into memory."""
-
-    def __len__(self) -> int:
-        """Number of runs."""
-        ...
-
-    def block(self, start: int, stop: int) -> Block:
-        """Runs start, ..., stop - 1."""
-        ...
-
-
-@dataclass(frozen=True)
-class ListedBlock:
-    """A block of runs that were listed one by one."""
-
-    listed: tuple[Run, ...]
-
-    def __len__(self) -> int:
-        """Number of runs."""
-        return len(self.listed)
-
-    @property
-    def name(self) -> str:
-        """Hash of the runs and of the code that flies them."""
-        from sim.sweep.fingerprint import block_hash
-
-        return block_hash(self.listed)
-
-    @property
-    def expected_s(self) -> float:
-        """Flying time to expect [s]."""
-        return sum(run.expected_s for run in self.listed)
-
-    def runs(self) -> Sequence[Run]:
-        """The runs."""
-        return self.listed
-
-
-@dataclass(frozen=True)
-class Listed:
-    """A design whose runs were listed one by one."""
-
-    listed: Sequence[Run]
-
-    def __len__(self) -> int:
-        """Number of runs."""
-        return len(self.listed)
-
-    def block(self, start: int, stop: int) -> ListedBlock:
-        """Runs start, ..., stop - 1."""
-        return ListedBlock(tuple(self.listed[start:stop]))
+    name: str
+    count: int
+    expected_s: float
+    make: Callable[[], Iterable[Run | Refusal]]

@@ -1,4 +1,4 @@
-"""Hashes that say whether two runs are the same: configuration, seed, and the code that flies."""
+"""Hashes that decide whether two runs are the same: configuration, seed, and source code of the flight."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ import allocation
 import ibvs_qp
 import sim
 from ibvs_qp.config.settings import to_dict
-from sim.sweep.design import Run
+from sim.sweep.design import Block, Run
 
-#: Folders of `sim` whose code only words or draws results: a change there needs no new flight.
-_AFTER_THE_FLIGHT = ("figures", "commands", "experiments", "tune")
-#: What source is written in.
+#: Folders of `sim` that only describe or draw results: a change there needs no new flight.
+_AFTER_THE_FLIGHT = ("figures", "commands", "experiments", "notebook", "report", "tune")
+#: Suffixes of source files.
 _SOURCES = (".py", ".c", ".h")
-#: Letters of a hash that are kept: 64 bit.
+#: Hexadecimal digits of a hash: 64 bit.
 _LENGTH = 16
 
 
 def digest(content: Any) -> str:
-    """Short hash of anything that JSON can hold."""
+    """Short hash of a JSON value."""
     text = json.dumps(content, sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()[:_LENGTH]
 
 
 def configuration_hash(run: Run) -> str:
-    """Hash of scene, configuration, options, job and faults; all seeds of a cell share it."""
+    """Hash of scene, configuration, options, job and faults; all seeds of a cell have the same one."""
     plan = run.plan
     options = {key: value for key, value in dataclasses.asdict(plan.options).items() if key != "seed"}
     return digest(
@@ -47,7 +47,7 @@ def configuration_hash(run: Run) -> str:
 
 @functools.cache
 def code_hash() -> str:
-    """Hash of the source of everything that takes part in a flight."""
+    """Hash of all source code that takes part in a flight."""
     source = hashlib.sha256()
     for package in (allocation, ibvs_qp, sim):
         root = Path(next(iter(package.__path__)))
@@ -59,10 +59,15 @@ def code_hash() -> str:
     return source.hexdigest()[:_LENGTH]
 
 
-def block_hash(runs: Sequence[Run]) -> str:
-    """Identity of a block of runs: the same block under the same code has the same rows."""
+def listed_block(runs: Sequence[Run]) -> Block:
+    """A block of explicitly listed runs."""
     rows = [
         (run.experiment, run.variant, run.params, configuration_hash(run), run.seed, run.measure.__qualname__, run.keep)
         for run in runs
     ]
-    return digest({"rows": rows, "code": code_hash()})
+    return Block(
+        name=digest({"rows": rows, "code": code_hash()}),
+        count=len(runs),
+        expected_s=sum(run.expected_s for run in runs),
+        make=functools.partial(tuple, runs),
+    )

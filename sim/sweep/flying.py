@@ -1,4 +1,4 @@
-"""Fly one block of a design in this process; what fails becomes a row with the reason."""
+"""Fly runs in this process; a failure becomes a row with the reason."""
 
 from __future__ import annotations
 
@@ -23,31 +23,38 @@ from sim.sweep.parts import PARAM
 Row = dict[str, Any]
 
 
-def fly_block(block: Block, name: str, folder: Path, leave_interrupt: bool = False) -> tuple[str, list[Row]]:
+def fly_block(block: Block, folder: Path, ignore_interrupt: bool = False) -> tuple[str, list[Row]]:
     """Fly the runs of a block.
 
     Args:
         block: The runs.
-        name: Its hash.
-        folder: Where logs are kept.
-        leave_interrupt: Whether Ctrl-C is left to the parent of this process.
+        folder: Folder of logs.
+        ignore_interrupt: Whether only the parent of this process handles Ctrl-C.
 
     Returns:
-        The name, and a row per run.
+        The name of the block, and a row per run.
 
     Raises:
-        KeyboardInterrupt: On Ctrl-C; the block is lost then.
+        KeyboardInterrupt: On Ctrl-C; the block is then lost.
     """
-    if leave_interrupt:
+    if ignore_interrupt:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
+    return block.name, [fly_run(run, folder / "logs" / f"{block.name}-{k}") for k, run in enumerate(block.make())]
+
+
+def fly_run(run: Run | Refusal, log: Path | None = None) -> Row:
+    """Fly one run; a failed one is a row with the reason and without figures.
+
+    Args:
+        run: The run.
+        log: Folder of its log, if the run stores one.
+
+    Raises:
+        KeyboardInterrupt: On Ctrl-C.
+    """
     import cv2
 
-    cv2.setNumThreads(1)  # the runs share the cores as processes
-    return name, [_row(run, f"{name}-{index}", folder) for index, run in enumerate(block.runs())]
-
-
-def _row(run: Run | Refusal, name: str, folder: Path) -> Row:
-    """Fly one run; one that fails is a row with the reason and no figures."""
+    cv2.setNumThreads(1)  # the runs use the cores as processes
     row: Row = {
         "experiment": run.experiment,
         "law": run.law,
@@ -74,16 +81,16 @@ def _row(run: Run | Refusal, name: str, folder: Path) -> Row:
     if trace.reason == INTERRUPTED:
         raise KeyboardInterrupt
     row |= {"completed": bool(trace.completed), "reason": trace.reason}
-    if run.keep:
-        row["log"] = _keep(trace, folder / "logs" / name)
+    if run.keep and log is not None:
+        row["log"] = _store(trace, log)
     figures = run.measure(trace)
     return row | {key: None if math.isnan(value) else float(value) for key, value in figures.items()}
 
 
-def _keep(trace: Trace, folder: Path) -> str:
-    """Write the log of a flight where `sim.flight.flight_log.load_run` reads it."""
+def _store(trace: Trace, folder: Path) -> str:
+    """Write the log of a flight in the layout of `sim.flight.flight_log.load_run`."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "scene.toml").write_text(dump_toml(trace.scene), encoding="utf-8")
-    trace.canvas = None  # a picture of the board is the run folder's affair, and large
+    trace.canvas = None  # the picture of the board is large, and only a run folder shows it
     save_log(folder / "log.npz", {trace.law: trace})
     return f"{folder.parent.name}/{folder.name}"

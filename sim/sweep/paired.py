@@ -1,4 +1,4 @@
-"""Differences of flights that share a seed: median, bootstrap interval, and an exact one that says what is sure."""
+"""Differences of flights with the same seed: median, bootstrap interval, and an exact interval for significance."""
 
 from __future__ import annotations
 
@@ -8,37 +8,32 @@ from typing import Any
 
 import numpy as np
 import polars as pl
-from scipy.stats import binom
+from scipy.stats import quantile_test
 
 from sim.sweep.statistics import CONFIDENCE, figure_names, median_interval, parameters, split
 
 
 def exact_interval(values: np.ndarray) -> tuple[float, float]:
-    """Interval of the median from order statistics: it covers at least as often as it says, whatever the distribution.
-
-    [x_(k), x_(n+1-k)] with the largest k for which a fair coin falls on one side fewer than k times in n with at most
-    half of what is left of the confidence: the inverse of the sign test.
+    """Interval of the median from order statistics: the inverse of the sign test, valid for any distribution.
 
     Args:
-        values: Differences; what is not finite is left out.
+        values: Differences; values that are not finite are dropped.
 
     Returns:
-        Lower and upper end; NaN of fewer than six values, of which none is sure at 95 %.
-
-    Source: Conover, Practical Nonparametric Statistics, section 3.2.
+        Lower and upper end; NaN of fewer than `needed` values.
     """
-    good = np.sort(np.asarray(values, float)[np.isfinite(values)])
-    rank = int(binom.ppf((1.0 - CONFIDENCE) / 2.0, len(good), 0.5)) if len(good) else 0
-    return (float(good[rank - 1]), float(good[-rank])) if rank else (math.nan, math.nan)
+    good = np.asarray(values, float)
+    interval = quantile_test(good[np.isfinite(good)], p=0.5).confidence_interval(CONFIDENCE)
+    return float(interval.low), float(interval.high)
 
 
 def needed() -> int:
-    """Fewest pairs that can make a difference sure."""
+    """Fewest pairs of a significant difference."""
     return math.ceil(1.0 - math.log2(1.0 - CONFIDENCE))
 
 
 def sign(figure: dict[str, float]) -> int:
-    """+1 or -1 for a surely positive or negative difference, 0 for one that may be none or has too few pairs."""
+    """+1 or -1 for a significantly positive or negative difference, else 0."""
     return int(figure["sure_low"] > 0.0) - int(figure["sure_high"] < 0.0)
 
 
@@ -60,9 +55,8 @@ def differences(first: pl.DataFrame, second: pl.DataFrame, names: Sequence[str])
     figures = {}
     for name in names:
         values = (done[f"{name}.second"] - done[name]).cast(pl.Float64).fill_null(math.nan).to_numpy()
-        if np.isfinite(values).any():
+        if pairs := int(np.isfinite(values).sum()):
             low, high = exact_interval(values)
-            pairs = int(np.count_nonzero(np.isfinite(values)))
             figures[name] = {**median_interval(values), "pairs": pairs, "sure_low": low, "sure_high": high}
     failed = [int((~both[name]).sum()) for name in ("completed", "completed.second")]
     return {"flown": both.height, "n": done.height, "failed": failed, "differences": figures}
@@ -71,8 +65,8 @@ def differences(first: pl.DataFrame, second: pl.DataFrame, names: Sequence[str])
 def paired_differences(table: pl.DataFrame, names: Sequence[str] | None = None) -> list[dict[str, Any]]:
     """Analytic law minus QP law, seed by seed, per variant and parameters.
 
-    Only flights that both laws ended as planned are compared: what a crash cut short measures nothing. A positive
-    difference of an error means that the QP law is better.
+    Only flights that both laws ended as planned are compared. A positive difference of an error means that the QP law
+    is better.
 
     Args:
         table: Rows of both laws.
@@ -80,8 +74,8 @@ def paired_differences(table: pl.DataFrame, names: Sequence[str] | None = None) 
     """
     result = []
     for key, rows in split(table, ("experiment", "variant")):
-        laws = {law: rows.filter(pl.col("law") == law) for law in ("qp", "paper")}
-        found = differences(laws["qp"], laws["paper"], list(names or figure_names(table)))
+        qp, paper = (rows.filter(pl.col("law") == law) for law in ("qp", "paper"))
+        found = differences(qp, paper, names or figure_names(table))
         if found["flown"]:
             cell = {"experiment": key["experiment"], "variant": key["variant"], "params": parameters(key)}
             result.append(cell | found)
@@ -91,11 +85,11 @@ def paired_differences(table: pl.DataFrame, names: Sequence[str] | None = None) 
 def variant_differences(
     table: pl.DataFrame, references: Mapping[str, Sequence[str]], names: Sequence[str] | None = None
 ) -> list[dict[str, Any]]:
-    """Each variant minus the one it is judged against, per law and parameters, seed by seed.
+    """Each variant minus its reference, per law and parameters, seed by seed.
 
     Args:
         table: Rows of some variants.
-        references: For each variant what it is judged against; the first that flew in the same cell.
+        references: Possible references of each variant; the first one in the same cell counts.
         names: Figures to compare; None takes all.
     """
     result = []
@@ -105,7 +99,7 @@ def variant_differences(
             against = next((name for name in references.get(variant, ()) if name in flown and name != variant), None)
             if against is None:
                 continue
-            found = differences(flown[against], part, list(names or figure_names(table)))
+            found = differences(flown[against], part, names or figure_names(table))
             if found["flown"]:
                 cell = {"experiment": key["experiment"], "law": key["law"], "variant": variant, "against": against}
                 result.append(cell | {"params": parameters(key)} | found)

@@ -1,4 +1,4 @@
-"""Parquet parts of a sweep: written whole or not at all, found again by hash, joined in the order of the design."""
+"""Parquet parts of a sweep: complete or absent, named by hash, joined in the order of the design."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 import polars as pl
 
-#: Columns that every row has, before parameters and figures.
+#: Columns of every row, before parameters and figures.
 HEAD = {
     "experiment": pl.String,
     "law": pl.String,
@@ -31,13 +31,8 @@ def part_file(folder: Path, name: str) -> Path:
     return folder / f"part-{name}.parquet"
 
 
-def write_part(file: Path, rows: Sequence[dict[str, Any]]) -> None:
-    """Write a block's rows; the file appears under its name only when complete."""
-    write_table(file, frame(rows))
-
-
 def write_table(file: Path, table: pl.DataFrame) -> None:
-    """Write a table by an atomic rename, so that no reader and no crash meets half a file."""
+    """Write a table by an atomic rename, so that neither a reader nor a crash sees half a file."""
     file.parent.mkdir(parents=True, exist_ok=True)
     partial = file.with_name(f".{file.name}.{os.getpid()}")
     table.write_parquet(partial)
@@ -45,7 +40,7 @@ def write_table(file: Path, table: pl.DataFrame) -> None:
 
 
 def frame(rows: Sequence[dict[str, Any]]) -> pl.DataFrame:
-    """Rows as a table: head columns as they are, every figure a float, parameters of their own type."""
+    """Rows as a table: typed head columns, every figure a float, parameters of their own type."""
     schema: dict[str, Any] = dict(HEAD)
     for row in rows:
         for name, value in row.items():
@@ -59,6 +54,6 @@ def _kind(value: Any) -> Any:
 
 
 def join(files: Sequence[Path]) -> pl.DataFrame:
-    """One table of several parts, in the order given; a column that a part lacks is null there."""
+    """One table of several parts, in the given order; a column that a part lacks is null there."""
     tables = [pl.read_parquet(file) for file in files]
     return pl.concat(tables, how="diagonal_relaxed") if tables else pl.DataFrame(schema=HEAD)

@@ -1,4 +1,4 @@
-"""Who flies the blocks: this process, processes of this computer, or a cluster; all through joblib, all alike."""
+"""Pools that fly blocks, all through joblib: this process, processes of this computer, or a Dask cluster."""
 
 from __future__ import annotations
 
@@ -11,35 +11,24 @@ from ibvs_qp.config.errors import IbvsQpError
 from sim.sweep.design import Block
 from sim.sweep.flying import Row, fly_block
 
-#: Flies named blocks in any order and hands over name and rows of each as it is finished.
-Pool = Callable[[Sequence[tuple[Block, str]], Path], Iterator[tuple[str, list[Row]]]]
-#: Blocks handed to a cluster ahead of time: a cluster that grows finds work waiting, and a block is a few kB.
+#: Flies blocks in any order and yields name and rows of each when it is finished.
+Pool = Callable[[Sequence[Block], Path], Iterator[tuple[str, list[Row]]]]
+#: Blocks sent to a cluster ahead of time: a growing cluster finds work, and a block is a few kB.
 AHEAD = 1000
 
 
 class WorkerDied(IbvsQpError):
-    """A process that flew died without a word, as one does that the system ends for lack of memory."""
+    """A process died without an exception, as after the system ran out of memory."""
 
 
-def local_pool(workers: int) -> Pool:
-    """This process for one worker, else so many processes of this computer."""
-    return fly_here if workers == 1 else functools.partial(fly_apart, workers=workers)
-
-
-def fly_here(blocks: Sequence[tuple[Block, str]], folder: Path) -> Iterator[tuple[str, list[Row]]]:
-    """One block after the other in this process."""
-    for block, name in blocks:
-        yield fly_block(block, name, folder)
-
-
-def fly_apart(blocks: Sequence[tuple[Block, str]], folder: Path, workers: int) -> Iterator[tuple[str, list[Row]]]:
-    """Blocks in processes of this computer; a single block needs none.
+def fly_local(blocks: Sequence[Block], folder: Path, workers: int) -> Iterator[tuple[str, list[Row]]]:
+    """Blocks in processes of this computer; in this process for one worker or a single block.
 
     Raises:
         WorkerDied: When a process died.
     """
-    if len(blocks) <= 1:
-        yield from fly_here(blocks, folder)
+    if workers == 1 or len(blocks) <= 1:
+        yield from (fly_block(block, folder) for block in blocks)
         return
     import joblib
     from joblib.externals.loky import get_reusable_executor
@@ -47,9 +36,9 @@ def fly_apart(blocks: Sequence[tuple[Block, str]], folder: Path, workers: int) -
 
     with joblib.parallel_config(backend="loky", inner_max_num_threads=1):
         try:
-            yield from _parallel(blocks, folder, n_jobs=workers, leave_interrupt=True)
+            yield from _parallel(blocks, folder, ignore_interrupt=True, n_jobs=workers)
         except KeyboardInterrupt:
-            # What is in the air is lost: its part is not written, and a run that starts again flies it anew.
+            # Blocks in flight are lost: they have no part, and the next start flies them anew.
             get_reusable_executor().shutdown(wait=False, kill_workers=True)
             raise
         except BrokenProcessPool:
@@ -57,11 +46,11 @@ def fly_apart(blocks: Sequence[tuple[Block, str]], folder: Path, workers: int) -
 
 
 def dask_pool(client: Any) -> Pool:
-    """The workers of a Dask cluster, whatever started them."""
+    """The workers of a Dask cluster."""
     return functools.partial(_fly_dask, client=client)
 
 
-def _fly_dask(blocks: Sequence[tuple[Block, str]], folder: Path, client: Any) -> Iterator[tuple[str, list[Row]]]:
+def _fly_dask(blocks: Sequence[Block], folder: Path, client: Any) -> Iterator[tuple[str, list[Row]]]:
     import joblib
     from distributed.scheduler import KilledWorker
 
@@ -75,17 +64,16 @@ def _fly_dask(blocks: Sequence[tuple[Block, str]], folder: Path, client: Any) ->
 
 
 def _parallel(
-    blocks: Sequence[tuple[Block, str]], folder: Path, leave_interrupt: bool = False, **settings: Any
+    blocks: Sequence[Block], folder: Path, ignore_interrupt: bool = False, **settings: Any
 ) -> Iterator[tuple[str, list[Row]]]:
     import joblib
 
     parallel = joblib.Parallel(return_as="generator_unordered", batch_size=1, **settings)  # type: ignore[arg-type]
-    calls = (joblib.delayed(fly_block)(block, name, folder, leave_interrupt) for block, name in blocks)
-    yield from parallel(calls)  # type: ignore[misc]
+    yield from parallel(joblib.delayed(fly_block)(block, folder, ignore_interrupt) for block in blocks)  # type: ignore[misc]
 
 
 def _died(folder: Path) -> WorkerDied:
     return WorkerDied(
-        f"a process that flew died; was it out of memory? Finished blocks are in {folder}: "
-        "the same command goes on from there, with fewer --jobs if memory was short"
+        f"a flying process died, possibly for lack of memory. Finished blocks are in {folder}: "
+        "the same command continues from there, with fewer --jobs if memory was short"
     )

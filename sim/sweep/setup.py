@@ -1,10 +1,9 @@
-"""What a sweep may vary: scene, pilot and job as one tree, changed by dotted paths."""
+"""The tree of all sweep parameters: scene, pilot and job, changed by dotted paths."""
 
 from __future__ import annotations
 
 import copy
 import dataclasses
-import typing
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -12,19 +11,21 @@ from typing import Any
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.settings import from_dict, to_dict
 from ibvs_qp.pilot import PilotConfig
-from sim.flight.closed_loop import FlightOptions, pilot_config
 from sim.flight.jobs import PaintJob, PressJob
 from sim.world.scene import Scene
+
+#: Sections of a setup, the first parts of a dotted path.
+ROOTS = ("scene", "pilot", "job")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Setup:
-    """Everything of a flight that a dotted path reaches, e.g. ``scene.wall.friction``.
+    """Everything of a flight within reach of a dotted path, e.g. ``scene.wall.friction``.
 
     Attributes:
         scene: The truth.
         pilot: Perception, controller, strategy.
-        job: What is done at the wall.
+        job: Task at the wall.
     """
 
     scene: Scene = field(default_factory=Scene)
@@ -36,27 +37,42 @@ def changed(setup: Setup, values: Mapping[str, Any]) -> Setup:
     """The setup with other values, checked alone and together.
 
     Args:
-        setup: Where to start.
-        values: New value by dotted path; a last part that is a number counts entries of a list from 0.
+        setup: Start values.
+        values: New value by dotted path; a number as last part is the index of a list entry, from 0.
 
     Raises:
-        ConfigError: Naming path, value, unit and allowed range.
+        ConfigError: With path, value, unit and allowed range.
     """
-    roots = {name: getattr(setup, name) for name in ("scene", "pilot", "job")}
-    trees = {name: to_dict(root) for name, root in roots.items()}
-    touched = set()
+    trees: dict[str, dict[str, Any]] = {}
     for path, value in values.items():
         root, _, rest = path.partition(".")
-        if root not in roots or not rest:
+        if root not in ROOTS or not rest:
             raise ConfigError(f"unknown parameter {path!r}; paths begin with scene., pilot. or job.")
+        if root not in trees:
+            trees[root] = copy.deepcopy(to_dict(getattr(setup, root)))
         if not trees[root] and root == "job":
             raise ConfigError(f"unknown parameter {path!r}: this job has no settings")
-        if root not in touched:
-            trees[root] = copy.deepcopy(trees[root])
-            touched.add(root)
         _put(trees[root], rest.split("."), value, path)
-    new = {name: from_dict(type(roots[name]), trees[name], name) for name in touched}
-    return Setup(**{**roots, **new})
+    return dataclasses.replace(
+        setup, **{root: from_dict(type(getattr(setup, root)), tree, root) for root, tree in trees.items()}
+    )
+
+
+def _put(tree: dict[str, Any], parts: list[str], value: Any, path: str) -> None:
+    node: Any = tree
+    for part in parts[:-1]:
+        # `from_dict` later refuses an unknown section by name.
+        node = node.setdefault(part, {}) if isinstance(node, dict) else None
+    last = parts[-1]
+    if isinstance(node, dict):
+        if isinstance(node.get(last), dict):
+            raise ConfigError(f"{path} is a section; give one of its keys: {', '.join(node[last])}")
+        node[last] = value
+    elif isinstance(node, list) and last.isdigit() and int(last) < len(node):
+        node[int(last)] = value
+    else:
+        kind = f"a list of {len(node)}, entries 0 to {len(node) - 1}" if isinstance(node, list) else "a single value"
+        raise ConfigError(f"unknown parameter {path!r}: {path.rsplit('.', 1)[0]} is {kind}")
 
 
 def value_at(setup: Setup, path: str) -> Any:
@@ -79,38 +95,13 @@ def value_at(setup: Setup, path: str) -> Any:
     return node
 
 
-def flown_by(setup: Setup, options: FlightOptions) -> PilotConfig:
-    """The pilot as it flies: what the scene decides for it is filled in."""
-    return pilot_config(setup.scene, options, setup.pilot)
-
-
-def _put(tree: dict[str, Any], parts: list[str], value: Any, path: str) -> None:
-    node: Any = tree
-    for part in parts[:-1]:
-        if isinstance(node, dict) and part not in node:
-            node[part] = {}  # an unknown section: refused by name when the tree is read
-        node = node[part] if isinstance(node, dict) else None
-    last = parts[-1]
-    if isinstance(node, dict):
-        if isinstance(node.get(last), dict):
-            raise ConfigError(f"{path} is a section; give one of its keys: {', '.join(node[last])}")
-        node[last] = value
-    elif isinstance(node, list) and last.isdigit() and int(last) < len(node):
-        node[int(last)] = value
-    else:
-        held = f"a list of {len(node)}, entries 0 to {len(node) - 1}" if isinstance(node, list) else "a single value"
-        raise ConfigError(f"unknown parameter {path!r}: {path.rsplit('.', 1)[0]} is {held}")
-
-
 def unit_of(path: str) -> str:
-    """Unit of a dotted path; empty where it has none or there is no such path."""
-    kinds = {"scene": Scene, "pilot": PilotConfig, "job": PressJob}
-    root, *parts = path.split(".")
-    kind, unit = kinds.get(root), ""
-    for part in parts:
-        fields = {each.name: each for each in dataclasses.fields(kind)} if dataclasses.is_dataclass(kind) else {}
+    """Unit of a dotted path; empty for a pure number or an unknown path."""
+    node: Any = Setup(job=PressJob())
+    unit = ""
+    for part in path.split("."):
+        fields = {each.name: each for each in dataclasses.fields(node)} if dataclasses.is_dataclass(node) else {}
         if part not in fields:
             break
-        unit = fields[part].metadata.get("unit", "")
-        kind = typing.get_type_hints(kind)[part]
+        unit, node = fields[part].metadata.get("unit", ""), getattr(node, part)
     return unit

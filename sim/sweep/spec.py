@@ -1,8 +1,9 @@
-"""A sweep as a TOML file: what is flown, what is held, what is varied."""
+"""A sweep as a TOML file: flights, fixed values, varied values."""
 
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import re
 import tomllib
 from dataclasses import dataclass
@@ -12,15 +13,15 @@ from typing import Any
 from ibvs_qp.config.errors import ConfigError, out_of_range
 from ibvs_qp.config.settings import choice, from_dict, setting, validate
 from ibvs_qp.pilot import PilotConfig
-from sim.flight.closed_loop import FlightOptions, default_preset
+from sim.flight.closed_loop import FlightOptions, default_preset, pilot_config
 from sim.flight.jobs import PaintJob, PressJob
-from sim.sweep.axes import Axis, grid_axis, random_axis
-from sim.sweep.setup import Setup, changed, flown_by, value_at
+from sim.sweep.axes import Axis, make_axis
+from sim.sweep.setup import Setup, changed, value_at
 from sim.world.scene import Scene, load_scene
 
 LAWS = ("qp", "paper")
 JOBS = {"paint": PaintJob, "press": PressJob}
-#: Sections of a spec that hold dotted paths.
+#: Sections of a spec with dotted paths.
 SECTIONS = ("fixed", "grid", "random")
 
 
@@ -29,9 +30,9 @@ class SweepSettings:
     """The keys of a spec outside its sections."""
 
     name: str = setting("sweep", "name of the table: letters, digits, - and _")
-    about: str = setting("", "what is asked, in a sentence")
+    about: str = setting("", "question of the sweep, in a sentence")
     job: str = choice("press", "press and slide, or paint", tuple(JOBS))
-    laws: tuple[str, ...] = ("qp",)  # laws that fly every point, with the same seeds
+    laws: tuple[str, ...] = ("qp",)  # every point flies under each law, with the same seeds
     features: str = choice("geometric", "sensor model of lines, or rendered pictures", ("geometric", "rendered"))
     vision: str = choice("own", "perception of rendered pictures", ("own", "paper"))
     scene: str = setting("", "scene file, beside the spec; empty is the default scene")
@@ -40,8 +41,8 @@ class SweepSettings:
     seed: int = setting(0, "first seed", low=0, high=2**31 - 1)
     seeds: int = setting(1, "flights of every point and law: seed, seed + 1, ...", low=1, high=1_000_000)
     samples: int = setting(0, "number of draws of [random]", low=0, high=1_000_000_000)
-    draw: str = choice("random", "how they are drawn", ("random", "sobol"))
-    block_runs: int = setting(10, "runs per block: what an interrupt may lose", low=1, high=100_000)
+    draw: str = choice("random", "method of the draws", ("random", "sobol"))
+    block_runs: int = setting(10, "runs per block: the most that an interrupt loses", low=1, high=100_000)
 
     def __post_init__(self) -> None:
         """Validate."""
@@ -58,9 +59,9 @@ class SweepSpec:
 
     Attributes:
         settings: Keys outside the sections.
-        setups: What every law starts from, [fixed] included.
-        grid: Axes of the grid; every combination is flown.
-        random: Axes that are drawn; every draw is flown at every point of the grid.
+        setups: Start values of every law, [fixed] included.
+        grid: Axes of the grid; every combination flies.
+        random: Drawn axes; every draw flies at every point of the grid.
     """
 
     settings: SweepSettings
@@ -70,10 +71,10 @@ class SweepSpec:
 
 
 def load_spec(file: Path) -> SweepSpec:
-    """Read a spec and check every name and every value that can be checked alone.
+    """Read a spec and check every name and every single value.
 
     Raises:
-        ConfigError: Naming the file and what is wrong in it.
+        ConfigError: With the file and the error in it.
     """
     try:
         table = tomllib.loads(file.read_text(encoding="utf-8"))
@@ -88,31 +89,36 @@ def load_spec(file: Path) -> SweepSpec:
 
 
 def parse_spec(table: dict[str, Any], folder: Path) -> SweepSpec:
-    """Check a spec that was read; scene and presets lie beside it.
+    """Check the content of a spec; paths of scene and presets are relative to its folder.
 
     Raises:
-        ConfigError: Naming what is wrong.
+        ConfigError: With the reason.
     """
     sections = {name: _section(table, name) for name in SECTIONS}
     settings = from_dict(SweepSettings, {key: value for key, value in table.items() if key not in SECTIONS})
     if bool(sections["random"]) != bool(settings.samples):
         raise ConfigError("samples and [random] go together: give both or neither")
     scene = load_scene(folder / settings.scene) if settings.scene else Scene()
-    _refuse_twice(sections)
+    for a, b in itertools.combinations(SECTIONS, 2):
+        for path in sections[a].keys() & sections[b].keys():
+            raise ConfigError(f"{path} is in [{a}] and in [{b}]; leave it in one of them")
     setups = {}
-    for law in settings.laws:
-        start = Setup(scene=scene, pilot=_preset(settings, law, folder), job=JOBS[settings.job]())
-        setups[law] = changed(start, sections["fixed"])
-    first = next(iter(setups.values()))
-    grid = tuple(grid_axis(path, given, value_at(first, path)) for path, given in sections["grid"].items())
-    random = tuple(random_axis(path, given, value_at(first, path)) for path, given in sections["random"].items())
+    for law, file in (("qp", settings.preset_qp), ("paper", settings.preset_paper)):
+        if law in settings.laws:
+            pilot = PilotConfig.from_toml(folder / file) if file else default_preset(law)
+            setups[law] = changed(Setup(scene=scene, pilot=pilot, job=JOBS[settings.job]()), sections["fixed"])
+    first = setups[settings.laws[0]]
+    grid, random = (
+        tuple(make_axis(name, path, given, value_at(first, path)) for path, given in sections[name].items())
+        for name in ("grid", "random")
+    )
     spec = SweepSpec(settings=settings, setups=setups, grid=grid, random=random)
     _check_values(spec, sections["fixed"])
     return spec
 
 
 def options_of(settings: SweepSettings, law: str, seed: int) -> FlightOptions:
-    """How a run is flown."""
+    """Options of a flight of the spec."""
     return FlightOptions(law=law, seed=seed, features=settings.features, vision=settings.vision, video=False)
 
 
@@ -124,7 +130,7 @@ def _section(table: dict[str, Any], name: str) -> dict[str, Any]:
 
 
 def flat(table: dict[str, Any], fixed: bool, prefix: str = "") -> dict[str, Any]:
-    """Dotted paths of nested tables, so that quotes around a path may be left out; low and high make a range."""
+    """Dotted paths of nested tables, so that a path needs no quotes; low and high make a range."""
     paths = {}
     for key, value in table.items():
         if isinstance(value, dict) and (fixed or not {"low", "high"} & value.keys()):
@@ -134,34 +140,18 @@ def flat(table: dict[str, Any], fixed: bool, prefix: str = "") -> dict[str, Any]
     return paths
 
 
-def _preset(settings: SweepSettings, law: str, folder: Path) -> PilotConfig:
-    file = {"qp": settings.preset_qp, "paper": settings.preset_paper}[law]
-    return PilotConfig.from_toml(folder / file) if file else default_preset(law)
-
-
-def _refuse_twice(sections: dict[str, dict[str, Any]]) -> None:
-    seen: dict[str, str] = {}
-    for name, paths in sections.items():
-        for path in paths:
-            if path in seen:
-                raise ConfigError(f"{path} is in [{seen[path]}] and in [{name}]; leave it in one of them")
-            seen[path] = name
-
-
 def _check_values(spec: SweepSpec, fixed: dict[str, Any]) -> None:
-    """Every value alone, under every law; and that nothing else decides it when it flies."""
+    """Check every value alone, under every law, and that no other setting overrides it in flight."""
     varied = {path: (value,) for path, value in fixed.items()}
     varied |= {axis.path: axis.ends for axis in (*spec.grid, *spec.random)}
     for law, setup in spec.setups.items():
         options = options_of(spec.settings, law, spec.settings.seed)
         for path, values in varied.items():
             for value in values:
-                asked = changed(setup, {path: value})
-                if not path.startswith("pilot."):
-                    continue
-                flown = dataclasses.replace(asked, pilot=flown_by(asked, options))
-                if value_at(flown, path) != value_at(asked, path):
+                given = changed(setup, {path: value})
+                flown = dataclasses.replace(given, pilot=pilot_config(given.scene, options, given.pilot))
+                if path.startswith("pilot.") and value_at(flown, path) != value_at(given, path):
                     raise ConfigError(
-                        f"{path} cannot be set here: scene.paint, laws and vision decide it; "
-                        "the paint job, for one, is told to the pilot by the scene"
+                        f"{path} cannot be set here: scene.paint, laws and vision determine it; "
+                        "the pilot takes its paint job, for example, from the scene"
                     )

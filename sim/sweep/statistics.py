@@ -1,8 +1,7 @@
-"""What a table of runs says: medians with bootstrap intervals per cell."""
+"""Statistics of a table of runs: medians with bootstrap intervals per cell."""
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Collection, Sequence
 from typing import Any
@@ -23,10 +22,10 @@ def median_interval(values: np.ndarray) -> dict[str, float]:
     """Median with its percentile bootstrap interval; of a single value, or equal ones, the value itself.
 
     Args:
-        values: Figures of the flights of one cell; what is not finite is left out.
+        values: Figures of the flights of one cell; values that are not finite are dropped.
 
     Returns:
-        ``median``, ``low``, ``high``; NaN of nothing.
+        ``median``, ``low``, ``high``; NaN without values.
     """
     good = np.asarray(values, float)
     good = good[np.isfinite(good)]
@@ -48,7 +47,7 @@ def median_interval(values: np.ndarray) -> dict[str, float]:
 
 
 def figure_names(table: pl.DataFrame) -> list[str]:
-    """Columns that hold figures."""
+    """Columns of figures."""
     return [name for name in table.columns if name not in HEAD and not name.startswith(PARAM)]
 
 
@@ -60,7 +59,7 @@ def parameters(row: dict[str, Any]) -> dict[str, Any]:
 
 
 def split(table: pl.DataFrame, keys: Sequence[str]) -> list[tuple[dict[str, Any], pl.DataFrame]]:
-    """Groups of rows alike in some columns and in all parameters, in the order of the table."""
+    """Groups of rows with equal columns `keys` and equal parameters, in the order of the table."""
     columns = [*keys, *(name for name in table.columns if name.startswith(PARAM))]
     groups = table.group_by(columns, maintain_order=True)
     return [(dict(zip(columns, values, strict=True)), rows) for values, rows in groups]
@@ -69,37 +68,17 @@ def split(table: pl.DataFrame, keys: Sequence[str]) -> list[tuple[dict[str, Any]
 def cells(table: pl.DataFrame, of_all: Collection[str] = ()) -> list[dict[str, Any]]:
     """Cells of the contract: law, variant, params, n, completed, and every figure with its interval.
 
-    Figures are those of flights that ended as planned: what a crash cut short measures nothing.
+    Only flights that ended as planned have figures: a flight cut short by a crash measures nothing.
 
     Args:
         table: Rows.
-        of_all: Figures that failed flights have as well, such as how long they lived.
+        of_all: Figures that failed flights have as well, such as their duration.
     """
     names, result = figure_names(table), []
     for key, rows in split(table, ("experiment", "law", "variant")):
         done = rows.filter(pl.col("completed"))
         columns = {name: (rows if name in of_all else done)[name].drop_nulls() for name in names}
-        result.append(
-            {
-                "experiment": key["experiment"],
-                "law": key["law"],
-                "variant": key["variant"],
-                "params": parameters(key),
-                "n": rows.height,
-                "completed": done.height,
-                "metrics": {
-                    name: median_interval(values.to_numpy()) for name, values in columns.items() if len(values)
-                },
-            }
-        )
+        metrics = {name: median_interval(values.to_numpy()) for name, values in columns.items() if len(values)}
+        cell = {name: key[name] for name in ("experiment", "law", "variant")} | {"params": parameters(key)}
+        result.append(cell | {"n": rows.height, "completed": done.height, "metrics": metrics})
     return result
-
-
-def same_cell(params: dict[str, Any], wanted: dict[str, Any]) -> bool:
-    """Whether a cell has the wanted values of the wanted parameters."""
-    return all(name in params and params[name] == value for name, value in wanted.items())
-
-
-def cell_name(cell: dict[str, Any]) -> str:
-    """Law, variant and parameters of a cell as one text."""
-    return f"{cell['law']} {cell['variant']} {json.dumps(cell['params'])}"

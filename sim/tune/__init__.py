@@ -1,1 +1,1 @@
-"""Search for gains: several objectives, the same search, budget and flights for both laws, judged on unseen seeds."""
+"""Search for gains: several objectives, the same search, budget and flights for both laws, compared on unseen seeds."""

@@ -1,22 +1,24 @@
-"""Choosing one preset from a front: nowhere clearly worse than the shipped one, and best on the whole."""
+"""Rules for choosing one preset among many: nowhere clearly worse than the shipped one, and best on the mean."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+
+import numpy as np
 
 from ibvs_qp.config.contact_margin import least_margin
 from ibvs_qp.pilot import PilotConfig
 from sim.tune.objectives import OBJECTIVES, Score
 
-#: A preset may be this much worse than the shipped one in any objective: a tenth is about what seeds do.
+#: Largest ratio to the shipped preset in any objective [-]: seeds alone change an objective by about a tenth.
 ALLOWED_WORSE = 1.1
-#: It may be this much worse in any objective of a single scene: fewer flights, more luck.
+#: The same in any objective of a single scene [-]: fewer flights, more luck.
 ALLOWED_WORSE_SCENE = 1.25
-#: It keeps this much of the shipped preset's contact damping: stability is worth as much as an objective.
-DAMPING_KEPT = 1.0 / ALLOWED_WORSE
-#: Presets of a search that fly again, on other seeds and harder scenes, before one is chosen: the best of many trials
-#: is partly luck, and what the harder scenes ask of it no trial has shown.
+#: Least ratio to the shipped preset's contact damping [-]: stability is worth as much as an objective.
+LEAST_DAMPING = 1.0 / ALLOWED_WORSE
+#: Presets of a search that fly again, on other seeds and harder scenes, before the choice: the best of many trials is
+#: partly luck, and no trial flew the harder scenes.
 FINALISTS = 8
 
 
@@ -28,7 +30,7 @@ def gain_over(score: Score, shipped: Score) -> float:
 
 
 def allowed(score: Score, shipped: Score, worse: float = ALLOWED_WORSE) -> bool:
-    """Whether it may take the shipped preset's place.
+    """Whether a preset is good enough to replace the shipped one.
 
     Args:
         score: Its own.
@@ -45,16 +47,16 @@ def contact_damping(config: PilotConfig) -> float:
 
 
 def ranked(scores: Mapping[int, Score], shipped: Score) -> list[int]:
-    """Trials that may take the shipped preset's place and better it, best first."""
+    """Trials that may replace the shipped preset and are better on the mean, best first."""
     good = [number for number, each in scores.items() if allowed(each, shipped) and gain_over(each, shipped) < 0.0]
     return sorted(good, key=lambda number: (gain_over(scores[number], shipped), number))
 
 
 def front(scores: Mapping[int, Score]) -> list[int]:
-    """Trials that no other betters in every objective, all of whose flights completed."""
-    able = {number: each.values for number, each in scores.items() if not each.failed}
-    return [number for number, mine in able.items() if not any(_dominates(other, mine) for other in able.values())]
-
-
-def _dominates(a: Sequence[float], b: Sequence[float]) -> bool:
-    return all(x <= y for x, y in zip(a, b, strict=True)) and any(x < y for x, y in zip(a, b, strict=True))
+    """Pareto front: trials with all flights completed and no other trial better or equal in every objective."""
+    able = {number: np.array(each.values) for number, each in scores.items() if not each.failed}
+    return [
+        number
+        for number, mine in able.items()
+        if not any((other <= mine).all() and (other < mine).any() for other in able.values())
+    ]

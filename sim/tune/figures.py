@@ -12,19 +12,20 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, StrMethodF
 from sim.figures.style import FAINT, REFERENCE, law_colour, law_name, new_figure
 from sim.sweep.parts import PARAM
 from sim.tune.choice import front
+from sim.tune.finalists import TUNED
 from sim.tune.objectives import OBJECTIVES, Score
-from sim.tune.verdict import TUNED, paired
+from sim.tune.verdict import paired
 
-#: Trials worse than this many times the shipped preset lie outside the picture.
-_SHOWN_TO = 2.0
-#: Logarithmic axes that span less have no two of 1, 2, 5, 10 on them.
+#: Upper end of the axes, as a multiple of the shipped preset.
+_AXES_TO = 2.0
+#: Logarithmic axes with a smaller ratio of their ends have linear ticks: no two of 1, 2, 5, 10 lie on them.
 _NARROW = 3.0
 _MARKERS = ("o", "s", "^", "D", "v", "P")
 _SHADES = ("#222222", "#8a8a8a", "#c0a000", "#7a5195", "#5a8f3c")
 
 
 def draw_front(law: str, scores: dict[int, Score], shipped: Score, chosen: int | None) -> Figure:
-    """Every pair of objectives: trials, those that no other betters, the shipped and the chosen preset."""
+    """Every pair of objectives: trials, Pareto front, the shipped and the chosen preset."""
     able = {number: each for number, each in scores.items() if not each.failed}
     best, last = front(scores), len(OBJECTIVES) - 1
     figure = new_figure(7.0)
@@ -49,7 +50,7 @@ def draw_front(law: str, scores: dict[int, Score], shipped: Score, chosen: int |
                          linewidth=1.3, label="chosen")  # fmt: skip
         for axis, objective, place in ((axes.set_xlim, x, i), (axes.set_ylim, y, j)):
             seen = [each.values[place] for each in [*able.values(), shipped]]
-            axis(0.9 * objective.scale * min(seen), objective.scale * min(1.05 * max(seen), _SHOWN_TO * start[place]))
+            axis(0.9 * objective.scale * min(seen), objective.scale * min(1.05 * max(seen), _AXES_TO * start[place]))
         if j == last:
             axes.set_xlabel(x.label)
         if i == 0:

@@ -1,4 +1,4 @@
-"""The finalists of a search: what they do on seeds and scenes that no trial flew, and which of them is chosen."""
+"""Flights beyond the search: finalists on other seeds and harder scenes, and the chosen preset on unseen seeds."""
 
 from __future__ import annotations
 
@@ -13,22 +13,20 @@ from sim.sweep.engine import SweepProgress
 from sim.sweep.parts import PARAM
 from sim.tune.choice import (
     ALLOWED_WORSE_SCENE,
-    DAMPING_KEPT,
     FINALISTS,
+    LEAST_DAMPING,
     allowed,
     contact_damping,
     gain_over,
     ranked,
 )
-from sim.tune.flights import CHOICE_SEED, checks, flights, scenes, seeds
+from sim.tune.flights import CHOICE_SEED, REPORT_SEED, checks, flights, scenes, seeds
 from sim.tune.objectives import Score, score
-from sim.tune.search import SearchPlan, start_gains
+from sim.tune.search import SearchPlan, Trials, start_gains
 from sim.tune.space import with_gains
 
-#: Name under which the shipped preset flies.
-SHIPPED = "shipped"
-
-Trials = dict[int, tuple[dict[str, float], Score]]
+#: Names of the shipped and of the chosen preset in tables.
+SHIPPED, TUNED = "shipped", "tuned"
 
 
 @dataclass(frozen=True)
@@ -46,7 +44,7 @@ class Finalist:
     damping: float
 
     def may_replace(self, shipped: Finalist) -> bool:
-        """Whether it betters the shipped preset on the whole, and is clearly worse in no objective and no scene."""
+        """Whether it is better than the shipped preset on the mean, and clearly worse in no objective and no scene."""
         near = all(allowed(self.scenes[name], each, ALLOWED_WORSE_SCENE) for name, each in shipped.scenes.items())
         return near and allowed(self.score, shipped.score) and gain_over(self.score, shipped.score) < 0.0
 
@@ -58,46 +56,56 @@ def fly_finalists(
 
     Args:
         plan: The search.
-        trials: What it found.
+        trials: Its trials.
         count: Seeds per scene.
-        parts: Where flights are kept.
-        progress: Told about the flights.
+        parts: Folder of the flights.
+        progress: Progress of the flights.
 
     Returns:
-        The shipped preset and every finalist, by name or number; empty when no trial came so far.
+        The shipped preset and every finalist, by name or number; empty when no trial qualifies.
 
     Raises:
-        KeyboardInterrupt: On Ctrl-C; what was flown is kept.
+        KeyboardInterrupt: On Ctrl-C; finished flights stay on disk.
     """
-    shipped = contact_damping(plan.shipped)
-    better = ranked({number: each for number, (_, each) in trials.items()}, shipped_score(plan, trials))
-    damped = {number: contact_damping(with_gains(plan.shipped, trials[number][0])) for number in better}
-    best = [number for number in better if damped[number] >= DAMPING_KEPT * shipped][:FINALISTS]
-    if not best:
+    dampings = {SHIPPED: contact_damping(plan.shipped)}
+    presets: dict[str, dict[str, float]] = {SHIPPED: {}}
+    for number in ranked({number: each for number, (_, each) in trials.items()}, shipped_score(plan, trials)):
+        if len(presets) > FINALISTS:
+            break
+        gains = trials[number][0]
+        damping = contact_damping(with_gains(plan.shipped, gains))
+        if damping >= LEAST_DAMPING * dampings[SHIPPED]:
+            presets[str(number)], dampings[str(number)] = gains, damping
+    if len(presets) == 1:
         return {}
-    presets = {SHIPPED: {}} | {str(number): trials[number][0] for number in best}
     table = fly_presets(plan, presets, seeds(CHOICE_SEED, plan.seed, count), parts, progress)
-    dampings = {SHIPPED: shipped} | {str(number): damped[number] for number in best}
-    return {name: _finalist(table.filter(pl.col("variant") == name), each) for name, each in dampings.items()}
+    result = {}
+    for name, damping in dampings.items():
+        rows = table.filter(pl.col("variant") == name)
+        by_scene = rows.partition_by(PARAM + "scene", maintain_order=True, as_dict=True)
+        in_scenes = {str(scene): score(part.to_dicts()) for (scene,), part in by_scene.items()}
+        result[name] = Finalist(score(rows.to_dicts()), in_scenes, damping)
+    return result
 
 
 def best_of(finalists: Mapping[str, Finalist]) -> int | None:
-    """Number of the best finalist that may replace the shipped preset; None when none may."""
+    """Number of the best finalist that may replace the shipped preset; None without one."""
     good = {name: each for name, each in finalists.items() if each.may_replace(finalists[SHIPPED])}
     best = min(good, key=lambda name: gain_over(good[name].score, finalists[SHIPPED].score), default=None)
     return None if best is None else int(best)
 
 
-def _finalist(rows: pl.DataFrame, damping: float) -> Finalist:
-    names = rows[PARAM + "scene"].unique(maintain_order=True).to_list()
-    by_scene = {name: score(rows.filter(pl.col(PARAM + "scene") == name).to_dicts()) for name in names}
-    return Finalist(score(rows.to_dicts()), by_scene, damping)
-
-
 def shipped_score(plan: SearchPlan, trials: Trials) -> Score:
-    """Score of the shipped gains; they are the first trial of every search."""
+    """Score of the shipped gains, which are the first trial of every search."""
     gains = start_gains(plan)
     return next((each for found, each in trials.values() if found == gains), trials[min(trials)][1])
+
+
+def fly_unseen(
+    plan: SearchPlan, gains: dict[str, float], count: int, parts: Path, progress: SweepProgress
+) -> pl.DataFrame:
+    """Flights of the shipped and of the chosen preset on the seeds of the report."""
+    return fly_presets(plan, {SHIPPED: {}, TUNED: gains}, seeds(REPORT_SEED, plan.seed, count), parts, progress)
 
 
 def fly_presets(
@@ -109,11 +117,11 @@ def fly_presets(
         plan: The search.
         presets: Gains that differ from the shipped ones, by name of the preset.
         on_seeds: Seeds.
-        parts: Where flights are kept.
-        progress: Told about the flights.
+        parts: Folder of the flights.
+        progress: Progress of the flights.
 
     Raises:
-        KeyboardInterrupt: On Ctrl-C; what was flown is kept.
+        KeyboardInterrupt: On Ctrl-C; finished flights stay on disk.
     """
     flown, runs = scenes() | checks(), []
     for name, gains in presets.items():

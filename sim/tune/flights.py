@@ -1,4 +1,4 @@
-"""What is flown: short paint jobs on three scenes in a trial, and three harder ones more before a preset is chosen."""
+"""Flights: short paint jobs on three scenes in a trial, and three harder scenes before the choice of a preset."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from sim.world.scene import Scene
 
 #: Length of a row [m]: touch, both corners and a climb in about 17 s of flight.
 STROKE_M = 0.2
-#: First seed of the search, of the choice among its best, and of the report; none is flown by another experiment.
+#: First seed of the search, of the choice among its best, and of the report; no other experiment flies them.
 SEARCH_SEED, CHOICE_SEED, REPORT_SEED = 1000, 2000, 3000
-#: Starts, approaches and retreats beside the strokes [s]; sizes the bar only.
-_AROUND_S = 9.0
+#: Starts, approaches and retreats beside the strokes [s]; sizes the progress bar only.
+_OVERHEAD_S = 9.0
 
 
 def scenes() -> dict[str, Scene]:
@@ -36,7 +36,7 @@ def scenes() -> dict[str, Scene]:
 
 
 def checks() -> dict[str, Scene]:
-    """What finalists fly beside it, as no trial does: the whole job, a wall to which the tip sticks, strong gusts."""
+    """Further scenes of finalists: the whole job, a wall to which the tip sticks, strong gusts."""
     nominal = short_job(STROKE_M)
     return {
         "job": near_wall(),
@@ -52,8 +52,8 @@ def flights(
 
     Args:
         flown: Scenes by name.
-        config: The preset; its law flies.
-        variant: Name under which its rows go.
+        config: The preset, with its law.
+        variant: Name of the preset in the table.
         seeds: Seeds.
         features: "geometric" or "rendered".
     """
@@ -69,12 +69,12 @@ def flights(
                     params={"scene": name},
                     plan=FlightPlan(scene=scene, config=pilot, options=options),
                     measure=paint_row,
-                    expected_s=_AROUND_S + PaintJob().expected_s(pilot.painting),
+                    expected_s=_OVERHEAD_S + PaintJob().expected_s(pilot.painting),
                 )
             )
     return runs
 
 
 def seeds(first: int, seed: int, count: int) -> range:
-    """Seeds of one purpose: searches with different seeds fly different ones."""
+    """Seeds of one purpose; searches with different seeds have different ones."""
     return range(first + 10_000 * seed, first + 10_000 * seed + count)

@@ -1,4 +1,4 @@
-"""What is minimised: push, path, tilt, yaw and nervousness of the rotors, each a mean over the flights of a trial."""
+"""Objectives of the search: push, path, tilt, yaw and thrust rate, each a mean over the flights of a trial."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Objective:
-    """One figure to be made small.
+    """One figure to minimise.
 
     Attributes:
-        column: Of the row of a flight.
+        column: Column of a flight's row.
         words: In words.
-        scale: Factor to the shown unit.
+        scale: Factor to the reported unit.
         unit: That unit.
-        failed: What a flight that does not complete counts as, in the unit of the column: far beyond any that does.
+        failed: Value of a flight that does not complete, in the unit of the column: far beyond any completed one.
     """
 
     column: str
@@ -43,11 +43,11 @@ OBJECTIVES = (
 
 @dataclass(frozen=True)
 class Score:
-    """What a preset is worth.
+    """Quality of a preset.
 
     Attributes:
         values: Mean of every objective.
-        failed: Share of flights that did not complete; a preset whose contact would ring counts as all failed.
+        failed: Fraction of flights that did not complete; 1 for a preset with an oscillating contact.
     """
 
     values: tuple[float, ...]
@@ -55,14 +55,14 @@ class Score:
 
 
 def score(rows: Iterable[Mapping[str, Any]]) -> Score:
-    """Means over flights; one that failed, or has no figure, counts with the objective's `failed`."""
+    """Means over flights; a failed flight, or one without the figure, counts with the objective's `failed`."""
     rows = list(rows)
     values = tuple(sum(_value(row, each) for row in rows) / len(rows) for each in OBJECTIVES)
     return Score(values, sum(not row["completed"] for row in rows) / len(rows))
 
 
 def refused() -> Score:
-    """Of a preset that may not fly."""
+    """Score of a refused preset."""
     return Score(tuple(each.failed for each in OBJECTIVES), 1.0)
 
 

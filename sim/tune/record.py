@@ -1,4 +1,4 @@
-"""What a search leaves: the preset, every trial, the verdict on unseen seeds, figures and a page."""
+"""Results of a search: the preset, every trial, the verdict on unseen seeds, figures and a page."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from sim.report.rundir import as_json
 from sim.sweep.parts import write_table
 from sim.tune.choice import front, gain_over
 from sim.tune.figures import draw_front, draw_unseen
-from sim.tune.finalists import SHIPPED, Finalist, Trials, best_of, shipped_score
-from sim.tune.kept import NUMBER
+from sim.tune.finalists import SHIPPED, Finalist, best_of, shipped_score
 from sim.tune.objectives import OBJECTIVES, Score
-from sim.tune.search import SearchPlan
+from sim.tune.search import SearchPlan, Trials
 from sim.tune.space import RANGES, with_gains
+from sim.tune.stored import objective_columns, trial_rows
 from sim.tune.verdict import differences
 
 
@@ -27,13 +27,13 @@ class Outcome:
     """A finished search.
 
     Attributes:
-        plan: What was searched.
+        plan: The search.
         trials: Gains and score by number.
-        finalists: What they did.
-        table: Flights of shipped and chosen on unseen seeds; None when nothing was chosen.
+        finalists: Finalists and the shipped preset by name.
+        table: Flights of shipped and chosen on unseen seeds; None without a chosen trial.
         command: The command line.
-        searched_by: The command line of the search, where its trials were kept.
-        again: The command that gives the same on any computer.
+        searched_by: The command line of the search that made the trials.
+        again: The command that repeats it on any computer.
     """
 
     plan: SearchPlan
@@ -46,12 +46,12 @@ class Outcome:
 
     @property
     def law(self) -> str:
-        """Law tuned."""
+        """Tuned law."""
         return self.plan.shipped.law
 
     @property
     def chosen(self) -> int | None:
-        """Number of the chosen trial; None keeps the shipped preset."""
+        """Number of the chosen trial; None leaves the shipped preset in place."""
         return best_of(self.finalists)
 
     @property
@@ -61,7 +61,7 @@ class Outcome:
 
 
 def content(outcome: Outcome, folder: Path) -> dict[str, Any]:
-    """The JSON: everything but the trials."""
+    """The JSON, without the trials."""
     found = outcome.scores
     return {
         "schema": 1,
@@ -84,17 +84,17 @@ def content(outcome: Outcome, folder: Path) -> dict[str, Any]:
 
 
 def write(outcome: Outcome, folder: Path) -> dict[str, Any]:
-    """Write everything; returns the JSON."""
+    """Write all files; returns the JSON."""
     law, found, summary = outcome.law, outcome.scores, content(outcome, folder)
     gains = {} if outcome.chosen is None else outcome.trials[outcome.chosen][0]
     head = (
-        f"# Gains found by `{outcome.again}`: trial {outcome.chosen} of {len(found)}; everything else is as shipped.\n"
+        f"# Gains found by `{outcome.again}`: trial {outcome.chosen} of {len(found)}; all other values are as shipped."
     )
-    head = "# The shipped preset: no trial of the search may take its place.\n" if outcome.chosen is None else head
+    if outcome.chosen is None:
+        head = "# The shipped preset: no trial of the search may replace it."
     preset = with_gains(outcome.plan.shipped, gains).to_toml()
-    (folder / f"{law}.toml").write_text(head + preset, encoding="utf-8")
-    rows = [{NUMBER: number, **_objectives(score), **params} for number, (params, score) in outcome.trials.items()]
-    record = {**summary, "ranges": RANGES, "all_trials": rows}
+    (folder / f"{law}.toml").write_text(f"{head}\n{preset}", encoding="utf-8")
+    record = {**summary, "ranges": RANGES, "all_trials": trial_rows(outcome.trials)}
     (folder / f"{law}_trials.json").write_text(as_json(record, indent=1) + "\n", encoding="utf-8")
     with styled():
         shipped = shipped_score(outcome.plan, outcome.trials)
@@ -106,13 +106,9 @@ def write(outcome: Outcome, folder: Path) -> dict[str, Any]:
     return summary
 
 
-def _objectives(score: Score) -> dict[str, float]:
-    return dict(zip((each.column for each in OBJECTIVES), score.values, strict=True)) | {"failed": score.failed}
-
-
 def _finalist(each: Finalist) -> dict[str, Any]:
-    by_scene = {name: _objectives(score) for name, score in each.scenes.items()}
-    return {**_objectives(each.score), "damping": each.damping, "scenes": by_scene}
+    by_scene = {name: objective_columns(score) for name, score in each.scenes.items()}
+    return {**objective_columns(each.score), "damping": each.damping, "scenes": by_scene}
 
 
 def _finalists(finalists: dict[str, Finalist]) -> list[str]:
@@ -120,7 +116,7 @@ def _finalists(finalists: dict[str, Finalist]) -> list[str]:
     if not finalists:
         return []
     objectives = [each.label for each in OBJECTIVES]
-    heads = ["on the seeds of the choice", *objectives, "flights failed", "contact damping", "may take its place"]
+    heads = ["on the seeds of the choice", *objectives, "flights failed", "contact damping", "may replace it"]
     lines = ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
     for name, each in finalists.items():
         values = (f"{one.scale * value:.3g}" for one, value in zip(OBJECTIVES, each.score.values, strict=True))
@@ -146,13 +142,13 @@ def _page(outcome: Outcome, summary: dict[str, Any]) -> list[str]:
     if outcome.chosen is None:
         return [
             *lines,
-            "No trial betters the shipped preset on the whole without being clearly worse in one objective or scene or "
-            "in the contact's damping, in the search and on the seeds of the choice: the shipped preset stays.",
+            "No trial is better than the shipped preset on the mean without being clearly worse in an objective, a "
+            "scene or in contact damping, both in the search and on the seeds of the choice: the shipped preset stays.",
         ]
-    share = 100.0 * (1.0 - math.exp(gain_over(outcome.scores[outcome.chosen], shipped)))
+    percent = 100.0 * (1.0 - math.exp(gain_over(outcome.scores[outcome.chosen], shipped)))
     lines += [
-        f"Trial {outcome.chosen} was chosen; on the flights of the search its objectives are {share:.0f} % smaller on "
-        "the geometric mean. On seeds that neither search nor choice saw:",
+        f"Chosen: trial {outcome.chosen}; on the flights of the search its objectives are {percent:.0f} % smaller on "
+        "the geometric mean. On unseen seeds, of neither search nor choice:",
         "",
         "| scene | objective | flights | shipped | tuned | tuned - shipped (95 % interval) | verdict |",
         "|---|---|---|---|---|---|---|",

@@ -1,10 +1,9 @@
-"""The search: Optuna's multi-objective TPE over a journal on disk; it resumes, and several processes may share it."""
+"""The search: Optuna's multi-objective TPE over a journal on disk, resumable, for one or several processes."""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import joblib
@@ -13,8 +12,7 @@ import numpy as np
 from ibvs_qp.config.contact_margin import require_margin
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.pilot import PilotConfig
-from sim.sweep.design import ListedBlock
-from sim.sweep.flying import Row, fly_block
+from sim.sweep.flying import fly_run
 from sim.tune.flights import SEARCH_SEED, flights, scenes, seeds
 from sim.tune.objectives import OBJECTIVES, Score, refused, score
 from sim.tune.space import RANGES, rounded, searched_gains, with_gains
@@ -22,11 +20,14 @@ from sim.tune.space import RANGES, rounded, searched_gains, with_gains
 if TYPE_CHECKING:
     import optuna
 
-#: Key under which a trial keeps its share of failed flights.
+#: Attribute of a trial with its fraction of failed flights.
 FAILED = "failed"
-#: Trials before the sampler learns from them, and the greatest factor by which they change a gain: over the whole of
+#: Trials before the sampler uses their results, and the greatest factor by which they change a gain: over the whole of
 #: so many ranges hardly a draw would fly.
 STARTUP, NEAR = 10, 1.6
+
+#: Gains and score of trials by number.
+Trials = dict[int, tuple[dict[str, float], Score]]
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -34,8 +35,8 @@ class SearchPlan:
     """A search.
 
     Attributes:
-        shipped: The preset it starts from; trial 0 flies its gains.
-        trials: Number of finished trials at which it stops.
+        shipped: The start preset; trial 0 flies its gains.
+        trials: Number of finished trials at the end.
         seed: Of sampler and flights.
         flights: Seeds per scene and trial.
         features: "geometric" or "rendered".
@@ -56,10 +57,11 @@ def open_study(plan: SearchPlan) -> optuna.Study:
     """Open or create the study.
 
     Raises:
-        ConfigError: When Optuna is not installed, the storage does not open, or holds another search.
+        ConfigError: When Optuna is not installed, the storage does not open, or has another search.
     """
     try:
         import optuna
+        from optuna.storages.journal import JournalFileBackend, JournalStorage
         from optuna.study import StudyDirection
     except ImportError:
         raise ConfigError("tuning needs the extra tune: pip install -c constraints.txt -e '.[tune]'") from None
@@ -67,7 +69,7 @@ def open_study(plan: SearchPlan) -> optuna.Study:
     try:
         study = optuna.create_study(
             study_name=f"{plan.shipped.law}-{plan.seed}",
-            storage=_storage(plan.storage),
+            storage=plan.storage if "://" in plan.storage else JournalStorage(JournalFileBackend(plan.storage)),
             directions=[StudyDirection.MINIMIZE] * len(OBJECTIVES),
             load_if_exists=True,
         )
@@ -75,40 +77,34 @@ def open_study(plan: SearchPlan) -> optuna.Study:
         reason = str(error).split("\n")[0]
         raise ConfigError(f"cannot open {plan.storage}: {reason}; give a file or a database with --storage") from None
     identity = {"law": plan.shipped.law, "seed": plan.seed, "flights": plan.flights, "features": plan.features}
-    held = {name: study.user_attrs.get(name, value) for name, value in identity.items()}
-    if held != identity:
-        other = ", ".join(f"{name} {value}" for name, value in held.items())
-        raise ConfigError(f"{plan.storage} holds a search with {other}; give another --out, or the same options")
+    stored = {name: study.user_attrs.get(name, value) for name, value in identity.items()}
+    if stored != identity:
+        other = ", ".join(f"{name} {value}" for name, value in stored.items())
+        raise ConfigError(f"{plan.storage} has a search with {other}; give another --out, or the same options")
     for name, value in identity.items():
         study.set_user_attr(name, value)
     return study
 
 
-def _storage(address: str) -> Any:
-    from optuna.storages.journal import JournalFileBackend, JournalStorage
+def search(plan: SearchPlan, study: optuna.Study, progress: Callable[[int], None]) -> None:
+    """Fly trials until the required number is finished; the sampler uses all batches before the present one.
 
-    return address if "://" in address else JournalStorage(JournalFileBackend(address))
-
-
-def search(plan: SearchPlan, study: optuna.Study, told: Callable[[int], None]) -> None:
-    """Fly trials until so many are finished; each batch is sampled from what was told before it.
-
-    The sampler is seeded anew for every trial by the number of finished ones, so a search that was killed goes on as
-    if it had not been.
+    The number of finished trials seeds the sampler of every trial, so that an interrupted search continues as without
+    the interruption.
     """
     with joblib.Parallel(n_jobs=plan.jobs) as parallel:
         while (done := len(finished(study))) < plan.trials:
-            told(done)
-            batch = [_ask(plan, study, done + place) for place in range(min(plan.jobs, plan.trials - done))]
+            progress(done)
+            batch = [_sample(plan, study, done + place) for place in range(min(plan.jobs, plan.trials - done))]
             scores = evaluate([gains for _, gains in batch], plan, parallel)
             for (trial, _), each in zip(batch, scores, strict=True):
                 trial.set_user_attr(FAILED, each.failed)
                 trial.set_constraint(FAILED, each.failed)
                 study.tell(trial, each.values)
-    told(len(finished(study)))
+    progress(len(finished(study)))
 
 
-def _ask(plan: SearchPlan, study: optuna.Study, number: int) -> tuple[optuna.Trial, dict[str, float]]:
+def _sample(plan: SearchPlan, study: optuna.Study, number: int) -> tuple[optuna.Trial, dict[str, float]]:
     import optuna
 
     draw = int(np.random.SeedSequence([plan.seed, number]).generate_state(1)[0])
@@ -127,37 +123,31 @@ def start_gains(plan: SearchPlan) -> dict[str, float]:
 
 
 def _near_shipped(plan: SearchPlan, number: int) -> dict[str, float]:
-    """The shipped gains first, then each of them times a random factor, within the range of the search."""
-    factors = (
-        np.random.default_rng([plan.seed, number]).uniform(-1.0, 1.0, len(RANGES)) if number else np.zeros(len(RANGES))
-    )
-    start = searched_gains(plan.shipped)
-    return {
-        name: float(np.clip(start[name] * NEAR**factor, *RANGES[name]))
-        for name, factor in zip(RANGES, factors, strict=True)
-    }
+    """Trial 0 has the shipped gains, the others each of them times a random factor, within the range of the search."""
+    count, start = len(RANGES), searched_gains(plan.shipped)
+    factors = np.random.default_rng([plan.seed, number]).uniform(-1.0, 1.0, count) if number else np.zeros(count)
+    gains = zip(RANGES.items(), factors, strict=True)
+    return {name: float(np.clip(start[name] * NEAR**factor, *span)) for (name, span), factor in gains}
 
 
 def evaluate(gains: Sequence[dict[str, float]], plan: SearchPlan, parallel: joblib.Parallel) -> list[Score]:
-    """Fly sets of gains over all scenes; one whose contact would ring by the loop's margin is not flown."""
-    scores, jobs = {}, {}
+    """Fly sets of gains over all scenes; gains with an oscillating contact by the loop margin are refused."""
+    scores, runs = [refused()] * len(gains), {}
     for place, each in enumerate(gains):
         config = with_gains(plan.shipped, rounded(each))
         try:
             require_margin(config.controller, config.controller.brush)
         except ConfigError:
-            scores[place] = refused()
             continue
-        jobs[place] = flights(scenes(), config, "trial", seeds(SEARCH_SEED, plan.seed, plan.flights), plan.features)
-    calls = [(place, ListedBlock((run,))) for place, runs in jobs.items() for run in runs]
-    rows: dict[int, list[Row]] = {place: [] for place in jobs}
-    results: Any = parallel(joblib.delayed(fly_block)(block, "trial", Path()) for _, block in calls)
-    for (place, _), (_, flown) in zip(calls, results, strict=True):
-        rows[place] += flown
-    return [scores[place] if place in scores else score(rows[place]) for place in range(len(gains))]
+        on_seeds = seeds(SEARCH_SEED, plan.seed, plan.flights)
+        runs[place] = flights(scenes(), config, "trial", on_seeds, plan.features)
+    rows: Any = iter(parallel(joblib.delayed(fly_run)(run) for each in runs.values() for run in each))
+    for place, each in runs.items():
+        scores[place] = score([next(rows) for _ in each])
+    return scores
 
 
-def finished(study: optuna.Study) -> dict[int, tuple[dict[str, float], Score]]:
+def finished(study: optuna.Study) -> Trials:
     """Gains and score of every finished trial, by number."""
     from optuna.trial import TrialState
 

@@ -1,4 +1,4 @@
-"""What is searched: the gains that both laws share, each over a logarithmic range."""
+"""Search space: the gains that both laws have in common, each over a logarithmic range."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import dataclasses
 
 from ibvs_qp.pilot import PilotConfig
 
-#: Search range of every gain, both laws alike: [low, high] on a logarithmic scale, about a decade around what flies.
+#: Search range of every gain, both laws alike: [low, high] on a logarithmic scale, about a decade around flying gains.
 RANGES = {
     "line_kp": (4.0, 40.0),
     "line_kd": (3.0, 14.0),
@@ -25,12 +25,12 @@ RANGES = {
     "force_kfp": (0.05, 1.0),
     "force_kfi": (0.4, 5.0),
 }
-#: Digits that are kept of a gain, so that the preset written is the one flown.
+#: Significant digits of a gain, so that the written preset equals the flown one.
 DIGITS = 4
 
 
 def rounded(gains: dict[str, float]) -> dict[str, float]:
-    """Gains as a preset shows them."""
+    """Gains with the digits of a preset."""
     return {name: float(f"{value:.{DIGITS}g}") for name, value in gains.items()}
 
 
@@ -41,5 +41,5 @@ def with_gains(config: PilotConfig, gains: dict[str, float]) -> PilotConfig:
 
 
 def searched_gains(config: PilotConfig) -> dict[str, float]:
-    """The present values of what is searched."""
+    """The present values of the searched gains."""
     return {name: getattr(config.controller.gains, name) for name in RANGES}

@@ -5,22 +5,23 @@ import math
 
 import numpy as np
 import pytest
+from reach_oracle import by_linear_program
+from rotor_layouts import OCTOROTOR
 
 from allocation import (
     DEFAULT_ROW_WEIGHTS,
     TAROT_T960,
-    WrenchSet,
+    WrenchFacets,
     allocate_least_squares,
     allocate_pseudo_inverse,
     control_effectiveness,
     level_polygon,
-    level_reach,
     worst_level_reach,
 )
 
 G = 9.81
 IDLE, FULL = 1.2, 52.56
-B = control_effectiveness(TAROT_T960)
+B, FACETS = control_effectiveness(TAROT_T960), WrenchFacets(TAROT_T960)
 LOWER, UPPER = np.full(6, IDLE), np.full(6, FULL)
 
 
@@ -91,6 +92,14 @@ def test_least_squares_keeps_height_and_level_where_clipping_climbs():
     assert np.abs(held[3:5]).max() < 0.1
 
 
+def level_reach(azimuth_deg: float, lower=IDLE, upper=FULL, mass: float = 6.0) -> float:
+    """Greatest level force along an azimuth from front to right [N]."""
+    azimuth = math.radians(azimuth_deg)
+    return FACETS.interval(
+        hover(mass=mass), np.array([math.cos(azimuth), math.sin(azimuth), 0, 0, 0, 0]), lower, upper
+    )[1]
+
+
 @pytest.mark.parametrize(
     ("mass", "idle", "best", "worst", "side"),
     [
@@ -101,88 +110,73 @@ def test_least_squares_keeps_height_and_level_where_clipping_climbs():
     ],
 )
 def test_level_reach_figures(mass, idle, best, worst, side):
-    wrenches = WrenchSet(TAROT_T960, idle, FULL)
-    for azimuth in np.radians([0.0, 120.0, 240.0]):
-        assert level_reach(wrenches, mass * G, [math.cos(azimuth), math.sin(azimuth)]) == pytest.approx(best, abs=0.06)
-    for azimuth in np.radians([60.0, 180.0, 300.0]):
-        assert level_reach(wrenches, mass * G, [math.cos(azimuth), math.sin(azimuth)]) == pytest.approx(worst, abs=0.06)
-    assert worst_level_reach(wrenches, mass * G)[0] == pytest.approx(worst, abs=0.06)
+    for azimuth in (0.0, 120.0, 240.0):
+        assert level_reach(azimuth, idle, mass=mass) == pytest.approx(best, abs=0.06)
+    for azimuth in (60.0, 180.0, 300.0):
+        assert level_reach(azimuth, idle, mass=mass) == pytest.approx(worst, abs=0.06)
+    assert worst_level_reach(FACETS, mass * G, idle, FULL)[0] == pytest.approx(worst, abs=0.06)
     if side is not None:
-        assert level_reach(wrenches, mass * G, [0.0, -2.0]) == pytest.approx(side, abs=0.06)
+        assert level_reach(-90.0, idle, mass=mass) == pytest.approx(side, abs=0.06)
 
 
 @pytest.mark.parametrize(("upper", "push"), [(30.0, 28.0), (25.0, 20.5), (20.0, 13.0), (18.0, 10.0), (15.0, 5.5)])
 def test_derated_limits_cut_the_push(upper, push):
-    assert level_reach(WrenchSet(TAROT_T960, IDLE, upper), 6.0 * G, [1.0, 0.0]) == pytest.approx(push, abs=0.06)
+    assert level_reach(0.0, upper=upper) == pytest.approx(push, abs=0.06)
 
 
-@pytest.mark.parametrize(("mu", "push"), [(0.3, 15.8), (0.8, 8.7)])
-def test_sliding_push_limit_with_friction_at_the_tip(mu, push):
-    # Sliding sideways the vehicle also carries mu f along the wall and its yaw moment at the tip 0.7 m ahead.
-    wrenches = WrenchSet(TAROT_T960, IDLE, FULL)
-    limits = [wrenches.reach(hover(), np.array([1.0, s * mu, 0, 0, 0, 0.7 * s * mu])).distance for s in (-1.0, 1.0)]
-    assert min(limits) == pytest.approx(push, abs=0.06)
-
-
-def test_reach_thrusts_make_the_wrench_and_touch_a_limit():
-    direction = np.array([1.0, 0.5, -0.2, 0.0, 0.02, 0.05])
-    reach = WrenchSet(TAROT_T960, IDLE, FULL).reach(hover(), direction)
-    np.testing.assert_allclose(B @ reach.thrusts, hover() + reach.distance * direction, atol=1e-6)
-    assert min((reach.thrusts - IDLE).min(), (FULL - reach.thrusts).min()) == pytest.approx(0.0, abs=1e-7)
-
-
-def test_reach_equals_closed_form_of_the_square_matrix():
-    # Six rotors, regular B: thrusts are unique, so the reach is the first rotor that meets a limit.
+def test_interval_equals_the_linear_program_and_the_closed_form_of_the_square_matrix():
+    # Six rotors, regular B: thrusts are unique, so the reach ends at the first rotor that meets a limit.
     rng = np.random.default_rng(5)
     for _ in range(20):
         wrench, direction = hover() + rng.normal(size=6) * [3, 3, 5, 0.4, 0.4, 0.4], rng.normal(size=6)
         start, rate = np.linalg.solve(B, wrench), np.linalg.solve(B, direction)
         room = np.where(rate > 0, FULL - start, IDLE - start) / rate
-        reach = WrenchSet(TAROT_T960, IDLE, FULL).reach(wrench, direction)
-        assert reach.distance == pytest.approx(room.min(), rel=1e-7)
+        reach = FACETS.interval(wrench, direction, IDLE, FULL)[1]
+        assert reach == pytest.approx(room.min(), rel=1e-7)
+        assert reach == pytest.approx(by_linear_program(B, wrench, direction, LOWER, UPPER, 1.0), rel=1e-7)
 
 
-def test_margin_is_the_room_of_the_tightest_rotor():
-    wrenches = WrenchSet(TAROT_T960, IDLE, FULL)
+def test_a_wrench_is_attainable_while_every_rotor_is_within_its_limits():
     for wrench in (hover(), hover(20.0, 0, 0, 0, 0, 0), hover(40.0, 0, 0, 0, 0, 0), hover(mass=60.0)):
         thrusts = np.linalg.solve(B, wrench)
-        room = min((thrusts - IDLE).min(), (FULL - thrusts).min())
-        assert wrenches.margin(wrench) == pytest.approx(room, abs=1e-7)
-        assert wrenches.contains(wrench) == (room >= 0.0)
+        within = min((thrusts - IDLE).min(), (FULL - thrusts).min()) >= 0.0
+        assert FACETS.contains(wrench, IDLE, FULL) == within
 
 
 def test_level_polygon_is_the_triangle_and_every_corner_attainable():
-    wrenches = WrenchSet(TAROT_T960, IDLE, FULL)
-    corners = level_polygon(wrenches, 6.0 * G)
+    corners = level_polygon(FACETS, 6.0 * G, IDLE, FULL)
     assert corners.shape == (3, 2)
     np.testing.assert_allclose(np.linalg.norm(corners, axis=1), 30.383, atol=1e-3)
     for front, right in corners:
-        assert wrenches.contains(hover(front, right, 0, 0, 0, 0))
-    rng = np.random.default_rng(1)
-    polygon = level_polygon(WrenchSet(TAROT_T960, IDLE, rng.uniform(13.0, 25.0, 6)), 6.0 * G)
-    edge, following = (
-        np.roll(polygon, -1, axis=0) - polygon,
-        np.roll(polygon, -2, axis=0) - np.roll(polygon, -1, axis=0),
-    )
+        assert FACETS.contains(hover(front, right, 0, 0, 0, 0), IDLE - 1e-7, FULL)
+    polygon = level_polygon(FACETS, 6.0 * G, IDLE, np.random.default_rng(1).uniform(13.0, 25.0, 6))
+    edge = np.roll(polygon, -1, axis=0) - polygon
+    following = np.roll(edge, -1, axis=0)
     assert np.all(edge[:, 0] * following[:, 1] - edge[:, 1] * following[:, 0] > 0.0)
 
 
-def test_worst_direction_of_an_uneven_set_against_a_scan():
-    upper = np.full(6, FULL)
-    upper[TAROT_T960.names.index("front_left")] = 0.3 * FULL
-    wrenches = WrenchSet(TAROT_T960, IDLE, upper)
-    worst, azimuth = worst_level_reach(wrenches, 6.0 * G)
-    scan = [level_reach(wrenches, 6.0 * G, [math.cos(a), math.sin(a)]) for a in np.radians(np.arange(0.0, 360.0, 1.0))]
+@pytest.mark.parametrize("geometry", [TAROT_T960, OCTOROTOR])
+def test_worst_direction_of_an_uneven_set_against_a_scan(geometry):
+    facets, lower, upper = WrenchFacets(geometry), np.full(geometry.count, IDLE), np.full(geometry.count, FULL)
+    upper[2] = 0.3 * FULL
+    worst, azimuth = worst_level_reach(facets, 6.0 * G, lower, upper)
+
+    def reach(angle: float) -> float:
+        direction = np.array([math.cos(angle), math.sin(angle), 0.0, 0.0, 0.0, 0.0])
+        return by_linear_program(facets.matrix, hover(), direction, lower, upper, 1.0)
+
+    scan = [reach(angle) for angle in np.radians(np.arange(0.0, 360.0, 2.0))]
     assert worst == pytest.approx(min(scan), rel=1e-3) and worst <= min(scan) + 1e-9
-    assert level_reach(wrenches, 6.0 * G, [math.cos(azimuth), math.sin(azimuth)]) == pytest.approx(worst, abs=1e-6)
+    assert reach(azimuth) == pytest.approx(worst, abs=1e-6)
+    polygon = level_polygon(facets, 6.0 * G, lower, upper)
+    for front, right in polygon:
+        distance = math.hypot(front, right)
+        assert reach(math.atan2(right, front)) == pytest.approx(distance, abs=1e-5)
 
 
 def test_lost_rotor_leaves_no_level_hover():
     for lost in range(6):
         upper = np.full(6, FULL)
         upper[lost] = IDLE + 1e-3
-        wrenches = WrenchSet(TAROT_T960, IDLE, upper)
-        assert not wrenches.contains(hover())
-        assert worst_level_reach(wrenches, 6.0 * G)[0] == -math.inf
-    # A wrench outside the span of too few rotors is out of reach at once.
-    assert WrenchSet(B[:, :3], IDLE, FULL).reach(hover(), np.eye(6)[0]).distance == -math.inf
+        assert not FACETS.contains(hover(), IDLE, upper)
+        assert worst_level_reach(FACETS, 6.0 * G, IDLE, upper)[0] == -math.inf

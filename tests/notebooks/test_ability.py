@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from allocation import WrenchSet, level_polygon
+from allocation import level_polygon
 from sim.notebook.ability.abilities import abilities, kept_after_loss, push_over_share, push_thrusts
 from sim.notebook.ability.case import vehicle_case
 from sim.notebook.ability.choice import Duties, design_map
@@ -16,19 +16,19 @@ from sim.notebook.ability.words import abilities_table, choice_text
 @pytest.mark.parametrize("case", [vehicle_case(), vehicle_case(mass_kg=7.5, tilt_deg=22.0)])
 def test_level_cut_is_the_level_polygon(case):
     corners = level_cut(case)
-    wanted = level_polygon(WrenchSet(case.matrix, case.lower, case.upper), case.weight_n)
+    wanted = level_polygon(case.facets, case.weight_n, case.lower, case.upper)
     assert sorted(map(tuple, corners.round(5))) == sorted(map(tuple, (wanted + 0.0).round(5)))
 
 
 def test_cuts_end_where_the_set_ends():
     case = vehicle_case(weak_rotor="rear_left", share=0.5)
-    wrenches = WrenchSet(case.matrix, case.lower, case.upper)
+    limits = case.lower, case.upper
     corners = side_cut(case)
     middle = corners.mean(axis=0)
     for corner in corners:
         (front, up), (far_front, far_up) = middle + 0.999 * (corner - middle), middle + 1.001 * (corner - middle)
-        assert wrenches.contains(np.array([front, 0.0, -up, 0.0, 0.0, 0.0]))
-        assert not wrenches.contains(np.array([far_front, 0.0, -far_up, 0.0, 0.0, 0.0]))
+        assert case.facets.contains(np.array([front, 0.0, -up, 0.0, 0.0, 0.0]), *limits)
+        assert not case.facets.contains(np.array([far_front, 0.0, -far_up, 0.0, 0.0, 0.0]), *limits)
     assert yaw_cut(case)[:, 0].max() == pytest.approx(abilities(case, 0.0).push_still_n, abs=1e-6)
 
 

@@ -1,4 +1,4 @@
-"""Reach oracle shared by several test modules."""
+"""Reach by linear programs, independent of the facets: the oracle of several test modules."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ RIGHT, DOWN = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
 def by_linear_program(
     matrix: np.ndarray, start: np.ndarray, direction: np.ndarray, lower: np.ndarray, upper: np.ndarray, sign: float
 ) -> float:
-    """Greatest (sign 1) or least (sign -1) push >= 0 by brute linear programming; NaN when there is none."""
+    """Greatest (sign 1) or least (sign -1) t >= 0 with start + t direction attainable; NaN when there is none."""
     count = matrix.shape[1]
     result = linprog(
         np.append(np.zeros(count), -sign),

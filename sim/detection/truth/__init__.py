@@ -1,4 +1,4 @@
-"""Rendered RGB-D frames whose every line is known exactly, for accuracy figures and tests."""
+"""Rendered RGB-D frames with exactly known lines, for accuracy figures and tests."""
 
 from sim.detection.truth.frame import TruthFrame, render_frame
 from sim.detection.truth.scenes import FAMILIES, TruthScene, Variation, sample_scene

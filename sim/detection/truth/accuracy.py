@@ -1,8 +1,9 @@
-"""How well a detector finds the edges of truth frames: ``python -m sim.detection.truth.accuracy --frames 40``."""
+"""Accuracy of a detector on the edges of truth frames: ``python -m sim.detection.truth.accuracy --frames 40``."""
 
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -16,21 +17,23 @@ from sim.detection.methods import METHODS, make_method
 from sim.detection.truth.frame import TrueLine, TruthFrame, render_frame
 from sim.detection.truth.scenes import FAMILIES, TruthScene, sample_scene
 
-#: A line is the true one if both ends of the true segment lie this near to it [px] and it is turned by at most [deg].
+#: Match: largest distance of both ends of the true segment from the line [px], and largest angle [deg].
 MATCH_PX, MATCH_DEG = 4.0, 2.0
+#: Least confidence of a certain line [-].
+HIGH_CONFIDENCE = 0.8
 
 
 @dataclass
 class Errors:
-    """What a detector made of a family of frames.
+    """Errors of a detector on a family of frames.
 
     Attributes:
-        offset_px: Distance at the middle of the true segment, of guides found.
-        angle_deg: Angle error of guides found.
-        confidence: Confidence of guides found.
-        wrong: Confidence of guides that are no true edge of that side.
-        missed: Names of frames and edges without a right guide.
-        asked: Number of true edges in view.
+        offset_px: Distance at the middle of the true segment, of found guides.
+        angle_deg: Angle error of found guides.
+        confidence: Confidence of found guides.
+        wrong: Confidence of guides on no true edge of that side.
+        missed: Names of frames and edges without a correct guide.
+        visible: Number of true edges in view.
         chi_square: Squared error of (rho, theta) over its covariance; 2 expected.
         refused: Reasons of frames without a surface.
     """
@@ -40,17 +43,17 @@ class Errors:
     confidence: list[float] = field(default_factory=list)
     wrong: list[float] = field(default_factory=list)
     missed: list[str] = field(default_factory=list)
-    asked: int = 0
+    visible: int = 0
     chi_square: list[float] = field(default_factory=list)
     refused: list[str] = field(default_factory=list)
 
     def add(self, truth: TruthFrame, result: Detection, name: str) -> None:
-        """Count one frame."""
+        """Add one frame."""
         if result.refused is not None:
             self.refused.append(f"{name}: {result.refused}")
         for side in GUIDE_SIDES:
             line, edge = result.guides.get(side), truth.edges.get(side)
-            self.asked += edge is not None
+            self.visible += edge is not None
             if line is None:
                 if edge is not None:
                     self.missed.append(f"{name} {side}")
@@ -70,17 +73,22 @@ class Errors:
 
     @property
     def found(self) -> float:
-        """Share of the true edges with a right guide."""
-        return len(self.offset_px) / max(self.asked, 1)
+        """Fraction of the true edges with a correct guide."""
+        return len(self.offset_px) / max(self.visible, 1)
+
+    def pool(self, other: Errors) -> None:
+        """Add the frames of another family."""
+        for entry in dataclasses.fields(self):
+            setattr(self, entry.name, getattr(self, entry.name) + getattr(other, entry.name))
 
     def __str__(self) -> str:
         if not self.offset_px:
-            return f"found 0 of {self.asked}"
+            return f"found 0 of {self.visible}"
         offset, angle = np.percentile(self.offset_px, [50, 95]), np.percentile(self.angle_deg, [50, 95])
         return (
-            f"found {100 * self.found:5.1f} % of {self.asked:4d}  offset {offset[0]:.3f} / {offset[1]:.3f} px  "
+            f"found {100 * self.found:5.1f} % of {self.visible:4d}  offset {offset[0]:.3f} / {offset[1]:.3f} px  "
             f"angle {angle[0]:.4f} / {angle[1]:.4f} deg  chi2 {np.mean(self.chi_square):5.1f}  "
-            f"sure {100 * float(np.mean(np.array(self.confidence) >= 0.8)):3.0f} %  "
+            f"sure {100 * float(np.mean(np.array(self.confidence) >= HIGH_CONFIDENCE)):3.0f} %  "
             f"wrong {len(self.wrong)} (highest confidence {max(self.wrong, default=0.0):.2f})"
         )
 
@@ -94,27 +102,23 @@ def line_errors(
     return abs(float(across.mean())) * intrinsics[0], angle, float(np.abs(across).max()) * intrinsics[0]
 
 
-def measure_family(
-    scenes: list[TruthScene], detect: Callable[[TruthFrame], Detection], progress: Callable[[], None] | None = None
-) -> Errors:
-    """Render scenes one by one and count what a detector makes of them."""
+def measure_family(scenes: list[TruthScene], detect: Callable[[TruthFrame], Detection]) -> Errors:
+    """Render scenes one by one and add up the errors of a detector."""
     errors = Errors()
     for scene in scenes:
         truth = render_frame(scene)
         errors.add(truth, detect(truth), f"seed {scene.seed}")
-        if progress is not None:
-            progress()
     return errors
 
 
 def main() -> None:
-    """Print one line a family."""
+    """Print one line per family."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--frames", type=int, default=40, help="frames per family")
     parser.add_argument("--first-seed", type=int, default=0, help="seed of the first frame")
     parser.add_argument("--method", choices=tuple(METHODS), default="own")
     parser.add_argument("--family", choices=tuple(FAMILIES), help="one family only")
-    parser.add_argument("--show-missed", action="store_true", help="name what was not found")
+    parser.add_argument("--show-missed", action="store_true", help="list the missed edges")
     options = parser.parse_args()
     method, total = make_method(options.method), Errors()
     for name in [options.family] if options.family else FAMILIES:
@@ -124,9 +128,7 @@ def main() -> None:
         if options.show_missed:
             for missed in [*errors.missed, *errors.refused]:
                 print(f"    {missed}")
-        for entry in ("offset_px", "angle_deg", "confidence", "wrong", "missed", "chi_square", "refused"):
-            getattr(total, entry).extend(getattr(errors, entry))
-        total.asked += errors.asked
+        total.pool(errors)
     print(f"{'all':14s} {total}")
 
 

@@ -15,20 +15,20 @@ from sim.detection.truth.scenes import TruthScene
 from sim.sensors.cameras.arm import vehicle_layer
 from sim.world.scene import CameraScene, Scene
 
-#: Shortest visible piece of an edge that counts as being in the picture, and margin from the picture's border [px].
+#: Shortest visible piece of an edge in view, and margin from the border of a picture 640 px wide [px].
 _SHORTEST_PX, _MARGIN_PX = 40.0, 8.0
-#: Steps along an edge at which its visibility is asked.
+#: Points along an edge for the test of its visibility.
 _STEPS = 200
 
 
 @dataclass(frozen=True, kw_only=True)
 class TrueLine:
-    """An edge as it truly is.
+    """The exact position of an edge.
 
     Attributes:
         rho: Distance from the image centre, normalised.
         theta: Angle of the normal [rad].
-        pixels: Ends of its visible piece [px], (2, 2); empty where too little is seen.
+        pixels: Ends of its visible piece [px], (2, 2); empty below the shortest piece.
     """
 
     rho: float
@@ -42,11 +42,11 @@ class TruthFrame:
 
     Attributes:
         frame: The pictures.
-        edges: Edges of the board by name (top, bottom, left, right), those that are in view.
+        edges: Edges of the board in view by name (top, bottom, left, right).
         strokes: Upper and lower edge of every stroke in view, as "0 top", "0 bottom", ...
         plane: (a, b, c) of 1/Z = a x + b y + c of the board.
-        seed: (u, v) of a place on the board [px].
-        mask: Where the vehicle hides the view, bool (H, W).
+        seed: (u, v) of a point on the board [px].
+        mask: Pixels that the vehicle covers, bool (H, W).
     """
 
     frame: RgbdFrame
@@ -61,9 +61,9 @@ def render_frame(scene: TruthScene, stamp_ns: int = 0, noise_seed: int | None = 
     """Render a scene.
 
     Args:
-        scene: What stands before the camera.
+        scene: The scene.
         stamp_ns: Time of capture.
-        noise_seed: Seed of the noise where it shall differ from the scene's: frames of one sequence.
+        noise_seed: Seed of the noise for frames of one sequence; None takes the seed of the scene.
     """
     rng = np.random.default_rng(np.random.SeedSequence([scene.seed if noise_seed is None else noise_seed, 0x6E6F]))
     width, height, _ = scene.camera
@@ -119,16 +119,16 @@ def true_line(scene: TruthScene, first: tuple[float, float], second: tuple[float
     rays = np.array([first, second]) @ scene.rotation[:, :2].T + scene.translation
     a, b, c = np.cross(rays[0], rays[1])
     length = math.hypot(a, b)
-    share = np.linspace(0.0, 1.0, _STEPS)[:, None]
-    pixels = project(scene, np.array(first) + share * (np.array(second) - np.array(first)))
+    fraction = np.linspace(0.0, 1.0, _STEPS)[:, None]
+    pixels = project(scene, np.array(first) + fraction * (np.array(second) - np.array(first)))
     height, width = mask.shape
     margin = _MARGIN_PX * width / 640.0
     inside = (pixels[:, 0] > margin) & (pixels[:, 0] < width - 1 - margin)
     inside &= (pixels[:, 1] > margin) & (pixels[:, 1] < height - 1 - margin)
     at = np.clip(np.rint(pixels), 0, (width - 1, height - 1)).astype(np.intp)
-    seen = pixels[inside & ~mask[at[:, 1], at[:, 0]]]
-    long = len(seen) > 1 and np.hypot(*(seen[-1] - seen[0])) > _SHORTEST_PX * width / 640.0
-    return TrueLine(rho=-c / length, theta=math.atan2(b, a), pixels=seen[[0, -1]] if long else np.zeros((0, 2)))
+    visible = pixels[inside & ~mask[at[:, 1], at[:, 0]]]
+    long = len(visible) > 1 and np.hypot(*(visible[-1] - visible[0])) > _SHORTEST_PX * width / 640.0
+    return TrueLine(rho=-c / length, theta=math.atan2(b, a), pixels=visible[[0, -1]] if long else np.zeros((0, 2)))
 
 
 def _inverse_depths(scene: TruthScene) -> tuple[np.ndarray, np.ndarray]:
@@ -141,10 +141,10 @@ def _inverse_depths(scene: TruthScene) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _seed(scene: TruthScene, mask: np.ndarray) -> tuple[float, float]:
-    """A place on the board that is in view: the one nearest to the picture's middle of a few."""
+    """A point on the board in view: of a grid the one nearest to the middle of the picture."""
     half = 0.5 * np.array(scene.size_m)
-    share = np.linspace(-0.7, 0.7, 15)
-    pixels = project(scene, np.stack(np.meshgrid(share * half[0], share * half[1]), axis=-1).reshape(-1, 2))
+    grid = np.linspace(-0.7, 0.7, 15)
+    pixels = project(scene, np.stack(np.meshgrid(grid * half[0], grid * half[1]), axis=-1).reshape(-1, 2))
     height, width = mask.shape
     inside = (pixels > 20.0).all(axis=1) & (pixels < (width - 20, height - 20)).all(axis=1)
     pixels = pixels[inside]

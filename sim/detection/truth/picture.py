@@ -1,4 +1,4 @@
-"""The colour picture of a truth scene: supersampled, edges by their exact share of every pixel."""
+"""The colour picture of a truth scene: supersampled, edges by their exact coverage of every pixel."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from sim.detection.truth.scenes import TruthScene
 from sim.world.clutter import clutter_board
 from sim.world.textures import flat, shade, smooth_noise, wall_surface
 
-#: Pixels per pixel and side; resolution of the textures [px/m]; how far the wall reaches beyond the board [m].
+#: Subpixels per pixel and side; resolution of the textures [px/m]; width of the wall beyond the board [m].
 SUPERSAMPLING, _PX_M, _WALL_M = 3, 1100.0, 0.5
-#: Side of a printed tag and its modules: as an AprilTag of 6 x 6 with its border.
+#: Modules per side of a printed tag: as an AprilTag of 6 x 6 with its border.
 _MODULES = 8
-#: Different walls of one kind.
+#: Number of different walls of one kind.
 _WALLS = 4
 
 
@@ -27,11 +27,11 @@ def paint_picture(scene: TruthScene, rng: np.random.Generator) -> np.ndarray:
     board = _warp(_board(scene, textures), scene, 0.0)
     for (left, top, right, bottom), color in scene.strokes:
         corners = np.array([[left, top], [right, top], [right, bottom], [left, bottom]])
-        share = quad_share(scene, corners)[..., None]
-        board = board * (1.0 - share) + share * np.array(color, np.float32)
+        coverage = quad_coverage(scene, corners)[..., None]
+        board = board * (1.0 - coverage) + coverage * np.array(color, np.float32)
     half = 0.5 * np.array(scene.size_m)
-    share = quad_share(scene, half * [[-1, -1], [1, -1], [1, 1], [-1, 1]])[..., None]
-    picture = share * board + (1.0 - share) * wall
+    coverage = quad_coverage(scene, half * [[-1, -1], [1, -1], [1, 1], [-1, 1]])[..., None]
+    picture = coverage * board + (1.0 - coverage) * wall
     picture = cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA)
     light = np.linspace(1.0 - scene.shading, 1.0 + scene.shading, width, dtype=np.float32)[None, :, None]
     picture = picture * light
@@ -46,11 +46,11 @@ def paint_picture(scene: TruthScene, rng: np.random.Generator) -> np.ndarray:
     return np.clip(np.rint(picture), 0, 255).astype(np.uint8)
 
 
-def quad_share(scene: TruthScene, corners: np.ndarray) -> np.ndarray:
-    """Share of every subpixel that a convex quadrilateral of the board covers, float32 (S H, S W).
+def quad_coverage(scene: TruthScene, corners: np.ndarray) -> np.ndarray:
+    """Fraction 0..1 of every subpixel inside a convex quadrilateral of the board, float32 (S H, S W).
 
     Args:
-        scene: Gives pose and camera.
+        scene: For pose and camera.
         corners: Its corners in order (right, down) [m], (4, 2).
     """
     width, height, _ = scene.camera
@@ -58,18 +58,18 @@ def quad_share(scene: TruthScene, corners: np.ndarray) -> np.ndarray:
     v = (np.arange(SUPERSAMPLING * height, dtype=np.float32) + 0.5) / SUPERSAMPLING - 0.5
     fx, fy, cx, cy = scene.intrinsics
     rays = corners @ scene.rotation[:, :2].T + scene.translation
-    share = np.ones((len(v), len(u)), np.float32)
+    coverage = np.ones((len(v), len(u)), np.float32)
     for first, second in zip(rays, np.roll(rays, -1, axis=0), strict=True):
         a, b, c = np.cross(first, second)  # interpretation plane of the edge, the board on its positive side
         p, q, r = a / fx, b / fy, c - a * cx / fx - b * cy / fy
         scale = SUPERSAMPLING / float(np.hypot(p, q))
         distance = (scale * p * u)[None] + (scale * q * v + scale * r)[:, None]
-        share *= np.clip(distance + 0.5, 0.0, 1.0).astype(np.float32)
-    return share
+        coverage *= np.clip(distance + 0.5, 0.0, 1.0).astype(np.float32)
+    return coverage
 
 
 def _warp(texture: tuple[np.ndarray, np.ndarray, float], scene: TruthScene, behind_m: float) -> np.ndarray:
-    """A texture with its corner (right, down) [m] and step [m] as the camera sees it, float32 (S H, S W, 3)."""
+    """Camera view of a texture with its corner (right, down) [m] and step [m], float32 (S H, S W, 3)."""
     picture, corner, step = texture
     fx, fy, cx, cy = scene.intrinsics
     camera = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
@@ -84,7 +84,7 @@ def _warp(texture: tuple[np.ndarray, np.ndarray, float], scene: TruthScene, behi
 
 
 def _wall(scene: TruthScene) -> tuple[np.ndarray, np.ndarray, float]:
-    """Texture, its corner (right, down) [m] and its step [m]; it goes on mirrored beyond its border."""
+    """Texture, its corner (right, down) [m] and its step [m]; mirrored beyond its border."""
     reach = np.array(scene.size_m) * 0.5 + _WALL_M * max(1.0, scene.gap_m)
     scale = _PX_M / max(1.0, 2.0 * scene.gap_m)  # a far wall needs no finer texture
     shape = (round(2 * reach[1] * scale), round(2 * reach[0] * scale))
@@ -133,8 +133,8 @@ def _motion_kernel(motion_px: tuple[float, float]) -> np.ndarray | None:
     reach = int(np.ceil(0.5 * length)) + 1
     fine = 16
     kernel = np.zeros((2 * reach + 1, 2 * reach + 1), np.float32)
-    for share in (np.arange(fine * reach * 2) + 0.5) / (fine * reach * 2) - 0.5:
-        x, y = share * motion_px[0] + reach, share * motion_px[1] + reach
+    for place in (np.arange(fine * reach * 2) + 0.5) / (fine * reach * 2) - 0.5:
+        x, y = place * motion_px[0] + reach, place * motion_px[1] + reach
         i, j = int(np.floor(y)), int(np.floor(x))
         for di, dj in ((0, 0), (0, 1), (1, 0), (1, 1)):
             weight = (1 - abs(y - i - di)) * (1 - abs(x - j - dj))

@@ -1,4 +1,4 @@
-"""The depth picture of a truth scene: noise, holes along steps, steps moved outwards as depth cameras do."""
+"""The depth picture of a truth scene: noise, holes along steps, steps shifted outwards as by depth cameras."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ def measure_depth(scene: TruthScene, inverse: tuple[np.ndarray, np.ndarray], rng
     """Depth [m], float32 (H, W), 0 where there is no reading.
 
     Args:
-        scene: Gives the outline and the noise.
+        scene: For outline and noise.
         inverse: 1/Z of board and wall at every pixel [1/m], (H, W) each.
         rng: Source of the noise.
     """
     board, wall = inverse
     outline = _outline(scene)
     shape = outline.shape
-    if scene.smear_px > 0.0:  # the nearer surface grows, here more, there less
+    if scene.smear_px > 0.0:  # the nearer surface grows by a varying width
         patches = cv2.GaussianBlur(rng.standard_normal(shape, np.float32), (0, 0), 25.0)
         reach = np.clip(0.5 + patches / (4.0 * float(patches.std())), 0.0, 1.0) * scene.smear_px
         beyond = cv2.distanceTransform((~outline).astype(np.uint8), cv2.DIST_L2, 5)
@@ -44,7 +44,7 @@ def measure_depth(scene: TruthScene, inverse: tuple[np.ndarray, np.ndarray], rng
 
 
 def _outline(scene: TruthScene) -> np.ndarray:
-    """Pixels whose middle shows the board, bool (H, W)."""
+    """Pixels with their middle on the board, bool (H, W)."""
     width, height, _ = scene.camera
     fx, fy, cx, cy = scene.intrinsics
     half = 0.5 * np.array(scene.size_m)

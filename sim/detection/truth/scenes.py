@@ -1,4 +1,4 @@
-"""What stands before the camera of a truth frame, and how it is drawn at random by families."""
+"""Scenes of truth frames, and their random draw by families."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import cv2
 import numpy as np
 
-#: RGB colours of boards, paints and walls from which scenes choose.
+#: RGB colours of boards and paints.
 LIGHT = ((228, 230, 222), (214, 205, 188), (196, 204, 214))
 _DARK = ((52, 56, 62), (70, 48, 44), (38, 60, 56))
 PAINTS = ((40, 90, 200), (190, 50, 50), (50, 140, 80), (230, 190, 40))
@@ -35,8 +35,8 @@ class TruthScene:
         noise: Standard deviation of the colour noise [grey levels].
         blur_px: Standard deviation of the lens blur [px].
         motion_px: Length of the motion blur and its direction (right, down) [px].
-        depth_noise: White, and again correlated, depth noise, share of depth.
-        smear_px: Largest distance by which the depth camera moves a step outwards [px].
+        depth_noise: White, and again correlated, depth noise, fraction of depth.
+        smear_px: Largest outward shift of a depth step by the depth camera [px].
         arm: Whether arm and brush of the vehicle are in view.
         camera: (width, height, focal length) [px].
         seed: Of textures, clutter and noise.
@@ -71,7 +71,7 @@ class TruthScene:
 
 @dataclass(frozen=True, kw_only=True)
 class Variation:
-    """Ranges from which the scenes of a family are drawn; angles in degrees, uniform, both signs."""
+    """Ranges of the scenes of a family; angles in degrees, uniform, both signs."""
 
     distance_m: tuple[float, float] = (0.7, 1.2)
     roll: float = 4.0
@@ -84,9 +84,8 @@ class Variation:
 
 
 #: Families of scenes: a board 5 cm and 1.2 m before a brick wall, 2 cm before plaster near the camera, 1.5 cm
-#: before brick (which depth cannot tell apart), dark on light,
-#: turned and oblique, printed, moving, smeared as real depth cameras do, and hard: faint, noisy, 1.5 cm before the
-#: wall, where not every edge can be found and confidence has to say so.
+#: before brick (too near for depth), dark on light, turned and oblique, printed, moving, smeared as by real depth
+#: cameras, and hard: faint, noisy, 1.5 cm before the wall, with undetectable edges and low confidence.
 FAMILIES = {
     "near wall": Variation(),
     "far wall": Variation(base=TruthScene(gap_m=1.2)),

@@ -10,7 +10,7 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from allocation import WrenchSet, control_effectiveness, level_polygon
+from allocation import WrenchFacets, control_effectiveness, level_polygon
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import GRAVITY
 from sim.evaluate.window import phase_window
@@ -38,8 +38,8 @@ def draw_wrench_set(results: Results, rows: pl.DataFrame) -> Figure:
         rows: Flights to show; the first kept log of each push and law is drawn.
     """
     vehicle = VehicleParams()
-    rotors = WrenchSet(vehicle.geometry, vehicle.thrust_min, vehicle.thrust_max)
-    corners = level_polygon(rotors, vehicle.mass_kg * GRAVITY)
+    limits = vehicle.thrust_min, vehicle.thrust_max
+    corners = level_polygon(WrenchFacets(vehicle.geometry), vehicle.mass_kg * GRAVITY, *limits)
     laws = [law for law in ("qp", "paper") if rows.filter(pl.col("law") == law).height]
     figure = new_figure(3.7)
     colours = colormaps["viridis"]

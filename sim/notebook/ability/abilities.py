@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import linprog
 
-from allocation import WrenchSet, hover_wrench, push_direction, push_reach, worst_level_reach, worst_push_reach
+from allocation import hover_wrench, push_direction, push_reach, worst_level_reach, worst_push_reach
 from sim.notebook.ability.case import VehicleCase, vehicle_case
 
 #: Travel of a sliding tip in B, by name.
@@ -52,7 +52,7 @@ def abilities(case: VehicleCase, friction: float) -> Abilities:
     asked = (facets, case.weight_n, case.tip, case.lower, case.upper)
     still = push_reach(*asked)
     sliding = {name: push_reach(*asked, friction=friction, travel=np.array(way)).push for name, way in TRAVELS.items()}
-    lateral, _ = worst_level_reach(WrenchSet(case.matrix, case.lower, case.upper), case.weight_n)
+    lateral, _ = worst_level_reach(facets, case.weight_n, case.lower, case.upper)
     return Abilities(
         hover_share=float(np.mean(case.hover_thrusts / case.vehicle.thrust_max)),
         hover_power_w=case.hover_power_w,

@@ -44,7 +44,7 @@ def main() -> int:
     """Fly the sample and write its table."""
     folder = Path(tempfile.gettempdir()) / "ibvs-qp-noise-sample"
 
-    def tell(done: int, count: int, _: int) -> None:
+    def tell(done: int, count: int, *_: float) -> None:
         print(f"{done} of {count} flights", file=sys.stderr)
 
     result = run_sweep(sample_runs(), folder, progress=tell)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from allocation import TAROT_T960, WrenchSet, control_effectiveness, level_polygon
+from allocation import TAROT_T960, WrenchFacets, control_effectiveness, hover_wrench, level_polygon
 from ibvs_qp.frames import GRAVITY
 from sim.evaluate.path_error import CONTACT_N
 from sim.flight.trace import Trace
@@ -22,9 +22,8 @@ RIM_N = 2.0
 @functools.lru_cache(maxsize=64)
 def _corners(mass_kg: float, lower: tuple[float, ...], upper: tuple[float, ...]) -> np.ndarray | None:
     """Level polygon (front, right) [N]; None where the rotors cannot carry the vehicle."""
-    rotors, weight = WrenchSet(TAROT_T960, np.array(lower), np.array(upper)), mass_kg * GRAVITY
-    hover = np.array([0.0, 0.0, -weight, 0.0, 0.0, 0.0])
-    return level_polygon(rotors, weight) if rotors.contains(hover) else None
+    facets, weight, limits = WrenchFacets(TAROT_T960), mass_kg * GRAVITY, (np.array(lower), np.array(upper))
+    return level_polygon(facets, weight, *limits) if facets.contains(hover_wrench(weight), *limits) else None
 
 
 def _polygon(trace: Trace) -> np.ndarray | None:

@@ -1,4 +1,4 @@
-"""Figures of a sweep, drawn from its table alone: boxes, heat maps, success-rate maps, what depends on what."""
+"""Figures of a sweep, drawn from its table alone: boxes, heat maps, success-rate maps, rank correlations."""
 
 from sim.sweep.figures.page import write_report
 

@@ -1,37 +1,48 @@
-"""Box plots: how a figure of merit is spread at every level of every parameter, law beside law."""
+"""Box plots: spread of a figure of merit at every level of every parameter, law beside law."""
 
 from __future__ import annotations
 
 import numpy as np
 import polars as pl
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 from matplotlib.patches import Patch
 
 from sim.figures.style import law_colour, law_name, new_figure
-from sim.sweep.figures.shown import Figure, Levels, levels
+from sim.sweep.figures.levels import Figure, levels
 
-#: Share of a level's width that its boxes take together, and height of a panel [in].
+#: Fraction of a level's width for its boxes together, and height of a panel [in].
 _WIDTH, _PANEL_IN = 0.76, 1.9
-#: A figure whose spread is wider than this ratio is drawn on a logarithmic axis.
+#: A figure with a spread wider than this ratio has a logarithmic axis.
 _LOG_SPREAD = 30.0
-#: Letters of a row of tick labels that fit without touching.
+#: Letters of a row of tick labels that fit side by side.
 _LETTERS = 90
 
 
 def draw_boxes(table: pl.DataFrame, figure: Figure, columns: list[str]) -> Canvas:
     """One panel per parameter."""
     laws = [law for law in ("qp", "paper") if law in table["law"].unique()]
-    canvas = new_figure(0.45 + _PANEL_IN * len(columns))
-    values = figure.scale * table[figure.column].cast(pl.Float64).fill_null(float("nan")).to_numpy()
-    law_of = table["law"].to_numpy()
-    good = values[np.isfinite(values) & (values > 0.0)]
+    canvas, values, width = new_figure(0.45 + _PANEL_IN * len(columns)), figure.values(table), _WIDTH / len(laws)
+    finite, law_of = np.isfinite(values), table["law"].to_numpy()
+    good = values[finite & (values > 0.0)]
     wide = len(good) > 1 and np.quantile(good, 0.98) > _LOG_SPREAD * np.quantile(good, 0.02)
     for axes, column in zip(canvas.subplots(len(columns), 1, squeeze=False)[:, 0], columns, strict=True):
         sorted_in = levels(table, column)
+        count = len(sorted_in.names)
         for place, law in enumerate(laws):
-            _law_boxes(axes, np.where(law_of == law, values, np.nan), sorted_in, law, place, len(laws))
-        axes.set_xticks(range(len(sorted_in.names)), sorted_in.names)
+            rows = finite & (law_of == law)
+            boxes = axes.boxplot(
+                [values[rows & (sorted_in.level == level)] for level in range(count)],
+                positions=np.arange(count) + (place - 0.5 * (len(laws) - 1)) * width,
+                widths=0.9 * width,
+                patch_artist=True,
+                manage_ticks=False,
+                medianprops={"color": "#222222"},
+                flierprops={"markersize": 3, "marker": "."},
+                boxprops={"linewidth": 0.6},
+            )
+            for box in boxes["boxes"]:
+                box.set(facecolor=law_colour(law), alpha=0.5)
+        axes.set_xticks(range(count), sorted_in.names)
         axes.tick_params(axis="x", labelsize=8 if sum(map(len, sorted_in.names)) < _LETTERS else 6.5)
         axes.set_xlabel(sorted_in.label)
         axes.grid(visible=False, axis="x")
@@ -43,21 +54,3 @@ def draw_boxes(table: pl.DataFrame, figure: Figure, columns: list[str]) -> Canva
     handles = [Patch(facecolor=law_colour(law), alpha=0.5, label=law_name(law)) for law in laws]
     canvas.axes[0].legend(handles=handles, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(laws))
     return canvas
-
-
-def _law_boxes(axes: Axes, values: np.ndarray, sorted_in: Levels, law: str, place: int, count: int) -> None:
-    width = _WIDTH / count
-    for level in range(len(sorted_in.names)):
-        here = values[(sorted_in.level == level) & np.isfinite(values)]
-        if not len(here):
-            continue
-        boxes = axes.boxplot(
-            [here],
-            positions=[level + (place - 0.5 * (count - 1)) * width],
-            widths=0.9 * width,
-            patch_artist=True,
-            manage_ticks=False,
-            medianprops={"color": "#222222"},
-            flierprops={"markersize": 3, "marker": "."},
-        )
-        boxes["boxes"][0].set(facecolor=law_colour(law), alpha=0.5, linewidth=0.6)

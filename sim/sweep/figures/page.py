@@ -1,4 +1,4 @@
-"""The report of a sweep: a page with a table, the reasons of what failed, and the figures."""
+"""The report of a sweep: a page with a table, the reasons of failed flights, and the figures."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from matplotlib.figure import Figure as Canvas
 from ibvs_qp.config.errors import ConfigError
 from sim.figures.style import law_name, save, styled
 from sim.sweep.figures.boxes import draw_boxes
+from sim.sweep.figures.levels import Figure, chosen_figures, most_influential, varied
 from sim.sweep.figures.maps import draw_dependence, draw_figure_maps, draw_success_maps
-from sim.sweep.figures.shown import Figure, chosen_figures, telling, varied
 from sim.sweep.parts import HEAD
 
-#: Parameters in the box plots and in the maps: those on which most depends.
+#: Number of parameters in the box plots and in the maps: those with the largest influence.
 MOST_BOXES, MOST_MAPS = 4, 3
-#: Reasons of failure that are listed.
+#: Longest list of reasons of failure.
 _REASONS = 8
 
 
 def read_table(path: Path) -> tuple[pl.DataFrame, Path]:
-    """The table of a sweep or an experiment, and the folder beside which a report goes.
+    """The table of a sweep or an experiment, and the folder of its report.
 
     Args:
         path: A Parquet file, or a folder with one or with its parts.
@@ -29,41 +29,38 @@ def read_table(path: Path) -> tuple[pl.DataFrame, Path]:
     Raises:
         ConfigError: When there is no such table.
     """
+    files, folder = [path] if path.is_file() else [], path.parent
     if path.is_dir():
-        files = sorted(path.glob("*.parquet")) or sorted((path / "parts").glob("part-*.parquet"))
-        folder = path
-    else:
-        files, folder = [path] if path.is_file() else [], path.parent
-    mend = "give the folder or the Parquet file of `ibvs-qp sweep` or `experiment`"
+        files, folder = sorted(path.glob("*.parquet")) or sorted((path / "parts").glob("part-*.parquet")), path
+    remedy = "give the folder or the Parquet file of `ibvs-qp sweep` or `experiment`"
     if not files:
-        raise ConfigError(f"no table in {path}; {mend}")
+        raise ConfigError(f"no table in {path}; {remedy}")
     try:
         table = pl.concat([pl.read_parquet(file) for file in files], how="diagonal_relaxed")
     except (pl.exceptions.PolarsError, OSError) as error:
-        raise ConfigError(f"{path} cannot be read: {str(error).splitlines()[0]}; {mend}") from None
+        raise ConfigError(f"{path} cannot be read: {str(error).splitlines()[0]}; {remedy}") from None
     if missing := {"law", "seed", "completed", "reason"} - set(table.columns):
-        raise ConfigError(f"{path} is no table of flights: it lacks {', '.join(sorted(missing))}; {mend}")
+        raise ConfigError(f"{path} is no table of flights: it lacks {', '.join(sorted(missing))}; {remedy}")
     if not table.height:
         raise ConfigError(f"{path} has no rows yet; fly the sweep first")
     head = [name for name in HEAD if name in table.columns]
-    return table.unique(subset=[name for name in table.columns if name not in ("log",)], maintain_order=True)[
-        [*head, *(name for name in table.columns if name not in head)]
-    ], folder
+    rows = table.unique(subset=pl.selectors.exclude("log"), maintain_order=True)
+    return rows.select(*head, pl.exclude(head)), folder
 
 
-def write_report(table: pl.DataFrame, folder: Path, title: str, wanted: tuple[str, ...] = ()) -> Path:
+def write_report(table: pl.DataFrame, folder: Path, title: str, chosen: tuple[str, ...] = ()) -> Path:
     """Draw the figures and write ``report.md``; returns its file.
 
     Args:
         table: Rows of flights.
-        folder: Where page and ``figures/`` go.
+        folder: Folder of the page and of ``figures/``.
         title: Heading.
-        wanted: Figures of merit by column; empty takes the usual ones.
+        chosen: Figures of merit by column; empty takes the default ones.
 
     Raises:
         ConfigError: On a figure that the table does not have.
     """
-    figures, columns = chosen_figures(table, wanted), varied(table)
+    figures, columns = chosen_figures(table, chosen), varied(table)
     lines = [
         f"# {title}",
         "",
@@ -84,17 +81,17 @@ def _draw_all(table: pl.DataFrame, figures: list[Figure], columns: list[str]) ->
     drawn: dict[str, tuple[str, Canvas]] = {}
     if not columns:
         return drawn
-    boxed = telling(table, figures, columns, MOST_BOXES)
-    mapped = telling(table, figures, columns, MOST_MAPS)
-    which = "" if len(mapped) == len(columns) else f", the {len(mapped)} parameters on which most depends"
-    drawn["success"] = (f"Share of flights that ended as planned{which}", draw_success_maps(table, mapped))
+    boxed = most_influential(table, figures, columns, MOST_BOXES)
+    mapped = most_influential(table, figures, columns, MOST_MAPS)
+    which = "" if len(mapped) == len(columns) else f", the {len(mapped)} parameters with the largest influence"
+    drawn["success"] = (f"Flights that ended as planned{which}", draw_success_maps(table, mapped))
     for figure in figures:
         drawn[f"boxes-{figure.column}"] = (f"{figure.words.capitalize()}: boxes", draw_boxes(table, figure, boxed))
         drawn[f"map-{figure.column}"] = (
             f"{figure.words.capitalize()}: medians{which}", draw_figure_maps(table, figure, mapped)
         )  # fmt: skip
     if len(columns) > 1 and (canvas := draw_dependence(table, figures, columns)) is not None:
-        drawn["dependence"] = ("What depends on what: rank correlation", canvas)
+        drawn["dependence"] = ("Rank correlation of parameters and figures", canvas)
     return drawn
 
 
@@ -106,7 +103,7 @@ def _summary(table: pl.DataFrame, figures: list[Figure]) -> list[str]:
         cells = [law_name(law), str(rows.height), f"{100.0 * float(rows['completed'].mean()):.1f} %"]  # type: ignore[arg-type]
         for figure in figures:
             values = figure.scale * rows[figure.column].drop_nulls().drop_nans()
-            low, middle, high = (values.quantile(share, "linear") for share in (0.05, 0.5, 0.95))
+            low, middle, high = (values.quantile(level, "linear") for level in (0.05, 0.5, 0.95))
             cells.append("–" if middle is None else f"{middle:.3g} ({low:.3g} to {high:.3g})")
         lines.append("| " + " | ".join(cells) + " |")
     return lines

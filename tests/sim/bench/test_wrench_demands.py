@@ -52,7 +52,7 @@ def test_what_is_given_up_is_reported(bench: dict) -> None:
     for wrench in bench["demands"](300, seed=4):
         missing = wrench - effectiveness @ program(wrench)
         # The pull to the last thrusts, here far away, bends the free optimum where it is softest: along the push.
-        np.testing.assert_allclose(program.given_up, missing, rtol=0.02, atol=0.2)
+        np.testing.assert_allclose(program.unallocated, missing, rtol=0.02, atol=0.2)
     assert set(program.outcomes) <= {"solved", "inaccurate_accepted", "capped_accepted", "exact_fallback"}
     assert program.outcomes["solved"] >= 0.97 * 300
 

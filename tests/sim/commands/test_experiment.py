@@ -120,10 +120,11 @@ def test_the_time_left_goes_by_expected_flying_time(flown, tmp_path):
     flights = (
         experiment("friction").design(Choice(quick=True)) + experiment("force-hold").design(Choice(quick=True))[:1]
     )
-    told: list[tuple[float, float]] = []
-    run_sweep(flights, tmp_path, timed=lambda *times: told.append(times))
-    assert [entry[0] for entry in told] == pytest.approx(list(accumulate(run.expected_s for run in flights)))
-    assert told[-1][0] == told[-1][1] and len({run.expected_s for run in flights}) > 1
+    finished: list[float] = []
+    run_sweep(flights, tmp_path, progress=lambda *counts: finished.append(counts[3]))
+    expected = [0.0, *accumulate(run.expected_s for run in flights)]
+    assert finished == pytest.approx([passed / expected[-1] for passed in expected])
+    assert len({run.expected_s for run in flights}) > 1
 
 
 def test_the_page_says_how_to_redo_it_with_the_same_choices(flown, tmp_path):

@@ -14,7 +14,7 @@ import pytest
 import sim
 from ibvs_qp.config.errors import ConfigError
 from sim.sweep import Planned, Run, load_spec
-from sim.sweep.axes import shares
+from sim.sweep.axes import fractions
 from sim.sweep.design import Refusal
 from sim.sweep.setup import Setup, changed, unit_of, value_at
 from sim.sweep.spec import parse_spec
@@ -83,9 +83,9 @@ def test_draws_lie_in_their_ranges_and_more_of_them_keep_the_first(draw):
 
 def test_draws_are_uniform_and_of_one_seed():
     for kind in ("random", "sobol"):
-        numbers = shares(kind, 4096, 3, 1)
+        numbers = fractions(kind, 4096, 3, 1)
         assert np.allclose(numbers.mean(axis=0), 0.5, atol=0.02) and numbers.min() >= 0.0 and numbers.max() < 1.0
-        assert not np.array_equal(numbers, shares(kind, 4096, 3, 2))
+        assert not np.array_equal(numbers, fractions(kind, 4096, 3, 2))
 
 
 @pytest.mark.parametrize(
@@ -150,8 +150,8 @@ def test_a_block_is_small_and_the_same_elsewhere():
     sent = pickle.dumps(block)
     assert len(sent) < 20_000
     there = pickle.loads(sent)
-    assert there.name == block.name and len(there) == 100
-    made = list(itertools.islice(there.runs(), 3))
+    assert there.name == block.name and there.count == 100
+    made = list(itertools.islice(there.make(), 3))
     assert [run.params for run in made] == [design.place(70_000 + index).params for index in range(3)]
 
 

@@ -30,9 +30,7 @@ def test_edges_are_found_to_a_fraction_of_a_pixel(count: int) -> None:
         errors = run(family, count)
         assert not any(confidence >= 0.8 for confidence in errors.wrong), (family, errors.wrong)
         assert not errors.refused, errors.refused
-        for name in ("offset_px", "angle_deg", "missed", "chi_square"):
-            getattr(total, name).extend(getattr(errors, name))
-        total.asked += errors.asked
+        total.pool(errors)
     assert total.found >= 0.99, total.missed
     assert np.median(total.offset_px) <= 0.05 and np.percentile(total.offset_px, 95) <= 0.3
     assert np.median(total.angle_deg) <= 0.01 and np.percentile(total.angle_deg, 95) <= 0.05

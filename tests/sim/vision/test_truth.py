@@ -7,13 +7,13 @@ import math
 
 import numpy as np
 import pytest
+from row_2_scene import attitude_of, row_2_scene
 
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.vision import LineHint, Perception, VisionConfig
 from sim.bench.mission import mission_shots
 from sim.detection.truth import render_frame
 from sim.detection.truth.accuracy import line_errors
-from sim.detection.truth.row_2 import attitude_of, row_2_scene
 from sim.world.scene import Scene
 
 #: Pictures of one view: two confirm a track, the third is judged.

@@ -1,4 +1,4 @@
-"""The view in which the paint's guide is not the topmost line: brush in row 2, its own fresh edge above the guide."""
+"""A view with the guide below the topmost line: brush in row 2, its own fresh edge above the guide."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import numpy as np
 from ibvs_qp.frames import R_BODY_CAMERA
 from sim.detection.truth.scenes import LIGHT, PAINTS, TruthScene, turned
 
-#: Largest relative change of the light across half a row-2 view: the flight tells board from wall by a colour gate of
-#: 42 grey levels, a tenth of a white board's colour.
+#: Largest relative change of the light across half a row-2 view: the colour gate between board and wall in flight
+#: is 42 grey levels, a tenth of a white board's colour.
 _ROW_2_SHADING = 0.08
 
 
 def row_2_scene(seed: int) -> TruthScene:
-    """The view of design, section 4.4: brush in row 2, guide ahead of it inside its footprint, fresh edge above.
+    """Brush in row 2, guide ahead of it inside its footprint, fresh edge above.
 
     Row 1 is painted along the whole board, row 2 behind the brush only: to the left, as it is painted to the right.
     """
@@ -31,7 +31,7 @@ def row_2_scene(seed: int) -> TruthScene:
         ((-0.8, row_1 - 0.04, 0.8, row_1 + 0.04), paint),
         ((-0.8, row_2 - 0.04, 0.0, row_2 + 0.04), paint),
     )
-    # board frame: its middle is put so that row 1 runs 0.05 m above the bottom edge
+    # board frame: row 1 runs 0.05 m above the bottom edge
     size = (1.6, 0.5)
     middle = row_1 + 0.05 - 0.5 * size[1]
     moved = tuple(
