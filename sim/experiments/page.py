@@ -1,21 +1,22 @@
-"""The results page: every number comes from the tables, none is typed."""
+"""The results page as Markdown; all numbers come from the tables."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import polars as pl
 
-from sim.experiments.balanced import account
-from sim.experiments.base import Experiment
+from sim.experiments.balance import balance
 from sim.experiments.clipping import clipping
+from sim.experiments.spec import Experiment
 from sim.experiments.variants import VARIANTS
-from sim.experiments.verdict import Verdict, telling, verdicts
-from sim.experiments.wording import cell, entry, figure, folded, headed, markdown, of, shown
-from sim.experiments.worth import difference, worth
+from sim.experiments.verdict import Verdict, distinguishing, verdicts
+from sim.experiments.wording import cell, difference, entry, headings, interval, markdown, measured, value_of
+from sim.experiments.worth import worth
 from sim.figures.style import law_name
 from sim.sweep.paired import needed, paired_differences
 from sim.sweep.parts import PARAM
@@ -36,72 +37,78 @@ paper reports is in [experiments.md](../experiments.md).
 """
 
 
-def results_page(
-    flown: Sequence[tuple[Experiment, pl.DataFrame, dict[str, tuple[str, Path]]]], lead: str, command: str, name: str
-) -> str:
+@dataclass(frozen=True, kw_only=True)
+class Section:
+    """One flown experiment of the page.
+
+    Attributes:
+        experiment: The experiment.
+        table: Its rows.
+        figures: Caption and file of each figure; files are relative to the page.
+    """
+
+    experiment: Experiment
+    table: pl.DataFrame
+    figures: Mapping[str, tuple[str, Path]]
+
+
+def results_page(sections: Sequence[Section], lead: str, command: str, name: str) -> str:
     """Markdown text of the page.
 
     Args:
-        flown: Experiments with their tables and the caption and file of their figures, files relative to the page.
+        sections: The flown experiments.
         lead: A sentence on what was flown.
-        command: The command that flies one experiment alike, with ``{name}`` where its name goes.
-        name: What was flown.
+        command: Command that repeats one experiment, with ``{name}`` in the place of its name.
+        name: What was flown: an experiment, or "all".
     """
     text = _HEAD.format(command=command.format(name=name), lead=lead, needed=needed())
-    text += "## What the QP law is held to\n\n" + _summary(flown)
-    tables = [(experiment, table) for experiment, table, _ in flown]
-    text += "\n## Where the QP helps, and where it does not\n\n" + account(tables)
+    text += "## What the QP law is held to\n\n" + _criteria(sections)
+    tables = [(section.experiment, section.table) for section in sections]
+    text += "\n## Where the QP helps, and where it does not\n\n" + balance(tables)
     for _, table in tables:
         near = clipping(table) if "clipped" in table["variant"] and PARAM + "push_n" in table.columns else ""
         text += f"\n### Where clipping wins and loses\n\n{near}" if near else ""
     text += "\n## What each part is worth\n\n" + worth(tables)
-    for experiment, table, figures in flown:
+    for section in sections:
+        experiment, table = section.experiment, section.table
         text += f"\n## {experiment.title}\n\n{experiment.about}\n\n"
-        text += f"**Published:** {experiment.paper}\n\n"
+        text += f"**Published:** {experiment.published}\n\n"
         text += f"To redo it: `{command.format(name=experiment.name)}`\n\n"
-        text += _table(experiment, table) + "\n" + _differences(experiment, table)
-        text += _failures(experiment, table)
-        for caption, file in figures.values():
+        text += _table(experiment, table) + "\n" + _differences(experiment, table) + _failures(experiment, table)
+        for caption, file in section.figures.values():
             text += f"![{caption}]({file.as_posix()})\n\n*{caption}.*\n\n"
     return text
 
 
-def _summary(flown: Sequence[tuple[Experiment, pl.DataFrame, dict[str, tuple[str, Path]]]]) -> str:
-    heads = ("experiment", "figure", "cell", "bound", "median", "worst flight", "flights within", "met")
-    lines = ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
-    for experiment, table, _ in flown:
-        listed = verdicts(experiment, table)
-        lines += [_verdict_line(experiment, verdict, telling(listed, verdict)) for verdict in listed]
-    return "\n".join(lines) + "\n"
+def _criteria(sections: Sequence[Section]) -> str:
+    rows = []
+    for section in sections:
+        listed = verdicts(section.experiment, section.table)
+        rows += [_verdict(section.experiment, each, distinguishing(listed, each)) for each in listed]
+    return markdown(("experiment", "figure", "cell", "bound", "median", "worst flight", "flights within", "met"), rows)
 
 
-def _verdict_line(experiment: Experiment, verdict: Verdict, place: dict[str, Any]) -> str:
+def _verdict(experiment: Experiment, verdict: Verdict, place: dict[str, Any]) -> list[str]:
     criterion = verdict.criterion
-    sign, unit = (">=" if criterion.least else "<="), f" {criterion.unit}" if criterion.unit else ""
-    sign += " every" if criterion.every else ""
+    unit = f" {criterion.unit}" if criterion.unit else ""
+    sign = (">=" if criterion.least else "<=") + (" every" if criterion.every else "")
     where = cell(experiment, place) or "all"
-    if criterion.variant != "standard":
-        where += f", {criterion.variant}"
-    return (
-        f"| {experiment.name} | {criterion.text} | {where} | {sign} {verdict.bound:.4g}{unit} | "
-        f"{_number(verdict.median, unit)} | {_number(verdict.worst, unit)} | {verdict.held} of {verdict.n} | "
-        f"{'**no**' if verdict.words == 'no' else verdict.words} |"
-    )
-
-
-def _number(value: float, unit: str) -> str:
-    return f"{value:.3g}{unit}" if np.isfinite(value) else "–"
+    where += f", {criterion.variant}" if criterion.variant != "standard" else ""
+    values = (f"{value:.3g}{unit}" if np.isfinite(value) else "–" for value in (verdict.median, verdict.worst))
+    met = "**no**" if verdict.words == "no" else verdict.words
+    bound, within = f"{sign} {verdict.bound:.4g}{unit}", f"{verdict.within} of {verdict.n}"
+    return [experiment.name, criterion.text, where, bound, *values, within, met]
 
 
 def _table(experiment: Experiment, table: pl.DataFrame) -> str:
-    columns = shown(experiment, table)
-    heads = [*experiment.params.values(), "variant", "law", "done", *headed(columns)]
+    columns = measured(experiment, table)
+    heads = [*experiment.params.values(), "variant", "law", "done", *headings(columns)]
     rows: dict[bool, list[list[str]]] = {False: [], True: []}
     for flown in cells(table, {column.metric for column in columns if column.of_all}):
         row = [entry(flown["params"].get(name, "")) for name in experiment.params]
         row += [flown["variant"], law_name(flown["law"]), f"{flown['completed']} of {flown['n']}"]
-        row += [figure(of(flown["metrics"], column, flown["params"]), column) for column in columns]
-        rows[folded(experiment, flown["params"])].append(row)
+        row += [interval(value_of(flown["metrics"], column, flown["params"]), column) for column in columns]
+        rows[experiment.is_folded(flown["params"])].append(row)
     text = markdown(heads, rows[False])
     if rows[True]:
         text += f"\n<details><summary>{len(rows[True])} more cells, which the figure shows</summary>\n\n"
@@ -112,18 +119,17 @@ def _table(experiment: Experiment, table: pl.DataFrame) -> str:
 
 
 def _differences(experiment: Experiment, table: pl.DataFrame) -> str:
-    columns = shown(experiment, table)
-    found = paired_differences(table, [column.metric for column in columns])
-    found = [flown for flown in found if not folded(experiment, flown["params"])]
-    if not found:
-        return ""
-    heads = [*experiment.params.values(), "variant", "pairs", "failed, QP and analytic", *headed(columns)]
+    columns = measured(experiment, table)
     rows = []
-    for flown in found:
-        row = [entry(flown["params"].get(name, "")) for name in experiment.params]
+    for flown in paired_differences(table, [column.metric for column in columns]):
+        params = flown["params"]
+        if experiment.is_folded(params):
+            continue
+        row = [entry(params.get(name, "")) for name in experiment.params]
         row += [flown["variant"], f"{flown['n']} of {flown['flown']}", " and ".join(map(str, flown["failed"]))]
-        rows.append(row + [difference(of(flown["differences"], column, flown["params"]), column) for column in columns])
-    return f"Analytic law minus QP law:\n\n{markdown(heads, rows)}\n"
+        rows.append(row + [difference(value_of(flown["differences"], column, params), column) for column in columns])
+    heads = [*experiment.params.values(), "variant", "pairs", "failed, QP and analytic", *headings(columns)]
+    return f"Analytic law minus QP law:\n\n{markdown(heads, rows)}\n" if rows else ""
 
 
 def _failures(experiment: Experiment, table: pl.DataFrame) -> str:

@@ -9,10 +9,11 @@ from typing import Any
 import polars as pl
 
 from sim.experiments import ALL
-from sim.experiments.base import Experiment, Results
-from sim.experiments.page import results_page
+from sim.experiments.figures import Results, draw
+from sim.experiments.page import Section, results_page
+from sim.experiments.spec import Experiment
 from sim.experiments.variants import REFERENCES
-from sim.experiments.verdict import telling, verdicts
+from sim.experiments.verdict import distinguishing, verdicts
 from sim.figures.style import save, styled
 from sim.report.rundir import as_json
 from sim.sweep.paired import paired_differences, variant_differences
@@ -64,13 +65,13 @@ def summary(
                 "metric": verdict.criterion.metric,
                 "variant": verdict.criterion.variant,
                 "params": verdict.params,
-                "cell": telling(listed, verdict),
+                "cell": distinguishing(listed, verdict),
                 "bound": verdict.bound,
                 "least": verdict.criterion.least,
                 "unit": verdict.criterion.unit,
                 "median": verdict.median,
                 "worst": verdict.worst,
-                "held": verdict.held,
+                "held": verdict.within,
                 "n": verdict.n,
                 "every": verdict.criterion.every,
                 "met": verdict.met,
@@ -114,16 +115,16 @@ def write_page(
         command: The command that flies one alike, with ``{name}`` where its name goes.
         name: What was flown: an experiment, or "all".
     """
-    flown = []
+    sections = []
     with styled():
         for experiment in experiments:
             rows = rows_of(table, experiment)
             if not rows.height:
                 continue
             figures = {}
-            for title, (caption, figure) in experiment.draw(Results(table=rows, folder=folder / PARTS)).items():
+            for title, (caption, figure) in draw(Results(experiment, rows, folder / PARTS)).items():
                 save(figure, folder / "figures" / f"{title}.png")
                 figures[title] = (caption, Path("figures") / f"{title}.png")
-            flown.append((experiment, rows, figures))
-    (folder / PAGE).write_text(results_page(flown, lead, command, name), encoding="utf-8")
+            sections.append(Section(experiment=experiment, table=rows, figures=figures))
+    (folder / PAGE).write_text(results_page(sections, lead, command, name), encoding="utf-8")
     return folder / PAGE

@@ -35,6 +35,13 @@ class Variant:
         return dataclasses.replace(config, controller=dataclasses.replace(config.controller, **self.switches))
 
 
+def with_force_gain(config: PilotConfig, factor: float) -> PilotConfig:
+    """The pilot with the force gains K_fp and K_fi multiplied."""
+    gains = config.controller.gains
+    gains = dataclasses.replace(gains, force_kfp=factor * gains.force_kfp, force_kfi=factor * gains.force_kfi)
+    return dataclasses.replace(config, controller=dataclasses.replace(config.controller, gains=gains))
+
+
 VARIANTS = {
     "standard": Variant(words="as shipped: each law at gains tuned alike, with ramp, feed-forward and reach check"),
     "direct": Variant(words="direct force control, no impedance", switches={"impedance": False}),

@@ -8,9 +8,11 @@ from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 from matplotlib.patches import Patch, Rectangle
 
-from sim.experiments.figures.snapshots import painted_board
+from sim.experiments.figures.common import Drawn, Results, select, stored_trace
+from sim.experiments.figures.snapshots import draw_snapshots, painted_board
+from sim.experiments.spec import FigureSpec
 from sim.figures.board import draw_canvas
-from sim.figures.style import PHASE_TINTS, REFERENCE, law_colour, new_figure, shade_phases, thin
+from sim.figures.style import PHASE_TINTS, REFERENCE, law_colour, law_name, new_figure, shade_phases, thin
 from sim.flight.trace import Trace
 from sim.world.board import BoardGeometry
 
@@ -25,6 +27,23 @@ LONG_M = 1.5
 #: Free space above the curves for their legend, as a share of their range.
 HEADROOM = 0.2
 _WORDS = {"press": "touch and press", "paint": "painting a row", "climb": "climb to the next row"}
+
+
+def draw_demonstrations(_: FigureSpec, results: Results) -> Drawn:
+    """Six panels per law, and snapshots of the line detection under the QP law."""
+    figures: Drawn = {}
+    for law in ("qp", "paper"):
+        trace = stored_trace(results, select(results.table, law=law, variant="standard"))
+        if trace is None or not len(trace.t):
+            continue
+        figures[f"demonstration-{law}"] = (f"The complete demonstration, {law_name(law)}", draw_demonstration(trace))
+        if law == "qp":
+            caption = (
+                "Line detection at three moments; below, normals of the depth picture and the bounding box of the "
+                "plane found, both computed for this figure"
+            )
+            figures["line-detection"] = (caption, draw_snapshots(trace))
+    return figures
 
 
 def draw_demonstration(trace: Trace) -> Figure:

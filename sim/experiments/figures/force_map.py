@@ -12,8 +12,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ibvs_qp.config.contact_margin import contact_mode_damping
-from sim.experiments.figures.common import select
-from sim.experiments.variants import VARIANTS
+from sim.experiments.figures.common import Drawn, Results, select
+from sim.experiments.spec import FigureSpec
+from sim.experiments.variants import VARIANTS, with_force_gain
 from sim.figures.style import law_name, new_figure
 from sim.flight.closed_loop import default_preset
 from sim.sweep.parts import PARAM
@@ -41,8 +42,6 @@ def predicted_damping(law: str, variant: str, gain: float, stiffness: float, del
         stiffness: Of the wall [N/m].
         delay_s: Latency of the force/torque sensor [s]; half a sample period comes on top.
     """
-    from sim.experiments.force_hold import with_force_gain
-
     config = VARIANTS[variant].apply(with_force_gain(default_preset(law), gain)).controller
     age = delay_s + 0.5 / ForceTorqueScene().rate_hz
     return contact_mode_damping(config, stiffness, WallScene().damping_n_s_m, age).least_damping_ratio
@@ -105,6 +104,14 @@ def _calmer(holds: pl.DataFrame) -> str:
         if None not in rows:
             found.append(f"{rows[1]:.3f} against {rows[0]:.3f} N at {wall / 1000:g} kN/m")
     return f"; at shipped gains direct control deviates by {', '.join(found)}" if found else ""
+
+
+def draw_gain_map(spec: FigureSpec, results: Results) -> Drawn:
+    """The map, with the counted verdict as its caption."""
+    table = select(results.table, kind="map")
+    if not table.height:
+        return {}
+    return {spec.name: (map_verdict(table, select(results.table, kind="hold")), draw_map(table))}
 
 
 def draw_map(table: pl.DataFrame) -> Figure:

@@ -12,8 +12,7 @@ from synthetic_trace import Errors, synthetic_trace
 
 import sim.sweep.flying
 from sim.commands.cli import main
-from sim.experiments import experiment
-from sim.experiments.base import Choice
+from sim.experiments import Choice, designs
 from sim.experiments.figures.force_map import predicted_damping
 from sim.flight.jobs import PressJob
 from sim.sweep import run_sweep
@@ -117,9 +116,8 @@ def test_all_cut_short_still_reports_what_was_flown(flown, monkeypatch, capsys):
 
 
 def test_the_time_left_goes_by_expected_flying_time(flown, tmp_path):
-    flights = (
-        experiment("friction").design(Choice(quick=True)) + experiment("force-hold").design(Choice(quick=True))[:1]
-    )
+    quick = Choice(quick=True)
+    flights = designs("friction", quick) + designs("force-hold", quick)[:1]
     told: list[tuple[float, float]] = []
     run_sweep(flights, tmp_path, timed=lambda *times: told.append(times))
     assert [entry[0] for entry in told] == pytest.approx(list(accumulate(run.expected_s for run in flights)))

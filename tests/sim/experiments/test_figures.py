@@ -9,12 +9,11 @@ import pytest
 from matplotlib.figure import Figure
 from press_trace import press_trace
 
-from sim.experiments import experiment
-from sim.experiments.base import Choice, Results
-from sim.experiments.figures import force_hold
-from sim.experiments.figures.common import CRASH, plot_medians
-from sim.experiments.figures.derate import draw_derate
+from sim.experiments import Choice, designs, experiment
+from sim.experiments.figures import Results, draw, force_hold
+from sim.experiments.figures.common import CRASH
 from sim.experiments.figures.force_map import judged_cells, map_verdict
+from sim.experiments.figures.medians import plot_medians
 from sim.sweep.parts import PARAM
 
 GAINS, WALLS = (1.0, 5.0), (1500.0, 10000.0)
@@ -26,7 +25,7 @@ def table_of(name: str, **figures: float) -> pl.DataFrame:
         {"experiment": name, "law": run.law, "variant": run.variant, "seed": run.seed, "completed": True, "log": None}
         | {PARAM + key: value for key, value in run.params.items()}
         | figures
-        for run in experiment(name).design(Choice(quick=True))
+        for run in designs(name, Choice(quick=True))
     ]
     return pl.DataFrame(rows, schema_overrides={"log": pl.String}, infer_schema_length=None)
 
@@ -47,7 +46,7 @@ def the_map(bad: float) -> pl.DataFrame:
 def test_failed_flights_are_crosses_and_enter_no_median():
     rows = pl.DataFrame({"completed": [True, True, False, False], PARAM + "x": [1.0] * 4, "y": [1.0, 3.0, 60.0, None]})
     axes = Figure().subplots()
-    plot_medians(axes, rows, "x", "y", "qp", top=5.0)
+    plot_medians(axes, rows, "x", "y", "#0b6f9e", top=5.0)
     assert sum(line.get_gid() == CRASH for line in axes.lines) == 2
     (middle,) = [line for line in axes.lines if line.get_marker() == "o"]
     assert list(middle.get_ydata()) == [2.0]  # type: ignore[arg-type]
@@ -79,8 +78,8 @@ def test_a_variant_without_a_log_borrows_no_reference(monkeypatch, tmp_path, log
         made.arrays["line_error_px"] = 0.0 * made.t[:, None].repeat(2, 1)
         return made
 
-    monkeypatch.setattr(force_hold, "kept_trace", trace)
-    figures = force_hold.draw_force_hold(Results(table=table, folder=tmp_path))
+    monkeypatch.setattr(force_hold, "stored_trace", trace)
+    figures = draw(Results(experiment("force-hold"), table, tmp_path))
     panels = figures["force-hold-1.5kNm"][1].axes[:2]
     empty, drawn = panels if logged == "direct" else panels[::-1]
     assert len(drawn.lines) == 3
@@ -89,7 +88,7 @@ def test_a_variant_without_a_log_borrows_no_reference(monkeypatch, tmp_path, log
 
 def test_derating_without_a_reach_still_draws(tmp_path):
     table = table_of("rotor-derate").with_columns(pl.lit(None, pl.Float64).alias("reach_n"))
-    assert draw_derate(Results(table=table, folder=tmp_path))
+    assert draw(Results(experiment("rotor-derate"), table, tmp_path))
 
 
 @pytest.mark.parametrize(
@@ -97,7 +96,7 @@ def test_derating_without_a_reach_still_draws(tmp_path):
 )
 def test_curves_draw_their_bound_and_every_variant(tmp_path, name, metric, bounds):
     table = table_of(name, **{metric: 1.0})
-    axes = experiment(name).draw(Results(table=table, folder=tmp_path))[name][1].axes[0]
+    axes = draw(Results(experiment(name), table, tmp_path))[name][1].axes[0]
     labels = axes.get_legend_handles_labels()[1]
     assert labels.count("bound") == bounds
     assert len([label for label in labels if label != "bound"]) == 2 * table["variant"].n_unique()

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import polars as pl
 
 from sim.experiments import experiment
-from sim.experiments.balanced import account
+from sim.experiments.balance import balance
 from sim.experiments.clipping import clipping
-from sim.experiments.page import results_page
+from sim.experiments.page import Section, results_page
 from sim.experiments.wording import cell, rounded
 from sim.experiments.worth import worth
 from sim.sweep.parts import frame
@@ -61,9 +61,9 @@ def test_a_variant_that_changes_nothing_is_said_to_do_nothing():
 
 def test_few_pairs_are_too_few_and_chance_is_named():
     flights = rows("paint", "qp", "standard", [1.0] * 5) + rows("paint", "paper", "standard", [2.0] * 5)
-    assert "| paint | 5 of 5 | 5 of 5 | 0 | 0 | 0 | 0 | 1 |" in account([(experiment("paint"), frame(flights))])
+    assert "| paint | 5 of 5 | 5 of 5 | 0 | 0 | 0 | 0 | 1 |" in balance([(experiment("paint"), frame(flights))])
     flights = rows("paint", "qp", "standard", [1.0] * 20) + rows("paint", "paper", "standard", [2.0] * 20)
-    text = account([(experiment("paint"), frame(flights))])
+    text = balance([(experiment("paint"), frame(flights))])
     assert "| paint | 20 of 20 | 20 of 20 | 1 | 1 | 0 | 0 | 0 |" in text and "Comparisons with enough pairs: 1;" in text
 
 
@@ -77,7 +77,7 @@ def test_cells_are_words_and_maps_are_folded():
     flights = [
         row for kind in ("hold", "map") for row in rows("force-hold", "qp", "standard", [1.0], **{"param.kind": kind})
     ]
-    flown = [(experiment("force-hold"), frame(flights), {})]
+    flown = [Section(experiment=experiment("force-hold"), table=frame(flights), figures={})]
     page = results_page(flown, "Made up.", "ibvs-qp experiment {name}", "force-hold")
     assert (
         "| map |" in page.split("<details>")[1].split("</details>")[0] and "| map |" not in page.split("<details>")[0]
