@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Sequence
 from typing import Any
 
 import polars as pl
@@ -14,52 +14,9 @@ from sim.sweep.paired import needed, paired_differences, sign
 from sim.sweep.spec import LAWS
 from sim.sweep.statistics import CONFIDENCE
 
-#: Winner of a comparison and its heading; "" is neither.
-_OUTCOMES = {
-    "qp": "QP surely better",
-    "": "no sure difference",
-    "paper": "analytic surely better",
-    "few": "too few pairs to tell",
-}
-
-
-@dataclass(frozen=True, kw_only=True)
-class Comparison:
-    """One metric of one cell under both laws, paired by seed.
-
-    Attributes:
-        column: The metric.
-        variant: Variant flown.
-        params: The cell.
-        difference: Analytic law minus QP law, in SI: median, intervals and number of pairs.
-        winner: Key of `_OUTCOMES`.
-    """
-
-    column: Column
-    variant: str
-    params: dict[str, Any]
-    difference: dict[str, float]
-    winner: str
-
-
-def comparisons(experiment: Experiment, table: pl.DataFrame) -> Iterator[Comparison]:
-    """Every metric with a direction, in every cell that both laws flew; folded cells are left out."""
-    columns = [column for column in measured(experiment, table) if column.better]
-    for entry in paired_differences(table, [column.metric for column in columns]):
-        if experiment.is_folded(entry["params"]):
-            continue
-        for column in columns:
-            found = value_of(entry["differences"], column, entry["params"])
-            if found is None:
-                continue
-            winner = {1: "qp", -1: "paper", 0: ""}[-column.better * sign(found)]
-            yield Comparison(
-                column=column,
-                variant=entry["variant"],
-                params=entry["params"],
-                difference=found,
-                winner=winner if found["pairs"] >= needed() else "few",
-            )
+#: Outcome of a comparison by the sign of QP being better, and without enough pairs.
+_OUTCOMES = {1: "QP surely better", 0: "no sure difference", -1: "analytic surely better"}
+_FEW = "too few pairs to tell"
 
 
 def balance(flown: Sequence[tuple[Experiment, pl.DataFrame]]) -> str:
@@ -70,14 +27,19 @@ def balance(flown: Sequence[tuple[Experiment, pl.DataFrame]]) -> str:
     """
     rows, losses, compared = [], [], 0
     for experiment, table in flown:
-        found = list(comparisons(experiment, table))
-        count = {winner: sum(entry.winner == winner for entry in found) for winner in _OUTCOMES}
-        enough = len(found) - count["few"]
+        found = _comparisons(experiment, table)
+        outcomes = [_outcome(column, difference) for _, column, difference in found]
+        count = Counter(outcomes)
+        enough = len(found) - count[_FEW]
         compared += enough
-        rows.append([experiment.name, *_done(table), *map(str, (enough, *count.values()))])
-        for entry, params in zip(found, varying([entry.params for entry in found]), strict=True):
-            if entry.winner == "paper":
-                losses.append(_loss(experiment, entry, params))
+        counts = [count[outcome] for outcome in (*_OUTCOMES.values(), _FEW)]
+        rows.append([experiment.name, *_done(table), *map(str, (enough, *counts))])
+        places = varying([entry["params"] for entry, *_ in found])
+        for (entry, column, difference), params, outcome in zip(found, places, outcomes, strict=True):
+            if outcome == _OUTCOMES[-1]:
+                where = ", ".join(part for part in (entry["variant"], cell(experiment, params)) if part)
+                words = f"{column.label} {exact(difference, column)} {column.unit}".rstrip()
+                losses.append(f"- {experiment.name}, {where}: {words}, {difference['pairs']} pairs\n")
     text = (
         "Figures of cells that both laws flew with the same seeds, over the flights that both ended as planned. Surely "
         f"better: the exact {100.0 * CONFIDENCE:g} % interval of the median difference (order statistics, the inverse "
@@ -85,12 +47,27 @@ def balance(flown: Sequence[tuple[Experiment, pl.DataFrame]]) -> str:
         f"enough pairs: {compared}; if the laws were alike, up to "
         f"{(1.0 - CONFIDENCE) * compared:.0f} of them would look sure by chance alone.\n\n"
     )
-    heads = ("experiment", "flights done, QP", "flights done, analytic", "comparisons", *_OUTCOMES.values())
+    heads = ("experiment", "flights done, QP", "flights done, analytic", "comparisons", *_OUTCOMES.values(), _FEW)
     text += markdown(heads, rows)
     if losses:
-        text += "\nThe analytic law with clipping is surely better in (analytic minus QP):\n\n"
-        text += "\n".join(losses) + "\n"
+        text += "\nThe analytic law with clipping is surely better in (analytic minus QP):\n\n" + "".join(losses)
     return text
+
+
+def _comparisons(experiment: Experiment, table: pl.DataFrame) -> list[tuple[dict[str, Any], Column, dict[str, float]]]:
+    """Cell, metric and difference of every metric with a direction, in unfolded cells that both laws flew."""
+    columns = [column for column in measured(experiment, table) if column.better]
+    return [
+        (entry, column, difference)
+        for entry in paired_differences(table, [column.metric for column in columns])
+        if not experiment.is_folded(entry["params"])
+        for column in columns
+        if (difference := value_of(entry["differences"], column, entry["params"])) is not None
+    ]
+
+
+def _outcome(column: Column, difference: dict[str, float]) -> str:
+    return _OUTCOMES[-column.better * sign(difference)] if difference["pairs"] >= needed() else _FEW
 
 
 def _done(table: pl.DataFrame) -> list[str]:
@@ -99,11 +76,3 @@ def _done(table: pl.DataFrame) -> list[str]:
     shared = table.filter(pl.col("variant").is_in(sorted(set.intersection(*variants))))
     both = [shared.filter(pl.col("law") == law)["completed"] for law in LAWS]
     return [f"{int(column.sum())} of {column.len()}" for column in both]
-
-
-def _loss(experiment: Experiment, entry: Comparison, params: dict[str, Any]) -> str:
-    column = entry.column
-    where = ", ".join(part for part in (entry.variant, cell(experiment, params)) if part)
-    unit = f" {column.unit}" if column.unit else ""
-    words = exact(entry.difference, column)
-    return f"- {experiment.name}, {where}: {column.label} {words}{unit}, {entry.difference['pairs']} pairs"

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import polars as pl
@@ -14,7 +13,7 @@ from sim.experiments.balance import balance
 from sim.experiments.clipping import clipping
 from sim.experiments.spec import Experiment
 from sim.experiments.variants import VARIANTS
-from sim.experiments.verdict import Verdict, distinguishing, verdicts
+from sim.experiments.verdict import Verdict, verdicts
 from sim.experiments.wording import cell, difference, entry, headings, interval, markdown, measured, value_of
 from sim.experiments.worth import worth
 from sim.figures.style import law_name
@@ -39,17 +38,11 @@ paper reports is in [experiments.md](../experiments.md).
 
 @dataclass(frozen=True, kw_only=True)
 class Section:
-    """One flown experiment of the page.
-
-    Attributes:
-        experiment: The experiment.
-        table: Its rows.
-        figures: Caption and file of each figure; files are relative to the page.
-    """
+    """One flown experiment of the page."""
 
     experiment: Experiment
-    table: pl.DataFrame
-    figures: Mapping[str, tuple[str, Path]]
+    table: pl.DataFrame  # its rows
+    figures: Mapping[str, tuple[str, Path]]  # caption and file of each; files are relative to the page
 
 
 def results_page(sections: Sequence[Section], lead: str, command: str, name: str) -> str:
@@ -81,18 +74,16 @@ def results_page(sections: Sequence[Section], lead: str, command: str, name: str
 
 
 def _criteria(sections: Sequence[Section]) -> str:
-    rows = []
-    for section in sections:
-        listed = verdicts(section.experiment, section.table)
-        rows += [_verdict(section.experiment, each, distinguishing(listed, each)) for each in listed]
-    return markdown(("experiment", "figure", "cell", "bound", "median", "worst flight", "flights within", "met"), rows)
+    heads = ("experiment", "figure", "cell", "bound", "median", "worst flight", "flights within", "met")
+    flown = ((section.experiment, section.table) for section in sections)
+    return markdown(heads, [_verdict(each, verdict) for each, table in flown for verdict in verdicts(each, table)])
 
 
-def _verdict(experiment: Experiment, verdict: Verdict, place: dict[str, Any]) -> list[str]:
+def _verdict(experiment: Experiment, verdict: Verdict) -> list[str]:
     criterion = verdict.criterion
     unit = f" {criterion.unit}" if criterion.unit else ""
     sign = (">=" if criterion.least else "<=") + (" every" if criterion.every else "")
-    where = cell(experiment, place) or "all"
+    where = cell(experiment, verdict.place) or "all"
     where += f", {criterion.variant}" if criterion.variant != "standard" else ""
     values = (f"{value:.3g}{unit}" if np.isfinite(value) else "–" for value in (verdict.median, verdict.worst))
     met = "**no**" if verdict.words == "no" else verdict.words

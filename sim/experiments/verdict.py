@@ -8,34 +8,26 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from sim.experiments.spec import Criterion, Experiment
+from sim.experiments.criteria import Criterion
+from sim.experiments.spec import Experiment
+from sim.experiments.wording import varying
 from sim.sweep.parts import PARAM
 from sim.sweep.statistics import parameters, split
 
 
 @dataclass(frozen=True, kw_only=True)
 class Verdict:
-    """One criterion in one cell; values in the unit of the criterion.
-
-    Attributes:
-        criterion: The criterion.
-        params: The cell.
-        median: Median over its flights; NaN without data.
-        worst: Worst flight; NaN without data.
-        within: Flights within the bound.
-        known: Flights with a value; failed flights count only if the criterion includes them.
-        n: Flights.
-        measured: Whether the table has the metric.
-    """
+    """One criterion in one cell; values in the unit of the criterion, NaN without data."""
 
     criterion: Criterion
-    params: dict[str, Any]
-    median: float
-    worst: float
-    within: int
-    known: int
-    n: int
-    measured: bool
+    params: dict[str, Any]  # the cell
+    place: dict[str, Any]  # parameters in which it differs from other cells of the criterion
+    median: float  # of its flights
+    worst: float  # worst flight
+    within: int  # flights within the bound
+    known: int  # flights with a value; failed flights count only if the criterion includes them
+    n: int  # flights
+    measured: bool  # whether the table has the metric
 
     @property
     def met(self) -> bool:
@@ -68,23 +60,20 @@ def verdicts(experiment: Experiment, table: pl.DataFrame) -> list[Verdict]:
         rows = table.filter((pl.col("law") == "qp") & (pl.col("variant") == criterion.variant))
         for name, value in criterion.where.items():
             rows = rows.filter(pl.col(PARAM + name) == value) if PARAM + name in rows.columns else rows.clear()
-        result += [evaluate(criterion, parameters(key), cell) for key, cell in split(rows, ("variant",))]
+        cells = [(parameters(key), cell) for key, cell in split(rows, ("variant",))]
+        places = varying([params for params, _ in cells])
+        result += [evaluate(criterion, *cell, place) for cell, place in zip(cells, places, strict=True)]
     return result
 
 
-def distinguishing(listed: list[Verdict], verdict: Verdict) -> dict[str, Any]:
-    """Parameters in which the cell of a verdict differs from other cells of the same criterion."""
-    alike = [other.params for other in listed if other.criterion == verdict.criterion]
-    return {key: value for key, value in verdict.params.items() if len({str(params.get(key)) for params in alike}) > 1}
-
-
-def evaluate(criterion: Criterion, params: dict[str, Any], cell: pl.DataFrame) -> Verdict:
+def evaluate(criterion: Criterion, params: dict[str, Any], cell: pl.DataFrame, place: dict[str, Any]) -> Verdict:
     """Evaluate a criterion on the flights of one cell.
 
     Args:
         criterion: The criterion.
         params: Parameters of the cell.
         cell: Its rows.
+        place: Parameters that name the cell.
     """
     values = np.full(cell.height, np.nan)
     measured = criterion.metric in cell.columns
@@ -97,6 +86,7 @@ def evaluate(criterion: Criterion, params: dict[str, Any], cell: pl.DataFrame) -
     return Verdict(
         criterion=criterion,
         params=params,
+        place=place,
         median=float(np.median(good)) if len(good) else np.nan,
         worst=float(good.min() if criterion.least else good.max()) if len(good) else np.nan,
         within=int(np.count_nonzero(good >= bound if criterion.least else good <= bound)),

@@ -22,7 +22,7 @@ def draw_bars(spec: FigureSpec, results: Results) -> Drawn:
     crashed = False
     for axes, panel in zip(grid, spec.panels, strict=True):
         for law, side in (("qp", -0.5), ("paper", 0.5)):
-            rows = [select(results.table, law=law, **{spec.x: value}) for value in values]
+            rows = [select(results.table, {spec.x: value}, law=law) for value in values]
             found = [median_interval(completed(row, panel.metric)) for row in rows]
             middle, low, high = (
                 panel.scale * np.array([entry[part] for entry in found]) for part in ("median", "low", "high")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -28,28 +29,20 @@ BOUND = {"color": "#555555", "linestyle": (0, (6, 3))}
 
 @dataclass(frozen=True)
 class Results:
-    """Data of the figures of an experiment.
-
-    Attributes:
-        experiment: The experiment.
-        table: One row per flight.
-        folder: Folder of the stored logs.
-    """
+    """Data of the figures of an experiment."""
 
     experiment: Experiment
-    table: pl.DataFrame
-    folder: Path
+    table: pl.DataFrame  # one row per flight
+    folder: Path  # of the stored logs
 
 
-def select(table: pl.DataFrame, *, law: str | None = None, variant: str | None = None, **params: Any) -> pl.DataFrame:
-    """Rows of a law, a variant and parameter values."""
-    for name, value in {"law": law, "variant": variant}.items():
-        if value is not None:
-            table = table.filter(pl.col(name) == value)
-    for name, value in params.items():
-        if PARAM + name not in table.columns:
+def select(table: pl.DataFrame, where: Mapping[str, Any] | None = None, **more: Any) -> pl.DataFrame:
+    """Rows with a law, a variant and parameter values."""
+    for name, value in {**(where or {}), **more}.items():
+        column = name if name in ("law", "variant") else PARAM + name
+        if column not in table.columns:
             return table.clear()
-        table = table.filter(pl.col(PARAM + name) == value)
+        table = table.filter(pl.col(column) == value)
     return table
 
 

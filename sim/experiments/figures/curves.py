@@ -37,7 +37,7 @@ def draw_curves(spec: FigureSpec, results: Results) -> Drawn:
 
 
 def _panel(axes: Axes, results: Results, panel: Panel, x: str, variants: list[str]) -> None:
-    table = select(results.table, **panel.where)
+    table = select(results.table, panel.where)
     values = table[PARAM + x].drop_nulls() if PARAM + x in table.columns else pl.Series([], dtype=pl.Float64)
     places = sorted(float(value) for value in values.unique())
     apart = _APART * (places[-1] - places[0]) if places else 0.0
@@ -76,7 +76,7 @@ def _bounds(axes: Axes, results: Results, panel: Panel, x: str, places: list[flo
 
 def draw_rows(spec: FigureSpec, results: Results) -> Drawn:
     """One row of panels per law over the commanded push, with given lines and the reach."""
-    table = select(results.table, **spec.where)
+    table = select(results.table, spec.where)
     if not table.height or table[PARAM + spec.x].n_unique() < 2:
         return {}
     figure = new_figure(5.0)
@@ -86,7 +86,7 @@ def draw_rows(spec: FigureSpec, results: Results) -> Drawn:
             for place, line in enumerate(spec.lines):
                 shift = _APART_N * (place - (len(spec.lines) - 1) / 2)
                 plot_medians(
-                    axes, select(table, law=law, variant=line.variant, **line.where), spec.x, panel.metric, line.color,
+                    axes, select(table, line.where, law=law, variant=line.variant), spec.x, panel.metric, line.color,
                     scale=panel.scale, shift=shift, top=panel.top, label=line.label, linewidth=1.0,
                 )  # fmt: skip
             axes.set_ylabel(panel.label if axes is not row[0] else f"{law_name(law)}\n{panel.label}")
@@ -105,7 +105,7 @@ def _reaches(axes: Axes, table: pl.DataFrame, x: str, lines: tuple[Line, ...]) -
     axes.plot(ends, ends, **REFERENCE)
     seen = set()
     for line in lines:
-        reach = select(table, variant=line.variant, **line.where)["reach_n"].drop_nulls()
+        reach = select(table, line.where, variant=line.variant)["reach_n"].drop_nulls()
         if reach.len() and (value := round(float(reach[0]), 1)) not in seen:
             seen.add(value)
             axes.axhline(value, color="#888888", linewidth=0.8)

@@ -18,7 +18,7 @@ BEFORE_S, AFTER_S = 2.0, 7.0
 
 def draw_fault(spec: FigureSpec, results: Results) -> Drawn:
     """Three time series of both laws for the cell in the middle of the table, neither harmless nor hopeless."""
-    table = select(results.table, **spec.where)
+    table = select(results.table, spec.where)
     if not table.height:
         return {}
     cells = table.select(PARAM + "rotor", PARAM + "share").unique(maintain_order=True).rows()

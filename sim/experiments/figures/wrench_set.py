@@ -32,7 +32,7 @@ def draw_wrench_sets(spec: FigureSpec, results: Results) -> Drawn:
     """One figure per variant flown."""
     figures: Drawn = {}
     for variant in spec.variants:
-        rows = select(results.table, variant=variant, **spec.where)
+        rows = select(results.table, spec.where, variant=variant)
         if rows.height:
             caption = (
                 f"Attainable level forces without moment (shaded) and those flown while pressing, {_WORDS[variant]}; "

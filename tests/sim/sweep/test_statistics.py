@@ -11,7 +11,7 @@ import pytest
 
 from ibvs_qp.config.errors import ConfigError
 from sim.experiments import NAMES, Choice, designs, experiment
-from sim.experiments.spec import EVERY, Criterion
+from sim.experiments.criteria import EVERY, Criterion
 from sim.experiments.verdict import evaluate
 from sim.report.comparison import compare, read_run
 from sim.sweep.paired import exact_interval, needed, paired_differences, sign, variant_differences
@@ -114,7 +114,7 @@ def judged(values: list[float], completed: list[bool] | None = None, **criterion
     data = table({"qp": values})
     if completed:
         data = data.with_columns(pl.Series("completed", completed))
-    return evaluate(Criterion(text="", metric="error", **criterion), {}, data)
+    return evaluate(Criterion(text="", metric="error", **criterion), {}, data, {})
 
 
 def test_a_bound_is_held_by_the_median_and_counted_per_flight():
