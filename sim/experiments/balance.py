@@ -15,8 +15,8 @@ from sim.sweep.spec import LAWS
 from sim.sweep.statistics import CONFIDENCE
 
 #: Outcome of a comparison by the sign of QP being better, and without enough pairs.
-_OUTCOMES = {1: "QP surely better", 0: "no sure difference", -1: "analytic surely better"}
-_FEW = "too few pairs to tell"
+_OUTCOMES = {1: "QP significantly better", 0: "no significant difference", -1: "analytic significantly better"}
+_FEW = "too few pairs"
 
 
 def balance(flown: Sequence[tuple[Experiment, pl.DataFrame]]) -> str:
@@ -41,16 +41,16 @@ def balance(flown: Sequence[tuple[Experiment, pl.DataFrame]]) -> str:
                 words = f"{column.label} {exact(difference, column)} {column.unit}".rstrip()
                 losses.append(f"- {experiment.name}, {where}: {words}, {difference['pairs']} pairs\n")
     text = (
-        "Figures of cells that both laws flew with the same seeds, over the flights that both ended as planned. Surely "
-        f"better: the exact {100.0 * CONFIDENCE:g} % interval of the median difference (order statistics, the inverse "
-        f"of the sign test) excludes zero; it takes {needed()} pairs, and fewer can never say so. Comparisons with "
-        f"enough pairs: {compared}; if the laws were alike, up to "
-        f"{(1.0 - CONFIDENCE) * compared:.0f} of them would look sure by chance alone.\n\n"
+        "Metrics of cells that both laws flew with the same seeds, over the flights that both ended as planned. "
+        f"Significantly better: the exact {100.0 * CONFIDENCE:g} % interval of the median difference (order "
+        f"statistics, the inverse of the sign test) excludes zero, which takes at least {needed()} pairs. Comparisons "
+        f"with enough pairs: {compared}; if the laws were equal, up to {(1.0 - CONFIDENCE) * compared:.0f} of them "
+        "would look significant by chance.\n\n"
     )
     heads = ("experiment", "flights done, QP", "flights done, analytic", "comparisons", *_OUTCOMES.values(), _FEW)
     text += markdown(heads, rows)
     if losses:
-        text += "\nThe analytic law with clipping is surely better in (analytic minus QP):\n\n" + "".join(losses)
+        text += "\nThe analytic law with clipping is significantly better in (analytic minus QP):\n\n" + "".join(losses)
     return text
 
 

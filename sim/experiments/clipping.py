@@ -19,7 +19,7 @@ _RIVALS = {
 }
 #: Metrics shown: metric, heading, factor, decimals; the first ranks the rivals.
 _METRICS = (
-    ("force_error_rms_n", "push minus asked, rms [N]", 1.0, 2),
+    ("force_error_rms_n", "push minus command, rms [N]", 1.0, 2),
     ("height_error_peak_m", "height error, peak [mm]", 1e3, 1),
     ("tilt_peak_deg", "tilt, peak [deg]", 1.0, 2),
 )
@@ -56,10 +56,10 @@ def clipping(table: pl.DataFrame) -> str:
             sentences.append(f"- {push:g} N: {_winner(scores)}.\n")
     if not sentences:
         return ""
-    heads = ("asked [N]", "law", "done", *(heading for _, heading, *_ in _METRICS))
+    heads = ("command [N]", "law", "done", *(heading for _, heading, *_ in _METRICS))
     return (
         f"Static pushes of {FROM_N:g} to {TO_N:g} N without the reach check, medians over the flights that ended as "
-        "planned. Ranked by flights that end as planned, then by how near the push is to the asked one:\n\n"
+        "planned. Rank: flights that ended as planned, then push error:\n\n"
         + markdown(heads, lines)
         + "\n"
         + "".join(sentences)
@@ -76,10 +76,10 @@ def _winner(scores: dict[str, tuple[float, float]]) -> str:
     best = min(scores.values())
     winners = [words for words, score in scores.items() if score == best]
     if best[0] >= 1.0:
-        return "no law ends a flight as planned"
+        return "no flight ends as planned"
     if _QP not in winners:
         outcome = f"clipping wins ({' and '.join(winners)})"
     else:
         outcome = f"{_QP} wins" if len(winners) == 1 else f"no difference ({' and '.join(winners)})"
     crashed = [words for words, (failed, _) in scores.items() if failed >= 1.0]
-    return outcome + (f"; no flight of {' or '.join(crashed)} survives" if crashed else "")
+    return outcome + (f"; all flights of {' and '.join(crashed)} fail" if crashed else "")

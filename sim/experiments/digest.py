@@ -61,7 +61,7 @@ def digest(table: pl.DataFrame, lines: Sequence[Line] = LINES) -> str:
         lines: Lines of the table.
     """
     text = [
-        "| | QP | analytic law | published | flights, QP and analytic | redo it: `ibvs-qp` |",
+        "| | QP | analytic law | published | flights, QP and analytic | command: `ibvs-qp` |",
         "|---|---|---|---|---|---|",
     ]
     for line in lines:

@@ -25,13 +25,13 @@ from sim.sweep.statistics import cells, parameters, split
 _HEAD = """# Results of the experiments
 
 Generated from data by `{command}`; do not edit. {lead}
-*Met*: flags, peaks and bounces (marked *every*) must hold in every flight, other figures by the median of the cell,
-then with the count of flights where not all hold; a flight without the figure makes it a no.
-Medians over the flights of a cell, in brackets their 95 % bootstrap interval; *done* counts the flights that ended as
-planned, and only those have figures. Differences are analytic law minus QP law, flown with the same seeds, over the
-flights that both ended as planned, in brackets the exact interval of the median; **bold** where it excludes zero. Of
-fewer than {needed} pairs there is no such interval: they are too few to tell. What each experiment flies and what the
-paper reports is in [experiments.md](../experiments.md).
+*Met*: a bound marked *every* (flags, peaks, bounces) applies to each flight, any other bound to the median of the cell;
+if only the median is within the bound, the number of flights within it follows. A flight without the metric fails.
+Values are medians over the flights of a cell, with their 95 % bootstrap interval in brackets. *Done* counts the flights
+that ended as planned; values come from those flights only. Differences are analytic law minus QP law with the same
+seeds, over the flights that both laws ended as planned, with the exact interval of the median in brackets; **bold**
+means that the interval excludes zero. Fewer than {needed} pairs are too few for such an interval.
+[experiments.md](../experiments.md) describes the experiments.
 
 """
 
@@ -55,18 +55,18 @@ def results_page(sections: Sequence[Section], lead: str, command: str, name: str
         name: What was flown: an experiment, or "all".
     """
     text = _HEAD.format(command=command.format(name=name), lead=lead, needed=needed())
-    text += "## What the QP law is held to\n\n" + _criteria(sections)
+    text += "## Criteria of the QP law\n\n" + _criteria(sections)
     tables = [(section.experiment, section.table) for section in sections]
-    text += "\n## Where the QP helps, and where it does not\n\n" + balance(tables)
+    text += "\n## Comparison of the two laws\n\n" + balance(tables)
     for _, table in tables:
         near = clipping(table) if "clipped" in table["variant"] and PARAM + "push_n" in table.columns else ""
-        text += f"\n### Where clipping wins and loses\n\n{near}" if near else ""
-    text += "\n## What each part is worth\n\n" + worth(tables)
+        text += f"\n### Limits in the QP against clipping\n\n{near}" if near else ""
+    text += "\n## Effect of each part\n\n" + worth(tables)
     for section in sections:
         experiment, table = section.experiment, section.table
         text += f"\n## {experiment.title}\n\n{experiment.about}\n\n"
         text += f"**Published:** {experiment.published}\n\n"
-        text += f"To redo it: `{command.format(name=experiment.name)}`\n\n"
+        text += f"Command: `{command.format(name=experiment.name)}`\n\n"
         text += _table(experiment, table) + "\n" + _differences(experiment, table) + _failures(experiment, table)
         for caption, file in section.figures.values():
             text += f"![{caption}]({file.as_posix()})\n\n*{caption}.*\n\n"
@@ -74,7 +74,7 @@ def results_page(sections: Sequence[Section], lead: str, command: str, name: str
 
 
 def _criteria(sections: Sequence[Section]) -> str:
-    heads = ("experiment", "figure", "cell", "bound", "median", "worst flight", "flights within", "met")
+    heads = ("experiment", "metric", "cell", "bound", "median", "worst flight", "flights within", "met")
     flown = ((section.experiment, section.table) for section in sections)
     return markdown(heads, [_verdict(each, verdict) for each, table in flown for verdict in verdicts(each, table)])
 
@@ -102,7 +102,7 @@ def _table(experiment: Experiment, table: pl.DataFrame) -> str:
         rows[experiment.is_folded(flown["params"])].append(row)
     text = markdown(heads, rows[False])
     if rows[True]:
-        text += f"\n<details><summary>{len(rows[True])} more cells, which the figure shows</summary>\n\n"
+        text += f"\n<details><summary>{len(rows[True])} more cells; the figure shows them</summary>\n\n"
         text += markdown(heads, rows[True]) + "\n</details>\n"
     used = [name for name in VARIANTS if name in table["variant"].unique().to_list()]
     notes = "; ".join(f"*{name}*: {VARIANTS[name].words}" for name in used)

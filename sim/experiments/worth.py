@@ -25,10 +25,10 @@ def worth(flown: Sequence[tuple[Experiment, pl.DataFrame]]) -> str:
         flown: Experiments with their tables.
     """
     text = (
-        "Variant minus what it is judged against, same law, same seeds, over the flights that both ended as planned; "
+        "Variant minus its reference with the same law and seeds, over the flights that both ended as planned; "
         f"**bold** as above, from {needed()} pairs on. A positive difference of an error means that the part helps. "
-        "*Done* counts the flights of the variant and of its reference that ended as planned, out of the seeds that "
-        "both flew.\n"
+        "*Done* counts the flights of the variant and of its reference that ended as planned, of the seeds that both "
+        "flew.\n"
     )
     for experiment, table in flown:
         columns = measured(experiment, table)
@@ -40,7 +40,7 @@ def worth(flown: Sequence[tuple[Experiment, pl.DataFrame]]) -> str:
         shown = varying([entry["params"] for entry in found])
         text += f"\n**{experiment.title}**\n\n"
         text += markdown(
-            ("variant", "against", "law", "cell", "done", "pairs", *headings(columns)),
+            ("variant", "reference", "law", "cell", "done", "pairs", *headings(columns)),
             [_row(entry, cell(experiment, params), columns) for entry, params in zip(found, shown, strict=True)],
         )
         text += _idle(found, columns)
@@ -74,7 +74,7 @@ def _idle(found: Sequence[dict[str, Any]], columns: Sequence[Column]) -> str:
             change = f"{rounded(most, column.digits + 1, plus=True)} {column.unit}".rstrip()
             pairs = sum(entry["n"] for entry in entries)
             lines.append(
-                f"- *{name}*, {law_name(law)}: does nothing here; over {pairs} pairs no median moves by more than one "
-                f"step of the last digit shown (the most: {column.label} {change})."
+                f"- *{name}*, {law_name(law)}: no effect here; over {pairs} pairs no median changes by more than one "
+                f"step of the last decimal shown (largest change: {column.label} {change})."
             )
     return "\n" + "\n".join(lines) + "\n" if lines else ""

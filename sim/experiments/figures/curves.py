@@ -57,7 +57,7 @@ def _panel(axes: Axes, results: Results, panel: Panel, x: str, variants: list[st
         _bounds(axes, results, panel, x, places)
         axes.set_ylim(0.0, max(1.12 * float(axes.dataLim.y1), 1e-9))
     else:
-        note_empty(axes, "no flight came so far")
+        note_empty(axes, "no data")
 
 
 def _bounds(axes: Axes, results: Results, panel: Panel, x: str, places: list[float]) -> None:

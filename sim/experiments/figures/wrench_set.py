@@ -24,7 +24,7 @@ LIGHTEST = 0.9
 _WORDS = {
     "standard": "with the reach check",
     "no-reach-check": "without the reach check",
-    "clipped": "thrusts clipped after a program without limits",
+    "clipped": "thrusts clipped after a QP without limits",
 }
 
 
@@ -50,7 +50,7 @@ def draw_wrench_set(results: Results, rows: pl.DataFrame) -> Figure:
 
     Args:
         results: For its logs.
-        rows: Flights to show; the first kept log of each push and law is drawn.
+        rows: Flights to show; the first stored log of each push and law is drawn.
     """
     vehicle = VehicleParams()
     rotors = WrenchSet(vehicle.geometry, vehicle.thrust_min, vehicle.thrust_max)
@@ -69,7 +69,7 @@ def draw_wrench_set(results: Results, rows: pl.DataFrame) -> Figure:
                 wrench = trace.thrusts_actual[(trace.t >= begin) & (trace.t <= end)][::EVERY]
                 wrench = wrench @ control_effectiveness(vehicle.geometry).T
                 axes.plot(wrench[:, 1], wrench[:, 0], ".", color=colours(float(shade)), markersize=2.5,
-                          label=f"{push:g} N asked")  # fmt: skip
+                          label=f"{push:g} N commanded")  # fmt: skip
         _dress(axes, law_name(law))
     figure.axes[0].set_ylabel("force to the front [N]")
     return figure

@@ -128,8 +128,8 @@ def test_the_page_says_how_to_redo_it_with_the_same_choices(flown, tmp_path):
     words = ["experiment", "approach", "--quick", "--seed", "3", "--features", "geometric"]
     assert main([*words, "--jobs", "1", "--json", "--out", "run"]) == 0
     page = (tmp_path / "run" / "results.md").read_text()
-    assert "To redo it: `ibvs-qp experiment approach --quick --features geometric --seed 3`" in page
-    assert "too few to tell" in page and "-0.00" not in page and "_n_m" not in page
+    assert "Command: `ibvs-qp experiment approach --quick --features geometric --seed 3`" in page
+    assert "too few for such an interval" in page and "-0.00" not in page and "_n_m" not in page
 
 
 def test_plan_flies_nothing(flown, tmp_path, capsys):

@@ -12,7 +12,7 @@ from press_trace import press_trace
 from sim.experiments import Choice, designs, experiment
 from sim.experiments.figures import Results, draw, force_hold
 from sim.experiments.figures.common import CRASH
-from sim.experiments.figures.force_map import judged_cells, map_verdict
+from sim.experiments.figures.force_map import map_caption, map_cells
 from sim.experiments.figures.medians import plot_medians
 from sim.sweep.parts import PARAM
 
@@ -52,23 +52,22 @@ def test_failed_flights_are_crosses_and_enter_no_median():
     assert list(middle.get_ydata()) == [2.0]  # type: ignore[arg-type]
 
 
-def test_verdict_counts_what_the_map_shows():
-    shown, refuted = (map_verdict(the_map(bad), pl.DataFrame()) for bad in (0.8, 0.2))
-    assert shown.startswith("Shown") and "refuted for the shipped gains" in shown
-    assert "impedance oscillates above 0.5 N or loses the wall in 0 of 8 cells" in shown
-    assert "direct force control oscillates above 0.5 N or loses the wall in 2 of 8 cells" in shown
+def test_the_caption_counts_the_cells_of_the_map():
+    shown, refuted = (map_caption(the_map(bad), pl.DataFrame()) for bad in (0.8, 0.2))
+    assert shown.startswith("Direct force control oscillates") and "but not at the shipped gains" in shown
+    assert "impedance 0 of 8 cells" in shown and "direct force control 2 of 8 cells" in shown
     assert "none below 5 times" in shown
-    assert refuted.startswith("Refuted") and "in 2 of 8 cells" not in refuted
+    assert refuted.startswith("Direct force control does not oscillate") and "2 of 8 cells" not in refuted
 
 
 def test_a_hold_that_crashed_has_lost_the_wall():
     table = the_map(0.1).with_columns(pl.col(PARAM + "force_gain").eq(1.0).alias("completed"))
-    cells = judged_cells(table)
+    cells = map_cells(table)
     assert (cells["lost"] == (cells[PARAM + "force_gain"] == 5.0)).all()
 
 
 @pytest.mark.parametrize("logged", ["standard", "direct"])
-def test_a_variant_without_a_log_borrows_no_reference(monkeypatch, tmp_path, logged):
+def test_a_variant_without_a_log_shows_no_reference(monkeypatch, tmp_path, logged):
     table = table_of("force-hold", force_std_n=0.1, contact_share=1.0)
 
     def trace(results, rows):

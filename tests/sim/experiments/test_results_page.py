@@ -46,8 +46,8 @@ def test_who_clips_better_follows_the_rows():
     assert said[1].startswith(
         "- 27.5 N: no difference (the QP with its limits and the QP's thrusts clipped afterwards)"
     )
-    assert said[2].startswith("- 30 N: the QP with its limits wins; no flight of")
-    assert said[3] == "- 35 N: no law ends a flight as planned."
+    assert said[2].startswith("- 30 N: the QP with its limits wins; all flights of")
+    assert said[3] == "- 35 N: no flight ends as planned."
     assert clipping(table.filter(pl.col("variant") != "clipped")) == ""
 
 
@@ -56,7 +56,7 @@ def test_a_variant_that_changes_nothing_is_said_to_do_nothing():
     flights = rows("paint", "qp", "standard", base) + rows("paint", "qp", "no-barriers", [e + 1e-4 for e in base])
     flights += rows("paint", "qp", "no-ramp", [e + 1.0 for e in base])
     text = worth([(experiment("paint"), frame(flights))])
-    assert "*no-barriers*, QP law: does nothing here; over 4 pairs" in text and "*no-ramp*, QP law" not in text
+    assert "*no-barriers*, QP law: no effect here; over 4 pairs" in text and "*no-ramp*, QP law" not in text
 
 
 def test_few_pairs_are_too_few_and_chance_is_named():
@@ -70,7 +70,7 @@ def test_few_pairs_are_too_few_and_chance_is_named():
 def test_cells_are_words_and_maps_are_folded():
     derate = {"kind": "derate", "rotor": "mid_right", "share": 0.5, "told": False}
     assert cell(experiment("rotor-derate"), derate) == (
-        "derate, rotor mid right, thrust left 0.5, not told to the pilot"
+        "derate, rotor mid right, remaining thrust 0.5, not reported to the pilot"
     )
     assert cell(experiment("force-hold"), {"stiffness_n_m": 1500.0}) == "wall 1500 N/m"
     assert (rounded(-0.001, 2), rounded(0.001, 2, plus=True), rounded(1.0, 1, plus=True)) == ("0.00", "0.00", "+1.0")
