@@ -20,11 +20,7 @@ _FEW = "too few pairs"
 
 
 def balance(flown: Sequence[tuple[Experiment, pl.DataFrame]]) -> str:
-    """Counts per experiment, then every metric in which the analytic law is significantly better.
-
-    Args:
-        flown: Experiments with their tables.
-    """
+    """Counts per experiment, then every metric in which the analytic law is significantly better."""
     rows, losses, compared = [], [], 0
     for experiment, table in flown:
         found = _comparisons(experiment, table)

@@ -28,11 +28,7 @@ _TIE_DIGITS = 1
 
 
 def clipping(table: pl.DataFrame) -> str:
-    """A table of the three rivals per push, and the winner, from the rows of ``saturation``; empty without them.
-
-    Args:
-        table: Rows of the experiment.
-    """
+    """A table of the three rivals per push, and the winner, from the rows of ``saturation``; empty without them."""
     rows = table.filter((pl.col(PARAM + "kind") == "static") & pl.col(PARAM + "push_n").is_between(FROM_N, TO_N))
     friction = rows.filter(pl.col("variant") == "clipped")[PARAM + "friction"].unique()
     rows = rows.filter(pl.col(PARAM + "friction").is_in(friction.to_list()))

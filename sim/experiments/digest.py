@@ -54,12 +54,7 @@ LINES = load_toml(Lines, Path(__file__).with_name("readme.toml")).lines
 
 
 def digest(table: pl.DataFrame, lines: Sequence[Line] = LINES) -> str:
-    """Markdown table of the lines that have flights.
-
-    Args:
-        table: Rows of all experiments.
-        lines: Lines of the table.
-    """
+    """Markdown table of the lines that have flights in a table of all experiments."""
     text = [
         "| | QP | analytic law | published | flights, QP and analytic | command: `ibvs-qp` |",
         "|---|---|---|---|---|---|",

@@ -67,14 +67,7 @@ def verdicts(experiment: Experiment, table: pl.DataFrame) -> list[Verdict]:
 
 
 def evaluate(criterion: Criterion, params: dict[str, Any], cell: pl.DataFrame, place: dict[str, Any]) -> Verdict:
-    """Evaluate a criterion on the flights of one cell.
-
-    Args:
-        criterion: The criterion.
-        params: Parameters of the cell.
-        cell: Its rows.
-        place: Parameters that name the cell.
-    """
+    """Evaluate a criterion on the rows of one cell; `place` holds the parameters that name the cell."""
     values = np.full(cell.height, np.nan)
     measured = criterion.metric in cell.columns
     if measured:

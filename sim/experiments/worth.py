@@ -19,11 +19,7 @@ _IDLE_STEPS = 1.0
 
 
 def worth(flown: Sequence[tuple[Experiment, pl.DataFrame]]) -> str:
-    """A table for each experiment with variants, and a sentence on variants without effect.
-
-    Args:
-        flown: Experiments with their tables.
-    """
+    """A table for each experiment with variants, and a sentence on variants without effect."""
     text = (
         "Variant minus its reference with the same law and seeds, over the flights that both ended as planned; "
         f"**bold** as above, from {needed()} pairs on. A positive difference of an error means that the part helps. "

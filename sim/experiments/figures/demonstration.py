@@ -1,6 +1,8 @@
-"""The six panels of the complete demonstration: board, path of the tip, push, visual target, velocity, attitude."""
+"""Six panels of the complete demonstration: board, path of the tip, push, visual target, velocity, attitude."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -24,7 +26,7 @@ LEAST_ANGLE_DEG = 1.0
 OBLIQUE = (1.2, -0.3)
 #: A longer board gets fewer ticks [m].
 LONG_M = 1.5
-#: Free space above the curves for their legend, as a share of their range.
+#: Free space above the curves for their legend, as a fraction of their range.
 HEADROOM = 0.2
 _WORDS = {"press": "touch and press", "paint": "painting a row", "climb": "climb to the next row"}
 
@@ -47,11 +49,7 @@ def draw_demonstrations(_: FigureSpec, results: Results) -> Drawn:
 
 
 def draw_demonstration(trace: Trace) -> Figure:
-    """Six panels of one paint job; tints say what is done.
-
-    Args:
-        trace: A paint job flown with rendered pictures.
-    """
+    """Six panels of one paint job with rendered pictures; tints mark the phases."""
     figure = new_figure(7.6)
     grid = GridSpec(4, 2, figure, height_ratios=(1.12, 1.3, 1.0, 0.85))
     _board(figure.add_subplot(grid[0, :]), trace)
@@ -116,18 +114,15 @@ def _trajectory(axes: Axes, trace: Trace) -> None:
 
 
 def _force(axes: Axes, trace: Trace) -> None:
-    t, true, wanted = thin(trace.t, trace.push_true, trace.push_reference)
-    axes.plot(t, true, color=law_colour(trace.law), linewidth=0.8, label="true push")
-    axes.plot(t, wanted, **REFERENCE, label="reference")
+    _plot(axes, trace, trace.push_true, "true push", color=law_colour(trace.law), linewidth=0.8)
+    _plot(axes, trace, trace.push_reference, "reference", **REFERENCE)
     axes.set(title="(c) push", ylabel="[N]")
     axes.legend(loc="lower center", ncols=1)
 
 
 def _visual(axes: Axes, trace: Trace) -> None:
-    edges = ((0, law_colour(trace.law), "level edge"), (1, THIRD, "upright edge"))
-    for axis, colour, words in edges:
-        t, error = thin(trace.t, trace.line_error_px[:, axis])
-        axes.plot(t, error, color=colour, linewidth=0.9, label=words)
+    _plot(axes, trace, trace.line_error_px[:, 0], "level edge", color=law_colour(trace.law))
+    _plot(axes, trace, trace.line_error_px[:, 1], "upright edge", color=THIRD)
     axes.set(title="(d) visual target: edge error at the tip", ylabel="[px]")
     note = "steps at a climb: the reference moves to the next row"
     axes.text(0.99, 0.03, note, transform=axes.transAxes, ha="right", va="bottom", fontsize=7, color="#555555")
@@ -135,16 +130,21 @@ def _visual(axes: Axes, trace: Trace) -> None:
 
 def _speed(axes: Axes, trace: Trace) -> None:
     for axis, words, shade in ((1, "right", law_colour(trace.law)), (2, "down", SECOND)):
-        t, estimate, truth = thin(trace.t, trace.velocity_estimate[:, axis], trace.velocity[:, axis])
-        axes.plot(t, estimate, color=shade, linewidth=1.8, alpha=0.55, label=f"{words}, estimated")
-        axes.plot(t, truth, color=TRUE, linewidth=0.6, label="true" if axis == 2 else None)
+        _plot(
+            axes, trace, trace.velocity_estimate[:, axis], f"{words}, estimated", color=shade, linewidth=1.8, alpha=0.55
+        )
+        _plot(axes, trace, trace.velocity[:, axis], "true" if axis == 2 else None, color=TRUE, linewidth=0.6)
     axes.set(title="(e) velocity along the wall", ylabel="[m/s]")
 
 
 def _attitude(axes: Axes, trace: Trace) -> None:
     angles = np.degrees(np.unwrap(trace.euler, axis=0))
     for axis, words, colour in ((0, "roll", SECOND), (1, "pitch", law_colour(trace.law)), (2, "yaw", THIRD)):
-        t, angle = thin(trace.t, angles[:, axis])
-        axes.plot(t, angle, color=colour, linewidth=0.9, label=words)
+        _plot(axes, trace, angles[:, axis], words, color=colour)
     widest = max(LEAST_ANGLE_DEG, 1.05 * float(np.nanmax(np.abs(angles))))
     axes.set(title="(f) attitude", ylabel="[deg]", ylim=(-widest, widest))
+
+
+def _plot(axes: Axes, trace: Trace, values: np.ndarray, label: str | None, **style: Any) -> None:
+    """A thinned time series."""
+    axes.plot(*thin(trace.t, values), label=label, **{"linewidth": 0.9, **style})

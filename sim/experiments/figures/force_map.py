@@ -50,8 +50,7 @@ def predicted_damping(law: str, variant: str, gain: float, stiffness: float, del
 def map_cells(table: pl.DataFrame) -> pl.DataFrame:
     """One row per law, variant and cell: deviation [N], lost, unstable (oscillates or lost), predicted unstable.
 
-    Args:
-        table: Flights of the map; in a flight that did not end as planned contact counts as lost.
+    In a flight that did not end as planned contact counts as lost.
     """
     lost = (pl.col("contact_share").fill_null(0.0).median() < CONTACT_FRACTION) | ~pl.col("completed").all()
     cells = table.group_by("law", "variant", *_CELL, maintain_order=True).agg(
@@ -63,12 +62,7 @@ def map_cells(table: pl.DataFrame) -> pl.DataFrame:
 
 
 def map_caption(table: pl.DataFrame, holds: pl.DataFrame) -> str:
-    """Direct force control against impedance, as counted in the map.
-
-    Args:
-        table: Flights of the map.
-        holds: Flights of the holds at shipped gains.
-    """
+    """Direct force control against impedance, as counted in the map and in the holds at shipped gains."""
     cells = map_cells(table)
     unstable, parts = {}, []
     for variant, words in VARIANT_WORDS.items():
@@ -113,11 +107,7 @@ def draw_gain_map(spec: FigureSpec, results: Results) -> Drawn:
 
 
 def draw_map(table: pl.DataFrame) -> Figure:
-    """Steady deviation of the push per law, variant and delay; the predicted limit over it.
-
-    Args:
-        table: Flights of the map.
-    """
+    """Steady deviation of the push per law, variant and delay; the predicted limit over it."""
     cells = map_cells(table)
     laws = [law for law in ("qp", "paper") if select(table, law=law).height]
     delays, walls, gains = (sorted(table[name].unique()) for name in (_CELL[2], _CELL[1], _CELL[0]))
