@@ -133,6 +133,10 @@ def _convert(hint: Any, value: Any, place: str) -> Any:
         return from_dict(hint, value, place)
     if origin is tuple:
         return _convert_tuple(hint, value, place)
+    if origin is dict:
+        if not isinstance(value, dict):
+            raise ConfigError(f"{place} must be a table, got {value!r}")
+        return {key: _convert(typing.get_args(hint)[1], entry, f"{place}.{key}") for key, entry in value.items()}
     wanted = {float: (int, float), int: (int,), bool: (bool,), str: (str,), type(None): (type(None),)}.get(hint)
     if wanted is None or not isinstance(value, wanted) or (hint in (int, float) and isinstance(value, bool)):
         raise ConfigError(f"{place} = {value!r} is refused: a {getattr(hint, '__name__', hint)} is needed")

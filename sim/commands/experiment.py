@@ -73,8 +73,7 @@ class ExperimentCommand:
 
         from rich.console import Console
 
-        from sim.experiments import chosen, designs
-        from sim.experiments.base import Choice
+        from sim.experiments import Choice, chosen, designs
         from sim.experiments.record import PARTS, write_page, write_summary, write_tables
         from sim.experiments.record import summary as summarise
         from sim.report.rundir import RunFolder, as_json

@@ -1,13 +1,12 @@
-"""The experiments by name, each in a file of its own."""
+"""The experiments by name; each is a file in ``specs``."""
 
 from __future__ import annotations
 
-import importlib
-
-from sim.experiments.base import Choice, Experiment
+from sim.experiments.design import Choice, design
+from sim.experiments.spec import Experiment, experiment
 from sim.sweep.design import Run
 
-#: Names in the order of the report; the module of each has the same name with underscores.
+#: Names in the order of the report.
 NAMES = (
     "force-hold",
     "paint",
@@ -23,16 +22,11 @@ NAMES = (
 ALL = "all"
 
 
-def experiment(name: str) -> Experiment:
-    """The experiment of a name."""
-    return importlib.import_module(f"sim.experiments.{name.replace('-', '_')}").EXPERIMENT
-
-
 def chosen(name: str) -> list[Experiment]:
-    """One experiment, or every one for ``all``."""
+    """One experiment, or all of them for ``all``."""
     return [experiment(each) for each in (NAMES if name == ALL else (name,))]
 
 
 def designs(name: str, choice: Choice) -> list[Run]:
     """Runs of one or of all experiments, in the order of the report."""
-    return [run for each in chosen(name) for run in each.design(choice)]
+    return [run for each in chosen(name) for run in design(each, choice)]

@@ -1,21 +1,21 @@
-"""The results page: every number comes from the tables, none is typed."""
+"""The results page as Markdown; all numbers come from the tables."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import polars as pl
 
-from sim.experiments.balanced import account
-from sim.experiments.base import Experiment
+from sim.experiments.balance import balance
 from sim.experiments.clipping import clipping
+from sim.experiments.spec import Experiment
 from sim.experiments.variants import VARIANTS
-from sim.experiments.verdict import Verdict, telling, verdicts
-from sim.experiments.wording import cell, entry, figure, folded, headed, markdown, of, shown
-from sim.experiments.worth import difference, worth
+from sim.experiments.verdict import Verdict, verdicts
+from sim.experiments.wording import cell, difference, entry, headings, interval, markdown, measured, value_of
+from sim.experiments.worth import worth
 from sim.figures.style import law_name
 from sim.sweep.paired import needed, paired_differences
 from sim.sweep.parts import PARAM
@@ -25,86 +25,84 @@ from sim.sweep.statistics import cells, parameters, split
 _HEAD = """# Results of the experiments
 
 Generated from data by `{command}`; do not edit. {lead}
-*Met*: flags, peaks and bounces (marked *every*) must hold in every flight, other figures by the median of the cell,
-then with the count of flights where not all hold; a flight without the figure makes it a no.
-Medians over the flights of a cell, in brackets their 95 % bootstrap interval; *done* counts the flights that ended as
-planned, and only those have figures. Differences are analytic law minus QP law, flown with the same seeds, over the
-flights that both ended as planned, in brackets the exact interval of the median; **bold** where it excludes zero. Of
-fewer than {needed} pairs there is no such interval: they are too few to tell. What each experiment flies and what the
-paper reports is in [experiments.md](../experiments.md).
+*Met*: a bound marked *every* (flags, peaks, bounces) applies to each flight, any other bound to the median of the cell;
+if only the median is within the bound, the number of flights within it follows. A flight without the metric fails.
+Values are medians over the flights of a cell, with their 95 % bootstrap interval in brackets. *Done* counts the flights
+that ended as planned; values come from those flights only. Differences are analytic law minus QP law with the same
+seeds, over the flights that both laws ended as planned, with the exact interval of the median in brackets; **bold**
+means that the interval excludes zero. Fewer than {needed} pairs are too few for such an interval.
+[experiments.md](../experiments.md) describes the experiments.
 
 """
 
 
-def results_page(
-    flown: Sequence[tuple[Experiment, pl.DataFrame, dict[str, tuple[str, Path]]]], lead: str, command: str, name: str
-) -> str:
+@dataclass(frozen=True, kw_only=True)
+class Section:
+    """One flown experiment of the page."""
+
+    experiment: Experiment
+    table: pl.DataFrame  # its rows
+    figures: Mapping[str, tuple[str, Path]]  # caption and file of each; files are relative to the page
+
+
+def results_page(sections: Sequence[Section], lead: str, command: str, name: str) -> str:
     """Markdown text of the page.
 
     Args:
-        flown: Experiments with their tables and the caption and file of their figures, files relative to the page.
+        sections: The flown experiments.
         lead: A sentence on what was flown.
-        command: The command that flies one experiment alike, with ``{name}`` where its name goes.
-        name: What was flown.
+        command: Command that repeats one experiment, with ``{name}`` in the place of its name.
+        name: What was flown: an experiment, or "all".
     """
     text = _HEAD.format(command=command.format(name=name), lead=lead, needed=needed())
-    text += "## What the QP law is held to\n\n" + _summary(flown)
-    tables = [(experiment, table) for experiment, table, _ in flown]
-    text += "\n## Where the QP helps, and where it does not\n\n" + account(tables)
+    text += "## Criteria of the QP law\n\n" + _criteria(sections)
+    tables = [(section.experiment, section.table) for section in sections]
+    text += "\n## Comparison of the two laws\n\n" + balance(tables)
     for _, table in tables:
         near = clipping(table) if "clipped" in table["variant"] and PARAM + "push_n" in table.columns else ""
-        text += f"\n### Where clipping wins and loses\n\n{near}" if near else ""
-    text += "\n## What each part is worth\n\n" + worth(tables)
-    for experiment, table, figures in flown:
+        text += f"\n### Limits in the QP against clipping\n\n{near}" if near else ""
+    text += "\n## Effect of each part\n\n" + worth(tables)
+    for section in sections:
+        experiment, table = section.experiment, section.table
         text += f"\n## {experiment.title}\n\n{experiment.about}\n\n"
-        text += f"**Published:** {experiment.paper}\n\n"
-        text += f"To redo it: `{command.format(name=experiment.name)}`\n\n"
-        text += _table(experiment, table) + "\n" + _differences(experiment, table)
-        text += _failures(experiment, table)
-        for caption, file in figures.values():
+        text += f"**Published:** {experiment.published}\n\n"
+        text += f"Command: `{command.format(name=experiment.name)}`\n\n"
+        text += _table(experiment, table) + "\n" + _differences(experiment, table) + _failures(experiment, table)
+        for caption, file in section.figures.values():
             text += f"![{caption}]({file.as_posix()})\n\n*{caption}.*\n\n"
     return text
 
 
-def _summary(flown: Sequence[tuple[Experiment, pl.DataFrame, dict[str, tuple[str, Path]]]]) -> str:
-    heads = ("experiment", "figure", "cell", "bound", "median", "worst flight", "flights within", "met")
-    lines = ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
-    for experiment, table, _ in flown:
-        listed = verdicts(experiment, table)
-        lines += [_verdict_line(experiment, verdict, telling(listed, verdict)) for verdict in listed]
-    return "\n".join(lines) + "\n"
+def _criteria(sections: Sequence[Section]) -> str:
+    heads = ("experiment", "metric", "cell", "bound", "median", "worst flight", "flights within", "met")
+    flown = ((section.experiment, section.table) for section in sections)
+    return markdown(heads, [_verdict(each, verdict) for each, table in flown for verdict in verdicts(each, table)])
 
 
-def _verdict_line(experiment: Experiment, verdict: Verdict, place: dict[str, Any]) -> str:
+def _verdict(experiment: Experiment, verdict: Verdict) -> list[str]:
     criterion = verdict.criterion
-    sign, unit = (">=" if criterion.least else "<="), f" {criterion.unit}" if criterion.unit else ""
-    sign += " every" if criterion.every else ""
-    where = cell(experiment, place) or "all"
-    if criterion.variant != "standard":
-        where += f", {criterion.variant}"
-    return (
-        f"| {experiment.name} | {criterion.text} | {where} | {sign} {verdict.bound:.4g}{unit} | "
-        f"{_number(verdict.median, unit)} | {_number(verdict.worst, unit)} | {verdict.held} of {verdict.n} | "
-        f"{'**no**' if verdict.words == 'no' else verdict.words} |"
-    )
-
-
-def _number(value: float, unit: str) -> str:
-    return f"{value:.3g}{unit}" if np.isfinite(value) else "–"
+    unit = f" {criterion.unit}" if criterion.unit else ""
+    sign = (">=" if criterion.least else "<=") + (" every" if criterion.every else "")
+    where = cell(experiment, verdict.place) or "all"
+    where += f", {criterion.variant}" if criterion.variant != "standard" else ""
+    values = (f"{value:.3g}{unit}" if np.isfinite(value) else "–" for value in (verdict.median, verdict.worst))
+    met = "**no**" if verdict.words == "no" else verdict.words
+    bound, within = f"{sign} {verdict.bound:.4g}{unit}", f"{verdict.within} of {verdict.n}"
+    return [experiment.name, criterion.text, where, bound, *values, within, met]
 
 
 def _table(experiment: Experiment, table: pl.DataFrame) -> str:
-    columns = shown(experiment, table)
-    heads = [*experiment.params.values(), "variant", "law", "done", *headed(columns)]
+    columns = measured(experiment, table)
+    heads = [*experiment.params.values(), "variant", "law", "done", *headings(columns)]
     rows: dict[bool, list[list[str]]] = {False: [], True: []}
     for flown in cells(table, {column.metric for column in columns if column.of_all}):
         row = [entry(flown["params"].get(name, "")) for name in experiment.params]
         row += [flown["variant"], law_name(flown["law"]), f"{flown['completed']} of {flown['n']}"]
-        row += [figure(of(flown["metrics"], column, flown["params"]), column) for column in columns]
-        rows[folded(experiment, flown["params"])].append(row)
+        row += [interval(value_of(flown["metrics"], column, flown["params"]), column) for column in columns]
+        rows[experiment.is_folded(flown["params"])].append(row)
     text = markdown(heads, rows[False])
     if rows[True]:
-        text += f"\n<details><summary>{len(rows[True])} more cells, which the figure shows</summary>\n\n"
+        text += f"\n<details><summary>{len(rows[True])} more cells; the figure shows them</summary>\n\n"
         text += markdown(heads, rows[True]) + "\n</details>\n"
     used = [name for name in VARIANTS if name in table["variant"].unique().to_list()]
     notes = "; ".join(f"*{name}*: {VARIANTS[name].words}" for name in used)
@@ -112,18 +110,17 @@ def _table(experiment: Experiment, table: pl.DataFrame) -> str:
 
 
 def _differences(experiment: Experiment, table: pl.DataFrame) -> str:
-    columns = shown(experiment, table)
-    found = paired_differences(table, [column.metric for column in columns])
-    found = [flown for flown in found if not folded(experiment, flown["params"])]
-    if not found:
-        return ""
-    heads = [*experiment.params.values(), "variant", "pairs", "failed, QP and analytic", *headed(columns)]
+    columns = measured(experiment, table)
     rows = []
-    for flown in found:
-        row = [entry(flown["params"].get(name, "")) for name in experiment.params]
+    for flown in paired_differences(table, [column.metric for column in columns]):
+        params = flown["params"]
+        if experiment.is_folded(params):
+            continue
+        row = [entry(params.get(name, "")) for name in experiment.params]
         row += [flown["variant"], f"{flown['n']} of {flown['flown']}", " and ".join(map(str, flown["failed"]))]
-        rows.append(row + [difference(of(flown["differences"], column, flown["params"]), column) for column in columns])
-    return f"Analytic law minus QP law:\n\n{markdown(heads, rows)}\n"
+        rows.append(row + [difference(value_of(flown["differences"], column, params), column) for column in columns])
+    heads = [*experiment.params.values(), "variant", "pairs", "failed, QP and analytic", *headings(columns)]
+    return f"Analytic law minus QP law:\n\n{markdown(heads, rows)}\n" if rows else ""
 
 
 def _failures(experiment: Experiment, table: pl.DataFrame) -> str:

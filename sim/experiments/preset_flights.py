@@ -1,4 +1,4 @@
-"""Flights of a user's preset over the paint job, for comparing presets."""
+"""Paint flights under a preset, for the comparison of presets."""
 
 from __future__ import annotations
 

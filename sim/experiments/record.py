@@ -1,4 +1,4 @@
-"""What an experiment leaves in its folder: tables, summary, figures and the results page."""
+"""Files in the folder of an experiment: tables, summary, figures and the results page."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ from typing import Any
 import polars as pl
 
 from sim.experiments import ALL
-from sim.experiments.base import Experiment, Results
-from sim.experiments.page import results_page
+from sim.experiments.figures import Results, draw
+from sim.experiments.page import Section, results_page
+from sim.experiments.spec import Experiment
 from sim.experiments.variants import REFERENCES
-from sim.experiments.verdict import telling, verdicts
+from sim.experiments.verdict import Verdict, verdicts
 from sim.figures.style import save, styled
 from sim.report.rundir import as_json
 from sim.sweep.paired import paired_differences, variant_differences
@@ -20,9 +21,11 @@ from sim.sweep.parts import write_table
 from sim.sweep.statistics import cells
 
 SCHEMA = 1
-#: Parts and logs lie here, under the folder of the experiment.
+#: Folder of parts and logs, under the folder of the experiment.
 PARTS = "parts"
 PAGE = "results.md"
+#: Facts of a run that the summary repeats.
+_FACTS = ("command", "version", "seed", "features", "interrupted", "wall_time_s")
 
 
 def data_file(folder: Path, name: str) -> Path:
@@ -37,9 +40,9 @@ def summary(
 
     Args:
         name: Experiment, or "all".
-        experiments: Those flown.
+        experiments: The flown experiments.
         table: Their rows.
-        folder: Where the data file is.
+        folder: Folder of the data file.
         facts: quick, seed, features, version, command, interrupted, wall_time_s.
     """
     of_all = {column.metric for each in experiments for column in each.columns if column.of_all}
@@ -53,40 +56,42 @@ def summary(
         "quick": facts["quick"],
         "data_file": str(data_file(folder, name)),
         "run_dir": str(folder),
-        **{key: facts[key] for key in ("command", "version", "seed", "features", "interrupted", "wall_time_s")},
+        **{key: facts[key] for key in _FACTS},
         "cells": listed,
         "differences": paired_differences(table) if table.height else [],
         "parts": variant_differences(table, REFERENCES) if table.height else [],
         "verdicts": [
-            {
-                "experiment": each.name,
-                "figure": verdict.criterion.text,
-                "metric": verdict.criterion.metric,
-                "variant": verdict.criterion.variant,
-                "params": verdict.params,
-                "cell": telling(listed, verdict),
-                "bound": verdict.bound,
-                "least": verdict.criterion.least,
-                "unit": verdict.criterion.unit,
-                "median": verdict.median,
-                "worst": verdict.worst,
-                "held": verdict.held,
-                "n": verdict.n,
-                "every": verdict.criterion.every,
-                "met": verdict.met,
-                "words": verdict.words,
-            }
-            for each in experiments
-            for listed in [verdicts(each, rows_of(table, each))]
-            for verdict in listed
+            _verdict_row(each.name, verdict) for each in experiments for verdict in verdicts(each, rows_of(table, each))
         ],
     }
 
 
+def _verdict_row(name: str, verdict: Verdict) -> dict[str, Any]:
+    criterion = verdict.criterion
+    return {
+        "experiment": name,
+        "figure": criterion.text,
+        "metric": criterion.metric,
+        "variant": criterion.variant,
+        "params": verdict.params,
+        "cell": verdict.place,
+        "bound": verdict.bound,
+        "least": criterion.least,
+        "unit": criterion.unit,
+        "median": verdict.median,
+        "worst": verdict.worst,
+        "held": verdict.within,
+        "n": verdict.n,
+        "every": criterion.every,
+        "met": verdict.met,
+        "words": verdict.words,
+    }
+
+
 def rows_of(table: pl.DataFrame, experiment: Experiment) -> pl.DataFrame:
-    """Rows of one experiment, without columns that it does not have."""
+    """Rows of one experiment, without columns that are empty there."""
     rows = table.filter(pl.col("experiment") == experiment.name)
-    return rows[[series.name for series in rows if series.null_count() < rows.height or series.name in ("log",)]]
+    return rows[[series.name for series in rows if series.null_count() < rows.height or series.name == "log"]]
 
 
 def write_tables(folder: Path, name: str, experiments: Sequence[Experiment], table: pl.DataFrame) -> None:
@@ -107,23 +112,23 @@ def write_page(
     """Draw every figure and write the results page; returns its file.
 
     Args:
-        folder: Where it goes, with logs in its ``parts``.
-        experiments: Those flown.
+        folder: Folder of the page, with logs in its ``parts``.
+        experiments: The flown experiments.
         table: Their rows.
         lead: A sentence on what was flown.
-        command: The command that flies one alike, with ``{name}`` where its name goes.
+        command: Command that repeats one experiment, with ``{name}`` in the place of its name.
         name: What was flown: an experiment, or "all".
     """
-    flown = []
+    sections = []
     with styled():
         for experiment in experiments:
             rows = rows_of(table, experiment)
             if not rows.height:
                 continue
             figures = {}
-            for title, (caption, figure) in experiment.draw(Results(table=rows, folder=folder / PARTS)).items():
-                save(figure, folder / "figures" / f"{title}.png")
+            for title, (caption, figure) in draw(Results(experiment, rows, folder / PARTS)).items():
                 figures[title] = (caption, Path("figures") / f"{title}.png")
-            flown.append((experiment, rows, figures))
-    (folder / PAGE).write_text(results_page(flown, lead, command, name), encoding="utf-8")
+                save(figure, folder / figures[title][1])
+            sections.append(Section(experiment=experiment, table=rows, figures=figures))
+    (folder / PAGE).write_text(results_page(sections, lead, command, name), encoding="utf-8")
     return folder / PAGE

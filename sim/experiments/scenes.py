@@ -1,4 +1,4 @@
-"""Scenes that several experiments share, and changes of them."""
+"""Scenes that presets, tuning, notebooks and tests share, and changes of them."""
 
 from __future__ import annotations
 

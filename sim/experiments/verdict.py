@@ -1,109 +1,89 @@
-"""Whether the QP law holds what an experiment asks of it, and by how much."""
+"""Evaluation of the criteria of the QP law on the table of flights."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import polars as pl
 
-from sim.experiments.base import Criterion, Experiment
+from sim.experiments.criteria import Criterion
+from sim.experiments.spec import Experiment
+from sim.experiments.wording import varying
 from sim.sweep.parts import PARAM
 from sim.sweep.statistics import parameters, split
 
 
 @dataclass(frozen=True, kw_only=True)
 class Verdict:
-    """One criterion in one cell.
-
-    Attributes:
-        criterion: What was asked.
-        params: The cell.
-        median: Median over its flights, in the criterion's unit; NaN without data.
-        worst: Its worst flight.
-        held: Flights that hold the bound.
-        known: Flights that have the figure; one that failed counts only where the criterion says so.
-        n: Flights.
-        measured: Whether the table has the figure at all.
-    """
+    """One criterion in one cell; values in the unit of the criterion, NaN without data."""
 
     criterion: Criterion
-    params: dict
-    median: float
-    worst: float
-    held: int
-    known: int
-    n: int
-    measured: bool = True
+    params: dict[str, Any]  # the cell
+    place: dict[str, Any]  # parameters in which it differs from other cells of the criterion
+    median: float  # of its flights
+    worst: float  # worst flight
+    within: int  # flights within the bound
+    known: int  # flights with a value; failed flights count only if the criterion includes them
+    n: int  # flights
+    measured: bool  # whether the table has the metric
 
     @property
     def met(self) -> bool:
-        """Whether every flight has the figure and holds the bound, or their median where the criterion asks no more."""
+        """Whether all flights have a value, and the statistic of the criterion is within the bound."""
         if not self.n or self.known < self.n:
             return False
-        good = self.median >= self.bound if self.criterion.least else self.median <= self.bound
-        return self.held == self.n if self.criterion.every else bool(good)
+        if self.criterion.every:
+            return self.within == self.n
+        return bool(self.median >= self.bound if self.criterion.least else self.median <= self.bound)
 
     @property
     def words(self) -> str:
-        """``yes`` or ``no``, and what every flight says where the median speaks for them."""
+        """``yes`` or ``no``, with the count of flights if only the median is within the bound."""
         if not self.measured:
             return "not measured"
-        if self.met and self.held < self.n:
-            return f"yes (median; {self.held} of {self.n})"
+        if self.met and self.within < self.n:
+            return f"yes (median; {self.within} of {self.n})"
         return "yes" if self.met else "no"
 
     @property
     def bound(self) -> float:
-        """The bound in the criterion's unit."""
+        """The bound in the unit of the criterion."""
         return self.criterion.scale * self.criterion.bound
 
 
 def verdicts(experiment: Experiment, table: pl.DataFrame) -> list[Verdict]:
-    """Every criterion in every cell of the QP law that it holds for."""
+    """Verdict of each criterion in each cell of the QP law that it applies to."""
     result = []
-    for criterion in experiment.criteria if table.height else ():
+    for criterion in experiment.every_criterion() if table.height else ():
         rows = table.filter((pl.col("law") == "qp") & (pl.col("variant") == criterion.variant))
-        for name, value in criterion.params.items():
+        for name, value in criterion.where.items():
             rows = rows.filter(pl.col(PARAM + name) == value) if PARAM + name in rows.columns else rows.clear()
-        for key, cell in split(rows, ("variant",)) if rows.height else ():
-            result.append(_judge(criterion, parameters(key), cell))
+        cells = [(parameters(key), cell) for key, cell in split(rows, ("variant",))]
+        places = varying([params for params, _ in cells])
+        result += [evaluate(criterion, *cell, place) for cell, place in zip(cells, places, strict=True)]
     return result
 
 
-def telling(listed: list[Verdict], verdict: Verdict) -> dict:
-    """Parameters that tell a verdict's cell from others of the same criterion."""
-    alike = [other.params for other in listed if other.criterion == verdict.criterion]
-    return {key: value for key, value in verdict.params.items() if len({str(params.get(key)) for params in alike}) > 1}
-
-
-def _judge(criterion: Criterion, params: dict, cell: pl.DataFrame) -> Verdict:
+def evaluate(criterion: Criterion, params: dict[str, Any], cell: pl.DataFrame, place: dict[str, Any]) -> Verdict:
+    """Evaluate a criterion on the rows of one cell; `place` holds the parameters that name the cell."""
     values = np.full(cell.height, np.nan)
-    if criterion.metric in cell.columns:
+    measured = criterion.metric in cell.columns
+    if measured:
         values = criterion.scale * cell[criterion.metric].cast(pl.Float64).fill_null(np.nan).to_numpy().copy()
-    if not criterion.failed_too:
-        values[~cell["completed"].to_numpy().astype(bool)] = np.nan  # what a crash cut short measures nothing
+    if not criterion.include_failed:
+        values[~cell["completed"].to_numpy().astype(bool)] = np.nan  # a crash truncates the measurement
     good = values[np.isfinite(values)]
     bound = criterion.scale * criterion.bound
-    held = np.count_nonzero(good >= bound if criterion.least else good <= bound)
-    if not len(good):
-        return Verdict(
-            criterion=criterion,
-            params=params,
-            median=np.nan,
-            worst=np.nan,
-            held=0,
-            known=0,
-            n=len(values),
-            measured=criterion.metric in cell.columns,
-        )
-    worst = good.min() if criterion.least else good.max()
     return Verdict(
         criterion=criterion,
         params=params,
-        median=float(np.median(good)),
-        worst=float(worst),
-        held=int(held),
+        place=place,
+        median=float(np.median(good)) if len(good) else np.nan,
+        worst=float(good.min() if criterion.least else good.max()) if len(good) else np.nan,
+        within=int(np.count_nonzero(good >= bound if criterion.least else good <= bound)),
         known=len(good),
         n=len(values),
+        measured=measured,
     )

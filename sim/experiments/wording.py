@@ -1,4 +1,4 @@
-"""Numbers, cells and tables of the results page in words."""
+"""Numbers, cells and tables of the results page as text."""
 
 from __future__ import annotations
 
@@ -8,45 +8,51 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from sim.experiments.base import Column, Experiment
+from sim.experiments.spec import Column, Experiment
+from sim.sweep.paired import sign
 
 
 def rounded(value: float, digits: int, plus: bool = False) -> str:
-    """A number with so many decimals, without the sign of what rounds to zero; a dash for none."""
+    """A number with `digits` decimals, without the sign of a rounded zero; a dash if it is not finite."""
     if not np.isfinite(value):
         return "–"
     text = f"{value:.{digits}f}"
     return text.lstrip("-") if float(text) == 0.0 else f"{value:+.{digits}f}" if plus else text
 
 
-def figure(
-    value: dict[str, float] | None, column: Column, plus: bool = False, ends: tuple[str, str] = ("low", "high")
-) -> str:
-    """Median with its interval in the unit of a column."""
+def interval(value: Mapping[str, float] | None, column: Column) -> str:
+    """Median with its bootstrap interval in the unit of a column."""
+    return _interval(value, column, False, ("median", "low", "high"))
+
+
+def exact(value: Mapping[str, float] | None, column: Column) -> str:
+    """Median difference with its exact interval in the unit of a column, signed."""
+    return _interval(value, column, True, ("median", "sure_low", "sure_high"))
+
+
+def difference(found: Mapping[str, float] | None, column: Column) -> str:
+    """A difference with its exact interval, bold if significant; the median alone if there are too few pairs."""
+    text = exact(found, column)
+    return f"**{text}**" if found is not None and column.better and sign(dict(found)) else text
+
+
+def _interval(value: Mapping[str, float] | None, column: Column, plus: bool, names: Sequence[str]) -> str:
     if value is None or not np.isfinite(value["median"]):
         return "–"
-    middle, low, high = (
-        rounded(column.scale * value[name], column.digits, plus) for name in ("median", ends[0], ends[1])
-    )
+    middle, low, high = (rounded(column.scale * value[name], column.digits, plus) for name in names)
     return middle if low == high or "–" in (low, high) else f"{middle} ({low} to {high})"
 
 
 def entry(value: Any) -> str:
-    """A parameter's value."""
+    """Value of a parameter."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     return f"{value:g}" if isinstance(value, float) else str(value).replace("_", " ")
 
 
-def cell(experiment: Experiment, params: dict[str, Any]) -> str:
-    """The parameters of a cell: "hold, wall 1500 N/m"."""
+def cell(experiment: Experiment, params: Mapping[str, Any]) -> str:
+    """Parameters of a cell, e.g. "hold, wall 1500 N/m"."""
     return ", ".join(_parameter(experiment.params.get(name, name), name, value) for name, value in params.items())
-
-
-def varying(listed: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Each cell's parameters without those that are the same in all cells."""
-    told = {name for params in listed for name in params if len({str(each.get(name)) for each in listed}) > 1}
-    return [{name: value for name, value in params.items() if name in told} for params in listed]
 
 
 def _parameter(heading: str, name: str, value: Any) -> str:
@@ -60,29 +66,28 @@ def _parameter(heading: str, name: str, value: Any) -> str:
     return f"{heading.split(' [')[0]} {entry(value)}"
 
 
-def headed(columns: Sequence[Column]) -> list[str]:
-    """Headings of figures, with their units."""
+def varying(listed: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Parameters of each cell without those that are equal in all cells."""
+    varied = {name for params in listed for name in params if len({str(each.get(name)) for each in listed}) > 1}
+    return [{name: value for name, value in params.items() if name in varied} for params in listed]
+
+
+def headings(columns: Sequence[Column]) -> list[str]:
+    """Labels of columns with their units."""
     return [column.label + (f" [{column.unit}]" if column.unit else "") for column in columns]
 
 
 def markdown(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table, with a line break after it."""
+    """A table that ends with a line break."""
     lines = ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
     return "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in rows)]) + "\n"
 
 
-def shown(experiment: Experiment, table: pl.DataFrame) -> list[Column]:
-    """Columns of an experiment that its table holds."""
+def measured(experiment: Experiment, table: pl.DataFrame) -> list[Column]:
+    """Columns of an experiment whose metric is in the table."""
     return [column for column in experiment.columns if column.metric in table.columns]
 
 
-def of(figures: Mapping[str, Any], column: Column, params: Mapping[str, Any]) -> Any:
-    """What a cell has of a column; None where the column does not apply."""
-    return (
-        figures.get(column.metric) if all(params.get(name) == value for name, value in column.where.items()) else None
-    )
-
-
-def folded(experiment: Experiment, params: dict[str, Any]) -> bool:
-    """Whether a cell is one that the tables fold away."""
-    return bool(experiment.folded) and all(params.get(name) == value for name, value in experiment.folded.items())
+def value_of(metrics: Mapping[str, Any], column: Column, params: Mapping[str, Any]) -> Any:
+    """Value of a column in a cell; None if the column does not apply there."""
+    return metrics.get(column.metric) if column.where.items() <= params.items() else None

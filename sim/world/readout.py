@@ -112,9 +112,9 @@ def drive(rotors: int) -> ca.Function:
 
     Function of (commanded, lower, upper, actual thrusts, lags, air, rotation, arm) yielding the limited thrusts [N],
     the time constant of every rotor [s], and force and moment of the air, front-left-up [N, N m]. ``air`` is its force
-    at the true centre of mass in the world [N], ``arm`` the way there from the bare vehicle's centre of mass, where MuJoCo
-    applies forces, in B [m]. Under a constant command a first-order lag never crosses it, so one choice between the
-    lags up and down holds for the tick.
+    at the true centre of mass in the world [N], ``arm`` the way there from the bare vehicle's centre of mass, where
+    MuJoCo applies forces, in B [m]. Under a constant command a first-order lag never crosses it, so one choice between
+    the lags up and down holds for the tick.
     """
     commanded, lower, upper, actual = (ca.SX.sym(name, rotors) for name in ("commanded", "lower", "upper", "actual"))
     lags, air, rotation, arm = ca.SX.sym("lags", 2), ca.SX.sym("air", 3), ca.SX.sym("rotation", 9), ca.SX.sym("arm", 3)

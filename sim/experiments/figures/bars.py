@@ -1,43 +1,33 @@
-"""Wrong beliefs side by side: path, push and tilt per error, both laws."""
+"""Horizontal bars of a few metrics per value of a parameter, both laws."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
-import polars as pl
-from matplotlib.figure import Figure
 
-from sim.experiments.figures.common import select
+from sim.experiments.figures.common import Drawn, Results, completed, select
+from sim.experiments.spec import FigureSpec
 from sim.figures.style import law_colour, law_name, new_figure
 from sim.sweep.parts import PARAM
 from sim.sweep.statistics import median_interval
 
-if TYPE_CHECKING:
-    from sim.experiments.base import Results
-
-_PANELS = (
-    ("path_rms_m", "path error, rms [mm]", 1e3),
-    ("force_rms_n", "push error, rms [N]", 1.0),
-    ("tilt_peak_deg", "tilt, peak [deg]", 1.0),
-)
+#: Width of a bar; values of the parameter are one apart.
 _BAR = 0.38
 
 
-def draw_payload(results: Results) -> dict[str, tuple[str, Figure]]:
-    """Horizontal bars, one pair per error."""
-    errors = list(results.table[PARAM + "error"].unique(maintain_order=True))
-    figure = new_figure(0.9 + 0.3 * len(errors))
-    grid = figure.subplots(1, len(_PANELS), sharey=True)
+def draw_bars(spec: FigureSpec, results: Results) -> Drawn:
+    """One pair of bars per value of the parameter."""
+    values = list(results.table[PARAM + spec.x].unique(maintain_order=True))
+    figure = new_figure(0.9 + 0.3 * len(values))
+    grid = figure.subplots(1, len(spec.panels), sharey=True)
     crashed = False
-    for axes, (name, label, scale) in zip(grid, _PANELS, strict=True):
+    for axes, panel in zip(grid, spec.panels, strict=True):
         for law, side in (("qp", -0.5), ("paper", 0.5)):
-            rows = [select(results.table, law=law, error=error) for error in errors]
-            found = [median_interval(_completed(row, name)) for row in rows]
+            rows = [select(results.table, {spec.x: value}, law=law) for value in values]
+            found = [median_interval(completed(row, panel.metric)) for row in rows]
             middle, low, high = (
-                scale * np.array([entry[part] for entry in found]) for part in ("median", "low", "high")
+                panel.scale * np.array([entry[part] for entry in found]) for part in ("median", "low", "high")
             )
-            places = np.arange(len(errors)) + side * _BAR
+            places = np.arange(len(values)) + side * _BAR
             axes.barh(places, middle, height=_BAR, color=law_colour(law), label=law_name(law))
             ends = np.vstack((middle - low, high - middle))
             axes.errorbar(middle, places, xerr=ends, fmt="none", ecolor="#333333", capsize=1.5, linewidth=0.8)
@@ -47,15 +37,11 @@ def draw_payload(results: Results) -> dict[str, tuple[str, Figure]]:
                     axes.text(0.02, place, f"x {failed}", transform=axes.get_yaxis_transform(), va="center",
                               fontsize=7, color="#222222")  # fmt: skip
                     crashed = True
-        axes.set_xlabel(label)
+        axes.set_xlabel(panel.label)
         axes.grid(visible=False, axis="y")
-    grid[0].set_yticks(range(len(errors)), ["no error" if error == "nothing" else error for error in errors])
-    grid[0].set_ylim(len(errors) - 0.4, -0.6)
+    grid[0].set_yticks(range(len(values)), ["no error" if value == "nothing" else value for value in values])
+    grid[0].set_ylim(len(values) - 0.4, -0.6)
     handles, labels = grid[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=2)
     note = "; x: flights that did not end as planned, left out" if crashed else ""
-    return {"payload": (f"Path, push and tilt with one wrong belief at a time, medians with intervals{note}", figure)}
-
-
-def _completed(rows: pl.DataFrame, name: str) -> np.ndarray:
-    return rows.filter(pl.col("completed"))[name].drop_nulls().to_numpy()
+    return {spec.name: (spec.caption + note, figure)}

@@ -1,6 +1,8 @@
-"""The six panels of the complete demonstration: board, path of the tip, push, visual target, velocity, attitude."""
+"""Six panels of the complete demonstration: board, path of the tip, push, visual target, velocity, attitude."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -8,9 +10,11 @@ from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 from matplotlib.patches import Patch, Rectangle
 
-from sim.experiments.figures.snapshots import painted_board
+from sim.experiments.figures.common import Drawn, Results, select, stored_trace
+from sim.experiments.figures.snapshots import draw_snapshots, painted_board
+from sim.experiments.spec import FigureSpec
 from sim.figures.board import draw_canvas
-from sim.figures.style import PHASE_TINTS, REFERENCE, law_colour, new_figure, shade_phases, thin
+from sim.figures.style import PHASE_TINTS, REFERENCE, law_colour, law_name, new_figure, shade_phases, thin
 from sim.flight.trace import Trace
 from sim.world.board import BoardGeometry
 
@@ -22,17 +26,30 @@ LEAST_ANGLE_DEG = 1.0
 OBLIQUE = (1.2, -0.3)
 #: A longer board gets fewer ticks [m].
 LONG_M = 1.5
-#: Free space above the curves for their legend, as a share of their range.
+#: Free space above the curves for their legend, as a fraction of their range.
 HEADROOM = 0.2
 _WORDS = {"press": "touch and press", "paint": "painting a row", "climb": "climb to the next row"}
 
 
-def draw_demonstration(trace: Trace) -> Figure:
-    """Six panels of one paint job; tints say what is done.
+def draw_demonstrations(_: FigureSpec, results: Results) -> Drawn:
+    """Six panels per law, and snapshots of the line detection under the QP law."""
+    figures: Drawn = {}
+    for law in ("qp", "paper"):
+        trace = stored_trace(results, select(results.table, law=law, variant="standard"))
+        if trace is None or not len(trace.t):
+            continue
+        figures[f"demonstration-{law}"] = (f"The complete demonstration, {law_name(law)}", draw_demonstration(trace))
+        if law == "qp":
+            caption = (
+                "Line detection at three moments; below, normals of the depth picture and the bounding box of the "
+                "plane found, both computed for this figure"
+            )
+            figures["line-detection"] = (caption, draw_snapshots(trace))
+    return figures
 
-    Args:
-        trace: A paint job flown with rendered pictures.
-    """
+
+def draw_demonstration(trace: Trace) -> Figure:
+    """Six panels of one paint job with rendered pictures; tints mark the phases."""
     figure = new_figure(7.6)
     grid = GridSpec(4, 2, figure, height_ratios=(1.12, 1.3, 1.0, 0.85))
     _board(figure.add_subplot(grid[0, :]), trace)
@@ -97,18 +114,15 @@ def _trajectory(axes: Axes, trace: Trace) -> None:
 
 
 def _force(axes: Axes, trace: Trace) -> None:
-    t, true, wanted = thin(trace.t, trace.push_true, trace.push_reference)
-    axes.plot(t, true, color=law_colour(trace.law), linewidth=0.8, label="true push")
-    axes.plot(t, wanted, **REFERENCE, label="reference")
+    _plot(axes, trace, trace.push_true, "true push", color=law_colour(trace.law), linewidth=0.8)
+    _plot(axes, trace, trace.push_reference, "reference", **REFERENCE)
     axes.set(title="(c) push", ylabel="[N]")
     axes.legend(loc="lower center", ncols=1)
 
 
 def _visual(axes: Axes, trace: Trace) -> None:
-    edges = ((0, law_colour(trace.law), "level edge"), (1, THIRD, "upright edge"))
-    for axis, colour, words in edges:
-        t, error = thin(trace.t, trace.line_error_px[:, axis])
-        axes.plot(t, error, color=colour, linewidth=0.9, label=words)
+    _plot(axes, trace, trace.line_error_px[:, 0], "level edge", color=law_colour(trace.law))
+    _plot(axes, trace, trace.line_error_px[:, 1], "upright edge", color=THIRD)
     axes.set(title="(d) visual target: edge error at the tip", ylabel="[px]")
     note = "steps at a climb: the reference moves to the next row"
     axes.text(0.99, 0.03, note, transform=axes.transAxes, ha="right", va="bottom", fontsize=7, color="#555555")
@@ -116,16 +130,21 @@ def _visual(axes: Axes, trace: Trace) -> None:
 
 def _speed(axes: Axes, trace: Trace) -> None:
     for axis, words, shade in ((1, "right", law_colour(trace.law)), (2, "down", SECOND)):
-        t, estimate, truth = thin(trace.t, trace.velocity_estimate[:, axis], trace.velocity[:, axis])
-        axes.plot(t, estimate, color=shade, linewidth=1.8, alpha=0.55, label=f"{words}, estimated")
-        axes.plot(t, truth, color=TRUE, linewidth=0.6, label="true" if axis == 2 else None)
+        _plot(
+            axes, trace, trace.velocity_estimate[:, axis], f"{words}, estimated", color=shade, linewidth=1.8, alpha=0.55
+        )
+        _plot(axes, trace, trace.velocity[:, axis], "true" if axis == 2 else None, color=TRUE, linewidth=0.6)
     axes.set(title="(e) velocity along the wall", ylabel="[m/s]")
 
 
 def _attitude(axes: Axes, trace: Trace) -> None:
     angles = np.degrees(np.unwrap(trace.euler, axis=0))
     for axis, words, colour in ((0, "roll", SECOND), (1, "pitch", law_colour(trace.law)), (2, "yaw", THIRD)):
-        t, angle = thin(trace.t, angles[:, axis])
-        axes.plot(t, angle, color=colour, linewidth=0.9, label=words)
+        _plot(axes, trace, angles[:, axis], words, color=colour)
     widest = max(LEAST_ANGLE_DEG, 1.05 * float(np.nanmax(np.abs(angles))))
     axes.set(title="(f) attitude", ylabel="[deg]", ylim=(-widest, widest))
+
+
+def _plot(axes: Axes, trace: Trace, values: np.ndarray, label: str | None, **style: Any) -> None:
+    """A thinned time series."""
+    axes.plot(*thin(trace.t, values), label=label, **{"linewidth": 0.9, **style})

@@ -1,47 +1,38 @@
-"""Force holding with and without impedance, and the map of where direct force control oscillates."""
+"""Push and edge error over time while holding a force, with and without impedance."""
 
 from __future__ import annotations
-
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from sim.evaluate.window import CONTACT_N, PHYSICS_RATE_HZ
-from sim.experiments.figures.common import kept_trace, select
-from sim.experiments.figures.force_map import VARIANT_WORDS as _VARIANTS
-from sim.experiments.figures.force_map import draw_map, map_verdict
+from sim.experiments.figures.common import Drawn, Results, note_empty, select, stored_trace
+from sim.experiments.figures.force_map import VARIANT_WORDS
+from sim.experiments.spec import FigureSpec
 from sim.figures.style import REFERENCE, law_colour, law_name, new_figure
-
-if TYPE_CHECKING:
-    from sim.experiments.base import Results
 
 #: Shown before and after the first touch [s].
 BEFORE_S, AFTER_S = 3.0, 9.0
 
 
-def draw_force_hold(results: Results) -> dict[str, tuple[str, Figure]]:
-    """Force and visual target with and without impedance, per wall; the map of both."""
-    figures = {}
+def draw_force_hold(_: FigureSpec, results: Results) -> Drawn:
+    """Push and visual target with and without impedance, one figure per wall."""
+    figures: Drawn = {}
     holds = select(results.table, kind="hold")
     for stiffness in holds["param.stiffness_n_m"].unique(maintain_order=True) if holds.height else ():
-        name = f"force-hold-{stiffness / 1000:g}kNm"
         caption = f"Push and visual target with and without impedance, wall of {stiffness / 1000:g} kN/m"
-        figures[name] = (caption, _hold(results, stiffness))
-    table = select(results.table, kind="map")
-    if table.height:
-        figures["force-hold-map"] = (map_verdict(table, holds), draw_map(table))
+        figures[f"force-hold-{stiffness / 1000:g}kNm"] = (caption, _hold(results, stiffness))
     return figures
 
 
 def _hold(results: Results, stiffness: float) -> Figure:
     figure = new_figure(4.3)
     grid = figure.subplots(2, 2, sharex=True, sharey="row")
-    for (variant, words), (above, below) in zip(_VARIANTS.items(), grid.T, strict=True):
+    for (variant, words), (above, below) in zip(VARIANT_WORDS.items(), grid.T, strict=True):
         reference = None
         for law in ("paper", "qp"):
             rows = select(results.table, law=law, variant=variant, kind="hold", stiffness_n_m=stiffness)
-            trace = kept_trace(results, rows)
+            trace = stored_trace(results, rows)
             if trace is None or not np.any(trace.contact_1khz > CONTACT_N):
                 continue
             touch = float(np.argmax(trace.contact_1khz > CONTACT_N)) / PHYSICS_RATE_HZ
@@ -55,7 +46,7 @@ def _hold(results: Results, stiffness: float) -> Figure:
             below.axhline(0.0, **REFERENCE)
         else:
             for axes in (above, below):
-                axes.text(0.5, 0.5, "not flown", transform=axes.transAxes, ha="center", color="#777777")
+                note_empty(axes, "not flown")
         above.set_title(words)
         below.set_xlabel("time since touch [s]")
     grid[0][0].set_ylabel("true push [N]")

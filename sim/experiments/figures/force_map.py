@@ -1,4 +1,4 @@
-"""The map of force gain, wall and sensor delay: where the push oscillates, with and without impedance, and why."""
+"""Map of force gain, wall and sensor delay: push oscillation with and without impedance, and its predicted limit."""
 
 from __future__ import annotations
 
@@ -12,19 +12,20 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ibvs_qp.config.contact_margin import contact_mode_damping
-from sim.experiments.figures.common import select
-from sim.experiments.variants import VARIANTS
+from sim.experiments.figures.common import Drawn, Results, select
+from sim.experiments.spec import FigureSpec
+from sim.experiments.variants import VARIANTS, with_force_gain
 from sim.figures.style import law_name, new_figure
 from sim.flight.closed_loop import default_preset
 from sim.sweep.parts import PARAM
 from sim.world.scene import ForceTorqueScene, WallScene
 
 VARIANT_WORDS = {"standard": "impedance", "direct": "direct force control"}
-#: A hold whose steady part has less contact than this has lost the wall; one that deviates more [N] oscillates.
-KEPT_SHARE, OSCILLATES_N = 0.995, 0.5
+#: Less steady contact than this fraction means that contact is lost; a larger deviation [N] means oscillation.
+CONTACT_FRACTION, OSCILLATES_N = 0.995, 0.5
 #: Cells with a smaller deviation are dark on the colour scale [N].
 DARK_BELOW_N = 0.3
-#: Where the scale of deviations ends [N].
+#: Ends of the colour scale of deviations [N].
 SCALE_N = (0.005, 1.0)
 _LIMIT = "#ff5a36"
 _CELL = [PARAM + name for name in ("force_gain", "stiffness_n_m", "delay_s")]
@@ -32,88 +33,82 @@ _CELL = [PARAM + name for name in ("force_gain", "stiffness_n_m", "delay_s")]
 
 @functools.lru_cache(maxsize=4096)
 def predicted_damping(law: str, variant: str, gain: float, stiffness: float, delay_s: float) -> float:
-    """Least damping ratio of the contact that the linear loop predicts; below zero the push oscillates ever more.
+    """Least damping ratio of the contact that the linear loop predicts; the push oscillates below zero.
 
     Args:
-        law: Whose shipped gains.
+        law: Law at its shipped gains.
         variant: Key of `VARIANTS`.
         gain: Factor on K_fp and K_fi.
-        stiffness: Of the wall [N/m].
-        delay_s: Latency of the force/torque sensor [s]; half a sample period comes on top.
+        stiffness: Stiffness of the wall [N/m].
+        delay_s: Latency of the force/torque sensor [s]; half a sample period is added.
     """
-    from sim.experiments.force_hold import with_force_gain
-
     config = VARIANTS[variant].apply(with_force_gain(default_preset(law), gain)).controller
     age = delay_s + 0.5 / ForceTorqueScene().rate_hz
     return contact_mode_damping(config, stiffness, WallScene().damping_n_s_m, age).least_damping_ratio
 
 
-def judged_cells(table: pl.DataFrame) -> pl.DataFrame:
-    """One row per law, variant and cell: deviation [N], lost, bad (oscillates or lost), predicted to be unstable.
+def map_cells(table: pl.DataFrame) -> pl.DataFrame:
+    """One row per law, variant and cell: deviation [N], lost, unstable (oscillates or lost), predicted unstable.
 
-    Args:
-        table: Flights of the map; a flight that did not end as planned counts as lost.
+    In a flight that did not end as planned contact counts as lost.
     """
-    lost = (pl.col("contact_share").fill_null(0.0).median() < KEPT_SHARE) | ~pl.col("completed").all()
+    lost = (pl.col("contact_share").fill_null(0.0).median() < CONTACT_FRACTION) | ~pl.col("completed").all()
     cells = table.group_by("law", "variant", *_CELL, maintain_order=True).agg(
         pl.col("force_std_n").median().alias("deviation"), lost.alias("lost"), pl.len().alias("flights")
     )
     damping = [predicted_damping(*key) for key in cells.select("law", "variant", *_CELL).iter_rows()]
     oscillates = (pl.col("deviation") > OSCILLATES_N).fill_null(False)
-    return cells.with_columns((oscillates | pl.col("lost")).alias("bad"), pl.Series("unstable", damping) < 0.0)
+    return cells.with_columns((oscillates | pl.col("lost")).alias("unstable"), pl.Series("predicted", damping) < 0.0)
 
 
-def map_verdict(table: pl.DataFrame, holds: pl.DataFrame) -> str:
-    """What the map says about direct force control against impedance, counted, as the figure's caption.
-
-    Args:
-        table: Flights of the map.
-        holds: Flights of the holds at shipped gains.
-    """
-    cells = judged_cells(table)
-    counts, parts = {}, []
+def map_caption(table: pl.DataFrame, holds: pl.DataFrame) -> str:
+    """Direct force control against impedance, as counted in the map and in the holds at shipped gains."""
+    cells = map_cells(table)
+    unstable, parts = {}, []
     for variant, words in VARIANT_WORDS.items():
         own = cells.filter(pl.col("variant") == variant)
-        counts[variant] = bad = int(own["bad"].sum())
-        lost = int(own["lost"].sum())
-        right = int((own["bad"] == own["unstable"]).sum())
-        gains = own.filter(pl.col("bad"))[PARAM + "force_gain"]
+        unstable[variant] = own["unstable"].sum()
+        gains = own.filter(pl.col("unstable"))[PARAM + "force_gain"]
         least = f", none below {gains.min():g} times the force gain" if gains.len() else ""
         parts.append(
-            f"{words} oscillates above {OSCILLATES_N:g} N or loses the wall in {bad} of {own.height} cells (lost in "
-            f"{lost}{least}), as the predicted margin says in {right} of them"
+            f"{words} {unstable[variant]} of {own.height} cells ({own['lost'].sum()} lost{least}; the predicted margin "
+            f"agrees in {(own['unstable'] == own['predicted']).sum()})"
         )
-    calm = _calmer(holds)
-    head, tail = "Refuted that direct force control oscillates where impedance holds", ""
-    if counts["direct"] > counts["standard"]:
-        shipped = cells.filter((pl.col("variant") == "direct") & (pl.col(PARAM + "force_gain") == 1.0))
-        head = "Shown that direct force control oscillates in a region where impedance holds"
-        if shipped.height and not shipped["bad"].any():
-            head += ", refuted for the shipped gains"
-    if "efuted" in head:
-        tail = (
-            "; ramp, scheduled approach and the loop's lag margin keep direct control calm there (docs/loop_margin.md)"
-        )
-    return f"{head}: {'; '.join(parts)}{calm}{tail}"
+    shipped = cells.filter((pl.col("variant") == "direct") & (pl.col(PARAM + "force_gain") == 1.0))
+    calm = unstable["direct"] <= unstable["standard"] or (shipped.height and not shipped["unstable"].any())
+    if unstable["direct"] > unstable["standard"]:
+        head = "Direct force control oscillates in a region where impedance is stable"
+        head += ", but not at the shipped gains" if calm else ""
+    else:
+        head = "Direct force control does not oscillate in more cells than impedance"
+    tail = "; touch ramp, scheduled approach and the lag margin of the loop damp direct control (docs/loop_margin.md)"
+    return (
+        f"{head}. Push deviation above {OSCILLATES_N:g} N or contact lost: {', '.join(parts)}"
+        f"{_shipped_deviation(holds)}{tail if calm else ''}"
+    )
 
 
-def _calmer(holds: pl.DataFrame) -> str:
-    """Push deviation of both at shipped gains, per wall."""
+def _shipped_deviation(holds: pl.DataFrame) -> str:
+    """Push deviation of both variants at shipped gains, per wall."""
     found = []
     for wall in sorted(holds[PARAM + "stiffness_n_m"].unique()) if holds.height else ():
         rows = [select(holds, variant=variant, stiffness_n_m=wall)["force_std_n"].median() for variant in VARIANT_WORDS]
         if None not in rows:
             found.append(f"{rows[1]:.3f} against {rows[0]:.3f} N at {wall / 1000:g} kN/m")
-    return f"; at shipped gains direct control deviates by {', '.join(found)}" if found else ""
+    return f"; at shipped gains the push of direct control deviates by {', '.join(found)}" if found else ""
+
+
+def draw_gain_map(spec: FigureSpec, results: Results) -> Drawn:
+    """The map of force gain, wall and delay."""
+    table = select(results.table, kind="map")
+    if not table.height:
+        return {}
+    return {spec.name: (map_caption(table, select(results.table, kind="hold")), draw_map(table))}
 
 
 def draw_map(table: pl.DataFrame) -> Figure:
-    """Steady deviation of the push per law, variant and delay; the predicted limit over it.
-
-    Args:
-        table: Flights of the map.
-    """
-    cells = judged_cells(table)
+    """Steady deviation of the push per law, variant and delay; the predicted limit over it."""
+    cells = map_cells(table)
     laws = [law for law in ("qp", "paper") if select(table, law=law).height]
     delays, walls, gains = (sorted(table[name].unique()) for name in (_CELL[2], _CELL[1], _CELL[0]))
     rows = [(law, variant) for law in laws for variant in VARIANT_WORDS]

@@ -1,4 +1,4 @@
-"""Pictures of a flight made again from its log: the camera stands where it stood, perception runs as it ran."""
+"""Pictures of a flight rendered again from its log: same camera poses, same perception."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from sim.sensors.cameras import PlaneCamera
 from sim.world.board import BoardGeometry
 from sim.world.canvas import Canvas
 
-#: Moments of row 1 that are shown, as shares of it.
+#: Moments of row 1 that are shown, as fractions of it.
 MOMENTS = (0.05, 0.5, 0.92)
-#: Pictures perceived before each moment, so that tracks live; and their spacing in ticks.
+#: Pictures processed before each moment, so that tracks exist; and their spacing in ticks.
 LEAD_FRAMES, FRAME_TICKS = 12, 8
 #: Cells over which a normal is taken, and width of the box's line [px].
 CELL_PX, BOX_PX = 15, 3
@@ -47,16 +47,8 @@ def _canvas(trace: Trace, until: int) -> Canvas:
     return canvas
 
 
-def _camera(trace: Trace, until: int) -> PlaneCamera:
-    return PlaneCamera(trace.scene, VehicleParams(), _canvas(trace, until), trace.seed)
-
-
-def _capture(camera: PlaneCamera, trace: Trace, tick: int) -> RgbdFrame:
-    return camera.capture(trace.position[tick], trace.attitude[tick], round(trace.t[tick] * 1e9))
-
-
 def painted_board(trace: Trace) -> np.ndarray:
-    """The board as painted by the end of the flight, painted again from the log, uint8 RGB (h, w, 3)."""
+    """The board at the end of the flight, painted again from the log, uint8 RGB (h, w, 3)."""
     return _canvas(trace, len(trace.t)).rgb
 
 
@@ -66,16 +58,16 @@ def draw_snapshots(trace: Trace) -> Figure:
     row = np.flatnonzero((trace.t >= begin) & (trace.t <= end) & (trace.row <= 1))
     figure = new_figure(4.6)
     grid = figure.subplots(2, len(MOMENTS))
-    for (above, below), share in zip(grid.T, MOMENTS, strict=True):
-        tick = int(row[int(share * (len(row) - 1))])
-        camera = _camera(trace, tick)
+    for (above, below), moment in zip(grid.T, MOMENTS, strict=True):
+        tick = int(row[int(moment * (len(row) - 1))])
+        camera = PlaneCamera(trace.scene, VehicleParams(), _canvas(trace, tick), trace.seed)
+        ticks = range(tick - LEAD_FRAMES * FRAME_TICKS, tick + 1, FRAME_TICKS)
+        frames = [camera.capture(trace.position[at], trace.attitude[at], round(trace.t[at] * 1e9)) for at in ticks]
         perception = Perception(VisionConfig(paint_color=trace.scene.paint.color), VehicleParams())
-        percept, frame = None, None
-        for lead in range(LEAD_FRAMES, -1, -1):
-            at = tick - lead * FRAME_TICKS
-            frame = _capture(camera, trace, at)
-            percept = perception.process(frame, attitude=trace.attitude[at], rotation=np.zeros(3), velocity=None)
-        assert frame is not None and percept is not None
+        frame, percept = [
+            (frame, perception.process(frame, attitude=trace.attitude[at], rotation=np.zeros(3), velocity=None))
+            for at, frame in zip(ticks, frames, strict=True)
+        ][-1]
         above.imshow(draw_overlay(frame.rgb, percept, words=False))
         below.imshow(normal_picture(frame, percept.features.plane if percept.features else None))
         above.set_title(f"t = {trace.t[tick]:.1f} s, row {int(trace.row[tick])}")
@@ -115,8 +107,8 @@ def normal_picture(frame: RgbdFrame, plane: tuple[float, float, float, float] | 
     good = frame.depth > 0.0
     x, y = np.meshgrid((np.arange(width) - cx) / fx, (np.arange(height) - cy) / fy)
     inverse = np.where(good, 1.0 / np.maximum(frame.depth, 1e-3), 0.0)
-    share = np.maximum(cv2.blur(good.astype(float), (CELL_PX, CELL_PX)), 1e-6)
-    smooth = cv2.blur(inverse, (CELL_PX, CELL_PX)) / share  # holes count for nothing
+    density = np.maximum(cv2.blur(good.astype(float), (CELL_PX, CELL_PX)), 1e-6)
+    smooth = cv2.blur(inverse, (CELL_PX, CELL_PX)) / density  # holes have no weight
     a, b = np.gradient(smooth, axis=1) * fx, np.gradient(smooth, axis=0) * fy
     normal = np.stack((-a, b, smooth - a * x - b * y), axis=2)
     normal /= np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-9)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import polars as pl
 from matplotlib import colormaps
@@ -14,17 +12,34 @@ from allocation import WrenchFacets, control_effectiveness, level_polygon
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import GRAVITY
 from sim.evaluate.window import phase_window
-from sim.experiments.figures.common import kept_trace
+from sim.experiments.figures.common import Drawn, Results, select, stored_trace
+from sim.experiments.spec import FigureSpec
 from sim.figures.style import law_name, new_figure
 from sim.sweep.parts import PARAM
-
-if TYPE_CHECKING:
-    from sim.experiments.base import Results
 
 #: One dot in so many ticks.
 EVERY = 12
 #: Lightest colour used, as a share of the map's.
 LIGHTEST = 0.9
+_WORDS = {
+    "standard": "with the reach check",
+    "no-reach-check": "without the reach check",
+    "clipped": "thrusts clipped after a QP without limits",
+}
+
+
+def draw_wrench_sets(spec: FigureSpec, results: Results) -> Drawn:
+    """One figure per variant flown."""
+    figures: Drawn = {}
+    for variant in spec.variants:
+        rows = select(results.table, spec.where, variant=variant)
+        if rows.height:
+            caption = (
+                f"Attainable level forces without moment (shaded) and those flown while pressing, {_WORDS[variant]}; "
+                "a dot outside has a moment, or less lift than the weight"
+            )
+            figures[f"wrench-set-{variant}"] = (caption, draw_wrench_set(results, rows))
+    return figures
 
 
 def draw_wrench_set(results: Results, rows: pl.DataFrame) -> Figure:
@@ -35,7 +50,7 @@ def draw_wrench_set(results: Results, rows: pl.DataFrame) -> Figure:
 
     Args:
         results: For its logs.
-        rows: Flights to show; the first kept log of each push and law is drawn.
+        rows: Flights to show; the first stored log of each push and law is drawn.
     """
     vehicle = VehicleParams()
     limits = vehicle.thrust_min, vehicle.thrust_max
@@ -48,13 +63,13 @@ def draw_wrench_set(results: Results, rows: pl.DataFrame) -> Figure:
         flown = rows.filter(pl.col("law") == law)
         pushes = sorted(flown[PARAM + "push_n"].unique(), reverse=True)  # smaller ones lie on the way to greater ones
         for push, shade in zip(pushes, np.linspace(LIGHTEST, 0.0, max(len(pushes), 1)), strict=True):
-            trace = kept_trace(results, flown.filter(pl.col(PARAM + "push_n") == push))
+            trace = stored_trace(results, flown.filter(pl.col(PARAM + "push_n") == push))
             if trace is not None:
                 begin, end = phase_window(trace, "press")
                 wrench = trace.thrusts_actual[(trace.t >= begin) & (trace.t <= end)][::EVERY]
                 wrench = wrench @ control_effectiveness(vehicle.geometry).T
                 axes.plot(wrench[:, 1], wrench[:, 0], ".", color=colours(float(shade)), markersize=2.5,
-                          label=f"{push:g} N asked")  # fmt: skip
+                          label=f"{push:g} N commanded")  # fmt: skip
         _dress(axes, law_name(law))
     figure.axes[0].set_ylabel("force to the front [N]")
     return figure

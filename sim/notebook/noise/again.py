@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from sim.experiments import noise_sweep
-from sim.experiments.base import Choice
+from sim.experiments import Choice
+from sim.experiments import designs as experiment_runs
 from sim.flight.closed_loop import fly
 from sim.flight.trace import Trace
 from sim.notebook.noise.sample import sample_runs
@@ -42,7 +42,7 @@ def find_run(row: dict[str, Any]) -> Run:
         LookupError: When no design has such a cell, law and seed.
     """
     designs = [sample_runs(_MOST_SEEDS)]
-    designs += [noise_sweep.design(Choice(features=features)) for features in ("geometric", "rendered")]
+    designs += [experiment_runs("noise-sweep", Choice(features=features)) for features in ("geometric", "rendered")]
     alike = [
         run
         for design in designs

@@ -5,14 +5,12 @@ Usage: ``python -m sim.notebook.noise.sample`` writes `SAMPLE` anew; interrupted
 
 from __future__ import annotations
 
+import dataclasses
 import sys
 import tempfile
 from pathlib import Path
 
-from sim.evaluate.measures import paint_figures
-from sim.experiments.base import Choice, runs
-from sim.experiments.noise_sweep import NAME, QUICK_STROKE_M, SIGMA_F, SIGMA_VS
-from sim.experiments.scenes import short_job
+from sim.experiments import Choice, design, experiment
 from sim.sweep import run_sweep
 from sim.sweep.design import Run
 from sim.sweep.parts import write_table
@@ -25,19 +23,9 @@ SEEDS = 6
 
 def sample_runs(seeds: int = SEEDS) -> list[Run]:
     """All nine cells under both laws, without logs."""
-    choice, flights = Choice(features="geometric"), []
-    for vs in SIGMA_VS:
-        for force in SIGMA_F:
-            flights += runs(
-                NAME,
-                choice,
-                scene=short_job(QUICK_STROKE_M, features={"sigma_vs": vs}, force_torque={"sigma_n": force}),
-                measure=paint_figures,
-                params={"sigma_vs": vs, "sigma_f_n": force},
-                seeds=seeds,
-                keep=False,
-            )
-    return flights
+    sweep = experiment("noise-sweep")
+    short = dataclasses.replace(sweep.flights[0], seeds=seeds, keep=False, fixed=sweep.quick[0].fixed)
+    return design(dataclasses.replace(sweep, flights=(short,)), Choice(features="geometric"))
 
 
 def main() -> int:

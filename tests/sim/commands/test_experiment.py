@@ -12,8 +12,7 @@ from synthetic_trace import Errors, synthetic_trace
 
 import sim.sweep.flying
 from sim.commands.cli import main
-from sim.experiments import experiment
-from sim.experiments.base import Choice
+from sim.experiments import Choice, designs
 from sim.experiments.figures.force_map import predicted_damping
 from sim.flight.jobs import PressJob
 from sim.sweep import run_sweep
@@ -117,9 +116,8 @@ def test_all_cut_short_still_reports_what_was_flown(flown, monkeypatch, capsys):
 
 
 def test_the_time_left_goes_by_expected_flying_time(flown, tmp_path):
-    flights = (
-        experiment("friction").design(Choice(quick=True)) + experiment("force-hold").design(Choice(quick=True))[:1]
-    )
+    quick = Choice(quick=True)
+    flights = designs("friction", quick) + designs("force-hold", quick)[:1]
     finished: list[float] = []
     run_sweep(flights, tmp_path, progress=lambda *counts: finished.append(counts[3]))
     expected = [0.0, *accumulate(run.expected_s for run in flights)]
@@ -131,8 +129,8 @@ def test_the_page_says_how_to_redo_it_with_the_same_choices(flown, tmp_path):
     words = ["experiment", "approach", "--quick", "--seed", "3", "--features", "geometric"]
     assert main([*words, "--jobs", "1", "--json", "--out", "run"]) == 0
     page = (tmp_path / "run" / "results.md").read_text()
-    assert "To redo it: `ibvs-qp experiment approach --quick --features geometric --seed 3`" in page
-    assert "too few to tell" in page and "-0.00" not in page and "_n_m" not in page
+    assert "Command: `ibvs-qp experiment approach --quick --features geometric --seed 3`" in page
+    assert "too few for such an interval" in page and "-0.00" not in page and "_n_m" not in page
 
 
 def test_plan_flies_nothing(flown, tmp_path, capsys):

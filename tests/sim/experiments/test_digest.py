@@ -8,6 +8,7 @@ import polars as pl
 import pytest
 
 from sim.experiments.digest import BEGIN, END, LINES, Line, digest, put_into
+from sim.experiments.spec import Column
 
 ROOT = Path(__file__).parents[3]
 ROW = {"experiment": "paint", "variant": "standard", "seed": 0, "param.push_n": 5.0}
@@ -17,7 +18,7 @@ def table(*rows: dict) -> pl.DataFrame:
     return pl.DataFrame([ROW | {"law": "qp", "completed": True, "error_m": None} | row for row in rows], strict=False)
 
 
-LINE = Line(words="error [mm]", experiment="paint", metric="error_m", scale=1e3, params={"push_n": 5.0})
+LINE = Line(label="error [mm]", experiment="paint", metric="error_m", scale=1e3, where={"push_n": 5.0})
 
 
 def test_the_readme_shows_what_the_data_say() -> None:
@@ -41,8 +42,10 @@ def test_medians_of_flights_that_ended_as_planned_and_how_many_did_not() -> None
 
 def test_who_lives_is_counted_over_all_flights_and_what_else_is_kept_stands_behind() -> None:
     rows = table({"error_m": 5.0, "tilt": 1.25}, {"error_m": 3.0, "completed": False})
-    lives = Line(words="alive", experiment="paint", metric="error_m", at_least=5.0)
-    also = Line(words="push", experiment="paint", metric="error_m", also=(("tilt", "tilt {} deg", 1.0, 1),))
+    lives = Line(label="alive", experiment="paint", metric="error_m", at_least=5.0)
+    also = Line(
+        label="push", experiment="paint", metric="error_m", also=(Column(metric="tilt", label="tilt {} deg", digits=1),)
+    )
     assert [line.split(" | ")[1] for line in digest(rows, [lives, also]).splitlines()[2:]] == [
         "1 of 2",
         "5.00; tilt 1.2 deg; fails in 1 of 2",

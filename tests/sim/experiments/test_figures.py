@@ -9,12 +9,11 @@ import pytest
 from matplotlib.figure import Figure
 from press_trace import press_trace
 
-from sim.experiments import experiment
-from sim.experiments.base import Choice, Results
-from sim.experiments.figures import force_hold
-from sim.experiments.figures.common import CRASH, plot_medians
-from sim.experiments.figures.derate import draw_derate
-from sim.experiments.figures.force_map import judged_cells, map_verdict
+from sim.experiments import Choice, designs, experiment
+from sim.experiments.figures import Results, draw, force_hold
+from sim.experiments.figures.common import CRASH
+from sim.experiments.figures.force_map import map_caption, map_cells
+from sim.experiments.figures.medians import plot_medians
 from sim.sweep.parts import PARAM
 
 GAINS, WALLS = (1.0, 5.0), (1500.0, 10000.0)
@@ -26,7 +25,7 @@ def table_of(name: str, **figures: float) -> pl.DataFrame:
         {"experiment": name, "law": run.law, "variant": run.variant, "seed": run.seed, "completed": True, "log": None}
         | {PARAM + key: value for key, value in run.params.items()}
         | figures
-        for run in experiment(name).design(Choice(quick=True))
+        for run in designs(name, Choice(quick=True))
     ]
     return pl.DataFrame(rows, schema_overrides={"log": pl.String}, infer_schema_length=None)
 
@@ -47,29 +46,28 @@ def the_map(bad: float) -> pl.DataFrame:
 def test_failed_flights_are_crosses_and_enter_no_median():
     rows = pl.DataFrame({"completed": [True, True, False, False], PARAM + "x": [1.0] * 4, "y": [1.0, 3.0, 60.0, None]})
     axes = Figure().subplots()
-    plot_medians(axes, rows, "x", "y", "qp", top=5.0)
+    plot_medians(axes, rows, "x", "y", "#0b6f9e", top=5.0)
     assert sum(line.get_gid() == CRASH for line in axes.lines) == 2
     (middle,) = [line for line in axes.lines if line.get_marker() == "o"]
     assert list(middle.get_ydata()) == [2.0]  # type: ignore[arg-type]
 
 
-def test_verdict_counts_what_the_map_shows():
-    shown, refuted = (map_verdict(the_map(bad), pl.DataFrame()) for bad in (0.8, 0.2))
-    assert shown.startswith("Shown") and "refuted for the shipped gains" in shown
-    assert "impedance oscillates above 0.5 N or loses the wall in 0 of 8 cells" in shown
-    assert "direct force control oscillates above 0.5 N or loses the wall in 2 of 8 cells" in shown
+def test_the_caption_counts_the_cells_of_the_map():
+    shown, refuted = (map_caption(the_map(bad), pl.DataFrame()) for bad in (0.8, 0.2))
+    assert shown.startswith("Direct force control oscillates") and "but not at the shipped gains" in shown
+    assert "impedance 0 of 8 cells" in shown and "direct force control 2 of 8 cells" in shown
     assert "none below 5 times" in shown
-    assert refuted.startswith("Refuted") and "in 2 of 8 cells" not in refuted
+    assert refuted.startswith("Direct force control does not oscillate") and "2 of 8 cells" not in refuted
 
 
 def test_a_hold_that_crashed_has_lost_the_wall():
     table = the_map(0.1).with_columns(pl.col(PARAM + "force_gain").eq(1.0).alias("completed"))
-    cells = judged_cells(table)
+    cells = map_cells(table)
     assert (cells["lost"] == (cells[PARAM + "force_gain"] == 5.0)).all()
 
 
 @pytest.mark.parametrize("logged", ["standard", "direct"])
-def test_a_variant_without_a_log_borrows_no_reference(monkeypatch, tmp_path, logged):
+def test_a_variant_without_a_log_shows_no_reference(monkeypatch, tmp_path, logged):
     table = table_of("force-hold", force_std_n=0.1, contact_share=1.0)
 
     def trace(results, rows):
@@ -79,8 +77,8 @@ def test_a_variant_without_a_log_borrows_no_reference(monkeypatch, tmp_path, log
         made.arrays["line_error_px"] = 0.0 * made.t[:, None].repeat(2, 1)
         return made
 
-    monkeypatch.setattr(force_hold, "kept_trace", trace)
-    figures = force_hold.draw_force_hold(Results(table=table, folder=tmp_path))
+    monkeypatch.setattr(force_hold, "stored_trace", trace)
+    figures = draw(Results(experiment("force-hold"), table, tmp_path))
     panels = figures["force-hold-1.5kNm"][1].axes[:2]
     empty, drawn = panels if logged == "direct" else panels[::-1]
     assert len(drawn.lines) == 3
@@ -89,7 +87,7 @@ def test_a_variant_without_a_log_borrows_no_reference(monkeypatch, tmp_path, log
 
 def test_derating_without_a_reach_still_draws(tmp_path):
     table = table_of("rotor-derate").with_columns(pl.lit(None, pl.Float64).alias("reach_n"))
-    assert draw_derate(Results(table=table, folder=tmp_path))
+    assert draw(Results(experiment("rotor-derate"), table, tmp_path))
 
 
 @pytest.mark.parametrize(
@@ -97,7 +95,7 @@ def test_derating_without_a_reach_still_draws(tmp_path):
 )
 def test_curves_draw_their_bound_and_every_variant(tmp_path, name, metric, bounds):
     table = table_of(name, **{metric: 1.0})
-    axes = experiment(name).draw(Results(table=table, folder=tmp_path))[name][1].axes[0]
+    axes = draw(Results(experiment(name), table, tmp_path))[name][1].axes[0]
     labels = axes.get_legend_handles_labels()[1]
     assert labels.count("bound") == bounds
     assert len([label for label in labels if label != "bound"]) == 2 * table["variant"].n_unique()

@@ -15,8 +15,11 @@ import pytest
 _PROGRAM = """
 import sys
 import sim.commands.experiment
-import sim.experiments.approach as approach
-approach.HOLD_S = 0.5
+import dataclasses
+import sim.experiments as experiments
+approach = experiments.experiment("approach")
+short = dataclasses.replace(approach, fixed={"job.hold_s": 0.5})
+experiments.experiment = lambda name: short
 from sim.commands.cli import main
 sys.exit(main())
 """

@@ -10,9 +10,9 @@ import polars as pl
 import pytest
 
 from ibvs_qp.config.errors import ConfigError
-from sim.experiments import NAMES, experiment
-from sim.experiments.base import Criterion
-from sim.experiments.verdict import _judge
+from sim.experiments import NAMES, Choice, designs, experiment
+from sim.experiments.criteria import EVERY, Criterion
+from sim.experiments.verdict import evaluate
 from sim.report.comparison import compare, read_run
 from sim.sweep.paired import exact_interval, needed, paired_differences, sign, variant_differences
 from sim.sweep.parts import frame, write_table
@@ -114,36 +114,36 @@ def judged(values: list[float], completed: list[bool] | None = None, **criterion
     data = table({"qp": values})
     if completed:
         data = data.with_columns(pl.Series("completed", completed))
-    return _judge(Criterion(text="", metric="error", **criterion), {}, data)
+    return evaluate(Criterion(text="", metric="error", **criterion), {}, data, {})
 
 
 def test_a_bound_is_held_by_the_median_and_counted_per_flight():
-    verdict = judged([0.1, 0.2, 0.9], bound=0.5)
-    assert verdict.met and (verdict.held, verdict.n, verdict.worst) == (2, 3, 0.9)
-    assert not judged([0.6, 0.7, 0.1], bound=0.5).met
-    assert judged([0.97, 0.99], bound=0.95, least=True).met
+    verdict = judged([0.1, 0.2, 0.9], at_most=0.5)
+    assert verdict.met and (verdict.within, verdict.n, verdict.worst) == (2, 3, 0.9)
+    assert not judged([0.6, 0.7, 0.1], at_most=0.5).met
+    assert judged([0.97, 0.99], at_least=0.95).met
 
 
 def test_what_must_never_happen_must_hold_in_every_flight():
     flags = [1.0, 1.0, 0.0]
-    assert not judged(flags, bound=1.0, least=True, every=True).met
-    lenient = judged(flags, bound=1.0, least=True)
+    assert not judged(flags, at_least=1.0, statistic=EVERY).met
+    lenient = judged(flags, at_least=1.0)
     assert lenient.met and lenient.words == "yes (median; 2 of 3)"
-    assert judged([1.0, 1.0], bound=1.0, least=True, every=True).words == "yes"
-    assert judged([5.0, 9.0, 5.1], bound=6.5, every=True).words == "no"
+    assert judged([1.0, 1.0], at_least=1.0, statistic=EVERY).words == "yes"
+    assert judged([5.0, 9.0, 5.1], at_most=6.5, statistic=EVERY).words == "no"
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_flags_peaks_and_mishaps_are_asked_of_every_flight(name):
     never = ("completed", "survived_s", "detached", "bounces", "reduced_said")
-    for criterion in experiment(name).criteria:
+    for criterion in experiment(name).every_criterion():
         assert criterion.every or not (criterion.metric in never or "peak" in criterion.metric), criterion.text
 
 
 def test_a_crash_is_no_good_figure():
-    verdict = judged([0.1, 0.2], [True, False], bound=0.5)
-    assert not verdict.met and (verdict.held, verdict.median, verdict.known) == (1, 0.1, 1)
-    assert judged([0.1, 0.1], [True, False], bound=0.5, failed_too=True).met
+    verdict = judged([0.1, 0.2], [True, False], at_most=0.5)
+    assert not verdict.met and (verdict.within, verdict.median, verdict.known) == (1, 0.1, 1)
+    assert judged([0.1, 0.1], [True, False], at_most=0.5, include_failed=True).met
 
 
 def test_two_tables_compare_flight_by_flight(tmp_path):
@@ -178,11 +178,9 @@ def test_runs_that_share_nothing_are_refused(tmp_path):
              "approach", "payload"]
 )  # fmt: skip
 def test_every_experiment_pairs_its_laws_and_judges_figures_that_its_cells_can_have(name):
-    from sim.experiments.base import Choice
-
     each = experiment(name)
     for quick in (True, False):
-        flights = each.design(Choice(quick=quick))
+        flights = designs(name, Choice(quick=quick))
         keys = [(run.variant, str(run.params), run.law, run.seed) for run in flights]
         assert len(set(keys)) == len(keys)
         assert {run.experiment for run in flights} == {name}

@@ -1,0 +1,78 @@
+"""Criteria of the QP law as data: bounds on metrics, and the variants and cells that they apply to."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from ibvs_qp.config.errors import ConfigError
+from ibvs_qp.config.settings import choice, validate
+from sim.sweep.design import Parameter
+
+#: Statistic that a bound applies to: the median of the cell, or each of its flights (flags, peaks, counts of mishaps).
+MEDIAN, EVERY = "median", "every flight"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bound:
+    """A bound on one metric: exactly one of `at_most` and `at_least` is given."""
+
+    text: str  # label; {name:g} inserts a parameter of the cell
+    metric: str  # column of the table of flights
+    at_most: float = math.nan  # upper bound, in SI
+    at_least: float = math.nan  # lower bound, in SI
+    scale: float = 1.0  # factor from SI to `unit`
+    unit: str = ""  # unit shown
+    statistic: str = choice(MEDIAN, "statistic that the bound applies to", (MEDIAN, EVERY))
+    include_failed: bool = False  # whether flights that did not end as planned count with their values
+    reason: str = ""  # why this bound
+
+    def __post_init__(self) -> None:
+        """Validate."""
+        validate(self)
+        if math.isnan(self.at_most) == math.isnan(self.at_least):
+            raise ConfigError(f"bound {self.text!r} needs either at_most or at_least")
+
+    @property
+    def least(self) -> bool:
+        """Whether the bound is a lower one."""
+        return math.isnan(self.at_most)
+
+    @property
+    def bound(self) -> float:
+        """The bound, in SI."""
+        return self.at_least if self.least else self.at_most
+
+    @property
+    def every(self) -> bool:
+        """Whether each flight must satisfy the bound."""
+        return self.statistic == EVERY
+
+
+@dataclass(frozen=True, kw_only=True)
+class Criterion(Bound):
+    """A bound with the variant and the cells that it applies to; empty `where` means all cells."""
+
+    variant: str = "standard"
+    where: dict[str, Parameter] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Criteria:
+    """Bounds that apply to the same variants and cells."""
+
+    bounds: tuple[Bound, ...]
+    where: dict[str, Parameter] = field(default_factory=dict)  # parameters that all cells share
+    cells: tuple[dict[str, Parameter], ...] = ({},)  # further parameters of each cell
+    variants: tuple[str, ...] = ("standard",)
+
+    def expanded(self) -> Iterator[Criterion]:
+        """One criterion per variant, cell and bound."""
+        for variant in self.variants:
+            for where in (self.where | cell for cell in self.cells):
+                for bound in self.bounds:
+                    values = {each.name: getattr(bound, each.name) for each in dataclasses.fields(bound)}
+                    values["text"] = bound.text.format(**where)
+                    yield Criterion(**values, variant=variant, where=where)

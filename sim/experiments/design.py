@@ -1,0 +1,102 @@
+"""From the data of an experiment to its runs."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from sim.evaluate import measures
+from sim.experiments.spec import Experiment, Flights, Value
+from sim.experiments.variants import VARIANTS, with_force_gain
+from sim.flight.closed_loop import FlightOptions, default_preset, pilot_config
+from sim.flight.faults import Derate, Fault, WindStep
+from sim.flight.jobs import PaintJob, PressJob
+from sim.sweep.design import FlightPlan, Parameter, Run
+from sim.sweep.setup import Setup, changed
+from sim.world.scene import Scene
+
+#: Start, approach, alignment, touch and retreat of a flight that starts near the wall [s]; sizes plan and bar only.
+AROUND_S = 9.0
+#: Parameter that multiplies the force gains of the preset; no dotted path can, as presets differ.
+FORCE_GAIN = "force_gain"
+#: Unit vectors of wind steps: north (into the wall), east (along it), down.
+DIRECTIONS = {"along the wall": (0.0, 1.0, 0.0), "off the wall": (-1.0, 0.0, 0.0)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Choice:
+    """Options of the command line.
+
+    Attributes:
+        quick: A few cells and seeds, for minutes instead of the record.
+        seed: First seed.
+        features: "rendered" or "geometric".
+    """
+
+    quick: bool = False
+    seed: int = 0
+    features: str = "rendered"
+
+
+def design(experiment: Experiment, choice: Choice) -> list[Run]:
+    """Runs of an experiment, in the order of its file: flights, levels, laws, seeds."""
+    runs = []
+    for flights in experiment.quick if choice.quick else experiment.flights:
+        if flights.rendered_only and choice.features != "rendered":
+            continue
+        for values in itertools.product(*flights.levels.values()):
+            runs += _cell(experiment, flights, dict(zip(flights.levels, values, strict=True)), choice)
+    return runs
+
+
+def _cell(experiment: Experiment, flights: Flights, level: dict[str, Parameter], choice: Choice) -> Iterator[Run]:
+    """Flights of one cell under every law, with the same seeds."""
+    variant = str(level.get("variant", "standard"))
+    for law in flights.laws or VARIANTS[variant].laws:
+        setup = _setup(experiment, flights, level, law, variant)
+        for index in range(flights.seeds):
+            options = FlightOptions(
+                law=law,
+                seed=choice.seed + index,
+                features=flights.features or choice.features,
+                vision=VARIANTS[variant].vision,
+                video=False,
+            )
+            config = pilot_config(setup.scene, options, setup.pilot)
+            yield Run(
+                experiment=experiment.name,
+                variant=variant,
+                params={name: level[name] for name in experiment.params},
+                plan=FlightPlan(
+                    scene=setup.scene, config=config, options=options, job=setup.job, faults=_faults(flights, level)
+                ),
+                measure=getattr(measures, f"{flights.measure}_figures"),
+                keep=flights.keep and index == 0,
+                expected_s=AROUND_S + setup.job.expected_s(config.painting),
+            )
+
+
+def _setup(experiment: Experiment, flights: Flights, level: Mapping[str, Parameter], law: str, variant: str) -> Setup:
+    """Scene, pilot and job of a cell under a law."""
+    values: dict[str, Value] = {**experiment.fixed, **flights.fixed}
+    for name, value in level.items():
+        paths = (*experiment.paths.get(name, ()), *flights.paths.get(name, ()))
+        values |= dict.fromkeys(paths, value)
+        values |= experiment.named.get(name, {}).get(str(value), {})
+    pilot = VARIANTS[variant].apply(default_preset(law))
+    if FORCE_GAIN in level:
+        pilot = with_force_gain(pilot, float(level[FORCE_GAIN]))
+    job = PaintJob() if flights.measure == "paint" else PressJob()
+    return changed(Setup(scene=Scene(), pilot=pilot, job=job), values)
+
+
+def _faults(flights: Flights, level: Mapping[str, Parameter]) -> tuple[Fault, ...]:
+    delay_s = flights.fault_delay_s
+    if flights.fault == "derate":
+        rotor, share, told = str(level["rotor"]), float(level["share"]), bool(level["told"])
+        return (Derate(delay_s=delay_s, rotor=rotor, share=share, reported=told),)
+    if flights.fault == "wind step":
+        north, east, down = (float(level["wind"]) * entry for entry in DIRECTIONS[str(level["direction"])])
+        return (WindStep(delay_s=delay_s, mean_m_s=(north, east, down)),)
+    return ()

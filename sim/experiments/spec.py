@@ -1,0 +1,132 @@
+"""One experiment as data: what is flown, the columns of its table, criteria of the QP law, and figures.
+
+Each experiment is one file ``specs/NAME.toml``. Unknown keys and wrong types are errors.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ibvs_qp.config.settings import choice, load_toml, setting, validate
+from sim.experiments.criteria import Criteria, Criterion
+from sim.sweep.design import Parameter
+
+SPECS = Path(__file__).with_name("specs")
+#: Value of a dotted path of scene, pilot or job; integers stay integers.
+Value = int | float | bool | str | tuple[float, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Column:
+    """A metric shown in the tables of an experiment."""
+
+    metric: str  # column of the table of flights
+    label: str  # heading
+    unit: str = ""  # unit shown
+    scale: float = 1.0  # factor from SI to `unit`
+    digits: int = 2  # decimals
+    better: int = -1  # +1 if more is better, -1 if less is better, 0 if neither
+    of_all: bool = False  # whether flights that did not end as planned have the metric too
+    where: dict[str, Parameter] = field(default_factory=dict)  # cells with this metric; empty means all
+
+
+@dataclass(frozen=True, kw_only=True)
+class Flights:
+    """Flights of one kind: every combination of the levels, under each law with the same seeds."""
+
+    measure: str = choice(
+        "press", "what is measured; paint paints, the others press", ("paint", "press", "slide", "loss")
+    )
+    seeds: int = setting(1, "flights of each cell and law", low=1)
+    levels: dict[str, tuple[Parameter, ...]] = field(default_factory=dict)  # the first varies slowest; also `variant`
+    fixed: dict[str, Value] = field(default_factory=dict)  # values of dotted paths, as in ibvs-qp sweep
+    paths: dict[str, tuple[str, ...]] = field(default_factory=dict)  # further paths that take a parameter's value
+    laws: tuple[str, ...] = ()  # laws that fly; empty means those of the variant
+    fault: str = choice("none", "what goes wrong after touch", ("none", "derate", "wind step"))
+    fault_delay_s: float = setting(0.0, "time from touch to the fault", unit="s", low=0.0)
+    features: str = choice("", "overrides the command line", ("", "rendered", "geometric"))
+    rendered_only: bool = False  # whether the flights need rendered pictures
+    keep: bool = True  # whether the log of the first seed is stored
+
+    def __post_init__(self) -> None:
+        """Validate."""
+        validate(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Panel:
+    """One axis of a figure."""
+
+    metric: str
+    label: str  # with unit
+    scale: float = 1.0  # factor from SI to that unit
+    top: float = math.inf  # highest value shown
+    where: dict[str, Parameter] = field(default_factory=dict)  # rows shown
+    xlabel: str = ""  # if it differs from that of the figure
+
+
+@dataclass(frozen=True, kw_only=True)
+class Line:
+    """One line of each panel: rows of a variant and of parameter values."""
+
+    label: str
+    color: str
+    variant: str = "standard"
+    where: dict[str, Parameter] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class FigureSpec:
+    """A figure of the results page."""
+
+    kind: str  # key of sim.experiments.figures.KINDS
+    name: str = ""  # file name; kinds with several files name them themselves
+    caption: str = ""
+    x: str = ""  # parameter along x
+    xlabel: str = ""  # with unit
+    where: dict[str, Parameter] = field(default_factory=dict)  # rows shown
+    panels: tuple[Panel, ...] = ()  # from left to right
+    variants: tuple[str, ...] = ("standard",)  # drawn first, the first with a full line; others in the data follow
+    lines: tuple[Line, ...] = ()  # lines of each panel of kind "rows"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Experiment:
+    """One experiment."""
+
+    name: str  # as on the command line
+    title: str  # heading of its section
+    about: str  # what is flown and measured
+    published: str  # what the paper, or other publications, report
+    params: dict[str, str]  # parameters of its cells and their headings
+    columns: tuple[Column, ...]
+    criteria: tuple[Criteria, ...]
+    flights: tuple[Flights, ...]  # of the record
+    quick: tuple[Flights, ...]  # of --quick
+    figures: tuple[FigureSpec, ...]
+    paths: dict[str, tuple[str, ...]] = field(default_factory=dict)  # dotted paths that take a parameter's value
+    named: dict[str, dict[str, dict[str, Value]]] = field(default_factory=dict)  # paths set by a parameter's value
+    fixed: dict[str, Value] = field(default_factory=dict)  # values of dotted paths for all flights
+    folded: dict[str, Parameter] = field(default_factory=dict)  # cells that the page folds away: a figure shows them
+
+    def every_criterion(self) -> list[Criterion]:
+        """The criteria one by one."""
+        return [criterion for group in self.criteria for criterion in group.expanded()]
+
+    def is_folded(self, params: dict[str, Any]) -> bool:
+        """Whether the page folds a cell away."""
+        return bool(self.folded) and self.folded.items() <= params.items()
+
+
+@functools.cache
+def experiment(name: str) -> Experiment:
+    """The experiment of a name.
+
+    Raises:
+        ConfigError: When its file is missing or refused.
+    """
+    return load_toml(Experiment, SPECS / f"{name}.toml")

@@ -1,0 +1,80 @@
+"""Experiments as data: every file is read, wrong keys are refused, levels become flights."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+
+from ibvs_qp.config.errors import ConfigError
+from ibvs_qp.config.settings import load_toml
+from sim.experiments import NAMES, Choice, design, experiment
+from sim.experiments.criteria import Bound, Criteria
+from sim.experiments.figures import KINDS
+from sim.experiments.spec import SPECS, Experiment
+
+
+def test_every_file_has_a_name_and_every_name_a_file():
+    assert {file.stem for file in SPECS.glob("*.toml")} == set(NAMES)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_experiment_is_complete(name):
+    each = experiment(name)
+    assert each.name == name
+    assert {figure.kind for figure in each.figures} <= set(KINDS)
+    assert all(criterion.reason and criterion.text for criterion in each.every_criterion())
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("at_most = 6.5", "at_mots = 6.5", "did you mean 'at_most'"),
+        ("at_most = 6.5", "at_most = 6.5\nat_least = 1.0", "either at_most or at_least"),
+        ('statistic = "every flight"', 'statistic = "mean"', "allowed are median, every flight"),
+        ("seeds = 3", "seeds = 0", "seeds"),
+        ("levels.stiffness_n_m = [5000.0]", "levels.stiffness_n_m = 5000.0", "quick"),
+        ("[fixed]", "[fixde]", "did you mean 'fixed'"),
+    ],
+)
+def test_wrong_files_are_refused_by_place(tmp_path, old, new, message):
+    text = (SPECS / "approach.toml").read_text(encoding="utf-8")
+    assert old in text
+    file = tmp_path / "approach.toml"
+    file.write_text(text.replace(old, new), encoding="utf-8")
+    with pytest.raises(ConfigError, match=message):
+        load_toml(Experiment, file)
+
+
+def test_a_dotted_path_that_does_not_exist_is_refused():
+    wrong = dataclasses.replace(experiment("approach"), fixed={"scene.wall.stifness_n_m": 1.0})
+    with pytest.raises(ConfigError, match="stiffness_n_m"):
+        design(wrong, Choice())
+
+
+def test_criteria_expand_to_variants_cells_and_bounds():
+    group = Criteria(
+        bounds=(Bound(text="{push_n:g} N", metric="a", at_most=1.0), Bound(text="b", metric="b", at_least=2.0)),
+        where={"kind": "static"},
+        cells=({"push_n": 5.0}, {"push_n": 7.5}),
+        variants=("standard", "clipped"),
+    )
+    listed = list(group.expanded())
+    assert [each.text for each in listed] == ["5 N", "b", "7.5 N", "b"] * 2
+    assert [each.variant for each in listed] == ["standard"] * 4 + ["clipped"] * 4
+    assert listed[2].where == {"kind": "static", "push_n": 7.5}
+    assert (listed[1].least, listed[1].bound) == (True, 2.0)
+
+
+def test_levels_vary_from_the_last_to_the_first_and_laws_share_seeds():
+    runs = design(experiment("friction"), Choice(seed=4))
+    first = [(run.variant, run.params["friction"], run.law, run.seed) for run in runs[:10]]
+    assert first[:4] == [("standard", 0.1, "qp", seed) for seed in (4, 5, 6, 7)]
+    assert first[4:8] == [("standard", 0.1, "paper", seed) for seed in (4, 5, 6, 7)]
+    assert first[8][1] == 0.2
+    assert runs[0].plan.scene.wall.friction == 0.1 and runs[0].keep and not runs[1].keep
+
+
+def test_flights_that_need_pictures_are_left_out_of_geometric_ones():
+    flown = {run.params["error"] for run in design(experiment("payload"), Choice(features="geometric"))}
+    assert "camera 1 cm low" in flown and not any("focal" in str(error) for error in flown)
