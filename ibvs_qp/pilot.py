@@ -37,7 +37,7 @@ from ibvs_qp.measurement import (
 from ibvs_qp.painting.command import PainterInput, PaintingCommand
 from ibvs_qp.painting.config import PaintingConfig
 from ibvs_qp.painting.painter import Painter
-from ibvs_qp.safety.rotor_loss import Supervisor
+from ibvs_qp.safety.rotor_loss import RotorLoss
 from ibvs_qp.validation.sensor_frame import SensorGate
 from ibvs_qp.vectors import Row, down_row
 from ibvs_qp.vision.config import VisionConfig
@@ -128,7 +128,7 @@ class Pilot:
             settings.machine_code,
         )
         self.tare = WrenchTare(vehicle, self.config.estimation)
-        self.supervisor = Supervisor(vehicle)
+        self.supervisor = RotorLoss(vehicle)
         self.painter = painter or Painter(self.config.painting)
         self._seen_as = seen_as
         self._tick_s = settings.tick_s
@@ -212,7 +212,7 @@ class Pilot:
         if features is not None and self._fresh(features.stamp_ns):
             self._take(features)
         inputs = self._painter_input(frame)
-        if self.thrust_limits is not None and self.supervisor.consider(self.thrust_limits):
+        if self.thrust_limits is not None and self.supervisor.update(self.thrust_limits):
             self.painter.abandon(inputs, "no level hover is left")
         target = self.painter.step(inputs)
         if self.supervisor.lost:
