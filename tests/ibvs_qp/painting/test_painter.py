@@ -37,7 +37,7 @@ class Edge:
 
 @dataclass
 class World:
-    """A tip that goes where it is told: velocity, guides (first order), stand-off, push."""
+    """A tip that follows its commands: velocity, guides (first order), stand-off, push."""
 
     config: PaintingConfig
     tip: np.ndarray = field(default_factory=lambda: np.zeros(2))
@@ -166,7 +166,7 @@ def short(**changes: object) -> PaintingConfig:
 
 
 @pytest.mark.parametrize("rows", [1, 2, 3, 4, 5])
-def test_rows_alternate_and_end_where_they_shall(rows: int) -> None:
+def test_rows_alternate_and_end_at_their_nominal_places(rows: int) -> None:
     world = World(short(rows=rows))
     world.fly(200.0)
     assert world.painter.finished and not world.painter.failed, world.painter.reason
@@ -240,10 +240,10 @@ def test_align_needs_stillness_and_place() -> None:
     assert world.painter.phase == "press"
 
 
-def test_align_gives_way_with_time() -> None:
+def test_tolerances_of_the_alignment_open_with_time() -> None:
     world = World(short())
     world.fly(20.0, until="align")
-    world.edges[0].place += 0.006  # twice what is allowed: let pass after sqrt(2) times the patience
+    world.edges[0].place += 0.006  # twice the tolerance: reached after sqrt(2) times the patience
     world.stuck = True
     world.fly(2.5)
     assert world.painter.phase == "align"
