@@ -31,8 +31,10 @@ from ibvs_qp.measurement import (
     Reference,
     SensorFrame,
 )
-from ibvs_qp.painting.painter import Painter, PaintingConfig, Scenery, Wish
-from ibvs_qp.safety.rotor_loss import Supervisor
+from ibvs_qp.painting.command import PainterInput, PaintingCommand
+from ibvs_qp.painting.config import PaintingConfig
+from ibvs_qp.painting.painter import Painter
+from ibvs_qp.safety.rotor_loss import RotorLoss
 from ibvs_qp.validation.sensor_frame import SensorGate
 from ibvs_qp.vectors import Row, down_row
 from ibvs_qp.vision.config import VisionConfig
@@ -116,7 +118,7 @@ class Pilot:
             settings.machine_code,
         )
         self.tare = WrenchTare(vehicle, self.config.estimation)
-        self.supervisor = Supervisor(vehicle)
+        self.supervisor = RotorLoss(vehicle)
         self.painter = painter or Painter(self.config.painting)
         self._seen_as = seen_as
         self._tick_s = settings.tick_s
@@ -151,7 +153,7 @@ class Pilot:
         self.controller_time_s = 0.0
         self.measurement: Measurement | None = None
         self.reference = Reference()
-        self.wish: Wish | None = None
+        self.painting_command: PaintingCommand | None = None
         self._plane: tuple[float, float, float, float] | None = None
         self._plane_stamp = 0
 
@@ -198,17 +200,17 @@ class Pilot:
         features = None if blind else frame.features if frame.image is None else self._see(frame)
         if features is not None and self._fresh(features.stamp_ns):
             self._take(features)
-        scenery = self._scenery(frame)
-        if self.thrust_limits is not None and self.supervisor.consider(self.thrust_limits):
-            self.painter.abandon(scenery, "no level hover is left")
-        wish = self.painter.step(scenery)
+        inputs = self._painter_input(frame)
+        if self.thrust_limits is not None and self.supervisor.update(self.thrust_limits):
+            self.painter.abandon(inputs, "no level hover is left")
+        target = self.painter.step(inputs)
         if self.supervisor.lost:
             away = contact.distance + float(contact.normal @ self._tip)
             tilt = self.supervisor.tilt(away, contact.speed, float(self.motion.state[0]), contact.normal, dt)
-            wish = dataclasses.replace(wish, tilt=tilt)
-        self.wish = wish
-        self.reference = self._refer(wish)
-        self.measurement = self._measure(frame, wrench, axes, wish)
+            target = dataclasses.replace(target, tilt=tilt)
+        self.painting_command = target
+        self.reference = self._refer(target)
+        self.measurement = self._measure(frame, wrench, axes, target)
         begin = time.perf_counter()
         command = self.controller.step(self.measurement, self.reference)
         self.controller_time_s = time.perf_counter() - begin
@@ -295,7 +297,7 @@ class Pilot:
         self.motion.correct(features, WallAxes.of(normal, gravity), distance)
         self._covariance = self.motion.velocity_variance * _EYE  # nothing else changes it
 
-    def _measure(self, frame: SensorFrame, wrench: np.ndarray, axes: WallAxes, wish: Wish) -> Measurement:
+    def _measure(self, frame: SensorFrame, wrench: np.ndarray, axes: WallAxes, target: PaintingCommand) -> Measurement:
         velocity = covariance = None
         contact = self.terms.contact
         distance = contact.distance if contact.known else 0.5
@@ -318,7 +320,7 @@ class Pilot:
             specific_force=frame.specific_force,
             contact_wrench=wrench,
             wrench_stamp_ns=frame.wrench_stamp_ns,
-            lines=tuple([self.motion.feature(line, axes, distance, frame.stamp_ns) for line, _ in wish.guides]),
+            lines=tuple([self.motion.feature(line, axes, distance, frame.stamp_ns) for line, _ in target.guides]),
             plane=self._plane,
             plane_stamp_ns=self._plane_stamp,
             velocity=velocity,
@@ -327,10 +329,10 @@ class Pilot:
             thrust_max=high,
         )
 
-    def _scenery(self, frame: SensorFrame) -> Scenery:
+    def _painter_input(self, frame: SensorFrame) -> PainterInput:
         terms, motion = self.controller.setpoints, self.motion
         contact, state = terms.contact, motion.state
-        return Scenery(
+        return PainterInput(
             (frame.stamp_ns - self._first) * 1e-9,
             motion.lines,
             state[4:6],
@@ -344,23 +346,23 @@ class Pilot:
             self.tare.ready,
         )
 
-    def _refer(self, wish: Wish) -> Reference:
+    def _refer(self, target: PaintingCommand) -> Reference:
         """Offsets in metres to line references: rho = l / d at the measured distance."""
         contact = self.terms.contact
         depth = self._tip_camera[2] + (contact.distance if contact.known else 0.5)
         references = []
-        for line, offset in wish.guides:
+        for line, offset in target.guides:
             if line.role == HORIZONTAL:
                 rho, theta = (offset + self._tip_camera[1]) / depth, 0.5 * math.pi
             else:
                 rho, theta = offset / depth, 0.0
             references.append(LineReference(rho=rho, theta=theta, role=line.role))
         return Reference(
-            push_force=wish.push,
-            standoff=wish.standoff,
+            push_force=target.push,
+            standoff=target.standoff,
             lines=tuple(references),
-            velocity=wish.velocity,
-            contact=wish.contact,
-            tilt=wish.tilt,
-            travel=wish.travel,
+            velocity=target.velocity,
+            contact=target.contact,
+            tilt=target.tilt,
+            travel=target.travel,
         )

@@ -1,7 +1,7 @@
 """Validated settings: dataclass fields that carry unit, allowed range and meaning, and their TOML form.
 
-Every configuration of the project (controller, pilot, scene) is a tree of frozen dataclasses whose fields are
-made by `setting`. The same metadata validates a value, words its error, and documents it.
+Every configuration of the project (controller, pilot, scene) is a tree of frozen dataclasses with fields of `setting`
+and `choice`. The same metadata validates a value, explains its error, and documents it.
 """
 
 from __future__ import annotations
@@ -29,18 +29,18 @@ def setting(
     """Declare a settings field with its unit and closed allowed range [low, high].
 
     Args:
-        default: Default value; numbers, booleans, strings, or tuples of numbers.
-        doc: What it is, and where its value comes from unless ``why`` says so.
+        default: Number, boolean, string, or tuple of numbers.
+        doc: Meaning, and source of the value unless ``why`` gives it.
         unit: SI unit, empty for a pure number.
         why: Reason for the default.
-        low: Smallest allowed value (each entry, for tuples).
+        low: Smallest allowed value, of each entry for tuples.
         high: Largest allowed value.
     """
     return dataclasses.field(default=default, metadata={"doc": doc, "unit": unit, "why": why, "low": low, "high": high})
 
 
 def choice(default: str, doc: str, options: tuple[str, ...]) -> Any:
-    """Declare a settings field that takes one of a few words."""
+    """Declare a settings field with a closed set of values."""
     return dataclasses.field(default=default, metadata={"doc": doc, "unit": "", "options": options})
 
 
@@ -60,13 +60,13 @@ def validate(instance: Any, prefix: str = "") -> None:
 
 
 def require_order(instance: Any, smaller: str, larger: str, reason: str) -> None:
-    """Refuse two fields of a settings dataclass unless the first lies below the second.
+    """Require that one field lies below another.
 
     Args:
         instance: The settings.
-        smaller: Name of the field that must be smaller, in the same unit as the other.
-        larger: Name of the other.
-        reason: What goes wrong otherwise.
+        smaller: Name of the smaller field.
+        larger: Name of the larger field, in the same unit.
+        reason: Consequence of the wrong order.
 
     Raises:
         ConfigError: Naming both fields, their values and their unit.
@@ -94,7 +94,7 @@ def from_dict(kind: type[T], table: dict[str, Any], path: str = "") -> T:
     Args:
         kind: The dataclass to build.
         table: Keys and values; nested tables become nested dataclasses, lists become tuples.
-        path: Dotted place of this table, for messages.
+        path: Dotted path of this table, for messages.
 
     Raises:
         ConfigError: On an unknown key, a value of the wrong type or out of range.
@@ -113,7 +113,10 @@ def from_dict(kind: type[T], table: dict[str, Any], path: str = "") -> T:
         return kind(**values)
     except ConfigError as error:
         raise ConfigError(f"{path}.{error}" if path and not str(error).startswith(path + ".") else str(error)) from None
-    except (TypeError, ValueError) as error:  # a dataclass of another package, or a field without default left out
+    except (
+        TypeError,
+        ValueError,
+    ) as error:  # from a dataclass of another package, or for a missing field without default
         raise ConfigError(f"{path or 'table'}: {error}") from None
 
 
@@ -155,7 +158,7 @@ def _convert_tuple(hint: Any, value: Any, place: str) -> tuple[Any, ...]:
 
 
 def to_dict(instance: Any) -> dict[str, Any]:
-    """Turn a settings tree into plain tables (None entries are left out, as TOML has no null)."""
+    """Convert a settings tree to plain tables without None entries: TOML has no null."""
     table: dict[str, Any] = {}
     for field in dataclasses.fields(instance):
         value = getattr(instance, field.name)
@@ -174,7 +177,7 @@ def load_toml(kind: type[T], file: str | Path) -> T:
     """Read a settings tree from a TOML file.
 
     Raises:
-        ConfigError: When the file is missing, is no TOML, or holds a refused value.
+        ConfigError: When the file is missing, is not TOML, or contains a refused value.
     """
     try:
         table = tomllib.loads(Path(file).read_text(encoding="utf-8"))
@@ -189,5 +192,5 @@ def load_toml(kind: type[T], file: str | Path) -> T:
 
 
 def dump_toml(instance: Any) -> str:
-    """Write a settings tree as TOML text that `load_toml` reads back equal."""
+    """Write a settings tree as TOML text; `load_toml` restores an equal tree."""
     return tomli_w.dumps(to_dict(instance))

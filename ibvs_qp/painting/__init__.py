@@ -1,1 +1,1 @@
-"""The painting strategy: what to do next, as references for the controller."""
+"""Painting strategy: references for the controller from what the pilot estimates, phase by phase."""

@@ -1,7 +1,7 @@
-"""The line that leads: the board's edge in row 1, then the upper edge of the row before; its wanted offset slides.
+"""The guide of a row: the board's edge in row 1, then the upper edge of the row before.
 
-Which line is which: `ibvs_qp.painting.line_choice`. Offsets are in metres around the tip's wall point
-(see `TrackedLine`).
+Selection among the tracked lines: `ibvs_qp.painting.line_choice`. Offsets are in metres from the tip's wall point
+(`TrackedLine`).
 """
 
 from __future__ import annotations
@@ -9,21 +9,18 @@ from __future__ import annotations
 import math
 
 from ibvs_qp.estimation.wall_motion import TrackedLine
-from ibvs_qp.painting.job import PaintingConfig, Scenery, clipped
-from ibvs_qp.painting.line_choice import FRESH_LEAN, LOST_WEIGHT, ROW_GATE, bottom_edge, fresh_edge
-
-#: A guide's reference slides to its nominal offset at this speed [m/s].
-SLIDE_SPEED = 0.01
-#: A line of more weight is surely in view.
-SURE_WEIGHT = 0.5
+from ibvs_qp.painting.command import PainterInput
+from ibvs_qp.painting.config import PaintingConfig
+from ibvs_qp.painting.line_choice import LOST_WEIGHT, VISIBLE_WEIGHT, bottom_edge, fresh_edge
+from ibvs_qp.painting.speed import clipped
 
 
-class Guide:
-    """The leading line by its track, and the offset at which it shall be.
+class GuideLine:
+    """The guide by its track, with its target offset.
 
     Attributes:
         identity: Track of the guide, -1 before there is one.
-        target: Its wanted offset [m].
+        target: Its target offset [m].
     """
 
     def __init__(self, config: PaintingConfig) -> None:
@@ -31,66 +28,67 @@ class Guide:
         self.identity = self._board = -1
         self.target = config.edge_margin_m
         self._level = 0.5 * math.pi  # angle of the board's edge [rad]
+        self._lean = math.radians(config.gates.fresh_lean_deg)
 
     def take(self, line: TrackedLine, target: float) -> None:
-        """Follow this line to this offset [m]."""
+        """Follow a line to a target offset [m]."""
         self.identity, self.target = line.track_id, target
 
-    def line(self, seen: Scenery) -> TrackedLine | None:
-        """The guide as it is tracked now."""
-        return seen.lines.get(self.identity)
+    def line(self, inputs: PainterInput) -> TrackedLine | None:
+        """The guide at this tick, None if it is not tracked."""
+        return inputs.lines.get(self.identity)
 
-    def error(self, seen: Scenery) -> float:
-        """How far the guide is from its wanted offset [m]; infinite without one."""
-        line = self.line(seen)
+    def error(self, inputs: PainterInput) -> float:
+        """Distance of the guide from its target [m]; infinite without a guide."""
+        line = self.line(inputs)
         return math.inf if line is None else abs(line.offset - self.target)
 
     def slide(self, row: int, dt: float) -> None:
-        """Let the wanted offset slide towards the nominal one of the row."""
-        step = SLIDE_SPEED * dt
+        """Move the target towards the nominal offset of the row for a tick of dt [s]."""
+        step = self._config.guide_slide_m_s * dt
         self.target += clipped(self._nominal(row) - self.target, -step, step)
 
-    def keep_board(self, seen: Scenery, gate: float, *, leads: bool) -> TrackedLine | None:
-        """Stay with the guide while it lives; when it is gone, look for the board's edge where it must be.
+    def follow_board(self, inputs: PainterInput, gate: float, *, first_row: bool) -> TrackedLine | None:
+        """Follow the board's edge up to row 1; a lost guide is searched near its target.
 
         Args:
-            seen: What is seen.
-            gate: Farthest that it may be from its wanted offset [m].
-            leads: Whether this is row 1, which the board's edge leads: later rows come back to it.
+            inputs: Estimates of the tick.
+            gate: Largest distance from the target [m].
+            first_row: Whether row 1 is being painted: later rows can return to its guide.
 
         Returns:
-            The new guide, when it changed.
+            The new guide, if it changed.
         """
-        line, new = self.line(seen), None
+        line, new = self.line(inputs), None
         if line is None or line.weight <= LOST_WEIGHT:
-            new = self._change(bottom_edge(seen.lines.values(), self.target, gate))
-        if leads:
+            new = self._change(bottom_edge(inputs.lines.values(), self.target, gate))
+        if first_row:
             self._board = self.identity
         return new
 
-    def keep_row(self, seen: Scenery, row: int) -> TrackedLine | None:
-        """Stay with the fresh edge while it lives and runs level; else the board's edge leads to the end of the row.
+    def follow_row(self, inputs: PainterInput, row: int) -> TrackedLine | None:
+        """Follow the fresh edge while it is tracked and level; otherwise the board's edge to the end of the row.
 
         Returns:
-            The new guide, when it changed.
+            The new guide, if it changed.
         """
-        self._mind_level(seen)
-        line = self.line(seen)
+        self._update_level(inputs)
+        line = self.line(inputs)
         if line is not None and line.weight > LOST_WEIGHT:
-            if self.identity == self._board or abs(line.angle - self._level) < FRESH_LEAN:
+            if self.identity == self._board or abs(line.angle - self._level) < self._lean:
                 return None
-        found = self.fresh(seen)
+        found = self.fresh(inputs)
         if found is None:
-            found = self._board_edge(seen, row)
+            found = self._board_edge(inputs, row)
             if found is not None:
-                # From where it is to where it belongs at the pace of `slide`: what led until now has misled.
+                # The lost guide has misled: slide from the present offset to the nominal one.
                 self._board, self.target = found.track_id, found.offset
         return self._change(found)
 
-    def fresh(self, seen: Scenery) -> TrackedLine | None:
-        """The upper edge of the last row, where it must be."""
-        self._mind_level(seen)
-        return fresh_edge(seen.lines.values(), self._config.fresh_edge_m, self._level)
+    def fresh(self, inputs: PainterInput) -> TrackedLine | None:
+        """The upper edge of the last row, if it is seen at its nominal offset."""
+        self._update_level(inputs)
+        return fresh_edge(inputs.lines.values(), self._config.fresh_edge_m, self._level, self._config.gates)
 
     def _change(self, found: TrackedLine | None) -> TrackedLine | None:
         if found is None or found.track_id == self.identity:
@@ -98,26 +96,26 @@ class Guide:
         self.identity = found.track_id
         return found
 
-    def _mind_level(self, seen: Scenery) -> None:
-        """Remember how the board's edge runs, for when it is out of sight."""
-        board = seen.lines.get(self._board)
-        if board is not None and board.weight > SURE_WEIGHT:
+    def _update_level(self, inputs: PainterInput) -> None:
+        """Store the angle of the board's edge for the time when it is out of view."""
+        board = inputs.lines.get(self._board)
+        if board is not None and board.weight > VISIBLE_WEIGHT:
             self._level = board.angle
 
-    def _board_edge(self, seen: Scenery, row: int) -> TrackedLine | None:
+    def _board_edge(self, inputs: PainterInput, row: int) -> TrackedLine | None:
         """The board's edge that guided row 1, from a later row."""
-        line = seen.lines.get(self._board)
-        if line is not None and line.weight > SURE_WEIGHT:
+        line = inputs.lines.get(self._board)
+        if line is not None and line.weight > VISIBLE_WEIGHT:
             return line
-        return bottom_edge(seen.lines.values(), self._board_nominal(row), 0.5 * self._config.pitch_m)
+        return bottom_edge(inputs.lines.values(), self._board_nominal(row), 0.5 * self._config.pitch_m)
 
     def _board_nominal(self, row: int) -> float:
-        """Where the board's edge lies below the row [m]."""
+        """Offset of the board's edge in a row [m]."""
         return self._config.edge_margin_m + (row - 1) * self._config.pitch_m
 
     def _nominal(self, row: int) -> float:
-        """Where the present guide shall be: the row's own, or one of the rows before, which stays where it was put."""
+        """Nominal offset of the guide [m]; a guide from an earlier row keeps its last target."""
         if self.identity == self._board:
             return self._board_nominal(row)
-        near = abs(self.target - self._config.fresh_edge_m) < 2.0 * ROW_GATE
+        near = abs(self.target - self._config.fresh_edge_m) < 2.0 * self._config.gates.row_m
         return self._config.fresh_edge_m if near else self.target

@@ -1,7 +1,7 @@
-"""Which line is which: guides, start mark and stop edge among the tracked lines.
+"""Choice of guide, start mark and stop edge among the tracked lines.
 
-A line is chosen by association: distance to where it must be, the side on which the surface lies, and the direction of
-travel; never by "topmost" or "first vertical". All offsets are in metres around the tip's wall point (`TrackedLine`).
+A line is chosen by its distance from the expected place, the side on which the surface lies, and the direction of
+travel; never as "topmost" or "first upright". Offsets are in metres from the tip's wall point (`TrackedLine`).
 """
 
 from __future__ import annotations
@@ -11,24 +11,12 @@ from collections.abc import Callable, Iterable
 
 from ibvs_qp.estimation.wall_motion import TrackedLine
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL
+from ibvs_qp.painting.line_gates import LineGates
 
-#: A guide may differ from where it must be by this much [m]: at the start, and from row to row.
-START_GATE, ROW_GATE = 0.15, 0.018
-#: A fresh edge may lean by this much against the board's [rad]. It is seen 0.05 to 0.25 m ahead of the tip and followed
-#: as a straight line: at 3 degrees that of a bent stroke says 8 mm too much or too little. Its short end, too, leans as
-#: a row ends; a gate of 6 degrees let it roll the vehicle (the analytic law by 0.30 degrees rms instead of 0.16).
-FRESH_LEAN = math.radians(3.0)
-#: A line of less weight is lost.
-LOST_WEIGHT = 0.05
-#: A gate says nothing of a line known less well than this share of it.
-GATE_SHARE = 1.0 / 3.0
-#: The right board edge is trusted as start mark only this near to its expected place [m].
-MARK_GATE = 0.06
-#: The edge that ends a row may differ from where it is expected by this much [m]: in row 1, whose length is nominal,
-#: and later, when the odometer has passed both ends.
-FIRST_STOP_GATE, STOP_GATE = 0.25, 0.06
-#: Weight of a line that may become the start mark, and of one that may end a row.
-MARK_WEIGHT, STOP_WEIGHT = 0.3, 0.9
+#: Weight of a line [0..1]: below, it is lost; above, it may mark the start; it is in view; it may end a row or lead.
+LOST_WEIGHT, MARK_WEIGHT, VISIBLE_WEIGHT, CERTAIN_WEIGHT = 0.05, 0.3, 0.5, 0.9
+#: Largest standard deviation of an offset relative to the gate: three of them fit into it.
+DEVIATION_RATIO = 1.0 / 3.0
 
 Lines = Iterable[TrackedLine]
 
@@ -38,8 +26,8 @@ def bottom_edge(lines: Lines, expected: float, gate: float) -> TrackedLine | Non
 
     Args:
         lines: Tracked lines.
-        expected: Offset at which it must be [m].
-        gate: Farthest that it may be from there [m].
+        expected: Its expected offset [m].
+        gate: Largest distance from there [m].
     """
 
     def accept(line: TrackedLine) -> bool:
@@ -48,30 +36,31 @@ def bottom_edge(lines: Lines, expected: float, gate: float) -> TrackedLine | Non
     return _nearest(lines, accept, expected, gate)
 
 
-def fresh_edge(lines: Lines, expected: float, level: float) -> TrackedLine | None:
+def fresh_edge(lines: Lines, expected: float, level: float, gates: LineGates) -> TrackedLine | None:
     """The upper edge of the last row: paint below, bare surface above.
 
     Args:
         lines: Tracked lines.
-        expected: Offset at which it must be [m].
+        expected: Its expected offset [m].
         level: Angle of the rows [rad], see `TrackedLine.angle`.
+        gates: Largest distance and angle from there.
     """
 
     def accept(line: TrackedLine) -> bool:
         fresh = line.role == HORIZONTAL and line.kind != "board" and line.surface_side <= 0
-        return fresh and abs(line.angle - level) < FRESH_LEAN
+        return fresh and abs(line.angle - level) < math.radians(gates.fresh_lean_deg)
 
-    return _nearest(lines, accept, expected, ROW_GATE)
+    return _nearest(lines, accept, expected, gates.row_m)
 
 
-def start_mark(lines: Lines, expected: float) -> TrackedLine | None:
-    """The right edge of the board, where a row that starts one margin inside has it; arguments as for `bottom_edge`."""
+def start_mark(lines: Lines, expected: float, gate: float) -> TrackedLine | None:
+    """The right edge of the board beside the start of row 1; arguments as for `bottom_edge`."""
 
     def accept(line: TrackedLine) -> bool:
         upright = line.role == VERTICAL and line.kind != "paint"
         return upright and line.surface_side <= 0 and line.weight > MARK_WEIGHT
 
-    return _nearest(lines, accept, expected, MARK_GATE)
+    return _nearest(lines, accept, expected, gate)
 
 
 def stop_edge(lines: Lines, travel: float, expected: float, gate: float) -> TrackedLine | None:
@@ -80,14 +69,14 @@ def stop_edge(lines: Lines, travel: float, expected: float, gate: float) -> Trac
     Args:
         lines: Tracked lines.
         travel: Direction of the row, +1 right, -1 left.
-        expected: Offset at which it must be [m].
-        gate: Farthest that it may be from there [m].
+        expected: Its expected offset [m].
+        gate: Largest distance from there [m].
     """
     side = 1 if travel < 0 else -1
 
     def accept(line: TrackedLine) -> bool:
         upright = line.role == VERTICAL and line.kind != "paint" and line.surface_side == side
-        return upright and line.weight > STOP_WEIGHT and travel * line.offset > 0.0
+        return upright and line.weight > CERTAIN_WEIGHT and travel * line.offset > 0.0
 
     return _nearest(lines, accept, expected, gate)
 
@@ -95,7 +84,7 @@ def stop_edge(lines: Lines, travel: float, expected: float, gate: float) -> Trac
 def _nearest(lines: Lines, accept: Callable[[TrackedLine], bool], expected: float, gate: float) -> TrackedLine | None:
     best, least = None, gate
     for line in lines:
-        if line.weight > 0.0 and line.deviation <= GATE_SHARE * gate:
+        if line.weight > 0.0 and line.deviation <= DEVIATION_RATIO * gate:
             away = abs(line.offset - expected)
             if (away < least or (away == least and best is None)) and accept(line):
                 best, least = line, away

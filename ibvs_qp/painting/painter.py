@@ -1,7 +1,7 @@
-"""Painting strategy: from what is seen and felt to the reference of the controller, row by row.
+"""The painting strategy: start, approach, align, press, paint and climb row by row, retreat, done.
 
-Everything is in metres around the tip's wall point (see `TrackedLine`). The line that leads:
-`ibvs_qp.painting.guide_line`; where a row ends: `ibvs_qp.painting.stroke_end`.
+Offsets are in metres from the tip's wall point (`TrackedLine`). The guide of a row: `ibvs_qp.painting.guide_line`; the
+end of a stroke: `ibvs_qp.painting.stroke_end`; time-outs and failure: `ibvs_qp.painting.phase_machine`.
 """
 
 from __future__ import annotations
@@ -12,276 +12,220 @@ import numpy as np
 
 from ibvs_qp.estimation.wall_motion import TrackedLine
 from ibvs_qp.measurement import VERTICAL
-from ibvs_qp.painting.guide_line import Guide
-from ibvs_qp.painting.job import NONE, PaintingConfig, Scenery, Wish, clipped
-from ibvs_qp.painting.line_choice import ROW_GATE, START_GATE, bottom_edge, start_mark
-from ibvs_qp.painting.stroke_end import RowEnd, travel_of
+from ibvs_qp.painting.alignment import Alignment
+from ibvs_qp.painting.command import ZERO, PainterInput, PaintingCommand
+from ibvs_qp.painting.config import PaintingConfig
+from ibvs_qp.painting.guide_line import GuideLine
+from ibvs_qp.painting.line_choice import CERTAIN_WEIGHT, VISIBLE_WEIGHT, bottom_edge, start_mark
+from ibvs_qp.painting.phase_machine import PhaseMachine
+from ibvs_qp.painting.speed import climb_speed, clipped, ramped, stroke_speed
+from ibvs_qp.painting.stroke_end import STOP_DISTANCE, StrokeEnd, travel_of
 
-#: Nobody sets out for a guide known less well than this [m].
-START_DEVIATION = 0.01
-#: Errors and speed of the alignment are averaged over this time [s]: half a period of the sway in hover.
-SWAY_TIME = 0.4
-#: Farthest that the alignment's tolerances open: 15 mm and 25 mm/s, what 3 N rms of gusts leave.
-MOST_OPENING = 5.0
-#: Stiction may keep the tip from the last millimetres; a stop settles for this long at most [s].
-SETTLE_TIME = 0.8
-#: Position hold along the wall by the odometer [1/s], speed-limited [m/s].
-HOLD_GAIN, HOLD_SPEED = 0.8, 0.03
-#: Vertical speed of a vehicle that gives up the wall [m/s], down: slow, because nothing measures the height.
-DESCENT_M_S = 0.15
+#: Difference from the stand-off and from the retreat distance at which these phases end [m].
+STANDOFF_REACHED, RETREAT_REACHED = 0.01, 0.02
+#: Least push to which the relative error of a press refers [N].
+PRESS_REFERENCE_MIN = 1.0
 
 
-class Painter:
-    """Phase machine of the paint job; `step` returns the wish of the tick."""
+class Painter(PhaseMachine):
+    """Paints the rows of a job; `step` returns the command of the tick.
 
-    _slides = True  # whether a stroke follows the press
+    Attributes:
+        row: Row in progress from 1, 0 before the first stroke.
+    """
+
+    _SLIDES = True  # whether a stroke follows the press
+    _COMPLETED = "all rows painted, retreated"
 
     def __init__(self, config: PaintingConfig) -> None:
-        self.config = config
         self._travel = np.array((-config.speed_m_s, 0.0))
-        self._travel.flags.writeable = False  # shared by all wishes
-        self.reset()
+        self._travel.flags.writeable = False  # one array for all commands
+        super().__init__(config)
 
     def reset(self) -> None:
-        """Back to the start."""
-        self.phase, self.row, self.entered = "start", 0, 0.0
-        self.log: list[tuple[float, str, str]] = []
-        self._calm: tuple[float, ...] | None = None
-        self.finished = self.failed = self._given_up = False
-        self.reason = ""
-        self._guide = Guide(self.config)
-        self._row_end = RowEnd(self.config)
-        self._speed = 0.0
-        self._since = math.nan
-        self._anchor = 0.0  # row 1 begins where the tip was at the start, before the vehicle turned to the wall
-        self._last_time = math.nan
+        """As after construction."""
+        super().reset()
+        self.row = 0
+        self._guide, self._stroke_end = GuideLine(self.config), StrokeEnd(self.config)
+        self._alignment = Alignment(self.config)
+        self._speed = self._climbed = 0.0
+        self._since = math.nan  # time of the touch in press, and of the arrival in climb [s]
+        self._anchor = 0.0  # odometer to hold [m]: at first where the tip was before the vehicle turned to the wall
         self._paused = False
-        self._climbed = 0.0
+
+    def _enter(self, inputs: PainterInput, phase: str, reason: str) -> None:
+        super()._enter(inputs, phase, reason)
+        self._since = math.nan
 
     # ------------------------------------------------------------------ phases
 
-    def step(self, seen: Scenery) -> Wish:
-        """Advance the phase machine by one tick."""
-        dt = 0.0 if math.isnan(self._last_time) else seen.time_s - self._last_time
-        self._last_time = seen.time_s
-        if seen.time_s - self.entered > self.config.timeout_s and self.phase not in ("paint", "done"):
-            self._time_out(seen)
-        return getattr(self, "_" + self.phase)(seen, dt)
-
-    def _enter(self, seen: Scenery, phase: str, reason: str) -> None:
-        self.log.append((seen.time_s, phase, reason))
-        self.phase, self.entered, self._since = phase, seen.time_s, math.nan
-
-    def _time_out(self, seen: Scenery) -> None:
-        if self.phase == "retreat":
-            self._end(seen, f"time-out after {self.config.timeout_s:g} s in retreat", failed=True)
-            return
-        self._fail(seen, f"time-out after {self.config.timeout_s:g} s in {self.phase}")
-
-    def _fail(self, seen: Scenery, reason: str) -> None:
-        self.failed, self.reason = True, self.reason or reason
-        self._speed = 0.0
-        self._enter(seen, "retreat", reason)
-
-    def abandon(self, seen: Scenery, reason: str) -> None:
-        """Give up the wall for good: detach, get clear of it and descend."""
-        self.failed = True
-        self._give_up(seen, reason)
-
-    def _give_up(self, seen: Scenery, reason: str) -> None:
-        self.reason, self._given_up = reason, True
-        self._enter(seen, "retreat", reason)
-
-    def _escape(self, seen: Scenery, dt: float) -> Wish:
-        if seen.time_s - self.entered > self.config.descend_s:
-            self._end(seen, f"{self.reason}: wall given up, descended for {self.config.descend_s:g} s")
-        velocity = np.array([0.0, DESCENT_M_S])
-        return Wish(contact=False, standoff=self.config.retreat_m, velocity=velocity, guides=[], push=0.0)
-
-    def _end(self, seen: Scenery, reason: str, failed: bool = False) -> None:
-        self.failed = self.failed or failed
-        self.reason = self.reason or reason
-        self.finished = True
-        self._enter(seen, "done", reason)
-
-    def _start(self, seen: Scenery, dt: float) -> Wish:
-        guide = bottom_edge(seen.lines.values(), self.config.edge_margin_m, START_GATE)
-        sure = guide is not None and guide.weight > 0.9 and guide.deviation < START_DEVIATION
-        if guide is not None and sure and seen.wall_known and seen.tared:
-            self._guide.take(guide, self.config.edge_margin_m)
-            self._enter(seen, "approach", f"guide {guide.offset * 1e3:+.0f} mm below the tip, wall known, wrench tared")
-        distance = seen.distance if seen.wall_known else self.config.retreat_m
-        return self._wish(seen, contact=False, standoff=max(distance, self.config.standoff_m), guided=False)
-
-    def _approach(self, seen: Scenery, dt: float) -> Wish:
-        self._keep_guide(seen, START_GATE)
-        if abs(seen.distance - self.config.standoff_m) < 0.01:
-            self._enter(seen, "align", f"stand-off {seen.distance * 1e3:.0f} mm reached")
-        return self._wish(seen, contact=False, standoff=self.config.standoff_m, hold=True, mark=True)
-
-    def _align(self, seen: Scenery, dt: float) -> Wish:
-        self._keep_guide(seen)
-        line, mark = self._guide.line(seen), self._start_mark(seen)
-        high = math.inf if line is None else line.offset - self._guide.target
-        aside = 0.0 if mark is None else mark.offset - self.config.edge_margin_m
-        error, speed = self._without_sway((high, aside, *seen.velocity[:2]), dt)
-        # Gusts and noisy pictures may never let the vehicle stand still: what counts as aligned opens with time.
-        waited = (seen.time_s - self.entered) / self.config.align_patience_s
-        opening = min(max(1.0, waited**2), MOST_OPENING)
-        still = speed < opening * self.config.align_speed_m_s
-        if error < opening * self.config.align_error_m and still:
-            self._since = seen.time_s if math.isnan(self._since) else self._since
-            if seen.time_s - self._since >= self.config.align_time_s:
-                self._row_end.right_margin = mark.offset if mark is not None else None
-                self._anchor = float(seen.odometer[0])
-                self._enter(seen, "press", f"aligned within {error * 1e3:.1f} mm")
-        else:
-            self._since = math.nan
-        return self._wish(seen, contact=False, standoff=self.config.standoff_m, hold=True, mark=True)
-
-    def _without_sway(self, now: tuple[float, ...], dt: float) -> tuple[float, float]:
-        """Error and speed averaged over a sway: a hovering vehicle sways by as much as is allowed, about its place."""
-        if not all(map(math.isfinite, now)):
-            self._calm = None
-            return math.inf, math.inf
-        share = 1.0 - math.exp(-dt / SWAY_TIME)
-        last = self._calm or now
-        self._calm = tuple(old + share * (new - old) for old, new in zip(last, now, strict=True))
-        high, aside, right, down = self._calm
-        return max(abs(high), abs(aside)), math.hypot(right, down)
-
-    def _hold_where_it_touched(self, seen: Scenery) -> None:
-        """A tip that is pressed is held by friction: to wish it elsewhere would be to wish a slide."""
-        if seen.in_contact and math.isnan(self._since):
-            self._since, self._anchor = seen.time_s, float(seen.odometer[0])
-
-    def _press(self, seen: Scenery, dt: float) -> Wish:
-        self._keep_guide(seen)
-        self._hold_where_it_touched(seen)
-        settled = seen.in_contact and seen.time_since_touch > 1.2
-        if settled and abs(seen.push - seen.push_wanted) < 0.15 * max(seen.push_wanted, 1.0):
-            self.row = 1
-            self._row_end.begin_first_row(float(seen.odometer[0]))
-            self._begin_row(seen, f"push {seen.push:.1f} N held")
-        return self._wish(seen, contact=True, hold=True, mark=True)
-
-    def _begin_row(self, seen: Scenery, reason: str) -> None:
-        self._speed = 0.0
-        self._row_end.forget()
-        self._enter(seen, "paint", f"row {self.row}: {reason}")
-
-    def _paint(self, seen: Scenery, dt: float) -> Wish:
+    def _start(self, inputs: PainterInput, dt: float) -> PaintingCommand:
         config = self.config
-        if seen.time_s - self.entered > config.timeout_s + 2.0 * config.stroke_m / config.speed_m_s:
-            self._fail(seen, f"time-out in row {self.row}")
-        self._keep_guide(seen)
-        self._guide.slide(self.row, dt)
-        travel = travel_of(self.row)
-        remaining, edge = self._row_end.remaining(seen, self.row)
-        self._check_contact(seen)
-        left = remaining if remaining > 0.0 else 0.0
-        speed = min(config.speed_m_s, math.sqrt(2.0 * config.acceleration_m_s2 * left), 2.0 * left + 0.005)
-        step = config.acceleration_m_s2 * dt
-        self._speed += clipped((0.0 if self._paused else speed) - self._speed, -2.0 * step, step)
-        if remaining <= 0.004:
+        guide = bottom_edge(inputs.lines.values(), config.edge_margin_m, config.gates.start_m)
+        if guide is not None and inputs.wall_known and inputs.tared:
+            if guide.weight > CERTAIN_WEIGHT and guide.deviation < config.gates.start_deviation_m:
+                self._guide.take(guide, config.edge_margin_m)
+                found = f"guide {guide.offset * 1e3:+.0f} mm below the tip, wall known, wrench tared"
+                self._enter(inputs, "approach", found)
+        distance = inputs.distance if inputs.wall_known else config.retreat_m
+        return self._command(inputs, contact=False, standoff=max(distance, config.standoff_m), guided=False)
+
+    def _approach(self, inputs: PainterInput, dt: float) -> PaintingCommand:
+        config = self.config
+        self._follow_guide(inputs, config.gates.start_m)
+        if abs(inputs.distance - config.standoff_m) < STANDOFF_REACHED:
+            self._enter(inputs, "align", f"stand-off {inputs.distance * 1e3:.0f} mm reached")
+        return self._command(inputs, contact=False, standoff=config.standoff_m, hold=True, mark=True)
+
+    def _align(self, inputs: PainterInput, dt: float) -> PaintingCommand:
+        config = self.config
+        self._follow_guide(inputs, config.gates.row_m)
+        line, mark = self._guide.line(inputs), self._start_mark(inputs)
+        high = math.inf if line is None else line.offset - self._guide.target
+        aside = 0.0 if mark is None else mark.offset - config.edge_margin_m
+        if self._alignment.is_reached(inputs, (high, aside), self.entered, dt):
+            self._stroke_end.right_margin = mark.offset if mark is not None else None
+            self._anchor = float(inputs.odometer[0])
+            self._enter(inputs, "press", f"aligned within {self._alignment.error * 1e3:.1f} mm")
+        return self._command(inputs, contact=False, standoff=config.standoff_m, hold=True, mark=True)
+
+    def _press(self, inputs: PainterInput, dt: float) -> PaintingCommand:
+        config = self.config
+        self._follow_guide(inputs, config.gates.row_m)
+        self._hold_touch_point(inputs)
+        if inputs.in_contact and inputs.time_since_touch > config.press_time_s:
+            tolerance = config.press_error * max(inputs.push_reference, PRESS_REFERENCE_MIN)
+            if abs(inputs.push - inputs.push_reference) < tolerance:
+                self.row = 1
+                self._begin_row(inputs, f"push {inputs.push:.1f} N held")
+        return self._command(inputs, contact=True, hold=True, mark=True)
+
+    def _paint(self, inputs: PainterInput, dt: float) -> PaintingCommand:
+        config, travel = self.config, travel_of(self.row)
+        late = inputs.time_s - self.entered > config.timeout_s + 2.0 * config.stroke_m / config.speed_m_s
+        if late:
             self._speed = 0.0
-            self._since = seen.time_s if math.isnan(self._since) else self._since
-            still = abs(seen.velocity[0]) < 2.0 * config.align_speed_m_s
-            waited = seen.time_s - self._since
-            if (waited > 0.15 and still and remaining < 0.003) or waited > SETTLE_TIME:
-                self._end_row(seen, edge)
-        return self._wish(
-            seen, contact=True, along=travel * self._speed, edge=edge, edge_rate=-travel * self._speed * dt
-        )
+            self._fail(inputs, f"time-out in row {self.row}")
+        self._follow_guide(inputs, config.gates.row_m)
+        self._guide.slide(self.row, dt)
+        remaining, edge = self._stroke_end.remaining(inputs, self.row)
+        self._pause_without_contact(inputs)
+        target = 0.0 if self._paused else stroke_speed(config, remaining)
+        self._speed = ramped(self._speed, target, config.acceleration_m_s2 * dt)
+        if remaining <= STOP_DISTANCE:
+            self._speed = 0.0
+        if not late and self._stroke_end.is_reached(inputs, remaining):
+            self._end_row(inputs, edge)
+        along = travel * self._speed
+        return self._command(inputs, contact=True, along=along, edge=edge, edge_rate=-along * dt)
 
-    def _end_row(self, seen: Scenery, edge: TrackedLine | None) -> None:
-        if self.row == 1:
-            self._row_end.end_first_row(float(seen.odometer[0]))
-        how = f"at {edge.kind or 'unknown'} edge {edge.offset * 1e3:+.0f} mm" if edge is not None else "by the odometer"
-        if self.row >= self.config.rows:
-            self._enter(seen, "retreat", f"row {self.row} ended {how}; all rows done")
-            return
-        self.row += 1
-        self._climbed, self._speed = 0.0, 0.0
-        self._anchor = float(seen.odometer[0])
-        self._enter(seen, "climb", f"row {self.row - 1} ended {how}")
-
-    def _climb(self, seen: Scenery, dt: float) -> Wish:
-        config, edge = self.config, self._row_end.beside_climb(seen, self.row - 1)
-        self._check_contact(seen)
+    def _climb(self, inputs: PainterInput, dt: float) -> PaintingCommand:
+        config, edge = self.config, self._stroke_end.beside_climb(inputs, self.row - 1)
+        self._pause_without_contact(inputs)
         left = config.pitch_m - self._climbed
-        speed = min(config.climb_speed_m_s, math.sqrt(2.0 * config.acceleration_m_s2 * max(left, 0.0)) + 0.002)
-        speed = 0.0 if self._paused else speed
-        step = config.acceleration_m_s2 * dt
-        self._speed += clipped(speed - self._speed, -2.0 * step, step)
+        target = 0.0 if self._paused else climb_speed(config, left)
+        self._speed = ramped(self._speed, target, config.acceleration_m_s2 * dt)
         move = min(self._speed * dt, max(left, 0.0))
         self._climbed += move
         self._guide.target += move
         if left <= 0.0:
             self._speed = 0.0
-            self._since = seen.time_s if math.isnan(self._since) else self._since
-            waited = seen.time_s - self._since
-            fresh = self._guide.fresh(seen)
-            good = fresh is not None and fresh.weight > 0.9
-            if waited > 0.3 and (good or waited > 2.0) and (self._guide.error(seen) < 0.004 or waited > 1.0):
-                why = "fresh edge found" if good else "no fresh edge; the old guide stays"
-                if good and fresh is not None:
-                    self._guide.take(fresh, fresh.offset)
-                self._begin_row(seen, f"climbed {self._climbed * 1e3:.0f} mm, {why}")
+            if self._climb_settled(inputs):
                 edge = None
-        return self._wish(seen, contact=True, climb=self._speed if left > 0.0 else 0.0, edge=edge, hold=edge is None)
+        return self._command(inputs, contact=True, climb=self._speed, edge=edge, hold=edge is None)
 
-    def _retreat(self, seen: Scenery, dt: float) -> Wish:
+    def _retreat(self, inputs: PainterInput, dt: float) -> PaintingCommand:
         if self._given_up:
-            return self._escape(seen, dt)
-        if seen.distance > self.config.retreat_m - 0.02 and not seen.in_contact:
-            self._end(seen, "all rows painted, retreated" if not self.failed else self.reason)
-        return self._wish(seen, contact=False, standoff=self.config.retreat_m, hold=True)
+            return self._descend(inputs)
+        if inputs.distance > self.config.retreat_m - RETREAT_REACHED and not inputs.in_contact:
+            self._end(inputs, self.reason if self.failed else self._COMPLETED)
+        return self._command(inputs, contact=False, standoff=self.config.retreat_m, hold=True)
 
-    def _done(self, seen: Scenery, dt: float) -> Wish:
-        return self._wish(seen, contact=False, standoff=self.config.retreat_m, guided=False)
+    def _done(self, inputs: PainterInput, dt: float) -> PaintingCommand:
+        return self._command(inputs, contact=False, standoff=self.config.retreat_m, guided=False)
 
-    # ------------------------------------------------------------- association
+    # -------------------------------------------------------------------- rows
+
+    def _begin_row(self, inputs: PainterInput, reason: str) -> None:
+        self._speed = 0.0
+        self._stroke_end.begin_row(self.row, inputs)
+        self._enter(inputs, "paint", f"row {self.row}: {reason}")
+
+    def _end_row(self, inputs: PainterInput, edge: TrackedLine | None) -> None:
+        self._stroke_end.end_row(self.row, inputs)
+        how = "by the odometer" if edge is None else f"at {edge.kind or 'unknown'} edge {edge.offset * 1e3:+.0f} mm"
+        if self.row >= self.config.rows:
+            self._enter(inputs, "retreat", f"row {self.row} ended {how}; all rows done")
+            return
+        self.row += 1
+        self._climbed, self._speed = 0.0, 0.0
+        self._anchor = float(inputs.odometer[0])
+        self._enter(inputs, "climb", f"row {self.row - 1} ended {how}")
+
+    def _climb_settled(self, inputs: PainterInput) -> bool:
+        """Begin the next row once the fresh edge is found, or was searched for too long; True when it begins."""
+        config = self.config
+        self._since = inputs.time_s if math.isnan(self._since) else self._since
+        waited = inputs.time_s - self._since
+        fresh = self._guide.fresh(inputs)
+        if fresh is not None and fresh.weight <= CERTAIN_WEIGHT:
+            fresh = None
+        found = fresh is not None or waited > config.fresh_edge_timeout_s
+        near = self._guide.error(inputs) < config.climb_error_m or waited > config.climb_timeout_s
+        if not (waited > config.climb_time_s and found and near):
+            return False
+        if fresh is not None:
+            self._guide.take(fresh, fresh.offset)
+        why = "no fresh edge; the old guide stays" if fresh is None else "fresh edge found"
+        self._begin_row(inputs, f"climbed {self._climbed * 1e3:.0f} mm, {why}")
+        return True
+
+    def _hold_touch_point(self, inputs: PainterInput) -> None:
+        """Hold the point of the touch: friction holds the tip there, and another target would command a slide."""
+        if inputs.in_contact and math.isnan(self._since):
+            self._since, self._anchor = inputs.time_s, float(inputs.odometer[0])
+
+    def _pause_without_contact(self, inputs: PainterInput) -> None:
+        if not inputs.in_contact and not self._paused:
+            self._paused = True
+            self.log.append((inputs.time_s, "contact lost", f"in {self.phase}, waiting for it"))
+        elif self._paused and inputs.in_contact and inputs.time_since_touch > self.config.contact_back_s:
+            self._paused = False
+            self.log.append((inputs.time_s, "contact back", "going on"))
+
+    # ------------------------------------------------------------------- lines
 
     def expected_fresh_edge(self, lines: dict[int, TrackedLine]) -> tuple[float, float] | None:
-        """Where the last row's upper edge must be while it is not followed: offset [m] and side it lies to (+-1).
+        """Expected offset [m] of the last row's upper edge while it is not followed, and its side (+1 right, -1 left).
 
-        It exists only ahead of the brush, to the side of the coming travel (+1 right, -1 left).
+        It is visible only ahead of the brush, on the side of the coming travel.
         """
         if self.row < 2 or self.phase not in ("climb", "paint"):
             return None
         line = lines.get(self._guide.identity)
-        followed = line is not None and line.weight > 0.5 and line.kind == "paint"
+        followed = line is not None and line.weight > VISIBLE_WEIGHT and line.kind == "paint"
         if followed and self.phase == "paint":
             return None
         left = self.config.pitch_m - self._climbed if self.phase == "climb" else 0.0
         return self.config.fresh_edge_m - left, travel_of(self.row)
 
-    def _start_mark(self, seen: Scenery) -> TrackedLine | None:
-        return start_mark(seen.lines.values(), self.config.edge_margin_m)
+    def _start_mark(self, inputs: PainterInput) -> TrackedLine | None:
+        return start_mark(inputs.lines.values(), self.config.edge_margin_m, self.config.gates.mark_m)
 
-    def _keep_guide(self, seen: Scenery, gate: float = ROW_GATE) -> None:
-        """Stay with the guide, or take the line that has to lead now."""
+    def _follow_guide(self, inputs: PainterInput, gate: float) -> None:
+        """Follow the guide, or choose another line within a gate [m]."""
         if self.row < 2:
-            new = self._guide.keep_board(seen, gate, leads=self.row == 1)
+            new = self._guide.follow_board(inputs, gate, first_row=self.row == 1)
         else:
-            new = self._guide.keep_row(seen, self.row)
+            new = self._guide.follow_row(inputs, self.row)
         if new is not None:
-            self.log.append((seen.time_s, "guide", f"track {new.track_id} at {new.offset * 1e3:+.1f} mm"))
+            self.log.append((inputs.time_s, "guide", f"track {new.track_id} at {new.offset * 1e3:+.1f} mm"))
 
-    def _check_contact(self, seen: Scenery) -> None:
-        if not seen.in_contact and not self._paused:
-            self._paused = True
-            self.log.append((seen.time_s, "contact lost", f"in {self.phase}, waiting for it"))
-        elif self._paused and seen.in_contact and seen.time_since_touch > 0.5:
-            self._paused = False
-            self.log.append((seen.time_s, "contact back", "going on"))
+    # ----------------------------------------------------------------- command
 
-    # ------------------------------------------------------------------ wishes
-
-    def _wish(
+    def _command(
         self,
-        seen: Scenery,
+        inputs: PainterInput,
         *,
         contact: bool,
         standoff: float = 0.0,
@@ -292,25 +236,28 @@ class Painter:
         climb: float = 0.0,
         edge: TrackedLine | None = None,
         edge_rate: float = 0.0,
-    ) -> Wish:
-        guides: list[tuple[TrackedLine, float]] = []
-        right = 0.0
-        line = self._guide.line(seen) if guided else None
-        slope = 0.0
+    ) -> PaintingCommand:
+        """Command of the tick.
+
+        ``hold`` holds the position on the odometer where no upright line is followed, ``mark`` follows the start mark;
+        ``along`` and ``climb`` are speeds along the guide to the right and across it upwards [m/s], ``edge`` ends the
+        row and ``edge_rate`` is the change of its target since the last tick [m].
+        """
+        config, guides, right, slope = self.config, [], 0.0, 0.0
+        line = self._guide.line(inputs) if guided else None
         if line is not None:
             guides.append((line, self._guide.target))
             slope = line.angle - 0.5 * math.pi
-        if mark:
-            start = self._start_mark(seen)
-            if start is not None:
-                guides.append((start, self.config.edge_margin_m))
+        start = self._start_mark(inputs) if mark else None
+        if start is not None:
+            guides.append((start, config.edge_margin_m))
         if edge is not None and edge.weight > 0.0:
             climbs = self.phase == "climb"  # beside the edge at which the row before ended
-            wanted = self._row_end.reference(edge, edge_rate, self.row - climbs, reached=climbs)
-            guides.append((edge, wanted))
-        if hold and not any([entry.role == VERTICAL for entry, _ in guides]):
-            right = clipped(HOLD_GAIN * (self._anchor - seen.odometer[0]), -HOLD_SPEED, HOLD_SPEED)
+            guides.append((edge, self._stroke_end.reference(edge, edge_rate, self.row - climbs, reached=climbs)))
+        if hold and not any([guide.role == VERTICAL for guide, _ in guides]):
+            error = self._anchor - inputs.odometer[0]
+            right = clipped(config.hold_gain * error, -config.hold_speed_m_s, config.hold_speed_m_s)
         c, s = math.cos(slope), math.sin(slope)
         velocity = np.array((right + along * c + climb * s, along * s - climb * c))
-        travel = self._travel if contact and self._slides else NONE
-        return Wish(contact, standoff, velocity, guides, self.config.push_n, NONE, travel)
+        travel = self._travel if contact and self._SLIDES else ZERO
+        return PaintingCommand(contact, standoff, velocity, guides, config.push_n, ZERO, travel)

@@ -1,1 +1,1 @@
-"""What remains when something fails: hover on inertial data, flight after a lost rotor."""
+"""Flight after faults: hover from inertial data, retreat after the loss of a rotor."""

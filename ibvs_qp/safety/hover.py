@@ -1,4 +1,4 @@
-"""The last resort: carry the weight and stay level by the last good inertial data."""
+"""Hover without a solution or a measurement: weight compensation and level attitude from the last inertial data."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from ibvs_qp.measurement import Measurement
 
 
 def hold_thrusts(config: ControllerConfig, measurement: Measurement | None) -> np.ndarray:
-    """Thrusts that carry the weight and level the vehicle; plain hover when nothing was ever measured.
+    """Thrusts that carry the weight and level the vehicle; those of a level hover without a measurement.
 
     Args:
         config: The controller's configuration.
-        measurement: Last good measurement, or None.
+        measurement: Last accepted measurement, None before the first.
 
     Returns:
         Thrusts within the box [N], (n,).

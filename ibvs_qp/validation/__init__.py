@@ -1,1 +1,1 @@
-"""Checks of what comes in: measurements, references, sensor frames and their time stamps."""
+"""Checks of all inputs: measurements, references, sensor frames and their time stamps."""

@@ -1,22 +1,34 @@
-"""Time of a stream of frames that never runs backwards, whatever the clock behind their stamps does."""
+"""Time stamps: a monotonic time from a stream of stamps whose clock may stop, leap or be set back."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from ibvs_qp.validation.measurement import LEAP_NS, RESTART_STAMPS, STAMP_END, is_stamp
+import numpy as np
+
+#: Largest step from the last stamp that is accepted at once [ns].
+LEAP_NS = 1_000_000_000
+#: Consecutive stamps that must agree before a clock that was set back is followed.
+RESTART_STAMPS = 25
+#: Stamps end here: 63 bits hold the sum of two.
+STAMP_END = 2**62
 
 
-class StampFollower:
-    """Maps stamps to a time of one's own that only ever runs on.
+def is_stamp(value: Any) -> bool:
+    """Whether a value is a time stamp: a whole number of nanoseconds below `STAMP_END`."""
+    return isinstance(value, (int, np.integer)) and not isinstance(value, bool) and bool(0 <= value < STAMP_END)
 
-    One stamp that leaps blinds nobody: it is refused, and so are the next until they agree with each other (two ahead,
-    `RESTART_STAMPS` behind). A clock that was set back is then followed by a shift, so that all who remember earlier
-    times go on with theirs.
+
+class MonotonicClock:
+    """Maps stamps to a time that only increases.
+
+    A stamp that leaps is refused, and so are the following ones until they agree with each other: two stamps ahead,
+    `RESTART_STAMPS` behind. A clock that was set back is then followed by a shift, so earlier times stay valid.
 
     Attributes:
-        shift_ns: Added to a stamp to give the time of one's own.
-        last_ns: The last time accepted, -1 before the first.
+        shift_ns: Added to a stamp to obtain the time.
+        last_ns: Time of the last accepted stamp, -1 before the first.
+        restarted: Whether the last accepted stamp began a new time base, behind the old one.
     """
 
     def __init__(self) -> None:
@@ -24,39 +36,33 @@ class StampFollower:
 
     def reset(self) -> None:
         """As before the first stamp."""
-        self.shift_ns, self.last_ns = 0, -1
+        self.shift_ns, self.last_ns, self.restarted = 0, -1, False
         self._odd_first = self._odd_last = -1
         self._odd_count = 0
 
-    def goes_on(self, stamp: Any) -> bool:
-        """Whether a stamp surely follows the last one and is accepted; where it is not sure, `refuse` finds out."""
-        if type(stamp) is not int or stamp >= STAMP_END or self._odd_count or self.last_ns < 0:
-            return False
-        time = stamp + self.shift_ns
-        if not (stamp >= 0 and 0 < time - self.last_ns <= LEAP_NS):
-            return False
-        self.last_ns = time
-        return True
+    def accept(self, stamp: Any) -> str:
+        """Advance to a stamp.
 
-    def refuse(self, stamp: Any) -> str:
-        """Why a stamp is refused; empty if it is not, and then `last_ns` is its time."""
+        Returns:
+            Why the stamp is refused; empty if it was accepted, and then `last_ns` is its time.
+        """
         if not is_stamp(stamp):
             return "not a whole number of nanoseconds"
-        time = int(stamp) + self.shift_ns
+        stamp = int(stamp)
+        time = stamp + self.shift_ns
         if self.last_ns < 0 or 0 < time - self.last_ns <= LEAP_NS:
-            self.last_ns, self._odd_count = time, 0
+            self.last_ns, self._odd_count, self.restarted = time, 0, False
             return ""
-        follows = self._odd_count > 0 and 0 < stamp - self._odd_last <= LEAP_NS
-        step = int(stamp) - self._odd_last if follows else 0
-        self._odd_first = self._odd_first if follows else int(stamp)
-        self._odd_last, self._odd_count = int(stamp), self._odd_count + 1 if follows else 1
         ahead = time > self.last_ns
+        follows = self._odd_count > 0 and 0 < stamp - self._odd_last <= LEAP_NS
+        if not follows:
+            self._odd_first, self._odd_count = stamp, 0
+        step = stamp - self._odd_last
+        self._odd_last, self._odd_count = stamp, self._odd_count + 1
         if not follows or not (ahead or self._odd_count >= RESTART_STAMPS):
             return "far ahead of the last one" if ahead else "not after the last one"
-        self._odd_count = 0
-        if not ahead:
-            self.last_ns += int(stamp) - self._odd_first + step
-            self.shift_ns = self.last_ns - int(stamp)
-        else:
-            self.last_ns = time
+        self._odd_count, self.restarted = 0, not ahead
+        # The refused stamps behind count as time that passed, each with its own step.
+        self.last_ns = time if ahead else self.last_ns + stamp - self._odd_first + step
+        self.shift_ns = self.last_ns - stamp
         return ""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from ibvs_qp.config.settings import setting, validate
-from ibvs_qp.painting.job import PaintingConfig
+from ibvs_qp.painting.config import PaintingConfig
 from ibvs_qp.painting.painter import Painter
 from ibvs_qp.painting.presser import Presser
 

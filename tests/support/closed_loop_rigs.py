@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ibvs_qp.painting.painter import Painter, Scenery, Wish
+from ibvs_qp.painting.command import PainterInput, PaintingCommand
+from ibvs_qp.painting.painter import Painter
 from ibvs_qp.pilot import Pilot
 from sim.evaluate.metrics import compute_metrics
 from sim.flight.closed_loop import FlightOptions, World, fly, pilot_config
@@ -40,10 +41,10 @@ class HoldPainter(Painter):
         self._hold_s = hold_s
         super().__init__(config)
 
-    def _paint(self, seen: Scenery, dt: float) -> Wish:
-        if seen.time_s - self.entered > self._hold_s:
-            self._enter(seen, "retreat", "held")
-        return self._wish(seen, contact=True, hold=True, mark=True)
+    def _paint(self, inputs: PainterInput, dt: float) -> PaintingCommand:
+        if inputs.time_s - self.entered > self._hold_s:
+            self._enter(inputs, "retreat", "held")
+        return self._command(inputs, contact=True, hold=True, mark=True)
 
 
 def hold(scene: Scene, law: str, hold_s: float, seed: int = 0) -> dict[str, np.ndarray]:

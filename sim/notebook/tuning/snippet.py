@@ -6,7 +6,8 @@ import dataclasses
 import functools
 from dataclasses import dataclass, field
 
-from ibvs_qp.painting.job import PaintingConfig, Scenery, Wish
+from ibvs_qp.painting.command import PainterInput, PaintingCommand
+from ibvs_qp.painting.config import PaintingConfig
 from ibvs_qp.painting.painter import Painter
 from ibvs_qp.painting.presser import Presser
 from ibvs_qp.pilot import PilotConfig
@@ -38,19 +39,19 @@ class Setting:
 class _Snippet(Presser):
     """A press and a slide: no waiting until the lines have settled, no way back, an end at any rate."""
 
-    def step(self, seen: Scenery) -> Wish:
-        if seen.time_s > LONGEST_S:
-            self._end(seen, f"ended after {LONGEST_S:g} s in {self.phase}", failed=True)
-        return super().step(seen)
+    def step(self, inputs: PainterInput) -> PaintingCommand:
+        if inputs.time_s > LONGEST_S:
+            self._end(inputs, f"ended after {LONGEST_S:g} s in {self.phase}", failed=True)
+        return super().step(inputs)
 
-    def _align(self, seen: Scenery, dt: float) -> Wish:
-        self._anchor = float(seen.odometer[0])
-        self._enter(seen, "press", "lines settle on the way")
-        return super()._press(seen, dt)
+    def _align(self, inputs: PainterInput, dt: float) -> PaintingCommand:
+        self._anchor = float(inputs.odometer[0])
+        self._enter(inputs, "press", "lines settle on the way")
+        return super()._press(inputs, dt)
 
-    def _retreat(self, seen: Scenery, dt: float) -> Wish:
-        self._end(seen, self.reason if self.failed else "pressed and slid")
-        return super()._retreat(seen, dt)
+    def _retreat(self, inputs: PainterInput, dt: float) -> PaintingCommand:
+        self._end(inputs, self.reason if self.failed else "pressed and slid")
+        return super()._retreat(inputs, dt)
 
 
 @dataclass(frozen=True, kw_only=True)

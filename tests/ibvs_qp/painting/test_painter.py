@@ -11,7 +11,9 @@ import pytest
 
 from ibvs_qp.estimation.wall_motion import TrackedLine
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL
-from ibvs_qp.painting.painter import Painter, PaintingConfig, Scenery, Wish
+from ibvs_qp.painting.command import PainterInput, PaintingCommand
+from ibvs_qp.painting.config import PaintingConfig
+from ibvs_qp.painting.painter import Painter
 
 TICK = 0.02
 #: What the camera sees around the tip [m].
@@ -35,7 +37,7 @@ class Edge:
 
 @dataclass
 class World:
-    """A tip that goes where it is told: velocity, guides (first order), stand-off, push."""
+    """A tip that follows its commands: velocity, guides (first order), stand-off, push."""
 
     config: PaintingConfig
     tip: np.ndarray = field(default_factory=lambda: np.zeros(2))
@@ -59,7 +61,7 @@ class World:
             Edge(4, HORIZONTAL, -0.9, 1),
         ]
         self.velocity = np.zeros(2)
-        self.wish: Wish | None = None
+        self.command: PaintingCommand | None = None
         self.ends: list[tuple[int, float, float]] = []
         self.extent = [0.0, 0.0]
         self.drift = 0.0
@@ -92,11 +94,11 @@ class World:
                 )
         return found
 
-    def step(self) -> Wish:
+    def step(self) -> PaintingCommand:
         self.time += TICK
         touching = 0.0 if math.isnan(self.contact_since) else self.time - self.contact_since
         push = 5.0 * min(1.0, touching)
-        seen = Scenery(
+        seen = PainterInput(
             time_s=self.time,
             lines=self.seen(),
             odometer=self.tip.copy(),
@@ -106,30 +108,30 @@ class World:
             in_contact=self.in_contact,
             time_since_touch=touching,
             push=push,
-            push_wanted=5.0,
+            push_reference=5.0,
             tared=self.time > self.tared_after,
         )
         before, row = self.painter.phase, self.painter.row
-        wish = self.painter.step(seen)
+        command = self.painter.step(seen)
         if before == "paint" and self.painter.phase != "paint":
             self.ends.append((row, *self.tip.tolist()))
             self._leave_paint(row)
-        self._move(wish)
+        self._move(command)
         if self.painter.phase == "climb":
             self.drift = max(self.drift, abs(self.tip[0] - self.ends[-1][1]))
-        self.wish = wish
-        return wish
+        self.command = command
+        return command
 
-    def _move(self, wish: Wish) -> None:
-        velocity = np.array(wish.velocity, float)
-        for line, offset in wish.guides:
+    def _move(self, command: PaintingCommand) -> None:
+        velocity = np.array(command.velocity, float)
+        for line, offset in command.guides:
             axis = 1 if line.role == HORIZONTAL else 0
             velocity[axis] += 4.0 * (line.offset - offset)
         self.velocity = np.zeros(2) if self.stuck else np.clip(velocity, -0.15, 0.15)
         self.tip = self.tip + TICK * self.velocity
         if self.painter.phase == "paint":
             self.extent = [min(self.extent[0], self.tip[0]), max(self.extent[1], self.tip[0])]
-        target = -0.0025 if wish.contact else wish.standoff
+        target = -0.0025 if command.contact else command.standoff
         self.distance += np.clip(target - self.distance, -0.05 * TICK, 0.15 * TICK)
         touching = self.distance < 0.0 and self.contact_allowed
         if touching and not self.in_contact:
@@ -143,13 +145,13 @@ class World:
         self.edges.append(upper)
         self.extent = [self.tip[0], self.tip[0]]
 
-    def fly(self, seconds: float, until: str = "") -> list[Wish]:
-        wishes = []
+    def fly(self, seconds: float, until: str = "") -> list[PaintingCommand]:
+        commands = []
         for _ in range(round(seconds / TICK)):
-            wishes.append(self.step())
+            commands.append(self.step())
             if self.painter.finished or (until and self.painter.phase == until):
                 break
-        return wishes
+        return commands
 
     def phases(self) -> list[str]:
         names = {"start", "approach", "align", "press", "paint", "climb", "retreat", "done"}
@@ -164,7 +166,7 @@ def short(**changes: object) -> PaintingConfig:
 
 
 @pytest.mark.parametrize("rows", [1, 2, 3, 4, 5])
-def test_rows_alternate_and_end_where_they_shall(rows: int) -> None:
+def test_rows_alternate_and_end_at_their_nominal_places(rows: int) -> None:
     world = World(short(rows=rows))
     world.fly(200.0)
     assert world.painter.finished and not world.painter.failed, world.painter.reason
@@ -193,8 +195,8 @@ def test_travel_goes_left_then_up_then_right() -> None:
     world = World(short(rows=2))
     seen: dict[tuple[str, int], list[np.ndarray]] = {}
     for _ in range(5000):
-        wish = world.step()
-        seen.setdefault((world.painter.phase, world.painter.row), []).append(wish.velocity)
+        command = world.step()
+        seen.setdefault((world.painter.phase, world.painter.row), []).append(command.velocity)
         if world.painter.finished:
             break
     assert min(v[0] for v in seen[("paint", 1)]) == pytest.approx(-world.config.speed_m_s)
@@ -217,9 +219,9 @@ def test_without_side_edges_rows_end_by_the_odometer(rows: int) -> None:
 
 def test_start_waits_for_guide_wall_and_tare() -> None:
     for world in (World(short(), hidden={1}), World(short(), blind_wall=True), World(short(), tared_after=99.0)):
-        wishes = world.fly(5.0)
+        commands = world.fly(5.0)
         assert world.painter.phase == "start"
-        assert not any(wish.contact for wish in wishes)
+        assert not any(command.contact for command in commands)
     fading = World(short())
     fading.edges[0].weight = 0.5
     fading.fly(5.0)
@@ -238,10 +240,10 @@ def test_align_needs_stillness_and_place() -> None:
     assert world.painter.phase == "press"
 
 
-def test_align_gives_way_with_time() -> None:
+def test_tolerances_of_the_alignment_open_with_time() -> None:
     world = World(short())
     world.fly(20.0, until="align")
-    world.edges[0].place += 0.006  # twice what is allowed: let pass after sqrt(2) times the patience
+    world.edges[0].place += 0.006  # twice the tolerance: reached after sqrt(2) times the patience
     world.stuck = True
     world.fly(2.5)
     assert world.painter.phase == "align"
@@ -281,8 +283,8 @@ def test_every_phase_times_out_into_a_retreat_with_the_reason(phase: str, break_
     assert "retreat" in world.phases() and world.painter.failed
     assert world.painter.reason == f"time-out after 8 s in {phase}"
     world.distance = min(world.distance, 1.0)
-    wishes = world.fly(9.0)
-    assert world.painter.finished and world.painter.failed and not any(wish.contact for wish in wishes)
+    commands = world.fly(9.0)
+    assert world.painter.finished and world.painter.failed and not any(command.contact for command in commands)
 
 
 def test_a_row_that_never_ends_times_out_and_a_retreat_too() -> None:
@@ -322,7 +324,7 @@ def test_the_right_edge_in_view_at_the_start_does_not_end_row_one() -> None:
     world.fly(60.0, until="paint")
     assert 2 in world.seen()
     world.fly(1.0)
-    assert world.painter.phase == "paint" and world.painter._row_end._identity == -1
+    assert world.painter.phase == "paint" and world.painter._stroke_end._identity == -1
 
 
 def test_only_an_edge_with_the_surface_on_our_side_ends_a_row() -> None:
@@ -428,8 +430,8 @@ def test_lost_contact_pauses_the_stroke_and_goes_on_afterwards() -> None:
     world.contact_allowed = False
     world.fly(2.0)
     held = world.tip.copy()
-    wishes = world.fly(1.0)
-    assert all(wish.contact and abs(wish.velocity[0]) < 1e-9 for wish in wishes)
+    commands = world.fly(1.0)
+    assert all(command.contact and abs(command.velocity[0]) < 1e-9 for command in commands)
     assert np.linalg.norm(world.tip - held) < 1e-3
     world.contact_allowed = True
     world.fly(0.4)

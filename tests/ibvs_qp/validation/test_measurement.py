@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable
 from dataclasses import fields, replace
@@ -27,7 +28,7 @@ NAN3 = np.array([0.0, math.nan, 0.0])
 
 
 class Unfriendly:
-    """Answers every question with an exception of its own kind."""
+    """Raises at every access."""
 
     def __getattr__(self, name: str) -> Any:
         raise AttributeError(name) if name.startswith("__") else RuntimeError(name)
@@ -106,8 +107,15 @@ def check(command: Command, last: Command | None) -> None:
     assert command.tasks is not None
 
 
-def warmed(law: Callable[[], Any]) -> tuple[Any, SmallVehicle, Command]:
-    controller = law()
+@functools.cache
+def built(law: Callable[[], Any], number: int) -> Any:
+    """Controllers of a law by number: construction costs far more than `reset`."""
+    return law()
+
+
+def warmed(law: Callable[[], Any], number: int = 0) -> tuple[Any, SmallVehicle, Command]:
+    controller = built(law, number)
+    controller.reset()
     vehicle = SmallVehicle(controller.config)
     for _ in range(5):
         command = controller.step(vehicle.measure(), good_reference())
@@ -132,7 +140,7 @@ def test_every_broken_field_is_named_and_survived(law: Callable[[], Any]) -> Non
 def test_a_broken_reference_leaves_the_last_good_one_in_force(law: Callable[[], Any]) -> None:
     for bad in BROKEN_REFERENCES:
         controller, vehicle, last = warmed(law)
-        twin, same_vehicle, _ = warmed(law)
+        twin, same_vehicle, _ = warmed(law, 1)
         command = controller.step(vehicle.measure(), bad)
         check(command, last)
         assert any(entry.startswith("reference") for entry in command.rejected), bad
@@ -159,7 +167,7 @@ def test_things_that_are_no_measurement(law: Callable[[], Any], thing: Any) -> N
     "stamp", [None, 0, -5, 3 * TICK_NS, 5 * TICK_NS, 1.5, math.nan, "now", 2**80, 10**17, np.array([1, 2]), True]
 )
 def test_a_clock_that_stands_still_jumps_or_runs_backwards(law: Callable[[], Any], stamp: Any) -> None:
-    """One bad stamp is a hold for one tick; above all a leap ahead may not blind the controller for good."""
+    """One bad stamp is a hold for one tick; a leap ahead must not stop the controller for good."""
     controller, vehicle, last = warmed(law)
     bad = controller.step(vehicle.measure(stamp_ns=stamp), good_reference())
     check(bad, last)
@@ -172,7 +180,7 @@ def test_a_clock_that_stands_still_jumps_or_runs_backwards(law: Callable[[], Any
 @pytest.mark.parametrize("law", LAWS)
 def test_a_real_pause_is_flown_on_after_one_tick_of_hold(law: Callable[[], Any]) -> None:
     controller, vehicle, _ = warmed(law)
-    vehicle.tick += 2500  # ten seconds without a word
+    vehicle.tick += 2500  # ten seconds without a measurement
     assert controller.step(vehicle.measure(), good_reference()).outcome is Outcome.HOLD
     vehicle.tick += 1
     assert controller.step(vehicle.measure(), good_reference()).outcome is Outcome.SOLVED
@@ -203,12 +211,12 @@ def test_a_hold_in_between_is_as_if_the_tick_had_not_been(law: Callable[[], Any]
     one, two = law(), law()
     vehicle = SmallVehicle(one.config)
     for tick in range(60):
-        seen, wish = vehicle.measure(), good_reference()
+        seen, reference = vehicle.measure(), good_reference()
         if tick == 30:
-            one.step(replace(seen, stamp_ns=0, contact_wrench=np.full(6, 77.0)), wish)
+            one.step(replace(seen, stamp_ns=0, contact_wrench=np.full(6, 77.0)), reference)
             continue
-        command = one.step(seen, wish)
-        two.step(seen, wish)
+        command = one.step(seen, reference)
+        two.step(seen, reference)
         np.testing.assert_array_equal(one.setpoints.contact.distance, two.setpoints.contact.distance)
         np.testing.assert_array_equal(one.setpoints.normal, two.setpoints.normal)
         vehicle.fly(command.thrusts)
@@ -294,34 +302,12 @@ def broken_reference(draw: Any) -> Any:
     return replace(good_reference(), **{name: draw(anything) for name in chosen})
 
 
-def passed_at_once(changes: dict[str, Any]) -> bool:
-    """Whether a measurement passes at once; if so, asking field by field must find nothing either."""
-    at_once, thorough = MeasurementGate(6), MeasurementGate(6)
-    for gate in (at_once, thorough):
-        assert gate.check(measured(0))[1] == ()
-    seen = measured(1, **changes)
-    if not at_once._sound(seen):
-        return False
-    kept, rejected = thorough._mend(seen)
-    assert kept is seen and rejected == (), changes
-    for name in ("attitude", "angular_velocity", "contact_wrench", "wrench_stamp_ns", "stamp_ns"):
-        np.testing.assert_array_equal(getattr(at_once.inertial, name), getattr(thorough.inertial, name))
-    return True
-
-
-def test_sound_measurements_pass_at_once_and_broken_ones_never() -> None:
+def test_a_good_measurement_passes_unchanged() -> None:
     limits = {"thrust_min": np.full(6, 2.0), "thrust_max": np.full(6, 20.0)}
-    for sound in ({}, limits, {"thrust_max": np.zeros(6)}, {"velocity": None, "plane": None, "specific_force": None}):
-        assert passed_at_once(sound)
-    assert not passed_at_once({"thrust_min": np.full(6, 20.0), "thrust_max": np.full(6, 2.0)})
-    for name, value, _ in BROKEN_FIELDS:
-        assert not passed_at_once({name: value}), (name, value)
-
-
-@settings(max_examples=300, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
-@given(changes=broken_measurement())
-def test_what_passes_at_once_would_pass_field_by_field(changes: dict[str, Any]) -> None:
-    passed_at_once(changes)
+    for good in ({}, limits, {"thrust_max": np.zeros(6)}, {"velocity": None, "plane": None, "specific_force": None}):
+        seen = measured(1, **good)
+        checked, rejected = MeasurementGate(6).check(seen)
+        assert checked is seen and rejected == ()
 
 
 @pytest.fixture(scope="module", params=LAWS)
@@ -361,8 +347,9 @@ def test_fuzz(controller: Any, steps: list[tuple[dict[str, Any], Any]]) -> None:
     ],
 )
 def test_one_believable_lie_does_not_bring_the_vehicle_down(law: Callable[[], Any], lie: dict[str, Any]) -> None:
-    """What passes the gate and is wrong all the same: the vehicle is back at its hover two seconds later."""
-    controller = law()
+    """The checks cannot find a plausible wrong value: the vehicle is back at its hover two seconds later."""
+    controller = built(law, 0)
+    controller.reset()
     vehicle = SmallVehicle(controller.config, distance=0.3)
     for tick in range(450):
         seen = vehicle.measure(**(lie if tick == 100 else {}))

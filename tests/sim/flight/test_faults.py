@@ -69,17 +69,6 @@ def test_a_vehicle_that_loses_a_rotor_while_pressing_leaves_the_wall_and_comes_d
     assert figures["tilt_peak_deg"] <= 25.0 and 0.0 < figures["descent_peak_m_s"] <= 1.5
 
 
-def test_only_a_lost_hover_is_given_up():
-    pilot = world_and_pilot()[1]
-    lower, upper = np.full(6, 1.2), np.full(6, 52.56)
-    assert not pilot.supervisor.consider((lower, upper))
-    upper[0] = 0.4 * 52.56
-    assert not pilot.supervisor.consider((lower, upper)) and not pilot.supervisor.lost
-    upper[0] = lower[0] = 0.0
-    assert pilot.supervisor.consider((lower, upper)) and pilot.supervisor.lost
-    assert not pilot.supervisor.consider((lower, upper)), "said once"
-
-
 def test_wind_pushes_from_the_step_on():
     world, pilot = world_and_pilot()
     text = WindStep(mean_m_s=(0.0, 8.0, 0.0)).strike(world, pilot)

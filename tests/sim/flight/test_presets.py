@@ -17,7 +17,7 @@ from ibvs_qp.config import ControllerConfig
 from ibvs_qp.config.contact_margin import BrushSettings
 from ibvs_qp.config.settings import from_dict
 from ibvs_qp.config.vehicle import VehicleParams
-from ibvs_qp.painting.painter import PaintingConfig
+from ibvs_qp.painting.config import PaintingConfig
 from ibvs_qp.pilot import PilotConfig
 from sim.evaluate.metrics import compute_metrics
 from sim.flight.closed_loop import PRESETS, FlightOptions, default_preset, fly

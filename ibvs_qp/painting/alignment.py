@@ -1,0 +1,56 @@
+"""Alignment before a touch: still and on its lines, averaged over the sway of hover."""
+
+from __future__ import annotations
+
+import math
+
+from ibvs_qp.painting.command import PainterInput
+from ibvs_qp.painting.config import PaintingConfig
+
+
+class Alignment:
+    """Decides when the tip is aligned.
+
+    A vehicle in hover sways about its place by as much as the tolerances, so error and speed are averaged. Gusts and
+    noisy pictures may prevent any standstill, so the tolerances open with time.
+
+    Attributes:
+        error: Averaged line error [m].
+    """
+
+    def __init__(self, config: PaintingConfig) -> None:
+        self._config = config
+        self._average: tuple[float, ...] | None = None
+        self._since = math.nan
+        self.error = math.inf
+
+    def is_reached(self, inputs: PainterInput, errors: tuple[float, float], began: float, dt: float) -> bool:
+        """Whether errors and speed have stayed within their tolerances for the required time.
+
+        Args:
+            inputs: Estimates of the tick.
+            errors: Of the guide and of the start mark [m].
+            began: Begin of the alignment [s].
+            dt: Time since the last tick [s].
+        """
+        config = self._config
+        self.error, speed = self._averaged((*errors, *inputs.velocity[:2]), dt)
+        waited = (inputs.time_s - began) / config.align_patience_s
+        opening = min(max(1.0, waited**2), config.align_opening_max)
+        if not (self.error < opening * config.align_error_m and speed < opening * config.align_speed_m_s):
+            self._since = math.nan
+            return False
+        if math.isnan(self._since):
+            self._since = inputs.time_s
+        return inputs.time_s - self._since >= config.align_time_s
+
+    def _averaged(self, now: tuple[float, ...], dt: float) -> tuple[float, float]:
+        """Largest averaged error [m] and averaged speed [m/s]; infinite without a guide."""
+        if not all(map(math.isfinite, now)):
+            self._average = None
+            return math.inf, math.inf
+        ratio = 1.0 - math.exp(-dt / self._config.align_average_s)
+        last = self._average or now
+        self._average = tuple(old + ratio * (new - old) for old, new in zip(last, now, strict=True))
+        high, aside, right, down = self._average
+        return max(abs(high), abs(aside)), math.hypot(right, down)

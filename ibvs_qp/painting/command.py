@@ -1,0 +1,68 @@
+"""Input and output of a strategy at one tick."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ibvs_qp.estimation.wall_motion import TrackedLine
+
+#: No tilt, no travel; one array for all commands.
+ZERO = np.zeros(2)
+ZERO.flags.writeable = False
+
+
+@dataclass(slots=True)
+class PainterInput:
+    """Estimates at one tick.
+
+    Attributes:
+        time_s: Time since the first tick [s].
+        lines: Tracked lines by track.
+        odometer: Position of the tip along the wall (right, down) [m], (2,).
+        velocity: Velocity of the tip along the wall (right, down) [m/s], (2,).
+        distance: Tip to wall [m].
+        wall_known: Whether a plane was measured.
+        in_contact: Whether the brush touches the wall.
+        time_since_touch: Time since the touch [s].
+        push: Measured push [N].
+        push_reference: Push that the controller commands after ramp and reach check [N].
+        tared: Whether the wrench is tared.
+    """
+
+    time_s: float
+    lines: dict[int, TrackedLine]
+    odometer: Sequence[float]
+    velocity: Sequence[float]
+    distance: float
+    wall_known: bool
+    in_contact: bool
+    time_since_touch: float
+    push: float
+    push_reference: float
+    tared: bool
+
+
+@dataclass(slots=True)
+class PaintingCommand:
+    """Targets of one tick.
+
+    Attributes:
+        contact: Press the wall (True) or keep the stand-off.
+        standoff: Tip to wall while not in contact [m].
+        velocity: Velocity along the wall (right, down) [m/s], (2,).
+        guides: Lines to follow, each with its target offset [m].
+        push: Push [N].
+        tilt: Roll and pitch [rad], (2,).
+        travel: Velocity along the wall that is planned at this push (right, down) [m/s], (2,).
+    """
+
+    contact: bool
+    standoff: float
+    velocity: np.ndarray
+    guides: list[tuple[TrackedLine, float]]
+    push: float
+    tilt: np.ndarray = field(default_factory=lambda: ZERO)
+    travel: np.ndarray = field(default_factory=lambda: ZERO)

@@ -1,0 +1,95 @@
+"""Settings of a paint job: its geometry, speeds, tolerances and time-outs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from ibvs_qp.config.settings import setting, validate
+from ibvs_qp.painting.line_gates import LineGates
+
+
+@dataclass(frozen=True, kw_only=True)
+class PaintingConfig:
+    """The paint job and how it is executed."""
+
+    brush_width_m: float = setting(0.08, "diameter of the brush", unit="m", low=0.02, high=0.3)
+    edge_margin_m: float = setting(0.05, "brush centre to the guiding or stopping edge", unit="m", low=0.01, high=0.5)
+    rows: int = setting(2, "number of rows", low=1, high=20)
+    stroke_m: float = setting(1.30, "length of a row", unit="m", low=0.1, high=20.0)
+    overlap_m: float = setting(0.008, "overlap of rows", unit="m", low=0.0, high=0.1)
+    speed_m_s: float = setting(0.10, "painting speed", unit="m/s", low=0.01, high=0.5)
+    push_n: float = setting(5.0, "push", unit="N", low=0.5, high=40.0)
+    climb_speed_m_s: float = setting(0.05, "speed of a climb", unit="m/s", low=0.005, high=0.3)
+    acceleration_m_s2: float = setting(
+        0.12, "along a stroke and a climb; braking takes up to twice as much", unit="m/s^2", low=0.01, high=2.0
+    )
+    standoff_m: float = setting(0.06, "tip to wall while aligning", unit="m", low=0.02, high=0.5)
+    retreat_m: float = setting(0.35, "tip to wall at the end", unit="m", low=0.1, high=2.0)
+
+    hold_gain: float = setting(
+        0.8, "position error on the odometer to speed, where no upright line is followed", unit="1/s", low=0.0, high=5.0
+    )
+    hold_speed_m_s: float = setting(0.03, "largest speed of that position hold", unit="m/s", low=0.0, high=0.2)
+    guide_slide_m_s: float = setting(
+        0.01, "speed at which a guide's target slides to its nominal offset", unit="m/s", low=0.001, high=0.1
+    )
+    gates: LineGates = field(default_factory=LineGates)
+
+    align_error_m: float = setting(0.003, "line error that counts as aligned", unit="m", low=0.0005, high=0.05)
+    align_speed_m_s: float = setting(0.005, "speed that counts as still", unit="m/s", low=0.001, high=0.1)
+    align_time_s: float = setting(0.3, "aligned this long", unit="s", low=0.0, high=10.0)
+    align_average_s: float = setting(
+        0.4, "average of error and speed", unit="s", why="half a period of the sway in hover", low=0.01, high=5.0
+    )
+    align_patience_s: float = setting(
+        2.0, "after this long both tolerances open with the square of time", unit="s", low=0.5, high=300.0
+    )
+    align_opening_max: float = setting(
+        5.0, "largest factor on both", why="15 mm and 25 mm/s: what 3 N rms of gusts leave", low=1.0, high=20.0
+    )
+    press_time_s: float = setting(
+        1.2, "least time in contact before a stroke", unit="s", why="the force ramp takes 1 s", low=0.0, high=10.0
+    )
+    press_error: float = setting(
+        0.15, "largest error of the push before a stroke, relative to its reference or 1 N", low=0.01, high=1.0
+    )
+    contact_back_s: float = setting(
+        0.5, "contact after a loss for this long before a stroke goes on", unit="s", low=0.0, high=10.0
+    )
+    stop_error_m: float = setting(0.003, "distance to its end at which a row stops", unit="m", low=0.0005, high=0.05)
+    stop_time_s: float = setting(0.15, "least time of a stop", unit="s", low=0.0, high=5.0)
+    stop_timeout_s: float = setting(
+        0.8, "longest time of a stop", unit="s", why="stiction may hold the last millimetres", low=0.1, high=10.0
+    )
+    overrun_m: float = setting(
+        0.10, "farthest that row 1 runs past its length in search of its end", unit="m", low=0.0, high=1.0
+    )
+    climb_error_m: float = setting(0.004, "error of the guide that ends a climb", unit="m", low=0.0005, high=0.05)
+    climb_time_s: float = setting(0.3, "least time at the end of a climb", unit="s", low=0.0, high=5.0)
+    climb_timeout_s: float = setting(1.0, "longest time for that error", unit="s", low=0.0, high=10.0)
+    fresh_edge_timeout_s: float = setting(
+        2.0, "longest search for the fresh edge after a climb; then the guide stays", unit="s", low=0.0, high=20.0
+    )
+    descend_s: float = setting(
+        5.0, "after the wall was given up: time of retreat and descent", unit="s", low=0.5, high=60.0
+    )
+    descend_speed_m_s: float = setting(
+        0.15, "speed of that descent", unit="m/s", why="slow: nothing measures the height", low=0.01, high=1.0
+    )
+    timeout_s: float = setting(
+        15.0, "longest start, approach, align, press, climb or retreat", unit="s", low=1.0, high=300.0
+    )
+
+    def __post_init__(self) -> None:
+        """Validate."""
+        validate(self)
+
+    @property
+    def pitch_m(self) -> float:
+        """Distance between rows [m]."""
+        return self.brush_width_m - self.overlap_m
+
+    @property
+    def fresh_edge_m(self) -> float:
+        """Upper edge of the last row below the brush centre of the present row [m]."""
+        return self.pitch_m - 0.5 * self.brush_width_m

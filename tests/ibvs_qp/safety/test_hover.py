@@ -1,0 +1,31 @@
+"""Hover without a solution: the weight is carried and a tilt is opposed, within the thrust limits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from controller_scenes import CEILING, FLOOR, attitude, measured
+
+from allocation.effectiveness import control_effectiveness
+from ibvs_qp.config import ControllerConfig
+from ibvs_qp.safety.hover import hold_thrusts
+
+CONFIG = ControllerConfig()
+MATRIX = control_effectiveness(CONFIG.vehicle.geometry)
+
+
+@pytest.mark.parametrize("seen", [None, measured(0, attitude=attitude(), angular_velocity=np.zeros(3))])
+def test_at_rest_it_is_a_level_hover(seen: object) -> None:
+    wrench = MATRIX @ hold_thrusts(CONFIG, seen)  # type: ignore[arg-type]
+    np.testing.assert_allclose(wrench, [0, 0, -9.81 * CONFIG.vehicle.mass_kg, 0, 0, 0], atol=1e-9)
+
+
+def test_tilt_and_rates_are_opposed() -> None:
+    turning = np.array([0.1, -0.2, 0.3])
+    wrench = MATRIX @ hold_thrusts(CONFIG, measured(0, attitude=attitude(0.05, -0.05), angular_velocity=turning))
+    assert wrench[3] < 0.0 < wrench[4] and wrench[5] < 0.0
+
+
+def test_thrusts_stay_within_their_limits() -> None:
+    thrusts = hold_thrusts(CONFIG, measured(0, attitude=attitude(2.0), angular_velocity=np.full(3, 30.0)))
+    assert (thrusts >= FLOOR).all() and (thrusts <= CEILING).all()
