@@ -14,12 +14,10 @@ from allocation import (
     PushReach,
     RotorGeometry,
     WrenchFacets,
-    WrenchSet,
     control_effectiveness,
     hover_wrench,
     push_direction,
     push_reach,
-    worst_level_reach,
     worst_push_reach,
 )
 from ibvs_qp.config.vehicle import VehicleParams
@@ -104,9 +102,49 @@ class Case:
 
     @property
     def level_force_n(self) -> float:
-        """Horizontal force possible in every direction [N]; NaN where level hover is impossible."""
-        force, _ = worst_level_reach(WrenchSet(self.matrix, self.lower, self.upper), self.weight_n)
-        return force if math.isfinite(force) else math.nan
+        r"""Horizontal force possible in every direction [N]; NaN where level hover is impossible.
+
+        It is the radius of the largest disc about zero in the level cut: the least distance of zero to a facet.
+        """
+        facets = _facets(self.geometry)
+        low, high = facets.rooms(hover_wrench(self.weight_n), self.lower, self.upper)
+        room, slopes = np.minimum(-low, high), np.linalg.norm(facets.normals[:, :2], axis=1)
+        return float((room / np.maximum(slopes, 1e-12)).min()) if room.min() >= 0.0 else math.nan
+
+    def cut(self, origin: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+        r"""Corners of all (a, b) for which the wrench :math:`w_0 + a\,d_1 + b\,d_2` is attainable.
+
+        With six rotors a wrench has unique thrusts :math:`u = B^{-1} w`, so each thrust limit is a half-plane in
+        (a, b). A large square is clipped with one after the other (Sutherland and Hodgman).
+
+        Args:
+            origin: Wrench w_0, (6,) [N, N m].
+            first: Direction d_1, (6,).
+            second: Direction d_2, (6,).
+
+        Returns:
+            Corners in order around the polygon, (k, 2); (0, 2) when its area is zero.
+        """
+        inverse = np.linalg.inv(self.matrix)
+        at, slopes = inverse @ origin, inverse @ np.column_stack((first, second))
+        rooms = np.concatenate((self.upper - at, at - self.lower))
+        corners = LARGEST * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+        for slope, room in zip(np.vstack((slopes, -slopes)), rooms, strict=True):
+            beyond, kept = corners @ slope - room, []
+            for i in range(len(corners)):
+                if beyond[i - 1] * beyond[i] < 0.0:
+                    step = beyond[i - 1] / (beyond[i - 1] - beyond[i])
+                    kept.append(corners[i - 1] + step * (corners[i] - corners[i - 1]))
+                if beyond[i] <= 0.0:
+                    kept.append(corners[i])
+            corners = np.reshape(kept, (-1, 2))
+        x, y = corners.T
+        area = 0.5 * abs(x @ np.roll(y, 1) - y @ np.roll(x, 1)) if len(corners) > 2 else 0.0
+        return corners if area > EMPTY_AREA else np.empty((0, 2))
+
+    def level_cut(self) -> np.ndarray:
+        """Corners of the horizontal forces (right, front) [N] in level flight without moment, (k, 2)."""
+        return self.cut(hover_wrench(self.weight_n), RIGHT, FRONT)
 
 
 def vehicle_case(weak_rotor: str = "", fraction: float = 1.0, tilt_deg: float | None = None, **changes: object) -> Case:
@@ -139,38 +177,6 @@ def abilities(case: Case, friction: float) -> dict[str, float]:
         "greatest push, any travel [N]": case.worst_reach(friction).push,
         "horizontal force in every direction [N]": case.level_force_n,
     }
-
-
-def wrench_cut(case: Case, origin: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    r"""Corners of all (a, b) for which the wrench :math:`w_0 + a\,d_1 + b\,d_2` is attainable.
-
-    With six rotors a wrench has unique thrusts :math:`u = B^{-1} w`, so each thrust limit is a half-plane in (a, b).
-    A large square is clipped with one after the other (Sutherland and Hodgman).
-
-    Args:
-        case: The vehicle.
-        origin: Wrench w_0, (6,) [N, N m].
-        first: Direction d_1, (6,).
-        second: Direction d_2, (6,).
-
-    Returns:
-        Corners in order around the polygon, (k, 2); (0, 2) when its area is zero.
-    """
-    inverse = np.linalg.inv(case.matrix)
-    at, slopes = inverse @ origin, inverse @ np.column_stack((first, second))
-    corners = LARGEST * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-    for slope, room in zip(np.vstack((slopes, -slopes)), np.concatenate((case.upper - at, at - case.lower)), strict=True):
-        beyond, kept = corners @ slope - room, []
-        for i in range(len(corners)):
-            if beyond[i - 1] * beyond[i] < 0.0:
-                step = beyond[i - 1] / (beyond[i - 1] - beyond[i])
-                kept.append(corners[i - 1] + step * (corners[i] - corners[i - 1]))
-            if beyond[i] <= 0.0:
-                kept.append(corners[i])
-        corners = np.reshape(kept, (-1, 2))
-    x, y = corners.T
-    area = 0.5 * abs(x @ np.roll(y, 1) - y @ np.roll(x, 1)) if len(corners) > 2 else 0.0
-    return corners if area > EMPTY_AREA else np.empty((0, 2))
 
 
 def after_loss(case: Case) -> tuple[float, float, float]:
@@ -261,14 +267,6 @@ def design_map(duties: Duties, tilts_deg: np.ndarray, masses_kg: np.ndarray) -> 
         masses_kg=masses_kg,
         push_n=np.array([[case.reach().push for case in row] for row in cells]),
         sliding_n=np.array([[case.worst_reach(duties.friction).push for case in row] for row in cells]),
-        gust_n=np.array([[_gust(case) for case in row] for row in cells]),
+        gust_n=np.array([[case.level_force_n for case in row] for row in cells]),
         power_w=np.array([[case.hover_power_w for case in row] for row in cells]),
     )
-
-
-def _gust(case: Case) -> float:
-    r"""Radius of the largest disc about zero in the level cut: least distance of zero to a facet [N]."""
-    facets = _facets(case.geometry)
-    low, high = facets.rooms(hover_wrench(case.weight_n), case.lower, case.upper)
-    room, slopes = np.minimum(-low, high), np.linalg.norm(facets.normals[:, :2], axis=1)
-    return float((room / np.maximum(slopes, 1e-12)).min()) if room.min() >= 0.0 else math.nan

@@ -13,7 +13,7 @@ from matplotlib.patches import Circle
 
 from sim.figures.style import FAINT, REFERENCE, new_figure
 from sim.notebook.plots import BLUE, GREEN, ORANGE, legend_below
-from sim.notebook.vehicle import DOWN, FRONT, RIGHT, YAW, Case, DesignMap, Duties, wrench_cut
+from sim.notebook.vehicle import DOWN, FRONT, RIGHT, YAW, Case, DesignMap, Duties
 
 #: Length of the arrow of a rotor's sideways force, per unit of sin(tilt) [m].
 _ARROW_M = 0.36
@@ -35,7 +35,7 @@ def draw_cuts(case: Case, nominal: Case) -> Figure:
             (nominal, {"facecolor": "none", "edgecolor": "#999999", "linestyle": "--"}),
             (case, {"facecolor": BLUE, "edgecolor": BLUE, "alpha": 0.3}),
         ):
-            corners = wrench_cut(each, -each.weight_n * DOWN * lift, x, y)
+            corners = each.cut(-each.weight_n * DOWN * lift, x, y)
             axes.fill(*corners.T, linewidth=1.0, **style)
             if not len(corners):
                 message = "empty: level hover\nis out of reach"

@@ -5,40 +5,37 @@ import math
 import numpy as np
 import pytest
 
-from allocation import WrenchSet, level_polygon
-from sim.notebook.vehicle import DOWN, FRONT, RIGHT, YAW, Duties, abilities, after_loss, design_map, vehicle_case
-from sim.notebook.vehicle import wrench_cut as cut
+from allocation import WrenchFacets
+from sim.notebook.vehicle import DOWN, FRONT, YAW, Duties, abilities, after_loss, design_map, vehicle_case
+
+WEAK = vehicle_case(weak_rotor="rear_left", fraction=0.5)
 
 
-def polygon_area(corners: np.ndarray) -> float:
-    x, y = corners.T
-    return 0.5 * abs(x @ np.roll(y, 1) - y @ np.roll(x, 1))
+@pytest.mark.parametrize("case", [vehicle_case(), vehicle_case(mass_kg=7.5, tilt_deg=22.0), WEAK])
+def test_cuts_end_where_the_set_ends(case):
+    facets = WrenchFacets(case.geometry)
 
+    def attainable(wrench: list[float]) -> bool:
+        low, high = facets.rooms(np.array(wrench), case.lower, case.upper)
+        return bool((low <= 0.0).all() and (high >= 0.0).all())
 
-@pytest.mark.parametrize("case", [vehicle_case(), vehicle_case(mass_kg=7.5, tilt_deg=22.0)])
-def test_level_cut_is_the_level_polygon(case):
-    corners = cut(case, -case.weight_n * DOWN, FRONT, RIGHT)
-    expected = level_polygon(WrenchSet(case.matrix, case.lower, case.upper), case.weight_n)
-    assert all(np.linalg.norm(corners - corner, axis=1).min() < 1e-5 for corner in expected)
-    assert polygon_area(corners) == pytest.approx(polygon_area(expected), rel=1e-6)
-
-
-def test_cuts_end_where_the_set_ends():
-    case = vehicle_case(weak_rotor="rear_left", fraction=0.5)
-    wrenches = WrenchSet(case.matrix, case.lower, case.upper)
-    corners = cut(case, np.zeros(6), FRONT, -DOWN)
-    middle = corners.mean(axis=0)
-    for corner in corners:
-        (front, up), (far_front, far_up) = middle + 0.999 * (corner - middle), middle + 1.001 * (corner - middle)
-        assert wrenches.contains(np.array([front, 0.0, -up, 0.0, 0.0, 0.0]))
-        assert not wrenches.contains(np.array([far_front, 0.0, -far_up, 0.0, 0.0, 0.0]))
-    push = cut(case, -case.weight_n * DOWN, FRONT, YAW)[:, 0].max()
+    side, level = case.cut(np.zeros(6), FRONT, -DOWN), case.level_cut()
+    for corners, wrench in (
+        (side, lambda front, up: [front, 0.0, -up, 0.0, 0.0, 0.0]),
+        (level, lambda right, front: [front, right, -case.weight_n, 0.0, 0.0, 0.0]),
+    ):
+        middle = corners.mean(axis=0)
+        for corner in corners:
+            assert attainable(wrench(*(middle + 0.999 * (corner - middle))))
+            assert not attainable(wrench(*(middle + 1.001 * (corner - middle))))
+    push = case.cut(-case.weight_n * DOWN, FRONT, YAW)[:, 0].max()
     assert push == pytest.approx(case.reach().push, abs=1e-6)
+    assert np.linalg.norm(level, axis=1).min() >= case.level_force_n - 1e-6
 
 
 def test_level_hover_is_impossible_without_a_rotor():
     lost = vehicle_case(weak_rotor="mid_right", fraction=0.0)
-    assert cut(lost, -lost.weight_n * DOWN, FRONT, RIGHT).shape == (0, 2) and math.isnan(lost.reach().push)
+    assert lost.level_cut().shape == (0, 2) and math.isnan(lost.reach().push)
     force, lean, yaw = after_loss(vehicle_case(weak_rotor="mid_right", fraction=0.0, thrust_min_n=0.0))
     # Published for this geometry: 0.289 m g, 16.1 deg, or 17 N m of yaw moment.
     assert force == pytest.approx(0.289 * lost.weight_n, rel=2e-3)
