@@ -271,9 +271,7 @@ def _(mu):
 @app.cell(hide_code=True)
 def _(rubbed):
     mo.md(
-        flights_table(
-            rubbed, ("greatest yaw in contact [deg]", "push error, rms [N]", "path along the edge, rms [mm]")
-        )
+        flights_table(rubbed, ("greatest yaw in contact [deg]", "push error, rms [N]", "path along the edge, rms [mm]"))
         + r"""
 
     With the feed-forward both laws hold their yaw, without it neither does. The published law has no such term; with it,

@@ -47,7 +47,9 @@ def draw_dashboard(comparison: Comparison) -> Figure:
     greatest = max(4.0, _greatest(flights, errors))
     _curves(error, flights, errors)
     error.axhline(0.0, color="#333333", linewidth=0.6)
-    error.set(title="guide line in the picture, at the tip", ylabel="error [px]", ylim=(-1.1 * greatest, 1.1 * greatest))
+    error.set(
+        title="guide line in the picture, at the tip", ylabel="error [px]", ylim=(-1.1 * greatest, 1.1 * greatest)
+    )
 
     tilts = {name: tilt_deg(trace) for name, trace in flights.items()}
     greatest = max(0.2, _greatest(flights, tilts))

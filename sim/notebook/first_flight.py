@@ -92,7 +92,13 @@ def moment_text(trace: Trace, time_s: float) -> str:
     tasks = table(
         ["task", "unit", "target", "achieved", "weight"],
         [
-            (task.name.replace("_", " "), task.unit, f"{task.asked:+.3f}", f"{task.achieved:+.3f}", f"{task.weight:.3g}")
+            (
+                task.name.replace("_", " "),
+                task.unit,
+                f"{task.asked:+.3f}",
+                f"{task.achieved:+.3f}",
+                f"{task.weight:.3g}",
+            )
             for task in explained.tasks
             if not task.name.startswith(REGULARISATION)
         ],

@@ -12,7 +12,18 @@ from sim.evaluate.measures.window import board_tip, phase_window, tilt_deg
 from sim.figures.style import REFERENCE, law_colour, law_name, new_figure
 from sim.flight.trace import Trace
 from sim.notebook.internals import Tick, paper_profile, record_tick
-from sim.notebook.plots import BLUE, CONTACT, FORCES, GREEN, LIMITED, MOMENTS, ORANGE, legend_below, shade, wrench_curves
+from sim.notebook.plots import (
+    BLUE,
+    CONTACT,
+    FORCES,
+    GREEN,
+    LIMITED,
+    MOMENTS,
+    ORANGE,
+    legend_below,
+    shade,
+    wrench_curves,
+)
 from sim.notebook.wall_flights import RecordedFlight
 
 #: Lambda from which a tick counts as full contact, and below which as free flight.

@@ -47,7 +47,9 @@ def draw_race(results: Sequence[Result]) -> Figure:
     axes.set(xscale="log", yscale="log", xlabel="time of a tick, median to 99 % [µs]", ylabel="thrust error, 99 % [N]")
     axes.set_title("Lower left is better; below the dotted line the error is negligible")
     families = dict.fromkeys(one.contender.family for one in results)
-    legend_below(figure, [Line2D([], [], marker="o", linestyle="", color=COLOURS[f], label=f) for f in families], ncols=5)
+    legend_below(
+        figure, [Line2D([], [], marker="o", linestyle="", color=COLOURS[f], label=f) for f in families], ncols=5
+    )
     _write_names(figure, axes, results, places)
     return figure
 

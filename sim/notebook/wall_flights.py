@@ -142,7 +142,10 @@ def record_flight(task: WallTask) -> RecordedFlight:
     setting = task.setting("qp")
     config = pilot_config(setting.scene, setting.options, setting.pilot)
     job = WallJob(hold_s=task.hold_s, slide_s=task.slide_s)
-    pilot, world = make_pilot(setting.scene, setting.options, config, job), World(setting.scene, setting.options, config)
+    pilot, world = (
+        make_pilot(setting.scene, setting.options, config, job),
+        World(setting.scene, setting.options, config),
+    )
     controller, ticks, records, stamps, thrusts = pilot.controller, [], [], [], []
     assert isinstance(controller, HybridController)
     while not world.plant.crashed:

@@ -3,6 +3,7 @@
 import ast
 import functools
 import re
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -10,9 +11,16 @@ from pathlib import Path
 import nbformat
 import pytest
 
-from sim.notebook.render import LARGEST_COPY, NOTEBOOKS, chosen, notebook_files, rendered_file
+from sim.notebook.render import (
+    LARGEST_COPY,
+    NOTEBOOKS,
+    chosen,
+    copy_sources,
+    notebook_files,
+    notebook_sources,
+    rendered_file,
+)
 from sim.notebook.short import SHORT_VARIABLE
-from sim.notebook.sources import copy_sources, load_app, notebook_sources
 
 FILES = notebook_files()
 #: What a copy must not need: marimo's elements, scripts, anything from elsewhere.
@@ -38,8 +46,7 @@ def short_form(monkeypatch):
 @functools.cache
 def run(file: Path) -> dict:
     """Run a notebook; what its cells define."""
-    _, definitions = load_app(file).run()
-    return dict(definitions)
+    return runpy.run_path(str(file))["app"].run()[1]
 
 
 @each
