@@ -18,10 +18,10 @@ def _():
     mo.md(r"""
     # A first flight
 
-    A hexarotor with tilted rotors carries a rigid arm with a brush. It presses the brush against a board with 5 N
-    and paints a C: one row along the board's lower edge, up by nine tenths of a brush width, and back along the upper
-    edge of the first row. No position is measured. The sensors are an IMU, a force/torque sensor at the base of the arm,
-    and an RGB-D camera with a delay of 60 ms.
+    A hexarotor with tilted rotors carries a rigid arm with a brush. It presses the brush against a board with 5 N and
+    paints a C: one row along the board's lower edge, up by nine tenths of a brush width, and back along the upper edge
+    of the first row. No position is measured. The sensors are an IMU, a force/torque sensor at the base of the arm, and
+    an RGB-D camera with a delay of 60 ms.
 
     Vision extracts lines from pictures. Lines and forces give the targets of the tasks. One quadratic program per tick,
     solved by OSQP, converts the targets into six rotor thrusts:
@@ -65,11 +65,11 @@ def _():
     ## What the camera sees
 
     Vision fits the board's face in the depth picture as a plane $1/Z = a x + b y + c$ over normalised image
-    coordinates. It detects edges in the colour picture, where the plane ends or the paint begins. A line is $x\cos\theta +
-    y\sin\theta = \rho$; it moves with the camera's twist by the interaction matrix $[\dot\rho,\,\dot\theta]^\top =
-    L(\rho,\theta,\text{plane})\,[v,\,\omega]^\top$. The pictures below show the detections: the plane
-    is tinted; each line has a label with its track, its kind and its confidence. The dark bar is the arm, the orange
-    disc the brush. They hide a part of the board.
+    coordinates. It detects edges in the colour picture, where the plane ends or the paint begins. A line is
+    $x\cos\theta + y\sin\theta = \rho$; it moves with the camera's twist by the interaction matrix
+    $[\dot\rho,\,\dot\theta]^\top = L(\rho,\theta,\text{plane})\,[v,\,\omega]^\top$. The pictures below show the
+    detections: the plane is tinted; each line has a label with its track, its kind and its confidence. The dark bar is
+    the arm, the orange disc the brush. They hide a part of the board.
     """)
     return
 
@@ -127,9 +127,9 @@ def _():
     mo.md(r"""
     ## The path
 
-    The controller has no reference path. The dashed line is the path of a perfect vehicle on this board: row 1 along the
-    lower edge, row 2 along the edge of row 1 *as painted*. The error is the distance of the true tip to this line; a
-    delay along the path does not count.
+    The controller has no reference path. The dashed line is the path of a perfect vehicle on this board: row 1 along
+    the lower edge, row 2 along the edge of row 1 *as painted*. The error is the distance of the true tip to this line;
+    a delay along the path does not count.
     """)
     return
 
@@ -181,9 +181,9 @@ def _():
     mo.md(r"""
     ## Any tick in detail
 
-    The log holds the program of each tick, so any tick can be solved again. Each task has a *target*, an acceleration or
-    a force, and an *achieved* value. Without an active limit the two agree to the accuracy of the weights. With one, the
-    task with the smaller weight deviates.
+    The log holds the program of each tick, so any tick can be solved again. Each task has a *target*, an acceleration
+    or a force, and an *achieved* value. Without an active limit the two agree to the accuracy of the weights. With one,
+    the task with the smaller weight deviates.
     """)
     return
 

@@ -62,8 +62,8 @@ def _():
 
     The controls are in the sidebar. On release of a control the closed loop flies again: the vehicle starts 15 cm in
     front of the board, approaches, presses for 1.6 s and slides to the left along the board's lower edge. Plant,
-    contact, sensors with noise and delays, estimators and strategy are those of `ibvs-qp paint`; a sensor model of lines
-    replaces the camera (`--features geometric`).
+    contact, sensors with noise and delays, estimators and strategy are those of `ibvs-qp paint`; a sensor model of
+    lines replaces the camera (`--features geometric`).
     """)
     return
 
@@ -119,9 +119,9 @@ def _():
     actuated and pushes without leaning.
 
     **Right: limits.** The first panel has one row per limit that was active, the largest multipliers on top, with the
-    fraction of ticks in which it was active. The colour is the multiplier on a logarithmic scale. Below it, the distance
-    of the nearest rotor to one of its limits: zero means that the wrench lies on the boundary of the *attainable wrench
-    set*
+    fraction of ticks in which it was active. The colour is the multiplier on a logarithmic scale. Below it, the
+    distance of the nearest rotor to one of its limits: zero means that the wrench lies on the boundary of the
+    *attainable wrench set*
 
     $$ \mathcal{W} = \{\, B u \;:\; u_\text{min} \le u \le u_\text{max} \,\} \subset \mathbb{R}^6 . $$
 
@@ -146,9 +146,9 @@ def _():
     limits the reference to 97 % of that push. At rest that would be 29.7 N. But a slide follows, on a wall whose
     friction has not been measured yet, so $d$ includes the largest sideways friction of a brush, 0.8, and 8.5 N remain
     until the slide has shown less. Without the check, rotor limits are active from the end of the ramp on. The program
-    then gives up the task with the smallest weight, the push. It ends 4 N short at rest, and more while sliding, because
-    friction needs thrust too. Tilt stays below one degree and the tip within a millimetre of its row. The analytic law
-    clips: it holds the push and loses the attitude, with a tilt of 35 degrees.
+    then gives up the task with the smallest weight, the push. It ends 4 N short at rest, and more while sliding,
+    because friction needs thrust too. Tilt stays below one degree and the tip within a millimetre of its row. The
+    analytic law clips: it holds the push and loses the attitude, with a tilt of 35 degrees.
     """)
     return
 

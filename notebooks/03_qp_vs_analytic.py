@@ -30,8 +30,8 @@ def _():
     accelerations that level the vehicle and turn it to the wall, and a velocity in directions without a line.
 
     **The analytic law** (the paper's equations 4 to 16, with corrected signs) inverts the interaction matrix $L$ of the
-    lines, projects the other targets $\dot\nu_0$ into its null space, replaces the part along $n$ by the force law with a
-    selection matrix, and allocates to the rotors. Thrusts outside $[l, h]$ are clipped:
+    lines, projects the other targets $\dot\nu_0$ into its null space, replaces the part along $n$ by the force law with
+    a selection matrix, and allocates to the rotors. Thrusts outside $[l, h]$ are clipped:
 
     $$
     \dot\nu = L^\dagger a_\text{lines} + (I - L^\dagger L)\,\dot\nu_0, \qquad
@@ -65,8 +65,8 @@ def _():
     ## Where they agree exactly
 
     A strict hierarchy is the limit of a weighted one. Give the line rows the weight $w$ and all targets of their null
-    space the weight 1 on the scale of mass-weighted acceleration, remove the limits, and measure line errors at the image
-    centre (`line_profile = "paper"`). Then, as $w \to \infty$,
+    space the weight 1 on the scale of mass-weighted acceleration, remove the limits, and measure line errors at the
+    image centre (`line_profile = "paper"`). Then, as $w \to \infty$,
 
     $$
     u_\text{QP} \;\to\; u_\text{analytic}, \qquad \lVert u_\text{QP} - u_\text{analytic} \rVert = O(1 / w).
@@ -155,12 +155,12 @@ def _(saturated):
         _lost = np.abs(saturated.wrench_given_up(_law)[_late][:, [0, 2, 3, 4, 5]]).mean(axis=0) if _late.any() else ()
         _rows.append((_name, *(number(_value, ".3f") for _value in _lost)))
     mo.md(
-        f"Same flight, same ticks, each law against its own unlimited thrusts. Mean over {_late.sum()} limited ticks in "
-        "contact:\n\n"
+        "Same flight, same ticks, each law against its own unlimited thrusts. "
+        f"Mean over {_late.sum()} limited ticks in contact:\n\n"
         + table(["given up", "push [N]", "height [N]", "roll [N m]", "pitch [N m]", "yaw [N m]"], _rows)
         + "\n\nThe program gives up *more* push, as its weights specify. Now each law flies its own closed loop:"
         if _late.any()
-        else "At this push no limit is active in contact: nothing is given up, and both laws fly alike. Increase the push."
+        else "At this push no limit is active in contact, and both laws fly alike. Increase the push."
     )
     return
 
@@ -198,9 +198,9 @@ def _(pressed):
     ## A sloped edge: the cost of the angle rows
 
     Turn the board in its own plane. A level edge looks tilted when the *vehicle* rolls, and when the *board* is turned;
-    the picture cannot distinguish the two. The analytic law's angle row is part of $L$ and therefore strictly above level
-    flight: the vehicle rolls with the edge. In the program the angle row has a ten-thousandth of the weight of the level
-    rows, and the line's error is measured at the tip: the tip follows the edge and the vehicle stays level.
+    the picture cannot distinguish the two. The analytic law's angle row is part of $L$ and therefore strictly above
+    level flight: the vehicle rolls with the edge. In the program the angle row has a ten-thousandth of the weight of
+    the level rows, and the line's error is measured at the tip: the tip follows the edge and the vehicle stays level.
     """
     )
     return
@@ -235,14 +235,14 @@ def _(sloped):
         )
         + r"""
 
-    This difference comes from the *rows and weights*, not from the solver: an analytic law with a level-first null space
-    could do the same. It would be another law than the published one.
+    This difference comes from the *rows and weights*, not from the solver: an analytic law with a level-first null
+    space could do the same. It would be another law than the published one.
 
     ## Friction: no advantage of the program
 
-    A tip that slides with friction $\mu$ under a push $f$ feels the force $\mu f$ against its travel, 0.7 m ahead of the
-    centre of mass: a yaw moment. The **feed-forward of the measured contact moment** cancels it. This term is part of $b$
-    and therefore common to both laws. Dashed: the same laws without it.
+    A tip that slides with friction $\mu$ under a push $f$ feels the force $\mu f$ against its travel, 0.7 m ahead of
+    the centre of mass: a yaw moment. The **feed-forward of the measured contact moment** cancels it. This term is part
+    of $b$ and therefore common to both laws. Dashed: the same laws without it.
     """
     )
     return
@@ -274,9 +274,9 @@ def _(rubbed):
         flights_table(rubbed, ("greatest yaw in contact [deg]", "push error, rms [N]", "path along the edge, rms [mm]"))
         + r"""
 
-    With the feed-forward both laws hold their yaw, without it neither does. The published law has no such term; with it,
-    friction is no argument for the program. One point remains: the *reach* of a sliding push is smaller (notebook 04),
-    so a high friction brings the limits nearer.
+    With the feed-forward both laws hold their yaw, without it neither does. The published law has no such term; with
+    it, friction is no argument for the program. One point remains: the *reach* of a sliding push is smaller (notebook
+    04), so a high friction brings the limits nearer.
 
     ## Summary
 

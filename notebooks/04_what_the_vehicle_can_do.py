@@ -95,10 +95,10 @@ def _(case, friction):
     _binding = ", ".join(f"{case.geometry.names[index]} {side}" for index, side in case.reach().binding)
     mo.md(
         r"""
-    **What to see.** *Top right*: the triangle of horizontal forces that are possible in level flight at full lift
-    and without moment. Each corner is the direction in which a pair of opposite rotors pushes. The longest corner points
-    to the **front**, so the arm must be there: the same vehicle with the arm at the back pushes half as hard.
-    *Bottom left* shows the reason: at the height of the weight, the set is cut near its lower corner, where rotors idle.
+    **What to see.** *Top right*: the triangle of horizontal forces that are possible in level flight at full lift and
+    without moment. Each corner is the direction in which a pair of opposite rotors pushes. The longest corner points to
+    the **front**, so the arm must be there: the same vehicle with the arm at the back pushes half as hard. *Bottom
+    left* shows the reason: at the height of the weight, the set is cut near its lower corner, where rotors idle.
     Vehicles of this class hover at a fifth of their full thrust; **the idle floor ends the push, not the ceiling**.
     *Bottom right*: a yaw moment (a gust, friction at the tip) reduces the push.
 
@@ -186,10 +186,10 @@ def _():
     mo.md(r"""
     ## A rotor that weakens, a rotor that is lost
 
-    A **mid** rotor pushes, so its ceiling ends the push directly. Below about a fifth of full thrust it cannot carry its
-    part of the weight, and level hover is impossible. An **outer** rotor is *unloaded* by the push: as it weakens, the
-    greatest push stays the same. But below the same fifth the vehicle is level **only while it pushes**; the lower curve
-    is the least push that makes level flight possible. A controller with a fixed push cannot use that; one with a
+    A **mid** rotor pushes, so its ceiling ends the push directly. Below about a fifth of full thrust it cannot carry
+    its part of the weight, and level hover is impossible. An **outer** rotor is *unloaded* by the push: as it weakens,
+    the greatest push stays the same. But below the same fifth the vehicle is level **only while it pushes**; the lower
+    curve is the least push that makes level flight possible. A controller with a fixed push cannot use that; one with a
     weighted push can.
     """)
     return
@@ -293,8 +293,8 @@ def _():
     mo.md(r"""
     **Limits of this analysis.** The set is static. Motor lag and thrust rate decide how fast its border is reached, and
     sensor noise decides how near to it a vehicle can fly. The controller therefore limits the push reference to 97 % of
-    the reach with the limits in force (`ibvs_qp/model/reach.py`) and reports the margin as `Command.reach_margin`. Power
-    is the ideal induced power; a real propeller needs about 50 % more.
+    the reach with the limits in force (`ibvs_qp/model/reach.py`) and reports the margin as `Command.reach_margin`.
+    Power is the ideal induced power; a real propeller needs about 50 % more.
     """)
     return
 

@@ -104,8 +104,8 @@ def _(results):
     - *A persistent workspace is an order of magnitude faster than anything else.* OSQP through `qpsolvers` builds and
       scales a new problem at every tick; the same OSQP with values updated in place does not. The choice of the solver
       matters less.
-    - *A tolerance is not an accuracy.* OSQP's test is relative to the largest entries of $P x$ and $q$. The rows of this
-      program differ in weight by orders of magnitude (roll and pitch 400, push 0.5), so an iterate can pass the test
+    - *A tolerance is not an accuracy.* OSQP's test is relative to the largest entries of $P x$ and $q$. The rows of
+      this program differ in weight by orders of magnitude (roll and pitch 400, push 0.5), so an iterate can pass the test
       with an error of newtons along the push. Tested every 5 iterations at 1e-3 it stops too early. The defaults are
       more accurate at the same tolerance only because they test every 25 iterations.
     - *Each decade of tolerance* costs some iterations and gains about one digit.
@@ -129,16 +129,16 @@ def _(flight, results, stretch):
 @app.cell(hide_code=True)
 def _():
     mo.md(r"""
-    **Tick by tick.** OSQP needs few iterations where no limit is active. At a loose tolerance it drifts: the push row has
-    a small weight, so a wrong push hardly shows in the residuals. Where limits are active (tinted) iterations rise, most
-    at ticks at which the active set *changes*: the warm start then has a wrong multiplier, and multipliers move by one
-    step size per iteration. These ticks make the tail of the times.
+    **Tick by tick.** OSQP needs few iterations where no limit is active. At a loose tolerance it drifts: the push row
+    has a small weight, so a wrong push hardly shows in the residuals. Where limits are active (tinted) iterations rise,
+    most at ticks at which the active set *changes*: the warm start then has a wrong multiplier, and multipliers move by
+    one step size per iteration. These ticks make the tail of the times.
 
     ## OSQP's settings
 
     Two settings are decisive: the tolerance, and how often the step size $\rho$ is adapted. An adaptation costs a new
-    factorisation. Without it, a step size that suits the rows of one phase is too small for those of another. Errors and
-    iterations do not depend on the computer.
+    factorisation. Without it, a step size that suits the rows of one phase is too small for those of another. Errors
+    and iterations do not depend on the computer.
     """)
     return
 

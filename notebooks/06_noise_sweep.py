@@ -79,9 +79,9 @@ def _(problem, sweep):
     mo.md(
         (f"**{problem}**\n\n" if problem else "")
         + f"""
-    The table has {sweep.height} flights. The first question: **which flights were completed?** The figures below include
-    completed flights only. Where many flights fail, the completed ones are a biased selection, and a law that fails in
-    heavy noise may look precise. Always read the figures together with this table.
+    The table has {sweep.height} flights. The first question: **which flights were completed?** The figures below
+    include completed flights only. Where many flights fail, the completed ones are a biased selection, and a law that
+    fails in heavy noise may look precise. Always read the figures together with this table.
 
     """
         + success_table(sweep)
@@ -118,18 +118,18 @@ def _(chosen, sweep):
 
     ## Is one law better?
 
-    Both laws fly the same seeds, so compare them **pair by pair**: the effect of a seed is in both flights and cancels in
-    the difference. The interval of the median is exact for any distribution. With six pairs it spans all of them, so a
-    sign is significant only if all six agree. Fewer pairs are never significant.
+    Both laws fly the same seeds, so compare them **pair by pair**: the effect of a seed is in both flights and cancels
+    in the difference. The interval of the median is exact for any distribution. With six pairs it spans all of them, so
+    a sign is significant only if all six agree. Fewer pairs are never significant.
 
     """
         + differences_table(sweep, chosen.value)
         + r"""
 
     A program does not win by being a program. Estimation (line filter, contact estimator) reduces the noise, and both
-    laws share it. Without an active limit the two laws compute nearly the same thrusts (notebook 03). They differ in the
-    effect of noise on the rows: the analytic law rolls with a noisy angle, the program hardly does, and it measures a
-    line's error at the tip. With few seeds per cell many intervals contain zero, and that is a result.
+    laws share it. Without an active limit the two laws compute nearly the same thrusts (notebook 03). They differ in
+    the effect of noise on the rows: the analytic law rolls with a noisy angle, the program hardly does, and it measures
+    a line's error at the tip. With few seeds per cell many intervals contain zero, and that is a result.
 
     """
     )
@@ -156,8 +156,8 @@ def _(sweep):
 
     An exponent of 1 means *proportional to the noise*, as for a linear filter of fixed bandwidth. An exponent below 1
     means a floor that does not depend on the noise (0: no effect), or a filter that reduces its bandwidth with more
-    noise. The next columns are the parts of the scatter of $\log y$ that each noise explains alone. The rest, which both
-    together do not explain cell by cell, comes from the seeds.
+    noise. The next columns are the parts of the scatter of $\log y$ that each noise explains alone. The rest, which
+    both together do not explain cell by cell, comes from the seeds.
 
     """
         + effects_table(sweep)
@@ -166,9 +166,9 @@ def _(sweep):
     ## How many samples are averaged
 
     The mean of $N$ independent samples has noise $\sigma / \sqrt N$. Conversely, an error of rms $e$ under noise
-    $\sigma$ means that at least $N = (\sigma / e)^2$ samples were averaged (at least, because $e$ has other causes too).
-    The table uses the smallest value of the other noise. For a first-order filter of bandwidth $f_c$ on samples at
-    rate $f_s$, $N \approx f_s / (\pi f_c)$.
+    $\sigma$ means that at least $N = (\sigma / e)^2$ samples were averaged (at least, because $e$ has other causes
+    too). The table uses the smallest value of the other noise. For a first-order filter of bandwidth $f_c$ on samples
+    at rate $f_s$, $N \approx f_s / (\pi f_c)$.
 
     """
         + averages_table(sweep)

@@ -142,7 +142,7 @@ def _shade(grid: np.ndarray, flight: RecordedFlight) -> None:
 
 
 def draw_flown(flights: dict[str, Trace], panels: Sequence[str]) -> Figure:
-    """Flights in the same axes from the press on: full lines as shipped, dashes with a switch off, a cross at a crash."""
+    """Flights in the same axes from the press on: dashes with a switch off, a cross at a crash."""
     figure = new_figure(0.7 + 1.25 * len(panels))
     grid = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
     for axes, panel in zip(grid, panels, strict=True):
