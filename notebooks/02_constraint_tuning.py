@@ -4,15 +4,15 @@ __generated_with = "0.25.2"
 app = marimo.App(width="full", app_title="Constraint tuning")
 
 with app.setup:
-    from pathlib import Path
-
     import marimo as mo
 
+    from ibvs_qp.pilot import PilotConfig
     from sim.notebook.dashboard import draw_dashboard
-    from sim.notebook.knobs import control_panel, knob_values, make_controls
+    from sim.notebook.knobs import GROUPS, KNOBS, knob_values
     from sim.notebook.picture import picture
-    from sim.notebook.tuning import TuningBench, compare_pair, load_setting, save_setting, save_text
+    from sim.notebook.tuning import TuningBench, compare_pair, save_setting, save_text
     from sim.notebook.wall_flights import Setting, flights_table, fly_setting
+    from sim.world.scene import load_scene
 
     FIGURES = (
         "first touch [s]",
@@ -70,15 +70,28 @@ def _():
 
 @app.cell(hide_code=True)
 def _():
+    def _widget(knob, value):
+        if knob.low is None:
+            return mo.ui.switch(value=value, label=knob.label)
+        _look = {"label": knob.label, "show_value": True, "full_width": True}
+        return mo.ui.slider(
+            steps=knob.stops(value), value=value, debounce=True, **_look
+        )  # reports its value on release
+
     bench = TuningBench()
-    controls = make_controls(bench.base)
+    controls = mo.ui.dictionary({name: _widget(KNOBS[name], value) for name, value in knob_values(bench.base).items()})
     share_gains = mo.ui.switch(value=False, label="the analytic law uses the gains set here")
     return bench, controls, share_gains
 
 
 @app.cell(hide_code=True)
 def _(controls, share_gains):
-    control_panel(controls, share_gains)
+    _groups = {
+        title: mo.vstack([controls[knob.path] for knob in knobs], gap=0.3).style({"padding-right": "1.2rem"})
+        for title, knobs in GROUPS.items()
+    }
+    _folded = mo.accordion({title: panel for title, panel in _groups.items() if title != "Task"}, multiple=True)
+    mo.sidebar([mo.md("### Task"), _groups["Task"], _folded, share_gains], width="22rem")
     return
 
 
@@ -276,7 +289,8 @@ def _(at_the_limit, bench, comparison, controls):
         assert comparison.changes == () and not comparison.refusal
 
     def test_a_preset_comes_back_and_flies_the_same():
-        again = load_setting(*save_setting(at_the_limit.setting, Path("saved.toml")))
+        preset, scene = save_setting(at_the_limit.setting, "saved.toml")
+        again = Setting(pilot=PilotConfig.from_toml(preset), scene=load_scene(scene))
         assert again == at_the_limit.setting
         assert (fly_setting(again).thrusts == at_the_limit.now.thrusts).all()
         saved = save_text(again, "saved.toml")

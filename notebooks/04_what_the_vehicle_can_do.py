@@ -12,7 +12,7 @@ with app.setup:
     from allocation import TAROT_T960
     from sim.notebook.picture import picture
     from sim.notebook.table import number, table
-    from sim.notebook.vehicle import Duties, abilities, after_loss, design_map, vehicle_case
+    from sim.notebook.vehicle import Duties, abilities, after_loss, cheapest, design_map, vehicle_case
     from sim.notebook.vehicle_figures import (
         draw_cuts,
         draw_design_map,
@@ -278,7 +278,7 @@ def _(duty_friction, duty_gust, duty_mass, duty_push, duty_sliding, nominal):
 
 @app.cell(hide_code=True)
 def _(designs, duties):
-    _best = designs.cheapest(duties)
+    _best = cheapest(designs)
     mo.md(
         f"**Cheapest: {_best.geometry.tilt_deg:g}° at {_best.vehicle.mass_kg:g} kg.**\n\n"
         + abilities_table(_best, duties.friction)

@@ -105,9 +105,9 @@ def _(results):
       scales a new problem at every tick; the same OSQP with values updated in place does not. The choice of the solver
       matters less.
     - *A tolerance is not an accuracy.* OSQP's test is relative to the largest entries of $P x$ and $q$. The rows of
-      this program differ in weight by orders of magnitude (roll and pitch 400, push 0.5), so an iterate can pass the test
-      with an error of newtons along the push. Tested every 5 iterations at 1e-3 it stops too early. The defaults are
-      more accurate at the same tolerance only because they test every 25 iterations.
+      this program differ in weight by orders of magnitude (roll and pitch 400, push 0.5), so an iterate can pass the
+      test with an error of newtons along the push. Tested every 5 iterations at 1e-3 it stops too early. The defaults
+      are more accurate at the same tolerance only because they test every 25 iterations.
     - *Each decade of tolerance* costs some iterations and gains about one digit.
     - *DAQP with a persistent workspace* is faster than OSQP at this size (six thrusts, a few slacks) **and** exact.
       Through CasADi or `qpsolvers` conversions cost this lead. In the controller DAQP is the exact fallback. The
@@ -150,7 +150,7 @@ def _(exact, ticks):
     for _interval in unless_short((5, 25, 100, NEVER), (25,)):
         for _tolerance in unless_short((1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8), (1e-3, 1e-6)):
             _settings = {"eps_abs": _tolerance, "eps_rel": _tolerance, "check_termination": 5, "max_iter": CAP}
-            _one = race(osqp_workspace("grid", adaptive_rho_interval=_interval, **_settings), ticks, exact)
+            _one = race(osqp_workspace("grid", {**_settings, "adaptive_rho_interval": _interval}), ticks, exact)
             _rows.append(
                 {
                     "tolerance": _tolerance,
@@ -205,7 +205,7 @@ def _(adapt, check, exact, most, polish, power, results, scaling, ticks):
         "scaling": scaling.value,
         "polishing": polish.value,
     }
-    yours = race(osqp_workspace("yours", family="yours", **_settings), ticks, exact, repeats=unless_short(3, 1))
+    yours = race(osqp_workspace("yours", _settings, family="yours"), ticks, exact, repeats=unless_short(3, 1))
     picture(draw_race, [*(one for one in results if one.contender.family != "qpsolvers"), yours])
     return (yours,)
 

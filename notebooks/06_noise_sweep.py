@@ -11,14 +11,15 @@ with app.setup:
     import polars as pl
 
     from sim.figures import draw_force, draw_path
+    from sim.figures.style import law_name
     from sim.notebook.noise import (
         FIGURES,
         FORCE,
+        LAWS,
         VS,
-        averages_table,
+        averaged_samples,
         differences_table,
         effects,
-        effects_table,
         find_run,
         fly_again,
         row_name,
@@ -29,6 +30,7 @@ with app.setup:
     from sim.notebook.noise_figures import draw_boxes, draw_maps, draw_path_and_push
     from sim.notebook.picture import picture
     from sim.notebook.short import unless_short
+    from sim.notebook.table import number, table
     from sim.sweep.fingerprint import configuration_hash
 
 
@@ -144,6 +146,15 @@ def _(sweep):
 
 @app.cell(hide_code=True)
 def _(sweep):
+    _effects, _averages = [], []
+    for _law in LAWS:
+        for _figure in FIGURES[:2]:
+            _flights, _vs, _force, *_parts = effects(sweep, _law, _figure).values()
+            _percent = (number(part, ".0%") for part in _parts)
+            _effects.append((_figure.label, law_name(_law), _flights, number(_vs), number(_force), *_percent))
+        _pictures, _samples = averaged_samples(sweep, _law)
+        for (_vs, _seen), (_force, _felt) in zip(_pictures.items(), _samples.items(), strict=False):
+            _averages.append((law_name(_law), f"{_vs:g}", number(_seen, ".0f"), f"{_force:g}", number(_felt, ".0f")))
     mo.md(
         r"""
     ## Which noise, how much, and how it grows
@@ -160,7 +171,16 @@ def _(sweep):
     both together do not explain cell by cell, comes from the seeds.
 
     """
-        + effects_table(sweep)
+        + table(
+            [
+                *"figure|law|flights|exponent of sigma_vs|exponent of sigma_f".split("|"),
+                "explained by sigma_vs",
+                "by sigma_f",
+                "rest (seeds)",
+            ],
+            _effects,
+            left=2,
+        )
         + r"""
 
     ## How many samples are averaged
@@ -171,7 +191,7 @@ def _(sweep):
     at rate $f_s$, $N \approx f_s / (\pi f_c)$.
 
     """
-        + averages_table(sweep)
+        + table(["law", "sigma_vs", "pictures", "sigma_f [N]", "force samples"], _averages)
         + r"""
 
     With $N = 1$ the line noise would appear in the path without reduction. Tens of pictures are a filter memory of a
@@ -205,9 +225,9 @@ def _(sweep):
 
 @app.cell
 def _(flight):
-    again, figures = unless_short(fly_again, lambda row: (None, ""))(flight.value)
+    again, figures, same = unless_short(fly_again, lambda row: (None, {}, False))(flight.value)
     picture(draw_path, {again.law: again}) if again else None
-    return again, figures
+    return again, figures, same
 
 
 @app.cell
@@ -217,8 +237,21 @@ def _(again):
 
 
 @app.cell(hide_code=True)
-def _(again, figures, flight):
-    mo.md(f"**{row_name(flight.value)}: {again.reason}**\n\n{figures}" if again else "")
+def _(again, figures, flight, same):
+    _rows = [
+        (each.label, *(number(value and each.scale * value, ".3f") for value in (flight.value[each.column], flown)))
+        for each in FIGURES[:4]
+        for flown in [figures.get(each.column)]
+    ]
+    _note = "Same code and settings: the figures are equal to the bit."
+    _changed = "Code or settings have changed since the table was made, so the figures may differ."
+    mo.md(
+        f"**{row_name(flight.value)}: {again.reason}**\n\n"
+        + table(["figure", "in the table", "flown again"], _rows)
+        + f"\n\n{_note if same else _changed}"
+        if again
+        else ""
+    )
     return
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
@@ -33,7 +34,8 @@ EVERY = 8
 
 def draw_dashboard(comparison: Comparison) -> Figure:
     """Push, image error, tilt; limits with their multipliers, room to the limits, and the attainable forces."""
-    figure = Figure(figsize=SIZE_IN, layout="none")
+    figure = Figure(figsize=SIZE_IN)
+    figure.set_layout_engine("none")
     grid = figure.subplots(3, 2, gridspec_kw={**MARGINS, "height_ratios": [1.0, 1.0, 1.15]})
     flights = {name: comparison.flights[name] for name in STYLES}
     push, error, tilt = grid[:, 0]
@@ -109,21 +111,23 @@ def _draw_multipliers(axes: Axes, comparison: Comparison) -> None:
         axes.set_yticks([])
         return
     top = max(1.0, *(float(np.nanmax(trace.limit_price, initial=0.0)) for trace in (now, last)))
-    scale = {"norm": LogNorm(top / 10.0**DECADES, top, clip=True), "cmap": "viridis_r", "marker": "|"}
+    norm = LogNorm(top / 10.0**DECADES, top, clip=True)
     for trace, offset, size in ((last, 0.36, 12.0), (now, -0.06, 190.0)):
         for row, name in enumerate(names):
             if name in trace.limits:
                 multiplier = trace.limit_price[:, trace.limits.index(name)]
                 active = multiplier > 0.0
-                marks = axes.scatter(trace.t[active], np.full(active.sum(), row + offset), size, multiplier[active],
-                                     linewidths=1.0, **scale)  # fmt: skip
+                axes.scatter(trace.t[active], np.full(active.sum(), row + offset), size, multiplier[active],
+                             linewidths=1.0, norm=norm, cmap="viridis_r", marker="|")  # fmt: skip
     active = {name: 100.0 * float(now.active[:, now.limits.index(name)].mean()) for name in names if name in now.limits}
     labels = [f"{name.replace('_', ' ')}\n{active.get(name, 0.0):.1f} %" for name in names]
     axes.set_yticks(range(len(names)), labels, fontsize=6.8)
     axes.set_ylim(len(names) - 0.5, -0.5)
     axes.grid(visible=False, axis="y")
     assert axes.figure is not None
-    bar = axes.figure.colorbar(marks, cax=axes.inset_axes((1.01, 0.0, 0.016, 1.0)), label="|d cost / d bound|")
+    bar = axes.figure.colorbar(
+        ScalarMappable(norm, "viridis_r"), cax=axes.inset_axes((1.01, 0.0, 0.016, 1.0)), label="|d cost / d bound|"
+    )
     bar.minorticks_off()
 
 

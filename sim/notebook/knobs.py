@@ -137,32 +137,3 @@ def _replaced(node: Any, changes: dict[tuple[str, ...], Any]) -> Any:
         if value != getattr(node, name):
             new[name] = value
     return dataclasses.replace(node, **new) if new else node
-
-
-def make_controls(setting: Setting) -> Any:
-    """Every knob as a marimo slider or switch at its value in a setting; the values have the knobs' names."""
-    import marimo as mo
-
-    widgets = {}
-    for name, value in knob_values(setting).items():
-        knob = KNOBS[name]
-        if knob.low is None:
-            widgets[name] = mo.ui.switch(value=value, label=knob.label)
-        else:  # with `debounce` a slider reports its value on release: one flight, not one per pixel
-            widgets[name] = mo.ui.slider(
-                steps=knob.stops(value), value=value, label=knob.label, show_value=True, debounce=True, full_width=True
-            )
-    return mo.ui.dictionary(widgets)
-
-
-def control_panel(controls: Any, *further: Any) -> Any:
-    """Sidebar with the first group of knobs, the other groups folded, and further elements below."""
-    import marimo as mo
-
-    groups = {
-        title: mo.vstack([controls[knob.path] for knob in knobs], gap=0.3).style({"padding-right": "1.2rem"})
-        for title, knobs in GROUPS.items()
-    }
-    first, *others = groups
-    folded = mo.accordion({title: groups[title] for title in others}, multiple=True)
-    return mo.sidebar([mo.md(f"### {first}"), groups[first], folded, *further], width="22rem")

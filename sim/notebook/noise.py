@@ -17,7 +17,7 @@ from sim.figures.style import law_name
 from sim.flight.closed_loop import fly
 from sim.flight.trace import Trace
 from sim.notebook.noise_sample import SAMPLE, sample_runs
-from sim.notebook.table import number, table
+from sim.notebook.table import table
 from sim.sweep.design import Run
 from sim.sweep.fingerprint import code_hash, configuration_hash
 from sim.sweep.paired import needed, paired_differences, sign
@@ -145,18 +145,6 @@ def effects(sweep: pl.DataFrame, law: str, figure: Figure) -> dict[str, float]:
     return {"flights": len(y), "vs": float(slope[1]), "force": float(slope[2]), **parts}
 
 
-def effects_table(sweep: pl.DataFrame) -> str:
-    """Effects on path and push error per law, as markdown."""
-    rows = []
-    for figure in FIGURES[:2]:
-        for law in LAWS:
-            flights, vs, force, *parts = effects(sweep, law, figure).values()
-            percent = (number(part, ".0%") for part in parts)
-            rows.append((figure.label, law_name(law), flights, number(vs), number(force), *percent))
-    header = ["figure", "law", "flights", "exponent of sigma_vs", "exponent of sigma_f"]
-    return table([*header, "explained by sigma_vs", "by sigma_f", "rest (seeds)"], rows, left=2)
-
-
 def averaged_samples(sweep: pl.DataFrame, law: str) -> tuple[dict[float, float], dict[float, float]]:
     r"""Least number of averaged samples behind an error: :math:`N = (\sigma / \text{rms})^2`.
 
@@ -173,16 +161,6 @@ def averaged_samples(sweep: pl.DataFrame, law: str) -> tuple[dict[float, float],
 
     pictures = {vs: count(vs * DEPTH_M * path.scale, cell_values(sweep, law, vs, forces[0], path)) for vs in sigmas}
     return pictures, {force: count(force, cell_values(sweep, law, sigmas[0], force, push)) for force in forces}
-
-
-def averages_table(sweep: pl.DataFrame) -> str:
-    """Averaged samples per noise and law, as markdown."""
-    rows = []
-    for law in LAWS:
-        pictures, samples = averaged_samples(sweep, law)
-        for (vs, seen), (force, felt) in zip(pictures.items(), samples.items(), strict=False):
-            rows.append((law_name(law), f"{vs:g}", number(seen, ".0f"), f"{force:g}", number(felt, ".0f")))
-    return table(["law", "sigma_vs", "pictures", "sigma_f [N]", "force samples"], rows)
 
 
 def differences_table(sweep: pl.DataFrame, figure: Figure) -> str:
@@ -226,16 +204,9 @@ def find_run(row: dict[str, Any]) -> Run:
     return next((run for run in alike if configuration_hash(run) == row.get("config_hash")), alike[0])
 
 
-def fly_again(row: dict[str, Any]) -> tuple[Trace, str]:
-    """Fly the run of a row in this process; its trace, and its figures beside those of the row as markdown."""
+def fly_again(row: dict[str, Any]) -> tuple[Trace, dict[str, float], bool]:
+    """Fly the run of a row; its trace and figures, and whether code and settings are those of the row."""
     run = find_run(row)
     plan = run.plan
     trace = fly(plan.scene, plan.options, config=plan.config, job=plan.job, faults=plan.faults)
-    figures, rows = run.measure(trace), []
-    for figure in FIGURES[:4]:
-        pair = (row.get(figure.column), figures.get(figure.column))
-        rows.append((figure.label, *(number(None if v is None else figure.scale * v, ".3f") for v in pair)))
-    same = (configuration_hash(run), code_hash()) == (row.get("config_hash"), row.get("code_hash"))
-    note = "Same code and settings: the figures are equal to the bit."
-    changed = "Code or settings have changed since the table was made, so the figures may differ."
-    return trace, table(["figure", "in the table", "flown again"], rows) + f"\n\n{note if same else changed}"
+    return trace, run.measure(trace), (configuration_hash(run), code_hash()) == (row["config_hash"], row["code_hash"])

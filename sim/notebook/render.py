@@ -81,29 +81,6 @@ def _is_static(output: Any) -> bool:
     return not any(live in str(content) for content in output.get("data", {}).values() for live in _LIVE)
 
 
-def notebook_sources(notebook: Path) -> list[tuple[str, str]]:
-    """Kind and text of the cells that an export of a notebook would have, without running it."""
-    import nbformat
-    from marimo._ast import load  # the command-line export does the same and takes 2 s longer
-    from marimo._ast.app import InternalApp
-    from marimo._convert.ipynb.from_ir import convert_from_ir_to_ipynb
-
-    app = load.load_app(notebook)
-    assert app is not None, f"{notebook} is no notebook"
-    return _sources(nbformat.reads(convert_from_ir_to_ipynb(InternalApp(app), sort_mode="top-down"), as_version=4))
-
-
-def copy_sources(file: Path) -> list[tuple[str, str]]:
-    """Kind and text of the cells of a copy, without its note."""
-    import nbformat
-
-    return _sources(nbformat.read(file, as_version=4))
-
-
-def _sources(notebook: Any) -> list[tuple[str, str]]:
-    return [(cell.cell_type, cell.source.strip()) for cell in notebook.cells if cell.id != NOTE_ID]
-
-
 def chosen(names: list[str]) -> list[Path]:
     """Notebooks with these stems, or all.
 

@@ -61,7 +61,7 @@ class Result:
     iterations: np.ndarray
 
 
-def osqp_workspace(name: str, family: str = "OSQP, workspace", **settings: float) -> Contender:
+def osqp_workspace(name: str, settings: dict[str, float], family: str = "OSQP, workspace") -> Contender:
     """One OSQP workspace for all ticks: values updated in place, warm start. Settings have OSQP's own names."""
 
     def make(programs: Sequence[Program]) -> Callable[[Program], Answer]:
@@ -123,11 +123,12 @@ def _casadi_daqp(programs: Sequence[Program]) -> Callable[[Program], Answer]:
 
 def contenders() -> list[Contender]:
     """OSQP at several tolerances, the shipped engine, DAQP, and the installed back ends of qpsolvers."""
-    found = [osqp_workspace("OSQP defaults")]
+    found = [osqp_workspace("OSQP defaults", {})]
     for power in (3, 4, 5, 6, 8):
         tolerance = {"eps_abs": 10.0**-power, "eps_rel": 10.0**-power}
-        found.append(osqp_workspace(f"OSQP 1e-{power}", check_termination=5, adaptive_rho_interval=25, **tolerance))
-    found.append(osqp_workspace("OSQP, shipped settings", **shipped_osqp_settings()))
+        settings = {"check_termination": 5, "adaptive_rho_interval": 25, **tolerance}
+        found.append(osqp_workspace(f"OSQP 1e-{power}", settings))
+    found.append(osqp_workspace("OSQP, shipped settings", shipped_osqp_settings()))
     found.append(Contender(name="shipped", family="shipped", make=lambda programs: shipped_solver()))
     found.append(Contender(name="DAQP in CasADi", family="active set", make=_casadi_daqp))
     if importlib.util.find_spec("daqp") is not None:

@@ -11,12 +11,10 @@ from typing import Any
 from ibvs_qp.config.contact_margin import require_margin
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.settings import dump_toml
-from ibvs_qp.pilot import PilotConfig
 from sim.flight.closed_loop import default_preset
 from sim.flight.trace import Trace
 from sim.notebook.knobs import KNOBS, knob_values, turned
 from sim.notebook.wall_flights import Setting, fly_setting
-from sim.world.scene import load_scene
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -137,15 +135,6 @@ def save_setting(setting: Setting, preset: str | Path) -> tuple[Path, Path]:
     except OSError as error:
         raise ConfigError(f"cannot write {file}: {error.strerror or error}") from None
     return file, scene
-
-
-def load_setting(preset: Path, scene: Path, seed: int = 0) -> Setting:
-    """Read the files of `save_setting`.
-
-    Raises:
-        ConfigError: When a file is missing or refused.
-    """
-    return Setting(pilot=PilotConfig.from_toml(preset), scene=load_scene(scene), seed=seed)
 
 
 def save_text(setting: Setting, preset: str) -> str:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import itertools
 import math
 from dataclasses import dataclass, field
 
 import numpy as np
+import polars as pl
 from scipy.optimize import lsq_linear
 
 from allocation import (
@@ -222,51 +224,27 @@ class Duties:
     least_mass_kg: float = 5.5
 
 
-@dataclass(frozen=True, kw_only=True)
-class DesignMap:
-    """Figures over tilt (k rows) and mass (m columns); NaN where level hover is impossible.
+def design_map(duties: Duties, tilts_deg: np.ndarray, masses_kg: np.ndarray) -> pl.DataFrame:
+    """Figures of every tilt and all-up mass; NaN where level hover is impossible.
 
-    Attributes:
-        tilts_deg: (k,).
-        masses_kg: (m,).
-        push_n: Push standing still [N], (k, m).
-        sliding_n: Push for any travel of the tip [N], (k, m).
-        gust_n: Horizontal force from any side [N], (k, m).
-        power_w: Ideal hover power [W], (k, m).
+    Returns:
+        Rows by tilt, then mass: ``tilt_deg``, ``mass_kg``, ``push_n``, ``sliding_n`` (push for any travel), ``gust_n``,
+        ``power_w`` of hover, and ``margin``, the relative margin of the tightest duty, negative where one is not met.
     """
-
-    tilts_deg: np.ndarray
-    masses_kg: np.ndarray
-    push_n: np.ndarray
-    sliding_n: np.ndarray
-    gust_n: np.ndarray
-    power_w: np.ndarray
-
-    def margin(self, duties: Duties) -> np.ndarray:
-        """Relative margin of the tightest duty, negative where one is not met, (k, m)."""
-        required = (duties.push_n, duties.sliding_push_n, duties.gust_n, duties.least_mass_kg)
-        values = (self.push_n, self.sliding_n, self.gust_n, np.broadcast_to(self.masses_kg, self.push_n.shape))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            pairs = zip(values, required, strict=True)
-            return np.min([np.nan_to_num(value / least, nan=0.0) - 1.0 for value, least in pairs], axis=0)
-
-    def cheapest(self, duties: Duties) -> Case | None:
-        """The design that meets all duties with the least hover power; None if there is none on the map."""
-        meets = self.margin(duties) >= 0.0
-        if not meets.any():
-            return None
-        tilt, mass = np.unravel_index(np.argmin(np.where(meets, self.power_w, np.inf)), meets.shape)
-        return vehicle_case(mass_kg=float(self.masses_kg[mass]), tilt_deg=float(self.tilts_deg[tilt]))
-
-
-def design_map(duties: Duties, tilts_deg: np.ndarray, masses_kg: np.ndarray) -> DesignMap:
-    """Figures of every tilt, (k,), and all-up mass, (m,), under the friction of the duties."""
-    cells = [[vehicle_case(mass_kg=float(mass), tilt_deg=float(tilt)) for mass in masses_kg] for tilt in tilts_deg]
-    return DesignMap(
-        tilts_deg=tilts_deg,
-        masses_kg=masses_kg,
-        push_n=np.array([[case.reach().push for case in row] for row in cells]),
-        sliding_n=np.array([[case.worst_reach(duties.friction).push for case in row] for row in cells]),
-        gust_n=np.array([[case.level_force_n for case in row] for row in cells]),
-        power_w=np.array([[case.hover_power_w for case in row] for row in cells]),
+    rows = []
+    for tilt, mass in itertools.product(tilts_deg.tolist(), masses_kg.tolist()):
+        case = vehicle_case(mass_kg=mass, tilt_deg=tilt)
+        sliding = case.worst_reach(duties.friction).push
+        rows.append((tilt, mass, case.reach().push, sliding, case.level_force_n, case.hover_power_w))
+    designs = pl.DataFrame(rows, ["tilt_deg", "mass_kg", "push_n", "sliding_n", "gust_n", "power_w"], orient="row")
+    required = {"push_n": duties.push_n, "sliding_n": duties.sliding_push_n, "gust_n": duties.gust_n}
+    margins = [pl.col(name).fill_nan(-1.0) / max(least, 1e-9) - 1.0 for name, least in required.items()]
+    return designs.with_columns(
+        pl.min_horizontal(*margins, pl.col("mass_kg") / duties.least_mass_kg - 1.0).alias("margin")
     )
+
+
+def cheapest(designs: pl.DataFrame) -> Case | None:
+    """The design that meets all duties with the least hover power; None if there is none on the map."""
+    best = designs.filter(pl.col("margin") >= 0.0).sort("power_w").head(1).to_dicts()
+    return vehicle_case(mass_kg=best[0]["mass_kg"], tilt_deg=best[0]["tilt_deg"]) if best else None

@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
+import polars as pl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -13,7 +14,7 @@ from matplotlib.patches import Circle
 
 from sim.figures.style import FAINT, REFERENCE, new_figure
 from sim.notebook.plots import BLUE, GREEN, ORANGE, legend_below
-from sim.notebook.vehicle import DOWN, FRONT, RIGHT, YAW, Case, DesignMap, Duties
+from sim.notebook.vehicle import DOWN, FRONT, RIGHT, YAW, Case, Duties, cheapest
 
 #: Length of the arrow of a rotor's sideways force, per unit of sin(tilt) [m].
 _ARROW_M = 0.36
@@ -143,18 +144,20 @@ def draw_weak_rotor(case: Case) -> Figure:
     return figure
 
 
-def draw_design_map(designs: DesignMap, duties: Duties, nominal: Case) -> Figure:
+def draw_design_map(designs: pl.DataFrame, duties: Duties, nominal: Case) -> Figure:
     """Hover power over mass and tilt, the border of every duty, the region that meets all, and its cheapest design."""
     figure = new_figure(3.9)
     axes = figure.subplots()
-    x, y = designs.masses_kg, designs.tilts_deg
-    axes.clabel(axes.contour(x, y, designs.power_w, 12, colors="#bbbbbb", linewidths=0.7), fmt="%.0f W", fontsize=6)
-    axes.contourf(x, y, designs.margin(duties), levels=[0.0, np.inf], colors=[BLUE], alpha=0.18)
+    shape = (designs["tilt_deg"].n_unique(), designs["mass_kg"].n_unique())
+    maps = {name: designs[name].to_numpy().reshape(shape) for name in designs.columns}
+    x, y = maps["mass_kg"], maps["tilt_deg"]
+    axes.clabel(axes.contour(x, y, maps["power_w"], 12, colors="#bbbbbb", linewidths=0.7), fmt="%.0f W", fontsize=6)
+    axes.contourf(x, y, maps["margin"], levels=[0.0, np.inf], colors=[BLUE], alpha=0.18)
     handles = []
     for values, bound, colour, label in (
-        (designs.push_n, duties.push_n, BLUE, f"push {duties.push_n:g} N, standing"),
-        (designs.sliding_n, duties.sliding_push_n, ORANGE, f"push {duties.sliding_push_n:g} N, any travel"),
-        (designs.gust_n, duties.gust_n, GREEN, f"{duties.gust_n:g} N from any side"),
+        (maps["push_n"], duties.push_n, BLUE, f"push {duties.push_n:g} N, standing"),
+        (maps["sliding_n"], duties.sliding_push_n, ORANGE, f"push {duties.sliding_push_n:g} N, any travel"),
+        (maps["gust_n"], duties.gust_n, GREEN, f"{duties.gust_n:g} N from any side"),
     ):
         if np.nanmin(values) < bound < np.nanmax(values):
             axes.contour(x, y, np.nan_to_num(values), levels=[bound], colors=[colour], linewidths=1.4)
@@ -164,7 +167,7 @@ def draw_design_map(designs: DesignMap, duties: Duties, nominal: Case) -> Figure
     place = (nominal.vehicle.mass_kg, nominal.geometry.tilt_deg)
     axes.plot(*place, "s", color="#333333", markersize=5)
     axes.annotate(" Tarot T960", place, fontsize=7, va="bottom")
-    best = designs.cheapest(duties)
+    best = cheapest(designs)
     if best is not None:
         place = (best.vehicle.mass_kg, best.geometry.tilt_deg)
         axes.plot(*place, "*", color=ORANGE, markersize=13, zorder=5)

@@ -119,7 +119,7 @@ def test_a_race_measures_errors_of_every_tick(programs):
     exact, _ = exact_solutions(programs)
     settings = {"max_iter": 20_000, "check_termination": 5, "adaptive_rho_interval": 25}
     tight, loose = (
-        race(osqp_workspace(str(each), eps_abs=each, eps_rel=each, **settings), programs, exact)
+        race(osqp_workspace(str(each), settings | {"eps_abs": each, "eps_rel": each}), programs, exact)
         for each in (1e-9, 1e-1)
     )
     assert tight.errors_n.max() < 1e-3 < loose.errors_n.max() and not np.isnan(tight.errors_n).any()

@@ -9,13 +9,15 @@ import pytest
 from matplotlib.figure import Figure
 
 from ibvs_qp.config.errors import ConfigError
+from ibvs_qp.pilot import PilotConfig
 from sim.commands import cli
 from sim.figures.style import new_figure
 from sim.notebook.knobs import KNOBS, knob_values, turned
 from sim.notebook.picture import DOTS_PER_INCH, picture
 from sim.notebook.short import SHORT_VARIABLE
-from sim.notebook.tuning import TuningBench, analytic_setting, load_setting, save_setting
+from sim.notebook.tuning import TuningBench, analytic_setting, save_setting
 from sim.notebook.wall_flights import Setting, flight_figures
+from sim.world.scene import load_scene
 
 
 @pytest.fixture(autouse=True)
@@ -85,7 +87,7 @@ def test_a_saved_setting_is_flown_by_paint(tmp_path, capsys):
     base = dataclasses.replace(base, scene=dataclasses.replace(base.scene, paint=paint, board=board))
     setting = turned(base, {"scene.paint.push_n": 8.0, "pilot.controller.weights.push": 1.0})
     preset, scene = save_setting(setting, tmp_path / "mine.toml")
-    assert load_setting(preset, scene) == setting
+    assert Setting(pilot=PilotConfig.from_toml(preset), scene=load_scene(scene)) == setting
     words = ["--preset", str(preset), "--scene", str(scene), "--out", str(tmp_path / "run")]
     assert cli.main(["paint", *words, "--law", "qp", "--features", "geometric", "--no-video", "--json"]) == 0
     flown = json.loads(capsys.readouterr().out)["laws"]["qp"]
