@@ -6,18 +6,11 @@ app = marimo.App(width="medium", app_title="A first flight")
 with app.setup:
     import marimo as mo
 
+    from sim.evaluate.metrics import compute_metrics
     from sim.figures import draw_board, draw_force, draw_image_error, draw_path
-    from sim.notebook.first_flight import (
-        draw_camera_story,
-        draw_moment,
-        draw_one,
-        fly_first,
-        merit_table,
-        moment_text,
-        settings_form,
-        story,
-    )
+    from sim.notebook.first_flight import draw_camera, draw_moment, fly_first, moment_text
     from sim.notebook.picture import picture
+    from sim.notebook.table import number, table
 
 
 @app.cell(hide_code=True)
@@ -25,29 +18,37 @@ def _():
     mo.md(r"""
     # A first flight
 
-    A hexarotor with tilted rotors carries a rigid arm with a brush. It shall press the brush against a board with 5 N
-    and paint a C: one row along the board's lower edge, up by nine tenths of a brush width, and back along the upper
-    edge of what it has just painted. It knows no position. All it has is an IMU, a force/torque sensor at the arm's
-    base, and an RGB-D camera, whose pictures come 60 ms late.
+    A hexarotor with tilted rotors carries a rigid arm with a brush. It presses the brush against a board with 5 N and
+    paints a C: one row along the board's lower edge, up by nine tenths of a brush width, and back along the upper edge
+    of the first row. No position is measured. The sensors are an IMU, a force/torque sensor at the base of the arm, and
+    an RGB-D camera with a delay of 60 ms.
 
-    Pictures become lines, lines and forces become wishes, and one quadratic program per tick turns the wishes into
-    six rotor thrusts:
+    Vision extracts lines from pictures. Lines and forces give the targets of the tasks. One quadratic program per tick,
+    solved by OSQP, converts the targets into six rotor thrusts:
 
     $$
     \text{picture} \;\to\; (\rho, \theta),\ \text{plane}
     \qquad\qquad
-    \text{wishes } b_k \;\to\; \min_u \sum_k w_k \bigl\| A_k M^{-1}(B u + h) - b_k \bigr\|^2
+    \text{targets } b_k \;\to\; \min_u \sum_k w_k \bigl\| A_k M^{-1}(B u + h) - b_k \bigr\|^2
     \;\text{ within limits} \;\to\; u .
     $$
 
-    This page flies the job once, in closed loop with the simulated vehicle, and looks at it from all sides.
+    This page flies the job once, in closed loop with the simulated vehicle, and shows the flight in detail.
     """)
     return
 
 
 @app.cell(hide_code=True)
 def _():
-    form = settings_form()
+    form = (
+        mo.md("{seed} {push_n} {slope_deg}")
+        .batch(
+            seed=mo.ui.slider(0, 9, 1, value=0, label="seed", show_value=True),
+            push_n=mo.ui.slider(2.0, 12.0, 0.5, value=5.0, label="push [N]", show_value=True),
+            slope_deg=mo.ui.slider(-4.0, 4.0, 0.5, value=0.0, label="slope of the board [°]", show_value=True),
+        )
+        .form(submit_button_label="fly", bordered=True)  # a flight takes too long to follow a slider
+    )
     form
     return (form,)
 
@@ -63,19 +64,19 @@ def _():
     mo.md(r"""
     ## What the camera sees
 
-    The board's face is found in the depth picture as a plane $1/Z = a x + b y + c$ over normalised image coordinates;
-    its edges are found in the colour picture where the plane ends or the paint begins. A line is $x\cos\theta +
-    y\sin\theta = \rho$; it moves with the camera's twist by the interaction matrix $[\dot\rho,\,\dot\theta]^\top =
-    L(\rho,\theta,\text{plane})\,[v,\,\omega]^\top$. The detections are drawn into the pictures below: tinted is what
-    belongs to the plane, beside each line stand its track, what it borders on and its confidence. The dark bar is the
-    arm, the orange disc the brush; what they hide must be known otherwise.
+    Vision fits the board's face in the depth picture as a plane $1/Z = a x + b y + c$ over normalised image
+    coordinates. It detects edges in the colour picture, where the plane ends or the paint begins. A line is
+    $x\cos\theta + y\sin\theta = \rho$; it moves with the camera's twist by the interaction matrix
+    $[\dot\rho,\,\dot\theta]^\top = L(\rho,\theta,\text{plane})\,[v,\,\omega]^\top$. The pictures below show the
+    detections: the plane is tinted; each line has a label with its track, its kind and its confidence. The dark bar is
+    the arm, the orange disc the brush. They hide a part of the board.
     """)
     return
 
 
 @app.cell
 def _(flight):
-    picture(draw_camera_story, flight)
+    picture(draw_camera, flight)
     return
 
 
@@ -91,15 +92,15 @@ def _():
     K_{fp}\,(F_\text{ref} - f) + K_{fi}\!\int (F_\text{ref} - f)\,dt ,
     $$
 
-    weighted with $1-\lambda$ and $\lambda$. At the first touch both $\lambda$ and $F_\text{ref}$ ramp up within a
-    second: the wall is a spring of 1.5 kN/m, and 5 N on it are 3 mm.
+    weighted with $1-\lambda$ and $\lambda$. After the first touch both $\lambda$ and $F_\text{ref}$ ramp up within one
+    second. The wall is a spring of 1.5 kN/m; 5 N compress it by 3 mm.
     """)
     return
 
 
 @app.cell
 def _(flight):
-    picture(draw_one, draw_force, flight)
+    picture(draw_force, {flight.law: flight})
     return
 
 
@@ -108,16 +109,16 @@ def _():
     mo.md(r"""
     ## The error in the picture
 
-    The guiding line shall pass a given distance beside the brush tip. Its error is taken where the picture shows the
-    tip; at half a metre one pixel is 0.8 mm on the board. On the climb between the rows the vertical edge guides, in
-    the second row the upper edge of the fresh paint.
+    The guide line must pass the brush tip at a given distance. Its error is measured at the image position of the tip;
+    at half a metre one pixel is 0.8 mm on the board. In the first row the guide is the lower edge of the board, on the
+    climb between the rows the vertical edge, and in the second row the upper edge of the fresh paint.
     """)
     return
 
 
 @app.cell
 def _(flight):
-    picture(draw_one, draw_image_error, flight)
+    picture(draw_image_error, {flight.law: flight})
     return
 
 
@@ -126,45 +127,63 @@ def _():
     mo.md(r"""
     ## The path
 
-    Nobody told the vehicle a path. The dashed line is what a perfect vehicle would do on the board as it is: row 1
-    along the lower edge, row 2 along the edge of row 1 *as painted*. The error is the distance of the true tip to it,
-    never a lag in time.
+    The controller has no reference path. The dashed line is the path of a perfect vehicle on this board: row 1 along
+    the lower edge, row 2 along the edge of row 1 *as painted*. The error is the distance of the true tip to this line;
+    a delay along the path does not count.
     """)
     return
 
 
 @app.cell
 def _(flight):
-    picture(draw_one, draw_path, flight)
+    picture(draw_path, {flight.law: flight})
     return
 
 
 @app.cell
 def _(flight):
-    picture(draw_one, draw_board, flight)
+    picture(draw_board, {flight.law: flight})
     return
 
 
 @app.cell(hide_code=True)
 def _(flight):
-    mo.md("## Figures of merit\n\n" + merit_table(flight) + "\n\n`docs/metrics.md` defines each of them.")
+    _metrics = compute_metrics(flight)
+    _rows = (
+        ("flight", 1.0, "s", "duration_s"),
+        ("push minus reference, rms, straights", 1.0, "N", "force_rms_straight_n"),
+        ("greatest push", 1.0, "N", "force_peak_n"),
+        ("path error, rms, straights", 1e3, "mm", "path_rms_straight_m"),
+        ("path error, rms, within 10 cm of a corner", 1e3, "mm", "path_rms_corner_m"),
+        ("tilt, rms", 1.0, "°", "tilt_rms_deg"),
+        ("tilt, greatest", 1.0, "°", "tilt_peak_deg"),
+        ("intended band covered", 100.0, "%", "coverage"),
+        ("least clearance of a propeller to the wall", 1e3, "mm", "propeller_clearance_min_m"),
+    )
+    _cells = [(_name, number(_scale * _metrics[_key], ".3g"), _unit) for _name, _scale, _unit, _key in _rows]
+    mo.md(
+        "## Figures of merit\n\n"
+        + table(["figure", "", ""], [("end", flight.reason, ""), *_cells])
+        + "\n\n`docs/metrics.md` defines each of them."
+    )
     return
 
 
 @app.cell(hide_code=True)
 def _(flight):
-    mo.md("## What happened, and why\n\n" + story(flight))
+    _events = [(f"{event.t:.2f} s", event.kind, event.text) for event in flight.events]
+    mo.md("## Events\n\n" + table(["time", "event", "detail"], _events, left=3))
     return
 
 
 @app.cell(hide_code=True)
 def _():
     mo.md(r"""
-    ## Any moment in detail
+    ## Any tick in detail
 
-    The program of each tick is in the log, so it can be solved again and asked. A task *asks* for an acceleration or
-    a force and *does* something; where no limit binds the two agree to the weights' accuracy, and where one does, the
-    lighter task gives way.
+    The log holds the program of each tick, so any tick can be solved again. Each task has a *target*, an acceleration
+    or a force, and an *achieved* value. Without an active limit the two agree to the accuracy of the weights. With one,
+    the task with the smaller weight deviates.
     """)
     return
 
@@ -196,8 +215,8 @@ def _():
     mo.md(r"""
     ## Where to go on
 
-    `ibvs-qp paint` does the same for both laws and writes a report with a video. Notebook 02 turns weights and
-    limits, 03 compares the two laws tick by tick.
+    `ibvs-qp paint` flies the same job under both laws and writes a report with a video. Notebook 02 varies weights and
+    limits, notebook 03 compares the two laws tick by tick.
     """)
     return
 
@@ -208,7 +227,7 @@ def _(flight):
         assert flight.completed, flight.reason
         assert flight.coverage_mask.max() > 0.9 and len(flight.pictures) > 20
 
-    def test_push_is_held_while_painting():
+    def test_push_follows_its_reference_while_painting():
         painting = (flight.row > 0) & (flight.t > flight.t[flight.row > 0][0] + 0.5)
         error = (flight.push_true - flight.push_reference)[painting]
         assert abs(error).mean() < 0.5

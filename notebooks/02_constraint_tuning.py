@@ -4,26 +4,26 @@ __generated_with = "0.25.2"
 app = marimo.App(width="full", app_title="Constraint tuning")
 
 with app.setup:
-    from pathlib import Path
-
     import marimo as mo
 
+    from ibvs_qp.pilot import PilotConfig
+    from sim.notebook.dashboard import draw_dashboard
+    from sim.notebook.knobs import GROUPS, KNOBS, knob_values
     from sim.notebook.picture import picture
-    from sim.notebook.tuning import (
-        Setting,
-        TuningBench,
-        changed_text,
-        command_line,
-        compare_pair,
-        comparison_table,
-        control_panel,
-        draw_dashboard,
-        fly_snippet,
-        knob_values,
-        load_setting,
-        make_controls,
-        save_setting,
-        saved_text,
+    from sim.notebook.tuning import TuningBench, compare_pair, save_setting, save_text
+    from sim.notebook.wall_flights import Setting, flights_table, fly_setting
+    from sim.world.scene import load_scene
+
+    FIGURES = (
+        "first touch [s]",
+        "greatest push [N]",
+        "push error while holding, rms [N]",
+        "push error while sliding, rms [N]",
+        "path along the edge, rms [mm]",
+        "greatest tilt [deg]",
+        "change of a thrust per tick in contact, rms [N]",
+        "least reach margin in contact [N]",
+        "ticks with an active limit [%]",
     )
 
 
@@ -48,36 +48,50 @@ def _():
     c_j^\top \dot\nu(u) \;\le\; d_j + s_j .
     $$
 
-    $\dot\nu$ are the vehicle's linear and angular accelerations, $B$ is the control effectiveness of the tilted
-    rotors, $h$ gathers gravity, contact and what else acts, $u^-$ are the thrusts of the tick before. The tasks $k$
-    are image lines, push, level attitude, yaw, free velocity and height. So there are three kinds of screws:
+    $\dot\nu$ is the linear and angular acceleration of the vehicle, $B$ the control effectiveness of the tilted
+    rotors, $h$ the wrench of gravity, contact and other known effects, and $u^-$ the thrusts of the tick before. The
+    tasks $k$ are image lines, push, level attitude, yaw, free velocity and height. OSQP solves the program at every
+    tick. There are three kinds of parameters:
 
-    * a **weight** $w_k$ says how dear a residual is: the inverse square of an error that one would accept. Where
-      everything can be had at once, weights mean nothing; they decide who gives way when it cannot;
-    * a **hard limit** (thrust, thrust rate) is never left. Its **price** $|\partial J^\star / \partial
-      u_\text{max}|$, the multiplier of its row, says what a newton more would have saved;
-    * a **soft limit** may be left at $p_j$ per squared unit of slack: large $p_j$ is nearly a wall, small $p_j$ a
-      slope.
+    * a **weight** $w_k$ is the inverse square of an acceptable error. Weights have no effect while all tasks can be
+      met together. Otherwise they decide which task deviates;
+    * a **hard limit** (thrust, thrust rate) always holds. Its **multiplier** $|\partial J^\star / \partial
+      u_\text{max}|$ is the cost that one more newton would save;
+    * a **soft limit** has a slack $s_j$ with the **slack weight** $p_j$: a large $p_j$ is nearly a hard limit, a small
+      $p_j$ allows violations.
 
-    The settings stand at the side of the page. Each time one is let go, the closed loop is flown again: the vehicle
-    starts 15 cm in front of the board, closes in, presses for 1.6 s and slides to the left along the board's lower
-    edge. Plant, contact, sensors with their noise and delays, estimators and strategy are those of `ibvs-qp paint`;
-    only the camera's pictures are replaced by a sensor model of lines (`--features geometric`).
+    The controls are in the sidebar. On release of a control the closed loop flies again: the vehicle starts 15 cm in
+    front of the board, approaches, presses for 1.6 s and slides to the left along the board's lower edge. Plant,
+    contact, sensors with noise and delays, estimators and strategy are those of `ibvs-qp paint`; a sensor model of
+    lines replaces the camera (`--features geometric`).
     """)
     return
 
 
 @app.cell(hide_code=True)
 def _():
+    def _widget(knob, value):
+        if knob.low is None:
+            return mo.ui.switch(value=value, label=knob.label)
+        _look = {"label": knob.label, "show_value": True, "full_width": True}
+        return mo.ui.slider(
+            steps=knob.stops(value), value=value, debounce=True, **_look
+        )  # reports its value on release
+
     bench = TuningBench()
-    controls = make_controls(bench.base)
-    share_gains = mo.ui.switch(value=False, label="the analytic law flies the gains set here")
+    controls = mo.ui.dictionary({name: _widget(KNOBS[name], value) for name, value in knob_values(bench.base).items()})
+    share_gains = mo.ui.switch(value=False, label="the analytic law uses the gains set here")
     return bench, controls, share_gains
 
 
 @app.cell(hide_code=True)
 def _(controls, share_gains):
-    control_panel(controls, share_gains)
+    _groups = {
+        title: mo.vstack([controls[knob.path] for knob in knobs], gap=0.3).style({"padding-right": "1.2rem"})
+        for title, knobs in GROUPS.items()
+    }
+    _folded = mo.accordion({title: panel for title, panel in _groups.items() if title != "Task"}, multiple=True)
+    mo.sidebar([mo.md("### Task"), _groups["Task"], _folded, share_gains], width="22rem")
     return
 
 
@@ -95,13 +109,15 @@ def _(comparison):
 
 @app.cell(hide_code=True)
 def _(comparison):
-    mo.md(changed_text(comparison))
+    _changes = "; ".join(comparison.changes) or "nothing, this is the shipped preset"
+    _refused = f"**Refused:** {comparison.refusal}. The figures show the setting before."
+    mo.md(_refused if comparison.refusal else f"**Changed:** {_changes}")
     return
 
 
 @app.cell(hide_code=True)
 def _(comparison):
-    mo.md(comparison_table(comparison))
+    mo.md(flights_table(comparison.flights, FIGURES))
     return
 
 
@@ -111,24 +127,24 @@ def _():
     ## How to read the picture
 
     **Left: response.** The push on the board, with its reference: zero in free flight, then a ramp of one second from
-    the first touch, cut to what the rotors can hold. The error of the guiding edge, where the picture shows the brush
-    tip; one pixel is 0.8 mm on the board. The tilt of the vehicle, which should be none: it is fully actuated, it
-    need not lean to push.
+    the first touch, limited to the push that the rotors can hold. The error of the guide line at the image position of
+    the brush tip; one pixel is 0.8 mm on the board. The tilt of the vehicle. It should be zero: the vehicle is fully
+    actuated and pushes without leaning.
 
-    **Right: limits.** Each row of the first panel is a limit that was active at some time, the dearest above, with
-    the share of ticks in which it bound; the colour is the price on a scale of logarithms. Under it the distance of
-    the nearest rotor to one of its limits: zero means that the wrench lies on the boundary of the *attainable wrench
-    set*
+    **Right: limits.** The first panel has one row per limit that was active, the largest multipliers on top, with the
+    fraction of ticks in which it was active. The colour is the multiplier on a logarithmic scale. Below it, the
+    distance of the nearest rotor to one of its limits: zero means that the wrench lies on the boundary of the
+    *attainable wrench set*
 
     $$ \mathcal{W} = \{\, B u \;:\; u_\text{min} \le u \le u_\text{max} \,\} \subset \mathbb{R}^6 . $$
 
-    With six rotors $B$ is square, each wrench has one allocation, and the room of the nearest rotor *is* the margin
-    of the wrench, counted in thrust. The last panel cuts $\mathcal{W}$ at full lift and without moment: the
-    horizontal forces in level flight. Its corner to the front is the greatest push; sliding adds friction, which
-    pulls the dots to the side, where the set is narrower.
+    With six rotors $B$ is square and each wrench has unique thrusts, so the room of the nearest rotor *is* the margin
+    of the wrench, measured in thrust. The last panel is the cut of $\mathcal{W}$ at full lift and without moment: the
+    horizontal forces in level flight. Its front corner is the greatest push. Sliding adds friction, which moves the
+    dots sideways, where the set is narrower.
 
-    The *analytic law* flies the same scene with the gains of its own preset, found by the same search; it allocates
-    by the pseudo-inverse and clips, so it has limits but no prices.
+    The *analytic law* flies the same scene with the gains of its own preset, which the same search found. It allocates
+    with the pseudo-inverse and clips, so it has limits but no multipliers.
     """)
     return
 
@@ -136,16 +152,16 @@ def _():
 @app.cell(hide_code=True)
 def _():
     mo.md(r"""
-    ## Three changes worth making
+    ## Three instructive changes
 
-    **Ask for more than there is: push 34 N, without the reach check.** With the check (the flight before) the push
-    never gets there: it follows the ray of pushes $w(f)=f\,[d;\,p{\times}d]-h$ to the first facet of $\mathcal{W}$
-    and cuts the reference to 97 % of what it finds. Standing still that would be 29.7 N. But a slide is to follow, on
-    a wall whose friction nobody has felt yet, so $d$ leans sideways by the most friction that a brush has, 0.8, and
-    8.5 N are left until the slide has shown less. Switched off, rotor limits bind from the end of the ramp on, and
-    the program chooses what to give up: the push, which has the lightest weight. It ends 4 N short standing and ever
-    more as friction takes its share, while tilt stays below one degree and the tip within a millimetre of its row.
-    The analytic law, which clips, holds the push and loses the attitude: it leans by 35 degrees.
+    **A push beyond reach: 34 N without the reach check.** The flight before has the check on, and its push stays far
+    below 34 N: the check follows the ray of pushes $w(f)=f\,[d;\,p{\times}d]-h$ to the first facet of $\mathcal{W}$ and
+    limits the reference to 97 % of that push. At rest that would be 29.7 N. But a slide follows, on a wall whose
+    friction has not been measured yet, so $d$ includes the largest sideways friction of a brush, 0.8, and 8.5 N remain
+    until the slide has shown less. Without the check, rotor limits are active from the end of the ramp on. The program
+    then gives up the task with the smallest weight, the push. It ends 4 N short at rest, and more while sliding,
+    because friction needs thrust too. Tilt stays below one degree and the tip within a millimetre of its row. The
+    analytic law clips: it holds the push and loses the attitude, with a tilt of 35 degrees.
     """)
     return
 
@@ -159,18 +175,18 @@ def _():
 
 @app.cell(hide_code=True)
 def _(at_the_limit):
-    mo.md(comparison_table(at_the_limit))
+    mo.md(flights_table(at_the_limit.flights, FIGURES))
     return
 
 
 @app.cell(hide_code=True)
 def _():
     mo.md(r"""
-    **Turn the priorities round: the weight of the push from 0.5 to 5000, at the same 34 N, still without the check.**
-    The flight before is the same at the shipped weight. Nothing but one weight says who gives way: now the vehicle
-    leans into the wall by up to 19 degrees, because leaning turns lift into push, and gets its 34 N. The prices tell
-    it as well, they rise from some ten to some ten thousand: a newton of thrust is worth more when what it buys is
-    weighted more. The analytic law has no such choice; clipped thrusts lose whatever the geometry makes them lose.
+    **Reversed priorities: the weight of the push from 0.5 to 5000, at the same 34 N without the check.** The flight
+    before has the shipped weight. This one weight decides which task deviates: now the vehicle leans into the wall by
+    up to 19 degrees, because leaning converts lift into push, and reaches its 34 N. The multipliers rise from about ten
+    to about ten thousand: a newton of thrust saves more cost when the weight of its effect is larger. The analytic law
+    has no such parameter; the geometry decides what the clipped thrusts lose.
     """)
     return
 
@@ -187,26 +203,24 @@ def _():
 
 @app.cell(hide_code=True)
 def _(push_first):
-    mo.md(comparison_table(push_first))
+    mo.md(flights_table(push_first.flights, FIGURES))
     return
 
 
 @app.cell(hide_code=True)
 def _():
     mo.md(r"""
-    **A bad force law: six times the force gain, no damping, no ramp.** The contact is a spring $k$ and a damper under
-    the mass $m$, and this force law alone would drive it into ringing. The *force ceiling* bounds the push by the
-    contact's own poles,
+    **A bad force law: six times the force gain, no damping, no ramp.** The contact is a spring $k$ with a damper under
+    the mass $m$, and this force law makes it ring. The *force ceiling* bounds the push by the poles of the contact,
 
     $$
     F_n \;\le\; f_\text{max} + 2\sqrt{k m}\;\dot e_s ,
     $$
 
-    with $\dot e_s < 0$ while the tip closes in, so that it is braked before the spring is compressed. The flight
-    before is the same without the ceiling: 17 N instead of 7 N at the peak, and a tip that leaves the wall again and
-    again. Switch off the approach barrier as well, and the tip strikes with 33 N. Note how busy the ceiling is: in
-    every sixth tick it mends what the force law spoils, and the push still swings. The shipped gains never ask for
-    it.
+    with $\dot e_s < 0$ while the tip approaches, so that it brakes the tip before the spring is compressed. The flight
+    before has no ceiling: 17 N instead of 7 N at the peak, and the tip loses contact again and again. Without the
+    approach barrier as well, the tip strikes with 33 N. The ceiling is active in every sixth tick, and the push still
+    oscillates. With the shipped gains it is never active.
     """)
     return
 
@@ -228,7 +242,7 @@ def _():
 
 @app.cell(hide_code=True)
 def _(hard_touch):
-    mo.md(comparison_table(hard_touch))
+    mo.md(flights_table(hard_touch.flights, FIGURES))
     return
 
 
@@ -237,9 +251,8 @@ def _():
     mo.md(r"""
     ## Save as preset
 
-    A setting that is better than the shipped one can be kept: the preset holds the controller (vehicle model, gains,
-    weights, limits), the scene beside it what is asked and what the world is like. `ibvs-qp paint` flies both through
-    the whole job, with rendered pictures and the report.
+    The preset holds the controller (vehicle model, gains, weights, limits), the scene file beside it the task and the
+    world. `ibvs-qp paint` flies both through the whole job, with rendered pictures and the report.
     """)
     return
 
@@ -255,7 +268,7 @@ def _():
 @app.cell(hide_code=True)
 def _(comparison, preset_file, save):
     mo.stop(not save.value)
-    mo.md(saved_text(comparison.setting, preset_file.value))
+    mo.md(save_text(comparison.setting, preset_file.value))
     return
 
 
@@ -264,7 +277,7 @@ def _():
     mo.md(r"""
     ## Tests
 
-    What this page rests on. `pytest notebooks/02_constraint_tuning.py` runs them.
+    Tests of this page. `pytest notebooks/02_constraint_tuning.py` runs them.
     """)
     return
 
@@ -276,17 +289,18 @@ def _(at_the_limit, bench, comparison, controls):
         assert comparison.changes == () and not comparison.refusal
 
     def test_a_preset_comes_back_and_flies_the_same():
-        file, _ = save_setting(at_the_limit.setting, Path("kept.toml"))
-        again = load_setting(file)
+        preset, scene = save_setting(at_the_limit.setting, "saved.toml")
+        again = Setting(pilot=PilotConfig.from_toml(preset), scene=load_scene(scene))
         assert again == at_the_limit.setting
-        assert (fly_snippet(again).thrusts == at_the_limit.now.thrusts).all()
-        assert command_line(again, file).startswith("ibvs-qp paint --preset kept.toml --scene kept.scene.toml")
+        assert (fly_setting(again).thrusts == at_the_limit.now.thrusts).all()
+        saved = save_text(again, "saved.toml")
+        assert "ibvs-qp paint --preset saved.toml --scene saved.scene.toml --seed 0" in saved
 
-    def test_limits_have_a_price_where_they_bind():
+    def test_active_limits_have_a_multiplier():
         flown = at_the_limit.now
         assert flown.active.any() and (flown.limit_price[flown.active] > 0.0).all()
 
-    def test_refused_settings_are_told_and_the_last_flight_stays():
+    def test_a_refused_setting_is_reported_and_the_last_flight_stays():
         refused = bench.compare({"pilot.controller.limits.tilt_deg": 1e9})
         assert "tilt_deg" in refused.refusal and refused.now is comparison.now
 

@@ -1,4 +1,4 @@
-"""The quadratic program and the analytic law on the same ticks: where they agree, where they part, and why."""
+"""The quadratic program and the analytic law on the same ticks: where they agree, where they differ, and why."""
 
 import marimo
 
@@ -6,16 +6,16 @@ __generated_with = "0.25.2"
 app = marimo.App(width="medium", app_title="QP against the analytic law")
 
 with app.setup:
+    from dataclasses import replace
+
     import marimo as mo
     import numpy as np
 
-    from sim.notebook.laws.agreement import agreement
-    from sim.notebook.laws.draw import draw_agreement, draw_difference, draw_flown, draw_given_up
-    from sim.notebook.laws.flights import WallTask, fly_task, task_figures
-    from sim.notebook.laws.shadow import shadow_flight
-    from sim.notebook.laws.words import flights_table
+    from sim.notebook.laws import agreement, draw_agreement, draw_difference, draw_flown, draw_given_up
     from sim.notebook.picture import picture
     from sim.notebook.short import unless_short
+    from sim.notebook.table import number, table
+    from sim.notebook.wall_flights import WallTask, flight_figures, flights_table, record_flight
 
     LAWS = (("QP law", "qp"), ("analytic law", "paper"))
 
@@ -25,13 +25,13 @@ def _():
     mo.md(r"""
     # The program against the analytic law
 
-    Both laws of this package begin with the same wishes. From the sensors the same estimators and set-points compute
-    what is wanted of every direction: accelerations of the lines in the picture, a push along the wall normal $n$,
-    roll, pitch and yaw accelerations that level the vehicle and turn it to the wall, a velocity where no line fixes it.
+    Both laws of this package begin with the same targets. The same estimators and set-points compute a target for every
+    direction: accelerations of the lines in the picture, a push along the wall normal $n$, roll, pitch and yaw
+    accelerations that level the vehicle and turn it to the wall, and a velocity in directions without a line.
 
     **The analytic law** (the paper's equations 4 to 16, with corrected signs) inverts the interaction matrix $L$ of the
-    lines, puts the other wishes $\dot\nu_0$ into its null space, replaces the part along $n$ by the force law with a
-    selection matrix, and allocates to the rotors. Thrusts outside $[l, h]$ are clipped:
+    lines, projects the other targets $\dot\nu_0$ into its null space, replaces the part along $n$ by the force law with
+    a selection matrix, and allocates to the rotors. Thrusts outside $[l, h]$ are clipped:
 
     $$
     \dot\nu = L^\dagger a_\text{lines} + (I - L^\dagger L)\,\dot\nu_0, \qquad
@@ -39,7 +39,7 @@ def _():
     u = \operatorname{clip}_{[l, h]} \bigl( B^\dagger (\tau - b) \bigr), \qquad \Lambda = \lambda\, n n^T .
     $$
 
-    **The program** writes the same wishes as weighted rows in the thrusts themselves, and limits as limits:
+    **The program** states the same targets as weighted rows in the thrusts, and the limits as constraints:
 
     $$
     \min_{l \le u \le h,\; s} \; \sum_i w_i \bigl( a_i^T \dot\nu(u) - \alpha_i \bigr)^2 + \sum_j p_j s_j^2
@@ -47,15 +47,15 @@ def _():
     $$
 
     $b$ holds gravity, gyroscopic moment, contact feed-forward and the observed external wrench; it is the same for
-    both. Three things differ: how conflicting wishes share (*null space* against *weights*), what a limit does (*clip*
-    against *constraint*), and where on the picture a line is judged (*image centre* against *tip*). One by one:
+    both. Three things differ: the resolution of conflicting targets (*null space* against *weights*), the effect of a
+    limit (*clip* against *constraint*), and the image point of a line's error (*image centre* against *tip*).
     """)
     return
 
 
 @app.cell
 def _():
-    flight = shadow_flight(unless_short(WallTask(hold_s=1.6, slide_s=2.0), WallTask(push_n=35.0, hold_s=1.2)))
+    flight = record_flight(unless_short(WallTask(hold_s=1.6, slide_s=2.0), WallTask(push_n=35.0, hold_s=1.2)))
     return (flight,)
 
 
@@ -64,9 +64,9 @@ def _():
     mo.md(r"""
     ## Where they agree exactly
 
-    A strict hierarchy is the limit of a weighted one. Give the line rows the weight $w$, all wishes of their null space
-    the weight 1 on the scale of mass-weighted acceleration, leave the limits away and judge lines at the image centre
-    (`line_profile = "paper"`). Then, as $w \to \infty$,
+    A strict hierarchy is the limit of a weighted one. Give the line rows the weight $w$ and all targets of their null
+    space the weight 1 on the scale of mass-weighted acceleration, remove the limits, and measure line errors at the
+    image centre (`line_profile = "paper"`). Then, as $w \to \infty$,
 
     $$
     u_\text{QP} \;\to\; u_\text{analytic}, \qquad \lVert u_\text{QP} - u_\text{analytic} \rVert = O(1 / w).
@@ -75,12 +75,12 @@ def _():
     The figure replays the ticks of one flight through that program at several weights and compares with the law **at
     the same set-points**. In free flight the difference falls by a decade per decade, down to rounding.
 
-    In contact it does not, and the reason is in the printed law. It inverts $L$ *with* the pushing direction in it, so
-    part of a line's error is answered by motion along $n$; then the selection matrix deletes that part, because the
-    force law owns the direction. What the lines asked for there is lost. If the pushing direction is taken out of $L$
-    *before* the inversion, $(L S)^\dagger$ with $S = \operatorname{blockdiag}(I - \lambda n n^T, I)$, the difference
-    falls again. The program contains $L S$ by construction. This is small (tenths of a newton at most), but it is an
-    order of operations, not a matter of tuning.
+    In contact it does not, because of the law as printed. It inverts $L$ *with* the pushing direction, so motion along
+    $n$ corrects a part of a line's error. Then the selection matrix deletes this motion, because the force law controls
+    that direction, and this part of the correction is lost. If the pushing direction is removed from $L$ *before* the
+    inversion, $(L S)^\dagger$ with $S = \operatorname{blockdiag}(I - \lambda n n^T, I)$, the difference
+    falls again. The program contains $L S$ by construction. The effect is small (tenths of a newton at most), but
+    it comes from the order of operations, not from tuning.
     """)
     return
 
@@ -97,8 +97,8 @@ def _():
     mo.md(r"""
     ## As shipped, tick by tick
 
-    Now the program as it flies: weights chosen for the wall, lines judged where the tip meets the wall, barriers on.
-    The analytic law gets *the same* gains and answers every tick of the same flight without being flown.
+    Now the program as it flies: shipped weights, line errors at the tip, barriers on. The analytic law has *the same*
+    gains and is evaluated at every tick of the same flight, but not flown.
     """)
     return
 
@@ -116,33 +116,33 @@ def _(flight):
     mo.md(rf"""
     **What to see.** Hover thrusts are 11.3 N per rotor. In free flight the two commands differ by
     {np.median(_gap[_free]):.2f} N (median of the worst rotor), in full contact by {np.median(_gap[_touch]):.2f} N.
-    While no limit binds, the black curve lies on the orange one: *all* of the difference comes from the weights and
-    from the line rows, none from the allocation. Six rotors and six wrench components leave nothing to choose, so **for
-    a wrench within reach every allocation gives the same thrusts**, clipped pseudo-inverse or program.
+    While no limit is active, the black curve lies on the orange one: *all* of the difference comes from the weights and
+    the line rows, none from the allocation. Six rotors produce six wrench components, so **for a wrench within reach
+    every allocation gives the same thrusts**, clipped pseudo-inverse or program.
 
-    It follows that on an ordinary tick the program has no advantage by being a program. What it has comes from what the
-    rows *say*, and from what happens when they cannot all be had.
+    On an ordinary tick the program therefore has no advantage by being a program. Its advantages are the content of its
+    rows, and its behaviour when they cannot be met together.
 
-    ## Saturation: who pays
+    ## Saturation: which task deviates
 
-    A push of 30.4 N unloads four rotors to their idle floor. Ask for more than that and something must be given up. In
-    the program the push is the lightest row: it gives way, and height and attitude are kept. Clipping has no
-    priorities. It raises rotors to their floor one by one; each adds lift and a moment that nobody asked for.
+    A push of 30.4 N unloads four rotors to their idle floor. Beyond it some task must deviate. In the program the push
+    has the smallest weight: it deviates, and height and attitude follow their targets. Clipping has no priorities. It
+    raises rotors to their floor one by one; each adds lift and an unwanted moment.
     """)
     return
 
 
 @app.cell(hide_code=True)
 def _():
-    asked = mo.ui.slider(5.0, 40.0, 1.0, value=35.0, label="push asked [N]", show_value=True)
-    mo.vstack([asked])
-    return (asked,)
+    push = mo.ui.slider(5.0, 40.0, 1.0, value=35.0, label="push [N]", show_value=True)
+    mo.vstack([push])
+    return (push,)
 
 
 @app.cell
-def _(asked):
-    press = WallTask(push_n=asked.value, hold_s=unless_short(4.0, 1.2))
-    saturated = shadow_flight(press)
+def _(push):
+    press = WallTask(push_n=push.value, hold_s=unless_short(4.0, 1.2))
+    saturated = record_flight(press)
     picture(draw_given_up, saturated)
     return press, saturated
 
@@ -150,27 +150,24 @@ def _(asked):
 @app.cell(hide_code=True)
 def _(saturated):
     _late = saturated.limited & (saturated.contact_weight > 0.999)
-    _qp, _law = (np.abs(saturated.wrench_given_up(law)[_late]).mean(axis=0) for law in ("qp", "paper"))
+    _rows = []
+    for _name, _law in (("QP law", "qp"), ("clipping", "paper")):
+        _lost = np.abs(saturated.wrench_given_up(_law)[_late][:, [0, 2, 3, 4, 5]]).mean(axis=0) if _late.any() else ()
+        _rows.append((_name, *(number(_value, ".3f") for _value in _lost)))
     mo.md(
-        rf"""
-    Same flight, same ticks, each law against its own unlimited wish. Mean over {_late.sum()} limited ticks in contact:
-
-    | given up | push [N] | height [N] | roll [N m] | pitch [N m] | yaw [N m] |
-    |---|---:|---:|---:|---:|---:|
-    | QP law | {_qp[0]:.2f} | {_qp[2]:.2f} | {_qp[3]:.3f} | {_qp[4]:.3f} | {_qp[5]:.3f} |
-    | clipping | {_law[0]:.2f} | {_law[2]:.2f} | {_law[3]:.3f} | {_law[4]:.3f} | {_law[5]:.3f} |
-
-    The program gives up *more* push, and that is the point. Now each law flies its own closed loop:
-    """
+        "Same flight, same ticks, each law against its own unlimited thrusts. "
+        f"Mean over {_late.sum()} limited ticks in contact:\n\n"
+        + table(["given up", "push [N]", "height [N]", "roll [N m]", "pitch [N m]", "yaw [N m]"], _rows)
+        + "\n\nThe program gives up *more* push, as its weights specify. Now each law flies its own closed loop:"
         if _late.any()
-        else "At this push no limit binds in contact: nothing is given up, and both laws fly alike. Ask for more."
+        else "At this push no limit is active in contact, and both laws fly alike. Increase the push."
     )
     return
 
 
 @app.cell
 def _(press):
-    pressed = {name: fly_task(press, law) for name, law in unless_short(LAWS, LAWS[:1])}
+    pressed = {name: press.fly(law) for name, law in unless_short(LAWS, LAWS[:1])}
     picture(draw_flown, pressed, ("push [N]", "height [mm]", "tilt [deg]"))
     return (pressed,)
 
@@ -178,23 +175,32 @@ def _(press):
 @app.cell(hide_code=True)
 def _(pressed):
     mo.md(
-        flights_table(pressed, ("push_n", "push_error_n", "height_mm", "tilt_deg", "yaw_deg"))
+        flights_table(
+            pressed,
+            (
+                "push, mean once settled [N]",
+                "push error, rms [N]",
+                "greatest change of height in contact [mm]",
+                "greatest tilt in contact [deg]",
+                "greatest yaw in contact [deg]",
+            ),
+        )
         + r"""
 
-    A cross marks a crash. What the clipped law loses in pitch lets the vehicle lean into the wall; leaning, it does
-    press with nearly what was asked, as any multicopter would, until it tips over. The program stays level and delivers
-    what a level vehicle can.
+    A cross marks a crash. The clipped law loses pitch moment, so the vehicle leans into the wall. Leaning, it presses
+    with nearly the commanded push, as any multicopter would, until it tips over. The program stays level and delivers
+    the push of a level vehicle.
 
-    *In fairness:* asking for the impossible is avoidable. Both laws come with a reach check that cuts the asked push to
-    97 % of what the rotors can hold; it is switched off here to see the laws themselves. Limits that no check foresees
-    (a gust, a rotor that weakens) remain.
+    *In fairness:* a push beyond reach is avoidable. Both laws have a reach check that limits the push reference to 97 %
+    of the push that the rotors can hold; it is off here. Limits that no check foresees (a gust, a rotor that weakens)
+    remain.
 
-    ## A sloped edge: what the angle rows cost
+    ## A sloped edge: the cost of the angle rows
 
     Turn the board in its own plane. A level edge looks tilted when the *vehicle* rolls, and when the *board* is turned;
-    the picture cannot tell. The analytic law's angle row is part of $L$ and therefore strictly above level flight: the
-    vehicle rolls with the edge. In the program the angle row weighs ten thousandth of the level rows, and the line is
-    judged at the tip: it follows the edge with the tip and stays level.
+    the picture cannot distinguish the two. The analytic law's angle row is part of $L$ and therefore strictly above
+    level flight: the vehicle rolls with the edge. In the program the angle row has a ten-thousandth of the weight of
+    the level rows, and the line's error is measured at the tip: the tip follows the edge and the vehicle stays level.
     """
     )
     return
@@ -210,7 +216,7 @@ def _():
 @app.cell
 def _(slope):
     _task = WallTask(slope_deg=slope.value, hold_s=unless_short(1.2, 0.1), slide_s=unless_short(3.0, 0.2))
-    sloped = {name: fly_task(_task, law) for name, law in unless_short(LAWS, LAWS[:1])}
+    sloped = {name: _task.fly(law) for name, law in unless_short(LAWS, LAWS[:1])}
     picture(draw_flown, sloped, ("roll [deg]", "height [mm]"))
     return (sloped,)
 
@@ -218,17 +224,25 @@ def _(slope):
 @app.cell(hide_code=True)
 def _(sloped):
     mo.md(
-        flights_table(sloped, ("roll_deg", "tilt_deg", "path_mm", "push_error_n"))
+        flights_table(
+            sloped,
+            (
+                "roll while sliding, mean [deg]",
+                "greatest tilt in contact [deg]",
+                "path along the edge, rms [mm]",
+                "push error, rms [N]",
+            ),
+        )
         + r"""
 
-    This difference is in the *rows and weights*, not in the solver: an analytic law with a level-first null space could
-    do it too. It would be another law than the published one.
+    This difference comes from the *rows and weights*, not from the solver: an analytic law with a level-first null
+    space could do the same. It would be another law than the published one.
 
-    ## Friction: where the program does not help
+    ## Friction: no advantage of the program
 
-    A tip that slides with friction $\mu$ under a push $f$ is held back by $\mu f$ at a lever of 0.7 m ahead of the
-    centre of mass: a yaw moment. What cancels it is the **feed-forward of the measured contact moment**, which is part
-    of $b$ and therefore shared by both laws. Dashed: the same laws with that switch off.
+    A tip that slides with friction $\mu$ under a push $f$ feels the force $\mu f$ against its travel, 0.7 m ahead of
+    the centre of mass: a yaw moment. The **feed-forward of the measured contact moment** cancels it. This term is part
+    of $b$ and therefore common to both laws. Dashed: the same laws without it.
     """
     )
     return
@@ -245,17 +259,9 @@ def _():
 def _(mu):
     _cases = [(name, law, True) for name, law in LAWS]
     _cases += [(f"{name}, without feed-forward", law, False) for name, law in LAWS]
+    _task = WallTask(friction=mu.value, hold_s=unless_short(1.2, 0.1), slide_s=unless_short(2.5, 0.2), reach_check=True)
     rubbed = {
-        name: fly_task(
-            WallTask(
-                friction=mu.value,
-                hold_s=unless_short(1.2, 0.1),
-                slide_s=unless_short(2.5, 0.2),
-                reach_check=True,
-                feedforward=feedforward,
-            ),
-            law,
-        )
+        name: replace(_task, feedforward=feedforward).fly(law)
         for name, law, feedforward in unless_short(_cases, _cases[:1])
     }
     picture(draw_flown, rubbed, ("yaw [deg]", "push [N]"))
@@ -265,24 +271,24 @@ def _(mu):
 @app.cell(hide_code=True)
 def _(rubbed):
     mo.md(
-        flights_table(rubbed, ("yaw_deg", "push_error_n", "path_mm"))
+        flights_table(rubbed, ("greatest yaw in contact [deg]", "push error, rms [N]", "path along the edge, rms [mm]"))
         + r"""
 
-    With the switch on both laws hold their yaw, with it off neither does. The published law has no such term; with it
-    added, friction is no argument for the program. What remains of one: the *reach* of a sliding push is smaller
-    (notebook 04), so a high friction brings the limits nearer.
+    With the feed-forward both laws hold their yaw, without it neither does. The published law has no such term; with
+    it, friction is no argument for the program. One point remains: the *reach* of a sliding push is smaller (notebook
+    04), so a high friction brings the limits nearer.
 
-    ## In short
+    ## Summary
 
     | situation | difference | due to |
     |---|---|---|
-    | no limit binds, line rows strictly first, free flight | none | – |
+    | no active limit, line rows strictly first, free flight | none | – |
     | the same in contact | tenths of a newton | selection after the inversion instead of before it |
-    | no limit binds, as shipped | small | weights, and lines judged at the tip |
-    | thrust at its floor or ceiling | the law strikes the wall, the program gives up push | constraint against clip |
+    | no active limit, as shipped | small | weights, and line errors at the tip |
+    | thrust at its floor or ceiling | the law loses attitude, the program gives up push | constraint against clip |
     | sloped edge | the law rolls with it | priority of the angle row |
-    | friction | none worth the name | feed-forward, shared |
-    | noise | none worth the name (notebook 06) | estimation, shared |
+    | friction | negligible | feed-forward, common to both |
+    | noise | negligible (notebook 06) | estimation, common to both |
     """
     )
     return
@@ -291,29 +297,29 @@ def _(rubbed):
 @app.cell(hide_code=True)
 def _(flight, limits, press, pressed, saturated):
     def test_without_limits_the_program_converges_to_the_law():
-        assert limits[-1].free[1] < 1e-4 and limits[-1].free[1] < 1e-3 * limits[0].free[1]
+        worst = limits["free"][:, 1]
+        assert worst[-1] < 1e-4 and worst[-1] < 1e-3 * worst[0]
 
-    def test_in_contact_it_is_the_order_of_selection_and_inversion():
-        assert limits[-1].selected[1] < 1e-4 < 1e-2 < limits[-1].contact[1]
+    def test_in_contact_the_order_of_selection_and_inversion_makes_the_difference():
+        assert limits["selected"][-1, 1] < 1e-4 < 1e-2 < limits["contact"][-1, 1]
 
-    def test_within_limits_all_of_the_difference_is_in_the_wishes():
+    def test_within_limits_all_of_the_difference_is_in_the_targets():
         inside = ~flight.limited & (flight.law == flight.law_free).all(axis=1)
-        inside[0] = False  # the first tick sets OSQP up, which answers it to its tolerance
         difference = (flight.qp - flight.law) - (flight.qp_free - flight.law_free)
-        assert inside.any() and np.abs(difference[inside]).max() < 1e-6
+        assert inside.any() and np.abs(difference[inside]).max() < 2e-3  # accuracy of OSQP
 
-    def test_beyond_reach_the_program_gives_up_push_and_keeps_the_height():
+    def test_beyond_reach_the_program_gives_up_push_and_holds_the_height():
         late = saturated.limited & (saturated.contact_weight > 0.999)
         if late.any():
             qp, law = (np.abs(saturated.wrench_given_up(name)[late]).max(axis=0) for name in ("qp", "paper"))
             assert qp[2] < 0.5 * law[2] and qp[0] > qp[2]
         if press.push_n > 33.0 and press.hold_s > 3.0:
-            assert task_figures(pressed["QP law"])["height_mm"] < 5.0
+            assert flight_figures(pressed["QP law"])["greatest change of height in contact [mm]"] < 5.0
 
     return (
-        test_beyond_reach_the_program_gives_up_push_and_keeps_the_height,
-        test_in_contact_it_is_the_order_of_selection_and_inversion,
-        test_within_limits_all_of_the_difference_is_in_the_wishes,
+        test_beyond_reach_the_program_gives_up_push_and_holds_the_height,
+        test_in_contact_the_order_of_selection_and_inversion_makes_the_difference,
+        test_within_limits_all_of_the_difference_is_in_the_targets,
         test_without_limits_the_program_converges_to_the_law,
     )
 

@@ -8,16 +8,22 @@ app = marimo.App(width="medium", app_title="Solvers")
 with app.setup:
     import marimo as mo
     import numpy as np
+    import polars as pl
 
+    from sim.notebook.internals import shipped_osqp_settings
     from sim.notebook.picture import picture
     from sim.notebook.short import unless_short
-    from sim.notebook.solvers.contenders import field, kept_osqp
-    from sim.notebook.solvers.draw import draw_race, draw_settings, draw_ticks
-    from sim.notebook.solvers.programs import hard_press
-    from sim.notebook.solvers.race import exact_solutions, race, race_all
-    from sim.notebook.solvers.settings_grid import NEVER, settings_grid
-    from sim.notebook.solvers.words import race_table
-    from sim.notebook.solvers.yours import your_settings
+    from sim.notebook.solver_figures import draw_race, draw_settings, draw_ticks
+    from sim.notebook.solvers import (
+        NEVER,
+        contenders,
+        exact_solutions,
+        osqp_workspace,
+        race,
+        race_table,
+        transition,
+    )
+    from sim.notebook.wall_flights import WallTask, record_flight
 
 
 @app.cell(hide_code=True)
@@ -31,53 +37,53 @@ def _():
     \min_{x = (u, s)} \; \tfrac12 x^T P x + q^T x \qquad \text{with} \quad l \le A x \le h .
     $$
 
-    The accelerations are eliminated, so the program is small and dense, and its pattern of non-zeros never changes: an
-    absent line is a zero weight, not another problem. Two families of solvers compete for such programs.
+    The accelerations are eliminated, so the program is small and dense. Its pattern of non-zeros never changes: a line
+    that is not visible has weight zero. Three families of solvers apply.
 
     - **OSQP** (ADMM) repeats one cheap step: solve a linear system with a fixed matrix, clip to the bounds, move the
-      multipliers by the step size $\rho$. It is warm started with the last tick's solution, and it stops when primal
-      and dual residuals are below a tolerance. It approaches the solution; how close is a *setting*.
-    - **Active-set** methods (DAQP, quadprog) guess which rows bind, solve the equality problem exactly, and mend the
+      multipliers by the step size $\rho$. It starts from the last tick's solution and stops when primal and dual
+      residuals are below a tolerance. Its accuracy is a *setting*. The controller solves every tick with OSQP.
+    - **Active-set** methods (DAQP, quadprog) guess the active rows, solve the equality problem exactly, and correct the
       guess. They end *at* the solution, after a number of steps that depends on how many rows change.
-    - **Interior-point** and augmented-Lagrangian methods (Clarabel, PIQP, ProxQP) stand beside them for comparison.
+    - **Interior-point** and augmented-Lagrangian methods (Clarabel, PIQP, ProxQP) are included for comparison.
 
-    The ticks come from a flight: the vehicle is asked to press with 35 N where its rotors reach 30.4 N, and nobody
-    reduces the request, so that rotors meet their idle floor and the program has to decide what to give up.
+    The ticks come from a flight in which the vehicle presses with 35 N where its rotors reach 30.4 N, without the reach
+    check. Rotors meet their idle floor, and the program decides which task deviates.
     """)
     return
 
 
 @app.cell
 def _():
-    flight = hard_press(ticks=unless_short(1900, 1320))
-    stretch = flight.busy(unless_short(500, 100))
-    exact = exact_solutions(stretch)
-    return exact, flight, stretch
+    flight = record_flight(WallTask(push_n=35.0, hold_s=unless_short(3.5, 1.2)))
+    _programs = [record.program for record in flight.records]
+    stretch = transition(_programs, unless_short(500, 100))
+    ticks = _programs[stretch]
+    exact, residuals = exact_solutions(ticks)
+    return exact, flight, residuals, stretch, ticks
 
 
 @app.cell(hide_code=True)
-def _(exact, flight, stretch):
+def _(flight, residuals, stretch, ticks):
     mo.md(rf"""
-    The flight has {len(flight.t)} ticks; at {flight.limited.mean():.0%} of them a limit binds. The others need **no
-    solver at all**: without limits the program is linear least squares, whose optimum $-P^{{-1}} q$ is part of the
-    compiled tick. If it breaks no row it *is* the solution, and the shipped controller flies it. In an ordinary paint
-    job that is 99 % of all ticks. For the race we take {len(stretch.t)} consecutive ticks around the moment when the
-    rotors meet their floor; {stretch.limited.mean():.0%} of them are limited.
+    The flight has {len(flight.t)} ticks; at {flight.limited.mean():.0%} of them a limit is active. In an ordinary paint
+    job it is one per cent. The race uses {len(ticks)} consecutive ticks around the moment at which the rotors meet
+    their floor; {flight.limited[stretch].mean():.0%} of them are limited.
 
-    The yardstick is a solution that satisfies the optimality conditions
+    The reference solution satisfies the optimality conditions
 
     $$
     P x + q + A^T y = 0, \qquad l \le A x \le h, \qquad y_+^T (h - A x) = 0, \quad y_-^T (A x - l) = 0
     $$
 
-    to a relative {exact.residual.max():.0e} at the worst tick: it is exact to rounding, whoever found it.
+    to a relative {residuals.max():.0e} at the worst tick: it is exact to rounding.
     """)
     return
 
 
 @app.cell
-def _(exact, stretch):
-    results = race_all(field(), stretch, exact, repeats=unless_short(3, 1))
+def _(exact, ticks):
+    results = [race(contender, ticks, exact, repeats=unless_short(3, 1)) for contender in contenders()]
     picture(draw_race, results)
     return (results,)
 
@@ -86,85 +92,92 @@ def _(exact, stretch):
 def _(results):
     mo.md(
         r"""
-    **How to read it.** Each dot is one way to solve the same ticks in Python: time per tick to the right (dot: median,
-    line: to the 99th percentile), distance of the thrusts to the exact ones upwards. Times are those of the computer
-    that made this copy; trust their ratios.
+    **How to read it.** Each dot is one way to solve the same ticks in Python. To the right: time per tick (dot: median,
+    line: to the 99th percentile). Upwards: distance of the thrusts to the exact ones. Times belong to the computer that
+    made this copy; only their ratios are general. *Shipped* is the whole engine of the controller: OSQP, the acceptance
+    test (status, finiteness, bounds, residuals), and DAQP in the same tick when the test fails.
 
     """
         + race_table(results)
         + r"""
 
-    - *A kept workspace beats everything else by an order of magnitude.* OSQP through `qpsolvers` builds and scales a
-      new problem at every tick; the same OSQP with its values updated in place does not. Which solver it is matters
-      less than that.
-    - *A tolerance is no accuracy.* OSQP's test is relative to the largest entries of $P x$ and $q$. The rows of this
-      program differ in weight by orders of magnitude (roll and pitch 400, push 0.5), so an iterate may pass the test
-      and still be off by newtons along the push. Tested every 5 iterations at 1e-3 it stops too early; the defaults do
-      better at the same tolerance only because they test every 25 iterations.
-    - *Iterations buy digits*, a few for every decade of tolerance, and never all of them.
-    - *The shipped controller solves every tick with OSQP*, at an absolute tolerance of 1e-6 and no relative one:
-      thrusts within 1e-3 N of the exact solution. Where the cap of 500 iterations ends the solve and the residual,
-      converted to thrust, exceeds 1e-3 N, DAQP solves the same tick.
-    - *Where OSQP does not win:* at this size (six thrusts, a handful of slacks) DAQP with a kept workspace is faster
-      than OSQP **and** exact. Called through CasADi or `qpsolvers` the same DAQP loses that lead to conversions. In the
-      controller it is the exact fallback. What speaks for OSQP here is not the median: every iteration costs the
-      same, so a cap on iterations is a deadline. Which rows contradict each other where there is no solution does not
-      come from the solver: an iterate that was cut short holds no certificate, so a smallest set of rows in conflict is
-      sought by itself (Farkas' lemma by non-negative least squares, `ibvs_qp/qp/infeasible.py`).
+    - *A persistent workspace is an order of magnitude faster than anything else.* OSQP through `qpsolvers` builds and
+      scales a new problem at every tick; the same OSQP with values updated in place does not. The choice of the solver
+      matters less.
+    - *A tolerance is not an accuracy.* OSQP's test is relative to the largest entries of $P x$ and $q$. The rows of
+      this program differ in weight by orders of magnitude (roll and pitch 400, push 0.5), so an iterate can pass the
+      test with an error of newtons along the push. Tested every 5 iterations at 1e-3 it stops too early. The defaults
+      are more accurate at the same tolerance only because they test every 25 iterations.
+    - *Each decade of tolerance* costs some iterations and gains about one digit.
+    - *DAQP with a persistent workspace* is faster than OSQP at this size (six thrusts, a few slacks) **and** exact.
+      Through CasADi or `qpsolvers` conversions cost this lead. In the controller DAQP is the exact fallback. The
+      argument for OSQP is not the median: every iteration costs the same, so a cap on iterations is a deadline.
+    - *An infeasible program* yields no certificate from a capped solve. The controller then computes a smallest set of
+      conflicting rows itself (Farkas' lemma by non-negative least squares, `ibvs_qp/qp/infeasible.py`).
     """
     )
     return
 
 
 @app.cell
-def _(results, stretch):
-    _shown = ("OSQP 1e-3", "OSQP 1e-5", "shipped")
-    picture(draw_ticks, stretch, [one for one in results if one.contender.name in _shown])
+def _(flight, results, stretch):
+    _shown = [one for name in ("OSQP 1e-5", "OSQP 1e-3", "shipped") for one in results if one.contender.name == name]
+    picture(draw_ticks, flight.t[stretch], flight.limited[stretch], _shown)
     return
 
 
 @app.cell(hide_code=True)
 def _():
     mo.md(r"""
-    **Tick by tick.** OSQP alone needs few iterations where no limit binds, but at a loose tolerance it drifts: the
-    push row is so light that a wrong push hardly shows in the residuals. Where limits bind (tinted) iterations rise,
-    most at ticks at which the set of active rows *changes*: the warm start is then wrong about a multiplier, and
-    multipliers move by one step size per iteration. Those ticks make the tail of the times.
+    **Tick by tick.** OSQP needs few iterations where no limit is active. At a loose tolerance it drifts: the push row
+    has a small weight, so a wrong push hardly shows in the residuals. Where limits are active (tinted) iterations rise,
+    most at ticks at which the active set *changes*: the warm start then has a wrong multiplier, and multipliers move by
+    one step size per iteration. These ticks make the tail of the times.
 
     ## OSQP's settings
 
-    Two settings decide: the tolerance, and how often the step size $\rho$ is adapted. Adapting costs a new
-    factorisation; not adapting leaves a step size that suits the rows of one phase and starves those of another. Errors
+    Two settings are decisive: the tolerance, and how often the step size $\rho$ is adapted. An adaptation costs a new
+    factorisation. Without it, a step size that suits the rows of one phase is too small for those of another. Errors
     and iterations do not depend on the computer.
     """)
     return
 
 
 @app.cell
-def _(exact, stretch):
+def _(exact, ticks):
     CAP = 200
-    grid = settings_grid(
-        stretch,
-        exact,
-        tolerances=unless_short((1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8), (1e-3, 1e-6)),
-        intervals=unless_short((5, 25, 100, NEVER), (25,)),
-        cap=CAP,
-    )
+    _rows = []
+    for _interval in unless_short((5, 25, 100, NEVER), (25,)):
+        for _tolerance in unless_short((1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8), (1e-3, 1e-6)):
+            _settings = {"eps_abs": _tolerance, "eps_rel": _tolerance, "check_termination": 5, "max_iter": CAP}
+            _one = race(osqp_workspace("grid", {**_settings, "adaptive_rho_interval": _interval}), ticks, exact)
+            _rows.append(
+                {
+                    "tolerance": _tolerance,
+                    "interval": _interval,
+                    "error_n": float(np.percentile(_one.errors_n, 99.0)),
+                    "iterations": float(np.median(_one.iterations)),
+                    "iterations_p99": float(np.percentile(_one.iterations, 99.0)),
+                }
+            )
+    grid = pl.DataFrame(_rows)
     picture(draw_settings, grid, CAP)
     return (grid,)
 
 
 @app.cell(hide_code=True)
 def _():
-    mo.md(r"""
-    With the step size adapted, the error follows the tolerance down until the cap of 200 iterations ends it. Without
-    adaptation it does not move at all: the step size that OSQP begins with does not suit this program. The shipped
-    settings: absolute tolerance 1e-6, a test every 5 iterations, adaptation every 20, a cap of 500 and two passes of
-    scaling.
+    _shipped = shipped_osqp_settings()
+    mo.md(rf"""
+    With adaptation, the error follows the tolerance down to the cap of 200 iterations. Without adaptation the error is
+    nearly constant: OSQP's initial step size does not suit this program. The shipped settings are a tolerance of
+    {_shipped["eps_abs"]:.0e} (relative {_shipped["eps_rel"]:.0e}), a test every {_shipped["check_termination"]}
+    iterations, adaptation every {_shipped["adaptive_rho_interval"]}, a cap of {_shipped["max_iter"]}, and
+    {_shipped["scaling"]} passes of scaling.
 
-    ## Your setting
+    ## Your settings
 
-    Move the sliders: the purple star is OSQP with your settings on the same ticks.
+    Here a persistent OSQP workspace runs with your settings on the same ticks.
     """)
     return
 
@@ -176,22 +189,23 @@ def _():
     check = mo.ui.slider(1, 50, 1, value=5, label="test every ... iterations", show_value=True)
     adapt = mo.ui.slider(5, 200, 5, value=25, label="adapt rho every ... iterations", show_value=True)
     scaling = mo.ui.slider(0, 10, 1, value=2, label="scaling passes", show_value=True)
-    mo.hstack([mo.vstack([power, most, check]), mo.vstack([adapt, scaling])], justify="start", gap=3)
-    return adapt, check, most, power, scaling
+    polish = mo.ui.switch(value=False, label="polish: solve exactly on the active rows")
+    mo.hstack([mo.vstack([power, most, check]), mo.vstack([adapt, scaling, polish])], justify="start", gap=3)
+    return adapt, check, most, polish, power, scaling
 
 
 @app.cell
-def _(adapt, check, exact, most, power, results, scaling, stretch):
-    yours = race(
-        kept_osqp(
-            "yours",
-            your_settings(power.value, most.value, check.value, adapt.value, scaling.value),
-            family="yours",
-        ),
-        stretch,
-        exact,
-        repeats=unless_short(3, 1),
-    )
+def _(adapt, check, exact, most, polish, power, results, scaling, ticks):
+    _settings = {
+        "eps_abs": 10.0**-power.value,
+        "eps_rel": 10.0**-power.value,
+        "max_iter": most.value,
+        "check_termination": check.value,
+        "adaptive_rho_interval": adapt.value,
+        "scaling": scaling.value,
+        "polishing": polish.value,
+    }
+    yours = race(osqp_workspace("yours", _settings, family="yours"), ticks, exact, repeats=unless_short(3, 1))
     picture(draw_race, [*(one for one in results if one.contender.family != "qpsolvers"), yours])
     return (yours,)
 
@@ -203,28 +217,27 @@ def _(yours):
 
 
 @app.cell(hide_code=True)
-def _(exact, grid, results, stretch, yours):
-    def test_the_yardstick_is_exact():
-        assert exact.residual.max() < 1e-9
+def _(exact, flight, grid, residuals, results, stretch, yours):
+    def test_the_reference_is_exact():
+        assert residuals.max() < 1e-9
 
-    def test_the_shipped_solver_and_active_set_solvers_are_accurate_and_loose_osqp_is_not():
-        errors = {one.contender.name: float(np.nanmax(one.errors_n)) for one in results}
+    def test_accuracy_of_the_shipped_engine_and_of_tolerances():
+        errors = {one.contender.name: float(one.errors_n.max()) for one in results}
         assert errors["shipped"] < 2e-2 and errors["DAQP in CasADi"] < 1e-6
-        assert errors["OSQP 1e-8"] < 1e-3 < errors["OSQP 1e-3"]
-        assert not any(one.unanswered for one in results)
+        assert errors["OSQP 1e-8"] < 1e-3 < errors["OSQP 1e-3"]  # NaN, no answer, fails these as well
 
-    def test_a_tighter_tolerance_costs_iterations_and_buys_accuracy():
-        loose, tight = grid[0], grid[-1] if len(grid) == 2 else grid[5]
-        assert loose.iterations_p99 < tight.iterations_p99 and loose.error_n > tight.error_n
+    def test_a_tighter_tolerance_costs_iterations_and_gains_accuracy():
+        loose, tight = grid.sort("tolerance").filter(pl.col("interval") == 25)[[-1, 0]].to_dicts()
+        assert loose["iterations_p99"] < tight["iterations_p99"] and loose["error_n"] > tight["error_n"]
 
-    def test_limits_bind_in_about_half_of_the_ticks():
-        assert 0.3 < stretch.limited.mean() < 0.7 and len(yours.errors_n) == len(stretch.t)
+    def test_limits_are_active_in_about_half_of_the_ticks():
+        assert 0.3 < flight.limited[stretch].mean() < 0.7 and len(yours.errors_n) == len(exact)
 
     return (
-        test_a_tighter_tolerance_costs_iterations_and_buys_accuracy,
-        test_the_shipped_solver_and_active_set_solvers_are_accurate_and_loose_osqp_is_not,
-        test_limits_bind_in_about_half_of_the_ticks,
-        test_the_yardstick_is_exact,
+        test_a_tighter_tolerance_costs_iterations_and_gains_accuracy,
+        test_accuracy_of_the_shipped_engine_and_of_tolerances,
+        test_limits_are_active_in_about_half_of_the_ticks,
+        test_the_reference_is_exact,
     )
 
 

@@ -1,4 +1,1 @@
-"""What the notebooks in notebooks/ call: flights, figures, controls, and the copies for reading.
-
-A cell only calls; whatever decides or computes lives here or further down, where it is tested and typed.
-"""
+"""Library of the notebooks: flights, analysis, figures, tables, and the rendered copies."""

@@ -1,6 +1,6 @@
-"""Copies of the notebooks for reading: Jupyter files with their outputs, as a code host shows them.
+"""Rendered copies of the notebooks: Jupyter files with outputs, which a code host displays.
 
-Usage: ``python -m sim.notebook.render`` for all notebooks, or with the stems of some. Every notebook is flown in full.
+Usage: ``python -m sim.notebook.render`` for all notebooks, or with the stems of some. Every notebook runs in full.
 """
 
 from __future__ import annotations
@@ -16,14 +16,13 @@ from typing import Any
 from ibvs_qp.config.errors import ConfigError
 from sim.notebook.short import SHORT_VARIABLE
 
-#: Folder of the notebooks, of a source tree; an installed wheel has none.
+#: Folder of the notebooks in a source tree; an installed wheel has none.
 NOTEBOOKS = Path(__file__).parents[2] / "notebooks"
-RENDERED = "rendered"
-#: Largest copy; a code host shows no more than a few megabytes, and every clone pays [bytes].
+#: Largest size of a copy [bytes]; a code host displays a few megabytes at most.
 LARGEST_COPY = 1_500_000
-#: Name of the cell that a copy begins with and its notebook has not.
+#: Identifier of the cell that only the copy has.
 NOTE_ID = "note"
-#: How marimo's own elements begin, in HTML and escaped; they need its server and are left out.
+#: Beginning of marimo's own elements, in HTML and escaped. They need its server, so the copy leaves them out.
 _LIVE = ("<marimo-", "&lt;marimo-")
 
 
@@ -33,39 +32,37 @@ def notebook_files(folder: Path = NOTEBOOKS) -> list[Path]:
 
 
 def rendered_file(notebook: Path) -> Path:
-    """Where the copy of a notebook lies."""
-    return notebook.parent / RENDERED / f"{notebook.stem}.ipynb"
+    """File of a notebook's copy."""
+    return notebook.parent / "rendered" / f"{notebook.stem}.ipynb"
 
 
 def render(notebook: Path) -> Path:
-    """Run a notebook in full in a process of its own and write its copy.
-
-    Args:
-        notebook: The marimo file.
-
-    Returns:
-        The Jupyter file written.
+    """Run a notebook in its own process and write its copy.
 
     Raises:
-        RuntimeError: When a cell fails or the copy is too large; the old copy stays.
+        RuntimeError: When a cell fails or the copy is too large; the old copy remains.
     """
     import nbformat
 
     with tempfile.TemporaryDirectory() as folder:
         exported = Path(folder) / "copy.ipynb"
-        words = ["export", "ipynb", str(notebook), "--sort", "top-down", "--include-outputs", "-o", str(exported)]
-        environment = {name: value for name, value in os.environ.items() if name != SHORT_VARIABLE}
+        export = ["export", "ipynb", str(notebook), "--sort", "top-down", "--include-outputs", "-o", str(exported)]
         done = subprocess.run(
-            [sys.executable, "-m", "marimo", "-q", "-y", *words],
-            env=environment, cwd=notebook.parents[1], capture_output=True, text=True,
-        )  # fmt: skip
+            [sys.executable, "-m", "marimo", "-q", "-y", *export],
+            env={name: value for name, value in os.environ.items() if name != SHORT_VARIABLE},
+            cwd=notebook.parents[1],
+            capture_output=True,
+            text=True,
+        )
         if done.returncode:
             raise RuntimeError(f"{notebook.name} does not run:\n{done.stderr or done.stdout}")
         copy = nbformat.read(exported, as_version=4)
     for cell in copy.cells:
         if cell.cell_type == "code":
-            cell.outputs = [output for output in cell.outputs if _can_be_read(output)]
-    copy.cells.insert(0, _note(notebook))
+            cell.outputs = [output for output in cell.outputs if _is_static(output)]
+    place = f"notebooks/{notebook.name}"
+    note = f"*A copy of [`{place}`](../{notebook.name}) for reading. Sliders and switches need* `marimo edit {place}`"
+    copy.cells.insert(0, nbformat.v4.new_markdown_cell(note, id=NOTE_ID))
     text = nbformat.writes(copy) + "\n"
     if len(text) > LARGEST_COPY:
         raise RuntimeError(f"the copy of {notebook.name} has {len(text)} bytes, allowed are {LARGEST_COPY}")
@@ -75,28 +72,17 @@ def render(notebook: Path) -> Path:
     return file
 
 
-def _can_be_read(output: Any) -> bool:
-    """Whether an output shows without a running notebook: no widget, nothing printed."""
+def _is_static(output: Any) -> bool:
+    """Whether an output needs no running notebook: no widget, no printed text."""
     if output.output_type == "error":
         raise RuntimeError(f"a cell fails: {output.ename}: {output.evalue}")
-    if output.output_type == "stream":
-        return False  # warnings of libraries, and marimo's own run of the test cells
+    if output.output_type == "stream":  # warnings of libraries, and marimo's own run of the test cells
+        return False
     return not any(live in str(content) for content in output.get("data", {}).values() for live in _LIVE)
 
 
-def _note(notebook: Path) -> Any:
-    import nbformat
-
-    place = f"notebooks/{notebook.name}"
-    text = (
-        f"*A copy of [`{place}`](../{notebook.name}) for reading. Sliders and switches show only where it runs:* "
-        f"`marimo edit {place}`"
-    )
-    return nbformat.v4.new_markdown_cell(text, id=NOTE_ID)
-
-
 def chosen(names: list[str]) -> list[Path]:
-    """Notebooks of these stems, or all.
+    """Notebooks with these stems, or all.
 
     Raises:
         ConfigError: When there is no such notebook.
@@ -109,7 +95,7 @@ def chosen(names: list[str]) -> list[Path]:
 
 
 def main(names: list[str]) -> int:
-    """Render notebooks by their stems, all of them without any."""
+    """Render the notebooks with these stems, or all."""
     try:
         if importlib.util.find_spec("marimo") is None:
             raise ConfigError("notebooks need marimo; install it with pip install -c constraints.txt -e '.[notebooks]'")

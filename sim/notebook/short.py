@@ -1,4 +1,4 @@
-"""The short form in which tests run every notebook: the same cells, less flying."""
+"""Short form in which the tests run every notebook: the same cells with shorter flights and smaller grids."""
 
 from __future__ import annotations
 
@@ -7,20 +7,10 @@ from typing import TypeVar
 
 T = TypeVar("T")
 
-#: Environment variable that asks for the short form; any text but the empty one does.
+#: Environment variable that selects the short form; any non-empty text does.
 SHORT_VARIABLE = "IBVS_QP_NOTEBOOKS_SHORT"
 
 
-def short_form() -> bool:
-    """Whether notebooks run in their short form."""
-    return bool(os.environ.get(SHORT_VARIABLE))
-
-
 def unless_short(full: T, short: T) -> T:
-    """One of two sizes of the same thing.
-
-    Args:
-        full: What a reader gets.
-        short: What a test gets.
-    """
-    return short if short_form() else full
+    """Return `full` for a reader and `short` for a test."""
+    return short if os.environ.get(SHORT_VARIABLE) else full

@@ -1,6 +1,6 @@
-"""A small noise sweep for reading: every cell of the experiment, short strokes, lines from the sensor model.
+"""A small noise sweep for notebook 06: every cell of the experiment, short strokes, lines from the sensor model.
 
-Usage: ``python -m sim.notebook.noise.sample`` writes `SAMPLE` anew; interrupted, it goes on where it stopped.
+Usage: ``python -m sim.notebook.noise_sample`` writes `SAMPLE` anew; after an interruption it continues.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from sim.sweep import run_sweep
 from sim.sweep.design import Run
 from sim.sweep.parts import write_table
 
-#: Table that the notebook reads when it is given no other.
-SAMPLE = Path(__file__).parents[3] / "notebooks" / "data" / "noise_sweep.parquet"
-#: Flights per cell and law: the fewest pairs that can make a difference sure (`sim.sweep.paired.needed`).
+#: Table that the notebook reads by default.
+SAMPLE = Path(__file__).parents[2] / "notebooks" / "data" / "noise_sweep.parquet"
+#: Flights per cell and law: the fewest pairs that can make a difference significant (`sim.sweep.paired.needed`).
 SEEDS = 6
 
 
@@ -31,11 +31,9 @@ def sample_runs(seeds: int = SEEDS) -> list[Run]:
 def main() -> int:
     """Fly the sample and write its table."""
     folder = Path(tempfile.gettempdir()) / "ibvs-qp-noise-sample"
-
-    def tell(done: int, count: int, *_: float) -> None:
-        print(f"{done} of {count} flights", file=sys.stderr)
-
-    result = run_sweep(sample_runs(), folder, progress=tell)
+    result = run_sweep(
+        sample_runs(), folder, progress=lambda done, count, *_: print(f"{done} of {count} flights", file=sys.stderr)
+    )
     if result.interrupted:
         return 130
     write_table(SAMPLE, result.table.drop("log"))

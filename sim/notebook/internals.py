@@ -1,0 +1,222 @@
+"""Access of the notebooks to internals of controller, program and strategy; the only module that depends on them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ibvs_qp.analytic import RANK_TOLERANCE, analytic_thrusts
+from ibvs_qp.config import ControllerConfig, Weights
+from ibvs_qp.controller import HybridController
+from ibvs_qp.measurement import Measurement, Reference
+from ibvs_qp.painting.command import PainterInput, PaintingCommand
+from ibvs_qp.painting.config import PaintingConfig
+from ibvs_qp.painting.painter import Painter
+from ibvs_qp.painting.presser import Presser
+from ibvs_qp.qp.exact import ExactSolver
+
+#: A flight at the wall ends after this time in any case [s].
+LONGEST_S = 10.0
+#: Arrays of the engine's data that define one solve.
+_ARRAYS = ("p", "q", "a", "lower", "upper", "free")
+
+#: Measurement and reference of one tick.
+Tick = tuple[Measurement, Reference]
+#: Solution x, (variables,), or None without one, and iterations, 0 where a solver does not report them.
+Answer = tuple[np.ndarray | None, int]
+
+
+class _PressAndSlide(Presser):
+    """Press and slide without waiting for the lines to settle and without the way back."""
+
+    def step(self, inputs: PainterInput) -> PaintingCommand:
+        if inputs.time_s > LONGEST_S:
+            self._end(inputs, f"ended after {LONGEST_S:g} s in {self.phase}", failed=True)
+        return super().step(inputs)
+
+    def _align(self, inputs: PainterInput, dt: float) -> PaintingCommand:
+        self._anchor = float(inputs.odometer[0])
+        self._enter(inputs, "press", "lines settle on the way")
+        return super()._press(inputs, dt)
+
+    def _retreat(self, inputs: PainterInput, dt: float) -> PaintingCommand:
+        self._end(inputs, self.reason if self.failed else "pressed and slid")
+        return super()._retreat(inputs, dt)
+
+
+@dataclass(frozen=True, kw_only=True)
+class WallJob:
+    """Press at one place for `hold_s`, slide along the edge for `slide_s` [s], and end."""
+
+    hold_s: float
+    slide_s: float
+
+    def strategy(self, config: PaintingConfig) -> Painter:
+        """The strategy of one flight."""
+        return _PressAndSlide(config, self.hold_s, self.slide_s)
+
+    def expected_s(self, config: PaintingConfig) -> float:
+        """Hold and slide [s]."""
+        return self.hold_s + self.slide_s
+
+
+@dataclass(frozen=True, kw_only=True)
+class Program:
+    r"""The quadratic program of one tick, :math:`\min \tfrac12 x^T P x + q^T x, \; l \le A x \le h, \; x = (u, s)`.
+
+    Attributes:
+        hessian: P, (variables, variables).
+        q: (variables,).
+        rows: A, (rows, variables).
+        lower: l, (rows,).
+        upper: h, (rows,).
+        free: Thrusts of the optimum without limits [N], (n,).
+        limited: Whether this optimum violates a limit.
+        arrays: The engine's own data, for `shipped_solver`.
+    """
+
+    hessian: np.ndarray
+    q: np.ndarray
+    rows: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    free: np.ndarray
+    limited: bool
+    arrays: tuple[np.ndarray, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class TickRecord:
+    """One tick of the QP law, with the analytic law at the same set-points.
+
+    Attributes:
+        program: The tick's program.
+        contact_weight: Lambda [-].
+        lines: Number of lines in use.
+        push_reference: Commanded push [N].
+        law_free: Thrusts of the analytic law before clipping [N], (n,).
+        law: The same after clipping [N], (n,).
+        selected: The same with the pushing direction removed from L before its inversion [N], (n,); for lambda 0 or 1.
+    """
+
+    program: Program
+    contact_weight: float
+    lines: int
+    push_reference: float
+    law_free: np.ndarray
+    law: np.ndarray
+    selected: np.ndarray
+
+
+def record_program(controller: HybridController) -> Program:
+    """Program of the controller's last tick."""
+    data = controller.engine.data
+    hessian, rows, q = data.hessian(), data.rows(), data.q.copy()
+    lower, upper = data.lower.copy(), data.upper.copy()
+    optimum = np.linalg.solve(hessian, -q)
+    at = rows @ optimum
+    return Program(
+        hessian=hessian,
+        q=q,
+        rows=rows,
+        lower=lower,
+        upper=upper,
+        free=optimum[: controller.template.model.rotors],
+        limited=bool(((at < lower) | (at > upper)).any()),
+        arrays=tuple(getattr(data, name).copy() for name in _ARRAYS),
+    )
+
+
+def record_tick(controller: HybridController) -> TickRecord:
+    """The controller's last tick under both laws."""
+    terms = controller.setpoints
+    law_free = analytic_thrusts(terms)
+    return TickRecord(
+        program=record_program(controller),
+        contact_weight=terms.contact_weight,
+        lines=len(terms.lines),
+        push_reference=terms.push_reference,
+        law_free=law_free,
+        law=np.clip(law_free, terms.lower, terms.upper),
+        selected=_selected_thrusts(controller),
+    )
+
+
+def _selected_thrusts(controller: HybridController) -> np.ndarray:
+    r"""Thrusts of the analytic law with :math:`(L S)^\dagger` in the place of :math:`S L^\dagger` [N], (n,).
+
+    S removes the fraction lambda of the pushing direction. The printed law inverts L with that direction and then
+    drops the motion along it.
+    """
+    terms = controller.setpoints
+    gains, vehicle, contact = terms.config.gains, terms.config.vehicle, terms.contact_weight
+    mass = np.concatenate((np.full(3, vehicle.mass_kg), np.asarray(vehicle.inertia_kg_m2)))
+    along = (contact * terms.push_command + (1.0 - contact) * terms.standoff_command) / vehicle.mass_kg
+    right, down = terms.velocity_command
+    acceleration = np.append(terms.normal * along + terms.right * right + terms.down * down, terms.angular)
+    selection = np.eye(6)
+    selection[:3, :3] -= contact * np.outer(terms.normal, terms.normal)
+    if terms.lines:
+        level = min(terms.lines, key=lambda line: abs(line.rho))
+        matrix = np.vstack([*(line.matrix[0] for line in terms.lines), level.matrix[1]]) @ selection
+        target = [
+            -(gains.line_kp * line.rho_error + gains.line_kd * line.rho_rate + gains.line_ki * line.integral)
+            for line in terms.lines
+        ]
+        target.append(-(gains.theta_kp * level.angle_error + gains.theta_kd * level.angle_rate))
+        inverse = np.linalg.pinv(matrix, rcond=RANK_TOLERANCE)
+        acceleration = acceleration + inverse @ (np.array(target) - matrix @ acceleration)
+    return terms.inverse @ (mass * acceleration - terms.bias_wrench)
+
+
+def paper_profile(weight: float) -> ControllerConfig:
+    """The program that approaches the paper's law as the weight of the line rows grows.
+
+    All null-space targets have weight 1 on the scale of mass-weighted acceleration, effort almost none. There are no
+    barriers, and line errors are measured at the image centre.
+    """
+    mass = ControllerConfig().vehicle.mass_kg
+    tasks = {"level": 1.0, "yaw": 1.0, "velocity": 1.0, "push": 1.0 / mass**2}
+    weights = Weights(line=weight, effort=1e-9, smoothness=0.0, line_sigma=1.0, **tasks)
+    return ControllerConfig(weights=weights, line_profile="paper", barriers=False)
+
+
+def exact_solver() -> Callable[[Program], tuple[np.ndarray, np.ndarray]]:
+    """DAQP through CasADi, the exact fallback of the controller: a function that returns x and multipliers y."""
+    solver = ExactSolver(HybridController().template)
+
+    def solve(program: Program) -> tuple[np.ndarray, np.ndarray]:
+        found = solver.solve(*program.arrays[:5])
+        if found is None:
+            raise RuntimeError("a recorded program has no solution")
+        return found
+
+    return solve
+
+
+def shipped_solver() -> Callable[[Program], Answer]:
+    """The controller's engine with the shipped settings, on recorded data."""
+    engine = HybridController().engine
+
+    def solve(program: Program) -> Answer:
+        for name, values in zip(_ARRAYS, program.arrays, strict=True):
+            getattr(engine.data, name)[:] = values
+        found = engine.solve()
+        return (None, 0) if found is None else (found.x, found.iterations)
+
+    return solve
+
+
+def shipped_osqp_settings() -> dict[str, float]:
+    """The shipped settings of OSQP, under OSQP's own names."""
+    settings = ControllerConfig().solver
+    return {
+        "eps_abs": settings.tolerance,
+        "eps_rel": settings.relative_tolerance,
+        "max_iter": settings.max_iterations,
+        "check_termination": settings.check_interval,
+        "adaptive_rho_interval": settings.adaptive_rho_interval,
+        "scaling": settings.scaling,
+    }

@@ -1,0 +1,212 @@
+"""Notebook 06: the table of a noise sweep, its statistics, and flights of it flown again."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import polars as pl
+
+from ibvs_qp.config.errors import ConfigError
+from sim.experiments import Choice
+from sim.experiments import designs as experiment_runs
+from sim.figures.style import law_name
+from sim.flight.closed_loop import fly
+from sim.flight.trace import Trace
+from sim.notebook.noise_sample import SAMPLE, sample_runs
+from sim.notebook.table import table
+from sim.sweep.design import Run
+from sim.sweep.fingerprint import code_hash, configuration_hash
+from sim.sweep.paired import needed, paired_differences, sign
+from sim.sweep.parts import PARAM
+
+LAWS = ("qp", "paper")
+#: Columns of the two noises, and columns that identify a noise sweep.
+VS, FORCE = PARAM + "sigma_vs", PARAM + "sigma_f_n"
+NEEDED = ("law", "seed", "completed", "reason", VS, FORCE)
+#: Camera distance in contact [m]: sigma_vs times this is the noise of a line on the wall.
+DEPTH_M = 0.5
+#: More seeds per cell than any sweep of this design has.
+MOST_SEEDS = 10
+#: By the sign of analytic law minus QP law in a figure that should be small.
+_VERDICTS = {1: "QP better", 0: "no significant difference", -1: "analytic law better"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Figure:
+    """A column with its label, the factor into the unit of the label, and whether larger values are better."""
+
+    column: str
+    label: str
+    scale: float = 1.0
+    more_is_better: bool = False
+
+
+FIGURES = (
+    Figure(column="path_rms_m", label="path error, rms [mm]", scale=1e3),
+    Figure(column="force_rms_n", label="push error, rms [N]"),
+    Figure(column="path_max_m", label="path error, greatest [mm]", scale=1e3),
+    Figure(column="tilt_rms_deg", label="tilt, rms [deg]"),
+    Figure(column="yaw_rms_deg", label="yaw, rms [deg]"),
+    Figure(column="velocity_rms_m_s", label="error of the estimated velocity, rms [mm/s]", scale=1e3),
+    Figure(column="coverage", label="painted part of the intended band [%]", scale=1e2, more_is_better=True),
+    Figure(column="limited_share", label="ticks with an active limit [%]", scale=1e2),
+    Figure(column="duration_s", label="duration [s]"),
+)
+
+
+def read_sweep(file: str) -> pl.DataFrame:
+    """Table of a noise sweep; without a file name the sample of the notebooks.
+
+    Raises:
+        ConfigError: When there is no such file, or it is no noise sweep.
+    """
+    path = Path(file) if file else SAMPLE
+    if not path.is_file():
+        raise ConfigError(f"no file {file}; ibvs-qp experiment noise-sweep writes one")
+    try:
+        sweep = pl.read_parquet(path)
+    except pl.exceptions.PolarsError as error:
+        raise ConfigError(f"{path.name}: not a Parquet table ({str(error).splitlines()[0]})") from error
+    missing = [name for name in NEEDED if name not in sweep.columns]
+    if missing:
+        raise ConfigError(f"{path.name}: not a noise sweep, no column {', '.join(missing)}")
+    return sweep
+
+
+def sweep_or_sample(file: str) -> tuple[pl.DataFrame, str]:
+    """The table of a file and "", or the sample and the error."""
+    try:
+        return read_sweep(file), ""
+    except ConfigError as error:
+        return read_sweep(""), f"{error}. The page shows the sample."
+
+
+def grid_of(sweep: pl.DataFrame) -> tuple[list[float], list[float]]:
+    """Values of sigma_vs and of sigma_f, ascending."""
+    return sorted(sweep[VS].unique()), sorted(sweep[FORCE].unique())
+
+
+def cell_values(sweep: pl.DataFrame, law: str, vs: float, force: float, figure: Figure) -> np.ndarray:
+    """Figure of the completed flights of a cell, in the unit of its label."""
+    if figure.column not in sweep.columns:
+        return np.array([])
+    rows = sweep.filter((pl.col("law") == law) & (pl.col(VS) == vs) & (pl.col(FORCE) == force) & pl.col("completed"))
+    return figure.scale * rows[figure.column].drop_nulls().to_numpy()
+
+
+def success(sweep: pl.DataFrame) -> pl.DataFrame:
+    """Number of flights and fraction completed per law and cell."""
+    keys = ["law", VS, FORCE]
+    return sweep.group_by(keys).agg(pl.len().alias("flights"), pl.col("completed").mean()).sort(keys)
+
+
+def success_table(sweep: pl.DataFrame) -> str:
+    """Completed flights of each cell and the reasons of the others, as markdown."""
+    sigmas, forces = grid_of(sweep)
+    counts = {(row["law"], row[VS], row[FORCE]): row for row in success(sweep).to_dicts()}
+    rows = []
+    for law in LAWS:
+        for vs in sigmas:
+            cells = (counts.get((law, vs, force)) for force in forces)
+            texts = (f"{c['completed'] * c['flights']:.0f} of {c['flights']}" if c else "–" for c in cells)
+            rows.append((law_name(law), f"{vs:g}", *texts))
+    reasons = sweep.filter(~pl.col("completed")).group_by("law", "reason").len().sort("len", "law", descending=True)
+    failed = "; ".join(f"{count} × {law_name(law)}: {reason}" for law, reason, count in reasons.head(6).rows())
+    header = ["law", "sigma_vs", *(f"sigma_f {force:g} N" for force in forces)]
+    return table(header, rows) + f"\n\nNot completed: {failed or 'none'}."
+
+
+def effects(sweep: pl.DataFrame, law: str, figure: Figure) -> dict[str, float]:
+    r"""Effects of the two noises on a positive figure over the completed flights of a law.
+
+    Fitted is :math:`\log y = a + b \log \sigma_{vs} + c \log \sigma_f + \text{rest}`.
+
+    Returns:
+        ``flights``; the exponents b ``vs`` and c ``force`` (0: no effect, 1: proportional); and the fractions of the
+        scatter of log y that sigma_vs alone, sigma_f alone, and not even both explain: ``vs_part``, ``force_part`` and
+        ``rest``. NaN with too few flights.
+    """
+    flown = sweep.filter((pl.col("law") == law) & pl.col("completed") & (pl.col(figure.column) > 0.0))
+    logs = flown.select(pl.col(figure.column).log().alias("y"), pl.col(VS).log(), pl.col(FORCE).log())
+    y, vs, force = logs.to_numpy().T
+    if len(y) <= 3 or min(np.ptp(y), np.ptp(vs), np.ptp(force)) == 0.0:
+        return {"flights": len(y), **dict.fromkeys(("vs", "force", "vs_part", "force_part", "rest"), math.nan)}
+    slope = np.linalg.lstsq(np.column_stack((np.ones(len(y)), vs, force)), y, rcond=None)[0]
+
+    def explained(*groups: str) -> float:
+        means = logs.select(pl.col("y").mean().over(groups)).to_series().to_numpy()
+        return float(means.var() / y.var())
+
+    parts = {"vs_part": explained(VS), "force_part": explained(FORCE), "rest": 1.0 - explained(VS, FORCE)}
+    return {"flights": len(y), "vs": float(slope[1]), "force": float(slope[2]), **parts}
+
+
+def averaged_samples(sweep: pl.DataFrame, law: str) -> tuple[dict[float, float], dict[float, float]]:
+    r"""Least number of averaged samples behind an error: :math:`N = (\sigma / \text{rms})^2`.
+
+    For each noise at the smallest value of the other one, by the median of the completed flights.
+
+    Returns:
+        Pictures behind the path error per sigma_vs, and force samples behind the push error per sigma_f; NaN without
+        flights.
+    """
+    (path, push), (sigmas, forces) = FIGURES[:2], grid_of(sweep)
+
+    def count(noise: float, values: np.ndarray) -> float:
+        return (noise / float(np.median(values))) ** 2 if len(values) else math.nan
+
+    pictures = {vs: count(vs * DEPTH_M * path.scale, cell_values(sweep, law, vs, forces[0], path)) for vs in sigmas}
+    return pictures, {force: count(force, cell_values(sweep, law, sigmas[0], force, push)) for force in forces}
+
+
+def differences_table(sweep: pl.DataFrame, figure: Figure) -> str:
+    """Analytic law minus QP law, seed by seed: median with its exact interval per cell, as markdown."""
+    rows = []
+    for cell in paired_differences(sweep.filter(pl.col("completed")), [figure.column]):
+        found = cell["differences"].get(figure.column)
+        if found is None:
+            continue
+        low, middle, high = (figure.scale * found[name] for name in ("sure_low", "median", "sure_high"))
+        enough, better = math.isfinite(low), -sign(found) if figure.more_is_better else sign(found)
+        verdict = _VERDICTS[better] if enough else f"significant from {needed()} pairs on"
+        sigmas = (f"{cell['params'][name]:g}" for name in ("sigma_vs", "sigma_f_n"))
+        rows.append((*sigmas, cell["n"], f"{middle:+.2f}", f"{low:+.2f} to {high:+.2f}" if enough else "–", verdict))
+    header = ["sigma_vs", "sigma_f [N]", "pairs", f"analytic − QP, {figure.label}", "95 % interval", "result"]
+    return table(header, rows)
+
+
+def row_name(row: dict[str, Any]) -> str:
+    """Law, cell and seed of a row as text."""
+    return f"{row['law']}, sigma_vs {row[VS]:g}, sigma_f {row[FORCE]:g} N, seed {row['seed']}"
+
+
+def find_run(row: dict[str, Any]) -> Run:
+    """The run of a row: the one with its configuration, otherwise the same cell of the sample.
+
+    Raises:
+        LookupError: When no design has such a cell, law and seed.
+    """
+    designs = [sample_runs(MOST_SEEDS)]
+    designs += [experiment_runs("noise-sweep", Choice(features=features)) for features in ("geometric", "rendered")]
+    key = (row["law"], row["seed"], row[VS], row[FORCE])
+    alike = [
+        run
+        for design in designs
+        for run in design
+        if (run.law, run.seed, run.params["sigma_vs"], run.params["sigma_f_n"]) == key
+    ]
+    if not alike:
+        raise LookupError(f"no flight {row_name(row)}")
+    return next((run for run in alike if configuration_hash(run) == row.get("config_hash")), alike[0])
+
+
+def fly_again(row: dict[str, Any]) -> tuple[Trace, dict[str, float], bool]:
+    """Fly the run of a row; its trace and figures, and whether code and settings are those of the row."""
+    run = find_run(row)
+    plan = run.plan
+    trace = fly(plan.scene, plan.options, config=plan.config, job=plan.job, faults=plan.faults)
+    return trace, run.measure(trace), (configuration_hash(run), code_hash()) == (row["config_hash"], row["code_hash"])
