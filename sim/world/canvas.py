@@ -201,8 +201,8 @@ class Canvas:
         rows, columns = np.divmod(changed, c1 - c0)
         place = (rows + r0) * self._drawn.shape[1] + (columns + c0)
         fresh, blank = _pixels(self._fresh).take(place), _pixels(self._blank).take(place)
-        share = coverage[rows, columns]
-        mixed = _mix(share, fresh.view(np.uint8).reshape(-1, 4), blank.view(np.uint8).reshape(-1, 4))
+        fraction = coverage[rows, columns]
+        mixed = _mix(fraction, fresh.view(np.uint8).reshape(-1, 4), blank.view(np.uint8).reshape(-1, 4))
         _pixels(self.texture)[place] = mixed.view(np.uint32).reshape(-1)
         drawn[:] = coverage
         return box
@@ -218,9 +218,9 @@ def _pixels(picture: np.ndarray) -> np.ndarray:
     return picture.view(np.uint32).reshape(-1)
 
 
-def _mix(share: np.ndarray, fresh: np.ndarray, blank: np.ndarray) -> np.ndarray:
-    """Paint over ground: pixels uint8 (n, 4) by the share of the paint in 255ths, uint8 (n,)."""
-    wide = share[:, None].astype(np.uint16)
+def _mix(fraction: np.ndarray, fresh: np.ndarray, blank: np.ndarray) -> np.ndarray:
+    """Paint over ground: pixels uint8 (n, 4) by the fraction of the paint in 255ths, uint8 (n,)."""
+    wide = fraction[:, None].astype(np.uint16)
     return ((fresh * wide + blank * (255 - wide) + 127) // 255).astype(np.uint8)
 
 

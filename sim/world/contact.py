@@ -5,7 +5,7 @@ body's :math:`\hat m` = 1 / ``body_invweight0``. With the direct format ``solref
 :math:`K = k \hat m / (1 - d)`, a damper of :math:`b \hat m / (1 - d)` and an apparent mass of
 :math:`d \hat m / (1 - d)`. The regularised friction cone also adds :math:`\mu r v\, d \hat m / (1 - d)` to the normal
 force of a tip that slides at speed v, r being the rate of the friction rows; settings for which this comes near the
-push make a sliding tip chatter. A small d makes both terms vanish: the contact is then the wanted spring and damper,
+push make a sliding tip chatter. A small d makes both terms vanish: the contact is then the specified spring and damper,
 and the no-slip pass, which works without regularisation, alone decides the friction.
 """
 
@@ -40,7 +40,7 @@ def pair_xml(tip: str, board: str, name: str = "brush") -> str:
 def set_contact(
     model: mujoco.MjModel, *, stiffness: float, damping: float, friction: float, name: str = "brush"
 ) -> None:
-    """Give a compiled model's contact pair the wanted physical stiffness, damping and friction.
+    """Give a compiled model's contact pair the specified physical stiffness, damping and friction.
 
     Args:
         model: Compiled model with the pair of `pair_xml`; its masses must be final.

@@ -178,6 +178,6 @@ def build_model(scene: Scene, vehicle: VehicleParams, drawn: bool = True) -> tup
         sensor = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SENSOR, name)
         start = int(model.sensor_adr[sensor])
         slices[name] = slice(start, start + int(model.sensor_dim[sensor]))
-        # A ring of samples behind two numbers of MuJoCo's own and the stamps; whole ticks leave its oldest first.
+        # Layout: two numbers of MuJoCo's own, the stamps, a ring of samples; after a whole tick the oldest is first.
         remembered.append(int(model.sensor_historyadr[sensor]) + 2 + STEPS_PER_TICK)
     return model, ModelIds(**ids, **slices, remembered=tuple(remembered))

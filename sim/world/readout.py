@@ -76,7 +76,7 @@ def readout(size: int, accelerometer: int, force: int, torque: int, contact: int
     swing = turned(rotation, cross_product(rate, centre))
     felts = zip(*(sensed(accelerometer, 3, step) for step in range(steps)), strict=True)
     felt = [sum(samples[1:], samples[0]) for samples in felts]
-    share = 1.0 / steps
+    fraction = 1.0 / steps
     fx, fy, fz, mx, my, mz = (*sensed(force, 3, -1), *sensed(torque, 3, -1))
     touches = [sensed(contact, 10, step) for step in range(steps)]
     pushes = [ca.if_else(touch[0] > 0.0, touch[1], 0.0) for touch in touches]
@@ -96,7 +96,7 @@ def readout(size: int, accelerometer: int, force: int, torque: int, contact: int
         "body_velocity": turned_back(rotation, velocity),
         "centre_velocity": [a + b for a, b in zip(velocity, swing, strict=True)],
         "tip": [a + b for a, b in zip(position, turned(rotation, tip), strict=True)],
-        "felt": (share * felt[0], -share * felt[1], -share * felt[2]),
+        "felt": (fraction * felt[0], -fraction * felt[1], -fraction * felt[2]),
         "ft_wrench": (fx, -fy, -fz, mx, -my, -mz),
         "pushes": pushes,
         "friction": friction,
@@ -113,8 +113,8 @@ def drive(rotors: int) -> ca.Function:
     Function of (commanded, lower, upper, actual thrusts, lags, air, rotation, arm) yielding the limited thrusts [N],
     the time constant of every rotor [s], and force and moment of the air, front-left-up [N, N m]. ``air`` is its force
     at the true centre of mass in the world [N], ``arm`` the way there from the bare vehicle's centre of mass, where
-    MuJoCo applies forces, in B [m]. Under a constant command a first-order lag never crosses it, so one choice between
-    the lags up and down holds for the tick.
+    MuJoCo applies forces, in B [m]. Under a constant command a first-order lag never crosses it, so one choice
+    between the lags up and down holds for the tick.
     """
     commanded, lower, upper, actual = (ca.SX.sym(name, rotors) for name in ("commanded", "lower", "upper", "actual"))
     lags, air, rotation, arm = ca.SX.sym("lags", 2), ca.SX.sym("air", 3), ca.SX.sym("rotation", 9), ca.SX.sym("arm", 3)

@@ -48,7 +48,7 @@ class WallScene(_Checked):
 
 @dataclass(frozen=True, kw_only=True)
 class PaintScene(_Checked):
-    """The paint job; known to the painting strategy."""
+    """The paint job, an input of the painting strategy."""
 
     color: Color = setting((40, 90, 200), "paint colour", low=0, high=255)
     brush_width_m: float = setting(0.08, "diameter of the round brush", unit="m", low=0.02, high=0.3)

@@ -104,7 +104,7 @@ def _within(box: tuple[int, int, int, int], shape: tuple[int, ...]) -> tuple[int
 def _mend_rim(picture: np.ndarray, cut: CutLine) -> None:
     """Mix the pixels along one edge of the board's outline from the neighbours on its two sides, in place."""
     height, width = cut.shape
-    places, share = cut.rim((0, height, 0, width))
+    places, fraction = cut.rim((0, height, 0, width))
     near, far = places.reshape(2, -1)  # the two pixels that the edge passes between, smaller index first
     count = len(near)
     along = np.arange(count, dtype=float)
@@ -117,6 +117,6 @@ def _mend_rim(picture: np.ndarray, cut: CutLine) -> None:
     board, wall = (behind, before) if cut.normal[int(cut.flat)] > 0 else (before, behind)
     flat = picture.reshape(-1, 3)
     on, off = flat[board].astype(np.float32), flat[wall].astype(np.float32)
-    for row, part in zip((near, far), share.reshape(2, -1), strict=True):
+    for row, part in zip((near, far), fraction.reshape(2, -1), strict=True):
         weight = part[used, None].astype(np.float32) * np.float32(1.0 / 256.0)
         flat[row[used]] = np.rint(off + weight * (on - off)).astype(np.uint8)

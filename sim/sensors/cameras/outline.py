@@ -47,7 +47,7 @@ class CutLine:
     flat: bool
 
     def _across(self, places: np.ndarray) -> np.ndarray:
-        """Where the line runs, across its longer direction, at whole pixels along it [px]."""
+        """Position of the line across its longer direction, at whole pixels along it [px]."""
         across = int(self.flat)
         return -(self.normal[1 - across] * places + self.offset) / self.normal[across]
 
@@ -66,9 +66,9 @@ class CutLine:
         return ((b0, b1, c0, c1), (l0, l1, c0, c1)) if self.flat else ((r0, r1, b0, b1), (r0, r1, l0, l1))
 
     def rim(self, box: Box) -> tuple[np.ndarray, np.ndarray]:
-        """Flat indices of the pixels of a box near the line, and the board's share of each in 256ths, uint32 (n,).
+        """Flat indices of the pixels of a box near the line, and the board's fraction of each in 256ths, uint32 (n,).
 
-        Places outside the box are moved to its border: the share is computed for where they then are.
+        Places outside the box are moved to its border: the fraction is computed for where they then are.
         """
         r0, r1, c0, c1 = box
         low, high, first, end = (r0, r1, c0, c1) if self.flat else (c0, c1, r0, r1)

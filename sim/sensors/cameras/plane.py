@@ -119,9 +119,9 @@ class PlaneCamera:
         if r0 >= r1 or c0 >= c1:
             return
         self._draw(wall, band, self._behind, self._inverse_behind)
-        places, share = cut.rim(band)
+        places, fraction = cut.rim(band)
         picture = self._picture.view(np.uint32).reshape(-1)
-        mixed = _mix(picture.take(places), self._behind.view(np.uint32).reshape(-1).take(places), share)
+        mixed = _mix(picture.take(places), self._behind.view(np.uint32).reshape(-1).take(places), fraction)
         mask = self._mask[r0:r1, c0:c1]
         mask[:] = 0
         if len(cut.beyond):
@@ -143,9 +143,9 @@ def _inverse(matrix: np.ndarray) -> np.ndarray:
     return np.array(rows) / (a * rows[0][0] + b * rows[1][0] + c * rows[2][0])
 
 
-def _mix(front: np.ndarray, behind: np.ndarray, share: np.ndarray) -> np.ndarray:
+def _mix(front: np.ndarray, behind: np.ndarray, fraction: np.ndarray) -> np.ndarray:
     """Pixels, uint32 of four bytes, mixed with the weight of the front one in 256ths; two bytes at a time."""
-    rest = np.uint32(256) - share
-    even = ((front & _EVEN) * share + (behind & _EVEN) * rest + _HALF) >> np.uint32(8)
-    odd = ((front >> np.uint32(8)) & _EVEN) * share + ((behind >> np.uint32(8)) & _EVEN) * rest + _HALF
+    rest = np.uint32(256) - fraction
+    even = ((front & _EVEN) * fraction + (behind & _EVEN) * rest + _HALF) >> np.uint32(8)
+    odd = ((front >> np.uint32(8)) & _EVEN) * fraction + ((behind >> np.uint32(8)) & _EVEN) * rest + _HALF
     return (even & _EVEN) | (odd & ~_EVEN)

@@ -56,7 +56,7 @@ def press(controller: HybridController, push: float, limit: np.ndarray, ticks: i
 
 
 def test_holds_a_push_with_one_rotor_idle() -> None:
-    """Where a hexarotor loses its hover, the redundant pair carries on; the reach tells beforehand."""
+    """Where a hexarotor loses its hover, the redundant pair carries on, as the reach predicts."""
     limit = np.full(8, FULL)
     limit[0] = VEHICLE.thrust_min[0]
     assert push_reach(OCTOROTOR, 6.0 * 9.81, np.array([0.7, 0.0, 0.0]), 1.2, limit).push > 10.0

@@ -1,4 +1,4 @@
-"""What goes wrong in flight: when it strikes, what it changes, and what the pilot is told."""
+"""Faults in flight: their time, their effect on the plant, and the limits reported to the pilot."""
 
 from __future__ import annotations
 

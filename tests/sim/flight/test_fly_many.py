@@ -1,4 +1,4 @@
-"""Create once, fly many: what is shared between flights changes none of them, and what nobody sees is not drawn."""
+"""Shared and lazy parts of a flight: textures drawn on access, noise in blocks, objects made at once."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from sim.flight.trace import Trace
 from sim.world.random_streams import NormalRows, stream
 
 
-def test_without_a_camera_nothing_is_drawn_until_somebody_looks() -> None:
+def test_without_a_camera_nothing_is_drawn_before_access() -> None:
     scene, options = short_scene(stroke_m=0.2, rows=1), FlightOptions(features="geometric", video=False)
     world = World(scene, options, pilot_config(scene, options))
     for _ in range(20):

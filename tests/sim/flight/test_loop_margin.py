@@ -30,7 +30,7 @@ from sim.world.scene import ForceTorqueScene, ImuScene, Scene
 
 #: Mean age of the force in the simulated loop beyond its latency: half a period of 100 Hz [s].
 HALF_SAMPLE = 0.005
-#: When the commanded push steps by how much, counted from the start of the hold [s], [N].
+#: Time of the step of the push command from the start of the hold [s], and its size [N].
 STEP_TIME, STEP = 4.0, 2.0
 
 
@@ -40,7 +40,7 @@ def with_gains(**gains: float) -> ControllerConfig:
 
 
 class StepPainter(HoldPainter):
-    """Holds, and after a while wants more push."""
+    """Holds, with a step of the push command."""
 
     def _command(self, inputs: Any, **rest: Any) -> Any:
         command = super()._command(inputs, **rest)
@@ -63,7 +63,7 @@ def quiet_scene(stiffness: float, latency: float, distance: float) -> Scene:
 def pushed(
     stiffness: float, latency: float, seconds: float, distance: float = 0.2, **gains: float
 ) -> tuple[ControllerConfig, np.ndarray]:
-    """True push at 250 Hz over a hold with a step of the commanded push, and the controller with the K_fp that it used.
+    """True push at 250 Hz over a hold with a step of the command, and the controller with the K_fp it really used.
 
     The controller divides K_fp by the stiffness it has estimated, which is off by up to a third.
     """

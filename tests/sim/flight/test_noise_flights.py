@@ -1,4 +1,4 @@
-"""Painting with noise that nobody tells the pilot: the corners of the noise sweep, in closed loop."""
+"""Painting with unreported noise: the corners of the noise sweep, in closed loop."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def test_corners_of_the_noise_sweep(vs: float, force: float, law: str) -> None:
 
 @pytest.mark.slow
 def test_moments_as_noisy_as_the_forces() -> None:
-    """Moments noisy in the same proportion, 0.15 N m at 3 N, still tell the force across the tool better."""
+    """Moments noisy in the same proportion, 0.15 N m at 3 N, still measure the force across the tool better."""
     trace = fly(noisy(0.02, 3.0, sigma_nm=0.15), FlightOptions(law="qp", video=False))
     assert trace.completed, trace.reason
     assert paint_figures(trace)["path_rms_m"] <= bound("path_rms_m", sigma_vs=0.02)

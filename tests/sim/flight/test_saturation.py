@@ -1,4 +1,4 @@
-"""Static push at and beyond what the rotors can hold: who pays, and what the commands say."""
+"""Static push at and beyond the reach of the rotors: errors of both laws and reports of their commands."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ REACH_N = 30.4
 
 
 def press(push: float, friction: float, reach_check: bool = True, law: str = "qp", slide_s: float = 0.0) -> Trace:
-    """Press at one place, and slide to the left if asked to."""
+    """Press at one place, and optionally slide to the left."""
     scene = Scene(wall=wall(friction=friction))
     scene = dataclasses.replace(scene, paint=dataclasses.replace(scene.paint, push_n=push))
     options = FlightOptions(law=law, features="geometric", video=False)
@@ -105,4 +105,4 @@ def test_a_sliding_push_beyond_reach_is_reduced_with_the_reason(
     assert any("reduced" in text and "friction" in text and "along the travel" in text for text in notes(trace))
     assert rms <= 1.0
     if law == "qp":
-        assert speed == pytest.approx(0.1, abs=0.02), "it slides in the end, and at the speed that was asked"
+        assert speed == pytest.approx(0.1, abs=0.02), "it slides in the end, and at the commanded speed"

@@ -26,7 +26,7 @@ from sim.world.scene import PaintScene, Scene
 
 BACK_END, WHY_NOT = resolve_camera("gl")
 needs_gl = pytest.mark.skipif(BACK_END != "gl", reason=WHY_NOT or "")
-#: Agreement asked for: grey levels, pixels, metres.
+#: Required agreement: grey levels, pixels, metres.
 GREY, EDGE_PX, DEPTH_M = 3, 0.1, 1e-4
 POSES = [(1.2, 0.1, 0.05, 1.0, 0.5, 3.0), (0.2, 0.3, 0.0, -1.0, 0.0, -2.0), (0.7, 0.05, 0.45, 0.5, 0.0, 5.0)]
 
@@ -84,7 +84,7 @@ def test_pictures_agree(pose: tuple[float, ...], clutter: int) -> None:
     assert difference[clear].max() <= GREY
     assert (difference[~clear] > GREY).mean() < 0.02, "mended rims differ in the grain alone"
     assert difference.max() <= 3 * GREY
-    off = away_from(rim, 2)  # which side a pixel on the rim belongs to is nobody's truth
+    off = away_from(rim, 2)  # a pixel on the rim may belong to either side
     assert np.abs(one.depth - two.depth)[off].max() <= DEPTH_M
     assert (two.stamp_ns, two.intrinsics) == (7, one.intrinsics)
     assert two.rgb.dtype == np.uint8 and two.depth.dtype == np.float32
@@ -211,10 +211,10 @@ def bare(monkeypatch) -> None:
 
 
 def test_without_opengl_the_plane_camera_flies_and_one_line_says_so(bare) -> None:
-    for wanted in ("gl", "auto"):
-        camera, note = resolve_camera(wanted)
+    for option in ("gl", "auto"):
+        camera, note = resolve_camera(option)
         assert camera == "plane" and note is not None
-        for word in (f"--camera {wanted}", "egl: library not found", "osmesa: library", "libegl1", "flying with plane"):
+        for word in (f"--camera {option}", "egl: library not found", "osmesa: library", "libegl1", "flying with plane"):
             assert word in note
         assert "\n" not in note
     assert resolve_camera("plane") == ("plane", None)

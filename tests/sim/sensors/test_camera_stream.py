@@ -15,7 +15,7 @@ TICK_NS = 4_000_000
 
 
 class CountingCamera:
-    """Back end that notes when it was asked."""
+    """Back end that records the time of every capture."""
 
     intrinsics = (1.0, 1.0, 0.0, 0.0)
 

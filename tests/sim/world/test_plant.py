@@ -202,7 +202,7 @@ def test_contact_reads_zero_in_free_air_and_friction_opposes_the_slide():
 
 
 def test_forces_of_a_tick_are_those_of_its_physics_steps_in_order():
-    """MuJoCo's memory of its sensors is read oldest first: the same steps taken singly tell what it must hold."""
+    """MuJoCo's sensor history is read oldest first, compared with the same steps taken one by one."""
     plant, single = Plant(Scene(), seed=2), Plant(Scene(), seed=2)
     for each in (plant, single):
         each.data.qpos[0] += 0.002 - each.tip[0]  # 2 mm inside the wall: the push changes from step to step
