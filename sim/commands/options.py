@@ -13,9 +13,7 @@ from typing import Any
 import tyro
 
 from ibvs_qp.config.errors import ConfigError, out_of_range
-
-#: Exit code after Ctrl-C.
-EXIT_INTERRUPTED = 130
+from sim.commands.cli import EXIT_INTERRUPTED
 
 #: Help of a switch: no default is printed.
 flag = tyro.conf.arg(help_behavior_hint="")

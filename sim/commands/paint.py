@@ -8,8 +8,8 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
+from sim.commands.cli import EXIT_INTERRUPTED
 from sim.commands.options import (
-    EXIT_INTERRUPTED,
     check_mujoco,
     check_readable,
     check_seed,
