@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-import functools
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from enum import StrEnum
+from functools import cached_property
+from typing import overload
 
 import numpy as np
 
@@ -32,22 +34,22 @@ class TaskReport:
     residual: float
 
 
-@dataclass(frozen=True, kw_only=True)
-class TaskValues:
-    """Values of all task rows of one tick, in one array each: cheap to store at every tick.
+@dataclass(frozen=True, eq=False)
+class TaskReports(Sequence[TaskReport]):
+    """Reports of the task rows with a weight; built when read, because a tick has 4 ms and a report takes 1 us.
 
     Attributes:
         rows: Name and unit of every task row.
         weights: Their weights, (rows,). Likewise asked and achieved values.
     """
 
-    rows: tuple[tuple[str, str], ...] = ()
-    weights: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    asked: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    achieved: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    rows: tuple[tuple[str, str], ...]
+    weights: np.ndarray
+    asked: np.ndarray
+    achieved: np.ndarray
 
-    def reports(self) -> tuple[TaskReport, ...]:
-        """One report for every row with a weight."""
+    @cached_property
+    def _reports(self) -> tuple[TaskReport, ...]:
         columns = zip(self.rows, self.weights.tolist(), self.asked.tolist(), self.achieved.tolist(), strict=True)
         return tuple(
             TaskReport(name=name, unit=unit, weight=weight, asked=asked, achieved=value, residual=value - asked)
@@ -55,9 +57,27 @@ class TaskValues:
             if weight > 0.0
         )
 
+    def __len__(self) -> int:
+        """Number of task rows with a weight."""
+        return len(self._reports)
 
-#: Of a command without task rows.
-NO_TASKS = TaskValues()
+    @overload
+    def __getitem__(self, index: int) -> TaskReport: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> tuple[TaskReport, ...]: ...
+
+    def __getitem__(self, index: int | slice) -> TaskReport | tuple[TaskReport, ...]:
+        """One report, or a tuple of them."""
+        return self._reports[index]
+
+    def __eq__(self, other: object) -> bool:
+        """As tuples of reports are equal."""
+        return isinstance(other, Sequence) and self._reports == tuple(other)
+
+    def __hash__(self) -> int:
+        """As the tuple of reports."""
+        return hash(self._reports)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,7 +102,7 @@ class Command:
         outcome: How it was found.
         mode: Contact phase: "free", "approach", "contact" or "hold".
         rejected: Names of the inputs that were refused, with the reason.
-        task_values: Values of the task rows (QP law); `tasks` are the same as reports.
+        tasks: Task reports (QP law).
         active_limits: Active limits (QP law; clipped rotors for the analytic law).
         unallocated_wrench: Wrench of the same tick without limits minus the wrench [N, N m], (6,).
         reach_margin: Further push possible at the present contact [N], NaN if unknown.
@@ -96,14 +116,9 @@ class Command:
     outcome: Outcome
     mode: str
     rejected: tuple[str, ...] = ()
-    task_values: TaskValues = NO_TASKS
+    tasks: Sequence[TaskReport] = ()
     active_limits: tuple[ActiveLimit, ...] = ()
     unallocated_wrench: np.ndarray
     reach_margin: float = float("nan")
     iterations: int = 0
     solve_time_s: float = 0.0
-
-    @functools.cached_property
-    def tasks(self) -> tuple[TaskReport, ...]:
-        """Reports of the task rows with a weight."""
-        return self.task_values.reports()

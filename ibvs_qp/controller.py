@@ -15,7 +15,7 @@ from ibvs_qp.model.reporting import clipped_command, contact_mode, reach_margin,
 from ibvs_qp.model.setpoints import Setpoints
 from ibvs_qp.qp.accept import AcceptedSolution, QpEngine
 from ibvs_qp.qp.evaluator import ProgramData
-from ibvs_qp.qp.explain import active_limits, task_values
+from ibvs_qp.qp.explain import active_limits, task_reports
 from ibvs_qp.qp.faults import program_faults
 from ibvs_qp.qp.problem import QpProblem
 from ibvs_qp.safety.hover import hold_thrusts
@@ -137,7 +137,7 @@ class HybridController:
             unallocated = terms.effectiveness.dot(data.free - thrusts)
             given_up = max(map(abs, unallocated.tolist()))
             limits = active_limits(self.template, solution.x, solution.y)
-        tasks = task_values(self.template, data, thrusts)
+        tasks = task_reports(self.template, data, thrusts)
         terms.note(thrusts, given_up)
         return Command(
             stamp_ns=int(measurement.stamp_ns),
@@ -146,7 +146,7 @@ class HybridController:
             outcome=solution.outcome,
             mode=contact_mode(terms, self._reference),
             rejected=rejected + reach_note(terms, self._reference),
-            task_values=tasks,
+            tasks=tasks,
             active_limits=limits,
             unallocated_wrench=unallocated,
             reach_margin=reach_margin(terms),

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ibvs_qp.command import ActiveLimit, TaskReport, TaskValues
+from ibvs_qp.command import ActiveLimit, TaskReport, TaskReports
 from ibvs_qp.qp.accept import ACTIVE_MULTIPLIER
 from ibvs_qp.qp.evaluator import ProgramData, RecordedProgram
 from ibvs_qp.qp.exact import ExactSolver
@@ -51,10 +51,10 @@ class Explanation:
     unallocated_wrench: np.ndarray
 
 
-def task_values(template: QpProblem, data: ProgramData, thrusts: np.ndarray) -> TaskValues:
-    """Weight, target and achieved value of every task row."""
+def task_reports(template: QpProblem, data: ProgramData, thrusts: np.ndarray) -> TaskReports:
+    """Target, achieved value and residual of every task row with a weight."""
     achieved, asked, weights = data.report(data.point, thrusts)
-    return TaskValues(rows=template.task_names, weights=weights.copy(), asked=asked.copy(), achieved=achieved.copy())
+    return TaskReports(template.task_names, weights.copy(), asked.copy(), achieved.copy())
 
 
 def active_limits(template: QpProblem, x: np.ndarray, y: np.ndarray) -> tuple[ActiveLimit, ...]:
@@ -106,7 +106,7 @@ class TickReplay:
             return None
         x, y = solution
         thrusts = x[: template.model.rotors]
-        tasks = task_values(template, data, thrusts).reports()
+        tasks = tuple(task_reports(template, data, thrusts))
         cost = np.array([0.5 * task.weight * task.residual**2 for task in tasks])
         slack = x[len(thrusts) :]
         slack_cost = 0.5 * float(slack @ (data.hessian().diagonal()[len(thrusts) :] * slack))
