@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 
-from ibvs_qp.estimation.contact import ContactEstimator
+from ibvs_qp.estimation.contact_state import ContactState
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL, Measurement, Reference
 from ibvs_qp.model.inputs import ARRAYS, REFERENCE_INPUTS, SLOT_INPUTS, TOUCH
 from ibvs_qp.model.pairing import LinePairing
@@ -37,7 +37,7 @@ class TickInputs:
         self._vertical = [0.0] * self._slots
         self._lines = [0.0] * (self._slots * SLOT_INPUTS)
 
-    def write(self, measurement: Measurement, reference: Reference, contact: ContactEstimator, dt: float) -> None:
+    def write(self, measurement: Measurement, reference: Reference, contact: ContactState, dt: float) -> None:
         """Pack one checked measurement, its reference and the contact as estimated.
 
         Args:
@@ -47,7 +47,7 @@ class TickInputs:
             dt: Time since the last tick [s].
         """
         force, velocity = measurement.specific_force, measurement.velocity
-        press, known, stiffness = reference.contact, contact.known, contact.stiffness
+        press, known = reference.contact, contact.known
         self._pair(measurement, reference, known)
         self._pack(
             self._memory,
@@ -57,7 +57,7 @@ class TickInputs:
             *measurement.contact_wrench.tolist(),
             *(_NOTHING if force is None else force.tolist()),
             *(_NOTHING if velocity is None else velocity.tolist()),
-            *contact.direction,
+            *contact.normal,
             dt,
             force is not None,
             velocity is not None,
@@ -71,8 +71,8 @@ class TickInputs:
             contact.across_noise,
             contact.in_contact,
             contact.ramp,
-            stiffness.value,
-            stiffness.known,
+            contact.stiffness,
+            contact.stiffness_known,
             reference.push_force,
             reference.standoff,
             *reference.velocity.tolist(),

@@ -112,8 +112,18 @@ class Setpoints:
             dt = (stamp - self._stamp) * 1e-9
             dt = LONGEST_TICK if dt > LONGEST_TICK else dt if dt > 0.0 else 0.0
         self._stamp = stamp
-        self.contact.update(measurement, down_in_body(measurement.attitude))
-        self._inputs.write(measurement, reference, self.contact, dt)
+        force = measurement.specific_force
+        contact = self.contact.update(
+            stamp_ns=stamp,
+            angular_velocity=measurement.angular_velocity.tolist(),
+            specific_force=None if force is None else force.tolist(),
+            down=down_in_body(measurement.attitude),
+            contact_wrench=measurement.contact_wrench,
+            wrench_stamp_ns=measurement.wrench_stamp_ns,
+            plane=measurement.plane,
+            plane_stamp_ns=measurement.plane_stamp_ns,
+        )
+        self._inputs.write(measurement, reference, contact, dt)
         if self.last is None:
             values["thrust_last"][:] = hold_thrusts(config, measurement)
         low, high = measurement.thrust_min, measurement.thrust_max
