@@ -41,6 +41,12 @@ def cross(a: Sequence[float], b: Sequence[float]) -> Vector3:
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
+def add_scaled(a: Sequence[float], scale: float, b: Sequence[float]) -> Vector3:
+    """A + scale b of two 3-vectors."""
+    (ax, ay, az), (bx, by, bz) = a, b
+    return ax + scale * bx, ay + scale * by, az + scale * bz
+
+
 def unit(vector: Sequence[float]) -> Vector3:
     """A 3-vector divided by its length."""
     x, y, z = vector

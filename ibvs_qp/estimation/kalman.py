@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -40,6 +41,7 @@ class DelayedKalman:
             gate_sigmas: Innovations beyond this many standard deviations are refused.
         """
         self.chain, self._noise = np.array(chain, float), np.diag(noise)
+        self._identity = np.eye(len(chain))
         self._initial, self._gate = np.diag(np.square(initial_std)), gate_sigmas
         self.ticks = StampRing(tick_s)
         self.reset()
@@ -47,14 +49,15 @@ class DelayedKalman:
     def reset(self) -> None:
         """Return to the state before the first tick."""
         self.covariance = self._initial.copy()
-        self._history, self._lengths = np.zeros((HISTORY, len(self._noise))), np.zeros(HISTORY)
+        # Twice as long as needed: a full buffer moves its newest half to the front, so that history is one slice.
+        self._history, self._lengths, self._newest = np.zeros((2 * HISTORY, len(self._noise))), np.zeros(2 * HISTORY), 0
         self.ticks.reset()
-        self._covariance_stamp = -1
+        self._covariance_stamp, self._capture = -1, None
 
     @property
     def state(self) -> np.ndarray:
         """The state now, (n,): the newest entry of the history itself."""
-        return self._history[self.ticks.now % HISTORY]
+        return self._history[self._newest]
 
     def predict(self, stamp_ns: int, increment: np.ndarray, dt: float) -> None:
         """Advance the state by one tick: x += dt G x + increment."""
@@ -62,14 +65,19 @@ class DelayedKalman:
 
     def remember(self, stamp_ns: int, state: Sequence[float] | np.ndarray, dt: float) -> None:
         """Store a state that the caller has advanced by one tick of ``dt`` [s]."""
-        slot = self.ticks.add(stamp_ns)
-        self._history[slot] = state
-        self._lengths[slot] = dt
+        self.ticks.add(stamp_ns)
+        self._capture = None
+        if self._newest == 2 * HISTORY - 1:
+            self._history[:HISTORY], self._lengths[:HISTORY] = self._history[HISTORY:], self._lengths[HISTORY:]
+            self._newest = HISTORY - 1
+        self._newest += 1
+        self._history[self._newest] = state
+        self._lengths[self._newest] = dt
 
     def at(self, stamp_ns: int) -> np.ndarray | None:
         """State at the tick nearest to a stamp, (n,): the history itself; None if it is not remembered."""
         age = self.ticks.age(stamp_ns)
-        return None if age is None else self._history[self.ticks.slot(age)]
+        return None if age is None else self._history[self._newest - age]
 
     def set_entry(self, index: int, value: float, std: float) -> None:
         """Set one state entry now and in the past, uncorrelated with the rest (a new line, a first distance)."""
@@ -88,78 +96,102 @@ class DelayedKalman:
             std: Standard deviation.
         """
         past = self.at(stamp_ns)
-        path = np.zeros(HISTORY) if past is None else (self._history - past) @ rates
+        path = 0.0 if past is None else (self._history - past) @ rates
         self.set_entry(index, value, std)
         self._history[:, index] += path
 
-    def correct(
-        self,
-        stamp_ns: int,
-        entries: Sequence[int],
-        values: Sequence[float] | np.ndarray,
-        covariance: np.ndarray,
-        gate: float | None = None,
+    def correct_entry(
+        self, stamp_ns: int, index: int, value: float, variance: float, gate: float | None = None
     ) -> bool:
-        """Correct with measured entries of the state.
+        """Correct with one measured entry of the state.
 
         Args:
             stamp_ns: Time of capture.
-            entries: Indices of the k measured entries.
-            values: Measured values, (k,).
-            covariance: Of the values, (k, k).
+            index: The entry.
+            value: Its measured value.
+            variance: Of the value.
             gate: Innovations beyond this many standard deviations are refused; None: the filter's own.
 
         Returns:
             False if the stamp is not in the history or the innovation is beyond the gate.
         """
-        past = self._past(stamp_ns)
-        if past is None:
-            return False
-        columns, innovation = self.covariance[:, entries], values - past[list(entries)]
-        weight = np.linalg.inv(columns[list(entries)] + covariance)
-        if innovation @ weight @ innovation > (gate or self._gate) ** 2 * len(innovation):
-            return False
-        gain = columns @ weight
-        self._apply(stamp_ns, gain @ innovation, _symmetric(gain @ columns.T))
-        return True
-
-    def correct_entry(
-        self, stamp_ns: int, index: int, value: float, variance: float, gate: float | None = None
-    ) -> bool:
-        """`correct` for one entry."""
-        past = self._past(stamp_ns)
-        if past is None:
+        capture = self._go_to(stamp_ns)
+        if capture is None:
             return False
         column = self.covariance[:, index]
-        innovation, spread = value - past[index], column[index] + variance
+        innovation, spread = value - capture.states[0, index], column[index] + variance
         if innovation * innovation > (gate or self._gate) ** 2 * spread:
             return False
-        self._apply(stamp_ns, innovation / spread * column, np.outer(column, column) / spread)
+        scaled = column / math.sqrt(spread)
+        self._apply(capture, innovation / spread * column, scaled[:, None] * scaled)
         return True
 
-    def _past(self, stamp_ns: int) -> np.ndarray | None:
-        """State at a stamp, with the covariance propagated to it; None if it is not remembered."""
-        past = self.at(stamp_ns)
-        if past is None:
-            return None
+    def correct_pair(
+        self, stamp_ns: int, first: int, values: np.ndarray, covariance: np.ndarray, gate: float | None = None
+    ) -> bool:
+        """Correct with two neighbouring entries, as `correct_entry`.
+
+        Args:
+            stamp_ns: Time of capture.
+            first: Index of the first one.
+            values: Measured values, (2,).
+            covariance: Of the values, (2, 2).
+            gate: As in `correct_entry`, for the innovation's Mahalanobis distance over the square root of two.
+        """
+        capture = self._go_to(stamp_ns)
+        if capture is None:
+            return False
+        both = slice(first, first + 2)
+        columns, innovation = self.covariance[:, both], values - capture.states[0, both]
+        (a, b), (_, c) = (columns[both] + covariance).tolist()
+        weight = np.array(((c, -b), (-b, a))) / (a * c - b * b)
+        if innovation @ weight @ innovation > 2.0 * (gate or self._gate) ** 2:
+            return False
+        gain = columns @ weight
+        self._apply(capture, gain @ innovation, gain @ columns.T)
+        return True
+
+    def _go_to(self, stamp_ns: int) -> _Capture | None:
+        """Propagate the covariance to a stamp; None if the stamp is not remembered."""
+        if self._capture is None or self._capture.stamp_ns != stamp_ns:
+            age = self.ticks.age(stamp_ns)
+            if age is None:
+                return None
+            past, newest = self._newest - age, self._newest
+            self._capture = _Capture(stamp_ns, self._history[past : newest + 1], self._lengths[past + 1 : newest + 1])
+            self._propagate(stamp_ns)
+        return self._capture
+
+    def _propagate(self, stamp_ns: int) -> None:
         if 0 <= self._covariance_stamp < stamp_ns:
             dt = min((stamp_ns - self._covariance_stamp) * 1e-9, LONGEST_GROWTH)
             step = dt * self.chain
-            transition = np.eye(len(step)) + step + 0.5 * step @ step
-            self.covariance = _symmetric(transition @ self.covariance @ transition.T) + dt * self._noise
+            transition = self._identity + step + 0.5 * step @ step
+            grown = transition @ self.covariance @ transition.T
+            self.covariance = 0.5 * (grown + grown.T) + dt * self._noise
         self._covariance_stamp = max(stamp_ns, self._covariance_stamp)
-        return past
 
-    def _apply(self, stamp_ns: int, correction: np.ndarray, reduction: np.ndarray) -> None:
-        """Add a correction of the past state to every state since, and reduce the covariance."""
-        self.covariance = self.covariance - reduction
-        slots = self.ticks.slots_since(stamp_ns)
-        lengths = self._lengths[slots[1:]]
-        once = np.concatenate(([0.0], np.cumsum(lengths)))
-        twice = np.concatenate(([0.0], np.cumsum(lengths * once[:-1])))
+    def _apply(self, capture: _Capture, correction: np.ndarray, reduction: np.ndarray) -> None:
+        """Add a correction of the captured state to every state since, and reduce the covariance."""
+        self.covariance -= reduction
         first = self.chain @ correction
-        self._history[slots] += correction + np.outer(once, first) + np.outer(twice, self.chain @ first)
+        capture.states += capture.growth @ np.array((correction, first, self.chain @ first))
 
 
-def _symmetric(matrix: np.ndarray) -> np.ndarray:
-    return 0.5 * (matrix + matrix.T)
+class _Capture:
+    """The ticks since a capture.
+
+    Attributes:
+        stamp_ns: Time of capture.
+        states: States of the captured tick and of every later one, (age + 1, n): a part of the history itself.
+        growth: Factors of dx, G dx and G^2 dx at these ticks, (age + 1, 3) [1, s, s^2].
+    """
+
+    def __init__(self, stamp_ns: int, states: np.ndarray, lengths: np.ndarray) -> None:
+        self.stamp_ns, self.states = stamp_ns, states
+        once = twice = 0.0
+        factors = [(1.0, once, twice)]
+        for length in lengths.tolist():
+            once, twice = once + length, twice + length * once
+            factors.append((1.0, once, twice))
+        self.growth = np.array(factors)

@@ -32,7 +32,6 @@ class LineTracks:
 
     def __init__(self, motion: DelayedKalman, config: EstimationConfig) -> None:
         self._filter, self._config = motion, config
-        self._fade_from = min(config.fade_start_s, config.fade_end_s)
         self.reset()
 
     def reset(self) -> None:
@@ -43,21 +42,28 @@ class LineTracks:
         for slot in range(SLOTS):
             self._filter.set_entry(LINES + slot, 0.0, UNUSED_STD)
 
-    def advance(self, stamp_ns: int, state: list[float]) -> None:
-        """Copy the predicted offsets into the lines; fade and drop lines without new frames."""
+    def advance(self, stamp_ns: int, state: list[float], right: float, down: float) -> None:
+        """Predict the offsets in the state of a new tick; fade and drop lines without new frames.
+
+        Args:
+            stamp_ns: Time of the tick.
+            state: State of the filter; its offsets are those of the last tick and are advanced in place.
+            right: Path of the tip to the right since then [m].
+            down: Path of the tip down [m].
+        """
         start, end, old = self._config.fade_start_s, self._config.fade_end_s, []
-        for key, line in self.lines.items():
-            line.offset, line.weight = state[LINES + line.slot], line.fresh_weight
+        for line in self.lines.values():
+            entry, (per_right, per_down) = LINES + line.slot, line.rates
+            state[entry] += per_right * right + per_down * down
+            line.offset, line.weight = state[entry], line.fresh_weight
             age = (stamp_ns - line.news_ns) * 1e-9
-            if age <= self._fade_from:
-                continue
             if age > end:
-                old.append(key)
+                old.append(line)
             elif age > start:
-                line.weight = line.fresh_weight * ((end - age) / (end - start))
-        for key in old:
-            state[LINES + self.lines[key].slot] = 0.0
-            self._drop(key)
+                line.weight *= (end - age) / (end - start)
+        for line in old:
+            state[LINES + line.slot] = 0.0
+            self._drop(line)
 
     def correct(self, line: LineFeature, measured: MeasuredLine, stamp: int, tick_ns: int) -> None:
         """Correct or start the track of one line.
@@ -119,7 +125,7 @@ class LineTracks:
         agrees = difference * difference < 2.0 * self._config.gate_sigmas**2 * variance
         track.refused = track.refused + 1 if agrees else 1
         if track.refused >= self._config.refused_frames:
-            self._drop(track.track_id)
+            self._drop(track)
 
     def _correct_angle(self, track: TrackedLine, angle: float, stamp: int) -> None:
         # The fit's own variance is not used: on a short fresh edge it is three times too large.
@@ -157,7 +163,8 @@ class LineTracks:
         track.rates = -math.cos(track.angle), -math.sin(track.angle)
         self._filter.chain[LINES + track.slot, 0:2] = track.rates
 
-    def _drop(self, key: int) -> None:
-        entry = LINES + self.lines.pop(key).slot
+    def _drop(self, track: TrackedLine) -> None:
+        entry = LINES + track.slot
+        del self.lines[track.track_id]
         self._filter.chain[entry, :] = 0.0
         self._filter.set_entry(entry, 0.0, UNUSED_STD)

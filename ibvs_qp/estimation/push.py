@@ -37,7 +37,7 @@ class PushFilter:
         self._stamp = -1
         self.push = self.push_raw = 0.0
         self._push_mean, self._push_variance = 0.0, FIRST_PUSH_VARIANCE
-        self._moment, self._moment_variance = np.zeros(3), 0.0
+        self._moment, self._moment_variance = [0.0, 0.0, 0.0], 0.0
 
     @property
     def push_noise(self) -> float:
@@ -65,10 +65,11 @@ class PushFilter:
             return None
         dt = sample_interval(stamp_ns, self._stamp)
         self._stamp = stamp_ns
-        self.push_raw = -dot(wrench[:3].tolist(), normal)
+        sample = wrench.tolist()
+        self.push_raw = -dot(sample, normal)
         gain = 1.0 - math.exp(-2.0 * math.pi * self._settings.force_filter_hz * dt)
         self.push += gain * (self.push_raw - self.push)
-        self._moment += gain * (wrench[3:] - self._moment)
+        self._moment = [old + gain * (new - old) for old, new in zip(self._moment, sample[3:], strict=True)]
         if free:
             self._learn_noise(min(1.0, dt / self._settings.estimation.noise_time_s))
         return dt
@@ -77,4 +78,4 @@ class PushFilter:
         self._push_mean += gain * (self.push - self._push_mean)
         self._push_variance += gain * ((self.push - self._push_mean) ** 2 - self._push_variance)
         # Half the squared length: two of the three moments come from forces across the tip.
-        self._moment_variance += gain * (0.5 * float(self._moment @ self._moment) - self._moment_variance)
+        self._moment_variance += gain * (0.5 * dot(self._moment, self._moment) - self._moment_variance)

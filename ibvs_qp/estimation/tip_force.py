@@ -42,12 +42,16 @@ class TipForce:
         if ahead < LEAST_LEVER:
             return fy, fz
         off_tip = (self._spread * fx / ahead) ** 2
-        from_moment = (mz + right * fx) / ahead, (below * fx - my) / ahead
-        y, z = (
-            _weighted_mean(direct, self._variance(axis, direct), indirect, self._variance(axis + 2, indirect) + off_tip)
-            for axis, (direct, indirect) in enumerate(zip((fy, fz), from_moment, strict=True))
+        return (
+            self._mean(0, fy, (mz + right * fx) / ahead, off_tip),
+            self._mean(2, fz, (below * fx - my) / ahead, off_tip),
         )
-        return y, z
+
+    def _mean(self, channel: int, direct: float, from_moment: float, off_tip: float) -> float:
+        """Mean of a force sample and the one from the moment, whose variance is larger by ``off_tip`` [N^2]."""
+        variance = self._variance(channel, direct)
+        gain = variance / (variance + self._variance(channel + 1, from_moment) + off_tip)
+        return direct + gain * (from_moment - direct)
 
     def _variance(self, channel: int, sample: float) -> float:
         """Variance of one sample of a channel [N^2], estimated from successive samples."""
@@ -55,7 +59,3 @@ class TipForce:
         noise.learn(sample - noise.residual, self._floor)
         noise.residual = sample
         return noise.total(self._floor)
-
-
-def _weighted_mean(first: float, first_variance: float, second: float, second_variance: float) -> float:
-    return first + first_variance / (first_variance + second_variance) * (second - first)

@@ -14,7 +14,7 @@ import numpy as np
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.estimation.kalman import DelayedKalman
 from ibvs_qp.estimation.stamps import HISTORY
-from ibvs_qp.frames import GRAVITY, cross, dot, plane_in_body, unit
+from ibvs_qp.frames import GRAVITY, add_scaled, cross, dot, plane_in_body, unit
 
 #: Order of the filter's state: distance [m], speed of the centre of mass into the wall [m/s], accelerometer bias.
 DISTANCE, SPEED = 0, 1
@@ -89,12 +89,11 @@ class WallDistance:
             specific_force: Accelerometer in B [m/s^2], (3,); None counts as no acceleration.
             down: Unit vector of gravity in B, (3,).
         """
-        turn = cross(self.normal, angular_velocity)
-        self.normal = normal = unit([entry + dt * change for entry, change in zip(self.normal, turn, strict=True)])
+        self.normal = normal = unit(add_scaled(self.normal, dt, cross(self.normal, angular_velocity)))
         self._lever_speed = lever_speed = dot(normal, cross(angular_velocity, self._tip))
         measured = 0.0
         if specific_force is not None:
-            measured = dot(normal, [force + GRAVITY * entry for force, entry in zip(specific_force, down, strict=True)])
+            measured = dot(normal, add_scaled(specific_force, GRAVITY, down))
         distance, speed, bias = self._state
         gain = 1.0 - math.exp(-dt / self._settings.acceleration_filter_s)
         self.acceleration += gain * (bias - measured - self.acceleration)

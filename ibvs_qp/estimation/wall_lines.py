@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ibvs_qp.frames import Vector3, cross, dot
+from ibvs_qp.frames import Vector3, add_scaled, cross, dot
 from ibvs_qp.measurement import HORIZONTAL, LineFeature
 
 #: A wall whose normal is this close to gravity's direction is a floor and has no level direction of its own.
@@ -72,7 +72,7 @@ def wall_line(
     length = math.hypot(right, down)
     if length < LEAST_IN_PLANE:
         return None
-    point = _wall_point(axes, tip_from_camera, distance)
+    point = add_scaled(tip_from_camera, distance, axes.normal)
     sign = 1.0 if (down if line.role == HORIZONTAL else right) >= 0.0 else -1.0
     return MeasuredLine(
         offset=-sign * dot(h, point) / length,
@@ -86,19 +86,13 @@ def image_line(
     offset: float, angle: float, axes: WallAxes, tip_from_camera: Sequence[float], distance: float
 ) -> tuple[float, float, float]:
     """Inverse of `wall_line`: (rho, theta) of a line on the wall and the camera's depth in front of it [m]."""
-    foot, c, s = _wall_point(axes, tip_from_camera, distance), math.cos(angle), math.sin(angle)
+    c, s, (rx, ry, rz), (dx, dy, dz) = math.cos(angle), math.sin(angle), axes.right, axes.down
+    foot = add_scaled(tip_from_camera, distance, axes.normal)
     # Normal of the line in the wall, its direction, and a point on it.
-    normal = [c * right + s * down for right, down in zip(axes.right, axes.down, strict=True)]
-    along = cross(axes.normal, normal)
-    point = [place + offset * entry for place, entry in zip(foot, normal, strict=True)]
+    normal = c * rx + s * dx, c * ry + s * dy, c * rz + s * dz
+    along, point = cross(axes.normal, normal), add_scaled(foot, offset, normal)
     front, right, down = cross(point, along)  # normal of the interpretation plane, in B
     length = math.hypot(right, down)
     if right * normal[1] + down * normal[2] < 0.0:
         length = -length
     return -front / length, math.atan2(down / length, right / length), dot(foot, axes.normal)
-
-
-def _wall_point(axes: WallAxes, tip_from_camera: Sequence[float], distance: float) -> Vector3:
-    """The tip's foot point on the wall, relative to the camera, in B [m]."""
-    (x, y, z), (nx, ny, nz) = tip_from_camera, axes.normal
-    return x + distance * nx, y + distance * ny, z + distance * nz

@@ -13,7 +13,7 @@ from ibvs_qp.estimation.line_tracking import LINES, SLOTS, LineTracks
 from ibvs_qp.estimation.stamps import StampRing
 from ibvs_qp.estimation.tracked_line import TrackedLine
 from ibvs_qp.estimation.wall_lines import WallAxes, image_line, wall_line
-from ibvs_qp.frames import GRAVITY, cross, dot
+from ibvs_qp.frames import GRAVITY, add_scaled, cross, dot
 from ibvs_qp.measurement import FeatureFrame, LineFeature
 
 #: Order of the filter's state, each (right, down): velocity [m/s], accelerometer bias [m/s^2], odometer [m]; then the
@@ -54,6 +54,7 @@ class WallMotion:
         noise[ODOMETER] = ODOMETER_NOISE
         deviation[VELOCITY], deviation[BIAS], deviation[ODOMETER] = VELOCITY_STD, BIAS_STD, ODOMETER_STD
         self._filter = DelayedKalman(chain, noise, deviation, tick_s, config.gate_sigmas)
+        self._velocity_floor = config.velocity_std_m_s**2 * np.eye(2)
         self._tracks = LineTracks(self._filter, config)
         self.reset()
 
@@ -102,20 +103,18 @@ class WallMotion:
             omega: Angular velocity in B [rad/s], (3,).
             dt: Time since the last tick [s].
         """
-        acceleration = [force + GRAVITY * down for force, down in zip(specific_force, axes.gravity, strict=True)]
-        swing = cross(omega, self._tip)
+        acceleration, swing = add_scaled(specific_force, GRAVITY, axes.gravity), cross(omega, self._tip)
         state = self.state.copy()
-        for index, axis in enumerate((axes.right, axes.down)):
-            velocity, bias = state[index], state[index + 2]
-            path = dt * velocity + dt * dot(axis, swing)
-            state[index] = velocity + dt * (dot(axis, acceleration) - bias)
-            state[index + 4] += path
-            for line in self.lines.values():
-                state[LINES + line.slot] += line.rates[index] * path
+        velocity_right, velocity_down, bias_right, bias_down, *_ = state
+        right = dt * (velocity_right + dot(axes.right, swing))
+        down = dt * (velocity_down + dot(axes.down, swing))
+        state[0] += dt * (dot(axes.right, acceleration) - bias_right)
+        state[1] += dt * (dot(axes.down, acceleration) - bias_down)
+        state[4] += right
+        state[5] += down
+        self._tracks.advance(stamp_ns, state, right, down)
         self._filter.remember(stamp_ns, state, dt)
         self.state, self._stamp = state, stamp_ns
-        if self.lines:
-            self._tracks.advance(stamp_ns, state)
         self.velocity_age_s = (stamp_ns - self._velocity_stamp) * 1e-9 if self._velocity_stamp >= 0 else math.inf
 
     def correct(self, frame: FeatureFrame, axes: WallAxes, distance: float) -> None:
@@ -137,12 +136,12 @@ class WallMotion:
         self.state = self._filter.state.tolist()
 
     def _correct_velocity(self, frame: FeatureFrame, axes: WallAxes) -> None:
-        if frame.velocity is None or frame.velocity_covariance is None or not np.isfinite(frame.velocity).all():
+        if frame.velocity is None or frame.velocity_covariance is None or not math.isfinite(sum(frame.velocity)):
             return
         to_wall = np.array((axes.right, axes.down))
-        covariance = to_wall @ frame.velocity_covariance @ to_wall.T + self._config.velocity_std_m_s**2 * np.eye(2)
+        covariance = to_wall @ frame.velocity_covariance @ to_wall.T + self._velocity_floor
         stamp = frame.velocity_stamp_ns or frame.stamp_ns
-        if self._filter.correct(stamp, (0, 1), to_wall @ frame.velocity, covariance):
+        if self._filter.correct_pair(stamp, 0, to_wall @ frame.velocity, covariance):
             self._velocity_stamp = frame.stamp_ns
 
     def feature(self, line: TrackedLine, axes: WallAxes, distance: float, stamp_ns: int) -> LineFeature:
@@ -160,7 +159,7 @@ class WallMotion:
         return LineFeature(
             rho=rho,
             theta=theta,
-            covariance=np.diag((variance, line.theta_variance)),
+            covariance=np.array(((variance, 0.0), (0.0, line.theta_variance))),
             role=line.role,
             weight=line.weight,
             stamp_ns=stamp_ns,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from ibvs_qp.config import EstimationConfig, VehicleParams
 from ibvs_qp.estimation.stamps import sample_interval
 from ibvs_qp.estimation.tip_force import TipForce
-from ibvs_qp.frames import GRAVITY, skew
+from ibvs_qp.frames import GRAVITY, add_scaled, cross
 
 
 class WrenchTare:
@@ -24,16 +25,16 @@ class WrenchTare:
         self._config = config or EstimationConfig()
         self._mass = vehicle.tool_mass_kg
         sensor = np.array(vehicle.force_torque_position_m)
-        self._sensor_arm, self._tool_arm = skew(sensor), skew(np.array(vehicle.tool_position_m) - sensor)
+        self._sensor, self._tool = sensor.tolist(), (np.array(vehicle.tool_position_m) - sensor).tolist()
         self._tip = TipForce(vehicle, self._config)
         self.reset()
 
     def reset(self) -> None:
         """Forget the bias."""
         self._tip.reset()
-        self._bias, self._time, self._stamp = np.zeros(6), 0.0, -1
+        self._bias, self._time, self._stamp = [0.0] * 6, 0.0, -1
         self._wrench = np.zeros(6)
-        self._specific_force = np.array([0.0, 0.0, -GRAVITY])
+        self._specific_force = [0.0, 0.0, -GRAVITY]
 
     @property
     def ready(self) -> bool:
@@ -49,17 +50,21 @@ class WrenchTare:
             specific_force: Accelerometer in B [m/s^2], (3,); every tick, also between force samples.
             free: Whether the tip is known to be away from the wall, so that the mean is bias.
         """
-        self._specific_force += self._config.tare_acceleration_gain * (specific_force - self._specific_force)
-        if stamp_ns <= self._stamp or not np.isfinite(raw).all():
+        gain, last = self._config.tare_acceleration_gain, self._specific_force
+        self._specific_force = [old + gain * (new - old) for old, new in zip(last, specific_force, strict=True)]
+        sample = raw.tolist()
+        if stamp_ns <= self._stamp or not math.isfinite(sum(sample)):
             return self._wrench
         dt = sample_interval(stamp_ns, self._stamp)
         self._stamp = stamp_ns
-        load = self._mass * self._specific_force
-        contact = np.concatenate((load, self._tool_arm @ load)) - raw
+        load = [self._mass * entry for entry in self._specific_force]
+        contact = [entry - felt for entry, felt in zip((*load, *cross(self._tool, load)), sample, strict=True)]
         if free:
             self._time += dt
-            self._bias += dt / min(max(self._time, dt), self._config.tare_follow_s) * (contact - self._bias)
-        force, moment = np.split(contact - self._bias, 2)
-        force[1:] = self._tip.across(force.tolist(), moment.tolist())
-        self._wrench = np.concatenate((force, moment + self._sensor_arm @ force))
+            gain = dt / min(max(self._time, dt), self._config.tare_follow_s)
+            self._bias = [bias + gain * (entry - bias) for bias, entry in zip(self._bias, contact, strict=True)]
+        tared = [entry - bias for entry, bias in zip(contact, self._bias, strict=True)]
+        force, moment = tared[:3], tared[3:]
+        force[1:] = self._tip.across(force, moment)
+        self._wrench = np.array((*force, *add_scaled(moment, 1.0, cross(self._sensor, force))))
         return self._wrench

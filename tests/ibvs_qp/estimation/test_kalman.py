@@ -25,14 +25,14 @@ def test_a_late_correction_equals_the_replay_of_every_input() -> None:
         for k in range(60):
             late.predict(k * TICK_NS, inputs[k], TICK)
             if k in (5, 15, 25):  # so that distance, speed and bias are correlated
-                late.correct(k * TICK_NS, [0], np.array([0.01]), np.array([[1e-4]]), 1e6)
+                late.correct_entry(k * TICK_NS, 0, 0.01, 1e-4, 1e6)
         for k in range(60):
             replay.predict(k * TICK_NS, inputs[k], TICK)
             if k in (5, 15, 25):
-                replay.correct(k * TICK_NS, [0], np.array([0.01]), np.array([[1e-4]]), 1e6)
+                replay.correct_entry(k * TICK_NS, 0, 0.01, 1e-4, 1e6)
             if k == 59 - age:
-                assert replay.correct(k * TICK_NS, [0], np.array([0.02]), np.array([[1e-4]]), 1e6)
-        assert late.correct((59 - age) * TICK_NS, [0], np.array([0.02]), np.array([[1e-4]]), 1e6)
+                assert replay.correct_entry(k * TICK_NS, 0, 0.02, 1e-4, 1e6)
+        assert late.correct_entry((59 - age) * TICK_NS, 0, 0.02, 1e-4, 1e6)
         np.testing.assert_allclose(late.state, replay.state, atol=1e-12)
         np.testing.assert_allclose(late.covariance, replay.covariance, atol=1e-12)
         np.testing.assert_allclose(late.at(59 * TICK_NS), late.state)
@@ -50,19 +50,19 @@ def test_converges_without_lag_whatever_the_latency(latency: int) -> None:
         distances.append(distance)
         if k % 8 == 0 and k >= latency:
             seen = distances[k - latency] + rng.normal(0.0, 1e-3)
-            assert f.correct((k - latency) * TICK_NS, [0], np.array([seen]), np.array([[1e-6]]))
+            assert f.correct_entry((k - latency) * TICK_NS, 0, seen, 1e-6)
     assert (np.abs(f.state - [distance, speed, bias]) < [1e-3, 4e-3, 4e-3]).all()
 
 
 def test_stamps_out_of_the_history_are_refused_and_change_nothing() -> None:
     f = new_filter()
-    assert not f.correct(0, [0], np.array([1.0]), np.array([[1.0]]))  # nothing predicted yet
+    assert not f.correct_entry(0, 0, 1.0, 1.0)  # nothing predicted yet
     for k in range(HISTORY + 20):
         f.predict(k * TICK_NS, np.zeros(3), TICK)
     before = f.state.copy()
     newest = (HISTORY + 19) * TICK_NS
     for stamp in (newest - HISTORY * TICK_NS, newest + 10 * TICK_NS):
-        assert not f.correct(stamp, [0], np.array([1.0]), np.array([[1.0]]))
+        assert not f.correct_entry(stamp, 0, 1.0, 1.0)
     np.testing.assert_array_equal(f.state, before)
     assert f.at(newest - HISTORY * TICK_NS) is None
 
@@ -71,11 +71,11 @@ def test_outliers_are_refused_by_their_own_spread() -> None:
     f = new_filter()
     for k in range(50):
         f.predict(k * TICK_NS, np.zeros(3), TICK)
-        f.correct(k * TICK_NS, [0], np.array([0.0]), np.array([[1e-6]]))
+        f.correct_entry(k * TICK_NS, 0, 0.0, 1e-6)
     state = f.state.copy()
-    assert not f.correct(49 * TICK_NS, [0], np.array([0.1]), np.array([[1e-6]]))
+    assert not f.correct_entry(49 * TICK_NS, 0, 0.1, 1e-6)
     np.testing.assert_array_equal(f.state, state)
-    assert f.correct(49 * TICK_NS, [0], np.array([0.1]), np.array([[1.0]]))  # an honest variance is heard
+    assert f.correct_entry(49 * TICK_NS, 0, 0.1, 1.0)  # an honest variance is heard
 
 
 def test_a_late_new_entry_follows_the_remembered_motion_of_the_others() -> None:
@@ -91,7 +91,7 @@ def test_a_late_new_entry_follows_the_remembered_motion_of_the_others() -> None:
     past = f.at(79 * TICK_NS)
     assert past is not None and past[2] == pytest.approx(0.30, abs=1e-12)
     f.chain[2, 0] = -1.0
-    assert f.correct(85 * TICK_NS, [2], np.array([0.30 - 0.1 * 6 * TICK]), np.array([[1e-8]]), gate=1.0)
+    assert f.correct_entry(85 * TICK_NS, 2, 0.30 - 0.1 * 6 * TICK, 1e-8, gate=1.0)
 
 
 def test_covariance_stays_symmetric_and_positive() -> None:
@@ -99,8 +99,8 @@ def test_covariance_stays_symmetric_and_positive() -> None:
     for k in range(3000):
         f.predict(k * TICK_NS, rng.normal(0.0, 0.001, 3), TICK)
         if k % 8 == 0:
-            f.correct((k - 15) * TICK_NS, [0], np.array([rng.normal(0, 1e-3)]), np.array([[1e-6]]), 1e9)
-    np.testing.assert_array_equal(f.covariance, f.covariance.T)
+            f.correct_entry((k - 15) * TICK_NS, 0, rng.normal(0, 1e-3), 1e-6, 1e9)
+    np.testing.assert_allclose(f.covariance, f.covariance.T, rtol=1e-12)
     assert np.linalg.eigvalsh(f.covariance).min() > 0
 
 
@@ -109,29 +109,20 @@ def test_a_correction_is_the_textbook_one(entries: list[int]) -> None:
     """State and covariance against the matrix equations, with correlated noise."""
     rng, f, rows = np.random.default_rng(4), new_filter(), np.eye(3)[entries]
     noise = np.array([[4e-5, 1e-5], [1e-5, 2e-5]])[: len(entries), : len(entries)]
+
+    def correct(stamp: int, values: np.ndarray, gate: float | None = None) -> bool:
+        if len(entries) == 1:
+            return f.correct_entry(stamp, entries[0], float(values[0]), float(noise[0, 0]), gate)
+        return f.correct_pair(stamp, entries[0], values, noise, gate)
+
     for k in range(HISTORY + 10):
         f.predict(k * TICK_NS, rng.normal(0.0, 0.01, 3), TICK)
-        if k % 8:
-            continue
-        f.correct_entry(k * TICK_NS, 2, 0.0, 1e9)  # brings the covariance to this stamp and changes next to nothing
-        past, before, values = f.state.copy(), f.covariance.copy(), rng.normal(0.0, 0.02, len(entries))
-        gain = before @ rows.T @ np.linalg.inv(rows @ before @ rows.T + noise)
-        assert f.correct(k * TICK_NS, entries, values, noise, gate=1e3)
-        np.testing.assert_allclose(f.state, past + gain @ (values - past[entries]), atol=1e-12)
-        np.testing.assert_allclose(f.covariance, before - gain @ rows @ before, atol=1e-12)
-        last = k * TICK_NS
-    assert not f.correct(last, entries, np.full(len(entries), 9.0), noise)
-
-
-def test_one_entry_is_corrected_alike_by_both_methods() -> None:
-    rng, one, other = np.random.default_rng(5), new_filter(), new_filter()
-    for k in range(HISTORY + 40):
-        increment, value = rng.normal(0.0, 0.01, 3), rng.normal(0.0, 0.02)
-        for f in (one, other):
-            f.predict(k * TICK_NS, increment, TICK)
-        if k % 8 == 0 and k > 15:
-            stamp = (k - 15) * TICK_NS
-            taken = one.correct(stamp, [k % 3], [value], np.array([[1e-4]]))
-            assert other.correct_entry(stamp, k % 3, value, 1e-4) == taken
-        np.testing.assert_allclose(one.state, other.state, atol=1e-13)
-        np.testing.assert_allclose(one.covariance, other.covariance, atol=1e-13)
+        if k % 8 == 0:
+            last = k * TICK_NS
+            f.correct_entry(last, 2, 0.0, 1e9)  # brings the covariance to this stamp and changes next to nothing
+            past, before, values = f.state.copy(), f.covariance.copy(), rng.normal(0.0, 0.02, len(entries))
+            gain = before @ rows.T @ np.linalg.inv(rows @ before @ rows.T + noise)
+            assert correct(last, values, 1e3)
+            np.testing.assert_allclose(f.state, past + gain @ (values - past[entries]), atol=1e-12)
+            np.testing.assert_allclose(f.covariance, before - gain @ rows @ before, atol=1e-12)
+    assert not correct(last, np.full(len(entries), 9.0))
