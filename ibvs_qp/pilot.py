@@ -13,16 +13,15 @@ import numpy as np
 
 from ibvs_qp.analytic import PaperController
 from ibvs_qp.command import Command
-from ibvs_qp.config import LONGEST_TICK, ControllerConfig
+from ibvs_qp.config import LONGEST_TICK, ControllerConfig, EstimationConfig
 from ibvs_qp.config.contact_margin import require_margin
 from ibvs_qp.config.settings import choice, dump_toml, load_toml, setting, validate
 from ibvs_qp.controller import HybridController
-from ibvs_qp.estimation.config import EstimationConfig
 from ibvs_qp.estimation.stamps import HISTORY
 from ibvs_qp.estimation.wall_lines import WallAxes, image_line
 from ibvs_qp.estimation.wall_motion import WallMotion
 from ibvs_qp.estimation.wrench_tare import WrenchTare
-from ibvs_qp.frames import to_camera
+from ibvs_qp.frames import Vector3, down_in_body, plane_in_body, to_camera
 from ibvs_qp.measurement import (
     HORIZONTAL,
     FeatureFrame,
@@ -36,7 +35,6 @@ from ibvs_qp.painting.config import PaintingConfig
 from ibvs_qp.painting.painter import Painter
 from ibvs_qp.safety.rotor_loss import RotorLoss
 from ibvs_qp.validation.sensor_frame import SensorGate
-from ibvs_qp.vectors import Row, down_row
 from ibvs_qp.vision.config import VisionConfig
 from ibvs_qp.vision.paper.config import PaperConfig
 from ibvs_qp.vision.percept import LineHint
@@ -115,7 +113,6 @@ class Pilot:
             np.array(vehicle.camera_position_m),
             settings.tick_s,
             self.config.estimation,
-            settings.machine_code,
         )
         self.tare = WrenchTare(vehicle, self.config.estimation)
         self.supervisor = RotorLoss(vehicle)
@@ -144,7 +141,7 @@ class Pilot:
             self._perception.reset()
         self._first = self._stamp = -1
         self._history_attitude = [[1.0, 0.0, 0.0, 0.0]] * HISTORY
-        self._turn: Row = (0.0, 0.0, 0.0)
+        self._turn: Vector3 = (0.0, 0.0, 0.0)
         self._history_turn = [self._turn] * HISTORY
         self._covariance = self.motion.velocity_variance * _EYE
         self._last_capture = -1
@@ -189,10 +186,10 @@ class Pilot:
         self._stamp = stamp
         now = self._gate.last
         attitude, force, rate = now["attitude"], now["specific_force"], now["angular_velocity"]
-        contact = self.controller.setpoints.contact
+        contact = self.controller.setpoints.contact.state
         free = not contact.in_contact and contact.distance > self._tare_distance_m
         wrench = self.tare.update(frame.wrench, frame.wrench_stamp_ns, force, free)
-        axes = WallAxes.of(contact.direction, down_row(*attitude))
+        axes = WallAxes.of(contact.normal, down_in_body(attitude))
         self.motion.predict(stamp, axes, force, rate, dt)
         self._remember(attitude, rate, dt)
         # Without a rotor the vehicle turns away from the wall: what it sees then is not what the strategy knows.
@@ -205,8 +202,9 @@ class Pilot:
             self.painter.abandon(inputs, "no level hover is left")
         target = self.painter.step(inputs)
         if self.supervisor.lost:
-            away = contact.distance + float(contact.normal @ self._tip)
-            tilt = self.supervisor.tilt(away, contact.speed, float(self.motion.state[0]), contact.normal, dt)
+            normal = np.array(contact.normal)
+            away = contact.distance + float(normal @ self._tip)
+            tilt = self.supervisor.tilt(away, contact.speed, float(self.motion.state[0]), normal, dt)
             target = dataclasses.replace(target, tilt=tilt)
         self.painting_command = target
         self.reference = self._refer(target)
@@ -225,11 +223,11 @@ class Pilot:
 
     def _hints(self, stamp_ns: int) -> tuple[LineHint, ...]:
         """Tell perception where the fresh edge must appear: at the brush, ahead of it."""
-        expected, contact = self.painter.expected_fresh_edge(self.motion.lines), self.terms.contact
+        expected, contact = self.painter.expected_fresh_edge(self.motion.lines), self.terms.contact.state
         if expected is None or not contact.known:
             return ()
         offset, side = expected
-        axes = WallAxes.of(contact.direction, down_row(*self._history_attitude[self._slot(stamp_ns)]))
+        axes = WallAxes.of(contact.normal, down_in_body(self._history_attitude[self._slot(stamp_ns)]))
         rho, theta, _ = image_line(offset, 0.5 * math.pi, axes, self._tip_from_camera, contact.distance)
         near, far = HINT_SPAN
         span = (near, far) if side > 0.0 else (-far, -near)
@@ -280,26 +278,22 @@ class Pilot:
 
     def _take(self, features: FeatureFrame) -> None:
         """Correct motion and lines at the time of capture."""
-        contact = self.terms.contact
+        contact = self.terms.contact.state
         plane = features.plane
         if plane is not None:
             self._plane, self._plane_stamp = plane, features.stamp_ns
-            x, y, z = (entry * (-1.0 / plane[3]) for entry in (plane[2], plane[0], plane[1]))  # camera to body axes
-            length = math.sqrt(x * x + y * y + z * z)
-            tip_x, tip_y, tip_z = self._tip_from_camera
-            normal = x / length, y / length, z / length
-            distance = (1.0 - x * tip_x - y * tip_y - z * tip_z) / length
+            normal, distance = plane_in_body(plane, self._tip_from_camera)
         elif contact.known:
-            normal, distance = contact.direction, contact.distance
+            normal, distance = contact.normal, contact.distance
         else:
             return
-        gravity = down_row(*self._history_attitude[self._slot(features.stamp_ns)])
+        gravity = down_in_body(self._history_attitude[self._slot(features.stamp_ns)])
         self.motion.correct(features, WallAxes.of(normal, gravity), distance)
         self._covariance = self.motion.velocity_variance * _EYE  # nothing else changes it
 
     def _measure(self, frame: SensorFrame, wrench: np.ndarray, axes: WallAxes, target: PaintingCommand) -> Measurement:
         velocity = covariance = None
-        contact = self.terms.contact
+        contact = self.terms.contact.state
         distance = contact.distance if contact.known else 0.5
         low, high = self.thrust_limits or (None, None)
         if self.supervisor.lost or self.motion.velocity_age_s < self._velocity_life_s:
@@ -331,7 +325,7 @@ class Pilot:
 
     def _painter_input(self, frame: SensorFrame) -> PainterInput:
         terms, motion = self.controller.setpoints, self.motion
-        contact, state = terms.contact, motion.state
+        contact, state = terms.contact.state, motion.state
         return PainterInput(
             (frame.stamp_ns - self._first) * 1e-9,
             motion.lines,
@@ -348,7 +342,7 @@ class Pilot:
 
     def _refer(self, target: PaintingCommand) -> Reference:
         """Offsets in metres to line references: rho = l / d at the measured distance."""
-        contact = self.terms.contact
+        contact = self.terms.contact.state
         depth = self._tip_camera[2] + (contact.distance if contact.known else 0.5)
         references = []
         for line, offset in target.guides:

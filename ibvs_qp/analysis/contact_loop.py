@@ -12,16 +12,16 @@ With x the penetration of the undeformed tip (e_s = -x), f the push and F the ro
     \quad K = K_{fp} \min(1, k_s / k), \quad
     \hat g = \frac{1}{s/\omega_g + 1} (m \ddot x + e^{-s T_f} f - F).
 
-The impedance damps the rate one motor lag ahead; the rate itself counts by
-:math:`W = 1 - \frac{\kappa}{s + \kappa} e^{-s T_c}`: with every picture, T_c late, the estimator takes the speed of a
-tip in contact for nothing (`estimation/contact.py`). The observer of gusts (`model/external_wrench.py`) leaves a
-loop only for the age of the felt force.
+The impedance damps the rate one motor lag ahead. The rate itself passes through
+:math:`W = 1 - \frac{\kappa}{s + \kappa} e^{-s T_c}`: with every frame, T_c late, the estimator corrects the speed of a
+tip in contact towards zero (`estimation/wall_distance.py`). The observer of gusts (`model/external_wrench.py`) closes
+a loop only through the age of the measured force.
 
-T_f is the age of the force that the controller works with, T_h half a tick: how long a command is held on average, and
-again how old the accelerometer's mean over the last tick is, from which the impedance gets its rate. The lag tau is the
-mean of the rising and the falling one, because an oscillation does both. The rotors' force needs no moment (the arm
-points at the wall through the centre of mass), so m is the whole mass; the reference and the frozen part of the
-external wrench do not move. The closed loop's poles are the zeros of
+T_f is the age of the force in use and T_h half a tick: the mean time from a command to the middle of its hold, and
+the mean age of the accelerometer's average over the last tick, from which the rate comes. The lag tau is the mean of
+the rising and the falling one, because an oscillation does both. The arm points at the wall through the centre of
+mass, so the force needs no moment and m is the whole mass; the reference and the frozen part of the external wrench
+are constant. The closed loop's poles are the zeros of
 
 .. math::
     \Delta(s) = m s^2 + (b + c) s + k + \frac{e^{-s T_h}}{\tau s + 1} \Big[\Big(K + \frac{K_{fi}}{s}\Big)
@@ -30,7 +30,7 @@ external wrench do not move. The closed loop's poles are the zeros of
     + \frac{(e^{-s T_f} - 1)(k + b s) - c s}{s/\omega_g + 1}\Big].
 
 Pade approximants of the delays give a polynomial whose roots start Newton's method on the exact function. Force
-feedback adds stiffness late, which is negative damping: it is what the margin is spent on.
+feedback adds stiffness late, which is negative damping and reduces the margin.
 """
 
 from __future__ import annotations
@@ -44,18 +44,13 @@ from numpy.polynomial import Polynomial
 
 #: K_fp counts in full up to this stiffness k_s and falls with its inverse beyond [N/m] (`model/push.py`).
 FULL_GAIN_STIFFNESS = 1500.0
-#: Bandwidth at which gusts along the normal are learnt in contact [rad/s], and time constant of the filter of the
-#: acceleration by which the impedance looks ahead [s], a tenth of the motors' lag.
-GUST_BANDWIDTH, ACCELERATION_FILTER = 9.0, 6e-3
-#: Noise density of the acceleration along the normal [m/s^2/sqrt(Hz)] (IMU 4e-3, attitude noise), and deviation of the
-#: speed of a tip that the wall holds [m/s]: nothing but the swing of the contact. Their ratio is the bandwidth kappa.
-ACCELERATION_NOISE, HELD_SPEED_STD = 6e-3, 5e-3
-#: Period of the pictures, and their mean age: latency and half a period [s].
+#: Bandwidth at which the observer learns gusts along the normal in contact [rad/s] (`model/external_wrench.py`).
+GUST_BANDWIDTH = 9.0
+#: Period of the camera's frames, and their mean age: latency and half a period [s].
 FRAME_PERIOD, FRAME_AGE = 1.0 / 30.0, 0.077
-GUST_LAG = 1.0 / GUST_BANDWIDTH
 #: Order of the Pade approximants; Newton's method removes what they leave.
 PADE_ORDER = 4
-#: Poles faster than this are those of the approximants, far above what rotors with 50 ms of lag can excite [rad/s].
+#: Faster poles belong to the approximants; rotors with 50 ms of lag cannot excite them [rad/s].
 FASTEST_MODE = 250.0
 #: Newton's method stops at this relative step.
 POLE_TOLERANCE = 1e-12
@@ -67,7 +62,7 @@ class ContactLoop:
 
     Attributes:
         mass: Of the vehicle, m [kg].
-        lag: Mean motor lag [s]; the impedance looks as far ahead.
+        lag: Mean motor lag [s]; the impedance predicts the rate this far ahead.
         drag: Of the vehicle, c [N s/m].
         stiffness: Of wall and brush together, k [N/m].
         damping: Of wall and brush together, b [N s/m].
@@ -79,6 +74,9 @@ class ContactLoop:
         observer: 1 while the observer of gusts learns in contact, else 0.
         force_delay: Mean age of the force in use with half a tick of hold, T_f [s].
         rate_delay: Age of the inertial rate with that hold, T_h [s].
+        acceleration_filter: Time constant of the filtered acceleration by which the impedance predicts, tau_a [s].
+        acceleration_noise: Noise density of the acceleration along the normal [m/s^2/sqrt(Hz)].
+        stationary_speed_std: Standard deviation of the speed of a stationary tip in the estimator [m/s].
     """
 
     mass: float
@@ -94,11 +92,14 @@ class ContactLoop:
     observer: float
     force_delay: float
     rate_delay: float
+    acceleration_filter: float
+    acceleration_noise: float
+    stationary_speed_std: float
 
     @property
     def washout(self) -> float:
-        """Bandwidth kappa at which pictures pull the speed of a tip in contact to zero [1/s]."""
-        return ACCELERATION_NOISE / (HELD_SPEED_STD * math.sqrt(FRAME_PERIOD))
+        """Bandwidth kappa at which frames pull the speed of a tip in contact to zero [1/s]."""
+        return self.acceleration_noise / (self.stationary_speed_std * math.sqrt(FRAME_PERIOD))
 
     def poles(self) -> list[complex]:
         """Poles below `FASTEST_MODE`, upper half plane and real axis."""
@@ -108,16 +109,19 @@ class ContactLoop:
         motor, filtered = self.lag * s + 1.0, self.filter_lag * s + 1.0
         free = self.mass * s**2 + (self.damping + self.drag) * s + self.stiffness
         force = (self.proportional * s + self.integral) * (self.damping * s + self.stiffness)
-        smooth, gust = ACCELERATION_FILTER * s + 1.0, GUST_LAG * s + 1.0
+        smooth, gust = self.acceleration_filter * s + 1.0, s / GUST_BANDWIDTH + 1.0
         late_top, late_bottom = _pade(FRAME_AGE)
-        washed, held = (s + self.washout) * late_bottom - self.washout * late_top, (s + self.washout) * late_bottom
-        impedance = self.damper * s * (washed * smooth + held * self.lag * s) + self.spring * smooth * held
+        high_passed, bottom = (
+            (s + self.washout) * late_bottom - self.washout * late_top,
+            (s + self.washout) * late_bottom,
+        )
+        impedance = self.damper * s * (high_passed * smooth + bottom * self.lag * s) + self.spring * smooth * bottom
         unseen = (force_top - force_bottom) * (self.stiffness + self.damping * s) - self.drag * s * force_bottom
         total = free * s * motor * filtered * force_bottom
         total = (total + force * force_top) * rate_bottom * smooth * gust
         total = total + self.observer * unseen * s * filtered * rate_bottom * smooth
-        total = total * held + impedance * s * filtered * rate_top * force_bottom * gust
-        # Time in hundredths of a second keeps the coefficients within a few orders of each other.
+        total = total * bottom + impedance * s * filtered * rate_top * force_bottom * gust
+        # In hundredths of a second the coefficients are of similar magnitude.
         scaled = Polynomial(np.asarray(total.coef, float) * 100.0 ** np.arange(total.coef.size))
         starts = [100.0 * complex(root) for root in scaled.roots() if root.imag >= -1e-9]
         refined = [self._refine(start) for start in starts if 1e-9 < abs(start) < FASTEST_MODE]
@@ -133,10 +137,10 @@ class ContactLoop:
         force = (self.proportional + self.integral / s) * cmath.exp(-s * self.force_delay)
         force *= (self.stiffness + self.damping * s) / (self.filter_lag * s + 1.0)
         ahead = 1.0 - self.washout * cmath.exp(-s * FRAME_AGE) / (s + self.washout)
-        ahead += self.lag * s / (ACCELERATION_FILTER * s + 1.0)
+        ahead += self.lag * s / (self.acceleration_filter * s + 1.0)
         motion = (self.spring + self.damper * s * ahead) * cmath.exp(-s * self.rate_delay)
         unseen = (cmath.exp(-s * self.force_delay) - 1.0) * (self.stiffness + self.damping * s) - self.drag * s
-        gust = self.observer * unseen / (GUST_LAG * s + 1.0)
+        gust = self.observer * unseen / (s / GUST_BANDWIDTH + 1.0)
         free = self.mass * s * s + (self.damping + self.drag) * s + self.stiffness
         return free + (force + motion + gust) / (self.lag * s + 1.0)
 
@@ -154,7 +158,7 @@ class ContactLoop:
                 return None
             if abs(change) < POLE_TOLERANCE * abs(pole):
                 break
-        # A real pole may have been met on the way from a pair; a far jump is another pole, found from its own start.
+        # A far jump leads to another pole, which has its own start.
         return pole if abs(pole - start) < 0.2 * abs(start) else None
 
 

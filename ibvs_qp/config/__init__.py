@@ -2,8 +2,10 @@
 
 from ibvs_qp.config.brush import BrushSettings
 from ibvs_qp.config.contact import ContactSettings
+from ibvs_qp.config.contact_estimation import ContactEstimationSettings
 from ibvs_qp.config.controller import LONGEST_TICK, ControllerConfig
 from ibvs_qp.config.errors import ConfigError, IbvsQpError
+from ibvs_qp.config.estimation import EstimationConfig
 from ibvs_qp.config.gains import Gains
 from ibvs_qp.config.limits import LimitSettings
 from ibvs_qp.config.solver import SolverSettings
@@ -14,8 +16,10 @@ __all__ = [
     "LONGEST_TICK",
     "BrushSettings",
     "ConfigError",
+    "ContactEstimationSettings",
     "ContactSettings",
     "ControllerConfig",
+    "EstimationConfig",
     "Gains",
     "IbvsQpError",
     "LimitSettings",

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+from ibvs_qp.config.contact_estimation import ContactEstimationSettings
 from ibvs_qp.config.settings import require_order, setting, validate
 
 
@@ -54,6 +55,7 @@ class ContactSettings:
     stuck_speed_m_s: float = setting(
         0.005, "slower than this in contact counts as stuck", unit="m/s", low=0.0, high=0.1
     )
+    estimation: ContactEstimationSettings = field(default_factory=ContactEstimationSettings)
 
     def __post_init__(self) -> None:
         """Validate; pairs too that only make sense in one order."""

@@ -65,7 +65,7 @@ class PressingConfig(Protocol):
 
 def contact_loop(config: PressingConfig, stiffness: float, damping: float, force_delay_s: float) -> ContactLoop:
     """The linear contact loop of a controller against a wall; arguments as in `contact_mode_damping`."""
-    gains, vehicle, hold = config.gains, config.vehicle, 0.5 * config.tick_s
+    gains, vehicle, estimation, hold = config.gains, config.vehicle, config.contact.estimation, 0.5 * config.tick_s
     spring, damper = (gains.force_ksp, gains.force_ksd) if config.impedance else (0.0, 0.0)
     return ContactLoop(
         mass=vehicle.mass_kg,
@@ -81,6 +81,9 @@ def contact_loop(config: PressingConfig, stiffness: float, damping: float, force
         observer=1.0 if config.contact_feedforward else 0.0,  # without feed-forward it rests at the wall
         force_delay=force_delay_s + hold,
         rate_delay=2.0 * hold,
+        acceleration_filter=estimation.acceleration_filter_s,
+        acceleration_noise=estimation.acceleration_noise,
+        stationary_speed_std=estimation.stationary_speed_std_m_s,
     )
 
 

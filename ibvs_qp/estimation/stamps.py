@@ -1,19 +1,30 @@
-"""Which remembered tick a late measurement belongs to: found by time, not by counting nominal ticks."""
+"""Time of samples: the remembered tick of a late measurement, and the interval between two force samples."""
 
 from __future__ import annotations
 
-#: Ticks of history kept; at 250 Hz half a second, far beyond any camera's latency.
+from bisect import bisect_left
+from collections import deque
+
+import numpy as np
+
+#: Ticks remembered; at 250 Hz half a second, far beyond any camera's latency.
 HISTORY = 128
+#: A stamp may lie this many nominal ticks ahead of the newest tick, and this many before the oldest.
+AHEAD, BEFORE = 1.5, 0.5
+#: Interval of the first force sample: 100 Hz; and the longest one that filters count [s].
+FIRST_INTERVAL, LONGEST_INTERVAL = 0.01, 0.1
 
 
 class StampRing:
-    """Stamps of the last `HISTORY` ticks; slots of a ring in which others keep what they remember of them.
+    """Stamps of the last `HISTORY` ticks, and the slots of a ring in which other classes store what belongs to them.
+
+    Late measurements find their tick by time, so dropped and uneven ticks do no harm.
 
     Attributes:
-        now: Number of ticks remembered so far; the newest lies in slot ``now % HISTORY``.
+        now: Number of ticks so far; the newest has slot ``now % HISTORY``.
 
     Args:
-        tick_s: Nominal control period [s]: where the search begins, and how far ahead of the newest a stamp may lie.
+        tick_s: Nominal control period [s].
     """
 
     def __init__(self, tick_s: float) -> None:
@@ -22,41 +33,36 @@ class StampRing:
 
     def reset(self) -> None:
         """Forget every tick."""
-        self._stamps = [-1] * HISTORY
+        self._stamps: deque[int] = deque(maxlen=HISTORY)
         self.now = 0
-        self._newest = -1
-        self._asked: tuple[int, int] | None = None  # the last question, its answer in `_answer`
-        self._answer: int | None = None
 
     def add(self, stamp_ns: int) -> int:
-        """Remember one more tick; returns its slot."""
+        """Add a tick, later than all before, and return its slot."""
         self.now += 1
-        slot = self.now % HISTORY
-        self._stamps[slot] = self._newest = stamp_ns
-        return slot
+        self._stamps.append(stamp_ns)
+        return self.now % HISTORY
 
     def slot(self, age: int) -> int:
         """Slot of the tick so many ticks ago."""
         return (self.now - age) % HISTORY
 
     def age(self, stamp_ns: int) -> int | None:
-        """How many ticks ago the tick nearest to a stamp was; None where none is remembered so far back or ahead."""
-        question = stamp_ns, self.now  # everything in a picture asks the same
-        if question != self._asked:
-            self._asked, self._answer = question, self._find(stamp_ns)
-        return self._answer
-
-    def _find(self, stamp_ns: int) -> int | None:
-        stamps, now, newest, tick = self._stamps, self.now, self._newest, self._tick_ns
-        filled = min(HISTORY, now)
-        if not filled or newest - stamp_ns < -1.5 * tick:
+        """How many ticks ago the tick nearest to a stamp was; None outside the remembered time."""
+        stamps = self._stamps
+        if not stamps or not -BEFORE * self._tick_ns <= stamp_ns - stamps[0]:
             return None
-        age = min(max(round((newest - stamp_ns) / tick), 0), filled - 1)
-        here = abs(stamps[(now - age) % HISTORY] - stamp_ns)
-        # On a regular clock the first guess is the nearest; otherwise walk there, the stamps only ever grow.
-        while age + 1 < filled and (there := abs(stamps[(now - age - 1) % HISTORY] - stamp_ns)) < here:
-            age, here = age + 1, there
-        while age > 0 and (there := abs(stamps[(now - age + 1) % HISTORY] - stamp_ns)) < here:
-            age, here = age - 1, there
-        # Before the oldest tick there is nothing; half a tick is rounding.
-        return None if age == filled - 1 and stamp_ns < stamps[(now - age) % HISTORY] - 0.5 * tick else age
+        if stamp_ns - stamps[-1] > AHEAD * self._tick_ns:
+            return None
+        after = bisect_left(stamps, stamp_ns)
+        if after == len(stamps) or (after > 0 and stamp_ns - stamps[after - 1] <= stamps[after] - stamp_ns):
+            after -= 1
+        return len(stamps) - 1 - after
+
+    def slots_since(self, stamp_ns: int) -> np.ndarray:
+        """Slots of the tick nearest to a stamp and of every later one, oldest first, (age + 1,)."""
+        return np.arange(self.now - (self.age(stamp_ns) or 0), self.now + 1) % HISTORY
+
+
+def sample_interval(stamp_ns: int, last_ns: int) -> float:
+    """Interval that a force sample stands for [s]; ``last_ns`` is -1 before the first one."""
+    return FIRST_INTERVAL if last_ns < 0 else min((stamp_ns - last_ns) * 1e-9, LONGEST_INTERVAL)

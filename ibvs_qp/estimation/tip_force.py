@@ -1,4 +1,4 @@
-"""Force across the tool from both halves of a force/torque sensor: a push at a known tip shows in the moments too."""
+"""Force across the tool from both halves of a force/torque sensor: its moments measure a force at a known tip too."""
 
 from __future__ import annotations
 
@@ -6,21 +6,20 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ibvs_qp.config.vehicle import VehicleParams
-from ibvs_qp.estimation.config import EstimationConfig
+from ibvs_qp.config import EstimationConfig, VehicleParams
 from ibvs_qp.estimation.line_noise import WhiteNoise
 
-#: Levers shorter than this tell nothing about a force [m].
+#: The moments of a shorter lever carry no information about a force [m].
 LEAST_LEVER = 0.05
 
 
 class TipForce:
-    r"""Weighs the two ways of measuring the force across the tool, y and z, by the noise that each shows.
+    r"""Inverse-variance mean of two measurements of the force across the tool, y and z.
 
     A force f at the tip, r from the sensor, gives :math:`M_z = r_x f_y - r_y f_x` and
-    :math:`M_y = r_z f_x - r_x f_z`. So besides the sensor's force there is the moment's, its variance that of
-    successive samples and :math:`(s f_x / r_x)^2`, where s is how far from the tip the contact may press. The moments
-    about the sensor and the force along the tool are left as they are.
+    :math:`M_y = r_z f_x - r_x f_z`. So the moments measure the force as well; their variance is that of successive
+    samples plus :math:`(s f_x / r_x)^2`, where s is how far from the tip the contact may press. The moments about the
+    sensor and the force along the tool stay as measured.
     """
 
     def __init__(self, vehicle: VehicleParams, config: EstimationConfig) -> None:
@@ -33,7 +32,7 @@ class TipForce:
         self._noise = [WhiteNoise() for _ in range(4)]
 
     def across(self, force: Sequence[float], moment: Sequence[float]) -> tuple[float, float]:
-        """The better force across [N]: y and z of a tared wrench at the sensor.
+        """Mean force across [N]: y and z of a tared wrench at the sensor.
 
         Args:
             force: Contact force [N], FRD axes, (3,).
@@ -42,13 +41,21 @@ class TipForce:
         (ahead, right, below), (fx, fy, fz), (_, my, mz) = self._lever, force, moment
         if ahead < LEAST_LEVER:
             return fy, fz
-        samples = fy, fz, (mz + right * fx) / ahead, (below * fx - my) / ahead
-        floor = self._floor
-        variances = [noise.hear(sample, floor) for noise, sample in zip(self._noise, samples, strict=True)]
-        astray = (self._spread * fx / ahead) ** 2
-        better = []
-        for axis in (0, 1):
-            of_force, of_moment = variances[axis], variances[axis + 2] + astray
-            share = of_force / (of_force + of_moment)
-            better.append(samples[axis] + share * (samples[axis + 2] - samples[axis]))
-        return better[0], better[1]
+        off_tip = (self._spread * fx / ahead) ** 2
+        return (
+            self._mean(0, fy, (mz + right * fx) / ahead, off_tip),
+            self._mean(2, fz, (below * fx - my) / ahead, off_tip),
+        )
+
+    def _mean(self, channel: int, direct: float, from_moment: float, off_tip: float) -> float:
+        """Mean of a force sample and the one from the moment, whose variance is larger by ``off_tip`` [N^2]."""
+        variance = self._variance(channel, direct)
+        gain = variance / (variance + self._variance(channel + 1, from_moment) + off_tip)
+        return direct + gain * (from_moment - direct)
+
+    def _variance(self, channel: int, sample: float) -> float:
+        """Variance of one sample of a channel [N^2], estimated from successive samples."""
+        noise = self._noise[channel]
+        noise.learn(sample - noise.residual, self._floor)
+        noise.residual = sample
+        return noise.total(self._floor)

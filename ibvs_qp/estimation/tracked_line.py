@@ -1,14 +1,10 @@
-"""A line on the wall, as it is followed from picture to picture."""
+"""A line on the wall, tracked from frame to frame."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from ibvs_qp.estimation.kalman import GATE
 from ibvs_qp.estimation.line_noise import SteadyValue, WhiteNoise
-
-#: So many offsets in a row that agree with each other, not with the prediction, are another line.
-REFUSED = 3
 
 
 @dataclass(slots=True)
@@ -16,14 +12,21 @@ class TrackedLine:
     """One line on the wall, in metres from the tip's wall point.
 
     Attributes:
+        track_id: Identity that perception gives it.
+        role: "horizontal" or "vertical".
+        slot: Its place among the lines in the filter's state.
+        angle: Angle of the normal in (right, down) [rad]; pi/2 for a level line.
+        deviation: Standard deviation of the filtered offset [m], from the noise that the frames show.
+        seen_ns: Capture time of the last frame that shows it; news_ns: tick at which that frame arrived.
+        frames: Number of frames that showed it.
         offset: Signed distance from the tip to the line along its normal [m]; normals point down (horizontal lines)
             or right (vertical lines), so > 0 is below or right of the tip.
-        angle: Angle of the normal in (right, down) [rad]; pi/2 for a level line.
-        deviation: Of the filtered offset [m], from the noise that the pictures show.
-        weight: How much it counts now; fresh_weight: how much while pictures show it.
-        rates: Offset per unit of the tip's motion (right, down).
-        noise: Of the measured offset [m^2]; tilt: filter of the angle.
-        refused: Offsets beyond the gate in a row that agree with each other.
+        weight: Its weight now; fresh_weight: its weight at the last frame.
+        surface_side, kind: As in `ibvs_qp.measurement.LineFeature`.
+        theta_variance: Of the filtered angle [rad^2].
+        rates: Change of the offset per metre of tip motion (right, down).
+        noise: Noise of the measured offset [m^2]; tilt: filter of the angle.
+        refused: Refused offsets in a row that agree with each other.
     """
 
     track_id: int
@@ -44,16 +47,3 @@ class TrackedLine:
     noise: WhiteNoise = field(default_factory=WhiteNoise)
     tilt: SteadyValue = field(default_factory=SteadyValue)
     refused: int = 0
-
-    def is_another(self, difference: float, variance: float) -> bool:
-        """Whether a refused offset makes this another line: three in a row that agree with each other.
-
-        Noise that has just begun lies now here, now there; it is refused until it is known, and no more than that.
-
-        Args:
-            difference: Between the residuals of this picture and the last [m].
-            variance: Of one offset [m^2].
-        """
-        agrees = difference * difference < 2.0 * GATE * GATE * variance
-        self.refused = self.refused + 1 if agrees else 1
-        return self.refused >= REFUSED

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ibvs_qp.estimation.contact import ContactEstimator
+from ibvs_qp.estimation.contact_state import ContactState
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL, Measurement, Reference
 from ibvs_qp.model.inputs import ARRAYS, CONTACT, LINE, SCALARS, TARGET
 from ibvs_qp.model.pairing import LinePairing
@@ -35,7 +35,7 @@ class StepInputs:
         for line in self._lines:
             line[:] = [0.0] * len(LINE)
 
-    def write(self, measurement: Measurement, reference: Reference, contact: ContactEstimator, dt: float) -> None:
+    def write(self, measurement: Measurement, reference: Reference, contact: ContactState, dt: float) -> None:
         """Pack one validated measurement, its reference and the contact.
 
         Args:
@@ -45,7 +45,7 @@ class StepInputs:
             dt: Time since the last step [s].
         """
         force, velocity = measurement.specific_force, measurement.velocity
-        press, known, stiffness = reference.contact, contact.known, contact.stiffness
+        press, known = reference.contact, contact.known
         self._pair(measurement, reference, known)
         self._block[:] = (
             *measurement.attitude.tolist(),
@@ -53,7 +53,7 @@ class StepInputs:
             *measurement.contact_wrench.tolist(),
             *(_ZERO if force is None else force.tolist()),
             *(_ZERO if velocity is None else velocity.tolist()),
-            *contact.direction,
+            *contact.normal,
             # SCALARS
             dt,
             force is not None,
@@ -69,8 +69,8 @@ class StepInputs:
             contact.across_noise,
             contact.in_contact,
             contact.ramp,
-            stiffness.value,
-            stiffness.known,
+            contact.stiffness,
+            contact.stiffness_known,
             # TARGET
             reference.push_force,
             reference.standoff,

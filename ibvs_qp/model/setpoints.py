@@ -10,6 +10,7 @@ import numpy as np
 
 from ibvs_qp.config import LONGEST_TICK
 from ibvs_qp.estimation.contact import ContactEstimator
+from ibvs_qp.estimation.contact_state import ContactState
 from ibvs_qp.frames import camera_twist_matrix, down_in_body
 from ibvs_qp.measurement import Measurement, Reference
 from ibvs_qp.model.inputs import LINE_OUTPUTS
@@ -114,13 +115,26 @@ class Setpoints:
         if self._stamp >= 0:
             dt = min(max((stamp - self._stamp) * 1e-9, 0.0), LONGEST_TICK)
         self._stamp = stamp
-        self.contact.update(measurement, down_in_body(measurement.attitude))
+        contact = self._estimate_contact(measurement)
         self.step.advance()
-        self._inputs.write(measurement, reference, self.contact, dt)
+        self._inputs.write(measurement, reference, contact, dt)
         self._write_rotors(measurement)
         for view, parameter in self._parameters:
             view[:] = parameter.value
         self.step.evaluate()
+
+    def _estimate_contact(self, measurement: Measurement) -> ContactState:
+        force = measurement.specific_force
+        return self.contact.update(
+            stamp_ns=measurement.stamp_ns,
+            angular_velocity=measurement.angular_velocity.tolist(),
+            specific_force=None if force is None else force.tolist(),
+            down=down_in_body(measurement.attitude),
+            contact_wrench=measurement.contact_wrench,
+            wrench_stamp_ns=measurement.wrench_stamp_ns,
+            plane=measurement.plane,
+            plane_stamp_ns=measurement.plane_stamp_ns,
+        )
 
     def _write_rotors(self, measurement: Measurement) -> None:
         """Last thrusts and limits; limits of a measurement hold within those of the vehicle."""

@@ -9,7 +9,7 @@ from typing import Any
 
 import casadi as ca
 
-from ibvs_qp.vectors import rotation_rows, turned, turned_back
+from ibvs_qp.frames import rotate, rotate_back, rotation_rows
 
 #: Least visible depth [m].
 NEAR_M = 0.05
@@ -91,10 +91,10 @@ def board_view() -> ca.Function:
     position, quaternion, camera = ca.SX.sym("position", 3), ca.SX.sym("quaternion", 4), ca.SX.sym("camera", 3)
     outline, unit, half = ca.SX.sym("outline", 3 * OUTLINE), ca.SX.sym("unit", 9), ca.SX.sym("half", 2)
     rotation = rotation_rows(*_entries(quaternion))
-    centre = [a + b for a, b in zip(_entries(position), turned(rotation, _entries(camera)), strict=True)]
+    centre = [a + b for a, b in zip(_entries(position), rotate(rotation, _entries(camera)), strict=True)]
 
     def seen(point: _Numbers) -> tuple[Any, Any, Any]:
-        ahead, right, down = turned_back(rotation, [a - b for a, b in zip(point, centre, strict=True)])
+        ahead, right, down = rotate_back(rotation, [a - b for a, b in zip(point, centre, strict=True)])
         return right, down, ahead
 
     spots = [seen(point) for point in _rows(outline, OUTLINE)]

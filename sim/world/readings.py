@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from ibvs_qp.config.vehicle import VehicleParams
-from ibvs_qp.vectors import cross_product, turned
+from ibvs_qp.frames import cross, rotate
 from sim.world.clearance import PropellerClearance
 from sim.world.readout import MOTION, PLACES
 
@@ -63,10 +63,10 @@ class PlantReadings:
     @property
     def tip_velocity(self) -> np.ndarray:
         """Velocity of the tip, world NED [m/s], (3,)."""
-        swing = cross_product(self.angular_velocity.tolist(), self.vehicle.tip_position_m)
+        swing = cross(self.angular_velocity.tolist(), self.vehicle.tip_position_m)
         world = self.truth[PLACES["velocity"]]
         (a, b, c) = self.rotation.tolist()
-        return world + turned((tuple(a), tuple(b), tuple(c)), swing)
+        return world + rotate((tuple(a), tuple(b), tuple(c)), swing)
 
     @property
     def tip_on_wall(self) -> tuple[float, float]:

@@ -10,7 +10,7 @@ from typing import Any
 
 import casadi as ca
 
-from ibvs_qp.vectors import cross_product, rotation_rows, turned, turned_back
+from ibvs_qp.frames import cross, rotate, rotate_back, rotation_rows
 from sim.world.crash import FLIP_COSINE, GROUND_CLEARANCE_M
 
 #: Results of `readout` and their sizes; arrays in NED and FRD.
@@ -73,7 +73,7 @@ def readout(size: int, accelerometer: int, force: int, torque: int, contact: int
     rotation = rotation_rows(*quaternion)
     numbers = _entries(points)
     centre, tip, reach = numbers[:3], numbers[3:6], numbers[6]
-    swing = turned(rotation, cross_product(rate, centre))
+    swing = rotate(rotation, cross(rate, centre))
     felts = zip(*(sensed(accelerometer, 3, step) for step in range(steps)), strict=True)
     felt = [sum(samples[1:], samples[0]) for samples in felts]
     fraction = 1.0 / steps
@@ -81,7 +81,7 @@ def readout(size: int, accelerometer: int, force: int, torque: int, contact: int
     touches = [sensed(contact, 10, step) for step in range(steps)]
     pushes = [ca.if_else(touch[0] > 0.0, touch[1], 0.0) for touch in touches]
     found, _, first, second, *axes = touches[-1]
-    (_, ty, tz), (_, sy, sz) = axes[3:6], cross_product(axes[:3], axes[3:6])
+    (_, ty, tz), (_, sy, sz) = axes[3:6], cross(axes[:3], axes[3:6])
     # Minus the force on the board, in NED: the two signs of y and z cancel.
     friction = [ca.if_else(found < 1.0, 0.0, value) for value in (first * ty + second * sy, first * tz + second * sz)]
     total = sum(position[1:], position[0]) + sum(sum(row[1:], row[0]) for row in rotation)
@@ -93,9 +93,9 @@ def readout(size: int, accelerometer: int, force: int, torque: int, contact: int
         "quaternion": quaternion,
         "rate": rate,
         "rotation": [entry for row in rotation for entry in row],
-        "body_velocity": turned_back(rotation, velocity),
+        "body_velocity": rotate_back(rotation, velocity),
         "centre_velocity": [a + b for a, b in zip(velocity, swing, strict=True)],
-        "tip": [a + b for a, b in zip(position, turned(rotation, tip), strict=True)],
+        "tip": [a + b for a, b in zip(position, rotate(rotation, tip), strict=True)],
         "felt": (fraction * felt[0], -fraction * felt[1], -fraction * felt[2]),
         "ft_wrench": (fx, -fy, -fz, mx, -my, -mz),
         "pushes": pushes,
@@ -123,7 +123,7 @@ def drive(rotors: int) -> ca.Function:
     a, b, c, d, e, f, g, h, i = _entries(rotation)
     rows = (a, b, c), (d, e, f), (g, h, i)
     force = tuple(_entries(air))
-    mx, my, mz = turned(rows, cross_product(_entries(arm), turned_back(rows, force)))
+    mx, my, mz = rotate(rows, cross(_entries(arm), rotate_back(rows, force)))
     fx, fy, fz = force
     applied = ca.vertcat(fx, -fy, -fz, mx, -my, -mz)
     return ca.Function(

@@ -15,9 +15,14 @@ from ibvs_qp.frames import (
     align_line,
     camera_twist_matrix,
     cross,
+    dot,
     down_in_body,
+    plane_in_body,
     roll_pitch,
+    rotate,
+    rotate_back,
     rotation_from_quaternion,
+    rotation_rows,
     skew,
     to_camera,
 )
@@ -48,6 +53,25 @@ def test_attitude_takes_body_to_world_and_w_comes_first(yaw: float, pitch: float
     np.testing.assert_allclose(rotation_from_quaternion(-q), expected, atol=1e-12)  # q and -q are one attitude
 
 
+@given(any_angle, angles, angles)
+def test_rotation_of_one_vector_is_that_of_the_matrix(yaw: float, pitch: float, roll: float) -> None:
+    q, vector = quaternion(yaw, pitch, roll), (0.3, -2.0, 1.1)
+    rows, matrix = rotation_rows(*q.tolist()), rotation_from_quaternion(q)
+    np.testing.assert_allclose(rotate(rows, vector), matrix @ vector, atol=1e-12)
+    np.testing.assert_allclose(rotate_back(rows, vector), matrix.T @ vector, atol=1e-12)
+
+
+def test_plane_in_body_is_normal_and_distance_of_a_point() -> None:
+    """A wall 2 m from the camera, askew: it is 2 m from the camera and none from a point on it."""
+    normal = np.array([math.cos(0.3), math.sin(0.3), 0.0])
+    a, b, c = R_BODY_CAMERA.T @ normal / 2.0  # 1/Z = a x + b y + c for the points with n . P = 2
+    found, distance = plane_in_body((a, b, c, -1.0), (0.0, 0.0, 0.0))
+    np.testing.assert_allclose(found, normal, atol=1e-12)
+    assert distance == pytest.approx(2.0)
+    on_wall = 2.0 * normal + 0.7 * np.array([-math.sin(0.3), math.cos(0.3), 0.0]) + [0.0, 0.0, 0.4]
+    assert plane_in_body((a, b, c, -1.0), on_wall.tolist())[1] == pytest.approx(0.0, abs=1e-12)
+
+
 def test_signs_of_roll_pitch_and_yaw_are_ned() -> None:
     right_wing_down = rotation_from_quaternion(quaternion(0, 0, 0.1)) @ [0, 1, 0]
     assert right_wing_down[2] > 0
@@ -58,7 +82,8 @@ def test_signs_of_roll_pitch_and_yaw_are_ned() -> None:
 @given(st.lists(st.floats(-1e3, 1e3), min_size=6, max_size=6))
 def test_cross_and_skew_agree_with_numpy(numbers: list[float]) -> None:
     a, b = np.array(numbers[:3]), np.array(numbers[3:])
-    np.testing.assert_allclose(cross(a, b), np.cross(a, b), rtol=1e-12, atol=1e-9)
+    np.testing.assert_allclose(cross(a.tolist(), b.tolist()), np.cross(a, b), rtol=1e-12, atol=1e-9)
+    assert dot(a.tolist(), b.tolist()) == pytest.approx(float(a @ b), rel=1e-9, abs=1e-6)
     np.testing.assert_allclose(skew(a) @ b, np.cross(a, b), rtol=1e-12, atol=1e-6)
 
 

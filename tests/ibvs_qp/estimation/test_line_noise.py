@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from controller_scenes import TICK_NS, Wall, attitude
 
-from ibvs_qp.config.vehicle import VehicleParams
-from ibvs_qp.estimation.config import EstimationConfig
+from ibvs_qp.config import EstimationConfig, VehicleParams
 from ibvs_qp.estimation.line_noise import WINDOW, SteadyValue, WhiteNoise
 from ibvs_qp.estimation.wall_lines import WallAxes
 from ibvs_qp.estimation.wall_motion import WallMotion
@@ -89,8 +88,8 @@ def test_the_noise_is_found_while_the_filter_drifts(sigma: float) -> None:
     rng, noise, found = np.random.default_rng(1), WhiteNoise(), []
     for k in range(600):
         innovation = 0.2 * sigma * k + sigma * rng.standard_normal()
-        noise.learn(noise.difference(innovation), 1e-8)
-        noise.keep(innovation)
+        noise.learn(innovation - noise.residual, 1e-8)
+        noise.residual = innovation
         found.append(noise.variance)
     assert math.sqrt(np.mean(found[WINDOW:])) == pytest.approx(sigma, rel=0.1)
 
@@ -99,8 +98,8 @@ def test_one_leap_is_not_taken_for_noise() -> None:
     rng, noise = np.random.default_rng(2), WhiteNoise()
     for k in range(200):
         innovation = (1.0 if k >= 150 else 0.0) + 1e-3 * rng.standard_normal()
-        noise.learn(noise.difference(innovation), 1e-8)
-        noise.keep(innovation)
+        noise.learn(innovation - noise.residual, 1e-8)
+        noise.residual = innovation
         if k == 150:
             assert math.sqrt(noise.variance) < 2e-3
     assert math.sqrt(noise.variance) < 1.5e-3
@@ -112,7 +111,6 @@ def test_a_steady_value_becomes_the_mean_and_knows_how_good_it_is() -> None:
         rng = np.random.default_rng(seed)
         first = 0.12 * rng.standard_normal()
         angle = SteadyValue(value=first, spread=1e-6)
-        angle.noise.keep(0.0)
         for _ in range(120):
             angle.correct(0.12 * rng.standard_normal(), 1e-6, CONFIG.angle_noise**2 / 30.0)
         errors.append(angle.value)

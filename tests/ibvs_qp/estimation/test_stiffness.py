@@ -7,17 +7,21 @@ import math
 import numpy as np
 import pytest
 
-from ibvs_qp.estimation.stiffness import ASSUMED_STIFFNESS, StiffnessEstimator
+from ibvs_qp.config import ContactSettings
+from ibvs_qp.estimation.stiffness import StiffnessEstimator
+
+SETTINGS = ContactSettings()
+ASSUMED = SETTINGS.estimation.assumed_stiffness_n_m
 
 
 def press(stiffness: float, seed: int = 0, peak: float = 5.0) -> StiffnessEstimator:
     """A push that rises over a second; filtered as the contact estimator filters it, seen with millimetre noise."""
-    rng, estimator = np.random.default_rng(seed), StiffnessEstimator()
-    share = 1.0 - math.exp(-2.0 * math.pi * 8.0 * 0.01)
+    rng, estimator = np.random.default_rng(seed), StiffnessEstimator(SETTINGS)
+    gain = 1.0 - math.exp(-2.0 * math.pi * SETTINGS.force_filter_hz * 0.01)
     push = 0.0
     for k in range(300):
         force = peak * min(1.0, 0.01 * k)
-        push += share * (force + rng.normal(0.0, 0.2) - push)
+        push += gain * (force + rng.normal(0.0, 0.2) - push)
         estimator.add(push, force / stiffness + rng.normal(0.0, 2e-4), 0.01)
     return estimator
 
@@ -30,10 +34,10 @@ def test_stiffness_of_a_press(stiffness: float) -> None:
 
 
 def test_stiffness_unknown_is_assumed_stiff_and_a_poke_teaches_nothing() -> None:
-    assert StiffnessEstimator().value == ASSUMED_STIFFNESS
+    assert StiffnessEstimator(SETTINGS).value == ASSUMED
     poke = press(2000.0, peak=0.5)
-    assert not poke.known and poke.value == ASSUMED_STIFFNESS
-    backwards = StiffnessEstimator()
+    assert not poke.known and poke.value == ASSUMED
+    backwards = StiffnessEstimator(SETTINGS)
     for k in range(200):
         backwards.add(0.03 * k, -1e-5 * k, 0.01)  # a push that grows as the tip recedes is no spring
     assert not backwards.known
@@ -41,7 +45,7 @@ def test_stiffness_unknown_is_assumed_stiff_and_a_poke_teaches_nothing() -> None
 
 def test_stiffness_stays_in_its_range_and_survives_a_new_touch() -> None:
     rigid = press(1e7)
-    assert rigid.value <= StiffnessEstimator.RANGE[1]
+    assert rigid.value <= SETTINGS.estimation.stiffness_max_n_m
     known = press(1500.0)
     value = known.value
     known.start()

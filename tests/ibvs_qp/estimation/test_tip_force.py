@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ibvs_qp.config.vehicle import VehicleParams
-from ibvs_qp.estimation.config import EstimationConfig
+from ibvs_qp.config import EstimationConfig, VehicleParams
 from ibvs_qp.estimation.tip_force import TipForce
 
 SIGMA_NM = 0.005

@@ -39,9 +39,9 @@ def test_wall_to_image_and_back(
         seen = replace(wall.line(offset, tilt, role, flip=flip), surface_side=-1 if flip else 1)
         found = wall_line(seen, axes, TIP - CAMERA, distance)
         assert found is not None
-        assert found[0] == pytest.approx(offset, abs=1e-9)
-        assert found[1] == pytest.approx(tilt, abs=1e-9)
-        assert found[2] == 1  # the side is told for the normal of the wall line, however the image line was written
+        assert found.offset == pytest.approx(offset, abs=1e-9)
+        assert found.angle == pytest.approx(tilt, abs=1e-9)
+        assert found.surface_side == 1  # for the normal of the wall line, whatever the sign of the image line
     rho, theta, _ = image_line(offset, tilt, axes, TIP - CAMERA, distance)
     expected = wall.line(offset, tilt, role)
     sign = 1.0 if math.cos(theta - expected.theta) > 0 else -1.0
@@ -62,7 +62,7 @@ def test_metres_per_unit_of_rho() -> None:
     line = wall.line(0.03, 0.02, VERTICAL)
     here, there = (wall_line(replace(line, rho=line.rho + change), axes, TIP - CAMERA, 0.1) for change in (0.0, step))
     assert here is not None and there is not None
-    assert (there[0] - here[0]) / step == pytest.approx(here[3], rel=0.03)
+    assert (there.offset - here.offset) / step == pytest.approx(here.scale, rel=0.03)
 
 
 # ------------------------------------------------------------------------------------------------------ prediction

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from controller_scenes import TICK_NS, attitude, body_to_world
 
-from ibvs_qp.config.vehicle import VehicleParams
-from ibvs_qp.estimation.config import EstimationConfig
+from ibvs_qp.config import EstimationConfig, VehicleParams
 from ibvs_qp.estimation.wrench_tare import WrenchTare
 
 VEHICLE = VehicleParams()

@@ -97,13 +97,13 @@ def test_a_late_correction_over_uneven_ticks_equals_the_replay() -> None:
 
     def fly(at: int) -> DelayedKalman:
         """Correct tick 40 once tick `at` has been predicted."""
-        f = DelayedKalman(CHAIN, np.array([1e-10, 1e-6, 1e-7]), np.array([0.1, 0.1, 0.1]), 0.004)
+        f = DelayedKalman(CHAIN, np.array([1e-10, 1e-6, 1e-7]), np.array([0.1, 0.1, 0.1]), 0.004, 6.0)
         for k in range(60):
             f.predict(int(stamps[k]), inputs[k], lengths[k] * 0.004)
             if k in (5, 15, 25):  # so that distance, speed and bias are correlated
-                f.correct(int(stamps[k]), np.eye(3)[:1], np.array([0.01]), np.array([[1e-4]]), 1e6)
+                f.correct_entry(int(stamps[k]), 0, 0.01, 1e-4, 1e6)
             if k == at:
-                assert f.correct(int(stamps[40]), np.eye(3)[:1], np.array([0.02]), np.array([[1e-4]]), 1e6)
+                assert f.correct_entry(int(stamps[40]), 0, 0.02, 1e-4, 1e6)
         return f
 
     late, replay = fly(59), fly(40)

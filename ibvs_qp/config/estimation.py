@@ -1,4 +1,4 @@
-"""Settings of the pilot's estimators: tare, motion in the wall plane, tracked lines."""
+"""Settings of the pilot's estimators: motion in the wall plane, tracked lines, tare of the wrench."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class EstimationConfig:
     )
     line_std_m: float = setting(
         3e-4,
-        "least deviation of one line offset, whatever the fit claims; more is learned in flight",
+        "least deviation of one line offset, whatever the fit claims; the frames may show more",
         unit="m",
         low=1e-6,
         high=0.1,
@@ -38,7 +38,7 @@ class EstimationConfig:
     velocity_std_m_s: float = setting(2e-3, "least deviation of one flow velocity", unit="m/s", low=1e-6, high=1.0)
     angle_std_rad: float = setting(
         3e-3,
-        "least deviation of one line angle: attitude noise and the turning of a short edge that grows",
+        "least deviation of one line angle: attitude noise, and the rotation of a short edge as it grows",
         unit="rad",
         low=1e-6,
         high=0.1,
@@ -52,23 +52,37 @@ class EstimationConfig:
     )
     frames_to_trust: int = setting(4, "frames until a new line has full weight", low=1, high=100)
     fade_start_s: float = setting(
-        0.10, "a line this long without news fades, counted from delivery", unit="s", low=0.01, high=5.0
+        0.10, "a line without new frames fades after this time, counted from delivery", unit="s", low=0.01, high=5.0
     )
-    fade_end_s: float = setting(0.45, "and is forgotten after this long", unit="s", low=0.05, high=10.0)
-    velocity_life_s: float = setting(0.6, "a velocity older than this is not passed on", unit="s", low=0.05, high=10.0)
+    fade_end_s: float = setting(0.45, "and is dropped after this time", unit="s", low=0.05, high=10.0)
+    gate_sigmas: float = setting(
+        6.0, "offsets and velocities with a larger innovation are refused", low=1.0, high=100.0
+    )
+    refused_frames: int = setting(
+        3, "refused offsets in a row that agree with each other start a new line", low=1, high=100
+    )
+    velocity_life_s: float = setting(0.6, "an older velocity is not used", unit="s", low=0.05, high=10.0)
     tare_time_s: float = setting(
         0.5, "free flight averaged before the wrench is trusted", unit="s", low=0.05, high=10.0
     )
-    tare_follow_s: float = setting(20.0, "how slowly the bias is followed after that", unit="s", low=0.5, high=1000.0)
+    tare_follow_s: float = setting(20.0, "time constant of the bias after that", unit="s", low=0.5, high=1000.0)
     tare_distance_m: float = setting(0.04, "the tip counts as free beyond this distance", unit="m", low=0.005, high=1.0)
+    tare_acceleration_gain: float = setting(
+        0.3,
+        "accelerometer filter of the tool's load, per tick: averages about as long as a force sample lasts",
+        low=0.001,
+        high=1.0,
+    )
     force_std_n: float = setting(
         0.02,
-        "least deviation of a force sample across the tool; more is learned in flight",
+        "least deviation of a force sample across the tool; successive samples may show more",
         unit="N",
         low=1e-4,
         high=10.0,
     )
-    contact_spread_m: float = setting(0.01, "how far from the tip the contact may press", unit="m", low=0.0, high=0.5)
+    contact_spread_m: float = setting(
+        0.01, "largest distance of the contact from the tip's centre", unit="m", low=0.0, high=0.5
+    )
 
     def __post_init__(self) -> None:
         """Validate."""

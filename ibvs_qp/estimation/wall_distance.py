@@ -1,0 +1,150 @@
+"""Wall normal, distance of the tip and its rate: gyro and accelerometer integrated, corrected by measured planes.
+
+Differentiated depth is 60-100 ms late and takes the damping out of the contact; the rate here comes from the
+accelerometer and depth only corrects it (design section 4.2).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from ibvs_qp.config import ControllerConfig
+from ibvs_qp.estimation.kalman import DelayedKalman
+from ibvs_qp.estimation.stamps import HISTORY
+from ibvs_qp.frames import GRAVITY, add_scaled, cross, dot, plane_in_body, unit
+
+#: Order of the filter's state: distance [m], speed of the centre of mass into the wall [m/s], accelerometer bias.
+DISTANCE, SPEED = 0, 1
+#: d/dt (distance, speed, bias) = CHAIN (distance, speed, bias) + measured acceleration.
+CHAIN = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [0.0, 0.0, 0.0]])
+#: Spectral density of the distance itself [m^2/s]: nearly none.
+DISTANCE_NOISE = 1e-10
+#: Standard deviations at the start: distance [m], speed [m/s], bias [m/s^2]; and of the first measured distance [m].
+INITIAL_STD, FIRST_DISTANCE_STD = np.array([0.05, 0.05, 0.1]), 0.01
+
+
+class WallDistance:
+    """Filter of the wall normal and of distance, speed and accelerometer bias along it.
+
+    Attributes:
+        normal: Unit vector into the wall, in B, (3,).
+        known: Whether a plane was measured since the start.
+        acceleration: Filtered second derivative of the distance [m/s^2].
+    """
+
+    def __init__(self, config: ControllerConfig) -> None:
+        self._settings = settings = config.contact.estimation
+        self._tip = config.vehicle.tip_position_m
+        self._tip_from_camera = np.subtract(self._tip, config.vehicle.camera_position_m).tolist()
+        noise = np.array([DISTANCE_NOISE, settings.acceleration_noise**2, settings.bias_noise**2])
+        self._filter = DelayedKalman(CHAIN, noise, INITIAL_STD, config.tick_s, settings.gate_sigmas)
+        self.reset()
+
+    def reset(self) -> None:
+        """Return to the state before the first plane."""
+        self._filter.reset()
+        self._state = self._filter.state.tolist()
+        self.normal, self.known = (1.0, 0.0, 0.0), False
+        self._normals = np.zeros((HISTORY, 3))  # of the last ticks, by the slots of the filter's ticks
+        self._jumps, self._plane_ns = 0, -1
+        self.acceleration, self._lever_speed = 0.0, 0.0
+
+    @property
+    def distance(self) -> float:
+        """Tip to wall [m], infinite while unknown."""
+        return self._state[DISTANCE] if self.known else math.inf
+
+    @property
+    def rate(self) -> float:
+        """Rate of the distance [m/s]: of the centre of mass, and of the tip that rotates with the body."""
+        return -self._state[SPEED] - self._lever_speed if self.known else 0.0
+
+    @property
+    def speed(self) -> float:
+        """Speed of the centre of mass into the wall [m/s]."""
+        return -self.rate - self._lever_speed
+
+    @property
+    def depth(self) -> float:
+        """Camera to wall along the normal [m], infinite while unknown."""
+        return self.distance + dot(self.normal, self._tip_from_camera)
+
+    def predict(
+        self,
+        stamp_ns: int,
+        dt: float,
+        angular_velocity: Sequence[float],
+        specific_force: Sequence[float] | None,
+        down: Sequence[float],
+    ) -> None:
+        """Rotate the normal with the gyro and integrate the accelerometer along it.
+
+        Args:
+            stamp_ns: Time of the tick.
+            dt: Time since the last tick [s].
+            angular_velocity: Omega in B [rad/s], (3,).
+            specific_force: Accelerometer in B [m/s^2], (3,); None counts as no acceleration.
+            down: Unit vector of gravity in B, (3,).
+        """
+        self.normal = normal = unit(add_scaled(self.normal, dt, cross(self.normal, angular_velocity)))
+        self._lever_speed = lever_speed = dot(normal, cross(angular_velocity, self._tip))
+        measured = 0.0
+        if specific_force is not None:
+            measured = dot(normal, add_scaled(specific_force, GRAVITY, down))
+        distance, speed, bias = self._state
+        gain = 1.0 - math.exp(-dt / self._settings.acceleration_filter_s)
+        self.acceleration += gain * (bias - measured - self.acceleration)
+        self._state = [distance - dt * (speed + lever_speed), speed + dt * (measured - bias), bias]
+        self._filter.remember(stamp_ns, self._state, dt)
+        self._normals[self._filter.ticks.slot(0)] = normal
+
+    def correct(self, plane: Sequence[float], stamp_ns: int, tip_stationary: bool) -> None:
+        """Correct with a measured plane, at the time of its capture.
+
+        Args:
+            plane: (A, B, C, D) of the wall in C.
+            stamp_ns: Time of capture; a plane no newer than the last one is ignored.
+            tip_stationary: Whether the wall holds the tip still.
+        """
+        if stamp_ns <= self._plane_ns:
+            return
+        self._plane_ns = stamp_ns
+        normal, distance = plane_in_body(plane, self._tip_from_camera)
+        if not self.known:
+            self.normal, self._normals[:], self.known = normal, normal, True
+            self._filter.set_entry(DISTANCE, distance, FIRST_DISTANCE_STD)
+        elif self._correct_distance(stamp_ns, distance, tip_stationary):
+            self._correct_normal(stamp_ns, normal)
+        self._state = self._filter.state.tolist()
+
+    def _correct_distance(self, stamp_ns: int, distance: float, tip_stationary: bool) -> bool:
+        """Correct distance and speed; a jump only once the next frames repeat it. Whether the plane is accepted."""
+        settings, kalman = self._settings, self._filter
+        deviation = settings.stationary_distance_std_m if tip_stationary else settings.distance_std_m
+        if kalman.correct_entry(stamp_ns, DISTANCE, distance, deviation**2):
+            if tip_stationary:
+                kalman.correct_entry(stamp_ns, SPEED, -self._lever_speed, settings.stationary_speed_std_m_s**2)
+            self._jumps = 0
+            return True
+        past = kalman.at(stamp_ns)
+        if past is None:
+            return False
+        if abs(distance - past[DISTANCE]) < settings.jump_m:
+            self._jumps = 0
+            return kalman.correct_entry(stamp_ns, DISTANCE, distance, settings.outlier_std_m**2, gate=math.inf)
+        self._jumps += 1
+        if self._jumps < settings.jump_frames:
+            return False
+        self._jumps = 0
+        kalman.set_entry(DISTANCE, distance, FIRST_DISTANCE_STD)
+        return True
+
+    def _correct_normal(self, stamp_ns: int, normal: Sequence[float]) -> None:
+        """Move the normal of the capture towards the measured one, and every later one by as much."""
+        slots = self._filter.ticks.slots_since(stamp_ns)
+        change = self._settings.normal_gain * (np.array(normal) - self._normals[slots[0]])
+        self._normals[slots] += change
+        self.normal = unit((np.array(self.normal) + change).tolist())
