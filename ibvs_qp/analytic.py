@@ -6,6 +6,7 @@ import numpy as np
 
 from ibvs_qp.command import Command, Outcome
 from ibvs_qp.config import ControllerConfig
+from ibvs_qp.estimation.contact_state import ContactState
 from ibvs_qp.measurement import Measurement, Reference
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.reporting import clipped_command, contact_mode, reach_note
@@ -99,8 +100,8 @@ class PaperController:
         self._gate.reset()
         self._reference = Reference()
 
-    def step(self, measurement: Measurement, reference: Reference) -> Command:
-        """Thrusts for one tick; never raises, clips to box and rate."""
+    def step(self, measurement: Measurement, reference: Reference, contact: ContactState | None = None) -> Command:
+        """Thrusts for one tick; never raises, clips to box and rate; arguments as of `HybridController.step`."""
         checked, rejected = self._gate.check(measurement)
         reference, refused = check_reference(reference, self._reference)
         self._reference, rejected, terms = reference, rejected + refused, self.setpoints
@@ -112,7 +113,7 @@ class PaperController:
             )
         if self._gate.restarted:
             terms.restart()
-        terms.update(checked, reference)
+        terms.update(checked, reference, contact)
         free, outcome, mode = analytic_thrusts(terms), Outcome.SOLVED, contact_mode(terms, reference)
         if not np.isfinite(free).all():
             free, outcome, mode = hold_thrusts(self.config, checked), Outcome.HOLD, "hold"

@@ -8,6 +8,7 @@ import numpy as np
 
 from ibvs_qp.command import Command, Outcome
 from ibvs_qp.config import ControllerConfig
+from ibvs_qp.estimation.contact_state import ContactState
 from ibvs_qp.limits import ApproachLimit, Limit, PushCeiling, ThrustLimit, TiltLimit, ViewLimit, YawLimit
 from ibvs_qp.measurement import Measurement, Reference
 from ibvs_qp.model.model import Model
@@ -97,12 +98,14 @@ class HybridController:
         self._gate.reset()
         self._reference = Reference()
 
-    def step(self, measurement: Measurement, reference: Reference) -> Command:
+    def step(self, measurement: Measurement, reference: Reference, contact: ContactState | None = None) -> Command:
         """Thrusts for one tick; never raises, never leaves the limits.
 
         Args:
-            measurement: What is known now; fields that fail the checks are named in ``Command.rejected``.
-            reference: What shall be done.
+            measurement: State of the vehicle; fields that fail the checks are named in ``Command.rejected``.
+            reference: Targets.
+            contact: Wall and contact if the caller estimates them (`Pilot` does); None estimates them here from the
+                measurement.
 
         Returns:
             The command with its explanation.
@@ -119,7 +122,7 @@ class HybridController:
             return self._hold(measurement, rejected)
         if self._gate.restarted:
             self.setpoints.restart()
-        self.setpoints.update(checked, reference)
+        self.setpoints.update(checked, reference, contact)
         solution = self.engine.solve()
         if solution is None:
             return self._fallback(checked, rejected)

@@ -17,6 +17,7 @@ from ibvs_qp.config import LONGEST_TICK, ControllerConfig, EstimationConfig
 from ibvs_qp.config.contact_margin import require_margin
 from ibvs_qp.config.settings import choice, dump_toml, load_toml, setting, validate
 from ibvs_qp.controller import HybridController
+from ibvs_qp.estimation.contact import ContactEstimator
 from ibvs_qp.estimation.stamps import HISTORY
 from ibvs_qp.estimation.wall_lines import WallAxes, image_line
 from ibvs_qp.estimation.wall_motion import WallMotion
@@ -108,6 +109,7 @@ class Pilot:
         settings, vehicle = self.config.controller, self.config.controller.vehicle
         kind = HybridController if self.config.law == "qp" else PaperController
         self.controller = kind(settings)
+        self.contact = ContactEstimator(settings)
         self.motion = WallMotion(
             np.array(vehicle.tip_position_m),
             np.array(vehicle.camera_position_m),
@@ -132,6 +134,7 @@ class Pilot:
     def reset(self) -> None:
         """As after construction."""
         self.controller.reset()
+        self.contact.reset()
         self.motion.reset()
         self.tare.reset()
         self.painter.reset()
@@ -186,7 +189,7 @@ class Pilot:
         self._stamp = stamp
         now = self._gate.last
         attitude, force, rate = now["attitude"], now["specific_force"], now["angular_velocity"]
-        contact = self.controller.setpoints.contact.state
+        contact = self.contact.state
         free = not contact.in_contact and contact.distance > self._tare_distance_m
         wrench = self.tare.update(frame.wrench, frame.wrench_stamp_ns, force, free)
         axes = WallAxes.of(contact.normal, down_in_body(attitude))
@@ -210,7 +213,17 @@ class Pilot:
         self.reference = self._refer(target)
         self.measurement = self._measure(frame, wrench, axes, target)
         begin = time.perf_counter()
-        command = self.controller.step(self.measurement, self.reference)
+        contact = self.contact.update(
+            stamp_ns=stamp,
+            angular_velocity=rate,
+            specific_force=force,
+            down=down_in_body(attitude),
+            contact_wrench=wrench,
+            wrench_stamp_ns=frame.wrench_stamp_ns,
+            plane=self._plane,
+            plane_stamp_ns=self._plane_stamp,
+        )
+        command = self.controller.step(self.measurement, self.reference, contact)
         self.controller_time_s = time.perf_counter() - begin
         return command
 
@@ -223,7 +236,7 @@ class Pilot:
 
     def _hints(self, stamp_ns: int) -> tuple[LineHint, ...]:
         """Tell perception where the fresh edge must appear: at the brush, ahead of it."""
-        expected, contact = self.painter.expected_fresh_edge(self.motion.lines), self.terms.contact.state
+        expected, contact = self.painter.expected_fresh_edge(self.motion.lines), self.contact.state
         if expected is None or not contact.known:
             return ()
         offset, side = expected
@@ -278,7 +291,7 @@ class Pilot:
 
     def _take(self, features: FeatureFrame) -> None:
         """Correct motion and lines at the time of capture."""
-        contact = self.terms.contact.state
+        contact = self.contact.state
         plane = features.plane
         if plane is not None:
             self._plane, self._plane_stamp = plane, features.stamp_ns
@@ -293,7 +306,7 @@ class Pilot:
 
     def _measure(self, frame: SensorFrame, wrench: np.ndarray, axes: WallAxes, target: PaintingCommand) -> Measurement:
         velocity = covariance = None
-        contact = self.terms.contact.state
+        contact = self.contact.state
         distance = contact.distance if contact.known else 0.5
         low, high = self.thrust_limits or (None, None)
         if self.supervisor.lost or self.motion.velocity_age_s < self._velocity_life_s:
@@ -325,7 +338,7 @@ class Pilot:
 
     def _painter_input(self, frame: SensorFrame) -> PainterInput:
         terms, motion = self.controller.setpoints, self.motion
-        contact, state = terms.contact.state, motion.state
+        contact, state = self.contact.state, motion.state
         return PainterInput(
             (frame.stamp_ns - self._first) * 1e-9,
             motion.lines,
@@ -342,7 +355,7 @@ class Pilot:
 
     def _refer(self, target: PaintingCommand) -> Reference:
         """Offsets in metres to line references: rho = l / d at the measured distance."""
-        contact = self.terms.contact.state
+        contact = self.contact.state
         depth = self._tip_camera[2] + (contact.distance if contact.known else 0.5)
         references = []
         for line, offset in target.guides:

@@ -18,14 +18,14 @@ REDUCED = 1e-3
 
 def contact_mode(terms: Setpoints, reference: Reference) -> str:
     """Contact phase: "contact", "approach" or "free"."""
-    if terms.contact.state.in_contact:
+    if terms.contact.in_contact:
         return "contact"
     return "approach" if reference.contact else "free"
 
 
 def reach_margin(terms: Setpoints) -> float:
     """Further push possible at the present contact [N]; NaN while no wall is known, or no push can be held."""
-    contact, reach = terms.contact.state, terms.reach
+    contact, reach = terms.contact, terms.reach
     if not contact.known or terms.least_push > reach:
         return math.nan
     return reach - contact.push if contact.push > 0.0 else reach

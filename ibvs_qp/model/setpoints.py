@@ -59,7 +59,7 @@ class Setpoints:
     """Targets, bias wrench, reach and thrust window of one step, and the data of the program built on the same model.
 
     Attributes:
-        contact: Contact estimator.
+        contact: Wall and contact at this step.
         step: The compiled function.
         free: Fraction of the directions right and down that no line fixes, (2,).
         last: Last commanded thrusts [N], (n,), None before the first.
@@ -70,7 +70,7 @@ class Setpoints:
         vehicle = config.vehicle
         self.effectiveness = model.effectiveness
         self.inverse = np.linalg.pinv(self.effectiveness)
-        self.contact = ContactEstimator(config)
+        self._estimator = ContactEstimator(config)
         self.step = StepFunction(model.signals, extra, config.machine_code)
         self._parameters = [(self.step.inputs[entry.name], entry) for entry in model.parameters]
         self._inputs = StepInputs(self.step, config.line_slots)
@@ -85,7 +85,8 @@ class Setpoints:
 
     def reset(self) -> None:
         """Forget everything, as before the first measurement."""
-        self.contact.reset()
+        self._estimator.reset()
+        self.contact = self._estimator.state
         self.step.reset()
         self.step.results[:] = 0.0
         self._inputs.reset()
@@ -109,15 +110,21 @@ class Setpoints:
             low, high = self.floor, self.ceiling
             self.lower[:], self.upper[:] = thrust_window(self.last, low, high, self._rate_step, low, high)
 
-    def update(self, measurement: Measurement, reference: Reference) -> None:
-        """Evaluate the step function for one validated measurement and reference."""
+    def update(self, measurement: Measurement, reference: Reference, contact: ContactState | None = None) -> None:
+        """Evaluate the step function for one validated measurement and reference.
+
+        Args:
+            measurement: Validated.
+            reference: Validated.
+            contact: Estimated by the caller from the same sensors; None estimates it here.
+        """
         stamp, dt = measurement.stamp_ns, self.config.tick_s
         if self._stamp >= 0:
             dt = min(max((stamp - self._stamp) * 1e-9, 0.0), LONGEST_TICK)
         self._stamp = stamp
-        contact = self._estimate_contact(measurement)
+        self.contact = self._estimate_contact(measurement) if contact is None else contact
         self.step.advance()
-        self._inputs.write(measurement, reference, contact, dt)
+        self._inputs.write(measurement, reference, self.contact, dt)
         self._write_rotors(measurement)
         for view, parameter in self._parameters:
             view[:] = parameter.value
@@ -125,7 +132,7 @@ class Setpoints:
 
     def _estimate_contact(self, measurement: Measurement) -> ContactState:
         force = measurement.specific_force
-        return self.contact.update(
+        return self._estimator.update(
             stamp_ns=measurement.stamp_ns,
             angular_velocity=measurement.angular_velocity.tolist(),
             specific_force=None if force is None else force.tolist(),

@@ -202,7 +202,7 @@ def test_a_clock_set_back_for_good_is_followed_after_a_tenth_of_a_second(law: Ca
         found.append(command.outcome)
         last = command
     assert set(found[:20]) == {Outcome.HOLD} and set(found[26:]) == {Outcome.SOLVED}
-    assert controller.setpoints.contact.state.known
+    assert controller.setpoints.contact.known
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -217,7 +217,7 @@ def test_a_hold_in_between_is_as_if_the_tick_had_not_been(law: Callable[[], Any]
             continue
         command = one.step(seen, reference)
         two.step(seen, reference)
-        np.testing.assert_array_equal(one.setpoints.contact.state.distance, two.setpoints.contact.state.distance)
+        np.testing.assert_array_equal(one.setpoints.contact.distance, two.setpoints.contact.distance)
         np.testing.assert_array_equal(one.setpoints.normal, two.setpoints.normal)
         vehicle.fly(command.thrusts)
     other = two.step(vehicle.measure(), good_reference())

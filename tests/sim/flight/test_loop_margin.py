@@ -81,7 +81,7 @@ def pushed(
             push.append(world.plant.contact_normal_force)
 
     run(pilot, world, lambda: len(push) >= 250 * seconds, note, limit_s=60.0)
-    believed = pilot.terms.contact.state.stiffness
+    believed = pilot.terms.contact.stiffness
     used = gained.force_kfp * min(1.0, FULL_GAIN_STIFFNESS / believed) / min(1.0, FULL_GAIN_STIFFNESS / stiffness)
     gained = dataclasses.replace(gained, force_kfp=used)
     return dataclasses.replace(config.controller, gains=gained), np.array(push)
