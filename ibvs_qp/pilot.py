@@ -18,6 +18,7 @@ from ibvs_qp.config.contact_margin import require_margin
 from ibvs_qp.config.settings import choice, dump_toml, load_toml, setting, validate
 from ibvs_qp.controller import HybridController
 from ibvs_qp.estimation.contact import ContactEstimator
+from ibvs_qp.estimation.contact_state import ContactState
 from ibvs_qp.estimation.stamps import HISTORY
 from ibvs_qp.estimation.wall_lines import WallAxes, image_line
 from ibvs_qp.estimation.wall_motion import WallMotion
@@ -43,6 +44,9 @@ from ibvs_qp.vision.percept import LineHint
 #: Where the fresh edge exists ahead of the brush, normalised image x from the tip's side to the border.
 HINT_SPAN = (0.10, 0.50)
 
+
+#: Tip to wall while no plane was seen yet [m].
+ASSUMED_DISTANCE = 0.5
 
 _EYE = np.eye(3)
 
@@ -189,43 +193,64 @@ class Pilot:
         self._stamp = stamp
         now = self._gate.last
         attitude, force, rate = now["attitude"], now["specific_force"], now["angular_velocity"]
-        contact = self.contact.state
-        free = not contact.in_contact and contact.distance > self._tare_distance_m
-        wrench = self.tare.update(frame.wrench, frame.wrench_stamp_ns, force, free)
-        axes = WallAxes.of(contact.normal, down_in_body(attitude))
-        self.motion.predict(stamp, axes, force, rate, dt)
-        self._remember(attitude, rate, dt)
-        # Without a rotor the vehicle turns away from the wall: what it sees then is not what the strategy knows.
-        blind = self.supervisor.lost
-        features = None if blind else frame.features if frame.image is None else self._see(frame)
-        if features is not None and self._fresh(features.stamp_ns):
-            self._take(features)
-        inputs = self._painter_input(frame)
-        if self.thrust_limits is not None and self.supervisor.update(self.thrust_limits):
-            self.painter.abandon(inputs, "no level hover is left")
-        target = self.painter.step(inputs)
-        if self.supervisor.lost:
-            normal = np.array(contact.normal)
-            away = contact.distance + float(normal @ self._tip)
-            tilt = self.supervisor.tilt(away, contact.speed, float(self.motion.state[0]), normal, dt)
-            target = dataclasses.replace(target, tilt=tilt)
-        self.painting_command = target
-        self.reference = self._refer(target)
-        self.measurement = self._measure(frame, wrench, axes, target)
-        begin = time.perf_counter()
+        down = down_in_body(attitude)
+        wrench = self._tared_wrench(frame, force)
+        # After a lost rotor the vehicle turns away from the wall: the strategy does not match the pictures then.
+        features = None if self.supervisor.lost else self._perceive(frame)
         contact = self.contact.update(
             stamp_ns=stamp,
             angular_velocity=rate,
             specific_force=force,
-            down=down_in_body(attitude),
+            down=down,
             contact_wrench=wrench,
             wrench_stamp_ns=frame.wrench_stamp_ns,
             plane=self._plane,
             plane_stamp_ns=self._plane_stamp,
         )
+        axes = WallAxes.of(contact.normal, down)
+        self.motion.predict(stamp, axes, force, rate, dt)
+        self._remember(attitude, rate, dt)
+        if features is not None:
+            self._correct_motion(features, contact)
+        target = self._strategy(frame, contact, dt)
+        self.painting_command = target
+        self.reference = self._refer(target, contact)
+        self.measurement = self._measure(frame, wrench, axes, target, contact)
+        begin = time.perf_counter()
         command = self.controller.step(self.measurement, self.reference, contact)
         self.controller_time_s = time.perf_counter() - begin
         return command
+
+    def _tared_wrench(self, frame: SensorFrame, specific_force: list[float]) -> np.ndarray:
+        """Contact wrench on the vehicle [N, N m], (6,); the bias is averaged while the tip is away from the wall.
+
+        Away by the contact of the tick before: this tick's needs the wrench.
+        """
+        last = self.contact.state
+        free = not last.in_contact and last.distance > self._tare_distance_m
+        return self.tare.update(frame.wrench, frame.wrench_stamp_ns, specific_force, free)
+
+    def _perceive(self, frame: SensorFrame) -> FeatureFrame | None:
+        """Features of a new picture, or None; a plane becomes the latest one."""
+        features = frame.features if frame.image is None else self._see(frame)
+        if features is None or not self._fresh(features.stamp_ns):
+            return None
+        if features.plane is not None:
+            self._plane, self._plane_stamp = features.plane, features.stamp_ns
+        return features
+
+    def _strategy(self, frame: SensorFrame, contact: ContactState, dt: float) -> PaintingCommand:
+        """What the painter commands, tilted after a lost rotor."""
+        inputs = self._painter_input(frame, contact)
+        if self.thrust_limits is not None and self.supervisor.update(self.thrust_limits):
+            self.painter.abandon(inputs, "no level hover is left")
+        target = self.painter.step(inputs)
+        if not self.supervisor.lost:
+            return target
+        normal = np.array(contact.normal)
+        away = contact.distance + float(normal @ self._tip)
+        tilt = self.supervisor.tilt(away, contact.speed, float(self.motion.state[0]), normal, dt)
+        return dataclasses.replace(target, tilt=tilt)
 
     def _remember(self, attitude: list[float], rate: list[float], dt: float) -> None:
         (x, y, z), (wx, wy, wz) = self._turn, rate
@@ -235,7 +260,7 @@ class Pilot:
         self._history_turn[slot] = self._turn
 
     def _hints(self, stamp_ns: int) -> tuple[LineHint, ...]:
-        """Tell perception where the fresh edge must appear: at the brush, ahead of it."""
+        """Expected place of the fresh edge: at the brush, ahead of it, by lines and contact of the tick before."""
         expected, contact = self.painter.expected_fresh_edge(self.motion.lines), self.contact.state
         if expected is None or not contact.known:
             return ()
@@ -289,13 +314,10 @@ class Pilot:
 
         return Perception(self.config.vision, vehicle)
 
-    def _take(self, features: FeatureFrame) -> None:
+    def _correct_motion(self, features: FeatureFrame, contact: ContactState) -> None:
         """Correct motion and lines at the time of capture."""
-        contact = self.contact.state
-        plane = features.plane
-        if plane is not None:
-            self._plane, self._plane_stamp = plane, features.stamp_ns
-            normal, distance = plane_in_body(plane, self._tip_from_camera)
+        if features.plane is not None:
+            normal, distance = plane_in_body(features.plane, self._tip_from_camera)
         elif contact.known:
             normal, distance = contact.normal, contact.distance
         else:
@@ -304,10 +326,11 @@ class Pilot:
         self.motion.correct(features, WallAxes.of(normal, gravity), distance)
         self._covariance = self.motion.velocity_variance * _EYE  # nothing else changes it
 
-    def _measure(self, frame: SensorFrame, wrench: np.ndarray, axes: WallAxes, target: PaintingCommand) -> Measurement:
+    def _measure(
+        self, frame: SensorFrame, wrench: np.ndarray, axes: WallAxes, target: PaintingCommand, contact: ContactState
+    ) -> Measurement:
         velocity = covariance = None
-        contact = self.contact.state
-        distance = contact.distance if contact.known else 0.5
+        distance = contact.distance if contact.known else ASSUMED_DISTANCE
         low, high = self.thrust_limits or (None, None)
         if self.supervisor.lost or self.motion.velocity_age_s < self._velocity_life_s:
             right, down, *_ = self.motion.state
@@ -336,9 +359,8 @@ class Pilot:
             thrust_max=high,
         )
 
-    def _painter_input(self, frame: SensorFrame) -> PainterInput:
-        terms, motion = self.controller.setpoints, self.motion
-        contact, state = self.contact.state, motion.state
+    def _painter_input(self, frame: SensorFrame, contact: ContactState) -> PainterInput:
+        motion, state = self.motion, self.motion.state
         return PainterInput(
             (frame.stamp_ns - self._first) * 1e-9,
             motion.lines,
@@ -349,14 +371,13 @@ class Pilot:
             contact.in_contact,
             contact.time_since_touch,
             contact.push,
-            terms.push_reference,
+            self.controller.setpoints.push_reference,  # of the tick before: the controller runs after the painter
             self.tare.ready,
         )
 
-    def _refer(self, target: PaintingCommand) -> Reference:
+    def _refer(self, target: PaintingCommand, contact: ContactState) -> Reference:
         """Offsets in metres to line references: rho = l / d at the measured distance."""
-        contact = self.contact.state
-        depth = self._tip_camera[2] + (contact.distance if contact.known else 0.5)
+        depth = self._tip_camera[2] + (contact.distance if contact.known else ASSUMED_DISTANCE)
         references = []
         for line, offset in target.guides:
             if line.role == HORIZONTAL:
