@@ -12,6 +12,7 @@ from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from allocation import (
@@ -25,10 +26,13 @@ from allocation import (
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.frames import GRAVITY
 from ibvs_qp.limits import ThrustLimit
-from ibvs_qp.model.rows import SymbolicModel
+from ibvs_qp.model.model import Model
+from ibvs_qp.model.parameter import Parameter
+from ibvs_qp.model.rows import TaskRow
 from ibvs_qp.qp.accept import QpEngine
-from ibvs_qp.qp.problem import QpTemplate
-from ibvs_qp.tasks import EffortTask, HeightTask, LevelTask, PushTask, SmoothnessTask, VelocityTask, YawTask
+from ibvs_qp.qp.evaluator import RecordedProgram
+from ibvs_qp.qp.problem import QpProblem
+from ibvs_qp.tasks import EffortTask, SmoothnessTask, Task
 
 #: Half widths of the uniform demands about hover: lateral, vertical, roll and pitch, yaw [N, N m].
 LATERAL, VERTICAL, TIP_OVER, TURN = 40.0, 15.0, 3.0, 4.0
@@ -51,8 +55,37 @@ def demands(count: int, seed: int = 0) -> np.ndarray:
     return np.array(found)
 
 
+class DemandedWrench(Task):
+    """A demanded wrench through the rows of the shipped tasks: push along front, velocity right and down, level, yaw.
+
+    Args:
+        height_weight: Weight of the height row.
+    """
+
+    def __init__(self, height_weight: float) -> None:
+        self._height_weight, self.acceleration = height_weight, Parameter("demanded_acceleration", [0.0] * 6)
+
+    def rows(self, model: Model) -> list[TaskRow]:
+        """Rows of push [N], velocity and height [m/s^2], roll, pitch and yaw [rad/s^2]."""
+        weights, target, found = CONFIG.weights, model.parameter(self.acceleration), model.acceleration
+        mass = CONFIG.vehicle.mass_kg
+        rows = (
+            ("push", "N", mass, 0, weights.push),
+            ("velocity_right", "m/s^2", 1.0, 1, weights.velocity),
+            ("velocity_down", "m/s^2", 1.0, 2, weights.velocity),
+            ("roll", "rad/s^2", 1.0, 3, weights.level),
+            ("pitch", "rad/s^2", 1.0, 4, weights.level),
+            ("yaw", "rad/s^2", 1.0, 5, weights.yaw),
+            ("height", "m/s^2", 1.0, 2, self._height_weight),
+        )
+        return [
+            TaskRow(name=name, unit=unit, expression=scale * found[i], target=scale * target[i], weight=ca.SX(weight))
+            for name, unit, scale, i, weight in rows
+        ]
+
+
 class ProgramAllocation:
-    """The controller's program without lines: push along front, velocity right and down, level, yaw, height.
+    """The controller's program without lines, for one demanded wrench at a time.
 
     Attributes:
         outcomes: Number of programs per outcome of the solver.
@@ -60,43 +93,29 @@ class ProgramAllocation:
     """
 
     def __init__(self, height_weight: float | None = None) -> None:
-        tasks = [PushTask(), LevelTask(), YawTask(), VelocityTask(), HeightTask(), EffortTask(), SmoothnessTask()]
-        template = QpTemplate(SymbolicModel(CONFIG), tasks, [ThrustLimit()])
-        self._engine = QpEngine(template, CONFIG.solver)
-        self._data = self._engine.data
-        values, hover = self._data.parameters, np.full(B.shape[1], WEIGHT / -B[2].sum())
-        fixed: dict[str, Any] = {
-            "bias_wrench": (0.0, 0.0, WEIGHT, 0.0, 0.0, 0.0),
-            "normal": (1.0, 0.0, 0.0),
-            "axis_right": (0.0, 1.0, 0.0),
-            "axis_down": (0.0, 0.0, 1.0),
-            "last_thrust": hover,
-            "extrapolated_thrust": hover,
-            "thrust_lower": LOWER,
-            "thrust_upper": UPPER,
-        }
-        for name, value in fixed.items():
-            values[name][:] = value
-        self._height = CONFIG.weights.height if height_weight is None else height_weight
+        weight = CONFIG.weights.height if height_weight is None else height_weight
+        tasks = [DemandedWrench(weight), EffortTask(), SmoothnessTask()]
+        problem = QpProblem(Model(CONFIG), tasks, [ThrustLimit()])
+        self._program = RecordedProgram(problem)
+        self._engine = QpEngine(problem, CONFIG.solver, self._program)
+        inputs = self._program.inputs
+        inputs["attitude"][0] = inputs["normal"][0] = 1.0
+        inputs["thrust_last"][:] = WEIGHT / -B[2].sum()
+        inputs["thrust_step"][0] = UPPER.max()
+        for low, high in (("low", "high"), ("floor", "ceiling")):
+            inputs[f"thrust_{low}"][:], inputs[f"thrust_{high}"][:] = LOWER, UPPER
         self.outcomes: Counter[str] = Counter()
         self.unallocated = np.zeros(6)
 
     def __call__(self, wrench: np.ndarray) -> np.ndarray:
         """Thrusts for one demanded rotor wrench [N], (n,)."""
-        values, weights, vehicle = self._data.parameters, CONFIG.weights, CONFIG.vehicle
-        net = wrench + values["bias_wrench"]
-        right, down = net[1] / vehicle.mass_kg, net[2] / vehicle.mass_kg
-        roll, pitch, yaw = net[3:] / np.array(vehicle.inertia_kg_m2)
-        values["push"][:] = net[0], weights.push
-        values["velocity_right"][:] = right, weights.velocity
-        values["velocity_down"][:] = down, weights.velocity
-        values["height"][:] = down, self._height
-        values["level"][:] = roll, pitch, weights.level
-        values["yaw"][:] = yaw, weights.yaw
+        net = wrench + np.array([0.0, 0.0, WEIGHT, 0.0, 0.0, 0.0])
+        self._program.inputs["demanded_acceleration"][:] = net / CONFIG.vehicle.mass_matrix.diagonal()
+        self._program.evaluate()
         solution = self._engine.solve()
         assert solution is not None
         self.outcomes[str(solution.outcome)] += 1
-        self.unallocated = B @ (self._data.free - solution.thrusts)
+        self.unallocated = B @ (self._program.free - solution.thrusts)
         return solution.thrusts
 
 

@@ -103,7 +103,9 @@ def _rivals(
         for name, thrusts in answers.items():
             differences.setdefault(name, []).append(float(np.abs(found[0][: len(thrusts)] - thrusts).max()))
     figures = {
-        name: {"p99": float(np.percentile(errors, 99.0)), "max": max(errors)} for name, errors in differences.items()
+        name: {"p99": float(np.percentile(errors, 99.0)), "max": max(errors)}
+        for name, errors in differences.items()
+        if errors
     }
     return [*rows.values(), exact_row], figures
 

@@ -72,10 +72,10 @@ def test_importing_the_controller_adds_little_to_numpy_casadi_and_osqp() -> None
 
 def test_a_command_line_check_loads_no_solver() -> None:
     modules = loaded("import sys, ibvs_qp, allocation, ibvs_qp.vision\nprint(' '.join(sorted(sys.modules)))")
-    assert not modules & {"casadi", "osqp", "scipy", "cv2", "numpy"}
+    assert not modules & {"casadi", "osqp", "scipy", "cv2"}
 
 
-@pytest.mark.parametrize("package", ["allocation", "ibvs_qp", "ibvs_qp.vision"])
+@pytest.mark.parametrize("package", ["ibvs_qp", "ibvs_qp.vision"])
 def test_every_lazy_name_is_the_thing_itself(package: str) -> None:
     """A module of the same name as a function would hide it from the second import on."""
     module = importlib.import_module(package)

@@ -338,7 +338,7 @@ def optimal_cost(controller: HybridController, row: int, side: str, change: floa
     achieved, asked, weights = data.report(data.point, solution[0][:6])
     cost = 0.5 * float(weights @ (achieved - asked) ** 2)
     for limit, slot in zip(controller.template.limit_rows, controller.template.row_slack, strict=True):
-        cost += 0.0 if limit.price is None else 0.5 * limit.price * solution[0][slot] ** 2
+        cost += 0.5 * (limit.slack_weight or 0.0) * solution[0][slot] ** 2
     return cost
 
 

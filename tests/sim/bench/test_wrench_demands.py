@@ -54,7 +54,8 @@ def test_what_is_given_up_is_reported(bench: dict) -> None:
         # The pull to the last thrusts, here far away, bends the free optimum where it is softest: along the push.
         np.testing.assert_allclose(program.unallocated, missing, rtol=0.02, atol=0.2)
     assert set(program.outcomes) <= {"solved", "inaccurate_accepted", "capped_accepted", "exact_fallback"}
-    assert program.outcomes["solved"] >= 0.97 * 300
+    # Each demand is far from the last one, so that OSQP may reach its cap; DAQP solves those.
+    assert program.outcomes["solved"] >= 0.95 * 300
 
 
 def test_every_demand_is_beyond_reach_and_repeats(bench: dict) -> None:

@@ -12,8 +12,9 @@ import pytest
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.estimation.wall_motion import WallMotion
 from ibvs_qp.measurement import FeatureFrame
-from ibvs_qp.model import height, program, wall
-from ibvs_qp.model.signals import Signals
+from ibvs_qp.model import stationary_tip
+from ibvs_qp.model.model import Model
+from ibvs_qp.tasks import velocity
 from sim.experiments.scenes import near_wall
 from sim.flight.closed_loop import FlightOptions, fly, pilot_config
 from sim.flight.jobs import PressJob
@@ -66,8 +67,8 @@ def test_a_held_tip_is_no_pivot_to_rock_about(law: str) -> None:
 
 
 def test_without_the_softer_yaw_it_would_be(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(wall, "HELD_SHARE", 1e3)
-    assert rocking(press(tick_s=0.004 + 1e-12)) > 1.0  # another configuration: controllers are kept by theirs
+    monkeypatch.setattr(stationary_tip, "STIFFNESS_FRACTION", 1e3)
+    assert rocking(press()) > 1.0
 
 
 def test_a_push_beyond_reach_takes_no_damping_from_a_held_tip() -> None:
@@ -78,8 +79,8 @@ def test_a_push_beyond_reach_takes_no_damping_from_a_held_tip() -> None:
 
 
 def test_at_the_weight_of_a_sliding_vehicle_it_would(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(program, "held_sideways_weight", lambda weights: weights.velocity)
-    trace = press(35.0, reach_check=False, tick_s=0.004 + 1e-12)
+    monkeypatch.setattr(velocity, "stationary_sideways_weight", lambda weights: weights.velocity)
+    trace = press(35.0, reach_check=False)
     assert rocking(trace) > 2.0
     assert trace.push_true[held(trace)].mean() < 0.95 * REACH_N
 
@@ -91,12 +92,11 @@ def test_a_held_tip_turns_with_the_body_whatever_a_slide_counts_on() -> None:
 
 
 def test_counted_on_as_in_a_slide_it_would_lose_push(monkeypatch: pytest.MonkeyPatch) -> None:
-    def as_in_a_slide(signals: Signals, config: ControllerConfig) -> ca.SX:
-        return 1.0 - signals.input("contact_weight") * (1.0 - config.gains.body_rotation_gain)
+    def as_in_a_slide(model: Model) -> ca.SX:
+        return 1.0 - model.contact_weight * (1.0 - model.config.gains.body_rotation_gain)
 
-    monkeypatch.setattr(program, "turn_share", as_in_a_slide)
-    monkeypatch.setattr(height, "turn_share", as_in_a_slide)
-    trace = press(35.0, reach_check=False, tick_s=0.004 + 1e-12, body_rotation_gain=0.3)
+    monkeypatch.setattr(Model, "body_rotation_gain", property(as_in_a_slide))
+    trace = press(35.0, reach_check=False, body_rotation_gain=0.3)
     assert trace.push_true[held(trace)].mean() < 0.95 * REACH_N
 
 
@@ -128,15 +128,15 @@ def test_nor_is_it_one_to_nod_about_on_a_blank_wall(law: str) -> None:
 
 @pytest.mark.usefixtures("lines_lost")
 def test_without_the_softer_pitch_it_would_be(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(wall, "HELD_SHARE", 1e3)
-    assert nodding(press(tick_s=0.004 + 1e-12, hold_s=12.0)) > 1.0
+    monkeypatch.setattr(stationary_tip, "STIFFNESS_FRACTION", 1e3)
+    assert nodding(press(hold_s=12.0)) > 1.0
 
 
 def test_the_gains_of_a_held_vehicle_are_a_third_of_the_stability_limits() -> None:
     config = ControllerConfig()
     vehicle, gains = config.vehicle, config.gains
     swing = vehicle.mass_kg * 0.7**2 * (0.0575 + 1.0 / (16.0 * np.pi))
-    pitch, yaw = wall.held_gains(config)
+    pitch, yaw = stationary_tip.pivot_stiffness(config)
     assert yaw == pytest.approx(gains.yaw_kd * (vehicle.inertia_kg_m2[2] / swing + gains.velocity_kp) / 3.0)
     assert pitch == pytest.approx(gains.attitude_kd * (vehicle.inertia_kg_m2[1] / swing + gains.velocity_kp) / 3.0)
     assert yaw < gains.yaw_kp and pitch < gains.attitude_kp

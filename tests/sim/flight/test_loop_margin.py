@@ -23,8 +23,9 @@ from ibvs_qp.config.contact_margin import (
     require_margin,
 )
 from ibvs_qp.config.errors import ConfigError
-from ibvs_qp.model import push as push_law
+from ibvs_qp.model import push_reference
 from ibvs_qp.pilot import Pilot, PilotConfig
+from ibvs_qp.tasks import push
 from sim.flight.closed_loop import PRESETS, FlightOptions, World, pilot_config
 from sim.world.scene import ForceTorqueScene, ImuScene, Scene
 
@@ -103,7 +104,7 @@ def ringing(push: np.ndarray, dt: float, order: int = 8) -> tuple[float, float]:
 
 @pytest.mark.parametrize("force_kfp", [0.8, 1.6])  # the shipped 0.35 is damped 0.45: nothing rings
 def test_predicts_the_ringing_of_the_flown_contact(force_kfp: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(push_law, "RISE", 1e3)  # a step that is slewed in is no step
+    monkeypatch.setattr(push_reference, "RISE", 1e3)  # a step that is slewed in is no step
     # From farther away: the estimator of distance and rate has settled, as the model of the loop assumes.
     config, push = pushed(1500.0, 0.004, 6.2, distance=0.45, force_kfp=force_kfp)
     margin = contact_mode_damping(config, 1500.0, 30.0, 0.004 + HALF_SAMPLE)
@@ -212,7 +213,7 @@ def test_the_allowed_value_holds_and_a_little_more_does_not() -> None:
 
 
 def test_model_and_controller_divide_the_gain_alike() -> None:
-    assert FULL_GAIN_STIFFNESS == push_law.FULL_GAIN_STIFFNESS
+    assert FULL_GAIN_STIFFNESS == push.FULL_GAIN_STIFFNESS
 
 
 def test_a_brush_cannot_be_inside_out() -> None:

@@ -45,7 +45,7 @@ def test_a_flight_on_machine_code_is_the_same_flight_to_the_bit(law: type, own_c
             vehicle.fly(command.thrusts)
             thrusts.append(command.thrusts)
     np.testing.assert_array_equal(thrusts[:300], thrusts[300:])
-    assert list(own_cache.glob("tick-*.so"))
+    assert list(own_cache.glob("step-*.so"))
 
 
 @needs_compiler
