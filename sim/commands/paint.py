@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from sim.commands.cli import EXIT_INTERRUPTED
+from sim.commands.exit_codes import EXIT_INTERRUPTED
 from sim.commands.options import (
     check_mujoco,
     check_readable,
