@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from sim.evaluate import measures
 from sim.experiments.spec import Experiment, Flights, Value
 from sim.experiments.variants import VARIANTS, with_force_gain
-from sim.flight.closed_loop import FlightOptions, default_preset, pilot_config
 from sim.flight.faults import Derate, Fault, WindStep
 from sim.flight.jobs import PaintJob, PressJob
+from sim.flight.options import FlightOptions, default_preset, pilot_config
 from sim.sweep.design import FlightPlan, Parameter, Run
 from sim.sweep.setup import Setup, changed
 from sim.world.scene import Scene

@@ -14,7 +14,8 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from sim.flight.closed_loop import INTERRUPTED, FlightOptions, fly
+from sim.flight.closed_loop import INTERRUPTED, fly
+from sim.flight.options import FlightOptions
 from sim.flight.trace import Trace
 from sim.flight.video import pack_pictures
 from sim.world.scene import Scene

@@ -12,7 +12,8 @@ from allocation import TAROT_T960
 from sim.evaluate.explanation import explain_tick
 from sim.experiments.scenes import changed, short_job
 from sim.figures.style import law_colour, new_figure
-from sim.flight.closed_loop import FlightOptions, fly
+from sim.flight.closed_loop import fly
+from sim.flight.options import FlightOptions
 from sim.flight.trace import Trace
 from sim.flight.video import unpack_picture
 from sim.notebook.plots import RED

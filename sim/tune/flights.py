@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping
 from ibvs_qp.pilot import PilotConfig
 from sim.evaluate.measures import paint_row
 from sim.experiments.scenes import changed, near_wall, short_job
-from sim.flight.closed_loop import FlightOptions, pilot_config
 from sim.flight.jobs import PaintJob
+from sim.flight.options import FlightOptions, pilot_config
 from sim.sweep.design import FlightPlan, Run
 from sim.world.scene import Scene
 

@@ -9,7 +9,8 @@ import joblib
 import pytest
 
 from sim.evaluate.metrics import compute_metrics
-from sim.flight.closed_loop import FlightOptions, fly
+from sim.flight.closed_loop import fly
+from sim.flight.options import FlightOptions
 from sim.scenes import scene_path
 from sim.world.scene import PaintScene, Scene, WallScene, load_scene
 
