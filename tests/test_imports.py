@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import importlib.util
-import re
 import subprocess
 import sys
 from graphlib import CycleError, TopologicalSorter
@@ -13,7 +12,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-#: Rooms in the order in which they may import each other: every room only what stands before it (docs/development.md).
+#: Folders in the order of their imports: each imports only from earlier ones (docs/development.md).
 ORDER = {
     "ibvs_qp": (
         "frames measurement command analysis config validation estimation safety model tasks limits qp vision painting "
@@ -54,27 +53,6 @@ def test_imports_run_one_way(package):
 def test_the_check_sees_every_kind_of_import():
     text = "import osqp as o, sim.world.plant\ndef f():\n    from mujoco.x import y\n    from ..frames import skew\n"
     assert imported_names(text, "ibvs_qp") == {"osqp", "sim", "mujoco", "ibvs_qp"}
-
-
-def folder_order(package: str) -> list[set[str]]:
-    """Folders and modules of a package as docs/development.md lists them: each imports only from earlier sets."""
-    text = (ROOT / "docs" / "development.md").read_text(encoding="utf-8")
-    entry = text.split(f"\n- {package}: ")[1].split("\n- ")[0].split("\n\n")[0]
-    return [set(re.findall(r"`(\w+)`", group)) for group in re.sub(r"\([^)]*\)", "", entry).split("<")]
-
-
-@pytest.mark.parametrize("package", ["ibvs_qp", "sim"])
-def test_folders_import_only_those_before_them(package):
-    order = folder_order(package)
-    level = {name: index for index, names in enumerate(order) for name in names}
-    for file in sorted((ROOT / package).rglob("*.py")):
-        place = file.relative_to(ROOT / package).with_suffix("").parts
-        if place == ("__init__",):
-            continue
-        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
-            module = node.module or "" if isinstance(node, ast.ImportFrom) else ""
-            if module.startswith(f"{package}.") and (other := module.split(".")[1]) != place[0]:
-                assert level[other] < level[place[0]], f"{file.relative_to(ROOT)} imports {module}"
 
 
 def test_packages_are_the_installed_ones():
