@@ -16,11 +16,11 @@ from ibvs_qp.tasks import LevelTask, LineTask, PushTask, StandoffTask, VelocityT
 from ibvs_qp.validation.measurement import MeasurementGate, answered_stamp
 from ibvs_qp.validation.reference import check_reference
 
-#: Singular values below this share of the largest are dropped in the pseudo-inverse of L.
+#: Singular values below this fraction of the largest are dropped in the pseudo-inverse of L.
 RANK_TOLERANCE = 0.05
 
 
-def analytic_wrench(terms: Setpoints) -> np.ndarray:
+def analytic_wrench(setpoints: Setpoints) -> np.ndarray:
     r"""Control wrench tau of the paper, equations 4 to 16 as corrected in the design, section 3.
 
     .. math::
@@ -35,13 +35,13 @@ def analytic_wrench(terms: Setpoints) -> np.ndarray:
     Returns:
         Wrench beyond feedback linearisation [N, N m], (6,).
     """
-    config = terms.config
+    config = setpoints.config
     gains, vehicle = config.gains, config.vehicle
-    standoff, (right, down) = terms.standoff_command / vehicle.mass_kg, terms.velocity_command.tolist()
-    axes = zip(terms.normal.tolist(), terms.right.tolist(), terms.down.tolist(), strict=True)
-    complementary = np.array([n * standoff + r * right + d * down for n, r, d in axes] + terms.angular.tolist())
+    standoff, (right, down) = setpoints.standoff_command / vehicle.mass_kg, setpoints.velocity_command.tolist()
+    axes = zip(setpoints.normal.tolist(), setpoints.right.tolist(), setpoints.down.tolist(), strict=True)
+    complementary = np.array([n * standoff + r * right + d * down for n, r, d in axes] + setpoints.angular.tolist())
     acceleration = complementary
-    lines = terms.lines  # made anew whenever they are read, and so are their matrices
+    lines = setpoints.lines  # made anew whenever they are read, and so are their matrices
     if lines:
         matrices, wanted = [line.matrix for line in lines], []
         for line in lines:
@@ -56,9 +56,9 @@ def analytic_wrench(terms: Setpoints) -> np.ndarray:
         acceleration = inverse.dot(np.array(wanted)) + complementary - inverse.dot(matrix.dot(complementary))
     mass = vehicle.mass_kg
     motion = np.array((mass, mass, mass, *vehicle.inertia_kg_m2)) * acceleration
-    share, force = terms.contact_weight, motion[:3]
-    along = float(terms.normal.dot(force))
-    force += terms.normal * share * (terms.push_command - along)
+    force = motion[:3]
+    along = float(setpoints.normal.dot(force))
+    force += setpoints.normal * setpoints.contact_weight * (setpoints.push_command - along)
     return motion
 
 
@@ -71,9 +71,9 @@ def _pseudo_inverse(matrix: np.ndarray) -> np.ndarray:
     return np.matmul(right.T, inverted * left.T)
 
 
-def analytic_thrusts(terms: Setpoints) -> np.ndarray:
+def analytic_thrusts(setpoints: Setpoints) -> np.ndarray:
     """Unclipped thrusts of the analytic law: feedback linearisation and pseudo-inverse allocation [N], (n,)."""
-    return terms.inverse.dot(analytic_wrench(terms) - terms.bias_wrench)
+    return setpoints.inverse.dot(analytic_wrench(setpoints) - setpoints.bias_wrench)
 
 
 def analytic_setpoints(config: ControllerConfig) -> Setpoints:
@@ -104,17 +104,17 @@ class PaperController:
         """Thrusts for one tick; never raises, clips to box and rate; arguments as of `HybridController.step`."""
         checked, rejected = self._gate.check(measurement)
         reference, refused = check_reference(reference, self._reference)
-        self._reference, rejected, terms = reference, rejected + refused, self.setpoints
+        self._reference, rejected, setpoints = reference, rejected + refused, self.setpoints
         stamp = answered_stamp(measurement)
         if checked is None:
-            terms.pause()
+            setpoints.pause()
             return clipped_command(
-                terms, stamp, hold_thrusts(self.config, self._gate.inertial), Outcome.HOLD, "hold", rejected
+                setpoints, stamp, hold_thrusts(self.config, self._gate.inertial), Outcome.HOLD, "hold", rejected
             )
         if self._gate.restarted:
-            terms.restart()
-        terms.update(checked, reference, contact)
-        free, outcome, mode = analytic_thrusts(terms), Outcome.SOLVED, contact_mode(terms, reference)
+            setpoints.restart()
+        setpoints.update(checked, reference, contact)
+        free, outcome, mode = analytic_thrusts(setpoints), Outcome.SOLVED, contact_mode(setpoints, reference)
         if not np.isfinite(free).all():
             free, outcome, mode = hold_thrusts(self.config, checked), Outcome.HOLD, "hold"
-        return clipped_command(terms, stamp, free, outcome, mode, rejected + reach_note(terms, reference))
+        return clipped_command(setpoints, stamp, free, outcome, mode, rejected + reach_note(setpoints, reference))

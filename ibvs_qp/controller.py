@@ -63,7 +63,7 @@ def default_limits(config: ControllerConfig) -> list[Limit]:
     return [ThrustLimit(), *(limit for wanted, limit in barriers if config.barriers and wanted)]
 
 
-def program_template(config: ControllerConfig, tasks: Sequence[Task] = (), limits: Sequence[Limit] = ()) -> QpProblem:
+def qp_problem(config: ControllerConfig, tasks: Sequence[Task] = (), limits: Sequence[Limit] = ()) -> QpProblem:
     """The program of a configuration: shipped tasks and limits and further ones, assembled."""
     return QpProblem(Model(config), [*default_tasks(config), *tasks], [*default_limits(config), *limits])
 
@@ -84,10 +84,10 @@ class HybridController:
         self, config: ControllerConfig | None = None, *, tasks: Sequence[Task] = (), limits: Sequence[Limit] = ()
     ) -> None:
         self.config = config or ControllerConfig()
-        self.template = program_template(self.config, tasks, limits)
-        self.setpoints = Setpoints(self.template.model, self.template.values)
-        data = ProgramData(self.template, self.setpoints.step)
-        self.engine = QpEngine(self.template, self.config.solver, data)
+        self.problem = qp_problem(self.config, tasks, limits)
+        self.setpoints = Setpoints(self.problem.model, self.problem.values)
+        data = ProgramData(self.problem, self.setpoints.step)
+        self.engine = QpEngine(self.problem, self.config.solver, data)
         self._gate = MeasurementGate(self.config.vehicle.geometry.count)
         self.reset()
 
@@ -134,25 +134,25 @@ class HybridController:
         return self._finish(checked, solution, rejected)
 
     def _finish(self, measurement: Measurement, solution: AcceptedSolution, rejected: tuple[str, ...]) -> Command:
-        thrusts, terms, data = solution.thrusts, self.setpoints, self.engine.data
+        thrusts, setpoints, data = solution.thrusts, self.setpoints, self.engine.data
         unallocated, given_up, limits = _NOTHING, 0.0, ()
         if solution.limited:
-            unallocated = terms.effectiveness.dot(data.free - thrusts)
+            unallocated = setpoints.effectiveness.dot(data.free - thrusts)
             given_up = max(map(abs, unallocated.tolist()))
-            limits = active_limits(self.template, solution.x, solution.y)
-        tasks = task_reports(self.template, data, thrusts)
-        terms.note(thrusts, given_up)
+            limits = active_limits(self.problem, solution.x, solution.y)
+        tasks = task_reports(self.problem, data, thrusts)
+        setpoints.note(thrusts, given_up)
         return Command(
             stamp_ns=int(measurement.stamp_ns),
             thrusts=thrusts,
-            wrench=terms.effectiveness.dot(thrusts),
+            wrench=setpoints.effectiveness.dot(thrusts),
             outcome=solution.outcome,
-            mode=contact_mode(terms, self._reference),
-            rejected=rejected + reach_note(terms, self._reference),
+            mode=contact_mode(setpoints, self._reference),
+            rejected=rejected + reach_note(setpoints, self._reference),
             tasks=tasks,
             active_limits=limits,
             unallocated_wrench=unallocated,
-            reach_margin=reach_margin(terms),
+            reach_margin=reach_margin(setpoints),
             iterations=solution.iterations,
             solve_time_s=solution.seconds,
         )
@@ -166,7 +166,7 @@ class HybridController:
         if self.engine.conflict:
             rejected += (f"limits: no solution keeps all of {', '.join(self.engine.conflict)}",)
         else:
-            faults = program_faults(self.template, self.engine.data)
+            faults = program_faults(self.problem, self.engine.data)
             rejected += faults or ("program: no solver found a solution",)
         if not np.isfinite(free).all():
             free, outcome, mode = hold_thrusts(self.config, measurement), Outcome.HOLD, "hold"

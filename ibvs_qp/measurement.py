@@ -1,4 +1,4 @@
-"""What goes in: sensor frames for the pilot, measurements and references for a controller.
+"""Inputs: sensor frames for the pilot, measurements and references for a controller.
 
 All are frozen keyword-only dataclasses in float64 and SI units; stamps are integer nanoseconds of one monotonic
 clock. They are plain carriers: a controller checks them itself, because in flight nothing may raise.
@@ -54,7 +54,7 @@ class LineReference:
 
 @dataclass(frozen=True, kw_only=True)
 class Measurement:
-    """Everything a controller knows at one tick.
+    """Input of a controller at one tick.
 
     Attributes:
         stamp_ns: Time of the tick.
@@ -89,7 +89,7 @@ class Measurement:
 
 @dataclass(frozen=True, kw_only=True)
 class Reference:
-    """What a controller shall do.
+    """Targets of a controller.
 
     Attributes:
         push_force: Wanted push on the wall [N], >= 0.
@@ -130,14 +130,14 @@ class RgbdFrame:
 
 @dataclass(frozen=True, kw_only=True)
 class FeatureFrame:
-    """What perception saw in one picture.
+    """Result of perception on one picture.
 
     Attributes:
         lines: Lines at the time of capture.
         plane: (A, B, C, D) of the wall in C with D = -1, or None.
         stamp_ns: Time of capture.
         velocity: Linear velocity of the centre of mass in B at capture [m/s], (3,), or None.
-        velocity_covariance: Its covariance, (3, 3); directions nobody observed have a large variance.
+        velocity_covariance: Its covariance, (3, 3); unobserved directions have a large variance.
         velocity_stamp_ns: Time for which the velocity holds; 0 means at capture (flow: half a frame earlier).
     """
 
@@ -161,7 +161,7 @@ class SensorFrame:
         wrench: Raw F/T sample at the sensor, FRD axes, vehicle on tool [N, N m], (6,).
         wrench_stamp_ns: Time at which that sample was taken.
         image: A new picture, or None.
-        features: What perception saw, instead of an image, or None.
+        features: Result of perception instead of an image, or None.
     """
 
     stamp_ns: int

@@ -162,7 +162,7 @@ class Pilot:
         self._plane_stamp = 0
 
     @property
-    def terms(self):
+    def setpoints(self):
         """The controller's shared set-points, for logs."""
         return self.controller.setpoints
 

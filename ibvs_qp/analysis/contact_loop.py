@@ -42,11 +42,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import Polynomial
 
-#: K_fp counts in full up to this stiffness k_s and falls with its inverse beyond [N/m] (`model/push.py`).
-FULL_GAIN_STIFFNESS = 1500.0
-#: Bandwidth at which the observer learns gusts along the normal in contact [rad/s] (`model/external_wrench.py`).
-GUST_BANDWIDTH = 9.0
-#: Period of the camera's frames, and their mean age: latency and half a period [s].
+#: Period of the camera's frames, and their mean age: 60 ms of latency and half a period [s] (design section 5).
 FRAME_PERIOD, FRAME_AGE = 1.0 / 30.0, 0.077
 #: Order of the Pade approximants; Newton's method removes what they leave.
 PADE_ORDER = 4
@@ -72,6 +68,7 @@ class ContactLoop:
         spring: Impedance stiffness K_sp [N/m].
         damper: Impedance damping K_sd [N s/m].
         observer: 1 while the observer of gusts learns in contact, else 0.
+        gust_bandwidth: Bandwidth of that observer along the normal, omega_g [rad/s].
         force_delay: Mean age of the force in use with half a tick of hold, T_f [s].
         rate_delay: Age of the inertial rate with that hold, T_h [s].
         acceleration_filter: Time constant of the filtered acceleration by which the impedance predicts, tau_a [s].
@@ -90,6 +87,7 @@ class ContactLoop:
     spring: float
     damper: float
     observer: float
+    gust_bandwidth: float
     force_delay: float
     rate_delay: float
     acceleration_filter: float
@@ -109,7 +107,7 @@ class ContactLoop:
         motor, filtered = self.lag * s + 1.0, self.filter_lag * s + 1.0
         free = self.mass * s**2 + (self.damping + self.drag) * s + self.stiffness
         force = (self.proportional * s + self.integral) * (self.damping * s + self.stiffness)
-        smooth, gust = self.acceleration_filter * s + 1.0, s / GUST_BANDWIDTH + 1.0
+        smooth, gust = self.acceleration_filter * s + 1.0, s / self.gust_bandwidth + 1.0
         late_top, late_bottom = _pade(FRAME_AGE)
         high_passed, bottom = (
             (s + self.washout) * late_bottom - self.washout * late_top,
@@ -140,7 +138,7 @@ class ContactLoop:
         ahead += self.lag * s / (self.acceleration_filter * s + 1.0)
         motion = (self.spring + self.damper * s * ahead) * cmath.exp(-s * self.rate_delay)
         unseen = (cmath.exp(-s * self.force_delay) - 1.0) * (self.stiffness + self.damping * s) - self.drag * s
-        gust = self.observer * unseen / (s / GUST_BANDWIDTH + 1.0)
+        gust = self.observer * unseen / (s / self.gust_bandwidth + 1.0)
         free = self.mass * s * s + (self.damping + self.drag) * s + self.stiffness
         return free + (force + motion + gust) / (self.lag * s + 1.0)
 

@@ -41,19 +41,33 @@ class ContactSettings:
     loss_time_s: float = setting(0.10, "doubt this long is a loss", unit="s", low=0.01, high=2.0)
     force_filter_hz: float = setting(8.0, "first-order filter of the measured push", unit="Hz", low=0.5, high=100.0)
     moment_gain: float = setting(
-        1.0, "share of the measured contact moment fed forward; a stuck tip returns 0.9 of it", low=0.0, high=1.0
+        1.0, "gain of the measured contact moment in the feed-forward; a stuck tip returns 0.9 of it", low=0.0, high=1.0
     )
     moment_noise_n: float = setting(
         1.0,
-        "filtered force noise at which that share halves: the loop through a stuck tip multiplies noise",
+        "filtered force noise that halves that gain: the loop through a stuck tip amplifies noise",
         unit="N",
         low=0.01,
         high=100.0,
     )
-    friction_gain: float = setting(0.9, "share of the friction along travel fed forward", low=0.0, high=1.0)
+    friction_gain: float = setting(0.9, "gain of the friction along the travel in the feed-forward", low=0.0, high=1.0)
     friction_slew_n_s: float = setting(6.0, "fastest change of that force", unit="N/s", low=0.1, high=100.0)
     stuck_speed_m_s: float = setting(
         0.005, "slower than this in contact counts as stuck", unit="m/s", low=0.0, high=0.1
+    )
+    full_gain_stiffness_n_m: float = setting(
+        1500.0,
+        "force_kfp counts in full up to this stiffness and falls with its inverse: so does the loop gain rise",
+        unit="N/m",
+        low=50.0,
+        high=1e5,
+    )
+    gust_bandwidth_rad_s: float = setting(
+        9.0,
+        "bandwidth at which the observer learns gusts along the normal in contact: half of the motors' 17 rad/s",
+        unit="rad/s",
+        low=0.1,
+        high=50.0,
     )
     estimation: ContactEstimationSettings = field(default_factory=ContactEstimationSettings)
 

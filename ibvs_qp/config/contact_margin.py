@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
-from ibvs_qp.analysis.contact_loop import FULL_GAIN_STIFFNESS, ContactLoop
+from ibvs_qp.analysis.contact_loop import ContactLoop
 from ibvs_qp.config.brush import BrushSettings
 from ibvs_qp.config.contact import ContactSettings
 from ibvs_qp.config.errors import out_of_range
@@ -73,12 +73,13 @@ def contact_loop(config: PressingConfig, stiffness: float, damping: float, force
         drag=vehicle.linear_drag_n_s_m,
         stiffness=stiffness,
         damping=damping,
-        proportional=gains.force_kfp * min(1.0, FULL_GAIN_STIFFNESS / stiffness),
+        proportional=gains.force_kfp * min(1.0, config.contact.full_gain_stiffness_n_m / stiffness),
         integral=gains.force_kfi,
         filter_lag=1.0 / (2.0 * math.pi * config.contact.force_filter_hz),
         spring=spring,
         damper=damper,
         observer=1.0 if config.contact_feedforward else 0.0,  # without feed-forward it rests at the wall
+        gust_bandwidth=config.contact.gust_bandwidth_rad_s,
         force_delay=force_delay_s + hold,
         rate_delay=2.0 * hold,
         acceleration_filter=estimation.acceleration_filter_s,
@@ -136,7 +137,8 @@ def least_margin(config: PressingConfig, brush: BrushSettings | None = None) -> 
     low, high = brush.stiffness_min_n_m, brush.stiffness_max_n_m
     samples = {float(entry) for entry in np.geomspace(low, high, STIFFNESS_SAMPLES)}
     # The gain begins to fall there: a corner, possibly the least damped point of all.
-    samples |= {FULL_GAIN_STIFFNESS} if low < FULL_GAIN_STIFFNESS < high else set()
+    corner = config.contact.full_gain_stiffness_n_m
+    samples |= {corner} if low < corner < high else set()
     margins = (contact_mode_damping(config, k, brush.damping_n_s_m, brush.force_delay_s) for k in sorted(samples))
     return min(margins, key=lambda margin: margin.least_damping_ratio)
 

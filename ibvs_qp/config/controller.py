@@ -1,7 +1,7 @@
 """Configuration of a controller: frozen, validated, with a TOML round trip.
 
 Every number states its unit, allowed range and reason. The switches at the end of `ControllerConfig` are the
-ablations of the experiments. Gains and switches are shared by both laws; weights, limits and solver belong to the
+ablations of the experiments. Gains and switches serve both laws; weights, limits and solver belong to the
 quadratic program.
 """
 
@@ -51,7 +51,7 @@ class ControllerConfig:
     reach_check: bool = setting(True, "reduce a push that the vehicle cannot hold")
     barriers: bool = setting(True, "all barriers; each has its own switch in limits")
     thrust_rows: bool = setting(
-        True, "the program knows the rotors' limits (False: it does not, and its thrusts are clipped afterwards)"
+        True, "thrust limits as rows of the program (False: its thrusts are clipped afterwards)"
     )
     machine_code: bool = setting(
         False, "translate the tick with the C compiler, if there is one: the same bits, 1 s once, 25 us less per tick"

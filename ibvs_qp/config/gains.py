@@ -18,7 +18,7 @@ class Gains:
     theta_kd: float = setting(12.03, "line angle rate", unit="1/s", low=0.0, high=100.0)
     body_rotation_gain: float = setting(
         0.882,
-        "share of the body's turn that line rows count on in contact, where the tip shall travel",
+        "fraction of the body's rotation in the line rows while the tip travels in contact",
         low=0.0,
         high=1.0,
     )
@@ -32,7 +32,7 @@ class Gains:
     standoff_kd: float = setting(5.0, "approach speed error to acceleration", unit="1/s", low=0.0, high=50.0)
     force_ksp: float = setting(12.84, "impedance stiffness K_sp", unit="N/m", low=0.0, high=5000.0)
     force_ksd: float = setting(44.53, "impedance damping K_sd", unit="N s/m", low=0.0, high=1000.0)
-    force_kfp: float = setting(0.3467, "force error K_fp at 1.5 kN/m and softer", low=0.0, high=10.0)
+    force_kfp: float = setting(0.3467, "force error K_fp, up to contact.full_gain_stiffness_n_m", low=0.0, high=10.0)
     force_kfi: float = setting(0.4044, "integral of the force error K_fi", unit="1/s", low=0.0, high=50.0)
 
     def __post_init__(self) -> None:

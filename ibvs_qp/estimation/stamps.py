@@ -64,5 +64,5 @@ class StampRing:
 
 
 def sample_interval(stamp_ns: int, last_ns: int) -> float:
-    """Interval that a force sample stands for [s]; ``last_ns`` is -1 before the first one."""
+    """Time since the last force sample [s], bounded; ``last_ns`` is -1 before the first one."""
     return FIRST_INTERVAL if last_ns < 0 else min((stamp_ns - last_ns) * 1e-9, LONGEST_INTERVAL)

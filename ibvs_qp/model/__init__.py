@@ -1,1 +1,1 @@
-"""What all tasks share: vehicle, wall, contact, disturbance and reach as symbols, and the compiled step function."""
+"""Common to all tasks: vehicle, wall, contact, disturbance and reach as symbols, and the compiled step function."""

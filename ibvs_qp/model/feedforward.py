@@ -45,8 +45,8 @@ def contact_feedforward(
     r"""Wrench that the contact will put on the vehicle.
 
     Force: :math:`F = -g \mu f t` along the commanded travel t while sliding, slew-limited; nothing across the travel.
-    Moment: the measured one, its share falling with the noise of the force sensor, low-passed; it comes late by the
-    motors' lag and that filter, T, so what the force above is about to add comes from the model,
+    Moment: the measured one, low-passed, its gain falling with the noise of the force sensor; it is late by the
+    motors' lag and that filter, T, so the part that the force above is about to add comes from the model,
 
     .. math:: M = \hat M + \frac{T s}{T s + 1}\, p \times F,
 
@@ -54,7 +54,7 @@ def contact_feedforward(
     when it breaks away.
 
     Args:
-        signals: Keeps the filters' states.
+        signals: Registry of the filters' states.
         config: Contact gains, filter and slew; the vehicle's tip and motor lags.
         body: Measured wrench and time step.
         contact: Push and whether the tip touches.
@@ -63,10 +63,10 @@ def contact_feedforward(
     """
     settings = config.contact
     force = signals.remember("feedforward_friction", _friction(signals, settings, body, contact, travel, friction))
-    share = 1.0 - ca.exp(-2.0 * ca.pi * settings.force_filter_hz * body.dt)
+    smoothing = 1.0 - ca.exp(-2.0 * ca.pi * settings.force_filter_hz * body.dt)
     gain = contact.touching * settings.moment_gain / (1.0 + (contact.moment_noise / settings.moment_noise_n) ** 2)
     old = signals.state("feedforward_moment", 3)
-    felt = signals.remember("feedforward_moment", old + share * (gain * body.wrench[3:] - old))
+    felt = signals.remember("feedforward_moment", old + smoothing * (gain * body.wrench[3:] - old))
     model = settings.moment_gain * ca.cross(ca.DM(config.vehicle.tip_position_m), force)
     known = signals.state("feedforward_known", 3)
     late = 1.0 - ca.exp(-body.dt / moment_lag(config))

@@ -1,4 +1,4 @@
-"""Everything that tasks, limits and both laws share, as symbols: one object per controller."""
+"""The symbolic model common to tasks, limits and both laws: one object per controller."""
 
 from __future__ import annotations
 
@@ -118,14 +118,13 @@ class Model:
         near = ca.logic_or(contact.touching, contact.distance < config.contact.contact_distance_m)
         external = external_wrench(
             signals,
-            vehicle,
+            config,
             self.effectiveness,
             body,
             felt_moment,
             self.wall.normal,
             near,
             contact.push_noise,
-            config.contact_feedforward,
         )
         gyroscopic = -ca.cross(body.rate, ca.DM(vehicle.inertia_kg_m2) * body.rate)
         static = ca.vertcat(vehicle.mass_kg * GRAVITY * body.down, gyroscopic) + external
@@ -173,9 +172,9 @@ class Model:
     def body_rotation_gain(self) -> ca.SX:
         r"""Fraction of the body's rotation in line rows: :math:`1 - \lambda (1 - r)` while the tip travels, r the gain.
 
-        Held by friction, the tip does not follow the body's rotation; a row that expects it trades vertical force for
+        A tip stuck by friction does not follow the body's rotation; a row that expects it trades vertical force for
         pitch. While the tip is commanded to stay, use the full row: a reduced gain makes the horizontal line command
-        vertical motion (with r = 0.3, 35 N asked beyond reach lose 1.6 N of 30.1 N).
+        vertical motion (with r = 0.3, a command of 35 N beyond reach loses 1.6 N of 30.1 N).
         """
         if self.config.line_profile == "paper":
             return ca.SX(1.0)

@@ -1,4 +1,4 @@
-"""The push reference: what the user asked for, within what the rotors can hold."""
+"""The push reference: the commanded push within the reach of the rotors."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ FALL, RISE = 60.0, 10.0
 def push_reference(
     signals: Signals, config: ControllerConfig, body: Body, contact: Contact, target: Target, reach: ca.SX
 ) -> ca.SX:
-    """Push reference [N]: at most 97 % of the reach, changing at a limited rate in contact; 0 unless asked to press."""
+    """Push reference [N]: at most 97 % of the reach, slewed in contact; 0 without a press command."""
     allowed = ca.fmin(target.push, REACH_FRACTION * reach) if config.reach_check else target.push
     last = signals.state("push_allowed")
     limited = clamp(allowed, last - FALL * body.dt, last + RISE * body.dt)

@@ -9,11 +9,11 @@ from allocation.wrench_facets import ON_PLANE, RELATIVE_ZERO, WrenchFacets
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.model.signals import Signals
 
-#: Reach given out when nothing bounds it [N].
+#: Reach when nothing bounds it [N].
 UNBOUNDED = 1e6
-#: Least push given out when no push, not even zero, can be held [N].
+#: Least push when the vehicle can hold none, not even zero [N].
 NO_PUSH = 2.0 * UNBOUNDED
-#: Commanded speed below which the tip counts as standing still [m/s]: what a drifting odometer wishes is no slide.
+#: Commanded speed below which the tip counts as standing still [m/s]: a drifting odometer commands no slide.
 STANDING_SPEED = 1e-2
 
 
@@ -28,9 +28,9 @@ def push_reach(
     r"""Largest push that the limits in force can hold, level, against friction along the commanded travel [N].
 
     The ray :math:`w(f) = f [d; p \times d] - h`, :math:`d = n + \mu t`, meets the facets of the attainable wrench set
-    (`allocation.wrench_facets`): the reach is the first f at which it leaves, the output `least_push` the last at which
-    it enters, which is above zero where only pushing relieves a weak rotor, and `NO_PUSH` where no push, not even
-    zero, can be held. Exact for any number of rotors.
+    (`allocation.wrench_facets`), exactly for any number of rotors. The reach is the first f at which it leaves. The
+    output `least_push` is the last f at which it enters: above zero where only pushing relieves a weak rotor, and
+    `NO_PUSH` where the vehicle can hold no push, not even zero.
     """
     facets, count = WrenchFacets(vehicle.geometry), vehicle.geometry.count
     low, high = signals.input("thrust_low", count), signals.input("thrust_high", count)
@@ -40,8 +40,8 @@ def push_reach(
     lever = ca.cross(ca.DM(vehicle.tip_position_m), direction)
     slope = ca.DM(facets.normals) @ ca.vertcat(direction, lever)
     rising, falling = ca.DM(np.maximum(facets.coefficients, 0.0)), ca.DM(np.minimum(facets.coefficients, 0.0))
-    held = -(ca.DM(facets.normals) @ static_wrench)
-    upper, lower = rising @ high + falling @ low - held, rising @ low + falling @ high - held
+    offset = -(ca.DM(facets.normals) @ static_wrench)
+    upper, lower = rising @ high + falling @ low - offset, rising @ low + falling @ high - offset
     along, safe = ca.fabs(slope) > RELATIVE_ZERO, ca.if_else(ca.fabs(slope) > RELATIVE_ZERO, slope, 1.0)
     room = ca.if_else(along, ca.if_else(slope > 0.0, upper, lower) / safe, UNBOUNDED)
     outside = ca.logic_or(lower > ON_PLANE, upper < -ON_PLANE)  # of a pair of planes that the push does not move in

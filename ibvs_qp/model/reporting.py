@@ -12,78 +12,78 @@ from ibvs_qp.model.setpoints import Setpoints
 
 #: A thrust this far outside its window counts as clipped [N].
 CLIPPED = 1e-9
-#: A push reduced by less than this is not worth a word [N].
+#: A push reduced by less than this is not reported [N].
 REDUCED = 1e-3
 
 
-def contact_mode(terms: Setpoints, reference: Reference) -> str:
+def contact_mode(setpoints: Setpoints, reference: Reference) -> str:
     """Contact phase: "contact", "approach" or "free"."""
-    if terms.contact.in_contact:
+    if setpoints.contact.in_contact:
         return "contact"
     return "approach" if reference.contact else "free"
 
 
-def reach_margin(terms: Setpoints) -> float:
-    """Further push possible at the present contact [N]; NaN while no wall is known, or no push can be held."""
-    contact, reach = terms.contact, terms.reach
-    if not contact.known or terms.least_push > reach:
+def reach_margin(setpoints: Setpoints) -> float:
+    """Further push possible at the present contact [N]; NaN while no wall is known, or none is possible."""
+    contact, reach = setpoints.contact, setpoints.reach
+    if not contact.known or setpoints.least_push > reach:
         return math.nan
     return reach - contact.push if contact.push > 0.0 else reach
 
 
-def reach_note(terms: Setpoints, reference: Reference) -> tuple[str, ...]:
-    """Says that the push was reduced, or is less than can be held, and why; empty if neither."""
+def reach_note(setpoints: Setpoints, reference: Reference) -> tuple[str, ...]:
+    """Reason why the push was reduced or is below the least possible one; empty if neither."""
     if not reference.contact:
         return ()
-    asked, least = reference.push_force, terms.least_push
-    if asked - terms.push_reference < REDUCED and least - asked < REDUCED:
+    commanded, least = reference.push_force, setpoints.least_push
+    if commanded - setpoints.push_reference < REDUCED and least - commanded < REDUCED:
         return ()
-    friction = terms.reach_friction  # of the travel commanded, or planned at this push
+    friction = setpoints.reach_friction  # of the travel commanded, or planned at this push
     how = f"against friction {friction:.2f} along the travel" if friction > 0.0 else "standing still"
-    if least > terms.reach:
-        return (f"reference.push_force: {asked:.1f} N asked, the rotors cannot hold any push level, {how}",)
-    if least - asked >= REDUCED:
-        return (
-            f"reference.push_force: {asked:.1f} N asked, below what the rotors can hold: least {least:.1f} N, {how}",
-        )
-    return (f"reference.push_force: {asked:.1f} N reduced to {terms.push_reference:.1f} N, the rotors' reach {how}",)
+    if least > setpoints.reach:
+        result = "asked, the rotors cannot hold any push level,"
+    elif least - commanded >= REDUCED:
+        result = f"asked, below what the rotors can hold: least {least:.1f} N,"
+    else:
+        result = f"reduced to {setpoints.push_reference:.1f} N, the rotors' reach"
+    return (f"reference.push_force: {commanded:.1f} N {result} {how}",)
 
 
 def clipped_command(
-    terms: Setpoints, stamp_ns: int, free: np.ndarray, outcome: Outcome, mode: str, rejected: tuple[str, ...]
+    setpoints: Setpoints, stamp_ns: int, free: np.ndarray, outcome: Outcome, mode: str, rejected: tuple[str, ...]
 ) -> Command:
     """Command of free thrusts clipped to this tick's window; names the rotors that were clipped.
 
     Args:
-        terms: Set-points of the tick; take note of what is commanded.
+        setpoints: Set-points of the tick; take note of what is commanded.
         stamp_ns: Time of the measurement answered.
         free: Thrusts without limits [N], (n,).
         outcome: How they were found.
         mode: Contact phase.
         rejected: Inputs refused.
     """
-    thrusts = np.minimum(np.maximum(free, terms.lower), terms.upper)
+    thrusts = np.minimum(np.maximum(free, setpoints.lower), setpoints.upper)
     beyond = free - thrusts
-    unallocated = terms.effectiveness.dot(beyond)
-    terms.note(thrusts, max(map(abs, unallocated.tolist())))
+    unallocated = setpoints.effectiveness.dot(beyond)
+    setpoints.note(thrusts, max(map(abs, unallocated.tolist())))
     return Command(
         stamp_ns=stamp_ns,
         thrusts=thrusts,
-        wrench=terms.effectiveness @ thrusts,
+        wrench=setpoints.effectiveness @ thrusts,
         outcome=outcome,
         mode=mode,
         rejected=rejected,
-        active_limits=_clipped_rotors(terms, beyond.tolist()),
+        active_limits=_clipped_rotors(setpoints, beyond.tolist()),
         unallocated_wrench=unallocated,
-        reach_margin=math.nan if mode == "hold" else reach_margin(terms),
+        reach_margin=math.nan if mode == "hold" else reach_margin(setpoints),
     )
 
 
-def _clipped_rotors(terms: Setpoints, beyond: list[float]) -> tuple[ActiveLimit, ...]:
+def _clipped_rotors(setpoints: Setpoints, beyond: list[float]) -> tuple[ActiveLimit, ...]:
     """Rotors whose thrust was clipped, with what was taken away [N]."""
     if not any(beyond):
         return ()
-    names = terms.config.vehicle.geometry.names
+    names = setpoints.config.vehicle.geometry.names
     return tuple(
         ActiveLimit(
             name=f"thrust_{name}",

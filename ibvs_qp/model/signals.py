@@ -28,7 +28,7 @@ class Signals:
         """Symbol of an input, (size,); ConfigError when it exists with another size."""
         symbol = self.inputs.setdefault(name, ca.SX.sym(name, size))
         if symbol.numel() != size:
-            raise ConfigError(f"input {name!r} has {symbol.numel()} entries, {size} asked for")
+            raise ConfigError(f"input {name!r} has {symbol.numel()} entries, not {size}")
         return symbol
 
     def state(self, name: str, size: int = 1, start: float | Sequence[float] = 0.0) -> ca.SX:

@@ -97,7 +97,7 @@ class Painter(PhaseMachine):
             tolerance = config.press_error * max(inputs.push_reference, PRESS_REFERENCE_MIN)
             if abs(inputs.push - inputs.push_reference) < tolerance:
                 self.row = 1
-                self._begin_row(inputs, f"push {inputs.push:.1f} N held")
+                self._begin_row(inputs, f"push {inputs.push:.1f} N reached")
         return self._command(inputs, contact=True, hold=True, mark=True)
 
     def _paint(self, inputs: PainterInput, dt: float) -> PaintingCommand:

@@ -50,11 +50,11 @@ class QpEngine:
         conflict: Names of a smallest set of hard rows that contradict each other, after a solve without a solution.
     """
 
-    def __init__(self, template: QpProblem, settings: SolverSettings, data: ProgramData) -> None:
-        self.template, self.settings, self.data = template, settings, data
-        self.osqp, self.exact = OsqpSolver(template, settings), ExactSolver(template)
-        self._rotors = template.model.rotors
-        self._hard = np.flatnonzero(template.row_slack[self._rotors :] < 0) + self._rotors
+    def __init__(self, problem: QpProblem, settings: SolverSettings, data: ProgramData) -> None:
+        self.problem, self.settings, self.data = problem, settings, data
+        self.osqp, self.exact = OsqpSolver(problem, settings), ExactSolver(problem)
+        self._rotors = problem.model.rotors
+        self._hard = np.flatnonzero(problem.row_slack[self._rotors :] < 0) + self._rotors
         self.conflict: tuple[str, ...] = ()
 
     def reset(self) -> None:
@@ -75,7 +75,7 @@ class QpEngine:
         if exact is not None:
             self.osqp.warm_start(*exact)
             return self._accepted(*exact, Outcome.EXACT_FALLBACK, raw)
-        self.conflict = conflicting_rows(self.template, data)
+        self.conflict = conflicting_rows(self.problem, data)
         self.osqp.reset()
         return None
 

@@ -14,21 +14,21 @@ FEASIBLE = 1e-4
 class ExactSolver:
     """Dual active-set solver of the same program; exact to rounding, called only when OSQP is not accepted."""
 
-    def __init__(self, template: QpProblem) -> None:
-        self._template = template
-        p_sparsity = _casadi_sparsity(template.p_pattern + template.p_pattern.T)
-        self._p_sparsity, self._a_sparsity = p_sparsity, _casadi_sparsity(template.a_pattern)
+    def __init__(self, problem: QpProblem) -> None:
+        self._problem = problem
+        p_sparsity = _casadi_sparsity(problem.p_pattern + problem.p_pattern.T)
+        self._p_sparsity, self._a_sparsity = p_sparsity, _casadi_sparsity(problem.a_pattern)
         self._solver = ca.conic("exact", "daqp", {"h": p_sparsity, "a": self._a_sparsity}, {"error_on_fail": False})
 
     def solve(
         self, p: np.ndarray, q: np.ndarray, a: np.ndarray, lower: np.ndarray, upper: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray] | None:
         """Solution and multipliers (y > 0 at an upper bound), or None without success."""
-        upper_triangle = self._template.p_pattern.copy()
+        upper_triangle = self._problem.p_pattern.copy()
         upper_triangle.data = p.copy()
         full = upper_triangle.toarray()
         full = full + np.triu(full, 1).T
-        matrix = self._template.a_pattern.copy()
+        matrix = self._problem.a_pattern.copy()
         matrix.data = a.copy()
         arguments = {
             "h": ca.project(ca.DM(full), self._p_sparsity),

@@ -1,4 +1,4 @@
-"""One recorded tick again: the program from its parameters, solved exactly, with every task and limit in words."""
+"""Explanation of a tick: reports of tasks and limits, and the exact solution of a recorded program."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ibvs_qp.qp.problem import QpProblem
 
 @dataclass(frozen=True, kw_only=True)
 class LimitValue:
-    """One limit row of a tick: its bounds, and what the thrusts make of it, in the row's unit."""
+    """Bounds and value of one limit row at a tick, in the row's unit."""
 
     name: str
     unit: str
@@ -28,14 +28,14 @@ class LimitValue:
 
 @dataclass(frozen=True, kw_only=True)
 class Explanation:
-    """What a tick wanted, got and paid.
+    """Targets, results and costs of a tick.
 
     Attributes:
         thrusts: Of the exact solution [N], (n,).
-        tasks: Every task row with a weight; `cost` are their shares of the cost, in the same order.
-        total_cost: What the tick costs in all, without unit: weights and prices are per squared unit of their rows.
-        slack_cost: Share of the cost that is paid for slack of limits; with those of the tasks it makes one.
-        active_limits: Limits that bind, dearest first; `limit_cost` are the shares of the cost that their slack takes,
+        tasks: Every task row with a weight; `cost` are their fractions of the cost, in the same order.
+        total_cost: Cost of the tick, without unit: weights are per squared unit of their rows.
+        slack_cost: Fraction of the cost for slack; with those of the tasks it sums to one.
+        active_limits: Active limits by falling multiplier; `limit_cost` are the fractions of the cost for their slack,
             zero for a hard one, and `limit_rows` their bounds and values, in the same order.
         unallocated_wrench: Wrench of the same tick without limits minus the wrench [N, N m], (6,).
     """
@@ -51,24 +51,24 @@ class Explanation:
     unallocated_wrench: np.ndarray
 
 
-def task_reports(template: QpProblem, data: ProgramData, thrusts: np.ndarray) -> TaskReports:
+def task_reports(problem: QpProblem, data: ProgramData, thrusts: np.ndarray) -> TaskReports:
     """Target, achieved value and residual of every task row with a weight."""
     achieved, asked, weights = data.report(data.point, thrusts)
-    return TaskReports(template.task_names, weights.copy(), asked.copy(), achieved.copy())
+    return TaskReports(problem.task_names, weights.copy(), asked.copy(), achieved.copy())
 
 
-def active_limits(template: QpProblem, x: np.ndarray, y: np.ndarray) -> tuple[ActiveLimit, ...]:
-    """Limits with a price: name, side, |dJ*/d bound| and slack taken."""
+def active_limits(problem: QpProblem, x: np.ndarray, y: np.ndarray) -> tuple[ActiveLimit, ...]:
+    """Limits with a multiplier: name, side, |dJ*/d bound| and slack."""
     active = []
     for i in np.flatnonzero(np.abs(y) > ACTIVE_MULTIPLIER):
-        slot = template.row_slack[i]
+        slot = problem.row_slack[i]
         active.append(
             ActiveLimit(
-                name=template.row_names[i],
+                name=problem.row_names[i],
                 side="upper" if y[i] > 0 else "lower",
                 price=abs(float(y[i])),
                 slack=abs(float(x[slot])) if slot >= 0 else 0.0,
-                unit=template.row_units[i],
+                unit=problem.row_units[i],
             )
         )
     return tuple(active)
@@ -78,17 +78,17 @@ class TickReplay:
     """Explains recorded ticks of one program.
 
     Args:
-        template: The program.
+        problem: The program.
         solver: Back end of qpsolvers that solves it; None for the exact solver.
 
     Attributes:
         conflict: Names of the rows that contradict each other, where the last tick explained has no solution.
     """
 
-    def __init__(self, template: QpProblem, solver: str | None = None) -> None:
-        self._template, self._solver = template, solver
-        self._data = RecordedProgram(template)
-        self._exact = ExactSolver(template)
+    def __init__(self, problem: QpProblem, solver: str | None = None) -> None:
+        self._problem, self._solver = problem, solver
+        self._data = RecordedProgram(problem)
+        self._exact = ExactSolver(problem)
         self.conflict: tuple[str, ...] = ()
 
     def explain(self, point: np.ndarray) -> Explanation | None:
@@ -97,24 +97,24 @@ class TickReplay:
         Args:
             point: Inputs and states of the step as in `ProgramData.point`.
         """
-        data, template = self._data, self._template
+        data, problem = self._data, self._problem
         data.point[:] = point
         data.evaluate()
         solution, self.conflict = self._solve(), ()
         if solution is None:
-            self.conflict = conflicting_rows(template, data)
+            self.conflict = conflicting_rows(problem, data)
             return None
         x, y = solution
-        thrusts = x[: template.model.rotors]
-        tasks = tuple(task_reports(template, data, thrusts))
+        thrusts = x[: problem.model.rotors]
+        tasks = tuple(task_reports(problem, data, thrusts))
         cost = np.array([0.5 * task.weight * task.residual**2 for task in tasks])
         slack = x[len(thrusts) :]
         slack_cost = 0.5 * float(slack @ (data.hessian().diagonal()[len(thrusts) :] * slack))
         total = float(cost.sum()) + slack_cost or 1.0
-        limits = sorted(active_limits(template, x, y), key=lambda limit: -limit.price)
-        weights = {row.name: row.slack_weight or 0.0 for row in template.limit_rows}
+        limits = sorted(active_limits(problem, x, y), key=lambda limit: -limit.price)
+        weights = {row.name: row.slack_weight or 0.0 for row in problem.limit_rows}
         paid = (0.5 * weights[limit.name] * limit.slack**2 / total for limit in limits)
-        effectiveness = template.model.effectiveness
+        effectiveness = problem.model.effectiveness
         return Explanation(
             thrusts=thrusts,
             tasks=tasks,
@@ -132,15 +132,15 @@ class TickReplay:
 
         Args:
             names: Of the rows.
-            thrusts: What was commanded, or would be [N], (n,).
+            thrusts: Thrusts to evaluate at [N], (n,).
         """
-        template, data = self._template, self._data
-        rows = [template.row_names.index(name) for name in names]
+        problem, data = self._problem, self._data
+        rows = [problem.row_names.index(name) for name in names]
         values, lower, upper = data.limit_values(thrusts)
         return tuple(
             LimitValue(
-                name=template.row_names[row],
-                unit=template.row_units[row],
+                name=problem.row_names[row],
+                unit=problem.row_units[row],
                 lower=float(lower[row]),
                 upper=float(upper[row]),
                 value=float(values[row]),
@@ -154,4 +154,4 @@ class TickReplay:
             return self._exact.solve(data.p, data.q, data.a, data.lower, data.upper)
         from ibvs_qp.qp.offline import solve_offline
 
-        return solve_offline(self._template, data, self._solver)
+        return solve_offline(self._problem, data, self._solver)

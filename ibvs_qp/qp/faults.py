@@ -8,13 +8,13 @@ from ibvs_qp.qp.evaluator import ProgramData
 from ibvs_qp.qp.problem import QpProblem
 
 
-def program_faults(template: QpProblem, data: ProgramData) -> tuple[str, ...]:
+def program_faults(problem: QpProblem, data: ProgramData) -> tuple[str, ...]:
     """One sentence per invalid input, or else per invalid row; evaluated only if every solver failed.
 
     An input that is not finite breaks every row that uses it, so rows are checked only if all inputs are finite.
     """
     broken = [_broken(name, values) for name, values in data.inputs.items() if not np.isfinite(values).all()]
-    return tuple(broken) or (*_task_faults(template, data), *_limit_faults(template, data))
+    return tuple(broken) or (*_task_faults(problem, data), *_limit_faults(problem, data))
 
 
 def _broken(name: str, values: np.ndarray) -> str:
@@ -22,12 +22,12 @@ def _broken(name: str, values: np.ndarray) -> str:
     return f"input {name}: ({entries}) is not finite"
 
 
-def _task_faults(template: QpProblem, data: ProgramData) -> list[str]:
+def _task_faults(problem: QpProblem, data: ProgramData) -> list[str]:
     """Rows whose value, target or weight is no number, and weights below zero."""
-    thrusts = np.ones(template.model.rotors)  # not zero, so that a factor that is no number shows in any case
+    thrusts = np.ones(problem.model.rotors)  # not zero, so that a factor that is no number shows in any case
     achieved, asked, weights = data.report(data.point, thrusts)
     found = []
-    for row, value, target, weight in zip(template.task_rows, achieved, asked, weights, strict=True):
+    for row, value, target, weight in zip(problem.task_rows, achieved, asked, weights, strict=True):
         if not np.isfinite((value, target, weight)).all():
             found.append(f"task {row.name}: value {value:g}, target {target:g} or weight {weight:g} is not finite")
         elif weight < 0.0:
@@ -35,10 +35,10 @@ def _task_faults(template: QpProblem, data: ProgramData) -> list[str]:
     return found
 
 
-def _limit_faults(template: QpProblem, data: ProgramData) -> list[str]:
+def _limit_faults(problem: QpProblem, data: ProgramData) -> list[str]:
     """Rows that hold a number that is none, and rows whose bounds leave no room between them."""
     found = []
-    for i, row in enumerate(template.limit_rows):
+    for i, row in enumerate(problem.limit_rows):
         crossed = data.lower[i] - data.upper[i]
         if not np.isfinite((*data.rows()[i], data.lower[i], data.upper[i])).all():
             found.append(f"limit {row.name}: its row or one of its bounds is not finite")

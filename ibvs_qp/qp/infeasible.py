@@ -12,7 +12,7 @@ from ibvs_qp.qp.problem import QpProblem
 NO_CERTIFICATE = 1e-8
 
 
-def conflicting_rows(template: QpProblem, data: ProgramData) -> tuple[str, ...]:
+def conflicting_rows(problem: QpProblem, data: ProgramData) -> tuple[str, ...]:
     r"""Names of hard rows without a common solution, none of which could be spared; () where there is a solution.
 
     By Farkas' lemma :math:`G x \le h` has no solution exactly if some :math:`y \ge 0` has :math:`G^T y = 0` and
@@ -21,14 +21,14 @@ def conflicting_rows(template: QpProblem, data: ProgramData) -> tuple[str, ...]:
     every one that can be spared is struck off.
 
     Args:
-        template: Names of the rows, and which of them are hard.
+        problem: Names of the rows, and which of them are hard.
         data: Values of one tick's program.
 
     Source: Gleeson and Ryan, Identifying minimally infeasible subsystems of inequalities, ORSA J. Computing 1990;
         Chinneck, Feasibility and Infeasibility in Optimization, 2008, section 6.2 (deletion filter).
     """
-    hard = np.flatnonzero(template.row_slack < 0)
-    rotors = template.model.rotors
+    hard = np.flatnonzero(problem.row_slack < 0)
+    rotors = problem.model.rotors
     rows, lower, upper = data.rows()[hard, :rotors], data.lower[hard], data.upper[hard]
     if not np.isfinite((rows.sum(), lower.sum(), upper.sum())).all():
         return ()
@@ -40,7 +40,7 @@ def conflicting_rows(template: QpProblem, data: ProgramData) -> tuple[str, ...]:
     kept = _certificate(table, list(range(len(hard))))
     for row in list(kept):
         kept = _certificate(table, [other for other in kept if other != row]) or kept
-    return tuple(template.row_names[hard[row]] for row in kept)
+    return tuple(problem.row_names[hard[row]] for row in kept)
 
 
 def _certificate(table: np.ndarray, chosen: list[int]) -> list[int]:

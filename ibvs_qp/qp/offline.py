@@ -22,15 +22,15 @@ def installed_solvers() -> tuple[str, ...]:
     return tuple(sorted(qpsolvers.available_solvers))
 
 
-def qpsolvers_problem(template: QpProblem, data: ProgramData, dense: bool = False) -> qpsolvers.Problem:
+def qpsolvers_problem(problem: QpProblem, data: ProgramData, dense: bool = False) -> qpsolvers.Problem:
     """One tick's program in the form of qpsolvers: full P, two-sided rows stacked as G x <= h.
 
     Args:
-        template: Patterns of the matrices.
+        problem: Patterns of the matrices.
         data: Their values.
         dense: Arrays instead of sparse matrices.
     """
-    upper_triangle, rows = template.p_pattern.copy(), template.a_pattern.copy()
+    upper_triangle, rows = problem.p_pattern.copy(), problem.a_pattern.copy()
     upper_triangle.data, rows.data = data.p.copy(), data.a.copy()
     hessian = sparse.csc_matrix(upper_triangle + sparse.triu(upper_triangle, 1).T)
     stacked = sparse.csc_matrix(sparse.vstack((rows, -rows)))
@@ -41,12 +41,12 @@ def qpsolvers_problem(template: QpProblem, data: ProgramData, dense: bool = Fals
 
 
 def solve_offline(
-    template: QpProblem, data: ProgramData, solver: str, **options: Any
+    problem: QpProblem, data: ProgramData, solver: str, **options: Any
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """Solution and multipliers of one tick's program by a back end of qpsolvers.
 
     Args:
-        template: Patterns of the matrices.
+        problem: Patterns of the matrices.
         data: Their values.
         solver: Name of the back end, as in `installed_solvers`.
         options: Handed on to it, as in ``eps_abs=1e-9``.
@@ -64,7 +64,7 @@ def solve_offline(
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # some warn that a sparse matrix is made dense
         found = qpsolvers.solve_problem(
-            qpsolvers_problem(template, data, dense=solver in DENSE), solver=solver, **options
+            qpsolvers_problem(problem, data, dense=solver in DENSE), solver=solver, **options
         )
     if not found.found or found.x is None or found.z is None:
         return None

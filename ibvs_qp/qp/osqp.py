@@ -37,10 +37,10 @@ class OsqpSolver:
     closer, OSQP would turn the row into an equality and factorise again.
     """
 
-    def __init__(self, template: QpProblem, settings: SolverSettings) -> None:
-        self._template, self._settings = template, settings
-        variables, rows = len(template.variable_names), len(template.row_names)
-        self._lengths = (template.p_pattern.nnz, variables, template.a_pattern.nnz, rows, rows)
+    def __init__(self, problem: QpProblem, settings: SolverSettings) -> None:
+        self._problem, self._settings = problem, settings
+        variables, rows = len(problem.variable_names), len(problem.row_names)
+        self._lengths = (problem.p_pattern.nnz, variables, problem.a_pattern.nnz, rows, rows)
         self._reset_pending = True
 
     def reset(self) -> None:
@@ -50,8 +50,8 @@ class OsqpSolver:
     def _setup(self, p: np.ndarray, q: np.ndarray, a: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> None:
         settings, p_matrix, a_matrix = (
             self._settings,
-            self._template.p_pattern.copy(),
-            self._template.a_pattern.copy(),
+            self._problem.p_pattern.copy(),
+            self._problem.a_pattern.copy(),
         )
         p_matrix.data, a_matrix.data = p.copy(), a.copy()
         self._solver = osqp.OSQP()

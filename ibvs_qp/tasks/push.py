@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ibvs_qp.analysis.contact_loop import FULL_GAIN_STIFFNESS
 from ibvs_qp.config import VehicleParams
 from ibvs_qp.model.inputs import Contact, clamp
 from ibvs_qp.model.model import Model
@@ -44,7 +43,7 @@ class PushTask(Task):
         reference = model.push_reference * contact.ramp
         error = reference - contact.push
         # On stiff walls the loop gain rises with the stiffness; the proportional gain falls with it.
-        softness = ca.fmin(1.0, FULL_GAIN_STIFFNESS / contact.stiffness)
+        softness = ca.fmin(1.0, model.config.contact.full_gain_stiffness_n_m / contact.stiffness)
         feedback = softness * gains.force_kfp * error + gains.force_kfi * self._integral(model, error)
         return reference + feedback + self._impedance(model)
 

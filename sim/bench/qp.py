@@ -83,9 +83,9 @@ def _rivals(
     controller: HybridController, ticks: list[Tick], sample: int
 ) -> tuple[list[Row], dict[str, dict[str, float]]]:
     """Times of the rivals on the controller's own programs, and thrust differences to the exact solver [N]."""
-    template, data = controller.template, controller.engine.data
+    problem, data = controller.problem, controller.engine.data
     rows = {name: Row(name=f"qpsolvers_{name}") for name in RIVALS if name in installed_solvers()}
-    exact_row, exact = Row(name="casadi_daqp"), ExactSolver(template)
+    exact_row, exact = Row(name="casadi_daqp"), ExactSolver(problem)
     differences: dict[str, list[float]] = {name: [] for name in ("step", "step_limited", "step_unlimited", *rows)}
     for index, (measurement, reference) in enumerate(by_flight(controller, ticks)):
         command = controller.step(measurement, reference)
@@ -95,7 +95,7 @@ def _rivals(
         part = "step_limited" if command.active_limits else "step_unlimited"
         answers = {"step": command.thrusts, part: command.thrusts}
         for name, row in rows.items():
-            answer = row.measure(lambda: solve_offline(template, data, name))  # noqa: B023 - called at once
+            answer = row.measure(lambda: solve_offline(problem, data, name))  # noqa: B023 - called at once
             if answer is not None:
                 answers[name] = answer[0][: len(command.thrusts)]
         if found is None:

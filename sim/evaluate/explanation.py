@@ -10,7 +10,7 @@ import numpy as np
 
 from ibvs_qp.command import Outcome
 from ibvs_qp.config.settings import from_dict
-from ibvs_qp.controller import program_template
+from ibvs_qp.controller import qp_problem
 from ibvs_qp.pilot import PilotConfig
 from ibvs_qp.qp.explain import Explanation, LimitValue, TickReplay
 
@@ -22,7 +22,7 @@ _TIME_TOLERANCE_S = 1e-6
 
 
 #: Building the program of a configuration takes long; explanations need it several times.
-_program = functools.lru_cache(maxsize=2)(program_template)
+_program = functools.lru_cache(maxsize=2)(qp_problem)
 
 
 def _replay(

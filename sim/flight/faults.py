@@ -93,7 +93,7 @@ class FaultSchedule:
         now = world.plant.time_ns * 1e-9
         self.begun.setdefault("start", now)
         self.begun.setdefault(pilot.painter.phase, now)
-        if pilot.terms.contact.in_contact:
+        if pilot.setpoints.contact.in_contact:
             self.begun.setdefault("touch", now)
         happened = []
         for index, fault in enumerate(self.faults):

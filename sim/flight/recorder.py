@@ -42,7 +42,7 @@ _OUTCOME_INDEX = {outcome: float(index) for index, outcome in enumerate(Outcome)
 
 def controller_signals(pilot: Pilot) -> dict[str, np.ndarray]:
     """Signals of the controller's step that are logged, by name: 1-D views that hold after every step."""
-    step, lines = pilot.terms.step, [f"line_{index}" for index in range(pilot.config.controller.line_slots)]
+    step, lines = pilot.setpoints.step, [f"line_{index}" for index in range(pilot.config.controller.line_slots)]
     signals = {name: step.inputs[name] for name in INPUTS}
     signals |= {f"{line}.{name}": step.inputs[f"{line}.{name}"] for line in lines for name in ("present", "vertical")}
     signals |= {f"{line}.error": step.outputs[f"{line}.error"] for line in lines}
@@ -51,7 +51,7 @@ def controller_signals(pilot: Pilot) -> dict[str, np.ndarray]:
 
 def program_point(pilot: Pilot) -> np.ndarray | None:
     """Inputs and states that reproduce the quadratic program, a view; None under the analytic law."""
-    return pilot.terms.step.point if isinstance(pilot.controller, HybridController) else None
+    return pilot.setpoints.step.point if isinstance(pilot.controller, HybridController) else None
 
 
 class Recorder:

@@ -123,7 +123,7 @@ def record_program(controller: HybridController) -> Program:
         rows=rows,
         lower=lower,
         upper=upper,
-        free=optimum[: controller.template.model.rotors],
+        free=optimum[: controller.problem.model.rotors],
         limited=bool(((at < lower) | (at > upper)).any()),
         arrays=tuple(getattr(data, name).copy() for name in _ARRAYS),
     )
@@ -131,15 +131,15 @@ def record_program(controller: HybridController) -> Program:
 
 def record_tick(controller: HybridController) -> TickRecord:
     """The controller's last tick under both laws."""
-    terms = controller.setpoints
-    law_free = analytic_thrusts(terms)
+    setpoints = controller.setpoints
+    law_free = analytic_thrusts(setpoints)
     return TickRecord(
         program=record_program(controller),
-        contact_weight=terms.contact_weight,
-        lines=len(terms.lines),
-        push_reference=terms.push_reference,
+        contact_weight=setpoints.contact_weight,
+        lines=len(setpoints.lines),
+        push_reference=setpoints.push_reference,
         law_free=law_free,
-        law=np.clip(law_free, terms.lower, terms.upper),
+        law=np.clip(law_free, setpoints.lower, setpoints.upper),
         selected=_selected_thrusts(controller),
     )
 
@@ -150,25 +150,27 @@ def _selected_thrusts(controller: HybridController) -> np.ndarray:
     S removes the fraction lambda of the pushing direction. The printed law inverts L with that direction and then
     drops the motion along it.
     """
-    terms = controller.setpoints
-    gains, vehicle, contact = terms.config.gains, terms.config.vehicle, terms.contact_weight
+    setpoints = controller.setpoints
+    gains, vehicle, contact = setpoints.config.gains, setpoints.config.vehicle, setpoints.contact_weight
     mass = np.concatenate((np.full(3, vehicle.mass_kg), np.asarray(vehicle.inertia_kg_m2)))
-    along = (contact * terms.push_command + (1.0 - contact) * terms.standoff_command) / vehicle.mass_kg
-    right, down = terms.velocity_command
-    acceleration = np.append(terms.normal * along + terms.right * right + terms.down * down, terms.angular)
+    along = (contact * setpoints.push_command + (1.0 - contact) * setpoints.standoff_command) / vehicle.mass_kg
+    right, down = setpoints.velocity_command
+    acceleration = np.append(
+        setpoints.normal * along + setpoints.right * right + setpoints.down * down, setpoints.angular
+    )
     selection = np.eye(6)
-    selection[:3, :3] -= contact * np.outer(terms.normal, terms.normal)
-    if terms.lines:
-        level = min(terms.lines, key=lambda line: abs(line.rho))
-        matrix = np.vstack([*(line.matrix[0] for line in terms.lines), level.matrix[1]]) @ selection
+    selection[:3, :3] -= contact * np.outer(setpoints.normal, setpoints.normal)
+    if setpoints.lines:
+        level = min(setpoints.lines, key=lambda line: abs(line.rho))
+        matrix = np.vstack([*(line.matrix[0] for line in setpoints.lines), level.matrix[1]]) @ selection
         target = [
             -(gains.line_kp * line.rho_error + gains.line_kd * line.rho_rate + gains.line_ki * line.integral)
-            for line in terms.lines
+            for line in setpoints.lines
         ]
         target.append(-(gains.theta_kp * level.angle_error + gains.theta_kd * level.angle_rate))
         inverse = np.linalg.pinv(matrix, rcond=RANK_TOLERANCE)
         acceleration = acceleration + inverse @ (np.array(target) - matrix @ acceleration)
-    return terms.inverse @ (mass * acceleration - terms.bias_wrench)
+    return setpoints.inverse @ (mass * acceleration - setpoints.bias_wrench)
 
 
 def paper_profile(weight: float) -> ControllerConfig:
@@ -185,7 +187,7 @@ def paper_profile(weight: float) -> ControllerConfig:
 
 def exact_solver() -> Callable[[Program], tuple[np.ndarray, np.ndarray]]:
     """DAQP through CasADi, the exact fallback of the controller: a function that returns x and multipliers y."""
-    solver = ExactSolver(HybridController().template)
+    solver = ExactSolver(HybridController().problem)
 
     def solve(program: Program) -> tuple[np.ndarray, np.ndarray]:
         found = solver.solve(*program.arrays[:5])

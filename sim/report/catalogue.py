@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from ibvs_qp.config import ControllerConfig
-from ibvs_qp.controller import default_limits, default_tasks, program_template
+from ibvs_qp.controller import default_limits, default_tasks, qp_problem
 from ibvs_qp.limits import Limit
 from ibvs_qp.model.rows import LimitRow, TaskRow
 from ibvs_qp.tasks import Task
@@ -91,7 +91,7 @@ def catalogue(config: ControllerConfig | None = None) -> str:
         config: Configuration of the program; None for the default.
     """
     config = config or ControllerConfig()
-    model = program_template(config).model
+    model = qp_problem(config).model
     tasks, limits = default_tasks(config), default_limits(config)
     weighed = [line for task in tasks for line in _weighed(task, task.rows(model), config)]
     parts = [_HEAD, _TASKS, _table(("class", "purpose", "rows", "weight", "reason"), _joined(weighed))]

@@ -25,22 +25,22 @@ MASSES = np.array([MASS] * 3 + list(CONFIG.vehicle.inertia_kg_m2))
 
 
 def terms_of(seed: int, lines: int, share: float) -> Setpoints:
-    terms = analytic_setpoints(CONFIG)
-    terms.update(*random_tick(np.random.default_rng(seed), lines))
-    terms.step.inputs["contact_weight"][0] = share
-    terms.step.evaluate()
-    return terms
+    setpoints = analytic_setpoints(CONFIG)
+    setpoints.update(*random_tick(np.random.default_rng(seed), lines))
+    setpoints.step.inputs["contact_weight"][0] = share
+    setpoints.step.evaluate()
+    return setpoints
 
 
-def stacked(terms: Setpoints) -> tuple[np.ndarray, np.ndarray]:
+def stacked(setpoints: Setpoints) -> tuple[np.ndarray, np.ndarray]:
     """L in body axes and K_p e + K_d de + K_i int e: a rho row per line and one angle row."""
     gains, rows, feedback = CONFIG.gains, [], []
     twist = camera_twist_matrix(np.array(CONFIG.vehicle.camera_position_m))
-    for line in terms.lines:
-        rows.append(line_interaction_matrix(line.rho, line.theta, terms.plane)[0] @ twist)
+    for line in setpoints.lines:
+        rows.append(line_interaction_matrix(line.rho, line.theta, setpoints.plane)[0] @ twist)
         feedback.append(gains.line_kp * line.rho_error + gains.line_kd * line.rho_rate + gains.line_ki * line.integral)
-    level = sorted(terms.lines, key=lambda line: abs(line.rho))[0]
-    rows.append(line_interaction_matrix(level.rho, level.theta, terms.plane)[1] @ twist)
+    level = sorted(setpoints.lines, key=lambda line: abs(line.rho))[0]
+    rows.append(line_interaction_matrix(level.rho, level.theta, setpoints.plane)[1] @ twist)
     feedback.append(gains.theta_kp * level.angle_error + gains.theta_kd * level.angle_rate)
     return np.array(rows), np.array(feedback)
 
@@ -49,34 +49,34 @@ def stacked(terms: Setpoints) -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize("share", [0.0, 0.4, 1.0])
 def test_the_wrench_is_the_law_by_hand(lines: int, share: float) -> None:
     for seed in range(15):
-        terms = terms_of(seed, lines, share)
-        normal = terms.normal
+        setpoints = terms_of(seed, lines, share)
+        normal = setpoints.normal
         null = np.concatenate(
             (
-                normal * terms.standoff_command / MASS
-                + terms.right * terms.velocity_command[0]
-                + terms.down * terms.velocity_command[1],
-                terms.angular,
+                normal * setpoints.standoff_command / MASS
+                + setpoints.right * setpoints.velocity_command[0]
+                + setpoints.down * setpoints.velocity_command[1],
+                setpoints.angular,
             )
         )
         acceleration = null
         if lines:
-            matrix, feedback = stacked(terms)
+            matrix, feedback = stacked(setpoints)
             inverse = np.linalg.pinv(matrix, rcond=0.05)
             acceleration = -inverse @ feedback + (np.eye(6) - inverse @ matrix) @ null
         servo = MASSES * acceleration
         selection = np.zeros((6, 6))
         selection[:3, :3] = share * np.outer(normal, normal)
-        force = np.concatenate((normal * terms.push_command, np.zeros(3)))
+        force = np.concatenate((normal * setpoints.push_command, np.zeros(3)))
         expected = (np.eye(6) - selection) @ servo + selection @ force
-        np.testing.assert_allclose(analytic_wrench(terms), expected, atol=1e-8)
+        np.testing.assert_allclose(analytic_wrench(setpoints), expected, atol=1e-8)
 
 
 def test_full_contact_keeps_the_force_command() -> None:
     """Lambda' = lambda n n^T: along n exactly the push remains. The printed R diag(0,0,lambda) would cancel it."""
     for seed in range(10):
-        terms = terms_of(seed, 2, 1.0)
-        assert terms.normal @ analytic_wrench(terms)[:3] == pytest.approx(terms.push_command, abs=1e-9)
+        setpoints = terms_of(seed, 2, 1.0)
+        assert setpoints.normal @ analytic_wrench(setpoints)[:3] == pytest.approx(setpoints.push_command, abs=1e-9)
         none = terms_of(seed, 0, 0.0)
         assert none.normal @ analytic_wrench(none)[:3] == pytest.approx(none.standoff_command, abs=1e-9)
 
@@ -88,36 +88,36 @@ def test_one_angle_row_only() -> None:
         wall.line(0.05, 0.5 * math.pi + 0.02, HORIZONTAL),
         wall.line(-0.12, -0.02, VERTICAL),
     )
-    terms = analytic_setpoints(CONFIG)
-    terms.update(measured(0, plane=wall.plane, lines=seen), Reference(lines=line_references(2), contact=True))
-    assert len(terms.lines) == 2
-    matrix, feedback = stacked(terms)
+    setpoints = analytic_setpoints(CONFIG)
+    setpoints.update(measured(0, plane=wall.plane, lines=seen), Reference(lines=line_references(2), contact=True))
+    assert len(setpoints.lines) == 2
+    matrix, feedback = stacked(setpoints)
     assert matrix.shape == (3, 6)
-    both = np.vstack((matrix, terms.lines[1].matrix[1]))
+    both = np.vstack((matrix, setpoints.lines[1].matrix[1]))
     gains = CONFIG.gains
-    doubled = np.append(feedback, gains.theta_kp * terms.lines[1].angle_error + gains.theta_kd * 0.0)
+    doubled = np.append(feedback, gains.theta_kp * setpoints.lines[1].angle_error + gains.theta_kd * 0.0)
     printed = -np.linalg.pinv(both) @ doubled
-    assert abs(analytic_wrench(terms)[4] / MASSES[4]) < 0.1 * abs(printed[4])
+    assert abs(analytic_wrench(setpoints)[4] / MASSES[4]) < 0.1 * abs(printed[4])
 
 
 def test_thrusts_are_the_pseudo_inverse_of_the_whole_wrench() -> None:
     matrix = control_effectiveness(CONFIG.vehicle.geometry)
     for seed in range(10):
-        terms = terms_of(seed, seed % 3, 0.5)
-        wrench = matrix @ analytic_thrusts(terms)
-        np.testing.assert_allclose(wrench + terms.bias_wrench, analytic_wrench(terms), atol=1e-8)
+        setpoints = terms_of(seed, seed % 3, 0.5)
+        wrench = matrix @ analytic_thrusts(setpoints)
+        np.testing.assert_allclose(wrench + setpoints.bias_wrench, analytic_wrench(setpoints), atol=1e-8)
 
 
 def test_line_rates_are_those_of_the_rows() -> None:
     """The rates, written out without arrays, against the interaction matrix times the twist."""
     for seed in range(10):
         measurement, reference = random_tick(np.random.default_rng(seed), 2)
-        terms = analytic_setpoints(CONFIG)
-        terms.update(measurement, reference)
-        velocity = measurement.velocity - terms.normal * float(terms.normal @ measurement.velocity)
-        wanted = reference.velocity[0] * terms.right + reference.velocity[1] * terms.down
+        setpoints = analytic_setpoints(CONFIG)
+        setpoints.update(measurement, reference)
+        velocity = measurement.velocity - setpoints.normal * float(setpoints.normal @ measurement.velocity)
+        wanted = reference.velocity[0] * setpoints.right + reference.velocity[1] * setpoints.down
         twist = np.concatenate((velocity, measurement.angular_velocity))
-        for line in terms.lines:
+        for line in setpoints.lines:
             matrix = line.matrix
             row = matrix[0] + (line.tip[0] * math.sin(line.theta) - line.tip[1] * math.cos(line.theta)) * matrix[1]
             assert line.rate == pytest.approx(row @ twist - row[:3] @ wanted, abs=1e-9)

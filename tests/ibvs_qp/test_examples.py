@@ -87,9 +87,9 @@ def test_added_rows_are_named_and_absent_by_weight_zero() -> None:
     quiet, climb = example["QuietRotors"]("r0", "r7"), example["ClimbLimit"](50.0)
     controller = HybridController(example["CONFIG"], tasks=[quiet], limits=[climb])
     plain = HybridController(example["CONFIG"])
-    names = [row.name for row in controller.template.task_rows]
-    assert names[-2:] == ["quiet_r0", "quiet_r7"] and controller.template.row_names[-1] == "climb"
-    assert controller.template.variable_names[-1] == "slack_climb"
+    names = [row.name for row in controller.problem.task_rows]
+    assert names[-2:] == ["quiet_r0", "quiet_r7"] and controller.problem.row_names[-1] == "climb"
+    assert controller.problem.variable_names[-1] == "slack_climb"
     quiet.set_target(4.0)
     command = controller.step(example["HOVER"], example["RISE"])
     assert {"quiet_r0", "quiet_r7"} <= {task.name for task in command.tasks}

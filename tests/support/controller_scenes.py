@@ -165,8 +165,8 @@ def exact_thrusts(controller: HybridController) -> np.ndarray:
 
 def dense(controller: HybridController) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Full P, q, A, l, u of the packed program."""
-    data, template = controller.engine.data, controller.template
-    upper, a = template.p_pattern.copy(), template.a_pattern.copy()
+    data, problem = controller.engine.data, controller.problem
+    upper, a = problem.p_pattern.copy(), problem.a_pattern.copy()
     upper.data, a.data = data.p.copy(), data.a.copy()
     p = upper.toarray()
     return p + np.triu(p, 1).T, data.q.copy(), a.toarray(), data.lower.copy(), data.upper.copy()

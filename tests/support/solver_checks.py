@@ -22,7 +22,7 @@ def exact(controller: HybridController) -> tuple[np.ndarray, np.ndarray]:
 
 def check_active(names: set[str], controller: HybridController, y: np.ndarray) -> None:
     """The limits named are those of the exact multipliers; within a factor of two of the threshold either will do."""
-    size = dict(zip(controller.template.row_names, np.abs(y), strict=True))
+    size = dict(zip(controller.problem.row_names, np.abs(y), strict=True))
     assert {name for name, value in size.items() if value > 2.0 * ACTIVE_MULTIPLIER} <= names
     assert names <= {name for name, value in size.items() if value > 0.5 * ACTIVE_MULTIPLIER}
 

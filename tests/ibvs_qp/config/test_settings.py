@@ -201,9 +201,11 @@ def test_the_longest_tick_allowed_is_integrated_in_full() -> None:
         == f"tick_s = 0.05 s is refused: allowed is [{low:g}, {high:g}] s"
     )
     config = ControllerConfig(tick_s=LONGEST_TICK)
-    terms, ticks, step = analytic_setpoints(config), 12, round(LONGEST_TICK * 1e9)
+    setpoints, ticks, step = analytic_setpoints(config), 12, round(LONGEST_TICK * 1e9)
     for tick in range(ticks):  # carried along at 1 m/s, and the accelerometer says 1 m/s^2 towards the wall
         felt = np.array([1.0, 0.0, -9.81])
-        terms.update(measured(0, stamp_ns=(tick + 1) * step, specific_force=felt, plane_stamp_ns=TICK_NS), Reference())
-    assert terms.step.inputs["dt"][0] == pytest.approx(LONGEST_TICK)
-    assert -terms.contact.rate == pytest.approx((ticks - 1) * LONGEST_TICK, rel=0.1)
+        setpoints.update(
+            measured(0, stamp_ns=(tick + 1) * step, specific_force=felt, plane_stamp_ns=TICK_NS), Reference()
+        )
+    assert setpoints.step.inputs["dt"][0] == pytest.approx(LONGEST_TICK)
+    assert -setpoints.contact.rate == pytest.approx((ticks - 1) * LONGEST_TICK, rel=0.1)

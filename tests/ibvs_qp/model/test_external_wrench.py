@@ -7,7 +7,7 @@ import pytest
 from symbolic_block import Block
 
 from allocation import control_effectiveness
-from ibvs_qp.analysis.contact_loop import GUST_BANDWIDTH
+from ibvs_qp.config import ControllerConfig
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.model.external_wrench import FORCE_BOUND, MOMENT_BOUND, external_wrench
 from ibvs_qp.model.inputs import Body, Contact
@@ -17,6 +17,9 @@ MATRIX = control_effectiveness(VEHICLE.geometry)
 TICK, WEIGHT, STILL = 0.004, VEHICLE.mass_kg * 9.81, np.array([0.0, 0.0, -9.81])
 
 
+GUST_BANDWIDTH = ControllerConfig().contact.gust_bandwidth_rad_s
+
+
 def observer(adapt_in_contact: bool = True) -> Block:
     """The observer on its own; the moment fed forward is the measured contact moment."""
 
@@ -24,14 +27,13 @@ def observer(adapt_in_contact: bool = True) -> Block:
         body, contact = Body.of(signals), Contact.of(signals)
         return external_wrench(
             signals,
-            VEHICLE,
+            ControllerConfig(contact_feedforward=adapt_in_contact),
             MATRIX,
             body,
             body.wrench[3:],
             contact.normal,
             contact.touching,
             contact.push_noise,
-            adapt_in_contact,
         )
 
     return Block(build)

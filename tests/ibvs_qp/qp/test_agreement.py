@@ -20,7 +20,7 @@ def test_osqp_solves_programs_that_have_nothing_in_common_with_the_last_like_daq
         x, y = exact(controller)
         assert solution is not None and solution.iterations > 0
         worst = max(worst, float(np.abs(solution.thrusts - x[:6]).max()))
-        names = {controller.template.row_names[row] for row in np.flatnonzero(np.abs(solution.y) > ACTIVE_MULTIPLIER)}
+        names = {controller.problem.row_names[row] for row in np.flatnonzero(np.abs(solution.y) > ACTIVE_MULTIPLIER)}
         check_active(names, controller, y)
         assert solution.limited == bool(names)
     print(f"window {window}: {worst:.1e} N")

@@ -39,38 +39,38 @@ def free() -> HybridController:
 
 def closed_form(controller: HybridController, share: float, last: np.ndarray) -> np.ndarray:
     """Weighted least squares over all wishes at once, in numpy, from the set-points and the vehicle's numbers."""
-    config, terms = controller.config, controller.setpoints
+    config, setpoints = controller.config, controller.setpoints
     vehicle, weights, gains = config.vehicle, config.weights, config.gains
     matrix = control_effectiveness(vehicle.geometry)
     inertia = np.array([vehicle.mass_kg] * 3 + list(vehicle.inertia_kg_m2))
-    per_thrust, drift = matrix / inertia[:, None], terms.bias_wrench / inertia
+    per_thrust, drift = matrix / inertia[:, None], setpoints.bias_wrench / inertia
     rows: list[tuple[np.ndarray, float, float]] = []  # row on the acceleration, wish, weight
     selection = np.eye(6)
-    selection[:3, :3] -= np.outer(terms.normal, terms.normal)
+    selection[:3, :3] -= np.outer(setpoints.normal, setpoints.normal)
     selection[3:, 3:] *= 1.0 - share * (1.0 - gains.body_rotation_gain)
     twist = camera_twist_matrix(np.array(vehicle.camera_position_m))
-    for line in terms.lines:
-        image = line_interaction_matrix(line.rho, line.theta, terms.plane)
+    for line in setpoints.lines:
+        image = line_interaction_matrix(line.rho, line.theta, setpoints.plane)
         at_tip = endpoint_line_row(image, line.theta, line.tip)
         wanted = -(gains.line_kp * line.error + gains.line_kd * line.rate + gains.line_ki * line.integral)
         turn = -(gains.theta_kp * line.angle_error + gains.theta_kd * line.angle_rate)
         rows.append((at_tip @ twist @ selection, wanted, weights.line * line.weight))
         rows.append((image[1] @ twist @ selection, turn, weights.line_angle * line.weight))
-    along = np.concatenate((vehicle.mass_kg * terms.normal, np.zeros(3)))
-    rows.append((along, terms.push_command, weights.push * share))
-    rows.append((along, terms.standoff_command, weights.push * (1.0 - share)))
+    along = np.concatenate((vehicle.mass_kg * setpoints.normal, np.zeros(3)))
+    rows.append((along, setpoints.push_command, weights.push * share))
+    rows.append((along, setpoints.standoff_command, weights.push * (1.0 - share)))
     for axis, weight in ((0, weights.level), (1, weights.level), (2, weights.yaw)):
-        rows.append((np.eye(6)[3 + axis], terms.angular[axis], weight))
+        rows.append((np.eye(6)[3 + axis], setpoints.angular[axis], weight))
     for direction, wish, fixed in (
-        (terms.right, terms.velocity_command[0], terms.free[0]),
-        (terms.down, terms.velocity_command[1], terms.free[1]),
+        (setpoints.right, setpoints.velocity_command[0], setpoints.free[0]),
+        (setpoints.down, setpoints.velocity_command[1], setpoints.free[1]),
     ):
         rows.append((np.concatenate((direction, np.zeros(3))), wish, weights.velocity * fixed))
-    height, weight = terms.step.outputs["height_command"].item(), weights.height
-    rows.append((np.concatenate((terms.down, np.zeros(3))), height, weight))
+    height, weight = setpoints.step.outputs["height_command"].item(), weights.height
+    rows.append((np.concatenate((setpoints.down, np.zeros(3))), height, weight))
     jacobian = [math.sqrt(w) * (row @ per_thrust) for row, _, w in rows]
     target = [math.sqrt(w) * (wish - row @ drift) for row, wish, w in rows]
-    for weight, centre in ((weights.effort, last), (weights.smoothness, last + terms.step.inputs["thrust_change"])):
+    for weight, centre in ((weights.effort, last), (weights.smoothness, last + setpoints.step.inputs["thrust_change"])):
         jacobian += list(math.sqrt(weight) * np.eye(6))
         target += list(math.sqrt(weight) * centre)
     return np.linalg.lstsq(np.array(jacobian), np.array(target), rcond=None)[0]
@@ -235,7 +235,7 @@ def random_programs(count: int, window: tuple[float, float]) -> Iterator[tuple[H
 def test_any_back_end_of_qpsolvers_finds_the_same_solution_offline(solver: str) -> None:
     for controller, exact in random_programs(10, (8.0, 13.0)):
         options = {"eps_abs": 1e-9, "eps_rel": 1e-9, "max_iter": 100_000} if solver == "osqp" else {}
-        found = solve_offline(controller.template, controller.engine.data, solver, **options)
+        found = solve_offline(controller.problem, controller.engine.data, solver, **options)
         assert found is not None
         np.testing.assert_allclose(found[0][:6], exact[0][:6], atol=1e-2)
         assert found[1].shape == exact[1].shape
@@ -244,7 +244,7 @@ def test_any_back_end_of_qpsolvers_finds_the_same_solution_offline(solver: str) 
 def test_an_unknown_back_end_is_refused_by_name() -> None:
     controller = HybridController()
     with pytest.raises(IbvsQpError, match=r"'gurobbi' is not installed; there are .*osqp"):
-        solve_offline(controller.template, controller.engine.data, "gurobbi")
+        solve_offline(controller.problem, controller.engine.data, "gurobbi")
 
 
 # --------------------------------------------------------------------------------------------- what may not matter
@@ -306,7 +306,7 @@ def test_the_price_of_a_limit_is_the_slope_of_the_cost() -> None:
     for _ in range(20):
         command = controller.step(vehicle.measure(thrust_max=limit), Reference(standoff=0.1))
         vehicle.fly(command.thrusts)
-    name = controller.template.row_names[3]
+    name = controller.problem.row_names[3]
     (active,) = [entry for entry in command.active_limits if entry.name == name]
     assert active.side == "upper" and active.unit == "N" and active.slack == 0.0
     p, q, _, lower, upper = dense(controller)
@@ -337,7 +337,7 @@ def optimal_cost(controller: HybridController, row: int, side: str, change: floa
     assert solution is not None
     achieved, asked, weights = data.report(data.point, solution[0][:6])
     cost = 0.5 * float(weights @ (achieved - asked) ** 2)
-    for limit, slot in zip(controller.template.limit_rows, controller.template.row_slack, strict=True):
+    for limit, slot in zip(controller.problem.limit_rows, controller.problem.row_slack, strict=True):
         cost += 0.5 * (limit.slack_weight or 0.0) * solution[0][slot] ** 2
     return cost
 
@@ -355,18 +355,18 @@ def test_the_price_of_every_kind_of_limit_is_the_slope_of_the_cost(name: str, si
     """The cost is worked out from weights, residuals, prices and slack: as the documents say it, halves and all."""
     controller = HybridController()
     controller.step(measured(0), Reference())
-    data, row = controller.engine.data, controller.template.row_names.index(name)
+    data, row = controller.engine.data, controller.problem.row_names.index(name)
     at, sign = float(data.rows()[row, :6] @ data.free), 1.0 if side == "upper" else -1.0
     tight = data.upper if side == "upper" else data.lower
     tight[row] = at - sign * 0.5  # half a unit away from what the tasks want
     solution = controller.engine.exact.solve(data.p, data.q, data.a, data.lower, data.upper)
     assert solution is not None
-    (active,) = [limit for limit in active_limits(controller.template, *solution) if limit.name == name]
+    (active,) = [limit for limit in active_limits(controller.problem, *solution) if limit.name == name]
     assert active.side == side
     step = 1e-3
     slope = (optimal_cost(controller, row, side, step) - optimal_cost(controller, row, side, -step)) / (2.0 * step)
     assert active.price == pytest.approx(-sign * slope, rel=1e-4)
-    slack_weight = controller.template.limit_rows[row].slack_weight
+    slack_weight = controller.problem.limit_rows[row].slack_weight
     expected = active.price if slack_weight else 0.0
     assert active.slack * (slack_weight or 0.0) == pytest.approx(expected, rel=1e-6)
 

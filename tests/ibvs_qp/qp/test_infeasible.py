@@ -40,11 +40,11 @@ def least_violation(data: ProgramData, rows: list[int]) -> float:
 
 def assert_smallest_conflict(controller: HybridController, names: tuple[str, ...]) -> None:
     """The rows have no common solution, and without any one of them they have."""
-    data, rows = controller.engine.data, [controller.template.row_names.index(name) for name in names]
+    data, rows = controller.engine.data, [controller.problem.row_names.index(name) for name in names]
     assert least_violation(data, rows) > 1e-9
     for spared in rows:
         others = [row for row in rows if row != spared]
-        assert not others or least_violation(data, others) <= 1e-9, controller.template.row_names[spared]
+        assert not others or least_violation(data, others) <= 1e-9, controller.problem.row_names[spared]
 
 
 def said(command: Command) -> tuple[str, ...]:
@@ -56,7 +56,7 @@ def said(command: Command) -> tuple[str, ...]:
 @pytest.mark.parametrize("spin", [0.6, 2.0])  # rad/s: about one axis too many, about several
 def test_every_conflict_is_named_and_nothing_is_named_that_could_be_spared(spin: float) -> None:
     rng, controller, conflicts, sets = np.random.default_rng(0), HybridController(HARD), 0, set()
-    everything = list(range(len(controller.template.row_names)))
+    everything = list(range(len(controller.problem.row_names)))
     for tick in range(150):
         controller.reset()
         measurement, reference = random_tick(rng, tick % 3)
@@ -115,10 +115,10 @@ def test_rows_that_a_solution_satisfies_are_no_conflict() -> None:
     for soft in (False, True):
         controller = HybridController(ControllerConfig(limits=LimitSettings(hard_barriers=not soft)))
         assert controller.step(measured(0), Reference()).outcome is Outcome.SOLVED
-        assert conflicting_rows(controller.template, controller.engine.data) == ()
+        assert conflicting_rows(controller.problem, controller.engine.data) == ()
     spinning = HybridController()  # what is soft contradicts nobody
     spinning.step(measured(0, angular_velocity=np.array([3.0, 3.0, 3.0])), Reference())
-    assert conflicting_rows(spinning.template, spinning.engine.data) == ()
+    assert conflicting_rows(spinning.problem, spinning.engine.data) == ()
 
 
 def test_a_replay_names_the_conflict_of_a_tick_and_forgets_it() -> None:
@@ -126,7 +126,7 @@ def test_a_replay_names_the_conflict_of_a_tick_and_forgets_it() -> None:
     controller.step(measured(0), Reference())
     sound = controller.engine.data.point.copy()
     controller.step(measured(1, angular_velocity=np.array([0.0, 3.0, 0.0])), Reference())
-    replay = TickReplay(controller.template)
+    replay = TickReplay(controller.problem)
     assert replay.explain(controller.engine.data.point) is None
     assert replay.conflict == controller.engine.conflict and "tilt_pitch" in replay.conflict
     assert replay.explain(sound) is not None and replay.conflict == ()

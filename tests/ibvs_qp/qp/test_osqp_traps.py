@@ -162,13 +162,13 @@ both_ways = pytest.mark.parametrize("direct", [True, False])
 
 def solver_of(controller: HybridController, direct: bool = True) -> OsqpSolver:
     """A solver of its own for the program of a controller."""
-    return OsqpSolver(controller.template, replace(controller.config.solver, direct=direct))
+    return OsqpSolver(controller.problem, replace(controller.config.solver, direct=direct))
 
 
 def test_an_infeasible_program_is_never_believed() -> None:
     controller = flying()
     p, q, a, lower, upper = data_of(controller)
-    solver = OsqpSolver(controller.template, controller.config.solver)
+    solver = OsqpSolver(controller.problem, controller.config.solver)
     raw = solver.solve(p, q, np.zeros_like(a), np.full_like(lower, 1.0), np.full_like(upper, 2.0))  # 0 x >= 1
     assert raw is not None and raw.status != SOLVED
     assert np.isfinite(raw.x).all() and np.abs(raw.x).max() == GARBAGE
@@ -198,7 +198,7 @@ def test_an_iterate_that_breaks_a_hard_row_does_not_fly(status: int) -> None:
     """All thrusts within their boxes and no dual residual: a barrier without slack is broken none the less."""
     hard = ControllerConfig(limits=LimitSettings(hard_barriers=True))
     engine, row = flying(config=hard).engine, 6
-    assert engine.template.row_names[row] == "tilt_roll" and engine.template.row_slack[row] < 0
+    assert engine.problem.row_names[row] == "tilt_roll" and engine.problem.row_slack[row] < 0
     data = engine.data
     x, per_thrust = data.free.copy(), data.rows()[row]
     engine.dual_residual = lambda x, y: 0.0  # type: ignore[method-assign]
@@ -246,7 +246,7 @@ def test_crossed_bounds_are_refused_and_leave_no_trace(direct: bool) -> None:
 def test_arrays_handed_to_the_solver_stay_as_they_were(direct: bool) -> None:
     """Every solve has arrays of its own: an update writes into the matrices of the set-up."""
     controller = flying()
-    template = controller.template
+    problem = controller.problem
     solver, data = solver_of(controller, direct), data_of(controller)
     handed = [[array * (1.0 + 0.01 * tick) for array in data] for tick in range(4)]
     kept = [[array.copy() for array in arrays] for arrays in handed]
@@ -255,8 +255,8 @@ def test_arrays_handed_to_the_solver_stay_as_they_were(direct: bool) -> None:
     for arrays, before in zip(handed, kept, strict=True):
         for array, values in zip(arrays, before, strict=True):
             np.testing.assert_array_equal(array, values)
-    np.testing.assert_array_equal(template.p_pattern.data, 1.0)  # as it was made
-    np.testing.assert_array_equal(template.a_pattern.data, 1.0)
+    np.testing.assert_array_equal(problem.p_pattern.data, 1.0)  # as it was made
+    np.testing.assert_array_equal(problem.a_pattern.data, 1.0)
 
 
 def test_nothing_handed_to_the_set_up_is_shared_with_the_caller(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -274,7 +274,7 @@ def test_nothing_handed_to_the_set_up_is_shared_with_the_caller(monkeypatch: pyt
     data = data_of(controller)
     solver_of(controller).solve(*data)
     assert len(given) == 5
-    own = [*data, controller.template.p_pattern.data, controller.template.a_pattern.data]
+    own = [*data, controller.problem.p_pattern.data, controller.problem.a_pattern.data]
     assert not any(np.shares_memory(one, other) for one in given for other in own)
 
 
@@ -328,14 +328,14 @@ def test_bounds_of_thrusts_stay_a_millinewton_apart() -> None:
 
 def test_buffers_are_contiguous_doubles_of_fixed_length() -> None:
     controller = flying()
-    data, template = controller.engine.data, controller.template
+    data, problem = controller.engine.data, controller.problem
     for array in (data.p, data.q, data.a, data.lower, data.upper, data.point):
         assert array.dtype == np.float64 and array.flags.c_contiguous
     sizes = len(data.p), len(data.a), len(data.q), len(data.lower)
     for tick in range(5, 25):
         controller.step(*random_tick(np.random.default_rng(tick), tick % 3, tick))
         assert (len(data.p), len(data.a), len(data.q), len(data.lower)) == sizes
-    assert sizes[:2] == (template.p_pattern.nnz, template.a_pattern.nnz)
+    assert sizes[:2] == (problem.p_pattern.nnz, problem.a_pattern.nnz)
 
 
 def test_reset_restores_the_first_solve_to_the_bit() -> None:
@@ -417,7 +417,7 @@ def test_everything_failing_leads_to_hold_and_back(monkeypatch: pytest.MonkeyPat
     controller = flying()
     with monkeypatch.context() as broken:
         broken.setattr(controller.engine, "solve", lambda: None)
-        broken.setattr("ibvs_qp.analytic.analytic_thrusts", lambda terms: np.full(6, math.nan))
+        broken.setattr("ibvs_qp.analytic.analytic_thrusts", lambda setpoints: np.full(6, math.nan))
         command = controller.step(measured(6), Reference())
     assert command.outcome is Outcome.HOLD and command.mode == "hold"
     assert command.thrusts.sum() * math.cos(math.radians(30)) == pytest.approx(6.0 * 9.81, rel=0.02)

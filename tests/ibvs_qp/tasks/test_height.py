@@ -16,7 +16,7 @@ def height_target(config: ControllerConfig, seed: int, lines: int, share: float)
     """Target and weight of the row on a random tick, and the setpoints of that tick."""
     controller = HybridController(config)
     pack(controller, *random_tick(np.random.default_rng(seed), lines), share=share)
-    data, rows = controller.engine.data, controller.template.task_rows
+    data, rows = controller.engine.data, controller.problem.task_rows
     _, targets, weights = data.report(data.point, np.zeros(6))
     place = [row.name for row in rows].index("height")
     return float(targets[place]), float(weights[place]), controller.setpoints
@@ -26,26 +26,26 @@ def height_target(config: ControllerConfig, seed: int, lines: int, share: float)
 @pytest.mark.parametrize("share", [0.0, 1.0])
 def test_a_level_line_and_the_row_want_the_same(seed: int, share: float) -> None:
     config = ControllerConfig()
-    target, weight, terms = height_target(config, seed, 1, share)
-    (line,) = terms.lines
+    target, weight, setpoints = height_target(config, seed, 1, share)
+    (line,) = setpoints.lines
     turned = 1.0 - share * (1.0 - config.gains.body_rotation_gain)
-    sideways = terms.free[0] * terms.velocity_command[0]
-    twist = np.concatenate((target * terms.down + sideways * terms.right, turned * terms.angular))
-    image = line_interaction_matrix(line.rho, line.theta, terms.plane)
+    sideways = setpoints.free[0] * setpoints.velocity_command[0]
+    twist = np.concatenate((target * setpoints.down + sideways * setpoints.right, turned * setpoints.angular))
+    image = line_interaction_matrix(line.rho, line.theta, setpoints.plane)
     gains = config.gains
     wanted = -(gains.line_kp * line.error + gains.line_kd * line.rate + gains.line_ki * line.integral)
     assert line.matrix.shape == image.shape
     row = endpoint_line_row(line.matrix, line.theta, line.tip)
-    assert line.weight == pytest.approx(1.0) and terms.free[1] == pytest.approx(0.0)
+    assert line.weight == pytest.approx(1.0) and setpoints.free[1] == pytest.approx(0.0)
     assert row @ twist == pytest.approx(wanted, abs=1e-9)
     assert weight == config.weights.height
 
 
 def test_without_a_line_it_is_the_velocity_law() -> None:
-    target, _, terms = height_target(ControllerConfig(), 3, 0, 0.0)
-    assert target == pytest.approx(terms.velocity_command[1], abs=1e-12)
+    target, _, setpoints = height_target(ControllerConfig(), 3, 0, 0.0)
+    assert target == pytest.approx(setpoints.velocity_command[1], abs=1e-12)
 
 
 def test_the_published_law_has_no_such_row() -> None:
     controller = HybridController(ControllerConfig(line_profile="paper"))
-    assert "height" not in {row.name for row in controller.template.task_rows}
+    assert "height" not in {row.name for row in controller.problem.task_rows}

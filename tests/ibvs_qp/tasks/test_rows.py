@@ -36,15 +36,15 @@ def rows(controller: HybridController, thrusts: np.ndarray) -> dict[str, tuple[f
     """(achieved, asked, weight) of every task row of the packed program."""
     data = controller.engine.data
     achieved, asked, weights = (array.copy() for array in data.report(data.point.copy(), thrusts))
-    names = [row.name for row in controller.template.task_rows]
+    names = [row.name for row in controller.problem.task_rows]
     assert len(set(names)) == len(names)
     return {name: (achieved[i], asked[i], weights[i]) for i, name in enumerate(names)}
 
 
 def accelerations(controller: HybridController, thrusts: np.ndarray) -> np.ndarray:
     """Body acceleration by Newton and Euler, from the vehicle's numbers alone."""
-    vehicle, terms = controller.config.vehicle, controller.setpoints
-    wrench = control_effectiveness(vehicle.geometry) @ thrusts + terms.bias_wrench
+    vehicle, setpoints = controller.config.vehicle, controller.setpoints
+    wrench = control_effectiveness(vehicle.geometry) @ thrusts + setpoints.bias_wrench
     return wrench / np.array([vehicle.mass_kg] * 3 + list(vehicle.inertia_kg_m2))
 
 
@@ -129,28 +129,28 @@ def test_every_other_task_row_by_hand(controller: HybridController, share: float
         controller.reset()
         last = rng.uniform(8.0, 14.0, 6)
         pack(controller, *random_tick(rng, 2), share=share, last=last)
-        thrusts, terms = rng.uniform(2.0, 30.0, 6), controller.setpoints
-        right, down = weights.velocity * terms.free[0], weights.velocity * terms.free[1]
+        thrusts, setpoints = rng.uniform(2.0, 30.0, 6), controller.setpoints
+        right, down = weights.velocity * setpoints.free[0], weights.velocity * setpoints.free[1]
         motion = accelerations(controller, thrusts)
         force = motion[:3] * controller.config.vehicle.mass_kg
         found = rows(controller, thrusts)
         expected = {
-            "push": (terms.normal @ force, terms.push_command, weights.push * share),
-            "standoff": (terms.normal @ force, terms.standoff_command, weights.push * (1 - share)),
-            "roll": (motion[3], terms.angular[0], weights.level),
-            "pitch": (motion[4], terms.angular[1], weights.level),
-            "yaw": (motion[5], terms.angular[2], weights.yaw),
-            "velocity_right": (terms.right @ motion[:3], terms.velocity_command[0], right),
-            "velocity_down": (terms.down @ motion[:3], terms.velocity_command[1], down),
+            "push": (setpoints.normal @ force, setpoints.push_command, weights.push * share),
+            "standoff": (setpoints.normal @ force, setpoints.standoff_command, weights.push * (1 - share)),
+            "roll": (motion[3], setpoints.angular[0], weights.level),
+            "pitch": (motion[4], setpoints.angular[1], weights.level),
+            "yaw": (motion[5], setpoints.angular[2], weights.yaw),
+            "velocity_right": (setpoints.right @ motion[:3], setpoints.velocity_command[0], right),
+            "velocity_down": (setpoints.down @ motion[:3], setpoints.velocity_command[1], down),
         }
         height = controller.setpoints.step.outputs["height_command"].item()
-        expected["height"] = (terms.down @ motion[:3], height, weights.height)
+        expected["height"] = (setpoints.down @ motion[:3], height, weights.height)
         for i, name in enumerate(controller.config.vehicle.geometry.names):
             expected[f"effort_{name}"] = (thrusts[i], last[i], weights.effort)
             expected[f"smooth_{name}"] = (thrusts[i], last[i], weights.smoothness)
         for name, values in expected.items():
             np.testing.assert_allclose(found[name], values, rtol=1e-9, atol=1e-9, err_msg=name)
-        for slot, line in enumerate(terms.lines):
+        for slot, line in enumerate(setpoints.lines):
             wanted = -(gains.line_kp * line.error + gains.line_kd * line.rate + gains.line_ki * line.integral)
             angle = -(gains.theta_kp * line.angle_error + gains.theta_kd * line.angle_rate)
             np.testing.assert_allclose(found[f"line_{slot}"][1:], (wanted, weights.line * line.weight))
@@ -219,7 +219,7 @@ def test_line_error_vanishes_where_the_tip_will_meet_the_wall(
 
 def test_limit_rows_by_hand(controller: HybridController) -> None:
     rng = np.random.default_rng(11)
-    limits, names = controller.config.limits, controller.template.row_names
+    limits, names = controller.config.limits, controller.problem.row_names
     assert names[:6] == tuple(f"thrust_{name}" for name in controller.config.vehicle.geometry.names)
     assert names[6:9] == ("tilt_roll", "tilt_pitch", "yaw")
     assert names[9:] == ("view_horizontal", "view_vertical", "push_ceiling", "approach_speed")
@@ -228,7 +228,7 @@ def test_limit_rows_by_hand(controller: HybridController) -> None:
         measurement, reference = random_tick(rng, 1)
         pack(controller, measurement, reference, window=(3.0, 17.0))
         _, _, a, lower, upper = dense(controller)
-        terms = controller.setpoints
+        setpoints = controller.setpoints
         thrusts, slack = rng.uniform(2.0, 30.0, 6), rng.normal(size=7)
         motion = accelerations(controller, thrusts)
         value = a @ np.concatenate((thrusts, slack))
@@ -238,9 +238,9 @@ def test_limit_rows_by_hand(controller: HybridController) -> None:
         rates = measurement.angular_velocity
         for i, (angle, bound, pole) in enumerate(
             (
-                (terms.roll, limits.tilt_deg, limits.tilt_rate_1_s),
-                (terms.pitch, limits.tilt_deg, limits.tilt_rate_1_s),
-                (terms.yaw, limits.yaw_deg, limits.yaw_rate_1_s),
+                (setpoints.roll, limits.tilt_deg, limits.tilt_rate_1_s),
+                (setpoints.pitch, limits.tilt_deg, limits.tilt_rate_1_s),
+                (setpoints.yaw, limits.yaw_deg, limits.yaw_rate_1_s),
             )
         ):
             room_up = value[6 + i] - upper[6 + i]
@@ -258,21 +258,21 @@ def test_rows_of_view_push_and_approach_by_hand(controller: HybridController) ->
         controller.reset()
         pack(controller, *random_tick(rng, 2))
         _, _, a, lower, upper = dense(controller)
-        terms, thrusts = controller.setpoints, rng.uniform(2.0, 30.0, 6)
+        setpoints, thrusts = controller.setpoints, rng.uniform(2.0, 30.0, 6)
         motion = accelerations(controller, thrusts)
-        along = float(terms.normal @ motion[:3])
-        motion[:3] -= terms.normal * along
-        value = dict(zip(controller.template.row_names, a @ np.append(thrusts, np.zeros(7)), strict=True))
-        bounds = {name: (lower[i], upper[i]) for i, name in enumerate(controller.template.row_names)}
-        for line, bound in zip(terms.lines, (limits.view_down, limits.view_right), strict=True):
+        along = float(setpoints.normal @ motion[:3])
+        motion[:3] -= setpoints.normal * along
+        value = dict(zip(controller.problem.row_names, a @ np.append(thrusts, np.zeros(7)), strict=True))
+        bounds = {name: (lower[i], upper[i]) for i, name in enumerate(controller.problem.row_names)}
+        for line, bound in zip(setpoints.lines, (limits.view_down, limits.view_right), strict=True):
             name, pole = f"view_{line.role}", limits.view_rate_1_s
             drift = value[name] - bounds[name][1]  # constants of the row live in its bounds
-            right, down = (terms.step.inputs[f"reference.velocity_{axis}"].item() for axis in ("right", "down"))
-            wanted = line.matrix[0] @ np.append(right * terms.right + down * terms.down, np.zeros(3))
+            right, down = (setpoints.step.inputs[f"reference.velocity_{axis}"].item() for axis in ("right", "down"))
+            wanted = line.matrix[0] @ np.append(right * setpoints.right + down * setpoints.down, np.zeros(3))
             room = pole**2 * (bound - line.rho) - 2.0 * pole * (line.rho_rate + wanted)
             assert drift == pytest.approx(line.matrix[0] @ motion - room, abs=1e-8)
         name = "approach_speed"
-        inputs, outputs = terms.step.inputs, terms.step.outputs
+        inputs, outputs = setpoints.step.inputs, setpoints.step.outputs
         allowed, rate = outputs["approach_speed"].item(), inputs["contact.rate"].item()
         leaning = outputs["search_force"].item() / mass
         assert leaning >= 0.0
@@ -280,14 +280,14 @@ def test_rows_of_view_push_and_approach_by_hand(controller: HybridController) ->
         assert value[name] - bounds[name][1] == pytest.approx(along - room, abs=1e-9)
         assert bounds["push_ceiling"][1] > 1e3  # in free air the ceiling is wide
         inputs["contact.touching"][0] = 1.0
-        terms.step.evaluate()
+        setpoints.step.evaluate()
         _, _, a, lower, upper = dense(controller)
-        index = controller.template.row_names.index("push_ceiling")
+        index = controller.problem.row_names.index("push_ceiling")
         stiffness = inputs["contact.stiffness"].item()
-        room = limits.push_ceiling_ratio * terms.push_reference + 2.0 * math.sqrt(stiffness * mass) * min(
+        room = limits.push_ceiling_ratio * setpoints.push_reference + 2.0 * math.sqrt(stiffness * mass) * min(
             rate + limits.push_quiet_m_s, 0.0
         )
-        force = mass * (accelerations(controller, thrusts) @ np.append(terms.normal, np.zeros(3)))
+        force = mass * (accelerations(controller, thrusts) @ np.append(setpoints.normal, np.zeros(3)))
         assert a[index, :6] @ thrusts - upper[index] == pytest.approx(force - room, abs=1e-8)
 
 
@@ -306,5 +306,5 @@ def test_a_barrier_at_its_bound_never_lets_the_angle_through(pole: float, bound:
 
 def test_barriers_can_be_left_out() -> None:
     bare = HybridController(ControllerConfig(barriers=False))
-    assert len(bare.template.row_names) == 6
-    assert len(bare.template.variable_names) == 6
+    assert len(bare.problem.row_names) == 6
+    assert len(bare.problem.variable_names) == 6

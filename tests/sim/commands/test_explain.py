@@ -11,7 +11,7 @@ import pytest
 from closed_loop_rigs import short_scene
 
 from ibvs_qp.config.settings import dump_toml
-from ibvs_qp.controller import program_template
+from ibvs_qp.controller import qp_problem
 from ibvs_qp.model.signals import places
 from sim.commands.cli import main
 from sim.evaluate.explanation import explain_tick, flown_config
@@ -127,7 +127,7 @@ def turning(trace: Trace, tick: int, rate: float, hard: bool = False) -> Trace:
     limits = dataclasses.replace(config.controller.limits, hard_barriers=hard)
     config = dataclasses.replace(config, controller=dataclasses.replace(config.controller, limits=limits))
     program = trace.arrays["program"].copy()
-    place = places(program_template(config.controller).model.signals.inputs)
+    place = places(qp_problem(config.controller).model.signals.inputs)
     program[tick, place["attitude"]], program[tick, place["angular_velocity"]] = (1.0, 0.0, 0.0, 0.0), (0.0, rate, 0.0)
     return dataclasses.replace(trace, arrays=trace.arrays | {"program": program}, preset=dump_toml(config))
 

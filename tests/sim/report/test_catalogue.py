@@ -101,7 +101,7 @@ def test_every_price_and_bound_has_a_unit_and_a_reason(kind: type[Limit]) -> Non
 def weights(controller: HybridController) -> dict[str, float]:
     data = controller.engine.data
     _, _, values = data.report(data.point, np.zeros(6))
-    return {row.name: float(value) for row, value in zip(controller.template.task_rows, values, strict=True)}
+    return {row.name: float(value) for row, value in zip(controller.problem.task_rows, values, strict=True)}
 
 
 def test_a_weight_weighs_the_rows_that_the_page_gives_it_and_no_other() -> None:
@@ -127,10 +127,10 @@ def test_a_price_and_a_switch_are_those_of_their_rows() -> None:
         if limit.slack_weight_setting is None:  # thrusts stay rows of the program, with wide bounds
             assert (off.engine.data.upper[:6] >= 1e4).all() and (full.engine.data.upper[:6] < 60.0).all()
             continue
-        assert set(full.template.row_names) - set(off.template.row_names) == set(names)
+        assert set(full.problem.row_names) - set(off.problem.row_names) == set(names)
         doubled = packed(changed(limit.slack_weight_setting, 2.0))
         ratio = doubled.engine.data.hessian().diagonal()[6:] / full.engine.data.hessian().diagonal()[6:]
-        for slack, value in zip(full.template.variable_names[6:], ratio, strict=True):
+        for slack, value in zip(full.problem.variable_names[6:], ratio, strict=True):
             assert value == pytest.approx(2.0 if slack.removeprefix("slack_") in names else 1.0)
 
 
@@ -149,7 +149,7 @@ def test_a_bound_moves_the_rows_that_the_page_gives_it_and_no_other() -> None:
                 controller.setpoints.note(np.full(6, 11.3), 0.0)
         return np.concatenate((controller.engine.data.lower, controller.engine.data.upper))
 
-    names = np.array(packed(CONFIG).template.row_names * 2)
+    names = np.array(packed(CONFIG).problem.row_names * 2)
     for limit in LIMITS.values():
         for place in limit.bound_settings:
             moved = set()
