@@ -14,11 +14,7 @@ class BrushSettings:
 
     stiffness_min_n_m: float = setting(1000.0, "softest wall and brush", unit="N/m", low=50.0, high=1e5)
     stiffness_max_n_m: float = setting(
-        3500.0,
-        "stiffest wall and brush; above 4 kN/m 30 N s/m alone damp less than a tenth",
-        unit="N/m",
-        low=50.0,
-        high=1e5,
+        3500.0, "stiffest wall and brush; 30 N s/m damp 4 kN/m by a tenth", unit="N/m", low=50.0, high=1e5
     )
     damping_n_s_m: float = setting(30.0, "damping of wall and brush", unit="N s/m", low=0.0, high=1e4)
     force_delay_s: float = setting(

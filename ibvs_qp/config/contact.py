@@ -16,16 +16,11 @@ class ContactSettings:
     close_speed_m_s: float = setting(0.05, "approach speed within close_distance", unit="m/s", low=0.002, high=0.3)
     close_distance_m: float = setting(0.10, "where the approach slows down", unit="m", low=0.01, high=1.0)
     touch_speed_m_s: float = setting(
-        0.012, "speed of the last centimetre while the stiffness is unknown", unit="m/s", low=0.001, high=0.2
+        0.012, "speed in the last centimetre until the stiffness is known", unit="m/s", low=0.001, high=0.2
     )
     touch_distance_m: float = setting(0.01, "where the last centimetre begins", unit="m", low=0.005, high=0.2)
     landing_kd: float = setting(
-        15.0,
-        "approach speed error to acceleration in the last centimetre: 90 N s/m absorb a touch that the brush does not; "
-        "above, the approach-speed barrier would bind",
-        unit="1/s",
-        low=0.0,
-        high=50.0,
+        15.0, "standoff_kd in the last centimetre: 90 N s/m absorb a touch", unit="1/s", low=0.0, high=50.0
     )
     retreat_speed_m_s: float = setting(0.15, "speed away from the wall", unit="m/s", low=0.01, high=0.5)
     depth_min_m: float = setting(0.53, "camera to wall, lambda = 1 below", unit="m", low=0.1, high=3.0)
@@ -41,14 +36,10 @@ class ContactSettings:
     loss_time_s: float = setting(0.10, "doubt this long is a loss", unit="s", low=0.01, high=2.0)
     force_filter_hz: float = setting(8.0, "first-order filter of the measured push", unit="Hz", low=0.5, high=100.0)
     moment_gain: float = setting(
-        1.0, "gain of the measured contact moment in the feed-forward; a stuck tip returns 0.9 of it", low=0.0, high=1.0
+        1.0, "gain of the contact moment in the feed-forward; a stuck tip returns 0.9 of it", low=0.0, high=1.0
     )
     moment_noise_n: float = setting(
-        1.0,
-        "filtered force noise that halves that gain: the loop through a stuck tip amplifies noise",
-        unit="N",
-        low=0.01,
-        high=100.0,
+        1.0, "filtered force noise that halves that gain: a stuck tip amplifies noise", unit="N", low=0.01, high=100.0
     )
     friction_gain: float = setting(0.9, "gain of the friction along the travel in the feed-forward", low=0.0, high=1.0)
     friction_slew_n_s: float = setting(6.0, "fastest change of that force", unit="N/s", low=0.1, high=100.0)
@@ -56,15 +47,11 @@ class ContactSettings:
         0.005, "slower than this in contact counts as stuck", unit="m/s", low=0.0, high=0.1
     )
     full_gain_stiffness_n_m: float = setting(
-        1500.0,
-        "force_kfp counts in full up to this stiffness and falls with its inverse: so does the loop gain rise",
-        unit="N/m",
-        low=50.0,
-        high=1e5,
+        1500.0, "up to here force_kfp counts in full, beyond it falls with 1/k", unit="N/m", low=50.0, high=1e5
     )
     gust_bandwidth_rad_s: float = setting(
         9.0,
-        "bandwidth at which the observer learns gusts along the normal in contact: half of the motors' 17 rad/s",
+        "observer of gusts along the normal in contact: half the motors' 17 rad/s",
         unit="rad/s",
         low=0.1,
         high=50.0,

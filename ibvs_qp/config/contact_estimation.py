@@ -12,22 +12,18 @@ class ContactEstimationSettings:
     """Distance filter, push noise and stiffness (section 4.2 of the design)."""
 
     acceleration_noise: float = setting(
-        6e-3,
-        "acceleration along the wall normal: accelerometer 4e-3 and the attitude noise",
-        unit="m/s^2/sqrt(Hz)",
-        low=1e-5,
-        high=1.0,
+        6e-3, "acceleration along the normal, with the attitude noise", unit="m/s^2/sqrt(Hz)", low=1e-5, high=1.0
     )
     bias_noise: float = setting(
         2e-3,
-        "drift of the accelerometer bias that gravity leaks through the attitude bias",
+        "drift of the accelerometer bias, with gravity through attitude",
         unit="m/s^3/sqrt(Hz)",
         low=1e-6,
         high=1.0,
     )
     acceleration_filter_s: float = setting(
         6e-3,
-        "filter of the acceleration by which the impedance looks ahead: a tenth of the motors' lag",
+        "filter of the acceleration that predicts the rate: a tenth of the motors' lag",
         unit="s",
         low=1e-4,
         high=0.5,
@@ -35,55 +31,32 @@ class ContactEstimationSettings:
     distance_std_m: float = setting(
         1.2e-3, "distance of one fitted plane: common mode of the depth camera", unit="m", low=1e-5, high=0.1
     )
-    gate_sigmas: float = setting(
-        6.0, "distances with a larger innovation count with outlier_std_m only", low=1.0, high=100.0
-    )
+    gate_sigmas: float = setting(6.0, "a distance with a larger innovation has outlier_std_m", low=1.0, high=100.0)
     outlier_std_m: float = setting(0.02, "distance beyond the gate but within jump_m", unit="m", low=1e-4, high=1.0)
     jump_m: float = setting(
         0.05, "a plane this far from the expected distance is refused at first", unit="m", low=0.005, high=1.0
     )
     jump_frames: int = setting(5, "jumps in a row after which the new distance is accepted", low=1, high=100)
-    normal_gain: float = setting(
-        0.15, "correction of the normal per frame: it averages over about six frames", low=0.001, high=1.0
-    )
+    normal_gain: float = setting(0.15, "correction of the normal per frame: mean of six frames", low=0.001, high=1.0)
     stationary_after_s: float = setting(
-        0.3, "time after touch from which the wall holds the tip still", unit="s", low=0.0, high=5.0
+        0.3, "time from touch until the tip counts as stationary", unit="s", low=0.0, high=5.0
     )
     stationary_distance_std_m: float = setting(
-        5e-3,
-        "distance of a plane while the tip is stationary: the impedance damping would turn depth noise into push",
-        unit="m",
-        low=1e-5,
-        high=0.1,
+        5e-3, "distance while the tip is stationary: damping would turn noise into push", unit="m", low=1e-5, high=0.1
     )
     stationary_speed_std_m_s: float = setting(
-        5e-3,
-        "speed of a stationary tip: the swing of the contact; acceleration_noise over it is the bandwidth at which "
-        "frames pull the speed to zero",
-        unit="m/s",
-        low=1e-5,
-        high=1.0,
+        5e-3, "speed of a stationary tip: the swing of the contact", unit="m/s", low=1e-5, high=1.0
     )
-    noise_time_s: float = setting(
-        1.0, "the noise of the push in free flight is averaged over this time", unit="s", low=0.05, high=60.0
-    )
-    bounce_time_s: float = setting(
-        0.5, "a touch this soon after a loss resumes the ramp where it stopped", unit="s", low=0.0, high=5.0
-    )
-    bounce_ramp: float = setting(
-        0.4, "latest point of a resumed ramp: 16 % of the push; all at once would swing the vehicle", low=0.0, high=1.0
-    )
+    noise_time_s: float = setting(1.0, "averaging time of the push noise in free flight", unit="s", low=0.05, high=60.0)
+    bounce_time_s: float = setting(0.5, "a touch this soon after a loss resumes the ramp", unit="s", low=0.0, high=5.0)
+    bounce_ramp: float = setting(0.4, "latest point of a resumed ramp: 16 % of the push", low=0.0, high=1.0)
     assumed_stiffness_n_m: float = setting(
-        10_000.0,
-        "stiffness of brush and wall until it is measured: a stiff wall forgives least",
-        unit="N/m",
-        low=100.0,
-        high=1e5,
+        10_000.0, "stiffness until it is measured: a stiff wall forgives least", unit="N/m", low=100.0, high=1e5
     )
     stiffness_min_n_m: float = setting(300.0, "softest estimate accepted", unit="N/m", low=10.0, high=1e5)
     stiffness_max_n_m: float = setting(30_000.0, "stiffest estimate accepted", unit="N/m", low=10.0, high=1e6)
     stiffness_push_spread_n: float = setting(
-        1.0, "deviation of the push over a press from which the slope is accepted", unit="N", low=0.01, high=100.0
+        1.0, "deviation of the push from which a slope is accepted", unit="N", low=0.01, high=100.0
     )
     stiffness_time_s: float = setting(3.0, "samples count for this long after a touch", unit="s", low=0.1, high=60.0)
 

@@ -1,4 +1,4 @@
-"""Whether a controller and a brush go together: least damping ratio of the contact mode, and the check of a preset."""
+"""Least damping ratio of the contact mode of a controller and a brush, and the check of a preset."""
 
 from __future__ import annotations
 
@@ -19,51 +19,39 @@ from ibvs_qp.config.vehicle import VehicleParams
 
 #: A preset whose contact mode is damped less than this is refused: a tenth overshoots by 73 % and rings for seconds.
 LEAST_DAMPING_RATIO = 0.1
-#: Stiffnesses looked at over a brush's range, evenly spaced in their logarithm.
+#: Stiffnesses evaluated over a brush's range, evenly spaced in their logarithm.
 STIFFNESS_SAMPLES = 7
 #: Relative width at which the search for an allowed value stops.
 SEARCH_TOLERANCE = 1e-3
-#: Gains that a refusal may name, the likeliest culprit first.
+#: Gains that a refusal may name, the likeliest cause first.
 GAIN_NAMES = ("force_kfp", "force_kfi", "force_ksd", "force_ksp")
 
 
-class PressingConfig(Protocol):
+class _PressingConfig(Protocol):
     """The part of `ibvs_qp.config.ControllerConfig` that shapes the contact."""
 
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
     @property
-    def vehicle(self) -> VehicleParams:
-        """Mass, drag and motor lags."""
-        ...
+    def vehicle(self) -> VehicleParams: ...
 
     @property
-    def gains(self) -> Gains:
-        """Force feedback and impedance."""
-        ...
+    def gains(self) -> Gains: ...
 
     @property
-    def contact(self) -> ContactSettings:
-        """Force filter."""
-        ...
+    def contact(self) -> ContactSettings: ...
 
     @property
-    def tick_s(self) -> float:
-        """Control period [s]."""
-        ...
+    def tick_s(self) -> float: ...
 
     @property
-    def impedance(self) -> bool:
-        """Whether the force law has its impedance terms."""
-        ...
+    def impedance(self) -> bool: ...
 
     @property
-    def contact_feedforward(self) -> bool:
-        """Whether the observer of gusts learns in contact."""
-        ...
+    def contact_feedforward(self) -> bool: ...
 
 
-def contact_loop(config: PressingConfig, stiffness: float, damping: float, force_delay_s: float) -> ContactLoop:
+def contact_loop(config: _PressingConfig, stiffness: float, damping: float, force_delay_s: float) -> ContactLoop:
     """The linear contact loop of a controller against a wall; arguments as in `contact_mode_damping`."""
     gains, vehicle, estimation, hold = config.gains, config.vehicle, config.contact.estimation, 0.5 * config.tick_s
     spring, damper = (gains.force_ksp, gains.force_ksd) if config.impedance else (0.0, 0.0)
@@ -106,7 +94,7 @@ class LoopMargin:
     passive_damping_ratio: float
 
 
-def contact_mode_damping(config: PressingConfig, stiffness: float, damping: float, force_delay_s: float) -> LoopMargin:
+def contact_mode_damping(config: _PressingConfig, stiffness: float, damping: float, force_delay_s: float) -> LoopMargin:
     """Least damping ratio of the contact under a controller; `ContactLoop` derives the loop.
 
     Args:
@@ -131,32 +119,30 @@ def contact_mode_damping(config: PressingConfig, stiffness: float, damping: floa
     )
 
 
-def least_margin(config: PressingConfig, brush: BrushSettings | None = None) -> LoopMargin:
+def least_margin(config: _PressingConfig, brush: BrushSettings | None = None) -> LoopMargin:
     """Least damped contact over the stiffness range of a brush."""
     brush = brush or BrushSettings()
     low, high = brush.stiffness_min_n_m, brush.stiffness_max_n_m
     samples = {float(entry) for entry in np.geomspace(low, high, STIFFNESS_SAMPLES)}
-    # The gain begins to fall there: a corner, possibly the least damped point of all.
-    corner = config.contact.full_gain_stiffness_n_m
+    corner = config.contact.full_gain_stiffness_n_m  # the gain begins to fall: possibly the least damped point
     samples |= {corner} if low < corner < high else set()
     margins = (contact_mode_damping(config, k, brush.damping_n_s_m, brush.force_delay_s) for k in sorted(samples))
     return min(margins, key=lambda margin: margin.least_damping_ratio)
 
 
-def require_margin(config: PressingConfig, brush: BrushSettings | None = None, place: str = "") -> LoopMargin:
+def require_margin(config: _PressingConfig, brush: BrushSettings | None = None, place: str = "") -> LoopMargin:
     """Refuse a controller whose contact would ring.
 
     Args:
         config: The controller.
-        brush: What it shall press with and against; the default brush if None.
-        place: Where the controller was found, before the field's name: "preset.toml: controller.".
+        brush: Wall and brush; the default ones if None.
+        place: Prefix of the field's name in messages: "preset.toml: controller.".
 
     Returns:
         The least margin over the brush's stiffness range.
 
     Raises:
-        ConfigError: Naming the gain (or, where no gain helps, the stiffness or the damping), its value and what is
-            allowed while everything else stays.
+        ConfigError: Naming the gain (or, where no gain helps, the stiffness or the damping), its value and range.
     """
     brush = brush or BrushSettings()
     margin = least_margin(config, brush)
@@ -168,18 +154,17 @@ def require_margin(config: PressingConfig, brush: BrushSettings | None = None, p
         "feedback"
     )
 
-    def good(changed: PressingConfig, pressed: BrushSettings) -> bool:
+    def good(changed: _PressingConfig, pressed: BrushSettings) -> bool:
         return least_margin(changed, pressed).least_damping_ratio >= LEAST_DAMPING_RATIO
 
     def with_gain(name: str, value: float) -> bool:
         return good(dataclasses.replace(config, gains=dataclasses.replace(config.gains, **{name: value})), brush)
 
-    units = {field.name: field.metadata["unit"] for field in dataclasses.fields(config.gains)}
     for name in GAIN_NAMES:
         value = getattr(config.gains, name)
         if value > 0.0 and with_gain(name, 0.0):
             allowed = _search(0.0, value, lambda entry, name=name: with_gain(name, entry))
-            unit = units[name]
+            unit = type(config.gains).__dataclass_fields__[name].metadata["unit"]
             words = " ".join(filter(None, (f"allowed is [0, {allowed:.4g}]", unit, reason)))
             raise out_of_range(f"{place}gains.{name}", value, unit, words)
     low, high = brush.stiffness_min_n_m, brush.stiffness_max_n_m
@@ -191,10 +176,10 @@ def require_margin(config: PressingConfig, brush: BrushSettings | None = None, p
     raise out_of_range(f"{place}brush.damping_n_s_m", brush.damping_n_s_m, "N s/m", words)
 
 
-def _search(good: float, bad: float, holds: Callable[[float], bool]) -> float:
-    """Largest value between a good and a bad one that holds, by halving."""
+def _search(good: float, bad: float, accepts: Callable[[float], bool]) -> float:
+    """Largest accepted value between a good and a bad one, by bisection."""
     width = SEARCH_TOLERANCE * abs(bad - good)
     while abs(bad - good) > width:
         middle = 0.5 * (good + bad)
-        good, bad = (middle, bad) if holds(middle) else (good, middle)
+        good, bad = (middle, bad) if accepts(middle) else (good, middle)
     return good

@@ -12,15 +12,11 @@ class EstimationConfig:
     """Noise models and life times; defaults from the sensors of the design, section 5."""
 
     acceleration_noise: float = setting(
-        8e-3,
-        "accelerometer noise in the wall plane with what the attitude noise adds",
-        unit="m/s^2/sqrt(Hz)",
-        low=1e-5,
-        high=1.0,
+        8e-3, "acceleration in the wall plane, with the attitude noise", unit="m/s^2/sqrt(Hz)", low=1e-5, high=1.0
     )
     bias_noise: float = setting(
         3e-3,
-        "drift of the bias that gravity leaks through the attitude bias",
+        "drift of the accelerometer bias, with gravity through attitude",
         unit="m/s^3/sqrt(Hz)",
         low=1e-6,
         high=1.0,
@@ -29,38 +25,20 @@ class EstimationConfig:
         1e-3, "random walk of line offsets: edges are not perfectly straight", unit="m/sqrt(s)", low=1e-6, high=0.1
     )
     line_std_m: float = setting(
-        3e-4,
-        "least deviation of one line offset, whatever the fit claims; the frames may show more",
-        unit="m",
-        low=1e-6,
-        high=0.1,
+        3e-4, "least deviation of a line offset; the frames may show more", unit="m", low=1e-6, high=0.1
     )
     velocity_std_m_s: float = setting(2e-3, "least deviation of one flow velocity", unit="m/s", low=1e-6, high=1.0)
     angle_std_rad: float = setting(
-        3e-3,
-        "least deviation of one line angle: attitude noise, and the rotation of a short edge as it grows",
-        unit="rad",
-        low=1e-6,
-        high=0.1,
+        3e-3, "least deviation of a line angle: attitude noise, growth of a short edge", unit="rad", low=1e-6, high=0.1
     )
     angle_noise: float = setting(
-        2.7e-3,
-        "random walk of line angles; with the deviation above a clean angle follows within 0.2 s",
-        unit="rad/sqrt(s)",
-        low=1e-7,
-        high=0.1,
+        2.7e-3, "random walk of line angles: an angle follows within 0.2 s", unit="rad/sqrt(s)", low=1e-7, high=0.1
     )
     frames_to_trust: int = setting(4, "frames until a new line has full weight", low=1, high=100)
-    fade_start_s: float = setting(
-        0.10, "a line without new frames fades after this time, counted from delivery", unit="s", low=0.01, high=5.0
-    )
+    fade_start_s: float = setting(0.10, "a line without new frames fades from here", unit="s", low=0.01, high=5.0)
     fade_end_s: float = setting(0.45, "and is dropped after this time", unit="s", low=0.05, high=10.0)
-    gate_sigmas: float = setting(
-        6.0, "offsets and velocities with a larger innovation are refused", low=1.0, high=100.0
-    )
-    refused_frames: int = setting(
-        3, "refused offsets in a row that agree with each other start a new line", low=1, high=100
-    )
+    gate_sigmas: float = setting(6.0, "larger innovations of offset or velocity are refused", low=1.0, high=100.0)
+    refused_frames: int = setting(3, "agreeing refused offsets in a row that start a new line", low=1, high=100)
     velocity_life_s: float = setting(0.6, "an older velocity is not used", unit="s", low=0.05, high=10.0)
     tare_time_s: float = setting(
         0.5, "free flight averaged before the wrench is trusted", unit="s", low=0.05, high=10.0
@@ -68,17 +46,10 @@ class EstimationConfig:
     tare_follow_s: float = setting(20.0, "time constant of the bias after that", unit="s", low=0.5, high=1000.0)
     tare_distance_m: float = setting(0.04, "the tip counts as free beyond this distance", unit="m", low=0.005, high=1.0)
     tare_acceleration_gain: float = setting(
-        0.3,
-        "accelerometer filter of the tool's load, per tick: averages about as long as a force sample lasts",
-        low=0.001,
-        high=1.0,
+        0.3, "accelerometer filter of the tool's load, per tick: about a force sample", low=0.001, high=1.0
     )
     force_std_n: float = setting(
-        0.02,
-        "least deviation of a force sample across the tool; successive samples may show more",
-        unit="N",
-        low=1e-4,
-        high=10.0,
+        0.02, "least deviation of a force sample; the samples may show more", unit="N", low=1e-4, high=10.0
     )
     contact_spread_m: float = setting(
         0.01, "largest distance of the contact from the tip's centre", unit="m", low=0.0, high=0.5

@@ -17,10 +17,7 @@ class Gains:
     theta_kp: float = setting(46.51, "line angle error", unit="1/s^2", low=0.0, high=400.0)
     theta_kd: float = setting(12.03, "line angle rate", unit="1/s", low=0.0, high=100.0)
     body_rotation_gain: float = setting(
-        0.882,
-        "fraction of the body's rotation in the line rows while the tip travels in contact",
-        low=0.0,
-        high=1.0,
+        0.882, "fraction of the body's rotation in line rows while the tip travels", low=0.0, high=1.0
     )
     velocity_kp: float = setting(1.787, "velocity error along free directions", unit="1/s", low=0.0, high=50.0)
     velocity_ki: float = setting(3.242, "integral of that error", unit="1/s^2", low=0.0, high=50.0)

@@ -3,145 +3,89 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from ibvs_qp.config.settings import setting, validate
+
+
+def _slack_weight(default: float, name: str, unit: str, why: str) -> Any:
+    """Setting of a slack weight per squared unit of its rows."""
+    return setting(default, f"slack weight of {name}", unit=unit, why=why, low=1e-3, high=1e8)
+
+
+def _poles(default: float, name: str, why: str) -> Any:
+    """Setting of the pole of a barrier: how fast its bound may be approached."""
+    return setting(default, f"poles of {name}", unit="1/s", why=why, low=0.1, high=100.0)
 
 
 @dataclass(frozen=True, kw_only=True)
 class LimitSettings:
     """Bounds of the soft limits, weights of their slack per squared unit, and switches.
 
-    The program lets a demand beyond a bound pass by the fraction weight / (weight + slack weight), so compare a slack
-    weight with the weights of the rows that pull against it. Quoted figures are from flights of the small vehicle in
-    `tests/ibvs_qp/limits/test_barriers.py`, which asserts the main ones.
+    The program exceeds a bound by the fraction weight / (weight + slack weight) of the demand beyond it, so compare a
+    slack weight with the weights of the rows that pull against it. `tests/ibvs_qp/limits/test_barriers.py` flies them.
     """
 
     tilt_deg: float = setting(
         1.0,
         "zero-tilt bound on roll and pitch",
         unit="deg",
-        why="a job may tilt by 2 deg at its worst; painting in calm air takes 0.12 deg rms",
+        why="a job allows 2 deg; painting in calm air takes 0.12 deg rms",
         low=0.05,
         high=45.0,
     )
-    tilt_slack_weight: float = setting(
-        4000.0,
-        "slack weight of the tilt barriers",
-        unit="s^4/rad^2",
-        why="ten times the level rows. A pitch rate of 0.25 rad/s before two lines peaks at 1.08 deg; at a tenth of "
-        "the weight at 1.15, at ten times at 1.06",
-        low=1e-3,
-        high=1e8,
-    )
-    tilt_rate_1_s: float = setting(
-        8.0,
-        "poles of the tilt barriers: how fast the bound may be approached",
-        unit="1/s",
-        why="half of what the motors' 0.057 s follow, 17 1/s. A pitch rate of 0.25 rad/s peaks at 1.08 deg with 8, at "
-        "1.23 with 4; a tumble that no task levels at 0.8 deg with 8, at 4 deg with 32",
-        low=0.1,
-        high=100.0,
-    )
+    tilt_slack_weight: float = _slack_weight(4000.0, "the tilt barriers", "s^4/rad^2", "ten times the level rows")
+    tilt_rate_1_s: float = _poles(8.0, "the tilt barriers", "half of the motors' 17 1/s; faster ones brake too late")
     yaw_deg: float = setting(
         10.0,
         "yaw bound",
         unit="deg",
-        why="half of the 19 deg at which a front propeller strikes the wall",
+        why="half of 19 deg, where a front propeller strikes the wall",
         low=0.5,
         high=45.0,
     )
-    yaw_slack_weight: float = setting(
-        1000.0,
-        "slack weight of the yaw barrier",
-        unit="s^4/rad^2",
-        why="above every row that turns the vehicle; the yaw row itself pulls back, so the value hardly matters: a "
-        "turn of 0.7 rad/s peaks at 7.7 deg for any weight from 33 to 1e5",
-        low=1e-3,
-        high=1e8,
+    yaw_slack_weight: float = _slack_weight(
+        1000.0, "the yaw barrier", "s^4/rad^2", "above every row that turns the vehicle; not sensitive"
     )
-    yaw_rate_1_s: float = setting(
-        5.0,
-        "poles of the yaw barrier",
-        unit="1/s",
-        why="a third of what the motors follow: a turn of 0.7 rad/s that no task stops peaks at 7.7 deg, with 20 1/s "
-        "at 16",
-        low=0.1,
-        high=100.0,
-    )
+    yaw_rate_1_s: float = _poles(5.0, "the yaw barrier", "a third of the motors' 17 1/s; 20 1/s brake too late")
     view_down: float = setting(
         0.35, "largest |rho| of a level guide", why="the picture ends at 0.384", low=0.01, high=10.0
     )
     view_right: float = setting(
         0.48, "largest |rho| of an upright guide", why="the picture ends at 0.512", low=0.01, high=10.0
     )
-    view_slack_weight: float = setting(
-        4e4,
-        "slack weight of the line-in-view barriers",
-        unit="s^4",
-        why="400 times the line rows that pull a guide out. Told to take it to 0.60 they hold it at 0.356; at a tenth "
-        "of the weight at 0.417, out of the picture, at ten times at 0.350",
-        low=1e-3,
-        high=1e8,
+    view_slack_weight: float = _slack_weight(
+        4e4, "the line-in-view barriers", "s^4", "400 times the line rows; at a tenth a guide leaves the picture"
     )
-    view_rate_1_s: float = setting(
-        2.0,
-        "poles of the line-in-view barriers",
-        unit="1/s",
-        why="below the line loop's 5 1/s; the value hardly matters: a guide told to go to 0.60 stays at 0.356 with 1 "
-        "and 2, at 0.352 with 4",
-        low=0.1,
-        high=100.0,
-    )
+    view_rate_1_s: float = _poles(2.0, "the line-in-view barriers", "below the line loop's 5 1/s; not sensitive")
     push_ceiling_ratio: float = setting(
         1.5,
         "push ceiling over the push reference",
-        why="2.5 N above a push of 5 N are three times what gusts of 2 N rms leave, 0.87 N rms",
+        why="2.5 N above 5 N is three times the error that gusts of 2 N rms leave",
         low=1.0,
         high=100.0,
     )
     push_quiet_m_s: float = setting(
         0.005,
-        "closing speed that the push ceiling takes for noise of the estimate",
+        "closing speed that the push ceiling ignores as noise",
         unit="m/s",
-        why="0.005 m/s are 2.4 N at 10 kN/m: answered, the noise made the ceiling bind in 13 % of the ticks of a press "
-        "there",
+        why="otherwise 2.4 N at 10 kN/m: the ceiling would be active in 13 % of a press",
         low=0.0,
         high=1.0,
     )
-    push_slack_weight: float = setting(
-        40.0,
-        "slack weight of the push ceiling",
-        unit="1/N^2",
-        why="80 times the push row. With a force gain six times too high 5 N asked peak at 7.07 N; at a tenth of the "
-        "weight at 7.14, at ten times at 7.06",
-        low=1e-3,
-        high=1e8,
-    )
+    push_slack_weight: float = _slack_weight(40.0, "the push ceiling", "1/N^2", "80 times the push row")
     approach_speed_ratio: float = setting(
         1.5,
         "closing speed over that of the approach",
-        why="with 1.0 the barrier binds in 82 % of the first 3 s from 0.12 m away and the tip has not arrived by then, "
-        "with 1.5 in 5 % and it has",
+        why="the barrier is active in 5 % of an approach, with 1.0 in 82 %",
         low=1.0,
         high=100.0,
     )
-    approach_rate_1_s: float = setting(
-        10.0,
-        "pole of the approach-speed barrier",
-        unit="1/s",
-        why="thrown at the wall with 0.3 m/s from 0.12 m, its own damping cut to a tenth, the tip does not strike; "
-        "with 5 it does with 1.7 N, with 2.5 with 5.6 N",
-        low=0.1,
-        high=100.0,
+    approach_rate_1_s: float = _poles(
+        10.0, "the approach-speed barrier", "stops a vehicle at 0.3 m/s within 0.12 m; with 5 the tip strikes"
     )
-    approach_slack_weight: float = setting(
-        4000.0,
-        "slack weight of the approach-speed barrier",
-        unit="s^4/m^2",
-        why="220 times the stand-off row, 0.5 per N^2 at 6 kg. Thrown at the wall with 0.3 m/s the tip does not "
-        "strike, at a thirtieth of the weight with 0.6 N",
-        low=1e-3,
-        high=1e8,
+    approach_slack_weight: float = _slack_weight(
+        4000.0, "the approach-speed barrier", "s^4/m^2", "220 times the stand-off row, 0.5 per N^2 at 6 kg"
     )
     tilt_barrier: bool = setting(True, "zero-tilt barriers on roll and pitch")
     yaw_barrier: bool = setting(True, "yaw barrier")

@@ -12,26 +12,21 @@ class SolverSettings:
     """OSQP and the acceptance test; the values are measured on recorded flights (docs/control.md)."""
 
     max_iterations: int = setting(500, "deterministic deadline; an iteration takes about 0.5 us", low=1, high=100000)
-    tolerance: float = setting(
-        1e-6, "eps_abs; the softest direction costs 2e-3 per N^2, so it leaves at most 1e-3 N", low=1e-10, high=1e-1
-    )
+    tolerance: float = setting(1e-6, "eps_abs; leaves at most 1e-3 N in the softest direction", low=1e-10, high=1e-1)
     relative_tolerance: float = setting(
-        0.0, "eps_rel; gradients of 7000 per N would relax the test in the soft directions", low=0.0, high=1e-1
+        0.0, "eps_rel; it would relax the test in the soft directions", low=0.0, high=1e-1
     )
     check_interval: int = setting(5, "iterations between termination checks", low=1, high=1000)
-    adaptive_rho_interval: int = setting(
-        20, "iterations between step-size updates; at 10 the step size oscillates", low=1, high=10000
-    )
+    adaptive_rho_interval: int = setting(20, "iterations between step-size updates; 10 oscillate", low=1, high=10000)
     adaptive_rho_tolerance: float = setting(
-        2.0, "factor by which the step size must change to be updated; a quarter fewer iterations at the tail than 5",
-        low=1.0, high=100.0,
-    )  # fmt: skip
+        2.0, "change of the step size that triggers its update", low=1.0, high=100.0
+    )
     scaling: int = setting(
         2, "Ruiz equilibration passes; without, or with ten, some ticks end at the cap", low=0, high=100
     )
     direct: bool = setting(True, "call OSQP's extension object (half the overhead) instead of its wrapper")
     accept_residual: float = setting(
-        1e-3, "largest primal and dual residual of an accepted early stop, as thrust", unit="N", low=1e-9, high=10.0
+        1e-3, "largest residual of an accepted early stop, as thrust", unit="N", low=1e-9, high=10.0
     )
 
     def __post_init__(self) -> None:

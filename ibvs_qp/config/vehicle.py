@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from allocation.geometry import TAROT_T960, RotorGeometry
+from ibvs_qp.config.errors import out_of_range
 from ibvs_qp.config.settings import require_order, setting, validate
 
 
@@ -26,8 +27,7 @@ class VehicleParams:
         1.2,
         "idle thrust of a rotor",
         unit="N",
-        why="15 % of full speed, 2.25 % of full thrust: a stopped propeller starts late; it, not full thrust, bounds "
-        "push",
+        why="15 % of full speed, because a stopped propeller starts late",
         low=0.0,
         high=200.0,
     )
@@ -35,7 +35,7 @@ class VehicleParams:
         52.56,
         "full thrust of a rotor",
         unit="N",
-        why="KDE 4215XF with a 15 inch propeller at full throttle, as published with the vehicle",
+        why="KDE 4215XF with a 15 inch propeller, published with the vehicle",
         low=0.0,
         high=200.0,
     )
@@ -43,8 +43,7 @@ class VehicleParams:
         500.0,
         "fastest commanded thrust change",
         unit="N/s",
-        why="2 N a tick: hover to idle in 20 ms, faster than the motors' 57 ms follow, so it costs no performance, and "
-        "no tick jumps",
+        why="2 N a tick: faster than the motors' lag of 57 ms, without jumps",
         low=1.0,
         high=1e5,
     )
@@ -72,12 +71,8 @@ class VehicleParams:
         for field in ("thrust_min_n", "thrust_max_n"):
             value = getattr(self, field)
             if isinstance(value, tuple) and len(value) != self.geometry.count:
-                from ibvs_qp.config.errors import out_of_range
-
                 raise out_of_range(field, value, "N", f"one number or {self.geometry.count} (one per rotor)")
         if np.any(self.thrust_min >= self.thrust_max):
-            from ibvs_qp.config.errors import out_of_range
-
             raise out_of_range("thrust_min_n", self.thrust_min_n, "N", "must lie below thrust_max_n on every rotor")
 
     @property

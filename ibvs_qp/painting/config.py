@@ -21,13 +21,13 @@ class PaintingConfig:
     push_n: float = setting(5.0, "push", unit="N", low=0.5, high=40.0)
     climb_speed_m_s: float = setting(0.05, "speed of a climb", unit="m/s", low=0.005, high=0.3)
     acceleration_m_s2: float = setting(
-        0.12, "along a stroke and a climb; braking takes up to twice as much", unit="m/s^2", low=0.01, high=2.0
+        0.12, "along a stroke and a climb; braking takes twice as much", unit="m/s^2", low=0.01, high=2.0
     )
     standoff_m: float = setting(0.06, "tip to wall while aligning", unit="m", low=0.02, high=0.5)
     retreat_m: float = setting(0.35, "tip to wall at the end", unit="m", low=0.1, high=2.0)
 
     hold_gain: float = setting(
-        0.8, "position error on the odometer to speed, where no upright line is followed", unit="1/s", low=0.0, high=5.0
+        0.8, "position error on the odometer to speed, without an upright line", unit="1/s", low=0.0, high=5.0
     )
     hold_speed_m_s: float = setting(0.03, "largest speed of that position hold", unit="m/s", low=0.0, high=0.2)
     guide_slide_m_s: float = setting(
@@ -42,7 +42,7 @@ class PaintingConfig:
         0.4, "average of error and speed", unit="s", why="half a period of the sway in hover", low=0.01, high=5.0
     )
     align_patience_s: float = setting(
-        2.0, "after this long both tolerances open with the square of time", unit="s", low=0.5, high=300.0
+        2.0, "then both tolerances open with the square of time", unit="s", low=0.5, high=300.0
     )
     align_opening_max: float = setting(
         5.0, "largest factor on both", why="15 mm and 25 mm/s: what 3 N rms of gusts leave", low=1.0, high=20.0
@@ -50,9 +50,7 @@ class PaintingConfig:
     press_time_s: float = setting(
         1.2, "least time in contact before a stroke", unit="s", why="the force ramp takes 1 s", low=0.0, high=10.0
     )
-    press_error: float = setting(
-        0.15, "largest error of the push before a stroke, relative to its reference or 1 N", low=0.01, high=1.0
-    )
+    press_error: float = setting(0.15, "largest relative error of the push before a stroke", low=0.01, high=1.0)
     contact_back_s: float = setting(
         0.5, "contact after a loss for this long before a stroke goes on", unit="s", low=0.0, high=10.0
     )
@@ -68,11 +66,9 @@ class PaintingConfig:
     climb_time_s: float = setting(0.3, "least time at the end of a climb", unit="s", low=0.0, high=5.0)
     climb_timeout_s: float = setting(1.0, "longest time for that error", unit="s", low=0.0, high=10.0)
     fresh_edge_timeout_s: float = setting(
-        2.0, "longest search for the fresh edge after a climb; then the guide stays", unit="s", low=0.0, high=20.0
+        2.0, "longest search for the fresh edge after a climb", unit="s", low=0.0, high=20.0
     )
-    descend_s: float = setting(
-        5.0, "after the wall was given up: time of retreat and descent", unit="s", low=0.5, high=60.0
-    )
+    descend_s: float = setting(5.0, "retreat and descent after the wall was given up", unit="s", low=0.5, high=60.0)
     descend_speed_m_s: float = setting(
         0.15, "speed of that descent", unit="m/s", why="slow: nothing measures the height", low=0.01, high=1.0
     )

@@ -26,9 +26,7 @@ class LineGates:
         3.0,
         "angle between the fresh edge and the board's edge",
         unit="deg",
-        why="the edge is seen 0.05 to 0.25 m ahead of the tip and followed as a straight line: at 3 deg that of a bent "
-        "stroke is 8 mm off; a gate of 6 deg let its short end roll the vehicle (analytic law: 0.30 instead of 0.16 "
-        "deg rms)",
+        why="at 6 deg the short end of a bent stroke rolls the vehicle",
         low=0.5,
         high=30.0,
     )
