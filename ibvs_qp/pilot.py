@@ -1,4 +1,8 @@
-"""Pilot: raw sensor frames in, commands out; vision, estimation, strategy and one of the two laws in a row."""
+"""Pilot: raw sensor frames in, commands out.
+
+One tick, in the order of `Pilot._fly`: validation, tare of the wrench, perception, contact, motion in the wall plane,
+strategy, reference, controller.
+"""
 
 from __future__ import annotations
 
@@ -23,15 +27,8 @@ from ibvs_qp.estimation.stamps import HISTORY
 from ibvs_qp.estimation.wall_lines import WallAxes, image_line
 from ibvs_qp.estimation.wall_motion import WallMotion
 from ibvs_qp.estimation.wrench_tare import WrenchTare
-from ibvs_qp.frames import Vector3, down_in_body, plane_in_body, to_camera
-from ibvs_qp.measurement import (
-    HORIZONTAL,
-    FeatureFrame,
-    LineReference,
-    Measurement,
-    Reference,
-    SensorFrame,
-)
+from ibvs_qp.frames import Vector3, add_scaled, down_in_body, plane_in_body, to_camera
+from ibvs_qp.measurement import HORIZONTAL, FeatureFrame, LineReference, Measurement, Reference, RgbdFrame, SensorFrame
 from ibvs_qp.painting.command import PainterInput, PaintingCommand
 from ibvs_qp.painting.config import PaintingConfig
 from ibvs_qp.painting.painter import Painter
@@ -41,19 +38,15 @@ from ibvs_qp.vision.config import VisionConfig
 from ibvs_qp.vision.paper.config import PaperConfig
 from ibvs_qp.vision.percept import LineHint
 
-#: Where the fresh edge exists ahead of the brush, normalised image x from the tip's side to the border.
+#: Extent of the fresh edge ahead of the brush, normalised image x from the tip's side to the border.
 HINT_SPAN = (0.10, 0.50)
-
-
-#: Tip to wall while no plane was seen yet [m].
+#: Tip to wall before the first plane [m].
 ASSUMED_DISTANCE = 0.5
-
-_EYE = np.eye(3)
 
 
 @dataclass(frozen=True, kw_only=True)
 class CameraConfig:
-    """What the pilot expects of its camera beside the intrinsics, which come with every picture."""
+    """Settings of the camera beside the intrinsics, which come with every picture."""
 
     latest_s: float = setting(0.30, "pictures older than this at delivery are refused", unit="s", low=0.01, high=2.0)
 
@@ -92,7 +85,7 @@ class PilotConfig:
 
 
 class Pilot:
-    """The whole pilot; `step` turns one sensor frame into one command and knows no simulator.
+    """Vision, estimation, strategy and one of the two laws in a row; `step` needs no simulator.
 
     Attributes:
         thrust_limits: Lower and upper thrust limits that the drive reports [N], (n,) each, or None for the configured.
@@ -100,7 +93,7 @@ class Pilot:
     Args:
         config: Everything a flight needs.
         painter: Strategy to follow; None paints.
-        seen_as: Applied to what perception saw in a picture, for studies of its errors.
+        seen_as: Applied to the features of every picture, for studies of perception errors.
     """
 
     def __init__(
@@ -111,59 +104,41 @@ class Pilot:
     ) -> None:
         self.config = config or PilotConfig()
         settings, vehicle = self.config.controller, self.config.controller.vehicle
-        kind = HybridController if self.config.law == "qp" else PaperController
-        self.controller = kind(settings)
-        self.contact = ContactEstimator(settings)
-        self.motion = WallMotion(
-            np.array(vehicle.tip_position_m),
-            np.array(vehicle.camera_position_m),
-            settings.tick_s,
-            self.config.estimation,
-        )
+        self._tip, camera = np.array(vehicle.tip_position_m), np.array(vehicle.camera_position_m)
+        self._tip_camera = to_camera(self._tip, camera).tolist()
+        self._tip_from_camera = (self._tip - camera).tolist()
+        self._gate = SensorGate()
         self.tare = WrenchTare(vehicle, self.config.estimation)
+        self._perception, self._seen_as = None, seen_as
+        self.contact = ContactEstimator(settings)
+        self.motion = WallMotion(self._tip, camera, settings.tick_s, self.config.estimation)
         self.supervisor = RotorLoss(vehicle)
         self.painter = painter or Painter(self.config.painting)
-        self._seen_as = seen_as
-        self._tick_s = settings.tick_s
-        self._tare_distance_m = self.config.estimation.tare_distance_m
-        self._velocity_life_s = self.config.estimation.velocity_life_s
-        self._gate = SensorGate()
-        self._tip = np.array(vehicle.tip_position_m)
-        self._camera = np.array(vehicle.camera_position_m)
-        self._tip_camera = to_camera(self._tip, self._camera).tolist()
-        self._tip_from_camera = (self._tip - self._camera).tolist()
-        self._perception = None
+        self.controller = (HybridController if self.config.law == "qp" else PaperController)(settings)
         self.reset()
 
     def reset(self) -> None:
         """As after construction."""
-        self.controller.reset()
-        self.contact.reset()
-        self.motion.reset()
-        self.tare.reset()
-        self.painter.reset()
-        self.supervisor.reset()
-        self._gate.reset()
-        if self._perception is not None:
-            self._perception.reset()
-        self._first = self._stamp = -1
-        self._history_attitude = [[1.0, 0.0, 0.0, 0.0]] * HISTORY
-        self._turn: Vector3 = (0.0, 0.0, 0.0)
-        self._history_turn = [self._turn] * HISTORY
-        self._covariance = self.motion.velocity_variance * _EYE
-        self._last_capture = -1
-        self.percept = None
+        parts = (self._gate, self.tare, self._perception, self.contact, self.motion)
+        for part in (*parts, self.supervisor, self.painter, self.controller):
+            if part is not None:
+                part.reset()
+        self._first = self._stamp = self._last_capture = -1
+        self._turn: Vector3 = (0.0, 0.0, 0.0)  # integrated gyro [rad]
+        self._history_attitude, self._history_turn = [[1.0, 0.0, 0.0, 0.0]] * HISTORY, [self._turn] * HISTORY
+        self._covariance = self.motion.velocity_variance * np.eye(3)
+        self._plane: tuple[float, float, float, float] | None = None
+        self._plane_stamp = 0
         self.thrust_limits: tuple[np.ndarray, np.ndarray] | None = None
-        self.controller_time_s = 0.0
+        self.percept = None
         self.measurement: Measurement | None = None
         self.reference = Reference()
         self.painting_command: PaintingCommand | None = None
-        self._plane: tuple[float, float, float, float] | None = None
-        self._plane_stamp = 0
+        self.controller_time_s = 0.0
 
     @property
     def setpoints(self):
-        """The controller's shared set-points, for logs."""
+        """The controller's set-points, for logs."""
         return self.controller.setpoints
 
     def step(self, frame: SensorFrame) -> Command:
@@ -175,23 +150,20 @@ class Pilot:
         Returns:
             The controller's command.
         """
-        sound, refused = self._gate.check(frame)
-        if sound is None:
+        checked, refused = self._gate.check(frame)
+        if checked is None:
             command = self.controller.step(self.measurement, self.reference)  # type: ignore[arg-type]
         else:
-            command = self._fly(sound)
-        if self._gate.clock.shift_ns and sound is not None:  # back to the time of the frames
-            command = dataclasses.replace(command, stamp_ns=frame.stamp_ns)
+            command = self._fly(checked)
+            if self._gate.clock.shift_ns:  # back to the time of the frames
+                command = dataclasses.replace(command, stamp_ns=frame.stamp_ns)
         return command if not refused else dataclasses.replace(command, rejected=command.rejected + refused)
 
     def _fly(self, frame: SensorFrame) -> Command:
-        stamp = frame.stamp_ns
-        if self._first < 0:
-            self._first = stamp
-        dt = self._tick_s if self._stamp < 0 else (stamp - self._stamp) * 1e-9
-        dt = dt if dt < LONGEST_TICK else LONGEST_TICK
-        self._stamp = stamp
-        now = self._gate.last
+        """The tick of a validated frame."""
+        stamp, now, tick_s = frame.stamp_ns, self._gate.last, self.config.controller.tick_s
+        dt = tick_s if self._stamp < 0 else min((stamp - self._stamp) * 1e-9, LONGEST_TICK)
+        self._first, self._stamp = stamp if self._first < 0 else self._first, stamp
         attitude, force, rate = now["attitude"], now["specific_force"], now["angular_velocity"]
         down = down_in_body(attitude)
         wrench = self._tared_wrench(frame, force)
@@ -212,8 +184,7 @@ class Pilot:
         self._remember(attitude, rate, dt)
         if features is not None:
             self._correct_motion(features, contact)
-        target = self._strategy(frame, contact, dt)
-        self.painting_command = target
+        target = self.painting_command = self._strategy(frame, contact, dt)
         self.reference = self._refer(target, contact)
         self.measurement = self._measure(frame, wrench, axes, target, contact)
         begin = time.perf_counter()
@@ -224,40 +195,50 @@ class Pilot:
     def _tared_wrench(self, frame: SensorFrame, specific_force: list[float]) -> np.ndarray:
         """Contact wrench on the vehicle [N, N m], (6,); the bias is averaged while the tip is away from the wall.
 
-        Away by the contact of the tick before: this tick's needs the wrench.
+        Away by the contact of the tick before, because the contact of this tick needs the wrench.
         """
         last = self.contact.state
-        free = not last.in_contact and last.distance > self._tare_distance_m
+        free = not last.in_contact and last.distance > self.config.estimation.tare_distance_m
         return self.tare.update(frame.wrench, frame.wrench_stamp_ns, specific_force, free)
 
+    # -------------------------------------------------------------- perception
+
     def _perceive(self, frame: SensorFrame) -> FeatureFrame | None:
-        """Features of a new picture, or None; a plane becomes the latest one."""
-        features = frame.features if frame.image is None else self._see(frame)
-        if features is None or not self._fresh(features.stamp_ns):
+        """Features of a new picture, or None if its stamp is in the future or too old; stores their plane."""
+        features = frame.features if frame.image is None else self._process(frame.image)
+        if features is None or not 0 <= self._stamp - features.stamp_ns <= self.config.camera.latest_s * 1e9:
             return None
         if features.plane is not None:
             self._plane, self._plane_stamp = features.plane, features.stamp_ns
         return features
 
-    def _strategy(self, frame: SensorFrame, contact: ContactState, dt: float) -> PaintingCommand:
-        """What the painter commands, tilted after a lost rotor."""
-        inputs = self._painter_input(frame, contact)
-        if self.thrust_limits is not None and self.supervisor.update(self.thrust_limits):
-            self.painter.abandon(inputs, "no level hover is left")
-        target = self.painter.step(inputs)
-        if not self.supervisor.lost:
-            return target
-        normal = np.array(contact.normal)
-        away = contact.distance + float(normal @ self._tip)
-        tilt = self.supervisor.tilt(away, contact.speed, float(self.motion.state[0]), normal, dt)
-        return dataclasses.replace(target, tilt=tilt)
+    def _process(self, image: RgbdFrame) -> FeatureFrame | None:
+        """Run perception on a picture, with the gyro's turn since the last one."""
+        if self._perception is None:
+            self._perception = self._load_perception()
+        slot = self._slot(image.stamp_ns)
+        last = self._slot(self._last_capture) if self._last_capture >= 0 else slot
+        self._last_capture = image.stamp_ns
+        self.percept = self._perception.process(
+            image,
+            attitude=np.array(self._history_attitude[slot]),
+            rotation=np.subtract(self._history_turn[slot], self._history_turn[last]),
+            velocity=self.measurement.velocity if self.measurement is not None else None,
+            hints=self._hints(image.stamp_ns),
+        )
+        seen = self.percept.features
+        return seen if self._seen_as is None or seen is None else self._seen_as(seen)
 
-    def _remember(self, attitude: list[float], rate: list[float], dt: float) -> None:
-        (x, y, z), (wx, wy, wz) = self._turn, rate
-        self._turn = x + dt * wx, y + dt * wy, z + dt * wz
-        slot = self.motion.ticks.now % HISTORY
-        self._history_attitude[slot] = attitude
-        self._history_turn[slot] = self._turn
+    def _load_perception(self):
+        """The configured perception, loaded when the first picture comes."""
+        vehicle = self.config.controller.vehicle
+        if self.config.perception == "paper":
+            from ibvs_qp.vision.paper import PaperPerception
+
+            return PaperPerception(self.config.paper_vision, self.config.vision, vehicle)
+        from ibvs_qp.vision.perception import Perception
+
+        return Perception(self.config.vision, vehicle)
 
     def _hints(self, stamp_ns: int) -> tuple[LineHint, ...]:
         """Expected place of the fresh edge: at the brush, ahead of it, by lines and contact of the tick before."""
@@ -271,48 +252,21 @@ class Pilot:
         span = (near, far) if side > 0.0 else (-far, -near)
         return (LineHint(name="fresh", rho=rho, theta=theta, kind="paint", surface_side=-1, span=span),)
 
-    def _fresh(self, stamp_ns: int) -> bool:
-        """Whether a picture's stamp is believable: neither from the future nor older than the camera may be."""
-        return 0 <= self._stamp - stamp_ns <= self.config.camera.latest_s * 1e9
+    # -------------------------------------------------------------- estimation
+
+    def _remember(self, attitude: list[float], rate: list[float], dt: float) -> None:
+        """Store attitude and integrated gyro of the tick for pictures that arrive late."""
+        self._turn = add_scaled(self._turn, dt, rate)
+        slot = self.motion.ticks.slot(0)
+        self._history_attitude[slot], self._history_turn[slot] = attitude, self._turn
 
     def _slot(self, stamp_ns: int) -> int:
-        """Where the tick nearest to a stamp is remembered; the newest or the oldest where none is."""
+        """Place in the history of the tick nearest to a stamp, or of the newest or the oldest one."""
         ticks = self.motion.ticks
         age = ticks.age(stamp_ns)
         if age is None:
             age = 0 if stamp_ns > self._stamp else min(HISTORY, ticks.now) - 1
         return ticks.slot(age)
-
-    def _see(self, frame: SensorFrame) -> FeatureFrame | None:
-        """Run perception on a picture, with the gyro's turn since the last one."""
-        if self._perception is None:
-            self._perception = self._open_eyes()
-        image = frame.image
-        assert image is not None
-        slot = self._slot(image.stamp_ns)
-        last = self._slot(self._last_capture) if self._last_capture >= 0 else slot
-        rotation = np.subtract(self._history_turn[slot], self._history_turn[last])
-        self._last_capture = image.stamp_ns
-        self.percept = self._perception.process(
-            image,
-            attitude=np.array(self._history_attitude[slot]),
-            rotation=rotation,
-            velocity=self.measurement.velocity if self.measurement is not None else None,
-            hints=self._hints(image.stamp_ns),
-        )
-        seen = self.percept.features
-        return seen if self._seen_as is None or seen is None else self._seen_as(seen)
-
-    def _open_eyes(self):
-        """The configured perception, loaded when the first picture comes."""
-        vehicle = self.config.controller.vehicle
-        if self.config.perception == "paper":
-            from ibvs_qp.vision.paper import PaperPerception
-
-            return PaperPerception(self.config.paper_vision, self.config.vision, vehicle)
-        from ibvs_qp.vision.perception import Perception
-
-        return Perception(self.config.vision, vehicle)
 
     def _correct_motion(self, features: FeatureFrame, contact: ContactState) -> None:
         """Correct motion and lines at the time of capture."""
@@ -324,25 +278,68 @@ class Pilot:
             return
         gravity = down_in_body(self._history_attitude[self._slot(features.stamp_ns)])
         self.motion.correct(features, WallAxes.of(normal, gravity), distance)
-        self._covariance = self.motion.velocity_variance * _EYE  # nothing else changes it
+        self._covariance = self.motion.velocity_variance * np.eye(3)  # changes nowhere else
+
+    # ------------------------------------------------- strategy and controller
+
+    def _strategy(self, frame: SensorFrame, contact: ContactState, dt: float) -> PaintingCommand:
+        """Command of the painter, tilted after a lost rotor."""
+        motion = self.motion
+        inputs = PainterInput(
+            time_s=(frame.stamp_ns - self._first) * 1e-9,
+            lines=motion.lines,
+            odometer=motion.state[4:6],
+            velocity=motion.state[:2],
+            distance=contact.distance,
+            wall_known=contact.known,
+            in_contact=contact.in_contact,
+            time_since_touch=contact.time_since_touch,
+            push=contact.push,
+            push_reference=self.setpoints.push_reference,  # of the tick before: the controller runs after the painter
+            tared=self.tare.ready,
+        )
+        if self.thrust_limits is not None and self.supervisor.update(self.thrust_limits):
+            self.painter.abandon(inputs, "no level hover is left")
+        target = self.painter.step(inputs)
+        if not self.supervisor.lost:
+            return target
+        normal = np.array(contact.normal)
+        away = contact.distance + float(normal @ self._tip)
+        return dataclasses.replace(target, tilt=self.supervisor.tilt(away, contact.speed, motion.state[0], normal, dt))
+
+    def _refer(self, target: PaintingCommand, contact: ContactState) -> Reference:
+        """Reference of a command; offsets in metres become rho = l / d at the measured distance."""
+        _, tip_below, tip_ahead = self._tip_camera
+        depth = tip_ahead + (contact.distance if contact.known else ASSUMED_DISTANCE)
+        references = []
+        for line, offset in target.guides:
+            if line.role == HORIZONTAL:
+                rho, theta = (offset + tip_below) / depth, 0.5 * math.pi
+            else:
+                rho, theta = offset / depth, 0.0
+            references.append(LineReference(rho=rho, theta=theta, role=line.role))
+        return Reference(
+            push_force=target.push,
+            standoff=target.standoff,
+            lines=tuple(references),
+            velocity=target.velocity,
+            contact=target.contact,
+            tilt=target.tilt,
+            travel=target.travel,
+        )
 
     def _measure(
         self, frame: SensorFrame, wrench: np.ndarray, axes: WallAxes, target: PaintingCommand, contact: ContactState
     ) -> Measurement:
+        """Measurement of the tick from sensors and estimates; no velocity if the last one is too old."""
         velocity = covariance = None
+        if self.supervisor.lost or self.motion.velocity_age_s < self.config.estimation.velocity_life_s:
+            (right, down, *_), rate = self.motion.state, contact.rate
+            rows = zip(axes.right, axes.down, axes.normal, strict=True)
+            velocity = np.array([r * right + d * down - n * rate for r, d, n in rows])
+            covariance = self._covariance
         distance = contact.distance if contact.known else ASSUMED_DISTANCE
         low, high = self.thrust_limits or (None, None)
-        if self.supervisor.lost or self.motion.velocity_age_s < self._velocity_life_s:
-            right, down, *_ = self.motion.state
-            (nx, ny, nz), (rx, ry, rz), (dx, dy, dz), rate = axes.normal, axes.right, axes.down, contact.rate
-            velocity = np.array(
-                (
-                    rx * right + dx * down - nx * rate,
-                    ry * right + dy * down - ny * rate,
-                    rz * right + dz * down - nz * rate,
-                )
-            )
-            covariance = self._covariance
         return Measurement(
             stamp_ns=frame.stamp_ns,
             attitude=frame.attitude,
@@ -357,40 +354,4 @@ class Pilot:
             velocity_covariance=covariance,
             thrust_min=low,
             thrust_max=high,
-        )
-
-    def _painter_input(self, frame: SensorFrame, contact: ContactState) -> PainterInput:
-        motion, state = self.motion, self.motion.state
-        return PainterInput(
-            (frame.stamp_ns - self._first) * 1e-9,
-            motion.lines,
-            state[4:6],
-            state[:2],
-            contact.distance,
-            contact.known,
-            contact.in_contact,
-            contact.time_since_touch,
-            contact.push,
-            self.controller.setpoints.push_reference,  # of the tick before: the controller runs after the painter
-            self.tare.ready,
-        )
-
-    def _refer(self, target: PaintingCommand, contact: ContactState) -> Reference:
-        """Offsets in metres to line references: rho = l / d at the measured distance."""
-        depth = self._tip_camera[2] + (contact.distance if contact.known else ASSUMED_DISTANCE)
-        references = []
-        for line, offset in target.guides:
-            if line.role == HORIZONTAL:
-                rho, theta = (offset + self._tip_camera[1]) / depth, 0.5 * math.pi
-            else:
-                rho, theta = offset / depth, 0.0
-            references.append(LineReference(rho=rho, theta=theta, role=line.role))
-        return Reference(
-            push_force=target.push,
-            standoff=target.standoff,
-            lines=tuple(references),
-            velocity=target.velocity,
-            contact=target.contact,
-            tilt=target.tilt,
-            travel=target.travel,
         )

@@ -25,7 +25,6 @@ from ibvs_qp.config.contact_margin import (
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.model import push_reference
 from ibvs_qp.pilot import Pilot, PilotConfig
-from ibvs_qp.tasks import push
 from sim.flight.options import PRESETS, FlightOptions, pilot_config
 from sim.flight.surroundings import World
 from sim.world.scene import ForceTorqueScene, ImuScene, Scene
