@@ -13,8 +13,7 @@ from allocation import Rotor
 from ibvs_qp import ControllerConfig, HybridController, Measurement, Reference, RotorGeometry, VehicleParams
 from ibvs_qp.limits import Limit
 from ibvs_qp.model.model import Model
-from ibvs_qp.model.parameter import Parameter
-from ibvs_qp.model.rows import LimitRow, TaskRow
+from ibvs_qp.model.rows import LimitRow, Parameter, TaskRow
 from ibvs_qp.tasks import Task
 
 

@@ -17,7 +17,7 @@ from ibvs_qp.model.setpoints import Setpoints
 from ibvs_qp.qp.accept import AcceptedSolution, QpEngine
 from ibvs_qp.qp.evaluator import ProgramData
 from ibvs_qp.qp.explain import active_limits, task_reports
-from ibvs_qp.qp.faults import program_faults
+from ibvs_qp.qp.infeasible import program_faults
 from ibvs_qp.qp.problem import QpProblem
 from ibvs_qp.safety.hover import hold_thrusts
 from ibvs_qp.tasks import (

@@ -1,9 +1,11 @@
-"""A limit: a named set of two-sided rows, hard or soft."""
+"""A limit: a named set of two-sided rows, hard or soft; bounds of an exponential barrier."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from typing import ClassVar
+
+import casadi as ca
 
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.rows import LimitRow
@@ -36,3 +38,17 @@ class Limit(ABC):
     def slack_weight(model: Model, weight: float) -> float | None:
         """Weight of the slack; None with `limits.hard_barriers`."""
         return None if model.config.limits.hard_barriers else weight
+
+
+def barrier_bounds(angle: ca.SX, rate: ca.SX, bound: float, pole: float) -> tuple[ca.SX, ca.SX]:
+    r"""Acceleration bounds of an exponential barrier with both poles at -p.
+
+    For :math:`h = \bar\varphi - \varphi` demand :math:`\ddot h + 2p\dot h + p^2 h \ge 0`, so
+    :math:`\ddot\varphi \le p^2(\bar\varphi-\varphi) - 2p\dot\varphi`, and mirrored below (Nguyen and Sreenath,
+    Exponential control barrier functions, ACC 2016).
+
+    Returns:
+        Lower and upper bound of the angular acceleration [rad/s^2].
+    """
+    damping = -2.0 * pole * rate
+    return -(pole**2) * (bound + angle) + damping, pole**2 * (bound - angle) + damping

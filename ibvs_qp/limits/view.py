@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ibvs_qp.limits.barrier import barrier_bounds
-from ibvs_qp.limits.limit import WIDE, Limit
+from ibvs_qp.limits.limit import WIDE, Limit, barrier_bounds
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL
 from ibvs_qp.model.interaction_matrix import symbolic_line_rows
 from ibvs_qp.model.model import Model

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ibvs_qp.limits.barrier import barrier_bounds
-from ibvs_qp.limits.limit import Limit
+from ibvs_qp.limits.limit import Limit, barrier_bounds
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.rows import LimitRow
 

@@ -18,9 +18,8 @@ from ibvs_qp.model.external_wrench import external_wrench
 from ibvs_qp.model.feedforward import SLIDING_COMMAND, contact_feedforward
 from ibvs_qp.model.friction import cautious_friction, estimated_friction
 from ibvs_qp.model.inputs import Body, Contact, Line, Target, declare_inputs
-from ibvs_qp.model.parameter import Parameter
-from ibvs_qp.model.push_reference import push_reference
-from ibvs_qp.model.reach import STANDING_SPEED, push_reach
+from ibvs_qp.model.reach import STANDING_SPEED, push_reach, push_reference
+from ibvs_qp.model.rows import Parameter
 from ibvs_qp.model.signals import Signals
 from ibvs_qp.model.thrust_window import thrust_window
 from ibvs_qp.model.wall_axes import wall_axes
@@ -100,13 +99,8 @@ class Model:
 
     def _disturbances(self) -> tuple[ca.SX, ca.SX]:
         """Bias wrench; returns its part without contact, and the friction coefficient that the reach assumes."""
-        signals, config, vehicle, body, contact = (
-            self.signals,
-            self.config,
-            self.config.vehicle,
-            self.body,
-            self.contact,
-        )
+        signals, config, vehicle = self.signals, self.config, self.config.vehicle
+        body, contact = self.body, self.contact
         tip = body.velocity_of(vehicle.tip_position_m)
         stuck_speed = config.contact.stuck_speed_m_s
         before, friction = estimated_friction(signals, body, contact, tip, self.travel, SLIDING_COMMAND, stuck_speed)

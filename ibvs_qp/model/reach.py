@@ -1,4 +1,4 @@
-"""How far the vehicle can push, and how little: a ray in wrench space from where the rotors' limits let it in."""
+"""Largest and least push within the rotors' limits, by a ray in wrench space, and the push reference within them."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import casadi as ca
 import numpy as np
 
 from allocation.wrench_facets import ON_PLANE, RELATIVE_ZERO, WrenchFacets
-from ibvs_qp.config.vehicle import VehicleParams
+from ibvs_qp.config import ControllerConfig, VehicleParams
+from ibvs_qp.model.inputs import Body, Contact, Target, clamp
 from ibvs_qp.model.signals import Signals
 
 #: Reach when nothing bounds it [N].
@@ -15,6 +16,10 @@ UNBOUNDED = 1e6
 NO_PUSH = 2.0 * UNBOUNDED
 #: Commanded speed below which the tip counts as standing still [m/s]: a drifting odometer commands no slide.
 STANDING_SPEED = 1e-2
+#: Fraction of the reach that a push may use; the rest holds the vehicle in place.
+REACH_FRACTION = 0.97
+#: Fastest fall and rise of the reference in contact [N/s]: a fall follows a thrust limit that was just lowered.
+FALL, RISE = 60.0, 10.0
 
 
 def push_reach(
@@ -50,3 +55,14 @@ def push_reach(
     reach = ca.fmax(leave, 0.0)
     signals.output("least_push", ca.if_else(leave >= enter - ON_PLANE, ca.fmin(enter, reach), NO_PUSH))
     return signals.output("reach", reach)
+
+
+def push_reference(
+    signals: Signals, config: ControllerConfig, body: Body, contact: Contact, target: Target, reach: ca.SX
+) -> ca.SX:
+    """Push reference [N]: at most 97 % of the reach, slewed in contact; 0 without a press command."""
+    allowed = ca.fmin(target.push, REACH_FRACTION * reach) if config.reach_check else target.push
+    last = signals.state("push_allowed")
+    limited = clamp(allowed, last - FALL * body.dt, last + RISE * body.dt)
+    allowed = signals.remember("push_allowed", ca.if_else(contact.touching, limited, allowed))
+    return signals.output("push_reference", ca.if_else(target.press, allowed, 0.0))

@@ -1,10 +1,12 @@
-"""The two kinds of rows of the program: a weighted least-squares row of a task, a two-sided row of a limit."""
+"""Rows of the program: a least-squares row of a task, a two-sided row of a limit, and a parameter of either."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import casadi as ca
+import numpy as np
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,3 +46,15 @@ class LimitRow:
     lower: ca.SX
     upper: ca.SX
     slack_weight: float | None = None
+
+
+class Parameter:
+    """Number of a task or limit that may change between steps; rows contain its symbol (`Model.parameter`).
+
+    Attributes:
+        name: Unique among the inputs of the step.
+        value: Present value, (size,); assign with ``value[:] =``.
+    """
+
+    def __init__(self, name: str, value: float | Sequence[float]) -> None:
+        self.name, self.value = name, np.atleast_1d(np.array(value, float))

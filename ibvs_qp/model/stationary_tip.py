@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+import casadi as ca
+
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.model.feedforward import moment_lag
+from ibvs_qp.model.model import Model
 
 #: Used fraction of the largest stable stiffness; closer to it the vehicle rocks about its tip until it slips.
 STIFFNESS_FRACTION = 1.0 / 3.0
@@ -27,3 +32,20 @@ def pivot_stiffness(config: ControllerConfig) -> tuple[float, float]:
         STIFFNESS_FRACTION * gains.attitude_kd * (pitch / swing + gains.velocity_kp),
         STIFFNESS_FRACTION * gains.yaw_kd * (yaw / swing + gains.velocity_kp),
     )
+
+
+def pivot_limited(model: Model, stiffness: float, pivot: float, guides: Sequence[ca.SX]) -> ca.SX:
+    """Stiffness of an axis [1/s^2], reduced while friction alone holds the tip.
+
+    Args:
+        model: Lines, tip and switch of the feed-forward.
+        stiffness: Of a free vehicle [1/s^2].
+        pivot: Of a vehicle that turns about its tip, by `pivot_stiffness` [1/s^2].
+        guides: For every line 1 if it fixes the place of the tip across this axis.
+    """
+    if not model.config.contact_feedforward:
+        return ca.SX(stiffness)
+    guided = ca.SX(0.0)
+    for line, guide in zip(model.lines, guides, strict=True):
+        guided = ca.fmax(guided, guide * line.present * line.confidence)
+    return stiffness + model.tip_stationary * (1.0 - guided) * (min(stiffness, pivot) - stiffness)

@@ -6,7 +6,7 @@ import casadi as ca
 
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.rows import TaskRow
-from ibvs_qp.model.stationary_tip import pivot_stiffness
+from ibvs_qp.model.stationary_tip import pivot_limited, pivot_stiffness
 from ibvs_qp.tasks.task import Task
 
 
@@ -30,16 +30,8 @@ class LevelTask(Task):
         ]
 
     def targets(self, model: Model) -> ca.SX:
-        """Roll and pitch accelerations [rad/s^2], (2,)."""
-        stiffness = ca.vertcat(model.config.gains.attitude_kp, self._pitch_stiffness(model))
-        return -stiffness * model.attitude.tilt_error - model.config.gains.attitude_kd * model.attitude.tilt_rate
-
-    def _pitch_stiffness(self, model: Model) -> ca.SX:
-        """K_p of pitch [1/s^2], lower while friction alone holds the tip vertically."""
-        stiffness, guided = model.config.gains.attitude_kp, ca.SX(0.0)
-        if not model.config.contact_feedforward:
-            return ca.SX(stiffness)
-        for line in model.lines:
-            guided = ca.fmax(guided, (1.0 - line.vertical) * line.present * line.confidence)
-        soft, _ = pivot_stiffness(model.config)
-        return stiffness + model.tip_stationary * (1.0 - guided) * (min(stiffness, soft) - stiffness)
+        """Roll and pitch accelerations [rad/s^2], (2,); softer in pitch while friction alone holds the tip."""
+        gains, (soft, _) = model.config.gains, pivot_stiffness(model.config)
+        level = [1.0 - line.vertical for line in model.lines]
+        stiffness = ca.vertcat(gains.attitude_kp, pivot_limited(model, gains.attitude_kp, soft, level))
+        return -stiffness * model.attitude.tilt_error - gains.attitude_kd * model.attitude.tilt_rate

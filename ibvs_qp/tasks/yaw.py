@@ -7,7 +7,7 @@ import casadi as ca
 from ibvs_qp.model.inputs import clamp
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.rows import TaskRow
-from ibvs_qp.model.stationary_tip import pivot_stiffness
+from ibvs_qp.model.stationary_tip import pivot_limited, pivot_stiffness
 from ibvs_qp.tasks.task import Task
 
 #: Largest yaw acceleration of a vehicle that lost a rotor [rad/s^2]: more would cost roll and pitch.
@@ -32,18 +32,10 @@ class YawTask(Task):
         ]
 
     def target(self, model: Model) -> ca.SX:
-        """Yaw acceleration [rad/s^2]."""
-        damping = -model.config.gains.yaw_kd * model.body.rate[2]
-        facing = -self._stiffness(model) * model.attitude.yaw + damping
+        """Yaw acceleration [rad/s^2]; softer while friction alone holds the tip sideways."""
+        gains, (_, soft) = model.config.gains, pivot_stiffness(model.config)
+        stiffness = pivot_limited(model, gains.yaw_kp, soft, [line.vertical for line in model.lines])
+        damping = -gains.yaw_kd * model.body.rate[2]
+        facing = -stiffness * model.attitude.yaw + damping
         braking = clamp(damping, -ROTOR_LOST_ACCELERATION, ROTOR_LOST_ACCELERATION)
         return ca.if_else(model.attitude.tilted, braking, facing)
-
-    def _stiffness(self, model: Model) -> ca.SX:
-        """K_p of yaw [1/s^2], lower while friction alone holds the tip sideways."""
-        stiffness, guided = model.config.gains.yaw_kp, ca.SX(0.0)
-        if not model.config.contact_feedforward:
-            return ca.SX(stiffness)
-        for line in model.lines:
-            guided = ca.fmax(guided, line.vertical * line.present * line.confidence)
-        _, soft = pivot_stiffness(model.config)
-        return stiffness + model.tip_stationary * (1.0 - guided) * (min(stiffness, soft) - stiffness)

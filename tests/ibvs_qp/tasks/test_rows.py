@@ -23,7 +23,7 @@ from allocation import control_effectiveness
 from ibvs_qp.config import ControllerConfig, Weights
 from ibvs_qp.controller import HybridController
 from ibvs_qp.frames import R_BODY_CAMERA, align_line
-from ibvs_qp.limits.barrier import barrier_bounds
+from ibvs_qp.limits.limit import barrier_bounds
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL, Reference
 
 

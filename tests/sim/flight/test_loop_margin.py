@@ -23,7 +23,7 @@ from ibvs_qp.config.contact_margin import (
     require_margin,
 )
 from ibvs_qp.config.errors import ConfigError
-from ibvs_qp.model import push_reference
+from ibvs_qp.model import reach
 from ibvs_qp.pilot import Pilot, PilotConfig
 from sim.flight.options import PRESETS, FlightOptions, pilot_config
 from sim.flight.surroundings import World
@@ -105,7 +105,7 @@ def ringing(push: np.ndarray, dt: float, order: int = 8) -> tuple[float, float]:
 
 @pytest.mark.parametrize("force_kfp", [0.8, 1.6])  # the shipped 0.35 is damped 0.45: nothing rings
 def test_predicts_the_ringing_of_the_flown_contact(force_kfp: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(push_reference, "RISE", 1e3)  # a step that is slewed in is no step
+    monkeypatch.setattr(reach, "RISE", 1e3)  # a step that is slewed in is no step
     # From farther away: the estimator of distance and rate has settled, as the model of the loop assumes.
     config, push = pushed(1500.0, 0.004, 6.2, distance=0.45, force_kfp=force_kfp)
     margin = contact_mode_damping(config, 1500.0, 30.0, 0.004 + HALF_SAMPLE)
