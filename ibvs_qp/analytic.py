@@ -5,15 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from ibvs_qp.command import Command, Outcome
-from ibvs_qp.config import ControllerConfig
+from ibvs_qp.config import ControllerConfig, Gains
 from ibvs_qp.estimation.contact_state import ContactState
 from ibvs_qp.measurement import Measurement, Reference
 from ibvs_qp.model.model import Model
-from ibvs_qp.model.reporting import clipped_command, contact_mode, reach_note
-from ibvs_qp.model.setpoints import Setpoints
-from ibvs_qp.safety.hover import hold_thrusts
+from ibvs_qp.model.reporting import clipped_command, hover_command, reach_note
+from ibvs_qp.model.setpoints import LineSetpoint, Setpoints
 from ibvs_qp.tasks import LevelTask, LineTask, PushTask, StandoffTask, VelocityTask, YawTask
-from ibvs_qp.validation.measurement import MeasurementGate, answered_stamp
+from ibvs_qp.validation.measurement import MeasurementGate
 from ibvs_qp.validation.reference import check_reference
 
 #: Singular values below this fraction of the largest are dropped in the pseudo-inverse of L.
@@ -25,41 +24,48 @@ def analytic_wrench(setpoints: Setpoints) -> np.ndarray:
 
     .. math::
         \tau = (I-\Lambda)\,\tau_{vs} + \Lambda \tau_f, \quad
-        \tau_{vs} = -M [L^\dagger (K_p e + K_d \dot e + K_i \textstyle\int e) + (I - L^\dagger L)\tau_p],
-        \quad \Lambda = \mathrm{blockdiag}(\lambda n n^T, 0).
+        \tau_{vs} = M [L^\dagger \ddot s + (I - L^\dagger L) a_p], \quad
+        \ddot s = -(K_p e + K_d \dot e + K_i \textstyle\int e), \quad
+        \Lambda = \mathrm{blockdiag}(\lambda n n^T, 0)
 
-    L stacks the rho row of every line and ONE angle row, that of the line nearest the image centre. Stacking the
-    angle rows of a horizontal and a vertical line as printed makes their difference command pitch through a lever
-    of rho: measured, a vertical edge entering the picture pitched the vehicle by 14 degrees.
+    with the acceleration a_p of the secondary tasks and the push n F as tau_f.
 
     Returns:
         Wrench beyond feedback linearisation [N, N m], (6,).
     """
-    config = setpoints.config
-    gains, vehicle = config.gains, config.vehicle
-    standoff, (right, down) = setpoints.standoff_command / vehicle.mass_kg, setpoints.velocity_command.tolist()
-    axes = zip(setpoints.normal.tolist(), setpoints.right.tolist(), setpoints.down.tolist(), strict=True)
-    complementary = np.array([n * standoff + r * right + d * down for n, r, d in axes] + setpoints.angular.tolist())
-    acceleration = complementary
-    lines = setpoints.lines  # made anew whenever they are read, and so are their matrices
-    if lines:
-        matrices, wanted = [line.matrix for line in lines], []
-        for line in lines:
-            wanted.append(
-                -(gains.line_kp * line.rho_error + gains.line_kd * line.rho_rate + gains.line_ki * line.integral)
-            )
-        nearest = min(range(len(lines)), key=lambda index: abs(lines[index].rho))
-        level = lines[nearest]
-        wanted.append(-(gains.theta_kp * level.angle_error + gains.theta_kd * level.angle_rate))
-        matrix = np.array([*(rows[0] for rows in matrices), matrices[nearest][1]])
+    vehicle = setpoints.config.vehicle
+    acceleration = _secondary_acceleration(setpoints)
+    if lines := setpoints.lines:
+        matrix, image_acceleration = _stacked_lines(lines, setpoints.config.gains)
         inverse = _pseudo_inverse(matrix)
-        acceleration = inverse.dot(np.array(wanted)) + complementary - inverse.dot(matrix.dot(complementary))
-    mass = vehicle.mass_kg
-    motion = np.array((mass, mass, mass, *vehicle.inertia_kg_m2)) * acceleration
-    force = motion[:3]
-    along = float(setpoints.normal.dot(force))
-    force += setpoints.normal * setpoints.contact_weight * (setpoints.push_command - along)
-    return motion
+        acceleration = inverse.dot(image_acceleration) + acceleration - inverse.dot(matrix.dot(acceleration))
+    wrench = np.array((*[vehicle.mass_kg] * 3, *vehicle.inertia_kg_m2)) * acceleration
+    along = float(setpoints.normal.dot(wrench[:3]))
+    wrench[:3] += setpoints.normal * setpoints.contact_weight * (setpoints.push_command - along)
+    return wrench
+
+
+def _secondary_acceleration(setpoints: Setpoints) -> np.ndarray:
+    """Acceleration a_p of stand-off, velocity and attitude, for the null space of the lines, (6,)."""
+    standoff = setpoints.standoff_command / setpoints.config.vehicle.mass_kg
+    right, down = setpoints.velocity_command.tolist()
+    axes = zip(setpoints.normal.tolist(), setpoints.right.tolist(), setpoints.down.tolist(), strict=True)
+    return np.array([n * standoff + r * right + d * down for n, r, d in axes] + setpoints.angular.tolist())
+
+
+def _stacked_lines(lines: list[LineSetpoint], gains: Gains) -> tuple[np.ndarray, np.ndarray]:
+    """L and the commanded image acceleration: rho of every line and ONE angle, of the line nearest the image centre.
+
+    Stacking the angle rows of a horizontal and a vertical line as printed makes their difference command pitch through
+    a lever of rho: measured, a vertical edge entering the picture pitched the vehicle by 14 degrees.
+    """
+    level = min(lines, key=lambda line: abs(line.rho))
+    commands = [
+        -(gains.line_kp * line.rho_error + gains.line_kd * line.rho_rate + gains.line_ki * line.integral)
+        for line in lines
+    ]
+    commands.append(-(gains.theta_kp * level.angle_error + gains.theta_kd * level.angle_rate))
+    return np.array([*(line.matrix[0] for line in lines), level.matrix[1]]), np.array(commands)
 
 
 def _pseudo_inverse(matrix: np.ndarray) -> np.ndarray:
@@ -104,17 +110,12 @@ class PaperController:
         """Thrusts for one tick; never raises, clips to box and rate; arguments as of `HybridController.step`."""
         checked, rejected = self._gate.check(measurement)
         reference, refused = check_reference(reference, self._reference)
-        self._reference, rejected, setpoints = reference, rejected + refused, self.setpoints
-        stamp = answered_stamp(measurement)
+        self._reference, rejected = reference, rejected + refused
         if checked is None:
-            setpoints.pause()
-            return clipped_command(
-                setpoints, stamp, hold_thrusts(self.config, self._gate.inertial), Outcome.HOLD, "hold", rejected
-            )
+            return hover_command(self.setpoints, measurement, self._gate.inertial, rejected)
         if self._gate.restarted:
-            setpoints.restart()
-        setpoints.update(checked, reference, contact)
-        free, outcome, mode = analytic_thrusts(setpoints), Outcome.SOLVED, contact_mode(setpoints, reference)
-        if not np.isfinite(free).all():
-            free, outcome, mode = hold_thrusts(self.config, checked), Outcome.HOLD, "hold"
-        return clipped_command(setpoints, stamp, free, outcome, mode, rejected + reach_note(setpoints, reference))
+            self.setpoints.restart()
+        self.setpoints.update(checked, reference, contact)
+        rejected += reach_note(self.setpoints, reference)
+        free = analytic_thrusts(self.setpoints)
+        return clipped_command(self.setpoints, checked, reference, free, Outcome.SOLVED, rejected)

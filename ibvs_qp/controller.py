@@ -1,4 +1,9 @@
-"""HybridController: one quadratic program per tick for lines, push, level flight, yaw and six tilted rotors."""
+"""HybridController: one quadratic program per tick for lines, push, level flight, yaw and six tilted rotors.
+
+A tick validates its inputs, evaluates the set-points of the tasks (one compiled function that also fills the program),
+solves the program with OSQP and reports what tasks and limits did. The equations are in `ibvs_qp.tasks` and
+`ibvs_qp.limits`, one file each; the program is assembled in `ibvs_qp.qp.problem`.
+"""
 
 from __future__ import annotations
 
@@ -6,20 +11,20 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ibvs_qp.analytic import analytic_thrusts
 from ibvs_qp.command import Command, Outcome
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.estimation.contact_state import ContactState
 from ibvs_qp.limits import ApproachLimit, Limit, PushCeiling, ThrustLimit, TiltLimit, ViewLimit, YawLimit
 from ibvs_qp.measurement import Measurement, Reference
 from ibvs_qp.model.model import Model
-from ibvs_qp.model.reporting import clipped_command, contact_mode, reach_margin, reach_note
+from ibvs_qp.model.reporting import clipped_command, contact_mode, hover_command, reach_margin, reach_note
 from ibvs_qp.model.setpoints import Setpoints
 from ibvs_qp.qp.accept import AcceptedSolution, QpEngine
 from ibvs_qp.qp.evaluator import ProgramData
 from ibvs_qp.qp.explain import active_limits, task_reports
 from ibvs_qp.qp.infeasible import program_faults
 from ibvs_qp.qp.problem import QpProblem
-from ibvs_qp.safety.hover import hold_thrusts
 from ibvs_qp.tasks import (
     EffortTask,
     HeightTask,
@@ -33,12 +38,12 @@ from ibvs_qp.tasks import (
     VelocityTask,
     YawTask,
 )
-from ibvs_qp.validation.measurement import MeasurementGate, answered_stamp
+from ibvs_qp.validation.measurement import MeasurementGate
 from ibvs_qp.validation.reference import check_reference
 
-#: Wrench given up by a tick that no limit touches; shared by all of them.
-_NOTHING = np.zeros(6)
-_NOTHING.flags.writeable = False
+#: Unallocated wrench of every tick without an active limit [N, N m].
+NO_WRENCH = np.zeros(6)
+NO_WRENCH.flags.writeable = False
 
 
 def default_tasks(config: ControllerConfig) -> list[Task]:
@@ -60,11 +65,11 @@ def default_limits(config: ControllerConfig) -> list[Limit]:
         (settings.push_barrier, PushCeiling()),
         (settings.approach_barrier, ApproachLimit()),
     ]
-    return [ThrustLimit(), *(limit for wanted, limit in barriers if config.barriers and wanted)]
+    return [ThrustLimit(), *(limit for enabled, limit in barriers if config.barriers and enabled)]
 
 
 def qp_problem(config: ControllerConfig, tasks: Sequence[Task] = (), limits: Sequence[Limit] = ()) -> QpProblem:
-    """The program of a configuration: shipped tasks and limits and further ones, assembled."""
+    """The program of a configuration: the shipped tasks and limits and further ones."""
     return QpProblem(Model(config), [*default_tasks(config), *tasks], [*default_limits(config), *limits])
 
 
@@ -86,8 +91,7 @@ class HybridController:
         self.config = config or ControllerConfig()
         self.problem = qp_problem(self.config, tasks, limits)
         self.setpoints = Setpoints(self.problem.model, self.problem.values)
-        data = ProgramData(self.problem, self.setpoints.step)
-        self.engine = QpEngine(self.problem, self.config.solver, data)
+        self.engine = QpEngine(self.problem, self.config.solver, ProgramData(self.problem, self.setpoints.step))
         self._gate = MeasurementGate(self.config.vehicle.geometry.count)
         self.reset()
 
@@ -112,43 +116,37 @@ class HybridController:
         """
         checked, rejected = self._gate.check(measurement)
         reference, refused = check_reference(reference, self._reference)
-        self._reference = reference
-        rejected += refused
-        if len(reference.lines) > self.config.line_slots:
-            rejected += (
-                f"reference.lines: {len(reference.lines)} given, room for line_slots = {self.config.line_slots}",
-            )
+        self._reference, rejected = reference, rejected + refused + self._surplus_lines(reference)
         if checked is None:
-            return self._hold(measurement, rejected)
+            return hover_command(self.setpoints, measurement, self._gate.inertial, rejected)
         if self._gate.restarted:
             self.setpoints.restart()
         self.setpoints.update(checked, reference, contact)
         solution = self.engine.solve()
         if solution is None:
-            return self._fallback(checked, rejected)
+            free, rejected = analytic_thrusts(self.setpoints), rejected + self._causes()
+            return clipped_command(self.setpoints, checked, reference, free, Outcome.ANALYTIC_FALLBACK, rejected)
         if not self.config.thrust_rows:
-            mode = contact_mode(self.setpoints, self._reference)
-            return clipped_command(
-                self.setpoints, int(checked.stamp_ns), solution.thrusts, solution.outcome, mode, rejected
-            )
-        return self._finish(checked, solution, rejected)
+            return clipped_command(self.setpoints, checked, reference, solution.thrusts, solution.outcome, rejected)
+        return self._command(checked, reference, solution, rejected)
 
-    def _finish(self, measurement: Measurement, solution: AcceptedSolution, rejected: tuple[str, ...]) -> Command:
+    def _command(
+        self, measurement: Measurement, reference: Reference, solution: AcceptedSolution, rejected: tuple[str, ...]
+    ) -> Command:
         thrusts, setpoints, data = solution.thrusts, self.setpoints, self.engine.data
-        unallocated, given_up, limits = _NOTHING, 0.0, ()
+        unallocated, limits = NO_WRENCH, ()
         if solution.limited:
             unallocated = setpoints.effectiveness.dot(data.free - thrusts)
-            given_up = max(map(abs, unallocated.tolist()))
             limits = active_limits(self.problem, solution.x, solution.y)
         tasks = task_reports(self.problem, data, thrusts)
-        setpoints.note(thrusts, given_up)
+        setpoints.note(thrusts, max(map(abs, unallocated.tolist())))
         return Command(
             stamp_ns=int(measurement.stamp_ns),
             thrusts=thrusts,
             wrench=setpoints.effectiveness.dot(thrusts),
             outcome=solution.outcome,
-            mode=contact_mode(setpoints, self._reference),
-            rejected=rejected + reach_note(setpoints, self._reference),
+            mode=contact_mode(setpoints, reference),
+            rejected=rejected + reach_note(setpoints, reference),
             tasks=tasks,
             active_limits=limits,
             unallocated_wrench=unallocated,
@@ -157,22 +155,13 @@ class HybridController:
             solve_time_s=solution.seconds,
         )
 
-    def _fallback(self, measurement: Measurement, rejected: tuple[str, ...]) -> Command:
-        """The analytic law answers when no solver did."""
-        from ibvs_qp.analytic import analytic_thrusts
-
-        free, outcome = analytic_thrusts(self.setpoints), Outcome.ANALYTIC_FALLBACK
-        mode = contact_mode(self.setpoints, self._reference)
+    def _causes(self) -> tuple[str, ...]:
+        """Reasons why no solver found a solution."""
         if self.engine.conflict:
-            rejected += (f"limits: no solution keeps all of {', '.join(self.engine.conflict)}",)
-        else:
-            faults = program_faults(self.problem, self.engine.data)
-            rejected += faults or ("program: no solver found a solution",)
-        if not np.isfinite(free).all():
-            free, outcome, mode = hold_thrusts(self.config, measurement), Outcome.HOLD, "hold"
-        return clipped_command(self.setpoints, int(measurement.stamp_ns), free, outcome, mode, rejected)
+            return (f"limits: no solution keeps all of {', '.join(self.engine.conflict)}",)
+        faults = program_faults(self.problem, self.engine.data)
+        return faults or ("program: no solver found a solution",)
 
-    def _hold(self, measurement: Measurement, rejected: tuple[str, ...]) -> Command:
-        free = hold_thrusts(self.config, self._gate.inertial)
-        self.setpoints.pause()
-        return clipped_command(self.setpoints, answered_stamp(measurement), free, Outcome.HOLD, "hold", rejected)
+    def _surplus_lines(self, reference: Reference) -> tuple[str, ...]:
+        given, room = len(reference.lines), self.config.line_slots
+        return (f"reference.lines: {given} given, room for line_slots = {room}",) if given > room else ()

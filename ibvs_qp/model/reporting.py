@@ -1,4 +1,4 @@
-"""What both laws report alike: contact phase, reach, and thrusts that were clipped."""
+"""Reports of both laws: contact phase, reach, and commands of clipped thrusts."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ import math
 import numpy as np
 
 from ibvs_qp.command import ActiveLimit, Command, Outcome
-from ibvs_qp.measurement import Reference
+from ibvs_qp.measurement import Measurement, Reference
 from ibvs_qp.model.setpoints import Setpoints
+from ibvs_qp.safety.hover import hold_thrusts
+from ibvs_qp.validation.measurement import answered_stamp
 
 #: A thrust this far outside its window counts as clipped [N].
 CLIPPED = 1e-9
@@ -50,18 +52,41 @@ def reach_note(setpoints: Setpoints, reference: Reference) -> tuple[str, ...]:
 
 
 def clipped_command(
-    setpoints: Setpoints, stamp_ns: int, free: np.ndarray, outcome: Outcome, mode: str, rejected: tuple[str, ...]
+    setpoints: Setpoints,
+    measurement: Measurement,
+    reference: Reference,
+    free: np.ndarray,
+    outcome: Outcome,
+    rejected: tuple[str, ...],
 ) -> Command:
-    """Command of free thrusts clipped to this tick's window; names the rotors that were clipped.
+    """Command of thrusts that ignore the limits, clipped to this tick's window; hover if they are not finite.
 
     Args:
-        setpoints: Set-points of the tick; take note of what is commanded.
-        stamp_ns: Time of the measurement answered.
+        setpoints: Set-points of the tick; they store the command.
+        measurement: Validated measurement of the tick.
+        reference: Validated reference.
         free: Thrusts without limits [N], (n,).
         outcome: How they were found.
-        mode: Contact phase.
         rejected: Inputs refused.
     """
+    mode = contact_mode(setpoints, reference)
+    if not np.isfinite(free).all():
+        free, outcome, mode = hold_thrusts(setpoints.config, measurement), Outcome.HOLD, "hold"
+    return _clipped(setpoints, int(measurement.stamp_ns), free, outcome, mode, rejected)
+
+
+def hover_command(
+    setpoints: Setpoints, measurement: Measurement, inertial: Measurement | None, rejected: tuple[str, ...]
+) -> Command:
+    """Command of a tick whose measurement was refused: hover by the last accepted inertial data, if any."""
+    setpoints.pause()
+    free = hold_thrusts(setpoints.config, inertial)
+    return _clipped(setpoints, answered_stamp(measurement), free, Outcome.HOLD, "hold", rejected)
+
+
+def _clipped(
+    setpoints: Setpoints, stamp_ns: int, free: np.ndarray, outcome: Outcome, mode: str, rejected: tuple[str, ...]
+) -> Command:
     thrusts = np.minimum(np.maximum(free, setpoints.lower), setpoints.upper)
     beyond = free - thrusts
     unallocated = setpoints.effectiveness.dot(beyond)
@@ -80,17 +105,13 @@ def clipped_command(
 
 
 def _clipped_rotors(setpoints: Setpoints, beyond: list[float]) -> tuple[ActiveLimit, ...]:
-    """Rotors whose thrust was clipped, with what was taken away [N]."""
+    """Rotors whose thrust was clipped; slack is the thrust beyond the limit [N]."""
     if not any(beyond):
         return ()
     names = setpoints.config.vehicle.geometry.names
     return tuple(
         ActiveLimit(
-            name=f"thrust_{name}",
-            side="upper" if over > 0.0 else "lower",
-            price=math.nan,
-            slack=abs(over),
-            unit="N",
+            name=f"thrust_{name}", side="upper" if over > 0.0 else "lower", price=math.nan, slack=abs(over), unit="N"
         )
         for name, over in zip(names, beyond, strict=True)
         if abs(over) > CLIPPED

@@ -417,7 +417,7 @@ def test_everything_failing_leads_to_hold_and_back(monkeypatch: pytest.MonkeyPat
     controller = flying()
     with monkeypatch.context() as broken:
         broken.setattr(controller.engine, "solve", lambda: None)
-        broken.setattr("ibvs_qp.analytic.analytic_thrusts", lambda setpoints: np.full(6, math.nan))
+        broken.setattr("ibvs_qp.controller.analytic_thrusts", lambda setpoints: np.full(6, math.nan))
         command = controller.step(measured(6), Reference())
     assert command.outcome is Outcome.HOLD and command.mode == "hold"
     assert command.thrusts.sum() * math.cos(math.radians(30)) == pytest.approx(6.0 * 9.81, rel=0.02)
