@@ -72,11 +72,11 @@ class TaskReports(Sequence[TaskReport]):
         return self._reports[index]
 
     def __eq__(self, other: object) -> bool:
-        """As tuples of reports are equal."""
+        """Whether the reports are equal one by one."""
         return isinstance(other, Sequence) and self._reports == tuple(other)
 
     def __hash__(self) -> int:
-        """As the tuple of reports."""
+        """Hash of the tuple of reports."""
         return hash(self._reports)
 
 
@@ -97,7 +97,7 @@ class Command:
 
     Attributes:
         stamp_ns: Time of the measurement answered.
-        thrusts: Wanted rotor thrusts [N], (n,), always finite and within the limits.
+        thrusts: Commanded rotor thrusts [N], (n,), always finite and within the limits.
         wrench: B @ thrusts [N, N m], (6,).
         outcome: How it was found.
         mode: Contact phase: "free", "approach", "contact" or "hold".

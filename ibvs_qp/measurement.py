@@ -45,7 +45,7 @@ class LineFeature:
 
 @dataclass(frozen=True, kw_only=True)
 class LineReference:
-    """Where a line shall be: rho [-], theta [rad] and role, at the nominal tip image point."""
+    """Target of a line: rho [-], theta [rad] and role, at the nominal tip image point."""
 
     rho: float
     theta: float
@@ -92,14 +92,14 @@ class Reference:
     """Targets of a controller.
 
     Attributes:
-        push_force: Wanted push on the wall [N], >= 0.
-        standoff: Wanted distance from tip to wall while not in contact [m].
-        lines: Wanted lines; they pair with the measured ones by role, then order.
-        velocity: Wanted velocity in the wall plane (right, down) [m/s], (2,).
+        push_force: Push on the wall [N], >= 0.
+        standoff: Distance from tip to wall while not in contact [m].
+        lines: Targets of lines; they pair with the measured ones by role, then order.
+        velocity: Velocity in the wall plane (right, down) [m/s], (2,).
         contact: Press the wall (True) or keep the stand-off (False: lambda = 0).
         travel: Velocity in the wall plane that is planned at this push [m/s], (2,): reach is taken for it before it
             begins.
-        tilt: Wanted roll and pitch [rad], (2,): level, but for a vehicle that lost a rotor.
+        tilt: Roll and pitch [rad], (2,): level, except for a vehicle that lost a rotor.
     """
 
     push_force: float = 0.0

@@ -48,8 +48,16 @@ FRAME_PERIOD, FRAME_AGE = 1.0 / 30.0, 0.077
 PADE_ORDER = 4
 #: Faster poles belong to the approximants; rotors with 50 ms of lag cannot excite them [rad/s].
 FASTEST_MODE = 250.0
-#: Newton's method stops at this relative step.
-POLE_TOLERANCE = 1e-12
+#: Newton's method has diverged beyond this [rad/s].
+DIVERGED = 4.0 * FASTEST_MODE
+#: Newton's method: relative step at which it stops, largest number of steps, step of the difference quotient [1/s].
+POLE_TOLERANCE, NEWTON_STEPS, DIFFERENCE_STEP = 1e-12, 30, 1e-6
+#: Newton's method may move a start by this fraction; a farther jump leads to another pole, which has its own start.
+LARGEST_MOVE = 0.2
+#: The polynomial is scaled to this unit of time [s], in which its coefficients are of similar magnitude.
+TIME_UNIT = 0.01
+#: Roots nearer to zero than this, or to the real axis from below, are rounding [1/TIME_UNIT].
+ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,10 +127,9 @@ class ContactLoop:
         total = (total + force * force_top) * rate_bottom * smooth * gust
         total = total + self.observer * unseen * s * filtered * rate_bottom * smooth
         total = total * bottom + impedance * s * filtered * rate_top * force_bottom * gust
-        # In hundredths of a second the coefficients are of similar magnitude.
-        scaled = Polynomial(np.asarray(total.coef, float) * 100.0 ** np.arange(total.coef.size))
-        starts = [100.0 * complex(root) for root in scaled.roots() if root.imag >= -1e-9]
-        refined = [self._refine(start) for start in starts if 1e-9 < abs(start) < FASTEST_MODE]
+        scaled = Polynomial(np.asarray(total.coef, float) / TIME_UNIT ** np.arange(total.coef.size))
+        starts = [complex(root) / TIME_UNIT for root in scaled.roots() if root.imag >= -ROUNDING]
+        refined = [self._refine(start) for start in starts if ROUNDING < abs(start) < FASTEST_MODE]
         return [pole for pole in refined if pole is not None]
 
     @property
@@ -144,20 +151,19 @@ class ContactLoop:
 
     def _refine(self, start: complex) -> complex | None:
         """Newton's method from an approximate pole; None when it leads elsewhere."""
-        pole, step = start, 1e-6
-        for _ in range(30):
+        pole, step = start, DIFFERENCE_STEP
+        for _ in range(NEWTON_STEPS):
             value = self.characteristic(pole)
             slope = (self.characteristic(pole + step) - self.characteristic(pole - step)) / (2.0 * step)
             if slope == 0.0:
                 return None
             change = value / slope
             pole -= change
-            if abs(pole) > 4.0 * FASTEST_MODE:
+            if abs(pole) > DIVERGED:
                 return None
             if abs(change) < POLE_TOLERANCE * abs(pole):
                 break
-        # A far jump leads to another pole, which has its own start.
-        return pole if abs(pole - start) < 0.2 * abs(start) else None
+        return pole if abs(pole - start) < LARGEST_MOVE * abs(start) else None
 
 
 def _pade(delay: float) -> tuple[Polynomial, Polynomial]:

@@ -23,6 +23,8 @@ LEAST_DAMPING_RATIO = 0.1
 STIFFNESS_SAMPLES = 7
 #: Relative width at which the search for an allowed value stops.
 SEARCH_TOLERANCE = 1e-3
+#: A pole with a smaller relative imaginary part does not oscillate.
+REAL_POLE = 1e-6
 #: Gains that a refusal may name, the likeliest cause first.
 GAIN_NAMES = ("force_kfp", "force_kfi", "force_ksd", "force_ksp")
 
@@ -106,7 +108,7 @@ def contact_mode_damping(config: _PressingConfig, stiffness: float, damping: flo
     loop = contact_loop(config, stiffness, damping, force_delay_s)
     ratio, frequency = 1.0, 0.0
     for pole in loop.poles():
-        oscillates = abs(pole.imag) > 1e-6 * abs(pole)
+        oscillates = abs(pole.imag) > REAL_POLE * abs(pole)
         if oscillates or pole.real > 0.0:
             own = -pole.real / abs(pole) if oscillates else -1.0
             if own < ratio:

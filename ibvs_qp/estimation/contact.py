@@ -102,7 +102,6 @@ class ContactEstimator:
             speed=wall.speed,
             depth=depth,
             push=push.push,
-            push_raw=push.push_raw,
             push_noise=push.push_noise,
             across_noise=push.moment_noise / self._tip_ahead,
             in_contact=touch.in_contact,

@@ -20,7 +20,6 @@ class ContactState:
         speed: Speed of the centre of mass into the wall [m/s]; the tip moves with the body's rotation as well.
         depth: Camera to wall along the normal [m], infinite while unknown.
         push: Filtered push [N].
-        push_raw: Push of the last force sample [N].
         push_noise: Standard deviation of `push` in free flight [N].
         across_noise: Standard deviation of the filtered moments in free flight, as a force across the tip [N].
         in_contact: Whether the tip touches the wall.
@@ -39,7 +38,6 @@ class ContactState:
     speed: float
     depth: float
     push: float
-    push_raw: float
     push_noise: float
     across_noise: float
     in_contact: bool

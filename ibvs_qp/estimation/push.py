@@ -20,9 +20,6 @@ class PushFilter:
 
     Attributes:
         push: Filtered push [N].
-        push_raw: Push of the last sample [N].
-        push_noise: Standard deviation of the filtered push in free flight [N].
-        moment_noise: Standard deviation of a filtered moment in free flight [N m].
 
     Args:
         settings: Filter and averaging time.
@@ -35,7 +32,7 @@ class PushFilter:
     def reset(self) -> None:
         """Return to the state before the first sample."""
         self._stamp = -1
-        self.push = self.push_raw = 0.0
+        self.push = 0.0
         self._push_mean, self._push_variance = 0.0, FIRST_PUSH_VARIANCE
         self._moment, self._moment_variance = [0.0, 0.0, 0.0], 0.0
 
@@ -66,9 +63,8 @@ class PushFilter:
         dt = sample_interval(stamp_ns, self._stamp)
         self._stamp = stamp_ns
         sample = wrench.tolist()
-        self.push_raw = -dot(sample, normal)
         gain = 1.0 - math.exp(-2.0 * math.pi * self._settings.force_filter_hz * dt)
-        self.push += gain * (self.push_raw - self.push)
+        self.push += gain * (-dot(sample, normal) - self.push)
         self._moment = [old + gain * (new - old) for old, new in zip(self._moment, sample[3:], strict=True)]
         if free:
             self._learn_noise(min(1.0, dt / self._settings.estimation.noise_time_s))

@@ -43,7 +43,7 @@ class StampRing:
         return self.now % HISTORY
 
     def slot(self, age: int) -> int:
-        """Slot of the tick so many ticks ago."""
+        """Slot of the tick ``age`` ticks ago."""
         return (self.now - age) % HISTORY
 
     def age(self, stamp_ns: int) -> int | None:

@@ -143,7 +143,7 @@ class WallDistance:
         return True
 
     def _correct_normal(self, stamp_ns: int, normal: Sequence[float]) -> None:
-        """Move the normal of the capture towards the measured one, and every later one by as much."""
+        """Move the normal of the capture, and equally every later one, towards the measured one."""
         slots = self._filter.ticks.slots_since(stamp_ns)
         change = self._settings.normal_gain * (np.array(normal) - self._normals[slots[0]])
         self._normals[slots] += change

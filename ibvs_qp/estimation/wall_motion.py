@@ -77,19 +77,9 @@ class WallMotion:
         return self._filter.ticks
 
     @property
-    def velocity(self) -> np.ndarray:
-        """Velocity of the centre of mass (right, down) [m/s], (2,)."""
-        return np.array(self.state[VELOCITY])
-
-    @property
     def velocity_variance(self) -> float:
         """Trace of the velocity's covariance [m^2/s^2]."""
         return float(np.trace(self._filter.covariance[VELOCITY, VELOCITY]))
-
-    @property
-    def odometer(self) -> np.ndarray:
-        """Path of the tip's wall point since the start (right, down) [m], (2,)."""
-        return np.array(self.state[ODOMETER])
 
     def predict(
         self, stamp_ns: int, axes: WallAxes, specific_force: Sequence[float], omega: Sequence[float], dt: float

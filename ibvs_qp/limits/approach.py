@@ -14,7 +14,7 @@ class ApproachLimit(Limit):
     r"""The tip never closes in faster than the approach allows at its distance.
 
     First-order barrier on :math:`h = v_{max}(e_s) + \dot e_s`: :math:`n^T \dot V \le p\,h`. The search force of the
-    approach leans on a wall that the force sensor does not feel yet: it accelerates nothing, so the bound rises by it.
+    approach acts against a wall that the force sensor does not measure yet, without acceleration: it raises the bound.
     """
 
     bound_settings = ("limits.approach_speed_ratio", "limits.approach_rate_1_s")

@@ -10,7 +10,7 @@ import casadi as ca
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.rows import LimitRow
 
-#: Bound of an inactive row: finite, so that OSQP never sees the row change its type.
+#: Bound of an inactive row: finite, so that the row never changes its type in OSQP.
 WIDE = 1e4
 
 

@@ -34,8 +34,8 @@ def attitude(body: Body, contact: Contact, target: Target) -> Attitude:
     roll = ca.atan2(body.down[1], body.down[2])
     pitch = ca.asin(clamp(-body.down[0], -1.0, 1.0))
     yaw = ca.if_else(contact.known, -ca.atan2(contact.normal[1], contact.normal[0]), 0.0)
-    wanted = ca.vertcat(target.roll, target.pitch)
-    tilted = ca.norm_2(wanted) > 0.0
+    target_angles = ca.vertcat(target.roll, target.pitch)
+    tilted = ca.norm_2(target_angles) > 0.0
     # Near level the body rates are the angle rates; a tilted vehicle that turns about the vertical has body rates
     # in roll and pitch without changing either angle.
     p, q, r = ca.vertsplit(body.rate)
@@ -44,7 +44,7 @@ def attitude(body: Body, contact: Contact, target: Target) -> Attitude:
         roll=roll,
         pitch=pitch,
         yaw=yaw,
-        tilt_error=ca.vertcat(roll, pitch) - wanted,
+        tilt_error=ca.vertcat(roll, pitch) - target_angles,
         tilt_rate=ca.if_else(tilted, swept, body.rate[:2]),
         tilted=tilted,
     )

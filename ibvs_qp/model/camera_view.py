@@ -1,4 +1,4 @@
-"""What the camera sees of wall and tip: the wall's plane, the image of the tip's wall point, the camera's twists."""
+"""Wall and tip in the picture: the wall's plane, the image of the tip's wall point, the camera's twists."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class CameraView:
 
 
 def camera_view(vehicle: VehicleParams, body: Body, contact: Contact, travel: ca.SX) -> CameraView:
-    """Wall, tip and motion as the camera sees them.
+    """Wall, tip and motion in the camera frame.
 
     Args:
         vehicle: Places of tip and camera.

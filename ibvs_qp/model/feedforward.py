@@ -17,16 +17,18 @@ from ibvs_qp.model.signals import Signals
 
 #: Commanded speed above which the tip is meant to slide [m/s].
 SLIDING_COMMAND = 0.01
+#: Least step of the friction force [N]; it keeps the slew limit finite.
+LEAST_FORCE_STEP = 1e-12
 
 
 @dataclass(frozen=True, kw_only=True)
 class ContactFeedforward:
-    """What the contact does to the vehicle, as far as it may be compensated.
+    """The part of the contact wrench that may be compensated.
 
     Attributes:
-        force: To be expected once the rotors answer [N], (3,).
-        moment: To be expected then [N m], (3,).
-        felt_moment: The moment as it was measured [N m], (3,): the one that acts now.
+        force: Expected once the rotors answer [N], (3,).
+        moment: Expected then [N m], (3,).
+        felt_moment: The measured moment, which acts now [N m], (3,).
     """
 
     force: ca.SX
@@ -90,4 +92,4 @@ def _friction(
     last = signals.state("feedforward_friction", 3)
     step = ca.if_else(sliding, size * travel, 0.0) - last
     allowed = ca.if_else(contact.touching, settings.friction_slew_n_s * body.dt, ca.inf)
-    return last + step * ca.fmin(1.0, allowed / ca.fmax(ca.norm_2(step), 1e-12))
+    return last + step * ca.fmin(1.0, allowed / ca.fmax(ca.norm_2(step), LEAST_FORCE_STEP))

@@ -1,8 +1,8 @@
-"""The compiled tick as machine code: CasADi writes it down as C, a C compiler that is there translates it once.
+"""The compiled tick as machine code: CasADi writes C code, a C compiler, if there is one, translates it once.
 
 CasADi evaluates a function instruction by instruction, about 7 ns each; a compiler's code takes a tenth of that and
-gives the same bits (no contraction of products and sums, the same mathematical library). Where there is no compiler,
-or anything goes wrong, the function itself serves.
+gives the same bits (no contraction of products and sums, the same mathematical library). Without a
+compiler, or after any failure, CasADi interprets the function.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from ibvs_qp.model.shared_library import compiler, shared_library
 
 #: How the code is translated: -O1 takes 1 s for a tick of 4000 instructions, and -O3 gives code no faster.
 FLAGS = ("-O1", "-fPIC", "-shared", "-ffp-contract=off")
-#: Random inputs on which the machine code must agree to the bit before it is believed.
+#: Random inputs on which the machine code must agree to the bit.
 TRIALS = 8
 
 log = logging.getLogger(__name__)
 
 
 def machine_code(function: ca.Function) -> ca.Function:
-    """The same function as machine code, the function itself where that cannot be had.
+    """The same function as machine code, or the function itself without a working compiler.
 
     Args:
         function: Any function of numbers; its name must be a C identifier.

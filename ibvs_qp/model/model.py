@@ -43,7 +43,7 @@ class Model:
         body, contact, target, lines: Inputs (`ibvs_qp.model.inputs`).
         wall: Axes of the wall in B.
         attitude: Angles and rates.
-        view: Wall and tip as the camera sees them.
+        view: Wall and tip in the picture.
         travel: Commanded velocity in the wall plane, in B [m/s], (3,).
         contact_weight: Lambda, 0 in free air to 1 in contact.
         tip_stationary: 1 for a tip in contact that is commanded to stay.

@@ -17,7 +17,7 @@ class TaskRow:
         name: Unique among task rows.
         unit: Of expression and target.
         expression: Affine in `Model.thrust` and `Model.acceleration`.
-        target: Wanted value, independent of both.
+        target: Independent of both.
         weight: Per squared unit; 0 while the task is absent.
     """
 

@@ -1,4 +1,4 @@
-"""C code as a shared library: translated once by the system's own compiler, kept in the user's cache."""
+"""C code as a shared library, translated once by the system's compiler and stored in the user's cache."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ import subprocess
 import tempfile
 from pathlib import Path
 
-#: A compiler that takes longer is given up [s].
+#: Longest time of a compiler run [s].
 PATIENCE_S = 60.0
 
 
 def cache_folder() -> Path:
-    """Where machine code is kept between runs: ``IBVS_QP_CACHE``, else ``ibvs_qp`` in the user's cache folder."""
+    """Cache of machine code: ``IBVS_QP_CACHE``, else ``ibvs_qp`` in the user's cache folder."""
     own, base = os.environ.get("IBVS_QP_CACHE"), os.environ.get("XDG_CACHE_HOME")
     return Path(own) if own else (Path(base) if base else Path.home() / ".cache") / "ibvs_qp"
 

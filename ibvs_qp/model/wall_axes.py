@@ -8,6 +8,9 @@ import casadi as ca
 
 from ibvs_qp.model.inputs import Body, Contact
 
+#: Least sine between wall normal and gravity; it keeps the axes of a floor finite.
+LEAST_CROSS = 1e-6
+
 
 @dataclass(frozen=True, kw_only=True)
 class WallAxes:
@@ -25,5 +28,5 @@ class WallAxes:
 def wall_axes(body: Body, contact: Contact) -> WallAxes:
     """Axes of the wall: right is level and in the wall, down completes it."""
     across = ca.cross(body.down, contact.normal)
-    right = across / ca.fmax(ca.norm_2(across), 1e-6)
+    right = across / ca.fmax(ca.norm_2(across), LEAST_CROSS)
     return WallAxes(normal=contact.normal, right=right, down=ca.cross(contact.normal, right))

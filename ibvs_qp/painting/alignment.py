@@ -11,7 +11,7 @@ from ibvs_qp.painting.config import PaintingConfig
 class Alignment:
     """Decides when the tip is aligned.
 
-    A vehicle in hover sways about its place by as much as the tolerances, so error and speed are averaged. Gusts and
+    A vehicle in hover sways within the tolerances, so error and speed are averaged. Gusts and
     noisy pictures may prevent any standstill, so the tolerances open with time.
 
     Attributes:

@@ -32,7 +32,7 @@ def ramped(speed: float, target: float, step: float) -> float:
 
     Args:
         speed: Present speed [m/s].
-        target: Wanted speed [m/s].
+        target: Target speed [m/s].
         step: Largest increase within the tick [m/s].
     """
     return speed + clipped(target - speed, -BRAKING_RATIO * step, step)

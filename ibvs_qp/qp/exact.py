@@ -7,7 +7,7 @@ import numpy as np
 
 from ibvs_qp.qp.problem import QpProblem
 
-#: Violation of a row above which a reported success is not believed: DAQP skips rows that are all zero.
+#: Largest violation of a row in an accepted solution: DAQP skips rows that are all zero.
 FEASIBLE = 1e-4
 
 

@@ -7,18 +7,18 @@ import numpy as np
 from ibvs_qp.qp.evaluator import ProgramData
 from ibvs_qp.qp.problem import QpProblem
 
-#: Residual of the certificate below which there is no solution; one r long lies 1/r newtons away, so none this side
-#: of 10^8 N counts as none.
+#: Residual of the certificate below which there is no solution; a residual r means a solution
+#: 1/r newtons away.
 NO_CERTIFICATE = 1e-8
 
 
 def conflicting_rows(problem: QpProblem, data: ProgramData) -> tuple[str, ...]:
-    r"""Names of hard rows without a common solution, none of which could be spared; () where there is a solution.
+    r"""Names of a smallest set of hard rows without a common solution; () if there is one.
 
     By Farkas' lemma :math:`G x \le h` has no solution exactly if some :math:`y \ge 0` has :math:`G^T y = 0` and
     :math:`h^T y = -1`. Non-negative least squares finds it, or leaves a residual of length
-    :math:`1 / \sqrt{1 + d^2}`, d being the distance to the nearest solution. Its y has few non-zeros; of these rows
-    every one that can be spared is struck off.
+    :math:`1 / \sqrt{1 + d^2}`, d being the distance to the nearest solution. Its y has few non-zeros; every
+    row that the contradiction does not need is removed.
 
     Args:
         problem: Names of the rows, and which of them are hard.
@@ -51,10 +51,10 @@ def _certificate(table: np.ndarray, chosen: list[int]) -> list[int]:
 
     rows, lower, upper = table[chosen, :-2], table[chosen, -2], table[chosen, -1]
     sides = np.vstack((np.hstack((rows.T, -rows.T)), np.concatenate((upper, -lower))))
-    wanted = np.zeros(len(sides))
-    wanted[-1] = -1.0
+    target = np.zeros(len(sides))
+    target[-1] = -1.0
     try:
-        weights, residual = nnls(sides, wanted)
+        weights, residual = nnls(sides, target)
     except RuntimeError:  # no end within its iterations
         return []
     if not residual < NO_CERTIFICATE:
@@ -79,8 +79,8 @@ def _broken(name: str, values: np.ndarray) -> str:
 
 
 def _task_faults(problem: QpProblem, data: ProgramData) -> list[str]:
-    """Rows whose value, target or weight is no number, and weights below zero."""
-    thrusts = np.ones(problem.model.rotors)  # not zero, so that a factor that is no number shows in any case
+    """Rows whose value, target or weight is not finite, and weights below zero."""
+    thrusts = np.ones(problem.model.rotors)  # not zero, so that every NaN factor shows
     achieved, asked, weights = data.report(data.point, thrusts)
     found = []
     for row, value, target, weight in zip(problem.task_rows, achieved, asked, weights, strict=True):
@@ -92,7 +92,7 @@ def _task_faults(problem: QpProblem, data: ProgramData) -> list[str]:
 
 
 def _limit_faults(problem: QpProblem, data: ProgramData) -> list[str]:
-    """Rows that hold a number that is none, and rows whose bounds leave no room between them."""
+    """Rows with a number that is not finite, and rows whose bounds are crossed."""
     found = []
     for i, row in enumerate(problem.limit_rows):
         crossed = data.lower[i] - data.upper[i]

@@ -49,7 +49,7 @@ def solve_offline(
         problem: Patterns of the matrices.
         data: Their values.
         solver: Name of the back end, as in `installed_solvers`.
-        options: Handed on to it, as in ``eps_abs=1e-9``.
+        options: Passed on to it, as in ``eps_abs=1e-9``.
 
     Returns:
         (variables,) and (rows,), multipliers > 0 at an upper bound; None if it found none.

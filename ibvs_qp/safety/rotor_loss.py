@@ -1,4 +1,4 @@
-"""Flight after the loss of rotors: without a level hover the vehicle leaves the wall, tilted by as much as it needs."""
+"""Flight after the loss of rotors: without a level hover the vehicle leaves the wall, tilted."""
 
 from __future__ import annotations
 
@@ -25,6 +25,8 @@ ESCAPE_SPEED, ESCAPE_DISTANCE = 0.6, 1.8
 DISTANCE_GAIN, VELOCITY_GAIN = 1.0, 1.5
 #: Largest commanded acceleration [m/s^2]: 7 deg of tilt beside the trim.
 ACCELERATION_BOUND = 1.2
+#: Least horizontal part of the wall normal, and least tilt [rad], in divisions.
+LEAST_HORIZONTAL, LEAST_TILT = 1e-6, 1e-9
 
 
 class RotorLoss:
@@ -79,10 +81,10 @@ class RotorLoss:
         away, back = np.clip(
             (VELOCITY_GAIN * (retreat + closing), -VELOCITY_GAIN * along), -ACCELERATION_BOUND, ACCELERATION_BOUND
         )
-        x, y = normal[:2] / max(float(np.hypot(normal[0], normal[1])), 1e-6)
+        x, y = normal[:2] / max(float(np.hypot(normal[0], normal[1])), LEAST_HORIZONTAL)
         ahead, right = -away * x - back * y, -away * y + back * x
         target = self._trim + np.array((right, -ahead)) / GRAVITY
-        target *= min(1.0, TILT_BOUND / max(float(np.hypot(*target)), 1e-9))
+        target *= min(1.0, TILT_BOUND / max(float(np.hypot(*target)), LEAST_TILT))
         step = TILT_RATE * dt
         self._tilt = self._tilt + np.clip(target - self._tilt, -step, step)
         return self._tilt

@@ -14,6 +14,8 @@ from ibvs_qp.tasks.yaw import YawTask
 
 #: Image motion per vertical motion below which a line does not measure height [1/m].
 LEAST_SENSITIVITY = 0.1
+#: Least sum of weights; it keeps the average finite.
+LEAST_WEIGHT = 1e-6
 
 
 class HeightTask(Task):
@@ -59,4 +61,4 @@ class HeightTask(Task):
             rest = task.target(model) - ca.dot(row[3:], rotation) - right * sideways
             total = total + part * rest / ca.if_else(sensitive, down, 1.0)
             weight = weight + part
-        return total / ca.fmax(weight, 1e-6)
+        return total / ca.fmax(weight, LEAST_WEIGHT)

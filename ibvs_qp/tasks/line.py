@@ -18,6 +18,8 @@ ERROR_BOUND = 0.10
 INTEGRAL_BOUND = 0.6
 #: Filter of the differentiated error while no velocity is known [s].
 RATE_FILTER = 0.08
+#: Least time step of that difference [s].
+LEAST_STEP = 1e-4
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -135,7 +137,7 @@ def _differentiated(model: Model, line: Line, error: ca.SX, rate: ca.SX) -> ca.S
     """Rate of the error: from the camera's motion, or differentiated and filtered while no velocity is known."""
     name, dt = f"line_{line.index}_last", model.body.dt
     last_error, last_rate, seen = ca.vertsplit(model.signals.state(name, 3))
-    step = (error - ca.if_else(seen, last_error, error)) / ca.fmax(dt, 1e-4)
+    step = (error - ca.if_else(seen, last_error, error)) / ca.fmax(dt, LEAST_STEP)
     filtered = last_rate + ca.fmin(1.0, dt / RATE_FILTER) * (step - last_rate)
     rate = ca.if_else(model.body.velocity_known, rate, filtered)
     now, before = ca.vertcat(error, rate, 1.0), ca.vertcat(last_error, last_rate, seen)

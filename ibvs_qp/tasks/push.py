@@ -12,6 +12,8 @@ from ibvs_qp.tasks.task import Task
 
 #: Bound of the force integral as a force [N].
 FORCE_INTEGRAL_BOUND = 8.0
+#: Least gain by which it is divided [1/s].
+LEAST_GAIN = 1e-6
 
 
 class PushTask(Task):
@@ -50,7 +52,7 @@ class PushTask(Task):
     def _integral(self, model: Model, error: ca.SX) -> ca.SX:
         """Integral of the force error [N s]: zero out of contact, stopped while thrusts are limited."""
         contact = model.contact
-        bound = FORCE_INTEGRAL_BOUND / max(model.config.gains.force_kfi, 1e-6)
+        bound = FORCE_INTEGRAL_BOUND / max(model.config.gains.force_kfi, LEAST_GAIN)
         step = ca.if_else(model.integrate, model.body.dt, 0.0) * model.contact_weight
         moved = clamp(model.signals.state("force_integral") + step * error, -bound, bound)
         pressing = ca.logic_and(contact.touching, model.target.press)

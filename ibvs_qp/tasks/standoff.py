@@ -28,8 +28,8 @@ class Approach:
 
     Attributes:
         allowed: Speed limit towards the wall at this distance [m/s].
-        speed_error: Wanted minus predicted closing speed [m/s].
-        search: Force that leans on a wall the force sensor does not feel yet [N].
+        speed_error: Target minus predicted closing speed [m/s].
+        search: Force against a wall that the force sensor does not measure yet [N].
     """
 
     allowed: ca.SX
@@ -38,7 +38,7 @@ class Approach:
 
 
 class StandoffTask(Task):
-    r"""Net force along n equals mass times the wanted approach acceleration [N], weight 1 - lambda.
+    r"""Net force along n equals mass times the target approach acceleration [N], weight 1 - lambda.
 
     .. math:: F = m K_d (v - (-\dot e_s)) + F_{search}, \quad v = \min(K_p (e_s - e_{ref}), v_{max}(e_s))
     """

@@ -13,6 +13,8 @@ from ibvs_qp.tasks.task import Task
 
 #: Bound of the velocity integral as an acceleration [m/s^2].
 VELOCITY_INTEGRAL_BOUND = 0.8
+#: Least gain by which it is divided [1/s^2].
+LEAST_GAIN = 1e-6
 
 
 class VelocityTask(Task):
@@ -56,11 +58,11 @@ def velocity_command(model: Model) -> ca.SX:
 
 def _commands(model: Model) -> list[ca.SX]:
     gains, body, free = model.config.gains, model.body, free_directions(model)
-    bound = VELOCITY_INTEGRAL_BOUND / max(gains.velocity_ki, 1e-6)
+    bound = VELOCITY_INTEGRAL_BOUND / max(gains.velocity_ki, LEAST_GAIN)
     axes = ((model.wall.right, model.target.velocity_right), (model.wall.down, model.target.velocity_down))
     commands = []
-    for axis, (direction, wanted) in enumerate(axes):
-        error = wanted - ca.dot(direction, body.velocity)
+    for axis, (direction, target) in enumerate(axes):
+        error = target - ca.dot(direction, body.velocity)
         old = model.signals.state(f"velocity_integral_{axis}")
         moved = clamp(free[axis] * (old + body.dt * error), -bound, bound)
         integral = ca.if_else(ca.logic_and(body.velocity_known, model.integrate_in_plane), moved, old)

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.estimation.wall_lines import WallAxes, image_line, wall_line
-from ibvs_qp.estimation.wall_motion import TrackedLine, WallMotion
+from ibvs_qp.estimation.wall_motion import ODOMETER, VELOCITY, TrackedLine, WallMotion
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL, FeatureFrame, LineFeature
 
 VEHICLE = VehicleParams()
@@ -140,8 +140,8 @@ def test_late_lines_are_predicted_to_the_present(latency: float, velocity: tuple
 def test_velocity_and_odometer_are_those_of_the_tip() -> None:
     stroke = Stroke((-0.1, 0.02), 0.060)
     stroke.fly(6.0)
-    np.testing.assert_allclose(stroke.motion.velocity, [-0.1, 0.02], atol=3e-3)
-    np.testing.assert_allclose(stroke.motion.odometer, stroke.tip[stroke.tick], atol=5e-3)
+    np.testing.assert_allclose(stroke.motion.state[VELOCITY], [-0.1, 0.02], atol=3e-3)
+    np.testing.assert_allclose(stroke.motion.state[ODOMETER], stroke.tip[stroke.tick], atol=5e-3)
     assert stroke.motion.velocity_age_s < 0.1
 
 
@@ -202,7 +202,7 @@ def test_turning_moves_the_tip_and_not_the_lines() -> None:
     start = motion.lines[7].offset
     for k in range(10):
         motion.predict((k + 2) * TICK_NS, axes, np.array([0, 0, -9.81]), np.array([0, 0, 0.1]), TICK)
-    assert motion.odometer[0] == pytest.approx(0.7 * 0.1 * 10 * TICK, abs=1e-6)
+    assert motion.state[ODOMETER][0] == pytest.approx(0.7 * 0.1 * 10 * TICK, abs=1e-6)
     assert motion.lines[7].offset - start == pytest.approx(-0.7 * 0.1 * 10 * TICK, abs=1e-6)
 
 
