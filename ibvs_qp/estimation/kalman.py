@@ -59,10 +59,6 @@ class DelayedKalman:
         """The state now, (n,): the newest entry of the history itself."""
         return self._history[self._newest]
 
-    def predict(self, stamp_ns: int, increment: np.ndarray, dt: float) -> None:
-        """Advance the state by one tick: x += dt G x + increment."""
-        self.remember(stamp_ns, self.state + dt * (self.chain @ self.state) + increment, dt)
-
     def remember(self, stamp_ns: int, state: Sequence[float] | np.ndarray, dt: float) -> None:
         """Store a state that the caller has advanced by one tick of ``dt`` [s]."""
         self.ticks.add(stamp_ns)

@@ -39,14 +39,9 @@ class WhiteNoise:
         return cls(variance=scale * other.variance, count=min(other.count, PRIOR))
 
     def learn(self, difference: float, claimed: float) -> float:
-        """Average one difference.
+        """Average one difference d = innovation - residual; ``claimed`` is the variance by the source [unit^2].
 
-        Args:
-            difference: d = innovation - residual.
-            claimed: Variance that the source claims [unit^2].
-
-        Returns:
-            The sample of the variance after clipping [unit^2].
+        Returns the sample of the variance after clipping [unit^2].
         """
         sample = 0.5 * difference * difference
         if self.count >= PRIOR:
@@ -86,13 +81,8 @@ class SteadyValue:
     def correct(self, measured: float, claimed: float, walk: float) -> float:
         """Correct with one measurement.
 
-        Args:
-            measured: The measurement.
-            claimed: Variance that its source claims [unit^2].
-            walk: Variance of the random walk since the last one [unit^2].
-
-        Returns:
-            The sample of the noise variance, for the prior of other lines.
+        ``claimed`` is its variance by the source and ``walk`` that of the random walk since the last one [unit^2].
+        Returns the sample of the noise variance, for the prior of other lines.
         """
         innovation = measured - self.value
         sample = self.noise.learn(innovation - self.noise.residual, claimed)

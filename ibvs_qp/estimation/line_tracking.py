@@ -45,11 +45,7 @@ class LineTracks:
     def advance(self, stamp_ns: int, state: list[float], right: float, down: float) -> None:
         """Predict the offsets in the state of a new tick; fade and drop lines without new frames.
 
-        Args:
-            stamp_ns: Time of the tick.
-            state: State of the filter; its offsets are those of the last tick and are advanced in place.
-            right: Path of the tip to the right since then [m].
-            down: Path of the tip down [m].
+        ``state`` holds the offsets of the last tick and is advanced in place by the path of the tip right and down [m].
         """
         start, end, old = self._config.fade_start_s, self._config.fade_end_s, []
         for line in self.lines.values():
@@ -66,13 +62,9 @@ class LineTracks:
             self._drop(line)
 
     def correct(self, line: LineFeature, measured: MeasuredLine, stamp: int, tick_ns: int) -> None:
-        """Correct or start the track of one line.
+        """Correct or start the track of a line in the image, measured on the wall at a time of capture.
 
-        Args:
-            line: The line in the image.
-            measured: The same on the wall.
-            stamp: Time of capture.
-            tick_ns: Time of the tick at which the frame arrived.
+        ``tick_ns`` is the time of the tick at which the frame arrived.
         """
         variance = self._config.line_std_m**2 + max(float(line.covariance[0, 0]), 0.0) * measured.scale**2
         track = self.lines.get(line.track_id)
@@ -115,12 +107,8 @@ class LineTracks:
     def _refuse(self, track: TrackedLine, difference: float, variance: float) -> None:
         """Drop the track once several refused offsets in a row agree with each other: it is another line then.
 
-        Noise that has just begun scatters; its offsets do not agree and are only refused until it is learned.
-
-        Args:
-            track: The line.
-            difference: Between the residuals of this frame and the last [m].
-            variance: Of one offset [m^2].
+        New noise scatters: its offsets do not agree and are only refused until it is learned. ``difference`` is
+        between the residuals of this frame and the last [m].
         """
         agrees = difference * difference < 2.0 * self._config.gate_sigmas**2 * variance
         track.refused = track.refused + 1 if agrees else 1

@@ -47,16 +47,10 @@ class PushFilter:
         return math.sqrt(self._moment_variance)
 
     def add(self, wrench: np.ndarray, stamp_ns: int, normal: Sequence[float], free: bool) -> float | None:
-        """Filter one sample.
+        """Filter the contact wrench ON the vehicle [N, N m], (6,), of one force sample.
 
-        Args:
-            wrench: Contact wrench ON the vehicle [N, N m], (6,).
-            stamp_ns: Its time.
-            normal: Unit vector into the wall, in B, (3,).
-            free: Whether the tip is away from the wall, so that the sample is noise.
-
-        Returns:
-            Time since the last sample [s]; None if this sample is not a new one.
+        A sample in ``free`` flight, away from the wall, is noise. Returns the time since the last sample [s]; None if
+        this sample is not a new one.
         """
         if stamp_ns <= self._stamp:
             return None

@@ -32,12 +32,7 @@ class TipForce:
         self._noise = [WhiteNoise() for _ in range(4)]
 
     def across(self, force: Sequence[float], moment: Sequence[float]) -> tuple[float, float]:
-        """Mean force across [N]: y and z of a tared wrench at the sensor.
-
-        Args:
-            force: Contact force [N], FRD axes, (3,).
-            moment: Its moment about the sensor [N m], (3,).
-        """
+        """Mean force across, y and z [N], of a tared force [N] and its moment about the sensor [N m], (3,) each."""
         (ahead, right, below), (fx, fy, fz), (_, my, mz) = self._lever, force, moment
         if ahead < LEAST_LEVER:
             return fy, fz

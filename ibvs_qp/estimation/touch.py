@@ -41,16 +41,7 @@ class TouchDetector:
         self._samples = self._samples + 1 if push > self.threshold(push_noise) else 0
 
     def update(self, stamp_ns: int, push: float, distance: float) -> bool:
-        """Decide on touch and loss at one tick.
-
-        Args:
-            stamp_ns: Time of the tick.
-            push: Filtered push [N].
-            distance: Tip to wall [m].
-
-        Returns:
-            Whether the tip touches since this tick.
-        """
+        """Decide on touch and loss at one tick by filtered push [N] and distance of the tip [m]; True at a touch."""
         if not self.in_contact:
             settings = self._settings
             touches = self._samples >= settings.touch_samples and distance < settings.contact_distance_m

@@ -80,14 +80,10 @@ class WallDistance:
         specific_force: Sequence[float] | None,
         down: Sequence[float],
     ) -> None:
-        """Rotate the normal with the gyro and integrate the accelerometer along it.
+        """Rotate the normal with the gyro [rad/s] and integrate the accelerometer [m/s^2] along it over dt [s].
 
-        Args:
-            stamp_ns: Time of the tick.
-            dt: Time since the last tick [s].
-            angular_velocity: Omega in B [rad/s], (3,).
-            specific_force: Accelerometer in B [m/s^2], (3,); None counts as no acceleration.
-            down: Unit vector of gravity in B, (3,).
+        All vectors are in B, (3,); ``down`` is the unit vector of gravity. Without a specific
+        force the speed is constant.
         """
         self.normal = normal = unit(add_scaled(self.normal, dt, cross(self.normal, angular_velocity)))
         self._lever_speed = lever_speed = dot(normal, cross(angular_velocity, self._tip))
@@ -102,13 +98,7 @@ class WallDistance:
         self._normals[self._filter.ticks.slot(0)] = normal
 
     def correct(self, plane: Sequence[float], stamp_ns: int, tip_stationary: bool) -> None:
-        """Correct with a measured plane, at the time of its capture.
-
-        Args:
-            plane: (A, B, C, D) of the wall in C.
-            stamp_ns: Time of capture; a plane no newer than the last one is ignored.
-            tip_stationary: Whether the wall holds the tip still.
-        """
+        """Correct with a plane (A, B, C, D) measured in C, at the time of its capture, if newer than the last one."""
         if stamp_ns <= self._plane_ns:
             return
         self._plane_ns = stamp_ns

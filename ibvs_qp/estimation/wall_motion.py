@@ -84,15 +84,7 @@ class WallMotion:
     def predict(
         self, stamp_ns: int, axes: WallAxes, specific_force: Sequence[float], omega: Sequence[float], dt: float
     ) -> None:
-        """Integrate the accelerometer in the wall plane; the tip moves with the body's rotation as well.
-
-        Args:
-            stamp_ns: Time of the tick.
-            axes: Wall axes and gravity in B.
-            specific_force: Accelerometer in B [m/s^2], (3,).
-            omega: Angular velocity in B [rad/s], (3,).
-            dt: Time since the last tick [s].
-        """
+        """Integrate accelerometer [m/s^2] and gyro [rad/s] over dt [s]; the tip moves with the body's rotation, too."""
         acceleration, swing = add_scaled(specific_force, GRAVITY, axes.gravity), cross(omega, self._tip)
         state = self.state.copy()
         velocity_right, velocity_down, bias_right, bias_down, *_ = state
@@ -108,13 +100,7 @@ class WallMotion:
         self.velocity_age_s = (stamp_ns - self._velocity_stamp) * 1e-9 if self._velocity_stamp >= 0 else math.inf
 
     def correct(self, frame: FeatureFrame, axes: WallAxes, distance: float) -> None:
-        """Correct with the features of a frame; one no newer than the last is ignored.
-
-        Args:
-            frame: Features at capture.
-            axes: Wall axes in B at capture.
-            distance: Tip to wall along the normal at capture [m].
-        """
+        """Correct with the features of a newer frame; axes and distance of the tip [m] are those at capture."""
         if frame.stamp_ns <= self._frame_stamp:
             return
         self._frame_stamp = frame.stamp_ns
@@ -135,14 +121,7 @@ class WallMotion:
             self._velocity_stamp = frame.stamp_ns
 
     def feature(self, line: TrackedLine, axes: WallAxes, distance: float, stamp_ns: int) -> LineFeature:
-        """The line as the camera would see it now.
-
-        Args:
-            line: The line.
-            axes: Wall axes in B now.
-            distance: Tip to wall along the normal now [m].
-            stamp_ns: Time of the tick.
-        """
+        """The line in the image now, with wall axes in B and the distance of the tip [m]."""
         rho, theta, scale = image_line(line.offset, line.angle, axes, self._tip_from_camera, distance)
         entry = LINES + line.slot
         variance = max(float(self._filter.covariance[entry, entry]), LEAST_VARIANCE) / (scale * scale)

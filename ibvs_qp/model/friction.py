@@ -37,16 +37,10 @@ def estimated_friction(
 ) -> tuple[ca.SX, ca.SX]:
     r"""Friction coefficient before and after this tick.
 
-    While sliding :math:`\mu` follows :math:`-F_t / f`; while the tip is stuck against a commanded travel it rises.
-
-    Args:
-        signals: Registry of the estimate.
-        body: Velocity and measured force.
-        contact: Push and whether the tip touches.
-        tip: Velocity of the tip, in B [m/s], (3,): a vehicle that turns about a stuck tip moves, its tip does not.
-        travel: Commanded velocity in the wall plane, in B [m/s], (3,).
-        sliding_command: Commanded speed above which the tip is meant to slide [m/s].
-        stuck_speed: Speed below which it counts as stuck [m/s].
+    While sliding :math:`\mu` follows :math:`-F_t / f`; while the tip is stuck against a commanded travel it rises. Tip
+    velocity and travel are in B [m/s], (3,): a vehicle that turns about a stuck tip moves, its tip does not.
+    ``sliding_command`` is the commanded speed above which the tip shall slide, ``stuck_speed`` the largest speed of a
+    stuck tip [m/s].
     """
     before, stuck = signals.state("friction", start=ASSUMED_FRICTION), signals.state("friction_stuck")
     speed = ca.norm_2(travel)

@@ -12,7 +12,7 @@ from allocation.effectiveness import control_effectiveness
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.frames import GRAVITY, camera_twist_matrix
-from ibvs_qp.model.attitude import attitude
+from ibvs_qp.model.attitude import attitude, wall_axes
 from ibvs_qp.model.camera_view import camera_view
 from ibvs_qp.model.external_wrench import external_wrench
 from ibvs_qp.model.feedforward import SLIDING_COMMAND, contact_feedforward
@@ -22,7 +22,6 @@ from ibvs_qp.model.reach import STANDING_SPEED, push_reach, push_reference
 from ibvs_qp.model.rows import Parameter
 from ibvs_qp.model.signals import Signals
 from ibvs_qp.model.thrust_window import thrust_window
-from ibvs_qp.model.wall_axes import wall_axes
 
 T = TypeVar("T")
 

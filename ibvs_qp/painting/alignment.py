@@ -25,13 +25,9 @@ class Alignment:
         self.error = math.inf
 
     def is_reached(self, inputs: PainterInput, errors: tuple[float, float], began: float, dt: float) -> bool:
-        """Whether errors and speed have stayed within their tolerances for the required time.
+        """Whether the errors of guide and start mark [m] and the speed have stayed within their tolerances long enough.
 
-        Args:
-            inputs: Estimates of the tick.
-            errors: Of the guide and of the start mark [m].
-            began: Begin of the alignment [s].
-            dt: Time since the last tick [s].
+        ``began`` is the begin of the alignment and ``dt`` the time since the last tick [s].
         """
         config = self._config
         self.error, speed = self._averaged((*errors, *inputs.velocity[:2]), dt)

@@ -49,15 +49,9 @@ class GuideLine:
         self.target += clipped(self._nominal(row) - self.target, -step, step)
 
     def follow_board(self, inputs: PainterInput, gate: float, *, first_row: bool) -> TrackedLine | None:
-        """Follow the board's edge up to row 1; a lost guide is searched near its target.
+        """Follow the board's edge up to row 1; a lost guide is searched within a gate [m] of its target.
 
-        Args:
-            inputs: Estimates of the tick.
-            gate: Largest distance from the target [m].
-            first_row: Whether row 1 is being painted: later rows can return to its guide.
-
-        Returns:
-            The new guide, if it changed.
+        Later rows can return to the guide of row 1. Returns the new guide, if it changed.
         """
         line, new = self.line(inputs), None
         if line is None or line.weight <= LOST_WEIGHT:
@@ -69,8 +63,7 @@ class GuideLine:
     def follow_row(self, inputs: PainterInput, row: int) -> TrackedLine | None:
         """Follow the fresh edge while it is tracked and level; otherwise the board's edge to the end of the row.
 
-        Returns:
-            The new guide, if it changed.
+        Returns the new guide, if it changed.
         """
         self._update_level(inputs)
         line = self.line(inputs)

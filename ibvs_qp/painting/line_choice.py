@@ -1,7 +1,8 @@
 """Choice of guide, start mark and stop edge among the tracked lines.
 
 A line is chosen by its distance from the expected place, the side on which the surface lies, and the direction of
-travel; never as "topmost" or "first upright". Offsets are in metres from the tip's wall point (`TrackedLine`).
+travel; never as "topmost" or "first upright". Offsets are in metres from the tip's wall point (`TrackedLine`);
+``expected`` is the expected offset and ``gate`` the largest distance from it [m].
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from collections.abc import Callable, Iterable
 
 from ibvs_qp.estimation.wall_motion import TrackedLine
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL
-from ibvs_qp.painting.line_gates import LineGates
+from ibvs_qp.painting.config import LineGates
 
 #: Weight of a line [0..1]: below, it is lost; above, it may mark the start; it is in view; it may end a row or lead.
 LOST_WEIGHT, MARK_WEIGHT, VISIBLE_WEIGHT, CERTAIN_WEIGHT = 0.05, 0.3, 0.5, 0.9
@@ -22,13 +23,7 @@ Lines = Iterable[TrackedLine]
 
 
 def bottom_edge(lines: Lines, expected: float, gate: float) -> TrackedLine | None:
-    """The level edge of the board below the tip, with the surface above it.
-
-    Args:
-        lines: Tracked lines.
-        expected: Its expected offset [m].
-        gate: Largest distance from there [m].
-    """
+    """The level edge of the board below the tip, with the surface above it."""
 
     def accept(line: TrackedLine) -> bool:
         return line.role == HORIZONTAL and line.kind != "paint" and line.surface_side <= 0
@@ -37,14 +32,7 @@ def bottom_edge(lines: Lines, expected: float, gate: float) -> TrackedLine | Non
 
 
 def fresh_edge(lines: Lines, expected: float, level: float, gates: LineGates) -> TrackedLine | None:
-    """The upper edge of the last row: paint below, bare surface above.
-
-    Args:
-        lines: Tracked lines.
-        expected: Its expected offset [m].
-        level: Angle of the rows [rad], see `TrackedLine.angle`.
-        gates: Largest distance and angle from there.
-    """
+    """The upper edge of the last row: paint below, bare surface above; ``level`` is the angle of the rows [rad]."""
 
     def accept(line: TrackedLine) -> bool:
         fresh = line.role == HORIZONTAL and line.kind != "board" and line.surface_side <= 0
@@ -54,7 +42,7 @@ def fresh_edge(lines: Lines, expected: float, level: float, gates: LineGates) ->
 
 
 def start_mark(lines: Lines, expected: float, gate: float) -> TrackedLine | None:
-    """The right edge of the board beside the start of row 1; arguments as for `bottom_edge`."""
+    """The right edge of the board beside the start of row 1."""
 
     def accept(line: TrackedLine) -> bool:
         upright = line.role == VERTICAL and line.kind != "paint"
@@ -64,14 +52,7 @@ def start_mark(lines: Lines, expected: float, gate: float) -> TrackedLine | None
 
 
 def stop_edge(lines: Lines, travel: float, expected: float, gate: float) -> TrackedLine | None:
-    """The upright edge ahead whose surface lies on the side that the brush comes from.
-
-    Args:
-        lines: Tracked lines.
-        travel: Direction of the row, +1 right, -1 left.
-        expected: Its expected offset [m].
-        gate: Largest distance from there [m].
-    """
+    """The upright edge ahead, its surface on the side from which the brush comes; ``travel`` is +1 right, -1 left."""
     side = 1 if travel < 0 else -1
 
     def accept(line: TrackedLine) -> bool:

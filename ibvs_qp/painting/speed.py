@@ -28,13 +28,7 @@ def climb_speed(config: PaintingConfig, remaining: float) -> float:
 
 
 def ramped(speed: float, target: float, step: float) -> float:
-    """Speed one tick later on its way to a target [m/s].
-
-    Args:
-        speed: Present speed [m/s].
-        target: Target speed [m/s].
-        step: Largest increase within the tick [m/s].
-    """
+    """Speed one tick later on its way to a target [m/s]; it increases by at most ``step`` [m/s]."""
     return speed + clipped(target - speed, -BRAKING_RATIO * step, step)
 
 

@@ -71,12 +71,7 @@ class StrokeEnd:
         return ahead, None
 
     def is_reached(self, inputs: PainterInput, remaining: float) -> bool:
-        """Stop condition of a stroke: near the end and still, or waited for too long.
-
-        Args:
-            inputs: Estimates of the tick.
-            remaining: Distance left in the row [m].
-        """
+        """Stop condition of a stroke with that distance left [m]: near the end and still, or waited for too long."""
         config = self._config
         if remaining > STOP_DISTANCE:
             return False
@@ -88,12 +83,7 @@ class StrokeEnd:
         return (waited > config.stop_time_s and still and near) or waited > config.stop_timeout_s
 
     def beside_climb(self, inputs: PainterInput, row: int) -> TrackedLine | None:
-        """The edge at which the row ended; brush and paint may hide it for a while.
-
-        Args:
-            inputs: Estimates of the tick.
-            row: Row that ended.
-        """
+        """The edge at which a row ended; brush and paint may hide it for a while."""
         edge = inputs.lines.get(self._identity)
         if edge is not None and edge.weight >= LOST_WEIGHT:
             return edge
@@ -103,13 +93,9 @@ class StrokeEnd:
         return edge
 
     def reference(self, edge: TrackedLine, rate: float, row: int, *, reached: bool) -> float:
-        """Target offset of the edge [m]: from its first measured offset to the margin at the speed of the stroke.
+        """Target offset of the edge of a row [m]: from its first measured one to the margin at the speed of the stroke.
 
-        Args:
-            edge: The edge.
-            rate: Change since the last tick [m].
-            row: Row that it ends.
-            reached: Whether the row has ended: then the target is the margin.
+        ``rate`` is the change since the last tick [m]; once the row's end is reached the target is the margin.
         """
         travel = travel_of(row)
         margin = self._margin(travel)

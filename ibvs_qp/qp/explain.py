@@ -128,12 +128,7 @@ class TickReplay:
         )
 
     def limit_values(self, names: Sequence[str], thrusts: np.ndarray) -> tuple[LimitValue, ...]:
-        """Bounds and values of some limit rows at the tick explained last.
-
-        Args:
-            names: Of the rows.
-            thrusts: Thrusts to evaluate at [N], (n,).
-        """
+        """Bounds and values of limit rows by name at the tick explained last, for given thrusts [N], (n,)."""
         problem, data = self._problem, self._data
         rows = [problem.row_names.index(name) for name in names]
         values, lower, upper = data.limit_values(thrusts)

@@ -10,15 +10,7 @@ from ibvs_qp.validation.geometry import accepts_line_reference
 
 
 def check_reference(reference: Reference, last: Reference) -> tuple[Reference, tuple[str, ...]]:
-    """The reference in force at this tick.
-
-    Args:
-        reference: New reference.
-        last: Reference of the last tick.
-
-    Returns:
-        The new reference if all of it is accepted, otherwise the last one; and what was rejected.
-    """
+    """The new reference if all of it is accepted, otherwise the last one; and what was rejected."""
     if not isinstance(reference, Reference):
         return last, ("reference: not a Reference",)
     rejected = [f"reference.{field.rejection}" for field in REFERENCE.faults(REFERENCE.pack(reference))]

@@ -100,7 +100,8 @@ def test_a_late_correction_over_uneven_ticks_equals_the_replay() -> None:
         """Correct tick 40 once tick `at` has been predicted."""
         f = DelayedKalman(CHAIN, np.array([1e-10, 1e-6, 1e-7]), np.array([0.1, 0.1, 0.1]), 0.004, 6.0)
         for k in range(60):
-            f.predict(int(stamps[k]), inputs[k], lengths[k] * 0.004)
+            dt = lengths[k] * TICK_NS * 1e-9
+            f.remember(int(stamps[k]), f.state + dt * (f.chain @ f.state) + inputs[k], dt)
             if k in (5, 15, 25):  # so that distance, speed and bias are correlated
                 f.correct_entry(int(stamps[k]), 0, 0.01, 1e-4, 1e6)
             if k == at:
