@@ -37,14 +37,7 @@ class CameraView:
 
 
 def camera_view(vehicle: VehicleParams, body: Body, contact: Contact, travel: ca.SX) -> CameraView:
-    """Wall, tip and motion in the camera frame.
-
-    Args:
-        vehicle: Places of tip and camera.
-        body: Velocity and body rate.
-        contact: Normal and distance of the wall.
-        travel: Commanded velocity in the wall plane, in B [m/s], (3,).
-    """
+    """Wall, tip and motion in the camera frame; ``travel`` is the commanded velocity in the wall plane, in B [m/s]."""
     to_c = ca.DM(R_BODY_CAMERA.T)
     tip = to_camera(np.array(vehicle.tip_position_m), np.array(vehicle.camera_position_m))
     normal = to_c @ contact.normal

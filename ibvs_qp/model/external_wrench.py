@@ -57,15 +57,8 @@ def external_wrench(
     contact, because it would take contact moments for a load. A gust of correlation time T_g and rms s then leaves a
     push error of :math:`s\sqrt{T/(T_g+T)}`, T being the observer's time constant plus motor lag and delays.
 
-    Args:
-        signals: Registry of the observer's states.
-        config: Vehicle, gust bandwidth and the switch of the feed-forward.
-        effectiveness: B, (6, n).
-        body: Inertial measurements.
-        felt_moment: Moment of the contact, measured [N m], (3,).
-        normal: Unit vector into the wall, in B.
-        touching: 1 in contact or about to be.
-        noise: Deviation of the filtered push in free flight [N].
+    ``felt_moment`` is the measured moment of the contact [N m], (3,), ``touching`` 1 in contact or just before it, and
+    ``noise`` the deviation of the filtered push in free flight [N].
     """
     vehicle = config.vehicle
     thrusts, ready = lagged_thrusts(signals, vehicle, body.dt)

@@ -52,16 +52,10 @@ def contact_feedforward(
 
     .. math:: M = \hat M + \frac{T s}{T s + 1}\, p \times F,
 
-    with p the tip. Without it a tip that sticks turns the vehicle by a degree before the moment is felt, and leaps
+    with p the tip. Without it a sticking tip turns the vehicle by a degree before the moment is measured, and leaps
     when it breaks away.
 
-    Args:
-        signals: Registry of the filters' states.
-        config: Contact gains, filter and slew; the vehicle's tip and motor lags.
-        body: Measured wrench and time step.
-        contact: Push and whether the tip touches.
-        travel: Commanded velocity in the wall plane, in B [m/s], (3,).
-        friction: Estimated Coulomb coefficient.
+    ``travel`` is the commanded velocity in the wall plane, in B [m/s], (3,), ``friction`` the coefficient.
     """
     settings = config.contact
     force = signals.remember("feedforward_friction", _friction(signals, settings, body, contact, travel, friction))
@@ -77,7 +71,7 @@ def contact_feedforward(
 
 
 def moment_lag(config: ControllerConfig) -> float:
-    """How late a measured moment is when the rotors answer to it: their mean lag and the filter's [s]."""
+    """Delay from a measured moment to the rotors' response: their mean lag and that of the filter [s]."""
     vehicle = config.vehicle
     motors = 0.5 * (vehicle.motor_lag_up_s + vehicle.motor_lag_down_s)
     return motors + 1.0 / (2.0 * math.pi * config.contact.force_filter_hz)

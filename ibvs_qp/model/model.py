@@ -97,7 +97,7 @@ class Model:
         return ca.logic_and(self.contact.touching, slow)
 
     def _disturbances(self) -> tuple[ca.SX, ca.SX]:
-        """Bias wrench; returns its part without contact, and the friction coefficient that the reach assumes."""
+        """Set the bias wrench; its part without contact, and the friction coefficient that the reach assumes."""
         signals, config, vehicle = self.signals, self.config, self.config.vehicle
         body, contact = self.body, self.contact
         tip = body.velocity_of(vehicle.tip_position_m)

@@ -15,7 +15,7 @@ _ZERO = (0.0, 0.0, 0.0)
 
 
 class StepInputs:
-    """Packs the inputs that `ibvs_qp.model.inputs` declares; entry by entry it would cost four times as much.
+    """Packs the inputs that `ibvs_qp.model.inputs` declares; entry by entry that costs four times as much.
 
     Attributes:
         present: Indices of the lines present at this step, and their roles.
@@ -36,14 +36,7 @@ class StepInputs:
             line[:] = [0.0] * len(LINE)
 
     def write(self, measurement: Measurement, reference: Reference, contact: ContactState, dt: float) -> None:
-        """Pack one validated measurement, its reference and the contact.
-
-        Args:
-            measurement: All but the thrust limits.
-            reference: Targets.
-            contact: Updated with this measurement.
-            dt: Time since the last step [s].
-        """
+        """Pack a validated measurement (not its thrust limits), reference, contact and time since the last step [s]."""
         force, velocity = measurement.specific_force, measurement.velocity
         press, known = reference.contact, contact.known
         self._pair(measurement, reference, known)

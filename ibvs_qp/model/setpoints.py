@@ -84,7 +84,7 @@ class Setpoints:
         self.reset()
 
     def reset(self) -> None:
-        """Forget everything, as before the first measurement."""
+        """As before the first measurement."""
         self._estimator.reset()
         self.contact = self._estimator.state
         self.step.reset()
@@ -97,7 +97,7 @@ class Setpoints:
         self.step.outputs["reach"][0], self.step.outputs["least_push"][0] = UNBOUNDED, 0.0
 
     def restart(self) -> None:
-        """Reset all but the rotors: the clock was set anew, the thrusts go on from where they are."""
+        """Reset all but the rotors, after a clock that was set back: the thrusts continue."""
         last, change = self.last, self._change
         self.reset()
         self.last, self._change = last, change
@@ -111,13 +111,7 @@ class Setpoints:
             self.lower[:], self.upper[:] = thrust_window(self.last, low, high, self._rate_step, low, high)
 
     def update(self, measurement: Measurement, reference: Reference, contact: ContactState | None = None) -> None:
-        """Evaluate the step function for one validated measurement and reference.
-
-        Args:
-            measurement: Validated.
-            reference: Validated.
-            contact: Estimated by the caller from the same sensors; None estimates it here.
-        """
+        """Evaluate the step function for validated inputs; without a contact it is estimated here."""
         stamp, dt = measurement.stamp_ns, self.config.tick_s
         if self._stamp >= 0:
             dt = min(max((stamp - self._stamp) * 1e-9, 0.0), LONGEST_TICK)

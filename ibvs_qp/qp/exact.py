@@ -30,23 +30,17 @@ class ExactSolver:
         full = full + np.triu(full, 1).T
         matrix = self._problem.a_pattern.copy()
         matrix.data = a.copy()
-        arguments = {
-            "h": ca.project(ca.DM(full), self._p_sparsity),
-            "g": q,
-            "a": ca.project(ca.DM(matrix.toarray()), self._a_sparsity),
-            "lba": lower,
-            "uba": upper,
-        }
+        hessian = ca.project(ca.DM(full), self._p_sparsity)
+        rows = ca.project(ca.DM(matrix.toarray()), self._a_sparsity)
         try:
-            result = self._solver(**arguments)
+            result = self._solver(h=hessian, g=q, a=rows, lba=lower, uba=upper)
         except RuntimeError:
             return None
-        x = np.array(result["x"]).ravel()
-        y = np.array(result["lam_a"]).ravel()
+        x, y = np.array(result["x"]).ravel(), np.array(result["lam_a"]).ravel()
         if not self._solver.stats().get("success", False) or not np.isfinite(x.sum() + y.sum()):
             return None
-        rows = matrix @ x
-        return (x, y) if float(np.maximum(lower - rows, rows - upper).max()) <= FEASIBLE else None
+        at = matrix @ x
+        return (x, y) if float(np.maximum(lower - at, at - upper).max()) <= FEASIBLE else None
 
 
 def _casadi_sparsity(pattern: object) -> ca.Sparsity:

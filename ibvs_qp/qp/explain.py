@@ -61,13 +61,13 @@ def active_limits(problem: QpProblem, x: np.ndarray, y: np.ndarray) -> tuple[Act
     """Limits with a multiplier: name, side, |dJ*/d bound| and slack."""
     active = []
     for i in np.flatnonzero(np.abs(y) > ACTIVE_MULTIPLIER):
-        slot = problem.row_slack[i]
+        column = problem.row_slack[i]
         active.append(
             ActiveLimit(
                 name=problem.row_names[i],
                 side="upper" if y[i] > 0 else "lower",
                 price=abs(float(y[i])),
-                slack=abs(float(x[slot])) if slot >= 0 else 0.0,
+                slack=abs(float(x[column])) if column >= 0 else 0.0,
                 unit=problem.row_units[i],
             )
         )
@@ -147,6 +147,6 @@ class TickReplay:
         data = self._data
         if self._solver is None:
             return self._exact.solve(data.p, data.q, data.a, data.lower, data.upper)
-        from ibvs_qp.qp.offline import solve_offline
+        from ibvs_qp.qp.offline import solve_offline  # qpsolvers loads every installed back end
 
         return solve_offline(self._problem, data, self._solver)

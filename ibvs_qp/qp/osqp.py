@@ -48,11 +48,8 @@ class OsqpSolver:
         self._reset_pending = True
 
     def _setup(self, p: np.ndarray, q: np.ndarray, a: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> None:
-        settings, p_matrix, a_matrix = (
-            self._settings,
-            self._problem.p_pattern.copy(),
-            self._problem.a_pattern.copy(),
-        )
+        settings, problem = self._settings, self._problem
+        p_matrix, a_matrix = problem.p_pattern.copy(), problem.a_pattern.copy()
         p_matrix.data, a_matrix.data = p.copy(), a.copy()
         self._solver = osqp.OSQP()
         self._solver.setup(
@@ -106,13 +103,7 @@ class OsqpSolver:
             self._inner.solve()
             solution, info = self._inner.solution, self._inner.info
             x, y = np.array(solution.x), np.array(solution.y)
-        return RawSolution(
-            x=x,
-            y=y,
-            status=int(info.status_val),
-            iterations=int(info.iter),
-            seconds=time.perf_counter() - start,
-        )
+        return RawSolution(x, y, int(info.status_val), int(info.iter), time.perf_counter() - start)
 
     def warm_start(self, x: np.ndarray, y: np.ndarray) -> None:
         """Replace the iterate after a solve that was not accepted."""

@@ -124,11 +124,9 @@ class QpProblem:
     def limit_values(self) -> ca.Function:
         """(inputs, states, thrusts) to value, lower and upper bound of every limit row in the row's own unit."""
         values = AffineRows(self.model, ca.vertcat(*(row.expression for row in self.limit_rows))).at(self.model.thrust)
-        bounds = (
-            ca.vertcat(*(row.lower for row in self.limit_rows)),
-            ca.vertcat(*(row.upper for row in self.limit_rows)),
-        )
-        return ca.Function("limit_values", [*self._step, self.model.thrust], [values, *bounds])
+        lower = ca.vertcat(*(row.lower for row in self.limit_rows))
+        upper = ca.vertcat(*(row.upper for row in self.limit_rows))
+        return ca.Function("limit_values", [*self._step, self.model.thrust], [values, lower, upper])
 
 
 def _unlimited_thrusts(hessian: ca.SX, gradient: ca.SX) -> ca.SX:
