@@ -12,7 +12,7 @@ import numpy as np
 
 
 class Outcome(StrEnum):
-    """How a command was found; every exit of a step has one of these names."""
+    """Exit of a step: the solver or law that found the command."""
 
     SOLVED = "solved"
     INACCURATE_ACCEPTED = "inaccurate_accepted"

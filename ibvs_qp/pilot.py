@@ -57,7 +57,7 @@ class CameraConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class PilotConfig:
-    """Everything a flight needs beside the vehicle itself."""
+    """Configuration of a flight."""
 
     controller: ControllerConfig = field(default_factory=ControllerConfig)
     camera: CameraConfig = field(default_factory=CameraConfig)
@@ -91,7 +91,7 @@ class Pilot:
         thrust_limits: Lower and upper thrust limits that the drive reports [N], (n,) each, or None for the configured.
 
     Args:
-        config: Everything a flight needs.
+        config: Configuration of the flight.
         painter: Strategy to follow; None paints.
         seen_as: Applied to the features of every picture, for studies of perception errors.
     """

@@ -44,7 +44,7 @@ from numpy.polynomial import Polynomial
 
 #: Period of the camera's frames, and their mean age: 60 ms of latency and half a period [s] (design section 5).
 FRAME_PERIOD, FRAME_AGE = 1.0 / 30.0, 0.077
-#: Order of the Pade approximants; Newton's method removes what they leave.
+#: Order of the Pade approximants; Newton's method removes their error.
 PADE_ORDER = 4
 #: Faster poles belong to the approximants; rotors with 50 ms of lag cannot excite them [rad/s].
 FASTEST_MODE = 250.0

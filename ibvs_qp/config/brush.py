@@ -1,4 +1,4 @@
-"""Wall and brush that a preset is made for."""
+"""Wall and brush of a preset."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ibvs_qp.config.settings import setting, validate
 
 @dataclass(frozen=True, kw_only=True)
 class BrushSettings:
-    """What a preset is made for: wall and brush in series, and the age of the felt force."""
+    """Contact of a preset: wall and brush in series, and the age of the measured force."""
 
     stiffness_min_n_m: float = setting(1000.0, "softest wall and brush", unit="N/m", low=50.0, high=1e5)
     stiffness_max_n_m: float = setting(

@@ -87,7 +87,7 @@ class LoopMargin:
             oscillating, 1 when nothing oscillates.
         frequency_hz: Natural frequency of that mode [Hz], 0 when nothing oscillates.
         stiffness_n_m: Wall and brush stiffness it holds for [N/m].
-        passive_damping_ratio: What vehicle and wall alone have, without any feedback.
+        passive_damping_ratio: Of vehicle and wall alone, without feedback.
     """
 
     least_damping_ratio: float

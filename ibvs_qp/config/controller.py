@@ -27,7 +27,7 @@ LONGEST_TICK = 0.02
 
 @dataclass(frozen=True, kw_only=True)
 class ControllerConfig:
-    """Everything a controller needs; the default flies the Tarot T960."""
+    """Configuration of a controller; the default flies the Tarot T960."""
 
     vehicle: VehicleParams = field(default_factory=VehicleParams)
     gains: Gains = field(default_factory=Gains)

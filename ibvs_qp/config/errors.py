@@ -1,4 +1,4 @@
-"""Errors that a person can mend; each says what is wrong, where and what is allowed."""
+"""Errors of configuration and use: field, value and allowed range."""
 
 from __future__ import annotations
 

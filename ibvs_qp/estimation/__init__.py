@@ -1,1 +1,1 @@
-"""Estimation: from late, noisy samples to what is true now."""
+"""Estimation of the present state from late, noisy samples."""

@@ -37,7 +37,7 @@ class BoundFunction:
         self._alive = function, buffer, tuple(arguments), tuple(results)
 
     def __call__(self) -> None:
-        """Evaluate on what the arguments hold now."""
+        """Evaluate on the present arguments."""
         self.evaluate()
 
 

@@ -1,4 +1,4 @@
-"""What the step function reads: body, contact, reference and lines, as symbols in the order of packing."""
+"""Inputs of the step function: body, contact, reference and lines, as symbols in the order of packing."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Painting strategy: references for the controller from what the pilot estimates, phase by phase."""
+"""Painting strategy: references for the controller from the estimates, phase by phase."""

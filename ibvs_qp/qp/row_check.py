@@ -18,7 +18,7 @@ def check_rows(model: Model, tasks: Sequence[TaskRow], limits: Sequence[LimitRow
     A task and a limit may share a name ("yaw" is both); two tasks or two limits may not, because reports name rows.
 
     Raises:
-        ConfigError: Naming the row and what is wrong with it.
+        ConfigError: Naming the row and its fault.
     """
     _refuse_duplicates("task", [row.name for row in tasks])
     _refuse_duplicates("limit", [row.name for row in limits])

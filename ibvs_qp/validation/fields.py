@@ -135,7 +135,7 @@ SENSOR_FRAME = FieldTable(
     _vector("wrench", 6, 500.0, "N or N m", fallback=(0.0,) * 6),
 )
 
-#: What a controller shall do (`Reference`): a fault rejects the whole reference.
+#: Targets of a controller (`Reference`): a fault rejects the whole reference.
 REFERENCE = FieldTable(
     Field("push_force", 0, 0.0, 1e3, "N"),
     Field("standoff", 0, -1.0, 10.0, "m"),
