@@ -27,8 +27,7 @@ from ibvs_qp.config import ControllerConfig
 from ibvs_qp.frames import GRAVITY
 from ibvs_qp.limits import ThrustLimit
 from ibvs_qp.model.model import Model
-from ibvs_qp.model.parameter import Parameter
-from ibvs_qp.model.rows import TaskRow
+from ibvs_qp.model.rows import Parameter, TaskRow
 from ibvs_qp.qp.accept import QpEngine
 from ibvs_qp.qp.evaluator import RecordedProgram
 from ibvs_qp.qp.problem import QpProblem
