@@ -1,4 +1,4 @@
-"""Tables for the terminal, and the figures of merit that tables show with their units and digits."""
+"""Tables for the terminal and in Markdown, and the figures of merit that they show with their units and digits."""
 
 from __future__ import annotations
 
@@ -78,6 +78,19 @@ def figure_table(metrics: dict[str, dict[str, Any]]) -> Table:
     headings = ("figure", *(law_name(law) for law in metrics), "unit")
     rows = [(line.label, *(line.show(figures) for figures in metrics.values()), line.unit) for line in LINES]
     return terminal_table(headings, rows, text=("figure", "unit"), wrap=headings[1:-1])
+
+
+def markdown(heads: Sequence[str], rows: Iterable[Sequence[str]], left: int | None = None) -> str:
+    """A Markdown table that ends with a line break.
+
+    Args:
+        heads: Headings of the columns.
+        rows: Cells of every row.
+        left: Number of left-aligned columns, the others are numbers; None leaves the alignment open.
+    """
+    rule = "".join("---|" if left is None else ":--|" if place < left else "--:|" for place in range(len(heads)))
+    lines = ["| " + " | ".join(line) + " |" for line in (heads, *rows)]
+    return "\n".join([lines[0], "|" + rule, *lines[1:]]) + "\n"
 
 
 def terminal_table(

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import polars as pl
 
-from sim.experiments.wording import markdown, rounded
+from sim.evaluate.table import markdown
+from sim.experiments.wording import rounded
 from sim.sweep.parts import PARAM
 
 #: Pushes compared [N].

@@ -14,6 +14,7 @@ import numpy as np
 import polars as pl
 
 from ibvs_qp.config.settings import load_toml
+from sim.evaluate.table import markdown
 from sim.experiments.spec import Column
 from sim.experiments.wording import rounded
 from sim.sweep.parts import PARAM
@@ -55,10 +56,8 @@ LINES = load_toml(Lines, Path(__file__).with_name("readme.toml")).lines
 
 def digest(table: pl.DataFrame, lines: Sequence[Line] = LINES) -> str:
     """Markdown table of the lines that have flights in a table of all experiments."""
-    text = [
-        "| | QP | analytic law | published | flights, QP and analytic | command: `ibvs-qp` |",
-        "|---|---|---|---|---|---|",
-    ]
+    heads = ("", "QP", "analytic law", "published", "flights, QP and analytic", "command: `ibvs-qp`")
+    cells = []
     for line in lines:
         rows = table.filter((pl.col("experiment") == line.experiment) & (pl.col("variant") == line.variant))
         for name, value in line.where.items():
@@ -66,9 +65,9 @@ def digest(table: pl.DataFrame, lines: Sequence[Line] = LINES) -> str:
         if rows.height:
             laws = [rows.filter(pl.col("law") == law) for law in LAWS]
             count = ", ".join(str(each.height) if each.height else "–" for each in laws)
-            values = " | ".join(_value(each, line) for each in laws)
-            text.append(f"| {line.label} | {values} | {line.published} | {count} | `experiment {line.experiment}` |")
-    return "\n".join(text) + "\n"
+            values = (_value(each, line) for each in laws)
+            cells.append((line.label, *values, line.published, count, f"`experiment {line.experiment}`"))
+    return markdown(heads, cells)
 
 
 def _value(rows: pl.DataFrame, line: Line) -> str:
