@@ -36,6 +36,12 @@ class PathError:
     distance: np.ndarray
     height: np.ndarray
 
+    @property
+    def travelled(self) -> np.ndarray:
+        """Distance painted so far at every painting tick [m], (painting ticks,)."""
+        steps = np.linalg.norm(np.diff(self.tip[self.painting], axis=0), axis=1)
+        return np.concatenate(([0.0], np.cumsum(steps)))
+
 
 def painted_rows(trace: Trace, tip: np.ndarray) -> dict[int, np.ndarray]:
     """Tip path of every row while painting in contact, board coordinates, (S, 2) each [m]."""

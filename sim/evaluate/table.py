@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    import numpy as np
+    import polars as pl
     from rich.table import Table
 
 LAW_NAMES = {"qp": "QP law", "paper": "analytic law"}
@@ -16,6 +18,36 @@ LAW_NAMES = {"qp": "QP law", "paper": "analytic law"}
 def law_name(law: str) -> str:
     """Name of a law in titles, headings and legends."""
     return LAW_NAMES.get(law, law)
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure of merit: a column of a table of flights, and its form in figures and reports.
+
+    Attributes:
+        column: Name of the column.
+        words: In words.
+        scale: Factor from the column's unit to the reported one.
+        unit: Reported unit.
+        more_is_better: Whether larger values are better.
+    """
+
+    column: str
+    words: str
+    scale: float = 1.0
+    unit: str = ""
+    more_is_better: bool = False
+
+    @property
+    def label(self) -> str:
+        """Words with unit."""
+        return f"{self.words} [{self.unit}]" if self.unit else self.words
+
+    def values(self, table: pl.DataFrame) -> np.ndarray:
+        """Figure of every row in the reported unit, NaN where there is none, (rows,)."""
+        import polars as pl
+
+        return self.scale * table[self.column].cast(pl.Float64).fill_null(math.nan).to_numpy()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,7 +121,7 @@ def markdown(heads: Sequence[str], rows: Iterable[Sequence[str]], left: int | No
         left: Number of left-aligned columns, the others are numbers; None leaves the alignment open.
     """
     rule = "".join("---|" if left is None else ":--|" if place < left else "--:|" for place in range(len(heads)))
-    lines = ["| " + " | ".join(line) + " |" for line in (heads, *rows)]
+    lines = ["|" + "|".join(f" {cell} " if cell else " " for cell in line) + "|" for line in (heads, *rows)]
     return "\n".join([lines[0], "|" + rule, *lines[1:]]) + "\n"
 
 

@@ -14,8 +14,9 @@ from matplotlib.colors import Normalize, TwoSlopeNorm
 from matplotlib.figure import Figure as Canvas
 from matplotlib.image import AxesImage
 
+from sim.evaluate.table import Figure
 from sim.figures.style import law_name, new_figure
-from sim.sweep.figures.levels import Figure, Levels, levels, parameter_label, rank_correlation
+from sim.sweep.figures.levels import Levels, levels, parameter_label, rank_correlation
 
 #: Colour maps: of a figure (dark is bad), of a difference (blue: QP law better), of a success rate.
 FIGURE_MAP, DIFFERENCE_MAP, SUCCESS_MAP = "YlOrRd", "RdBu", "YlGn"

@@ -8,10 +8,10 @@ import polars as pl
 from matplotlib.figure import Figure as Canvas
 
 from ibvs_qp.config.errors import ConfigError
-from sim.evaluate.table import law_name, markdown
+from sim.evaluate.table import Figure, law_name, markdown
 from sim.figures.style import save, styled
 from sim.sweep.figures.boxes import draw_boxes
-from sim.sweep.figures.levels import Figure, chosen_figures, most_influential, varied
+from sim.sweep.figures.levels import chosen_figures, most_influential, varied
 from sim.sweep.figures.maps import draw_dependence, draw_figure_maps, draw_success_maps
 from sim.sweep.parts import HEAD
 
