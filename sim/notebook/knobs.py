@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from sim.notebook.wall_flights import Setting
+from sim.sweep.setup import changed, value_at
 
 #: Steps of a logarithmic slider per decade, and their significant digits.
 STEPS_PER_DECADE, DIGITS = 10, 3
@@ -109,7 +110,7 @@ KNOBS = {knob.path: knob for knobs in GROUPS.values() for knob in knobs}
 
 def knob_values(setting: Setting) -> dict[str, Any]:
     """Value of every knob in a setting."""
-    return {name: _value(setting, name.split(".")) for name in KNOBS}
+    return {name: value_at(setting, name) for name in KNOBS}
 
 
 def turned(setting: Setting, values: dict[str, Any]) -> Setting:
@@ -118,22 +119,5 @@ def turned(setting: Setting, values: dict[str, Any]) -> Setting:
     Raises:
         ConfigError: When a value, or several together, are refused.
     """
-    changes = {path: value for name, value in values.items() for path in (KNOBS[name].path, KNOBS[name].also) if path}
-    return _replaced(setting, {tuple(path.split(".")): value for path, value in changes.items()})
-
-
-def _value(node: Any, path: list[str]) -> Any:
-    for name in path:
-        node = getattr(node, name)
-    return node
-
-
-def _replaced(node: Any, changes: dict[tuple[str, ...], Any]) -> Any:
-    """Replace all fields of a section at once: some values are valid only together."""
-    new = {}
-    for name in dict.fromkeys(path[0] for path in changes):
-        below = {path[1:]: value for path, value in changes.items() if path[0] == name}
-        value = below[()] if () in below else _replaced(getattr(node, name), below)
-        if value != getattr(node, name):
-            new[name] = value
-    return dataclasses.replace(node, **new) if new else node
+    paths = {path: value for name, value in values.items() for path in (KNOBS[name].path, KNOBS[name].also) if path}
+    return changed(dataclasses.replace(setting, seed=paths.pop("seed", setting.seed)), paths)

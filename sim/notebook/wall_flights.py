@@ -21,6 +21,7 @@ from sim.flight.trace import Trace
 from sim.notebook.internals import Tick, TickRecord, WallJob, record_tick
 from sim.notebook.short import unless_short
 from sim.notebook.table import number, table
+from sim.sweep.setup import Setup
 from sim.world.scene import Scene
 
 #: Hold and slide of notebook 02, in full and in the short form [s]: a push settles within 1 s, a line within 2 s.
@@ -32,7 +33,7 @@ SETTLED_S, HOVER_S = 1.1, 1.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Setting:
+class Setting(Setup):
     """Pilot configuration with its law, scene and seed; equal settings give the same flight to the bit."""
 
     pilot: PilotConfig = field(default_factory=lambda: default_preset("qp"))

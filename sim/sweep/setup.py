@@ -6,7 +6,7 @@ import copy
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.settings import from_dict, to_dict
@@ -33,7 +33,10 @@ class Setup:
     job: PaintJob | PressJob = field(default_factory=PaintJob)
 
 
-def changed(setup: Setup, values: Mapping[str, Any]) -> Setup:
+AnySetup = TypeVar("AnySetup", bound=Setup)
+
+
+def changed(setup: AnySetup, values: Mapping[str, Any]) -> AnySetup:
     """The setup with other values, checked alone and together.
 
     Args:

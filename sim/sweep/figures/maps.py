@@ -77,7 +77,7 @@ def _draw(
         _bar(canvas, images[0], list(row[: len(parts)]), label)
         if both:
             difference = cells[1] - cells[0]
-            reach = np.nanmax(np.abs(difference), initial=1e-12) if np.isfinite(difference).any() else 1.0
+            reach = float(np.abs(difference[np.isfinite(difference)]).max(initial=0.0)) or 1.0
             scale, colours = TwoSlopeNorm(0.0, -reach, reach), DIFFERENCE_MAP + ("_r" if span else "")
             _bar(canvas, _panel(row[-1], difference, "analytic - QP", x, y, scale, colours), [row[-1]], "")
         for axes in row[1:]:
