@@ -7,17 +7,12 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from sim.flight.trace import law_name
+
 if TYPE_CHECKING:
     import numpy as np
     import polars as pl
     from rich.table import Table
-
-LAW_NAMES = {"qp": "QP law", "paper": "analytic law"}
-
-
-def law_name(law: str) -> str:
-    """Name of a law in titles, headings and legends."""
-    return LAW_NAMES.get(law, law)
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -48,6 +47,14 @@ FIELDS = {
     "contact_1khz": "(M,) true normal contact force at every physics step [N]",
     "painting_1khz": "(M,) bool, true while a row or a climb is being painted (phase demands contact)",
 }
+
+
+_LAW_NAMES = {"qp": "QP law", "paper": "analytic law"}
+
+
+def law_name(law: str) -> str:
+    """Name of a law in titles, headings and legends."""
+    return _LAW_NAMES.get(law, law)
 
 
 @dataclass(kw_only=True)
@@ -94,7 +101,6 @@ class Trace:
     wall_time_s: float = 0.0
     canvas: np.ndarray | None = field(default_factory=lambda: None)  # no class attribute: see `draw_later`
     canvas_px_per_m: float = 0.0
-    canvas_origin_m: tuple[float, float] = (0.0, 0.0)
     coverage_mask: np.ndarray | None = None
     pictures: list[tuple[float, np.ndarray, str]] = field(default_factory=list)
     preset: str = ""
@@ -120,9 +126,3 @@ class Trace:
         state = self.__dict__ | {"canvas": self.canvas}
         state.pop("_draw", None)
         return state
-
-    def save(self, file: str | Path, prefix: str = "") -> None:
-        """Write every array to a compressed npz file; load with ``numpy.load``."""
-        names = {"phases": self.phases, "outcomes": self.outcomes, "limits": self.limits}
-        words = {prefix + key: np.array(value, dtype=str) for key, value in names.items()}
-        np.savez_compressed(file, **{prefix + key: value for key, value in self.arrays.items()}, **words)  # type: ignore[arg-type]

@@ -24,6 +24,7 @@ from allocation import (
 )
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import GRAVITY
+from sim.sensors.cameras.outline import clip_polygon
 
 #: Density of the air at sea level and 15 degrees [kg/m^3] (ISO 2533).
 AIR_DENSITY = 1.225
@@ -117,7 +118,7 @@ class Case:
         r"""Corners of all (a, b) for which the wrench :math:`w_0 + a\,d_1 + b\,d_2` is attainable.
 
         With six rotors a wrench has unique thrusts :math:`u = B^{-1} w`, so each thrust limit is a half-plane in
-        (a, b). A large square is clipped with one after the other (Sutherland and Hodgman).
+        (a, b). A large square is clipped with one after the other.
 
         Args:
             origin: Wrench w_0, (6,) [N, N m].
@@ -132,16 +133,9 @@ class Case:
         rooms = np.concatenate((self.upper - at, at - self.lower))
         corners = LARGEST * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
         for slope, room in zip(np.vstack((slopes, -slopes)), rooms, strict=True):
-            beyond, kept = corners @ slope - room, []
-            for i in range(len(corners)):
-                if beyond[i - 1] * beyond[i] < 0.0:
-                    step = beyond[i - 1] / (beyond[i - 1] - beyond[i])
-                    kept.append(corners[i - 1] + step * (corners[i] - corners[i - 1]))
-                if beyond[i] <= 0.0:
-                    kept.append(corners[i])
-            corners = np.reshape(kept, (-1, 2))
+            corners = clip_polygon(corners, -slope, room)
         x, y = corners.T
-        area = 0.5 * abs(x @ np.roll(y, 1) - y @ np.roll(x, 1)) if len(corners) > 2 else 0.0
+        area = 0.5 * abs(x @ np.roll(y, 1) - y @ np.roll(x, 1))
         return corners if area > EMPTY_AREA else np.empty((0, 2))
 
     def level_cut(self) -> np.ndarray:

@@ -11,7 +11,7 @@ import polars as pl
 
 from sim.evaluate.table import law_name, markdown
 from sim.figures.style import save, styled
-from sim.report.rundir import as_json
+from sim.report.rundir import write_json
 from sim.sweep.parts import write_table
 from sim.tune.choice import front, gain_over
 from sim.tune.figures import draw_front, draw_unseen
@@ -96,7 +96,7 @@ def write(outcome: Outcome, folder: Path) -> dict[str, Any]:
     preset = with_gains(outcome.plan.shipped, gains).to_toml()
     (folder / f"{law}.toml").write_text(f"{head}\n{preset}", encoding="utf-8")
     record = {**summary, "ranges": RANGES, "all_trials": trial_rows(outcome.trials)}
-    (folder / f"{law}_trials.json").write_text(as_json(record, indent=1) + "\n", encoding="utf-8")
+    write_json(folder / f"{law}_trials.json", record)
     with styled():
         shipped = shipped_score(outcome.plan, outcome.trials)
         save(draw_front(law, found, shipped, outcome.chosen), folder / "figures" / f"{law}-front.png")
