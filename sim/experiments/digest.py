@@ -17,9 +17,8 @@ from ibvs_qp.config.settings import load_toml
 from sim.evaluate.table import markdown
 from sim.experiments.spec import Column
 from sim.experiments.wording import rounded
-from sim.sweep.parts import PARAM
 from sim.sweep.spec import LAWS
-from sim.sweep.statistics import median_interval
+from sim.sweep.statistics import median_interval, select
 
 #: Marks around the table.
 BEGIN, END = "<!-- experiments: generated -->", "<!-- end of experiments -->"
@@ -59,9 +58,7 @@ def digest(table: pl.DataFrame, lines: Sequence[Line] = LINES) -> str:
     heads = ("", "QP", "analytic law", "published", "flights, QP and analytic", "command: `ibvs-qp`")
     cells = []
     for line in lines:
-        rows = table.filter((pl.col("experiment") == line.experiment) & (pl.col("variant") == line.variant))
-        for name, value in line.where.items():
-            rows = rows.filter(pl.col(PARAM + name) == value) if PARAM + name in rows.columns else rows.clear()
+        rows = select(table.filter(pl.col("experiment") == line.experiment), line.where, variant=line.variant)
         if rows.height:
             laws = [rows.filter(pl.col("law") == law) for law in LAWS]
             count = ", ".join(str(each.height) if each.height else "–" for each in laws)

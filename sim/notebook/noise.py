@@ -23,6 +23,7 @@ from sim.sweep.fingerprint import code_hash, configuration_hash
 from sim.sweep.paired import needed, paired_differences, sign
 from sim.sweep.parts import PARAM
 from sim.sweep.spec import LAWS
+from sim.sweep.statistics import completed, select
 
 #: Columns of the two noises.
 VS, FORCE = PARAM + "sigma_vs", PARAM + "sigma_f_n"
@@ -76,8 +77,7 @@ def cell_values(sweep: pl.DataFrame, law: str, vs: float, force: float, figure: 
     """Figure of the completed flights of a cell, in the unit of its label."""
     if figure.column not in sweep.columns:
         return np.array([])
-    rows = sweep.filter((pl.col("law") == law) & (pl.col(VS) == vs) & (pl.col(FORCE) == force) & pl.col("completed"))
-    return figure.scale * rows[figure.column].drop_nulls().to_numpy()
+    return figure.scale * completed(select(sweep, law=law, sigma_vs=vs, sigma_f_n=force), figure.column)
 
 
 def success(sweep: pl.DataFrame) -> pl.DataFrame:

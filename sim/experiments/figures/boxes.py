@@ -6,10 +6,11 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from sim.experiments.figures.common import BOUND, Drawn, Results, select
+from sim.experiments.figures.common import BOUND, Drawn, Results
 from sim.experiments.spec import FigureSpec, Panel
 from sim.figures.style import draw_boxes, law_patches, new_figure
 from sim.sweep.parts import PARAM
+from sim.sweep.statistics import select
 
 #: Width of a box of the noise sweep and gap between both laws; cells are one apart.
 _BOX, _GAP = 0.34, 0.04

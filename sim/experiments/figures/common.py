@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import polars as pl
 from matplotlib.figure import Figure
 
@@ -15,7 +13,6 @@ from sim.experiments.spec import Experiment
 from sim.figures.style import legend_below
 from sim.flight.flight_log import load_run
 from sim.flight.trace import Trace
-from sim.sweep.parts import PARAM
 
 #: Caption and figure by file name.
 Drawn = dict[str, tuple[str, Figure]]
@@ -32,21 +29,6 @@ class Results:
     experiment: Experiment
     table: pl.DataFrame  # one row per flight
     folder: Path  # of the stored logs
-
-
-def select(table: pl.DataFrame, where: Mapping[str, Any] | None = None, **more: Any) -> pl.DataFrame:
-    """Rows with a law, a variant and parameter values."""
-    for name, value in {**(where or {}), **more}.items():
-        column = name if name in ("law", "variant") else PARAM + name
-        if column not in table.columns:
-            return table.clear()
-        table = table.filter(pl.col(column) == value)
-    return table
-
-
-def completed(rows: pl.DataFrame, metric: str) -> np.ndarray:
-    """Values of a metric in the flights that ended as planned."""
-    return rows.filter(pl.col("completed"))[metric].drop_nulls().to_numpy()
 
 
 def stored_trace(results: Results, rows: pl.DataFrame) -> Trace | None:

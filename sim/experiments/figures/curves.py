@@ -8,11 +8,12 @@ import numpy as np
 import polars as pl
 from matplotlib.axes import Axes
 
-from sim.experiments.figures.common import BOUND, Drawn, Results, legend_with_crosses, select
+from sim.experiments.figures.common import BOUND, Drawn, Results, legend_with_crosses
 from sim.experiments.figures.medians import plot_medians
 from sim.experiments.spec import FigureSpec, Line, Panel
 from sim.figures.style import REFERENCE, law_colour, law_name, new_figure, note_empty
 from sim.sweep.parts import PARAM
+from sim.sweep.statistics import select
 
 #: Line style of the variants, in the order given.
 _DASHES = ("-", ":", "--")

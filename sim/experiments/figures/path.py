@@ -7,9 +7,10 @@ from matplotlib.axes import Axes
 
 from sim.evaluate.path_error import path_error
 from sim.experiments.figures.boxes import noise_cells
-from sim.experiments.figures.common import Drawn, Results, completed, select, stored_trace
+from sim.experiments.figures.common import Drawn, Results, stored_trace
 from sim.experiments.spec import FigureSpec
 from sim.figures.style import FAINT, law_colour, law_name, legend_below, new_figure, note_empty
+from sim.sweep.statistics import completed, select
 
 
 def draw_path_error(spec: FigureSpec, results: Results) -> Drawn:

@@ -33,7 +33,7 @@ def at_rest(plant: Plant, position: np.ndarray, rotation: tuple[float, float, fl
     plant.data.qpos[:3] = FLIP * position
     plant.data.qpos[3:] = [math.cos(half), *(FLIP * axis * math.sin(half))]
     plant.data.qvel[:] = 0.0
-    plant._refresh()
+    plant._read()
     return plant
 
 
@@ -191,7 +191,7 @@ def test_contact_reads_zero_in_free_air_and_friction_opposes_the_slide():
     assert plant.contact_normal_force == 0.0 and not plant.contact_friction.any()
     at_rest(plant, np.array([-0.695, 1.0, -1.5]))
     plant.data.qvel[:3] = FLIP * [0.0, 0.1, 0.05]
-    plant._refresh()
+    plant._read()
     plant.step(plant.thrusts_actual)
     assert plant.contact_normal_force > 5.0 and plant.contact_1khz[-1] == plant.contact_normal_force
     friction = plant.contact_friction
