@@ -38,16 +38,11 @@ class Stopwatch:
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
-    """Times of one operation.
+    """Times of one operation."""
 
-    Attributes:
-        name: Of the operation.
-        size: Picture size as in "640x480", or None.
-        times_us: Processor times of the measuring thread [us], in order; other processes disturb them least.
-    """
-
-    name: str
-    size: str | None = None
+    name: str  # of the operation
+    size: str | None = None  # picture size as in "640x480", or None
+    # processor times of the measuring thread [us], in order; other processes disturb them least
     times_us: list[float] = field(default_factory=list)
 
     @property

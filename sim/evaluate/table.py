@@ -17,21 +17,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure of merit: a column of a table of flights, and its form in figures and reports.
+    """A figure of merit: a column of a table of flights, and its form in figures and reports."""
 
-    Attributes:
-        column: Name of the column.
-        words: In words.
-        scale: Factor from the column's unit to the reported one.
-        unit: Reported unit.
-        more_is_better: Whether larger values are better.
-    """
-
-    column: str
-    words: str
-    scale: float = 1.0
-    unit: str = ""
-    more_is_better: bool = False
+    column: str  # name of the column
+    words: str  # in words
+    scale: float = 1.0  # factor from the column's unit to the reported one
+    unit: str = ""  # reported unit
+    more_is_better: bool = False  # whether larger values are better
 
     @property
     def label(self) -> str:

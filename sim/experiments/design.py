@@ -26,17 +26,11 @@ DIRECTIONS = {"along the wall": (0.0, 1.0, 0.0), "off the wall": (-1.0, 0.0, 0.0
 
 @dataclass(frozen=True, kw_only=True)
 class Choice:
-    """Options of the command line.
+    """Options of the command line."""
 
-    Attributes:
-        quick: A few cells and seeds, for minutes instead of the record.
-        seed: First seed.
-        features: "rendered" or "geometric".
-    """
-
-    quick: bool = False
-    seed: int = 0
-    features: str = "rendered"
+    quick: bool = False  # a few cells and seeds, for minutes instead of the record
+    seed: int = 0  # first seed
+    features: str = "rendered"  # "rendered" or "geometric"
 
 
 def design(experiment: Experiment, choice: Choice) -> list[Run]:

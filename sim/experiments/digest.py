@@ -26,20 +26,13 @@ BEGIN, END = "<!-- experiments: generated -->", "<!-- end of experiments -->"
 
 @dataclass(frozen=True, kw_only=True)
 class Line(Column):
-    """A line: one metric over the flights of both laws in the cells of `where`.
+    """A line: one metric over the flights of both laws in the cells of `where`."""
 
-    Attributes:
-        experiment: Name of the experiment.
-        variant: Variant of the controller.
-        published: Value in the literature.
-        also: Further metrics behind it; their labels hold "{}" for the number.
-        at_least: If given, the number of flights, failed ones included, that reach this value replaces the median.
-    """
-
-    experiment: str
-    variant: str = "standard"
-    published: str = "–"
-    also: tuple[Column, ...] = ()
+    experiment: str  # name of the experiment
+    variant: str = "standard"  # variant of the controller
+    published: str = "–"  # value in the literature
+    also: tuple[Column, ...] = ()  # further metrics behind it; their labels hold "{}" for the number
+    # if given, the number of flights, failed ones included, that reach this value replaces the median
     at_least: float | None = None
 
 

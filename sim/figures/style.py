@@ -15,6 +15,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.transforms import blended_transform_factory
+from numpy.typing import ArrayLike
 
 from sim.evaluate.table import law_name
 from sim.flight.trace import Trace
@@ -128,11 +129,11 @@ def note_empty(axes: Axes, text: str) -> None:
     axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", color=GREY)
 
 
-def draw_boxes(axes: Axes, values: Sequence[np.ndarray], places: Sequence[float], width: float, law: str) -> None:
+def draw_boxes(axes: Axes, values: Sequence[np.ndarray], places: ArrayLike, width: float, law: str) -> None:
     """Box plots of one law at places along x; outliers are dots."""
     drawn = axes.boxplot(
         values,
-        positions=list(places),
+        positions=np.atleast_1d(places).tolist(),
         widths=width,
         patch_artist=True,
         manage_ticks=False,

@@ -18,23 +18,14 @@ STEPS_PER_DECADE, DIGITS = 10, 3
 
 @dataclass(frozen=True)
 class Knob:
-    """One slider or switch.
+    """One slider or switch."""
 
-    Attributes:
-        label: Name with the unit in brackets.
-        path: Dotted field of `Setting`; it is also the knob's name.
-        low: Left end of the slider; None for a switch.
-        high: Right end.
-        step: Step; None for logarithmic steps.
-        also: A second field with the same value. Rotor limits are set in the controller and in the plant.
-    """
-
-    label: str
-    path: str
-    low: float | None = None
-    high: float | None = None
-    step: float | None = None
-    also: str = ""
+    label: str  # name with the unit in brackets
+    path: str  # dotted field of `Setting`; it is also the knob's name
+    low: float | None = None  # left end of the slider; None for a switch
+    high: float | None = None  # right end
+    step: float | None = None  # step; None for logarithmic steps
+    also: str = ""  # a second field with the same value. Rotor limits are set in the controller and in the plant
 
     def stops(self, value: float) -> list[float]:
         """Positions of the slider, including its initial value."""

@@ -27,7 +27,7 @@ def draw_boxes(sweep: pl.DataFrame, figure: Figure) -> Drawing:
     for law, side in zip(LAWS, (-0.5, 0.5), strict=True):
         values = [cell_values(sweep, law, vs, force, figure) for vs, force in cells]
         places, colour = np.arange(len(cells)) + side * (_BOX + 0.04), law_colour(law)
-        style.draw_boxes(axes, values, places.tolist(), _BOX, law)
+        style.draw_boxes(axes, values, places, _BOX, law)
         dots = np.repeat(places, [len(each) for each in values])
         axes.plot(dots, np.concatenate(values), ".", color=colour, markersize=3)
     axes.set_xticks(range(len(cells)), [f"$\\sigma_{{vs}}$ {vs:g}\n$\\sigma_f$ {force:g} N" for vs, force in cells])

@@ -42,17 +42,11 @@ _facets = functools.lru_cache(maxsize=64)(WrenchFacets)
 
 @dataclass(frozen=True, kw_only=True)
 class Case:
-    """A vehicle and the state of its rotors.
+    """A vehicle and the state of its rotors."""
 
-    Attributes:
-        vehicle: Mass, geometry, limits, tip.
-        weak_rotor: Name of a rotor with less thrust; empty if there is none.
-        fraction: Part of its full thrust that remains; 0 is a lost rotor.
-    """
-
-    vehicle: VehicleParams = field(default_factory=VehicleParams)
-    weak_rotor: str = ""
-    fraction: float = 1.0
+    vehicle: VehicleParams = field(default_factory=VehicleParams)  # mass, geometry, limits, tip
+    weak_rotor: str = ""  # name of a rotor with less thrust; empty if there is none
+    fraction: float = 1.0  # part of its full thrust that remains; 0 is a lost rotor
 
     @property
     def geometry(self) -> RotorGeometry:
@@ -201,21 +195,13 @@ def after_loss(case: Case) -> tuple[float, float, float]:
 
 @dataclass(frozen=True, kw_only=True)
 class Duties:
-    """Required abilities in level flight.
+    """Required abilities in level flight."""
 
-    Attributes:
-        push_n: Push standing still [N].
-        sliding_push_n: Push for any travel of the tip [N].
-        friction: Coulomb coefficient of tip and wall [-].
-        gust_n: Horizontal force from any side, in free flight [N].
-        least_mass_kg: Frame, battery and tools; the rest is ballast.
-    """
-
-    push_n: float = 10.0
-    sliding_push_n: float = 5.0
-    friction: float = 0.6
-    gust_n: float = 10.0
-    least_mass_kg: float = 5.5
+    push_n: float = 10.0  # push standing still [N]
+    sliding_push_n: float = 5.0  # push for any travel of the tip [N]
+    friction: float = 0.6  # Coulomb coefficient of tip and wall [-]
+    gust_n: float = 10.0  # horizontal force from any side, in free flight [N]
+    least_mass_kg: float = 5.5  # frame, battery and tools; the rest is ballast
 
 
 def design_map(duties: Duties, tilts_deg: np.ndarray, masses_kg: np.ndarray) -> pl.DataFrame:

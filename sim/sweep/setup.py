@@ -20,17 +20,11 @@ ROOTS = ("scene", "pilot", "job")
 
 @dataclass(frozen=True, kw_only=True)
 class Setup:
-    """Everything of a flight within reach of a dotted path, e.g. ``scene.wall.friction``.
+    """Everything of a flight within reach of a dotted path, e.g. ``scene.wall.friction``."""
 
-    Attributes:
-        scene: The truth.
-        pilot: Perception, controller, strategy.
-        job: Task at the wall.
-    """
-
-    scene: Scene = field(default_factory=Scene)
-    pilot: PilotConfig = field(default_factory=PilotConfig)
-    job: PaintJob | PressJob = field(default_factory=PaintJob)
+    scene: Scene = field(default_factory=Scene)  # the truth
+    pilot: PilotConfig = field(default_factory=PilotConfig)  # perception, controller, strategy
+    job: PaintJob | PressJob = field(default_factory=PaintJob)  # task at the wall
 
 
 AnySetup = TypeVar("AnySetup", bound=Setup)

@@ -12,12 +12,9 @@ from sim.evaluate.table import Figure
 
 @dataclass(frozen=True)
 class Objective(Figure):
-    """A figure to minimise.
+    """A figure to minimise."""
 
-    Attributes:
-        failed: Value of a flight that does not complete, in the unit of the column: far beyond any completed one.
-    """
-
+    # value of a flight that does not complete, in the unit of the column: far beyond any completed one
     failed: float = math.inf
 
 
@@ -32,15 +29,10 @@ OBJECTIVES = (
 
 @dataclass(frozen=True)
 class Score:
-    """Quality of a preset.
+    """Quality of a preset."""
 
-    Attributes:
-        values: Mean of every objective.
-        failed: Fraction of flights that did not complete; 1 for a preset with an oscillating contact.
-    """
-
-    values: tuple[float, ...]
-    failed: float
+    values: tuple[float, ...]  # mean of every objective
+    failed: float  # fraction of flights that did not complete; 1 for a preset with an oscillating contact
 
 
 def score(rows: Iterable[Mapping[str, Any]]) -> Score:

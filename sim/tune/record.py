@@ -25,25 +25,15 @@ from sim.tune.verdict import differences
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """A finished search.
+    """A finished search."""
 
-    Attributes:
-        plan: The search.
-        trials: Gains and score by number.
-        finalists: Finalists and the shipped preset by name.
-        table: Flights of shipped and chosen on unseen seeds; None without a chosen trial.
-        command: The command line.
-        searched_by: The command line of the search that made the trials.
-        again: The command that repeats it on any computer.
-    """
-
-    plan: SearchPlan
-    trials: Trials
-    finalists: dict[str, Finalist]
-    table: pl.DataFrame | None
-    command: str
-    searched_by: str
-    again: str
+    plan: SearchPlan  # the search
+    trials: Trials  # gains and score by number
+    finalists: dict[str, Finalist]  # finalists and the shipped preset by name
+    table: pl.DataFrame | None  # flights of shipped and chosen on unseen seeds; None without a chosen trial
+    command: str  # the command line
+    searched_by: str  # the command line of the search that made the trials
+    again: str  # the command that repeats it on any computer
 
     @property
     def law(self) -> str:

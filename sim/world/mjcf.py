@@ -35,22 +35,14 @@ STEPS_PER_TICK = 4
 
 @dataclass(frozen=True, kw_only=True)
 class ModelIds:
-    """Indices of bodies and sensors in the compiled model.
+    """Indices of bodies and sensors in the compiled model."""
 
-    Attributes:
-        vehicle: Body of the vehicle without tool.
-        accelerometer: Slice of ``sensordata``: specific force at the body origin, front-left-up [m/s^2].
-        force: Slice: force of the vehicle on the tool, front-left-up [N].
-        torque: Slice: the moment at the force/torque sensor [N m].
-        contact: Slice: found flag, then force (normal, tangents) and the normal and first tangent axes.
-        remembered: Start in ``history`` of the samples of those four sensors at the steps of a tick, oldest first.
-    """
-
-    vehicle: int
-    accelerometer: slice
-    force: slice
-    torque: slice
-    contact: slice
+    vehicle: int  # body of the vehicle without tool
+    accelerometer: slice  # slice of ``sensordata``: specific force at the body origin, front-left-up [m/s^2]
+    force: slice  # slice: force of the vehicle on the tool, front-left-up [N]
+    torque: slice  # slice: the moment at the force/torque sensor [N m]
+    contact: slice  # slice: found flag, then force (normal, tangents) and the normal and first tangent axes
+    # start in ``history`` of the samples of those four sensors at the steps of a tick, oldest first
     remembered: tuple[int, int, int, int]
 
 

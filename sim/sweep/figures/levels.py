@@ -33,17 +33,11 @@ LEAST_ROWS = 8
 
 @dataclass(frozen=True)
 class Levels:
-    """A parameter, sorted into levels: its values, or bins of drawn values.
+    """A parameter, sorted into levels: its values, or bins of drawn values."""
 
-    Attributes:
-        label: Words with unit.
-        names: Of the levels, in order.
-        level: Level of every row, (rows,); -1 without a value.
-    """
-
-    label: str
-    names: tuple[str, ...]
-    level: np.ndarray
+    label: str  # words with unit
+    names: tuple[str, ...]  # of the levels, in order
+    level: np.ndarray  # level of every row, (rows,); -1 without a value
 
 
 def chosen_figures(table: pl.DataFrame, columns: tuple[str, ...]) -> list[Figure]:
