@@ -7,7 +7,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from sim.evaluate import measures
-from sim.experiments.spec import Experiment, Flights, Value
+from sim.experiments import ALL, NAMES
+from sim.experiments.spec import Experiment, Flights, Value, experiment
 from sim.experiments.variants import VARIANTS, with_force_gain
 from sim.flight.closed_loop import FlightOptions, default_preset, pilot_config
 from sim.flight.faults import Derate, Fault, WindStep
@@ -31,6 +32,16 @@ class Choice:
     quick: bool = False  # a few cells and seeds, for minutes instead of the record
     seed: int = 0  # first seed
     features: str = "rendered"  # "rendered" or "geometric"
+
+
+def chosen(name: str) -> list[Experiment]:
+    """One experiment, or all of them for ``all``."""
+    return [experiment(each) for each in (NAMES if name == ALL else (name,))]
+
+
+def designs(name: str, choice: Choice) -> list[Run]:
+    """Runs of one or of all experiments, in the order of the report."""
+    return [run for each in chosen(name) for run in design(each, choice)]
 
 
 def design(experiment: Experiment, choice: Choice) -> list[Run]:

@@ -11,8 +11,8 @@ import polars as pl
 
 from ibvs_qp.config.errors import ConfigError
 from sim.evaluate.table import Figure, law_name
-from sim.experiments import Choice
-from sim.experiments import designs as experiment_runs
+from sim.experiments.design import Choice
+from sim.experiments.design import designs as experiment_runs
 from sim.flight.closed_loop import fly
 from sim.flight.trace import Trace
 from sim.notebook.noise_sample import SAMPLE, sample_runs

@@ -10,8 +10,10 @@ import polars as pl
 import pytest
 
 from ibvs_qp.config.errors import ConfigError
-from sim.experiments import NAMES, Choice, designs, experiment
+from sim.experiments import NAMES
 from sim.experiments.criteria import EVERY, Criterion
+from sim.experiments.design import Choice, designs
+from sim.experiments.spec import experiment
 from sim.experiments.verdict import evaluate
 from sim.report.comparison import compare, read_run
 from sim.sweep.paired import exact_interval, needed, paired_differences, sign, variant_differences
