@@ -49,6 +49,16 @@ class TruthScene:
         width, height, focal = self.camera
         return focal, focal, 0.5 * (width - 1), 0.5 * (height - 1)
 
+    @property
+    def corners(self) -> np.ndarray:
+        """Corners of the board in order (right, down) [m], (4, 2)."""
+        return 0.5 * np.array(self.size_m) * [[-1, -1], [1, -1], [1, 1], [-1, 1]]
+
+    def edge_planes(self, corners: np.ndarray) -> list[np.ndarray]:
+        """Interpretation planes (a, b, c) of a polygon's edges, its inside on their positive side."""
+        rays = corners @ self.rotation[:, :2].T + self.translation
+        return [np.cross(first, second) for first, second in zip(rays, np.roll(rays, -1, axis=0), strict=True)]
+
 
 @dataclass(frozen=True, kw_only=True)
 class Variation:
