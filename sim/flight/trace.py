@@ -68,42 +68,26 @@ class Event:
 
 @dataclass(kw_only=True)
 class Trace:
-    """One flight under one law.
+    """One flight under one law."""
 
-    Attributes:
-        scene: The scene flown.
-        seed: Its seed.
-        law: "qp" or "paper".
-        arrays: See `FIELDS`.
-        phases: Names of the phases, e.g. approach, align, press, paint, climb, retreat, done.
-        outcomes: Names of the outcomes.
-        limits: Names of the limits, columns of ``active``.
-        events: Phase changes and other events in order.
-        completed: Rows, climbs and retreat done without time-out or crash.
-        reason: Why the flight ended, in words.
-        wall_time_s: Wall-clock time of the simulation.
-        canvas: Painted board as the camera would see it, uint8 RGB, with `canvas_px_per_m`.
-        coverage_mask: Paint coverage of the canvas 0..1, float32, same size.
-        preset: Configuration of the pilot, TOML.
-        pictures: Video material: (t, RGB picture with detections drawn, phase name), thinned out.
-    """
-
-    scene: Scene
-    seed: int
-    law: str
-    arrays: dict[str, np.ndarray] = field(default_factory=dict)
-    phases: tuple[str, ...] = ()
-    outcomes: tuple[str, ...] = ()
-    limits: tuple[str, ...] = ()
-    events: list[Event] = field(default_factory=list)
-    completed: bool = False
-    reason: str = ""
-    wall_time_s: float = 0.0
-    canvas: np.ndarray | None = field(default_factory=lambda: None)  # no class attribute: see `draw_later`
-    canvas_px_per_m: float = 0.0
-    coverage_mask: np.ndarray | None = None
+    scene: Scene  # the scene flown
+    seed: int  # its seed
+    law: str  # "qp" or "paper"
+    arrays: dict[str, np.ndarray] = field(default_factory=dict)  # see `FIELDS`
+    phases: tuple[str, ...] = ()  # names of the phases: approach, align, press, paint, climb, retreat, done
+    outcomes: tuple[str, ...] = ()  # names of the outcomes
+    limits: tuple[str, ...] = ()  # names of the limits, columns of ``active``
+    events: list[Event] = field(default_factory=list)  # phase changes and other events in order
+    completed: bool = False  # rows, climbs and retreat done without time-out or crash
+    reason: str = ""  # why the flight ended, in words
+    wall_time_s: float = 0.0  # wall-clock time of the simulation [s]
+    # Painted board as the camera would see it, uint8 RGB, with `canvas_px_per_m`; no class attribute, see `draw_later`.
+    canvas: np.ndarray | None = field(default_factory=lambda: None)
+    canvas_px_per_m: float = 0.0  # resolution of canvas and coverage mask [px/m]
+    coverage_mask: np.ndarray | None = None  # paint coverage of the canvas 0..1, float32, same size
+    # Video material: (t, RGB picture with detections drawn, phase name), thinned out.
     pictures: list[tuple[float, np.ndarray, str]] = field(default_factory=list)
-    preset: str = ""
+    preset: str = ""  # configuration of the pilot, TOML
 
     def draw_later(self, draw: Callable[[], np.ndarray]) -> None:
         """Draw `canvas` on first access; sweeps and tuning never access it."""
