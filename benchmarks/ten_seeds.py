@@ -12,7 +12,8 @@ import joblib
 import numpy as np
 
 from sim.evaluate.metrics import compute_metrics
-from sim.flight.closed_loop import FlightOptions, fly
+from sim.flight.closed_loop import fly
+from sim.flight.options import FlightOptions
 from sim.world.scene import Scene
 
 #: Figure, words, factor to the reported unit, unit, and bound of the QP law.

@@ -1,7 +1,7 @@
 """Errors of every allocation method on random wrench demands beyond reach: delivered minus demanded, rms.
 
-Run as ``python benchmarks/wrench_demands.py [--count 4000] [--json]``. The program is assembled from the controller's
-own tasks and limits with the controller's own weights; the demand is the target of its rows.
+Run as ``python benchmarks/wrench_demands.py [--count 4000] [--json]``. The QP has the rows, weights and thrust
+limit of the controller without lines; the demand is the target of its rows.
 """
 
 from __future__ import annotations
@@ -85,11 +85,11 @@ class DemandedWrench(Task):
 
 
 class ProgramAllocation:
-    """The controller's program without lines, for one demanded wrench at a time.
+    """The QP of the controller without lines, for one demanded wrench at a time.
 
     Attributes:
-        outcomes: Number of programs per outcome of the solver.
-        unallocated: Wrench of the last program without limits minus its wrench, (6,) [N, N m].
+        outcomes: Number of demands per outcome of the solver.
+        unallocated: Wrench of the last solution without limits minus its wrench, (6,) [N, N m].
     """
 
     def __init__(self, height_weight: float | None = None) -> None:

@@ -1,8 +1,7 @@
-"""A task and a limit of one's own in the controller, in one file; docs/extending.md explains it line by line.
+"""A user's own task and limit in the controller; docs/extending.md explains both.
 
-The task keeps the propellers next to the brush slow, so that their wash does not reach wet paint. The limit bounds how
-fast the vehicle is accelerated upwards. The vehicle has eight rotors, so the slow ones cost no force: the program finds
-that by itself.
+The task slows the propellers next to the brush, so that their wash does not reach wet paint. The limit bounds the
+upward acceleration. The vehicle has eight rotors: the other six replace the force of the slow ones.
 
 Run it with ``python examples/my_task.py``.
 """
@@ -20,7 +19,7 @@ from ibvs_qp.tasks import Task
 
 
 class QuietRotors(Task):
-    """Named rotors stay near a low thrust."""
+    """Thrusts of named rotors stay near a target."""
 
     def __init__(self, *names: str, weight: float = 0.1) -> None:
         self.names = names
@@ -45,7 +44,7 @@ class QuietRotors(Task):
 
 
 class ClimbLimit(Limit):
-    """Upward acceleration stays below a bound [m/s^2]; soft, so that it can never make the program infeasible."""
+    """Upward acceleration stays below a bound [m/s^2]; soft, so that the QP always has a solution."""
 
     def __init__(self, bound: float, weight: float = 4e4) -> None:
         self.bound, self.weight = bound, weight
@@ -57,7 +56,7 @@ class ClimbLimit(Limit):
                 name="climb",
                 unit="m/s^2",
                 expression=-model.acceleration[2],
-                lower=ca.SX(-1e3),  # finite, and never reached: row types must not change
+                lower=ca.SX(-1e3),  # finite and never reached, so that the row type is constant
                 upper=ca.SX(self.bound),
                 slack_weight=self.weight,
             )
@@ -71,7 +70,7 @@ OCTOROTOR = RotorGeometry(
     torque_ratio_m=0.020,
 )
 CONFIG = ControllerConfig(vehicle=VehicleParams(geometry=OCTOROTOR, thrust_max_n=35.0, propeller_radius_m=0.165))
-#: A hover before a wall 0.8 m away, told to rise with 1 m/s.
+#: Hover 0.8 m in front of a wall; the reference is a climb at 1 m/s.
 HOVER = Measurement(
     stamp_ns=4_000_000,
     attitude=np.array([1.0, 0.0, 0.0, 0.0]),
@@ -87,7 +86,7 @@ RISE = Reference(standoff=0.3, velocity=np.array([0.0, -1.0]))
 
 
 def main() -> None:
-    """Answer the same measurement three times: as shipped, with the task, with task and limit."""
+    """Solve the same measurement three times: as shipped, with the task, with task and limit."""
     quiet, climb = QuietRotors("r0", "r7"), ClimbLimit(bound=0.5)
     cases: list[tuple[str, list[Task], list[Limit]]] = [
         ("as shipped", [], []),
@@ -97,7 +96,7 @@ def main() -> None:
     for words, tasks, limits in cases:
         controller = HybridController(CONFIG, tasks=tasks, limits=limits)
         if tasks:
-            # 4 N, and a weight of 1 / (3 N)^2: three newtons more are worth as much as half a newton of push.
+            # 4 N at the default weight of 1 / (3 N)^2: an error of 3 N costs as much as 1.3 N of push.
             quiet.set_target(4.0)
         command = controller.step(HOVER, RISE)
         up = -command.wrench[2] / CONFIG.vehicle.mass_kg - 9.81

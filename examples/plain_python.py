@@ -1,7 +1,7 @@
-"""HybridController on a vehicle of one's own: press a springy wall with 5 N and slide along an edge drawn on it.
+"""HybridController on a user's own vehicle: press an elastic wall with 5 N and slide along an edge drawn on it.
 
-Nothing here but numpy and scipy: a rigid body with lagging rotors, a wall that is a spring with friction, and sensors
-that see the edge by geometry. Replace `Vehicle` by your own vehicle or simulator; the loop at the end stays.
+The vehicle needs numpy and scipy only: a rigid body with first-order rotors, a wall with stiffness, damping and
+friction, and an edge projected into the camera. Replace `Vehicle` by your own vehicle or simulator.
 
 Run it with ``python examples/plain_python.py``.
 """
@@ -29,7 +29,7 @@ STIFFNESS, DAMPING, FRICTION = 1500.0, 30.0, 0.3  # N/m, N s/m, Coulomb
 
 
 class Vehicle:
-    """Rigid body in world NED, body front-right-down, with what its sensors would say."""
+    """Rigid body in world NED, body front-right-down, and its sensors."""
 
     def __init__(self, config: ControllerConfig) -> None:
         self.params, self.dt = config.vehicle, config.tick_s
@@ -46,7 +46,7 @@ class Vehicle:
         return self.position + self.turn.apply(self.tip)
 
     def fly(self, command: np.ndarray) -> None:
-        """One control tick in four steps."""
+        """Integrate one control tick in four steps; rotor thrusts follow the commanded ones [N], (n,)."""
         for _ in range(4):
             step = self.dt / 4
             self.thrusts = self.thrusts + (command - self.thrusts) * step / 0.05
@@ -67,11 +67,11 @@ class Vehicle:
         self.time_ns += round(self.dt * 1e9)
 
     def in_camera(self, point: np.ndarray) -> np.ndarray:
-        """World point to camera axes (right, down, front)."""
+        """Point in world NED to camera axes (right, down, front) [m], (3,)."""
         return R_BODY_CAMERA.T @ (self.turn.inv().apply(point - self.position) - self.camera)
 
     def measure(self) -> Measurement:
-        """What the controller is told: attitude, IMU, contact wrench, the edge, the wall plane, a flow velocity."""
+        """Attitude, IMU, contact wrench, edge line, wall plane and velocity at the present time."""
         x, y, z, w = self.turn.as_quat()
         normal = R_BODY_CAMERA.T @ self.turn.inv().apply([1.0, 0.0, 0.0])
         middle = np.array([WALL, self.tip_world[1], EDGE])
@@ -110,7 +110,7 @@ def main() -> None:
         reference = Reference(
             push_force=PUSH,
             contact=True,
-            # Where the edge shall appear: EDGE below the tip, in normalised image coordinates.
+            # Target of the line: EDGE below the tip, in normalised image coordinates.
             lines=(LineReference(rho=(EDGE - below_tip) / depth, theta=0.5 * math.pi, role="horizontal"),),
             velocity=np.array([SLIDE if tick * vehicle.dt > 5.0 else 0.0, 0.0]),
         )

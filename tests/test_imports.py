@@ -1,4 +1,4 @@
-"""Imports run one way: allocation <- ibvs_qp <- sim <- notebooks, and the controller knows no simulator."""
+"""Imports run one way: allocation <- ibvs_qp <- sim <- notebooks, and the controller imports no simulator."""
 
 from __future__ import annotations
 
@@ -6,11 +6,22 @@ import ast
 import importlib.util
 import subprocess
 import sys
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).parents[1]
+#: Folders in the order of their imports: each imports only from earlier ones (docs/development.md).
+ORDER = {
+    "ibvs_qp": (
+        "frames measurement command analysis config validation estimation safety model tasks limits qp vision painting "
+        "analytic controller pilot"
+    ).split(),
+    "sim": (
+        "world scenes sensors flight evaluate figures sweep report detection experiments tune notebook bench commands"
+    ).split(),
+}
 #: What every package must not import.
 FORBIDDEN = {
     "allocation": {"ibvs_qp", "sim", "notebooks", "mujoco", "casadi", "osqp", "cv2"},
@@ -65,3 +76,46 @@ def test_controller_loads_where_the_simulator_cannot():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
+
+
+def imported_modules(package: str) -> dict[str, set[str]]:
+    """Modules of a package, and what each imports of it: inside functions and under TYPE_CHECKING as well."""
+    files = {".".join(file.relative_to(ROOT).with_suffix("").parts): file for file in (ROOT / package).rglob("*.py")}
+    files = {name.removesuffix(".__init__"): file for name, file in files.items()}
+    found: dict[str, set[str]] = {}
+    for name, file in files.items():
+        used: set[str] = set()
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                used |= {alias.name for alias in node.names}
+            elif isinstance(node, ast.ImportFrom) and node.module:
+                whole = {f"{node.module}.{alias.name}" for alias in node.names}
+                used |= {module if module in files else node.module for module in whole}
+        found[name] = {module for module in used if module in files and module != name}
+    return found
+
+
+@pytest.mark.parametrize("package", ORDER)
+def test_rooms_depend_one_way(package: str) -> None:
+    order = ORDER[package]
+    rooms = {
+        path.stem for path in (ROOT / package).iterdir() if path.suffix == ".py" or (path / "__init__.py").exists()
+    }
+    assert rooms - {"__init__"} == set(order)
+    for name, used in imported_modules(package).items():
+        room = name.split(".")[1] if "." in name else None
+        for other in used:
+            if room is None or other == package or other.split(".")[1] == room:
+                continue  # the package's own page of public names, and modules of one room
+            later = order.index(other.split(".")[1]) > order.index(room)
+            assert not later, f"{name} imports {other}: {room} stands before {other.split('.')[1]}"
+
+
+@pytest.mark.parametrize("package", ORDER)
+def test_no_module_imports_itself_in_a_circle(package: str) -> None:
+    graph = imported_modules(package)
+    lazy = {package, f"{package}.vision"}  # pages of public names that load on first use
+    try:
+        tuple(TopologicalSorter({name: used - lazy for name, used in graph.items() if name not in lazy}).static_order())
+    except CycleError as circle:
+        pytest.fail(f"imports in a circle: {' -> '.join(circle.args[1])}")

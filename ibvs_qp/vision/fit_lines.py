@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ibvs_qp.vision.consensus import middle_values
+from ibvs_qp.vision.robust import MAD_TO_SIGMA
 
 #: Tukey's constant: 95 % efficiency on normal residuals.
 _TUKEY = 4.685
 #: Smallest residual scale [px]: below this, all residuals are rounding.
 _SCALE_MIN = 0.02
-_MAD = 1.4826
 #: Rounds of fitting, the first with equal weights.
 _ROUNDS = 2
 #: Largest correlation of neighbouring residuals accounted for.
@@ -127,7 +127,7 @@ def _unit(residual: np.ndarray, used: np.ndarray, count: np.ndarray) -> np.ndarr
     """Inverse of the residual at which a point has no weight, from the median one of each line, (L, 1)."""
     middle = middle_values(np.abs(residual), used, count)
     middle = [0.0 if value == math.inf else value for value in middle.tolist()]
-    return np.array([1.0 / (_TUKEY * max(_MAD * value, _SCALE_MIN)) for value in middle])[:, None]
+    return np.array([1.0 / (_TUKEY * max(MAD_TO_SIGMA * value, _SCALE_MIN)) for value in middle])[:, None]
 
 
 def _tukey(residual: np.ndarray, unit: np.ndarray) -> np.ndarray:

@@ -9,11 +9,10 @@ import numpy as np
 
 from ibvs_qp.vision.mask import Intrinsics
 from ibvs_qp.vision.normal_equations import solve_three
-from ibvs_qp.vision.robust import median
+from ibvs_qp.vision.robust import MAD_TO_SIGMA, median
 
 #: Rounds of reweighting.
 _ROUNDS = 4
-_MAD = 1.4826
 #: Columns of the system: what is seen, after velocity (0 to 2) and before turn (4 to 6).
 _SEEN = 3
 
@@ -89,7 +88,7 @@ def solve_with_numpy(
         answer = np.array((*velocity, -1.0, 0.0, 0.0, 0.0))
         residual = rows @ answer
         size = np.vecdot(residual, residual)
-        spread = max(_MAD * math.sqrt(median(size)), 0.5)
+        spread = max(MAD_TO_SIGMA * math.sqrt(median(size)), 0.5)
         weight = np.maximum(0.0, 1.0 - size * (1.0 / (gate_sigmas * spread) ** 2)) ** 2
     agreeing = float(np.count_nonzero(weight > 0.1))
     return [*velocity, float(weight @ size), float(weight.sum()), agreeing], sums

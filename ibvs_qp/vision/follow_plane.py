@@ -13,7 +13,7 @@ from ibvs_qp.vision.grid import CoarseGrid
 from ibvs_qp.vision.native import native
 from ibvs_qp.vision.native_plane import NativePlane, Refit, estimate_of
 from ibvs_qp.vision.normal_equations import solve_three
-from ibvs_qp.vision.robust import median
+from ibvs_qp.vision.robust import MAD_TO_SIGMA, median
 from ibvs_qp.vision.surface import PlaneEstimate, connected_samples, surface_problem
 
 #: Samples per row against the grid of the search: the noise holds together over 20 px of 640, so that the mean of four
@@ -28,8 +28,6 @@ _HALFWAY = 32 * 16 + 16
 _BLOCK = 4
 #: Smallest determinant of the normal matrix, share of the product of its diagonal.
 _FLAT = 1e-6
-#: Turns a median absolute deviation into a standard deviation of a normal distribution.
-_MAD = 1.4826
 
 
 class PlaneFollower:
@@ -145,7 +143,7 @@ class PlaneFollower:
             normal=-plane / length,
             distance_m=1.0 / length,
             inlier_share=count / max(int(np.count_nonzero(usable)), 1),
-            residual_sigma=_MAD * median(spread),
+            residual_sigma=MAD_TO_SIGMA * median(spread),
             component=chosen.reshape(grid.shape),
         )
 

@@ -106,8 +106,3 @@ class Percept:
     mask: np.ndarray | None = None
     intrinsics: tuple[float, float, float, float] | None = None
     time_ms: dict[str, float] = field(default_factory=dict)
-
-    @property
-    def total_ms(self) -> float:
-        """Wall-clock time of the whole picture [ms]."""
-        return sum(self.time_ms.values())

@@ -13,7 +13,7 @@ from ibvs_qp.vision.grid import CoarseGrid
 from ibvs_qp.vision.hypotheses import judged_planes
 from ibvs_qp.vision.native import native
 from ibvs_qp.vision.native_plane import NativePlane, Refit, estimate_of
-from ibvs_qp.vision.robust import median
+from ibvs_qp.vision.robust import MAD_TO_SIGMA, median
 from ibvs_qp.vision.seeds import seed_values
 from ibvs_qp.vision.surface import BLOCK, PlaneEstimate, connected_samples, plane_covariance, surface_problem
 
@@ -24,8 +24,6 @@ _JUDGED = 400
 _PAINT_GATES = (0.0, 0.5)
 #: Smallest determinant of the normal matrix, share of the product of its diagonal.
 _FLAT = 1e-6
-#: Turns a median absolute deviation into a standard deviation of a normal distribution.
-_MAD = 1.4826
 
 
 class LabelsOfSeeds(Protocol):
@@ -180,7 +178,7 @@ class PlaneFitter:
             if count < config.min_samples:
                 return "too few samples on the surface"
             spread = relative.take(chosen[:: max(1, count // _JUDGED)])
-            sigma = _MAD * median(np.abs(spread - median(spread)))
+            sigma = MAD_TO_SIGMA * median(np.abs(spread - median(spread)))
             gate = min(max(config.fine_gate_sigmas * sigma, config.fine_gate_low), config.fine_gate_high)
             samples = design.take(chosen, axis=0)
             normal_matrix = samples.T @ samples

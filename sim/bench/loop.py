@@ -10,9 +10,11 @@ import cv2
 import numpy as np
 
 from sim.bench.timing import Bench, Row, Stopwatch
-from sim.flight.closed_loop import FlightOptions, World, make_pilot, pilot_config
+from sim.flight.closed_loop import make_pilot
 from sim.flight.jobs import PaintJob
+from sim.flight.options import FlightOptions, pilot_config
 from sim.flight.recorder import Recorder
+from sim.flight.surroundings import World
 from sim.world.plant import TICK_NS
 from sim.world.scene import Scene
 

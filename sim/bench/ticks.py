@@ -8,9 +8,11 @@ from collections.abc import Iterator
 from allocation.geometry import TAROT_T960
 from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import Measurement, Reference
-from sim.flight.closed_loop import FlightOptions, World, make_pilot, pilot_config
+from sim.flight.closed_loop import make_pilot
 from sim.flight.faults import Derate, Fault, FaultSchedule
 from sim.flight.jobs import Job, PaintJob, PressJob
+from sim.flight.options import FlightOptions, pilot_config
+from sim.flight.surroundings import World
 from sim.world.scene import Scene
 
 #: Longest flight [ticks]: two minutes.

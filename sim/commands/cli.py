@@ -16,8 +16,7 @@ import traceback
 from typing import Protocol
 
 from ibvs_qp.config.errors import IbvsQpError
-
-EXIT_INTERNAL, EXIT_USER, EXIT_INTERRUPTED = 1, 2, 130
+from sim.commands.exit_codes import EXIT_INTERNAL, EXIT_INTERRUPTED, EXIT_USER
 
 #: One thread each: the matrices are small, and flights run side by side as processes.
 _THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")

@@ -13,7 +13,7 @@ from typing import Any
 import tyro
 
 from ibvs_qp.config.errors import ConfigError, out_of_range
-from sim.commands.cli import EXIT_INTERRUPTED
+from sim.commands.exit_codes import EXIT_INTERRUPTED
 
 #: Help of a switch: no default is printed.
 flag = tyro.conf.arg(help_behavior_hint="")

@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from sim.commands.cli import EXIT_INTERRUPTED
+from sim.commands.exit_codes import EXIT_INTERRUPTED
 from sim.commands.options import (
     check_mujoco,
     check_readable,
@@ -68,7 +68,7 @@ class Paint:
         from sim.sensors.cameras import resolve_camera
 
         check_mujoco()
-        from sim.flight.closed_loop import FlightOptions, pilot_config
+        from sim.flight.options import FlightOptions, pilot_config
         from sim.flight.progress import flight_progress
         from sim.flight.side_by_side import fly_laws
         from sim.flight.viewer import check_display

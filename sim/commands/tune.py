@@ -90,7 +90,7 @@ class Tune:
 
     def _plan(self, folder: Path) -> SearchPlan:
         from ibvs_qp.pilot import PilotConfig
-        from sim.flight.closed_loop import default_preset
+        from sim.flight.options import default_preset
         from sim.tune.search import SearchPlan
 
         start = PilotConfig.from_toml(self.preset) if self.preset else default_preset(self.law)

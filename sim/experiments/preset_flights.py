@@ -10,8 +10,8 @@ from typing import Any
 from ibvs_qp.pilot import PilotConfig
 from sim.evaluate.measures import paint_figures
 from sim.experiments.scenes import near_wall, short_job
-from sim.flight.closed_loop import FlightOptions, pilot_config
 from sim.flight.jobs import PaintJob
+from sim.flight.options import FlightOptions, pilot_config
 from sim.sweep.design import FlightPlan, Measure, Run
 from sim.world.scene import Scene
 

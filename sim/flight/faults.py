@@ -6,13 +6,11 @@ import dataclasses
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from ibvs_qp.pilot import Pilot
-    from sim.flight.closed_loop import World
+from ibvs_qp.pilot import Pilot
+from sim.flight.surroundings import World
 
 #: Least distance between the lower and the upper limit of a working rotor [N].
 LEAST_WINDOW_N = 1e-3

@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterator
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 
-from sim.flight.closed_loop import FlightOptions, pilot_config
 from sim.flight.jobs import PaintJob
+from sim.flight.options import FlightOptions, pilot_config
 from sim.flight.trace import law_name
 from sim.world.scene import Scene
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,15 +13,14 @@ from ibvs_qp.pilot import Pilot
 from ibvs_qp.vision.overlay import draw_overlay
 from sim.flight.columns import Columns
 from sim.flight.flight_truth import euler_angles, in_body, rotations
+from sim.flight.options import FlightOptions
+from sim.flight.surroundings import World
 from sim.flight.trace import Event, Trace
 from sim.flight.video import pack_picture
 from sim.sensors.cameras.protocol import camera_intrinsics
 from sim.world.plant import STEPS_PER_TICK
 from sim.world.readout import PLACES
-
-if TYPE_CHECKING:
-    from sim.flight.closed_loop import FlightOptions, World
-    from sim.world.scene import Scene
+from sim.world.scene import Scene
 
 #: Names of the strategy's phases, in the order of a flight.
 PHASES = ("start", "approach", "align", "press", "paint", "climb", "retreat", "done")

@@ -15,7 +15,8 @@ from typing import Any
 
 import joblib
 
-from sim.flight.closed_loop import INTERRUPTED, FlightOptions, fly
+from sim.flight.closed_loop import INTERRUPTED, fly
+from sim.flight.options import FlightOptions
 from sim.flight.trace import Trace
 from sim.flight.video import pack_pictures
 from sim.world.scene import Scene

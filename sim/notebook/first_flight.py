@@ -13,7 +13,8 @@ from sim.evaluate.explanation import explain_tick
 from sim.evaluate.explanation_text import TASK_HEADINGS, task_rows
 from sim.experiments.scenes import changed, short_job
 from sim.figures.style import law_colour, new_figure
-from sim.flight.closed_loop import FlightOptions, fly
+from sim.flight.closed_loop import fly
+from sim.flight.options import FlightOptions
 from sim.flight.trace import Trace
 from sim.flight.video import unpack_picture
 from sim.notebook.plots import RED

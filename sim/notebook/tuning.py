@@ -11,7 +11,7 @@ from typing import Any
 from ibvs_qp.config.contact_margin import require_margin
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.settings import dump_toml
-from sim.flight.closed_loop import default_preset
+from sim.flight.options import default_preset
 from sim.flight.trace import Trace
 from sim.notebook.knobs import KNOBS, knob_values, turned
 from sim.notebook.wall_flights import Setting, fly_setting

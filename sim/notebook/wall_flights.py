@@ -16,7 +16,9 @@ from ibvs_qp.pilot import PilotConfig
 from sim.evaluate.path_error import CONTACT_N
 from sim.evaluate.window import board_tip, mean, peak, phase_window, rms, tilt_deg
 from sim.experiments.scenes import near_wall
-from sim.flight.closed_loop import FlightOptions, World, default_preset, fly, make_pilot, pilot_config
+from sim.flight.closed_loop import fly, make_pilot
+from sim.flight.options import FlightOptions, default_preset, pilot_config
+from sim.flight.surroundings import World
 from sim.flight.trace import Trace
 from sim.notebook.internals import Tick, TickRecord, WallJob, record_tick
 from sim.notebook.short import unless_short

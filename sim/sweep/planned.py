@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.settings import to_dict
 from sim.evaluate.measures import paint_row, press_row
-from sim.flight.closed_loop import pilot_config
 from sim.flight.jobs import PaintJob
+from sim.flight.options import pilot_config
 from sim.sweep.axes import fractions
 from sim.sweep.design import Block, FlightPlan, Parameter, Refusal, Run
 from sim.sweep.fingerprint import code_hash, digest

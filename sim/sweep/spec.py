@@ -13,8 +13,8 @@ from typing import Any
 from ibvs_qp.config.errors import ConfigError, out_of_range
 from ibvs_qp.config.settings import choice, from_dict, setting, validate
 from ibvs_qp.pilot import PilotConfig
-from sim.flight.closed_loop import FlightOptions, default_preset, pilot_config
 from sim.flight.jobs import PaintJob, PressJob
+from sim.flight.options import FlightOptions, default_preset, pilot_config
 from sim.sweep.axes import Axis, make_axis
 from sim.sweep.setup import Setup, changed, value_at
 from sim.world.scene import Scene, load_scene

@@ -33,8 +33,9 @@ IMAGE_SIZE, PICTURE_RATE_HZ = (424, 240), 10.0
 def fly(name: str, case: Case) -> Recording:
     """Fly a case in the closed loop and keep what went into pilot and controller."""
     from sim.experiments.scenes import near_wall
-    from sim.flight.closed_loop import FlightOptions, World, pilot_config
     from sim.flight.faults import Derate, FaultSchedule
+    from sim.flight.options import FlightOptions, pilot_config
+    from sim.flight.surroundings import World
 
     camera = {"depth_noise_relative": 0.0, "rate_hz": PICTURE_RATE_HZ}  # the noise is added at loading
     scene = near_wall(**({"camera": camera} if case.pictures else {}), **SCENES.get(name, {}))

@@ -12,7 +12,9 @@ from ibvs_qp.painting.command import PainterInput, PaintingCommand
 from ibvs_qp.painting.painter import Painter
 from ibvs_qp.pilot import Pilot
 from sim.evaluate.metrics import compute_metrics
-from sim.flight.closed_loop import FlightOptions, World, fly, pilot_config
+from sim.flight.closed_loop import fly
+from sim.flight.options import FlightOptions, pilot_config
+from sim.flight.surroundings import World
 from sim.flight.trace import Trace
 from sim.world.scene import Scene, WallScene
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 import ctypes
 import functools
 import logging
-import platform
 import subprocess
 from pathlib import Path
 
@@ -54,31 +53,6 @@ def native() -> ctypes.CDLL | None:
         return None
 
 
-def _asked(array: np.ndarray | None) -> ctypes.c_void_p:
-    return ctypes.c_void_p(None if array is None else array.__array_interface__["data"][0])
-
-
-#: Size of what every object begins with [bytes].
-_HEAD = object.__basicsize__
-_NULL = ctypes.c_void_p(None)
-
-
-def _read(array: np.ndarray | None, _at=ctypes.c_void_p.from_address, _pointer=ctypes.c_void_p) -> ctypes.c_void_p:
-    # the first field of an array behind the object's head; a tenth of the time, and a search asks for a hundred
-    return _NULL if array is None else _pointer(_at(id(array) + _HEAD).value)
-
-
-def _readable() -> bool:
-    """Whether arrays of this numpy and this Python begin as their interface in C says."""
-    if platform.python_implementation() != "CPython":
-        return False
-    tried = np.zeros((4, 3)), np.zeros(5, np.uint8)[2:]
-    return all(_read(array).value == _asked(array).value for array in tried)
-
-
-_place = _read if _readable() else _asked
-
-
 def place(array: np.ndarray | None) -> ctypes.c_void_p:
-    """Where an array lies in memory, NULL without one; the array must outlive the call, and be contiguous."""
-    return _place(array)
+    """Address of an array's data, NULL without one; the array must outlive the call, and be contiguous."""
+    return ctypes.c_void_p(None if array is None else array.ctypes.data)

@@ -6,14 +6,12 @@ import numpy as np
 
 from ibvs_qp.vision.config import PlaneConfig
 from ibvs_qp.vision.grid import CoarseGrid
-from ibvs_qp.vision.robust import median
+from ibvs_qp.vision.robust import MAD_TO_SIGMA, median
 
 #: Distances from the seed up to which samples count, one after the other, normalised.
 _RADII = (0.10, 0.14, 0.20, 0.28, 0.40, 0.60)
 #: Fewer samples near the seed give no plane.
 _LEAST = 40
-#: Turns a median absolute deviation into a standard deviation of a normal distribution.
-_MAD = 1.4826
 
 
 def grown_plane(
@@ -50,6 +48,6 @@ def grown_plane(
             return plane
         plane = np.linalg.solve(normal_matrix, samples.T @ flat[chosen])
         residual = flat[chosen] / np.maximum(samples @ plane, 1e-3) - 1.0
-        sigma = _MAD * median(np.abs(residual))
+        sigma = MAD_TO_SIGMA * median(np.abs(residual))
         gate = min(max(config.fine_gate_sigmas * sigma, config.fine_gate_low), config.fine_gate_high)
     return plane

@@ -16,7 +16,7 @@ from sim.experiments.figures.common import Drawn, Results
 from sim.experiments.spec import FigureSpec
 from sim.experiments.variants import VARIANTS, with_force_gain
 from sim.figures.style import law_name, new_figure
-from sim.flight.closed_loop import default_preset
+from sim.flight.options import default_preset
 from sim.sweep.parts import PARAM
 from sim.sweep.statistics import select
 from sim.world.scene import ForceTorqueScene, WallScene

@@ -19,8 +19,8 @@ from made_up_flights import fake_fly
 import sim.flight.side_by_side
 from ibvs_qp.config.errors import ConfigError
 from sim.commands.cli import main
-from sim.flight.closed_loop import FlightOptions
 from sim.flight.flight_log import load_run
+from sim.flight.options import FlightOptions
 from sim.world.scene import PaintScene, Scene
 
 

@@ -16,8 +16,9 @@ from ibvs_qp.model.signals import places
 from sim.commands.cli import main
 from sim.evaluate.explanation import explain_tick, flown_config
 from sim.evaluate.explanation_text import explanation_tables
-from sim.flight.closed_loop import FlightOptions, fly
+from sim.flight.closed_loop import fly
 from sim.flight.flight_log import load_run, save_log
+from sim.flight.options import FlightOptions
 from sim.flight.trace import Event, Trace
 
 

@@ -10,7 +10,8 @@ from closed_loop_rigs import fly_geometric, hold, short_scene, wall
 
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.pilot import PilotConfig
-from sim.flight.closed_loop import FlightOptions, fly
+from sim.flight.closed_loop import fly
+from sim.flight.options import FlightOptions
 from sim.world.scene import CameraScene, ForceTorqueScene, VehicleScene
 
 

@@ -17,7 +17,8 @@ from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import Reference
 from sim.evaluate.metrics import compute_metrics
-from sim.flight.closed_loop import FlightOptions, default_preset, fly
+from sim.flight.closed_loop import fly
+from sim.flight.options import FlightOptions, default_preset
 
 #: Thrust of a 13 inch propeller's motor [N].
 FULL = 35.0

@@ -10,9 +10,11 @@ from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import rotation_from_quaternion
 from sim.evaluate.measures.loss import loss_figures
 from sim.experiments.scenes import near_wall
-from sim.flight.closed_loop import FlightOptions, World, fly, make_pilot, pilot_config
+from sim.flight.closed_loop import fly, make_pilot
 from sim.flight.faults import Derate, FaultSchedule, WindStep
 from sim.flight.jobs import PressJob
+from sim.flight.options import FlightOptions, pilot_config
+from sim.flight.surroundings import World
 from sim.sensors.miscalibration import Miscalibration
 from sim.world.scene import CameraScene, Scene
 

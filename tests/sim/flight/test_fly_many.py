@@ -10,7 +10,8 @@ import pytest
 from closed_loop_rigs import short_scene
 
 from ibvs_qp.model.bound_function import BoundFunction
-from sim.flight.closed_loop import FlightOptions, World, pilot_config
+from sim.flight.options import FlightOptions, pilot_config
+from sim.flight.surroundings import World
 from sim.flight.trace import Trace
 from sim.world.random_streams import NormalRows, stream
 

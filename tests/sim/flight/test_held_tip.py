@@ -16,8 +16,9 @@ from ibvs_qp.model import stationary_tip
 from ibvs_qp.model.model import Model
 from ibvs_qp.tasks import velocity
 from sim.experiments.scenes import near_wall
-from sim.flight.closed_loop import FlightOptions, fly, pilot_config
+from sim.flight.closed_loop import fly
 from sim.flight.jobs import PressJob
+from sim.flight.options import FlightOptions, pilot_config
 from sim.flight.trace import Trace
 from sim.world.scene import Scene
 

@@ -26,7 +26,8 @@ from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.model import push_reference
 from ibvs_qp.pilot import Pilot, PilotConfig
 from ibvs_qp.tasks import push
-from sim.flight.closed_loop import PRESETS, FlightOptions, World, pilot_config
+from sim.flight.options import PRESETS, FlightOptions, pilot_config
+from sim.flight.surroundings import World
 from sim.world.scene import ForceTorqueScene, ImuScene, Scene
 
 #: Mean age of the force in the simulated loop beyond its latency: half a period of 100 Hz [s].

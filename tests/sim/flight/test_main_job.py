@@ -11,7 +11,8 @@ import pytest
 
 import sim.scenes
 from sim.evaluate.metrics import compute_metrics
-from sim.flight.closed_loop import FlightOptions, fly
+from sim.flight.closed_loop import fly
+from sim.flight.options import FlightOptions
 from sim.world.scene import PaintScene, Scene, WallScene, load_scene
 
 #: Seeds of the record.

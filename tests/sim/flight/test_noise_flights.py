@@ -7,7 +7,8 @@ import pytest
 from sim.evaluate.measures import paint_figures
 from sim.experiments.scenes import short_job
 from sim.experiments.spec import experiment
-from sim.flight.closed_loop import FlightOptions, fly
+from sim.flight.closed_loop import fly
+from sim.flight.options import FlightOptions
 from sim.world.scene import Scene
 
 STROKE_M = 0.5

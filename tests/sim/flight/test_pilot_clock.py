@@ -14,7 +14,8 @@ from ibvs_qp.estimation.kalman import HISTORY, DelayedKalman
 from ibvs_qp.estimation.stamps import StampRing
 from ibvs_qp.measurement import SensorFrame
 from ibvs_qp.pilot import Pilot
-from sim.flight.closed_loop import FlightOptions, World, pilot_config
+from sim.flight.options import FlightOptions, pilot_config
+from sim.flight.surroundings import World
 
 TICK_NS = 4_000_000
 SECOND = 1_000_000_000

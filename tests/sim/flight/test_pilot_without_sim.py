@@ -12,7 +12,8 @@ import pytest
 from closed_loop_rigs import short_scene
 
 from ibvs_qp.pilot import Pilot
-from sim.flight.closed_loop import FlightOptions, World, pilot_config
+from sim.flight.options import FlightOptions, pilot_config
+from sim.flight.surroundings import World
 
 #: Flies recorded frames where any import of the simulator fails.
 REPLAY = """

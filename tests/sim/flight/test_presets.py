@@ -20,7 +20,8 @@ from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.painting.config import PaintingConfig
 from ibvs_qp.pilot import PilotConfig
 from sim.evaluate.metrics import compute_metrics
-from sim.flight.closed_loop import PRESETS, FlightOptions, default_preset, fly
+from sim.flight.closed_loop import fly
+from sim.flight.options import PRESETS, FlightOptions, default_preset
 from sim.tune.finalists import Finalist, best_of
 from sim.tune.objectives import OBJECTIVES, Score
 

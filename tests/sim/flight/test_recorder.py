@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from sim.evaluate.metrics import compute_metrics
-from sim.flight.closed_loop import FlightOptions, fly
+from sim.flight.closed_loop import fly
 from sim.flight.columns import Columns
+from sim.flight.options import FlightOptions
 from sim.world.scene import Scene
 
 

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from closed_loop_rigs import wall
 
-from sim.flight.closed_loop import FlightOptions, fly, pilot_config
+from sim.flight.closed_loop import fly
 from sim.flight.jobs import PressJob
+from sim.flight.options import FlightOptions, pilot_config
 from sim.flight.trace import Trace
 from sim.world.scene import Scene
 

@@ -10,7 +10,8 @@ import pytest
 from closed_loop_rigs import short_scene
 
 from ibvs_qp.pilot import Pilot
-from sim.flight.closed_loop import FlightOptions, World, pilot_config
+from sim.flight.options import FlightOptions, pilot_config
+from sim.flight.surroundings import World
 
 NAN3, NAN6 = np.full(3, np.nan), np.full(6, np.nan)
 

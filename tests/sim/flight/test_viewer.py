@@ -11,7 +11,8 @@ import pytest
 
 from sim.commands import cli
 from sim.flight import viewer
-from sim.flight.closed_loop import FlightOptions, fly
+from sim.flight.closed_loop import fly
+from sim.flight.options import FlightOptions
 from sim.world.scene import PaintScene, Scene, StartScene
 
 

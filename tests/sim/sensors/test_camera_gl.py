@@ -16,7 +16,8 @@ from made_up_flights import fake_fly
 import sim.flight.side_by_side
 from sim.commands import cli
 from sim.evaluate.metrics import compute_metrics
-from sim.flight.closed_loop import FlightOptions, fly
+from sim.flight.closed_loop import fly
+from sim.flight.options import FlightOptions
 from sim.sensors.cameras import CameraUnavailable, PlaneCamera, open_camera, resolve_camera
 from sim.sensors.cameras import gl_context as contexts
 from sim.sensors.cameras.arm import vehicle_layer

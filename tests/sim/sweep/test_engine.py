@@ -13,8 +13,8 @@ import sim.sweep.flying
 from ibvs_qp.config.errors import ConfigError
 from sim.evaluate.measures import paint_figures, press_figures
 from sim.experiments.scenes import changed, near_wall, short_job
-from sim.flight.closed_loop import FlightOptions, pilot_config
 from sim.flight.jobs import PressJob
+from sim.flight.options import FlightOptions, pilot_config
 from sim.sweep import FlightPlan, Run, run_sweep
 from sim.sweep.fingerprint import configuration_hash
 

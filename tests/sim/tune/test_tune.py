@@ -13,7 +13,7 @@ import sim.sweep.flying
 import sim.tune.flights
 from ibvs_qp.pilot import PilotConfig
 from sim.commands.cli import main
-from sim.flight.closed_loop import default_preset
+from sim.flight.options import default_preset
 from sim.tune.choice import allowed, contact_damping, front, gain_over, ranked
 from sim.tune.finalists import Finalist, best_of, fly_finalists
 from sim.tune.flights import CHOICE_SEED, REPORT_SEED, SEARCH_SEED, checks, flights, scenes, seeds

@@ -1,0 +1,85 @@
+"""How to fly a scene: law, seed, perception, camera, and the pilot's configuration."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from dataclasses import dataclass
+from pathlib import Path
+
+import ibvs_qp
+from ibvs_qp.config.errors import out_of_range
+from ibvs_qp.pilot import PilotConfig
+from sim.world.plant import TICK_NS
+from sim.world.scene import Scene
+
+#: Shipped presets, one per law.
+PRESETS = Path(ibvs_qp.__file__).parent / "presets"
+
+
+@dataclass(frozen=True, kw_only=True)
+class FlightOptions:
+    """How to fly a scene; the defaults are the main job.
+
+    With `machine_code` the C compiler, where there is one, compiles the controller's tick: the same flight to the bit,
+    faster.
+    """
+
+    law: str = "qp"
+    seed: int = 0
+    features: str = "rendered"
+    vision: str = "own"
+    camera: str = "plane"
+    image_size: tuple[int, int] | None = None
+    preset: str | None = None
+    video: bool = True
+    machine_code: bool = False
+    view: bool = False
+
+
+@functools.lru_cache(maxsize=4)
+def default_preset(law: str) -> PilotConfig:
+    """The shipped preset of a law; both were tuned by the same search (docs/tuning.md)."""
+    file = PRESETS / f"tarot_t960_{law}.toml"
+    return PilotConfig.from_toml(file) if file.exists() else PilotConfig(law=law)
+
+
+def pilot_config(scene: Scene, options: FlightOptions, config: PilotConfig | None = None) -> PilotConfig:
+    """The pilot's configuration: preset, law, and the scene's paint job; nothing else of the scene.
+
+    Args:
+        scene: Only its paint job is read.
+        options: Law and preset file.
+        config: Replaces the preset.
+
+    Raises:
+        ConfigError: If the controller expects another period than the one that is simulated.
+    """
+    if config is None:
+        config = PilotConfig.from_toml(options.preset) if options.preset else default_preset(options.law)
+    if round(config.controller.tick_s * 1e9) != TICK_NS:
+        allowed = f"the simulated loop ticks every {TICK_NS * 1e-9:g} s"
+        raise out_of_range("controller.tick_s", config.controller.tick_s, "s", allowed)
+    paint = scene.paint
+    painting = dataclasses.replace(
+        config.painting,
+        brush_width_m=paint.brush_width_m,
+        edge_margin_m=paint.edge_margin_m,
+        rows=paint.rows,
+        stroke_m=paint.stroke_m,
+        overlap_m=paint.overlap_m,
+        speed_m_s=paint.speed_m_s,
+        push_n=paint.push_n,
+    )
+    vision = dataclasses.replace(config.vision, paint_color=paint.color, brush_width_m=paint.brush_width_m)
+    controller = config.controller
+    if options.machine_code:
+        controller = dataclasses.replace(controller, machine_code=True)
+    return dataclasses.replace(
+        config,
+        controller=controller,
+        painting=painting,
+        vision=vision,
+        perception=options.vision,
+        law=options.law,
+    )

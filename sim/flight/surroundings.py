@@ -1,0 +1,96 @@
+"""The world of one flight: plant, sensors, canvas and camera."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from ibvs_qp.measurement import SensorFrame
+from ibvs_qp.pilot import PilotConfig
+from sim.flight.options import FlightOptions
+from sim.flight.viewer import FlightViewer
+from sim.sensors.cameras import CameraStream, open_camera
+from sim.sensors.features import GeometricFeatures
+from sim.sensors.imu_ft import SensorSuite
+from sim.sensors.miscalibration import Miscalibration
+from sim.world.board import BoardGeometry
+from sim.world.canvas import Canvas
+from sim.world.plant import Plant
+from sim.world.readout import PLACES
+from sim.world.scene import Scene
+
+#: Normal force above which the brush leaves paint [N].
+PAINTING_FORCE = 0.05
+#: Pressed ticks per drawn stroke: 1.2 mm at 0.1 m/s, below the 2 mm between stamps.
+STROKE_TICKS = 3
+_SEEN_FROM = [PLACES[name] for name in ("position", "quaternion", "body_velocity")]
+
+
+class World:
+    """Plant, sensors, canvas and camera: everything but the pilot."""
+
+    def __init__(self, scene: Scene, options: FlightOptions, config: PilotConfig) -> None:
+        if options.image_size is not None:
+            width, height = options.image_size
+            scene = dataclasses.replace(scene, camera=dataclasses.replace(scene.camera, width=width, height=height))
+        self.scene, self.geometry = scene, BoardGeometry(scene)
+        vehicle = config.controller.vehicle
+        self._rendered = options.features == "rendered"
+        self.stream: CameraStream | None = None
+        self.plant = Plant(scene, vehicle, options.seed, options.view)
+        self.sensors = SensorSuite(scene, vehicle, options.seed)
+        self.canvas = Canvas(scene, options.seed)
+        self._miscalibration = Miscalibration(scene.camera, vehicle, self._rendered)
+        if self._rendered:
+            camera = open_camera(options.camera, scene, vehicle, self.canvas, options.seed)
+            self.stream = CameraStream(camera, scene.camera.rate_hz, scene.camera.latency_s)
+        else:
+            self._features = GeometricFeatures(scene, vehicle, self.canvas, options.seed)
+        self._seen_from = tuple(self.plant.truth[place] for place in _SEEN_FROM)  # views
+        self.viewer = self._open_viewer() if options.view else None
+        self._brush: tuple[float, float] | None = None
+        self._pressed = 0
+
+    def _open_viewer(self) -> FlightViewer:
+        from sim.flight.viewer import FlightViewer
+
+        board = self.scene.board
+        middle = self.geometry.point(0.5 * board.width_m, 0.5 * board.height_m)
+        return FlightViewer(self.plant, np.append(0.0, middle))
+
+    def sense(self) -> SensorFrame:
+        """Sensor frame of the present tick."""
+        plant = self.plant
+        if self.stream is not None:
+            pose = self._miscalibration.pose(plant.position, plant.quaternion)
+            image = self.stream.tick(plant.time_ns, *pose)
+            return self.sensors.sample(plant, image=None if image is None else self._miscalibration.picture(image))
+        features, now = self._features, plant.time_ns
+        if features.rests(now):
+            return self.sensors.sample(plant)
+        position, quaternion, velocity = self._seen_from
+        pose = self._miscalibration.pose(position, quaternion)
+        return self.sensors.sample(plant, None, features.tick(now, *pose, velocity))
+
+    def act(self, thrusts: np.ndarray) -> None:
+        """Advance one control tick and paint where the brush presses."""
+        plant = self.plant
+        plant.step(thrusts)
+        pressing = plant.contact_normal_force > PAINTING_FORCE
+        if self.viewer is not None:
+            self.viewer.show(pressing)
+        if pressing:
+            self._pressed += 1
+            if self._brush is not None and self._pressed % STROKE_TICKS:
+                return
+            point = self.geometry.spot(*plant.tip_on_wall)
+            self.canvas.stroke(self._brush, point)
+            self._brush = point
+        else:
+            self._brush = None
+
+    def close(self) -> None:
+        """Close the window."""
+        if self.viewer is not None:
+            self.viewer.close()
