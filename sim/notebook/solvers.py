@@ -14,7 +14,6 @@ import osqp
 import qpsolvers
 from scipy import sparse
 
-from sim.bench.qp import RIVALS
 from sim.notebook.internals import Answer, Program, exact_solver, shipped_osqp_settings, shipped_solver
 from sim.notebook.table import number, table
 
@@ -26,8 +25,8 @@ ROUNDING_N, ACTIVE = 1e-14, 1e-9
 OSQP_DEFAULTS = {"eps_abs": 1e-3, "eps_rel": 1e-3, "max_iter": 4000, "check_termination": 25,
                  "adaptive_rho_interval": 50, "scaling": 10}  # fmt: skip
 NEVER = 10_000
-#: Back ends of qpsolvers that take dense matrices.
-DENSE = ("daqp", "quadprog")
+#: Back ends of qpsolvers for a program of this kind, and those that take dense matrices.
+BACK_ENDS, DENSE = ("osqp", "daqp", "quadprog", "proxqp", "piqp", "clarabel"), ("daqp", "quadprog")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -122,7 +121,7 @@ def contenders() -> list[Contender]:
     found.append(Contender(name="DAQP in CasADi", family="active set", make=_casadi_daqp))
     if importlib.util.find_spec("daqp") is not None:
         found.append(Contender(name="DAQP, workspace", family="active set", make=_daqp_workspace))
-    installed = [name for name in RIVALS if name in qpsolvers.available_solvers]
+    installed = [name for name in BACK_ENDS if name in qpsolvers.available_solvers]
     return [*found, *(Contender(name=f"qpsolvers {n}", family="qpsolvers", make=_back_end(n)) for n in installed)]
 
 
