@@ -27,7 +27,7 @@ with app.setup:
         success_table,
         sweep_or_sample,
     )
-    from sim.notebook.noise_figures import draw_boxes, draw_maps, draw_path_and_push
+    from sim.notebook.noise_figures import draw_boxes, draw_completed, draw_medians, draw_path_and_push
     from sim.notebook.picture import picture
     from sim.notebook.short import unless_short
     from sim.notebook.table import number, table
@@ -106,7 +106,7 @@ def _(chosen, sweep):
 
 @app.cell
 def _(chosen, sweep):
-    picture(draw_maps, sweep, chosen.value)
+    mo.vstack([picture(draw_completed, sweep), picture(draw_medians, sweep, chosen.value)])
     return
 
 

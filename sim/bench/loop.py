@@ -9,7 +9,7 @@ from collections.abc import Callable
 import cv2
 import numpy as np
 
-from sim.bench.timing import Bench, Row
+from sim.bench.timing import Bench, Row, Stopwatch
 from sim.flight.closed_loop import make_pilot
 from sim.flight.jobs import PaintJob
 from sim.flight.options import FlightOptions, pilot_config
@@ -59,13 +59,13 @@ def stage_times(seed: int, features: str) -> dict[str, np.ndarray]:
     config, job = pilot_config(scene, options), PaintJob()
     pilot, world = make_pilot(scene, options, config, job), World(scene, options, config)
     recorder = Recorder(scene, options, world, pilot)
-    drawing = _Stopwatch()
+    drawing = Stopwatch()
     if world.stream is not None:
         camera = world.stream.camera
-        camera.capture = drawing.around(camera.capture)
+        camera.capture = drawing.around("drawing", camera.capture)
     laps, pictures = [], []
     while not pilot.painter.finished and world.plant.crashed is None and len(laps) < LONGEST_FLIGHT:
-        drawing.spent_s, start = 0.0, time.perf_counter()
+        drawing.spent, start = {}, time.perf_counter()
         frame = world.sense()
         sensed = time.perf_counter()
         command = pilot.step(frame)
@@ -76,28 +76,11 @@ def stage_times(seed: int, features: str) -> dict[str, np.ndarray]:
         logged = time.perf_counter()
         if frame.image is not None:
             pictures.append(len(laps))
-        laps.append((drawing.spent_s, sensed - start, stepped - sensed, acted - stepped, logged - acted))
+        parts = sensed - start, stepped - sensed, acted - stepped, logged - acted
+        laps.append((1e-6 * drawing.spent.get("drawing", 0.0), *parts))
     drawn, sense, step, act, log = 1e6 * np.array(laps).T
     trace, vision = recorder.trace(), np.zeros(len(laps))
     vision[pictures] = 1e3 * trace.vision_ms
     control = trace.step_us
     spent = (drawn, sense - drawn, vision, step - vision - control, control, act, log)
     return {stage: times[WARM_UP_TICKS:] for stage, times in zip(STAGES, spent, strict=True)}
-
-
-class _Stopwatch:
-    """Adds up the time spent in calls of a function [s]."""
-
-    def __init__(self) -> None:
-        self.spent_s = 0.0
-
-    def around(self, call: Callable) -> Callable:
-        """The same function, timed."""
-
-        def timed(*arguments: object) -> object:
-            start = time.perf_counter()
-            result = call(*arguments)
-            self.spent_s += time.perf_counter() - start
-            return result
-
-        return timed

@@ -29,19 +29,12 @@ _GYRO_RAD = 6e-5
 
 @dataclass(frozen=True, kw_only=True)
 class Shot:
-    """One picture with the motion that the vehicle's sensors measure.
+    """One picture with the motion that the vehicle's sensors measure."""
 
-    Attributes:
-        frame: Colour and depth.
-        attitude: Quaternion B in I, (4,).
-        rotation: Rotation of the body since the previous shot, in B [rad], (3,).
-        velocity: Velocity of the body in B [m/s], (3,).
-    """
-
-    frame: RgbdFrame
-    attitude: np.ndarray
-    rotation: np.ndarray
-    velocity: np.ndarray
+    frame: RgbdFrame  # colour and depth
+    attitude: np.ndarray  # quaternion B in I, (4,)
+    rotation: np.ndarray  # rotation of the body since the previous shot, in B [rad], (3,)
+    velocity: np.ndarray  # velocity of the body in B [m/s], (3,)
 
 
 def mission_shots(size: tuple[int, int], count: int, seed: int, vehicle: VehicleParams) -> Iterator[Shot]:

@@ -10,30 +10,13 @@ import numpy as np
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.controller import HybridController
 from sim.bench.ticks import Tick, by_flight
-
-
-class _Stopwatch:
-    """Wraps calls and sums the time that each stage takes in a tick [us]."""
-
-    def __init__(self) -> None:
-        self.spent: dict[str, float] = {}
-
-    def around(self, stage: str, call: Any) -> Any:
-        """The same call, timed."""
-
-        def timed(*arguments: Any, **options: Any) -> Any:
-            start = time.perf_counter_ns()
-            result = call(*arguments, **options)
-            self.spent[stage] = self.spent.get(stage, 0.0) + 1e-3 * (time.perf_counter_ns() - start)
-            return result
-
-        return timed
+from sim.bench.timing import Stopwatch
 
 
 class _TimedWorkspace:
     """OSQP's extension object, which has no writable attributes, with its calls timed."""
 
-    def __init__(self, inner: Any, watch: _Stopwatch) -> None:
+    def __init__(self, inner: Any, watch: Stopwatch) -> None:
         self._inner = inner
         self.update_data_vec = watch.around("update", inner.update_data_vec)
         self.update_data_mat = watch.around("update", inner.update_data_mat)
@@ -45,7 +28,7 @@ class _TimedWorkspace:
 
 def stage_medians(config: ControllerConfig, ticks: list[Tick]) -> dict[str, float]:
     """Median time of every stage of a step [us]; it includes the time of the measurement itself."""
-    controller, watch = HybridController(config), _Stopwatch()
+    controller, watch = HybridController(config), Stopwatch()
     engine, step = controller.engine, controller.setpoints.step
     step.evaluate = watch.around("evaluate", step.evaluate)
     engine.solve = watch.around("engine", engine.solve)  # type: ignore[method-assign]

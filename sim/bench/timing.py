@@ -18,18 +18,31 @@ _PERCENTILES = {"p50_us": 50.0, "p90_us": 90.0, "p99_us": 99.0, "p999_us": 99.9}
 Result = TypeVar("Result")
 
 
+class Stopwatch:
+    """Wraps calls and sums the wall-clock time of each stage [us]; the caller clears `spent`."""
+
+    def __init__(self) -> None:
+        self.spent: dict[str, float] = {}
+
+    def around(self, stage: str, call: Callable[..., Any]) -> Callable[..., Any]:
+        """The same call, timed."""
+
+        def timed(*arguments: Any, **options: Any) -> Any:
+            start = time.perf_counter_ns()
+            result = call(*arguments, **options)
+            self.spent[stage] = self.spent.get(stage, 0.0) + 1e-3 * (time.perf_counter_ns() - start)
+            return result
+
+        return timed
+
+
 @dataclass(frozen=True, kw_only=True)
 class Row:
-    """Times of one operation.
+    """Times of one operation."""
 
-    Attributes:
-        name: Of the operation.
-        size: Picture size as in "640x480", or None.
-        times_us: Processor times of the measuring thread [us], in order; other processes disturb them least.
-    """
-
-    name: str
-    size: str | None = None
+    name: str  # of the operation
+    size: str | None = None  # picture size as in "640x480", or None
+    # processor times of the measuring thread [us], in order; other processes disturb them least
     times_us: list[float] = field(default_factory=list)
 
     @property

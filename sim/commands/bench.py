@@ -75,18 +75,14 @@ class Bench:
 def _show_loop(bench: BenchResult) -> None:
     """Print where a flown second goes, one column per flight."""
     from rich.console import Console
-    from rich.table import Table
 
     from sim.bench.loop import STAGES
+    from sim.evaluate.table import terminal_table
 
-    table = Table("stage", title="Wall-clock time per flown second, in ms")
     columns = {key.removesuffix("_real_time"): factor for key, factor in bench.ratios.items()}
-    for flight in columns:
-        table.add_column(flight, justify="right")
-    for stage in STAGES:
-        table.add_row(stage, *(f"{1e-3 * bench.stages_us[f'{flight}_{stage}']:.1f}" for flight in columns))
-    table.add_row("real-time factor", *(f"{factor:.1f}" for factor in columns.values()))
-    Console().print(table)
+    rows = [(s, *(f"{1e-3 * bench.stages_us[f'{flight}_{s}']:.1f}" for flight in columns)) for s in STAGES]
+    rows.append(("real-time factor", *(f"{factor:.1f}" for factor in columns.values())))
+    Console().print(terminal_table(("stage", *columns), rows, "Wall-clock time per flown second, in ms"))
 
 
 def _show(bench: BenchResult) -> None:

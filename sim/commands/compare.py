@@ -77,10 +77,7 @@ class Compare:
                 "run_b": str(self.run_b),
                 "run_dir": None if folder is None else str(folder),
                 "interrupted": stopped,
-                "cells": [
-                    {**cell, "differences": {each.figure: _plain(each) for each in cell["differences"]}}
-                    for cell in cells
-                ],
+                "cells": cells,
             }
             print(as_json(content))
         elif not stopped:
@@ -141,10 +138,6 @@ class Compare:
         return a, b, folder, result.interrupted
 
 
-def _plain(difference: Any) -> dict[str, float]:
-    return {name: value for name, value in dataclasses.asdict(difference).items() if name != "figure"}
-
-
 def _print(cells: list[dict[str, Any]], a: Path, b: Path) -> None:
     from rich.console import Console
 
@@ -154,10 +147,10 @@ def _print(cells: list[dict[str, Any]], a: Path, b: Path) -> None:
     for cell in cells:
         labels = [cell["experiment"], cell["law"], cell["variant"], *(f"{k} {v}" for k, v in cell["params"].items())]
         done = " and ".join(f"{count} of {cell['n']}" for count in cell["completed"])
-        found = {each.figure: each for each in cell["differences"]}
         rows = []
-        for each in (found[name] for name in SHOWN if name in found):
-            interval = f"{each.low:+.4g} to {each.high:+.4g}" if each.low != each.high else "one flight"
-            rows.append((each.figure, f"{each.a:.4g}", f"{each.b:.4g}", f"{each.median:+.4g}", interval))
+        for name, found in ((name, cell["differences"][name]) for name in SHOWN if name in cell["differences"]):
+            a_median, b_median, median, low, high = (found[key] for key in ("a", "b", "median", "low", "high"))
+            interval = f"{low:+.4g} to {high:+.4g}" if low != high else "one flight"
+            rows.append((name, f"{a_median:.4g}", f"{b_median:.4g}", f"{median:+.4g}", interval))
         title = f"{', '.join(labels)}: completed {done}"
         Console().print(terminal_table(headings, rows, title, wrap=headings[1:]))

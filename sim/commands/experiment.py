@@ -21,25 +21,12 @@ from sim.commands.options import (
     optional,
     usable_cores,
 )
+from sim.experiments import ALL, NAMES
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from sim.sweep.design import Run
-
-Name = Literal[
-    "force-hold",
-    "paint",
-    "noise-sweep",
-    "saturation",
-    "sloped-edge",
-    "friction",
-    "gust",
-    "rotor-derate",
-    "approach",
-    "payload",
-    "all",
-]
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -49,7 +36,7 @@ class ExperimentCommand:
     Example: ibvs-qp experiment force-hold --quick --out runs/force-hold
     """
 
-    name: Annotated[Name, tyro.conf.Positional, tyro.conf.arg(metavar="NAME")]
+    name: Annotated[Literal[(*NAMES, ALL)], tyro.conf.Positional, tyro.conf.arg(metavar="NAME")]  # type: ignore[valid-type]
     """Experiment: force-hold, paint, noise-sweep, saturation, sloped-edge, friction, gust, rotor-derate, approach,
     payload or all."""
     quick: Annotated[bool, flag] = False
@@ -73,7 +60,7 @@ class ExperimentCommand:
 
         from rich.console import Console
 
-        from sim.experiments import Choice, chosen, designs
+        from sim.experiments.design import Choice, chosen, designs
         from sim.experiments.record import PARTS, write_page, write_summary, write_tables
         from sim.experiments.record import summary as summarise
         from sim.report.rundir import RunFolder, as_json

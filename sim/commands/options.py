@@ -74,7 +74,9 @@ def check_mujoco() -> None:
 
 def usable_cores() -> int:
     """Number of processor cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    import joblib
+
+    return joblib.cpu_count()
 
 
 def command_line(words: Sequence[str]) -> str:

@@ -86,7 +86,7 @@ class Sweep:
         return 0
 
     def _fly(self, words: list[str], notes: Console) -> int:
-        from sim.report.rundir import RunFolder, as_json
+        from sim.report.rundir import RunFolder, as_json, write_json
         from sim.sweep import run_sweep
         from sim.sweep.figures import write_report
         from sim.sweep.parts import write_table
@@ -126,7 +126,7 @@ class Sweep:
             "report": str(page) if page else None,
             "wall_time_s": time.perf_counter() - started,
         }
-        (folder / "sweep.json").write_text(as_json(content, indent=1) + "\n", encoding="utf-8")
+        write_json(folder / "sweep.json", content)
         if self.json:
             print(as_json(content))
         elif page is not None:

@@ -18,23 +18,14 @@ _NUMBERED = re.compile(r"(?P<prefix>.*)_(?P<number>\d+)_color$")
 
 @dataclass(frozen=True, kw_only=True)
 class FrameEntry:
-    """One frame.
+    """One frame."""
 
-    Attributes:
-        color: Colour file, as in the manifest.
-        depth: Depth file, or "" if there is none.
-        folder: Folder of both.
-        intrinsics: (fx, fy, cx, cy) [px].
-        depth_units_per_metre: Depth values per metre.
-        seed: (u, v) of a point on the surface [px], or None.
-    """
-
-    color: str
-    depth: str
-    folder: Path
-    intrinsics: tuple[float, float, float, float]
-    depth_units_per_metre: float
-    seed: tuple[float, float] | None
+    color: str  # colour file, as in the manifest
+    depth: str  # depth file, or "" if there is none
+    folder: Path  # folder of both
+    intrinsics: tuple[float, float, float, float]  # (fx, fy, cx, cy) [px]
+    depth_units_per_metre: float  # depth values per metre
+    seed: tuple[float, float] | None  # (u, v) of a point on the surface [px], or None
 
 
 def read_manifest(folder: Path) -> list[FrameEntry]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from ibvs_qp.vision.survey.detection import GUIDE_SIDES
 from sim.detection.run import FrameResult
+from sim.evaluate.table import terminal_table
 from sim.report import rundir
 
 if TYPE_CHECKING:
@@ -72,21 +73,16 @@ def _line_dict(line: Any) -> dict[str, Any] | None:
 
 def frame_table(results: list[FrameResult]) -> Table:
     """One row per guide: frame, surface, side, position, slope, confidence and time."""
-    from rich import box
-    from rich.table import Table
-
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for heading in ("frame", "surface", "guide", "middle, px", "slope", "conf.", "ms"):
-        table.add_column(heading, no_wrap=True, justify="left" if heading in ("frame", "guide") else "right")
+    table = []
     for result in results:
         found = result.detection
         surface = "none" if found.plane is None else f"{found.plane.distance_m:.3f} m"
         lines = {side: line for side in GUIDE_SIDES if (line := found.guides.get(side)) is not None}
         rows = [_guide_row(line, side) for side, line in lines.items()] or [("none", "", "", "")]
-        table.add_row(Path(result.entry.color).stem, surface, *rows[0], f"{result.time_ms:.0f}")
-        for row in rows[1:]:
-            table.add_row("", "", *row)
-    return table
+        table.append((Path(result.entry.color).stem, surface, *rows[0], f"{result.time_ms:.0f}"))
+        table += [("", "", *row, "") for row in rows[1:]]
+    headings = ("frame", "surface", "guide", "middle, px", "slope", "conf.", "ms")
+    return terminal_table(headings, table, text=("frame", "guide"))
 
 
 def refusals(results: list[FrameResult]) -> list[str]:

@@ -20,19 +20,12 @@ _INTERVAL_NS = 33_333_333
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class FrameResult:
-    """A frame and its detection.
+    """A frame and its detection."""
 
-    Attributes:
-        entry: The entry of the manifest.
-        frame: The pictures, or None if they are unreadable.
-        detection: Result of the method, with the candidates to report.
-        time_ms: Wall-clock time of the method, without reading and without the list of all lines [ms].
-    """
-
-    entry: FrameEntry
-    frame: RgbdFrame | None
-    detection: Any
-    time_ms: float
+    entry: FrameEntry  # the entry of the manifest
+    frame: RgbdFrame | None  # the pictures, or None if they are unreadable
+    detection: Any  # result of the method, with the candidates to report
+    time_ms: float  # wall-clock time of the method, without reading and without the list of all lines [ms]
 
 
 def detect_frames(

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 #: Names of task rows that only regularise.
 _REGULAR = ("effort", "smooth")
+#: Headings of the table of tasks.
+TASK_HEADINGS = ("task", "unit", "target", "achieved", "residual", "weight", "cost")
 _AXES = ("front", "right", "down", "roll", "pitch", "yaw")
 #: Components of the wrench given up below this are not listed [N, N m].
 _NOTHING = 5e-4
@@ -65,7 +67,8 @@ def _headline(trace: Trace, tick: int, config: PilotConfig) -> list[str]:
     return [headline, *(f"Rejected at {event.t:.3f} s: {event.text}" for event in rejections(trace, tick))]
 
 
-def _tasks(explanation: Explanation) -> Any:
+def task_rows(explanation: Explanation) -> list[tuple[str, ...]]:
+    """Cells under `TASK_HEADINGS` of every task; the last row sums up the rows that only regularise."""
     rows, regular = [], 0.0
     for task, cost in zip(explanation.tasks, explanation.cost, strict=True):
         if task.name.startswith(_REGULAR):
@@ -73,9 +76,11 @@ def _tasks(explanation: Explanation) -> Any:
             continue
         values = (f"{value:+.4f}" for value in (task.asked, task.achieved, task.residual))
         rows.append((task.name, task.unit, *values, f"{task.weight:.4g}", _percent(cost)))
-    rows.append(("effort, smoothness", "N", "", "", "", "", _percent(regular)))
-    headings = ("task", "unit", "target", "achieved", "residual", "weight", "cost")
-    return terminal_table(headings, rows, "Tasks", text=("task", "unit"))
+    return [*rows, ("effort, smoothness", "N", "", "", "", "", _percent(regular))]
+
+
+def _tasks(explanation: Explanation) -> Any:
+    return terminal_table(TASK_HEADINGS, task_rows(explanation), "Tasks", text=("task", "unit"))
 
 
 def _limits(explanation: Explanation) -> list[Any]:

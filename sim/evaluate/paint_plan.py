@@ -20,17 +20,11 @@ BIN_M = 0.01
 
 @dataclass(frozen=True, kw_only=True)
 class Segment:
-    """One row or one climb of the nominal polyline.
+    """One row or one climb of the nominal polyline."""
 
-    Attributes:
-        kind: "row" or "climb".
-        row: Number of the row, or of the row that the climb leads to.
-        points: Corners of the segment in the order of travel, (K, 2) [m].
-    """
-
-    kind: str
-    row: int
-    points: np.ndarray
+    kind: str  # "row" or "climb"
+    row: int  # number of the row, or of the row that the climb leads to
+    points: np.ndarray  # corners of the segment in the order of travel, (K, 2) [m]
 
 
 @dataclass(frozen=True, kw_only=True)

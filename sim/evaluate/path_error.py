@@ -18,23 +18,20 @@ PAINTING_PHASES = {"paint": "row", "climb": "climb"}
 
 @dataclass(frozen=True, kw_only=True)
 class PathError:
-    """Path error of every control tick; NaN or False outside painting.
+    """Path error of every control tick; NaN or False outside painting."""
 
-    Attributes:
-        plan: The reference polyline.
-        tip: Tip in board coordinates (along, up), (N, 2) [m].
-        painting: The vehicle paints a row or a climb, (N,) bool.
-        corner: Painting within 0.10 m of a vertex, (N,) bool.
-        distance: Unsigned distance to the polyline, (N,) [m].
-        height: Tip above (+) or below (-) its row, in phase ``paint``, (N,) [m].
-    """
+    plan: PaintPlan  # the reference polyline
+    tip: np.ndarray  # tip in board coordinates (along, up), (N, 2) [m]
+    painting: np.ndarray  # the vehicle paints a row or a climb, (N,) bool
+    corner: np.ndarray  # painting within 0.10 m of a vertex, (N,) bool
+    distance: np.ndarray  # unsigned distance to the polyline, (N,) [m]
+    height: np.ndarray  # tip above (+) or below (-) its row, in phase ``paint``, (N,) [m]
 
-    plan: PaintPlan
-    tip: np.ndarray
-    painting: np.ndarray
-    corner: np.ndarray
-    distance: np.ndarray
-    height: np.ndarray
+    @property
+    def travelled(self) -> np.ndarray:
+        """Distance painted so far at every painting tick [m], (painting ticks,)."""
+        steps = np.linalg.norm(np.diff(self.tip[self.painting], axis=0), axis=1)
+        return np.concatenate(([0.0], np.cumsum(steps)))
 
 
 def painted_rows(trace: Trace, tip: np.ndarray) -> dict[int, np.ndarray]:

@@ -1,4 +1,4 @@
-"""Tables for the terminal, and the figures of merit that tables show with their units and digits."""
+"""Tables for the terminal and in Markdown, and the figures of merit that they show with their units and digits."""
 
 from __future__ import annotations
 
@@ -7,15 +7,34 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from sim.flight.trace import law_name
+
 if TYPE_CHECKING:
+    import numpy as np
+    import polars as pl
     from rich.table import Table
 
-LAW_NAMES = {"qp": "QP law", "paper": "analytic law"}
 
+@dataclass(frozen=True)
+class Figure:
+    """A figure of merit: a column of a table of flights, and its form in figures and reports."""
 
-def law_name(law: str) -> str:
-    """Name of a law in titles, headings and legends."""
-    return LAW_NAMES.get(law, law)
+    column: str  # name of the column
+    words: str  # in words
+    scale: float = 1.0  # factor from the column's unit to the reported one
+    unit: str = ""  # reported unit
+    more_is_better: bool = False  # whether larger values are better
+
+    @property
+    def label(self) -> str:
+        """Words with unit."""
+        return f"{self.words} [{self.unit}]" if self.unit else self.words
+
+    def values(self, table: pl.DataFrame) -> np.ndarray:
+        """Figure of every row in the reported unit, NaN where there is none, (rows,)."""
+        import polars as pl
+
+        return self.scale * table[self.column].cast(pl.Float64).fill_null(math.nan).to_numpy()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,6 +97,19 @@ def figure_table(metrics: dict[str, dict[str, Any]]) -> Table:
     headings = ("figure", *(law_name(law) for law in metrics), "unit")
     rows = [(line.label, *(line.show(figures) for figures in metrics.values()), line.unit) for line in LINES]
     return terminal_table(headings, rows, text=("figure", "unit"), wrap=headings[1:-1])
+
+
+def markdown(heads: Sequence[str], rows: Iterable[Sequence[str]], left: int | None = None) -> str:
+    """A Markdown table that ends with a line break.
+
+    Args:
+        heads: Headings of the columns.
+        rows: Cells of every row.
+        left: Number of left-aligned columns, the others are numbers; None leaves the alignment open.
+    """
+    rule = "".join("---|" if left is None else ":--|" if place < left else "--:|" for place in range(len(heads)))
+    lines = ["|" + "|".join(f" {cell} " if cell else " " for cell in line) + "|" for line in (heads, *rows)]
+    return "\n".join([lines[0], "|" + rule, *lines[1:]]) + "\n"
 
 
 def terminal_table(

@@ -1,12 +1,5 @@
-"""The experiments by name; each is a file in ``specs``."""
+"""The experiments by name, in the order of the report; each is a file in ``specs``. This module imports nothing."""
 
-from __future__ import annotations
-
-from sim.experiments.design import Choice, design
-from sim.experiments.spec import Experiment, experiment
-from sim.sweep.design import Run
-
-#: Names in the order of the report.
 NAMES = (
     "force-hold",
     "paint",
@@ -20,13 +13,3 @@ NAMES = (
     "payload",
 )
 ALL = "all"
-
-
-def chosen(name: str) -> list[Experiment]:
-    """One experiment, or all of them for ``all``."""
-    return [experiment(each) for each in (NAMES if name == ALL else (name,))]
-
-
-def designs(name: str, choice: Choice) -> list[Run]:
-    """Runs of one or of all experiments, in the order of the report."""
-    return [run for each in chosen(name) for run in design(each, choice)]

@@ -8,8 +8,9 @@ from typing import Any
 
 import polars as pl
 
+from sim.evaluate.table import markdown
 from sim.experiments.spec import Column, Experiment
-from sim.experiments.wording import cell, exact, markdown, measured, value_of, varying
+from sim.experiments.wording import cell, exact, measured, value_of, varying
 from sim.sweep.paired import needed, paired_differences, sign
 from sim.sweep.spec import LAWS
 from sim.sweep.statistics import CONFIDENCE

@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import polars as pl
 
-from sim.experiments.wording import markdown, rounded
+from sim.evaluate.table import markdown
+from sim.experiments.wording import rounded
 from sim.sweep.parts import PARAM
+from sim.sweep.statistics import select
 
 #: Pushes compared [N].
 FROM_N, TO_N = 25.0, 35.0
@@ -36,8 +38,7 @@ def clipping(table: pl.DataFrame) -> str:
     for push in sorted(set(rows[PARAM + "push_n"])):
         scores = {}
         for words, (law, variant) in _RIVALS.items():
-            cell = {"law": law, "variant": variant, PARAM + "push_n": push}
-            part = rows.filter(*(pl.col(name) == value for name, value in cell.items()))
+            part = select(rows, law=law, variant=variant, push_n=push)
             if not part.height:
                 continue
             done = part.filter(pl.col("completed"))

@@ -7,7 +7,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from sim.evaluate import measures
-from sim.experiments.spec import Experiment, Flights, Value
+from sim.experiments import ALL, NAMES
+from sim.experiments.spec import Experiment, Flights, Value, experiment
 from sim.experiments.variants import VARIANTS, with_force_gain
 from sim.flight.faults import Derate, Fault, WindStep
 from sim.flight.jobs import PaintJob, PressJob
@@ -26,17 +27,21 @@ DIRECTIONS = {"along the wall": (0.0, 1.0, 0.0), "off the wall": (-1.0, 0.0, 0.0
 
 @dataclass(frozen=True, kw_only=True)
 class Choice:
-    """Options of the command line.
+    """Options of the command line."""
 
-    Attributes:
-        quick: A few cells and seeds, for minutes instead of the record.
-        seed: First seed.
-        features: "rendered" or "geometric".
-    """
+    quick: bool = False  # a few cells and seeds, for minutes instead of the record
+    seed: int = 0  # first seed
+    features: str = "rendered"  # "rendered" or "geometric"
 
-    quick: bool = False
-    seed: int = 0
-    features: str = "rendered"
+
+def chosen(name: str) -> list[Experiment]:
+    """One experiment, or all of them for ``all``."""
+    return [experiment(each) for each in (NAMES if name == ALL else (name,))]
+
+
+def designs(name: str, choice: Choice) -> list[Run]:
+    """Runs of one or of all experiments, in the order of the report."""
+    return [run for each in chosen(name) for run in design(each, choice)]
 
 
 def design(experiment: Experiment, choice: Choice) -> list[Run]:

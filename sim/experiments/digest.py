@@ -14,11 +14,11 @@ import numpy as np
 import polars as pl
 
 from ibvs_qp.config.settings import load_toml
+from sim.evaluate.table import markdown
 from sim.experiments.spec import Column
 from sim.experiments.wording import rounded
-from sim.sweep.parts import PARAM
 from sim.sweep.spec import LAWS
-from sim.sweep.statistics import median_interval
+from sim.sweep.statistics import median_interval, select
 
 #: Marks around the table.
 BEGIN, END = "<!-- experiments: generated -->", "<!-- end of experiments -->"
@@ -26,20 +26,13 @@ BEGIN, END = "<!-- experiments: generated -->", "<!-- end of experiments -->"
 
 @dataclass(frozen=True, kw_only=True)
 class Line(Column):
-    """A line: one metric over the flights of both laws in the cells of `where`.
+    """A line: one metric over the flights of both laws in the cells of `where`."""
 
-    Attributes:
-        experiment: Name of the experiment.
-        variant: Variant of the controller.
-        published: Value in the literature.
-        also: Further metrics behind it; their labels hold "{}" for the number.
-        at_least: If given, the number of flights, failed ones included, that reach this value replaces the median.
-    """
-
-    experiment: str
-    variant: str = "standard"
-    published: str = "–"
-    also: tuple[Column, ...] = ()
+    experiment: str  # name of the experiment
+    variant: str = "standard"  # variant of the controller
+    published: str = "–"  # value in the literature
+    also: tuple[Column, ...] = ()  # further metrics behind it; their labels hold "{}" for the number
+    # if given, the number of flights, failed ones included, that reach this value replaces the median
     at_least: float | None = None
 
 
@@ -55,20 +48,16 @@ LINES = load_toml(Lines, Path(__file__).with_name("readme.toml")).lines
 
 def digest(table: pl.DataFrame, lines: Sequence[Line] = LINES) -> str:
     """Markdown table of the lines that have flights in a table of all experiments."""
-    text = [
-        "| | QP | analytic law | published | flights, QP and analytic | command: `ibvs-qp` |",
-        "|---|---|---|---|---|---|",
-    ]
+    heads = ("", "QP", "analytic law", "published", "flights, QP and analytic", "command: `ibvs-qp`")
+    cells = []
     for line in lines:
-        rows = table.filter((pl.col("experiment") == line.experiment) & (pl.col("variant") == line.variant))
-        for name, value in line.where.items():
-            rows = rows.filter(pl.col(PARAM + name) == value) if PARAM + name in rows.columns else rows.clear()
+        rows = select(table.filter(pl.col("experiment") == line.experiment), line.where, variant=line.variant)
         if rows.height:
             laws = [rows.filter(pl.col("law") == law) for law in LAWS]
             count = ", ".join(str(each.height) if each.height else "–" for each in laws)
-            values = " | ".join(_value(each, line) for each in laws)
-            text.append(f"| {line.label} | {values} | {line.published} | {count} | `experiment {line.experiment}` |")
-    return "\n".join(text) + "\n"
+            values = (_value(each, line) for each in laws)
+            cells.append((line.label, *values, line.published, count, f"`experiment {line.experiment}`"))
+    return markdown(heads, cells)
 
 
 def _value(rows: pl.DataFrame, line: Line) -> str:

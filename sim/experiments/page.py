@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
+from sim.evaluate.table import law_name, markdown
 from sim.experiments.balance import balance
 from sim.experiments.clipping import clipping
 from sim.experiments.spec import Experiment
 from sim.experiments.variants import VARIANTS
 from sim.experiments.verdict import Verdict, verdicts
-from sim.experiments.wording import cell, difference, entry, headings, interval, markdown, measured, value_of
+from sim.experiments.wording import cell, difference, entry, headings, interval, measured, value_of
 from sim.experiments.worth import worth
-from sim.figures.style import law_name
 from sim.sweep.paired import needed, paired_differences
 from sim.sweep.parts import PARAM
 from sim.sweep.statistics import cells, parameters, split

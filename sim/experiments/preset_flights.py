@@ -1,23 +1,64 @@
-"""Paint flights under a preset, for the comparison of presets."""
+"""Paint flights under a preset, for the comparison of presets and for tuning."""
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 from ibvs_qp.pilot import PilotConfig
 from sim.evaluate.measures import paint_figures
 from sim.experiments.scenes import near_wall, short_job
 from sim.flight.jobs import PaintJob
 from sim.flight.options import FlightOptions, pilot_config
-from sim.sweep.design import FlightPlan, Run
+from sim.sweep.design import FlightPlan, Measure, Run
+from sim.world.scene import Scene
 
 #: Stroke of the quick job [m].
 QUICK_STROKE_M = 0.4
 
 
+def paint_runs(
+    scene: Scene,
+    config: PilotConfig,
+    seeds: Iterable[int],
+    features: str,
+    *,
+    measure: Measure = paint_figures,
+    overhead_s: float = 0.0,
+    **cell: Any,
+) -> list[Run]:
+    """Paint jobs of one scene under a preset and its law.
+
+    Args:
+        scene: The scene.
+        config: The preset.
+        seeds: Seeds to fly.
+        features: "rendered" or "geometric".
+        measure: Figures of a flight.
+        overhead_s: Start, approaches and retreats beside the strokes [s]; sizes the progress bar only.
+        cell: ``experiment``, ``variant`` and ``params`` of the runs.
+    """
+    pilot = pilot_config(scene, FlightOptions(law=config.law), config)
+    expected_s = overhead_s + PaintJob().expected_s(pilot.painting)
+    return [
+        Run(
+            plan=FlightPlan(
+                scene=scene,
+                config=pilot,
+                options=FlightOptions(law=config.law, seed=seed, features=features, video=False),
+            ),
+            measure=measure,
+            expected_s=expected_s,
+            **cell,
+        )
+        for seed in seeds
+    ]
+
+
 def preset_runs(name: str, preset: Path, law: str, seeds: Iterable[int], features: str, quick: bool) -> list[Run]:
-    """Paint jobs under a preset.
+    """Paint jobs under a preset file.
 
     Args:
         name: Variant under which its rows go.
@@ -32,18 +73,6 @@ def preset_runs(name: str, preset: Path, law: str, seeds: Iterable[int], feature
     """
     pilot = PilotConfig.from_toml(preset)
     scene = short_job(QUICK_STROKE_M) if quick else near_wall()
-    flown = pilot.law if law == "own" else law
-    runs = []
-    for seed in seeds:
-        options = FlightOptions(law=flown, seed=seed, features=features, video=False)
-        runs.append(
-            Run(
-                experiment="paint",
-                variant=name,
-                params={"stroke_m": scene.paint.stroke_m},
-                plan=FlightPlan(scene=scene, config=pilot_config(scene, options, pilot), options=options),
-                measure=paint_figures,
-                expected_s=PaintJob().expected_s(pilot_config(scene, options, pilot).painting),
-            )
-        )
-    return runs
+    pilot = pilot if law == "own" else dataclasses.replace(pilot, law=law)
+    params = {"stroke_m": scene.paint.stroke_m}
+    return paint_runs(scene, pilot, seeds, features, experiment="paint", variant=name, params=params)

@@ -15,7 +15,7 @@ from sim.experiments.spec import Experiment
 from sim.experiments.variants import REFERENCES
 from sim.experiments.verdict import Verdict, verdicts
 from sim.figures.style import save, styled
-from sim.report.rundir import as_json
+from sim.report.rundir import write_json
 from sim.sweep.paired import paired_differences, variant_differences
 from sim.sweep.parts import write_table
 from sim.sweep.statistics import cells
@@ -103,7 +103,7 @@ def write_tables(folder: Path, name: str, experiments: Sequence[Experiment], tab
 
 def write_summary(folder: Path, content: dict[str, Any]) -> None:
     """Write the JSON."""
-    (folder / f"{content['name']}.json").write_text(as_json(content, indent=1) + "\n", encoding="utf-8")
+    write_json(folder / f"{content['name']}.json", content)
 
 
 def write_page(

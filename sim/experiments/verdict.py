@@ -11,8 +11,7 @@ import polars as pl
 from sim.experiments.criteria import Criterion
 from sim.experiments.spec import Experiment
 from sim.experiments.wording import varying
-from sim.sweep.parts import PARAM
-from sim.sweep.statistics import parameters, split
+from sim.sweep.statistics import parameters, select, split
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,9 +56,7 @@ def verdicts(experiment: Experiment, table: pl.DataFrame) -> list[Verdict]:
     """Verdict of each criterion in each cell of the QP law that it applies to."""
     result = []
     for criterion in experiment.every_criterion() if table.height else ():
-        rows = table.filter((pl.col("law") == "qp") & (pl.col("variant") == criterion.variant))
-        for name, value in criterion.where.items():
-            rows = rows.filter(pl.col(PARAM + name) == value) if PARAM + name in rows.columns else rows.clear()
+        rows = select(table, criterion.where, law="qp", variant=criterion.variant)
         cells = [(parameters(key), cell) for key, cell in split(rows, ("variant",))]
         places = varying([params for params, _ in cells])
         result += [evaluate(criterion, *cell, place) for cell, place in zip(cells, places, strict=True)]

@@ -1,4 +1,4 @@
-"""Numbers, cells and tables of the results page as text."""
+"""Numbers and cells of the results page as text."""
 
 from __future__ import annotations
 
@@ -75,12 +75,6 @@ def varying(listed: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 def headings(columns: Sequence[Column]) -> list[str]:
     """Labels of columns with their units."""
     return [column.label + (f" [{column.unit}]" if column.unit else "") for column in columns]
-
-
-def markdown(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table that ends with a line break."""
-    lines = ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
-    return "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in rows)]) + "\n"
 
 
 def measured(experiment: Experiment, table: pl.DataFrame) -> list[Column]:

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import polars as pl
 
+from sim.evaluate.table import law_name, markdown
 from sim.experiments.spec import Column, Experiment
 from sim.experiments.variants import REFERENCES
-from sim.experiments.wording import cell, difference, headings, markdown, measured, rounded, value_of, varying
-from sim.figures.style import law_name
+from sim.experiments.wording import cell, difference, headings, measured, rounded, value_of, varying
 from sim.sweep.paired import needed, variant_differences
 
 #: A variant has no effect if no median moves by more than this many steps of the last decimal shown.

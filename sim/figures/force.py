@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from sim.evaluate.table import law_name
 from sim.evaluate.window import CONTACT_N, PHYSICS_RATE_HZ
-from sim.figures.style import FAINT, GREY, REFERENCE, law_colour, legend_above, new_figure, shade_phases, thin
+from sim.figures.style import FAINT, REFERENCE, law_colour, legend_above, new_figure, note_empty, shade_phases, thin
 from sim.flight.trace import Trace
 
 #: Time before and after the first touch in the enlarged view [s].
@@ -40,7 +40,7 @@ def draw_force(traces: dict[str, Trace]) -> Figure:
 def _draw_touch(axes, trace: Trace, law: str) -> None:
     contact = trace.contact_1khz
     if not np.any(contact > CONTACT_N):
-        axes.text(0.5, 0.5, "no touch", transform=axes.transAxes, ha="center", color=GREY)
+        note_empty(axes, "no touch")
         return
     touch = float(np.argmax(contact > CONTACT_N)) / PHYSICS_RATE_HZ
     clock = np.arange(len(contact)) / PHYSICS_RATE_HZ - touch

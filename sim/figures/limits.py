@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from sim.figures.style import law_colour, law_panels, runs, shade_phases
+from sim.figures.style import law_colour, law_panels, note_empty, runs, shade_phases
 from sim.flight.trace import Trace
 
 #: An active stretch is drawn at least this long, so that a single tick is visible [s].
@@ -22,7 +22,7 @@ def draw_limits(traces: dict[str, Trace]) -> Figure:
         axes.set(ylim=(count - 0.4, -0.6), yticks=[])
         axes.grid(visible=False)
         if not trace.limits or not trace.active.any():
-            axes.text(0.5, 0.5, "no limit was active", transform=axes.transAxes, ha="center", va="center")
+            note_empty(axes, "no limit was active")
             continue
         order = np.argsort(-trace.active.mean(axis=0))
         axes.set_yticks(range(len(order)), [trace.limits[column].replace("_", " ") for column in order], fontsize=7)

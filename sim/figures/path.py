@@ -58,15 +58,12 @@ def _draw_error(axes, traces: dict[str, Trace]) -> None:
     largest = 1.0
     for law, trace in traces.items():
         path = path_error(trace)
-        index = np.flatnonzero(path.painting)
-        if not len(index):
+        if not path.painting.any():
             continue
-        steps = np.linalg.norm(np.diff(path.tip[index], axis=0), axis=1)
-        travelled = np.concatenate(([0.0], np.cumsum(steps)))
-        error = 1e3 * path.distance[index]
+        travelled, error = path.travelled, 1e3 * path.distance[path.painting]
         largest = max(largest, float(error.max()))
         axes.plot(*thin(travelled, error), color=law_colour(law), label=law_name(law))
-        axes.fill_between(travelled, 0, 1, where=path.corner[index], transform=axes.get_xaxis_transform(),
+        axes.fill_between(travelled, 0, 1, where=path.corner[path.painting], transform=axes.get_xaxis_transform(),
                           color="#efefef", linewidth=0, zorder=0)  # fmt: skip
     axes.set(xlabel="painted distance [m]", ylabel="path error [mm]", ylim=(0.0, 1.15 * largest))
     axes.set_title(f"distance of the tip to the nominal polyline (grey: within {CORNER_M:.2f} m of a vertex)")

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import matplotlib
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 from matplotlib.transforms import blended_transform_factory
+from numpy.typing import ArrayLike
 
 from sim.evaluate.table import law_name
 from sim.flight.trace import Trace
@@ -109,6 +112,42 @@ def legend_above(axes: Axes) -> None:
     """Put the legend above the axes at the right, where it covers no data."""
     count = len(axes.get_legend_handles_labels()[0])
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=count, borderaxespad=0.1)
+
+
+def legend_below(figure: Figure, handles: Sequence[Artist] | None = None, columns: int = 4, **style: Any) -> None:
+    """Put one legend below all panels: of these handles, or of all curves with a label."""
+    entries: dict[str, Artist] = {str(handle.get_label()): handle for handle in handles or ()}
+    for axes in figure.axes if handles is None else ():
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            entries.setdefault(label, handle)
+    if entries:
+        figure.legend(list(entries.values()), list(entries), loc="outside lower center", ncols=columns, **style)
+
+
+def note_empty(axes: Axes, text: str) -> None:
+    """Write in the middle of the axes why they show no data."""
+    axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", color=GREY)
+
+
+def draw_boxes(axes: Axes, values: Sequence[np.ndarray], places: ArrayLike, width: float, law: str) -> None:
+    """Box plots of one law at places along x; outliers are dots."""
+    drawn = axes.boxplot(
+        values,
+        positions=np.atleast_1d(places).tolist(),
+        widths=width,
+        patch_artist=True,
+        manage_ticks=False,
+        medianprops={"color": "#222222"},
+        flierprops={"markersize": 3, "marker": "."},
+        boxprops={"linewidth": 0.6},
+    )
+    for box in drawn["boxes"]:
+        box.set(facecolor=law_colour(law), alpha=0.5)
+
+
+def law_patches(laws: Iterable[str] = ("qp", "paper")) -> list[Patch]:
+    """Legend entries of the boxes of `draw_boxes`."""
+    return [Patch(facecolor=law_colour(law), alpha=0.5, label=law_name(law)) for law in laws]
 
 
 def save(figure: Figure, file: Path) -> Path:

@@ -18,15 +18,10 @@ LEAST_WINDOW_N = 1e-3
 
 @dataclass(frozen=True, kw_only=True)
 class Fault(ABC):
-    """A fault that occurs once.
+    """A fault that occurs once."""
 
-    Attributes:
-        after: Event that starts the delay: "start", "touch", or the name of a phase of the strategy.
-        delay_s: Time from then on [s].
-    """
-
-    after: str = "touch"
-    delay_s: float = 3.0
+    after: str = "touch"  # event that starts the delay: "start", "touch", or the name of a phase of the strategy
+    delay_s: float = 3.0  # time from then on [s]
 
     @abstractmethod
     def strike(self, world: World, pilot: Pilot) -> str:
@@ -35,17 +30,11 @@ class Fault(ABC):
 
 @dataclass(frozen=True, kw_only=True)
 class Derate(Fault):
-    """One rotor, or all, give only a fraction of the full thrust from now on; the drive reports it.
+    """One rotor, or all, give only a fraction of the full thrust from now on; the drive reports it."""
 
-    Attributes:
-        share: Fraction of the nominal upper limit; 0 stops the rotor.
-        rotor: Its name; empty derates all.
-        reported: Whether the drive reports the new limits to the pilot.
-    """
-
-    share: float = 0.5
-    rotor: str = ""
-    reported: bool = True
+    share: float = 0.5  # fraction of the nominal upper limit; 0 stops the rotor
+    rotor: str = ""  # its name; empty derates all
+    reported: bool = True  # whether the drive reports the new limits to the pilot
 
     def strike(self, world: World, pilot: Pilot) -> str:
         """Lower the limits of the plant and, if reported, those of the pilot."""
@@ -64,13 +53,9 @@ class Derate(Fault):
 
 @dataclass(frozen=True, kw_only=True)
 class WindStep(Fault):
-    """The mean wind jumps to a value.
+    """The mean wind jumps to a value."""
 
-    Attributes:
-        mean_m_s: New mean wind, world NED [m/s].
-    """
-
-    mean_m_s: tuple[float, float, float] = (0.0, 3.0, 0.0)
+    mean_m_s: tuple[float, float, float] = (0.0, 3.0, 0.0)  # new mean wind, world NED [m/s]
 
     def strike(self, world: World, pilot: Pilot) -> str:
         """Change the wind."""

@@ -8,17 +8,13 @@ from collections.abc import Callable, Iterator
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 
+from sim.flight.jobs import PaintJob
+from sim.flight.options import FlightOptions, pilot_config
+from sim.flight.trace import law_name
 from sim.world.scene import Scene
 
 #: Flying time that does not grow with the job: approach, alignment, press, retreat [s]; only sizes the bar.
 OVERHEAD_S = 25.0
-LAW_TITLES = {"qp": "QP law", "paper": "analytic law"}
-
-
-def expected_duration(scene: Scene) -> float:
-    """Rough length of a flight [s]; only sizes the bar."""
-    paint = scene.paint
-    return (paint.rows * paint.stroke_m + (paint.rows - 1) * paint.pitch_m) / paint.speed_m_s + OVERHEAD_S
 
 
 @contextlib.contextmanager
@@ -36,9 +32,9 @@ def flight_progress(
         TaskProgressColumn(),
         TextColumn("{task.fields[note]}"),
     )
-    total = expected_duration(scene)
+    total = PaintJob().expected_s(pilot_config(scene, FlightOptions()).painting) + OVERHEAD_S
     with Progress(*columns, console=console, disable=console.quiet) as bars:
-        tasks = {law: bars.add_task(LAW_TITLES[law], total=total, note="starting") for law in laws}
+        tasks = {law: bars.add_task(law_name(law), total=total, note="starting") for law in laws}
 
         def update(law: str, t: float, phase: str, rtf: float) -> None:
             done = phase == "done"

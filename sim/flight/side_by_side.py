@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import functools
-import os
 import resource
 import signal
 import sys
@@ -13,6 +12,8 @@ import threading
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
+
+import joblib
 
 from sim.flight.closed_loop import INTERRUPTED, fly
 from sim.flight.options import FlightOptions
@@ -54,8 +55,7 @@ def fly_laws(
         One flight per law; after Ctrl-C the partial ones, without those that never began.
     """
     jobs = {law: dataclasses.replace(options, law=law) for law in laws}
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    if (workers or cores) >= len(jobs) > 1:
+    if (workers or joblib.cpu_count()) >= len(jobs) > 1:
         return _fly_apart(scene, jobs, progress)
     flights: dict[str, Flight] = {}
     for law, job in jobs.items():
@@ -81,7 +81,6 @@ def _fly_apart(scene: Scene, jobs: dict[str, FlightOptions], progress: LawProgre
     Raises:
         RuntimeError: When a process died.
     """
-    import joblib
     from joblib.externals.loky import get_reusable_executor
     from joblib.externals.loky.process_executor import BrokenProcessPool
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -50,6 +49,14 @@ FIELDS = {
 }
 
 
+_LAW_NAMES = {"qp": "QP law", "paper": "analytic law"}
+
+
+def law_name(law: str) -> str:
+    """Name of a law in titles, headings and legends."""
+    return _LAW_NAMES.get(law, law)
+
+
 @dataclass(kw_only=True)
 class Event:
     """A phase change with its reason, a touch, a loss, a rejected input."""
@@ -61,43 +68,26 @@ class Event:
 
 @dataclass(kw_only=True)
 class Trace:
-    """One flight under one law.
+    """One flight under one law."""
 
-    Attributes:
-        scene: The scene flown.
-        seed: Its seed.
-        law: "qp" or "paper".
-        arrays: See `FIELDS`.
-        phases: Names of the phases, e.g. approach, align, press, paint, climb, retreat, done.
-        outcomes: Names of the outcomes.
-        limits: Names of the limits, columns of ``active``.
-        events: Phase changes and other events in order.
-        completed: Rows, climbs and retreat done without time-out or crash.
-        reason: Why the flight ended, in words.
-        wall_time_s: Wall-clock time of the simulation.
-        canvas: Painted board as the camera would see it, uint8 RGB, with `canvas_px_per_m`.
-        coverage_mask: Paint coverage of the canvas 0..1, float32, same size.
-        preset: Configuration of the pilot, TOML.
-        pictures: Video material: (t, RGB picture with detections drawn, phase name), thinned out.
-    """
-
-    scene: Scene
-    seed: int
-    law: str
-    arrays: dict[str, np.ndarray] = field(default_factory=dict)
-    phases: tuple[str, ...] = ()
-    outcomes: tuple[str, ...] = ()
-    limits: tuple[str, ...] = ()
-    events: list[Event] = field(default_factory=list)
-    completed: bool = False
-    reason: str = ""
-    wall_time_s: float = 0.0
-    canvas: np.ndarray | None = field(default_factory=lambda: None)  # no class attribute: see `draw_later`
-    canvas_px_per_m: float = 0.0
-    canvas_origin_m: tuple[float, float] = (0.0, 0.0)
-    coverage_mask: np.ndarray | None = None
+    scene: Scene  # the scene flown
+    seed: int  # its seed
+    law: str  # "qp" or "paper"
+    arrays: dict[str, np.ndarray] = field(default_factory=dict)  # see `FIELDS`
+    phases: tuple[str, ...] = ()  # names of the phases: approach, align, press, paint, climb, retreat, done
+    outcomes: tuple[str, ...] = ()  # names of the outcomes
+    limits: tuple[str, ...] = ()  # names of the limits, columns of ``active``
+    events: list[Event] = field(default_factory=list)  # phase changes and other events in order
+    completed: bool = False  # rows, climbs and retreat done without time-out or crash
+    reason: str = ""  # why the flight ended, in words
+    wall_time_s: float = 0.0  # wall-clock time of the simulation [s]
+    # Painted board as the camera would see it, uint8 RGB, with `canvas_px_per_m`; no class attribute, see `draw_later`.
+    canvas: np.ndarray | None = field(default_factory=lambda: None)
+    canvas_px_per_m: float = 0.0  # resolution of canvas and coverage mask [px/m]
+    coverage_mask: np.ndarray | None = None  # paint coverage of the canvas 0..1, float32, same size
+    # Video material: (t, RGB picture with detections drawn, phase name), thinned out.
     pictures: list[tuple[float, np.ndarray, str]] = field(default_factory=list)
-    preset: str = ""
+    preset: str = ""  # configuration of the pilot, TOML
 
     def draw_later(self, draw: Callable[[], np.ndarray]) -> None:
         """Draw `canvas` on first access; sweeps and tuning never access it."""
@@ -120,9 +110,3 @@ class Trace:
         state = self.__dict__ | {"canvas": self.canvas}
         state.pop("_draw", None)
         return state
-
-    def save(self, file: str | Path, prefix: str = "") -> None:
-        """Write every array to a compressed npz file; load with ``numpy.load``."""
-        names = {"phases": self.phases, "outcomes": self.outcomes, "limits": self.limits}
-        words = {prefix + key: np.array(value, dtype=str) for key, value in names.items()}
-        np.savez_compressed(file, **{prefix + key: value for key, value in self.arrays.items()}, **words)  # type: ignore[arg-type]

@@ -8,14 +8,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from sim.flight.trace import Trace
+from sim.flight.trace import Trace, law_name
 
 FRAME_RATE_HZ = 15.0
 PANEL_WIDTH, STRIP_HEIGHT, TITLE_HEIGHT, MARGIN = 640, 150, 36, 46
 #: Push shown at the top of the strip, per commanded push.
 FORCE_HEADROOM = 1.7
 JPEG_QUALITY = 88
-_TITLES = {"qp": "QP law", "paper": "analytic law"}
 # BGR colours of OpenCV.
 _INK, _PAPER, _GRID, _REFERENCE = (40, 40, 40), (250, 250, 250), (215, 215, 215), (120, 120, 120)
 _COLOURS = {"qp": (158, 111, 11), "paper": (26, 94, 213)}
@@ -97,8 +96,7 @@ class _Panel:
     def _title(self, panel: np.ndarray, t: float, tick: int) -> None:
         row = int(self.trace.row[tick])
         phase = self.trace.phases[int(self.trace.phase[tick])] + (f" (row {row})" if row else "")
-        title = _TITLES.get(self.trace.law, self.trace.law)
-        _text(panel, title, (12, 25), 0.65, _COLOURS.get(self.trace.law, _INK), 2)
+        _text(panel, law_name(self.trace.law), (12, 25), 0.65, _COLOURS.get(self.trace.law, _INK), 2)
         _text(panel, phase, (220, 25), 0.6, _INK)
         _text(panel, f"{t:6.1f} s", (PANEL_WIDTH - 110, 25), 0.6, _INK)
 

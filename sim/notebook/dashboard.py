@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from sim.evaluate.path_error import CONTACT_N
 from sim.evaluate.window import tilt_deg
-from sim.figures.style import REFERENCE
+from sim.figures.style import REFERENCE, note_empty
 from sim.flight.trace import Trace
 from sim.notebook.plots import BLUE, ORANGE, RED
 from sim.notebook.tuning import Comparison
@@ -107,7 +107,7 @@ def _draw_multipliers(axes: Axes, comparison: Comparison) -> None:
         totals |= dict(zip(trace.limits, np.nansum(trace.limit_price, axis=0).tolist(), strict=True))
     names = sorted(totals, key=lambda name: -totals[name])[:MOST_LIMITS]
     if not names:
-        axes.text(0.5, 0.5, "no limit was active", transform=axes.transAxes, ha="center", va="center", color="#777777")
+        note_empty(axes, "no limit was active")
         axes.set_yticks([])
         return
     top = max(1.0, *(float(np.nanmax(trace.limit_price, initial=0.0)) for trace in (now, last)))

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from allocation import TAROT_T960
 from sim.evaluate.explanation import explain_tick
+from sim.evaluate.explanation_text import TASK_HEADINGS, task_rows
 from sim.experiments.scenes import changed, short_job
 from sim.figures.style import law_colour, new_figure
 from sim.flight.closed_loop import fly
@@ -23,8 +24,6 @@ from sim.world.scene import Scene
 
 #: Camera pictures shown: phase, and fraction of its duration.
 MOMENTS = (("approach", 0.5), ("press", 0.7), ("paint", 0.35), ("paint", 0.9))
-#: Tasks that only regularise the program; the table omits them.
-REGULARISATION = ("effort", "smooth")
 #: Stroke [m] and picture size [px] of the short form.
 SHORT_STROKE_M, SHORT_SIZE = 0.12, (424, 240)
 
@@ -90,21 +89,7 @@ def moment_text(trace: Trace, time_s: float) -> str:
     _, explained = explain_tick(trace, tick)
     if explained is None:
         return f"At {trace.t[tick]:.3f} s the program had no solution."
-    tasks = table(
-        ["task", "unit", "target", "achieved", "weight"],
-        [
-            (
-                task.name.replace("_", " "),
-                task.unit,
-                f"{task.asked:+.3f}",
-                f"{task.achieved:+.3f}",
-                f"{task.weight:.3g}",
-            )
-            for task in explained.tasks
-            if not task.name.startswith(REGULARISATION)
-        ],
-        left=2,
-    )
+    tasks = table(TASK_HEADINGS, task_rows(explained), left=2)
     limits = "; ".join(
         f"{limit.name.replace('_', ' ')} ({limit.side}), multiplier {limit.price:.3g} per {limit.unit}"
         for limit in explained.active_limits

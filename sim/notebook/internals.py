@@ -64,49 +64,29 @@ class WallJob:
 
 @dataclass(frozen=True, kw_only=True)
 class Program:
-    r"""The quadratic program of one tick, :math:`\min \tfrac12 x^T P x + q^T x, \; l \le A x \le h, \; x = (u, s)`.
+    r"""The quadratic program of one tick, :math:`\min \tfrac12 x^T P x + q^T x, \; l \le A x \le h, \; x = (u, s)`."""
 
-    Attributes:
-        hessian: P, (variables, variables).
-        q: (variables,).
-        rows: A, (rows, variables).
-        lower: l, (rows,).
-        upper: h, (rows,).
-        free: Thrusts of the optimum without limits [N], (n,).
-        limited: Whether this optimum violates a limit.
-        arrays: The engine's own data, for `shipped_solver`.
-    """
-
-    hessian: np.ndarray
-    q: np.ndarray
-    rows: np.ndarray
-    lower: np.ndarray
-    upper: np.ndarray
-    free: np.ndarray
-    limited: bool
-    arrays: tuple[np.ndarray, ...]
+    hessian: np.ndarray  # P, (variables, variables)
+    q: np.ndarray  # (variables,)
+    rows: np.ndarray  # A, (rows, variables)
+    lower: np.ndarray  # l, (rows,)
+    upper: np.ndarray  # h, (rows,)
+    free: np.ndarray  # thrusts of the optimum without limits [N], (n,)
+    limited: bool  # whether this optimum violates a limit
+    arrays: tuple[np.ndarray, ...]  # the engine's own data, for `shipped_solver`
 
 
 @dataclass(frozen=True, kw_only=True)
 class TickRecord:
-    """One tick of the QP law, with the analytic law at the same set-points.
+    """One tick of the QP law, with the analytic law at the same set-points."""
 
-    Attributes:
-        program: The tick's program.
-        contact_weight: Lambda [-].
-        lines: Number of lines in use.
-        push_reference: Commanded push [N].
-        law_free: Thrusts of the analytic law before clipping [N], (n,).
-        law: The same after clipping [N], (n,).
-        selected: The same with the pushing direction removed from L before its inversion [N], (n,); for lambda 0 or 1.
-    """
-
-    program: Program
-    contact_weight: float
-    lines: int
-    push_reference: float
-    law_free: np.ndarray
-    law: np.ndarray
+    program: Program  # the tick's program
+    contact_weight: float  # Lambda [-]
+    lines: int  # number of lines in use
+    push_reference: float  # commanded push [N]
+    law_free: np.ndarray  # thrusts of the analytic law before clipping [N], (n,)
+    law: np.ndarray  # the same after clipping [N], (n,)
+    # the same with the pushing direction removed from L before its inversion [N], (n,); for lambda 0 or 1
     selected: np.ndarray
 
 

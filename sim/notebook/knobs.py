@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from sim.notebook.wall_flights import Setting
+from sim.sweep.setup import changed, value_at
 
 #: Steps of a logarithmic slider per decade, and their significant digits.
 STEPS_PER_DECADE, DIGITS = 10, 3
@@ -17,23 +18,14 @@ STEPS_PER_DECADE, DIGITS = 10, 3
 
 @dataclass(frozen=True)
 class Knob:
-    """One slider or switch.
+    """One slider or switch."""
 
-    Attributes:
-        label: Name with the unit in brackets.
-        path: Dotted field of `Setting`; it is also the knob's name.
-        low: Left end of the slider; None for a switch.
-        high: Right end.
-        step: Step; None for logarithmic steps.
-        also: A second field with the same value. Rotor limits are set in the controller and in the plant.
-    """
-
-    label: str
-    path: str
-    low: float | None = None
-    high: float | None = None
-    step: float | None = None
-    also: str = ""
+    label: str  # name with the unit in brackets
+    path: str  # dotted field of `Setting`; it is also the knob's name
+    low: float | None = None  # left end of the slider; None for a switch
+    high: float | None = None  # right end
+    step: float | None = None  # step; None for logarithmic steps
+    also: str = ""  # a second field with the same value. Rotor limits are set in the controller and in the plant
 
     def stops(self, value: float) -> list[float]:
         """Positions of the slider, including its initial value."""
@@ -109,7 +101,7 @@ KNOBS = {knob.path: knob for knobs in GROUPS.values() for knob in knobs}
 
 def knob_values(setting: Setting) -> dict[str, Any]:
     """Value of every knob in a setting."""
-    return {name: _value(setting, name.split(".")) for name in KNOBS}
+    return {name: value_at(setting, name) for name in KNOBS}
 
 
 def turned(setting: Setting, values: dict[str, Any]) -> Setting:
@@ -118,22 +110,5 @@ def turned(setting: Setting, values: dict[str, Any]) -> Setting:
     Raises:
         ConfigError: When a value, or several together, are refused.
     """
-    changes = {path: value for name, value in values.items() for path in (KNOBS[name].path, KNOBS[name].also) if path}
-    return _replaced(setting, {tuple(path.split(".")): value for path, value in changes.items()})
-
-
-def _value(node: Any, path: list[str]) -> Any:
-    for name in path:
-        node = getattr(node, name)
-    return node
-
-
-def _replaced(node: Any, changes: dict[tuple[str, ...], Any]) -> Any:
-    """Replace all fields of a section at once: some values are valid only together."""
-    new = {}
-    for name in dict.fromkeys(path[0] for path in changes):
-        below = {path[1:]: value for path, value in changes.items() if path[0] == name}
-        value = below[()] if () in below else _replaced(getattr(node, name), below)
-        if value != getattr(node, name):
-            new[name] = value
-    return dataclasses.replace(node, **new) if new else node
+    paths = {path: value for name, value in values.items() for path in (KNOBS[name].path, KNOBS[name].also) if path}
+    return changed(dataclasses.replace(setting, seed=paths.pop("seed", setting.seed)), paths)

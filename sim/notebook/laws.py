@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from ibvs_qp.controller import HybridController
 from sim.evaluate.window import board_tip, phase_window, tilt_deg
-from sim.figures.style import REFERENCE, law_colour, law_name, new_figure
+from sim.figures.style import REFERENCE, law_colour, law_name, legend_below, new_figure
 from sim.flight.trace import Trace
 from sim.notebook.internals import Tick, paper_profile, record_tick
 from sim.notebook.plots import (
@@ -20,7 +20,6 @@ from sim.notebook.plots import (
     LIMITED,
     MOMENTS,
     ORANGE,
-    legend_below,
     shade,
     wrench_curves,
 )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,22 +10,23 @@ import numpy as np
 import polars as pl
 
 from ibvs_qp.config.errors import ConfigError
-from sim.experiments import Choice
-from sim.experiments import designs as experiment_runs
-from sim.figures.style import law_name
+from sim.evaluate.table import Figure, law_name
+from sim.experiments.design import Choice
+from sim.experiments.design import designs as experiment_runs
 from sim.flight.closed_loop import fly
 from sim.flight.trace import Trace
 from sim.notebook.noise_sample import SAMPLE, sample_runs
 from sim.notebook.table import table
 from sim.sweep.design import Run
+from sim.sweep.figures.page import read_table
 from sim.sweep.fingerprint import code_hash, configuration_hash
 from sim.sweep.paired import needed, paired_differences, sign
 from sim.sweep.parts import PARAM
+from sim.sweep.spec import LAWS
+from sim.sweep.statistics import completed, select
 
-LAWS = ("qp", "paper")
-#: Columns of the two noises, and columns that identify a noise sweep.
+#: Columns of the two noises.
 VS, FORCE = PARAM + "sigma_vs", PARAM + "sigma_f_n"
-NEEDED = ("law", "seed", "completed", "reason", VS, FORCE)
 #: Camera distance in contact [m]: sigma_vs times this is the noise of a line on the wall.
 DEPTH_M = 0.5
 #: More seeds per cell than any sweep of this design has.
@@ -35,26 +35,16 @@ MOST_SEEDS = 10
 _VERDICTS = {1: "QP better", 0: "no significant difference", -1: "analytic law better"}
 
 
-@dataclass(frozen=True, kw_only=True)
-class Figure:
-    """A column with its label, the factor into the unit of the label, and whether larger values are better."""
-
-    column: str
-    label: str
-    scale: float = 1.0
-    more_is_better: bool = False
-
-
 FIGURES = (
-    Figure(column="path_rms_m", label="path error, rms [mm]", scale=1e3),
-    Figure(column="force_rms_n", label="push error, rms [N]"),
-    Figure(column="path_max_m", label="path error, greatest [mm]", scale=1e3),
-    Figure(column="tilt_rms_deg", label="tilt, rms [deg]"),
-    Figure(column="yaw_rms_deg", label="yaw, rms [deg]"),
-    Figure(column="velocity_rms_m_s", label="error of the estimated velocity, rms [mm/s]", scale=1e3),
-    Figure(column="coverage", label="painted part of the intended band [%]", scale=1e2, more_is_better=True),
-    Figure(column="limited_share", label="ticks with an active limit [%]", scale=1e2),
-    Figure(column="duration_s", label="duration [s]"),
+    Figure("path_rms_m", "path error, rms", 1e3, "mm"),
+    Figure("force_rms_n", "push error, rms", unit="N"),
+    Figure("path_max_m", "path error, largest", 1e3, "mm"),
+    Figure("tilt_rms_deg", "tilt, rms", unit="deg"),
+    Figure("yaw_rms_deg", "yaw, rms", unit="deg"),
+    Figure("velocity_rms_m_s", "error of the estimated velocity, rms", 1e3, "mm/s"),
+    Figure("coverage", "painted part of the intended band", 1e2, "%", more_is_better=True),
+    Figure("limited_share", "ticks with an active limit", 1e2, "%"),
+    Figure("duration_s", "duration", unit="s"),
 )
 
 
@@ -64,16 +54,9 @@ def read_sweep(file: str) -> pl.DataFrame:
     Raises:
         ConfigError: When there is no such file, or it is no noise sweep.
     """
-    path = Path(file) if file else SAMPLE
-    if not path.is_file():
-        raise ConfigError(f"no file {file}; ibvs-qp experiment noise-sweep writes one")
-    try:
-        sweep = pl.read_parquet(path)
-    except pl.exceptions.PolarsError as error:
-        raise ConfigError(f"{path.name}: not a Parquet table ({str(error).splitlines()[0]})") from error
-    missing = [name for name in NEEDED if name not in sweep.columns]
-    if missing:
-        raise ConfigError(f"{path.name}: not a noise sweep, no column {', '.join(missing)}")
+    sweep, _ = read_table(Path(file) if file else SAMPLE)
+    if missing := [name for name in (VS, FORCE) if name not in sweep.columns]:
+        raise ConfigError(f"{file} is no noise sweep: it lacks {', '.join(missing)}")
     return sweep
 
 
@@ -94,8 +77,7 @@ def cell_values(sweep: pl.DataFrame, law: str, vs: float, force: float, figure: 
     """Figure of the completed flights of a cell, in the unit of its label."""
     if figure.column not in sweep.columns:
         return np.array([])
-    rows = sweep.filter((pl.col("law") == law) & (pl.col(VS) == vs) & (pl.col(FORCE) == force) & pl.col("completed"))
-    return figure.scale * rows[figure.column].drop_nulls().to_numpy()
+    return figure.scale * completed(select(sweep, law=law, sigma_vs=vs, sigma_f_n=force), figure.column)
 
 
 def success(sweep: pl.DataFrame) -> pl.DataFrame:

@@ -10,7 +10,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-from sim.experiments import Choice, design, experiment
+from sim.experiments.design import Choice, design
+from sim.experiments.spec import experiment
 from sim.sweep import run_sweep
 from sim.sweep.design import Run
 from sim.sweep.parts import write_table

@@ -1,12 +1,9 @@
-"""What the figures of several notebooks share: shaded spans of time, curves of vectors, legends below the panels."""
+"""What the figures of several notebooks share: shaded spans of time and curves of vectors."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from sim.figures.style import LAW_COLOURS
 
@@ -30,9 +27,3 @@ def shade(axes: Axes, t: np.ndarray, where: np.ndarray, colour: str, height: flo
     axes.fill_between(
         t, 0.0, height, where=where.tolist(), color=colour, transform=axes.get_xaxis_transform(), linewidth=0, zorder=0
     )
-
-
-def legend_below(figure: Figure, handles: Sequence | None = None, **options: object) -> None:
-    """Place one legend below all panels: of these handles, or of the first panel."""
-    handles = figure.axes[0].get_legend_handles_labels()[0] if handles is None else handles
-    figure.legend(handles=list(handles), loc="outside lower center", **{"ncols": 4, **options})  # type: ignore[arg-type]

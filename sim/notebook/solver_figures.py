@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.transforms import Bbox
 
-from sim.figures.style import new_figure
-from sim.notebook.plots import BLUE, GREEN, LIMITED, ORANGE, legend_below, shade
+from sim.figures.style import legend_below, new_figure
+from sim.notebook.plots import BLUE, GREEN, LIMITED, ORANGE, shade
 from sim.notebook.solvers import NEVER, Result
 
 COLOURS = {
@@ -48,7 +48,7 @@ def draw_race(results: Sequence[Result]) -> Figure:
     axes.set_title("Lower left is better; below the dotted line the error is negligible")
     families = dict.fromkeys(one.contender.family for one in results)
     legend_below(
-        figure, [Line2D([], [], marker="o", linestyle="", color=COLOURS[f], label=f) for f in families], ncols=5
+        figure, [Line2D([], [], marker="o", linestyle="", color=COLOURS[f], label=f) for f in families], columns=5
     )
     _write_names(figure, axes, results, places)
     return figure
@@ -97,7 +97,7 @@ def draw_settings(grid: pl.DataFrame, cap: int) -> Figure:
         errors.plot(rows["tolerance"], rows["error_n"], "o-", label=label, **style)
         iterations.plot(rows["tolerance"], rows["iterations_p99"], "o-", **style)
         iterations.plot(rows["tolerance"], rows["iterations"], ":", **style)
-    iterations.axhline(cap, color="#999999", linewidth=0.8, label="cap")
+    iterations.axhline(cap, color="#999999", linewidth=0.8)
     iterations.text(float(grid["tolerance"].to_numpy().min()), cap, "cap", fontsize=7, va="bottom", color="#777777")
     for axes in (errors, iterations):
         axes.set(xscale="log", xlabel="tolerance (absolute and relative)")

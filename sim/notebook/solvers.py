@@ -31,34 +31,22 @@ BACK_ENDS, DENSE = ("osqp", "daqp", "quadprog", "proxqp", "piqp", "clarabel"), (
 
 @dataclass(frozen=True, kw_only=True)
 class Contender:
-    """A way to solve the ticks.
+    """A way to solve the ticks."""
 
-    Attributes:
-        name: In figures and tables.
-        family: Its colour: "OSQP, workspace", "active set", "qpsolvers", "shipped" or "yours".
-        make: Sets it up for some programs and returns the function that solves one; only that function is timed.
-    """
-
-    name: str
-    family: str
+    name: str  # in figures and tables
+    family: str  # its colour: "OSQP, workspace", "active set", "qpsolvers", "shipped" or "yours"
+    # sets it up for some programs and returns the function that solves one; only that function is timed
     make: Callable[[Sequence[Program]], Callable[[Program], Answer]]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Result:
-    """Measurements of one contender (N ticks).
+    """Measurements of one contender (N ticks)."""
 
-    Attributes:
-        contender: The contender.
-        times_us: Thread time per tick [us], (N,).
-        errors_n: Largest distance of a thrust to the exact one [N], (N,); NaN without an answer.
-        iterations: Of the solver, (N,); 0 where it reports none.
-    """
-
-    contender: Contender
-    times_us: np.ndarray
-    errors_n: np.ndarray
-    iterations: np.ndarray
+    contender: Contender  # the contender
+    times_us: np.ndarray  # thread time per tick [us], (N,)
+    errors_n: np.ndarray  # largest distance of a thrust to the exact one [N], (N,); NaN without an answer
+    iterations: np.ndarray  # of the solver, (N,); 0 where it reports none
 
 
 def osqp_workspace(name: str, settings: dict[str, float], family: str = "OSQP, workspace") -> Contender:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 
+from sim.evaluate.table import markdown
+
 #: Text of a missing value.
 MISSING = "–"
 
@@ -22,6 +24,5 @@ def table(header: Sequence[str], rows: Iterable[Sequence[object]], left: int = 1
         rows: Cells of every row; numbers have the format of `number`.
         left: How many columns, from the first, are aligned left; the others are aligned right.
     """
-    lines = [header, [":--" if column < left else "--:" for column in range(len(header))], *rows]
-    texts = ([number(cell) if isinstance(cell, float) else str(cell) for cell in line] for line in lines)
-    return "\n".join("| " + " | ".join(line) + " |" for line in texts)
+    texts = ([number(cell) if isinstance(cell, float) else str(cell) for cell in line] for line in rows)
+    return markdown(header, texts, left).rstrip()

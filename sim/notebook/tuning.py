@@ -19,23 +19,14 @@ from sim.notebook.wall_flights import Setting, fly_setting
 
 @dataclass(frozen=True, kw_only=True)
 class Comparison:
-    """A flown setting beside the previous setting and the analytic law.
+    """A flown setting beside the previous setting and the analytic law."""
 
-    Attributes:
-        setting: The setting.
-        last_setting: The setting before.
-        now: Flight of the setting under the QP law.
-        last: Flight of the setting before.
-        analytic: Flight of the analytic law in the same scene.
-        refusal: Reason of a refused setting; the other fields then show the comparison before.
-    """
-
-    setting: Setting
-    last_setting: Setting
-    now: Trace
-    last: Trace
-    analytic: Trace
-    refusal: str = ""
+    setting: Setting  # the setting
+    last_setting: Setting  # the setting before
+    now: Trace  # flight of the setting under the QP law
+    last: Trace  # flight of the setting before
+    analytic: Trace  # flight of the analytic law in the same scene
+    refusal: str = ""  # reason of a refused setting; the other fields then show the comparison before
 
     @property
     def flights(self) -> dict[str, Trace]:

@@ -24,6 +24,7 @@ from allocation import (
 )
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import GRAVITY
+from sim.sensors.cameras.outline import clip_polygon
 
 #: Density of the air at sea level and 15 degrees [kg/m^3] (ISO 2533).
 AIR_DENSITY = 1.225
@@ -41,17 +42,11 @@ _facets = functools.lru_cache(maxsize=64)(WrenchFacets)
 
 @dataclass(frozen=True, kw_only=True)
 class Case:
-    """A vehicle and the state of its rotors.
+    """A vehicle and the state of its rotors."""
 
-    Attributes:
-        vehicle: Mass, geometry, limits, tip.
-        weak_rotor: Name of a rotor with less thrust; empty if there is none.
-        fraction: Part of its full thrust that remains; 0 is a lost rotor.
-    """
-
-    vehicle: VehicleParams = field(default_factory=VehicleParams)
-    weak_rotor: str = ""
-    fraction: float = 1.0
+    vehicle: VehicleParams = field(default_factory=VehicleParams)  # mass, geometry, limits, tip
+    weak_rotor: str = ""  # name of a rotor with less thrust; empty if there is none
+    fraction: float = 1.0  # part of its full thrust that remains; 0 is a lost rotor
 
     @property
     def geometry(self) -> RotorGeometry:
@@ -117,7 +112,7 @@ class Case:
         r"""Corners of all (a, b) for which the wrench :math:`w_0 + a\,d_1 + b\,d_2` is attainable.
 
         With six rotors a wrench has unique thrusts :math:`u = B^{-1} w`, so each thrust limit is a half-plane in
-        (a, b). A large square is clipped with one after the other (Sutherland and Hodgman).
+        (a, b). A large square is clipped with one after the other.
 
         Args:
             origin: Wrench w_0, (6,) [N, N m].
@@ -132,16 +127,9 @@ class Case:
         rooms = np.concatenate((self.upper - at, at - self.lower))
         corners = LARGEST * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
         for slope, room in zip(np.vstack((slopes, -slopes)), rooms, strict=True):
-            beyond, kept = corners @ slope - room, []
-            for i in range(len(corners)):
-                if beyond[i - 1] * beyond[i] < 0.0:
-                    step = beyond[i - 1] / (beyond[i - 1] - beyond[i])
-                    kept.append(corners[i - 1] + step * (corners[i] - corners[i - 1]))
-                if beyond[i] <= 0.0:
-                    kept.append(corners[i])
-            corners = np.reshape(kept, (-1, 2))
+            corners = clip_polygon(corners, -slope, room)
         x, y = corners.T
-        area = 0.5 * abs(x @ np.roll(y, 1) - y @ np.roll(x, 1)) if len(corners) > 2 else 0.0
+        area = 0.5 * abs(x @ np.roll(y, 1) - y @ np.roll(x, 1))
         return corners if area > EMPTY_AREA else np.empty((0, 2))
 
     def level_cut(self) -> np.ndarray:
@@ -207,21 +195,13 @@ def after_loss(case: Case) -> tuple[float, float, float]:
 
 @dataclass(frozen=True, kw_only=True)
 class Duties:
-    """Required abilities in level flight.
+    """Required abilities in level flight."""
 
-    Attributes:
-        push_n: Push standing still [N].
-        sliding_push_n: Push for any travel of the tip [N].
-        friction: Coulomb coefficient of tip and wall [-].
-        gust_n: Horizontal force from any side, in free flight [N].
-        least_mass_kg: Frame, battery and tools; the rest is ballast.
-    """
-
-    push_n: float = 10.0
-    sliding_push_n: float = 5.0
-    friction: float = 0.6
-    gust_n: float = 10.0
-    least_mass_kg: float = 5.5
+    push_n: float = 10.0  # push standing still [N]
+    sliding_push_n: float = 5.0  # push for any travel of the tip [N]
+    friction: float = 0.6  # Coulomb coefficient of tip and wall [-]
+    gust_n: float = 10.0  # horizontal force from any side, in free flight [N]
+    least_mass_kg: float = 5.5  # frame, battery and tools; the rest is ballast
 
 
 def design_map(duties: Duties, tilts_deg: np.ndarray, masses_kg: np.ndarray) -> pl.DataFrame:

@@ -23,6 +23,7 @@ from sim.flight.trace import Trace
 from sim.notebook.internals import Tick, TickRecord, WallJob, record_tick
 from sim.notebook.short import unless_short
 from sim.notebook.table import number, table
+from sim.sweep.setup import Setup
 from sim.world.scene import Scene
 
 #: Hold and slide of notebook 02, in full and in the short form [s]: a push settles within 1 s, a line within 2 s.
@@ -34,7 +35,7 @@ SETTLED_S, HOVER_S = 1.1, 1.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Setting:
+class Setting(Setup):
     """Pilot configuration with its law, scene and seed; equal settings give the same flight to the bit."""
 
     pilot: PilotConfig = field(default_factory=lambda: default_preset("qp"))
@@ -62,25 +63,15 @@ def fly_setting(setting: Setting, hold_s: float | None = None, slide_s: float | 
 
 @dataclass(frozen=True, kw_only=True)
 class WallTask:
-    """A flight of notebook 03.
+    """A flight of notebook 03."""
 
-    Attributes:
-        push_n: Push reference [N].
-        slope_deg: Rotation of the board in its own plane [deg].
-        friction: Coulomb coefficient of brush and board [-].
-        hold_s: Time of pressing at one place [s].
-        slide_s: Time of sliding along the edge afterwards [s].
-        reach_check: Whether the controller limits a push beyond reach.
-        feedforward: Whether the controller feeds contact moments and expected friction forward.
-    """
-
-    push_n: float = 5.0
-    slope_deg: float = 0.0
-    friction: float = 0.3
-    hold_s: float = 1.2
-    slide_s: float = 0.0
-    reach_check: bool = False
-    feedforward: bool = True
+    push_n: float = 5.0  # push reference [N]
+    slope_deg: float = 0.0  # rotation of the board in its own plane [deg]
+    friction: float = 0.3  # Coulomb coefficient of brush and board [-]
+    hold_s: float = 1.2  # time of pressing at one place [s]
+    slide_s: float = 0.0  # time of sliding along the edge afterwards [s]
+    reach_check: bool = False  # whether the controller limits a push beyond reach
+    feedforward: bool = True  # whether the controller feeds contact moments and expected friction forward
 
     def setting(self, law: str) -> Setting:
         """Preset of a law with these switches, and the scene."""
@@ -100,21 +91,13 @@ class WallTask:
 
 @dataclass(frozen=True, kw_only=True)
 class RecordedFlight:
-    """A flight under the QP law with internals of every tick (N ticks, n rotors).
+    """A flight under the QP law with internals of every tick (N ticks, n rotors)."""
 
-    Attributes:
-        ticks: Measurement and reference of every tick, N.
-        records: Both laws at every tick, N.
-        t: Time [s], (N,).
-        qp: Thrusts of the QP law, which were flown [N], (N, n).
-        effectiveness: B, (6, n).
-    """
-
-    ticks: list[Tick]
-    records: list[TickRecord]
-    t: np.ndarray
-    qp: np.ndarray
-    effectiveness: np.ndarray
+    ticks: list[Tick]  # measurement and reference of every tick, N
+    records: list[TickRecord]  # both laws at every tick, N
+    t: np.ndarray  # time [s], (N,)
+    qp: np.ndarray  # thrusts of the QP law, which were flown [N], (N, n)
+    effectiveness: np.ndarray  # B, (6, n)
 
     def __getattr__(self, name: str) -> np.ndarray:
         """Field of all records as one array, (N, ...)."""

@@ -15,6 +15,7 @@ from ibvs_qp.controller import default_limits, default_tasks, qp_problem
 from ibvs_qp.limits import Limit
 from ibvs_qp.model.rows import LimitRow, TaskRow
 from ibvs_qp.tasks import Task
+from sim.evaluate.table import markdown
 
 _HEAD = """\
 # Tasks and limits of the program
@@ -161,8 +162,7 @@ def _superscript(unit: str) -> str:
 
 
 def _table(head: Sequence[str], lines: Iterable[Sequence[str]]) -> str:
-    lines = [head, ["---"] * len(head), *([cell.replace("|", "\\|") for cell in line] for line in lines)]
-    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+    return markdown(head, ([cell.replace("|", "\\|") for cell in line] for line in lines))
 
 
 if __name__ == "__main__":

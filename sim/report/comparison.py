@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import json
-import math
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import polars as pl
 
 from ibvs_qp.config.errors import ConfigError
-from sim.sweep.paired import exact_interval
+from sim.sweep.paired import difference
 from sim.sweep.parts import PARAM, frame
 from sim.sweep.statistics import figure_names, median_interval
 
@@ -52,38 +51,13 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Difference:
-    """Difference of one figure in one cell between runs A and B.
-
-    Attributes:
-        figure: Its name.
-        a: Median of run A over the shared flights.
-        b: Median of run B.
-        median: Median of the differences B - A, flight by flight.
-        low: Lower end of its bootstrap interval.
-        high: Upper end.
-        sure_low: Lower end of the exact interval (six pairs or more, see `sim.sweep.paired`); else NaN.
-        sure_high: Upper end.
-    """
-
-    figure: str
-    a: float
-    b: float
-    median: float
-    low: float
-    high: float
-    sure_low: float
-    sure_high: float
-
-
 def compare(a: pl.DataFrame, b: pl.DataFrame) -> list[dict[str, Any]]:
     """Pair the flights of two runs by experiment, law, variant, parameters and seed, and compare each cell.
 
     Two `paint` runs pair law by law, whatever their seeds.
 
     Returns:
-        Per cell: experiment, law, variant, params, n, completed of both, and the differences.
+        Per cell: experiment, law, variant, params, n, completed of both, and by figure the differences.
 
     Raises:
         ConfigError: If they share no flight.
@@ -104,17 +78,16 @@ def compare(a: pl.DataFrame, b: pl.DataFrame) -> list[dict[str, Any]]:
                 "params": {name.removeprefix(PARAM): values[name] for name in params if values[name] is not None},
                 "n": rows.height,
                 "completed": [int(rows["completed"].sum()), int(rows["completed.b"].sum())],
-                "differences": [found for name in shared if (found := _difference(rows, name)) is not None],
+                "differences": {name: found for name in shared if (found := _difference(rows, name)) is not None},
             }
         )
     return cells
 
 
-def _difference(rows: pl.DataFrame, name: str) -> Difference | None:
+def _difference(rows: pl.DataFrame, name: str) -> dict[str, float] | None:
+    """Medians of run A and B, and of B - A flight by flight with its bootstrap and its exact interval."""
     first, second = (rows[column].cast(pl.Float64).to_numpy() for column in (name, f"{name}.b"))
-    change = median_interval(second - first)
-    if not math.isfinite(change["median"]):
+    if not np.isfinite(second - first).any():
         return None
-    low, high = exact_interval(second - first)
     medians = {"a": median_interval(first)["median"], "b": median_interval(second)["median"]}
-    return Difference(figure=name, **medians, **change, sure_low=low, sure_high=high)
+    return medians | difference(second - first)

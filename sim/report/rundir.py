@@ -102,7 +102,7 @@ class RunFolder:
 
     def write_summary(self, summary_table: dict[str, Any]) -> None:
         """Write summary.json."""
-        (self.path / "summary.json").write_text(as_json(summary_table, indent=1) + "\n", encoding="utf-8")
+        write_json(self.path / "summary.json", summary_table)
 
     def write_report(self, traces: dict[str, Trace], summary_table: dict[str, Any], video: bool) -> None:
         """Draw the figures, the video and the report."""
@@ -167,6 +167,11 @@ def peak_memory(flights: Iterable[Flight]) -> int:
 def as_json(value: Any, indent: int | None = None) -> str:
     """JSON text; non-finite numbers become null."""
     return json.dumps(_finite(value), indent=indent, allow_nan=False)
+
+
+def write_json(file: Path, value: Any) -> None:
+    """Write a JSON file for people too, with line breaks; non-finite numbers become null."""
+    file.write_text(as_json(value, indent=1) + "\n", encoding="utf-8")
 
 
 def _finite(value: Any) -> Any:

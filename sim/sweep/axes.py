@@ -36,19 +36,12 @@ class Span:
 
 @dataclass(frozen=True)
 class Axis:
-    """One varied parameter.
+    """One varied parameter."""
 
-    Attributes:
-        path: Dotted path.
-        values: Listed values, on a grid or to choose from; empty for a range to draw from.
-        span: That range.
-        whole: Whether values are whole numbers.
-    """
-
-    path: str
-    values: tuple[Parameter, ...] = ()
-    span: Span | None = None
-    whole: bool = False
+    path: str  # dotted path
+    values: tuple[Parameter, ...] = ()  # listed values, on a grid or to choose from; empty for a range to draw from
+    span: Span | None = None  # that range
+    whole: bool = False  # whether values are whole numbers
 
     def draw(self, fraction: float) -> Parameter:
         """The value at a uniform number 0..1."""

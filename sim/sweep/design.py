@@ -20,44 +20,26 @@ Measure = Callable[[Trace], dict[str, float]]
 
 @dataclass(frozen=True, kw_only=True)
 class FlightPlan:
-    """Everything that determines a flight to the bit.
+    """Everything that determines a flight to the bit."""
 
-    Attributes:
-        scene: The truth.
-        config: The complete pilot; no preset is read later.
-        options: Law, seed, features, picture size.
-        job: Task at the wall.
-        faults: Faults and their times.
-    """
-
-    scene: Scene
-    config: PilotConfig
-    options: FlightOptions
-    job: Job = field(default_factory=PaintJob)
-    faults: tuple[Fault, ...] = ()
+    scene: Scene  # the truth
+    config: PilotConfig  # the complete pilot; no preset is read later
+    options: FlightOptions  # law, seed, features, picture size
+    job: Job = field(default_factory=PaintJob)  # task at the wall
+    faults: tuple[Fault, ...] = ()  # faults and their times
 
 
 @dataclass(frozen=True, kw_only=True)
 class Run:
-    """One flight of a design: a row of its table.
+    """One flight of a design: a row of its table."""
 
-    Attributes:
-        experiment: Name of its design.
-        variant: Switched part of the controller; laws compare within a variant.
-        params: Parameters of the cell, by name with unit.
-        plan: The flight.
-        measure: Module-level function from trace to figures.
-        keep: Whether the whole log is stored, for figures of single flights.
-        expected_s: Expected flying time [s]; sizes the plan and the progress bar.
-    """
-
-    experiment: str
-    variant: str
-    params: dict[str, Parameter]
-    plan: FlightPlan
-    measure: Measure
-    keep: bool = False
-    expected_s: float = 20.0
+    experiment: str  # name of its design
+    variant: str  # switched part of the controller; laws compare within a variant
+    params: dict[str, Parameter]  # parameters of the cell, by name with unit
+    plan: FlightPlan  # the flight
+    measure: Measure  # module-level function from trace to figures
+    keep: bool = False  # whether the whole log is stored, for figures of single flights
+    expected_s: float = 20.0  # expected flying time [s]; sizes the plan and the progress bar
 
     @property
     def law(self) -> str:
@@ -84,16 +66,9 @@ class Refusal:
 
 @dataclass(frozen=True, kw_only=True)
 class Block:
-    """Runs that fly in one go and are one part on disk; small, as it is sent to other processes.
+    """Runs that fly in one go and are one part on disk; small, as it is sent to other processes."""
 
-    Attributes:
-        name: Hash of its runs and of the code: the same name has the same rows.
-        count: Number of runs.
-        expected_s: Expected flying time [s]; only ratios between blocks matter.
-        make: Lists the runs in order, in the process that flies them.
-    """
-
-    name: str
-    count: int
-    expected_s: float
-    make: Callable[[], Iterable[Run | Refusal]]
+    name: str  # hash of its runs and of the code: the same name has the same rows
+    count: int  # number of runs
+    expected_s: float  # expected flying time [s]; only ratios between blocks matter
+    make: Callable[[], Iterable[Run | Refusal]]  # lists the runs in order, in the process that flies them

@@ -22,17 +22,11 @@ SweepProgress = Callable[[int, int, int, float], None]
 
 @dataclass(frozen=True, kw_only=True)
 class SweepResult:
-    """Outcome of a sweep.
+    """Outcome of a sweep."""
 
-    Attributes:
-        table: One row per finished run, in the order of the design.
-        interrupted: Whether Ctrl-C ended it early.
-        reused: Runs that were on disk already.
-    """
-
-    table: pl.DataFrame
-    interrupted: bool
-    reused: int
+    table: pl.DataFrame  # one row per finished run, in the order of the design
+    interrupted: bool  # whether Ctrl-C ended it early
+    reused: int  # runs that were on disk already
 
 
 def run_sweep(

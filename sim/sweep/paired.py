@@ -27,6 +27,12 @@ def exact_interval(values: np.ndarray) -> tuple[float, float]:
     return float(interval.low), float(interval.high)
 
 
+def difference(values: np.ndarray) -> dict[str, float]:
+    """Median of differences with its bootstrap interval, ``low`` and ``high``, and its exact one, ``sure_...``."""
+    low, high = exact_interval(values)
+    return {**median_interval(values), "sure_low": low, "sure_high": high}
+
+
 def needed() -> int:
     """Fewest pairs of a significant difference."""
     return math.ceil(1.0 - math.log2(1.0 - CONFIDENCE))
@@ -56,8 +62,7 @@ def differences(first: pl.DataFrame, second: pl.DataFrame, names: Sequence[str])
     for name in names:
         values = (done[f"{name}.second"] - done[name]).cast(pl.Float64).fill_null(math.nan).to_numpy()
         if pairs := int(np.isfinite(values).sum()):
-            low, high = exact_interval(values)
-            figures[name] = {**median_interval(values), "pairs": pairs, "sure_low": low, "sure_high": high}
+            figures[name] = {**difference(values), "pairs": pairs}
     failed = [int((~both[name]).sum()) for name in ("completed", "completed.second")]
     return {"flown": both.height, "n": done.height, "failed": failed, "differences": figures}
 

@@ -33,13 +33,9 @@ class Place(NamedTuple):
 
 @dataclass(frozen=True)
 class Planned:
-    """The runs of a spec: draws, then grid points, then laws, then seeds; more draws do not change the first ones.
+    """The runs of a spec: draws, then grid points, then laws, then seeds; more draws do not change the first ones."""
 
-    Attributes:
-        spec: The spec.
-    """
-
-    spec: SweepSpec
+    spec: SweepSpec  # the spec
 
     def __len__(self) -> int:
         """Number of runs."""

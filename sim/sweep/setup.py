@@ -6,7 +6,7 @@ import copy
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.settings import from_dict, to_dict
@@ -20,20 +20,17 @@ ROOTS = ("scene", "pilot", "job")
 
 @dataclass(frozen=True, kw_only=True)
 class Setup:
-    """Everything of a flight within reach of a dotted path, e.g. ``scene.wall.friction``.
+    """Everything of a flight within reach of a dotted path, e.g. ``scene.wall.friction``."""
 
-    Attributes:
-        scene: The truth.
-        pilot: Perception, controller, strategy.
-        job: Task at the wall.
-    """
-
-    scene: Scene = field(default_factory=Scene)
-    pilot: PilotConfig = field(default_factory=PilotConfig)
-    job: PaintJob | PressJob = field(default_factory=PaintJob)
+    scene: Scene = field(default_factory=Scene)  # the truth
+    pilot: PilotConfig = field(default_factory=PilotConfig)  # perception, controller, strategy
+    job: PaintJob | PressJob = field(default_factory=PaintJob)  # task at the wall
 
 
-def changed(setup: Setup, values: Mapping[str, Any]) -> Setup:
+AnySetup = TypeVar("AnySetup", bound=Setup)
+
+
+def changed(setup: AnySetup, values: Mapping[str, Any]) -> AnySetup:
     """The setup with other values, checked alone and together.
 
     Args:

@@ -55,19 +55,12 @@ class SweepSettings:
 
 @dataclass(frozen=True, kw_only=True)
 class SweepSpec:
-    """A sweep, checked.
+    """A sweep, checked."""
 
-    Attributes:
-        settings: Keys outside the sections.
-        setups: Start values of every law, [fixed] included.
-        grid: Axes of the grid; every combination flies.
-        random: Drawn axes; every draw flies at every point of the grid.
-    """
-
-    settings: SweepSettings
-    setups: dict[str, Setup]
-    grid: tuple[Axis, ...]
-    random: tuple[Axis, ...]
+    settings: SweepSettings  # keys outside the sections
+    setups: dict[str, Setup]  # start values of every law, [fixed] included
+    grid: tuple[Axis, ...]  # axes of the grid; every combination flies
+    random: tuple[Axis, ...]  # drawn axes; every draw flies at every point of the grid
 
 
 def load_spec(file: Path) -> SweepSpec:

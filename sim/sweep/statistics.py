@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -56,6 +56,21 @@ def parameters(row: dict[str, Any]) -> dict[str, Any]:
     return {
         name.removeprefix(PARAM): value for name, value in row.items() if name.startswith(PARAM) and value is not None
     }
+
+
+def select(table: pl.DataFrame, where: Mapping[str, Any] | None = None, **more: Any) -> pl.DataFrame:
+    """Rows with a law, a variant and parameter values."""
+    for name, value in {**(where or {}), **more}.items():
+        column = name if name in ("law", "variant") else PARAM + name
+        if column not in table.columns:
+            return table.clear()
+        table = table.filter(pl.col(column) == value)
+    return table
+
+
+def completed(rows: pl.DataFrame, metric: str) -> np.ndarray:
+    """Values of a metric in the flights that ended as planned."""
+    return rows.filter(pl.col("completed"))[metric].drop_nulls().to_numpy()
 
 
 def split(table: pl.DataFrame, keys: Sequence[str]) -> list[tuple[dict[str, Any], pl.DataFrame]]:

@@ -31,17 +31,11 @@ SHIPPED, TUNED = "shipped", "tuned"
 
 @dataclass(frozen=True)
 class Finalist:
-    """A preset on the seeds of the choice.
+    """A preset on the seeds of the choice."""
 
-    Attributes:
-        score: Over all scenes.
-        scenes: By scene.
-        damping: Least damping ratio of the contact.
-    """
-
-    score: Score
-    scenes: dict[str, Score]
-    damping: float
+    score: Score  # over all scenes
+    scenes: dict[str, Score]  # by scene
+    damping: float  # least damping ratio of the contact
 
     def may_replace(self, shipped: Finalist) -> bool:
         """Whether it is better than the shipped preset on the mean, and clearly worse in no objective and no scene."""

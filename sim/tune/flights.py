@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from typing import Any
 
 from ibvs_qp.pilot import PilotConfig
 from sim.evaluate.measures import paint_row
+from sim.experiments.preset_flights import paint_runs
 from sim.experiments.scenes import changed, near_wall, short_job
-from sim.flight.jobs import PaintJob
-from sim.flight.options import FlightOptions, pilot_config
-from sim.sweep.design import FlightPlan, Run
+from sim.sweep.design import Run
 from sim.world.scene import Scene
 
 #: Length of a row [m]: touch, both corners and a climb in about 17 s of flight.
@@ -57,22 +57,13 @@ def flights(
         seeds: Seeds.
         features: "geometric" or "rendered".
     """
-    runs = []
-    for name, scene in flown.items():
-        for seed in seeds:
-            options = FlightOptions(law=config.law, seed=seed, features=features, video=False)
-            pilot = pilot_config(scene, options, config)
-            runs.append(
-                Run(
-                    experiment="tune",
-                    variant=variant,
-                    params={"scene": name},
-                    plan=FlightPlan(scene=scene, config=pilot, options=options),
-                    measure=paint_row,
-                    expected_s=_OVERHEAD_S + PaintJob().expected_s(pilot.painting),
-                )
-            )
-    return runs
+    cell: dict[str, Any] = {"experiment": "tune", "variant": variant, "measure": paint_row, "overhead_s": _OVERHEAD_S}
+    every = tuple(seeds)
+    return [
+        run
+        for name, scene in flown.items()
+        for run in paint_runs(scene, config, every, features, params={"scene": name}, **cell)
+    ]
 
 
 def seeds(first: int, seed: int, count: int) -> range:

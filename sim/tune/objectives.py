@@ -7,51 +7,32 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from sim.evaluate.table import Figure
+
 
 @dataclass(frozen=True)
-class Objective:
-    """One figure to minimise.
+class Objective(Figure):
+    """A figure to minimise."""
 
-    Attributes:
-        column: Column of a flight's row.
-        words: In words.
-        scale: Factor to the reported unit.
-        unit: That unit.
-        failed: Value of a flight that does not complete, in the unit of the column: far beyond any completed one.
-    """
-
-    column: str
-    words: str
-    scale: float
-    unit: str
-    failed: float
-
-    @property
-    def label(self) -> str:
-        """Words with unit."""
-        return f"{self.words} [{self.unit}]"
+    # value of a flight that does not complete, in the unit of the column: far beyond any completed one
+    failed: float = math.inf
 
 
 OBJECTIVES = (
-    Objective("force_rms_n", "push error, rms", 1.0, "N", 3.0),
-    Objective("path_rms_m", "path error, rms", 1e3, "mm", 0.05),
-    Objective("tilt_peak_deg", "tilt, peak", 1.0, "deg", 20.0),
-    Objective("yaw_peak_deg", "yaw, peak", 1.0, "deg", 20.0),
-    Objective("jitter_n_s", "thrust rate, rms", 1.0, "N/s", 1000.0),
+    Objective("force_rms_n", "push error, rms", unit="N", failed=3.0),
+    Objective("path_rms_m", "path error, rms", 1e3, "mm", failed=0.05),
+    Objective("tilt_peak_deg", "tilt, peak", unit="deg", failed=20.0),
+    Objective("yaw_peak_deg", "yaw, peak", unit="deg", failed=20.0),
+    Objective("jitter_n_s", "thrust rate, rms", unit="N/s", failed=1000.0),
 )
 
 
 @dataclass(frozen=True)
 class Score:
-    """Quality of a preset.
+    """Quality of a preset."""
 
-    Attributes:
-        values: Mean of every objective.
-        failed: Fraction of flights that did not complete; 1 for a preset with an oscillating contact.
-    """
-
-    values: tuple[float, ...]
-    failed: float
+    values: tuple[float, ...]  # mean of every objective
+    failed: float  # fraction of flights that did not complete; 1 for a preset with an oscillating contact
 
 
 def score(rows: Iterable[Mapping[str, Any]]) -> Score:

@@ -9,8 +9,9 @@ from typing import Any
 
 import polars as pl
 
-from sim.figures.style import law_name, save, styled
-from sim.report.rundir import as_json
+from sim.evaluate.table import law_name, markdown
+from sim.figures.style import save, styled
+from sim.report.rundir import write_json
 from sim.sweep.parts import write_table
 from sim.tune.choice import front, gain_over
 from sim.tune.figures import draw_front, draw_unseen
@@ -24,25 +25,15 @@ from sim.tune.verdict import differences
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """A finished search.
+    """A finished search."""
 
-    Attributes:
-        plan: The search.
-        trials: Gains and score by number.
-        finalists: Finalists and the shipped preset by name.
-        table: Flights of shipped and chosen on unseen seeds; None without a chosen trial.
-        command: The command line.
-        searched_by: The command line of the search that made the trials.
-        again: The command that repeats it on any computer.
-    """
-
-    plan: SearchPlan
-    trials: Trials
-    finalists: dict[str, Finalist]
-    table: pl.DataFrame | None
-    command: str
-    searched_by: str
-    again: str
+    plan: SearchPlan  # the search
+    trials: Trials  # gains and score by number
+    finalists: dict[str, Finalist]  # finalists and the shipped preset by name
+    table: pl.DataFrame | None  # flights of shipped and chosen on unseen seeds; None without a chosen trial
+    command: str  # the command line
+    searched_by: str  # the command line of the search that made the trials
+    again: str  # the command that repeats it on any computer
 
     @property
     def law(self) -> str:
@@ -95,7 +86,7 @@ def write(outcome: Outcome, folder: Path) -> dict[str, Any]:
     preset = with_gains(outcome.plan.shipped, gains).to_toml()
     (folder / f"{law}.toml").write_text(f"{head}\n{preset}", encoding="utf-8")
     record = {**summary, "ranges": RANGES, "all_trials": trial_rows(outcome.trials)}
-    (folder / f"{law}_trials.json").write_text(as_json(record, indent=1) + "\n", encoding="utf-8")
+    write_json(folder / f"{law}_trials.json", record)
     with styled():
         shipped = shipped_score(outcome.plan, outcome.trials)
         save(draw_front(law, found, shipped, outcome.chosen), folder / "figures" / f"{law}-front.png")
@@ -117,14 +108,14 @@ def _finalists(finalists: dict[str, Finalist]) -> list[str]:
         return []
     objectives = [each.label for each in OBJECTIVES]
     heads = ["on the seeds of the choice", *objectives, "flights failed", "contact damping", "may replace it"]
-    lines = ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
+    lines = []
     for name, each in finalists.items():
         values = (f"{one.scale * value:.3g}" for one, value in zip(OBJECTIVES, each.score.values, strict=True))
         words = "" if name == SHIPPED else "yes" if each.may_replace(finalists[SHIPPED]) else "no"
         title = name if name == SHIPPED else f"trial {name}"
         failed = f"{100.0 * each.score.failed:.0f} %"
-        lines.append(f"| {title} | {' | '.join(values)} | {failed} | {each.damping:.2f} | {words} |")
-    return [*lines, ""]
+        lines.append((title, *values, failed, f"{each.damping:.2f}", words))
+    return [markdown(heads, lines)]
 
 
 def _page(outcome: Outcome, summary: dict[str, Any]) -> list[str]:
@@ -150,16 +141,13 @@ def _page(outcome: Outcome, summary: dict[str, Any]) -> list[str]:
         f"Chosen: trial {outcome.chosen}; on the flights of the search its objectives are {percent:.0f} % smaller on "
         "the geometric mean. On unseen seeds, of neither search nor choice:",
         "",
-        "| scene | objective | flights | shipped | tuned | tuned - shipped (95 % interval) | verdict |",
-        "|---|---|---|---|---|---|---|",
     ]
-    scale = {each.column: each for each in OBJECTIVES}
+    heads = ("scene", "objective", "flights", "shipped", "tuned", "tuned - shipped (95 % interval)", "verdict")
+    scale, rows = {each.column: each for each in OBJECTIVES}, []
     for each in summary["unseen"]:
         objective = scale[each["objective"]]
         a, b = (objective.scale * each[name] for name in ("shipped", "tuned"))
         median, low, high = (objective.scale * each["difference"][name] for name in ("median", "low", "high"))
-        lines.append(
-            f"| {each['scene']} | {objective.label} | {each['n']} | {a:.3g} | {b:.3g} | "
-            f"{median:+.3g} ({low:+.3g} to {high:+.3g}) | {each['verdict']} |"
-        )
-    return [*lines, "", f"![Unseen seeds](figures/{law}-unseen.png)"]
+        change = f"{median:+.3g} ({low:+.3g} to {high:+.3g})"
+        rows.append((each["scene"], objective.label, str(each["n"]), f"{a:.3g}", f"{b:.3g}", change, each["verdict"]))
+    return [*lines, markdown(heads, rows), f"![Unseen seeds](figures/{law}-unseen.png)"]

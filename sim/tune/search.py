@@ -32,25 +32,15 @@ Trials = dict[int, tuple[dict[str, float], Score]]
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class SearchPlan:
-    """A search.
+    """A search."""
 
-    Attributes:
-        shipped: The start preset; trial 0 flies its gains.
-        trials: Number of finished trials at the end.
-        seed: Of sampler and flights.
-        flights: Seeds per scene and trial.
-        features: "geometric" or "rendered".
-        jobs: Trials side by side; one gives the same search every time, more give one that depends on their number.
-        storage: Journal file, or the address of a database.
-    """
-
-    shipped: PilotConfig
-    trials: int
-    seed: int
-    flights: int
-    features: str
-    jobs: int
-    storage: str
+    shipped: PilotConfig  # the start preset; trial 0 flies its gains
+    trials: int  # number of finished trials at the end
+    seed: int  # of sampler and flights
+    flights: int  # seeds per scene and trial
+    features: str  # "geometric" or "rendered"
+    jobs: int  # trials side by side; one gives the same search every time, more give one that depends on their number
+    storage: str  # journal file, or the address of a database
 
 
 def open_study(plan: SearchPlan) -> optuna.Study:

@@ -47,14 +47,11 @@ class PropellerClearance:
         angle = np.arange(RIM_POINTS)[:, None] * (2.0 * math.pi / RIM_POINTS)
         return position + self._radius * (np.cos(angle) * first + np.sin(angle) * np.cross(axis, first))
 
-    def _fronts(self, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
-        """World x of the foremost point of every disc [m], (n,)."""
-        axis = self._axes @ rotation[0]
-        return position[0] + self._positions @ rotation[0] + self._radius * np.sqrt(np.maximum(1.0 - axis * axis, 0.0))
-
     def foremost(self, position: np.ndarray, rotation: np.ndarray) -> float:
         """Largest world x that any disc reaches [m], exact; negative: clear of board and wall."""
-        return float(self._fronts(position, rotation).max())
+        slopes = self._axes @ rotation[0]
+        fronts = self._positions @ rotation[0] + self._radius * np.sqrt(np.maximum(1.0 - slopes * slopes, 0.0))
+        return float(position[0] + fronts.max())
 
     def strikes(self, position: Sequence[float], rotation: Sequence[Sequence[float]]) -> bool:
         """Whether any disc touches board or wall."""
@@ -92,11 +89,4 @@ class PropellerClearance:
             position: Body origin, world NED [m], (3,).
             rotation: Rotation B to I, (3, 3).
         """
-        fronts = self._fronts(position, rotation)
-        foremost = float(fronts.max())
-        # The board stands gap_m before the wall, so only discs that reach that far can be nearest.
-        rim = position + self._rims[fronts >= foremost - self._gap].reshape(-1, 3) @ rotation.T
-        on_board = (rim[:, 1:] - self._corner) @ self._outline
-        inside = ((on_board >= 0.0) & (on_board <= self._size)).all(axis=1)
-        ahead = rim[inside, 0]
-        return min(self._gap - foremost, -float(ahead.max())) if ahead.size else self._gap - foremost
+        return float(self._block(position[None], rotation[None])[0])

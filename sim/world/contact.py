@@ -32,14 +32,16 @@ OPTION_XML = (
 )
 
 
-def pair_xml(tip: str, board: str, name: str = "brush") -> str:
+#: Name of the contact pair.
+_PAIR = "brush"
+
+
+def pair_xml(tip: str, board: str) -> str:
     """The explicit contact pair of two named geoms; `set_contact` gives it its numbers."""
-    return f'<contact><pair name="{name}" geom1="{tip}" geom2="{board}" condim="3"/></contact>'
+    return f'<contact><pair name="{_PAIR}" geom1="{tip}" geom2="{board}" condim="3"/></contact>'
 
 
-def set_contact(
-    model: mujoco.MjModel, *, stiffness: float, damping: float, friction: float, name: str = "brush"
-) -> None:
+def set_contact(model: mujoco.MjModel, *, stiffness: float, damping: float, friction: float) -> None:
     """Give a compiled model's contact pair the specified physical stiffness, damping and friction.
 
     Args:
@@ -47,9 +49,8 @@ def set_contact(
         stiffness: Contact stiffness K [N/m].
         damping: Contact damping [N s/m].
         friction: Coulomb coefficient mu [-].
-        name: Name of the pair.
     """
-    pair = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_PAIR, name)
+    pair = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_PAIR, _PAIR)
     bodies = model.geom_bodyid[[model.pair_geom1[pair], model.pair_geom2[pair]]]
     inverse_mass = float(model.body_invweight0[bodies, 0].sum())
     scale = (1.0 - IMPEDANCE) * inverse_mass

@@ -35,36 +35,27 @@ STEPS_PER_TICK = 4
 
 @dataclass(frozen=True, kw_only=True)
 class ModelIds:
-    """Indices of bodies and sensors in the compiled model.
+    """Indices of bodies and sensors in the compiled model."""
 
-    Attributes:
-        vehicle: Body of the vehicle without tool.
-        tool: Body of the tool.
-        accelerometer: Slice of ``sensordata``: specific force at the body origin, front-left-up [m/s^2].
-        force: Slice: force of the vehicle on the tool, front-left-up [N].
-        torque: Slice: the moment at the force/torque sensor [N m].
-        contact: Slice: found flag, then force (normal, tangents) and the normal and first tangent axes.
-        remembered: Start in ``history`` of the samples of those four sensors at the steps of a tick, oldest first.
-    """
-
-    vehicle: int
-    tool: int
-    accelerometer: slice
-    force: slice
-    torque: slice
-    contact: slice
+    vehicle: int  # body of the vehicle without tool
+    accelerometer: slice  # slice of ``sensordata``: specific force at the body origin, front-left-up [m/s^2]
+    force: slice  # slice: force of the vehicle on the tool, front-left-up [N]
+    torque: slice  # slice: the moment at the force/torque sensor [N m]
+    contact: slice  # slice: found flag, then force (normal, tangents) and the normal and first tangent axes
+    # start in ``history`` of the samples of those four sensors at the steps of a tick, oldest first
     remembered: tuple[int, int, int, int]
 
 
-def _numbers(*values: float | np.ndarray) -> str:
+def numbers(*values: float | np.ndarray) -> str:
+    """Numbers and arrays as text of MuJoCo's XML, to the last digit."""
     return " ".join(f"{float(entry):.17g}" for value in values for entry in np.atleast_1d(value))
 
 
 def _inertial_xml(body: RigidBody) -> str:
     moments, quaternion = principal_axes(body)
     return (
-        f'<inertial mass="{_numbers(body.mass)}" pos="{_numbers(FLIP * body.centre)}" quat="{_numbers(quaternion)}" '
-        f'diaginertia="{_numbers(np.maximum(moments, 1e-9))}"/>'
+        f'<inertial mass="{numbers(body.mass)}" pos="{numbers(FLIP * body.centre)}" quat="{numbers(quaternion)}" '
+        f'diaginertia="{numbers(np.maximum(moments, 1e-9))}"/>'
     )
 
 
@@ -79,15 +70,15 @@ def _rotors_xml(vehicle: VehicleParams) -> tuple[str, str, str]:
         side = np.cross(up, [1.0, 0.0, 0.0])
         side /= np.linalg.norm(side)
         quaternion = quaternion_of_axes(np.column_stack((np.cross(side, up), side, up)))
-        frame = f'pos="{_numbers(place)}" quat="{_numbers(quaternion)}"'
+        frame = f'pos="{numbers(place)}" quat="{numbers(quaternion)}"'
         sites.append(f'<site name="{name}" {frame} size="0.01"/>')
-        size = _numbers(vehicle.propeller_radius_m, 0.004)
+        size = numbers(vehicle.propeller_radius_m, 0.004)
         discs.append(
             f'<geom type="cylinder" size="{size}" {frame} contype="0" conaffinity="0" rgba=".2 .2 .2 .4" mass="0"/>'
         )
         actuators.append(
-            f'<general name="{name}" site="{name}" dyntype="filterexact" dynprm="{_numbers(vehicle.motor_lag_up_s)}" '
-            f'gainprm="1" gear="0 0 1 0 0 {_numbers(-spin * geometry.torque_ratio_m)}"/>'
+            f'<general name="{name}" site="{name}" dyntype="filterexact" dynprm="{numbers(vehicle.motor_lag_up_s)}" '
+            f'gainprm="1" gear="0 0 1 0 0 {numbers(-spin * geometry.torque_ratio_m)}"/>'
         )
     return "\n".join(sites), "\n".join(actuators), "\n".join(discs)
 
@@ -99,12 +90,12 @@ def _surroundings_xml(scene: Scene) -> str:
     centre = np.array([0.5 * BOARD_THICKNESS_M, 0, board.bottom_m]) + 0.5 * (
         board.width_m * along + board.height_m * up
     )
-    half = _numbers(0.5 * board.width_m, 0.5 * board.height_m, 0.5 * BOARD_THICKNESS_M)
-    board_colour = _numbers(np.array(board.color) / 255.0, 1.0)
-    wall_colour = _numbers(np.array(scene.wall.color) / 255.0, 1.0)
-    return f"""<geom name="board" type="box" pos="{_numbers(centre)}" xyaxes="{_numbers(along, up)}" size="{half}"
+    half = numbers(0.5 * board.width_m, 0.5 * board.height_m, 0.5 * BOARD_THICKNESS_M)
+    board_colour = numbers(np.array(board.color) / 255.0, 1.0)
+    wall_colour = numbers(np.array(scene.wall.color) / 255.0, 1.0)
+    return f"""<geom name="board" type="box" pos="{numbers(centre)}" xyaxes="{numbers(along, up)}" size="{half}"
       rgba="{board_colour}" contype="0" conaffinity="0"/>
-    <geom name="wall" type="box" pos="{_numbers(board.gap_m + 0.5, 0, 0)}" size="0.5 20 20" rgba="{wall_colour}"
+    <geom name="wall" type="box" pos="{numbers(board.gap_m + 0.5, 0, 0)}" size="0.5 20 20" rgba="{wall_colour}"
       contype="0" conaffinity="0"/>"""
 
 
@@ -116,14 +107,14 @@ def build_xml(scene: Scene, vehicle: VehicleParams, drawn: bool = True) -> str:
     sites, actuators, discs = _rotors_xml(vehicle)
     tip, sensor = FLIP * vehicle.tip_position_m, FLIP * vehicle.force_torque_position_m
     sphere = tip - np.array([TIP_RADIUS_M, 0.0, 0.0])
-    ends, radius = _numbers(sensor, sphere), _numbers(vehicle.arm_radius_m)
+    ends, radius = numbers(sensor, sphere), numbers(vehicle.arm_radius_m)
     shape = f'name="arm" type="capsule" fromto="{ends}" size="{radius}"'
     arm = f'<geom {shape} contype="0" conaffinity="0" rgba=".1 .1 .1 1"/>'
     # Geometry without contact costs MuJoCo time at every step.
     surroundings, discs, arm = (_surroundings_xml(scene), discs, arm) if drawn else ("", "", "")
     return f"""<mujoco model="ibvs_qp">
   <compiler angle="radian" balanceinertia="true" autolimits="true"/>
-  {OPTION_XML.format(gravity=_numbers(GRAVITY))}
+  {OPTION_XML.format(gravity=numbers(GRAVITY))}
   <statistic extent="1"/>
   <worldbody>
     <geom name="face" type="plane" size="0 0 1" zaxis="-1 0 0" contype="0" conaffinity="0" group="3"/>
@@ -136,9 +127,9 @@ def build_xml(scene: Scene, vehicle: VehicleParams, drawn: bool = True) -> str:
       {discs}
       <body name="tool">
         {_inertial_xml(tool_body(vehicle))}
-        <site name="force_torque" pos="{_numbers(sensor)}"/>
+        <site name="force_torque" pos="{numbers(sensor)}"/>
         {arm}
-        <geom name="tip" type="sphere" pos="{_numbers(sphere)}" size="{_numbers(TIP_RADIUS_M)}" contype="0"
+        <geom name="tip" type="sphere" pos="{numbers(sphere)}" size="{numbers(TIP_RADIUS_M)}" contype="0"
           conaffinity="0"/>
       </body>
     </body>
@@ -167,9 +158,9 @@ def build_model(scene: Scene, vehicle: VehicleParams, drawn: bool = True) -> tup
         ConfigError: When the tool alone exceeds the scene's mass or inertia.
     """
     model = mujoco.MjModel.from_xml_string(build_xml(scene, vehicle, drawn))
-    ids = {name: mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name) for name in ("vehicle", "tool")}
+    body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "vehicle")
     # The compiler evens out moments that break the triangle inequality; the scene's numbers are meant literally.
-    model.body_inertia[ids["vehicle"]] = principal_axes(bare_body(scene, vehicle))[0]
+    model.body_inertia[body] = principal_axes(bare_body(scene, vehicle))[0]
     mujoco.mj_setConst(model, mujoco.MjData(model))
     wall = scene.wall
     set_contact(model, stiffness=wall.stiffness_n_m, damping=wall.damping_n_s_m, friction=wall.friction)
@@ -180,4 +171,4 @@ def build_model(scene: Scene, vehicle: VehicleParams, drawn: bool = True) -> tup
         slices[name] = slice(start, start + int(model.sensor_dim[sensor]))
         # Layout: two numbers of MuJoCo's own, the stamps, a ring of samples; after a whole tick the oldest is first.
         remembered.append(int(model.sensor_historyadr[sensor]) + 2 + STEPS_PER_TICK)
-    return model, ModelIds(**ids, **slices, remembered=tuple(remembered))
+    return model, ModelIds(vehicle=body, **slices, remembered=tuple(remembered))

@@ -14,9 +14,6 @@ import numpy as np
 #: Diagonal of S; multiply a vector (..., 3) by it to change sides.
 FLIP = np.array([1.0, -1.0, -1.0])
 
-#: The same for a wrench or twist (..., 6).
-FLIP6 = np.concatenate((FLIP, FLIP))
-
 #: The same for a quaternion (w, x, y, z).
 FLIP_QUATERNION = np.array([1.0, 1.0, -1.0, -1.0])
 

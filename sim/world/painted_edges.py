@@ -81,13 +81,8 @@ class PaintedEdges:
         self._catch_up()
         return self._lowest, self._highest
 
-    def exposed(self, row: int) -> np.ndarray:
-        """Points (along, up) [m] of a row's upper edge that no later row covers, in order along the board, (n, 2)."""
-        rows, points = self.all_exposed()
-        return points[rows == row]
-
     def all_exposed(self, first_m: float = -math.inf, last_m: float = math.inf) -> tuple[np.ndarray, np.ndarray]:
-        """Row of every exposed point, in order, (n,), and the points of `exposed` of all rows, (n, 2).
+        """Points of the rows' upper edges that no later row covers, along the board: rows (n,), (along, up) [m] (n, 2).
 
         Args:
             first_m: Points farther left along the board are left out [m].

@@ -103,10 +103,6 @@ class Plant(PlantReadings):
         for start, place in zip(ids.remembered, (ids.accelerometer, ids.force, ids.torque, ids.contact), strict=True):
             now = sensed[place]
             history[start : start + STEPS_PER_TICK * len(now)] = np.tile(now, STEPS_PER_TICK)
-        self._refresh()
-
-    def _refresh(self) -> None:
-        """Read the state; once per tick."""
         self._read()
 
     def step(self, thrusts: np.ndarray) -> None:

@@ -7,7 +7,6 @@ import math
 import numpy as np
 
 from ibvs_qp.config.vehicle import VehicleParams
-from ibvs_qp.frames import cross, rotate
 from sim.world.clearance import PropellerClearance
 from sim.world.readout import MOTION, PLACES
 
@@ -59,14 +58,6 @@ class PlantReadings:
         (forward_x, _, _), (forward_y, _, _), (forward_z, right_z, down_z) = self.rotation.tolist()
         pitch = math.asin(max(-1.0, min(1.0, -forward_z)))
         return np.array([math.atan2(right_z, down_z), pitch, math.atan2(forward_y, forward_x)])
-
-    @property
-    def tip_velocity(self) -> np.ndarray:
-        """Velocity of the tip, world NED [m/s], (3,)."""
-        swing = cross(self.angular_velocity.tolist(), self.vehicle.tip_position_m)
-        world = self.truth[PLACES["velocity"]]
-        (a, b, c) = self.rotation.tolist()
-        return world + rotate((tuple(a), tuple(b), tuple(c)), swing)
 
     @property
     def tip_on_wall(self) -> tuple[float, float]:

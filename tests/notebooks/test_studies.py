@@ -80,14 +80,14 @@ def test_a_wrong_file_is_named_and_the_sample_stands_in(tmp_path):
     other = tmp_path / "other.parquet"
     pl.DataFrame({"a": [1]}).write_parquet(other)
     for file, words in (
-        (str(tmp_path / "none.parquet"), "no file"),
-        (str(other), "no column law"),
-        (__file__, "Parquet"),
+        (str(tmp_path / "none.parquet"), "no table in"),
+        (str(other), "no table of flights"),
+        (__file__, "cannot be read"),
     ):
         with pytest.raises(ConfigError, match=words):
             read_sweep(file)
     table, problem = sweep_or_sample(str(other))
-    assert "no column" in problem and table.height == len(sample_runs(SEEDS))
+    assert "no table of flights" in problem and table.height == len(sample_runs(SEEDS))
 
 
 @pytest.fixture(scope="module")

@@ -25,27 +25,17 @@ HIGH_CONFIDENCE = 0.8
 
 @dataclass
 class Errors:
-    """Errors of a detector on a family of frames.
+    """Errors of a detector on a family of frames."""
 
-    Attributes:
-        offset_px: Distance at the middle of the true segment, of found guides.
-        angle_deg: Angle error of found guides.
-        confidence: Confidence of found guides.
-        wrong: Confidence of guides on no true edge of that side.
-        missed: Names of frames and edges without a correct guide.
-        visible: Number of true edges in view.
-        chi_square: Squared error of (rho, theta) over its covariance; 2 expected.
-        refused: Reasons of frames without a surface.
-    """
-
-    offset_px: list[float] = field(default_factory=list)
-    angle_deg: list[float] = field(default_factory=list)
-    confidence: list[float] = field(default_factory=list)
-    wrong: list[float] = field(default_factory=list)
-    missed: list[str] = field(default_factory=list)
-    visible: int = 0
+    offset_px: list[float] = field(default_factory=list)  # distance at the middle of the true segment, of found guides
+    angle_deg: list[float] = field(default_factory=list)  # angle error of found guides
+    confidence: list[float] = field(default_factory=list)  # confidence of found guides
+    wrong: list[float] = field(default_factory=list)  # confidence of guides on no true edge of that side
+    missed: list[str] = field(default_factory=list)  # names of frames and edges without a correct guide
+    visible: int = 0  # number of true edges in view
+    # squared error of (rho, theta) over its covariance; 2 expected
     chi_square: list[float] = field(default_factory=list)
-    refused: list[str] = field(default_factory=list)
+    refused: list[str] = field(default_factory=list)  # reasons of frames without a surface
 
     def add(self, truth: TruthFrame, result: Detection, name: str) -> None:
         """Add one frame."""

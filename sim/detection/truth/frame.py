@@ -23,38 +23,23 @@ _STEPS = 200
 
 @dataclass(frozen=True, kw_only=True)
 class TrueLine:
-    """The exact position of an edge.
+    """The exact position of an edge."""
 
-    Attributes:
-        rho: Distance from the image centre, normalised.
-        theta: Angle of the normal [rad].
-        pixels: Ends of its visible piece [px], (2, 2); empty below the shortest piece.
-    """
-
-    rho: float
-    theta: float
-    pixels: np.ndarray
+    rho: float  # distance from the image centre, normalised
+    theta: float  # angle of the normal [rad]
+    pixels: np.ndarray  # ends of its visible piece [px], (2, 2); empty below the shortest piece
 
 
 @dataclass(frozen=True, kw_only=True)
 class TruthFrame:
-    """A rendered frame and the truth.
+    """A rendered frame and the truth."""
 
-    Attributes:
-        frame: The pictures.
-        edges: Edges of the board in view by name (top, bottom, left, right).
-        strokes: Upper and lower edge of every stroke in view, as "0 top", "0 bottom", ...
-        plane: (a, b, c) of 1/Z = a x + b y + c of the board.
-        seed: (u, v) of a point on the board [px].
-        mask: Pixels that the vehicle covers, bool (H, W).
-    """
-
-    frame: RgbdFrame
-    edges: dict[str, TrueLine]
-    strokes: dict[str, TrueLine]
-    plane: np.ndarray
-    seed: tuple[float, float]
-    mask: np.ndarray
+    frame: RgbdFrame  # the pictures
+    edges: dict[str, TrueLine]  # edges of the board in view by name (top, bottom, left, right)
+    strokes: dict[str, TrueLine]  # upper and lower edge of every stroke in view, as "0 top", "0 bottom", ..
+    plane: np.ndarray  # (a, b, c) of 1/Z = a x + b y + c of the board
+    seed: tuple[float, float]  # (u, v) of a point on the board [px]
+    mask: np.ndarray  # pixels that the vehicle covers, bool (H, W)
 
 
 def render_frame(scene: TruthScene, stamp_ns: int = 0, noise_seed: int | None = None) -> TruthFrame:

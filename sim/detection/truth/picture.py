@@ -29,8 +29,7 @@ def paint_picture(scene: TruthScene, rng: np.random.Generator) -> np.ndarray:
         corners = np.array([[left, top], [right, top], [right, bottom], [left, bottom]])
         coverage = quad_coverage(scene, corners)[..., None]
         board = board * (1.0 - coverage) + coverage * np.array(color, np.float32)
-    half = 0.5 * np.array(scene.size_m)
-    coverage = quad_coverage(scene, half * [[-1, -1], [1, -1], [1, 1], [-1, 1]])[..., None]
+    coverage = quad_coverage(scene, scene.corners)[..., None]
     picture = coverage * board + (1.0 - coverage) * wall
     picture = cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA)
     light = np.linspace(1.0 - scene.shading, 1.0 + scene.shading, width, dtype=np.float32)[None, :, None]
@@ -57,10 +56,8 @@ def quad_coverage(scene: TruthScene, corners: np.ndarray) -> np.ndarray:
     u = (np.arange(SUPERSAMPLING * width, dtype=np.float32) + 0.5) / SUPERSAMPLING - 0.5
     v = (np.arange(SUPERSAMPLING * height, dtype=np.float32) + 0.5) / SUPERSAMPLING - 0.5
     fx, fy, cx, cy = scene.intrinsics
-    rays = corners @ scene.rotation[:, :2].T + scene.translation
     coverage = np.ones((len(v), len(u)), np.float32)
-    for first, second in zip(rays, np.roll(rays, -1, axis=0), strict=True):
-        a, b, c = np.cross(first, second)  # interpretation plane of the edge, the board on its positive side
+    for a, b, c in scene.edge_planes(corners):
         p, q, r = a / fx, b / fy, c - a * cx / fx - b * cy / fy
         scale = SUPERSAMPLING / float(np.hypot(p, q))
         distance = (scale * p * u)[None] + (scale * q * v + scale * r)[:, None]

@@ -47,12 +47,8 @@ def _outline(scene: TruthScene) -> np.ndarray:
     """Pixels with their middle on the board, bool (H, W)."""
     width, height, _ = scene.camera
     fx, fy, cx, cy = scene.intrinsics
-    half = 0.5 * np.array(scene.size_m)
-    corners = half * [[-1, -1], [1, -1], [1, 1], [-1, 1]]
-    rays = corners @ scene.rotation[:, :2].T + scene.translation
     x, y = (np.arange(width) - cx) / fx, (np.arange(height) - cy) / fy
     inside = np.ones((height, width), bool)
-    for first, second in zip(rays, np.roll(rays, -1, axis=0), strict=True):
-        a, b, c = np.cross(first, second)
+    for a, b, c in scene.edge_planes(scene.corners):
         inside &= (a * x)[None] + (b * y + c)[:, None] > 0.0
     return inside

@@ -19,54 +19,45 @@ class TruthScene:
 
     The board's coordinates are (right, down) [m] from its middle; it lies in the plane Z = 0 of its own frame, the
     wall `gap_m` behind it.
-
-    Attributes:
-        size_m: Width and height of the board.
-        gap_m: Distance of the wall behind the board.
-        rotation: Board frame to camera, (3, 3).
-        translation: Middle of the board in the camera frame [m], (3,).
-        board_color: RGB.
-        wall_color: RGB.
-        wall: "brick", "plaster" or "plain".
-        strokes: Painted bands as (left, top, right, bottom) [m] with their colour.
-        prints: Number of printed tags along the board's width; 0 for none.
-        clutter: Number of stickers on the board and posters on the wall.
-        shading: Relative change of the light across the picture.
-        noise: Standard deviation of the colour noise [grey levels].
-        blur_px: Standard deviation of the lens blur [px].
-        motion_px: Length of the motion blur and its direction (right, down) [px].
-        depth_noise: White, and again correlated, depth noise, fraction of depth.
-        smear_px: Largest outward shift of a depth step by the depth camera [px].
-        arm: Whether arm and brush of the vehicle are in view.
-        camera: (width, height, focal length) [px].
-        seed: Of textures, clutter and noise.
     """
 
-    size_m: tuple[float, float] = (0.60, 0.40)
-    gap_m: float = 0.05
-    rotation: np.ndarray = field(default_factory=lambda: np.eye(3))
+    size_m: tuple[float, float] = (0.60, 0.40)  # width and height of the board
+    gap_m: float = 0.05  # distance of the wall behind the board
+    rotation: np.ndarray = field(default_factory=lambda: np.eye(3))  # board frame to camera, (3, 3)
+    # middle of the board in the camera frame [m], (3,)
     translation: np.ndarray = field(default_factory=lambda: np.array([0.0, 0.0, 0.9]))
-    board_color: tuple[int, int, int] = LIGHT[0]
-    wall_color: tuple[int, int, int] = (150, 112, 92)
-    wall: str = "brick"
+    board_color: tuple[int, int, int] = LIGHT[0]  # RGB
+    wall_color: tuple[int, int, int] = (150, 112, 92)  # RGB
+    wall: str = "brick"  # "brick", "plaster" or "plain"
+    # painted bands as (left, top, right, bottom) [m] with their colour
     strokes: tuple[tuple[tuple[float, float, float, float], tuple[int, int, int]], ...] = ()
-    prints: int = 0
-    clutter: int = 0
-    shading: float = 0.15
-    noise: float = 2.0
-    blur_px: float = 0.7
-    motion_px: tuple[float, float] = (0.0, 0.0)
-    depth_noise: float = 0.005
-    smear_px: float = 0.0
-    arm: bool = False
-    camera: tuple[int, int, float] = (640, 480, 610.0)
-    seed: int = 0
+    prints: int = 0  # number of printed tags along the board's width; 0 for none
+    clutter: int = 0  # number of stickers on the board and posters on the wall
+    shading: float = 0.15  # relative change of the light across the picture
+    noise: float = 2.0  # standard deviation of the colour noise [grey levels]
+    blur_px: float = 0.7  # standard deviation of the lens blur [px]
+    motion_px: tuple[float, float] = (0.0, 0.0)  # length of the motion blur and its direction (right, down) [px]
+    depth_noise: float = 0.005  # white, and again correlated, depth noise, fraction of depth
+    smear_px: float = 0.0  # largest outward shift of a depth step by the depth camera [px]
+    arm: bool = False  # whether arm and brush of the vehicle are in view
+    camera: tuple[int, int, float] = (640, 480, 610.0)  # (width, height, focal length) [px]
+    seed: int = 0  # of textures, clutter and noise
 
     @property
     def intrinsics(self) -> tuple[float, float, float, float]:
         """(fx, fy, cx, cy) [px], pixel centres at integers."""
         width, height, focal = self.camera
         return focal, focal, 0.5 * (width - 1), 0.5 * (height - 1)
+
+    @property
+    def corners(self) -> np.ndarray:
+        """Corners of the board in order (right, down) [m], (4, 2)."""
+        return 0.5 * np.array(self.size_m) * [[-1, -1], [1, -1], [1, 1], [-1, 1]]
+
+    def edge_planes(self, corners: np.ndarray) -> list[np.ndarray]:
+        """Interpretation planes (a, b, c) of a polygon's edges, its inside on their positive side."""
+        rays = corners @ self.rotation[:, :2].T + self.translation
+        return [np.cross(first, second) for first, second in zip(rays, np.roll(rays, -1, axis=0), strict=True)]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.experiments.figures.common import Drawn, Results, completed, select
+from sim.experiments.figures.common import Drawn, Results
 from sim.experiments.spec import FigureSpec
 from sim.figures.style import law_colour, law_name, new_figure
 from sim.sweep.parts import PARAM
-from sim.sweep.statistics import median_interval
+from sim.sweep.statistics import completed, median_interval, select
 
 #: Width of a bar; values of the parameter are one apart.
 _BAR = 0.38

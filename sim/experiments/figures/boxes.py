@@ -6,10 +6,11 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from sim.experiments.figures.common import BOUND, Drawn, Results, draw_box, select
+from sim.experiments.figures.common import BOUND, Drawn, Results
 from sim.experiments.spec import FigureSpec, Panel
-from sim.figures.style import law_colour, law_name, new_figure
+from sim.figures.style import draw_boxes, law_patches, new_figure
 from sim.sweep.parts import PARAM
+from sim.sweep.statistics import select
 
 #: Width of a box of the noise sweep and gap between both laws; cells are one apart.
 _BOX, _GAP = 0.34, 0.04
@@ -28,7 +29,7 @@ def draw_spread(spec: FigureSpec, results: Results) -> Drawn:
         ticks = []
         for place, (law, words) in enumerate((("qp", "QP"), ("paper", "analytic"))):
             values = select(results.table, law=law, variant="standard")[panel.metric].drop_nulls().to_numpy()
-            draw_box(axes, panel.scale * values, place, 0.6, law)
+            draw_boxes(axes, [panel.scale * values], [place], 0.6, law)
             ticks.append(f"{words}\nn = {len(values)}")
         axes.set(title=panel.label, ylim=(0.0, None))
         axes.set_xticks([0, 1], ticks)
@@ -52,7 +53,7 @@ def draw_noise_boxes(spec: FigureSpec, results: Results) -> Drawn:
                 rows = select(results.table, law=law, sigma_vs=vs, sigma_f_n=force)
                 if panel.metric in rows.columns and rows[panel.metric].drop_nulls().len():
                     values = panel.scale * rows[panel.metric].drop_nulls().to_numpy()
-                    draw_box(axes, values, place + side * (_BOX + _GAP), _BOX, law)
+                    draw_boxes(axes, [values], [place + side * (_BOX + _GAP)], _BOX, law)
         _bounds(axes, results, panel, cells)
         axes.set_ylabel(panel.label)
         axes.set_ylim(bottom=0.0)
@@ -65,7 +66,7 @@ def draw_noise_boxes(spec: FigureSpec, results: Results) -> Drawn:
                 axes.axvspan(place - 0.5, place + 0.5, color=_DIAGONAL, linewidth=0, zorder=0)
     flights = results.table.group_by("law", PARAM + "sigma_vs", PARAM + "sigma_f_n").len()["len"]
     count = f"{flights.min()}" if flights.min() == flights.max() else f"{flights.min()} to {flights.max()}"
-    handles: list = [Patch(facecolor=law_colour(law), alpha=0.5, label=law_name(law)) for law in ("qp", "paper")]
+    handles: list = law_patches()
     handles.append(Patch(facecolor=_DIAGONAL, label="the paper's diagonal"))
     handles.append(Line2D([], [], linewidth=0.8, label="bound", **BOUND))
     figure.axes[0].set_title(f"n = {count} per box")

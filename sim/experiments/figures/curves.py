@@ -8,11 +8,12 @@ import numpy as np
 import polars as pl
 from matplotlib.axes import Axes
 
-from sim.experiments.figures.common import BOUND, Drawn, Results, legend_below, note_empty, select
+from sim.experiments.figures.common import BOUND, Drawn, Results, legend_with_crosses
 from sim.experiments.figures.medians import plot_medians
 from sim.experiments.spec import FigureSpec, Line, Panel
-from sim.figures.style import REFERENCE, law_colour, law_name, new_figure
+from sim.figures.style import REFERENCE, law_colour, law_name, new_figure, note_empty
 from sim.sweep.parts import PARAM
+from sim.sweep.statistics import select
 
 #: Line style of the variants, in the order given.
 _DASHES = ("-", ":", "--")
@@ -32,7 +33,7 @@ def draw_curves(spec: FigureSpec, results: Results) -> Drawn:
     for axes, panel in zip(figure.subplots(1, len(spec.panels), squeeze=False)[0], spec.panels, strict=True):
         _panel(axes, results, panel, spec.x, variants)
         axes.set(xlabel=panel.xlabel or spec.xlabel, ylabel=panel.label)
-    legend_below(figure, 3, fontsize=7.5)
+    legend_with_crosses(figure, fontsize=7.5)
     return {spec.name: (spec.caption, figure)}
 
 
@@ -95,7 +96,7 @@ def draw_rows(spec: FigureSpec, results: Results) -> Drawn:
         axes.set_ylim(0.0, panel.top if math.isfinite(panel.top) else None)
     for axes in grid[-1]:
         axes.set_xlabel(spec.xlabel)
-    legend_below(figure, 3, fontsize=7.5)
+    legend_with_crosses(figure, fontsize=7.5)
     return {spec.name: (spec.caption, figure)}
 
 

@@ -10,12 +10,13 @@ from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 from matplotlib.patches import Patch, Rectangle
 
-from sim.experiments.figures.common import Drawn, Results, select, stored_trace
+from sim.experiments.figures.common import Drawn, Results, stored_trace
 from sim.experiments.figures.snapshots import draw_snapshots, painted_board
 from sim.experiments.spec import FigureSpec
 from sim.figures.board import draw_canvas
 from sim.figures.style import PHASE_TINTS, REFERENCE, law_colour, law_name, new_figure, shade_phases, thin
 from sim.flight.trace import Trace
+from sim.sweep.statistics import select
 from sim.world.board import BoardGeometry
 
 #: Colours of quantities beside the law's own: true values under estimates, and the second and third axis.

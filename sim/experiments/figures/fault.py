@@ -7,10 +7,11 @@ import polars as pl
 from matplotlib.axes import Axes
 
 from sim.evaluate.window import event_time, tilt_deg
-from sim.experiments.figures.common import Drawn, Results, select, stored_trace
+from sim.experiments.figures.common import Drawn, Results, stored_trace
 from sim.experiments.spec import FigureSpec
 from sim.figures.style import law_colour, law_name, new_figure
 from sim.sweep.parts import PARAM
+from sim.sweep.statistics import select
 
 #: Shown before and after the fault [s].
 BEFORE_S, AFTER_S = 2.0, 7.0

@@ -6,10 +6,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from sim.evaluate.window import CONTACT_N, PHYSICS_RATE_HZ
-from sim.experiments.figures.common import Drawn, Results, note_empty, select, stored_trace
+from sim.experiments.figures.common import Drawn, Results, stored_trace
 from sim.experiments.figures.force_map import VARIANT_WORDS
 from sim.experiments.spec import FigureSpec
-from sim.figures.style import REFERENCE, law_colour, law_name, new_figure
+from sim.figures.style import REFERENCE, law_colour, law_name, new_figure, note_empty
+from sim.sweep.statistics import select
 
 #: Shown before and after the first touch [s].
 BEFORE_S, AFTER_S = 3.0, 9.0

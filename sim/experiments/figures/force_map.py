@@ -12,12 +12,13 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ibvs_qp.config.contact_margin import contact_mode_damping
-from sim.experiments.figures.common import Drawn, Results, select
+from sim.experiments.figures.common import Drawn, Results
 from sim.experiments.spec import FigureSpec
 from sim.experiments.variants import VARIANTS, with_force_gain
 from sim.figures.style import law_name, new_figure
 from sim.flight.options import default_preset
 from sim.sweep.parts import PARAM
+from sim.sweep.statistics import select
 from sim.world.scene import ForceTorqueScene, WallScene
 
 VARIANT_WORDS = {"standard": "impedance", "direct": "direct force control"}

@@ -8,9 +8,9 @@ import numpy as np
 import polars as pl
 from matplotlib.axes import Axes
 
-from sim.experiments.figures.common import CRASH, completed
+from sim.experiments.figures.common import CRASH
 from sim.sweep.parts import PARAM
-from sim.sweep.statistics import median_interval
+from sim.sweep.statistics import completed, median_interval
 
 #: Height of a cross without value or beyond the axis, and of a triangle above `top`, as fractions of the axis.
 _CRASH_HEIGHT, _BEYOND_HEIGHT = 0.97, 0.975

@@ -7,9 +7,10 @@ from matplotlib.axes import Axes
 
 from sim.evaluate.path_error import path_error
 from sim.experiments.figures.boxes import noise_cells
-from sim.experiments.figures.common import Drawn, Results, completed, legend_below, note_empty, select, stored_trace
+from sim.experiments.figures.common import Drawn, Results, stored_trace
 from sim.experiments.spec import FigureSpec
-from sim.figures.style import FAINT, law_colour, law_name, new_figure
+from sim.figures.style import FAINT, law_colour, law_name, legend_below, new_figure, note_empty
+from sim.sweep.statistics import completed, select
 
 
 def draw_path_error(spec: FigureSpec, results: Results) -> Drawn:
@@ -26,11 +27,9 @@ def draw_path_error(spec: FigureSpec, results: Results) -> Drawn:
                 path = path_error(trace) if trace is not None else None
                 if path is None or not path.painting.any():
                     continue
-                step = np.linalg.norm(np.diff(path.tip[path.painting], axis=0), axis=1)
-                way = np.concatenate(([0.0], np.cumsum(step)))
                 label = f"{law_name(law)}, $\\sigma_f$ {force:g} N"
                 error = 1e3 * path.distance[path.painting]
-                axes.plot(way, error, dash, color=law_colour(law), linewidth=0.8, label=label)
+                axes.plot(path.travelled, error, dash, color=law_colour(law), linewidth=0.8, label=label)
         drawn = bool(axes.lines)
         _corners(axes, results, sigma, drawn)
         axes.set_ylabel("path error [mm]")
@@ -39,7 +38,7 @@ def draw_path_error(spec: FigureSpec, results: Results) -> Drawn:
             note_empty(axes, "nothing was painted")
     grid[0].set_ylim(bottom=0.0)
     grid[-1].set_xlabel("distance along the path [m]")
-    legend_below(figure, 3)
+    legend_below(figure, columns=3)
     return {spec.name: (spec.caption, figure)}
 
 

@@ -12,10 +12,11 @@ from allocation import WrenchFacets, control_effectiveness, level_polygon
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import GRAVITY
 from sim.evaluate.window import phase_window
-from sim.experiments.figures.common import Drawn, Results, select, stored_trace
+from sim.experiments.figures.common import Drawn, Results, stored_trace
 from sim.experiments.spec import FigureSpec
 from sim.figures.style import law_name, new_figure
 from sim.sweep.parts import PARAM
+from sim.sweep.statistics import select
 
 #: One dot in so many ticks.
 EVERY = 12

@@ -25,21 +25,13 @@ _SHIFT, _ONE = 4, 16
 
 @dataclass(frozen=True, kw_only=True)
 class VehicleLayer:
-    """Constant picture of the vehicle's own parts.
+    """Constant picture of the vehicle's own parts."""
 
-    Attributes:
-        picture: uint8 (H, W, 4), valid under the mask.
-        mask: 255 where arm or brush hide the scene, uint8 (H, W).
-        inverse_depth: 1/Z of arm and brush under the mask [1/m], float32 (H, W).
-        holes: 255 where the depth step along the outline leaves no reading, uint8 (H, W).
-        propellers: 255 where a propeller disc lies in front of the scene, uint8 (H, W).
-    """
-
-    picture: np.ndarray
-    mask: np.ndarray
-    inverse_depth: np.ndarray
-    holes: np.ndarray
-    propellers: np.ndarray
+    picture: np.ndarray  # uint8 (H, W, 4), valid under the mask
+    mask: np.ndarray  # 255 where arm or brush hide the scene, uint8 (H, W)
+    inverse_depth: np.ndarray  # 1/Z of arm and brush under the mask [1/m], float32 (H, W)
+    holes: np.ndarray  # 255 where the depth step along the outline leaves no reading, uint8 (H, W)
+    propellers: np.ndarray  # 255 where a propeller disc lies in front of the scene, uint8 (H, W)
 
 
 def brush_color(scene: Scene) -> tuple[int, int, int]:

@@ -13,6 +13,7 @@ from sim.sensors.cameras.finish import FAR_M, NEAR_M
 from sim.sensors.cameras.gl_context import CameraUnavailable, open_context
 from sim.sensors.cameras.view import View
 from sim.world.board import BoardGeometry
+from sim.world.mjcf import numbers
 from sim.world.mujoco_frames import FLIP
 
 #: Half size of the plain wall beyond its picture [m], and how far it lies behind it [m]: below the depth's accuracy.
@@ -21,15 +22,11 @@ _PLAIN_M, _BEHIND_M = 100.0, 2e-5
 _GLOW = 'emission="1" specular="0" shininess="0" reflectance="0" texuniform="false" texrepeat="1 1"'
 
 
-def _numbers(*values: float | np.ndarray) -> str:
-    return " ".join(f"{float(entry):.17g}" for value in values for entry in np.atleast_1d(value))
-
-
 def _plane_xml(name: str, centre: np.ndarray, right: np.ndarray, up: np.ndarray, half: tuple[float, float]) -> str:
     """A plane that carries the picture ``name``: columns along ``right``, row 0 at the top; world NED."""
-    axes = _numbers(FLIP * right, FLIP * up)
+    axes = numbers(FLIP * right, FLIP * up)
     return (
-        f'<geom type="plane" pos="{_numbers(FLIP * centre)}" xyaxes="{axes}" size="{_numbers(*half, 1.0)}" '
+        f'<geom type="plane" pos="{numbers(FLIP * centre)}" xyaxes="{axes}" size="{numbers(*half, 1.0)}" '
         f'material="{name}" contype="0" conaffinity="0"/>'
     )
 
@@ -196,7 +193,7 @@ def _compile(
     wall_centre = np.append(gap, wall_origin + 0.5 * wall_size)
     right, above = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, -1.0])
     behind = wall_centre + np.array([_BEHIND_M, 0.0, 0.0])
-    plain = _numbers(np.array(scene.wall.color) / 255.0)
+    plain = numbers(np.array(scene.wall.color) / 255.0)
     pictures = (("board", board_shape), ("wall", wall.shape))
     textures = "".join(
         f'<texture name="{name}" type="2d" builtin="flat" rgb1="0 0 0" width="{shape[1]}" height="{shape[0]}"/>'

@@ -23,28 +23,18 @@ Box = tuple[int, int, int, int]
 
 @dataclass(frozen=True)
 class CutLine:
-    """One edge of the outline: s(u, v) = normal . (u, v) + offset is the distance to it [px], > 0 on the board.
+    """One edge of the outline: s(u, v) = normal . (u, v) + offset is the distance to it [px], > 0 on the board."""
 
-    Attributes:
-        normal: Unit normal towards the board, (2,).
-        offset: Its distance term [px].
-        start: First end of the edge [px], (2,).
-        stop: Other end [px], (2,).
-        beyond: Part of the picture beyond the line, polygon (n, 2) [px].
-        box: (row, row end, column, column end) around the part that no earlier line has cut away, and the rim; the
-            line changes no pixel outside.
-        shape: (height, width) of the picture.
-        flat: Whether the edge runs more across the picture than up it.
-    """
-
-    normal: np.ndarray
-    offset: float
-    start: np.ndarray
-    stop: np.ndarray
-    beyond: np.ndarray
+    normal: np.ndarray  # unit normal towards the board, (2,)
+    offset: float  # its distance term [px]
+    start: np.ndarray  # first end of the edge [px], (2,)
+    stop: np.ndarray  # other end [px], (2,)
+    beyond: np.ndarray  # part of the picture beyond the line, polygon (n, 2) [px]
+    # (row, row end, column, column end) around the part that no earlier line has cut away, and the rim; the line
+    # changes no pixel outside
     box: Box
-    shape: tuple[int, int]
-    flat: bool
+    shape: tuple[int, int]  # (height, width) of the picture
+    flat: bool  # whether the edge runs more across the picture than up it
 
     def _across(self, places: np.ndarray) -> np.ndarray:
         """Position of the line across its longer direction, at whole pixels along it [px]."""

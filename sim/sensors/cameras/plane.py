@@ -25,17 +25,11 @@ _WARP = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
 
 
 class _Sheet(NamedTuple):
-    """Board or wall in one view.
+    """Board or wall in one view."""
 
-    Attributes:
-        texture: Its picture, uint8 (h, w, 4).
-        back: Homography from picture to texture pixels, (3, 3).
-        plane: (p, q, r) of 1/Z = p u + q v + r as measured.
-    """
-
-    texture: np.ndarray
-    back: np.ndarray
-    plane: tuple[float, float, float]
+    texture: np.ndarray  # its picture, uint8 (h, w, 4)
+    back: np.ndarray  # homography from picture to texture pixels, (3, 3)
+    plane: tuple[float, float, float]  # (p, q, r) of 1/Z = p u + q v + r as measured
 
     @staticmethod
     def seen(

@@ -12,17 +12,11 @@ from sim.world.board import BoardGeometry
 
 @dataclass(frozen=True)
 class View:
-    """One camera pose.
+    """One camera pose."""
 
-    Attributes:
-        rotation: World to camera, (3, 3).
-        center: Camera centre in the world [m], (3,).
-        intrinsics: (fx, fy, cx, cy) [px].
-    """
-
-    rotation: np.ndarray
-    center: np.ndarray
-    intrinsics: tuple[float, float, float, float]
+    rotation: np.ndarray  # world to camera, (3, 3)
+    center: np.ndarray  # camera centre in the world [m], (3,)
+    intrinsics: tuple[float, float, float, float]  # (fx, fy, cx, cy) [px]
 
     @staticmethod
     def of_vehicle(

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import polars as pl
 from matplotlib.figure import Figure as Canvas
-from matplotlib.patches import Patch
 
-from sim.figures.style import law_colour, law_name, new_figure
-from sim.sweep.figures.levels import Figure, levels
+from sim.evaluate.table import Figure
+from sim.figures import style
+from sim.figures.style import law_patches, new_figure
+from sim.sweep.figures.levels import levels
 
 #: Fraction of a level's width for its boxes together, and height of a panel [in].
 _WIDTH, _PANEL_IN = 0.76, 1.9
@@ -30,18 +31,10 @@ def draw_boxes(table: pl.DataFrame, figure: Figure, columns: list[str]) -> Canva
         count = len(sorted_in.names)
         for place, law in enumerate(laws):
             rows = finite & (law_of == law)
-            boxes = axes.boxplot(
-                [values[rows & (sorted_in.level == level)] for level in range(count)],
-                positions=np.arange(count) + (place - 0.5 * (len(laws) - 1)) * width,
-                widths=0.9 * width,
-                patch_artist=True,
-                manage_ticks=False,
-                medianprops={"color": "#222222"},
-                flierprops={"markersize": 3, "marker": "."},
-                boxprops={"linewidth": 0.6},
+            by_level = [values[rows & (sorted_in.level == level)] for level in range(count)]
+            style.draw_boxes(
+                axes, by_level, np.arange(count) + (place - 0.5 * (len(laws) - 1)) * width, 0.9 * width, law
             )
-            for box in boxes["boxes"]:
-                box.set(facecolor=law_colour(law), alpha=0.5)
         axes.set_xticks(range(count), sorted_in.names)
         axes.tick_params(axis="x", labelsize=8 if sum(map(len, sorted_in.names)) < _LETTERS else 6.5)
         axes.set_xlabel(sorted_in.label)
@@ -51,6 +44,5 @@ def draw_boxes(table: pl.DataFrame, figure: Figure, columns: list[str]) -> Canva
         else:
             axes.set_ylim(bottom=0.0)
     canvas.supylabel(figure.label, fontsize=8.5)
-    handles = [Patch(facecolor=law_colour(law), alpha=0.5, label=law_name(law)) for law in laws]
-    canvas.axes[0].legend(handles=handles, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(laws))
+    canvas.axes[0].legend(handles=law_patches(laws), loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(laws))
     return canvas

@@ -10,24 +10,21 @@ import polars as pl
 from scipy.stats import spearmanr
 
 from ibvs_qp.config.errors import ConfigError
+from sim.evaluate.table import LINES, Figure
 from sim.sweep.parts import PARAM
 from sim.sweep.setup import unit_of
 from sim.sweep.statistics import figure_names
 
-#: Column to words, factor to the reported unit, and that unit; the default figures, in this order, as far as present.
-DEFAULT = {
-    "path_rms_m": ("path error, rms", 1e3, "mm"),
-    "force_rms_n": ("push error, rms", 1.0, "N"),
-    "tilt_peak_deg": ("tilt, peak", 1.0, "deg"),
-    "jitter_n_s": ("thrust rate, rms", 1.0, "N/s"),
-}
-#: Figures on request that have another unit in the report than in the table.
-ON_REQUEST = {
-    "path_max_m": ("path error, greatest", 1e3, "mm"),
-    "height_error_rms_m": ("height error, rms", 1e3, "mm"),
-    "coverage": ("coverage", 100.0, "%"),
-    "contact_share": ("contact", 100.0, "%"),
-}
+#: Figures of a report by default, in this order, as far as present.
+DEFAULT = (
+    Figure("path_rms_m", "path error, rms", 1e3, "mm"),
+    Figure("force_rms_n", "push error, rms", unit="N"),
+    Figure("tilt_peak_deg", "tilt, peak", unit="deg"),
+    Figure("jitter_n_s", "thrust rate, rms", unit="N/s"),
+)
+#: Figures by column; one that is not among them has the name and the unit of its column.
+KNOWN = {line.key: Figure(line.key, line.label, line.scale, line.unit) for line in LINES}
+KNOWN |= {figure.column: figure for figure in DEFAULT}
 #: A parameter with more distinct values than MOST_LEVELS is sorted into BINS bins of equal count.
 MOST_LEVELS, BINS = 12, 6
 #: Fewest rows of a rank correlation.
@@ -35,37 +32,12 @@ LEAST_ROWS = 8
 
 
 @dataclass(frozen=True)
-class Figure:
-    """A figure of merit and its form in the report."""
-
-    column: str
-    words: str
-    scale: float
-    unit: str
-
-    @property
-    def label(self) -> str:
-        """Words with unit."""
-        return f"{self.words} [{self.unit}]" if self.unit else self.words
-
-    def values(self, table: pl.DataFrame) -> np.ndarray:
-        """Figure of every row in the reported unit, NaN where there is none, (rows,)."""
-        return self.scale * table[self.column].cast(pl.Float64).fill_null(float("nan")).to_numpy()
-
-
-@dataclass(frozen=True)
 class Levels:
-    """A parameter, sorted into levels: its values, or bins of drawn values.
+    """A parameter, sorted into levels: its values, or bins of drawn values."""
 
-    Attributes:
-        label: Words with unit.
-        names: Of the levels, in order.
-        level: Level of every row, (rows,); -1 without a value.
-    """
-
-    label: str
-    names: tuple[str, ...]
-    level: np.ndarray
+    label: str  # words with unit
+    names: tuple[str, ...]  # of the levels, in order
+    level: np.ndarray  # level of every row, (rows,); -1 without a value
 
 
 def chosen_figures(table: pl.DataFrame, columns: tuple[str, ...]) -> list[Figure]:
@@ -82,8 +54,8 @@ def chosen_figures(table: pl.DataFrame, columns: tuple[str, ...]) -> list[Figure
     for name in columns:
         if name not in have:
             raise ConfigError(f"no figure {name!r} in the table; it has {', '.join(have) or 'none'}")
-    names = columns or tuple(name for name in DEFAULT if name in have) or tuple(have[:3])
-    return [Figure(name, *(DEFAULT | ON_REQUEST).get(name, (name, 1.0, ""))) for name in names]
+    names = columns or tuple(figure.column for figure in DEFAULT if figure.column in have) or tuple(have[:3])
+    return [KNOWN.get(name, Figure(name, name)) for name in names]
 
 
 def varied(table: pl.DataFrame) -> list[str]:

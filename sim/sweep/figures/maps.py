@@ -14,8 +14,9 @@ from matplotlib.colors import Normalize, TwoSlopeNorm
 from matplotlib.figure import Figure as Canvas
 from matplotlib.image import AxesImage
 
+from sim.evaluate.table import Figure
 from sim.figures.style import law_name, new_figure
-from sim.sweep.figures.levels import Figure, Levels, levels, parameter_label, rank_correlation
+from sim.sweep.figures.levels import Levels, levels, parameter_label, rank_correlation
 
 #: Colour maps: of a figure (dark is bad), of a difference (blue: QP law better), of a success rate.
 FIGURE_MAP, DIFFERENCE_MAP, SUCCESS_MAP = "YlOrRd", "RdBu", "YlGn"
@@ -76,7 +77,7 @@ def _draw(
         _bar(canvas, images[0], list(row[: len(parts)]), label)
         if both:
             difference = cells[1] - cells[0]
-            reach = np.nanmax(np.abs(difference), initial=1e-12) if np.isfinite(difference).any() else 1.0
+            reach = float(np.abs(difference[np.isfinite(difference)]).max(initial=0.0)) or 1.0
             scale, colours = TwoSlopeNorm(0.0, -reach, reach), DIFFERENCE_MAP + ("_r" if span else "")
             _bar(canvas, _panel(row[-1], difference, "analytic - QP", x, y, scale, colours), [row[-1]], "")
         for axes in row[1:]:

@@ -8,9 +8,10 @@ import polars as pl
 from matplotlib.figure import Figure as Canvas
 
 from ibvs_qp.config.errors import ConfigError
-from sim.figures.style import law_name, save, styled
+from sim.evaluate.table import Figure, law_name, markdown
+from sim.figures.style import save, styled
 from sim.sweep.figures.boxes import draw_boxes
-from sim.sweep.figures.levels import Figure, chosen_figures, most_influential, varied
+from sim.sweep.figures.levels import chosen_figures, most_influential, varied
 from sim.sweep.figures.maps import draw_dependence, draw_figure_maps, draw_success_maps
 from sim.sweep.parts import HEAD
 
@@ -67,7 +68,7 @@ def write_report(table: pl.DataFrame, folder: Path, title: str, chosen: tuple[st
         f"{table.height} flights, {table['version'].drop_nulls().max() or 'version unknown'}.",
         "",
     ]
-    lines += [*_summary(table, figures), "", *_reasons(table)]
+    lines += [_summary(table, figures), *_reasons(table)]
     with styled():
         for name, (caption, canvas) in _draw_all(table, figures, columns).items():
             save(canvas, folder / "figures" / f"{name}.png")
@@ -95,9 +96,9 @@ def _draw_all(table: pl.DataFrame, figures: list[Figure], columns: list[str]) ->
     return drawn
 
 
-def _summary(table: pl.DataFrame, figures: list[Figure]) -> list[str]:
+def _summary(table: pl.DataFrame, figures: list[Figure]) -> str:
     heads = ["law", "flights", "ended as planned", *(f"{figure.label}: median (5 % to 95 %)" for figure in figures)]
-    lines = ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
+    lines = []
     for law in table["law"].unique(maintain_order=True):
         rows = table.filter(pl.col("law") == law)
         cells = [law_name(law), str(rows.height), f"{100.0 * float(rows['completed'].mean()):.1f} %"]  # type: ignore[arg-type]
@@ -105,8 +106,8 @@ def _summary(table: pl.DataFrame, figures: list[Figure]) -> list[str]:
             values = figure.scale * rows[figure.column].drop_nulls().drop_nans()
             low, middle, high = (values.quantile(level, "linear") for level in (0.05, 0.5, 0.95))
             cells.append("–" if middle is None else f"{middle:.3g} ({low:.3g} to {high:.3g})")
-        lines.append("| " + " | ".join(cells) + " |")
-    return lines
+        lines.append(cells)
+    return markdown(heads, lines)
 
 
 def _reasons(table: pl.DataFrame) -> list[str]:
@@ -114,7 +115,7 @@ def _reasons(table: pl.DataFrame) -> list[str]:
     if not failed.height:
         return []
     counted = failed.group_by("law", "reason").len().sort("len", "law", "reason", descending=[True, False, False])
-    lines = ["| did not end as planned | law | flights |", "|---|---|---|"]
-    lines += [f"| {reason} | {law_name(law)} | {count} |" for law, reason, count in counted.head(_REASONS).rows()]
+    rows = [(reason, law_name(law), str(count)) for law, reason, count in counted.head(_REASONS).rows()]
     hidden = counted.height - _REASONS
-    return [*lines, *([f"| {hidden} further reasons | | |"] if hidden > 0 else []), ""]
+    rows += [(f"{hidden} further reasons", "", "")] if hidden > 0 else []
+    return [markdown(("did not end as planned", "law", "flights"), rows)]

@@ -12,7 +12,7 @@ from synthetic_trace import Errors, synthetic_trace
 
 import sim.sweep.flying
 from sim.commands.cli import main
-from sim.experiments import Choice, designs
+from sim.experiments.design import Choice, designs
 from sim.experiments.figures.force_map import predicted_damping
 from sim.flight.jobs import PressJob
 from sim.sweep import run_sweep

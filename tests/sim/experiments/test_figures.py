@@ -9,11 +9,12 @@ import pytest
 from matplotlib.figure import Figure
 from press_trace import press_trace
 
-from sim.experiments import Choice, designs, experiment
+from sim.experiments.design import Choice, designs
 from sim.experiments.figures import Results, draw, force_hold
 from sim.experiments.figures.common import CRASH
 from sim.experiments.figures.force_map import map_caption, map_cells
 from sim.experiments.figures.medians import plot_medians
+from sim.experiments.spec import experiment
 from sim.sweep.parts import PARAM
 
 GAINS, WALLS = (1.0, 5.0), (1500.0, 10000.0)

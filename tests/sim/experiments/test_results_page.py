@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import polars as pl
 
-from sim.experiments import experiment
 from sim.experiments.balance import balance
 from sim.experiments.clipping import clipping
 from sim.experiments.page import Section, results_page
+from sim.experiments.spec import experiment
 from sim.experiments.wording import cell, rounded
 from sim.experiments.worth import worth
 from sim.sweep.parts import frame

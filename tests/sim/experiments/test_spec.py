@@ -8,10 +8,11 @@ import pytest
 
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.settings import load_toml
-from sim.experiments import NAMES, Choice, design, experiment
+from sim.experiments import NAMES
 from sim.experiments.criteria import Bound, Criteria
+from sim.experiments.design import Choice, design
 from sim.experiments.figures import KINDS
-from sim.experiments.spec import SPECS, Experiment
+from sim.experiments.spec import SPECS, Experiment, experiment
 
 
 def test_every_file_has_a_name_and_every_name_a_file():

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 from typing import Any
 
 import joblib
 import pytest
 
+import sim.scenes
 from sim.evaluate.metrics import compute_metrics
 from sim.flight.closed_loop import fly
 from sim.flight.options import FlightOptions
-from sim.scenes import scene_path
 from sim.world.scene import PaintScene, Scene, WallScene, load_scene
 
 #: Seeds of the record.
@@ -50,7 +51,7 @@ def test_ten_seeds_of_the_default_scene() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["low_contrast", "dark_board"])
 def test_shipped_scenes(name: str) -> None:
-    check(*paint(load_scene(scene_path(name))))
+    check(*paint(load_scene(Path(sim.scenes.__file__).with_name(f"{name}.toml"))))
 
 
 @pytest.mark.slow

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from sim.evaluate.measures import paint_figures
-from sim.experiments import experiment
 from sim.experiments.scenes import short_job
+from sim.experiments.spec import experiment
 from sim.flight.closed_loop import fly
 from sim.flight.options import FlightOptions
 from sim.world.scene import Scene

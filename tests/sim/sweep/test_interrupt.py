@@ -16,7 +16,7 @@ _PROGRAM = """
 import sys
 import sim.commands.experiment
 import dataclasses
-import sim.experiments as experiments
+import sim.experiments.design as experiments
 approach = experiments.experiment("approach")
 short = dataclasses.replace(approach, fixed={"job.hold_s": 0.5})
 experiments.experiment = lambda name: short

@@ -10,8 +10,10 @@ import polars as pl
 import pytest
 
 from ibvs_qp.config.errors import ConfigError
-from sim.experiments import NAMES, Choice, designs, experiment
+from sim.experiments import NAMES
 from sim.experiments.criteria import EVERY, Criterion
+from sim.experiments.design import Choice, designs
+from sim.experiments.spec import experiment
 from sim.experiments.verdict import evaluate
 from sim.report.comparison import compare, read_run
 from sim.sweep.paired import exact_interval, needed, paired_differences, sign, variant_differences
@@ -150,9 +152,9 @@ def test_two_tables_compare_flight_by_flight(tmp_path):
     for name, shift in (("a", 0.0), ("b", 1.0)):
         write_table(tmp_path / name / "x.parquet", table({"qp": [1.0 + shift, 5.0 + shift, 9.0 + shift]}, push=5.0))
     cell = compare(read_run(tmp_path / "a"), read_run(tmp_path / "b"))[0]
-    difference = cell["differences"][0]
-    assert (cell["n"], difference.a, difference.b, difference.median) == (3, 5.0, 6.0, 1.0)
-    assert math.isnan(difference.sure_low)  # three pairs are too few
+    found = next(iter(cell["differences"].values()))
+    assert (cell["n"], found["a"], found["b"], found["median"]) == (3, 5.0, 6.0, 1.0)
+    assert math.isnan(found["sure_low"])  # three pairs are too few
 
 
 def test_two_paint_runs_compare_law_by_law_whatever_their_seeds(tmp_path):
@@ -163,7 +165,7 @@ def test_two_paint_runs_compare_law_by_law_whatever_their_seeds(tmp_path):
         (tmp_path / name / "summary.json").write_text(json.dumps(content))
     compared = compare(read_run(tmp_path / "a"), read_run(tmp_path / "b"))
     assert [cell["law"] for cell in compared] == ["qp", "paper"]
-    assert compared[0]["differences"][0].median == pytest.approx(0.002)
+    assert compared[0]["differences"]["path_rms_straight_m"]["median"] == pytest.approx(0.002)
 
 
 def test_runs_that_share_nothing_are_refused(tmp_path):

@@ -22,7 +22,7 @@ def at_rest(plant: Plant, position: np.ndarray, rotation: tuple[float, float, fl
     plant.data.qpos[:3] = FLIP * position
     plant.data.qpos[3:] = [math.cos(half), *(FLIP * axis * math.sin(half))]
     plant.data.qvel[:] = 0.0
-    plant._refresh()
+    plant._read()
     return plant
 
 
