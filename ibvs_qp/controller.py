@@ -91,7 +91,9 @@ class HybridController:
         self.config = config or ControllerConfig()
         self.problem = qp_problem(self.config, tasks, limits)
         self.setpoints = Setpoints(self.problem.model, self.problem.values)
-        self.engine = QpEngine(self.problem, self.config.solver, ProgramData(self.problem, self.setpoints.step))
+        self.engine = QpEngine(
+            self.problem, self.config.solver, ProgramData(self.problem, self.setpoints.step, self.config.machine_code)
+        )
         self._gate = MeasurementGate(self.config.vehicle.geometry.count)
         self.reset()
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from ibvs_qp.frames import Vector3
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
-class ContactState:
+class ContactState(NamedTuple):
     """Result of `ibvs_qp.estimation.contact.ContactEstimator.update`.
 
     Attributes:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ibvs_qp.model.bound_function import BoundFunction
+from ibvs_qp.model.machine_code import machine_code
 from ibvs_qp.model.step_function import StepFunction
 from ibvs_qp.qp.problem import QpProblem
 
@@ -18,11 +19,11 @@ class ProgramData:
         point: Inputs and states of the step; `inputs` are views of it by name.
     """
 
-    def __init__(self, problem: QpProblem, step: StepFunction) -> None:
+    def __init__(self, problem: QpProblem, step: StepFunction, to_machine_code: bool = False) -> None:
         self.p, self.q, self.a, self.lower, self.upper, self.free = step.extra
         self._step = step  # owns the memory that the compiled function writes
         self.point, self.inputs = step.point, step.inputs
-        report, inputs = problem.report, len(step.values)
+        report, inputs = machine_code(problem.report) if to_machine_code else problem.report, len(step.values)
         self._problem, self._inputs = problem, inputs
         self._point, self._thrusts = np.zeros(len(step.point)), np.zeros(problem.model.rotors)
         self._rows_reported = [np.zeros(report.numel_out(index)) for index in range(report.n_out())]

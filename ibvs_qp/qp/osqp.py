@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import signal
 import time
 from dataclasses import dataclass
 
@@ -14,6 +15,8 @@ from ibvs_qp.qp.problem import QpProblem
 
 #: Status values of OSQP 1.x whose iterate means something.
 SOLVED, SOLVED_INACCURATE, MAX_ITERATIONS = 1, 2, 7
+#: Status of a solve that Ctrl-C ended: OSQP replaces the signal's handler meanwhile.
+INTERRUPTED = 10
 
 
 @dataclass(slots=True)
@@ -33,8 +36,9 @@ class OsqpSolver:
     Guards, each against a behaviour reproduced on OSQP 1.1: non-finite data is refused, because one NaN stays in the
     warm start; l > u is refused, because such an update is dropped silently; strided arrays are copied and wrong
     lengths refused, because neither is checked; set-up receives private copies, because updates write into its
-    matrices; a reset sets up anew, because the adapted rho survives. The limits keep l and u at least 1e-4 apart; any
-    closer, OSQP would turn the row into an equality and factorise again.
+    matrices; a reset sets up anew, because the adapted rho survives; Ctrl-C during a solve is raised again, because
+    OSQP swallows it. The limits keep l and u at least 1e-4 apart; any closer, OSQP would turn the row into an equality
+    and factorise again.
     """
 
     def __init__(self, problem: QpProblem, settings: SolverSettings) -> None:
@@ -103,6 +107,8 @@ class OsqpSolver:
             self._inner.solve()
             solution, info = self._inner.solution, self._inner.info
             x, y = np.array(solution.x), np.array(solution.y)
+        if info.status_val == INTERRUPTED:
+            signal.raise_signal(signal.SIGINT)
         return RawSolution(x, y, int(info.status_val), int(info.iter), time.perf_counter() - start)
 
     def warm_start(self, x: np.ndarray, y: np.ndarray) -> None:

@@ -13,6 +13,7 @@ import os
 import re
 import sys
 import traceback
+from collections.abc import Iterator
 from typing import Protocol
 
 from ibvs_qp.config.errors import IbvsQpError
@@ -56,7 +57,8 @@ def main(arguments: list[str] | None = None) -> int:
         os.environ.setdefault(variable, "1")
     words = sys.argv[1:] if arguments is None else arguments
     try:
-        return _parse(words).run(words)
+        with _own_output() if "--json" in words else contextlib.nullcontext():
+            return _parse(words).run(words)
     except IbvsQpError as error:
         return _user_error(str(error))
     except KeyboardInterrupt:
@@ -68,6 +70,28 @@ def main(arguments: list[str] | None = None) -> int:
         traceback.print_exc()
         print("ibvs-qp: internal error; please report it with the lines above", file=sys.stderr)
         return EXIT_INTERNAL
+
+
+@contextlib.contextmanager
+def _own_output() -> Iterator[None]:
+    """Keep standard output for Python's own writes: C libraries write to standard error meanwhile.
+
+    OSQP prints "Solver interrupted" after Ctrl-C, which would stand before the line of JSON.
+    """
+    if sys.stdout is not sys.__stdout__ or sys.stdout.fileno() != 1:
+        yield  # somebody redirected it already
+        return
+    sys.stdout.flush()
+    copy = os.dup(1)
+    os.dup2(2, 1)
+    sys.stdout = os.fdopen(copy, "w", encoding=sys.stdout.encoding)
+    try:
+        yield
+    finally:
+        sys.stdout.flush()
+        os.dup2(copy, 1)
+        sys.stdout.close()
+        sys.stdout = sys.__stdout__
 
 
 def _commands() -> dict[str, type[Command]]:

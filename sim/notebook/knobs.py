@@ -111,4 +111,4 @@ def turned(setting: Setting, values: dict[str, Any]) -> Setting:
         ConfigError: When a value, or several together, are refused.
     """
     paths = {path: value for name, value in values.items() for path in (KNOBS[name].path, KNOBS[name].also) if path}
-    return changed(dataclasses.replace(setting, seed=paths.pop("seed", setting.seed)), paths)
+    return changed(dataclasses.replace(setting, seed=int(paths.pop("seed", setting.seed))), paths)
