@@ -196,7 +196,7 @@ class Flight:
 
 @pytest.fixture(scope="module")
 def flight() -> Flight:
-    return Flight(3, 3000)
+    return Flight(3, 2000)
 
 
 def test_osqp_agrees_with_the_exact_solver_while_limits_come_and_go(flight: Flight) -> None:
