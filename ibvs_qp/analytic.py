@@ -9,7 +9,7 @@ from ibvs_qp.config import ControllerConfig, Gains
 from ibvs_qp.estimation.contact_state import ContactState
 from ibvs_qp.measurement import Measurement, Reference
 from ibvs_qp.model.model import Model
-from ibvs_qp.model.reporting import clipped_command, hover_command, reach_note
+from ibvs_qp.model.reporting import check_contact, clipped_command, hover_command, reach_note
 from ibvs_qp.model.setpoints import LineSetpoint, Setpoints
 from ibvs_qp.tasks import LevelTask, LineTask, PushTask, StandoffTask, VelocityTask, YawTask
 from ibvs_qp.validation.measurement import MeasurementGate
@@ -110,7 +110,8 @@ class PaperController:
         """Thrusts for one tick; never raises, clips to box and rate; arguments as of `HybridController.step`."""
         checked, rejected = self._gate.check(measurement)
         reference, refused = check_reference(reference, self._reference)
-        self._reference, rejected = reference, rejected + refused
+        contact, unusable = check_contact(contact)
+        self._reference, rejected = reference, rejected + refused + unusable
         if checked is None:
             return hover_command(self.setpoints, measurement, self._gate.inertial, rejected)
         if self._gate.restarted:

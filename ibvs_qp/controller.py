@@ -18,7 +18,14 @@ from ibvs_qp.estimation.contact_state import ContactState
 from ibvs_qp.limits import ApproachLimit, Limit, PushCeiling, ThrustLimit, TiltLimit, ViewLimit, YawLimit
 from ibvs_qp.measurement import Measurement, Reference
 from ibvs_qp.model.model import Model
-from ibvs_qp.model.reporting import clipped_command, contact_mode, hover_command, reach_margin, reach_note
+from ibvs_qp.model.reporting import (
+    check_contact,
+    clipped_command,
+    contact_mode,
+    hover_command,
+    reach_margin,
+    reach_note,
+)
 from ibvs_qp.model.setpoints import Setpoints
 from ibvs_qp.qp.accept import AcceptedSolution, QpEngine
 from ibvs_qp.qp.evaluator import ProgramData
@@ -118,7 +125,8 @@ class HybridController:
         """
         checked, rejected = self._gate.check(measurement)
         reference, refused = check_reference(reference, self._reference)
-        self._reference, rejected = reference, rejected + refused + self._surplus_lines(reference)
+        contact, unusable = check_contact(contact)
+        self._reference, rejected = reference, rejected + refused + self._surplus_lines(reference) + unusable
         if checked is None:
             return hover_command(self.setpoints, measurement, self._gate.inertial, rejected)
         if self._gate.restarted:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
 from ibvs_qp.command import ActiveLimit, Command, Outcome
+from ibvs_qp.estimation.contact_state import ContactState
 from ibvs_qp.measurement import Measurement, Reference
 from ibvs_qp.model.setpoints import Setpoints
 from ibvs_qp.safety.hover import hold_thrusts
@@ -16,6 +18,13 @@ from ibvs_qp.validation.measurement import answered_stamp
 CLIPPED = 1e-9
 #: A push reduced by less than this is not reported [N].
 REDUCED = 1e-3
+
+
+def check_contact(contact: Any) -> tuple[ContactState | None, tuple[str, ...]]:
+    """The contact of a caller, or None and the rejection of anything else than a `ContactState`."""
+    if contact is None or isinstance(contact, ContactState):
+        return contact, ()
+    return None, ("contact: not a ContactState",)
 
 
 def contact_mode(setpoints: Setpoints, reference: Reference) -> str:

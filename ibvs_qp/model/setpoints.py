@@ -79,7 +79,8 @@ class Setpoints:
         self.normal, self.right, self.down = out["normal"], out["axis_right"], out["axis_down"]
         self.bias_wrench, self.velocity_command = out["bias_wrench"], out["velocity_command"]
         self.free, self.lower, self.upper = out["free"], out["thrust_lower"], out["thrust_upper"]
-        self.floor, self.ceiling = np.array(vehicle.thrust_min), np.array(vehicle.thrust_max)
+        self.floor, self.ceiling = self.step.inputs["thrust_floor"], self.step.inputs["thrust_ceiling"]
+        self.floor[:], self.ceiling[:] = vehicle.thrust_min, vehicle.thrust_max
         self._rate_step = vehicle.thrust_rate_n_s * config.tick_s
         self.reset()
 
@@ -148,7 +149,6 @@ class Setpoints:
         lowest = self.floor if low is None else np.maximum(low, self.floor)
         values["thrust_low"][:] = lowest
         values["thrust_high"][:] = self.ceiling if high is None else np.maximum(np.minimum(high, self.ceiling), lowest)
-        values["thrust_floor"][:], values["thrust_ceiling"][:] = self.floor, self.ceiling
 
     def note(self, thrusts: np.ndarray, given_up: float) -> None:
         """Store the commanded thrusts, and the largest force or moment given up (anti-windup), for the next step."""

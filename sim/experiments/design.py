@@ -99,8 +99,8 @@ def _setup(experiment: Experiment, flights: Flights, level: Mapping[str, Paramet
 def _faults(flights: Flights, level: Mapping[str, Parameter]) -> tuple[Fault, ...]:
     delay_s = flights.fault_delay_s
     if flights.fault == "derate":
-        rotor, share, told = str(level["rotor"]), float(level["share"]), bool(level["told"])
-        return (Derate(delay_s=delay_s, rotor=rotor, share=share, reported=told),)
+        rotor, fraction, reported = str(level["rotor"]), float(level["share"]), bool(level["told"])
+        return (Derate(delay_s=delay_s, rotor=rotor, share=fraction, reported=reported),)
     if flights.fault == "wind step":
         north, east, down = (float(level["wind"]) * entry for entry in DIRECTIONS[str(level["direction"])])
         return (WindStep(delay_s=delay_s, mean_m_s=(north, east, down)),)

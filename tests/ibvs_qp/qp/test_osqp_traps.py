@@ -24,11 +24,6 @@ a millinewton is kept between them
 from __future__ import annotations
 
 import math
-import os
-import signal
-import subprocess
-import sys
-import time
 from dataclasses import replace
 from typing import Any
 
@@ -442,39 +437,3 @@ def test_exact_solver_reports_failure_instead_of_numbers() -> None:
     assert controller.engine.exact.solve(p, np.full_like(q, math.nan), a, lower, upper) is None
     above = np.full_like(lower, 1.0)  # 0 x >= 1
     assert controller.engine.exact.solve(p, q, np.zeros_like(a), above, 9.0 * above) is None
-
-
-# ----------------------------------------------------------------------------------------------------- Ctrl-C
-
-
-_SOLVING = """
-import sys, numpy as np
-from controller_scenes import pack, random_tick
-from ibvs_qp.controller import HybridController
-controller, caught = HybridController(), 0
-pack(controller, *random_tick(np.random.default_rng(0), 2))
-data, solver = controller.engine.data, controller.engine.osqp
-while caught < 10:
-    try:
-        print("solving", flush=True)
-        while True:
-            data.q[:] = -data.q  # far from the last solution: nearly all the time is spent in OSQP
-            solver.solve(data.p, data.q, data.a, data.lower, data.upper)
-    except KeyboardInterrupt:
-        caught += 1
-"""
-
-
-def test_ctrl_c_during_a_solve_arrives() -> None:
-    """OSQP 1.1 handles SIGINT itself while it solves: it prints "Solver interrupted" and drops the signal."""
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-    command = [sys.executable, "-c", _SOLVING]
-    process = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True)
-    assert process.stdout is not None
-    for _ in range(10):
-        while process.stdout.readline() != "solving\n":
-            assert process.poll() is None
-        time.sleep(0.02)
-        process.send_signal(signal.SIGINT)
-    process.stdout.read()
-    assert process.wait(timeout=60) == 0

@@ -88,9 +88,9 @@ def test_row_2_guide_is_never_its_own_edge(name: str) -> None:
     right_ones, wrong, frames = 0, 0, 0
     score = Score(world.focal)
     path = left + 0.1 / 30.0 * np.arange(90)
-    told = (guide_hint(world),)
+    hints = (guide_hint(world),)
     for percept, position, attitude, _ in perceive(
-        world, path, world.geometry.row_height(2), np.zeros(90), 3, 2, 0.4, told
+        world, path, world.geometry.row_height(2), np.zeros(90), 3, 2, 0.4, hints
     ):
         frames += 1
         if frames <= SETTLE:
@@ -121,8 +121,8 @@ def test_climb_keeps_the_bottom_edge_and_ends_on_the_guide() -> None:
     )
     up = np.concatenate((np.full(15, low), low + (high - low) * steps, np.full(30, high)))
     truth, bottom = row_edge(world, 1, 1), board_edge(world, "bottom")
-    told, identities, guides = (guide_hint(world),), set(), 0
-    flight = perceive(world, along, up, np.zeros(len(along)), 4, 1, 0.4, told)
+    hints, identities, guides = (guide_hint(world),), set(), 0
+    flight = perceive(world, along, up, np.zeros(len(along)), 4, 1, 0.4, hints)
     for k, (percept, position, attitude, _) in enumerate(flight):
         if k < still:
             continue

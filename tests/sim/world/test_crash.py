@@ -3,27 +3,16 @@
 import math
 
 import numpy as np
+from plants import at_rest
 
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import rotation_from_quaternion
 from sim.world.board import BoardGeometry
 from sim.world.clearance import RIM_POINTS, PropellerClearance
-from sim.world.mujoco_frames import FLIP
 from sim.world.plant import TICK_NS, Plant
 from sim.world.scene import BoardScene, Scene
 
 VEHICLE = VehicleParams()
-
-
-def at_rest(plant: Plant, position: np.ndarray, rotation: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Plant:
-    """Put a plant somewhere, turned by a rotation vector (FRD)."""
-    half = 0.5 * float(np.linalg.norm(rotation))
-    axis = np.asarray(rotation) / max(2.0 * half, 1e-12)
-    plant.data.qpos[:3] = FLIP * position
-    plant.data.qpos[3:] = [math.cos(half), *(FLIP * axis * math.sin(half))]
-    plant.data.qvel[:] = 0.0
-    plant._read()
-    return plant
 
 
 def test_propeller_strike_is_a_crash_before_board_and_wall():

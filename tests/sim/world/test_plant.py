@@ -5,6 +5,7 @@ import math
 import mujoco
 import numpy as np
 import pytest
+from plants import at_rest
 
 from allocation import control_effectiveness
 from ibvs_qp.config.errors import ConfigError
@@ -24,17 +25,6 @@ B = control_effectiveness(VEHICLE.geometry)
 def fly(plant: Plant, thrusts: np.ndarray, ticks: int) -> None:
     for _ in range(ticks):
         plant.step(thrusts)
-
-
-def at_rest(plant: Plant, position: np.ndarray, rotation: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Plant:
-    """Put a plant somewhere, turned by a rotation vector (FRD)."""
-    half = 0.5 * float(np.linalg.norm(rotation))
-    axis = np.asarray(rotation) / max(2.0 * half, 1e-12)
-    plant.data.qpos[:3] = FLIP * position
-    plant.data.qpos[3:] = [math.cos(half), *(FLIP * axis * math.sin(half))]
-    plant.data.qvel[:] = 0.0
-    plant._read()
-    return plant
 
 
 def test_mujoco_moments_equal_control_effectiveness():
