@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
@@ -36,21 +36,24 @@ class TaskReport:
 
 @dataclass(frozen=True, eq=False)
 class TaskReports(Sequence[TaskReport]):
-    """Reports of the task rows with a weight; built when read, because a tick has 4 ms and a report takes 1 us.
+    """Reports of the task rows with a weight; evaluated when read, because few ticks are.
 
     Attributes:
         rows: Name and unit of every task row.
-        weights: Their weights, (rows,). Likewise asked and achieved values.
+        values: Function of point and thrusts: achieved and target values and weights of all rows, (rows,) each.
+        point: Inputs and states of the tick.
+        thrusts: Commanded thrusts [N], (n,).
     """
 
     rows: tuple[tuple[str, str], ...]
-    weights: np.ndarray
-    asked: np.ndarray
-    achieved: np.ndarray
+    values: Callable[[np.ndarray, np.ndarray], Sequence[np.ndarray]]
+    point: np.ndarray
+    thrusts: np.ndarray
 
     @cached_property
     def _reports(self) -> tuple[TaskReport, ...]:
-        columns = zip(self.rows, self.weights.tolist(), self.asked.tolist(), self.achieved.tolist(), strict=True)
+        achieved, targets, weights = (column.tolist() for column in self.values(self.point, self.thrusts))
+        columns = zip(self.rows, weights, targets, achieved, strict=True)
         return tuple(
             TaskReport(name=name, unit=unit, weight=weight, asked=asked, achieved=value, residual=value - asked)
             for (name, unit), weight, asked, value in columns

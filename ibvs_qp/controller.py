@@ -98,9 +98,7 @@ class HybridController:
         self.config = config or ControllerConfig()
         self.problem = qp_problem(self.config, tasks, limits)
         self.setpoints = Setpoints(self.problem.model, self.problem.values)
-        self.engine = QpEngine(
-            self.problem, self.config.solver, ProgramData(self.problem, self.setpoints.step, self.config.machine_code)
-        )
+        self.engine = QpEngine(self.problem, self.config.solver, ProgramData(self.problem, self.setpoints.step))
         self._gate = MeasurementGate(self.config.vehicle.geometry.count)
         self.reset()
 
@@ -144,12 +142,12 @@ class HybridController:
         self, measurement: Measurement, reference: Reference, solution: AcceptedSolution, rejected: tuple[str, ...]
     ) -> Command:
         thrusts, setpoints, data = solution.thrusts, self.setpoints, self.engine.data
-        unallocated, limits = NO_WRENCH, ()
+        unallocated, limits, given_up = NO_WRENCH, (), 0.0
         if solution.limited:
             unallocated = setpoints.effectiveness.dot(data.free - thrusts)
             limits = active_limits(self.problem, solution.x, solution.y)
-        tasks = task_reports(self.problem, data, thrusts)
-        setpoints.note(thrusts, max(map(abs, unallocated.tolist())))
+            given_up = max(map(abs, unallocated.tolist()))
+        setpoints.note(thrusts, given_up)
         return Command(
             stamp_ns=int(measurement.stamp_ns),
             thrusts=thrusts,
@@ -157,7 +155,7 @@ class HybridController:
             outcome=solution.outcome,
             mode=contact_mode(setpoints, reference),
             rejected=rejected + reach_note(setpoints, reference),
-            tasks=tasks,
+            tasks=task_reports(self.problem, data, thrusts),
             active_limits=limits,
             unallocated_wrench=unallocated,
             reach_margin=reach_margin(setpoints),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import chain
+
 from ibvs_qp.estimation.contact_state import ContactState
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL, Measurement, Reference
 from ibvs_qp.model.inputs import ARRAYS, CONTACT, LINE, SCALARS, TARGET
@@ -72,7 +74,7 @@ class StepInputs:
             *reference.tilt.tolist(),
             *reference.travel.tolist(),
             # LINE, for every line
-            *(entry for line in self._lines for entry in line),
+            *chain.from_iterable(self._lines),
         )
 
     def _pair(self, measurement: Measurement, reference: Reference, wall_known: bool) -> None:

@@ -131,7 +131,7 @@ class Setpoints:
             stamp_ns=measurement.stamp_ns,
             angular_velocity=measurement.angular_velocity.tolist(),
             specific_force=None if force is None else force.tolist(),
-            down=down_in_body(measurement.attitude),
+            down=down_in_body(measurement.attitude.tolist()),
             contact_wrench=measurement.contact_wrench,
             wrench_stamp_ns=measurement.wrench_stamp_ns,
             plane=measurement.plane,

@@ -43,7 +43,9 @@ class AcceptedSolution:
 
 
 class QpEngine:
-    """OSQP at every tick, warm started; DAQP in the same tick where OSQP's answer fails the acceptance test.
+    """OSQP at every tick; DAQP in the same tick where OSQP's answer fails the acceptance test.
+
+    OSQP starts from the last solution, after a tick without an active limit from this tick's solution without limits.
 
     Attributes:
         data: Values of the program.
@@ -53,30 +55,32 @@ class QpEngine:
     def __init__(self, problem: QpProblem, settings: SolverSettings, data: ProgramData) -> None:
         self.problem, self.settings, self.data = problem, settings, data
         self.osqp, self.exact = OsqpSolver(problem, settings), ExactSolver(problem)
-        self._rotors = problem.model.rotors
-        self._hard = np.flatnonzero(problem.row_slack[self._rotors :] < 0) + self._rotors
-        self.conflict: tuple[str, ...] = ()
+        self._rotors = n = problem.model.rotors
+        self._program = data.p, data.q, data.a, data.lower, data.upper
+        self._lower, self._upper = data.lower[:n], data.upper[:n]
+        self._hard = np.flatnonzero(problem.row_slack[n:] < 0) + n
+        self.conflict, self._limited = (), False
 
     def reset(self) -> None:
         """As after construction."""
         self.osqp.reset()
+        self._limited = False
 
     def solve(self) -> AcceptedSolution | None:
         """Solve the program of this tick; None if neither solver has a solution."""
-        data, self.conflict = self.data, ()
-        program = data.p, data.q, data.a, data.lower, data.upper
-        raw = self.osqp.solve(*program)
+        self.conflict = ()
+        raw = self.osqp.solve(*self._program, initial=None if self._limited else self.data.unlimited)
         if raw is None:
             return None
         outcome = self.accepts(raw)
         if outcome is not None:
             return self._accepted(raw.x, raw.y, outcome, raw)
-        exact = self.exact.solve(*program)
+        exact = self.exact.solve(*self._program)
         if exact is not None:
             self.osqp.warm_start(*exact)
             return self._accepted(*exact, Outcome.EXACT_FALLBACK, raw)
-        self.conflict = conflicting_rows(self.problem, data)
-        self.osqp.reset()
+        self.conflict = conflicting_rows(self.problem, self.data)
+        self.reset()
         return None
 
     def accepts(self, raw: RawSolution) -> Outcome | None:
@@ -96,8 +100,8 @@ class QpEngine:
     def primal_residual(self, x: np.ndarray) -> float:
         """Largest violation of a hard row [N of thrust]."""
         n, data = self._rotors, self.data
-        bounds = zip(x[:n].tolist(), data.lower[:n].tolist(), data.upper[:n].tolist(), strict=True)
-        slip = max(max(low - thrust, thrust - high) for thrust, low, high in bounds)
+        bounds = zip(x[:n].tolist(), self._lower.tolist(), self._upper.tolist(), strict=True)
+        slip = max([low - thrust if thrust < low else thrust - high for thrust, low, high in bounds])
         if len(self._hard):  # barriers without slack
             rows = data.rows()[self._hard, :n]
             at, unit_per_newton = rows @ x[:n], np.linalg.norm(rows, axis=1)
@@ -111,7 +115,6 @@ class QpEngine:
         return float(np.abs(x + np.linalg.solve(data.hessian(), data.q + data.rows().T @ y)).max())
 
     def _accepted(self, x: np.ndarray, y: np.ndarray, outcome: Outcome, raw: RawSolution) -> AcceptedSolution:
-        n, data = self._rotors, self.data
-        thrusts = np.minimum(np.maximum(x[:n], data.lower[:n]), data.upper[:n])
-        limited = max(map(abs, y.tolist())) > ACTIVE_MULTIPLIER
-        return AcceptedSolution(thrusts, x, y, outcome, raw.iterations, raw.seconds, limited)
+        thrusts = np.minimum(np.maximum(x[: self._rotors], self._lower), self._upper)
+        self._limited = max(map(abs, y.tolist())) > ACTIVE_MULTIPLIER
+        return AcceptedSolution(thrusts, x, y, outcome, raw.iterations, raw.seconds, self._limited)

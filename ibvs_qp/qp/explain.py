@@ -53,8 +53,7 @@ class Explanation:
 
 def task_reports(problem: QpProblem, data: ProgramData, thrusts: np.ndarray) -> TaskReports:
     """Target, achieved value and residual of every task row with a weight."""
-    achieved, asked, weights = data.report(data.point, thrusts)
-    return TaskReports(problem.task_names, weights.copy(), asked.copy(), achieved.copy())
+    return TaskReports(problem.task_names, problem.report, data.point.copy(), thrusts)
 
 
 def active_limits(problem: QpProblem, x: np.ndarray, y: np.ndarray) -> tuple[ActiveLimit, ...]:

@@ -81,7 +81,7 @@ def _broken(name: str, values: np.ndarray) -> str:
 def _task_faults(problem: QpProblem, data: ProgramData) -> list[str]:
     """Rows whose value, target or weight is not finite, and weights below zero."""
     thrusts = np.ones(problem.model.rotors)  # not zero, so that every NaN factor shows
-    achieved, asked, weights = data.report(data.point, thrusts)
+    achieved, asked, weights = problem.report(data.point, thrusts)
     found = []
     for row, value, target, weight in zip(problem.task_rows, achieved, asked, weights, strict=True):
         if not np.isfinite((value, target, weight)).all():

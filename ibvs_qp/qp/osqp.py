@@ -6,6 +6,7 @@ import math
 import signal
 import time
 from dataclasses import dataclass
+from operator import gt
 
 import numpy as np
 import osqp
@@ -45,6 +46,7 @@ class OsqpSolver:
         self._problem, self._settings = problem, settings
         variables, rows = len(problem.variable_names), len(problem.row_names)
         self._lengths = (problem.p_pattern.nnz, variables, problem.a_pattern.nnz, rows, rows)
+        self._no_multipliers = np.zeros(rows)
         self._reset_pending = True
 
     def reset(self) -> None:
@@ -79,9 +81,23 @@ class OsqpSolver:
         self._inner = getattr(self._solver, "_solver", None) if settings.direct else None
 
     def solve(
-        self, p: np.ndarray, q: np.ndarray, a: np.ndarray, lower: np.ndarray, upper: np.ndarray
+        self,
+        p: np.ndarray,
+        q: np.ndarray,
+        a: np.ndarray,
+        lower: np.ndarray,
+        upper: np.ndarray,
+        initial: np.ndarray | None = None,
     ) -> RawSolution | None:
         """Solve with new values; None when the data is not finite or a bound pair is crossed.
+
+        Args:
+            p: Non-zeros of the upper triangle of P.
+            q: Gradient.
+            a: Non-zeros of A.
+            lower: Lower bounds of the rows.
+            upper: Upper bounds of the rows.
+            initial: Iterate to start from, with multipliers of zero; None for the last solution.
 
         Raises:
             ValueError: When an array has another length than the program.
@@ -90,8 +106,8 @@ class OsqpSolver:
         p, q, a, lower, upper = arrays = [np.ascontiguousarray(array, float) for array in (p, q, a, lower, upper)]
         if tuple(map(len, arrays)) != self._lengths:
             raise ValueError(f"P, q, A, l, u need {self._lengths} entries, not {tuple(map(len, arrays))}")
-        squares = sum([array.dot(array) for array in arrays])  # infinite or NaN if one entry is
-        if not math.isfinite(squares) or (lower > upper).any():
+        squares = p.dot(p) + q.dot(q) + a.dot(a) + lower.dot(lower) + upper.dot(upper)  # not finite if one entry is not
+        if not math.isfinite(squares) or any(map(gt, lower.tolist(), upper.tolist())):
             return None
         if self._reset_pending:
             self._setup(p, q, a, lower, upper)
@@ -100,6 +116,8 @@ class OsqpSolver:
                 return None
         else:
             self._solver.update(q=q, l=lower, u=upper, Px=p, Ax=a)
+        if initial is not None and math.isfinite(initial.dot(initial)):
+            self.warm_start(initial, self._no_multipliers)  # after the update: OSQP computes A x here
         if self._inner is None:
             result = self._solver.solve(raise_error=False)
             x, y, info = result.x, result.y, result.info
@@ -112,6 +130,11 @@ class OsqpSolver:
         return RawSolution(x, y, int(info.status_val), int(info.iter), time.perf_counter() - start)
 
     def warm_start(self, x: np.ndarray, y: np.ndarray) -> None:
-        """Replace the iterate after a solve that was not accepted."""
-        if not self._reset_pending:
-            self._solver.warm_start(x=np.ascontiguousarray(x, float), y=np.ascontiguousarray(y, float))
+        """Replace the iterate, unless the next solve sets up anew."""
+        if self._reset_pending:
+            return
+        x, y = np.ascontiguousarray(x, float), np.ascontiguousarray(y, float)
+        if self._inner is not None:
+            self._inner.warm_start(x, y)
+        else:
+            self._solver.warm_start(x=x, y=y)

@@ -71,9 +71,10 @@ class QpProblem:
         variable_names: Names of the entries of x.
         task_names: Name and unit of every task row.
         row_names: Names of the rows of A.
-        values: Expressions of the non-zeros of P (upper triangle), q, A, l, u, and of the thrusts without any limit;
+        values: Expressions of the non-zeros of P (upper triangle), q, A, l, u, and of the solution without any limit;
             extra results of the step function.
-        report: CasADi function (inputs, states, thrusts) giving achieved and target of every task row, and weights.
+        report: Function of point (inputs and states) and thrusts: achieved and target values of every task row, and
+            weights, (rows,) each.
         row_slack: Column of every row's slack in x, -1 where the row is hard, (rows,).
 
     Raises:
@@ -105,11 +106,10 @@ class QpProblem:
         upper = ca.vertcat(*(row.upper for row in self.limit_rows)) - bounds.constant
 
         self.values = [p.nz[:], ca.densify(q), a.nz[:], ca.densify(lower), ca.densify(upper)]
-        self.values.append(_unlimited_thrusts(hessian, gradient))
-        self._step = [stack(model.signals.inputs), stack(model.signals.states)]
-        self.report = ca.Function(
-            "task_report", [*self._step, model.thrust], [achieved.at(model.thrust), targets, weights]
-        )
+        self.values.append(ca.vertcat(_unlimited_thrusts(hessian, gradient), ca.DM.zeros(m)))
+        point = ca.vertcat(stack(model.signals.inputs), stack(model.signals.states))
+        self._at = [point, model.thrust]
+        self.report = ArrayFunction("task_report", self._at, [achieved.at(model.thrust), targets, weights])
         self.p_pattern, self.a_pattern = _pattern(p.sparsity()), _pattern(a.sparsity())
         names = model.config.vehicle.geometry.names
         slacks = (f"slack_{self.limit_rows[place].name}" for place in soft)
@@ -121,12 +121,23 @@ class QpProblem:
         self.row_slack[soft] = np.arange(n, n + m)
 
     @functools.cached_property
-    def limit_values(self) -> ca.Function:
-        """(inputs, states, thrusts) to value, lower and upper bound of every limit row in the row's own unit."""
+    def limit_values(self) -> ArrayFunction:
+        """(point, thrusts) to value, lower and upper bound of every limit row in the row's own unit, (rows,) each."""
         values = AffineRows(self.model, ca.vertcat(*(row.expression for row in self.limit_rows))).at(self.model.thrust)
         lower = ca.vertcat(*(row.lower for row in self.limit_rows))
         upper = ca.vertcat(*(row.upper for row in self.limit_rows))
-        return ca.Function("limit_values", [*self._step, self.model.thrust], [values, lower, upper])
+        return ArrayFunction("limit_values", self._at, [values, lower, upper])
+
+
+class ArrayFunction:
+    """A CasADi function from arrays to arrays, for what is evaluated now and then."""
+
+    def __init__(self, name: str, arguments: list[ca.SX], results: list[ca.SX]) -> None:
+        self._function = ca.Function(name, arguments, results)
+
+    def __call__(self, *arguments: np.ndarray) -> list[np.ndarray]:
+        """Evaluate on vectors; returns vectors."""
+        return [np.array(value).ravel() for value in self._function(*arguments)]
 
 
 def _unlimited_thrusts(hessian: ca.SX, gradient: ca.SX) -> ca.SX:

@@ -16,7 +16,9 @@ STAMP_END = 2**62
 
 def is_stamp(value: Any) -> bool:
     """Whether a value is a time stamp: a whole number of nanoseconds below `STAMP_END`."""
-    return isinstance(value, (int, np.integer)) and not isinstance(value, bool) and bool(0 <= value < STAMP_END)
+    if type(value) is not int and (not isinstance(value, (int, np.integer)) or isinstance(value, bool)):
+        return False
+    return bool(0 <= value < STAMP_END)
 
 
 class MonotonicClock:

@@ -1,8 +1,7 @@
 """Bounds of every vector and number that enters: one table per type of input.
 
-`FieldTable.pack` writes the numbers of an input into one list in the order of the table, NaN for a field of wrong type
-or shape; one comparison of that list with the bounds accepts them all. Plain Python numbers, because one numpy call
-costs more than the arithmetic on vectors this short. Lines and planes: `ibvs_qp.validation.geometry`.
+A vector whose length is within the bound of its entries is accepted by that one comparison; only a longer one is
+compared entry by entry. Lines and planes: `ibvs_qp.validation.geometry`.
 """
 
 from __future__ import annotations
@@ -10,8 +9,8 @@ from __future__ import annotations
 import math
 from collections.abc import Container
 from dataclasses import dataclass
-from operator import le
-from typing import Any, cast
+from operator import attrgetter
+from typing import Any
 
 import numpy as np
 
@@ -54,70 +53,50 @@ class Field:
         count = f"{self.size} finite values " if self.size else ""
         return f"{self.name}: " + (self.fault or f"not {count}within {within}")
 
-    def numbers(self, value: Any) -> list[float]:
-        """Entries of a value; NaN if it has the wrong type or shape, 0 for an accepted None."""
+    def accepts(self, value: Any) -> bool:
+        """Whether type, shape, entries and length of a value are as stated; NaN lies within no bounds."""
         if self.size == 0:
-            return [cast(float, value) if is_number(value) else math.nan]
-        if isinstance(value, np.ndarray) and value.shape == (self.size,) and value.dtype.kind == "f":
-            return value.tolist()
-        return [0.0 if value is None and self.optional else math.nan] * self.size
-
-    def accepts(self, numbers: list[float]) -> bool:
-        """Whether all entries lie within the bounds; NaN lies within none."""
-        return all(self.low <= number <= self.high for number in numbers) and self.accepts_length(numbers)
-
-    def accepts_length(self, numbers: list[float]) -> bool:
-        """Whether the vector has length 1, where it must."""
-        return not self.unit_length or abs(sum([number * number for number in numbers]) - 1.0) <= UNIT_TOLERANCE
+            return is_number(value) and self.low <= value <= self.high
+        if value is None:
+            return self.optional
+        if not isinstance(value, np.ndarray) or value.shape != (self.size,) or value.dtype.kind != "f":
+            return False
+        entries = value.tolist()
+        length = math.hypot(*entries)
+        if self.unit_length:
+            return abs(length * length - 1.0) <= UNIT_TOLERANCE
+        return length <= self.high or all([self.low <= entry <= self.high for entry in entries])
 
 
 class FieldTable:
     """The rows for one type of input.
 
     Args:
-        fields: Rows in the order in which they are packed.
+        fields: The rows.
 
     Attributes:
-        part: Place of a field in the packed list, by name.
         fallbacks: Entries in force until an input was accepted, by name.
     """
 
     def __init__(self, *fields: Field) -> None:
         self._fields = fields
-        self._low, self._high = [], []
-        self.part: dict[str, slice] = {}
-        for field in fields:
-            entries = field.size or 1
-            self.part[field.name] = slice(len(self._low), len(self._low) + entries)
-            self._low += [field.low] * entries
-            self._high += [field.high] * entries
-        self._unit = [(field, self.part[field.name]) for field in fields if field.unit_length]
+        self._values = attrgetter(*(field.name for field in fields))
         self.fallbacks = {field.name: list(field.fallback) for field in fields if field.fallback}
 
-    def pack(self, source: Any) -> list[float]:
-        """Numbers of all fields of an input in one list."""
-        packed: list[float] = []
-        for field in self._fields:
-            packed += field.numbers(getattr(source, field.name))
-        return packed
+    def faults(self, source: Any) -> list[Field]:
+        """Fields of an input that are refused."""
+        return [
+            field for field, value in zip(self._fields, self._values(source), strict=True) if not field.accepts(value)
+        ]
 
-    def faults(self, packed: list[float]) -> list[Field]:
-        """Fields whose packed numbers are refused: field by field only if the comparison of the whole list fails."""
-        within = all(map(le, self._low, packed)) and all(map(le, packed, self._high))
-        if within and all([field.accepts_length(packed[part]) for field, part in self._unit]):
-            return []
-        return [field for field in self._fields if not field.accepts(packed[self.part[field.name]])]
-
-    def updated(
-        self, last: dict[str, list[float]], packed: list[float], rejected: Container[str]
-    ) -> dict[str, list[float]]:
-        """Last accepted entries by name after an input some of whose fields were rejected."""
-        return {name: old if name in rejected else packed[self.part[name]] for name, old in last.items()}
+    def entries(self, source: Any, rejected: Container[str], last: dict[str, list[float]]) -> dict[str, list[float]]:
+        """Entries of the fields with a fallback, by name: of an input, and the last ones of rejected fields."""
+        return {name: entries if name in rejected else getattr(source, name).tolist() for name, entries in last.items()}
 
 
 def is_number(value: Any) -> bool:
     """Whether a value is an integer or a float, of Python or numpy."""
-    return isinstance(value, (int, float, np.integer, np.floating))
+    return type(value) is float or isinstance(value, (int, float, np.integer, np.floating))
 
 
 def _vector(name: str, size: int, bound: float, unit: str, fault: str = "", **more: Any) -> Field:

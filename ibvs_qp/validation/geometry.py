@@ -38,15 +38,20 @@ def accepts_plane(plane: Any) -> bool:
     """Whether a value is a plane (A, B, C, D) in front of the camera with D != 0."""
     if not isinstance(plane, (tuple, list, np.ndarray)) or len(plane) != 4:
         return False
-    if not all(is_number(entry) and -PLANE_BOUND <= entry <= PLANE_BOUND for entry in plane) or plane[3] == 0.0:
+    a, b, c, d = plane
+    if not (
+        _within(a, PLANE_BOUND) and _within(b, PLANE_BOUND) and _within(c, PLANE_BOUND) and _within(d, PLANE_BOUND)
+    ):
         return False
-    a, b, c = (-(entry / plane[3]) for entry in plane[:3])
     bound = INVERSE_DEPTH_BOUND
-    return abs(a) < bound and abs(b) < bound and INVERSE_DEPTH_MIN < c < bound
+    return d != 0.0 and abs(a / d) < bound and abs(b / d) < bound and INVERSE_DEPTH_MIN < -c / d < bound
 
 
 def _accepts_parameters(line: LineFeature | LineReference) -> bool:
-    rho, theta, role = line.rho, line.theta, line.role
-    if not (is_number(rho) and is_number(theta) and isinstance(role, str) and role in (HORIZONTAL, VERTICAL)):
-        return False
-    return -LINE_BOUND <= rho <= LINE_BOUND and -LINE_BOUND <= theta <= LINE_BOUND
+    role = line.role
+    known = isinstance(role, str) and (role == HORIZONTAL or role == VERTICAL)
+    return known and _within(line.rho, LINE_BOUND) and _within(line.theta, LINE_BOUND)
+
+
+def _within(value: Any, bound: float) -> bool:
+    return is_number(value) and -bound <= value <= bound

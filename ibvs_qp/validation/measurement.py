@@ -69,20 +69,20 @@ class MeasurementGate:
             return None, ("measurement: not a Measurement",)
         if why := self._clock.accept(measurement.stamp_ns):
             return None, (f"stamp_ns: {why}",)
-        packed = self._table.pack(measurement)
-        faults = self._table.faults(packed)
-        names = [field.name for field in faults]
-        if "attitude" in names and not self._measured:
+        rejected: list[str] = []
+        changes: dict[str, Any] = {}
+        for field in self._table.faults(measurement):
+            rejected.append(field.rejection)
+            changes[field.name] = np.array(self._last[field.name]) if field.fallback else None
+        if "attitude" in changes and not self._measured:
             self._clock.reset()  # time begins with the first attitude
-            return None, (faults[0].rejection,)
-        rejected = [field.rejection for field in faults]
-        changes = {name: np.array(self._last[name]) if name in self._last else None for name in names}
+            return None, (rejected[0],)
         stamp = int(measurement.stamp_ns)
         self._check_wrench_stamp(measurement, stamp, rejected, changes)
         _check_plane(measurement, stamp, rejected, changes)
         _check_lines(measurement, rejected, changes)
         _check_limit_order(measurement, rejected, changes)
-        self._last = self._table.updated(self._last, packed, changes)
+        self._last = self._table.entries(measurement, changes, self._last)
         self._measured = True
         return (dataclasses.replace(measurement, **changes) if changes else measurement), tuple(rejected)
 
@@ -116,7 +116,7 @@ def _check_lines(measurement: Measurement, rejected: list[str], changes: dict[st
         rejected.append("lines: not a tuple")
         changes["lines"] = ()
         return
-    accepted = tuple(filter(accepts_line, measurement.lines))
+    accepted = tuple([line for line in measurement.lines if accepts_line(line)])
     if faults := len(measurement.lines) - len(accepted):
         rejected.append(f"lines: {faults} not finite or malformed")
         changes["lines"] = accepted

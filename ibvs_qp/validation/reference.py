@@ -13,7 +13,7 @@ def check_reference(reference: Reference, last: Reference) -> tuple[Reference, t
     """The new reference if all of it is accepted, otherwise the last one; and what was rejected."""
     if not isinstance(reference, Reference):
         return last, ("reference: not a Reference",)
-    rejected = [f"reference.{field.rejection}" for field in REFERENCE.faults(REFERENCE.pack(reference))]
+    rejected = [f"reference.{field.rejection}" for field in REFERENCE.faults(reference)]
     if not isinstance(reference.contact, (bool, np.bool_)):
         rejected.append("reference.contact: neither True nor False")
     if not isinstance(reference.lines, tuple) or not all(map(accepts_line_reference, reference.lines)):

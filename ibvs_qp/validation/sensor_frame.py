@@ -41,9 +41,8 @@ class SensorGate:
             return None, (f"sensor frame: stamp_ns {why}",)
         if self.clock.shift_ns:
             frame = _shifted(frame, self.clock.shift_ns)
-        packed = SENSOR_FRAME.pack(frame)
-        changes: dict[str, Any] = {field.name: np.array(self.last[field.name]) for field in SENSOR_FRAME.faults(packed)}
-        self.last = SENSOR_FRAME.updated(self.last, packed, changes)
+        changes: dict[str, Any] = {field.name: np.array(self.last[field.name]) for field in SENSOR_FRAME.faults(frame)}
+        self.last = SENSOR_FRAME.entries(frame, changes, self.last)
         stamp = frame.wrench_stamp_ns
         if "wrench" not in changes and is_stamp(stamp) and stamp <= frame.stamp_ns:
             self._wrench_stamp = stamp

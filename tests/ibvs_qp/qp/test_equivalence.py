@@ -335,7 +335,7 @@ def optimal_cost(controller: HybridController, row: int, side: str, change: floa
     bounds[side][row] += change
     solution = controller.engine.exact.solve(data.p, data.q, data.a, bounds["lower"], bounds["upper"])
     assert solution is not None
-    achieved, asked, weights = data.report(data.point, solution[0][:6])
+    achieved, asked, weights = controller.problem.report(data.point, solution[0][:6])
     cost = 0.5 * float(weights @ (achieved - asked) ** 2)
     for limit, slot in zip(controller.problem.limit_rows, controller.problem.row_slack, strict=True):
         cost += 0.5 * (limit.slack_weight or 0.0) * solution[0][slot] ** 2

@@ -359,6 +359,13 @@ def test_reset_restores_the_first_solve_to_the_bit() -> None:
 CUT_SHORT = SolverSettings(max_iterations=1, check_interval=1)
 
 
+def from_the_last_solution(controller: HybridController) -> HybridController:
+    """A controller whose solver starts from the last solution at every tick, and so needs many iterations."""
+    solve = controller.engine.osqp.solve
+    controller.engine.osqp.solve = lambda *data, initial=None: solve(*data)  # type: ignore[method-assign]
+    return controller
+
+
 def outcomes_of(controller: HybridController, ticks: int = 40) -> list[Outcome]:
     vehicle = SmallVehicle(controller.config)
     found = []
@@ -373,14 +380,14 @@ def outcomes_of(controller: HybridController, ticks: int = 40) -> list[Outcome]:
 
 
 def test_a_solver_cut_short_is_accepted_by_residual_or_replaced_by_the_exact_one() -> None:
-    short = outcomes_of(HybridController(ControllerConfig(solver=CUT_SHORT)))
+    short = outcomes_of(from_the_last_solution(HybridController(ControllerConfig(solver=CUT_SHORT))))
     assert set(short) <= {Outcome.SOLVED, Outcome.CAPPED_ACCEPTED, Outcome.EXACT_FALLBACK}
     assert Outcome.EXACT_FALLBACK in short
 
 
 def test_a_capped_solution_that_flies_is_as_near_as_promised() -> None:
     settings = SolverSettings(max_iterations=15, check_interval=5, accept_residual=1e-2)
-    controller = HybridController(ControllerConfig(solver=settings))
+    controller = from_the_last_solution(HybridController(ControllerConfig(solver=settings)))
     vehicle, capped = SmallVehicle(controller.config), 0
     rng, reference = np.random.default_rng(2), Reference()
     for tick in range(400):
@@ -400,14 +407,14 @@ def test_a_capped_solution_that_flies_is_as_near_as_promised() -> None:
 
 def test_without_any_solver_the_analytic_law_answers(monkeypatch: pytest.MonkeyPatch) -> None:
     controller = flying()
-    monkeypatch.setattr(controller.engine.osqp, "solve", lambda *data: None)
+    monkeypatch.setattr(controller.engine.osqp, "solve", lambda *data, initial: None)
     command = controller.step(measured(6), Reference(lines=line_references(2)))
     assert command.outcome is Outcome.ANALYTIC_FALLBACK
     np.testing.assert_allclose(command.thrusts, analytic_thrusts(controller.setpoints), atol=1e-9)
 
 
 def test_osqp_unbelieved_and_the_exact_solver_failing_leads_to_the_analytic_law() -> None:
-    controller = HybridController(ControllerConfig(solver=CUT_SHORT))
+    controller = from_the_last_solution(HybridController(ControllerConfig(solver=CUT_SHORT)))
     controller.engine.exact.solve = lambda *data: None  # type: ignore[method-assign]
     found = outcomes_of(controller)
     assert Outcome.ANALYTIC_FALLBACK in found and Outcome.EXACT_FALLBACK not in found
@@ -422,6 +429,16 @@ def test_everything_failing_leads_to_hold_and_back(monkeypatch: pytest.MonkeyPat
     assert command.outcome is Outcome.HOLD and command.mode == "hold"
     assert command.thrusts.sum() * math.cos(math.radians(30)) == pytest.approx(6.0 * 9.81, rel=0.02)
     assert controller.step(measured(7), Reference()).outcome is Outcome.SOLVED
+
+
+def test_the_first_test_of_residuals_confirms_the_solution_without_limits() -> None:
+    controller, slow = flying(), from_the_last_solution(flying())
+    for tick in range(6, 12):
+        reference = Reference(lines=line_references(2), standoff=0.1 + 0.01 * tick)
+        commands = [one.step(measured(tick), reference) for one in (controller, slow)]
+        assert commands[0].outcome is commands[1].outcome is Outcome.SOLVED and not commands[0].active_limits
+        assert commands[0].iterations == controller.config.solver.check_interval < commands[1].iterations
+        np.testing.assert_allclose(commands[0].thrusts, commands[1].thrusts, atol=1e-6)
 
 
 def test_nothing_ever_measured_is_plain_hover() -> None:

@@ -35,7 +35,7 @@ def controller() -> HybridController:
 def rows(controller: HybridController, thrusts: np.ndarray) -> dict[str, tuple[float, float, float]]:
     """(achieved, asked, weight) of every task row of the packed program."""
     data = controller.engine.data
-    achieved, asked, weights = (array.copy() for array in data.report(data.point.copy(), thrusts))
+    achieved, asked, weights = controller.problem.report(data.point, thrusts)
     names = [row.name for row in controller.problem.task_rows]
     assert len(set(names)) == len(names)
     return {name: (achieved[i], asked[i], weights[i]) for i, name in enumerate(names)}
