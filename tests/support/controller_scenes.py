@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.controller import HybridController
-from ibvs_qp.frames import R_BODY_CAMERA
+from ibvs_qp.frames import R_BODY_CAMERA, cross
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL, LineFeature, LineReference, Measurement, Reference
 
 TICK_NS = 4_000_000
@@ -17,6 +17,7 @@ TICK_NS = 4_000_000
 FLOOR, CEILING = 1.2, 52.56
 #: Where the line fit is certain: tests of geometry want no weights in between.
 CERTAIN = np.zeros((2, 2))
+DEFAULT = ControllerConfig()  # once: it validates a hundred settings
 
 
 def attitude(roll: float = 0.0, pitch: float = 0.0, yaw: float = 0.0) -> np.ndarray:
@@ -36,14 +37,14 @@ class Wall:
     def __init__(
         self, quaternion: np.ndarray, distance: float, turn: float = 0.0, config: ControllerConfig | None = None
     ) -> None:
-        vehicle = (config or ControllerConfig()).vehicle
+        vehicle = (config or DEFAULT).vehicle
         self.tip, self.camera = np.array(vehicle.tip_position_m), np.array(vehicle.camera_position_m)
         rotation = body_to_world(quaternion)
         self.distance = distance
         self.gravity = rotation.T @ np.array([0.0, 0.0, 1.0])
         self.normal = rotation.T @ np.array([math.cos(turn), math.sin(turn), 0.0])
-        self.right = np.cross(self.gravity, self.normal)
-        self.down = np.cross(self.normal, self.right)
+        self.right = np.array(cross(self.gravity, self.normal))
+        self.down = np.array(cross(self.normal, self.right))
         self.foot = self.tip + distance * self.normal
 
     @property
@@ -56,7 +57,7 @@ class Wall:
     def points(self, offset: float, angle: float) -> tuple[np.ndarray, np.ndarray]:
         """Two points, in B, of the line at a signed distance from the foot along (cos, sin) in (right, down)."""
         across = math.cos(angle) * self.right + math.sin(angle) * self.down
-        along = np.cross(self.normal, across)
+        along = np.array(cross(self.normal, across))
         middle = self.foot + offset * across
         return middle - 0.2 * along, middle + 0.2 * along
 
@@ -76,7 +77,7 @@ class Wall:
 
 def image_line(first: np.ndarray, second: np.ndarray) -> tuple[float, float]:
     """(rho, theta) of the image of the line through two points in C."""
-    a, b, c = np.cross(first / first[2], second / second[2])
+    a, b, c = cross(first / first[2], second / second[2])
     return -c / math.hypot(a, b), math.atan2(b, a)
 
 

@@ -70,7 +70,8 @@ class SmallVehicle:
             self.thrusts += (command - self.thrusts) * step / 0.05
             turn = self.attitude.as_matrix()
             speed = self.velocity + turn @ cross(self.omega, self.tip)
-            press = max(0.0, -self.stiffness * self.distance + 15.0 * speed[0]) if self.distance < 0 else 0.0
+            distance = self.wall - self.position[0] - turn[0] @ self.tip
+            press = max(0.0, -self.stiffness * distance + 15.0 * speed[0]) if distance < 0 else 0.0
             sliding = speed * [0.0, 1.0, 1.0]
             drag = -self.friction * press * sliding / max(float(np.linalg.norm(sliding)), 0.01)
             push = turn.T @ (np.array([-press, 0.0, 0.0]) + drag)
