@@ -100,7 +100,7 @@ def test_every_price_and_bound_has_a_unit_and_a_reason(kind: type[Limit]) -> Non
 
 def weights(controller: HybridController) -> dict[str, float]:
     data = controller.engine.data
-    _, _, values = data.report(data.point, np.zeros(6))
+    _, _, values = controller.problem.report(data.point, np.zeros(6))
     return {row.name: float(value) for row, value in zip(controller.problem.task_rows, values, strict=True)}
 
 
