@@ -7,6 +7,7 @@ from pathlib import Path
 
 from ibvs_qp.config.settings import load_toml, setting, validate
 from ibvs_qp.config.vehicle import VehicleParams
+from sim.world.errors import WorldErrors
 
 Color = tuple[int, int, int]
 
@@ -169,6 +170,7 @@ class Scene(_Checked):
     imu: ImuScene = field(default_factory=ImuScene)
     features: FeaturesScene = field(default_factory=FeaturesScene)
     wind: WindScene = field(default_factory=WindScene)
+    errors: WorldErrors = field(default_factory=WorldErrors)
 
 
 def load_scene(file: str | Path) -> Scene:

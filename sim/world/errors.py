@@ -1,0 +1,181 @@
+"""Errors of a real vehicle and its sensors, beyond the noise of the scene's sensors; all zero is the ideal world.
+
+Every number is a size. What a flight gets is drawn from its seed: a bias has this length and a random direction, a
+calibration error is normal with this standard deviation. Three profiles (`sim/world/profiles`) fill the sections.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ibvs_qp.config.errors import ConfigError
+from ibvs_qp.config.settings import load_toml, setting, validate
+
+#: Shipped profiles.
+PROFILES = Path(__file__).parent / "profiles"
+
+
+class _Checked:
+    """A section that refuses values out of range at construction."""
+
+    def __post_init__(self) -> None:
+        """Validate every field."""
+        validate(self)
+
+
+def _size(doc: str, unit: str, high: float, default: float = 0.0) -> Any:
+    return setting(default, doc, unit=unit, low=0.0, high=high)
+
+
+@dataclass(frozen=True, kw_only=True)
+class AttitudeErrors(_Checked):
+    """Tilt of the flight controller's attitude estimate."""
+
+    bias_deg: float = _size("constant tilt in a random direction", "deg", 10.0)
+    wander_deg: float = _size("slow tilt, standard deviation per axis", "deg", 10.0)
+    wander_time_s: float = setting(20.0, "correlation time of the wander", unit="s", low=0.1, high=1e4)
+    noise_deg: float = _size("white noise per sample and axis", "deg", 5.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class GyroErrors(_Checked):
+    """Angular velocity."""
+
+    bias_rad_s: float = _size("constant bias in a random direction", "rad/s", 0.5)
+    instability_rad_s: float = _size("wandering bias, standard deviation per axis", "rad/s", 0.5)
+    vibration_rad_s: float = _size("vibration at the rotors' frequencies per axis, rms", "rad/s", 5.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class AccelerometerErrors(_Checked):
+    """Specific force."""
+
+    bias_m_s2: float = _size("constant bias in a random direction", "m/s^2", 2.0)
+    instability_m_s2: float = _size("wandering bias, standard deviation per axis", "m/s^2", 2.0)
+    vibration_m_s2: float = _size("vibration at the rotors' frequencies per axis, rms", "m/s^2", 20.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ForceTorqueErrors(_Checked):
+    """Force/torque sensor."""
+
+    noise_n: float = _size("white force noise per sample and axis", "N", 10.0)
+    noise_nm: float = _size("white moment noise per sample and axis", "N m", 1.0)
+    bias_n: float = _size("constant force bias in a random direction", "N", 20.0)
+    drift_n_min: float = _size("steady drift of the force in a random direction", "N/min", 20.0)
+    gain: float = _size("relative gain error of all channels, standard deviation", "", 0.5)
+    cross_talk: float = _size("relative reading of one axis in another, standard deviation", "", 0.5)
+    overload_n: float = setting(
+        0.0, "force per axis at which the sensor saturates, 0 for never", unit="N", low=0.0, high=1e4
+    )
+    tool_mass: float = _size("relative error of the believed tool mass, standard deviation", "", 0.5)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RotorErrors(_Checked):
+    """Thrust of a commanded rotor."""
+
+    gain: float = setting(0.0, "relative thrust error common to all rotors, constant", low=-0.5, high=0.5)
+    spread: float = _size("relative thrust error of every rotor, standard deviation", "", 0.3)
+    sag_per_min: float = _size("relative loss of thrust as the battery drains", "1/min", 0.2)
+    noise: float = _size("relative thrust noise of every rotor, standard deviation", "", 0.3)
+    noise_time_s: float = setting(0.05, "correlation time of the thrust noise", unit="s", low=0.004, high=10.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class BodyErrors(_Checked):
+    """True body against the controller's belief."""
+
+    mass: float = setting(0.0, "relative error of the mass, constant", low=-0.3, high=0.3)
+    com_m: tuple[float, float, float] = setting(
+        (0.0, 0.0, 0.0), "size of the shift of the centre of mass per axis, random sign", unit="m", low=0.0, high=0.1
+    )
+    inertia: float = setting(0.0, "relative error of the inertia, constant", low=-0.3, high=0.3)
+    tip_m: tuple[float, float, float] = setting(
+        (0.0, 0.0, 0.0), "true minus believed position of the tip, FRD", unit="m", low=-0.05, high=0.05
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class CameraErrors(_Checked):
+    """Mount, optics and exposure of the camera."""
+
+    mount_m: float = _size("shift of the mount in a random direction", "m", 0.1)
+    mount_deg: float = _size("turn of the mount about a random axis", "deg", 5.0)
+    focal: float = _size("relative error of the reported focal length, standard deviation", "", 0.2)
+    distortion_k1: float = setting(0.0, "radial distortion k1 left after rectification", low=-0.3, high=0.3)
+    rolling_shutter_s: float = _size("readout time from the first to the last row", "s", 0.05)
+    exposure_s: float = _size("exposure time: blur by the camera's motion, vibration included", "s", 0.05)
+    defocus_px: float = _size("blur of the optics beyond the ideal one, standard deviation", "px", 10.0)
+    exposure_steps: float = _size("steps of the automatic exposure, relative brightness", "", 0.8)
+    dropped: float = _size("probability that a picture is lost", "", 0.9)
+
+
+@dataclass(frozen=True, kw_only=True)
+class DepthErrors(_Checked):
+    """Depth channel of a stereo camera."""
+
+    noise_relative: float = _size("white noise per depth", "", 0.2)
+    disparity_step_px: float = _size("quantisation step of the disparity", "px", 2.0)
+    baseline_m: float = setting(0.050, "distance of the two imagers (RealSense D435)", unit="m", low=0.01, high=0.5)
+    edge_fattening_px: float = _size("near surfaces grow over far ones at a depth step", "px", 20.0)
+    misregistration_px: float = _size("shift of depth against colour in a random direction", "px", 20.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TimingErrors(_Checked):
+    """Delivery and stamps of pictures."""
+
+    jitter_s: float = _size("latency beyond the camera's, exponential mean", "s", 0.1)
+    stamp_error_s: float = setting(0.0, "stamp minus true time of capture, constant", unit="s", low=-0.1, high=0.1)
+    stamp_jitter_s: float = _size("stamp error per picture, standard deviation", "s", 0.05)
+
+
+@dataclass(frozen=True, kw_only=True)
+class WorldErrors(_Checked):
+    """All errors of a world."""
+
+    attitude: AttitudeErrors = field(default_factory=AttitudeErrors)
+    gyro: GyroErrors = field(default_factory=GyroErrors)
+    accelerometer: AccelerometerErrors = field(default_factory=AccelerometerErrors)
+    force_torque: ForceTorqueErrors = field(default_factory=ForceTorqueErrors)
+    rotors: RotorErrors = field(default_factory=RotorErrors)
+    body: BodyErrors = field(default_factory=BodyErrors)
+    camera: CameraErrors = field(default_factory=CameraErrors)
+    depth: DepthErrors = field(default_factory=DepthErrors)
+    timing: TimingErrors = field(default_factory=TimingErrors)
+
+
+def world_names() -> list[str]:
+    """Names of the shipped profiles."""
+    return sorted(file.stem for file in PROFILES.glob("*.toml"))
+
+
+def world_errors(name: str) -> WorldErrors:
+    """A shipped profile by name, or one from a TOML file.
+
+    Raises:
+        ConfigError: When there is no such profile or file, or it is refused.
+    """
+    file = PROFILES / f"{name}.toml"
+    if file.exists():
+        return load_toml(WorldErrors, file)
+    if Path(name).suffix == ".toml":
+        return load_toml(WorldErrors, name)
+    raise ConfigError(f"world {name!r} is refused; known worlds: {', '.join(world_names())}, or a TOML file")
+
+
+def single_errors(errors: WorldErrors) -> dict[str, WorldErrors]:
+    """Every error of a world alone, by its dotted name ("accelerometer.vibration_m_s2"); the others are zero."""
+    found: dict[str, WorldErrors] = {}
+    for part in dataclasses.fields(errors):
+        section, ideal = getattr(errors, part.name), getattr(WorldErrors(), part.name)
+        for entry in dataclasses.fields(section):
+            value = getattr(section, entry.name)
+            if value != getattr(ideal, entry.name):
+                alone = dataclasses.replace(ideal, **{entry.name: value})
+                found[f"{part.name}.{entry.name}"] = dataclasses.replace(WorldErrors(), **{part.name: alone})
+    return found
