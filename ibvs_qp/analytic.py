@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from allocation.least_squares import allocate_least_squares
+from allocation.sequential_desaturation import allocate_sequential
 from ibvs_qp.command import Command, Outcome
 from ibvs_qp.config import ControllerConfig, Gains
 from ibvs_qp.estimation.contact_state import ContactState
 from ibvs_qp.measurement import Measurement, Reference
 from ibvs_qp.model.model import Model
-from ibvs_qp.model.reporting import check_contact, clipped_command, hover_command, reach_note
+from ibvs_qp.model.reporting import check_contact, clip, clipped_command, hover_command, reach_note
 from ibvs_qp.model.setpoints import LineSetpoint, Setpoints
 from ibvs_qp.tasks import LevelTask, LineTask, PushTask, StandoffTask, VelocityTask, YawTask
 from ibvs_qp.validation.measurement import MeasurementGate
@@ -46,8 +48,13 @@ def analytic_wrench(setpoints: Setpoints) -> np.ndarray:
 
 
 def _secondary_acceleration(setpoints: Setpoints) -> np.ndarray:
-    """Acceleration a_p of stand-off, velocity and attitude, for the null space of the lines, (6,)."""
-    standoff = setpoints.standoff_command / setpoints.config.vehicle.mass_kg
+    """Acceleration a_p of stand-off, velocity and attitude, for the null space of the lines, (6,).
+
+    The stand-off has the weight 1 - lambda, as in the program. At full weight in contact the projector would turn it
+    into an acceleration along the wall, a standing height error of 1.2 mm.
+    """
+    free = 1.0 - setpoints.contact_weight
+    standoff = free * setpoints.standoff_command / setpoints.config.vehicle.mass_kg
     right, down = setpoints.velocity_command.tolist()
     axes = zip(setpoints.normal.tolist(), setpoints.right.tolist(), setpoints.down.tolist(), strict=True)
     return np.array([n * standoff + r * right + d * down for n, r, d in axes] + setpoints.angular.tolist())
@@ -82,6 +89,21 @@ def analytic_thrusts(setpoints: Setpoints) -> np.ndarray:
     return setpoints.inverse.dot(analytic_wrench(setpoints) - setpoints.bias_wrench)
 
 
+def allocate(setpoints: Setpoints, free: np.ndarray) -> np.ndarray:
+    """Thrusts within this tick's window by the configured allocator [N], (n,).
+
+    Args:
+        setpoints: Set-points of the tick, with the window.
+        free: Thrusts of the desired wrench without limits [N], (n,), finite.
+    """
+    lower, upper, clipped = setpoints.lower, setpoints.upper, clip(setpoints, free)
+    if setpoints.config.allocator == "clip" or np.array_equal(clipped, free):
+        return clipped
+    matrix = setpoints.effectiveness
+    function = allocate_sequential if setpoints.config.allocator == "sequential" else allocate_least_squares
+    return function(matrix.dot(free), matrix, lower, upper)
+
+
 def analytic_setpoints(config: ControllerConfig) -> Setpoints:
     """Targets of the tasks without a program: the analytic law combines them itself."""
     model = Model(config)
@@ -107,7 +129,7 @@ class PaperController:
         self._reference = Reference()
 
     def step(self, measurement: Measurement, reference: Reference, contact: ContactState | None = None) -> Command:
-        """Thrusts for one tick; never raises, clips to box and rate; arguments as of `HybridController.step`."""
+        """Thrusts for one tick, within box and rate; never raises; arguments as of `HybridController.step`."""
         checked, rejected = self._gate.check(measurement)
         reference, refused = check_reference(reference, self._reference)
         contact, unusable = check_contact(contact)
@@ -119,4 +141,4 @@ class PaperController:
         self.setpoints.update(checked, reference, contact)
         rejected += reach_note(self.setpoints, reference)
         free = analytic_thrusts(self.setpoints)
-        return clipped_command(self.setpoints, checked, reference, free, Outcome.SOLVED, rejected)
+        return clipped_command(self.setpoints, checked, reference, free, Outcome.SOLVED, rejected, allocate)

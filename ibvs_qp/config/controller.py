@@ -53,6 +53,12 @@ class ControllerConfig:
     thrust_rows: bool = setting(
         True, "thrust limits as rows of the program (False: its thrusts are clipped afterwards)"
     )
+    allocator: str = choice(
+        "clip",
+        "allocation of the analytic law where a rotor reaches a limit: the paper's clipping, sequential desaturation "
+        "(lateral force yields first), or weighted least squares within the limits",
+        ("clip", "sequential", "box"),
+    )
     machine_code: bool = setting(
         False, "translate the tick with the C compiler, if there is one: the same bits, 1 s once, 25 us less per tick"
     )

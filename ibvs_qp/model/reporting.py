@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -60,6 +61,11 @@ def reach_note(setpoints: Setpoints, reference: Reference) -> tuple[str, ...]:
     return (f"reference.push_force: {commanded:.1f} N {result} {how}",)
 
 
+def clip(setpoints: Setpoints, free: np.ndarray) -> np.ndarray:
+    """Thrusts clipped to this tick's window [N], (n,)."""
+    return np.minimum(np.maximum(free, setpoints.lower), setpoints.upper)
+
+
 def clipped_command(
     setpoints: Setpoints,
     measurement: Measurement,
@@ -67,8 +73,9 @@ def clipped_command(
     free: np.ndarray,
     outcome: Outcome,
     rejected: tuple[str, ...],
+    allocate: Callable[[Setpoints, np.ndarray], np.ndarray] = clip,
 ) -> Command:
-    """Command of thrusts that ignore the limits, clipped to this tick's window; hover if they are not finite.
+    """Command of thrusts that ignore the limits, brought into this tick's window; hover if they are not finite.
 
     Args:
         setpoints: Set-points of the tick; they store the command.
@@ -77,11 +84,13 @@ def clipped_command(
         free: Thrusts without limits [N], (n,).
         outcome: How they were found.
         rejected: Inputs refused.
+        allocate: Thrusts within the window, from the set-points and finite thrusts without limits.
     """
     mode = contact_mode(setpoints, reference)
     if not np.isfinite(free).all():
         free, outcome, mode = hold_thrusts(setpoints.config, measurement), Outcome.HOLD, "hold"
-    return _clipped(setpoints, int(measurement.stamp_ns), free, outcome, mode, rejected)
+    thrusts = allocate(setpoints, free)
+    return _limited(setpoints, int(measurement.stamp_ns), free, thrusts, outcome, mode, rejected)
 
 
 def hover_command(
@@ -90,15 +99,21 @@ def hover_command(
     """Command of a tick whose measurement was refused: hover by the last accepted inertial data, if any."""
     setpoints.pause()
     free = hold_thrusts(setpoints.config, inertial)
-    return _clipped(setpoints, answered_stamp(measurement), free, Outcome.HOLD, "hold", rejected)
+    stamp = answered_stamp(measurement)
+    return _limited(setpoints, stamp, free, clip(setpoints, free), Outcome.HOLD, "hold", rejected)
 
 
-def _clipped(
-    setpoints: Setpoints, stamp_ns: int, free: np.ndarray, outcome: Outcome, mode: str, rejected: tuple[str, ...]
+def _limited(
+    setpoints: Setpoints,
+    stamp_ns: int,
+    free: np.ndarray,
+    thrusts: np.ndarray,
+    outcome: Outcome,
+    mode: str,
+    rejected: tuple[str, ...],
 ) -> Command:
-    thrusts = np.minimum(np.maximum(free, setpoints.lower), setpoints.upper)
-    beyond = free - thrusts
-    unallocated = setpoints.effectiveness.dot(beyond)
+    beyond = free - clip(setpoints, free)
+    unallocated = setpoints.effectiveness.dot(free - thrusts)
     setpoints.note(thrusts, max(map(abs, unallocated.tolist())))
     return Command(
         stamp_ns=stamp_ns,

@@ -14,6 +14,7 @@ from allocation import control_effectiveness
 from ibvs_qp.analytic import PaperController, analytic_setpoints, analytic_thrusts, analytic_wrench
 from ibvs_qp.command import Outcome
 from ibvs_qp.config import ControllerConfig
+from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.frames import camera_twist_matrix
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL, Reference
 from ibvs_qp.model.interaction_matrix import line_interaction_matrix
@@ -53,7 +54,7 @@ def test_the_wrench_is_the_law_by_hand(lines: int, share: float) -> None:
         normal = setpoints.normal
         null = np.concatenate(
             (
-                normal * setpoints.standoff_command / MASS
+                normal * (1.0 - share) * setpoints.standoff_command / MASS
                 + setpoints.right * setpoints.velocity_command[0]
                 + setpoints.down * setpoints.velocity_command[1],
                 setpoints.angular,
@@ -166,6 +167,49 @@ def test_holds_a_push_in_a_small_closed_loop() -> None:
     assert command.mode == "contact"
     assert np.mean(pushes[-250:]) == pytest.approx(5.0, abs=0.3)
     assert np.linalg.norm(vehicle.attitude.as_rotvec()) < math.radians(1.0)
+
+
+def test_lines_have_no_standing_error_in_contact() -> None:
+    """The push must not leak into the plane of the wall through the null space of the lines."""
+    controller, vehicle = PaperController(), SmallVehicle(CONFIG, distance=0.05)
+    vehicle.friction = 0.0  # nothing holds the tip but the law
+    errors = []
+    for tick in range(3000):
+        reference = Reference(push_force=5.0, contact=tick > 200, standoff=0.05, lines=line_references(2))
+        command = controller.step(vehicle.measure(), reference)
+        vehicle.fly(command.thrusts)
+        errors.append([line.rho_error / controller.setpoints.plane[2] for line in controller.setpoints.lines])
+    assert command.mode == "contact"
+    metres = np.abs(np.mean(errors[-500:], axis=0))  # 1 / plane[2] is the depth on the optical axis
+    print(f"standing line errors {metres}")
+    assert metres.max() < 2e-4
+
+
+@pytest.mark.parametrize("allocator", ["clip", "sequential", "box"])
+def test_every_allocator_stays_within_the_window(allocator: str) -> None:
+    controller, last = PaperController(replace(CONFIG, allocator=allocator)), None
+    clipped = PaperController(CONFIG)
+    for tick in range(40):
+        measurement, reference = random_tick(np.random.default_rng(tick), 2, tick)
+        reference = replace(reference, push_force=35.0, contact=True)
+        command = controller.step(measurement, reference)
+        plain = clipped.step(measurement, reference)
+        setpoints = controller.setpoints
+        assert (command.thrusts >= setpoints.lower).all() and (command.thrusts <= setpoints.upper).all()
+        free = analytic_thrusts(setpoints)
+        beyond = ((free < setpoints.lower - 1e-9) | (free > setpoints.upper + 1e-9)).any()
+        assert bool(command.active_limits) == beyond
+        matrix = control_effectiveness(CONFIG.vehicle.geometry)
+        np.testing.assert_allclose(command.unallocated_wrench, matrix @ (free - command.thrusts), atol=1e-9)
+        if beyond and tick == 0 and allocator != "clip":
+            assert np.abs(command.thrusts - plain.thrusts).max() > 1e-3
+        last = command
+    assert last is not None
+
+
+def test_an_unknown_allocator_is_refused() -> None:
+    with pytest.raises(ConfigError, match="allocator = 'best'.*clip, sequential, box"):
+        replace(CONFIG, allocator="best")
 
 
 def test_reset_repeats_to_the_bit_and_modes_are_named() -> None:
