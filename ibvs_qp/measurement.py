@@ -68,6 +68,8 @@ class Measurement:
         plane_stamp_ns: Time at which the plane was measured.
         velocity: Linear velocity in B [m/s], (3,), or None.
         velocity_covariance: Of the velocity, (3, 3), or None.
+        acceleration_bias: Specific force plus gravity by the attitude, minus the true acceleration, in B [m/s^2],
+            (3,), or None: what the caller's velocity filter learnt. Its part along the wall counts.
         thrust_min: Lower thrust limits [N], (n,), or None for the configured ones.
         thrust_max: Upper thrust limits [N], (n,), or None for the configured ones.
     """
@@ -83,6 +85,7 @@ class Measurement:
     plane_stamp_ns: int = 0
     velocity: np.ndarray | None = None
     velocity_covariance: np.ndarray | None = None
+    acceleration_bias: np.ndarray | None = None
     thrust_min: np.ndarray | None = None
     thrust_max: np.ndarray | None = None
 

@@ -25,7 +25,7 @@ from ibvs_qp.estimation.contact import ContactEstimator
 from ibvs_qp.estimation.contact_state import ContactState
 from ibvs_qp.estimation.stamps import HISTORY
 from ibvs_qp.estimation.wall_lines import WallAxes, image_line
-from ibvs_qp.estimation.wall_motion import WallMotion
+from ibvs_qp.estimation.wall_motion import BIAS, WallMotion
 from ibvs_qp.estimation.wrench_tare import WrenchTare
 from ibvs_qp.frames import Vector3, add_scaled, down_in_body, plane_in_body, to_camera
 from ibvs_qp.measurement import HORIZONTAL, FeatureFrame, LineReference, Measurement, Reference, RgbdFrame, SensorFrame
@@ -338,6 +338,7 @@ class Pilot:
             rows = zip(axes.right, axes.down, axes.normal, strict=True)
             velocity = np.array([r * right + d * down - n * rate for r, d, n in rows])
             covariance = self._covariance
+        bias_right, bias_down = self.motion.state[BIAS]
         distance = contact.distance if contact.known else ASSUMED_DISTANCE
         low, high = self.thrust_limits or (None, None)
         return Measurement(
@@ -352,6 +353,7 @@ class Pilot:
             plane_stamp_ns=self._plane_stamp,
             velocity=velocity,
             velocity_covariance=covariance,
+            acceleration_bias=bias_right * np.array(axes.right) + bias_down * np.array(axes.down),
             thrust_min=low,
             thrust_max=high,
         )

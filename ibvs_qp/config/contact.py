@@ -49,6 +49,9 @@ class ContactSettings:
     full_gain_stiffness_n_m: float = setting(
         1500.0, "up to here force_kfp counts in full, beyond it falls with 1/k", unit="N/m", low=50.0, high=1e5
     )
+    rate_quiet_m_s: float = setting(
+        0.006, "noise of the estimated rate at which the damping K_sd halves", unit="m/s", low=1e-4, high=1.0
+    )
     gust_bandwidth_rad_s: float = setting(
         9.0,
         "observer of gusts along the normal in contact: half the motors' 17 rad/s",

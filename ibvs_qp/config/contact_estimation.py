@@ -28,6 +28,16 @@ class ContactEstimationSettings:
         low=1e-4,
         high=0.5,
     )
+    acceleration_quiet_m_s2: float = setting(
+        0.3, "noise of the filtered acceleration at which it counts half", unit="m/s^2", low=1e-3, high=100.0
+    )
+    vibration_time_s: float = setting(
+        1.0,
+        "averaging time of the accelerometer's noise; it replaces a smaller acceleration_noise",
+        unit="s",
+        low=0.05,
+        high=60.0,
+    )
     distance_std_m: float = setting(
         1.2e-3, "distance of one fitted plane: common mode of the depth camera", unit="m", low=1e-5, high=0.1
     )

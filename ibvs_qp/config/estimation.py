@@ -21,6 +21,13 @@ class EstimationConfig:
         low=1e-6,
         high=1.0,
     )
+    vibration_time_s: float = setting(
+        1.0,
+        "averaging time of the accelerometer's noise; it replaces a smaller acceleration_noise",
+        unit="s",
+        low=0.05,
+        high=60.0,
+    )
     line_noise: float = setting(
         1e-3, "random walk of line offsets: edges are not perfectly straight", unit="m/sqrt(s)", low=1e-6, high=0.1
     )

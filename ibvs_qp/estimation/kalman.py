@@ -25,6 +25,7 @@ class DelayedKalman:
     Attributes:
         chain: G, (n, n); may be written.
         covariance: Of the state at the stamp of the last correction, (n, n); may be written.
+        noise: Power spectral densities of the process noise on the diagonal, (n, n) [unit^2/s]; may be written.
         ticks: Stamps of the ticks remembered.
     """
 
@@ -40,7 +41,7 @@ class DelayedKalman:
             tick_s: Nominal control period [s].
             gate_sigmas: Innovations beyond this many standard deviations are refused.
         """
-        self.chain, self._noise = np.array(chain, float), np.diag(noise)
+        self.chain, self.noise = np.array(chain, float), np.diag(noise)
         self._identity = np.eye(len(chain))
         self._initial, self._gate = np.diag(np.square(initial_std)), gate_sigmas
         self.ticks = StampRing(tick_s)
@@ -50,7 +51,7 @@ class DelayedKalman:
         """Return to the state before the first tick."""
         self.covariance = self._initial.copy()
         # Twice as long as needed: a full buffer moves its newest half to the front, so that history is one slice.
-        self._history, self._lengths, self._newest = np.zeros((2 * HISTORY, len(self._noise))), np.zeros(2 * HISTORY), 0
+        self._history, self._lengths, self._newest = np.zeros((2 * HISTORY, len(self.noise))), np.zeros(2 * HISTORY), 0
         self.ticks.reset()
         self._covariance_stamp, self._capture = -1, None
 
@@ -74,6 +75,15 @@ class DelayedKalman:
         """State at the tick nearest to a stamp, (n,): the history itself; None if it is not remembered."""
         age = self.ticks.age(stamp_ns)
         return None if age is None else self._history[self._newest - age]
+
+    def variance(self, index: int, stamp_ns: int) -> float:
+        """Variance of one entry at a stamp after the last correction, with its own process noise."""
+        since = (stamp_ns - self._covariance_stamp) * 1e-9 if self._covariance_stamp >= 0 else 0.0
+        return self.covariance.item(index, index) + min(since, LONGEST_GROWTH) * self.noise.item(index, index)
+
+    def restart(self) -> None:
+        """Covariance of the start, so that no gate refuses the next measurements; the state stays."""
+        self.covariance = self._initial.copy()
 
     def set_entry(self, index: int, value: float, std: float) -> None:
         """Set one state entry now and in the past, uncorrelated with the rest (a new line, a first distance)."""
@@ -164,7 +174,7 @@ class DelayedKalman:
             step = dt * self.chain
             transition = self._identity + step + 0.5 * step @ step
             grown = transition @ self.covariance @ transition.T
-            self.covariance = 0.5 * (grown + grown.T) + dt * self._noise
+            self.covariance = 0.5 * (grown + grown.T) + dt * self.noise
         self._covariance_stamp = max(stamp_ns, self._covariance_stamp)
 
     def _apply(self, capture: _Capture, correction: np.ndarray, reduction: np.ndarray) -> None:

@@ -14,16 +14,19 @@ import numpy as np
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.estimation.kalman import DelayedKalman
 from ibvs_qp.estimation.stamps import HISTORY
+from ibvs_qp.estimation.vibration import VibrationNoise
 from ibvs_qp.frames import GRAVITY, add_scaled, cross, dot, plane_in_body, unit
 
 #: Order of the filter's state: distance [m], speed of the centre of mass into the wall [m/s], accelerometer bias.
-DISTANCE, SPEED = 0, 1
+DISTANCE, SPEED, BIAS = 0, 1, 2
 #: d/dt (distance, speed, bias) = CHAIN (distance, speed, bias) + measured acceleration.
 CHAIN = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [0.0, 0.0, 0.0]])
 #: Spectral density of the distance itself [m^2/s]: nearly none.
 DISTANCE_NOISE = 1e-10
 #: Standard deviations at the start: distance [m], speed [m/s], bias [m/s^2]; and of the first measured distance [m].
 INITIAL_STD, FIRST_DISTANCE_STD = np.array([0.05, 0.05, 0.1]), 0.01
+#: Standard deviation of a speed from two planes a few frames apart [m/s], and least time between them [s].
+JUMP_SPEED_STD, SHORTEST_JUMPS = 0.05, 0.05
 
 
 class WallDistance:
@@ -32,7 +35,8 @@ class WallDistance:
     Attributes:
         normal: Unit vector into the wall, in B, (3,).
         known: Whether a plane was measured since the start.
-        acceleration: Filtered second derivative of the distance [m/s^2].
+        rate_noise: Standard deviation of the rate [m/s].
+        vibration: Noise of the acceleration along the normal.
     """
 
     def __init__(self, config: ControllerConfig) -> None:
@@ -40,6 +44,9 @@ class WallDistance:
         self._tip = config.vehicle.tip_position_m
         self._tip_from_camera = np.subtract(self._tip, config.vehicle.camera_position_m).tolist()
         noise = np.array([DISTANCE_NOISE, settings.acceleration_noise**2, settings.bias_noise**2])
+        self.vibration = VibrationNoise(settings.vibration_time_s)
+        gain = 1.0 - math.exp(-config.tick_s / settings.acceleration_filter_s)
+        self._ratio = gain / (2.0 - gain)  # variance of filtered white noise per variance of a sample
         self._filter = DelayedKalman(CHAIN, noise, INITIAL_STD, config.tick_s, settings.gate_sigmas)
         self.reset()
 
@@ -49,8 +56,9 @@ class WallDistance:
         self._state = self._filter.state.tolist()
         self.normal, self.known = (1.0, 0.0, 0.0), False
         self._normals = np.zeros((HISTORY, 3))  # of the last ticks, by the slots of the filter's ticks
-        self._jumps, self._plane_ns = 0, -1
-        self.acceleration, self._lever_speed = 0.0, 0.0
+        self._jumps, self._first_jump, self._plane_ns = 0, (0, 0.0), -1
+        self.vibration.reset()
+        self._filtered = self._lever_speed = self.rate_noise = 0.0
 
     @property
     def distance(self) -> float:
@@ -61,6 +69,18 @@ class WallDistance:
     def rate(self) -> float:
         """Rate of the distance [m/s]: of the centre of mass, and of the tip that rotates with the body."""
         return -self._state[SPEED] - self._lever_speed if self.known else 0.0
+
+    @property
+    def acceleration(self) -> float:
+        """Filtered second derivative of the distance [m/s^2], weighted by its ratio of signal to noise."""
+        return self._filtered / (
+            1.0 + self._ratio * self.vibration.variance / self._settings.acceleration_quiet_m_s2**2
+        )
+
+    @property
+    def bias(self) -> float:
+        """Measured minus true acceleration along the normal [m/s^2]; 0 while no wall is known."""
+        return self._state[BIAS] if self.known else 0.0
 
     @property
     def speed(self) -> float:
@@ -92,10 +112,13 @@ class WallDistance:
             measured = dot(normal, add_scaled(specific_force, GRAVITY, down))
         distance, speed, bias = self._state
         gain = 1.0 - math.exp(-dt / self._settings.acceleration_filter_s)
-        self.acceleration += gain * (bias - measured - self.acceleration)
+        self._filtered += gain * (bias - measured - self._filtered)
+        self.vibration.add(measured, dt)
+        self._filter.noise[SPEED, SPEED] = self.vibration.density(self._settings.acceleration_noise, dt)
         self._state = [distance - dt * (speed + lever_speed), speed + dt * (measured - bias), bias]
         self._filter.remember(stamp_ns, self._state, dt)
         self._normals[self._filter.ticks.slot(0)] = normal
+        self.rate_noise = math.sqrt(self._filter.variance(SPEED, stamp_ns))
 
     def correct(self, plane: Sequence[float], stamp_ns: int, tip_stationary: bool) -> None:
         """Correct with a plane (A, B, C, D) measured in C, at the time of its capture, if newer than the last one."""
@@ -126,11 +149,21 @@ class WallDistance:
             self._jumps = 0
             return kalman.correct_entry(stamp_ns, DISTANCE, distance, settings.outlier_std_m**2, gate=math.inf)
         self._jumps += 1
+        if self._jumps == 1:
+            self._first_jump = stamp_ns, distance
         if self._jumps < settings.jump_frames:
             return False
         self._jumps = 0
-        kalman.set_entry(DISTANCE, distance, FIRST_DISTANCE_STD)
+        self._restart(stamp_ns, distance)
         return True
+
+    def _restart(self, stamp_ns: int, distance: float) -> None:
+        """Take distance and speed from the refused planes: a filter that refuses them has a wrong speed as well."""
+        then, first = self._first_jump
+        kalman, elapsed = self._filter, max((stamp_ns - then) * 1e-9, SHORTEST_JUMPS)
+        kalman.restart()
+        kalman.set_entry(SPEED, (first - distance) / elapsed - self._lever_speed, JUMP_SPEED_STD)
+        kalman.set_entry(DISTANCE, distance, FIRST_DISTANCE_STD)
 
     def _correct_normal(self, stamp_ns: int, normal: Sequence[float]) -> None:
         """Move the normal of the capture, and equally every later one, towards the measured one."""

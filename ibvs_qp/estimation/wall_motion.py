@@ -12,6 +12,7 @@ from ibvs_qp.estimation.kalman import DelayedKalman
 from ibvs_qp.estimation.line_tracking import LINES, SLOTS, LineTracks
 from ibvs_qp.estimation.stamps import StampRing
 from ibvs_qp.estimation.tracked_line import TrackedLine
+from ibvs_qp.estimation.vibration import VibrationNoise
 from ibvs_qp.estimation.wall_lines import WallAxes, image_line, wall_line
 from ibvs_qp.frames import GRAVITY, add_scaled, cross, dot
 from ibvs_qp.measurement import FeatureFrame, LineFeature
@@ -56,12 +57,15 @@ class WallMotion:
         self._filter = DelayedKalman(chain, noise, deviation, tick_s, config.gate_sigmas)
         self._velocity_floor = config.velocity_std_m_s**2 * np.eye(2)
         self._tracks = LineTracks(self._filter, config)
+        self._vibration = VibrationNoise(config.vibration_time_s), VibrationNoise(config.vibration_time_s)
         self.reset()
 
     def reset(self) -> None:
         """Return to the state before the first frame."""
         self._filter.reset()
         self._tracks.reset()
+        for noise in self._vibration:
+            noise.reset()
         self.state: list[float] = self._filter.state.tolist()
         self.velocity_age_s = math.inf
         self._stamp = self._frame_stamp = self._velocity_stamp = -1
@@ -90,8 +94,12 @@ class WallMotion:
         velocity_right, velocity_down, bias_right, bias_down, *_ = state
         right = dt * (velocity_right + dot(axes.right, swing))
         down = dt * (velocity_down + dot(axes.down, swing))
-        state[0] += dt * (dot(axes.right, acceleration) - bias_right)
-        state[1] += dt * (dot(axes.down, acceleration) - bias_down)
+        along = dot(axes.right, acceleration), dot(axes.down, acceleration)
+        state[0] += dt * (along[0] - bias_right)
+        state[1] += dt * (along[1] - bias_down)
+        for entry, (noise, measured) in enumerate(zip(self._vibration, along, strict=True)):
+            noise.add(measured, dt)
+            self._filter.noise[entry, entry] = noise.density(self._config.acceleration_noise, dt)
         state[4] += right
         state[5] += down
         self._tracks.advance(stamp_ns, state, right, down)

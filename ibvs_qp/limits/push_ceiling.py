@@ -8,6 +8,9 @@ from ibvs_qp.limits.limit import WIDE, Limit
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.rows import LimitRow
 
+#: A closing speed within this many standard deviations of its estimate counts as zero.
+QUIET_SIGMAS = 2.0
+
 
 class PushCeiling(Limit):
     r"""The push stays below a ceiling, 1.5 times the reference by default.
@@ -26,7 +29,8 @@ class PushCeiling(Limit):
     def rows(self, model: Model) -> list[LimitRow]:
         """One soft row in newtons; wide before touch."""
         settings, contact, mass = model.config.limits, model.contact, model.config.vehicle.mass_kg
-        closing = ca.fmin(contact.rate + settings.push_quiet_m_s, 0.0)
+        quiet = ca.fmax(settings.push_quiet_m_s, QUIET_SIGMAS * contact.rate_noise)
+        closing = ca.fmin(contact.rate + quiet, 0.0)
         ceiling = settings.push_ceiling_ratio * model.push_reference
         bound = ceiling + 2.0 * ca.sqrt(contact.stiffness * mass) * closing
         return [

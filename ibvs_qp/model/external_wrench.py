@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 
 from ibvs_qp.config import ControllerConfig, VehicleParams
-from ibvs_qp.model.inputs import Body, clamp
+from ibvs_qp.model.inputs import Body, Contact, clamp
 from ibvs_qp.model.signals import Signals
 
 #: Bandwidth of the force observer in free flight, and in contact in the wall's plane [rad/s]; along the normal it is
@@ -18,6 +18,9 @@ QUIET_PUSH = 0.15
 #: In calm air the observer along the normal only passes on sensor noise. Its bandwidth halves where the force not yet
 #: learnt is this strong [N rms], low-passed at its own bandwidth and averaged over this time [s].
 CALM_AIR, CALM_TIME = 0.1, 0.5
+#: Power of the unlearnt force up to this many times that of the accelerometer's noise is no gust: a power averaged
+#: over half a second scatters by its own size.
+NOISE_POWERS = 2.0
 #: Bandwidth of the moment observer [rad/s]; below the attitude loop so that the two do not fight.
 MOMENT_BANDWIDTH = 2.5
 #: The force observer averages evenly over this time at the start, then turns to its bandwidth [s].
@@ -45,7 +48,7 @@ def external_wrench(
     felt_moment: ca.SX,
     normal: ca.SX,
     touching: ca.SX,
-    noise: ca.SX,
+    contact: Contact,
 ) -> ca.SX:
     r"""Momentum and accelerometer observer of the unmodelled wrench at the centre of mass [N, N m], (6,).
 
@@ -57,15 +60,15 @@ def external_wrench(
     contact, because it would take contact moments for a load. A gust of correlation time T_g and rms s then leaves a
     push error of :math:`s\sqrt{T/(T_g+T)}`, T being the observer's time constant plus motor lag and delays.
 
-    ``felt_moment`` is the measured moment of the contact [N m], (3,), ``touching`` 1 in contact or just before it, and
-    ``noise`` the deviation of the filtered push in free flight [N].
+    ``felt_moment`` is the measured moment of the contact [N m], (3,), ``touching`` 1 in contact or just before it;
+    of ``contact`` the noise of push and accelerometer counts.
     """
     vehicle = config.vehicle
     thrusts, ready = lagged_thrusts(signals, vehicle, body.dt)
     rotors = ca.DM(effectiveness) @ thrusts
     awake = ca.logic_and(ready, body.dt > 0.0)
     active = awake if config.contact_feedforward else ca.logic_and(awake, ca.logic_not(touching))
-    force = _force(signals, config, body, rotors[:3], normal, touching, noise, awake, active)
+    force = _force(signals, config, body, rotors[:3], normal, touching, contact, awake, active)
     moment = _moment(signals, vehicle, body, rotors[3:] + felt_moment, awake, active)
     return ca.vertcat(force, moment)
 
@@ -89,7 +92,7 @@ def _force(
     rotors: ca.SX,
     normal: ca.SX,
     touching: ca.SX,
-    noise: ca.SX,
+    contact: Contact,
     awake: ca.SX,
     active: ca.SX,
 ) -> ca.SX:
@@ -99,8 +102,9 @@ def _force(
     felt = free - body.wrench[:3]
     size = ca.dot(normal, felt)
     along = size * normal
-    windy = _gust_weight(signals, bandwidth, body.dt, touching * size)
-    pressing = bandwidth * windy / (1.0 + (noise / QUIET_PUSH) ** 2)
+    vibration = config.vehicle.mass_kg * contact.acceleration_noise
+    windy = _gust_weight(signals, bandwidth, body.dt, touching * size, vibration)
+    pressing = bandwidth * windy / (1.0 + (contact.push_noise / QUIET_PUSH) ** 2)
     learnt = filter_gain(pressing, body.dt) * along + filter_gain(FORCE_BANDWIDTH_WALL, body.dt) * (felt - along)
     average = ca.if_else(time < START_TIME, body.dt / ca.fmax(time, 1e-9), 0.0)
     step = ca.if_else(touching, learnt, ca.fmax(filter_gain(FORCE_BANDWIDTH_FREE, body.dt), average) * free)
@@ -108,12 +112,17 @@ def _force(
     return signals.remember("external_force", ca.if_else(ca.logic_and(active, body.specific_force_known), new, old))
 
 
-def _gust_weight(signals: Signals, bandwidth: float, dt: ca.SX, unlearnt: ca.SX) -> ca.SX:
-    """Weight of the observer along the normal: 0 in calm air to 1 in gusts, by the power of the unlearnt force."""
-    smooth, power = signals.state("gust_unlearnt"), signals.state("gust_power")
-    smooth = signals.remember("gust_unlearnt", smooth + filter_gain(bandwidth, dt) * (unlearnt - smooth))
+def _gust_weight(signals: Signals, bandwidth: float, dt: ca.SX, unlearnt: ca.SX, vibration: ca.SX) -> ca.SX:
+    """Weight of the observer along the normal: 0 in calm air to 1 in gusts, by the power of the unlearnt force.
+
+    ``vibration`` is the deviation of one sample of that force by the accelerometer's noise [N]: no gust.
+    """
+    smooth, power, gain = signals.state("gust_unlearnt"), signals.state("gust_power"), filter_gain(bandwidth, dt)
+    smooth = signals.remember("gust_unlearnt", smooth + gain * (unlearnt - smooth))
     power = signals.remember("gust_power", power + filter_gain(1.0 / CALM_TIME, dt) * (smooth**2 - power))
-    return power / (power + CALM_AIR**2)
+    noise = vibration**2 * gain / (2.0 - gain)
+    gust = ca.fmax(power - NOISE_POWERS * noise, 0.0)
+    return gust / (gust + CALM_AIR**2 + noise)
 
 
 def filter_gain(bandwidth: ca.SX | float, dt: ca.SX) -> ca.SX:

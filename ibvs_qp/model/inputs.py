@@ -9,7 +9,15 @@ import casadi as ca
 from ibvs_qp.model.signals import Signals
 
 #: Inputs that are arrays, and their sizes, in the order of packing (`ibvs_qp.model.packing`).
-ARRAYS = {"attitude": 4, "angular_velocity": 3, "contact_wrench": 6, "specific_force": 3, "velocity": 3, "normal": 3}
+ARRAYS = {
+    "attitude": 4,
+    "angular_velocity": 3,
+    "contact_wrench": 6,
+    "specific_force": 3,
+    "velocity": 3,
+    "acceleration_bias": 3,
+    "normal": 3,
+}
 #: Scalars that follow the arrays: time step [s], whether specific force and velocity are known, lambda.
 SCALARS = ("dt", "specific_force_known", "velocity_known", "contact_weight")
 
@@ -25,6 +33,7 @@ class Body:
         specific_force: Accelerometer [m/s^2]; specific_force_known: 1 if measured.
         wrench: Tared contact wrench on the vehicle [N, N m].
         velocity: Linear velocity [m/s]; velocity_known: 1 if estimated.
+        acceleration_bias: Measured minus true acceleration [m/s^2]; its part along the wall counts.
     """
 
     dt: ca.SX
@@ -35,6 +44,7 @@ class Body:
     wrench: ca.SX
     velocity: ca.SX
     velocity_known: ca.SX
+    acceleration_bias: ca.SX
 
     @classmethod
     def of(cls, signals: Signals) -> Body:
@@ -49,6 +59,7 @@ class Body:
             wrench=signals.input("contact_wrench", 6),
             velocity=signals.input("velocity", 3),
             velocity_known=signals.input("velocity_known"),
+            acceleration_bias=signals.input("acceleration_bias", 3),
         )
 
     def velocity_of(self, point: tuple[float, float, float]) -> ca.SX:
@@ -67,6 +78,8 @@ class Contact:
     Attributes:
         known: 1 once the wall was seen.
         distance: Tip to wall [m]; rate: its rate [m/s]; acceleration: its second derivative [m/s^2].
+        rate_noise: Standard deviation of the rate [m/s]; acceleration_noise: of an accelerometer sample [m/s^2].
+        bias: Measured minus true acceleration along n [m/s^2].
         push: Filtered push [N]; push_noise: its standard deviation in free flight [N].
         moment_noise: Standard deviation of the moments in free flight, as a force across the tip [N].
         touching: 1 in contact.
@@ -79,6 +92,9 @@ class Contact:
     distance: ca.SX
     rate: ca.SX
     acceleration: ca.SX
+    rate_noise: ca.SX
+    acceleration_noise: ca.SX
+    bias: ca.SX
     push: ca.SX
     push_noise: ca.SX
     moment_noise: ca.SX

@@ -117,10 +117,14 @@ class Model:
             felt_moment,
             self.wall.normal,
             near,
-            contact.push_noise,
+            contact,
         )
         gyroscopic = -ca.cross(body.rate, ca.DM(vehicle.inertia_kg_m2) * body.rate)
-        static = ca.vertcat(vehicle.mass_kg * GRAVITY * body.down, gyroscopic) + external
+        # The observer takes the accelerometer's bias for a force, and gravity leaks through the attitude's error.
+        normal, along = self.wall.normal, body.acceleration_bias
+        bias = contact.bias * normal + along - normal * ca.dot(normal, along)
+        unreal = ca.vertcat(vehicle.mass_kg * bias, ca.DM.zeros(3))
+        static = ca.vertcat(vehicle.mass_kg * GRAVITY * body.down, gyroscopic) + external - unreal
         self.bias_wrench = static + expected
         return static, cautious_friction(signals, friction)
 

@@ -39,7 +39,7 @@ class StepInputs:
 
     def write(self, measurement: Measurement, reference: Reference, contact: ContactState, dt: float) -> None:
         """Pack a validated measurement (not its thrust limits), reference, contact and time since the last step [s]."""
-        force, velocity = measurement.specific_force, measurement.velocity
+        force, velocity, bias = measurement.specific_force, measurement.velocity, measurement.acceleration_bias
         press, known = reference.contact, contact.known
         self._pair(measurement, reference, known)
         self._block[:] = (
@@ -48,6 +48,7 @@ class StepInputs:
             *measurement.contact_wrench.tolist(),
             *(_ZERO if force is None else force.tolist()),
             *(_ZERO if velocity is None else velocity.tolist()),
+            *(_ZERO if bias is None else bias.tolist()),
             *contact.normal,
             # SCALARS
             dt,
@@ -59,6 +60,9 @@ class StepInputs:
             contact.distance if known else FAR_AWAY,
             contact.rate,
             contact.acceleration,
+            contact.rate_noise,
+            contact.acceleration_noise,
+            contact.bias,
             contact.push,
             contact.push_noise,
             contact.across_noise,

@@ -64,7 +64,10 @@ class PushTask(Task):
         if not config.impedance:
             return ca.SX(0.0)
         gains = config.gains
-        force = gains.force_ksp * contact.distance + gains.force_ksd * predicted_rate(config.vehicle, contact)
+        # A rate that is mostly noise would be pushed into the wall.
+        quiet = 1.0 / (1.0 + (contact.rate_noise / config.contact.rate_quiet_m_s) ** 4)
+        damping = quiet * gains.force_ksd * predicted_rate(config.vehicle, contact)
+        force = gains.force_ksp * contact.distance + damping
         return ca.if_else(contact.known, force, 0.0)
 
 

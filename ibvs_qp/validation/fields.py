@@ -132,6 +132,7 @@ def measurement_table(rotors: int) -> FieldTable:
         _vector("specific_force", 3, 200.0, "m/s^2", optional=True),
         _vector("contact_wrench", 6, 500.0, "N or N m", fallback=(0.0,) * 6),
         _vector("velocity", 3, 20.0, "m/s", optional=True),
+        _vector("acceleration_bias", 3, 5.0, "m/s^2", optional=True),
         _vector("thrust_min", rotors, 1e4, "N", f"not {rotors} finite values", optional=True),
         _vector("thrust_max", rotors, 1e4, "N", f"not {rotors} finite values", optional=True),
     )

@@ -208,7 +208,7 @@ def test_every_allocator_stays_within_the_window(allocator: str) -> None:
 
 
 def test_an_unknown_allocator_is_refused() -> None:
-    with pytest.raises(ConfigError, match="allocator = 'best'.*clip, sequential, box"):
+    with pytest.raises(ConfigError, match=r"allocator = 'best'.*clip, sequential, box"):
         replace(CONFIG, allocator="best")
 
 

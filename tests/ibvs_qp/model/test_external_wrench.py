@@ -33,7 +33,7 @@ def observer(adapt_in_contact: bool = True) -> Block:
             body.wrench[3:],
             contact.normal,
             contact.touching,
-            contact.push_noise,
+            contact,
         )
 
     return Block(build)
@@ -125,6 +125,22 @@ def test_in_calm_air_sensor_noise_is_not_handed_on_and_a_gust_wakes_the_observer
     fixed = 0.25 * np.sqrt(GUST_BANDWIDTH * TICK / 2.0)  # what a first-order filter leaves of white noise
     assert np.std(calm) < 0.4 * fixed
     assert fly(1.0, 0.5)[-1] > 0.8  # 1 N that comes at once is learnt within half a second
+
+
+def test_vibration_is_no_gust() -> None:
+    """Vibration of 0.5 m/s^2 is 3 N per sample; known as noise it leaves the observer at rest."""
+
+    def passed_on(known: float) -> float:
+        rng, block, found = np.random.default_rng(4), observer(), []
+        block.contact(touching=True, acceleration_noise=known)
+        thrusts = np.linalg.solve(MATRIX, -np.array([0, 0, WEIGHT, 0, 0, 0]))
+        for _ in range(1500):
+            shake = np.array([rng.normal(0.0, 0.5), 0.0, 0.0])
+            without_lag(block, thrusts, specific_force=STILL + shake)
+            found.append(float(wrench(block)[0]))
+        return float(np.std(found[500:]))
+
+    assert passed_on(0.5) < 0.15 < 0.3 < passed_on(0.0)
 
 
 def test_acceleration_is_not_taken_for_a_load() -> None:

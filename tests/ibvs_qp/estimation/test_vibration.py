@@ -1,0 +1,86 @@
+"""Noise of the accelerometer measured in flight, and the filters that follow it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from ibvs_qp.config import ControllerConfig
+from ibvs_qp.estimation.vibration import VibrationNoise
+from ibvs_qp.estimation.wall_distance import WallDistance
+
+TICK = 0.004
+DOWN = (0.0, 0.0, 1.0)
+#: Camera to tip along the normal [m]: a wall at distance d of the tip has depth d + AHEAD in the camera.
+CONFIG = ControllerConfig()
+AHEAD = CONFIG.vehicle.tip_position_m[0] - CONFIG.vehicle.camera_position_m[0]
+
+
+def plane(distance: float) -> tuple[float, float, float, float]:
+    return 0.0, 0.0, 1.0 / (distance + AHEAD), -1.0
+
+
+def fly(
+    seconds: float, sigma: float = 0.0, bias: float = 0.0, tilt: float = 0.0, distance: float = 0.3, seed: int = 0
+) -> tuple[WallDistance, np.ndarray]:
+    """A vehicle at rest with noise [m/s^2], bias [m/s^2] and pitch error [rad]; the filter and its rates [m/s]."""
+    wall, rng, rates = WallDistance(CONFIG), np.random.default_rng(seed), []
+    down = (-math.sin(tilt), 0.0, math.cos(tilt))
+    for tick in range(int(seconds / TICK)):
+        stamp = (tick + 1) * 4_000_000
+        force = (bias + sigma * rng.standard_normal(), 0.0, -9.81)
+        wall.predict(stamp, TICK, (0.0, 0.0, 0.0), force, down)
+        if tick % 8 == 0 and tick > 15:
+            wall.correct(plane(distance + 0.001 * rng.standard_normal()), stamp - 60_000_000, False)
+        rates.append(wall.rate)
+    return wall, np.array(rates)
+
+
+@pytest.mark.parametrize("sigma", [0.06, 0.5, 1.0])
+def test_white_noise_is_measured(sigma: float) -> None:
+    noise, rng = VibrationNoise(1.0), np.random.default_rng(0)
+    for sample in sigma * rng.standard_normal(2000):
+        noise.add(2.0 + sample, TICK)
+    assert math.sqrt(noise.variance) == pytest.approx(sigma, rel=0.1)
+    assert noise.density(6e-3, TICK) == pytest.approx(max(6e-3**2, noise.variance * TICK))
+
+
+def test_motion_is_no_noise() -> None:
+    noise = VibrationNoise(1.0)
+    for tick in range(2000):
+        noise.add(2.0 * math.sin(2.0 * math.pi * 1.0 * tick * TICK), TICK)  # 2 m/s^2 at 1 Hz
+    assert math.sqrt(noise.variance) < 0.04
+
+
+@pytest.mark.parametrize("bias", [-0.15, 0.15])
+def test_the_accelerometer_bias_along_the_normal_is_learnt(bias: float) -> None:
+    wall, _ = fly(8.0, bias=bias, sigma=0.06)
+    assert wall.bias == pytest.approx(bias, abs=0.02)
+
+
+@pytest.mark.parametrize("degrees", [-1.5, 1.5])
+def test_gravity_through_an_attitude_error_is_learnt(degrees: float) -> None:
+    wall, _ = fly(8.0, tilt=math.radians(degrees), sigma=0.06)
+    assert wall.bias == pytest.approx(-9.81 * math.sin(math.radians(degrees)), abs=0.03)
+
+
+@pytest.mark.parametrize("sigma", [0.3, 1.0])
+def test_the_noise_of_the_rate_is_known_and_no_plane_is_refused(sigma: float) -> None:
+    wall, rates = fly(20.0, sigma=sigma)
+    late = rates[2000:]
+    assert 0.4 * wall.rate_noise < late.std() < 2.0 * wall.rate_noise
+    assert abs(wall.distance - 0.3) < 0.01 and abs(late).max() < 5.0 * wall.rate_noise
+
+
+def test_a_filter_that_refuses_restarts_with_distance_and_speed() -> None:
+    wall, _ = fly(4.0)
+    ticks = 8 * (CONFIG.contact.estimation.jump_frames - 1) + 1
+    for tick in range(ticks):  # the wall moves away at 0.2 m/s after a leap of 0.3 m; the accelerometer shows nothing
+        stamp = (1001 + tick) * 4_000_000
+        wall.predict(stamp, TICK, (0.0, 0.0, 0.0), (0.0, 0.0, -9.81), DOWN)
+        if tick % 8 == 0:
+            wall.correct(plane(0.6 + 0.2 * tick * TICK), stamp, False)
+    assert wall.distance == pytest.approx(0.6 + 0.2 * (ticks - 1) * TICK, abs=0.01)
+    assert wall.rate == pytest.approx(0.2, abs=0.02)
