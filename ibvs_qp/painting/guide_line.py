@@ -13,14 +13,19 @@ from ibvs_qp.painting.command import PainterInput
 from ibvs_qp.painting.config import PaintingConfig
 from ibvs_qp.painting.line_choice import LOST_WEIGHT, VISIBLE_WEIGHT, bottom_edge, fresh_edge
 from ibvs_qp.painting.speed import clipped
+from ibvs_qp.painting.tip_height import TipHeight
 
 
 class GuideLine:
-    """The guide by its track, with its target offset.
+    r"""The guide by its track, with its target offset.
+
+    With a tip that lies :math:`\delta` below the believed one, row 1 lies :math:`\delta` too low. Every later row lies
+    one pitch above the painted one: its upper edge is then :math:`\delta` farther below the believed tip.
 
     Attributes:
         identity: Track of the guide, -1 before there is one.
         target: Its target offset [m].
+        tip: Height of the tip, learnt in row 1.
     """
 
     def __init__(self, config: PaintingConfig) -> None:
@@ -29,10 +34,16 @@ class GuideLine:
         self.target = config.edge_margin_m
         self._level = 0.5 * math.pi  # angle of the board's edge [rad]
         self._lean = math.radians(config.gates.fresh_lean_deg)
+        self.tip = TipHeight(config)
 
     def take(self, line: TrackedLine, target: float) -> None:
         """Follow a line to a target offset [m]."""
         self.identity, self.target = line.track_id, target
+
+    @property
+    def fresh_offset(self) -> float:
+        """Offset of the last row's upper edge when this row is at its place [m]."""
+        return self._config.fresh_edge_m + self.tip.error
 
     def line(self, inputs: PainterInput) -> TrackedLine | None:
         """The guide at this tick, None if it is not tracked."""
@@ -81,7 +92,7 @@ class GuideLine:
     def fresh(self, inputs: PainterInput) -> TrackedLine | None:
         """The upper edge of the last row, if it is seen at its nominal offset."""
         self._update_level(inputs)
-        return fresh_edge(inputs.lines.values(), self._config.fresh_edge_m, self._level, self._config.gates)
+        return fresh_edge(inputs.lines.values(), self.fresh_offset, self._level, self._config.gates)
 
     def _change(self, found: TrackedLine | None) -> TrackedLine | None:
         if found is None or found.track_id == self.identity:
@@ -110,5 +121,5 @@ class GuideLine:
         """Nominal offset of the guide [m]; a guide from an earlier row keeps its last target."""
         if self.identity == self._board:
             return self._board_nominal(row)
-        near = abs(self.target - self._config.fresh_edge_m) < 2.0 * self._config.gates.row_m
-        return self._config.fresh_edge_m if near else self.target
+        near = abs(self.target - self.fresh_offset) < 2.0 * self._config.gates.row_m
+        return self.fresh_offset if near else self.target

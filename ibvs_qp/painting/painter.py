@@ -108,6 +108,8 @@ class Painter(PhaseMachine):
             self._fail(inputs, f"time-out in row {self.row}")
         self._follow_guide(inputs, config.gates.row_m)
         self._guide.slide(self.row, dt)
+        if self.row == 1:
+            self._guide.tip.look(inputs, dt)
         remaining, edge = self._stroke_end.remaining(inputs, self.row)
         self._pause_without_contact(inputs)
         target = 0.0 if self._paused else stroke_speed(config, remaining)
@@ -207,7 +209,7 @@ class Painter(PhaseMachine):
         if followed and self.phase == "paint":
             return None
         left = self.config.pitch_m - self._climbed if self.phase == "climb" else 0.0
-        return self.config.fresh_edge_m - left, travel_of(self.row)
+        return self._guide.fresh_offset - left, travel_of(self.row)
 
     def _start_mark(self, inputs: PainterInput) -> TrackedLine | None:
         return start_mark(inputs.lines.values(), self.config.edge_margin_m, self.config.gates.mark_m)
