@@ -12,8 +12,8 @@ from sim.flight.options import FlightOptions
 from sim.flight.viewer import FlightViewer
 from sim.sensors.cameras import CameraStream, open_camera
 from sim.sensors.features import GeometricFeatures
-from sim.sensors.imu_ft import SensorSuite
 from sim.sensors.miscalibration import Miscalibration
+from sim.sensors.suite import SensorSuite
 from sim.world.board import BoardGeometry
 from sim.world.canvas import Canvas
 from sim.world.plant import Plant
