@@ -12,7 +12,7 @@ from sim.sensors.cameras.timing import DeliveryErrors
 
 
 class CameraStream:
-    """Pictures at a fixed rate with a fixed latency; stamps give the time of capture.
+    """Pictures at a fixed rate with a fixed latency; stamps give the time of capture, but for their errors.
 
     Args:
         camera: The back end; it draws at the time of capture.
@@ -34,11 +34,7 @@ class CameraStream:
             quaternion_b_in_i: Attitude (w, x, y, z), (4,).
         """
         if self._schedule.due(now_ns):
-            picture, stamp_ns = (
-                self.camera.capture(position_ned, quaternion_b_in_i, now_ns),
-                self._schedule.stamp(now_ns),
-            )
-            if stamp_ns != now_ns:
-                picture = dataclasses.replace(picture, stamp_ns=stamp_ns)
-            self._schedule.push(now_ns, picture)
+            picture = self.camera.capture(position_ned, quaternion_b_in_i, now_ns)
+            stamped = dataclasses.replace(picture, stamp_ns=self._schedule.stamp(now_ns))
+            self._schedule.push(now_ns, stamped)
         return self._schedule.pop(now_ns)
