@@ -46,7 +46,7 @@ class World:
         if self._rendered:
             camera = open_camera(options.camera, scene, vehicle, self.canvas, options.seed)
             late = delivery_errors(scene.errors.timing, options.seed)
-            self.stream = CameraStream(camera, scene.camera.rate_hz, scene.camera.latency_s, late)
+            self.stream = CameraStream(camera, scene.camera.rate_hz, scene.camera.latency_s, errors=late)
         else:
             self._features = GeometricFeatures(scene, vehicle, self.canvas, options.seed)
         self._seen_from = tuple(self.plant.truth[place] for place in _SEEN_FROM)  # views

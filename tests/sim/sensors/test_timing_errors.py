@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+from typing import Any
 
 import numpy as np
 import pytest
@@ -30,7 +31,7 @@ class Blank:
     def __init__(self) -> None:
         self.captures = 0
 
-    def capture(self, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, stamp_ns: int) -> RgbdFrame:
+    def capture(self, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, stamp_ns: int, *_: Any) -> RgbdFrame:
         self.captures += 1
         rgb = np.full((2, 2, 3), self.captures % 256, np.uint8)
         return RgbdFrame(rgb=rgb, depth=np.ones((2, 2)), intrinsics=self.intrinsics, stamp_ns=stamp_ns)
@@ -38,7 +39,7 @@ class Blank:
 
 def pictures(timing: TimingErrors, ticks: int, seed: int = 0) -> list[tuple[int, RgbdFrame]]:
     """Times of delivery [ns] and pictures of a stream at 30 Hz with a latency of 60 ms."""
-    stream = CameraStream(Blank(), 30.0, 0.060, delivery_errors(timing, seed))
+    stream = CameraStream(Blank(), 30.0, 0.060, errors=delivery_errors(timing, seed))
     found = ((tick * TICK_NS, stream.tick(tick * TICK_NS, np.zeros(3), np.zeros(4))) for tick in range(ticks))
     return [(now, picture) for now, picture in found if picture is not None]
 
