@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tyro
 
 from sim.commands.options import (
+    World,
     check_count,
     check_preset,
     check_seed,
@@ -18,6 +19,7 @@ from sim.commands.options import (
     optional,
     usable_cores,
 )
+from sim.world.worlds import DEFAULT_WORLD
 
 if TYPE_CHECKING:
     import polars as pl
@@ -49,6 +51,7 @@ class Compare:
     """Presets only: first seed."""
     features: Literal["rendered", "geometric"] = "rendered"
     """Presets only: perception."""
+    world: World = DEFAULT_WORLD
     quick: Annotated[bool, flag] = False
     """Presets only: fly a short paint job."""
     jobs: Annotated[int | None, optional("N")] = None
@@ -75,6 +78,7 @@ class Compare:
                 "command": command_line(words),
                 "run_a": str(self.run_a),
                 "run_b": str(self.run_b),
+                "world": None if folder is None else self.world,
                 "run_dir": None if folder is None else str(folder),
                 "interrupted": stopped,
                 "cells": cells,
@@ -123,7 +127,7 @@ class Compare:
             run
             for name, file in (("a", self.run_a), ("b", self.run_b))
             for run in preset_runs(
-                name, file, self.law, range(self.seed, self.seed + self.seeds), self.features, self.quick
+                name, file, self.law, range(self.seed, self.seed + self.seeds), self.features, self.quick, self.world
             )
         ]
         folder = RunFolder.create(self.out).path

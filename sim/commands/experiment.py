@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tyro
 
 from sim.commands.options import (
+    World,
     check_count,
     check_seed,
     command_line,
@@ -22,6 +23,7 @@ from sim.commands.options import (
     usable_cores,
 )
 from sim.experiments import ALL, NAMES
+from sim.world.worlds import DEFAULT_WORLD
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -43,6 +45,7 @@ class ExperimentCommand:
     """Few cells and seeds: takes minutes, does not replace the record."""
     features: Literal["rendered", "geometric"] = "rendered"
     """Perception: rendered pictures through the vision pipeline, or a sensor model of lines."""
+    world: World = DEFAULT_WORLD
     seed: int = 0
     """First seed; the flights of a cell use consecutive seeds."""
     jobs: Annotated[int | None, optional("N")] = None
@@ -71,7 +74,7 @@ class ExperimentCommand:
         check_seed(self.seed)
         check_count("--jobs", self.jobs)
         notes = Console(stderr=True, quiet=self.json)
-        choice = Choice(quick=self.quick, seed=self.seed, features=self.features)
+        choice = Choice(quick=self.quick, seed=self.seed, features=self.features, world=self.world)
         runs = designs(self.name, choice)
         _print_plan(Console() if self.plan else notes, runs)
         if self.plan:
@@ -85,6 +88,7 @@ class ExperimentCommand:
             "quick": self.quick,
             "seed": self.seed,
             "features": self.features,
+            "world": self.world,
             "interrupted": result.interrupted,
             "wall_time_s": time.perf_counter() - started,
         }
@@ -94,7 +98,10 @@ class ExperimentCommand:
         write_summary(folder, content)  # before the figures: an error there must not lose the record
         page = None
         if table.height and not result.interrupted:
-            lead = f"{table.height} flights, {self.features} features, first seed {self.seed}, {facts['version']}."
+            lead = (
+                f"{table.height} flights, {self.features} features, world {self.world}, first seed {self.seed}, "
+                f"{facts['version']}."
+            )
             lead = ("A quick run with few flights, not the record: " if self.quick else "") + lead
             with notes.status("Drawing the figures ..."):
                 page = write_page(folder, experiments, table, lead, self._again(), self.name)
@@ -114,6 +121,7 @@ class ExperimentCommand:
         """The command that repeats an experiment on any computer, with ``{name}`` in place of its name."""
         words = ["ibvs-qp", "experiment", "NAME", *(["--quick"] if self.quick else [])]
         words += ["--features", self.features] if self.features != "rendered" else []
+        words += ["--world", self.world] if self.world != DEFAULT_WORLD else []
         words += ["--seed", str(self.seed)] if self.seed else []
         return shlex.join(words).replace("NAME", "{name}")
 

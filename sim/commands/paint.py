@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from sim.commands.exit_codes import EXIT_INTERRUPTED
 from sim.commands.options import (
+    SceneWorld,
     check_mujoco,
     check_readable,
     check_seed,
@@ -38,6 +39,7 @@ class Paint:
 
     scene: Annotated[Path | None, optional("FILE")] = None
     """Scene file (TOML); default: the built-in scene, a C of two rows."""
+    world: SceneWorld = None
     preset: Annotated[Path | None, optional("FILE")] = None
     """Controller preset (TOML): vehicle model, gains, weights, limits; default: the built-in one."""
     features: Literal["rendered", "geometric"] = "rendered"
@@ -74,12 +76,15 @@ class Paint:
         from sim.flight.viewer import check_display
         from sim.report.rundir import RunFolder
         from sim.world.scene import Scene, load_scene
+        from sim.world.worlds import DEFAULT_WORLD, in_world, world_name
 
         started = time.perf_counter()
         check_seed(self.seed)
         for option, file in (("--scene", self.scene), ("--preset", self.preset)):
             check_readable(option, file)
-        scene = load_scene(self.scene) if self.scene else Scene()
+        scene = load_scene(self.scene) if self.scene else in_world(Scene(), self.world or DEFAULT_WORLD)
+        if self.world is not None:
+            scene = in_world(scene, self.world)
         if self.view:
             check_display()
         size = _SIZES[self.image_size] if self.image_size else None
@@ -111,6 +116,7 @@ class Paint:
             "command": command_line(words),
             "seed": self.seed,
             "scene": str(self.scene) if self.scene else "default",
+            "world": self.world or world_name(scene.errors),
             "preset": str(self.preset) if self.preset else None,
             "camera": camera,
             "image_size": list(size or (scene.camera.width, scene.camera.height)),

@@ -16,6 +16,7 @@ from sim.flight.options import FlightOptions, default_preset, pilot_config
 from sim.sweep.design import FlightPlan, Parameter, Run
 from sim.sweep.setup import Setup, changed
 from sim.world.scene import Scene
+from sim.world.worlds import DEFAULT_WORLD, in_world
 
 #: Start, approach, alignment, touch and retreat of a flight that starts near the wall [s]; sizes plan and bar only.
 AROUND_S = 9.0
@@ -32,6 +33,7 @@ class Choice:
     quick: bool = False  # a few cells and seeds, for minutes instead of the record
     seed: int = 0  # first seed
     features: str = "rendered"  # "rendered" or "geometric"
+    world: str = DEFAULT_WORLD  # errors of vehicle and sensors
 
 
 def chosen(name: str) -> list[Experiment]:
@@ -59,7 +61,7 @@ def _cell(experiment: Experiment, flights: Flights, level: dict[str, Parameter],
     """Flights of one cell under every law, with the same seeds."""
     variant = str(level.get("variant", "standard"))
     for law in flights.laws or VARIANTS[variant].laws:
-        setup = _setup(experiment, flights, level, law, variant)
+        setup = _setup(experiment, flights, level, law, variant, in_world(Scene(), choice.world))
         for index in range(flights.seeds):
             options = FlightOptions(
                 law=law,
@@ -82,8 +84,10 @@ def _cell(experiment: Experiment, flights: Flights, level: dict[str, Parameter],
             )
 
 
-def _setup(experiment: Experiment, flights: Flights, level: Mapping[str, Parameter], law: str, variant: str) -> Setup:
-    """Scene, pilot and job of a cell under a law."""
+def _setup(
+    experiment: Experiment, flights: Flights, level: Mapping[str, Parameter], law: str, variant: str, scene: Scene
+) -> Setup:
+    """Scene, pilot and job of a cell under a law, from a scene with the errors of its world."""
     values: dict[str, Value] = {**experiment.fixed, **flights.fixed}
     for name, value in level.items():
         paths = (*experiment.paths.get(name, ()), *flights.paths.get(name, ()))
@@ -93,7 +97,7 @@ def _setup(experiment: Experiment, flights: Flights, level: Mapping[str, Paramet
     if FORCE_GAIN in level:
         pilot = with_force_gain(pilot, float(level[FORCE_GAIN]))
     job = PaintJob() if flights.measure == "paint" else PressJob()
-    return changed(Setup(scene=Scene(), pilot=pilot, job=job), values)
+    return changed(Setup(scene=scene, pilot=pilot, job=job), values)
 
 
 def _faults(flights: Flights, level: Mapping[str, Parameter]) -> tuple[Fault, ...]:

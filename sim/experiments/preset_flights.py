@@ -14,6 +14,7 @@ from sim.flight.jobs import PaintJob
 from sim.flight.options import FlightOptions, pilot_config
 from sim.sweep.design import FlightPlan, Measure, Run
 from sim.world.scene import Scene
+from sim.world.worlds import DEFAULT_WORLD, in_world
 
 #: Stroke of the quick job [m].
 QUICK_STROKE_M = 0.4
@@ -57,7 +58,15 @@ def paint_runs(
     ]
 
 
-def preset_runs(name: str, preset: Path, law: str, seeds: Iterable[int], features: str, quick: bool) -> list[Run]:
+def preset_runs(
+    name: str,
+    preset: Path,
+    law: str,
+    seeds: Iterable[int],
+    features: str,
+    quick: bool,
+    world: str = DEFAULT_WORLD,
+) -> list[Run]:
     """Paint jobs under a preset file.
 
     Args:
@@ -67,12 +76,13 @@ def preset_runs(name: str, preset: Path, law: str, seeds: Iterable[int], feature
         seeds: Seeds to fly.
         features: "rendered" or "geometric".
         quick: Short strokes.
+        world: Errors of vehicle and sensors.
 
     Raises:
-        ConfigError: When the preset is refused.
+        ConfigError: When the preset or the world is refused.
     """
     pilot = PilotConfig.from_toml(preset)
-    scene = short_job(QUICK_STROKE_M) if quick else near_wall()
+    scene = in_world(short_job(QUICK_STROKE_M) if quick else near_wall(), world)
     pilot = pilot if law == "own" else dataclasses.replace(pilot, law=law)
     params = {"stroke_m": scene.paint.stroke_m}
     return paint_runs(scene, pilot, seeds, features, experiment="paint", variant=name, params=params)

@@ -25,7 +25,7 @@ SCHEMA = 1
 PARTS = "parts"
 PAGE = "results.md"
 #: Facts of a run that the summary repeats.
-_FACTS = ("command", "version", "seed", "features", "interrupted", "wall_time_s")
+_FACTS = ("command", "version", "seed", "features", "world", "interrupted", "wall_time_s")
 
 
 def data_file(folder: Path, name: str) -> Path:
@@ -43,7 +43,7 @@ def summary(
         experiments: The flown experiments.
         table: Their rows.
         folder: Folder of the data file.
-        facts: quick, seed, features, version, command, interrupted, wall_time_s.
+        facts: quick, seed, features, world, version, command, interrupted, wall_time_s.
     """
     of_all = {column.metric for each in experiments for column in each.columns if column.of_all}
     listed = cells(table, of_all) if table.height else []

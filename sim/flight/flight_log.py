@@ -9,6 +9,7 @@ import numpy as np
 
 from sim.flight.trace import Event, Trace
 from sim.world.scene import load_scene
+from sim.world.worlds import world_name
 
 
 def save_log(file: Path, traces: dict[str, Trace]) -> None:
@@ -25,7 +26,7 @@ def save_log(file: Path, traces: dict[str, Trace]) -> None:
             arrays["coverage_percent"] = np.round(100 * trace.coverage_mask).astype(np.uint8)
             arrays["canvas_px_per_m"] = np.array(trace.canvas_px_per_m)
         arrays["outcome_of_flight"] = np.array([str(trace.completed), trace.reason], dtype=str)
-        arrays["preset"] = np.array(trace.preset)
+        arrays["preset"], arrays["world"] = np.array(trace.preset), np.array(world_name(trace.scene.errors))
         arrays["seed"], arrays["wall_time_s"] = np.array(trace.seed), np.array(trace.wall_time_s)
         content.update({f"{law}/{name}": values for name, values in arrays.items()})
     np.savez_compressed(file, **content)
@@ -49,6 +50,7 @@ def load_run(path: str | Path) -> dict[str, Trace]:
             completed, reason = arrays.pop("outcome_of_flight")
             event_t, event_text = arrays.pop("event_t"), arrays.pop("event_text").reshape(-1, 2)
             coverage = arrays.pop("coverage_percent", None)
+            arrays.pop("world", None)  # the scene holds the errors themselves
             traces[law] = Trace(
                 scene=scene,
                 seed=int(arrays.pop("seed")),

@@ -11,9 +11,10 @@ from ibvs_qp.pilot import PilotConfig
 from sim.flight.options import FlightOptions
 from sim.flight.viewer import FlightViewer
 from sim.sensors.cameras import CameraStream, open_camera
+from sim.sensors.cameras.timing import delivery_errors
 from sim.sensors.features import GeometricFeatures
-from sim.sensors.imu_ft import SensorSuite
 from sim.sensors.miscalibration import Miscalibration
+from sim.sensors.suite import SensorSuite
 from sim.world.board import BoardGeometry
 from sim.world.canvas import Canvas
 from sim.world.plant import Plant
@@ -44,7 +45,8 @@ class World:
         self._miscalibration = Miscalibration(scene.camera, vehicle, self._rendered)
         if self._rendered:
             camera = open_camera(options.camera, scene, vehicle, self.canvas, options.seed)
-            self.stream = CameraStream(camera, scene.camera.rate_hz, scene.camera.latency_s)
+            late = delivery_errors(scene.errors.timing, options.seed)
+            self.stream = CameraStream(camera, scene.camera.rate_hz, scene.camera.latency_s, errors=late)
         else:
             self._features = GeometricFeatures(scene, vehicle, self.canvas, options.seed)
         self._seen_from = tuple(self.plant.truth[place] for place in _SEEN_FROM)  # views

@@ -41,7 +41,8 @@ def write_report(
     """
     laws: dict[str, dict[str, Any]] = summary["laws"]
     lead = (
-        f"Scene <b>{escape(summary['scene'])}</b>, seed {summary['seed']}, {escape(summary['features'])} features, "
+        f"Scene <b>{escape(summary['scene'])}</b>, world <b>{escape(summary['world'])}</b>, seed {summary['seed']}, "
+        f"{escape(summary['features'])} features, "
         f"camera {escape(summary['camera'])} {summary['image_size'][0]}×{summary['image_size'][1]}, "
         f"{summary['wall_time_s']:.0f} s on this computer."
     )

@@ -138,7 +138,7 @@ def summary(
     """Content of summary.json.
 
     Args:
-        facts: command, seed, scene, preset, camera, image_size, features, vision.
+        facts: command, seed, scene, world, preset, camera, image_size, features, vision.
         folder: The run folder.
         metrics: M of every law flown.
         interrupted: Whether Ctrl-C ended the run.
@@ -149,7 +149,7 @@ def summary(
         "schema": SCHEMA,
         "command": facts["command"],
         "version": version("ibvs-qp"),
-        **{key: facts[key] for key in ("seed", "scene", "preset")},
+        **{key: facts[key] for key in ("seed", "scene", "world", "preset")},
         "run_dir": str(folder.path),
         **{key: facts[key] for key in ("camera", "image_size", "features", "vision")},
         "interrupted": interrupted,

@@ -15,6 +15,7 @@ from ibvs_qp.measurement import HORIZONTAL, VERTICAL, FeatureFrame
 from ibvs_qp.model.bound_function import BoundFunction
 from sim.sensors.cameras.arm import vehicle_mask
 from sim.sensors.cameras.protocol import Schedule, camera_intrinsics
+from sim.sensors.cameras.timing import delivery_errors
 from sim.sensors.edge_view import (
     BOARD_EDGES,
     BOARD_VIEW,
@@ -81,7 +82,8 @@ class GeometricFeatures:
         self.intrinsics = camera_intrinsics(scene.camera)
         own, extra = np.random.SeedSequence([seed, 0xFEA7]).spawn(2)
         self._normals, self._extra = Normals(np.random.default_rng(own)), np.random.default_rng(extra)
-        self._schedule: Schedule[FeatureFrame] = Schedule(scene.camera.rate_hz, scene.camera.latency_s)
+        late = delivery_errors(scene.errors.timing, seed)
+        self._schedule: Schedule[FeatureFrame] = Schedule(scene.camera.rate_hz, scene.camera.latency_s, late)
         self._bind()
         hidden = vehicle_mask(scene, vehicle, self.intrinsics)
         self._pieces = PaintedPieces(self._edges, self._board, self.intrinsics, hidden)
@@ -118,7 +120,8 @@ class GeometricFeatures:
             velocity_body: True velocity of the centre of mass in B [m/s], (3,).
         """
         if self._schedule.due(now_ns):
-            self._schedule.push(now_ns, self.capture(position_ned, quaternion_b_in_i, velocity_body, now_ns))
+            stamp_ns = self._schedule.stamp(now_ns)
+            self._schedule.push(now_ns, self.capture(position_ned, quaternion_b_in_i, velocity_body, stamp_ns))
         return self._schedule.pop(now_ns)
 
     def capture(

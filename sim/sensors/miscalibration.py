@@ -10,7 +10,7 @@ from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import rotation_from_quaternion
 from ibvs_qp.measurement import RgbdFrame
-from sim.sensors.imu_ft import multiply, small_turn
+from sim.sensors.small_turns import multiply, small_turn
 from sim.world.scene import CameraScene
 
 

@@ -44,6 +44,7 @@ class AttitudeErrors(_Checked):
 class GyroErrors(_Checked):
     """Angular velocity."""
 
+    density: float = _size("white noise density beyond the scene's", "rad/s/sqrt(Hz)", 0.1)
     bias_rad_s: float = _size("constant bias in a random direction", "rad/s", 0.5)
     instability_rad_s: float = _size("wandering bias, standard deviation per axis", "rad/s", 0.5)
     vibration_rad_s: float = _size("vibration at the rotors' frequencies per axis, rms", "rad/s", 5.0)
@@ -53,6 +54,7 @@ class GyroErrors(_Checked):
 class AccelerometerErrors(_Checked):
     """Specific force."""
 
+    density: float = _size("white noise density beyond the scene's", "m/s^2/sqrt(Hz)", 1.0)
     bias_m_s2: float = _size("constant bias in a random direction", "m/s^2", 2.0)
     instability_m_s2: float = _size("wandering bias, standard deviation per axis", "m/s^2", 2.0)
     vibration_m_s2: float = _size("vibration at the rotors' frequencies per axis, rms", "m/s^2", 20.0)

@@ -14,11 +14,13 @@ from ibvs_qp.model.bound_function import BoundFunction
 from sim.world.board import BoardGeometry
 from sim.world.clearance import PropellerClearance
 from sim.world.crash import crash_reason
+from sim.world.errors import RotorErrors
 from sim.world.mjcf import STEPS_PER_TICK, build_model
 from sim.world.mujoco_frames import FLIP, FLIP_QUATERNION
 from sim.world.random_streams import stream
 from sim.world.readings import PlantReadings
 from sim.world.readout import PLACES, SIZE, drive, readout
+from sim.world.rotor_errors import ThrustFactors
 from sim.world.scene import Scene
 from sim.world.trim import hover_thrusts, start_pose, true_limits
 from sim.world.wind import Wind
@@ -47,7 +49,7 @@ class Plant(PlantReadings):
     Args:
         scene: The truth.
         vehicle: Geometry and nominal parameters.
-        seed: Varies start pose and gusts.
+        seed: Varies start pose, gusts and rotors.
         drawn: Whether the model holds the geometry that a window shows; the motion is the same to the bit.
     """
 
@@ -65,6 +67,8 @@ class Plant(PlantReadings):
         self.clearance = PropellerClearance(BoardGeometry(scene), self.vehicle)
         drag = self.vehicle.linear_drag_n_s_m
         self.wind = Wind(scene.wind, drag, TICK_NS * 1e-9, stream(seed, "wind"))
+        rotors, count = scene.errors.rotors, self.vehicle.geometry.count
+        self._factors = ThrustFactors(rotors, count, TICK_NS * 1e-9, seed) if rotors != RotorErrors() else None
         self.time_ns = 0
         self.crashed: str | None = None
         self._bind()
@@ -114,7 +118,7 @@ class Plant(PlantReadings):
         if self.crashed == NOT_FINITE or not math.isfinite(sum(thrusts.tolist())):
             self.crashed, self.time_ns = self.crashed or NOT_FINITE, self.time_ns + TICK_NS
             return
-        self._wanted[:] = thrusts
+        self._wanted[:] = thrusts if self._factors is None else thrusts * self._factors.next()
         self._air[:] = self.wind.force(self._centre_velocity.tolist())
         self._drive()
         self._lag[:] = self._lags

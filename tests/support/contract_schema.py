@@ -39,6 +39,7 @@ def check_summary(summary: dict[str, Any], laws: set[str]) -> None:
         "version": str,
         "seed": int,
         "scene": str,
+        "world": str,
         "preset": (str, type(None)),
         "run_dir": str,
         "camera": str,

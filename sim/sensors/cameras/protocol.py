@@ -9,6 +9,7 @@ from typing import Generic, Protocol, TypeVar
 import numpy as np
 
 from ibvs_qp.measurement import RgbdFrame
+from sim.sensors.cameras.timing import DeliveryErrors
 from sim.world.scene import CameraScene
 
 NS_PER_S = 1_000_000_000
@@ -48,9 +49,11 @@ class Schedule(Generic[Item]):
     Args:
         rate_hz: Captures per second.
         latency_s: Capture to delivery [s].
+        errors: Later deliveries and wrong stamps, or None.
     """
 
-    def __init__(self, rate_hz: float, latency_s: float) -> None:
+    def __init__(self, rate_hz: float, latency_s: float, errors: DeliveryErrors | None = None) -> None:
+        self._errors = errors
         self._rate_hz, self._latency_ns = rate_hz, round(latency_s * NS_PER_S)
         self._start_ns: int | None = None
         self._next_ns = -1
@@ -71,9 +74,14 @@ class Schedule(Generic[Item]):
         """Whether neither a capture nor a delivery is due now; counts nothing."""
         return now_ns < self._next_ns and not (self._queue and self._queue[0][0] <= now_ns)
 
-    def push(self, stamp_ns: int, item: Item) -> None:
-        """Queue an item captured at ``stamp_ns``."""
-        self._queue.append((stamp_ns + self._latency_ns, item))
+    def stamp(self, captured_ns: int) -> int:
+        """Stamp that an item captured at ``captured_ns`` carries; call it once per item."""
+        return captured_ns if self._errors is None else self._errors.stamp_ns(captured_ns)
+
+    def push(self, captured_ns: int, item: Item) -> None:
+        """Queue an item captured at ``captured_ns``; items arrive in their order."""
+        delay_ns = 0 if self._errors is None else self._errors.delay_ns()
+        self._queue.append((captured_ns + self._latency_ns + delay_ns, item))
 
     def pop(self, now_ns: int) -> Item | None:
         """The newest item that has arrived since the last call, or None."""

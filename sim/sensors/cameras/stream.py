@@ -2,24 +2,28 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 
 from ibvs_qp.measurement import RgbdFrame
 from sim.sensors.cameras.protocol import Camera, Schedule
+from sim.sensors.cameras.timing import DeliveryErrors
 
 
 class CameraStream:
-    """Pictures at a fixed rate with a fixed latency; stamps give the time of capture.
+    """Pictures at a fixed rate with a fixed latency; stamps give the time of capture, but for their errors.
 
     Args:
         camera: The back end; it draws at the time of capture.
         rate_hz: Frame rate [Hz].
         latency_s: Capture to delivery [s].
+        errors: Later deliveries and wrong stamps, or None.
     """
 
-    def __init__(self, camera: Camera, rate_hz: float, latency_s: float) -> None:
+    def __init__(self, camera: Camera, rate_hz: float, latency_s: float, errors: DeliveryErrors | None = None) -> None:
         self.camera = camera
-        self._schedule: Schedule[RgbdFrame] = Schedule(rate_hz, latency_s)
+        self._schedule: Schedule[RgbdFrame] = Schedule(rate_hz, latency_s, errors)
 
     def tick(self, now_ns: int, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray) -> RgbdFrame | None:
         """Advance to ``now_ns``: capture if due, and return the newest picture that has just become due.
@@ -30,5 +34,7 @@ class CameraStream:
             quaternion_b_in_i: Attitude (w, x, y, z), (4,).
         """
         if self._schedule.due(now_ns):
-            self._schedule.push(now_ns, self.camera.capture(position_ned, quaternion_b_in_i, now_ns))
+            picture = self.camera.capture(position_ned, quaternion_b_in_i, now_ns)
+            stamped = dataclasses.replace(picture, stamp_ns=self._schedule.stamp(now_ns))
+            self._schedule.push(now_ns, stamped)
         return self._schedule.pop(now_ns)

@@ -21,6 +21,7 @@ FACTS = {
     "command": "ibvs-qp paint --scene 'a<b>.toml'",
     "seed": 0,
     "scene": "a<b>.toml",
+    "world": "ideal",
     "preset": None,
     "camera": "plane",
     "image_size": [640, 480],

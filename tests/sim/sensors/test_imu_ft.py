@@ -8,7 +8,8 @@ import pytest
 
 from ibvs_qp.frames import GRAVITY, roll_pitch, rotation_from_quaternion
 from ibvs_qp.measurement import SensorFrame
-from sim.sensors.imu_ft import SampleClock, SensorSuite
+from sim.sensors.sample_clock import SampleClock
+from sim.sensors.suite import SensorSuite
 from sim.world.plant import TICK_NS, Plant
 from sim.world.scene import ForceTorqueScene, ImuScene, Scene
 
