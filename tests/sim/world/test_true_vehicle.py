@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import tomllib
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -22,10 +23,11 @@ from sim.flight.options import FlightOptions, pilot_config
 from sim.flight.surroundings import World
 from sim.world.mujoco_frames import FLIP
 from sim.world.plant import Plant
-from sim.world.plant_scene import PlantScene
+from sim.world.plant_scene import PlantScene, Vector
 from sim.world.scene import Scene, StartScene
 from sim.world.true_vehicle import true_vehicle
 
+ROOT = Path(__file__).parents[3]
 BELIEVED = VehicleParams()
 AWAY = np.array([-2.0, 1.0, -1.5])
 TILT = math.radians(26.0)
@@ -101,15 +103,30 @@ def test_thrust_gain_and_drag_act_on_the_plant() -> None:
     np.testing.assert_allclose(plant.wind.force(velocity.tolist()), [-1.8, 0.0, 0.0])
 
 
-def test_a_turned_and_moved_force_torque_sensor_reads_in_its_own_axes() -> None:
-    weight = 0.35 * GRAVITY  # held by the vehicle, so the tool feels it upwards: -z
-    turned = Plant(Scene(plant=PlantScene(force_torque_turn_deg=(30.0, 0.0, 0.0)))).ft_wrench
-    # Rolled to the right, the sensor's y points right and down, so that up is minus sin 30 deg along it.
-    np.testing.assert_allclose(turned[:3], [0.0, -0.5 * weight, -math.cos(math.pi / 6.0) * weight], atol=1e-6)
-    lever = 0.25 * weight
-    np.testing.assert_allclose(turned[3:], [0.0, math.cos(math.pi / 6.0) * lever, -0.5 * lever], atol=1e-6)
-    moved = Plant(Scene(plant=PlantScene(force_torque_position_m=(0.30, 0.0, 0.0)))).ft_wrench
-    np.testing.assert_allclose(moved, [0.0, 0.0, -weight, 0.0, 0.20 * weight, 0.0], atol=1e-6)
+WEIGHT = 0.35 * GRAVITY  # of the tool; the vehicle holds it: force upwards, -z, and moment about the right axis, +y
+LEVER, SINE, COSINE = 0.25 * WEIGHT, 0.5, math.sqrt(0.75)
+
+
+@pytest.mark.parametrize(
+    ("turn", "expected"),
+    [
+        # y of the sensor points right and down.
+        ((30.0, 0.0, 0.0), [0.0, -SINE * WEIGHT, -COSINE * WEIGHT, 0.0, COSINE * LEVER, -SINE * LEVER]),
+        # x points forward and up.
+        ((0.0, 30.0, 0.0), [SINE * WEIGHT, 0.0, -COSINE * WEIGHT, 0.0, LEVER, 0.0]),
+        # x points forward and right.
+        ((0.0, 0.0, 30.0), [0.0, 0.0, -WEIGHT, SINE * LEVER, COSINE * LEVER, 0.0]),
+    ],
+    ids=["rolled right", "pitched up", "yawed right"],
+)
+def test_a_turned_force_torque_sensor_reads_in_its_own_axes(turn: Vector, expected: list[float]) -> None:
+    plant = Plant(Scene(plant=PlantScene(force_torque_turn_deg=turn)))
+    np.testing.assert_allclose(plant.ft_wrench, expected, atol=1e-6)
+
+
+def test_a_moved_force_torque_sensor_has_another_lever() -> None:
+    plant = Plant(Scene(plant=PlantScene(force_torque_position_m=(0.30, 0.0, 0.0))))
+    np.testing.assert_allclose(plant.ft_wrench, [0.0, 0.0, -WEIGHT, 0.0, 0.20 * WEIGHT, 0.0], atol=1e-6)
 
 
 def first_frame(plant: PlantScene) -> dict[int, LineFeature]:
@@ -151,7 +168,7 @@ def test_a_raised_camera_sees_things_lower() -> None:
 
 
 def test_without_a_plant_section_the_believed_vehicle_flies() -> None:
-    octorotor = PilotConfig.from_toml("ibvs_qp/presets/octorotor_qp.toml").controller.vehicle
+    octorotor = PilotConfig.from_toml(ROOT / "ibvs_qp" / "presets" / "octorotor_qp.toml").controller.vehicle
     for believed in (BELIEVED, octorotor, dataclasses.replace(BELIEVED, mass_kg=7.0, tip_position_m=(0.8, 0.0, 0.1))):
         for seed in (0, 5):
             true = true_vehicle(Scene(), believed, seed)
@@ -191,3 +208,13 @@ def test_a_plant_survives_its_toml() -> None:
 def test_wrong_entries_are_refused_by_name(plant: dict[str, object], named: str) -> None:
     with pytest.raises(ConfigError, match=named):
         Plant(from_dict(Scene, {"plant": plant}))
+
+
+def test_the_plant_of_the_documentation_flies() -> None:
+    page = (ROOT / "docs" / "plant.md").read_text(encoding="utf-8")
+    table = tomllib.loads(page.split("```toml")[1].split("```")[0])
+    plant = Plant(from_dict(Scene, table))
+    hover = plant.thrusts_actual / np.array(table["plant"]["thrust_gain"])
+    for _ in range(100):
+        plant.step(hover)
+    assert np.abs(plant.velocity).max() < 1e-5 and plant.crashed is None
