@@ -8,6 +8,7 @@ import pytest
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import rotation_from_quaternion
+from ibvs_qp.measurement import RgbdFrame
 from sim.evaluate.measures.loss import loss_figures
 from sim.experiments.scenes import near_wall
 from sim.flight.closed_loop import fly, make_pilot
@@ -103,6 +104,24 @@ def test_a_turned_camera_stands_where_it_stood_and_looks_elsewhere():
     assert moved + seen @ camera == pytest.approx(position + nominal @ (camera + np.array([0.0, 0.01, 0.0])))
     axis = nominal.T @ seen
     assert np.degrees(np.arccos((np.trace(axis) - 1.0) / 2.0)) == pytest.approx(2.0, rel=1e-3)
+
+
+def test_a_camera_turned_right_reports_forward_motion_as_partly_to_the_left():
+    true = true_vehicle(Scene(plant=PlantScene(camera_turn_deg=(0.0, 0.0, 2.0))), VehicleParams())
+    seen = CameraMount(true, VehicleParams()).velocity(np.array([1.0, 0.0, 0.0]))
+    assert seen == pytest.approx([np.cos(np.radians(2.0)), -np.sin(np.radians(2.0)), 0.0])
+
+
+def test_a_focal_ratio_changes_the_reported_focal_lengths_alone():
+    frame = RgbdFrame(
+        rgb=np.zeros((2, 2, 3), np.uint8),
+        depth=np.ones((2, 2), np.float32),
+        intrinsics=(600.0, 610.0, 1.0, 1.0),
+        stamp_ns=0,
+    )
+    mount = CameraMount(true_vehicle(Scene(plant=PlantScene(focal_ratio=1.03)), VehicleParams()), VehicleParams())
+    assert mount.picture(frame).intrinsics == pytest.approx((618.0, 628.3, 1.0, 1.0))
+    assert CameraMount(true_vehicle(Scene(), VehicleParams()), VehicleParams()).picture(frame) is frame
 
 
 def test_no_error_changes_nothing_to_the_bit():
