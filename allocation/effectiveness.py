@@ -10,8 +10,8 @@ from allocation.geometry import RotorGeometry
 def control_effectiveness(geometry: RotorGeometry) -> np.ndarray:
     r"""Wrench of unit thrust of every rotor, at the centre of mass in the body frame (FRD).
 
-    Column i is :math:`[t_i;\; p_i \times t_i - s_i K_M t_i]` with hub position p, thrust axis t, spin s
-    (+1 counter-clockwise) and drag-torque ratio K_M, the convention of PX4's rotor effectiveness.
+    Column i is :math:`[t_i;\; p_i \times t_i - s_i K_{M,i} t_i]` with hub position p, thrust axis t, spin s
+    (+1 counter-clockwise) and drag-torque ratio K_M of the rotor, the convention of PX4's rotor effectiveness.
 
     Args:
         geometry: The rotors.
@@ -20,7 +20,7 @@ def control_effectiveness(geometry: RotorGeometry) -> np.ndarray:
         Matrix B of shape (6, n): force rows [-], moment rows [m].
     """
     axes, positions = geometry.axes, geometry.positions
-    moments = np.cross(positions, axes) - (geometry.spins * geometry.torque_ratio_m)[:, None] * axes
+    moments = np.cross(positions, axes) - (geometry.spins * geometry.torque_ratios)[:, None] * axes
     return np.vstack((axes.T, moments.T))
 
 

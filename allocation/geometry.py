@@ -3,29 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-
-@dataclass(frozen=True, kw_only=True)
-class Rotor:
-    """One fixed rotor.
-
-    Attributes:
-        name: Readable name, unique in its geometry.
-        azimuth_deg: Angle of the rotor arm from body +x towards the right (+y), seen from above [deg].
-        spin: +1 if the propeller turns counter-clockwise seen from above, -1 if clockwise.
-    """
-
-    name: str
-    azimuth_deg: float
-    spin: int
+from allocation.rotor import Rotor, unit
 
 
 @dataclass(frozen=True, kw_only=True)
 class RotorGeometry:
-    """Rotors on a circle, each tilted sideways about its own arm (body frame FRD).
+    """Rotors on a circle, each tilted sideways about its own arm (body frame FRD), unless a rotor states its own place.
 
     The thrust axis of a rotor at azimuth ``a`` with spin ``s`` and tilt ``t`` is
     ``(-s sin t sin a, s sin t cos a, -cos t)``: spin and tilt have the same sign, so the drag torque adds to
@@ -40,16 +29,17 @@ class RotorGeometry:
     """
 
     rotors: tuple[Rotor, ...]
-    circle_radius_m: float
-    tilt_deg: float
+    circle_radius_m: float = 0.0
+    tilt_deg: float = 0.0
     torque_ratio_m: float
     hub_height_m: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse impossible geometries."""
+        on_circle = any(rotor.position_m is None for rotor in self.rotors)
         checks = (
             (len(self.rotors) >= 1, f"rotors: {len(self.rotors)} given, at least 1 is needed"),
-            (self.circle_radius_m > 0, f"circle_radius_m: {self.circle_radius_m} m, must be > 0 m"),
+            (self.circle_radius_m > 0 or not on_circle, f"circle_radius_m: {self.circle_radius_m} m, must be > 0 m"),
             (abs(self.tilt_deg) < 90, f"tilt_deg: {self.tilt_deg} deg, must lie within (-90, 90) deg"),
             (self.torque_ratio_m >= 0, f"torque_ratio_m: {self.torque_ratio_m} m, must be >= 0 m"),
             (all(r.spin in (-1, 1) for r in self.rotors), "spin: every rotor needs +1 (CCW) or -1 (CW)"),
@@ -74,19 +64,36 @@ class RotorGeometry:
         return np.array([float(rotor.spin) for rotor in self.rotors])
 
     @property
+    def torque_ratios(self) -> np.ndarray:
+        """Drag torque over thrust of every rotor, shape (n,) [m]."""
+        own = (rotor.torque_ratio_m for rotor in self.rotors)
+        return np.array([self.torque_ratio_m if ratio is None else ratio for ratio in own])
+
+    @property
     def positions(self) -> np.ndarray:
         """Hub positions in the body frame, shape (n, 3) [m]."""
-        azimuth = np.radians([rotor.azimuth_deg for rotor in self.rotors])
-        height = np.full(self.count, self.hub_height_m)
-        return np.column_stack((self.circle_radius_m * np.cos(azimuth), self.circle_radius_m * np.sin(azimuth), height))
+        azimuth, height = self._azimuths, np.full(self.count, self.hub_height_m)
+        circle = (self.circle_radius_m * np.cos(azimuth), self.circle_radius_m * np.sin(azimuth), height)
+        return _replaced(np.column_stack(circle), [rotor.position_m for rotor in self.rotors])
 
     @property
     def axes(self) -> np.ndarray:
         """Unit thrust axes in the body frame, shape (n, 3)."""
-        azimuth = np.radians([rotor.azimuth_deg for rotor in self.rotors])
-        tilt, spin = math.radians(self.tilt_deg), self.spins
-        side = math.sin(tilt) * spin
-        return np.column_stack((-side * np.sin(azimuth), side * np.cos(azimuth), np.full(self.count, -math.cos(tilt))))
+        azimuth, tilt = self._azimuths, math.radians(self.tilt_deg)
+        side = math.sin(tilt) * self.spins
+        tilted = (-side * np.sin(azimuth), side * np.cos(azimuth), np.full(self.count, -math.cos(tilt)))
+        return _replaced(np.column_stack(tilted), [rotor.axis and unit(rotor.axis) for rotor in self.rotors])
+
+    @property
+    def _azimuths(self) -> np.ndarray:
+        return np.radians([rotor.azimuth_deg or 0.0 for rotor in self.rotors])
+
+
+def _replaced(rows: np.ndarray, own: Sequence[Any]) -> np.ndarray:
+    for row, vector in zip(rows, own, strict=True):
+        if vector is not None:
+            row[:] = vector
+    return rows
 
 
 CLOCKWISE, COUNTER_CLOCKWISE = -1, 1

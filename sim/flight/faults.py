@@ -38,7 +38,7 @@ class Derate(Fault):
 
     def strike(self, world: World, pilot: Pilot) -> str:
         """Lower the limits of the plant and, if reported, those of the pilot."""
-        plant, vehicle = world.plant, pilot.config.controller.vehicle
+        plant, vehicle = world.plant, world.plant.vehicle
         names = vehicle.geometry.names
         hit = np.array([self.rotor in ("", name) for name in names])
         lower, upper = plant.thrust_limits

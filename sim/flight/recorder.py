@@ -145,6 +145,7 @@ class Recorder:
         vehicle = self._pilot.config.controller.vehicle
         arrays["thrust_min"], arrays["thrust_max"] = vehicle.thrust_min, vehicle.thrust_max
         arrays["true_thrust_min"], arrays["true_thrust_max"] = self._world.plant.thrust_limits
+        arrays["true_mass"] = np.array([self._world.plant.vehicle.mass_kg])
         arrays["vision_ms"] = np.array(self._vision, float)
         arrays["painting_1khz"] = np.repeat(pressed, STEPS_PER_TICK)
         canvas = self._world.canvas

@@ -6,14 +6,15 @@ import dataclasses
 
 import numpy as np
 
+from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.measurement import SensorFrame
 from ibvs_qp.pilot import PilotConfig
 from sim.flight.options import FlightOptions
 from sim.flight.viewer import FlightViewer
+from sim.sensors.camera_mount import CameraMount
 from sim.sensors.cameras import CameraStream, open_camera
 from sim.sensors.cameras.timing import delivery_errors
 from sim.sensors.features import GeometricFeatures
-from sim.sensors.miscalibration import Miscalibration
 from sim.sensors.suite import SensorSuite
 from sim.world.board import BoardGeometry
 from sim.world.canvas import Canvas
@@ -36,19 +37,20 @@ class World:
             width, height = options.image_size
             scene = dataclasses.replace(scene, camera=dataclasses.replace(scene.camera, width=width, height=height))
         self.scene, self.geometry = scene, BoardGeometry(scene)
-        vehicle = config.controller.vehicle
         self._rendered = options.features == "rendered"
         self.stream: CameraStream | None = None
-        self.plant = Plant(scene, vehicle, options.seed, options.view)
-        self.sensors = SensorSuite(scene, vehicle, options.seed)
+        self.plant = Plant(scene, config.controller.vehicle, options.seed, options.view)
+        self.sensors = SensorSuite(scene, self.plant.vehicle, options.seed)
         self.canvas = Canvas(scene, options.seed)
-        self._miscalibration = Miscalibration(scene.camera, vehicle, self._rendered)
+        self._mount = CameraMount(self.plant.vehicle, config.controller.vehicle)
         if self._rendered:
-            camera = open_camera(options.camera, scene, vehicle, self.canvas, options.seed)
+            camera = open_camera(options.camera, scene, self._mount.vehicle, self.canvas, options.seed)
             late = delivery_errors(scene.errors.timing, options.seed)
             self.stream = CameraStream(camera, scene.camera.rate_hz, scene.camera.latency_s, errors=late)
+        elif scene.plant.focal_ratio != 1.0:
+            raise ConfigError("plant.focal_ratio needs pictures; fly it with --features rendered")
         else:
-            self._features = GeometricFeatures(scene, vehicle, self.canvas, options.seed)
+            self._features = GeometricFeatures(scene, self._mount.vehicle, self.canvas, options.seed)
         self._seen_from = tuple(self.plant.truth[place] for place in _SEEN_FROM)  # views
         self.viewer = self._open_viewer() if options.view else None
         self._brush: tuple[float, float] | None = None
@@ -65,15 +67,15 @@ class World:
         """Sensor frame of the present tick."""
         plant = self.plant
         if self.stream is not None:
-            pose = self._miscalibration.pose(plant.position, plant.quaternion)
+            pose = self._mount.pose(plant.position, plant.quaternion)
             image = self.stream.tick(plant.time_ns, *pose)
-            return self.sensors.sample(plant, image=None if image is None else self._miscalibration.picture(image))
+            return self.sensors.sample(plant, image=None if image is None else self._mount.picture(image))
         features, now = self._features, plant.time_ns
         if features.rests(now):
             return self.sensors.sample(plant)
         position, quaternion, velocity = self._seen_from
-        pose = self._miscalibration.pose(position, quaternion)
-        return self.sensors.sample(plant, None, features.tick(now, *pose, velocity))
+        pose = self._mount.pose(position, quaternion)
+        return self.sensors.sample(plant, None, features.tick(now, *pose, self._mount.velocity(velocity)))
 
     def act(self, thrusts: np.ndarray) -> None:
         """Advance one control tick and paint where the brush presses."""

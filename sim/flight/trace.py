@@ -24,6 +24,7 @@ FIELDS = {
     "thrust_max": "(n,) upper limits [N]",
     "true_thrust_min": "(n,) lower limits of the real rotors at the end of the flight [N]",
     "true_thrust_max": "(n,) upper limits of the real rotors at the end of the flight [N]",
+    "true_mass": "(1,) true mass [kg]",
     "push_true": "(N,) true normal contact force, > 0 pressing [N]",
     "push_measured": "(N,) tared, filtered push that the controller used [N]",
     "push_reference": "(N,) commanded push [N], 0 while free",

@@ -153,4 +153,4 @@ def _draw_reach(axes: Axes, flights: dict[str, Trace]) -> None:
 def _rotors(trace: Trace) -> Case:
     """Vehicle with the mass and the thrust limits of a flight."""
     low, high = float(trace.thrust_min[0]), float(trace.thrust_max[0])
-    return vehicle_case(mass_kg=trace.scene.vehicle.mass_kg, thrust_min_n=low, thrust_max_n=high)
+    return vehicle_case(mass_kg=trace.true_mass.item(), thrust_min_n=low, thrust_max_n=high)

@@ -25,7 +25,6 @@ class Knob:
     low: float | None = None  # left end of the slider; None for a switch
     high: float | None = None  # right end
     step: float | None = None  # step; None for logarithmic steps
-    also: str = ""  # a second field with the same value. Rotor limits are set in the controller and in the plant
 
     def stops(self, value: float) -> list[float]:
         """Positions of the slider, including its initial value."""
@@ -59,8 +58,8 @@ GROUPS: dict[str, tuple[Knob, ...]] = {
         Knob("seed", "seed", 0, 9, 1),
     ),
     "Limits": (
-        Knob("full thrust [N]", _VEHICLE + "thrust_max_n", 12.0, 52.56, 0.5, "scene.vehicle.thrust_max_n"),
-        Knob("idle thrust [N]", _VEHICLE + "thrust_min_n", 0.0, 5.0, 0.1, "scene.vehicle.thrust_min_n"),
+        Knob("full thrust [N]", _VEHICLE + "thrust_max_n", 12.0, 52.56, 0.5),
+        Knob("idle thrust [N]", _VEHICLE + "thrust_min_n", 0.0, 5.0, 0.1),
         Knob("thrust rate [N/s]", _VEHICLE + "thrust_rate_n_s", 10.0, 1000.0),
         Knob("tilt barrier", _LIMITS + "tilt_barrier"),
         Knob("tilt bound [°]", _LIMITS + "tilt_deg", 0.1, 10.0),
@@ -110,5 +109,5 @@ def turned(setting: Setting, values: dict[str, Any]) -> Setting:
     Raises:
         ConfigError: When a value, or several together, are refused.
     """
-    paths = {path: value for name, value in values.items() for path in (KNOBS[name].path, KNOBS[name].also) if path}
+    paths = {KNOBS[name].path: value for name, value in values.items()}
     return changed(dataclasses.replace(setting, seed=int(paths.pop("seed", setting.seed))), paths)

@@ -28,10 +28,10 @@ def scenes() -> dict[str, Scene]:
         "hard": changed(
             nominal,
             wall={"friction": 0.6, "stiffness_n_m": 4000.0},
-            vehicle={"mass_kg": 6.5},
+            plant={"mass_kg": 6.5},
             force_torque={"sigma_n": 0.4},
         ),
-        "rough": changed(nominal, features={"sigma_vs": 0.01}, wind={"gust_n_rms": 1.0}, vehicle={"mass_kg": 5.6}),
+        "rough": changed(nominal, features={"sigma_vs": 0.01}, wind={"gust_n_rms": 1.0}, plant={"mass_kg": 5.6}),
     }
 
 

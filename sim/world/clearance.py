@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from allocation.rotor import perpendicular
 from ibvs_qp.config.vehicle import VehicleParams
 from sim.world.board import BoardGeometry
 
@@ -42,8 +43,7 @@ class PropellerClearance:
         self.reach = float(np.linalg.norm(self._positions, axis=1).max()) + self._radius
 
     def _rim(self, position: np.ndarray, axis: np.ndarray) -> np.ndarray:
-        first = np.cross(axis, [1.0, 0.0, 0.0])
-        first /= np.linalg.norm(first)
+        first = perpendicular(axis)
         angle = np.arange(RIM_POINTS)[:, None] * (2.0 * math.pi / RIM_POINTS)
         return position + self._radius * (np.cos(angle) * first + np.sin(angle) * np.cross(axis, first))
 

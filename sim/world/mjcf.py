@@ -1,4 +1,4 @@
-"""The simulated world as MuJoCo model, generated from the vehicle's parameters and the scene's truth.
+"""The simulated world as MuJoCo model, generated from the true vehicle and the scene.
 
 Body frame: origin at the ASSUMED centre of mass, axes front-left-up. The vehicle is one body without its tool, and
 the tool beyond the force/torque sensor is a rigid child, so that the sensor reads exactly the tool's load; together
@@ -16,12 +16,13 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from ibvs_qp.config.vehicle import VehicleParams
+from allocation.rotor import perpendicular
 from ibvs_qp.frames import GRAVITY
 from sim.world.contact import OPTION_XML, pair_xml, set_contact
-from sim.world.mujoco_frames import FLIP, quaternion_of_axes
+from sim.world.mujoco_frames import FLIP, FLIP_QUATERNION, quaternion_of_axes
 from sim.world.rigid_body import RigidBody, bare_body, principal_axes, tool_body
 from sim.world.scene import Scene
+from sim.world.true_vehicle import TrueVehicle, turn_quaternion
 
 #: Radius of the tip's contact sphere [m]; its foremost point is the tip. Small: the contact point stays at the tip.
 TIP_RADIUS_M = 0.005
@@ -59,16 +60,14 @@ def _inertial_xml(body: RigidBody) -> str:
     )
 
 
-def _rotors_xml(vehicle: VehicleParams) -> tuple[str, str, str]:
+def _rotors_xml(vehicle: TrueVehicle) -> tuple[str, str, str]:
     """Rotor sites (z = thrust axis), their actuators (force along z, drag torque against the spin), and their discs."""
     geometry = vehicle.geometry
     sites, actuators, discs = [], [], []
-    for name, position, axis, spin in zip(
-        geometry.names, geometry.positions, geometry.axes, geometry.spins, strict=True
-    ):
+    torques = -geometry.spins * geometry.torque_ratios
+    for name, position, axis, torque in zip(geometry.names, geometry.positions, geometry.axes, torques, strict=True):
         up, place = FLIP * axis, FLIP * position
-        side = np.cross(up, [1.0, 0.0, 0.0])
-        side /= np.linalg.norm(side)
+        side = perpendicular(up)
         quaternion = quaternion_of_axes(np.column_stack((np.cross(side, up), side, up)))
         frame = f'pos="{numbers(place)}" quat="{numbers(quaternion)}"'
         sites.append(f'<site name="{name}" {frame} size="0.01"/>')
@@ -78,7 +77,7 @@ def _rotors_xml(vehicle: VehicleParams) -> tuple[str, str, str]:
         )
         actuators.append(
             f'<general name="{name}" site="{name}" dyntype="filterexact" dynprm="{numbers(vehicle.motor_lag_up_s)}" '
-            f'gainprm="1" gear="0 0 1 0 0 {numbers(-spin * geometry.torque_ratio_m)}"/>'
+            f'gainprm="1" gear="0 0 1 0 0 {numbers(torque)}"/>'
         )
     return "\n".join(sites), "\n".join(actuators), "\n".join(discs)
 
@@ -99,7 +98,7 @@ def _surroundings_xml(scene: Scene) -> str:
       contype="0" conaffinity="0"/>"""
 
 
-def build_xml(scene: Scene, vehicle: VehicleParams, drawn: bool = True) -> str:
+def build_xml(scene: Scene, vehicle: TrueVehicle, drawn: bool = True) -> str:
     """MJCF text of the world; contact numbers follow after compilation, see `build_model`.
 
     The contact plane is infinite: a box would push the tip out sideways near its rim and bound the penetration.
@@ -107,6 +106,7 @@ def build_xml(scene: Scene, vehicle: VehicleParams, drawn: bool = True) -> str:
     sites, actuators, discs = _rotors_xml(vehicle)
     tip, sensor = FLIP * vehicle.tip_position_m, FLIP * vehicle.force_torque_position_m
     sphere = tip - np.array([TIP_RADIUS_M, 0.0, 0.0])
+    turn = FLIP_QUATERNION * turn_quaternion(vehicle.force_torque_turn_deg)
     ends, radius = numbers(sensor, sphere), numbers(vehicle.arm_radius_m)
     shape = f'name="arm" type="capsule" fromto="{ends}" size="{radius}"'
     arm = f'<geom {shape} contype="0" conaffinity="0" rgba=".1 .1 .1 1"/>'
@@ -121,13 +121,13 @@ def build_xml(scene: Scene, vehicle: VehicleParams, drawn: bool = True) -> str:
     {surroundings}
     <body name="vehicle">
       <freejoint/>
-      {_inertial_xml(bare_body(scene, vehicle))}
+      {_inertial_xml(bare_body(vehicle))}
       <site name="imu"/>
       {sites}
       {discs}
       <body name="tool">
         {_inertial_xml(tool_body(vehicle))}
-        <site name="force_torque" pos="{numbers(sensor)}"/>
+        <site name="force_torque" pos="{numbers(sensor)}" quat="{numbers(turn)}"/>
         {arm}
         <geom name="tip" type="sphere" pos="{numbers(sphere)}" size="{numbers(TIP_RADIUS_M)}" contype="0"
           conaffinity="0"/>
@@ -146,21 +146,21 @@ def build_xml(scene: Scene, vehicle: VehicleParams, drawn: bool = True) -> str:
 </mujoco>"""
 
 
-def build_model(scene: Scene, vehicle: VehicleParams, drawn: bool = True) -> tuple[mujoco.MjModel, ModelIds]:
+def build_model(scene: Scene, vehicle: TrueVehicle, drawn: bool = True) -> tuple[mujoco.MjModel, ModelIds]:
     """Compile the world.
 
     Args:
-        scene: The truth.
-        vehicle: Geometry and nominal parameters.
+        scene: Board and wall.
+        vehicle: The vehicle that flies.
         drawn: Whether to add geometry for display only; the motion is the same to the bit without it.
 
     Raises:
-        ConfigError: When the tool alone exceeds the scene's mass or inertia.
+        ConfigError: When the tool alone exceeds the vehicle's inertia.
     """
     model = mujoco.MjModel.from_xml_string(build_xml(scene, vehicle, drawn))
     body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "vehicle")
-    # The compiler evens out moments that break the triangle inequality; the scene's numbers are meant literally.
-    model.body_inertia[body] = principal_axes(bare_body(scene, vehicle))[0]
+    # The compiler evens out moments that break the triangle inequality; the plant's numbers are meant literally.
+    model.body_inertia[body] = principal_axes(bare_body(vehicle))[0]
     mujoco.mj_setConst(model, mujoco.MjData(model))
     wall = scene.wall
     set_contact(model, stiffness=wall.stiffness_n_m, damping=wall.damping_n_s_m, friction=wall.friction)

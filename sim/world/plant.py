@@ -22,7 +22,8 @@ from sim.world.readings import PlantReadings
 from sim.world.readout import PLACES, SIZE, drive, readout
 from sim.world.rotor_errors import ThrustFactors
 from sim.world.scene import Scene
-from sim.world.trim import hover_thrusts, start_pose, true_limits
+from sim.world.trim import hover_thrusts, start_pose
+from sim.world.true_vehicle import true_vehicle
 from sim.world.wind import Wind
 
 #: The control tick in nanoseconds.
@@ -37,7 +38,7 @@ class Plant(PlantReadings):
     """The simulated vehicle in its scene.
 
     The body frame has its origin at the ASSUMED centre of mass (positions of `VehicleParams`); the true one lies
-    ``scene.vehicle.com_offset_m`` away. Starts level and at rest with the rotors at hover, at the scene's start pose
+    ``com_offset_m`` of `TrueVehicle` away. Starts level and at rest with the rotors at hover, at the scene's start pose
     varied by the seed. Same scene, seed and thrusts: same bits.
 
     Attributes:
@@ -48,8 +49,8 @@ class Plant(PlantReadings):
 
     Args:
         scene: The truth.
-        vehicle: Geometry and nominal parameters.
-        seed: Varies start pose, gusts and rotors.
+        vehicle: What the controller believes; the scene's section ``plant`` and its errors make the true one of it.
+        seed: Varies start pose, gusts and errors.
         drawn: Whether the model holds the geometry that a window shows; the motion is the same to the bit.
     """
 
@@ -60,10 +61,10 @@ class Plant(PlantReadings):
         seed: int = 0,
         drawn: bool = True,
     ) -> None:
-        self.scene, self.vehicle = scene, vehicle or VehicleParams()
+        self.scene, self.vehicle = scene, true_vehicle(scene, vehicle or VehicleParams(), seed)
         self.model, self._ids = build_model(scene, self.vehicle, drawn)
         self.data = mujoco.MjData(self.model)
-        self._lower, self._upper = true_limits(scene, self.vehicle)
+        self._lower, self._upper = self.vehicle.thrust_min, self.vehicle.thrust_max
         self.clearance = PropellerClearance(BoardGeometry(scene), self.vehicle)
         drag = self.vehicle.linear_drag_n_s_m
         self.wind = Wind(scene.wind, drag, TICK_NS * 1e-9, stream(seed, "wind"))
@@ -72,14 +73,14 @@ class Plant(PlantReadings):
         self.time_ns = 0
         self.crashed: str | None = None
         self._bind()
-        self._start(*start_pose(scene, self.vehicle, seed), hover_thrusts(scene, self.vehicle))
+        self._start(*start_pose(scene, self.vehicle, seed), hover_thrusts(self.vehicle))
 
     def _bind(self) -> None:
         """Bind the CasADi functions to MuJoCo's arrays: fetching those at every tick costs more than reading them."""
-        model, data, ids, truth = self.model, self.data, self._ids, self.scene.vehicle
+        model, data, ids, truth = self.model, self.data, self._ids, self.vehicle
         self._act = data.act
         centre = np.array(truth.com_offset_m)
-        points = np.concatenate((centre, self.vehicle.tip_position_m, [self.clearance.reach]))
+        points = np.concatenate((centre, truth.tip_position_m, [self.clearance.reach]))
         self.truth = np.zeros(SIZE)
         self._centre_velocity = self.truth[PLACES["centre_velocity"]]
         self._read = BoundFunction(
@@ -88,6 +89,7 @@ class Plant(PlantReadings):
             (self.truth,),
         )
         self._wanted, self._air, self._lags = np.zeros(model.nu), np.zeros(3), np.zeros(model.nu)
+        self._gain = np.array(truth.thrust_gain)
         self._lag = model.actuator_dynprm[:, 0]
         lags = np.array((truth.motor_lag_up_s, truth.motor_lag_down_s))
         # Moment arm from the bare vehicle's centre of mass, where MuJoCo applies forces, to the whole one's.
@@ -118,7 +120,8 @@ class Plant(PlantReadings):
         if self.crashed == NOT_FINITE or not math.isfinite(sum(thrusts.tolist())):
             self.crashed, self.time_ns = self.crashed or NOT_FINITE, self.time_ns + TICK_NS
             return
-        self._wanted[:] = thrusts if self._factors is None else thrusts * self._factors.next()
+        wanted = thrusts * self._gain
+        self._wanted[:] = wanted if self._factors is None else wanted * self._factors.next()
         self._air[:] = self.wind.force(self._centre_velocity.tolist())
         self._drive()
         self._lag[:] = self._lags

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from ibvs_qp.config.vehicle import VehicleParams
 from sim.world.clearance import PropellerClearance
 from sim.world.readout import MOTION, PLACES
+from sim.world.true_vehicle import TrueVehicle
 
 _PUSH, _TIP = PLACES["pushes"].stop - 1, PLACES["tip"]
 
@@ -23,7 +23,7 @@ class PlantReadings:
     """Pose, motion, forces and contact of a plant, each a copy."""
 
     truth: np.ndarray
-    vehicle: VehicleParams
+    vehicle: TrueVehicle
     clearance: PropellerClearance
     _act: np.ndarray
 
@@ -37,7 +37,7 @@ class PlantReadings:
     )
     ft_wrench = _reading(
         "ft_wrench",
-        "Perfect force/torque sensor: vehicle on tool, at the sensor, FRD, at the last physics step [N, N m], (6,).",
+        "Perfect force/torque sensor: vehicle on tool, in its place and axes, last physics step [N, N m], (6,).",
     )
     contact_1khz = _reading("pushes", "Normal contact force at the four physics steps of the last tick [N], (4,).")
     contact_friction = _reading("friction", "Force of the board on the tip along it, world NED (y, z) [N], (2,).")

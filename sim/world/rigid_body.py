@@ -9,7 +9,7 @@ import numpy as np
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.vehicle import VehicleParams
 from sim.world.mujoco_frames import FLIP, quaternion_of_axes
-from sim.world.scene import Scene
+from sim.world.true_vehicle import TrueVehicle
 
 
 @dataclass(frozen=True)
@@ -34,24 +34,21 @@ def tool_body(vehicle: VehicleParams) -> RigidBody:
     )
 
 
-def bare_body(scene: Scene, vehicle: VehicleParams) -> RigidBody:
-    """The vehicle without its tool: the scene's mass, centre of mass and inertia minus the tool's.
+def bare_body(vehicle: TrueVehicle) -> RigidBody:
+    """The vehicle without its tool: mass, centre of mass and inertia of the whole minus the tool's.
 
     Raises:
-        ConfigError: When the tool alone has more mass or inertia than the whole vehicle.
+        ConfigError: When the tool alone has more inertia than the whole vehicle.
     """
-    truth, tool = scene.vehicle, tool_body(vehicle)
-    whole = np.array(truth.com_offset_m)
-    mass = truth.mass_kg - tool.mass
-    if mass <= 0.0:
-        raise ConfigError(f"vehicle.mass_kg = {truth.mass_kg:g} kg is refused: the tool alone weighs {tool.mass:g} kg")
-    centre = (truth.mass_kg * whole - tool.mass * tool.centre) / mass
-    inertia = np.diag(truth.inertia_kg_m2) - tool.inertia
+    tool, whole = tool_body(vehicle), np.array(vehicle.com_offset_m)
+    mass = vehicle.mass_kg - tool.mass
+    centre = (vehicle.mass_kg * whole - tool.mass * tool.centre) / mass
+    inertia = vehicle.inertia - tool.inertia
     inertia -= _steiner(tool.mass, tool.centre - whole) + _steiner(mass, centre - whole)
     if np.linalg.eigvalsh(inertia)[0] <= 0.0:
         raise ConfigError(
-            f"vehicle.inertia_kg_m2 = {truth.inertia_kg_m2} kg m^2 is refused: the tool of {tool.mass:g} kg at "
-            f"{vehicle.tool_position_m} m alone has more"
+            f"plant.inertia_kg_m2 = {vehicle.inertia_kg_m2} kg m^2 with the products {vehicle.inertia_products_kg_m2} "
+            f"is refused: the tool of {tool.mass:g} kg at {vehicle.tool_position_m} m alone has more"
         )
     return RigidBody(mass, centre, inertia)
 

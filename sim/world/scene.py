@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ibvs_qp.config.settings import load_toml, setting, validate
-from ibvs_qp.config.vehicle import VehicleParams
 from sim.world.errors import WorldErrors
+from sim.world.plant_scene import PlantScene
 
 Color = tuple[int, int, int]
 
@@ -76,30 +76,6 @@ class StartScene(_Checked):
     yaw_deg: float = setting(0.0, "yaw away from the wall normal, + to the right", unit="deg", low=-20.0, high=20.0)
 
 
-_NOMINAL = VehicleParams()
-
-
-@dataclass(frozen=True, kw_only=True)
-class VehicleScene(_Checked):
-    """The true vehicle of the plant; no input of the controller."""
-
-    mass_kg: float = setting(_NOMINAL.mass_kg, "all-up mass", unit="kg", low=2.0, high=20.0)
-    inertia_kg_m2: tuple[float, float, float] = setting(
-        _NOMINAL.inertia_kg_m2, "principal inertia", unit="kg m^2", low=0.01, high=10.0
-    )
-    com_offset_m: tuple[float, float, float] = setting(
-        (0.0, 0.0, 0.0), "true centre of mass from the assumed one, FRD", unit="m", low=-0.1, high=0.1
-    )
-    thrust_min_n: float | tuple[float, ...] = setting(
-        _NOMINAL.thrust_min_n, "idle thrust", unit="N", low=0.0, high=100.0
-    )
-    thrust_max_n: float | tuple[float, ...] = setting(
-        _NOMINAL.thrust_max_n, "full thrust", unit="N", low=0.0, high=100.0
-    )
-    motor_lag_up_s: float = setting(_NOMINAL.motor_lag_up_s, "lag of rising thrust", unit="s", low=0.001, high=0.5)
-    motor_lag_down_s: float = setting(_NOMINAL.motor_lag_down_s, "lag of falling thrust", unit="s", low=0.001, high=0.5)
-
-
 @dataclass(frozen=True, kw_only=True)
 class CameraScene(_Checked):
     """The RGB-D camera."""
@@ -110,13 +86,6 @@ class CameraScene(_Checked):
     rate_hz: float = setting(30.0, "frame rate", unit="Hz", low=5.0, high=120.0)
     latency_s: float = setting(0.060, "capture to delivery", unit="s", low=0.0, high=0.3)
     depth_noise_relative: float = setting(0.005, "white and correlated depth noise per depth", low=0.0, high=0.05)
-    mount_error_m: tuple[float, float, float] = setting(
-        (0.0, 0.0, 0.0), "true minus configured camera position, FRD", unit="m", low=-0.1, high=0.1
-    )
-    mount_error_deg: tuple[float, float, float] = setting(
-        (0.0, 0.0, 0.0), "true minus configured camera attitude, roll pitch yaw", unit="deg", low=-5.0, high=5.0
-    )
-    focal_error: float = setting(0.0, "reported focal length over the true one, minus 1", low=-0.2, high=0.2)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -164,7 +133,7 @@ class Scene(_Checked):
     wall: WallScene = field(default_factory=WallScene)
     paint: PaintScene = field(default_factory=PaintScene)
     start: StartScene = field(default_factory=StartScene)
-    vehicle: VehicleScene = field(default_factory=VehicleScene)
+    plant: PlantScene = field(default_factory=PlantScene)
     camera: CameraScene = field(default_factory=CameraScene)
     force_torque: ForceTorqueScene = field(default_factory=ForceTorqueScene)
     imu: ImuScene = field(default_factory=ImuScene)

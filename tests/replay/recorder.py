@@ -21,7 +21,6 @@ from .replayer import replay
 #: What the scenes have beside the near start: sections and their values.
 SCENES: dict[str, dict[str, dict[str, Any]]] = {
     "heavy_noise": {"features": {"sigma_vs": 0.12}, "force_torque": {"sigma_n": 3.0}},
-    "octorotor": {"vehicle": {"thrust_max_n": 35.0}},
 }
 SEEDS = {"heavy_noise": 1}
 #: The rotor that stops, and when after the touch [s].

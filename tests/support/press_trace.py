@@ -57,6 +57,7 @@ def press_trace(
         "phase": np.where(t < 1.0, 0, 1),
         "active": np.zeros((count, 1), bool),
         "thrusts_actual": np.full((count, 6), 11.33),
+        "true_mass": np.array([6.0]),
         "true_thrust_min": np.full(6, 1.2),
         "true_thrust_max": np.full(6, 52.56),
     }

@@ -115,6 +115,7 @@ def synthetic_trace(
         "thrust_max": np.full(6, 52.56),
         "true_thrust_min": np.full(6, 1.2),
         "true_thrust_max": np.full(6, 52.56),
+        "true_mass": np.array([6.0]),
         "push_true": push,
         "push_measured": push + 0.05 * rng.normal(size=count),
         "push_reference": reference,

@@ -73,7 +73,7 @@ def push_figures(trace: Trace, push: np.ndarray, commanded: float, sliding_frict
     """
     job, delivered = trace.scene.paint.push_n, mean(push)
     lower, upper = (tuple(map(float, trace.arrays[f"true_thrust_{side}"])) for side in ("min", "max"))
-    reach = push_reach(trace.scene.vehicle.mass_kg, lower, upper, sliding_friction)
+    reach = push_reach(trace.true_mass.item(), lower, upper, sliding_friction)
     return {
         "push_mean_n": delivered,
         "push_commanded_n": commanded,

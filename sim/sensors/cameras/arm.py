@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from allocation.rotor import perpendicular
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import R_BODY_CAMERA
 from sim.world.scene import Scene
@@ -106,8 +107,7 @@ def shade_propellers(picture: np.ndarray, propellers: np.ndarray) -> None:
 def _draw_disc(
     mask: np.ndarray, center: np.ndarray, axis: np.ndarray, radius: float, intrinsics: tuple[float, float, float, float]
 ) -> None:
-    side = np.cross(axis, [1.0, 0.0, 0.0])
-    side /= np.linalg.norm(side)
+    side = perpendicular(axis)
     angle = np.linspace(0.0, 2.0 * np.pi, 180, endpoint=False)[:, None]
     rim = center + radius * (np.cos(angle) * side + np.sin(angle) * np.cross(axis, side))
     points = clip_near(rim @ R_BODY_CAMERA, _NEAR_M)

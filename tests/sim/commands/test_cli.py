@@ -223,11 +223,11 @@ def test_ctrl_c_ends_both_processes_with_a_partial_run(tmp_path, group):
 
 def test_error_found_by_a_worker_is_one_line(tmp_path):
     """The number of rotors is compared with the scene where the plant is built, in the process that flies."""
-    (tmp_path / "scene.toml").write_text("[vehicle]\nthrust_min_n = [1.0, 2.0]\n")
+    (tmp_path / "scene.toml").write_text("[plant]\nthrust_min_n = [1.0, 2.0]\n")
     words = _paint(tmp_path / "run", "--no-video", "--scene", str(tmp_path / "scene.toml"))
     done = subprocess.run(words, capture_output=True, text=True, timeout=120)
     assert done.returncode == 2
-    assert done.stderr.startswith("ibvs-qp: error: vehicle.thrust_min_n") and done.stderr.count("\n") == 1
+    assert done.stderr.startswith("ibvs-qp: error: plant.thrust_min_n") and done.stderr.count("\n") == 1
     assert not (tmp_path / "run").exists()
 
 

@@ -47,7 +47,7 @@ SCENE = {
     "wall": "color texture_seed friction stiffness_n_m damping_n_s_m",
     "paint": "color brush_width_m edge_margin_m rows stroke_m overlap_m speed_m_s push_n",
     "start": "distance_m right_m down_m yaw_deg",
-    "vehicle": "mass_kg inertia_kg_m2 com_offset_m thrust_min_n thrust_max_n motor_lag_up_s motor_lag_down_s",
+    "plant": "mass_kg inertia_kg_m2 com_offset_m thrust_min_n thrust_max_n motor_lag_up_s motor_lag_down_s",
     "camera": "width height vertical_fov_deg rate_hz latency_s depth_noise_relative",
     "force_torque": "rate_hz sigma_n sigma_nm bias_n latency_s",
     "imu": "rate_hz gyro_density accel_density attitude_bias_deg attitude_noise_deg",

@@ -29,15 +29,15 @@ block_runs = 3
 [grid]
 scene.wall.friction = [0.2, 0.4, 0.6]
 [random]
-scene.vehicle.mass_kg = { low = 5.0, high = 7.0 }
+scene.plant.mass_kg = { low = 5.0, high = 7.0 }
 """
 RUNS = 24
 
 
 def made_up_flight(scene, options, **_):
     """A flight whose figures follow from scene and law; the slippery heavy ones fail."""
-    weight = scene.wall.friction * scene.vehicle.mass_kg
-    if scene.vehicle.mass_kg > 6.0 and scene.wall.friction > 0.5:
+    weight = scene.wall.friction * scene.plant.mass_kg
+    if scene.plant.mass_kg > 6.0 and scene.wall.friction > 0.5:
         raise ZeroDivisionError("too heavy")
     figures = {"path_rms_m": 1e-3 * weight, "force_rms_n": weight * (1.0 if options.law == "qp" else 1.5)}
     return SimpleNamespace(completed=weight < 2.3, reason="held" if weight < 2.3 else "lost", figures=figures)
@@ -221,7 +221,7 @@ def test_report_of_parts_alone_and_of_a_single_parameter(drawn, tmp_path):
     run_sweep(Planned(load_spec(Path("spec.toml"))), Path("run/parts"), block_runs=3)
     assert main(["sweep", "--report", "run", "--figures", "force_rms_n", "--json", "--out", "from_parts"]) == 0
     table = pl.concat([pl.read_parquet(file) for file in Path("run/parts").glob("*.parquet")], how="diagonal_relaxed")
-    write_table(tmp_path / "one.parquet", table.drop("param.scene.vehicle.mass_kg"))
+    write_table(tmp_path / "one.parquet", table.drop("param.scene.plant.mass_kg"))
     assert main(["sweep", "--report", "one.parquet", "--figures", "force_rms_n", "--json", "--out", "one"]) == 0
     assert Path("one/figures/success.png").exists() and not Path("one/figures/dependence.png").exists()
 

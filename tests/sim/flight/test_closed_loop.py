@@ -12,7 +12,8 @@ from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.pilot import PilotConfig
 from sim.flight.closed_loop import fly
 from sim.flight.options import FlightOptions
-from sim.world.scene import CameraScene, ForceTorqueScene, VehicleScene
+from sim.world.plant_scene import PlantScene
+from sim.world.scene import CameraScene, ForceTorqueScene
 
 
 @pytest.mark.parametrize("law", ["qp", "paper"])
@@ -48,10 +49,10 @@ def test_slide(law: str, friction: float) -> None:
     ("name", "sections"),
     [
         ("stiff wall", {"wall": wall(stiffness_n_m=10_000.0)}),
-        ("heavy", {"vehicle": dataclasses.replace(VehicleScene(), mass_kg=7.2)}),
+        ("heavy", {"plant": PlantScene(mass_kg=7.2)}),
         (
             "light, shifted centre of mass",
-            {"vehicle": dataclasses.replace(VehicleScene(), mass_kg=5.2, com_offset_m=(0.02, 0.01, 0.01))},
+            {"plant": PlantScene(mass_kg=5.2, com_offset_m=(0.02, 0.01, 0.01))},
         ),
         ("late camera", {"camera": dataclasses.replace(CameraScene(), latency_s=0.1)}),
         ("noisy force", {"force_torque": dataclasses.replace(ForceTorqueScene(), sigma_n=1.0)}),

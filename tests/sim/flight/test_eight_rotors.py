@@ -30,7 +30,6 @@ def test_paints_in_the_closed_loop(law: str) -> None:
     preset = default_preset(law)
     config = dataclasses.replace(preset, controller=dataclasses.replace(preset.controller, vehicle=VEHICLE))
     scene = short_scene(stroke_m=0.3, rows=1)
-    scene = dataclasses.replace(scene, vehicle=dataclasses.replace(scene.vehicle, thrust_max_n=FULL))
     trace = fly(scene, FlightOptions(law=law, features="geometric", video=False), config=config)
     metrics = compute_metrics(trace)
     assert trace.completed, trace.reason

@@ -8,6 +8,7 @@ import pytest
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import rotation_from_quaternion
+from ibvs_qp.measurement import RgbdFrame
 from sim.evaluate.measures.loss import loss_figures
 from sim.experiments.scenes import near_wall
 from sim.flight.closed_loop import fly, make_pilot
@@ -15,8 +16,10 @@ from sim.flight.faults import Derate, FaultSchedule, WindStep
 from sim.flight.jobs import PressJob
 from sim.flight.options import FlightOptions, pilot_config
 from sim.flight.surroundings import World
-from sim.sensors.miscalibration import Miscalibration
-from sim.world.scene import CameraScene, Scene
+from sim.sensors.camera_mount import CameraMount
+from sim.world.plant_scene import PlantScene
+from sim.world.scene import Scene
+from sim.world.true_vehicle import true_vehicle
 
 OPTIONS = FlightOptions(features="geometric", video=False)
 
@@ -91,9 +94,11 @@ def test_press_job_holds_as_long_as_asked_whatever_the_push_does():
 
 def test_a_turned_camera_stands_where_it_stood_and_looks_elsewhere():
     vehicle = VehicleParams()
-    scene = CameraScene(mount_error_deg=(0.0, 2.0, 0.0), mount_error_m=(0.0, 0.01, 0.0))
+    x, y, z = vehicle.camera_position_m
+    plant = PlantScene(camera_turn_deg=(0.0, 2.0, 0.0), camera_position_m=(x, y + 0.01, z))
+    true = true_vehicle(Scene(plant=plant), vehicle)
     position, quaternion = np.array([-1.0, 0.2, -1.5]), np.array([np.cos(0.1), 0.0, 0.0, np.sin(0.1)])
-    moved, turned = Miscalibration(scene, vehicle, True).pose(position, quaternion)
+    moved, turned = CameraMount(true, vehicle).pose(position, quaternion)
     camera = np.array(vehicle.camera_position_m)
     nominal, seen = rotation_from_quaternion(quaternion), rotation_from_quaternion(turned)
     assert moved + seen @ camera == pytest.approx(position + nominal @ (camera + np.array([0.0, 0.01, 0.0])))
@@ -101,13 +106,31 @@ def test_a_turned_camera_stands_where_it_stood_and_looks_elsewhere():
     assert np.degrees(np.arccos((np.trace(axis) - 1.0) / 2.0)) == pytest.approx(2.0, rel=1e-3)
 
 
+def test_a_camera_turned_right_reports_forward_motion_as_partly_to_the_left():
+    true = true_vehicle(Scene(plant=PlantScene(camera_turn_deg=(0.0, 0.0, 2.0))), VehicleParams())
+    seen = CameraMount(true, VehicleParams()).velocity(np.array([1.0, 0.0, 0.0]))
+    assert seen == pytest.approx([np.cos(np.radians(2.0)), -np.sin(np.radians(2.0)), 0.0])
+
+
+def test_a_focal_ratio_changes_the_reported_focal_lengths_alone():
+    frame = RgbdFrame(
+        rgb=np.zeros((2, 2, 3), np.uint8),
+        depth=np.ones((2, 2), np.float32),
+        intrinsics=(600.0, 610.0, 1.0, 1.0),
+        stamp_ns=0,
+    )
+    mount = CameraMount(true_vehicle(Scene(plant=PlantScene(focal_ratio=1.03)), VehicleParams()), VehicleParams())
+    assert mount.picture(frame).intrinsics == pytest.approx((618.0, 628.3, 1.0, 1.0))
+    assert CameraMount(true_vehicle(Scene(), VehicleParams()), VehicleParams()).picture(frame) is frame
+
+
 def test_no_error_changes_nothing_to_the_bit():
     position, quaternion = np.array([1.0, 2.0, 3.0]), np.array([1.0, 0.0, 0.0, 0.0])
-    same = Miscalibration(CameraScene(), VehicleParams(), True).pose(position, quaternion)
+    same = CameraMount(true_vehicle(Scene(), VehicleParams()), VehicleParams()).pose(position, quaternion)
     assert same[0] is position and same[1] is quaternion
 
 
-def test_focal_error_needs_pictures():
-    scene = Scene(camera=CameraScene(focal_error=0.03))
+def test_a_focal_ratio_needs_pictures():
+    scene = Scene(plant=PlantScene(focal_ratio=1.03))
     with pytest.raises(ConfigError, match="rendered"):
         World(scene, OPTIONS, pilot_config(scene, OPTIONS))

@@ -35,7 +35,7 @@ DRAWN = """
 samples = {samples}
 draw = "{draw}"
 [random]
-scene.vehicle.mass_kg = {{ low = 5.0, high = 7.0 }}
+scene.plant.mass_kg = {{ low = 5.0, high = 7.0 }}
 scene.board.clutter = {{ low = 0, high = 3 }}
 scene.wind.mean_m_s.1 = {{ low = -2.0, high = 2.0 }}
 pilot.controller.line_profile = ["tip", "paper"]
@@ -73,7 +73,7 @@ def test_draws_lie_in_their_ranges_and_more_of_them_keep_the_first(draw):
     assert [few.place(index).params for index in range(5)] == places[:5]
     assert few.block(0, 5).name == many.block(0, 5).name
     for params in places:
-        assert 5.0 <= params["scene.vehicle.mass_kg"] <= 7.0
+        assert 5.0 <= params["scene.plant.mass_kg"] <= 7.0
         assert params["scene.board.clutter"] in (0, 1, 2, 3)
     assert {params["pilot.controller.line_profile"] for params in places} == {"tip", "paper"}
     run = many.run(3)
@@ -93,10 +93,10 @@ def test_draws_are_uniform_and_of_one_seed():
     [
         ("[grid]\nscene.wall.fricton = [0.1]", ("scene.wall.fricton", "did you mean", "friction")),
         ("[grid]\nscene.wall.friction = [0.1, 9.0]", ("scene.wall.friction = 9.0", "[0, 1.5]")),
-        ("[fixed]\nscene.vehicle.mass_kg = 50.0", ("scene.vehicle.mass_kg = 50.0 kg", "[2, 20] kg")),
-        ("samples = 2\n[random]\nscene.vehicle.mass_kg = {low = 1.0, high = 7.0}", ("mass_kg = 1.0 kg", "[2, 20] kg")),
-        ("samples = 2\n[random]\nscene.vehicle.mass_kg = {low = 7.0, high = 5.0}", ("mass_kg = [7, 5]", "low <= high")),
-        ("[random]\nscene.vehicle.mass_kg = {low = 5.0, high = 7.0}", ("samples", "[random]")),
+        ("[fixed]\nscene.plant.mass_kg = 50.0", ("scene.plant.mass_kg = 50.0 kg", "[2, 20] kg")),
+        ("samples = 2\n[random]\nscene.plant.mass_kg = {low = 1.0, high = 7.0}", ("mass_kg = 1.0 kg", "[2, 20] kg")),
+        ("samples = 2\n[random]\nscene.plant.mass_kg = {low = 7.0, high = 5.0}", ("mass_kg = [7, 5]", "low <= high")),
+        ("[random]\nscene.plant.mass_kg = {low = 5.0, high = 7.0}", ("samples", "[random]")),
         ("samples = 3", ("samples", "[random]")),
         ("[grid]\njob.hold_s = [-1.0]", ("job.hold_s = -1.0 s", "[0, 600] s")),
         ("[grid]\njob.hold = [1.0]", ("job.hold", "hold_s")),
@@ -116,7 +116,7 @@ def test_draws_are_uniform_and_of_one_seed():
         ("name = 'a/b'", ("name = 'a/b'", "letters")),
         ("sees = 2", ("sees", "seeds")),
         ("grid = 3", ("grid must be a table",)),
-        ("[fixed]\nscene.vehicle.mass_kg = 'heavy'", ("scene.vehicle.mass_kg", "float")),
+        ("[fixed]\nscene.plant.mass_kg = 'heavy'", ("scene.plant.mass_kg", "float")),
     ],
 )
 def test_refusals_name_field_value_and_range(tmp_path, text, named):
@@ -172,7 +172,7 @@ def test_shipped_specs_load(file):
 
 
 def test_paths_have_units_and_values():
-    assert unit_of("scene.vehicle.mass_kg") == "kg" and unit_of("scene.wind.mean_m_s.1") == "m/s"
+    assert unit_of("scene.plant.mass_kg") == "kg" and unit_of("scene.wind.mean_m_s.1") == "m/s"
     assert unit_of("job.hold_s") == "s" and unit_of("pilot.controller.gains.line_kp") == "1/s^2"
     assert unit_of("sigma_f_n") == "" and unit_of("scene.nowhere.x") == ""
     assert value_at(Setup(), "scene.wind.mean_m_s.1") == 0.0

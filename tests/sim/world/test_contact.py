@@ -13,7 +13,9 @@ import pytest
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import GRAVITY
 from sim.world.mjcf import build_model
-from sim.world.scene import Scene, VehicleScene, WallScene
+from sim.world.plant_scene import PlantScene
+from sim.world.scene import Scene, WallScene
+from sim.world.true_vehicle import true_vehicle
 
 DT = 0.001
 STIFF_N_M, DAMP_N_S_M, TURN_N_M, TURN_DAMP = 4000.0, 300.0, 800.0, 40.0
@@ -31,9 +33,11 @@ class Record:
 
 
 class Rig:
-    def __init__(self, wall: WallScene, vehicle: VehicleScene | None = None, gap: float = 0.0) -> None:
-        self.mass = (vehicle or VehicleScene()).mass_kg
-        self.model, self.ids = build_model(Scene(wall=wall, vehicle=vehicle or VehicleScene()), VehicleParams())
+    def __init__(self, wall: WallScene, plant: PlantScene | None = None, gap: float = 0.0) -> None:
+        scene = Scene(wall=wall, plant=plant or PlantScene())
+        vehicle = true_vehicle(scene, VehicleParams())
+        self.mass = vehicle.mass_kg
+        self.model, self.ids = build_model(scene, vehicle)
         self.data = mujoco.MjData(self.model)
         self.data.qpos[:7] = [-0.70 - gap, 0.0, 2.0, 1.0, 0.0, 0.0, 0.0]
         # The rig acts at the body origin; MuJoCo applies forces at the bare vehicle's centre of mass.
@@ -95,7 +99,7 @@ def test_no_chatter_over_the_range_of_walls(stiffness, friction):
 @pytest.mark.parametrize("stiffness", [1000.0, 1500.0, 10000.0])
 def test_static_penetration_is_force_over_stiffness(stiffness, mass):
     damping = 2.0 * np.sqrt(stiffness * mass)  # critical, so that the rig comes to rest
-    rig = Rig(WallScene(stiffness_n_m=stiffness, damping_n_s_m=min(damping, 500.0)), VehicleScene(mass_kg=mass))
+    rig = Rig(WallScene(stiffness_n_m=stiffness, damping_n_s_m=min(damping, 500.0)), PlantScene(mass_kg=mass))
     record = rig.run(3.0, push=5.0)
     assert record.depth[-1] == pytest.approx(5.0 / stiffness, rel=0.02)
     assert record.normal[-1] == pytest.approx(5.0, rel=1e-3)

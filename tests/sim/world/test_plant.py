@@ -15,7 +15,8 @@ from sim.world.board import BoardGeometry
 from sim.world.mjcf import STEPS_PER_TICK
 from sim.world.mujoco_frames import FLIP
 from sim.world.plant import TICK_NS, Plant
-from sim.world.scene import Scene, StartScene, VehicleScene, WindScene
+from sim.world.plant_scene import PlantScene
+from sim.world.scene import Scene, StartScene, WindScene
 from sim.world.trim import START_DISTANCE_M, START_DOWN_M, START_RIGHT_M, START_YAW_DEG
 
 VEHICLE = VehicleParams()
@@ -28,7 +29,7 @@ def fly(plant: Plant, thrusts: np.ndarray, ticks: int) -> None:
 
 
 def test_mujoco_moments_equal_control_effectiveness():
-    plant = at_rest(Plant(Scene(vehicle=VehicleScene(com_offset_m=(0.02, -0.01, 0.03)))), np.array([-1.0, 0.0, -1.5]))
+    plant = at_rest(Plant(Scene(plant=PlantScene(com_offset_m=(0.02, -0.01, 0.03)))), np.array([-1.0, 0.0, -1.5]))
     model, data = plant.model, plant.data
     mujoco.mj_forward(model, data)
     moment = np.zeros((model.nu, model.nv))
@@ -67,8 +68,8 @@ def test_each_rotor_pushes_to_its_own_side():
     ],
 )
 def test_mass_centre_and_inertia_are_the_scenes(mass, inertia, offset):
-    truth = VehicleScene(mass_kg=mass, inertia_kg_m2=inertia, com_offset_m=offset)
-    plant = at_rest(Plant(Scene(vehicle=truth)), np.array([-1.0, 0.0, -1.5]))
+    truth = PlantScene(mass_kg=mass, inertia_kg_m2=inertia, com_offset_m=offset)
+    plant = at_rest(Plant(Scene(plant=truth)), np.array([-1.0, 0.0, -1.5]))
     mujoco.mj_forward(plant.model, plant.data)
     full = np.zeros((6, 6))
     mujoco.mj_fullM(plant.model, plant.data, full)
@@ -84,18 +85,18 @@ def test_mass_centre_and_inertia_are_the_scenes(mass, inertia, offset):
 
 def test_impossible_vehicles_are_refused():
     with pytest.raises(ConfigError, match=r"inertia_kg_m2 .* tool"):
-        Plant(Scene(vehicle=VehicleScene(inertia_kg_m2=(0.22, 0.05, 0.48))))
-    with pytest.raises(ConfigError, match="mass_kg"):
-        Plant(Scene(vehicle=VehicleScene(mass_kg=4.0)), VehicleParams(tool_mass_kg=5.0))
-    with pytest.raises(ConfigError, match=r"thrust_max_n .* list of 6"):
-        Plant(Scene(vehicle=VehicleScene(thrust_max_n=(52.0, 52.0))))
-    with pytest.raises(ConfigError, match="thrust_min_n"):
-        Plant(Scene(vehicle=VehicleScene(thrust_min_n=30.0, thrust_max_n=20.0)))
+        Plant(Scene(plant=PlantScene(inertia_kg_m2=(0.22, 0.05, 0.48))))
+    with pytest.raises(ConfigError, match=r"plant.tool_mass_kg .* mass_kg"):
+        Plant(Scene(plant=PlantScene(mass_kg=4.0)), VehicleParams(tool_mass_kg=5.0))
+    with pytest.raises(ConfigError, match=r"plant.thrust_max_n .* 6 .one per rotor"):
+        Plant(Scene(plant=PlantScene(thrust_max_n=(52.0, 52.0))))
+    with pytest.raises(ConfigError, match=r"plant\.thrust_min_n"):
+        Plant(Scene(plant=PlantScene(thrust_min_n=30.0, thrust_max_n=20.0)))
 
 
 def test_motor_lag_rises_and_falls_with_its_own_time_constant():
-    truth = VehicleScene(motor_lag_up_s=0.03, motor_lag_down_s=0.08)
-    plant = Plant(Scene(vehicle=truth, start=StartScene(distance_m=1.5)))
+    truth = PlantScene(motor_lag_up_s=0.03, motor_lag_down_s=0.08)
+    plant = Plant(Scene(plant=truth, start=StartScene(distance_m=1.5)))
     start = plant.thrusts_actual
     step = np.array([4.0, -4.0, 2.0, -2.0, 1.0, 0.0])
     for tick in range(1, 11):
@@ -106,7 +107,7 @@ def test_motor_lag_rises_and_falls_with_its_own_time_constant():
 
 def test_true_limits_clip_the_command():
     upper = (30.0, 52.56, 52.56, 20.0, 52.56, 52.56)
-    plant = Plant(Scene(vehicle=VehicleScene(thrust_min_n=2.0, thrust_max_n=upper, motor_lag_up_s=0.001)))
+    plant = Plant(Scene(plant=PlantScene(thrust_min_n=2.0, thrust_max_n=upper, motor_lag_up_s=0.001)))
     plant.step(np.full(6, 100.0))
     np.testing.assert_allclose(plant.thrusts_actual, upper, rtol=0.05)
     plant.step(np.full(6, -5.0))

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from sim.world.plant import Plant
+from sim.world.plant_scene import PlantScene
 from sim.world.random_streams import stream
-from sim.world.scene import Scene, StartScene, VehicleScene, WindScene
+from sim.world.scene import Scene, StartScene, WindScene
 from sim.world.wind import Wind
 
 
@@ -28,8 +29,8 @@ def test_drag_and_mean_wind_reach_the_air_speed():
 
 
 def test_air_acts_at_the_true_centre_of_mass():
-    truth = VehicleScene(com_offset_m=(0.03, 0.02, -0.03))
-    plant = Plant(Scene(wind=WindScene(mean_m_s=(0.0, 8.0, 0.0)), vehicle=truth, start=StartScene(distance_m=2.0)))
+    truth = PlantScene(com_offset_m=(0.03, 0.02, -0.03))
+    plant = Plant(Scene(wind=WindScene(mean_m_s=(0.0, 8.0, 0.0)), plant=truth, start=StartScene(distance_m=2.0)))
     fly(plant, plant.thrusts_actual, 25)
     assert np.abs(plant.angular_velocity).max() < 1e-9
 

@@ -1,0 +1,60 @@
+"""One rotor, and the plane of its disc."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+#: Error of the length of a given axis, which is then normalised: three digits suffice [-].
+UNIT_TOLERANCE = 2e-3
+#: Share of x in an axis beyond which a direction of the disc is found from y instead [-].
+ALONG_X = 0.99
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rotor:
+    """One fixed rotor: on the circle of its geometry by its azimuth, or with a position and an axis of its own.
+
+    Attributes:
+        name: Readable name, unique in its geometry.
+        azimuth_deg: Angle of the rotor arm from body +x towards the right (+y), seen from above [deg].
+        spin: +1 if the propeller turns counter-clockwise seen from above, -1 if clockwise.
+        position_m: Hub in the body frame FRD [m], (3,); None on the circle.
+        axis: Unit thrust axis in the body frame, (3,); None for the tilt of the geometry.
+        torque_ratio_m: Drag torque over thrust [m]; None for the geometry's.
+    """
+
+    name: str
+    azimuth_deg: float | None = None
+    spin: int
+    position_m: tuple[float, float, float] | None = None
+    axis: tuple[float, float, float] | None = None
+    torque_ratio_m: float | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse impossible rotors."""
+        place, axis, ratio = self.position_m, self.axis, self.torque_ratio_m
+        length = 1.0 if axis is None else float(np.linalg.norm(axis))
+        checks = (
+            (self.azimuth_deg is not None or bool(place and axis), "azimuth_deg, or position_m and axis, is needed"),
+            (place is None or all(map(math.isfinite, place)), f"position_m: {place} m, must be finite"),
+            (abs(length - 1.0) <= UNIT_TOLERANCE, f"axis: {axis} has the length {length:g}, must be a unit vector"),
+            (ratio is None or 0 <= ratio < math.inf, f"torque_ratio_m: {ratio} m, must be >= 0 m"),
+        )
+        for good, message in checks:
+            if not good:
+                raise ValueError(f"{self.name}: {message}")
+
+
+def unit(vector: Sequence[float]) -> np.ndarray:
+    """A vector divided by its length, (3,)."""
+    return np.array(vector) / np.linalg.norm(vector)
+
+
+def perpendicular(axis: np.ndarray) -> np.ndarray:
+    """A unit vector in the plane of a propeller disc with this axis, (3,)."""
+    side = np.cross(axis, [0.0, 1.0, 0.0] if abs(axis[0]) > ALONG_X else [1.0, 0.0, 0.0])
+    return side / np.linalg.norm(side)

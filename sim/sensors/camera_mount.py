@@ -1,0 +1,60 @@
+"""The true pose and focal length of the camera, where the cameras draw from the believed ones."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from ibvs_qp.config.vehicle import VehicleParams
+from ibvs_qp.frames import rotation_from_quaternion
+from ibvs_qp.measurement import RgbdFrame
+from sim.sensors.small_turns import multiply
+from sim.world.true_vehicle import TrueVehicle, turn_quaternion
+
+
+class CameraMount:
+    """Pose of the body from which a camera at the believed place sees what the true one does.
+
+    The camera's own view of arm and brush stays that of the believed place: a few degrees move it by less than the
+    blur of its outline.
+
+    Attributes:
+        vehicle: The vehicle to give to a camera: true, but for the place of the camera.
+
+    Args:
+        true: The vehicle that flies.
+        believed: The vehicle of the controller.
+    """
+
+    def __init__(self, true: TrueVehicle, believed: VehicleParams) -> None:
+        self.vehicle = dataclasses.replace(
+            believed,
+            geometry=true.geometry,
+            tip_position_m=true.tip_position_m,
+            force_torque_position_m=true.force_torque_position_m,
+        )
+        self._believed, self._true = np.array(believed.camera_position_m), np.array(true.camera_position_m)
+        self._turn, self._focal = turn_quaternion(true.camera_turn_deg), true.focal_ratio
+        self._back = rotation_from_quaternion(self._turn).T
+        self._turned = any(true.camera_turn_deg)
+        self._none = not self._turned and np.array_equal(self._believed, self._true)
+
+    def pose(self, position: np.ndarray, quaternion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Position (3,) and quaternion (4,) of the body to hand to the camera."""
+        if self._none:
+            return position, quaternion
+        turned = np.array(multiply(quaternion.tolist(), self._turn))
+        real = position + rotation_from_quaternion(quaternion) @ self._true
+        return real - rotation_from_quaternion(turned) @ self._believed, turned
+
+    def velocity(self, velocity: np.ndarray) -> np.ndarray:
+        """Velocity of the body in B [m/s], (3,), as a camera reports it that counts on its believed attitude."""
+        return self._back @ velocity if self._turned else velocity
+
+    def picture(self, frame: RgbdFrame) -> RgbdFrame:
+        """The picture with the reported focal lengths."""
+        if self._focal == 1.0:
+            return frame
+        fx, fy, cx, cy = frame.intrinsics
+        return dataclasses.replace(frame, intrinsics=(fx * self._focal, fy * self._focal, cx, cy))

@@ -1,0 +1,112 @@
+"""The vehicle that flies: what the controller believes, what ``[plant]`` states instead, and the errors of a seed."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ibvs_qp.config.errors import ConfigError, out_of_range
+from ibvs_qp.config.vehicle import VehicleParams
+from sim.world.errors import WorldErrors
+from sim.world.plant_scene import Vector
+from sim.world.random_streams import stream
+from sim.world.scene import Scene
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrueVehicle(VehicleParams):
+    """Parameters of the plant: those that a controller can believe, and those that it takes for zero or one.
+
+    Attributes:
+        com_offset_m: True centre of mass from the body origin, which is the assumed one, FRD [m].
+        inertia_products_kg_m2: Entries xy, xz, yz of the inertia about the true centre of mass [kg m^2].
+        thrust_gain: True over commanded thrust, one number or one per rotor [-].
+        force_torque_turn_deg: Rotation vector from B to the axes of the force/torque sensor [deg].
+        camera_turn_deg: Rotation vector from the camera that looks along +x to the real one, in B [deg].
+        focal_ratio: Reported over true focal length [-].
+    """
+
+    com_offset_m: Vector = (0.0, 0.0, 0.0)
+    inertia_products_kg_m2: Vector = (0.0, 0.0, 0.0)
+    thrust_gain: float | tuple[float, ...] = 1.0
+    force_torque_turn_deg: Vector = (0.0, 0.0, 0.0)
+    camera_turn_deg: Vector = (0.0, 0.0, 0.0)
+    focal_ratio: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Refuse values out of range."""
+        super().__post_init__()
+        gain, count = self.thrust_gain, self.geometry.count
+        if isinstance(gain, tuple) and len(gain) != count:
+            raise out_of_range("thrust_gain", gain, "", f"one number or {count} (one per rotor)")
+
+    @property
+    def inertia(self) -> np.ndarray:
+        """Inertia about the true centre of mass, FRD [kg m^2], (3, 3)."""
+        xy, xz, yz = self.inertia_products_kg_m2
+        return np.diag(self.inertia_kg_m2) + np.array([[0.0, xy, xz], [xy, 0.0, yz], [xz, yz, 0.0]])
+
+
+def true_vehicle(scene: Scene, believed: VehicleParams, seed: int = 0) -> TrueVehicle:
+    """The vehicle that flies in a scene.
+
+    Args:
+        scene: Its section ``plant`` states what differs, ``errors`` the sizes of what is drawn.
+        believed: What the controller believes.
+        seed: Draws signs and directions of the errors.
+
+    Raises:
+        ConfigError: When the plant's rotors are not as many as the believed ones, or its values do not go together.
+    """
+    plant = scene.plant
+    if plant.geometry is not None and plant.geometry.count != believed.geometry.count:
+        rotors, needed = plant.geometry.count, believed.geometry.count
+        raise out_of_range("plant.geometry", rotors, "rotors", f"the controller commands {needed}")
+    values = {field.name: getattr(believed, field.name) for field in dataclasses.fields(VehicleParams)}
+    values |= {
+        field.name: value for field in dataclasses.fields(plant) if (value := getattr(plant, field.name)) is not None
+    }
+    try:
+        return _with_errors(TrueVehicle(**values), scene.errors, seed)
+    except ConfigError as error:
+        raise ConfigError(f"plant.{error}") from None
+
+
+def _with_errors(vehicle: TrueVehicle, errors: WorldErrors, seed: int) -> TrueVehicle:
+    """The vehicle with the errors of a seed; errors of size zero change no bit."""
+    body, camera = errors.body, errors.camera
+    signs = stream(seed, "centre of mass").choice((-1.0, 1.0), 3)
+    return dataclasses.replace(
+        vehicle,
+        mass_kg=vehicle.mass_kg * (1.0 + body.mass),
+        com_offset_m=_moved(vehicle.com_offset_m, signs * body.com_m),
+        inertia_kg_m2=_moved((1.0 + body.inertia) * np.array(vehicle.inertia_kg_m2)),
+        inertia_products_kg_m2=_moved((1.0 + body.inertia) * np.array(vehicle.inertia_products_kg_m2)),
+        tip_position_m=_moved(vehicle.tip_position_m, body.tip_m),
+        camera_position_m=_moved(vehicle.camera_position_m, camera.mount_m * _direction(seed, "camera mount")),
+        camera_turn_deg=_moved(vehicle.camera_turn_deg, camera.mount_deg * _direction(seed, "camera turn")),
+        focal_ratio=vehicle.focal_ratio * (1.0 + camera.focal * float(stream(seed, "focal length").standard_normal())),
+    )
+
+
+def _moved(place: Sequence[float] | np.ndarray, shift: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0)) -> Vector:
+    x, y, z = (np.asarray(place, float) + shift).tolist()
+    return x, y, z
+
+
+def _direction(seed: int, purpose: str) -> np.ndarray:
+    """Random unit vector, (3,)."""
+    vector = stream(seed, purpose).standard_normal(3)
+    return vector / np.linalg.norm(vector)
+
+
+def turn_quaternion(degrees: Sequence[float]) -> tuple[float, float, float, float]:
+    """Quaternion (w, x, y, z) of a rotation vector [deg]."""
+    half = 0.5 * np.radians(degrees)
+    angle = float(np.linalg.norm(half))
+    x, y, z = (half * np.sinc(angle / math.pi)).tolist()
+    return math.cos(angle), x, y, z
