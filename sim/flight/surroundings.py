@@ -10,13 +10,14 @@ from ibvs_qp.measurement import SensorFrame
 from ibvs_qp.pilot import PilotConfig
 from sim.flight.options import FlightOptions
 from sim.flight.viewer import FlightViewer
-from sim.sensors.cameras import CameraStream, open_camera
+from sim.sensors.cameras import CameraStream, Dropouts, open_camera
 from sim.sensors.features import GeometricFeatures
 from sim.sensors.imu_ft import SensorSuite
 from sim.sensors.miscalibration import Miscalibration
 from sim.world.board import BoardGeometry
 from sim.world.canvas import Canvas
 from sim.world.plant import Plant
+from sim.world.random_streams import stream
 from sim.world.readout import PLACES
 from sim.world.scene import Scene
 
@@ -24,7 +25,7 @@ from sim.world.scene import Scene
 PAINTING_FORCE = 0.05
 #: Pressed ticks per drawn stroke: 1.2 mm at 0.1 m/s, below the 2 mm between stamps.
 STROKE_TICKS = 3
-_SEEN_FROM = [PLACES[name] for name in ("position", "quaternion", "body_velocity")]
+_SEEN_FROM = [PLACES[name] for name in ("position", "quaternion", "body_velocity", "rate")]
 
 
 class World:
@@ -44,7 +45,8 @@ class World:
         self._miscalibration = Miscalibration(scene.camera, vehicle, self._rendered)
         if self._rendered:
             camera = open_camera(options.camera, scene, vehicle, self.canvas, options.seed)
-            self.stream = CameraStream(camera, scene.camera.rate_hz, scene.camera.latency_s)
+            dropouts = Dropouts(scene.errors.camera.dropped, stream(options.seed, "dropped pictures"))
+            self.stream = CameraStream(camera, scene.camera.rate_hz, scene.camera.latency_s, dropouts)
         else:
             self._features = GeometricFeatures(scene, vehicle, self.canvas, options.seed)
         self._seen_from = tuple(self.plant.truth[place] for place in _SEEN_FROM)  # views
@@ -64,14 +66,14 @@ class World:
         plant = self.plant
         if self.stream is not None:
             pose = self._miscalibration.pose(plant.position, plant.quaternion)
-            image = self.stream.tick(plant.time_ns, *pose)
+            image = self.stream.tick(plant.time_ns, *pose, np.concatenate(self._seen_from[2:]))
             return self.sensors.sample(plant, image=None if image is None else self._miscalibration.picture(image))
         features, now = self._features, plant.time_ns
         if features.rests(now):
             return self.sensors.sample(plant)
-        position, quaternion, velocity = self._seen_from
+        position, quaternion, velocity, rate = self._seen_from
         pose = self._miscalibration.pose(position, quaternion)
-        return self.sensors.sample(plant, None, features.tick(now, *pose, velocity))
+        return self.sensors.sample(plant, None, features.tick(now, *pose, velocity, rate))
 
     def act(self, thrusts: np.ndarray) -> None:
         """Advance one control tick and paint where the brush presses."""
