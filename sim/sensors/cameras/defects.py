@@ -43,7 +43,7 @@ class CameraDefects:
     ) -> None:
         errors, shape = scene.errors.camera, (scene.camera.height, scene.camera.width)
         self._position, self._focal = np.array(vehicle.camera_position_m), intrinsics[0]
-        self._exposure_s = errors.exposure_s
+        self._exposure_s, self._blurred = errors.exposure_s, np.empty((*shape, 3), np.uint8)
         self._warp = PictureWarp(intrinsics, shape, errors.distortion_k1, errors.rolling_shutter_s)
         shaken = vibration_sigma_px(self._focal, scene.errors.gyro.vibration_rad_s, errors.exposure_s)
         extra = math.hypot(errors.defocus_px, shaken)
@@ -65,7 +65,7 @@ class CameraDefects:
         picture = self._warp.picture(picture, plane, twist)
         if self._exposure_s and twist is not None:
             u, v = (self._focal * self._exposure_s * float(rate) for rate in image_velocity(0.0, 0.0, plane, twist))
-            picture = cv2.filter2D(picture, -1, line_kernel(u, v), borderType=cv2.BORDER_REPLICATE)
+            picture = cv2.filter2D(picture, -1, line_kernel(u, v), self._blurred, borderType=cv2.BORDER_REPLICATE)
         return picture
 
     def layer(self, layer: VehicleLayer) -> VehicleLayer:

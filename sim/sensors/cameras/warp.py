@@ -43,10 +43,18 @@ class PictureWarp:
         ideal = cv2.undistortPoints(seen, matrix, np.array([distortion_k1, 0.0, 0.0, 0.0]))
         self._ideal = ideal.reshape(*u.shape, 2)
         self._row_time = ((v - self._center[1]) / (height - 1) * readout_s)[..., None]
-        self._lens = self._maps(self._ideal) if distortion_k1 else None
+        # Written at every picture: fresh memory of this size costs as much as the arithmetic.
+        self._nodes = np.empty((u.shape[0] * _NODE_PX, u.shape[1] * _NODE_PX, 2), np.float32)
+        self._moving = np.empty((height, width, 2), np.int16), np.empty((height, width), np.uint16)
+        self._warped = np.empty((height, width, 3), np.uint8)
+        self._lens = None
+        if distortion_k1:
+            self._lens = cv2.convertMaps(self._dense(self._ideal, np.zeros(2)), _ONE_PART, cv2.CV_16SC2)
 
     def picture(self, picture: np.ndarray, plane: np.ndarray, twist: np.ndarray | None) -> np.ndarray:
         """The picture, uint8 (H, W, 3), as lens and shutter show it; itself where they do nothing.
+
+        A warped picture holds until the next call.
 
         Args:
             picture: The ideal one.
@@ -56,10 +64,11 @@ class PictureWarp:
         maps = self._lens
         if self._readout_s and twist is not None:
             x, y = self._ideal[..., 0], self._ideal[..., 1]
-            maps = self._maps(self._ideal - self._row_time * np.stack(image_velocity(x, y, plane, twist), axis=-1))
+            shifted = self._ideal - self._row_time * np.stack(image_velocity(x, y, plane, twist), axis=-1)
+            maps = cv2.convertMaps(self._dense(shifted, np.zeros(2)), _ONE_PART, cv2.CV_16SC2, *self._moving)
         if maps is None:
             return picture
-        return cv2.remap(picture, *maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        return cv2.remap(picture, *maps, cv2.INTER_LINEAR, self._warped, cv2.BORDER_REPLICATE)
 
     def layer(self, layer: np.ndarray) -> np.ndarray:
         """A layer fixed to the camera, uint8 (H, W) or (H, W, C), as the lens shows it; from the nearest pixels."""
@@ -75,15 +84,11 @@ class PictureWarp:
             return None
         return cv2.convertMaps(self._dense(self._ideal, shift_px), _ONE_PART, cv2.CV_16SC2, nninterpolation=True)[0]
 
-    def _maps(self, ideal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return cv2.convertMaps(self._dense(ideal, np.zeros(2)), _ONE_PART, cv2.CV_16SC2)
-
     def _dense(self, ideal: np.ndarray, shift_px: np.ndarray) -> np.ndarray:
         nodes = (ideal * self._focal + self._center - shift_px).astype(np.float32)
-        rows, columns = nodes.shape[:2]
         height, width = self._shape
-        dense = cv2.resize(nodes, (columns * _NODE_PX, rows * _NODE_PX), interpolation=cv2.INTER_LINEAR)
-        return dense[_NODE_PX : _NODE_PX + height, _NODE_PX : _NODE_PX + width]
+        cv2.resize(nodes, self._nodes.shape[1::-1], self._nodes, interpolation=cv2.INTER_LINEAR)
+        return self._nodes[_NODE_PX : _NODE_PX + height, _NODE_PX : _NODE_PX + width]
 
 
 def nearest_remap(layer: np.ndarray, places: np.ndarray | None, border: int) -> np.ndarray:
