@@ -10,7 +10,7 @@ import numpy as np
 from sim.sensors.cameras.warp import PictureWarp, nearest_remap
 from sim.world.errors import DepthErrors
 
-#: Relative step of depth at which the nearer surface grows; a plane seen at 45 degrees changes by 0.2 % per pixel.
+#: Relative step of depth at which the nearer surface grows; ten pixels of a plane turned by 30 degrees change by 0.9 %.
 _STEP_RELATIVE = 0.01
 
 
