@@ -8,8 +8,8 @@ import numpy as np
 
 #: Standard deviation of a uniform distribution of width 1.
 _UNIFORM = 1.0 / math.sqrt(12.0)
-#: Vibration at the rotors' turning rate: about 3600 turns per minute hold a hexarotor with 15 inch propellers [Hz].
-VIBRATION_HZ = 60.0
+#: Frequency of the vibration: two blades of a propeller that turns at about 2550 turns per minute [Hz].
+VIBRATION_HZ = 85.0
 #: Least and largest time between two steps of the automatic exposure [s].
 STEP_TIMES_S = (0.5, 1.5)
 #: Points per pixel along the path from which a line kernel is summed.

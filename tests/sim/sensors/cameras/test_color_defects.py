@@ -86,7 +86,7 @@ def test_defocus_is_a_gaussian_of_the_stated_width(size: float) -> None:
     assert sigma == pytest.approx(math.hypot(size, IDEAL_SIGMA), rel=0.05)
 
 
-@pytest.mark.parametrize(("exposure", "expected"), [(0.008, FOCAL * 0.008 / math.sqrt(12.0)),
+@pytest.mark.parametrize(("exposure", "expected"), [(0.006, FOCAL * 0.006 / math.sqrt(12.0)),
     (0.05, FOCAL / (2.0 * math.pi * VIBRATION_HZ))])  # fmt: skip
 def test_vibration_blurs_by_rate_and_exposure_and_at_most_by_its_stroke(exposure: float, expected: float) -> None:
     _, sigma = edge_spread(taken(with_errors(vibration_rad_s=1.0, camera={"exposure_s": exposure})), 150)
