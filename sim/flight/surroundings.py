@@ -12,13 +12,14 @@ from ibvs_qp.pilot import PilotConfig
 from sim.flight.options import FlightOptions
 from sim.flight.viewer import FlightViewer
 from sim.sensors.camera_mount import CameraMount
-from sim.sensors.cameras import CameraStream, open_camera
+from sim.sensors.cameras import CameraStream, Dropouts, open_camera
 from sim.sensors.cameras.timing import delivery_errors
 from sim.sensors.features import GeometricFeatures
 from sim.sensors.suite import SensorSuite
 from sim.world.board import BoardGeometry
 from sim.world.canvas import Canvas
 from sim.world.plant import Plant
+from sim.world.random_streams import stream
 from sim.world.readout import PLACES
 from sim.world.scene import Scene
 
@@ -26,7 +27,7 @@ from sim.world.scene import Scene
 PAINTING_FORCE = 0.05
 #: Pressed ticks per drawn stroke: 1.2 mm at 0.1 m/s, below the 2 mm between stamps.
 STROKE_TICKS = 3
-_SEEN_FROM = [PLACES[name] for name in ("position", "quaternion", "body_velocity")]
+_SEEN_FROM = [PLACES[name] for name in ("position", "quaternion", "body_velocity", "rate")]
 
 
 class World:
@@ -45,8 +46,9 @@ class World:
         self._mount = CameraMount(self.plant.vehicle, config.controller.vehicle)
         if self._rendered:
             camera = open_camera(options.camera, scene, self._mount.vehicle, self.canvas, options.seed)
+            dropouts = Dropouts(scene.errors.camera.dropped, stream(options.seed, "dropped pictures"))
             late = delivery_errors(scene.errors.timing, options.seed)
-            self.stream = CameraStream(camera, scene.camera.rate_hz, scene.camera.latency_s, errors=late)
+            self.stream = CameraStream(camera, scene.camera.rate_hz, scene.camera.latency_s, dropouts, errors=late)
         elif scene.plant.focal_ratio != 1.0:
             raise ConfigError("plant.focal_ratio needs pictures; fly it with --features rendered")
         else:
@@ -68,14 +70,16 @@ class World:
         plant = self.plant
         if self.stream is not None:
             pose = self._mount.pose(plant.position, plant.quaternion)
-            image = self.stream.tick(plant.time_ns, *pose)
+            twist = np.concatenate([self._mount.velocity(part) for part in self._seen_from[2:]])
+            image = self.stream.tick(plant.time_ns, *pose, twist)
             return self.sensors.sample(plant, image=None if image is None else self._mount.picture(image))
         features, now = self._features, plant.time_ns
         if features.rests(now):
             return self.sensors.sample(plant)
-        position, quaternion, velocity = self._seen_from
+        position, quaternion, velocity, rate = self._seen_from
         pose = self._mount.pose(position, quaternion)
-        return self.sensors.sample(plant, None, features.tick(now, *pose, self._mount.velocity(velocity)))
+        seen = self._mount.velocity(velocity), self._mount.velocity(rate)
+        return self.sensors.sample(plant, None, features.tick(now, *pose, *seen))
 
     def act(self, thrusts: np.ndarray) -> None:
         """Advance one control tick and paint where the brush presses."""

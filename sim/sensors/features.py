@@ -1,6 +1,7 @@
 """Sensor model of line perception: true lines projected and clipped, with noise and the camera's latency.
 
-It replaces perception where the controller alone is studied (``--features geometric``).
+It replaces perception where the controller alone is studied (``--features geometric``). Of a real camera's errors, it
+has the lost pictures and those of `sim.sensors.line_defects`.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL, FeatureFrame
 from ibvs_qp.model.bound_function import BoundFunction
 from sim.sensors.cameras.arm import vehicle_mask
+from sim.sensors.cameras.exposure import Dropouts
 from sim.sensors.cameras.protocol import Schedule, camera_intrinsics
 from sim.sensors.cameras.timing import delivery_errors
 from sim.sensors.edge_view import (
@@ -25,12 +27,14 @@ from sim.sensors.edge_view import (
     board_view,
     painted_edge_view,
 )
+from sim.sensors.image_motion import camera_twist
+from sim.sensors.line_defects import LineDefects
 from sim.sensors.line_projection import moved_line, seen_line
 from sim.sensors.painted_pieces import PaintedPieces
 from sim.world.board import BoardGeometry
 from sim.world.canvas import Canvas
 from sim.world.painted_edges import PaintedEdges
-from sim.world.random_streams import Normals
+from sim.world.random_streams import Normals, stream
 from sim.world.scene import Scene
 
 #: Noise of the plane: distance [m] and direction of the normal [rad].
@@ -84,7 +88,11 @@ class GeometricFeatures:
         self._normals, self._extra = Normals(np.random.default_rng(own)), np.random.default_rng(extra)
         late = delivery_errors(scene.errors.timing, seed)
         self._schedule: Schedule[FeatureFrame] = Schedule(scene.camera.rate_hz, scene.camera.latency_s, late)
+        self._dropouts = Dropouts(scene.errors.camera.dropped, stream(seed, "dropped pictures"))
         self._bind()
+        self._defects = LineDefects(
+            scene.errors.camera, scene.errors.depth, self.intrinsics[0], self._half, scene.camera.height
+        )
         hidden = vehicle_mask(scene, vehicle, self.intrinsics)
         self._pieces = PaintedPieces(self._edges, self._board, self.intrinsics, hidden)
 
@@ -109,7 +117,12 @@ class GeometricFeatures:
         return self._schedule.rests(now_ns)
 
     def tick(
-        self, now_ns: int, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, velocity_body: np.ndarray
+        self,
+        now_ns: int,
+        position_ned: np.ndarray,
+        quaternion_b_in_i: np.ndarray,
+        velocity_body: np.ndarray,
+        rate: np.ndarray | None = None,
     ) -> FeatureFrame | None:
         """Advance to ``now_ns``; the newest frame that has just become due, or None.
 
@@ -118,14 +131,20 @@ class GeometricFeatures:
             position_ned: World position of the body frame's origin [m], (3,).
             quaternion_b_in_i: Attitude (w, x, y, z), (4,).
             velocity_body: True velocity of the centre of mass in B [m/s], (3,).
+            rate: True angular velocity in B [rad/s], (3,), or None for zero.
         """
-        if self._schedule.due(now_ns):
+        if self._schedule.due(now_ns) and not self._dropouts.lost():
             stamp_ns = self._schedule.stamp(now_ns)
-            self._schedule.push(now_ns, self.capture(position_ned, quaternion_b_in_i, velocity_body, stamp_ns))
+            self._schedule.push(now_ns, self.capture(position_ned, quaternion_b_in_i, velocity_body, stamp_ns, rate))
         return self._schedule.pop(now_ns)
 
     def capture(
-        self, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, velocity_body: np.ndarray, stamp_ns: int
+        self,
+        position_ned: np.ndarray,
+        quaternion_b_in_i: np.ndarray,
+        velocity_body: np.ndarray,
+        stamp_ns: int,
+        rate: np.ndarray | None = None,
     ) -> FeatureFrame:
         """Report of perception on a picture taken now; arguments as for `tick`."""
         self._position[:], self._quaternion[:] = position_ned, quaternion_b_in_i
@@ -133,6 +152,8 @@ class GeometricFeatures:
         board = self._board.tolist()
         found = [(board[at], role, kind, track) for at, role, kind, track in _BOARD_LINES if board[at.start]]
         found += self._paint_lines(board)
+        if self._defects.moves_lines:
+            found = self._as_seen(found, board[PLANE], velocity_body, rate)
         a, b, c = self._plane(*board[PLANE])
         velocity = np.array(velocity_body, float)
         take = self._normals.take
@@ -150,6 +171,14 @@ class GeometricFeatures:
             velocity_stamp_ns=stamp_ns,
         )
         return add_sigma_vs(frame, self.scene.features.sigma_vs, self._extra) if self._noise else frame
+
+    def _as_seen(
+        self, found: list[_Line], plane: list[float], velocity_body: np.ndarray, rate: np.ndarray | None
+    ) -> list[_Line]:
+        body = np.concatenate((velocity_body, np.zeros(3) if rate is None else rate))
+        twist = camera_twist(body, np.array(self.vehicle.camera_position_m)).tolist()
+        line = self._defects.line
+        return [(line(numbers, plane, twist), role, kind, track) for numbers, role, kind, track in found]
 
     def _world(self, along: np.ndarray, up: np.ndarray) -> np.ndarray:
         yz = self._geometry.point(along, up)
@@ -190,9 +219,13 @@ class GeometricFeatures:
         size = math.sqrt(a * a + b * b + c * c)
         x, y, z, distance = a / size, b / size, c / size, 1.0 / size
         i, j, k, far = self._normals.take(4)
+        sigma_distance, sigma_normal = SIGMA_DISTANCE_M, SIGMA_NORMAL
+        if self._defects.blurs_plane:
+            more = self._defects.plane_sigmas(distance)
+            sigma_distance, sigma_normal = math.hypot(sigma_distance, more[0]), math.hypot(sigma_normal, more[1])
         along = x * i + y * j + z * k  # a tilt leaves the length of the normal
-        x, y, z = (n + SIGMA_NORMAL * (tilt - n * along) for n, tilt in ((x, i), (y, j), (z, k)))
-        scale = math.sqrt(x * x + y * y + z * z) * (distance + SIGMA_DISTANCE_M * far)
+        x, y, z = (n + sigma_normal * (tilt - n * along) for n, tilt in ((x, i), (y, j), (z, k)))
+        scale = math.sqrt(x * x + y * y + z * z) * (distance + sigma_distance * far)
         return x / scale, y / scale, z / scale
 
 

@@ -1,6 +1,7 @@
 """Camera back ends behind one protocol, and the late stream of their pictures."""
 
 from sim.sensors.cameras.choose import open_camera, resolve_camera
+from sim.sensors.cameras.exposure import Dropouts
 from sim.sensors.cameras.gl_context import CameraUnavailable
 from sim.sensors.cameras.plane import PlaneCamera
 from sim.sensors.cameras.protocol import Camera, camera_intrinsics
@@ -10,6 +11,7 @@ __all__ = [
     "Camera",
     "CameraStream",
     "CameraUnavailable",
+    "Dropouts",
     "PlaneCamera",
     "camera_intrinsics",
     "open_camera",

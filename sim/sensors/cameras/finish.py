@@ -1,4 +1,4 @@
-"""Common last stage of every camera back end: vehicle, lens blur, noise and depth holes."""
+"""Common last stage of every camera back end: vehicle, lens blur, noise, depth holes, and a real camera's errors."""
 
 from __future__ import annotations
 
@@ -7,10 +7,12 @@ import numpy as np
 
 from ibvs_qp.config.vehicle import VehicleParams
 from sim.sensors.cameras.arm import clip_near, shade_propellers, vehicle_layer
+from sim.sensors.cameras.defects import CameraDefects
 from sim.sensors.cameras.noise import NoiseBank
 from sim.sensors.cameras.outline import Box, CutLine, cut_lines
 from sim.sensors.cameras.protocol import camera_intrinsics
 from sim.sensors.cameras.view import View
+from sim.world.random_streams import stream
 from sim.world.scene import Scene
 
 #: Least depth drawn, and largest depth with a reading [m].
@@ -23,18 +25,19 @@ class PictureFinish:
     For one picture call `common_error`, `color` and `depth`, in this order: each draws from one generator.
 
     Args:
-        scene: Camera and paint.
+        scene: Camera, paint and errors.
         vehicle: Where camera, arm and propellers are.
         seed: Seed of the noise.
         noise: Whether to add colour and depth noise and depth holes.
 
     Attributes:
         intrinsics: (fx, fy, cx, cy) [px].
-        propeller_box: (row, row end, column, column end) around the visible propellers, or None.
-        arm_box: The same around arm and brush, or None.
+        defects: Errors of a real camera.
+        propeller_box: (row, row end, column, column end) around the propellers visible in the colours, or None.
+        arm_box: The same around arm and brush, or None; ``depth_box`` is theirs in the depth.
         arm: Colours of arm and brush, uint8 (H, W, 3), under the mask.
         arm_inverse: Their inverse depths [1/m], float32 (H, W).
-        mask: 255 where arm or brush hide the scene, uint8 (H, W).
+        mask: 255 where arm or brush hide the scene in the colours, uint8 (H, W); ``depth_mask`` is that of the depth.
         propellers: 255 where a propeller lies before the scene, uint8 (H, W).
         no_depth: Flat indices of pixels without depth in every picture.
         noise: Banks of noise, or None.
@@ -48,11 +51,16 @@ class PictureFinish:
         shape = (scene.camera.height, scene.camera.width)
         relative = scene.camera.depth_noise_relative
         self.noise = NoiseBank(shape, relative, np.random.default_rng(bank)) if noise else None
+        if self.noise and scene.errors.depth.noise_relative:
+            self.noise.add_white_depth(scene.errors.depth.noise_relative, stream(seed, "depth noise"))
+        self.defects = CameraDefects(scene, vehicle, self.intrinsics, seed)
         layer = vehicle_layer(scene, vehicle, self.intrinsics, self.rng)
-        self.arm_box, self.propeller_box = _bounding_box(layer.mask), _bounding_box(layer.propellers)
-        self.arm, self.arm_inverse = np.ascontiguousarray(layer.picture[..., :3]), layer.inverse_depth
-        self.mask, self.propellers = layer.mask, layer.propellers
-        self.no_depth = np.flatnonzero((layer.holes | layer.propellers) & ~layer.mask)
+        seen, grown = self.defects.layer(layer), self.defects.depth.grown
+        self.arm_box, self.propeller_box = _bounding_box(seen.mask), _bounding_box(seen.propellers)
+        self.arm, self.mask, self.propellers = np.ascontiguousarray(seen.picture[..., :3]), seen.mask, seen.propellers
+        self.arm_inverse, self.depth_mask, self.depth_box = layer.inverse_depth, layer.mask, _bounding_box(layer.mask)
+        self._hides = grown(layer.mask)
+        self.no_depth = np.flatnonzero((grown(layer.holes) | layer.propellers) & ~self._hides)
         self._soft, self._ones = np.empty((*shape, 3), np.uint8), np.ones(shape, np.float32)
 
     def common_error(self, view: View) -> float:
@@ -68,15 +76,23 @@ class PictureFinish:
         height, width = self.mask.shape
         return cut_lines(polygon[:, :2] / polygon[:, 2:] * (fx, fy) + (cx, cy), width, height)
 
-    def color(self, rgb: np.ndarray) -> np.ndarray:
-        """A new picture from a drawn one, uint8 (H, W, 3), into which the vehicle is drawn: lens blur, sensor noise."""
+    def color(self, rgb: np.ndarray, view: View, twist: np.ndarray | None, stamp_ns: int) -> np.ndarray:
+        """A new picture from a drawn one: vehicle, lens blur, sensor noise.
+
+        Args:
+            rgb: The drawn one, uint8 (H, W, 3), which may be overwritten.
+            view: Pose at the stamp.
+            twist: Velocity of the body's origin [m/s] and angular velocity [rad/s] in B, (6,), or None at rest.
+            stamp_ns: Time of the middle row.
+        """
+        rgb = self.defects.moved(rgb, view.plane(0.0), twist)
         if self.propeller_box is not None:
             r0, r1, c0, c1 = self.propeller_box
             shade_propellers(rgb[r0:r1, c0:c1], self.propellers[r0:r1, c0:c1])
         if self.arm_box is not None:
             r0, r1, c0, c1 = self.arm_box
             cv2.copyTo(self.arm[r0:r1, c0:c1], self.mask[r0:r1, c0:c1], rgb[r0:r1, c0:c1])
-        cv2.GaussianBlur(rgb, (3, 3), 0.0, self._soft)  # binomial kernel: sigma 0.71 px
+        self.defects.expose(rgb, stamp_ns, self._soft)
         return self.noise.add_color(self._soft) if self.noise else self._soft.copy()
 
     def depth(self, inverse: np.ndarray, cuts: list[CutLine]) -> np.ndarray:
@@ -85,18 +101,19 @@ class PictureFinish:
         farthest = 1.0 / FAR_M
         if inverse[:: len(inverse) - 1, :: inverse.shape[1] - 1].min() < farthest:  # only when a horizon comes near
             np.maximum(inverse, np.float32(farthest), out=inverse)
-        if self.arm_box is not None:  # the vehicle takes no part in the scene's common error
-            r0, r1, c0, c1 = self.arm_box
-            cv2.copyTo(self.arm_inverse[r0:r1, c0:c1], self.mask[r0:r1, c0:c1], inverse[r0:r1, c0:c1])
-        cv2.divide(self.noise.depth_factor() if self.noise else self._ones, inverse, depth)
-        if self.noise is None:
-            return depth
-        flat, hidden = depth.reshape(-1), self.mask.reshape(-1)
-        for cut in cuts:
-            places = cut.holes(self.rng)
-            flat[places[hidden.take(places) == 0]] = 0.0  # arm and brush hide the step
-        flat[self.no_depth] = 0.0
-        return depth
+        if self.depth_box is not None:  # the vehicle takes no part in the scene's common error
+            r0, r1, c0, c1 = self.depth_box
+            cv2.copyTo(self.arm_inverse[r0:r1, c0:c1], self.depth_mask[r0:r1, c0:c1], inverse[r0:r1, c0:c1])
+        defects = self.defects.depth
+        defects.fatten(inverse)
+        defects.measure(self.noise.depth_factor() if self.noise else self._ones, inverse, depth)
+        if self.noise is not None:
+            flat, hidden = depth.reshape(-1), self._hides.reshape(-1)
+            for cut in cuts:
+                places = cut.holes(self.rng, defects.growth_px)
+                flat[places[hidden.take(places) == 0]] = 0.0  # arm and brush hide the step
+            flat[self.no_depth] = 0.0
+        return defects.placed(depth)
 
 
 def _bounding_box(mask: np.ndarray) -> Box | None:

@@ -61,7 +61,13 @@ class GLCamera:
         self.platform = self._drawn.platform
         self._rgb, self._inverse = np.empty((height, width, 3), np.uint8), np.empty((height, width), np.float32)
 
-    def capture(self, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, stamp_ns: int) -> RgbdFrame:
+    def capture(
+        self,
+        position_ned: np.ndarray,
+        quaternion_b_in_i: np.ndarray,
+        stamp_ns: int,
+        twist: np.ndarray | None = None,
+    ) -> RgbdFrame:
         """Take a picture, see `sim.sensors.cameras.protocol.Camera`; the frame owns its arrays."""
         view = View.of_vehicle(position_ned, quaternion_b_in_i, self.vehicle.camera_position_m, self.intrinsics)
         changed = self.canvas.refresh()
@@ -80,7 +86,7 @@ class GLCamera:
         common = self.finish.common_error(view)
         if common != 0.0:
             np.multiply(self._inverse, np.float32(1.0 / (1.0 + common)), out=self._inverse)
-        color = self.finish.color(self._rgb)
+        color = self.finish.color(self._rgb, view, twist, stamp_ns)
         depth = self.finish.depth(self._inverse, cuts)
         return RgbdFrame(rgb=color, depth=depth, intrinsics=self.intrinsics, stamp_ns=stamp_ns)
 

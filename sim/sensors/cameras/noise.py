@@ -49,6 +49,10 @@ class NoiseBank:
         cv2.subtract(self._lifted, self._darker[start : start + size].reshape(height, -1), flat)
         return noisy
 
+    def add_white_depth(self, relative: float, rng: np.random.Generator) -> None:
+        """Add white depth noise of a standard deviation per depth to the bank."""
+        self._factors += rng.standard_normal(self._factors.shape, np.float32) * np.float32(relative)
+
     def depth_factor(self) -> np.ndarray:
         """Factor 1 + white + correlated noise of one frame, float32 (H, W), not to be written."""
         height, width = self._shape

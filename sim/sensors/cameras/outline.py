@@ -75,18 +75,24 @@ class CutLine:
         indices = other * width + places if self.flat else other + places * width
         return indices.ravel(), distance.astype(np.uint32).ravel()
 
-    def holes(self, rng: np.random.Generator) -> np.ndarray:
-        """Flat indices of pixels beyond the edge that give no depth, ragged at random, (n,)."""
+    def holes(self, rng: np.random.Generator, beyond_px: int = 0) -> np.ndarray:
+        """Flat indices of pixels beyond the edge that give no depth, ragged at random, (n,).
+
+        Args:
+            rng: Raggedness.
+            beyond_px: By how much the board has grown beyond the edge.
+        """
         limit = self.shape[1 - int(self.flat)]
         along = 1 - int(self.flat)
         first, last = sorted((float(self.start[along]), float(self.stop[along])))
-        first, end = max(0, math.ceil(first)), min(self.shape[int(self.flat)], math.floor(last) + 1)
+        first, last = math.ceil(first) - beyond_px, math.floor(last) + beyond_px
+        first, end = max(0, first), min(self.shape[int(self.flat)], last + 1)
         places = np.arange(first, max(first, end))
         towards = 1 if self.normal[int(self.flat)] > 0 else -1  # the board
         widths = rng.integers(1, _HOLE_PX + 1, max(self.shape) // _HOLE_STEP_PX + 1)
         steps = np.arange(-_HOLE_PX, 2)[:, None]
         taken = -steps <= widths[places // _HOLE_STEP_PX]
-        other = np.floor(self._across(places)).astype(np.intp) + steps * towards
+        other = np.floor(self._across(places)).astype(np.intp) + (steps - beyond_px) * towards
         if len(places) and (other[[0, -1]].min() < 0 or other[[0, -1]].max() >= limit):
             taken &= (other >= 0) & (other < limit)
         stride, step = (self.shape[1], 1) if self.flat else (1, self.shape[1])

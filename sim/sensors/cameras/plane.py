@@ -74,7 +74,13 @@ class PlaneCamera:
         self._rgb = np.empty((*shape, 3), np.uint8)
         self._v, self._u = np.indices(shape, np.float32)
 
-    def capture(self, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, stamp_ns: int) -> RgbdFrame:
+    def capture(
+        self,
+        position_ned: np.ndarray,
+        quaternion_b_in_i: np.ndarray,
+        stamp_ns: int,
+        twist: np.ndarray | None = None,
+    ) -> RgbdFrame:
         """Take a picture, see `sim.sensors.cameras.protocol.Camera`; the frame owns its arrays."""
         view = View.of_vehicle(position_ned, quaternion_b_in_i, self.vehicle.camera_position_m, self.intrinsics)
         texture = self.canvas.flush()
@@ -87,7 +93,7 @@ class PlaneCamera:
         for cut in cuts:
             self._cut(wall, cut)
         cv2.cvtColor(self._picture, cv2.COLOR_RGBA2RGB, self._rgb)
-        rgb = self.finish.color(self._rgb)
+        rgb = self.finish.color(self._rgb, view, twist, stamp_ns)
         depth = self.finish.depth(self._inverse, cuts)
         return RgbdFrame(rgb=rgb, depth=depth, intrinsics=self.intrinsics, stamp_ns=stamp_ns)
 

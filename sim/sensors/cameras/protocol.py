@@ -32,13 +32,20 @@ class Camera(Protocol):
 
     intrinsics: tuple[float, float, float, float]
 
-    def capture(self, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, stamp_ns: int) -> RgbdFrame:
+    def capture(
+        self,
+        position_ned: np.ndarray,
+        quaternion_b_in_i: np.ndarray,
+        stamp_ns: int,
+        twist: np.ndarray | None = None,
+    ) -> RgbdFrame:
         """Take a picture.
 
         Args:
             position_ned: World position of the body frame's origin [m], (3,).
             quaternion_b_in_i: Attitude (w, x, y, z), (4,).
-            stamp_ns: Time of capture.
+            stamp_ns: Time of capture; of the middle row where the rows are exposed one after the other.
+            twist: Velocity of the body's origin [m/s] and angular velocity [rad/s] in B, (6,); None at rest.
         """
         ...
 

@@ -22,7 +22,13 @@ class CountingCamera:
     def __init__(self) -> None:
         self.stamps: list[int] = []
 
-    def capture(self, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, stamp_ns: int) -> RgbdFrame:
+    def capture(
+        self,
+        position_ned: np.ndarray,
+        quaternion_b_in_i: np.ndarray,
+        stamp_ns: int,
+        twist: np.ndarray | None = None,
+    ) -> RgbdFrame:
         self.stamps.append(stamp_ns)
         depth = np.full((1, 1), position_ned[0], np.float32)
         return RgbdFrame(rgb=np.zeros((1, 1, 3), np.uint8), depth=depth, intrinsics=self.intrinsics, stamp_ns=stamp_ns)
