@@ -145,6 +145,7 @@ def test_a_bound_moves_the_rows_that_the_page_gives_it_and_no_other() -> None:
             if tick:
                 inputs = controller.setpoints.step.inputs
                 inputs["contact.touching"][0], inputs["contact.rate"][0] = 1.0, -0.02  # closing in
+                inputs["contact.rate_noise"][0] = 0.0  # the quiet zone is the setting
                 controller.setpoints.step.evaluate()
                 controller.setpoints.note(np.full(6, 11.3), 0.0)
         return np.concatenate((controller.engine.data.lower, controller.engine.data.upper))
