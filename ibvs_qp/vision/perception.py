@@ -15,6 +15,7 @@ from ibvs_qp.vision.checks import StageClock, finite_vector, frame_problem
 from ibvs_qp.vision.colors import SurfaceColors
 from ibvs_qp.vision.config import VisionConfig
 from ibvs_qp.vision.detect import Candidate, detect_lines
+from ibvs_qp.vision.exposure import ExposureSteps
 from ibvs_qp.vision.flow import SparseFlow
 from ibvs_qp.vision.layout import PictureLayout
 from ibvs_qp.vision.light_samples import on_surface
@@ -58,11 +59,12 @@ class Perception:
         )
         self._colors = SurfaceColors(config.board_color, config.paint_color, config.line.color_gate)
         self._layout: PictureLayout | None = None
+        self._exposure = ExposureSteps()
         self.reset()
 
     def reset(self) -> None:
         """Forget everything seen: the same pictures then give the same bits."""
-        for part in (self._fitter, self._tracker, self._flow, self._colors):
+        for part in (self._fitter, self._tracker, self._flow, self._colors, self._exposure):
             part.reset()
         self._plane: PlaneEstimate | None = None
         self._stamp_ns: int | None = None
@@ -107,6 +109,10 @@ class Perception:
             features=FeatureFrame(lines=(), plane=None, stamp_ns=stamp), refused=problem, velocity_refused=problem
         )
 
+    def _at_one_exposure(self, frame: RgbdFrame) -> RgbdFrame:
+        levelled = self._exposure.level(frame.rgb, frame.stamp_ns)
+        return frame if levelled is frame.rgb else dataclasses.replace(frame, rgb=levelled)
+
     def _process(
         self,
         frame: RgbdFrame,
@@ -118,6 +124,7 @@ class Perception:
         seed_pixel: tuple[float, float] | None,
     ) -> Percept:
         clock = StageClock()
+        frame = self._at_one_exposure(frame)
         if self._layout is None or not self._layout.fits(frame):
             self._layout = PictureLayout(frame, self._config, self._vehicle)
             self._plane = None
