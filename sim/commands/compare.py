@@ -19,7 +19,7 @@ from sim.commands.options import (
     optional,
     usable_cores,
 )
-from sim.world.worlds import DEFAULT_WORLD
+from sim.world.worlds import EXPERIMENT_WORLD
 
 if TYPE_CHECKING:
     import polars as pl
@@ -51,7 +51,7 @@ class Compare:
     """Presets only: first seed."""
     features: Literal["rendered", "geometric"] = "rendered"
     """Presets only: perception."""
-    world: World = DEFAULT_WORLD
+    world: World = EXPERIMENT_WORLD
     quick: Annotated[bool, flag] = False
     """Presets only: fly a short paint job."""
     jobs: Annotated[int | None, optional("N")] = None

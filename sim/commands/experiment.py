@@ -23,7 +23,7 @@ from sim.commands.options import (
     usable_cores,
 )
 from sim.experiments import ALL, NAMES
-from sim.world.worlds import DEFAULT_WORLD
+from sim.world.worlds import EXPERIMENT_WORLD
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -45,7 +45,7 @@ class ExperimentCommand:
     """Few cells and seeds: takes minutes, does not replace the record."""
     features: Literal["rendered", "geometric"] = "rendered"
     """Perception: rendered pictures through the vision pipeline, or a sensor model of lines."""
-    world: World = DEFAULT_WORLD
+    world: World = EXPERIMENT_WORLD
     seed: int = 0
     """First seed; the flights of a cell use consecutive seeds."""
     jobs: Annotated[int | None, optional("N")] = None
@@ -121,7 +121,7 @@ class ExperimentCommand:
         """The command that repeats an experiment on any computer, with ``{name}`` in place of its name."""
         words = ["ibvs-qp", "experiment", "NAME", *(["--quick"] if self.quick else [])]
         words += ["--features", self.features] if self.features != "rendered" else []
-        words += ["--world", self.world] if self.world != DEFAULT_WORLD else []
+        words += ["--world", self.world] if self.world != EXPERIMENT_WORLD else []
         words += ["--seed", str(self.seed)] if self.seed else []
         return shlex.join(words).replace("NAME", "{name}")
 

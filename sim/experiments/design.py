@@ -16,7 +16,7 @@ from sim.flight.options import FlightOptions, default_preset, pilot_config
 from sim.sweep.design import FlightPlan, Parameter, Run
 from sim.sweep.setup import Setup, changed
 from sim.world.scene import Scene
-from sim.world.worlds import DEFAULT_WORLD, in_world
+from sim.world.worlds import EXPERIMENT_WORLD, in_world
 
 #: Start, approach, alignment, touch and retreat of a flight that starts near the wall [s]; sizes plan and bar only.
 AROUND_S = 9.0
@@ -33,7 +33,7 @@ class Choice:
     quick: bool = False  # a few cells and seeds, for minutes instead of the record
     seed: int = 0  # first seed
     features: str = "rendered"  # "rendered" or "geometric"
-    world: str = DEFAULT_WORLD  # errors of vehicle and sensors
+    world: str = EXPERIMENT_WORLD  # errors of vehicle and sensors
 
 
 def chosen(name: str) -> list[Experiment]:

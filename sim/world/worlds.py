@@ -7,8 +7,8 @@ import dataclasses
 from sim.world.errors import WorldErrors, world_errors, world_names
 from sim.world.scene import Scene
 
-#: World of a flight that names none and has no scene file.
-DEFAULT_WORLD = "ideal"
+#: World of `paint` without a scene file, and of the experiments and comparisons unless told otherwise.
+DEFAULT_WORLD, EXPERIMENT_WORLD = "datasheet", "ideal"
 #: Name of errors that no shipped profile has.
 OWN = "own"
 

@@ -1,0 +1,74 @@
+"""Flights in worlds with the errors of a real vehicle: the job ends, and its figures stay within what we promise."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import pytest
+
+from sim.evaluate.metrics import compute_metrics
+from sim.flight.closed_loop import fly
+from sim.flight.options import FlightOptions, default_preset
+from sim.flight.trace import Trace
+from sim.world.errors import WorldErrors, world_errors
+from sim.world.plant_scene import PlantScene
+from sim.world.scene import Scene
+
+
+def flown(errors: WorldErrors, law: str = "qp", seed: int = 0, stroke_m: float = 0.5, **scene: Any) -> Trace:
+    """A paint job on geometric features in a world."""
+    paint = dataclasses.replace(Scene().paint, stroke_m=stroke_m)
+    options = FlightOptions(law=law, seed=seed, features="geometric", video=False, machine_code=True)
+    return fly(Scene(paint=paint, errors=errors, **scene), options)
+
+
+def one_error(section: str, **values: float) -> WorldErrors:
+    ideal = WorldErrors()
+    return dataclasses.replace(ideal, **{section: dataclasses.replace(getattr(ideal, section), **values)})
+
+
+@pytest.mark.parametrize("law", ["qp", "paper"])
+@pytest.mark.parametrize(
+    "errors",
+    [
+        one_error("attitude", bias_deg=1.5),
+        one_error("accelerometer", bias_m_s2=0.15),
+        one_error("accelerometer", vibration_m_s2=1.0),
+    ],
+    ids=["attitude bias", "accelerometer bias", "vibration"],
+)
+def test_one_large_error_neither_keeps_the_tip_off_the_wall_nor_spoils_the_push(law: str, errors: WorldErrors) -> None:
+    for seed in (0, 1):
+        metrics = compute_metrics(flown(errors, law, seed))
+        assert metrics["completed"], metrics["reason"]
+        assert metrics["force_rms_straight_n"] < 0.15
+        assert metrics["path_rms_straight_m"] < (2e-3 if law == "qp" else 4e-3)
+
+
+@pytest.mark.parametrize(
+    ("world", "path_m", "push_n", "peak", "tilt_deg"),
+    [("datasheet", 6e-3, 0.25, 1.5, 1.3), ("harsh", 1.2e-2, 0.8, 2.5, 3.0)],
+)
+def test_a_world_is_painted_in(world: str, path_m: float, push_n: float, peak: float, tilt_deg: float) -> None:
+    for seed in (0, 1):
+        trace = flown(world_errors(world), "qp", seed)
+        metrics = compute_metrics(trace)
+        assert metrics["completed"], metrics["reason"]
+        assert metrics["path_rms_straight_m"] < path_m and metrics["force_rms_straight_n"] < push_n
+        assert metrics["force_peak_n"] < peak * trace.scene.paint.push_n
+        assert metrics["contact_share"] >= 0.99 and metrics["tilt_rms_deg"] < tilt_deg
+
+
+@pytest.mark.parametrize("world", ["datasheet", "harsh"])
+def test_the_analytic_law_completes_in_every_world(world: str) -> None:
+    metrics = compute_metrics(flown(world_errors(world), "paper"))
+    assert metrics["completed"], metrics["reason"]
+
+
+@pytest.mark.parametrize("down_m", [-0.005, 0.005])
+def test_a_tip_that_is_not_where_it_should_be_keeps_the_second_row_at_its_place(down_m: float) -> None:
+    front, right, down = default_preset("qp").controller.vehicle.tip_position_m  # believed
+    metrics = compute_metrics(flown(WorldErrors(), plant=PlantScene(tip_position_m=(front, right, down + down_m))))
+    rows = [row["path_rms_straight_m"] for row in metrics["rows"]]
+    assert metrics["completed"] and rows[0] > 4e-3 and rows[1] < 2e-3
