@@ -40,7 +40,7 @@ class ExperimentCommand:
 
     name: Annotated[Literal[(*NAMES, ALL)], tyro.conf.Positional, tyro.conf.arg(metavar="NAME")]  # type: ignore[valid-type]
     """Experiment: force-hold, paint, noise-sweep, saturation, sloped-edge, friction, gust, rotor-derate, approach,
-    payload or all."""
+    payload, worlds or all."""
     quick: Annotated[bool, flag] = False
     """Few cells and seeds: takes minutes, does not replace the record."""
     features: Literal["rendered", "geometric"] = "rendered"
@@ -98,8 +98,15 @@ class ExperimentCommand:
         write_summary(folder, content)  # before the figures: an error there must not lose the record
         page = None
         if table.height and not result.interrupted:
+            features, worlds = (
+                " and ".join(dict.fromkeys(names))
+                for names in (
+                    [run.plan.options.features for run in runs],
+                    [str(run.params.get("world", self.world)) for run in runs],
+                )
+            )
             lead = (
-                f"{table.height} flights, {self.features} features, world {self.world}, first seed {self.seed}, "
+                f"{table.height} flights, {features} features, world {worlds}, first seed {self.seed}, "
                 f"{facts['version']}."
             )
             lead = ("A quick run with few flights, not the record: " if self.quick else "") + lead

@@ -14,11 +14,11 @@ import tyro
 
 from ibvs_qp.config.errors import ConfigError, out_of_range
 from sim.commands.exit_codes import EXIT_INTERRUPTED
-from sim.world.worlds import DEFAULT_WORLD
+from sim.world.worlds import DEFAULT_WORLD, EXPERIMENT_WORLD
 
 _WORLD = "World: errors of vehicle and sensors, as ideal, datasheet, harsh, or a TOML file; default: "
 #: World of the flights of a command that flies no scene file.
-World = Annotated[str, tyro.conf.arg(metavar="NAME", help=f"{_WORLD}{DEFAULT_WORLD}.", help_behavior_hint="")]
+World = Annotated[str, tyro.conf.arg(metavar="NAME", help=f"{_WORLD}{EXPERIMENT_WORLD}.", help_behavior_hint="")]
 #: World of a flight that may have a scene file; None takes the scene file's errors.
 SceneWorld = Annotated[
     str | None,

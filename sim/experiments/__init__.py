@@ -11,5 +11,6 @@ NAMES = (
     "rotor-derate",
     "approach",
     "payload",
+    "worlds",
 )
 ALL = "all"

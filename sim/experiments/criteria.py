@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from ibvs_qp.config.errors import ConfigError
-from ibvs_qp.config.settings import choice, validate
+from ibvs_qp.config.settings import choice, setting, validate
 from sim.sweep.design import Parameter
 
 #: Statistic that a bound applies to: the median of the cell, or each of its flights (flags, peaks, counts of mishaps).
@@ -26,6 +26,9 @@ class Bound:
     scale: float = 1.0  # factor from SI to `unit`
     unit: str = ""  # unit shown
     statistic: str = choice(MEDIAN, "statistic that the bound applies to", (MEDIAN, EVERY))
+    share: float = setting(
+        1.0, "fraction of flights that must be within a bound on every flight, or have a value", low=0.0, high=1.0
+    )
     include_failed: bool = False  # whether flights that did not end as planned count with their values
     reason: str = ""  # why this bound
 

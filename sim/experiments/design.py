@@ -15,6 +15,7 @@ from sim.flight.jobs import PaintJob, PressJob
 from sim.flight.options import FlightOptions, default_preset, pilot_config
 from sim.sweep.design import FlightPlan, Parameter, Run
 from sim.sweep.setup import Setup, changed
+from sim.world.random_scene import EVALUATION, random_scene
 from sim.world.scene import Scene
 from sim.world.worlds import EXPERIMENT_WORLD, in_world
 
@@ -33,7 +34,7 @@ class Choice:
     quick: bool = False  # a few cells and seeds, for minutes instead of the record
     seed: int = 0  # first seed
     features: str = "rendered"  # "rendered" or "geometric"
-    world: str = EXPERIMENT_WORLD  # errors of vehicle and sensors
+    world: str = EXPERIMENT_WORLD  # errors of vehicle and sensors, where no level names another world
 
 
 def chosen(name: str) -> list[Experiment]:
@@ -61,8 +62,9 @@ def _cell(experiment: Experiment, flights: Flights, level: dict[str, Parameter],
     """Flights of one cell under every law, with the same seeds."""
     variant = str(level.get("variant", "standard"))
     for law in flights.laws or VARIANTS[variant].laws:
-        setup = _setup(experiment, flights, level, law, variant, in_world(Scene(), choice.world))
         for index in range(flights.seeds):
+            scene = _scene(flights, str(level.get("world", choice.world)), choice.seed + index)
+            setup = _setup(experiment, flights, level, law, variant, scene)
             options = FlightOptions(
                 law=law,
                 seed=choice.seed + index,
@@ -82,6 +84,11 @@ def _cell(experiment: Experiment, flights: Flights, level: dict[str, Parameter],
                 keep=flights.keep and index == 0,
                 expected_s=AROUND_S + setup.job.expected_s(config.painting),
             )
+
+
+def _scene(flights: Flights, world: str, seed: int) -> Scene:
+    """Start values of a flight: the default scene, or the one of its seed, with the errors of a world."""
+    return in_world(random_scene(seed, EVALUATION) if flights.scene == "random" else Scene(), world)
 
 
 def _setup(

@@ -25,8 +25,9 @@ from sim.sweep.statistics import cells, parameters, split
 _HEAD = """# Results of the experiments
 
 Generated from data by `{command}`; do not edit. {lead}
-*Met*: a bound marked *every* (flags, peaks, bounces) applies to each flight, any other bound to the median of the cell;
-if only the median is within the bound, the number of flights within it follows. A flight without the metric fails.
+*Met*: a bound marked *every* (flags, peaks, bounces) applies to each flight, one marked with a share to that share of
+them, any other bound to the median of the cell; if not all flights are within the bound, the number within it follows.
+A flight without the metric fails.
 Values are medians over the flights of a cell, with their 95 % bootstrap interval in brackets. *Done* counts the flights
 that ended as planned; values come from those flights only. Differences are analytic law minus QP law with the same
 seeds, over the flights that both laws ended as planned, with the exact interval of the median in brackets; **bold**
@@ -82,12 +83,13 @@ def _criteria(sections: Sequence[Section]) -> str:
 def _verdict(experiment: Experiment, verdict: Verdict) -> list[str]:
     criterion = verdict.criterion
     unit = f" {criterion.unit}" if criterion.unit else ""
-    sign = (">=" if criterion.least else "<=") + (" every" if criterion.every else "")
+    sign = (">=" if criterion.least else "<=") + (" every" if criterion.every and criterion.share == 1.0 else "")
+    share = f" in {100.0 * criterion.share:.0f} %" if criterion.every and criterion.share < 1.0 else ""
     where = cell(experiment, verdict.place) or "all"
     where += f", {criterion.variant}" if criterion.variant != "standard" else ""
     values = (f"{value:.3g}{unit}" if np.isfinite(value) else "–" for value in (verdict.median, verdict.worst))
     met = "**no**" if verdict.words == "no" else verdict.words
-    bound, within = f"{sign} {verdict.bound:.4g}{unit}", f"{verdict.within} of {verdict.n}"
+    bound, within = f"{sign} {verdict.bound:.4g}{unit}{share}", f"{verdict.within} of {verdict.n}"
     return [experiment.name, criterion.text, where, bound, *values, within, met]
 
 

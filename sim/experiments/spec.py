@@ -42,10 +42,11 @@ class Flights:
         "press", "what is measured; paint paints, the others press", ("paint", "press", "slide", "loss")
     )
     seeds: int = setting(1, "flights of each cell and law", low=1)
-    levels: dict[str, tuple[Parameter, ...]] = field(default_factory=dict)  # the first varies slowest; also `variant`
+    levels: dict[str, tuple[Parameter, ...]] = field(default_factory=dict)  # first slowest; also variant, world
     fixed: dict[str, Value] = field(default_factory=dict)  # values of dotted paths, as in ibvs-qp sweep
     paths: dict[str, tuple[str, ...]] = field(default_factory=dict)  # further paths that take a parameter's value
     laws: tuple[str, ...] = ()  # laws that fly; empty means those of the variant
+    scene: str = choice("default", "scene; random is one per seed, the same under every law", ("default", "random"))
     fault: str = choice("none", "what goes wrong after touch", ("none", "derate", "wind step"))
     fault_delay_s: float = setting(0.0, "time from touch to the fault", unit="s", low=0.0)
     features: str = choice("", "overrides the command line", ("", "rendered", "geometric"))

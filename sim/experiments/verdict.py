@@ -30,11 +30,12 @@ class Verdict:
 
     @property
     def met(self) -> bool:
-        """Whether all flights have a value, and the statistic of the criterion is within the bound."""
-        if not self.n or self.known < self.n:
+        """Whether enough flights have a value, and the statistic of the criterion is within the bound."""
+        enough = self.criterion.share * self.n
+        if not self.n or self.known < enough:
             return False
         if self.criterion.every:
-            return self.within == self.n
+            return self.within >= enough
         return bool(self.median >= self.bound if self.criterion.least else self.median <= self.bound)
 
     @property
@@ -43,7 +44,7 @@ class Verdict:
         if not self.measured:
             return "not measured"
         if self.met and self.within < self.n:
-            return f"yes (median; {self.within} of {self.n})"
+            return f"yes ({'' if self.criterion.every else 'median; '}{self.within} of {self.n})"
         return "yes" if self.met else "no"
 
     @property

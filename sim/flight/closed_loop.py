@@ -11,7 +11,7 @@ from sim.flight.jobs import Job, PaintJob
 from sim.flight.options import FlightOptions, pilot_config
 from sim.flight.recorder import Recorder
 from sim.flight.surroundings import World
-from sim.flight.trace import Event, Trace
+from sim.flight.trace import CRASH, Event, Trace
 from sim.sensors.features import add_sigma_vs
 from sim.world.plant import TICK_NS
 from sim.world.random_streams import stream
@@ -72,7 +72,7 @@ def fly(
             recorder.tick(frame, command)
             tick += 1
             if world.plant.crashed:
-                reason = f"crash: {world.plant.crashed}"
+                reason = f"{CRASH}: {world.plant.crashed}"
                 break
             if tick * TICK_NS * 1e-9 > limit:
                 reason = f"time-out after {limit:.0f} s of flight"

@@ -10,6 +10,8 @@ import numpy as np
 
 from sim.world.scene import Scene
 
+#: Beginning of the reason of a flight that ended in a crash.
+CRASH = "crash"
 #: Meaning of every array of a trace (N control ticks, M physics steps, F pictures).
 FIELDS = {
     "t": "(N,) time since start [s]",

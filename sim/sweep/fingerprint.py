@@ -31,7 +31,7 @@ def digest(content: Any) -> str:
 
 
 def configuration_hash(run: Run) -> str:
-    """Hash of scene, configuration, options, job and faults; all seeds of a cell have the same one."""
+    """Hash of scene, configuration, options, job and faults; all seeds of a cell in one scene have the same one."""
     plan = run.plan
     options = {key: value for key, value in dataclasses.asdict(plan.options).items() if key != "seed"}
     return digest(

@@ -9,14 +9,17 @@ import numpy as np
 from sim.evaluate.metrics import compute_metrics
 from sim.evaluate.path_error import path_error
 from sim.evaluate.window import limited_fraction, rms
-from sim.flight.trace import Trace
+from sim.flight.trace import CRASH, Trace
 
 #: The vehicle finds its hover within this time after release [s].
 SETTLED_S = 1.0
 
 
 def paint_figures(trace: Trace) -> dict[str, float]:
-    """Every number of M, rms of path and push over the whole painting, fractions of ticks solved and limited."""
+    """Every number of M, rms of path and push over the whole painting, fractions of ticks solved and limited, crash.
+
+    ``push_peak_ratio``: greatest push at 1 kHz over the push of the job. ``crashed``: 1 if the flight ended so, else 0.
+    """
     metrics = compute_metrics(trace)
     figures = {
         name: float(value)
@@ -26,6 +29,8 @@ def paint_figures(trace: Trace) -> dict[str, float]:
     ticks = sum(metrics["outcomes"].values())
     figures["solved_share"] = metrics["outcomes"].get("solved", 0) / ticks if ticks else math.nan
     figures["limited_share"] = limited_fraction(trace, np.ones(len(trace.t), bool))
+    figures["push_peak_ratio"] = metrics["force_peak_n"] / trace.scene.paint.push_n
+    figures["crashed"] = float(trace.reason.startswith(CRASH))
     path = path_error(trace)
     figures["path_rms_m"] = rms(path.distance[path.painting])
     figures["force_rms_n"] = rms((trace.push_true - trace.push_reference)[path.painting])

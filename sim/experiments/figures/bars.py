@@ -8,27 +8,39 @@ from sim.experiments.figures.common import Drawn, Results
 from sim.experiments.spec import FigureSpec
 from sim.figures.style import law_colour, law_name, new_figure
 from sim.sweep.parts import PARAM
+from sim.sweep.spec import LAWS
 from sim.sweep.statistics import completed, median_interval, select
 
-#: Width of a bar; values of the parameter are one apart.
-_BAR = 0.38
+#: Width of the bars of a value together; values of the parameter are one apart.
+_WIDTH = 0.76
+#: Opacity of the bars of each variant as a ratio of that of the one before; the first is opaque.
+_PALER = 0.6
 
 
 def draw_bars(spec: FigureSpec, results: Results) -> Drawn:
-    """One pair of bars per value of the parameter."""
+    """Bars per value of the parameter: one per law, and per variant of the figure that the law flew."""
+    series = [
+        (law, variant)
+        for law in LAWS
+        for variant in spec.variants
+        if select(results.table, law=law, variant=variant).height
+    ]
+    bar = _WIDTH / max(len(series), 1)
     values = list(results.table[PARAM + spec.x].unique(maintain_order=True))
     figure = new_figure(0.9 + 0.3 * len(values))
     grid = figure.subplots(1, len(spec.panels), sharey=True)
     crashed = False
     for axes, panel in zip(grid, spec.panels, strict=True):
-        for law, side in (("qp", -0.5), ("paper", 0.5)):
-            rows = [select(results.table, {spec.x: value}, law=law) for value in values]
+        for index, (law, variant) in enumerate(series):
+            rows = [select(results.table, {spec.x: value}, law=law, variant=variant) for value in values]
             found = [median_interval(completed(row, panel.metric)) for row in rows]
             middle, low, high = (
                 panel.scale * np.array([entry[part] for entry in found]) for part in ("median", "low", "high")
             )
-            places = np.arange(len(values)) + side * _BAR
-            axes.barh(places, middle, height=_BAR, color=law_colour(law), label=law_name(law))
+            places = np.arange(len(values)) + (index - 0.5 * (len(series) - 1)) * bar
+            order = spec.variants.index(variant)
+            label = law_name(law) + (f", {variant}" if order else "")
+            axes.barh(places, middle, height=bar, color=law_colour(law), alpha=_PALER**order, label=label)
             ends = np.vstack((middle - low, high - middle))
             axes.errorbar(middle, places, xerr=ends, fmt="none", ecolor="#333333", capsize=1.5, linewidth=0.8)
             for place, row in zip(places, rows, strict=True):
@@ -42,6 +54,6 @@ def draw_bars(spec: FigureSpec, results: Results) -> Drawn:
     grid[0].set_yticks(range(len(values)), ["no error" if value == "nothing" else value for value in values])
     grid[0].set_ylim(len(values) - 0.4, -0.6)
     handles, labels = grid[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=2)
+    figure.legend(handles, labels, loc="outside lower center", ncols=4)
     note = "; x: flights that did not end as planned, left out" if crashed else ""
     return {spec.name: (spec.caption + note, figure)}

@@ -22,6 +22,7 @@ from sim.commands.cli import main
 from sim.flight.flight_log import load_run
 from sim.flight.options import FlightOptions
 from sim.world.scene import PaintScene, Scene
+from sim.world.worlds import DEFAULT_WORLD, in_world
 
 
 @pytest.fixture
@@ -62,7 +63,7 @@ def test_json_is_one_line_and_equals_the_file(flown, capsys):
 
 def test_log_reads_back_equal(flown, capsys):
     assert main(["paint", "--law", "qp", "--out", "run", "--no-video"]) == 0
-    trace = fake_fly(Scene(), FlightOptions())
+    trace = fake_fly(in_world(Scene(), DEFAULT_WORLD), FlightOptions())
     back = load_run(flown / "run")["qp"]
     assert (back.scene, back.seed, back.phases, back.reason) == (trace.scene, 0, trace.phases, trace.reason)
     assert set(back.arrays) == set(trace.arrays)

@@ -20,7 +20,7 @@ from sim.experiments.design import Choice, designs
 from sim.flight.flight_log import load_run
 from sim.world.errors import WorldErrors, world_errors
 from sim.world.scene import Scene
-from sim.world.worlds import DEFAULT_WORLD, in_world
+from sim.world.worlds import DEFAULT_WORLD, EXPERIMENT_WORLD, in_world
 
 PRESET = str(Path(ibvs_qp.__file__).parent / "presets" / "tarot_t960_qp.toml")
 PAINT = ["paint", "--law", "qp", "--no-video", "--json", "--out", "run"]
@@ -85,7 +85,7 @@ def test_compare_and_experiment_fly_a_world(flown, capsys):
 
 def test_the_default_world_changes_no_experiment():
     plans = [run.plan for run in designs("approach", Choice(quick=True))]
-    assert {plan.scene.errors for plan in plans} == {world_errors(DEFAULT_WORLD)}
+    assert {plan.scene.errors for plan in plans} == {world_errors(EXPERIMENT_WORLD)}
 
 
 @pytest.mark.parametrize("words", [["paint"], ["compare", PRESET, PRESET], ["experiment", "approach", "--quick"]])

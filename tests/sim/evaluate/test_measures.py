@@ -7,8 +7,9 @@ import math
 import numpy as np
 import pytest
 from press_trace import press_trace
+from synthetic_trace import Errors, synthetic_trace
 
-from sim.evaluate.measures import loss_figures, press_figures
+from sim.evaluate.measures import loss_figures, paint_figures, press_figures
 from sim.evaluate.measures.press import push_reach
 
 LOW, HIGH = (1.2,) * 6, (52.56,) * 6
@@ -85,3 +86,10 @@ def test_a_spin_after_a_loss_counts_its_full_turns():
     assert figures["yaw_turned_deg"] == pytest.approx(np.degrees(turn[-1]), rel=1e-3)
     assert figures["yaw_rate_peak_deg_s"] == pytest.approx(np.degrees(2.0), rel=1e-2)
     assert figures["push_spike_n"] == np.max(trace.contact_1khz[6000:])
+
+
+def test_a_paint_job_tells_its_peak_and_its_crash():
+    trace = synthetic_trace(Errors(peak_n=7.5))
+    assert paint_figures(trace)["push_peak_ratio"] == pytest.approx(1.5) and paint_figures(trace)["crashed"] == 0.0
+    trace.completed, trace.reason = False, "crash: propeller strike"
+    assert paint_figures(trace)["crashed"] == 1.0

@@ -100,3 +100,10 @@ def test_curves_draw_their_bound_and_every_variant(tmp_path, name, metric, bound
     labels = axes.get_legend_handles_labels()[1]
     assert labels.count("bound") == bounds
     assert len([label for label in labels if label != "bound"]) == 2 * table["variant"].n_unique()
+
+
+def test_bars_show_every_variant_that_a_law_flew(tmp_path):
+    each = experiment("worlds")
+    figures = {panel.metric: 1.0 for panel in each.figures[0].panels}
+    axes = draw(Results(each, table_of("worlds", **figures), tmp_path))["worlds"][1].axes[0]
+    assert len(axes.get_legend_handles_labels()[1]) == 4

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
+import polars as pl
 import pytest
 
 from ibvs_qp.config.errors import ConfigError
@@ -13,6 +14,12 @@ from sim.experiments.criteria import Bound, Criteria
 from sim.experiments.design import Choice, design
 from sim.experiments.figures import KINDS
 from sim.experiments.spec import SPECS, Experiment, experiment
+from sim.experiments.verdict import evaluate
+from sim.world.random_scene import EVALUATION, random_scene
+from sim.world.worlds import in_world
+
+#: Scenes of the seeds of experiment worlds.
+SCENES = [random_scene(seed, EVALUATION) for seed in range(30)]
 
 
 def test_every_file_has_a_name_and_every_name_a_file():
@@ -67,6 +74,17 @@ def test_criteria_expand_to_variants_cells_and_bounds():
     assert (listed[1].least, listed[1].bound) == (True, 2.0)
 
 
+@pytest.mark.parametrize(("good", "met"), [(30, True), (29, True), (28, False)])
+def test_a_bound_may_hold_for_a_share_of_the_flights(good, met):
+    bound = next(each for each in experiment("worlds").every_criterion() if each.share < 1.0 and each.every)
+    done = [index < good for index in range(30)]
+    verdict = evaluate(bound, {}, pl.DataFrame({"completed": done}), {})
+    assert verdict.met is met and verdict.within == good
+    median = next(each for each in experiment("worlds").every_criterion() if each.share < 1.0 and not each.every)
+    rows = pl.DataFrame({"completed": done, median.metric: [0.004] * 30})
+    assert evaluate(median, {}, rows, {}).met is met
+
+
 def test_levels_vary_from_the_last_to_the_first_and_laws_share_seeds():
     runs = design(experiment("friction"), Choice(seed=4))
     first = [(run.variant, run.params["friction"], run.law, run.seed) for run in runs[:10]]
@@ -79,3 +97,16 @@ def test_levels_vary_from_the_last_to_the_first_and_laws_share_seeds():
 def test_flights_that_need_pictures_are_left_out_of_geometric_ones():
     flown = {run.params["error"] for run in design(experiment("payload"), Choice(features="geometric"))}
     assert "camera 1 cm low" in flown and not any("focal" in str(error) for error in flown)
+
+
+def test_worlds_flies_every_law_on_the_same_random_scenes_in_three_worlds():
+    runs = design(experiment("worlds"), Choice(world="ideal"))
+    laws = {(run.law, run.plan.config.controller.allocator) for run in runs}
+    assert laws == {("qp", "clip"), ("paper", "clip"), ("paper", "sequential"), ("paper", "box")}
+    assert len(runs) == 30 * len(laws) * 3
+    for run in runs:
+        expected = in_world(SCENES[run.seed], str(run.params["world"]))
+        assert run.plan.scene == expected and run.plan.options.features == "geometric"
+    assert {run.params["world"] for run in runs} == {"ideal", "datasheet", "harsh"}
+    shifted = design(experiment("worlds"), Choice(seed=5, quick=True))
+    assert {run.plan.scene.board for run in shifted} == {SCENES[5].board}

@@ -177,7 +177,7 @@ def test_runs_that_share_nothing_are_refused(tmp_path):
 
 @pytest.mark.parametrize(
     "name", ["force-hold", "paint", "noise-sweep", "saturation", "sloped-edge", "friction", "gust", "rotor-derate",
-             "approach", "payload"]
+             "approach", "payload", "worlds"]
 )  # fmt: skip
 def test_every_experiment_pairs_its_laws_and_judges_figures_that_its_cells_can_have(name):
     each = experiment(name)
