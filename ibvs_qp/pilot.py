@@ -353,7 +353,9 @@ class Pilot:
             plane_stamp_ns=self._plane_stamp,
             velocity=velocity,
             velocity_covariance=covariance,
-            acceleration_bias=bias_right * np.array(axes.right) + bias_down * np.array(axes.down),
+            acceleration_bias=np.array(
+                [bias_right * r + bias_down * d for r, d in zip(axes.right, axes.down, strict=True)]
+            ),
             thrust_min=low,
             thrust_max=high,
         )

@@ -59,6 +59,14 @@ def validate(instance: Any, prefix: str = "") -> None:
             _check_number(name, value, field.default, meta)
 
 
+class Checked:
+    """Base of a settings section that refuses values out of range at construction."""
+
+    def __post_init__(self) -> None:
+        """Validate every field."""
+        validate(self)
+
+
 def require_order(instance: Any, smaller: str, larger: str, reason: str) -> None:
     """Require that one field lies below another.
 

@@ -1,4 +1,4 @@
-"""A CasADi function on arrays that live elsewhere: one call reads and fills them where they are."""
+"""CasADi functions on numpy arrays: bound to fixed memory for every tick, or from arrays to arrays."""
 
 from __future__ import annotations
 
@@ -39,6 +39,17 @@ class BoundFunction:
     def __call__(self) -> None:
         """Evaluate on the present arguments."""
         self.evaluate()
+
+
+class ArrayFunction:
+    """A CasADi function from arrays to arrays, for what is evaluated now and then."""
+
+    def __init__(self, name: str, arguments: list[ca.SX], results: list[ca.SX]) -> None:
+        self._function = ca.Function(name, arguments, results)
+
+    def __call__(self, *arguments: np.ndarray) -> list[np.ndarray]:
+        """Evaluate on vectors; returns vectors."""
+        return [np.array(value).ravel() for value in self._function(*arguments)]
 
 
 def _memory(array: np.ndarray) -> memoryview:

@@ -10,6 +10,7 @@ import numpy as np
 from scipy import sparse
 
 from ibvs_qp.limits.limit import Limit
+from ibvs_qp.model.bound_function import ArrayFunction
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.rows import LimitRow, TaskRow
 from ibvs_qp.model.signals import stack
@@ -127,17 +128,6 @@ class QpProblem:
         lower = ca.vertcat(*(row.lower for row in self.limit_rows))
         upper = ca.vertcat(*(row.upper for row in self.limit_rows))
         return ArrayFunction("limit_values", self._at, [values, lower, upper])
-
-
-class ArrayFunction:
-    """A CasADi function from arrays to arrays, for what is evaluated now and then."""
-
-    def __init__(self, name: str, arguments: list[ca.SX], results: list[ca.SX]) -> None:
-        self._function = ca.Function(name, arguments, results)
-
-    def __call__(self, *arguments: np.ndarray) -> list[np.ndarray]:
-        """Evaluate on vectors; returns vectors."""
-        return [np.array(value).ravel() for value in self._function(*arguments)]
 
 
 def _unlimited_thrusts(hessian: ca.SX, gradient: ca.SX) -> ca.SX:

@@ -67,19 +67,15 @@ class World:
 
     def sense(self) -> SensorFrame:
         """Sensor frame of the present tick."""
-        plant = self.plant
-        if self.stream is not None:
-            pose = self._mount.pose(plant.position, plant.quaternion)
-            twist = np.concatenate([self._mount.velocity(part) for part in self._seen_from[2:]])
-            image = self.stream.tick(plant.time_ns, *pose, twist)
-            return self.sensors.sample(plant, image=None if image is None else self._mount.picture(image))
-        features, now = self._features, plant.time_ns
-        if features.rests(now):
+        plant, now = self.plant, self.plant.time_ns
+        if (self.stream or self._features).rests(now):
             return self.sensors.sample(plant)
-        position, quaternion, velocity, rate = self._seen_from
-        pose = self._mount.pose(position, quaternion)
-        seen = self._mount.velocity(velocity), self._mount.velocity(rate)
-        return self.sensors.sample(plant, None, features.tick(now, *pose, *seen))
+        position, quaternion, *motion = self._seen_from
+        pose, seen = self._mount.pose(position, quaternion), [self._mount.velocity(part) for part in motion]
+        if self.stream is None:
+            return self.sensors.sample(plant, None, self._features.tick(now, *pose, *seen))
+        image = self.stream.tick(now, *pose, np.concatenate(seen))
+        return self.sensors.sample(plant, image=None if image is None else self._mount.picture(image))
 
     def act(self, thrusts: np.ndarray) -> None:
         """Advance one control tick and paint where the brush presses."""

@@ -12,6 +12,7 @@ import math
 import numpy as np
 
 from ibvs_qp.config.vehicle import VehicleParams
+from ibvs_qp.frames import camera_twist_matrix
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL, FeatureFrame
 from ibvs_qp.model.bound_function import BoundFunction
 from sim.sensors.cameras.arm import vehicle_mask
@@ -27,7 +28,6 @@ from sim.sensors.edge_view import (
     board_view,
     painted_edge_view,
 )
-from sim.sensors.image_motion import camera_twist
 from sim.sensors.line_defects import LineDefects
 from sim.sensors.line_projection import moved_line, seen_line
 from sim.sensors.painted_pieces import PaintedPieces
@@ -176,7 +176,7 @@ class GeometricFeatures:
         self, found: list[_Line], plane: list[float], velocity_body: np.ndarray, rate: np.ndarray | None
     ) -> list[_Line]:
         body = np.concatenate((velocity_body, np.zeros(3) if rate is None else rate))
-        twist = camera_twist(body, np.array(self.vehicle.camera_position_m)).tolist()
+        twist = (camera_twist_matrix(np.array(self.vehicle.camera_position_m)) @ body).tolist()
         line = self._defects.line
         return [(line(numbers, plane, twist), role, kind, track) for numbers, role, kind, track in found]
 

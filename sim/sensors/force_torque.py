@@ -14,6 +14,7 @@ from sim.world.plant import Plant
 from sim.world.random_streams import Normals, stream
 from sim.world.readout import PLACES
 from sim.world.scene import ForceTorqueScene
+from sim.world.slow_noise import random_direction
 
 _WRENCH = PLACES["ft_wrench"]
 
@@ -35,8 +36,7 @@ class ForceTorque:
         self._latency_ns = round(scene.latency_s * NS)
         self._sigma = np.array([scene.sigma_n] * 3 + [scene.sigma_nm] * 3)
         self._noise = Normals(stream(seed, "force_torque"))
-        direction = np.array(self._noise.take(3))
-        self.bias = np.concatenate((scene.bias_n * direction / np.linalg.norm(direction), np.zeros(3)))
+        self.bias = np.append(scene.bias_n * random_direction(self._noise, 3), np.zeros(3))
         self._errors = WrenchErrors(errors, vehicle, seed) if errors != ForceTorqueErrors() else None
         self._line: deque[tuple[int, np.ndarray]] = deque()
         self.wrench, self.stamp_ns = np.zeros(0), 0

@@ -49,7 +49,7 @@ class LineDefects:
         Args:
             numbers: `sim.sensors.edge_view.EDGE_NUMBERS`.
             plane: (a, b, c) of the board, 1/Z = a x + b y + c [1/m].
-            twist: Of `sim.sensors.image_motion.camera_twist`, (6,).
+            twist: Of the camera in its axes [m/s, rad/s], (6,).
         """
         seen, x1, y1, x2, y2, rho, theta, side = numbers
         u, v, half_u, half_v = 0.5 * (x1 + x2), 0.5 * (y1 + y2), 0.5 * (x2 - x1), 0.5 * (y2 - y1)

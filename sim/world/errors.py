@@ -12,26 +12,18 @@ from pathlib import Path
 from typing import Any
 
 from ibvs_qp.config.errors import ConfigError
-from ibvs_qp.config.settings import load_toml, setting, validate
+from ibvs_qp.config.settings import Checked, load_toml, setting
 
 #: Shipped profiles.
 PROFILES = Path(__file__).parent / "profiles"
 
 
-class _Checked:
-    """A section that refuses values out of range at construction."""
-
-    def __post_init__(self) -> None:
-        """Validate every field."""
-        validate(self)
-
-
-def _size(doc: str, unit: str, high: float, default: float = 0.0) -> Any:
-    return setting(default, doc, unit=unit, low=0.0, high=high)
+def _size(doc: str, unit: str, high: float) -> Any:
+    return setting(0.0, doc, unit=unit, low=0.0, high=high)
 
 
 @dataclass(frozen=True, kw_only=True)
-class AttitudeErrors(_Checked):
+class AttitudeErrors(Checked):
     """Tilt of the flight controller's attitude estimate."""
 
     bias_deg: float = _size("constant tilt in a random direction", "deg", 10.0)
@@ -41,7 +33,7 @@ class AttitudeErrors(_Checked):
 
 
 @dataclass(frozen=True, kw_only=True)
-class GyroErrors(_Checked):
+class GyroErrors(Checked):
     """Angular velocity."""
 
     density: float = _size("white noise density beyond the scene's", "rad/s/sqrt(Hz)", 0.1)
@@ -51,7 +43,7 @@ class GyroErrors(_Checked):
 
 
 @dataclass(frozen=True, kw_only=True)
-class AccelerometerErrors(_Checked):
+class AccelerometerErrors(Checked):
     """Specific force."""
 
     density: float = _size("white noise density beyond the scene's", "m/s^2/sqrt(Hz)", 1.0)
@@ -61,7 +53,7 @@ class AccelerometerErrors(_Checked):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ForceTorqueErrors(_Checked):
+class ForceTorqueErrors(Checked):
     """Force/torque sensor."""
 
     noise_n: float = _size("white force noise per sample and axis", "N", 10.0)
@@ -77,7 +69,7 @@ class ForceTorqueErrors(_Checked):
 
 
 @dataclass(frozen=True, kw_only=True)
-class RotorErrors(_Checked):
+class RotorErrors(Checked):
     """Thrust of a commanded rotor."""
 
     gain: float = setting(0.0, "relative thrust error common to all rotors, constant", low=-0.5, high=0.5)
@@ -88,7 +80,7 @@ class RotorErrors(_Checked):
 
 
 @dataclass(frozen=True, kw_only=True)
-class BodyErrors(_Checked):
+class BodyErrors(Checked):
     """True body against the controller's belief."""
 
     mass: float = setting(0.0, "relative error of the mass, constant", low=-0.3, high=0.3)
@@ -102,7 +94,7 @@ class BodyErrors(_Checked):
 
 
 @dataclass(frozen=True, kw_only=True)
-class CameraErrors(_Checked):
+class CameraErrors(Checked):
     """Mount, optics and exposure of the camera."""
 
     mount_m: float = _size("shift of the mount in a random direction", "m", 0.1)
@@ -117,7 +109,7 @@ class CameraErrors(_Checked):
 
 
 @dataclass(frozen=True, kw_only=True)
-class DepthErrors(_Checked):
+class DepthErrors(Checked):
     """Depth channel of a stereo camera."""
 
     noise_relative: float = _size("white noise per depth", "", 0.2)
@@ -128,7 +120,7 @@ class DepthErrors(_Checked):
 
 
 @dataclass(frozen=True, kw_only=True)
-class TimingErrors(_Checked):
+class TimingErrors(Checked):
     """Delivery and stamps of pictures."""
 
     jitter_s: float = _size("latency beyond the camera's, exponential mean", "s", 0.1)
@@ -137,7 +129,7 @@ class TimingErrors(_Checked):
 
 
 @dataclass(frozen=True, kw_only=True)
-class WorldErrors(_Checked):
+class WorldErrors:
     """All errors of a world."""
 
     attitude: AttitudeErrors = field(default_factory=AttitudeErrors)

@@ -5,23 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ibvs_qp.config.settings import load_toml, setting, validate
+from ibvs_qp.config.settings import Checked, load_toml, setting
 from sim.world.errors import WorldErrors
 from sim.world.plant_scene import PlantScene
 
 Color = tuple[int, int, int]
 
 
-class _Checked:
-    """A settings section that refuses values out of range at construction."""
-
-    def __post_init__(self) -> None:
-        """Validate every field."""
-        validate(self)
-
-
 @dataclass(frozen=True, kw_only=True)
-class BoardScene(_Checked):
+class BoardScene(Checked):
     """The board that is painted, in front of the wall."""
 
     width_m: float = setting(1.40, "width of the board", unit="m", low=0.2, high=20.0)
@@ -37,7 +29,7 @@ class BoardScene(_Checked):
 
 
 @dataclass(frozen=True, kw_only=True)
-class WallScene(_Checked):
+class WallScene(Checked):
     """The wall and the contact between brush and board."""
 
     color: Color = setting((150, 120, 100), "wall colour", low=0, high=255)
@@ -48,7 +40,7 @@ class WallScene(_Checked):
 
 
 @dataclass(frozen=True, kw_only=True)
-class PaintScene(_Checked):
+class PaintScene(Checked):
     """The paint job, an input of the painting strategy."""
 
     color: Color = setting((40, 90, 200), "paint colour", low=0, high=255)
@@ -67,7 +59,7 @@ class PaintScene(_Checked):
 
 
 @dataclass(frozen=True, kw_only=True)
-class StartScene(_Checked):
+class StartScene(Checked):
     """Start pose as offsets from facing the right end of row 1."""
 
     distance_m: float = setting(0.45, "tip to board", unit="m", low=0.15, high=2.0)
@@ -77,7 +69,7 @@ class StartScene(_Checked):
 
 
 @dataclass(frozen=True, kw_only=True)
-class CameraScene(_Checked):
+class CameraScene(Checked):
     """The RGB-D camera."""
 
     width: int = setting(640, "picture width", unit="px", low=160, high=1920)
@@ -89,7 +81,7 @@ class CameraScene(_Checked):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ForceTorqueScene(_Checked):
+class ForceTorqueScene(Checked):
     """The force/torque sensor at the arm's base."""
 
     rate_hz: float = setting(100.0, "sample rate", unit="Hz", low=20.0, high=1000.0)
@@ -100,7 +92,7 @@ class ForceTorqueScene(_Checked):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ImuScene(_Checked):
+class ImuScene(Checked):
     """Gyro, accelerometer and attitude estimate."""
 
     rate_hz: float = setting(250.0, "sample rate", unit="Hz", low=50.0, high=1000.0)
@@ -111,14 +103,14 @@ class ImuScene(_Checked):
 
 
 @dataclass(frozen=True, kw_only=True)
-class FeaturesScene(_Checked):
+class FeaturesScene(Checked):
     """Extra noise on line features, after vision; not part of the reported covariance."""
 
     sigma_vs: float = setting(0.0, "noise added to rho and theta of each line per frame", low=0.0, high=0.5)
 
 
 @dataclass(frozen=True, kw_only=True)
-class WindScene(_Checked):
+class WindScene(Checked):
     """Mean wind (world NED, wall to the north) and Dryden-like gusts."""
 
     mean_m_s: tuple[float, float, float] = setting((0.0, 0.0, 0.0), "mean wind", unit="m/s", low=-20.0, high=20.0)
@@ -126,7 +118,7 @@ class WindScene(_Checked):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Scene(_Checked):
+class Scene(Checked):
     """One complete scene; every section and key has a default."""
 
     board: BoardScene = field(default_factory=BoardScene)

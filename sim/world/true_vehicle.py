@@ -13,8 +13,9 @@ from ibvs_qp.config.errors import ConfigError, out_of_range
 from ibvs_qp.config.vehicle import VehicleParams
 from sim.world.errors import WorldErrors
 from sim.world.plant_scene import Vector
-from sim.world.random_streams import stream
+from sim.world.random_streams import Normals, stream
 from sim.world.scene import Scene
+from sim.world.slow_noise import random_direction
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,9 +100,7 @@ def _moved(place: Sequence[float] | np.ndarray, shift: Sequence[float] | np.ndar
 
 
 def _direction(seed: int, purpose: str) -> np.ndarray:
-    """Random unit vector, (3,)."""
-    vector = stream(seed, purpose).standard_normal(3)
-    return vector / np.linalg.norm(vector)
+    return random_direction(Normals(stream(seed, purpose)), 3)
 
 
 def turn_quaternion(degrees: Sequence[float]) -> tuple[float, float, float, float]:

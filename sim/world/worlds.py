@@ -7,7 +7,7 @@ import dataclasses
 from sim.world.errors import WorldErrors, world_errors, world_names
 from sim.world.scene import Scene
 
-#: World of `paint` without a scene file, and of the experiments and comparisons unless told otherwise.
+#: World of `paint` without a scene file, and of experiments and comparisons without `--world`.
 DEFAULT_WORLD, EXPERIMENT_WORLD = "datasheet", "ideal"
 #: Name of errors that no shipped profile has.
 OWN = "own"

@@ -9,11 +9,12 @@ import cv2
 import numpy as np
 
 from ibvs_qp.config.vehicle import VehicleParams
+from ibvs_qp.frames import camera_twist_matrix
 from sim.sensors.cameras.arm import VehicleLayer
 from sim.sensors.cameras.depth_defects import DepthDefects
 from sim.sensors.cameras.exposure import ExposureSteps, line_kernel, vibration_sigma_px
 from sim.sensors.cameras.warp import PictureWarp
-from sim.sensors.image_motion import camera_twist, image_velocity
+from sim.sensors.image_motion import image_velocity
 from sim.world.random_streams import stream
 from sim.world.scene import Scene
 
@@ -42,7 +43,7 @@ class CameraDefects:
         self, scene: Scene, vehicle: VehicleParams, intrinsics: tuple[float, float, float, float], seed: int
     ) -> None:
         errors, shape = scene.errors.camera, (scene.camera.height, scene.camera.width)
-        self._position, self._focal = np.array(vehicle.camera_position_m), intrinsics[0]
+        self._to_camera, self._focal = camera_twist_matrix(np.array(vehicle.camera_position_m)), intrinsics[0]
         self._exposure_s, self._blurred = errors.exposure_s, np.empty((*shape, 3), np.uint8)
         self._warp = PictureWarp(intrinsics, shape, errors.distortion_k1, errors.rolling_shutter_s)
         shaken = vibration_sigma_px(self._focal, scene.errors.gyro.vibration_rad_s, errors.exposure_s)
@@ -61,7 +62,7 @@ class CameraDefects:
             plane: (a, b, c) of the board, 1/Z = a x + b y + c in camera coordinates [1/m].
             twist_body: Velocity of the body's origin [m/s] and angular velocity [rad/s] in B, (6,), or None at rest.
         """
-        twist = None if twist_body is None else camera_twist(twist_body, self._position)
+        twist = None if twist_body is None else self._to_camera @ twist_body
         picture = self._warp.picture(picture, plane, twist)
         if self._exposure_s and twist is not None:
             u, v = (self._focal * self._exposure_s * float(rate) for rate in image_velocity(0.0, 0.0, plane, twist))

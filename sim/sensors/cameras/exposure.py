@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
+from sim.sensors.vibration import BLADE_HZ
+
 #: Standard deviation of a uniform distribution of width 1.
 _UNIFORM = 1.0 / math.sqrt(12.0)
-#: Frequency of the vibration: two blades of a propeller that turns at about 2550 turns per minute [Hz].
-VIBRATION_HZ = 85.0
 #: Least and largest time between two steps of the automatic exposure [s].
 STEP_TIMES_S = (0.5, 1.5)
 #: Points per pixel along the path from which a line kernel is summed.
@@ -42,7 +42,7 @@ def vibration_sigma_px(focal_px: float, rate_rad_s: float, exposure_s: float) ->
         rate_rad_s: Angular rate of the vibration per axis, rms.
         exposure_s: Exposure time.
     """
-    return focal_px * rate_rad_s * min(_UNIFORM * exposure_s, 1.0 / (2.0 * math.pi * VIBRATION_HZ))
+    return focal_px * rate_rad_s * min(_UNIFORM * exposure_s, 1.0 / (2.0 * math.pi * BLADE_HZ))
 
 
 class ExposureSteps:

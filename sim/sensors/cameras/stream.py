@@ -34,6 +34,10 @@ class CameraStream:
         self.camera, self._dropouts = camera, dropouts
         self._schedule: Schedule[RgbdFrame] = Schedule(rate_hz, latency_s, errors)
 
+    def rests(self, now_ns: int) -> bool:
+        """Whether neither a capture nor a delivery is due now, so that `tick` may be skipped."""
+        return self._schedule.rests(now_ns)
+
     def tick(
         self, now_ns: int, position_ned: np.ndarray, quaternion_b_in_i: np.ndarray, twist: np.ndarray | None = None
     ) -> RgbdFrame | None:

@@ -59,7 +59,7 @@ class PictureWarp:
         Args:
             picture: The ideal one.
             plane: (a, b, c) of the board, 1/Z = a x + b y + c [1/m].
-            twist: Of `sim.sensors.image_motion.camera_twist`, (6,), or None at rest.
+            twist: Of the camera in its axes [m/s, rad/s], (6,), or None at rest.
         """
         maps = self._lens
         if self._readout_s and twist is not None:

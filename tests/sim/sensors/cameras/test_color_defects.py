@@ -10,8 +10,9 @@ from camera_scenes import PLAIN, VEHICLE, facing
 from defect_scenes import AT_LEFT, WALL, camera_of, edge_spread, left_edge, taken, with_errors
 
 from sim.sensors.cameras import camera_intrinsics
-from sim.sensors.cameras.exposure import VIBRATION_HZ, line_kernel
+from sim.sensors.cameras.exposure import line_kernel
 from sim.sensors.cameras.view import View
+from sim.sensors.vibration import BLADE_HZ
 
 #: Rows of the left edge that the bottom edge and its blur leave alone.
 ROWS = np.arange(10, 400)
@@ -87,7 +88,7 @@ def test_defocus_is_a_gaussian_of_the_stated_width(size: float) -> None:
 
 
 @pytest.mark.parametrize(("exposure", "expected"), [(0.006, FOCAL * 0.006 / math.sqrt(12.0)),
-    (0.05, FOCAL / (2.0 * math.pi * VIBRATION_HZ))])  # fmt: skip
+    (0.05, FOCAL / (2.0 * math.pi * BLADE_HZ))])  # fmt: skip
 def test_vibration_blurs_by_rate_and_exposure_and_at_most_by_its_stroke(exposure: float, expected: float) -> None:
     _, sigma = edge_spread(taken(with_errors(vibration_rad_s=1.0, camera={"exposure_s": exposure})), 150)
     assert sigma == pytest.approx(math.hypot(expected, IDEAL_SIGMA), rel=0.06)
