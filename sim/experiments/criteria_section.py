@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from sim.evaluate.table import markdown
+from sim.experiments.sections import Flown, capped
 from sim.experiments.spec import Experiment
 from sim.experiments.verdict import Verdict, verdicts
-from sim.experiments.verdict_section import Flown, capped
 from sim.experiments.wording import cell
 
 _HEADS = ("experiment", "metric", "cell", "bound", "median", "worst flight", "flights within", "met")

@@ -9,9 +9,9 @@ from typing import Any
 from sim.evaluate.table import law_name, markdown
 from sim.experiments.impedance_section import DIRECT
 from sim.experiments.relevance import Effect, effect, threshold
+from sim.experiments.sections import Flown, capped, grouped, world_of
 from sim.experiments.spec import Column, Experiment
 from sim.experiments.variants import REFERENCES, VARIANTS
-from sim.experiments.verdict_section import Flown, capped, grouped, world_of
 from sim.experiments.wording import cell, difference, exact, headings, measured, value_of, varying
 from sim.sweep.paired import variant_differences
 

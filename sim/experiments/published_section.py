@@ -6,7 +6,7 @@ import numpy as np
 
 from sim.evaluate.table import markdown
 from sim.experiments.comparison import best_allocator, compared_cells
-from sim.experiments.verdict_section import Flown, world_of
+from sim.experiments.sections import Flown, world_of
 from sim.experiments.wording import interval
 from sim.sweep.statistics import completed, median_interval, select
 
