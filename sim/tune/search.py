@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 FAILED = "failed"
 #: Trials before the sampler uses their results, and the greatest factor by which they change a gain: over the whole of
 #: so many ranges hardly a draw would fly.
-STARTUP, NEAR = 10, 1.6
+STARTUP, NEAR = 12, 1.6
 
 #: Gains and score of trials by number.
 Trials = dict[int, tuple[dict[str, float], Score]]
@@ -35,6 +35,7 @@ class SearchPlan:
     """A search."""
 
     shipped: PilotConfig  # the start preset; trial 0 flies its gains
+    rival: PilotConfig  # the preset of the other law; trial 1 flies its gains
     trials: int  # number of finished trials at the end
     seed: int  # of sampler and flights
     flights: int  # seeds per scene and trial
@@ -102,20 +103,25 @@ def _sample(plan: SearchPlan, study: optuna.Study, number: int) -> tuple[optuna.
         seed=draw, multivariate=True, constant_liar=False, n_startup_trials=STARTUP
     )
     if number < STARTUP:
-        study.enqueue_trial(_near_shipped(plan, number))
+        study.enqueue_trial(_start(plan, number))
     trial = study.ask()
     return trial, {name: trial.suggest_float(name, *span, log=True) for name, span in RANGES.items()}
 
 
 def start_gains(plan: SearchPlan) -> dict[str, float]:
     """Gains of trial 0: the shipped ones, within the range of the search."""
-    return rounded(_near_shipped(plan, 0))
+    return rounded(_start(plan, 0))
 
 
-def _near_shipped(plan: SearchPlan, number: int) -> dict[str, float]:
-    """Trial 0 has the shipped gains, the others each of them times a random factor, within the range of the search."""
-    count, start = len(RANGES), searched_gains(plan.shipped)
-    factors = np.random.default_rng([plan.seed, number]).uniform(-1.0, 1.0, count) if number else np.zeros(count)
+def _start(plan: SearchPlan, number: int) -> dict[str, float]:
+    """Gains of a trial before the sampler uses results, within the range of the search.
+
+    Trial 0 has the shipped gains and trial 1 those of the other law; the others multiply one of the two sets by random
+    factors, in turn.
+    """
+    count, start = len(RANGES), searched_gains(plan.rival if number % 2 else plan.shipped)
+    random = np.random.default_rng([plan.seed, number])
+    factors = random.uniform(-1.0, 1.0, count) if number > 1 else np.zeros(count)
     gains = zip(RANGES.items(), factors, strict=True)
     return {name: float(np.clip(start[name] * NEAR**factor, *span)) for (name, span), factor in gains}
 

@@ -16,10 +16,12 @@ from sim.commands.cli import main
 from sim.flight.options import default_preset
 from sim.tune.choice import allowed, contact_damping, front, gain_over, ranked
 from sim.tune.finalists import Finalist, best_of, fly_finalists
-from sim.tune.flights import CHOICE_SEED, REPORT_SEED, SEARCH_SEED, checks, flights, scenes, seeds
+from sim.tune.flights import CHOICE_SEED, REPORT_SEED, SEARCH_SEED, WORLD, checks, flights, scenes, seeds
 from sim.tune.objectives import OBJECTIVES, Score, refused, score
 from sim.tune.search import STARTUP, SearchPlan, finished, open_study, search
 from sim.tune.space import RANGES, searched_gains, with_gains
+from sim.world.errors import world_errors
+from sim.world.random_scene import EVALUATION, TUNING, random_scene
 
 pytest.importorskip("optuna", reason="tuning needs the extra tune")
 
@@ -58,7 +60,9 @@ def made_up_figures(trace):
 
 def plan(trials: int, storage: str, **changes) -> SearchPlan:
     settings = {"seed": 0, "flights": 1, "features": "geometric", "jobs": 1} | changes
-    return SearchPlan(shipped=default_preset("qp"), trials=trials, storage=storage, **settings)
+    return SearchPlan(
+        shipped=default_preset("qp"), rival=default_preset("paper"), trials=trials, storage=storage, **settings
+    )
 
 
 def searched(trials: int, storage: str, **changes):
@@ -72,6 +76,7 @@ def test_the_search_begins_at_the_shipped_gains_and_betters_them(flown):
     trials = searched(30, "a.log")
     gains, shipped = trials[0]
     assert gains == searched_gains(default_preset("qp")) and len(trials) == 30
+    assert trials[1][0] == searched_gains(default_preset("paper"))
     best = ranked({number: each for number, (_, each) in trials.items()}, shipped)
     assert best and gain_over(trials[best[0]][1], shipped) < -0.3
     for gains, _ in trials.values():
@@ -116,15 +121,27 @@ def test_a_preset_whose_contact_would_ring_is_not_flown(flown, monkeypatch):
     assert not flown and all(each == refused() for _, each in trials.values())
 
 
-def test_search_choice_and_report_fly_seeds_of_their_own(flown):
-    spans = [set(seeds(first, seed, 500)) for first in (SEARCH_SEED, CHOICE_SEED, REPORT_SEED) for seed in (0, 1)]
+def test_search_choice_and_report_fly_seeds_of_their_own():
+    config, flown = with_gains(default_preset("paper"), {"line_kp": 11.0}), scenes() | checks()
+    spans = [
+        {run.seed for run in flights(flown, config, "tuned", seeds(first, seed, 10), "geometric")}
+        for first in (SEARCH_SEED, CHOICE_SEED, REPORT_SEED)
+        for seed in (0, 1)
+    ]
+    assert {len(span) for span in spans} == {10 * len(flown)}, "every scene has seeds of its own"
     assert sum(map(len, spans)) == len(set().union(*spans))
-    config = with_gains(default_preset("paper"), {"line_kp": 11.0})
-    runs = flights(scenes() | checks(), config, "tuned", (5,), "geometric")
+    runs = flights(flown, config, "tuned", (5,), "geometric")
     assert {run.law for run in runs} == {"paper"} and {run.plan.config.controller.gains.line_kp for run in runs} == {
         11.0
     }
-    assert len({run.params["scene"] for run in runs}) == len({run.plan.scene for run in runs}) == 6
+    assert len({run.params["scene"] for run in runs}) == len({run.plan.scene for run in runs}) == 7
+
+
+def test_no_scene_of_the_search_is_one_of_the_evaluation():
+    textures = {scene.board.texture_seed % 2 for scene in (scenes() | checks()).values()}
+    assert textures == {random_scene(0, TUNING).board.texture_seed % 2}
+    assert textures != {random_scene(0, EVALUATION).board.texture_seed % 2}
+    assert all(scene.errors == world_errors(WORLD) for scene in scenes().values())
 
 
 def test_failed_flights_count_with_the_worst():
@@ -166,7 +183,7 @@ def test_command_writes_preset_trials_figures_and_verdict(flown, capsys):
     )
     everywhere = [each for each in content["unseen"] if each["scene"] == "all"]
     assert [each["objective"] for each in everywhere] == [each.column for each in OBJECTIVES]
-    assert all(each["n"] == 24 and each["verdict"] == "better" for each in everywhere)
+    assert all(each["n"] == 28 and each["verdict"] == "better" for each in everywhere)
     assert all(each["difference"]["high"] < 0.0 for each in everywhere)
     assert {seed // 1000 for seed in flown} == {1, 2, 3}
     for name in ("qp-front.png", "qp-unseen.png"):
