@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 class Tune:
     """Tune the gains of a law for push, path, tilt, yaw and thrust rate together; needs the extra tune.
 
-    Trials fly three scenes, the best of them also three harder ones.
+    Trials fly three random scenes in the datasheet world, the best of them also four harder ones.
 
     Example: ibvs-qp tune --law qp --trials 200 --out runs/tune
     """
@@ -42,7 +42,7 @@ class Tune:
     flights: int = 1
     """Seeds per scene in every trial."""
     unseen: int = 6
-    """Seeds that compare shipped and tuned gains, six scenes each; the best trials first fly half as many."""
+    """Seeds that compare shipped and tuned gains, seven scenes each; the best trials first fly half as many."""
     features: Literal["geometric", "rendered"] = "geometric"
     """Perception: a sensor model of lines, or rendered pictures (five times slower)."""
     preset: Annotated[Path | None, optional("FILE")] = None
@@ -96,6 +96,7 @@ class Tune:
         start = PilotConfig.from_toml(self.preset) if self.preset else default_preset(self.law)
         return SearchPlan(
             shipped=dataclasses.replace(start, law=self.law),
+            rival=default_preset("paper" if self.law == "qp" else "qp"),
             trials=self.trials,
             seed=self.seed,
             flights=self.flights,

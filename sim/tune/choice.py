@@ -11,12 +11,12 @@ from ibvs_qp.config.contact_margin import least_margin
 from ibvs_qp.pilot import PilotConfig
 from sim.tune.objectives import OBJECTIVES, Score
 
-#: Largest ratio to the shipped preset in any objective [-]: seeds alone change an objective by about a tenth.
-ALLOWED_WORSE = 1.1
-#: The same in any objective of a single scene [-]: fewer flights, more luck.
-ALLOWED_WORSE_SCENE = 1.25
+#: The bounds of the objectives are this much wider in a single scene [-]: fewer flights, more luck.
+SCENE_ROOM = 1.15
 #: Least ratio to the shipped preset's contact damping [-]: stability is worth as much as an objective.
-LEAST_DAMPING = 1.0 / ALLOWED_WORSE
+LEAST_DAMPING = 0.9
+#: Slope of the cost beyond the bound of an objective: one of five objectives must not buy room for the others [-].
+STEEP = 2.0
 #: Presets of a search that fly again, on other seeds and harder scenes, before the choice: the best of many trials is
 #: partly luck, and no trial flew the harder scenes.
 FINALISTS = 8
@@ -29,21 +29,38 @@ def gain_over(score: Score, shipped: Score) -> float:
     )
 
 
-def allowed(score: Score, shipped: Score, worse: float = ALLOWED_WORSE) -> bool:
+def cost(score: Score, shipped: Score) -> float:
+    """What the search minimises: `gain_over`, and steeply more beyond the bound of an objective."""
+    beyond = sum(max(0.0, each) for each in _beyond(score, shipped))
+    return gain_over(score, shipped) + STEEP * beyond
+
+
+def allowed(score: Score, shipped: Score, room: float = 1.0) -> bool:
     """Whether a preset is good enough to replace the shipped one.
 
     Args:
         score: Its own.
         shipped: The shipped preset's.
-        worse: Greatest ratio of any objective.
+        room: Factor on the bound of every objective.
     """
-    near = all(value <= worse * base for value, base in zip(score.values, shipped.values, strict=True))
-    return near and score.failed <= shipped.failed
+    return max(_beyond(score, shipped)) <= math.log(room) and score.failed <= shipped.failed
+
+
+def _beyond(score: Score, shipped: Score) -> list[float]:
+    """Logarithm of each objective over its bound."""
+    pairs = zip(OBJECTIVES, score.values, shipped.values, strict=True)
+    return [math.log(value / (objective.worse * base)) for objective, value, base in pairs]
 
 
 def contact_damping(config: PilotConfig) -> float:
     """Least damping ratio of the contact over the stiffness range of the preset's brush (docs/loop_margin.md)."""
     return least_margin(config.controller, config.controller.brush).least_damping_ratio
+
+
+def less_damped(config: PilotConfig, shipped: PilotConfig) -> float:
+    """Logarithm by which the contact's damping is below its bound; 0 above it."""
+    least = max(contact_damping(config), 1e-3)
+    return max(0.0, math.log(LEAST_DAMPING * contact_damping(shipped) / least))
 
 
 def ranked(scores: Mapping[int, Score], shipped: Score) -> list[int]:

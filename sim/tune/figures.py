@@ -20,8 +20,8 @@ from sim.tune.verdict import paired
 _AXES_TO = 2.0
 #: Logarithmic axes with a smaller ratio of their ends have linear ticks: no two of 1, 2, 5, 10 lie on them.
 _NARROW = 3.0
-_MARKERS = ("o", "s", "^", "D", "v", "P")
-_SHADES = ("#222222", "#8a8a8a", "#c0a000", "#7a5195", "#5a8f3c")
+_MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<")
+_SHADES = ("#222222", "#8a8a8a", "#c0a000", "#7a5195", "#5a8f3c", "#2f8f8b", "#c06080")
 
 
 def draw_front(law: str, scores: dict[int, Score], shipped: Score, chosen: int | None) -> Figure:

@@ -12,9 +12,9 @@ from sim.sweep import run_sweep
 from sim.sweep.engine import SweepProgress
 from sim.sweep.parts import PARAM
 from sim.tune.choice import (
-    ALLOWED_WORSE_SCENE,
     FINALISTS,
     LEAST_DAMPING,
+    SCENE_ROOM,
     allowed,
     contact_damping,
     gain_over,
@@ -39,7 +39,7 @@ class Finalist:
 
     def may_replace(self, shipped: Finalist) -> bool:
         """Whether it is better than the shipped preset on the mean, and clearly worse in no objective and no scene."""
-        near = all(allowed(self.scenes[name], each, ALLOWED_WORSE_SCENE) for name, each in shipped.scenes.items())
+        near = all(allowed(self.scenes[name], each, SCENE_ROOM) for name, each in shipped.scenes.items())
         return near and allowed(self.score, shipped.score) and gain_over(self.score, shipped.score) < 0.0
 
 

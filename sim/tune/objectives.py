@@ -16,6 +16,7 @@ class Objective(Figure):
 
     # value of a flight that does not complete, in the unit of the column: far beyond any completed one
     failed: float = math.inf
+    worse: float = 1.1  # greatest ratio to the shipped preset that may replace it; seeds alone change it by a tenth
 
 
 OBJECTIVES = (
@@ -23,7 +24,8 @@ OBJECTIVES = (
     Objective("path_rms_m", "path error, rms", 1e3, "mm", failed=0.05),
     Objective("tilt_peak_deg", "tilt, peak", unit="deg", failed=20.0),
     Objective("yaw_peak_deg", "yaw, peak", unit="deg", failed=20.0),
-    Objective("jitter_n_s", "thrust rate, rms", unit="N/s", failed=1000.0),
+    # It wears motors and costs no accuracy; a quarter more is an eighth of the limit of 500 N/s.
+    Objective("jitter_n_s", "thrust rate, rms", unit="N/s", failed=1000.0, worse=1.25),
 )
 
 

@@ -1,4 +1,4 @@
-"""The search: Optuna's multi-objective TPE over a journal on disk, resumable, for one or several processes."""
+"""The search: CMA-ES on the rule of choice, over a journal on disk, resumable, for one or several processes."""
 
 from __future__ import annotations
 
@@ -13,18 +13,19 @@ from ibvs_qp.config.contact_margin import require_margin
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.pilot import PilotConfig
 from sim.sweep.flying import fly_run
+from sim.tune.choice import STEEP, cost, less_damped
 from sim.tune.flights import SEARCH_SEED, flights, scenes, seeds
-from sim.tune.objectives import OBJECTIVES, Score, refused, score
+from sim.tune.objectives import Score, refused, score
 from sim.tune.space import RANGES, rounded, searched_gains, with_gains
 
 if TYPE_CHECKING:
     import optuna
 
-#: Attribute of a trial with its fraction of failed flights.
-FAILED = "failed"
-#: Trials before the sampler uses their results, and the greatest factor by which they change a gain: over the whole of
-#: so many ranges hardly a draw would fly.
-STARTUP, NEAR = 10, 1.6
+#: Attributes of a trial: its objectives, and its fraction of failed flights.
+VALUES, FAILED = "values", "failed"
+#: First deviation of CMA-ES, of the logarithmic range of a gain [-]: a factor of 1.3 for a range of a decade. It starts
+#: at the better of the shipped gains of both laws.
+SPREAD = 0.12
 
 #: Gains and score of trials by number.
 Trials = dict[int, tuple[dict[str, float], Score]]
@@ -35,6 +36,7 @@ class SearchPlan:
     """A search."""
 
     shipped: PilotConfig  # the start preset; trial 0 flies its gains
+    rival: PilotConfig  # the preset of the other law; trial 1 flies its gains
     trials: int  # number of finished trials at the end
     seed: int  # of sampler and flights
     flights: int  # seeds per scene and trial
@@ -50,9 +52,9 @@ def open_study(plan: SearchPlan) -> optuna.Study:
         ConfigError: When Optuna is not installed, the storage does not open, or has another search.
     """
     try:
+        import cmaes  # noqa: F401
         import optuna
         from optuna.storages.journal import JournalFileBackend, JournalStorage
-        from optuna.study import StudyDirection
     except ImportError:
         raise ConfigError("tuning needs the extra tune: pip install -c constraints.txt -e '.[tune]'") from None
     optuna.logging.set_verbosity(optuna.logging.ERROR)
@@ -60,7 +62,6 @@ def open_study(plan: SearchPlan) -> optuna.Study:
         study = optuna.create_study(
             study_name=f"{plan.shipped.law}-{plan.seed}",
             storage=plan.storage if "://" in plan.storage else JournalStorage(JournalFileBackend(plan.storage)),
-            directions=[StudyDirection.MINIMIZE] * len(OBJECTIVES),
             load_if_exists=True,
         )
     except Exception as error:  # files, URLs, drivers and databases each fail in their own way
@@ -77,47 +78,90 @@ def open_study(plan: SearchPlan) -> optuna.Study:
 
 
 def search(plan: SearchPlan, study: optuna.Study, progress: Callable[[int], None]) -> None:
-    """Fly trials until the required number is finished; the sampler uses all batches before the present one.
+    """Fly trials until the required number is finished, minimising `sim.tune.choice.cost`.
 
-    The number of finished trials seeds the sampler of every trial, so that an interrupted search continues as without
-    the interruption.
+    The candidates follow from the seed and the finished trials, so that an interrupted search continues as without the
+    interruption.
     """
     with joblib.Parallel(n_jobs=plan.jobs) as parallel:
         while (done := len(finished(study))) < plan.trials:
             progress(done)
-            batch = [_sample(plan, study, done + place) for place in range(min(plan.jobs, plan.trials - done))]
-            scores = evaluate([gains for _, gains in batch], plan, parallel)
-            for (trial, _), each in zip(batch, scores, strict=True):
+            batch = _candidates(plan, study)[: min(plan.jobs, plan.trials - done)]
+            trials = [_ask(study, gains) for gains in batch]
+            scores = evaluate(batch, plan, parallel)
+            shipped = next((each for _, each in finished(study).values()), scores[0])
+            for trial, gains, each in zip(trials, batch, scores, strict=True):
+                trial.set_user_attr(VALUES, each.values)
                 trial.set_user_attr(FAILED, each.failed)
-                trial.set_constraint(FAILED, each.failed)
-                study.tell(trial, each.values)
+                ringing = less_damped(with_gains(plan.shipped, rounded(gains)), plan.shipped)
+                study.tell(trial, cost(each, shipped) + STEEP * ringing)
     progress(len(finished(study)))
 
 
-def _sample(plan: SearchPlan, study: optuna.Study, number: int) -> tuple[optuna.Trial, dict[str, float]]:
-    import optuna
-
-    draw = int(np.random.SeedSequence([plan.seed, number]).generate_state(1)[0])
-    study.sampler = optuna.samplers.TPESampler(
-        seed=draw, multivariate=True, constant_liar=False, n_startup_trials=STARTUP
-    )
-    if number < STARTUP:
-        study.enqueue_trial(_near_shipped(plan, number))
+def _ask(study: optuna.Study, gains: dict[str, float]) -> optuna.Trial:
+    """A trial of these gains."""
+    study.enqueue_trial(gains)
     trial = study.ask()
-    return trial, {name: trial.suggest_float(name, *span, log=True) for name, span in RANGES.items()}
+    for name, span in RANGES.items():
+        trial.suggest_float(name, *span, log=True)
+    return trial
+
+
+def _candidates(plan: SearchPlan, study: optuna.Study) -> list[dict[str, float]]:
+    """Gains of the next trials: the rest of the starts, or of the present generation of CMA-ES.
+
+    The optimiser runs again from its start with the costs of the finished generations. Trials that another process
+    flies come last: it may have been killed.
+    """
+    import cmaes
+    from optuna.trial import TrialState
+
+    costs = {_key(trial.params): float(trial.values[0]) for trial in _complete(study)}
+    flying = {_key(trial.params) for trial in study.get_trials(deepcopy=False, states=(TrialState.RUNNING,))}
+
+    def waiting(generation: list[dict[str, float]]) -> list[dict[str, float]]:
+        left = [gains for gains in generation if _key(gains) not in costs]
+        return sorted(left, key=lambda gains: _key(gains) in flying)
+
+    starts = _starts(plan)
+    if left := waiting(starts):
+        return left
+    best = min(starts, key=lambda gains: costs[_key(gains)])
+    bounds = np.tile((0.0, 1.0), (len(RANGES), 1))
+    optimizer = cmaes.CMA(mean=_to_unit(best), sigma=SPREAD, bounds=bounds, seed=plan.seed)
+    while True:
+        draws = [optimizer.ask() for _ in range(optimizer.population_size)]
+        generation = [_from_unit(draw) for draw in draws]
+        if left := waiting(generation):
+            return left
+        optimizer.tell([(draw, costs[_key(gains)]) for draw, gains in zip(draws, generation, strict=True)])
+
+
+def _key(gains: dict[str, float]) -> tuple[float, ...]:
+    """Gains as flown, in the order of the ranges."""
+    flown = rounded(gains)
+    return tuple(flown[name] for name in RANGES)
+
+
+def _to_unit(gains: dict[str, float]) -> np.ndarray:
+    """Gains as fractions of their logarithmic ranges."""
+    return np.array([np.log(gains[name] / low) / np.log(high / low) for name, (low, high) in RANGES.items()])
+
+
+def _from_unit(fractions: np.ndarray) -> dict[str, float]:
+    spans = zip(RANGES.items(), fractions, strict=True)
+    return {name: min(float(low * (high / low) ** fraction), high) for (name, (low, high)), fraction in spans}
+
+
+def _starts(plan: SearchPlan) -> list[dict[str, float]]:
+    """Gains of the first trials, within the range of the search: the shipped ones, and those of the other law."""
+    both = [searched_gains(plan.shipped), searched_gains(plan.rival)]
+    return [{name: float(np.clip(gains[name], *span)) for name, span in RANGES.items()} for gains in both]
 
 
 def start_gains(plan: SearchPlan) -> dict[str, float]:
     """Gains of trial 0: the shipped ones, within the range of the search."""
-    return rounded(_near_shipped(plan, 0))
-
-
-def _near_shipped(plan: SearchPlan, number: int) -> dict[str, float]:
-    """Trial 0 has the shipped gains, the others each of them times a random factor, within the range of the search."""
-    count, start = len(RANGES), searched_gains(plan.shipped)
-    factors = np.random.default_rng([plan.seed, number]).uniform(-1.0, 1.0, count) if number else np.zeros(count)
-    gains = zip(RANGES.items(), factors, strict=True)
-    return {name: float(np.clip(start[name] * NEAR**factor, *span)) for (name, span), factor in gains}
+    return rounded(_starts(plan)[0])
 
 
 def evaluate(gains: Sequence[dict[str, float]], plan: SearchPlan, parallel: joblib.Parallel) -> list[Score]:
@@ -139,9 +183,13 @@ def evaluate(gains: Sequence[dict[str, float]], plan: SearchPlan, parallel: jobl
 
 def finished(study: optuna.Study) -> Trials:
     """Gains and score of every finished trial, by number."""
+    return {
+        trial.number: (rounded(trial.params), Score(tuple(trial.user_attrs[VALUES]), trial.user_attrs[FAILED]))
+        for trial in _complete(study)
+    }
+
+
+def _complete(study: optuna.Study) -> list[optuna.trial.FrozenTrial]:
     from optuna.trial import TrialState
 
-    return {
-        trial.number: (rounded(trial.params), Score(tuple(trial.values), trial.user_attrs[FAILED]))
-        for trial in study.get_trials(deepcopy=False, states=(TrialState.COMPLETE,))
-    }
+    return study.get_trials(deepcopy=False, states=(TrialState.COMPLETE,))
