@@ -18,6 +18,7 @@ class MpcSettings:
     height: float = setting(4.0, "ratio of level lines and vertical motion to the others", low=0.0, high=1e4)
     velocity: float = setting(400.0, "velocity of free directions", unit="s^2/m^2", low=0.0, high=1e8)
     push: float = setting(4.0, "push error", unit="1/N^2", low=0.0, high=1e6)
+    push_lead: float = setting(0.0, "fraction of the felt push's lag that the tip's motion makes up", low=0.0, high=1.0)
     tip_rate: float = setting(1e4, "motion of the tip along n in contact", unit="s^2/m^2", low=0.0, high=1e8)
     approach: float = setting(1e4, "speed of the approach", unit="s^2/m^2", low=0.0, high=1e8)
     tilt: float = setting(1e5, "roll and pitch", unit="1/rad^2", low=0.0, high=1e8)
