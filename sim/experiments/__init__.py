@@ -12,5 +12,6 @@ NAMES = (
     "approach",
     "payload",
     "worlds",
+    "rivals",
 )
 ALL = "all"

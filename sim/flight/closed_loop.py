@@ -30,7 +30,7 @@ BASE_TIME, STROKE_FACTOR = 90.0, 2.0
 
 
 def make_pilot(scene: Scene, options: FlightOptions, config: PilotConfig, job: Job) -> Pilot:
-    """The pilot of one flight; with the scene's extra feature noise after its own perception, and a rival as its law."""
+    """The pilot of one flight; the scene's extra feature noise follows its perception, and a rival replaces its law."""
     sigma, noise = scene.features.sigma_vs, stream(options.seed, "sigma_vs")
     rendered = options.features == "rendered"  # the sensor model of lines adds the same noise itself
     seen_as = (lambda frame: add_sigma_vs(frame, sigma, noise)) if rendered and sigma > 0.0 else None

@@ -8,7 +8,6 @@ from ibvs_qp.pilot import Controller
 from sim.rivals.lexicographic import LexicographicController
 from sim.rivals.mpc import MpcController
 
-
 #: Control law by name.
 RIVALS = {"lexicographic": LexicographicController, "mpc": MpcController}
 

@@ -36,8 +36,10 @@ class CascadeEngine(QpEngine):
     Level 0 finds the least slack of the soft limits. Level k minimises its own rows
     :math:`\sum w_i (J_i u - t_i)^2` subject to all limits, relaxed by that slack, and to
     :math:`J_j u = J_j u^*_j` for every row j of the levels above, kept by steps in their null space: their residuals
-    stay optimal. Weights decide only within a level (Kanoun, Lamiraux and Wieber, Kinematic control of redundant manipulators: generalizing the
-    task-priority framework to inequality task, IEEE T-RO 2011).
+    stay optimal. Weights decide only within a level.
+
+    Source: Kanoun, Lamiraux and Wieber, Kinematic control of redundant manipulators: generalizing the task-priority
+        framework to inequality task, IEEE Transactions on Robotics 2011.
     """
 
     def __init__(self, problem: QpProblem, settings: SolverSettings, data: ProgramData) -> None:
@@ -128,9 +130,7 @@ class CascadeEngine(QpEngine):
         found = part.solve(curvature[np.tril_indices(n)], gradient, (rows @ steps).T.ravel(), low, high)
         return None if found is None else (centre + steps @ found[0], scale * found[1])
 
-    def _answer(
-        self, thrusts: np.ndarray, slack: np.ndarray, multipliers: np.ndarray
-    ) -> AcceptedSolution:
+    def _answer(self, thrusts: np.ndarray, slack: np.ndarray, multipliers: np.ndarray) -> AcceptedSolution:
         parts = (self._first, *self._parts)
         exact = any(part.outcome is Outcome.EXACT_FALLBACK for part in parts)
         self._limited = bool(np.abs(multipliers).max(initial=0.0) > ACTIVE_MULTIPLIER)

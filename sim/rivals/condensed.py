@@ -29,6 +29,7 @@ class CondensedProgram:
 
     Attributes:
         function: The function.
+        generator, rows: Sparsity of the model and of the rows of its errors.
         p_pattern, a_pattern: Sparsity.
         a: Non-zeros of A.
     """
@@ -38,10 +39,14 @@ class CondensedProgram:
     ) -> None:
         errors, states = rows.shape
         self._states, self._rotors, self._settings = states, generator.shape[0] - states - 1, settings
-        rotors = self._rotors
+        self.generator, self.rows, rotors = generator, rows, self._rotors
         self._steps, moves = settings.steps(tick_s), len(settings.blocks)
         values = [ca.MX.sym("generator", generator.nnz()), ca.MX.sym("rows", rows.nnz()), ca.MX.sym("start", states)]
-        offsets, weights, last = ca.MX.sym("offsets", 3 * errors), ca.MX.sym("weights", errors), ca.MX.sym("last", rotors)
+        offsets, weights, last = (
+            ca.MX.sym("offsets", 3 * errors),
+            ca.MX.sym("weights", errors),
+            ca.MX.sym("last", rotors),
+        )
         window = [ca.MX.sym(name, rotors) for name in ("low", "high", "floor", "ceiling")]
         free, forced = self.predict(
             ca.MX(generator, values[0]), values[2], ca.MX(rows, values[1]), ca.reshape(offsets, errors, 3)

@@ -11,7 +11,9 @@ from ibvs_qp.config.settings import setting, validate
 class MpcSettings:
     """Grid and weights of the predictive law."""
 
-    step_s: float = setting(0.025, "coarse step of the prediction, after one control period", unit="s", low=0.02, high=0.03)
+    step_s: float = setting(
+        0.025, "coarse step of the prediction, after one control period", unit="s", low=0.02, high=0.03
+    )
     blocks: tuple[int, ...] = (1, 1, 2, 3, 5)  # steps of constant thrust command; the first step is one control period
     line: float = setting(1e4, "line error", low=0.0, high=1e8)
     line_rate: float = setting(400.0, "line error rate", unit="s^2", low=0.0, high=1e8)

@@ -8,8 +8,8 @@ this tick, twist, and rotor thrusts. The input u are the thrust commands:
     J \dot\Omega = B_M T + h_M - (p \times n)(f - \hat f), \quad \tau \dot T = u - T
 
 with the bias wrench h of the shipped law (gravity, observed external wrench, feed-forward of friction and of the
-measured contact moment), the measured push :math:`\hat f`, the push
-:math:`f = \hat f + k\, n^T \delta_{tip} + c\, n^T (\nu_{tip} - \hat\nu_{tip})` of the estimated stiffness in contact, and the
+measured contact moment), the measured push :math:`\hat f`, in contact the push
+:math:`f = \hat f + k\, n^T \delta_{tip} + c\, n^T (\nu_{tip} - \hat\nu_{tip})` of the estimated stiffness, and the
 integrals of the shipped law as disturbances d, constant over the horizon: predictions without offset.
 """
 

@@ -19,20 +19,18 @@ _PALER = 0.6
 
 def draw_bars(spec: FigureSpec, results: Results) -> Drawn:
     """Bars per value of the parameter: one per law, and per variant of the figure that the law flew."""
+    table = select(results.table, spec.where)
     series = [
-        (law, variant)
-        for law in LAWS
-        for variant in spec.variants
-        if select(results.table, law=law, variant=variant).height
+        (law, variant) for law in LAWS for variant in spec.variants if select(table, law=law, variant=variant).height
     ]
     bar = _WIDTH / max(len(series), 1)
-    values = list(results.table[PARAM + spec.x].unique(maintain_order=True))
+    values = list(table[PARAM + spec.x].unique(maintain_order=True))
     figure = new_figure(0.9 + 0.3 * len(values))
     grid = figure.subplots(1, len(spec.panels), sharey=True)
     crashed = False
     for axes, panel in zip(grid, spec.panels, strict=True):
         for index, (law, variant) in enumerate(series):
-            rows = [select(results.table, {spec.x: value}, law=law, variant=variant) for value in values]
+            rows = [select(table, {spec.x: value}, law=law, variant=variant) for value in values]
             found = [median_interval(completed(row, panel.metric)) for row in rows]
             middle, low, high = (
                 panel.scale * np.array([entry[part] for entry in found]) for part in ("median", "low", "high")
