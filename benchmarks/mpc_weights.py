@@ -28,7 +28,7 @@ from sim.world.random_scene import TUNING, random_scene
 from sim.world.scene import Scene
 from sim.world.worlds import in_world
 
-#: Range of every weight, on a logarithmic scale, and of the lead, on a linear one.
+#: Range of every weight, on a logarithmic scale.
 RANGES = {
     "line": (3e3, 1e5),
     "line_rate": (1e2, 2e3),
@@ -39,17 +39,10 @@ RANGES = {
     "thrust_change": (0.03, 1.0),
     "terminal": (1.0, 6.0),
 }
-LEAD = (0.0, 0.8)
 #: Cost of a flight that does not end as planned [-]: no flown one costs as much.
 FAILED = 20.0
 #: Tuning scenes, start, and stroke of a trial [m].
 SCENES, START_M, STROKE_M = (1, 4), 0.2, 0.3
-#: Starting points: the weights set by hand, and two variations.
-HAND = (
-    {"push": 1.0, "push_lead": 0.0, "thrust_change": 0.05},
-    {"push": 1.0, "push_lead": 0.5, "thrust_change": 0.2},
-    {"push": 1.0, "push_lead": 0.2, "thrust_change": 0.1, "tilt": 2e5, "height": 10.0},
-)
 
 
 def flown(scene: Scene, seed: int, settings: MpcSettings, job: Job | None, reach_check: bool) -> Trace:
@@ -92,16 +85,14 @@ def cost(settings: MpcSettings) -> float:
 def suggested(trial: optuna.Trial) -> MpcSettings:
     """Settings of a trial; the yaw weight is half of the tilt weight."""
     values = {name: trial.suggest_float(name, low, high, log=True) for name, (low, high) in RANGES.items()}
-    return MpcSettings(**values, yaw=0.5 * values["tilt"], push_lead=trial.suggest_float("push_lead", *LEAD))
+    return MpcSettings(**values, yaw=0.5 * values["tilt"])
 
 
 def main() -> None:
     """Search, and write every trial."""
     trials, file = int(sys.argv[1]), Path(sys.argv[2])
     study = optuna.create_study(sampler=optuna.samplers.TPESampler(seed=0, n_startup_trials=8))
-    for start in HAND:
-        plain = {name: getattr(MpcSettings(), name) for name in RANGES}
-        study.enqueue_trial(plain | start)
+    study.enqueue_trial({name: getattr(MpcSettings(), name) for name in RANGES})
     found = []
 
     def note(study: optuna.Study, trial: optuna.trial.FrozenTrial) -> None:

@@ -69,9 +69,8 @@ class Prediction:
         self._pressing = contact.touching * model.target.press
         self._stiffness = self._pressing * contact.stiffness
         self._damping = self._pressing * model.config.brush.damping_n_s_m
-        # The felt push is late by its filter and the sensor; the tip's motion since then completes it.
-        late = 1.0 / (2.0 * ca.pi * model.config.contact.force_filter_hz) + model.config.brush.force_delay_s
-        self._push = contact.push - settings.push_lead * late * self._stiffness * contact.rate
+        # On stiff walls noise and delay of the felt push count more: the weight falls there as the shipped K_fp.
+        self._softness = ca.fmin(1.0, model.config.contact.full_gain_stiffness_n_m / contact.stiffness)
         self.generator = self._generator()
         self.errors = [*self._line_errors(), *self._free_errors(), *self._normal_errors(), *self._attitude_errors()]
 
@@ -86,7 +85,7 @@ class Prediction:
         force = effectiveness[:3, :] @ self._thrusts
         turned = ca.vertcat(-ca.skew(force), ca.DM.zeros(3, 3))
         constant = model.bias_wrench - reaction * self._damping * (along @ self._twist)
-        constant[:3] -= normal * (self._push * self._pressing + self._disturbance())
+        constant[:3] -= normal * (model.contact.push * self._pressing + self._disturbance())
         z = ca.SX.zeros(size + n + 1, size + n + 1)
         z[:6, 6:12] = ca.DM.eye(6)
         z[6:12, :6] = inverse_mass @ (self._stiffness * reaction @ along + ca.horzcat(ca.DM.zeros(6, 3), turned))
@@ -164,8 +163,8 @@ class Prediction:
         return [
             Error(
                 row=push,
-                offset=self._push - self._damping * (self._along @ self._twist) - reference,
-                weight=settings.push * weight * self._pressing,
+                offset=contact.push - self._damping * (self._along @ self._twist) - reference,
+                weight=settings.push * self._softness * weight * self._pressing,
             ),
             Error(row=motion, offset=ca.SX(0.0), weight=settings.tip_rate * weight),
             Error(row=motion, offset=-speed, weight=settings.approach * free),
