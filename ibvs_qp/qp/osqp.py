@@ -44,7 +44,7 @@ class OsqpSolver:
 
     def __init__(self, problem: ProgramPatterns, settings: SolverSettings) -> None:
         self._problem, self._settings = problem, settings
-        rows, variables = (int(size) for size in np.shape(problem.a_pattern))
+        rows, variables = problem.a_pattern.toarray().shape
         self._lengths = (problem.p_pattern.nnz, variables, problem.a_pattern.nnz, rows, rows)
         self._no_multipliers = np.zeros(rows)
         self._reset_pending = True
