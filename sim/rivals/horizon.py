@@ -11,8 +11,8 @@ from ibvs_qp.config.settings import setting, validate
 class MpcSettings:
     """Grid and weights of the predictive law.
 
-    The weights were set by hand on tuning scenes, 15 settings, beside a search over 23 (`benchmarks/mpc_weights.py`),
-    whose best lost the contact of stiff walls on further tuning scenes.
+    The weights were set by hand on tuning scenes, 15 settings, after a search over 23 (`benchmarks/mpc_weights.py`);
+    of its best three, two failed on a stiff tuning scene and one had more push error.
     """
 
     step_s: float = setting(
