@@ -50,7 +50,7 @@ class ContactSettings:
         1500.0, "up to here force_kfp counts in full, beyond it falls with 1/k", unit="N/m", low=50.0, high=1e5
     )
     rate_quiet_m_s: float = setting(
-        0.006, "noise of the estimated rate at which the damping K_sd halves", unit="m/s", low=1e-4, high=1.0
+        0.006, "noise of the estimated rate at which K_sd and K_fp halve", unit="m/s", low=1e-4, high=1.0
     )
     gust_bandwidth_rad_s: float = setting(
         9.0,

@@ -53,7 +53,9 @@ class _PressingConfig(Protocol):
     def contact_feedforward(self) -> bool: ...
 
 
-def contact_loop(config: _PressingConfig, stiffness: float, damping: float, force_delay_s: float) -> ContactLoop:
+def contact_loop(
+    config: _PressingConfig, stiffness: float, damping: float, force_delay_s: float, quiet: float = 1.0
+) -> ContactLoop:
     """The linear contact loop of a controller against a wall; arguments as in `contact_mode_damping`."""
     gains, vehicle, estimation, hold = config.gains, config.vehicle, config.contact.estimation, 0.5 * config.tick_s
     spring, damper = (gains.force_ksp, gains.force_ksd) if config.impedance else (0.0, 0.0)
@@ -63,11 +65,11 @@ def contact_loop(config: _PressingConfig, stiffness: float, damping: float, forc
         drag=vehicle.linear_drag_n_s_m,
         stiffness=stiffness,
         damping=damping,
-        proportional=gains.force_kfp * min(1.0, config.contact.full_gain_stiffness_n_m / stiffness),
+        proportional=quiet * gains.force_kfp * min(1.0, config.contact.full_gain_stiffness_n_m / stiffness),
         integral=gains.force_kfi,
         filter_lag=1.0 / (2.0 * math.pi * config.contact.force_filter_hz),
         spring=spring,
-        damper=damper,
+        damper=quiet * damper,
         observer=1.0 if config.contact_feedforward else 0.0,  # without feed-forward it rests at the wall
         gust_bandwidth=config.contact.gust_bandwidth_rad_s,
         force_delay=force_delay_s + hold,
@@ -96,7 +98,9 @@ class LoopMargin:
     passive_damping_ratio: float
 
 
-def contact_mode_damping(config: _PressingConfig, stiffness: float, damping: float, force_delay_s: float) -> LoopMargin:
+def contact_mode_damping(
+    config: _PressingConfig, stiffness: float, damping: float, force_delay_s: float, quiet: float = 1.0
+) -> LoopMargin:
     """Least damping ratio of the contact under a controller; `ContactLoop` derives the loop.
 
     Args:
@@ -104,8 +108,9 @@ def contact_mode_damping(config: _PressingConfig, stiffness: float, damping: flo
         stiffness: Of wall and brush together [N/m].
         damping: Of wall and brush together [N s/m].
         force_delay_s: Mean age of the force sample in use: latency plus half a sample period [s].
+        quiet: Weight of K_sd and K_fp, which vibration reduces (docs/control.md) [-].
     """
-    loop = contact_loop(config, stiffness, damping, force_delay_s)
+    loop = contact_loop(config, stiffness, damping, force_delay_s, quiet)
     ratio, frequency = 1.0, 0.0
     for pole in loop.poles():
         oscillates = abs(pole.imag) > REAL_POLE * abs(pole)

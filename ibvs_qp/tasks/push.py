@@ -46,7 +46,8 @@ class PushTask(Task):
         error = reference - contact.push
         # On stiff walls the loop gain rises with the stiffness; the proportional gain falls with it.
         softness = ca.fmin(1.0, model.config.contact.full_gain_stiffness_n_m / contact.stiffness)
-        feedback = softness * gains.force_kfp * error + gains.force_kfi * self._integral(model, error)
+        proportional = softness * _quiet(model) * gains.force_kfp
+        feedback = proportional * error + gains.force_kfi * self._integral(model, error)
         return reference + feedback + self._impedance(model)
 
     def _integral(self, model: Model, error: ca.SX) -> ca.SX:
@@ -64,11 +65,18 @@ class PushTask(Task):
         if not config.impedance:
             return ca.SX(0.0)
         gains = config.gains
-        # A rate that is mostly noise would be pushed into the wall.
-        quiet = 1.0 / (1.0 + (contact.rate_noise / config.contact.rate_quiet_m_s) ** 4)
-        damping = quiet * gains.force_ksd * predicted_rate(config.vehicle, contact)
+        damping = _quiet(model) * gains.force_ksd * predicted_rate(config.vehicle, contact)
         force = gains.force_ksp * contact.distance + damping
         return ca.if_else(contact.known, force, 0.0)
+
+
+def _quiet(model: Model) -> ca.SX:
+    """Weight of K_sd and K_fp [-], 1/2 at `rate_quiet_m_s`.
+
+    A rate that is mostly noise would be pushed into the wall. The proportional gain needs the damping: without K_sd
+    it makes the contact oscillate.
+    """
+    return 1.0 / (1.0 + (model.contact.rate_noise / model.config.contact.rate_quiet_m_s) ** 4)
 
 
 def predicted_rate(vehicle: VehicleParams, contact: Contact) -> ca.SX:

@@ -3,6 +3,7 @@
 NAMES = (
     "force-hold",
     "paint",
+    "ablation",
     "noise-sweep",
     "saturation",
     "sloped-edge",
@@ -11,6 +12,7 @@ NAMES = (
     "rotor-derate",
     "approach",
     "payload",
+    "mismatch",
     "worlds",
     "rivals",
 )

@@ -104,7 +104,7 @@ def _setup(
     pilot = VARIANTS[variant].apply(default_preset(law))
     if FORCE_GAIN in level:
         pilot = with_force_gain(pilot, float(level[FORCE_GAIN]))
-    job = PaintJob() if flights.measure == "paint" else PressJob()
+    job = PaintJob() if flights.measure.startswith("paint") else PressJob()
     return changed(Setup(scene=scene, pilot=pilot, job=job), values)
 
 

@@ -15,9 +15,9 @@ import polars as pl
 
 from ibvs_qp.config.settings import load_toml
 from sim.evaluate.table import markdown
+from sim.experiments.comparison import SHIPPED, best_allocator, rivals
 from sim.experiments.spec import Column
 from sim.experiments.wording import rounded
-from sim.sweep.spec import LAWS
 from sim.sweep.statistics import median_interval, select
 
 #: Marks around the table.
@@ -26,11 +26,11 @@ BEGIN, END = "<!-- experiments: generated -->", "<!-- end of experiments -->"
 
 @dataclass(frozen=True, kw_only=True)
 class Line(Column):
-    """A line: one metric over the flights of both laws in the cells of `where`."""
+    """A line: one metric over the flights of the QP and of the analytic law in the cells of `where`."""
 
     experiment: str  # name of the experiment
     variant: str = "standard"  # variant of the controller
-    published: str = "–"  # value in the literature
+    published: str = "–"  # value in the literature, where it is comparable
     also: tuple[Column, ...] = ()  # further metrics behind it; their labels hold "{}" for the number
     # if given, the number of flights, failed ones included, that reach this value replaces the median
     at_least: float | None = None
@@ -48,16 +48,31 @@ LINES = load_toml(Lines, Path(__file__).with_name("readme.toml")).lines
 
 def digest(table: pl.DataFrame, lines: Sequence[Line] = LINES) -> str:
     """Markdown table of the lines that have flights in a table of all experiments."""
-    heads = ("", "QP", "analytic law", "published", "flights, QP and analytic", "command: `ibvs-qp`")
+    heads = ("", "QP", "analytic law (clip)", "its best allocator", "published", "flights", "`ibvs-qp experiment`")
     cells = []
     for line in lines:
-        rows = select(table.filter(pl.col("experiment") == line.experiment), line.where, variant=line.variant)
-        if rows.height:
-            laws = [rows.filter(pl.col("law") == law) for law in LAWS]
-            count = ", ".join(str(each.height) if each.height else "–" for each in laws)
-            values = (_value(each, line) for each in laws)
-            cells.append((line.label, *values, line.published, count, f"`experiment {line.experiment}`"))
+        rows = select(table.filter(pl.col("experiment") == line.experiment), line.where)
+        qp, flown = select(rows, law="qp", variant=line.variant), rivals(rows, line.variant)
+        if not qp.height:
+            continue
+        count = str(max(each.height for each in (qp, *flown.values())))
+        best = _best(flown, line) if len(flown) > 1 else ""
+        clip = _value(flown[SHIPPED], line) if SHIPPED in flown else "–"
+        other = f"{best}: {_value(flown[best], line)}" if best not in ("", SHIPPED) else best or "–"
+        cells.append((line.label, _value(qp, line), clip, other, line.published, count, line.experiment))
     return markdown(heads, cells)
+
+
+def _best(flown: dict[str, pl.DataFrame], line: Line) -> str:
+    """The allocator of the best value of a line."""
+    if line.at_least is None:
+        return best_allocator(flown, line)
+    return max(flown, key=lambda name: _reached(flown[name], line) / flown[name].height)
+
+
+def _reached(rows: pl.DataFrame, line: Line) -> int:
+    """Number of flights, failed ones included, whose metric is at least that of the line."""
+    return int((rows[line.metric].cast(pl.Float64).fill_null(0.0) >= line.at_least).sum())
 
 
 def _value(rows: pl.DataFrame, line: Line) -> str:
@@ -65,7 +80,7 @@ def _value(rows: pl.DataFrame, line: Line) -> str:
     if not rows.height:
         return "–"
     if line.at_least is not None:
-        return f"{int((rows[line.metric].fill_null(0.0) >= line.at_least).sum())} of {rows.height}"
+        return f"{_reached(rows, line)} of {rows.height}"
     done = rows.filter(pl.col("completed"))
     failed = [f"fails in {rows.height - done.height} of {rows.height}"] if done.height < rows.height else []
     values = line.scale * done[line.metric].drop_nulls().to_numpy()

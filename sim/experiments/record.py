@@ -10,8 +10,9 @@ import polars as pl
 
 from sim.experiments import ALL
 from sim.experiments.figures import Results, draw
-from sim.experiments.page import Section, results_page
+from sim.experiments.page import results_page
 from sim.experiments.spec import Experiment
+from sim.experiments.tables import Section, tables_page
 from sim.experiments.variants import REFERENCES
 from sim.experiments.verdict import Verdict, verdicts
 from sim.figures.style import save, styled
@@ -23,7 +24,9 @@ from sim.sweep.statistics import cells
 SCHEMA = 1
 #: Folder of parts and logs, under the folder of the experiment.
 PARTS = "parts"
-PAGE = "results.md"
+#: The results page, and the tables behind it.
+PAGE, TABLES = "results.md", "tables.md"
+FIGURES = "figures"
 #: Facts of a run that the summary repeats.
 _FACTS = ("command", "version", "seed", "features", "world", "interrupted", "wall_time_s")
 
@@ -109,7 +112,7 @@ def write_summary(folder: Path, content: dict[str, Any]) -> None:
 def write_page(
     folder: Path, experiments: Sequence[Experiment], table: pl.DataFrame, lead: str, command: str, name: str = ALL
 ) -> Path:
-    """Draw every figure and write the results page; returns its file.
+    """Draw every figure, remove those of earlier pages, write both pages; returns the file of the results page.
 
     Args:
         folder: Folder of the page, with logs in its ``parts``.
@@ -127,8 +130,12 @@ def write_page(
                 continue
             figures = {}
             for title, (caption, figure) in draw(Results(experiment, rows, folder / PARTS)).items():
-                figures[title] = (caption, Path("figures") / f"{title}.png")
+                figures[title] = (caption, Path(FIGURES) / f"{title}.png")
                 save(figure, folder / figures[title][1])
             sections.append(Section(experiment=experiment, table=rows, figures=figures))
+    shown = {folder / file for section in sections for _, file in section.figures.values()}
+    for file in set((folder / FIGURES).glob("*.png")) - shown:
+        file.unlink()
+    (folder / TABLES).write_text(tables_page(sections, lead, command, name), encoding="utf-8")
     (folder / PAGE).write_text(results_page(sections, lead, command, name), encoding="utf-8")
     return folder / PAGE

@@ -39,7 +39,9 @@ class Flights:
     """Flights of one kind: every combination of the levels, under each law with the same seeds."""
 
     measure: str = choice(
-        "press", "what is measured; paint paints, the others press", ("paint", "press", "slide", "loss")
+        "press",
+        "what is measured; paint paints, paint_timed also times perception, the others press",
+        ("paint", "paint_timed", "press", "slide", "loss"),
     )
     seeds: int = setting(1, "flights of each cell and law", low=1)
     levels: dict[str, tuple[Parameter, ...]] = field(default_factory=dict)  # first slowest; also variant, world
@@ -108,7 +110,7 @@ class Experiment:
     criteria: tuple[Criteria, ...]
     flights: tuple[Flights, ...]  # of the record
     quick: tuple[Flights, ...]  # of --quick
-    figures: tuple[FigureSpec, ...]
+    figures: tuple[FigureSpec, ...] = ()
     paths: dict[str, tuple[str, ...]] = field(default_factory=dict)  # dotted paths that take a parameter's value
     named: dict[str, dict[str, dict[str, Value]]] = field(default_factory=dict)  # paths set by a parameter's value
     fixed: dict[str, Value] = field(default_factory=dict)  # values of dotted paths for all flights

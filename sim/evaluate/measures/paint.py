@@ -19,6 +19,7 @@ def paint_figures(trace: Trace) -> dict[str, float]:
     """Every number of M, rms of path and push over the whole painting, fractions of ticks solved and limited, crash.
 
     ``push_peak_ratio``: greatest push at 1 kHz over the push of the job. ``crashed``: 1 if the flight ended so, else 0.
+    ``path_rms_last_row_m``: path on the straight of the last row, NaN if it was not reached.
     """
     metrics = compute_metrics(trace)
     figures = {
@@ -31,10 +32,19 @@ def paint_figures(trace: Trace) -> dict[str, float]:
     figures["limited_share"] = limited_fraction(trace, np.ones(len(trace.t), bool))
     figures["push_peak_ratio"] = metrics["force_peak_n"] / trace.scene.paint.push_n
     figures["crashed"] = float(trace.reason.startswith(CRASH))
+    rows = metrics["rows"]
+    reached = len(rows) == trace.scene.paint.rows
+    figures["path_rms_last_row_m"] = rows[-1]["path_rms_straight_m"] if reached else math.nan
     path = path_error(trace)
     figures["path_rms_m"] = rms(path.distance[path.painting])
     figures["force_rms_n"] = rms((trace.push_true - trace.push_reference)[path.painting])
     return figures
+
+
+def paint_timed_figures(trace: Trace) -> dict[str, float]:
+    """Figures of a paint job with a timing of the machine: ``perception_hz``, from the median time per picture."""
+    per_picture_ms = float(np.median(trace.vision_ms)) if len(trace.vision_ms) else 0.0
+    return paint_figures(trace) | {"perception_hz": 1e3 / per_picture_ms if per_picture_ms > 0.0 else math.nan}
 
 
 def effort_figures(trace: Trace) -> dict[str, float]:

@@ -20,6 +20,8 @@ _PALER = 0.6
 def draw_bars(spec: FigureSpec, results: Results) -> Drawn:
     """Bars per value of the parameter: one per law, and per variant of the figure that the law flew."""
     table = select(results.table, spec.where)
+    if not table.height:
+        return {}
     series = [
         (law, variant) for law in LAWS for variant in spec.variants if select(table, law=law, variant=variant).height
     ]

@@ -24,11 +24,12 @@ def draw_spread(spec: FigureSpec, results: Results) -> Drawn:
     """One panel per metric, one box per law; left out for a single seed."""
     if results.table["seed"].n_unique() < 2:
         return {}
+    flown = select(results.table, spec.where, variant="standard")
     figure = new_figure(2.5)
     for axes, panel in zip(figure.subplots(1, len(spec.panels)), spec.panels, strict=True):
         ticks = []
         for place, (law, words) in enumerate((("qp", "QP"), ("paper", "analytic"))):
-            values = select(results.table, law=law, variant="standard")[panel.metric].drop_nulls().to_numpy()
+            values = select(flown, law=law)[panel.metric].drop_nulls().to_numpy()
             draw_boxes(axes, [panel.scale * values], [place], 0.6, law)
             ticks.append(f"{words}\nn = {len(values)}")
         axes.set(title=panel.label, ylim=(0.0, None))

@@ -16,7 +16,7 @@ from sim.sweep.parts import PARAM
 from sim.sweep.statistics import select
 
 #: Line style of the variants, in the order given.
-_DASHES = ("-", ":", "--")
+_DASHES = ("-", ":", "--", "-.")
 #: Parameters that span a decade.
 _LOGARITHMIC = ("stiffness_n_m",)
 #: Distance of the two laws along x: relative on a logarithmic axis, else as a fraction of the range.

@@ -32,11 +32,11 @@ HEADROOM = 0.2
 _WORDS = {"press": "touch and press", "paint": "painting a row", "climb": "climb to the next row"}
 
 
-def draw_demonstrations(_: FigureSpec, results: Results) -> Drawn:
+def draw_demonstrations(spec: FigureSpec, results: Results) -> Drawn:
     """Six panels per law, and snapshots of the line detection under the QP law."""
     figures: Drawn = {}
     for law in ("qp", "paper"):
-        trace = stored_trace(results, select(results.table, law=law, variant="standard"))
+        trace = stored_trace(results, select(results.table, spec.where, law=law, variant="standard"))
         if trace is None or not len(trace.t):
             continue
         figures[f"demonstration-{law}"] = (f"The complete demonstration, {law_name(law)}", draw_demonstration(trace))

@@ -28,7 +28,7 @@ def draw_fault(spec: FigureSpec, results: Results) -> Drawn:
     figure = new_figure(2.8)
     grid = figure.subplots(1, 3)
     for law in ("paper", "qp"):
-        trace = stored_trace(results, select(flown, law=law))
+        trace = stored_trace(results, select(flown, law=law, variant="standard"))
         if trace is None:
             continue
         t = trace.t - event_time(trace, "fault")

