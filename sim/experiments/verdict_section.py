@@ -46,7 +46,12 @@ def world_of(params: dict[str, Any]) -> str:
 
 
 def verdict_section(flown: Flown) -> str:
-    """Counts, then the figures in which each law is better, those that do not matter, and failed flights."""
+    """Counts, then the figures in which each law is better, those that do not matter, and failed flights.
+
+    Empty if no cell was flown under both laws.
+    """
+    if not any(list(compared_cells(experiment, table)) for experiment, table in flown):
+        return ""
     found = [each for experiment, table in flown for each in comparisons(experiment, table)]
     best = [each for each in found if each.best]
     failures, completion = _failures(flown)

@@ -1,4 +1,4 @@
-"""Predictive rival: a linear model with rotor lag and contact over 0.3 s, solved anew at every tick."""
+"""Predictive rival: a linear model with rotor lag over 0.3 s, solved anew at every tick."""
 
 from __future__ import annotations
 
@@ -44,13 +44,12 @@ class MpcController(PaperController):
     def _make_setpoints(self) -> Setpoints:
         """The shipped set-points, with the prediction's values beside them."""
         config, model = self.config, Model(self.config)
-        for task in default_tasks(config):
-            task.rows(model)
-        prediction = Prediction(model, self.settings)
+        rows = [row for task in default_tasks(config) for row in task.rows(model)]
+        prediction = Prediction(model, self.settings, {row.name: row.target for row in rows})
         setpoints = Setpoints(model, prediction.values())
         values, inputs, step = setpoints.step.extra, setpoints.step.inputs, config.vehicle.thrust_rate_n_s
-        generator, rows = prediction.generator.sparsity(), prediction.rows.sparsity()
-        program = CondensedProgram(generator, rows, self.settings, config.tick_s, step)
+        patterns = prediction.generator.sparsity(), prediction.rows.sparsity()
+        program = CondensedProgram(*patterns, prediction.states, self.settings, config.tick_s, step)
         function = program.function  # its matrix products are faster in CasADi than in the C code it writes
         arguments = [
             *values,

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from ibvs_qp.pilot import PilotConfig
-from sim.evaluate.measures import paint_row
+from sim.evaluate.measures import paint_figures
 from sim.experiments.preset_flights import paint_runs
 from sim.experiments.scenes import changed, near_wall, short_job
 from sim.sweep.design import Run
@@ -57,7 +57,12 @@ def flights(
         seeds: Seeds.
         features: "geometric" or "rendered".
     """
-    cell: dict[str, Any] = {"experiment": "tune", "variant": variant, "measure": paint_row, "overhead_s": _OVERHEAD_S}
+    cell: dict[str, Any] = {
+        "experiment": "tune",
+        "variant": variant,
+        "measure": paint_figures,
+        "overhead_s": _OVERHEAD_S,
+    }
     every = tuple(seeds)
     return [
         run

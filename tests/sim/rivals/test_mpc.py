@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from controller_scenes import line_references, measured, random_tick
+from controller_scenes import Wall, line_references, measured, random_tick
 from scipy.integrate import solve_ivp
 
 from ibvs_qp.config import ControllerConfig
@@ -52,7 +52,7 @@ def integrated_cost(law: MpcController, commands: np.ndarray) -> float:
             rtol=1e-10, atol=1e-12,
         )  # fmt: skip
         state, time = flow.y[:, -1], time + step
-        error = rows @ state + offsets @ (1.0, time, 0.5 * time**2)
+        error = rows @ np.concatenate((state, forced[:-1])) + offsets @ (1.0, time, 0.5 * time**2)
         total += 0.5 * step * (settings.terminal if k == len(steps) - 1 else 1.0) * float(weights @ error**2)
     before = np.vstack((law.setpoints.step.inputs["thrust_last"], commands[:-1]))
     return total + 0.5 * settings.thrust_change * settings.step_s * float(((commands - before) ** 2).sum())
@@ -91,6 +91,22 @@ def test_commands_stay_within_the_window_of_the_tick():
         last = command.thrusts
 
 
+@pytest.mark.parametrize(("felt", "distance"), [(4.0, 0.0), (0.0, 0.2)], ids=["contact", "approach"])
+def test_along_the_normal_the_commands_follow_the_shipped_law(felt, distance):
+    law = MpcController(ControllerConfig())
+    wrench = np.array([-felt, 0.0, 0.0, 0.0, 0.0, 0.0])
+    for tick in range(400):
+        seen = measured(tick, contact_wrench=wrench, plane=Wall(np.array([1.0, 0.0, 0.0, 0.0]), distance).plane)
+        law.step(seen, Reference(push_force=6.0, contact=True))
+    setpoints = law.setpoints
+    weight = setpoints.step.outputs["contact_weight"][0]
+    wanted = weight * setpoints.push_command + (1.0 - weight) * setpoints.standoff_command
+    wrench = setpoints.effectiveness @ setpoints.last + setpoints.bias_wrench
+    assert (weight > 0.9) == (felt > 0.0)
+    assert wanted > 2.0
+    assert setpoints.normal @ wrench[:3] == pytest.approx(wanted, rel=0.1)  # weighted against the other errors
+
+
 class SteadyVehicle:
     """A level point mass in front of a wall with rotor lag, pushed by a constant force that nothing measures."""
 
@@ -108,8 +124,6 @@ class SteadyVehicle:
         self.position += 0.004 * self.velocity
 
     def seen(self, index: int, specific: np.ndarray) -> tuple[Measurement, Reference]:
-        from controller_scenes import Wall
-
         from ibvs_qp.measurement import HORIZONTAL, VERTICAL
 
         wall = Wall(np.array([1.0, 0.0, 0.0, 0.0]), 0.3 - self.position[0])
