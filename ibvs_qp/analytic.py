@@ -114,11 +114,14 @@ def analytic_setpoints(config: ControllerConfig) -> Setpoints:
 
 
 class PaperController:
-    """The paper's law with the same measurement, reference and command as the program."""
+    """The paper's law with the same measurement, reference and command as the program.
+
+    A subclass may replace the law: its set-points and its command.
+    """
 
     def __init__(self, config: ControllerConfig | None = None) -> None:
         self.config = config or ControllerConfig()
-        self.setpoints = analytic_setpoints(self.config)
+        self.setpoints = self._make_setpoints()
         self._gate = MeasurementGate(self.config.vehicle.geometry.count)
         self.reset()
 
@@ -139,6 +142,11 @@ class PaperController:
         if self._gate.restarted:
             self.setpoints.restart()
         self.setpoints.update(checked, reference, contact)
-        rejected += reach_note(self.setpoints, reference)
+        return self._command(checked, reference, rejected + reach_note(self.setpoints, reference))
+
+    def _make_setpoints(self) -> Setpoints:
+        return analytic_setpoints(self.config)
+
+    def _command(self, checked: Measurement, reference: Reference, rejected: tuple[str, ...]) -> Command:
         free = analytic_thrusts(self.setpoints)
         return clipped_command(self.setpoints, checked, reference, free, Outcome.SOLVED, rejected, allocate)

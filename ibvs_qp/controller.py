@@ -8,6 +8,7 @@ solves the program with OSQP and reports what tasks and limits did. The equation
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import ClassVar
 
 import numpy as np
 
@@ -75,13 +76,21 @@ def default_limits(config: ControllerConfig) -> list[Limit]:
     return [ThrustLimit(), *(limit for enabled, limit in barriers if config.barriers and enabled)]
 
 
-def qp_problem(config: ControllerConfig, tasks: Sequence[Task] = (), limits: Sequence[Limit] = ()) -> QpProblem:
+def qp_problem(
+    config: ControllerConfig,
+    tasks: Sequence[Task] = (),
+    limits: Sequence[Limit] = (),
+    kind: type[QpProblem] = QpProblem,
+) -> QpProblem:
     """The program of a configuration: the shipped tasks and limits and further ones."""
-    return QpProblem(Model(config), [*default_tasks(config), *tasks], [*default_limits(config), *limits])
+    return kind(Model(config), [*default_tasks(config), *tasks], [*default_limits(config), *limits])
 
 
 class HybridController:
     """The drop-in controller: measurement and reference in, rotor thrusts and their explanation out.
+
+    Attributes:
+        problem_kind, engine_kind: Assembly and solution of the rows; a subclass may solve the same rows differently.
 
     Args:
         config: Everything it needs; the default flies the Tarot T960.
@@ -92,13 +101,16 @@ class HybridController:
         ConfigError: When a row is not affine in the thrusts, two rows share a name, or the configuration is refused.
     """
 
+    problem_kind: ClassVar[type[QpProblem]] = QpProblem
+    engine_kind: ClassVar[type[QpEngine]] = QpEngine
+
     def __init__(
         self, config: ControllerConfig | None = None, *, tasks: Sequence[Task] = (), limits: Sequence[Limit] = ()
     ) -> None:
         self.config = config or ControllerConfig()
-        self.problem = qp_problem(self.config, tasks, limits)
+        self.problem = qp_problem(self.config, tasks, limits, self.problem_kind)
         self.setpoints = Setpoints(self.problem.model, self.problem.values)
-        self.engine = QpEngine(self.problem, self.config.solver, ProgramData(self.problem, self.setpoints.step))
+        self.engine = self.engine_kind(self.problem, self.config.solver, ProgramData(self.problem, self.setpoints.step))
         self._gate = MeasurementGate(self.config.vehicle.geometry.count)
         self.reset()
 

@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
@@ -29,6 +30,7 @@ from ibvs_qp.estimation.wall_motion import BIAS, WallMotion
 from ibvs_qp.estimation.wrench_tare import WrenchTare
 from ibvs_qp.frames import Vector3, add_scaled, down_in_body, plane_in_body, to_camera
 from ibvs_qp.measurement import HORIZONTAL, FeatureFrame, LineReference, Measurement, Reference, RgbdFrame, SensorFrame
+from ibvs_qp.model.setpoints import Setpoints
 from ibvs_qp.painting.command import PainterInput, PaintingCommand
 from ibvs_qp.painting.config import PaintingConfig
 from ibvs_qp.painting.painter import Painter
@@ -84,6 +86,23 @@ class PilotConfig:
         return dump_toml(self)
 
 
+class Controller(Protocol):
+    """A control law of the pilot; it never raises and never leaves the thrust limits."""
+
+    @property
+    def setpoints(self) -> Setpoints:
+        """Set-points of the last step."""
+        ...
+
+    def reset(self) -> None:
+        """As after construction."""
+        ...
+
+    def step(self, measurement: Measurement, reference: Reference, contact: ContactState | None = None) -> Command:
+        """Thrusts for one tick."""
+        ...
+
+
 class Pilot:
     """Vision, estimation, strategy and one of the two laws in a row; `step` needs no simulator.
 
@@ -94,6 +113,7 @@ class Pilot:
         config: Configuration of the flight.
         painter: Strategy to follow; None paints.
         seen_as: Applied to the features of every picture, for studies of perception errors.
+        controller: Control law, for studies of other laws; None builds the configured one.
     """
 
     def __init__(
@@ -101,6 +121,7 @@ class Pilot:
         config: PilotConfig | None = None,
         painter: Painter | None = None,
         seen_as: Callable[[FeatureFrame], FeatureFrame] | None = None,
+        controller: Controller | None = None,
     ) -> None:
         self.config = config or PilotConfig()
         settings, vehicle = self.config.controller, self.config.controller.vehicle
@@ -114,7 +135,8 @@ class Pilot:
         self.motion = WallMotion(self._tip, camera, settings.tick_s, self.config.estimation)
         self.supervisor = RotorLoss(vehicle)
         self.painter = painter or Painter(self.config.painting)
-        self.controller = (HybridController if self.config.law == "qp" else PaperController)(settings)
+        law = HybridController if self.config.law == "qp" else PaperController
+        self.controller: Controller = controller or law(settings)
         self.reset()
 
     def reset(self) -> None:

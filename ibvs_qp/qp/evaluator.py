@@ -15,11 +15,12 @@ class ProgramData:
         p: Non-zeros of the upper triangle of P. Likewise q, a, lower, upper.
         unlimited: Solution of the same step without any limit, (variables,).
         free: Its thrusts [N], (n,).
+        further: Further values of the problem, in their order.
         point: Inputs and states of the step; `inputs` are views of it by name.
     """
 
     def __init__(self, problem: QpProblem, step: StepFunction) -> None:
-        self.p, self.q, self.a, self.lower, self.upper, self.unlimited = step.extra
+        self.p, self.q, self.a, self.lower, self.upper, self.unlimited, *self.further = step.extra
         self.free = self.unlimited[: problem.model.rotors]
         self._step = step  # owns the memory that the compiled function writes
         self.point, self.inputs = step.point, step.inputs

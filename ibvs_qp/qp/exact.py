@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
-from ibvs_qp.qp.problem import QpProblem
+from ibvs_qp.qp.problem import ProgramPatterns
 
 #: Largest violation of a row in an accepted solution: DAQP skips rows that are all zero.
 FEASIBLE = 1e-4
@@ -14,7 +14,7 @@ FEASIBLE = 1e-4
 class ExactSolver:
     """Dual active-set solver of the same program; exact to rounding, called only when OSQP is not accepted."""
 
-    def __init__(self, problem: QpProblem) -> None:
+    def __init__(self, problem: ProgramPatterns) -> None:
         self._problem = problem
         p_sparsity = _casadi_sparsity(problem.p_pattern + problem.p_pattern.T)
         self._p_sparsity, self._a_sparsity = p_sparsity, _casadi_sparsity(problem.a_pattern)

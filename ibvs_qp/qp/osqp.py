@@ -12,7 +12,7 @@ import numpy as np
 import osqp
 
 from ibvs_qp.config import SolverSettings
-from ibvs_qp.qp.problem import QpProblem
+from ibvs_qp.qp.problem import ProgramPatterns
 
 #: Status values of OSQP 1.x whose iterate means something.
 SOLVED, SOLVED_INACCURATE, MAX_ITERATIONS = 1, 2, 7
@@ -42,9 +42,9 @@ class OsqpSolver:
     and factorise again.
     """
 
-    def __init__(self, problem: QpProblem, settings: SolverSettings) -> None:
+    def __init__(self, problem: ProgramPatterns, settings: SolverSettings) -> None:
         self._problem, self._settings = problem, settings
-        variables, rows = len(problem.variable_names), len(problem.row_names)
+        rows, variables = problem.a_pattern.toarray().shape
         self._lengths = (problem.p_pattern.nnz, variables, problem.a_pattern.nnz, rows, rows)
         self._no_multipliers = np.zeros(rows)
         self._reset_pending = True

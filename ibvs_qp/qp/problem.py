@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
+from typing import Protocol
 
 import casadi as ca
 import numpy as np
@@ -16,6 +17,13 @@ from ibvs_qp.model.rows import LimitRow, TaskRow
 from ibvs_qp.model.signals import stack
 from ibvs_qp.qp.row_check import check_rows
 from ibvs_qp.tasks.task import Task
+
+
+class ProgramPatterns(Protocol):
+    """Sparsity of a program: upper triangle of P, and A; enough for a solver."""
+
+    p_pattern: sparse.csc_matrix
+    a_pattern: sparse.csc_matrix
 
 
 class AffineRows:

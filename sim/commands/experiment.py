@@ -40,7 +40,7 @@ class ExperimentCommand:
 
     name: Annotated[Literal[(*NAMES, ALL)], tyro.conf.Positional, tyro.conf.arg(metavar="NAME")]  # type: ignore[valid-type]
     """Experiment: force-hold, paint, ablation, noise-sweep, saturation, sloped-edge, friction, gust, rotor-derate,
-    approach, payload, mismatch, worlds or all."""
+    approach, payload, mismatch, worlds, rivals or all."""
     quick: Annotated[bool, flag] = False
     """Few cells and seeds: takes minutes, does not replace the record."""
     features: Literal["rendered", "geometric"] = "rendered"

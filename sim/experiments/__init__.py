@@ -14,5 +14,6 @@ NAMES = (
     "payload",
     "mismatch",
     "worlds",
+    "rivals",
 )
 ALL = "all"

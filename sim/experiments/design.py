@@ -67,6 +67,7 @@ def _cell(experiment: Experiment, flights: Flights, level: dict[str, Parameter],
             setup = _setup(experiment, flights, level, law, variant, scene)
             options = FlightOptions(
                 law=law,
+                rival=VARIANTS[variant].rival,
                 seed=choice.seed + index,
                 features=flights.features or choice.features,
                 vision=VARIANTS[variant].vision,

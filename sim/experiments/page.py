@@ -28,8 +28,10 @@ def results_page(sections: Sequence[Section], lead: str, command: str, name: str
     text = (
         f"# Results of the experiments\n\nGenerated from data by `{command.format(name=name)}`; do not edit. {lead}\n"
         "[tables.md](tables.md) has every table and figure, [experiments.md](../experiments.md) describes the "
-        "experiments. All flights are simulated.\n\n## Verdict\n\n" + verdict_section(flown)
+        "experiments. All flights are simulated.\n"
     )
+    if verdict := verdict_section(flown):
+        text += "\n## Verdict\n\n" + verdict
     overview = [figure for section in sections if section.experiment.name == _OVERVIEW
                 for figure in section.figures.values()]  # fmt: skip
     for caption, file in overview[:1]:

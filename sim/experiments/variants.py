@@ -19,6 +19,7 @@ class Variant:
     words: str  # what differs, for tables
     switches: dict[str, bool | str] = field(default_factory=dict)  # fields of ControllerConfig
     qp_gains: bool = False  # whether the law flies the gains of the QP law
+    rival: str = ""  # control law of sim.rivals that flies instead of the law, as in FlightOptions
     vision: str = "own"  # perception of rendered pictures, as in FlightOptions
     laws: tuple[str, ...] = ("qp", "paper")  # laws that it applies to
     against: tuple[str, ...] = ("standard",)  # reference variants: the first that flew the same cell

@@ -15,7 +15,12 @@ from sim.sweep.statistics import CONFIDENCE
 
 
 def verdict_section(flown: Flown) -> str:
-    """Counts, then the figures in which each law is better, those that do not matter, and failed flights."""
+    """Counts, then the figures in which each law is better, those that do not matter, and failed flights.
+
+    Empty if no cell was flown under both laws.
+    """
+    if not any(list(compared_cells(experiment, table)) for experiment, table in flown):
+        return ""
     found = [each for experiment, table in flown for each in comparisons(experiment, table)]
     best = [each for each in found if each.best]
     failures, completion = completion_section(flown)

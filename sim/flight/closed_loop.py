@@ -12,6 +12,7 @@ from sim.flight.options import FlightOptions, pilot_config
 from sim.flight.recorder import Recorder
 from sim.flight.surroundings import World
 from sim.flight.trace import CRASH, Event, Trace
+from sim.rivals import rival_controller
 from sim.sensors.features import add_sigma_vs
 from sim.world.plant import TICK_NS
 from sim.world.random_streams import stream
@@ -29,11 +30,12 @@ BASE_TIME, STROKE_FACTOR = 90.0, 2.0
 
 
 def make_pilot(scene: Scene, options: FlightOptions, config: PilotConfig, job: Job) -> Pilot:
-    """The pilot of one flight; with the scene's extra feature noise after its own perception."""
+    """The pilot of one flight; the scene's extra feature noise follows its perception, and a rival replaces its law."""
     sigma, noise = scene.features.sigma_vs, stream(options.seed, "sigma_vs")
     rendered = options.features == "rendered"  # the sensor model of lines adds the same noise itself
     seen_as = (lambda frame: add_sigma_vs(frame, sigma, noise)) if rendered and sigma > 0.0 else None
-    return Pilot(config, job.strategy(config.painting), seen_as)
+    controller = rival_controller(options.rival, config.controller) if options.rival else None
+    return Pilot(config, job.strategy(config.painting), seen_as, controller)
 
 
 def fly(

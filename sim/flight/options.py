@@ -22,10 +22,11 @@ class FlightOptions:
     """How to fly a scene; the defaults are the main job.
 
     With `machine_code` the C compiler, where there is one, compiles the controller's tick: the same flight to the bit,
-    faster.
+    faster. A `rival` is a control law of `sim.rivals`, flown on the law's preset instead of the law itself.
     """
 
     law: str = "qp"
+    rival: str = ""
     seed: int = 0
     features: str = "rendered"
     vision: str = "own"

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.settings import to_dict
-from sim.evaluate.measures import paint_row, press_row
+from sim.evaluate.measures import paint_figures, press_row
 from sim.flight.jobs import PaintJob
 from sim.flight.options import pilot_config
 from sim.sweep.axes import fractions
@@ -92,7 +92,7 @@ class Planned:
         options = options_of(self.spec.settings, law, seed)
         config = pilot_config(setup.scene, options, setup.pilot)
         plan = FlightPlan(scene=setup.scene, config=config, options=options, job=setup.job)
-        measure = paint_row if isinstance(setup.job, PaintJob) else press_row
+        measure = paint_figures if isinstance(setup.job, PaintJob) else press_row
         return Run(**facts, plan=plan, measure=measure, expected_s=OVERHEAD_S + setup.job.expected_s(config.painting))
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from ibvs_qp.pilot import PilotConfig
-from sim.evaluate.measures import paint_row
+from sim.evaluate.measures import paint_figures
 from sim.experiments.preset_flights import paint_runs
 from sim.experiments.scenes import NEAR_START_M, changed
 from sim.sweep.design import Run
@@ -65,7 +65,12 @@ def flights(
         seeds: Seeds.
         features: "geometric" or "rendered".
     """
-    cell: dict[str, Any] = {"experiment": "tune", "variant": variant, "measure": paint_row, "overhead_s": _OVERHEAD_S}
+    cell: dict[str, Any] = {
+        "experiment": "tune",
+        "variant": variant,
+        "measure": paint_figures,
+        "overhead_s": _OVERHEAD_S,
+    }
     return [
         run
         for place, (name, scene) in enumerate(flown.items())

@@ -18,6 +18,7 @@ SETTLED_S = 1.0
 def paint_figures(trace: Trace) -> dict[str, float]:
     """Every number of M, rms of path and push over the whole painting, fractions of ticks solved and limited, crash.
 
+    Also effort and thrust rate.
     ``push_peak_ratio``: greatest push at 1 kHz over the push of the job. ``crashed``: 1 if the flight ended so, else 0.
     ``path_rms_last_row_m``: path on the straight of the last row, NaN if it was not reached.
     """
@@ -38,7 +39,7 @@ def paint_figures(trace: Trace) -> dict[str, float]:
     path = path_error(trace)
     figures["path_rms_m"] = rms(path.distance[path.painting])
     figures["force_rms_n"] = rms((trace.push_true - trace.push_reference)[path.painting])
-    return figures
+    return figures | effort_figures(trace)
 
 
 def paint_timed_figures(trace: Trace) -> dict[str, float]:
@@ -62,8 +63,3 @@ def effort_figures(trace: Trace) -> dict[str, float]:
         "effort_n": rms(thrusts - thrusts.mean(axis=0)),
         "jitter_n_s": rms(np.diff(thrusts, axis=0) / tick),
     }
-
-
-def paint_row(trace: Trace) -> dict[str, float]:
-    """Figures of a paint job with the effort."""
-    return paint_figures(trace) | effort_figures(trace)

@@ -166,6 +166,21 @@ def made_up(name: str) -> pl.DataFrame:
     return frame(flights)
 
 
+def test_laws_in_place_of_the_qp_are_compared_with_it_and_without_an_analytic_law_there_is_no_verdict():
+    facts = {"param.kind": "paint", "param.world": "datasheet"}
+    base = [3e-3 + 1e-5 * seed for seed in range(6)]
+    flights = [
+        row
+        for variant, gain in (("standard", 0.0), ("lexicographic", 1e-5), ("mpc", 2e-3))
+        for row in rows("rivals", "qp", variant, [e - gain for e in base], "path_rms_straight_m", **facts)
+    ]
+    sections = [Section(experiment=experiment("rivals"), table=frame(flights), figures={})]
+    page = results_page(sections, "Made up.", "ibvs-qp experiment {name}", "rivals")
+    assert "## Verdict" not in page and "analytic" not in page
+    assert "| rivals | datasheet | QP law | 6 and 6 of 6 | 0 | 0 | 1 | 0 | 0 | – |" in page
+    assert "| rivals | datasheet | QP law | 6 and 6 of 6 | 0 | 1 | 0 | 0 | 0 | path, straights, rms -2.00" in page
+
+
 def test_the_page_of_a_whole_record_is_short():
     sections = [Section(experiment=experiment(name), table=made_up(name), figures={}) for name in NAMES]
     page = results_page(sections, "Made up.", "ibvs-qp experiment {name}", "all")

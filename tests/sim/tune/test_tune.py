@@ -52,7 +52,7 @@ def flown(monkeypatch, tmp_path):
         return made_up_flight(scene, options, **named)
 
     monkeypatch.setattr(sim.sweep.flying, "fly", fly)
-    monkeypatch.setattr(sim.tune.flights, "paint_row", made_up_figures)
+    monkeypatch.setattr(sim.tune.flights, "paint_figures", made_up_figures)
     monkeypatch.setattr("sim.tune.search.require_margin", lambda *_: None)
     monkeypatch.chdir(tmp_path)
     return count

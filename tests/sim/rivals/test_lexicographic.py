@@ -1,0 +1,81 @@
+"""Strict priorities: the weighted program without limits, and upper levels at their optimum with limits."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from controller_scenes import random_tick
+from scipy.optimize import lsq_linear
+
+from ibvs_qp.config import ControllerConfig
+from ibvs_qp.controller import HybridController
+from sim.rivals.lexicographic import LexicographicController
+from sim.rivals.priorities import LEVELS, row_levels
+
+#: Barriers off: the levels then compete within the thrust window alone.
+FREE = dataclasses.replace(ControllerConfig(), barriers=False)
+
+
+def stepped(law: type[HybridController], seed: int, low: float, high: float) -> tuple[HybridController, np.ndarray]:
+    """A controller after two ticks near a wall; the window of the second is [low, high] around the last thrusts."""
+    rng, controller = np.random.default_rng(seed), law(FREE)
+    for tick in range(2):
+        measurement, reference = random_tick(rng, 2, tick)
+        controller.setpoints._rate_step = 1e3
+        if tick:
+            measurement = dataclasses.replace(measurement, thrust_min=np.full(6, low), thrust_max=np.full(6, high))
+        command = controller.step(measurement, reference)
+    return controller, command.thrusts
+
+
+def rows(controller: HybridController) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Matrix, target and weight of every task row."""
+    flat, targets, weights = controller.engine.data.further
+    return flat.reshape(6, -1).T, targets, weights
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_without_an_active_limit_both_laws_agree_up_to_smoothness(seed):
+    """Six rows fix six thrusts; effort, smoothness and lines that disagree with level flight move both a little."""
+    _, weighted = stepped(HybridController, seed, 1.2, 52.0)
+    _, strict = stepped(LexicographicController, seed, 1.2, 52.0)
+    assert np.abs(weighted - strict).max() < 0.05
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_where_a_limit_is_active_the_first_level_is_as_good_as_alone(seed):
+    controller, thrusts = stepped(LexicographicController, seed, 9.0, 12.0)
+    data = controller.engine.data
+    assert ((thrusts < 9.0 + 1e-3) | (thrusts > 12.0 - 1e-3)).any()
+    matrix, targets, weights = rows(controller)
+    first = row_levels([row.name for row in controller.problem.task_rows])[0]
+    scale = np.sqrt(weights[first])[:, None]
+    alone = lsq_linear(scale * matrix[first], scale[:, 0] * targets[first], (data.lower[:6], data.upper[:6]))
+    residual = matrix[first] @ thrusts - targets[first]
+    assert float(weights[first] @ residual**2) <= 2.0 * alone.cost + 1e-3
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_lower_level_takes_what_the_upper_ones_leave(seed):
+    """Weighted, the push row pulls at roll and pitch; in strict priorities it does not."""
+    strict, at = stepped(LexicographicController, seed, 9.0, 12.0)
+    _, mixed = stepped(HybridController, seed, 9.0, 12.0)
+    matrix, targets, weights = rows(strict)
+    first = row_levels([row.name for row in strict.problem.task_rows])[0]
+    cost = [float(weights[first] @ (matrix[first] @ thrusts - targets[first]) ** 2) for thrusts in (at, mixed)]
+    assert cost[0] <= cost[1] + 1e-3
+
+
+def test_every_row_has_one_level_and_the_angles_the_last():
+    names = ["line_0", "line_0_angle", "push", "standoff", "roll", "pitch", "yaw", "velocity_right", "height", "mine"]
+    found = [{names[index] for index in level} for level in row_levels(names)]
+    assert found == [
+        {"roll", "pitch"},
+        {"yaw"},
+        {"line_0", "velocity_right", "height"},
+        {"push", "standoff"},
+        {"line_0_angle", "mine"},
+    ]
+    assert len(found) == len(LEVELS)
