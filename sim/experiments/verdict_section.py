@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
-from sim.experiments.comparison import Comparison, comparisons
+from sim.experiments.comparison import Comparison, compared_cells, comparisons
 from sim.experiments.completion_section import completion_section
 from sim.experiments.relevance import THRESHOLDS, Effect, threshold
 from sim.experiments.sections import HEADINGS, Flown, capped, grouped, world_of
