@@ -48,7 +48,7 @@ class Tune:
     preset: Annotated[Path | None, optional("FILE")] = None
     """Preset to start from; default: the shipped one."""
     jobs: int = 1
-    """Parallel trials; the search depends on this number, not on the speed of the computer."""
+    """Trials of a generation that fly side by side."""
     trials_of: Annotated[Path | None, optional("FILE")] = None
     """Record of an earlier search (LAW_trials.json): choose again from its trials, without a search."""
     storage: Annotated[str | None, optional("FILE_OR_URL")] = None
@@ -96,7 +96,7 @@ class Tune:
         start = PilotConfig.from_toml(self.preset) if self.preset else default_preset(self.law)
         return SearchPlan(
             shipped=dataclasses.replace(start, law=self.law),
-            rival=default_preset("paper" if self.law == "qp" else "qp"),
+            other=default_preset("paper" if self.law == "qp" else "qp"),
             trials=self.trials,
             seed=self.seed,
             flights=self.flights,

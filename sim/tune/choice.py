@@ -15,6 +15,8 @@ from sim.tune.objectives import OBJECTIVES, Score
 SCENE_ROOM = 1.15
 #: Least ratio to the shipped preset's contact damping [-]: stability is worth as much as an objective.
 LEAST_DAMPING = 0.9
+#: Damping ratio as which an undamped contact counts [-]; it keeps the cost finite.
+HARDLY_DAMPED = 1e-3
 #: Slope of the cost beyond the bound of an objective: one of five objectives must not buy room for the others [-].
 STEEP = 2.0
 #: Presets of a search that fly again, on other seeds and harder scenes, before the choice: the best of many trials is
@@ -57,10 +59,14 @@ def contact_damping(config: PilotConfig) -> float:
     return least_margin(config.controller, config.controller.brush).least_damping_ratio
 
 
-def less_damped(config: PilotConfig, shipped: PilotConfig) -> float:
-    """Logarithm by which the contact's damping is below its bound; 0 above it."""
-    least = max(contact_damping(config), 1e-3)
-    return max(0.0, math.log(LEAST_DAMPING * contact_damping(shipped) / least))
+def less_damped(damping: float, shipped: float) -> float:
+    """Logarithm by which a contact's damping ratio is below its bound; 0 above it.
+
+    Args:
+        damping: Least damping ratio of the contact; an undamped one counts as hardly damped.
+        shipped: That of the shipped preset.
+    """
+    return max(0.0, math.log(LEAST_DAMPING * shipped / max(damping, HARDLY_DAMPED)))
 
 
 def ranked(scores: Mapping[int, Score], shipped: Score) -> list[int]:

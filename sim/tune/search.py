@@ -13,7 +13,7 @@ from ibvs_qp.config.contact_margin import require_margin
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.pilot import PilotConfig
 from sim.sweep.flying import fly_run
-from sim.tune.choice import STEEP, cost, less_damped
+from sim.tune.choice import STEEP, contact_damping, cost, less_damped
 from sim.tune.flights import SEARCH_SEED, flights, scenes, seeds
 from sim.tune.objectives import Score, refused, score
 from sim.tune.space import RANGES, rounded, searched_gains, with_gains
@@ -36,12 +36,12 @@ class SearchPlan:
     """A search."""
 
     shipped: PilotConfig  # the start preset; trial 0 flies its gains
-    rival: PilotConfig  # the preset of the other law; trial 1 flies its gains
+    other: PilotConfig  # the preset of the other law; trial 1 flies its gains
     trials: int  # number of finished trials at the end
     seed: int  # of sampler and flights
     flights: int  # seeds per scene and trial
     features: str  # "geometric" or "rendered"
-    jobs: int  # trials side by side; one gives the same search every time, more give one that depends on their number
+    jobs: int  # trials of a generation side by side
     storage: str  # journal file, or the address of a database
 
 
@@ -83,6 +83,7 @@ def search(plan: SearchPlan, study: optuna.Study, progress: Callable[[int], None
     The candidates follow from the seed and the finished trials, so that an interrupted search continues as without the
     interruption.
     """
+    firm = contact_damping(plan.shipped)
     with joblib.Parallel(n_jobs=plan.jobs) as parallel:
         while (done := len(finished(study))) < plan.trials:
             progress(done)
@@ -93,7 +94,7 @@ def search(plan: SearchPlan, study: optuna.Study, progress: Callable[[int], None
             for trial, gains, each in zip(trials, batch, scores, strict=True):
                 trial.set_user_attr(VALUES, each.values)
                 trial.set_user_attr(FAILED, each.failed)
-                ringing = less_damped(with_gains(plan.shipped, rounded(gains)), plan.shipped)
+                ringing = less_damped(contact_damping(with_gains(plan.shipped, rounded(gains))), firm)
                 study.tell(trial, cost(each, shipped) + STEEP * ringing)
     progress(len(finished(study)))
 
@@ -155,7 +156,7 @@ def _from_unit(fractions: np.ndarray) -> dict[str, float]:
 
 def _starts(plan: SearchPlan) -> list[dict[str, float]]:
     """Gains of the first trials, within the range of the search: the shipped ones, and those of the other law."""
-    both = [searched_gains(plan.shipped), searched_gains(plan.rival)]
+    both = [searched_gains(plan.shipped), searched_gains(plan.other)]
     return [{name: float(np.clip(gains[name], *span)) for name, span in RANGES.items()} for gains in both]
 
 

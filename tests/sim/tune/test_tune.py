@@ -14,7 +14,7 @@ import sim.tune.flights
 from ibvs_qp.pilot import PilotConfig
 from sim.commands.cli import main
 from sim.flight.options import default_preset
-from sim.tune.choice import STEEP, allowed, contact_damping, cost, front, gain_over, ranked
+from sim.tune.choice import STEEP, allowed, contact_damping, cost, front, gain_over, less_damped, ranked
 from sim.tune.finalists import Finalist, best_of, fly_finalists
 from sim.tune.flights import CHOICE_SEED, REPORT_SEED, SEARCH_SEED, WORLD, checks, flights, scenes, seeds
 from sim.tune.objectives import OBJECTIVES, Score, refused, score
@@ -65,7 +65,7 @@ def made_up_figures(trace):
 def plan(trials: int, storage: str, **changes) -> SearchPlan:
     settings = {"seed": 0, "flights": 1, "features": "geometric", "jobs": 1} | changes
     return SearchPlan(
-        shipped=default_preset("qp"), rival=default_preset("paper"), trials=trials, storage=storage, **settings
+        shipped=default_preset("qp"), other=default_preset("paper"), trials=trials, storage=storage, **settings
     )
 
 
@@ -174,6 +174,7 @@ def test_the_rule_of_choice():
     assert not allowed(scores[1], shipped) and not allowed(scores[4], shipped)
     assert front(scores) == [1, 3]
     assert gain_over(Score((math.e,) * 5, 0.0), shipped) == pytest.approx(1.0)
+    assert less_damped(0.3, 0.3) == 0.0 and less_damped(0.135, 0.3) == pytest.approx(math.log(2.0))
     assert cost(scores[2], shipped) == gain_over(scores[2], shipped)
     assert cost(scores[1], shipped) == pytest.approx(gain_over(scores[1], shipped) + STEEP * math.log(1.2 / 1.1))
 
