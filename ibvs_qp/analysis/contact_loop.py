@@ -52,6 +52,8 @@ FASTEST_MODE = 250.0
 DIVERGED = 4.0 * FASTEST_MODE
 #: Newton's method: relative step at which it stops, largest number of steps, step of the difference quotient [1/s].
 POLE_TOLERANCE, NEWTON_STEPS, DIFFERENCE_STEP = 1e-12, 30, 1e-6
+#: A last step larger than this, relative to the pole, has found none.
+CONVERGED = 1e-9
 #: Newton's method may move a start by this fraction; a farther jump leads to another pole, which has its own start.
 LARGEST_MOVE = 0.2
 #: The polynomial is scaled to this unit of time [s], in which its coefficients are of similar magnitude.
@@ -150,8 +152,8 @@ class ContactLoop:
         return free + (force + motion + gust) / (self.lag * s + 1.0)
 
     def _refine(self, start: complex) -> complex | None:
-        """Newton's method from an approximate pole; None when it leads elsewhere."""
-        pole, step = start, DIFFERENCE_STEP
+        """Newton's method from an approximate pole; None when it leads elsewhere or nowhere."""
+        pole, step, change = start, DIFFERENCE_STEP, start
         for _ in range(NEWTON_STEPS):
             value = self.characteristic(pole)
             slope = (self.characteristic(pole + step) - self.characteristic(pole - step)) / (2.0 * step)
@@ -163,7 +165,8 @@ class ContactLoop:
                 return None
             if abs(change) < POLE_TOLERANCE * abs(pole):
                 break
-        return pole if abs(pole - start) < LARGEST_MOVE * abs(start) else None
+        settled = abs(change) < CONVERGED * abs(pole)
+        return pole if settled and abs(pole - start) < LARGEST_MOVE * abs(start) else None
 
 
 def _pade(delay: float) -> tuple[Polynomial, Polynomial]:

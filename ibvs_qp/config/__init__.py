@@ -1,5 +1,6 @@
 """Settings of the controller: frozen dataclasses with unit, range and reason of every number, read from TOML."""
 
+from ibvs_qp.config.angular_rate import AngularRateSettings
 from ibvs_qp.config.brush import BrushSettings
 from ibvs_qp.config.contact import ContactSettings
 from ibvs_qp.config.contact_estimation import ContactEstimationSettings
@@ -14,6 +15,7 @@ from ibvs_qp.config.weights import Weights
 
 __all__ = [
     "LONGEST_TICK",
+    "AngularRateSettings",
     "BrushSettings",
     "ConfigError",
     "ContactEstimationSettings",

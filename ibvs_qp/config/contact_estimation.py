@@ -14,12 +14,13 @@ class ContactEstimationSettings:
     acceleration_noise: float = setting(
         6e-3, "acceleration along the normal, with the attitude noise", unit="m/s^2/sqrt(Hz)", low=1e-5, high=1.0
     )
-    bias_noise: float = setting(
-        2e-3,
-        "drift of the accelerometer bias, with gravity through attitude",
-        unit="m/s^3/sqrt(Hz)",
-        low=1e-6,
-        high=1.0,
+    bias_time_s: float = setting(
+        1.6,
+        "the accelerometer's bias is learnt within this time, with gravity through attitude: a wrong one keeps the tip "
+        "off the wall",
+        unit="s",
+        low=0.2,
+        high=100.0,
     )
     acceleration_filter_s: float = setting(
         6e-3,

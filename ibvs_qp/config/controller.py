@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from ibvs_qp.config.angular_rate import AngularRateSettings
 from ibvs_qp.config.brush import BrushSettings
 from ibvs_qp.config.contact import ContactSettings
 from ibvs_qp.config.contact_margin import require_margin
@@ -31,6 +32,7 @@ class ControllerConfig:
 
     vehicle: VehicleParams = field(default_factory=VehicleParams)
     gains: Gains = field(default_factory=Gains)
+    angular_rate: AngularRateSettings = field(default_factory=AngularRateSettings)
     contact: ContactSettings = field(default_factory=ContactSettings)
     weights: Weights = field(default_factory=Weights)
     limits: LimitSettings = field(default_factory=LimitSettings)

@@ -43,7 +43,7 @@ class WallDistance:
         self._settings = settings = config.contact.estimation
         self._tip = config.vehicle.tip_position_m
         self._tip_from_camera = np.subtract(self._tip, config.vehicle.camera_position_m).tolist()
-        noise = np.array([DISTANCE_NOISE, settings.acceleration_noise**2, settings.bias_noise**2])
+        noise = np.array([DISTANCE_NOISE, 0.0, 0.0])  # the others follow the vibration
         self.vibration = VibrationNoise(settings.vibration_time_s)
         gain = 1.0 - math.exp(-config.tick_s / settings.acceleration_filter_s)
         self._ratio = gain / (2.0 - gain)  # variance of filtered white noise per variance of a sample
@@ -114,7 +114,9 @@ class WallDistance:
         gain = 1.0 - math.exp(-dt / self._settings.acceleration_filter_s)
         self._filtered += gain * (bias - measured - self._filtered)
         self.vibration.add(measured, dt)
-        self._filter.noise[SPEED, SPEED] = self.vibration.density(self._settings.acceleration_noise, dt)
+        density = self.vibration.density(self._settings.acceleration_noise, dt)
+        self._filter.noise[SPEED, SPEED] = density
+        self._filter.noise[BIAS, BIAS] = density / self._settings.bias_time_s**2  # as fast in any vibration
         self._state = [distance - dt * (speed + lever_speed), speed + dt * (measured - bias), bias]
         self._filter.remember(stamp_ns, self._state, dt)
         self._normals[self._filter.ticks.slot(0)] = normal

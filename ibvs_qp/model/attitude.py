@@ -40,7 +40,7 @@ class Attitude:
         roll, pitch: Tait-Bryan angles z-y-x [rad].
         yaw: Of the body axis away from the wall normal [rad], 0 while no wall is known.
         tilt_error: Roll and pitch minus their targets [rad], (2,).
-        tilt_rate: Rates of roll and pitch [rad/s], (2,).
+        tilt_rate: Rates of roll and pitch [rad/s], (2,); tilt_rate_ahead: those after the lead.
         tilted: 1 for a vehicle that lost a rotor: it flies tilted, and cannot hold yaw.
     """
 
@@ -49,25 +49,31 @@ class Attitude:
     yaw: ca.SX
     tilt_error: ca.SX
     tilt_rate: ca.SX
+    tilt_rate_ahead: ca.SX
     tilted: ca.SX
 
 
-def attitude(body: Body, contact: Contact, target: Target) -> Attitude:
-    """Angles and rates of a step."""
+def attitude(body: Body, contact: Contact, target: Target, rate_ahead: ca.SX) -> Attitude:
+    """Angles and rates of a step; ``rate_ahead`` is the angular velocity after the lead [rad/s], (3,)."""
     roll = ca.atan2(body.down[1], body.down[2])
     pitch = ca.asin(clamp(-body.down[0], -1.0, 1.0))
     yaw = ca.if_else(contact.known, -ca.atan2(contact.normal[1], contact.normal[0]), 0.0)
     target_angles = ca.vertcat(target.roll, target.pitch)
     tilted = ca.norm_2(target_angles) > 0.0
+
     # Near level the body rates are the angle rates; a tilted vehicle that turns about the vertical has body rates
     # in roll and pitch without changing either angle.
-    p, q, r = ca.vertsplit(body.rate)
-    swept = ca.vertcat(p + ca.tan(pitch) * (q * ca.sin(roll) + r * ca.cos(roll)), q * ca.cos(roll) - r * ca.sin(roll))
+    def swept(rate: ca.SX) -> ca.SX:
+        p, q, r = ca.vertsplit(rate)
+        angles = p + ca.tan(pitch) * (q * ca.sin(roll) + r * ca.cos(roll)), q * ca.cos(roll) - r * ca.sin(roll)
+        return ca.if_else(tilted, ca.vertcat(*angles), rate[:2])
+
     return Attitude(
         roll=roll,
         pitch=pitch,
         yaw=yaw,
         tilt_error=ca.vertcat(roll, pitch) - target_angles,
-        tilt_rate=ca.if_else(tilted, swept, body.rate[:2]),
+        tilt_rate=swept(body.rate),
+        tilt_rate_ahead=swept(rate_ahead),
         tilted=tilted,
     )

@@ -7,6 +7,7 @@ import numpy as np
 
 from ibvs_qp.config import ControllerConfig, VehicleParams
 from ibvs_qp.model.inputs import Body, Contact, clamp
+from ibvs_qp.model.motor_thrust import MotorThrust
 from ibvs_qp.model.signals import Signals
 
 #: Bandwidth of the force observer in free flight, and in contact in the wall's plane [rad/s]; along the normal it is
@@ -29,17 +30,6 @@ START_TIME = 0.25
 FORCE_BOUND, MOMENT_BOUND = 40.0, 6.0
 
 
-def lagged_thrusts(signals: Signals, vehicle: VehicleParams, dt: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Thrusts that the motors give now [N], (n,), and 1 if anything was ever commanded."""
-    count = vehicle.geometry.count
-    last, commanded = signals.input("thrust_last", count), signals.input("commanded")
-    thrusts, ready = signals.state("motor_thrust", count), signals.state("motor_ready")
-    rise, fall = (1.0 - ca.exp(-dt / lag) for lag in (vehicle.motor_lag_up_s, vehicle.motor_lag_down_s))
-    step = last - thrusts
-    moved = ca.if_else(ready, thrusts + ca.if_else(step > 0.0, rise, fall) * step, last)
-    return signals.remember("motor_thrust", moved), signals.remember("motor_ready", commanded)
-
-
 def external_wrench(
     signals: Signals,
     config: ControllerConfig,
@@ -49,6 +39,7 @@ def external_wrench(
     normal: ca.SX,
     touching: ca.SX,
     contact: Contact,
+    motors: MotorThrust,
 ) -> ca.SX:
     r"""Momentum and accelerometer observer of the unmodelled wrench at the centre of mass [N, N m], (6,).
 
@@ -61,12 +52,11 @@ def external_wrench(
     push error of :math:`s\sqrt{T/(T_g+T)}`, T being the observer's time constant plus motor lag and delays.
 
     ``felt_moment`` is the measured moment of the contact [N m], (3,), ``touching`` 1 in contact or just before it;
-    of ``contact`` the noise of push and accelerometer counts.
+    of ``contact`` the noise of push and accelerometer counts; ``motors`` are the lagged thrusts.
     """
     vehicle = config.vehicle
-    thrusts, ready = lagged_thrusts(signals, vehicle, body.dt)
-    rotors = ca.DM(effectiveness) @ thrusts
-    awake = ca.logic_and(ready, body.dt > 0.0)
+    rotors = ca.DM(effectiveness) @ motors.thrusts
+    awake = ca.logic_and(motors.ready, body.dt > 0.0)
     active = awake if config.contact_feedforward else ca.logic_and(awake, ca.logic_not(touching))
     force = _force(signals, config, body, rotors[:3], normal, touching, contact, awake, active)
     moment = _moment(signals, vehicle, body, rotors[3:] + felt_moment, awake, active)
@@ -76,9 +66,9 @@ def external_wrench(
 def _moment(signals: Signals, vehicle: VehicleParams, body: Body, known: ca.SX, awake: ca.SX, active: ca.SX) -> ca.SX:
     old, started = signals.state("external_moment", 3), signals.state("external_started")
     integral = signals.state("external_momentum", 3)
-    momentum = ca.DM(vehicle.inertia_kg_m2) * body.rate
+    momentum = ca.DM(vehicle.inertia_kg_m2) * body.gyro
     begun = ca.if_else(started, integral, momentum - old / MOMENT_BANDWIDTH)
-    moved = begun + body.dt * (known - ca.cross(body.rate, momentum) + old)
+    moved = begun + body.dt * (known - ca.cross(body.gyro, momentum) + old)
     new = clamp(MOMENT_BANDWIDTH * (momentum - moved), -MOMENT_BOUND, MOMENT_BOUND)
     signals.remember("external_momentum", ca.if_else(active, moved, integral))
     signals.remember("external_started", ca.if_else(awake, active, started))

@@ -29,7 +29,8 @@ class Body:
     Attributes:
         dt: Time since the last step [s].
         down: Unit gravity.
-        rate: Angular velocity [rad/s].
+        gyro: Angular velocity as measured [rad/s].
+        rate: Angular velocity [rad/s]: the gyro's, in a model the estimated one (`ibvs_qp.model.angular_rate`).
         specific_force: Accelerometer [m/s^2]; specific_force_known: 1 if measured.
         wrench: Tared contact wrench on the vehicle [N, N m].
         velocity: Linear velocity [m/s]; velocity_known: 1 if estimated.
@@ -38,6 +39,7 @@ class Body:
 
     dt: ca.SX
     down: ca.SX
+    gyro: ca.SX
     rate: ca.SX
     specific_force: ca.SX
     specific_force_known: ca.SX
@@ -50,10 +52,12 @@ class Body:
     def of(cls, signals: Signals) -> Body:
         """Declare the inputs."""
         w, x, y, z = ca.vertsplit(signals.input("attitude", 4))
+        gyro = signals.input("angular_velocity", 3)
         return cls(
             dt=signals.input("dt"),
             down=ca.vertcat(2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
-            rate=signals.input("angular_velocity", 3),
+            gyro=gyro,
+            rate=gyro,
             specific_force=signals.input("specific_force", 3),
             specific_force_known=signals.input("specific_force_known"),
             wrench=signals.input("contact_wrench", 6),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from typing import TypeVar
 
@@ -12,12 +13,14 @@ from allocation.effectiveness import control_effectiveness
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.frames import GRAVITY, camera_twist_matrix
+from ibvs_qp.model.angular_rate import estimated_rate
 from ibvs_qp.model.attitude import attitude, wall_axes
 from ibvs_qp.model.camera_view import camera_view
 from ibvs_qp.model.external_wrench import external_wrench
 from ibvs_qp.model.feedforward import SLIDING_COMMAND, contact_feedforward
 from ibvs_qp.model.friction import cautious_friction, estimated_friction
 from ibvs_qp.model.inputs import Body, Contact, Line, Target, declare_inputs
+from ibvs_qp.model.motor_thrust import motor_thrust
 from ibvs_qp.model.reach import STANDING_SPEED, push_reach, push_reference
 from ibvs_qp.model.rows import Parameter
 from ibvs_qp.model.signals import Signals
@@ -42,6 +45,7 @@ class Model:
         body, contact, target, lines: Inputs (`ibvs_qp.model.inputs`).
         wall: Axes of the wall in B.
         attitude: Angles and rates.
+        rate_ahead: Angular velocity after ``angular_rate.lead_s`` [rad/s], (3,).
         view: Wall and tip in the picture.
         travel: Commanded velocity in the wall plane, in B [m/s], (3,).
         contact_weight: Lambda, 0 in free air to 1 in contact.
@@ -58,7 +62,7 @@ class Model:
         self._cache: dict[tuple[object, ...], object] = {}
         vehicle, signals = config.vehicle, self.signals
         declare_inputs(signals, config.line_slots)
-        self.body, self.contact, self.target = Body.of(signals), Contact.of(signals), Target.of(signals)
+        body, self.contact, self.target = Body.of(signals), Contact.of(signals), Target.of(signals)
         self.lines = [Line.of(signals, index) for index in range(config.line_slots)]
         self.contact_weight = signals.input("contact_weight")
 
@@ -68,8 +72,12 @@ class Model:
         self.acceleration = ca.SX.sym("acceleration", 6)
         self.wrench = ca.DM(vehicle.mass_matrix.diagonal()) * self.acceleration
 
+        self._motors = motor_thrust(signals, vehicle, body.dt)
+        rate, angular_acceleration = estimated_rate(signals, config, self.effectiveness, body, self._motors)
+        self.body = dataclasses.replace(body, rate=rate)
+        self.rate_ahead = rate + config.angular_rate.lead_s * angular_acceleration
         self.wall = wall_axes(self.body, self.contact)
-        self.attitude = attitude(self.body, self.contact, self.target)
+        self.attitude = attitude(self.body, self.contact, self.target, self.rate_ahead)
         target = self.target
         velocity = ca.vertcat(target.velocity_right, target.velocity_down)
         self.travel = self.wall.in_body(target.velocity_right, target.velocity_down)
@@ -118,6 +126,7 @@ class Model:
             self.wall.normal,
             near,
             contact,
+            self._motors,
         )
         gyroscopic = -ca.cross(body.rate, ca.DM(vehicle.inertia_kg_m2) * body.rate)
         # The observer takes the accelerometer's bias for a force, and gravity leaks through the attitude's error.
@@ -171,7 +180,7 @@ class Model:
 
         A tip stuck by friction does not follow the body's rotation; a row that expects it trades vertical force for
         pitch. While the tip is commanded to stay, use the full row: a reduced gain makes the horizontal line command
-        vertical motion (with r = 0.3, a command of 35 N beyond reach loses 1.6 N of 30.1 N).
+        vertical motion (with r = 0.05, a command of 35 N beyond reach loses 6 N of 30.1 N).
         """
         if self.config.line_profile == "paper":
             return ca.SX(1.0)

@@ -34,4 +34,4 @@ class LevelTask(Task):
         gains, (soft, _) = model.config.gains, pivot_stiffness(model.config)
         level = [1.0 - line.vertical for line in model.lines]
         stiffness = ca.vertcat(gains.attitude_kp, pivot_limited(model, gains.attitude_kp, soft, level))
-        return -stiffness * model.attitude.tilt_error - gains.attitude_kd * model.attitude.tilt_rate
+        return -stiffness * model.attitude.tilt_error - gains.attitude_kd * model.attitude.tilt_rate_ahead

@@ -5,6 +5,7 @@ from __future__ import annotations
 import casadi as ca
 
 from ibvs_qp.config import VehicleParams
+from ibvs_qp.model.feedforward import moment_lag
 from ibvs_qp.model.inputs import Contact, clamp
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.rows import TaskRow
@@ -47,17 +48,28 @@ class PushTask(Task):
         # On stiff walls the loop gain rises with the stiffness; the proportional gain falls with it.
         softness = ca.fmin(1.0, model.config.contact.full_gain_stiffness_n_m / contact.stiffness)
         proportional = softness * _quiet(model) * gains.force_kfp
-        feedback = proportional * error + gains.force_kfi * self._integral(model, error)
+        feedback = proportional * error + gains.force_kfi * self._integral(model, reference)
         return reference + feedback + self._impedance(model)
 
-    def _integral(self, model: Model, error: ca.SX) -> ca.SX:
-        """Integral of the force error [N s]: zero out of contact, stopped while thrusts are limited."""
-        contact = model.contact
-        bound = FORCE_INTEGRAL_BOUND / max(model.config.gains.force_kfi, LEAST_GAIN)
-        step = ca.if_else(model.integrate, model.body.dt, 0.0) * model.contact_weight
-        moved = clamp(model.signals.state("force_integral") + step * error, -bound, bound)
+    def _integral(self, model: Model, reference: ca.SX) -> ca.SX:
+        """Integral of the force error [N s]: zero out of contact; while thrusts are limited it only falls.
+
+        The error is that of the push to expect, lambda times the reference behind motors and force filter: the lag of
+        a ramp to 25 N in a second would fill the integral, and the push overshoot by 5 N. An integral that could not
+        fall while it alone keeps the thrusts limited would stay for good.
+        """
+        contact, signals = model.contact, model.signals
         pressing = ca.logic_and(contact.touching, model.target.press)
-        return model.signals.remember("force_integral", ca.if_else(pressing, moved, 0.0))
+        expected, old = signals.state("push_expected"), signals.state("force_integral")
+        late = 1.0 - ca.exp(-model.body.dt / moment_lag(model.config))
+        coming = model.contact_weight * reference
+        expected = ca.if_else(pressing, expected + late * (coming - expected), 0.0)
+        error = signals.remember("push_expected", expected) - contact.push
+        bound = FORCE_INTEGRAL_BOUND / max(model.config.gains.force_kfi, LEAST_GAIN)
+        moving = ca.logic_or(model.integrate, error * old < 0.0)
+        step = ca.if_else(moving, model.body.dt, 0.0) * model.contact_weight
+        moved = clamp(old + step * error, -bound, bound)
+        return signals.remember("force_integral", ca.if_else(pressing, moved, 0.0))
 
     def _impedance(self, model: Model) -> ca.SX:
         """Spring and damper between tip and wall [N]; none in direct force control."""

@@ -35,7 +35,7 @@ class YawTask(Task):
         """Yaw acceleration [rad/s^2]; softer while friction alone holds the tip sideways."""
         gains, (_, soft) = model.config.gains, pivot_stiffness(model.config)
         stiffness = pivot_limited(model, gains.yaw_kp, soft, [line.vertical for line in model.lines])
-        damping = -gains.yaw_kd * model.body.rate[2]
+        damping = -gains.yaw_kd * model.rate_ahead[2]
         facing = -stiffness * model.attitude.yaw + damping
         braking = clamp(damping, -ROTOR_LOST_ACCELERATION, ROTOR_LOST_ACCELERATION)
         return ca.if_else(model.attitude.tilted, braking, facing)

@@ -87,6 +87,6 @@ def draw_unseen(law: str, table: pl.DataFrame) -> Figure:
         axes.set_title(each.label.replace(", ", ",\n"), fontsize=8)
         axes.set_xlabel("shipped")
     grid[0].set_ylabel("tuned")
-    figure.legend(*grid[0].get_legend_handles_labels(), loc="outside upper right", ncols=len(names))
+    figure.legend(*grid[0].get_legend_handles_labels(), loc="outside lower center", ncols=len(names))
     figure.suptitle(f"{law_name(law)}, unseen seeds", x=0.01, ha="left", fontsize=9, fontweight="bold")
     return figure

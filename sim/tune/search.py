@@ -11,12 +11,13 @@ import numpy as np
 
 from ibvs_qp.config.contact_margin import require_margin
 from ibvs_qp.config.errors import ConfigError
+from ibvs_qp.config.motion_margin import LARGEST_SENSITIVITY, motion_sensitivity
 from ibvs_qp.pilot import PilotConfig
 from sim.sweep.flying import fly_run
 from sim.tune.choice import STEEP, contact_damping, cost, less_damped
 from sim.tune.flights import SEARCH_SEED, flights, scenes, seeds
 from sim.tune.objectives import Score, refused, score
-from sim.tune.space import RANGES, rounded, searched_gains, with_gains
+from sim.tune.space import BY_HAND, RANGES, rounded, searched_gains, with_gains
 
 if TYPE_CHECKING:
     import optuna
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 #: Attributes of a trial: its objectives, and its fraction of failed flights.
 VALUES, FAILED = "values", "failed"
 #: First deviation of CMA-ES, of the logarithmic range of a gain [-]: a factor of 1.3 for a range of a decade. It starts
-#: at the better of the shipped gains of both laws.
+#: at the best of the first trials.
 SPREAD = 0.12
 
 #: Gains and score of trials by number.
@@ -36,7 +37,7 @@ class SearchPlan:
     """A search."""
 
     shipped: PilotConfig  # the start preset; trial 0 flies its gains
-    other: PilotConfig  # the preset of the other law; trial 1 flies its gains
+    other: PilotConfig  # the preset of the other law; trial 1 flies its gains, trial 2 those set by hand
     trials: int  # number of finished trials at the end
     seed: int  # of sampler and flights
     flights: int  # seeds per scene and trial
@@ -155,9 +156,10 @@ def _from_unit(fractions: np.ndarray) -> dict[str, float]:
 
 
 def _starts(plan: SearchPlan) -> list[dict[str, float]]:
-    """Gains of the first trials, within the range of the search: the shipped ones, and those of the other law."""
-    both = [searched_gains(plan.shipped), searched_gains(plan.other)]
-    return [{name: float(np.clip(gains[name], *span)) for name, span in RANGES.items()} for gains in both]
+    """Gains of the first trials, within the range of the search: the shipped ones, the other law's, those by hand."""
+    shipped, other = searched_gains(plan.shipped), searched_gains(plan.other)
+    known = [shipped, other, shipped | BY_HAND]
+    return [{name: float(np.clip(gains[name], *span)) for name, span in RANGES.items()} for gains in known]
 
 
 def start_gains(plan: SearchPlan) -> dict[str, float]:
@@ -166,13 +168,15 @@ def start_gains(plan: SearchPlan) -> dict[str, float]:
 
 
 def evaluate(gains: Sequence[dict[str, float]], plan: SearchPlan, parallel: joblib.Parallel) -> list[Score]:
-    """Fly sets of gains over all scenes; gains with an oscillating contact by the loop margin are refused."""
+    """Fly sets of gains over all scenes; gains with an oscillating contact, or a loop close to it, are refused."""
     scores, runs = [refused()] * len(gains), {}
     for place, each in enumerate(gains):
         config = with_gains(plan.shipped, rounded(each))
         try:
             require_margin(config.controller, config.controller.brush)
         except ConfigError:
+            continue
+        if max(motion_sensitivity(config.controller).values()) > LARGEST_SENSITIVITY:
             continue
         on_seeds = seeds(SEARCH_SEED, plan.seed, plan.flights)
         runs[place] = flights(scenes(), config, "trial", on_seeds, plan.features)

@@ -8,22 +8,32 @@ from ibvs_qp.pilot import PilotConfig
 
 #: Search range of every gain, both laws alike: [low, high] on a logarithmic scale, about a decade around flying gains.
 RANGES = {
-    "line_kp": (4.0, 40.0),
-    "line_kd": (3.0, 14.0),
+    "line_kp": (4.0, 120.0),
+    "line_kd": (3.0, 30.0),
     "line_ki": (0.5, 15.0),
     "theta_kp": (4.0, 60.0),
     "theta_kd": (3.0, 16.0),
     "body_rotation_gain": (0.1, 1.0),
     "velocity_kp": (1.0, 8.0),
     "velocity_ki": (0.3, 6.0),
-    "attitude_kp": (15.0, 80.0),
-    "attitude_kd": (6.0, 18.0),
-    "yaw_kp": (8.0, 60.0),
-    "yaw_kd": (4.0, 16.0),
+    "attitude_kp": (15.0, 150.0),
+    "attitude_kd": (6.0, 40.0),
+    "yaw_kp": (8.0, 120.0),
+    "yaw_kd": (4.0, 30.0),
     "force_ksp": (10.0, 300.0),
     "force_ksd": (30.0, 250.0),
     "force_kfp": (0.05, 1.0),
     "force_kfi": (0.4, 5.0),
+}
+#: Gains of roll, pitch, yaw and lines near the bound of their loops (`ibvs_qp.config.motion_margin`): a start of both
+#: laws.
+BY_HAND = {
+    "line_kp": 60.0,
+    "line_kd": 20.0,
+    "attitude_kp": 80.0,
+    "attitude_kd": 22.0,
+    "yaw_kp": 60.0,
+    "yaw_kd": 18.0,
 }
 #: Significant digits of a gain, so that the written preset equals the flown one.
 DIGITS = 4

@@ -73,7 +73,7 @@ def test_my_task_moves_what_it_says_and_nothing_else(printed: dict[str, str]) ->
     # Front rotors (two), climb, price.
     assert max(quiet[:2]) < 5.0 < 9.0 < min(shipped[:2])
     assert quiet[2] == pytest.approx(shipped[2], abs=0.01)
-    assert 0.5 <= limited[2] <= 0.6 and limited[3] > 10.0 and shipped[3] == quiet[3] == 0.0
+    assert 0.5 <= limited[2] <= 0.65 and limited[3] > 10.0 and shipped[3] == quiet[3] == 0.0
     text = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
     told = text[text.index("as shipped ") :].splitlines()
     for line, ours in zip(told, printed["my_task"].splitlines(), strict=False):

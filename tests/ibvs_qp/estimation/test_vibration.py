@@ -23,13 +23,17 @@ def plane(distance: float) -> tuple[float, float, float, float]:
 
 
 def fly(
-    seconds: float, sigma: float = 0.0, bias: float = 0.0, tilt: float = 0.0, distance: float = 0.3, seed: int = 0
+    seconds: float, sigma: float = 0.0, bias: float = 0.0, tilt: float = 0.0, distance: float = 0.3, leap: float = 0.0
 ) -> tuple[WallDistance, np.ndarray]:
-    """A vehicle at rest with noise [m/s^2], bias [m/s^2] and pitch error [rad]; the filter and its rates [m/s]."""
-    wall, rng, rates = WallDistance(CONFIG), np.random.default_rng(seed), []
+    """A vehicle at rest with noise [m/s^2], bias [m/s^2] and pitch error [rad]; the filter and its rates [m/s].
+
+    Half-way the bias leaps by ``leap`` [m/s^2].
+    """
+    wall, rng, rates = WallDistance(CONFIG), np.random.default_rng(0), []
     down = (-math.sin(tilt), 0.0, math.cos(tilt))
     for tick in range(int(seconds / TICK)):
         stamp = (tick + 1) * 4_000_000
+        bias += leap * (tick == int(0.5 * seconds / TICK))
         force = (bias + sigma * rng.standard_normal(), 0.0, -9.81)
         wall.predict(stamp, TICK, (0.0, 0.0, 0.0), force, down)
         if tick % 8 == 0 and tick > 15:
@@ -58,6 +62,15 @@ def test_motion_is_no_noise() -> None:
 def test_the_accelerometer_bias_along_the_normal_is_learnt(bias: float) -> None:
     wall, _ = fly(8.0, bias=bias, sigma=0.06)
     assert wall.bias == pytest.approx(bias, abs=0.02)
+
+
+@pytest.mark.parametrize("sigma", [0.06, 0.4, 0.6])
+def test_a_wandering_bias_leaves_no_standing_speed(sigma: float) -> None:
+    """A wrong bias is a wrong closing speed: at 8 mm/s the tip stands still off the wall until the press times out."""
+    _, rates = fly(40.0, sigma=sigma, leap=0.07)
+    assert abs(rates[-4000:].mean()) < 1e-3
+    after = rates[5000 + 1250 : 5000 + 2500]  # 5 to 10 s after the leap
+    assert abs(after.mean()) < 1.5e-3
 
 
 @pytest.mark.parametrize("degrees", [-1.5, 1.5])

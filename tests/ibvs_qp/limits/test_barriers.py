@@ -135,9 +135,9 @@ def test_a_fast_approach_is_braked_before_it_touches() -> None:
     assert without.push > 12.0
 
 
-@pytest.mark.parametrize(("factor", "tilt_deg", "rho"), [(1.0, 1.08, 0.356), (0.1, 1.15, 0.417)])
+@pytest.mark.parametrize(("factor", "tilt_deg", "rho"), [(1.0, 1.07, 0.361), (0.1, 1.08, 0.452)])
 def test_prices_are_worth_what_the_settings_say(factor: float, tilt_deg: float, rho: float) -> None:
-    """Figures of `ibvs_qp/config/program.py`: a tenth of the price is too cheap."""
+    """At a tenth of the price the guide leaves the picture at 0.384; the level rows hold the tilt by themselves."""
     shipped = LimitSettings()
     cheap = config(limits={"tilt_slack_weight": factor * shipped.tilt_slack_weight})
     pitched = fly(cheap, Reference(standoff=0.1, lines=line_references(2)), 1.5, lines=2, prepare=turning(1, 0.25))

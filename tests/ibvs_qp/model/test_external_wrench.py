@@ -11,6 +11,7 @@ from ibvs_qp.config import ControllerConfig
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.model.external_wrench import FORCE_BOUND, MOMENT_BOUND, external_wrench
 from ibvs_qp.model.inputs import Body, Contact
+from ibvs_qp.model.motor_thrust import motor_thrust
 
 VEHICLE = VehicleParams()
 MATRIX = control_effectiveness(VEHICLE.geometry)
@@ -34,6 +35,7 @@ def observer(adapt_in_contact: bool = True) -> Block:
             contact.normal,
             contact.touching,
             contact,
+            motor_thrust(signals, VEHICLE, body.dt),
         )
 
     return Block(build)

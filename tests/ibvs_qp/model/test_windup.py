@@ -138,3 +138,28 @@ def test_a_push_out_of_reach_leaves_no_debt(law: type) -> None:
     if law is HybridController:  # the analytic law, clipped, has left the line by 0.1 m and bounces off
         after = loop.fly(SATURATED, PRESS)
         assert after[:, 0].min() > 2.5 and abs(after[-100:, 0].mean() - 5.0) < 0.2
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_the_lag_of_a_ramp_fills_no_integral(law: type) -> None:
+    """A push of 25 N overshoots little, although motors and filter are late."""
+    loop = Loop(law(), distance=0.005)
+    push = loop.fly(PRESSED, replace(PRESS, push_force=25.0))[:, 0]
+    assert push.max() < 1.09 * 25.0 and abs(push[-100:].mean() - 25.0) < 0.3
+
+
+def test_an_integral_that_alone_keeps_the_thrusts_limited_falls(monkeypatch: pytest.MonkeyPatch) -> None:
+    """28 N of 30.4 N and 5 N of integral too much, as a touch may leave them: limited, it must fall."""
+    loop = Loop(HybridController(ControllerConfig(reach_check=False)), distance=0.005)
+    press, step = replace(PRESS, push_force=28.0), loop.controller.setpoints.step
+    loop.fly(PRESSED, press)
+    advance = step.advance
+
+    def wind_up() -> None:
+        advance()
+        step.states["force_integral"][:] += 5.0 / loop.controller.config.gains.force_kfi
+
+    with monkeypatch.context() as patched:
+        patched.setattr(step, "advance", wind_up)
+        assert loop.fly(1, press)[-1, 3] > 0.5
+    assert abs(loop.fly(2 * SATURATED, press)[-50:, 0].mean() - 28.0) < 0.3

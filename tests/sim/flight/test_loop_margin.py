@@ -105,7 +105,7 @@ def ringing(push: np.ndarray, dt: float, order: int = 8) -> tuple[float, float]:
     return -pole.real / abs(pole), abs(pole) / (2.0 * math.pi)
 
 
-@pytest.mark.parametrize("force_kfp", [0.8, 1.6])  # the shipped 0.35 is damped 0.45: nothing rings
+@pytest.mark.parametrize("force_kfp", [0.8, 1.6])  # the shipped 0.19 is damped 0.4: nothing rings
 def test_predicts_the_ringing_of_the_flown_contact(force_kfp: float, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(reach, "RISE", 1e3)  # a step that is slewed in is no step
     # From farther away: the estimator of distance and rate has settled, as the model of the loop assumes.
@@ -113,7 +113,7 @@ def test_predicts_the_ringing_of_the_flown_contact(force_kfp: float, monkeypatch
     margin = contact_mode_damping(config, 1500.0, 30.0, 0.004 + HALF_SAMPLE, QUIET)
     start = int(250 * STEP_TIME) + 10
     ratio, frequency = ringing(push[start : start + 500 : 4], 0.016)
-    assert ratio == pytest.approx(margin.least_damping_ratio, abs=0.035)  # 0.128 flown, 0.098 expected at 1.6
+    assert ratio == pytest.approx(margin.least_damping_ratio, abs=0.035)  # 0.071 flown, 0.038 expected at 1.6
     assert frequency == pytest.approx(margin.frequency_hz, rel=0.05)
     assert margin.least_damping_ratio <= ratio + 0.005, "the margin must not promise more than the flight has"
 
@@ -176,7 +176,9 @@ def unstable_zeros(loop: ContactLoop) -> int:
 
 
 def test_more_gain_and_a_switched_off_impedance_cost_damping() -> None:
-    ratios = [contact_mode_damping(with_gains(force_kfp=k), 1500.0, 30.0, 0.009).least_damping_ratio for k in (0, 1, 2)]
+    ratios = [
+        contact_mode_damping(with_gains(force_kfp=k), 1500.0, 30.0, 0.009).least_damping_ratio for k in (0, 0.7, 2)
+    ]
     assert ratios[0] > ratios[1] > 0.1 > ratios[2]
     direct = dataclasses.replace(ControllerConfig(), impedance=False)
     assert (
@@ -194,10 +196,10 @@ def test_every_preset_keeps_the_margin(file: Path) -> None:
 @pytest.mark.parametrize(
     ("gains", "brush", "words"),
     [
-        ({"force_kfp": 3.0}, {}, r"gains\.force_kfp = 3\.0 is refused: allowed is \[0, 1\.3"),
-        ({"force_kfi": 30.0}, {}, r"gains\.force_kfi = 30\.0 1/s is refused: allowed is \[0, 7\.\d+\] 1/s "),
+        ({"force_kfp": 3.0}, {}, r"gains\.force_kfp = 3\.0 is refused: allowed is \[0, 0\.99"),
+        ({"force_kfi": 30.0}, {}, r"gains\.force_kfi = 30\.0 1/s is refused: allowed is \[0, 6\.\d+\] 1/s "),
         ({"force_ksp": 4000.0}, {}, r"gains\.force_ksp = 4000\.0 N/m is refused: allowed is \[0, 1\d{3}\] N/m "),
-        ({}, {"stiffness_max_n_m": 3e4}, r"brush\.stiffness_max_n_m = 30000\.0 N/m is refused: allowed is \[1000, 268"),
+        ({}, {"stiffness_max_n_m": 3e4}, r"brush\.stiffness_max_n_m = 30000\.0 N/m is refused: allowed is \[1000, 224"),
         ({}, {"stiffness_min_n_m": 28e3, "stiffness_max_n_m": 3e4}, r"brush\.damping_n_s_m = 30\.0 N s/m is refused"),
     ],
 )

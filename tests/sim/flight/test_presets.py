@@ -80,8 +80,8 @@ def test_round_trip(file: Path) -> None:
 def test_the_gains_are_those_that_the_kept_search_chose(law: str) -> None:
     """One search for both laws (docs/tuning.md); where no trial bettered the gains that it began at, these stay."""
     kept = Path(__file__).parents[3] / "docs" / "tuning"
-    search = json.loads((kept / f"rendered_{law}_trials.json").read_text(encoding="utf-8"))
-    assert search["trials"] == len(search["all_trials"]) == 200 and search["features"] == "rendered"
+    search = json.loads((kept / f"{law}_trials.json").read_text(encoding="utf-8"))
+    assert search["trials"] == len(search["all_trials"]) == 200 and search["features"] == "geometric"
     start = written(kept / f"start_{law}.toml")["controller"]["gains"]
     assert all(search["all_trials"][0][name] == value for name, value in start.items())
     finalists = {name: finalist(each) for name, each in search["finalists"].items()}

@@ -37,7 +37,7 @@ SWITCHES: list[tuple[str, dict[str, Any], dict[str, Any], float]] = [
     ("the velocity is lost", {"velocity": None}, {}, 0.3),
     ("the force sensor is lost", {"contact_wrench": np.full(6, np.nan)}, {}, 0.1),
     ("the plane is lost", {"plane": None}, {}, 0.1),
-    ("hold to slide", {}, {"velocity": np.array([-0.05, 0.0]), "travel": np.array([-0.05, 0.0])}, 0.5),
+    ("hold to slide", {}, {"velocity": np.array([-0.05, 0.0]), "travel": np.array([-0.05, 0.0])}, 0.6),
     ("all rotors derated", {"thrust_max": np.full(6, 16.0)}, {}, RATE_STEP),
     ("one rotor derated", {"thrust_max": WEAK_ROTOR}, {}, RATE_STEP),
     ("press to stand-off", {}, {"contact": False}, RATE_STEP),

@@ -41,7 +41,7 @@ def test_without_an_active_limit_both_laws_agree_up_to_smoothness(seed):
     """Six rows fix six thrusts; effort, smoothness and lines that disagree with level flight move both a little."""
     _, weighted = stepped(HybridController, seed, 1.2, 52.0)
     _, strict = stepped(LexicographicController, seed, 1.2, 52.0)
-    assert np.abs(weighted - strict).max() < 0.05
+    assert np.abs(weighted - strict).max() < 0.2  # N, of steps of 7 N
 
 
 @pytest.mark.parametrize("seed", range(4))

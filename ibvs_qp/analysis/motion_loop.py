@@ -1,0 +1,67 @@
+r"""Robustness of one axis of a rotation, or of one line, in free flight: the peak of its sensitivity.
+
+A double integrator behind the motors' lag and the sampling, :math:`P(s) = e^{-s T_h} / (s^2 (\tau s + 1))`, under
+
+.. math::
+    a = -(K_p + K_i / s)\, x - K_d (\hat v + T \hat a), \qquad
+    \hat a = \frac{a}{\tau s + 1}, \qquad \hat v = \frac{\omega_g s\, x + \hat a}{s + \omega_g},
+
+the rate estimate of `ibvs_qp.model.angular_rate` with the gyro's bandwidth omega_g and the lead T. Broken at the
+command,
+
+.. math::
+    L(s) = P(s) \frac{K_p + K_i/s + K_d\, \omega_g s / (s + \omega_g)}
+                     {1 + K_d (T + 1/(s + \omega_g)) / (\tau s + 1)}, \qquad
+    M_s = \max_\omega |1 + L(j\omega)|^{-1}.
+
+The loop bears any factor on its gain up to M_s / (M_s - 1), and a phase of 2 arcsin(1 / (2 M_s)). T_h is the time
+from a sample to the middle of the hold of its command.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+#: Frequencies at which the sensitivity is evaluated [rad/s]; crossover is at 5 to 20 rad/s.
+FREQUENCIES = np.geomspace(0.3, 300.0, 600)
+
+
+@dataclass(frozen=True, kw_only=True)
+class MotionLoop:
+    """Feedback of one axis.
+
+    Attributes:
+        kp, kd, ki: Gains of position [1/s^2], rate [1/s] and integral [1/s^3].
+        lag: Mean lag of the motors [s].
+        delay: From a sample to the middle of its command's hold [s].
+        lead: The rate is predicted this far ahead [s].
+        bandwidth_hz: Of the measured rate in its estimate [Hz]; infinite without a model of the motors.
+    """
+
+    kp: float
+    kd: float
+    lag: float
+    delay: float
+    ki: float = 0.0
+    lead: float = 0.0
+    bandwidth_hz: float = math.inf
+
+    def sensitivity(self, frequencies: np.ndarray) -> np.ndarray:
+        """1 / (1 + L) at frequencies [rad/s]; same shape."""
+        s, lagged = 1j * frequencies, 1j * frequencies * self.lag + 1.0
+        if math.isinf(self.bandwidth_hz):
+            measured, modelled = self.kd * s, self.kd * self.lead / lagged
+        else:
+            corner = 2.0 * math.pi * self.bandwidth_hz
+            measured = self.kd * corner * s / (s + corner)
+            modelled = self.kd * (self.lead + 1.0 / (s + corner)) / lagged
+        plant = np.exp(-self.delay * s) / (s**2 * lagged)
+        return 1.0 / (1.0 + plant * (self.kp + self.ki / s + measured) / (1.0 + modelled))
+
+    @property
+    def sensitivity_peak(self) -> float:
+        """M_s: largest amplification of a disturbance; 1 / M_s is the distance of L from -1."""
+        return float(np.abs(self.sensitivity(FREQUENCIES)).max())

@@ -1,0 +1,27 @@
+"""Settings of the angular rate that damps roll, pitch and yaw."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ibvs_qp.config.settings import setting, validate
+
+
+@dataclass(frozen=True, kw_only=True)
+class AngularRateSettings:
+    """Estimate of the angular velocity, and the lead against the motors' lag (docs/control.md)."""
+
+    gyro_bandwidth_hz: float = setting(
+        12.5,
+        "the gyro counts below, the motors' model above; 1000 takes the gyro as it is",
+        unit="Hz",
+        low=0.5,
+        high=1000.0,
+    )
+    lead_s: float = setting(
+        0.03, "damping acts on the rate this far ahead: half of the motors' lag", unit="s", low=0.0, high=0.1
+    )
+
+    def __post_init__(self) -> None:
+        """Validate."""
+        validate(self)

@@ -1,0 +1,38 @@
+"""Robustness of the loops of roll, pitch, yaw and lines of a controller."""
+
+from __future__ import annotations
+
+import math
+
+from ibvs_qp.analysis.motion_loop import MotionLoop
+from ibvs_qp.config.controller import ControllerConfig
+
+#: Gains with a larger sensitivity peak are not searched: 2.25 bears 1.8 times the gain and 25 degrees of phase.
+LARGEST_SENSITIVITY = 2.25
+#: Ticks from a sample to the middle of its command's hold: half a tick, and a tick that a sample may be old.
+TICKS_LATE = 1.5
+
+
+def motion_sensitivity(config: ControllerConfig) -> dict[str, float]:
+    """Sensitivity peaks of the loops "attitude", "yaw" and "line"; see `ibvs_qp.analysis.motion_loop`.
+
+    The rate of a line comes from the accelerometer and the camera, without a lead.
+    """
+    gains, rate, vehicle = config.gains, config.angular_rate, config.vehicle
+    loops = {
+        "attitude": (gains.attitude_kp, gains.attitude_kd, 0.0, rate.lead_s, rate.gyro_bandwidth_hz),
+        "yaw": (gains.yaw_kp, gains.yaw_kd, 0.0, rate.lead_s, rate.gyro_bandwidth_hz),
+        "line": (gains.line_kp, gains.line_kd, gains.line_ki, 0.0, math.inf),
+    }
+    return {
+        name: MotionLoop(
+            kp=kp,
+            kd=kd,
+            ki=ki,
+            lag=0.5 * (vehicle.motor_lag_up_s + vehicle.motor_lag_down_s),
+            delay=TICKS_LATE * config.tick_s,
+            lead=lead,
+            bandwidth_hz=bandwidth,
+        ).sensitivity_peak
+        for name, (kp, kd, ki, lead, bandwidth) in loops.items()
+    }
