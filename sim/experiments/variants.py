@@ -6,10 +6,15 @@ import dataclasses
 import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
-from ibvs_qp.config import Gains
+from ibvs_qp.config import AngularRateSettings
 from ibvs_qp.config.settings import from_dict
 from ibvs_qp.pilot import PilotConfig
+from sim.flight.options import default_preset
+
+#: The gyro in full, and no lead.
+GYRO_ITSELF = AngularRateSettings(gyro_bandwidth_hz=1000.0, lead_s=0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -18,7 +23,8 @@ class Variant:
 
     words: str  # what differs, for tables
     switches: dict[str, bool | str] = field(default_factory=dict)  # fields of ControllerConfig
-    qp_gains: bool = False  # whether the law flies the gains of the QP law
+    gains_of: str = ""  # law whose shipped gains it flies; empty for its own
+    gyro_rate: bool = False  # whether rotation is damped on the gyro itself
     rival: str = ""  # control law of sim.rivals that flies instead of the law, as in FlightOptions
     vision: str = "own"  # perception of rendered pictures, as in FlightOptions
     laws: tuple[str, ...] = ("qp", "paper")  # laws that it applies to
@@ -26,7 +32,11 @@ class Variant:
 
     def apply(self, config: PilotConfig) -> PilotConfig:
         """The configuration with the switches set."""
-        changes = self.switches | ({"gains": Gains()} if self.qp_gains else {})
+        changes: dict[str, Any] = dict(self.switches)
+        if self.gains_of:
+            changes["gains"] = default_preset(self.gains_of).controller.gains
+        if self.gyro_rate:
+            changes["angular_rate"] = GYRO_ITSELF
         return dataclasses.replace(config, controller=dataclasses.replace(config.controller, **changes))
 
 
