@@ -54,6 +54,11 @@ class GuideLine:
         line = self.line(inputs)
         return math.inf if line is None else abs(line.offset - self.target)
 
+    def displacement(self, inputs: PainterInput) -> float:
+        """Offset of the guide beyond its target [m]; zero without a guide."""
+        line = self.line(inputs)
+        return 0.0 if line is None else line.offset - self.target
+
     def slide(self, row: int, dt: float) -> None:
         """Move the target towards the nominal offset of the row for a tick of dt [s]."""
         step = self._config.guide_slide_m_s * dt
@@ -89,10 +94,11 @@ class GuideLine:
                 self._board, self.target = found.track_id, found.offset
         return self._change(found)
 
-    def fresh(self, inputs: PainterInput) -> TrackedLine | None:
-        """The upper edge of the last row, if it is seen at its nominal offset."""
+    def fresh(self, inputs: PainterInput, displacement: float = 0.0) -> TrackedLine | None:
+        """The upper edge of the last row, if it is seen at its nominal offset plus a known displacement [m]."""
         self._update_level(inputs)
-        return fresh_edge(inputs.lines.values(), self.fresh_offset, self._level, self._config.gates)
+        expected = self.fresh_offset + displacement
+        return fresh_edge(inputs.lines.values(), expected, self._level, self._config.gates)
 
     def _change(self, found: TrackedLine | None) -> TrackedLine | None:
         if found is None or found.track_id == self.identity:

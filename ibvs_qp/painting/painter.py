@@ -169,7 +169,8 @@ class Painter(PhaseMachine):
         config = self.config
         self._since = inputs.time_s if math.isnan(self._since) else self._since
         waited = inputs.time_s - self._since
-        fresh = self._guide.fresh(inputs)
+        # An old guide near the border of the picture holds the vehicle back (`limits.view`): all lines are displaced.
+        fresh = self._guide.fresh(inputs, self._guide.displacement(inputs))
         if fresh is not None and fresh.weight <= CERTAIN_WEIGHT:
             fresh = None
         found = fresh is not None or waited > config.fresh_edge_timeout_s

@@ -60,7 +60,7 @@ class Flight:
                 stamp = seen.stamp_ns + shift
                 seen = replace(seen, stamp_ns=stamp, wrench_stamp_ns=stamp, plane_stamp_ns=stamp)
                 command = self.law.step(seen, wish)
-                assert command.outcome is Outcome.SOLVED
+                assert command.outcome in (Outcome.SOLVED, Outcome.INACCURATE_ACCEPTED)
                 if index % 50 == 0:
                     assert command.tasks is not None and command.active_limits is not None  # made when read
         gc.collect()

@@ -50,6 +50,7 @@ class World:
     tared_after: float = 0.5
     blind_wall: bool = False
     stuck: bool = False
+    lowest_guide: float = math.inf  # offset at which a horizontal guide holds the vehicle back [m]
 
     def __post_init__(self) -> None:
         left = -self.config.stroke_m - MARGIN
@@ -127,6 +128,8 @@ class World:
         for line, offset in command.guides:
             axis = 1 if line.role == HORIZONTAL else 0
             velocity[axis] += 4.0 * (line.offset - offset)
+            if axis == 1 and line.offset > self.lowest_guide:
+                velocity[axis] = max(velocity[axis], 0.0)
         self.velocity = np.zeros(2) if self.stuck else np.clip(velocity, -0.15, 0.15)
         self.tip = self.tip + TICK * self.velocity
         if self.painter.phase == "paint":
@@ -351,6 +354,15 @@ def test_row_two_follows_the_fresh_edge_and_not_its_own_upper_edge() -> None:
         if world.painter.finished:
             break
     assert not world.painter.failed
+    assert world.ends[1][2] == pytest.approx(-world.config.pitch_m, abs=0.004)
+
+
+def test_the_fresh_edge_is_found_where_the_old_guide_holds_the_vehicle_back() -> None:
+    """The old guide at the border of the picture: 25 mm are missing to the row, more than the gate of 18 mm."""
+    world = World(short(rows=2), lowest_guide=MARGIN + short().pitch_m - 0.025)
+    world.fly(200.0)
+    assert world.painter.finished and not world.painter.failed
+    assert any(phase == "paint" and "fresh edge found" in reason for _, phase, reason in world.painter.log)
     assert world.ends[1][2] == pytest.approx(-world.config.pitch_m, abs=0.004)
 
 
