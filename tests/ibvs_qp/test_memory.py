@@ -27,6 +27,8 @@ PER_TICK = 1.0
 RECORDED, LAPS = 500, 100
 #: Resident memory comes and goes in pages; growth that is taken for that [bytes].
 RESIDENT = 250_000
+#: Open loop, a weak rotor's ticks take OSQP to its cap in 17 of 65,000; DAQP solves most of those.
+SOLUTIONS = (Outcome.SOLVED, Outcome.INACCURATE_ACCEPTED, Outcome.CAPPED_ACCEPTED, Outcome.EXACT_FALLBACK)
 STATM = Path("/proc/self/statm")
 
 
@@ -60,7 +62,7 @@ class Flight:
                 stamp = seen.stamp_ns + shift
                 seen = replace(seen, stamp_ns=stamp, wrench_stamp_ns=stamp, plane_stamp_ns=stamp)
                 command = self.law.step(seen, wish)
-                assert command.outcome in (Outcome.SOLVED, Outcome.INACCURATE_ACCEPTED)
+                assert command.outcome in SOLUTIONS
                 if index % 50 == 0:
                     assert command.tasks is not None and command.active_limits is not None  # made when read
         gc.collect()
