@@ -61,7 +61,7 @@ def contact_loop(
     spring, damper = (gains.force_ksp, gains.force_ksd) if config.impedance else (0.0, 0.0)
     return ContactLoop(
         mass=vehicle.mass_kg,
-        lag=0.5 * (vehicle.motor_lag_up_s + vehicle.motor_lag_down_s),
+        lag=vehicle.motor_lag_s,
         drag=vehicle.linear_drag_n_s_m,
         stiffness=stiffness,
         damping=damping,

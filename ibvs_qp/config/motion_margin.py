@@ -29,7 +29,7 @@ def motion_sensitivity(config: ControllerConfig) -> dict[str, float]:
             kp=kp,
             kd=kd,
             ki=ki,
-            lag=0.5 * (vehicle.motor_lag_up_s + vehicle.motor_lag_down_s),
+            lag=vehicle.motor_lag_s,
             delay=TICKS_LATE * config.tick_s,
             lead=lead,
             bandwidth_hz=bandwidth,

@@ -86,6 +86,11 @@ class VehicleParams:
         return np.broadcast_to(np.asarray(self.thrust_max_n, float), (self.geometry.count,)).copy()
 
     @property
+    def motor_lag_s(self) -> float:
+        """Mean lag of rising and falling thrust [s]."""
+        return 0.5 * (self.motor_lag_up_s + self.motor_lag_down_s)
+
+    @property
     def mass_matrix(self) -> np.ndarray:
         """Rigid-body mass matrix diag(m I, J), (6, 6)."""
         return np.diag(np.concatenate((np.full(3, self.mass_kg), np.asarray(self.inertia_kg_m2))))

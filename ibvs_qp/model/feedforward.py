@@ -72,9 +72,7 @@ def contact_feedforward(
 
 def moment_lag(config: ControllerConfig) -> float:
     """Delay from a measured moment to the rotors' response: their mean lag and that of the filter [s]."""
-    vehicle = config.vehicle
-    motors = 0.5 * (vehicle.motor_lag_up_s + vehicle.motor_lag_down_s)
-    return motors + 1.0 / (2.0 * math.pi * config.contact.force_filter_hz)
+    return config.vehicle.motor_lag_s + 1.0 / (2.0 * math.pi * config.contact.force_filter_hz)
 
 
 def _friction(

@@ -96,4 +96,4 @@ def predicted_rate(vehicle: VehicleParams, contact: Contact) -> ca.SX:
 
     A touch on a stiff wall lasts 80 ms. Damping that comes one motor lag late arrives when the tip already leaves.
     """
-    return contact.rate + 0.5 * (vehicle.motor_lag_up_s + vehicle.motor_lag_down_s) * contact.acceleration
+    return contact.rate + vehicle.motor_lag_s * contact.acceleration

@@ -70,7 +70,7 @@ class Prediction:
         vehicle = model.config.vehicle
         inverse_mass = ca.diag(1.0 / ca.DM(vehicle.mass_matrix.diagonal()))
         effectiveness = ca.DM(model.effectiveness)
-        lag = 0.5 * (vehicle.motor_lag_up_s + vehicle.motor_lag_down_s)
+        lag = vehicle.motor_lag_s
         force = effectiveness[:3, :] @ self._thrusts
         turned = ca.vertcat(-ca.skew(force), ca.DM.zeros(3, 3))
         z = ca.SX.zeros(size + n + 1, size + n + 1)

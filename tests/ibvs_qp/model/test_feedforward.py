@@ -34,7 +34,7 @@ def feedforward() -> Block:
 def climb(seconds: float, felt: bool = True) -> np.ndarray:
     """A climb whose friction answers as late as the motors push: force, moment, felt moment, true moment per tick."""
     vehicle, block = CONFIG.vehicle, feedforward()
-    share = 1.0 - math.exp(-TICK / (0.5 * (vehicle.motor_lag_up_s + vehicle.motor_lag_down_s)))
+    share = 1.0 - math.exp(-TICK / vehicle.motor_lag_s)
     answer, rows = np.zeros(3), []
     for _ in range(round(seconds / TICK)):
         wrench = np.concatenate((answer, np.cross(TIP, answer))) if felt else np.zeros(6)

@@ -61,7 +61,7 @@ def test_a_world_is_painted_in(world: str, path_m: float, push_n: float, peak: f
 
 
 def test_motors_slower_than_believed_cost_little_with_the_estimated_angular_rate() -> None:
-    """Half as slow again; on the gyro itself and without a lead the same gains are near instability."""
+    """Half as slow again: the rate that damps rotation comes from the motors' model above 12.5 Hz."""
     slow = PlantScene(motor_lag_up_s=0.0675, motor_lag_down_s=0.105)
     metrics = compute_metrics(flown(world_errors("datasheet"), plant=slow))
     assert metrics["completed"], metrics["reason"]
