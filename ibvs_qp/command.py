@@ -22,6 +22,17 @@ class Outcome(StrEnum):
     HOLD = "hold"
 
 
+class SafetyState(StrEnum):
+    """State of the supervisor (`ibvs_qp.safety`), in the order of severity."""
+
+    NOMINAL = "nominal"
+    DEGRADED = "degraded"
+    RETREAT = "retreat"
+    HOVER = "hover"
+    DESCEND = "descend"
+    TERMINATED = "terminated"
+
+
 @dataclass(frozen=True, kw_only=True)
 class TaskReport:
     """Target, achieved value and residual of one task row, in the task's own unit."""
@@ -111,6 +122,8 @@ class Command:
         reach_margin: Further push possible at the present contact [N], NaN if unknown.
         iterations: Solver iterations.
         solve_time_s: Wall-clock time of the solve [s].
+        safety: State of the supervisor; nominal without one.
+        safety_reasons: Why it is in that state; empty while nominal.
     """
 
     stamp_ns: int
@@ -125,3 +138,5 @@ class Command:
     reach_margin: float = float("nan")
     iterations: int = 0
     solve_time_s: float = 0.0
+    safety: SafetyState = SafetyState.NOMINAL
+    safety_reasons: tuple[str, ...] = ()

@@ -72,6 +72,8 @@ class Measurement:
             (3,), or None: what the caller's velocity filter learnt. Its part along the wall counts.
         thrust_min: Lower thrust limits [N], (n,), or None for the configured ones.
         thrust_max: Upper thrust limits [N], (n,), or None for the configured ones.
+        attitude_stamp_ns: Time for which the attitude holds, or None: at the tick.
+        imu_stamp_ns: Time at which gyro and accelerometer were sampled, or None: at the tick.
     """
 
     stamp_ns: int
@@ -88,6 +90,8 @@ class Measurement:
     acceleration_bias: np.ndarray | None = None
     thrust_min: np.ndarray | None = None
     thrust_max: np.ndarray | None = None
+    attitude_stamp_ns: int | None = None
+    imu_stamp_ns: int | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -165,6 +169,8 @@ class SensorFrame:
         wrench_stamp_ns: Time at which that sample was taken.
         image: A new picture, or None.
         features: Result of perception instead of an image, or None.
+        attitude_stamp_ns: Time for which the attitude holds, or None: at the tick.
+        imu_stamp_ns: Time at which gyro and accelerometer were sampled, or None: at the tick.
     """
 
     stamp_ns: int
@@ -175,3 +181,5 @@ class SensorFrame:
     wrench_stamp_ns: int
     image: RgbdFrame | None = None
     features: FeatureFrame | None = None
+    attitude_stamp_ns: int | None = None
+    imu_stamp_ns: int | None = None

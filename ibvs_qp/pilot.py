@@ -18,7 +18,7 @@ import numpy as np
 
 from ibvs_qp.analytic import PaperController
 from ibvs_qp.command import Command
-from ibvs_qp.config import LONGEST_TICK, ControllerConfig, EstimationConfig
+from ibvs_qp.config import LONGEST_TICK, ControllerConfig, EstimationConfig, SafetySettings
 from ibvs_qp.config.contact_margin import require_margin
 from ibvs_qp.config.settings import choice, dump_toml, load_toml, setting, validate
 from ibvs_qp.controller import HybridController
@@ -66,6 +66,7 @@ class PilotConfig:
     vision: VisionConfig = field(default_factory=VisionConfig)
     estimation: EstimationConfig = field(default_factory=EstimationConfig)
     painting: PaintingConfig = field(default_factory=PaintingConfig)
+    safety: SafetySettings = field(default_factory=SafetySettings)
     perception: str = choice("own", "vision pipeline: the own one or the paper's", ("own", "paper"))
     paper_vision: PaperConfig = field(default_factory=PaperConfig)
     law: str = choice("qp", "control law", ("qp", "paper"))

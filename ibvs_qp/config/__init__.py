@@ -9,6 +9,7 @@ from ibvs_qp.config.errors import ConfigError, IbvsQpError
 from ibvs_qp.config.estimation import EstimationConfig
 from ibvs_qp.config.gains import Gains
 from ibvs_qp.config.limits import LimitSettings
+from ibvs_qp.config.safety import SafetySettings
 from ibvs_qp.config.solver import SolverSettings
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.config.weights import Weights
@@ -25,6 +26,7 @@ __all__ = [
     "Gains",
     "IbvsQpError",
     "LimitSettings",
+    "SafetySettings",
     "SolverSettings",
     "VehicleParams",
     "Weights",

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ibvs_qp.command import Command, Outcome
+from ibvs_qp.command import Command, Outcome, SafetyState
 from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import SensorFrame
 from ibvs_qp.pilot import Pilot
@@ -75,6 +75,7 @@ class Recorder:
         self._pictures: list[tuple[float, np.ndarray, str]] = []
         self._next_picture = 0.0
         self._rejected: set[str] = set()
+        self._safety = SafetyState.NOMINAL
         self._logged = self._ticks = 0
 
     def tick(self, frame: SensorFrame, command: Command) -> None:
@@ -99,7 +100,7 @@ class Recorder:
             places = self._limits
             paid = [(places.setdefault(limit.name, len(places)), limit.price) for limit in active]
             self._active[self._ticks] = paid
-        if command.rejected or len(painter.log) != self._logged:
+        if command.rejected or len(painter.log) != self._logged or command.safety is not self._safety:
             self._note_events(time_s, command)
         if frame.image is not None and pilot.percept is not None:
             self._vision.append(sum(pilot.percept.time_ms.values()))
@@ -114,6 +115,9 @@ class Recorder:
         for when, kind, text in log[self._logged :]:
             self._events.append(Event(t=when, kind=kind, text=text))
         self._logged = len(log)
+        if command.safety is not self._safety:
+            self._safety, reasons = command.safety, "; ".join(command.safety_reasons)
+            self._events.append(Event(t=time_s, kind="safety", text=f"{command.safety}: {reasons}"))
         for name in command.rejected:
             kind = name.split(":")[0]  # the numbers after it may change from tick to tick
             if kind not in self._rejected:
