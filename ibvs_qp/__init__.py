@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from allocation import TAROT_T960, RotorGeometry, control_effectiveness
     from ibvs_qp.analytic import PaperController
-    from ibvs_qp.command import ActiveLimit, Command, Outcome, TaskReport
-    from ibvs_qp.config import ControllerConfig
+    from ibvs_qp.assured import Assured
+    from ibvs_qp.command import ActiveLimit, Command, Outcome, SafetyState, TaskReport
+    from ibvs_qp.config import ControllerConfig, SafetySettings
     from ibvs_qp.config.errors import ConfigError, IbvsQpError
     from ibvs_qp.config.vehicle import VehicleParams
     from ibvs_qp.controller import HybridController
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 __all__ = [
     "TAROT_T960",
     "ActiveLimit",
+    "Assured",
     "Command",
     "ConfigError",
     "ControllerConfig",
@@ -46,6 +48,8 @@ __all__ = [
     "Reference",
     "RgbdFrame",
     "RotorGeometry",
+    "SafetySettings",
+    "SafetyState",
     "SensorFrame",
     "TaskReport",
     "VehicleParams",
@@ -55,8 +59,10 @@ __all__ = [
 _HOMES = {
     "allocation": ("TAROT_T960", "RotorGeometry", "control_effectiveness"),
     "ibvs_qp.analytic": ("PaperController",),
-    "ibvs_qp.command": ("ActiveLimit", "Command", "Outcome", "TaskReport"),
+    "ibvs_qp.assured": ("Assured",),
+    "ibvs_qp.command": ("ActiveLimit", "Command", "Outcome", "SafetyState", "TaskReport"),
     "ibvs_qp.config.controller": ("ControllerConfig",),
+    "ibvs_qp.config.safety": ("SafetySettings",),
     "ibvs_qp.controller": ("HybridController",),
     "ibvs_qp.config.errors": ("ConfigError", "IbvsQpError"),
     "ibvs_qp.pilot": ("Pilot", "PilotConfig"),

@@ -14,7 +14,7 @@ from ibvs_qp.model.model import Model
 from ibvs_qp.model.reporting import check_contact, clip, clipped_command, hover_command, reach_note
 from ibvs_qp.model.setpoints import LineSetpoint, Setpoints
 from ibvs_qp.tasks import LevelTask, LineTask, PushTask, StandoffTask, VelocityTask, YawTask
-from ibvs_qp.validation.measurement import MeasurementGate
+from ibvs_qp.validation.measurement import MeasurementGate, answered_stamp
 from ibvs_qp.validation.reference import check_reference
 
 #: Singular values below this fraction of the largest are dropped in the pseudo-inverse of L.
@@ -122,24 +122,35 @@ class PaperController:
     def __init__(self, config: ControllerConfig | None = None) -> None:
         self.config = config or ControllerConfig()
         self.setpoints = self._make_setpoints()
-        self._gate = MeasurementGate(self.config.vehicle.geometry.count)
+        self.gate = MeasurementGate(self.config.vehicle.geometry.count)
         self.reset()
 
     def reset(self) -> None:
         """As after construction."""
         self.setpoints.reset()
-        self._gate.reset()
+        self.gate.reset()
         self._reference = Reference()
 
     def step(self, measurement: Measurement, reference: Reference, contact: ContactState | None = None) -> Command:
         """Thrusts for one tick, within box and rate; never raises; arguments as of `HybridController.step`."""
-        checked, rejected = self._gate.check(measurement)
+        checked, rejected = self.gate.check(measurement)
+        return self.respond(checked, rejected, reference, contact, answered_stamp(measurement))
+
+    def respond(
+        self,
+        checked: Measurement | None,
+        rejected: tuple[str, ...],
+        reference: Reference,
+        contact: ContactState | None,
+        stamp_ns: int,
+    ) -> Command:
+        """Second half of `step`, after ``gate`` has checked the measurement; stamp_ns is that of the measurement."""
         reference, refused = check_reference(reference, self._reference)
         contact, unusable = check_contact(contact)
         self._reference, rejected = reference, rejected + refused + unusable
         if checked is None:
-            return hover_command(self.setpoints, measurement, self._gate.inertial, rejected)
-        if self._gate.restarted:
+            return hover_command(self.setpoints, stamp_ns, self.gate.inertial, rejected)
+        if self.gate.restarted:
             self.setpoints.restart()
         self.setpoints.update(checked, reference, contact)
         return self._command(checked, reference, rejected + reach_note(self.setpoints, reference))

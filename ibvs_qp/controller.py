@@ -46,7 +46,7 @@ from ibvs_qp.tasks import (
     VelocityTask,
     YawTask,
 )
-from ibvs_qp.validation.measurement import MeasurementGate
+from ibvs_qp.validation.measurement import MeasurementGate, answered_stamp
 from ibvs_qp.validation.reference import check_reference
 
 #: Unallocated wrench of every tick without an active limit [N, N m].
@@ -90,6 +90,7 @@ class HybridController:
     """The drop-in controller: measurement and reference in, rotor thrusts and their explanation out.
 
     Attributes:
+        gate: Checks of the measurements.
         problem_kind, engine_kind: Assembly and solution of the rows; a subclass may solve the same rows differently.
 
     Args:
@@ -111,14 +112,14 @@ class HybridController:
         self.problem = qp_problem(self.config, tasks, limits, self.problem_kind)
         self.setpoints = Setpoints(self.problem.model, self.problem.values)
         self.engine = self.engine_kind(self.problem, self.config.solver, ProgramData(self.problem, self.setpoints.step))
-        self._gate = MeasurementGate(self.config.vehicle.geometry.count)
+        self.gate = MeasurementGate(self.config.vehicle.geometry.count)
         self.reset()
 
     def reset(self) -> None:
         """As after construction, to the bit."""
         self.engine.reset()
         self.setpoints.reset()
-        self._gate.reset()
+        self.gate.reset()
         self._reference = Reference()
 
     def step(self, measurement: Measurement, reference: Reference, contact: ContactState | None = None) -> Command:
@@ -133,13 +134,24 @@ class HybridController:
         Returns:
             The command with its explanation.
         """
-        checked, rejected = self._gate.check(measurement)
+        checked, rejected = self.gate.check(measurement)
+        return self.respond(checked, rejected, reference, contact, answered_stamp(measurement))
+
+    def respond(
+        self,
+        checked: Measurement | None,
+        rejected: tuple[str, ...],
+        reference: Reference,
+        contact: ContactState | None,
+        stamp_ns: int,
+    ) -> Command:
+        """Second half of `step`, after ``gate`` has checked the measurement; stamp_ns is that of the measurement."""
         reference, refused = check_reference(reference, self._reference)
         contact, unusable = check_contact(contact)
         self._reference, rejected = reference, rejected + refused + self._surplus_lines(reference) + unusable
         if checked is None:
-            return hover_command(self.setpoints, measurement, self._gate.inertial, rejected)
-        if self._gate.restarted:
+            return hover_command(self.setpoints, stamp_ns, self.gate.inertial, rejected)
+        if self.gate.restarted:
             self.setpoints.restart()
         self.setpoints.update(checked, reference, contact)
         solution = self.engine.solve()

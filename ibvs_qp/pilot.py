@@ -17,24 +17,30 @@ from typing import Protocol
 import numpy as np
 
 from ibvs_qp.analytic import PaperController
-from ibvs_qp.command import Command
+from ibvs_qp.command import Command, SafetyState
 from ibvs_qp.config import LONGEST_TICK, ControllerConfig, EstimationConfig, SafetySettings
 from ibvs_qp.config.contact_margin import require_margin
 from ibvs_qp.config.settings import choice, dump_toml, load_toml, setting, validate
 from ibvs_qp.controller import HybridController
+from ibvs_qp.estimation.attitude_steps import AttitudeSteps
 from ibvs_qp.estimation.contact import ContactEstimator
 from ibvs_qp.estimation.contact_state import ContactState
+from ibvs_qp.estimation.inertial_fallback import InertialFallback
 from ibvs_qp.estimation.stamps import HISTORY
 from ibvs_qp.estimation.wall_lines import WallAxes, image_line
 from ibvs_qp.estimation.wall_motion import BIAS, WallMotion
 from ibvs_qp.estimation.wrench_tare import WrenchTare
 from ibvs_qp.frames import Vector3, add_scaled, down_in_body, plane_in_body, to_camera
 from ibvs_qp.measurement import HORIZONTAL, FeatureFrame, LineReference, Measurement, Reference, RgbdFrame, SensorFrame
+from ibvs_qp.model.reporting import fixed_command
 from ibvs_qp.model.setpoints import Setpoints
 from ibvs_qp.painting.command import PainterInput, PaintingCommand
 from ibvs_qp.painting.config import PaintingConfig
 from ibvs_qp.painting.painter import Painter
+from ibvs_qp.safety.assurance import Assurance
+from ibvs_qp.safety.policy import Fault
 from ibvs_qp.safety.rotor_loss import RotorLoss
+from ibvs_qp.safety.tick import Tick
 from ibvs_qp.validation.sensor_frame import SensorGate
 from ibvs_qp.vision.config import VisionConfig
 from ibvs_qp.vision.paper.config import PaperConfig
@@ -42,6 +48,14 @@ from ibvs_qp.vision.percept import LineHint
 
 #: Extent of the fresh edge ahead of the brush, normalised image x from the tip's side to the border.
 HINT_SPAN = (0.10, 0.50)
+#: Inertial sensors of a frame.
+_INERTIAL = ("attitude", "angular_velocity", "specific_force")
+#: A vehicle turned farther from the wall than this does not use its pictures: cosine of 20 degrees.
+FACING = 0.94
+#: States in which the strategy flies.
+_FLYING = (SafetyState.NOMINAL, SafetyState.DEGRADED)
+#: Rows and columns between the pixels by which pictures are compared.
+SPARSE = 16
 #: Tip to wall before the first plane [m].
 ASSUMED_DISTANCE = 0.5
 
@@ -130,11 +144,14 @@ class Pilot:
         self._tip_camera = to_camera(self._tip, camera).tolist()
         self._tip_from_camera = (self._tip - camera).tolist()
         self._gate = SensorGate()
+        self._steps = AttitudeSteps()
+        self._fallback = InertialFallback(self._tip_from_camera, settings.tick_s)
         self.tare = WrenchTare(vehicle, self.config.estimation)
         self._perception, self._seen_as = None, seen_as
         self.contact = ContactEstimator(settings)
         self.motion = WallMotion(self._tip, camera, settings.tick_s, self.config.estimation)
-        self.supervisor = RotorLoss(vehicle)
+        self.rotor_loss = RotorLoss(vehicle)
+        self.assurance = Assurance(vehicle, self.config.safety)
         self.painter = painter or Painter(self.config.painting)
         law = HybridController if self.config.law == "qp" else PaperController
         self.controller: Controller = controller or law(settings)
@@ -142,16 +159,18 @@ class Pilot:
 
     def reset(self) -> None:
         """As after construction."""
-        parts = (self._gate, self.tare, self._perception, self.contact, self.motion)
-        for part in (*parts, self.supervisor, self.painter, self.controller):
+        parts = (self._gate, self._steps, self._fallback, self.tare, self._perception, self.contact, self.motion)
+        for part in (*parts, self.rotor_loss, self.assurance, self.painter, self.controller):
             if part is not None:
                 part.reset()
         self._first = self._stamp = self._last_capture = -1
+        self._attitude, self._rate, self._force = (self._gate.last[name] for name in _INERTIAL)
         self._turn: Vector3 = (0.0, 0.0, 0.0)  # integrated gyro [rad]
         self._history_attitude, self._history_turn = [[1.0, 0.0, 0.0, 0.0]] * HISTORY, [self._turn] * HISTORY
         self._covariance = self.motion.velocity_variance * np.eye(3)
         self._plane: tuple[float, float, float, float] | None = None
-        self._plane_stamp = 0
+        self._plane_stamp = self._image_stamp = self._imu_stamp = -1
+        self._picture: object = None
         self.thrust_limits: tuple[np.ndarray, np.ndarray] | None = None
         self.percept = None
         self.measurement: Measurement | None = None
@@ -184,21 +203,23 @@ class Pilot:
 
     def _fly(self, frame: SensorFrame) -> Command:
         """The tick of a validated frame."""
-        stamp, now, tick_s = frame.stamp_ns, self._gate.last, self.config.controller.tick_s
+        stamp, tick_s = frame.stamp_ns, self.config.controller.tick_s
         dt = tick_s if self._stamp < 0 else min((stamp - self._stamp) * 1e-9, LONGEST_TICK)
         self._first, self._stamp = stamp if self._first < 0 else self._first, stamp
-        attitude, force, rate = now["attitude"], now["specific_force"], now["angular_velocity"]
+        frame = self._inertial(frame, dt)
+        attitude, rate, force = self._attitude, self._rate, self._force
         down = down_in_body(attitude)
-        wrench = self._tared_wrench(frame, force)
-        # After a lost rotor the vehicle turns away from the wall: the strategy does not match the pictures then.
-        features = None if self.supervisor.lost else self._perceive(frame)
+        wrench, wrench_stamp = self._contact_wrench(frame, force)
+        # After a lost rotor the vehicle turns away from the wall, and its pictures show something else.
+        turned = self.rotor_loss.lost and self.contact.state.normal[0] < FACING
+        features = None if turned else self._perceive(frame)
         contact = self.contact.update(
             stamp_ns=stamp,
             angular_velocity=rate,
             specific_force=force,
             down=down,
             contact_wrench=wrench,
-            wrench_stamp_ns=frame.wrench_stamp_ns,
+            wrench_stamp_ns=wrench_stamp,
             plane=self._plane,
             plane_stamp_ns=self._plane_stamp,
         )
@@ -208,12 +229,84 @@ class Pilot:
         if features is not None:
             self._correct_motion(features, contact)
         target = self.painting_command = self._strategy(frame, contact, dt)
-        self.reference = self._refer(target, contact)
-        self.measurement = self._measure(frame, wrench, axes, target, contact)
+        self.reference = self.assurance.supervised(self._refer(target, contact))
+        self.measurement = self._measure(frame, (wrench, wrench_stamp), axes, target, contact)
         begin = time.perf_counter()
-        command = self.controller.step(self.measurement, self.reference, contact)
+        command = self._command(contact)
         self.controller_time_s = time.perf_counter() - begin
-        return command
+        shown = self.assurance.explained(command)
+        self.assurance.watch(self._shown(frame, contact, command), self.setpoints)
+        return shown
+
+    def _inertial(self, frame: SensorFrame, dt: float) -> SensorFrame:
+        """The frame with attitude, rate and specific force to fly by; those that fail are estimated."""
+        now, fallback, setpoints = self._gate.last, self._fallback, self.setpoints
+        missing = {name for name in _INERTIAL if name in self._gate.replaced}
+        if Fault.IMU_FROZEN in self.assurance.faults:
+            missing = set(_INERTIAL)
+        if not missing:
+            fallback.reset()
+            self._attitude, self._rate, self._force = (now[name] for name in _INERTIAL)
+            if (continuous := self._steps.update(self._attitude, self._rate, dt)) is None:
+                return frame
+            self._attitude = continuous
+            return dataclasses.replace(frame, attitude=np.array(continuous))
+        if not fallback.active:
+            lines = {identity: line.angle for identity, line in self.motion.lines.items()}
+            fallback.begin(self._attitude, self._rate, self.contact.state.normal, lines)
+        measured = (None if name in missing else now[name] for name in _INERTIAL)
+        attitude, rate, force = measured
+        fallback.step(frame.stamp_ns, dt, setpoints.angular_acceleration, attitude, rate)
+        self._attitude, self._rate = attitude or fallback.attitude, rate or fallback.rate
+        self._force = force or setpoints.modelled_force
+        values = (self._attitude, self._rate, self._force)
+        return dataclasses.replace(frame, **dict(zip(_INERTIAL, map(np.array, values), strict=True)))
+
+    def _command(self, contact: ContactState) -> Command:
+        """Command of the law, or of the supervisor where it replaces the law."""
+        setpoints = self.setpoints
+        fixed = self.assurance.thrusts(setpoints.last, setpoints.floor)
+        if fixed is not None:
+            return fixed_command(setpoints, self._stamp, fixed, ())
+        return self.controller.step(self.measurement, self.reference, contact)  # type: ignore[arg-type]
+
+    def _shown(self, frame: SensorFrame, contact: ContactState, command: Command) -> Tick:
+        """The tick as the monitors see it."""
+        now, motion, faults = self._gate.last, self.motion, dict[Fault, str]()
+        if motion.refused_s > self.config.safety.refusal_s:
+            faults[Fault.FILTER_REFUSES] = f"camera velocity refused for {motion.refused_s:.1f} s"
+        if self._fallback.lost:
+            faults[Fault.NO_ATTITUDE] = "by motors' model and camera, too uncertain"
+        if self.rotor_loss.lost:
+            faults[Fault.NO_HOVER] = ""
+        if not any(name in self._gate.replaced for name in _INERTIAL):
+            self._imu_stamp = frame.stamp_ns
+        picture, self._picture = self._picture, None
+        right, down = motion.state[0:2]
+        return Tick(
+            stamp_ns=frame.stamp_ns,
+            imu_ns=self._imu_stamp,
+            wrench_ns=frame.wrench_stamp_ns,
+            plane_ns=self.contact.plane_ns,
+            image_ns=self._image_stamp,
+            inertial=(now["attitude"], now["angular_velocity"], now["specific_force"]),
+            wrench=now["wrench"],
+            picture=picture,
+            down=down_in_body(self._attitude),
+            rate=self._rate,
+            speed=math.hypot(right, down, contact.speed),
+            height=-motion.state[5],
+            contact=contact,
+            press=self.reference.contact,
+            push_reference=self.setpoints.push_reference,
+            outcome=command.outcome,
+            faults=faults,
+        )
+
+    def _contact_wrench(self, frame: SensorFrame, specific_force: list[float]) -> tuple[np.ndarray, int]:
+        """Contact wrench and its time: the tared one, or that of inertial data while the sensor is faulty."""
+        tared, inertial = self._tared_wrench(frame, specific_force), self.assurance.wrench(self.setpoints)
+        return (tared, frame.wrench_stamp_ns) if inertial is None else (inertial, frame.stamp_ns)
 
     def _tared_wrench(self, frame: SensorFrame, specific_force: list[float]) -> np.ndarray:
         """Contact wrench on the vehicle [N, N m], (6,); the bias is averaged while the tip is away from the wall.
@@ -230,6 +323,9 @@ class Pilot:
         """Features of a new picture, or None if its stamp is in the future or too old; stores their plane."""
         features = frame.features if frame.image is None else self._process(frame.image)
         if features is None or not 0 <= self._stamp - features.stamp_ns <= self.config.camera.latest_s * 1e9:
+            return None
+        self._image_stamp, self._picture = features.stamp_ns, _content(frame, features)
+        if Fault.IMAGE_FROZEN in self.assurance.faults:
             return None
         if features.plane is not None:
             self._plane, self._plane_stamp = features.plane, features.stamp_ns
@@ -299,6 +395,8 @@ class Pilot:
             normal, distance = contact.normal, contact.distance
         else:
             return
+        if self._fallback.active:
+            self._fallback.correct(features, distance)
         gravity = down_in_body(self._history_attitude[self._slot(features.stamp_ns)])
         self.motion.correct(features, WallAxes.of(normal, gravity), distance)
         self._covariance = self.motion.velocity_variance * np.eye(3)  # changes nowhere else
@@ -321,14 +419,25 @@ class Pilot:
             push_reference=self.setpoints.push_reference,  # of the tick before: the controller runs after the painter
             tared=self.tare.ready,
         )
-        if self.thrust_limits is not None and self.supervisor.update(self.thrust_limits):
+        limits = self._thrust_limits()
+        if limits is not None and self.rotor_loss.update(limits):
             self.painter.abandon(inputs, "no level hover is left")
+        elif self.assurance.state not in _FLYING and not self.painter.failed:
+            self.painter.abandon(inputs, "; ".join(self.assurance.supervisor.reasons))
         target = self.painter.step(inputs)
-        if not self.supervisor.lost:
+        if not self.rotor_loss.lost:
             return target
         normal = np.array(contact.normal)
         away = contact.distance + float(normal @ self._tip)
-        return dataclasses.replace(target, tilt=self.supervisor.tilt(away, contact.speed, motion.state[0], normal, dt))
+        return dataclasses.replace(target, tilt=self.rotor_loss.tilt(away, contact.speed, motion.state[0], normal, dt))
+
+    def _thrust_limits(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Limits reported by the drive, within those of rotors that do not follow."""
+        reported, found = self.thrust_limits, self.assurance.limits
+        if reported is None or found is None:
+            return found if reported is None else reported
+        lower = np.maximum(reported[0], found[0])
+        return lower, np.maximum(np.minimum(reported[1], found[1]), lower)
 
     def _refer(self, target: PaintingCommand, contact: ContactState) -> Reference:
         """Reference of a command; offsets in metres become rho = l / d at the measured distance."""
@@ -352,25 +461,32 @@ class Pilot:
         )
 
     def _measure(
-        self, frame: SensorFrame, wrench: np.ndarray, axes: WallAxes, target: PaintingCommand, contact: ContactState
+        self,
+        frame: SensorFrame,
+        sample: tuple[np.ndarray, int],
+        axes: WallAxes,
+        target: PaintingCommand,
+        contact: ContactState,
     ) -> Measurement:
         """Measurement of the tick from sensors and estimates; no velocity if the last one is too old."""
         velocity = covariance = None
-        if self.supervisor.lost or self.motion.velocity_age_s < self.config.estimation.velocity_life_s:
+        inertial = self.rotor_loss.lost or self.assurance.state not in _FLYING
+        if inertial or self.motion.velocity_age_s < self.config.estimation.velocity_life_s:
             (right, down, *_), rate = self.motion.state, contact.rate
             rows = zip(axes.right, axes.down, axes.normal, strict=True)
             velocity = np.array([r * right + d * down - n * rate for r, d, n in rows])
             covariance = self._covariance
         bias_right, bias_down = self.motion.state[BIAS]
         distance = contact.distance if contact.known else ASSUMED_DISTANCE
-        low, high = self.thrust_limits or (None, None)
+        low, high = self._thrust_limits() or (None, None)
+        wrench, wrench_stamp = sample
         return Measurement(
             stamp_ns=frame.stamp_ns,
             attitude=frame.attitude,
             angular_velocity=frame.angular_velocity,
             specific_force=frame.specific_force,
             contact_wrench=wrench,
-            wrench_stamp_ns=frame.wrench_stamp_ns,
+            wrench_stamp_ns=wrench_stamp,
             lines=tuple([self.motion.feature(line, axes, distance, frame.stamp_ns) for line, _ in target.guides]),
             plane=self._plane,
             plane_stamp_ns=self._plane_stamp,
@@ -382,3 +498,10 @@ class Pilot:
             thrust_min=low,
             thrust_max=high,
         )
+
+
+def _content(frame: SensorFrame, features: FeatureFrame) -> object:
+    """What differs from picture to picture: sparse pixels, or the features themselves."""
+    if frame.image is not None:
+        return frame.image.rgb[::SPARSE, ::SPARSE].tobytes(), frame.image.depth[::SPARSE, ::SPARSE].tobytes()
+    return tuple(features.plane or ()), tuple([(line.rho, line.theta) for line in features.lines])

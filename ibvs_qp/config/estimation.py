@@ -45,6 +45,9 @@ class EstimationConfig:
     fade_start_s: float = setting(0.10, "a line without new frames fades from here", unit="s", low=0.01, high=5.0)
     fade_end_s: float = setting(0.45, "and is dropped after this time", unit="s", low=0.05, high=10.0)
     gate_sigmas: float = setting(6.0, "larger innovations of offset or velocity are refused", low=1.0, high=100.0)
+    refusal_s: float = setting(
+        0.5, "a velocity refused for longer starts the filter anew from what is seen", unit="s", low=0.05, high=10.0
+    )
     refused_frames: int = setting(3, "agreeing refused offsets in a row that start a new line", low=1, high=100)
     velocity_life_s: float = setting(0.6, "an older velocity is not used", unit="s", low=0.05, high=10.0)
     tare_time_s: float = setting(

@@ -14,6 +14,8 @@ from ibvs_qp.estimation.stiffness import StiffnessEstimator
 from ibvs_qp.estimation.touch import TouchDetector
 from ibvs_qp.estimation.wall_distance import WallDistance
 
+#: Without a plane for this long [ns], a push means that the tip touches, whatever the drifting distance says.
+BLIND_NS = 300_000_000
 #: The push noise is learned beyond this multiple of `contact_distance_m`.
 FREE_DISTANCES = 2.0
 
@@ -47,6 +49,11 @@ class ContactEstimator:
     def touch_threshold(self) -> float:
         """Filtered push that counts as touch [N]."""
         return self._touch.threshold(self._push.push_noise)
+
+    @property
+    def plane_ns(self) -> int:
+        """Capture time of the last accepted plane, -1 before the first."""
+        return self._wall.accepted_ns
 
     def update(
         self,
@@ -83,6 +90,9 @@ class ContactEstimator:
         interval = push.add(contact_wrench, wrench_stamp_ns, wall.normal, free)
         if interval is not None:
             touch.add_sample(push.push, push.push_noise)
+            blind = wall.known and stamp_ns - wall.accepted_ns > BLIND_NS
+            if blind and touch.pressed and not touch.in_contact:
+                wall.touch()
             if touch.in_contact:
                 self._stiffness.add(push.push, -wall.distance, interval)
         if touch.update(stamp_ns, push.push, wall.distance):

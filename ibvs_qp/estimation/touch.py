@@ -40,11 +40,16 @@ class TouchDetector:
         """Count one filtered force sample [N] towards a touch."""
         self._samples = self._samples + 1 if push > self.threshold(push_noise) else 0
 
+    @property
+    def pressed(self) -> bool:
+        """Whether enough force samples in a row exceeded the threshold."""
+        return self._samples >= self._settings.touch_samples
+
     def update(self, stamp_ns: int, push: float, distance: float) -> bool:
         """Decide on touch and loss at one tick by filtered push [N] and distance of the tip [m]; True at a touch."""
         if not self.in_contact:
             settings = self._settings
-            touches = self._samples >= settings.touch_samples and distance < settings.contact_distance_m
+            touches = self.pressed and distance < settings.contact_distance_m
             if touches:
                 self._touch(stamp_ns)
             return touches

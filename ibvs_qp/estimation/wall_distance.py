@@ -25,6 +25,8 @@ CHAIN = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [0.0, 0.0, 0.0]])
 DISTANCE_NOISE = 1e-10
 #: Standard deviations at the start: distance [m], speed [m/s], bias [m/s^2]; and of the first measured distance [m].
 INITIAL_STD, FIRST_DISTANCE_STD = np.array([0.05, 0.05, 0.1]), 0.01
+#: Standard deviation of the distance at a touch without planes [m].
+TOUCH_STD = 0.003
 #: Standard deviation of a speed from two planes a few frames apart [m/s], and least time between them [s].
 JUMP_SPEED_STD, SHORTEST_JUMPS = 0.05, 0.05
 
@@ -36,6 +38,7 @@ class WallDistance:
         normal: Unit vector into the wall, in B, (3,).
         known: Whether a plane was measured since the start.
         rate_noise: Standard deviation of the rate [m/s].
+        accepted_ns: Capture time of the last accepted plane, -1 before the first.
         vibration: Noise of the acceleration along the normal.
     """
 
@@ -57,6 +60,7 @@ class WallDistance:
         self.normal, self.known = (1.0, 0.0, 0.0), False
         self._normals = np.zeros((HISTORY, 3))  # of the last ticks, by the slots of the filter's ticks
         self._jumps, self._first_jump, self._plane_ns = 0, (0, 0.0), -1
+        self._odd_normals, self.accepted_ns = 0, -1
         self.vibration.reset()
         self._filtered = self._lever_speed = self.rate_noise = 0.0
 
@@ -131,9 +135,28 @@ class WallDistance:
         if not self.known:
             self.normal, self._normals[:], self.known = normal, normal, True
             self._filter.set_entry(DISTANCE, distance, FIRST_DISTANCE_STD)
-        elif self._correct_distance(stamp_ns, distance, tip_stationary):
+            self.accepted_ns = stamp_ns
+        elif self._trusts(stamp_ns, normal) and self._correct_distance(stamp_ns, distance, tip_stationary):
             self._correct_normal(stamp_ns, normal)
+            self.accepted_ns = stamp_ns
         self._state = self._filter.state.tolist()
+
+    def touch(self) -> None:
+        """The tip touches the wall: its distance is zero, whatever the planes said before."""
+        self._filter.set_entry(DISTANCE, 0.0, TOUCH_STD)
+        self._state = self._filter.state.tolist()
+
+    def _trusts(self, stamp_ns: int, normal: Sequence[float]) -> bool:
+        """Whether a measured normal agrees with the one predicted by the gyro; or has disagreed for long."""
+        settings, past = self._settings, self._normals[self._filter.ticks.slots_since(stamp_ns)[0]].tolist()
+        if dot(past, normal) >= math.cos(math.radians(settings.normal_gate_deg)) * math.hypot(*past):
+            self._odd_normals = 0
+            return True
+        self._odd_normals += 1
+        if self._odd_normals < settings.normal_frames:
+            return False
+        self._odd_normals, self.normal, self._normals[:] = 0, unit(normal), normal
+        return True
 
     def _correct_distance(self, stamp_ns: int, distance: float, tip_stationary: bool) -> bool:
         """Correct distance and speed; a jump only once the next frames repeat it. Whether the plane is accepted."""

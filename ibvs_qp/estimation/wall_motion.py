@@ -24,6 +24,9 @@ VELOCITY, BIAS, ODOMETER = slice(0, 2), slice(2, 4), slice(4, 6)
 ODOMETER_NOISE = 1e-10
 #: Standard deviations at the start: velocity [m/s], bias [m/s^2], odometer [m].
 VELOCITY_STD, BIAS_STD, ODOMETER_STD = 0.05, 0.1, 1e-6
+#: Standard deviations after refused velocities: of the velocity [m/s], and of the bias that made it wrong [m/s^2]: 3
+#: degrees of attitude.
+RESTART_VELOCITY_STD, RESTART_BIAS_STD = 0.03, 0.5
 #: Least variance of a reported line offset [m^2].
 LEAST_VARIANCE = 1e-10
 
@@ -34,6 +37,7 @@ class WallMotion:
     Attributes:
         state: Velocity (2), accelerometer bias (2), odometer (2), offset of every line slot, as plain floats.
         velocity_age_s: Time since the capture of the last accepted velocity [s].
+        refused_s: How long the camera's velocities have been refused [s]; 0 while they are accepted.
 
     Args:
         tip: Brush tip in B [m], (3,).
@@ -67,7 +71,8 @@ class WallMotion:
         for noise in self._vibration:
             noise.reset()
         self.state: list[float] = self._filter.state.tolist()
-        self.velocity_age_s = math.inf
+        self.velocity_age_s, self.refused_s = math.inf, 0.0
+        self._refused_stamp = -1
         self._stamp = self._frame_stamp = self._velocity_stamp = -1
 
     @property
@@ -125,8 +130,23 @@ class WallMotion:
         to_wall = np.array((axes.right, axes.down))
         covariance = to_wall @ frame.velocity_covariance @ to_wall.T + self._velocity_floor
         stamp = frame.velocity_stamp_ns or frame.stamp_ns
-        if self._filter.correct_pair(stamp, 0, to_wall @ frame.velocity, covariance):
-            self._velocity_stamp = frame.stamp_ns
+        velocity = to_wall @ frame.velocity
+        if self._filter.correct_pair(stamp, 0, velocity, covariance):
+            self._velocity_stamp, self._refused_stamp, self.refused_s = frame.stamp_ns, -1, 0.0
+            return
+        if self._refused_stamp < 0:
+            self._refused_stamp = frame.stamp_ns
+        self.refused_s = (frame.stamp_ns - self._refused_stamp) * 1e-9
+        if self.refused_s > self._config.refusal_s and self._filter.ticks.age(stamp) is not None:
+            self._restart(velocity.tolist())
+
+    def _restart(self, velocity: list[float]) -> None:
+        """Take the velocity (right, down) from the camera: a filter that refuses it has a wrong bias as well."""
+        for entry, seen in enumerate(velocity):
+            self._filter.set_entry(entry, seen, RESTART_VELOCITY_STD)
+            bias = BIAS.start + entry
+            self._filter.set_entry(bias, float(self._filter.state[bias]), RESTART_BIAS_STD)
+        self._refused_stamp = -1
 
     def feature(self, line: TrackedLine, axes: WallAxes, distance: float, stamp_ns: int) -> LineFeature:
         """The line in the image now, with wall axes in B and the distance of the tip [m]."""

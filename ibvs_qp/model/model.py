@@ -22,6 +22,7 @@ from ibvs_qp.model.friction import cautious_friction, estimated_friction
 from ibvs_qp.model.inputs import Body, Contact, Line, Target, declare_inputs
 from ibvs_qp.model.motor_thrust import motor_thrust
 from ibvs_qp.model.reach import STANDING_SPEED, push_reach, push_reference
+from ibvs_qp.model.response import carried_weight, inertial_push, missing_thrust
 from ibvs_qp.model.rows import Parameter
 from ibvs_qp.model.signals import Signals
 from ibvs_qp.model.thrust_window import thrust_window
@@ -74,6 +75,7 @@ class Model:
 
         self._motors = motor_thrust(signals, vehicle, body.dt)
         rate, angular_acceleration = estimated_rate(signals, config, self.effectiveness, body, self._motors)
+        self.output("angular_acceleration", angular_acceleration)
         self.body = dataclasses.replace(body, rate=rate)
         self.rate_ahead = rate + config.angular_rate.lead_s * angular_acceleration
         self.wall = wall_axes(self.body, self.contact)
@@ -128,6 +130,11 @@ class Model:
             contact,
             self._motors,
         )
+        inertial_push(signals, config, self.effectiveness, body, contact, self._motors)
+        carried_weight(signals, config, self.effectiveness, body, self._motors)
+        missing_thrust(signals, config, self.effectiveness, body, felt_moment, self._motors)
+        known = ca.DM(self.effectiveness[:3]) @ self._motors.thrusts + body.wrench[:3] + external[:3]
+        self.output("modelled_force", known / vehicle.mass_kg)
         gyroscopic = -ca.cross(body.rate, ca.DM(vehicle.inertia_kg_m2) * body.rate)
         # The observer takes the accelerometer's bias for a force, and gravity leaks through the attitude's error.
         normal, along = self.wall.normal, body.acceleration_bias
@@ -161,6 +168,7 @@ class Model:
             "thrust_lower": self.thrust_lower,
             "thrust_upper": self.thrust_upper,
             "contact_weight": self.contact_weight,
+            "motor_thrusts": self._motors.thrusts,
         }.items():
             self.output(name, value)
 

@@ -169,6 +169,41 @@ class Setpoints:
     contact_weight = _number("contact_weight", 0, "Lambda: 0 in free air or out of contact, 1 in contact.")
 
     @property
+    def inertial_push(self) -> float:
+        """Push on the wall without the force sensor [N]."""
+        return self.step.outputs["inertial_push"].item()
+
+    @property
+    def carried_weight(self) -> float:
+        """Weight that something else than the rotors carries [N]."""
+        return self.step.outputs["carried_weight"].item()
+
+    @property
+    def angular_acceleration(self) -> list[float]:
+        """Angular acceleration by the motors' model at the last step [rad/s^2], (3,)."""
+        return self.step.outputs["angular_acceleration"].tolist()
+
+    @property
+    def modelled_force(self) -> list[float]:
+        """Specific force by the motors' model, measured contact and observed force at the last step [m/s^2], (3,)."""
+        return self.step.outputs["modelled_force"].tolist()
+
+    @property
+    def motor_thrusts(self) -> np.ndarray:
+        """Thrusts behind the motors' lag at the last step [N], (n,): a view."""
+        return self.step.outputs["motor_thrusts"]
+
+    @property
+    def missing_thrust(self) -> np.ndarray:
+        """Thrust that every rotor gives less than commanded [N], (n,): a view of the last step."""
+        return self.step.outputs["missing_thrust"]
+
+    @property
+    def missing_noise(self) -> float:
+        """Standard deviation of one entry of `missing_thrust` while the rotors follow [N]."""
+        return self.step.outputs["missing_noise"].item()
+
+    @property
     def angular(self) -> np.ndarray:
         """Targets of the roll, pitch and yaw accelerations [rad/s^2], (3,)."""
         return np.concatenate((self.step.outputs["level_command"], self.step.outputs["yaw_command"]))

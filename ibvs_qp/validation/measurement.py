@@ -14,6 +14,8 @@ from ibvs_qp.validation.geometry import accepts_line, accepts_plane
 
 #: Largest lead of a sensor's stamp over the tick's [ns].
 LEAD_NS = 20_000_000
+#: What a refused measurement lacks.
+_ALL = ("attitude", "angular_velocity", "specific_force", "contact_wrench", "plane", "lines")
 
 
 def answered_stamp(measurement: Any) -> int:
@@ -24,6 +26,9 @@ def answered_stamp(measurement: Any) -> int:
 
 class MeasurementGate:
     """Checks measurements for a controller; a good one passes unchanged.
+
+    Attributes:
+        replaced: Names of the fields that the last measurement lacked.
 
     Args:
         rotors: Number of rotors, the length of the thrust limits.
@@ -40,6 +45,17 @@ class MeasurementGate:
         self._last = self._table.fallbacks
         self._measured = False
         self._wrench_stamp = 0
+        self.replaced: tuple[str, ...] = ()
+
+    @property
+    def time_ns(self) -> int:
+        """Monotonic time of the last accepted measurement; -1 before the first."""
+        return self._clock.last_ns
+
+    @property
+    def shift_ns(self) -> int:
+        """Added to a stamp to obtain that time."""
+        return self._clock.shift_ns
 
     @property
     def restarted(self) -> bool:
@@ -65,6 +81,7 @@ class MeasurementGate:
         Returns:
             None for the measurement when its stamp is refused or no attitude was ever accepted.
         """
+        self.replaced = _ALL
         if not isinstance(measurement, Measurement):
             return None, ("measurement: not a Measurement",)
         if why := self._clock.accept(measurement.stamp_ns):
@@ -83,7 +100,7 @@ class MeasurementGate:
         _check_lines(measurement, rejected, changes)
         _check_limit_order(measurement, rejected, changes)
         self._last = self._table.entries(measurement, changes, self._last)
-        self._measured = True
+        self._measured, self.replaced = True, tuple(changes)
         return (dataclasses.replace(measurement, **changes) if changes else measurement), tuple(rejected)
 
     def _check_wrench_stamp(

@@ -18,6 +18,7 @@ class SensorGate:
     Attributes:
         last: Last accepted numbers of every raw vector by name; those of the present frame where it is good.
         clock: Maps the frames' stamps to the pilot's monotonic time.
+        replaced: Names of what the last frame lacked.
     """
 
     def __init__(self) -> None:
@@ -29,6 +30,7 @@ class SensorGate:
         self.clock.reset()
         self.last = SENSOR_FRAME.fallbacks
         self._wrench_stamp = 0
+        self.replaced: tuple[str, ...] = ()
 
     def check(self, frame: Any) -> tuple[SensorFrame | None, tuple[str, ...]]:
         """The frame in the pilot's time with rejected sensors replaced, and what was rejected.
@@ -51,6 +53,7 @@ class SensorGate:
         for name, part in (("image", frame.image), ("features", frame.features)):
             if part is not None and not is_stamp(getattr(part, "stamp_ns", None)):
                 changes[name] = None
+        self.replaced = tuple(changes)
         if not changes:
             return frame, ()
         return dataclasses.replace(frame, **changes), tuple(f"sensor {name}: not sound" for name in changes)

@@ -117,7 +117,7 @@ class Recorder:
         self._logged = len(log)
         if command.safety is not self._safety:
             self._safety, reasons = command.safety, "; ".join(command.safety_reasons)
-            self._events.append(Event(t=time_s, kind="safety", text=f"{command.safety}: {reasons}"))
+            self._events.append(Event(t=time_s, kind="safety", text=f"{command.safety}: {reasons}".removesuffix(": ")))
         for name in command.rejected:
             kind = name.split(":")[0]  # the numbers after it may change from tick to tick
             if kind not in self._rejected:

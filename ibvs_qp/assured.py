@@ -1,0 +1,115 @@
+"""Assured: a controller under supervision, for loops without a `Pilot`."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+
+from ibvs_qp.analytic import PaperController
+from ibvs_qp.command import Command
+from ibvs_qp.config import SafetySettings
+from ibvs_qp.controller import HybridController
+from ibvs_qp.estimation.contact_state import ContactState
+from ibvs_qp.frames import down_in_body
+from ibvs_qp.measurement import Measurement, Reference
+from ibvs_qp.model.reporting import fixed_command
+from ibvs_qp.safety.assurance import Assurance
+from ibvs_qp.safety.policy import Fault
+from ibvs_qp.safety.tick import Tick
+from ibvs_qp.validation.measurement import answered_stamp
+
+#: Fields without which a measurement has no inertial sample.
+_ATTITUDE = ("attitude", "angular_velocity")
+_INERTIAL = ("attitude", "angular_velocity", "specific_force")
+
+
+class Assured:
+    """Monitors and supervisor around a controller, with the same `step`; one line to add to a loop.
+
+    ``controller = Assured(HybridController(config))``
+
+    Ages follow from the stamps of the measurement: attitude and inertial sensors, wrench, plane once one was given,
+    and lines once one with a stamp was given.
+
+    Args:
+        controller: The controller to supervise.
+        settings: Bounds of the monitors and motions of the states.
+    """
+
+    def __init__(self, controller: HybridController | PaperController, settings: SafetySettings | None = None) -> None:
+        self.controller = controller
+        self.assurance = Assurance(controller.config.vehicle, settings or SafetySettings())
+        self.reset()
+
+    def reset(self) -> None:
+        """As after construction."""
+        self.controller.reset()
+        self.assurance.reset()
+        self._attitude_ns = self._imu_ns = self._wrench_ns = self._plane_ns = self._lines_ns = -1
+        self._descended_m, self._time_ns = 0.0, -1
+
+    def step(self, measurement: Measurement, reference: Reference, contact: ContactState | None = None) -> Command:
+        """Thrusts for one tick, as `HybridController.step`; ``Command.safety`` is the state of the supervisor."""
+        controller, assurance, setpoints = self.controller, self.assurance, self.controller.setpoints
+        checked, rejected = controller.gate.check(measurement)
+        if isinstance(reference, Reference):
+            reference = assurance.supervised(reference)
+        flown, inertial = checked, assurance.wrench(setpoints)
+        if flown is not None and inertial is not None:
+            flown = dataclasses.replace(flown, contact_wrench=inertial, wrench_stamp_ns=flown.stamp_ns)
+        stamp, fixed = answered_stamp(measurement), assurance.thrusts(setpoints.last, setpoints.floor)
+        if fixed is None:
+            command = controller.respond(flown, rejected, reference, contact, stamp)
+        else:
+            command = fixed_command(setpoints, stamp, fixed, rejected)
+        shown = assurance.explained(command)
+        if checked is not None:
+            assurance.watch(self._tick(checked, command, reference), setpoints)
+        return shown
+
+    def _tick(self, checked: Measurement, command: Command, reference: Reference) -> Tick:
+        """The tick as the monitors see it, in monotonic time."""
+        gate, setpoints = self.controller.gate, self.controller.setpoints
+        now, shift = gate.time_ns, gate.shift_ns
+        if not any(name in gate.replaced for name in _ATTITUDE):
+            self._attitude_ns = now
+        if not any(name in gate.replaced for name in _INERTIAL):
+            stamps = [stamp for stamp in (checked.attitude_stamp_ns, checked.imu_stamp_ns) if stamp is not None]
+            self._imu_ns = min([now, *(stamp + shift for stamp in stamps)])
+        self._wrench_ns = int(checked.wrench_stamp_ns) + shift
+        if checked.plane is not None:
+            self._plane_ns = max(self._plane_ns, int(checked.plane_stamp_ns) + shift)
+        if newest := max((int(line.stamp_ns) for line in checked.lines), default=0):
+            self._lines_ns = max(self._lines_ns, newest + shift)
+        attitude, rate, force = checked.attitude.tolist(), checked.angular_velocity.tolist(), checked.specific_force
+        speed, down = math.nan, down_in_body(attitude)
+        if checked.velocity is not None:
+            velocity = checked.velocity.tolist()
+            speed = math.hypot(*velocity)
+            elapsed = (now - self._time_ns) * 1e-9 if self._time_ns >= 0 else 0.0
+            self._descended_m += elapsed * float(np.dot(velocity, down))
+        self._time_ns = now
+        faults: dict[Fault, str] = {}
+        if now - self._attitude_ns > self.assurance.settings.imu_age_s * 1e9:
+            faults[Fault.NO_ATTITUDE] = "attitude or gyro missing"
+        return Tick(
+            stamp_ns=now,
+            imu_ns=self._imu_ns,
+            wrench_ns=self._wrench_ns,
+            plane_ns=self._plane_ns,
+            image_ns=self._lines_ns,
+            inertial=(attitude, rate, None if force is None else force.tolist()),
+            wrench=checked.contact_wrench.tolist(),
+            picture=None,
+            down=down,
+            rate=rate,
+            speed=speed,
+            height=-self._descended_m,
+            contact=setpoints.contact,
+            press=bool(reference.contact) if isinstance(reference, Reference) else False,
+            push_reference=setpoints.push_reference,
+            outcome=command.outcome,
+            faults=faults,
+        )

@@ -1,0 +1,1 @@
+"""Monitors: each watches one quantity and says in words what is wrong with it; empty while nothing is."""

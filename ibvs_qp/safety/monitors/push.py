@@ -1,0 +1,43 @@
+"""Push against the wall: a measured one that is too high, and one that the force sensor does not measure."""
+
+from __future__ import annotations
+
+from ibvs_qp.config import SafetySettings
+from ibvs_qp.safety.monitors.persistence import Persistence
+from ibvs_qp.safety.policy import Fault
+from ibvs_qp.safety.tick import Response, Tick
+
+#: The tip can touch the wall nearer than this by the estimate, whose error a wrong mount or plane makes [m].
+NEAR_WALL = 0.06
+#: Push by inertial data, over the reference, that the sensor must measure, and its least value [-, N].
+UNFELT_OVER_REFERENCE, LEAST_UNFELT = 1.6, 4.0
+
+
+class PushMonitor:
+    """Compares the force sensor with the reference and with the push by inertial data.
+
+    The sensor may be dead, or measure zero, before the touch or in contact; controller and observers then press until
+    the rotors saturate, 30 N for 5 N. Thrust against acceleration measures the push without it. A gust changes that
+    figure too, so the sensor must disagree widely.
+    """
+
+    def __init__(self, settings: SafetySettings) -> None:
+        self._settings = settings
+        self._high, self._unfelt = Persistence(settings.push_time_s), Persistence(settings.push_time_s)
+
+    def reset(self) -> None:
+        """As before the flight."""
+        self._high.reset()
+        self._unfelt.reset()
+
+    def update(self, tick: Tick, response: Response, time_s: float) -> None:
+        """Add the faults of the push."""
+        settings, contact = self._settings, tick.contact
+        push, reference, inertial = contact.push, tick.push_reference, response.inertial_push
+        bound = max(settings.push_ratio * reference, settings.push_floor_n)
+        if self._high.update(push > bound, time_s):
+            tick.faults[Fault.PUSH_HIGH] = f"{push:.1f} N, bound {bound:.1f} N"
+        least = min(max(UNFELT_OVER_REFERENCE * reference, LEAST_UNFELT), settings.unfelt_push_n)
+        unfelt = inertial > least and push < settings.unfelt_ratio * inertial and contact.distance < NEAR_WALL
+        if self._unfelt.update(unfelt, time_s):
+            tick.faults[Fault.PUSH_UNFELT] = f"{inertial:.1f} N, measured {push:.1f} N"

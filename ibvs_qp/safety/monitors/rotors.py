@@ -1,0 +1,100 @@
+"""Rotors that do not follow their commands: detection, and the thrust limits that remain."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ibvs_qp.config import SafetySettings
+from ibvs_qp.config.vehicle import VehicleParams
+from ibvs_qp.safety.monitors.persistence import Persistence
+
+#: The thrusts that faulty rotors miss must explain all but this fraction of the missing thrust; a push on the body or
+#: a gust spreads over the rotors.
+UNEXPLAINED = 0.5
+#: Most rotors at once that are told apart.
+MOST_ROTORS = 2
+#: A rotor that was found is followed down to this missing thrust [N].
+FOUND = 1.5
+#: Half width of the remaining limits of a rotor whose thrust is estimated [N].
+MARGIN = 0.5
+
+
+class RotorMonitor:
+    """Finds rotors by the thrust they miss (`ibvs_qp.model.response.missing_thrust`).
+
+    Attributes:
+        limits: Lower and upper thrusts of faulty rotors, vehicle limits for the others [N], (n,) each; None while no
+            rotor is faulty.
+
+    Args:
+        vehicle: Names and limits of the rotors.
+        effectiveness: B, (6, n).
+        settings: Thresholds.
+    """
+
+    def __init__(self, vehicle: VehicleParams, effectiveness: np.ndarray, settings: SafetySettings) -> None:
+        self._settings, self._names = settings, vehicle.geometry.names
+        self._box = vehicle.thrust_min, vehicle.thrust_max
+        # Column i: what a newton missing at rotor i looks like; with more than six rotors it spreads over others.
+        self._signatures = np.linalg.pinv(effectiveness) @ effectiveness
+        self._persistence = Persistence(settings.missing_time_s)
+        self.reset()
+
+    def reset(self) -> None:
+        """All rotors follow."""
+        self.limits: tuple[np.ndarray, np.ndarray] | None = None
+        self._persistence.reset()
+        self._found: dict[str, float] = {}
+
+    def update(self, missing: np.ndarray, noise: float, thrusts: np.ndarray, time_s: float) -> str:
+        """Rotors that miss thrust, in words.
+
+        Args:
+            missing: Missing thrust by the response of the vehicle [N], (n,).
+            noise: Its standard deviation while the rotors follow [N].
+            thrusts: Thrusts behind the motors' lag by their model [N], (n,).
+            time_s: Time of the tick [s].
+        """
+        entries, least = missing.tolist(), FOUND if self._found else self._settings.missing_thrust_n
+        least = max(least, self._settings.missing_sigmas * noise)
+        if max(entries) < least and min(entries) > -least:
+            self._persistence.reset()
+        else:
+            self._suspect(missing, thrusts, time_s)
+        return ", ".join(f"{name} gives {thrust:.1f} N" for name, thrust in self._found.items())
+
+    def _suspect(self, missing: np.ndarray, thrusts: np.ndarray, time_s: float) -> None:
+        rotors = self._explain(missing)
+        if not self._persistence.update(bool(rotors), time_s):
+            return
+        for rotor in rotors:
+            loss = float(missing[rotor] / self._signatures[rotor, rotor])
+            self._limit(rotor, float(thrusts[rotor]) - loss, loss)
+
+    def _explain(self, missing: np.ndarray) -> Sequence[int]:
+        """Fewest rotors whose missing thrusts explain the rest."""
+        total, chosen = float(missing @ missing), list[int]()
+        for _ in range(MOST_ROTORS):
+            columns = self._signatures[:, chosen]
+            fitted = columns @ np.linalg.lstsq(columns, missing, rcond=None)[0] if chosen else 0.0
+            rest = missing - fitted
+            if chosen and float(rest @ rest) < UNEXPLAINED**2 * total:
+                return chosen
+            chosen.append(int(np.argmax(np.abs(rest))))
+        columns = self._signatures[:, chosen]
+        rest = missing - columns @ np.linalg.lstsq(columns, missing, rcond=None)[0]
+        return chosen if float(rest @ rest) < UNEXPLAINED**2 * total else ()
+
+    def _limit(self, rotor: int, actual: float, loss: float) -> None:
+        """A rotor that gives too little has a new upper limit, one that gives too much a new lower one."""
+        lower, upper = self.limits or (self._box[0].copy(), self._box[1].copy())
+        actual = min(max(actual, 0.0), float(self._box[1][rotor]))
+        if loss > 0.0:
+            upper[rotor] = min(upper[rotor], actual + MARGIN)
+            lower[rotor] = min(lower[rotor], upper[rotor])
+        else:
+            lower[rotor] = max(lower[rotor], actual - MARGIN)
+            upper[rotor] = max(upper[rotor], lower[rotor])
+        self.limits, self._found[self._names[rotor]] = (lower, upper), actual

@@ -1,0 +1,94 @@
+"""Age and liveliness of the inputs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ibvs_qp.config import SafetySettings
+from ibvs_qp.safety.policy import Fault
+from ibvs_qp.safety.tick import Tick
+
+#: Samples in a row, each different from the one before, that show a sensor with noise: half a second of force, and of
+#: pictures. A simulator without noise may repeat values; its sensors are not monitored.
+LIVELY_SAMPLES, LIVELY_PICTURES = 50, 15
+
+
+class SampleMonitor:
+    """Finds inputs that stopped, by their stamps, and inputs that repeat although their stamps go on."""
+
+    def __init__(self, settings: SafetySettings) -> None:
+        self._settings = settings
+        self._imu = FrozenInput(settings.frozen_imu_samples, LIVELY_SAMPLES)
+        self._wrench = FrozenInput(settings.frozen_samples, LIVELY_SAMPLES)
+        self._picture = FrozenInput(settings.frozen_pictures, LIVELY_PICTURES)
+        self.reset()
+
+    def reset(self) -> None:
+        """As before the first tick."""
+        for part in (self._imu, self._wrench, self._picture):
+            part.reset()
+        self._imu_ns = self._wrench_ns = -1
+
+    def update(self, tick: Tick) -> None:
+        """Add the faults of the inputs of a tick."""
+        faults, settings, now = tick.faults, self._settings, tick.stamp_ns
+        for fault, stamp, limit, must in (
+            (Fault.IMU_STALE, tick.imu_ns, settings.imu_age_s, True),
+            (Fault.WRENCH_STALE, tick.wrench_ns, settings.wrench_age_s, True),
+            (Fault.PLANE_STALE, tick.plane_ns, settings.plane_age_s, False),
+            (Fault.IMAGE_STALE, tick.image_ns, settings.image_age_s, False),
+        ):
+            age = (now - stamp) * 1e-9
+            if age > limit and (must or stamp >= 0):
+                faults[fault] = f"{1e3 * age:.0f} ms old, limit {1e3 * limit:.0f} ms" if stamp >= 0 else "none yet"
+        if tick.imu_ns != self._imu_ns:
+            self._imu_ns = tick.imu_ns
+            self._imu.add(tick.inertial)
+        if tick.wrench_ns != self._wrench_ns:
+            self._wrench_ns = tick.wrench_ns
+            self._wrench.add(tick.wrench)
+        if tick.picture is not None:
+            self._picture.add(tick.picture)
+        for fault, monitor in (
+            (Fault.IMU_FROZEN, self._imu),
+            (Fault.WRENCH_FROZEN, self._wrench),
+            (Fault.IMAGE_FROZEN, self._picture),
+        ):
+            if monitor.frozen:
+                faults[fault] = f"{monitor.equal + 1} equal samples in a row"
+
+
+class FrozenInput:
+    """Detects a sensor that repeats a value although it has noise.
+
+    Attributes:
+        equal: Samples in a row that repeat the one before.
+
+    Args:
+        samples: Repetitions in a row that count as frozen.
+        lively: Different samples in a row that show noise.
+    """
+
+    def __init__(self, samples: int, lively: int) -> None:
+        self._limit, self._least = samples, lively
+        self.reset()
+
+    def reset(self) -> None:
+        """As before the first sample."""
+        self._last: Any = None
+        self._lively = False
+        self._different = self.equal = 0
+
+    def add(self, sample: Any) -> None:
+        """Count a new sample, of any type with a comparison."""
+        if sample == self._last:
+            self.equal, self._different = self.equal + 1, 0
+            return
+        self.equal, self._last = 0, sample
+        self._different += 1
+        self._lively = self._lively or self._different >= self._least
+
+    @property
+    def frozen(self) -> bool:
+        """Whether it repeats."""
+        return self._lively and self.equal >= self._limit

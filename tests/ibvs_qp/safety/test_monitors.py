@@ -1,0 +1,140 @@
+"""Every monitor finds its fault in time, and nothing in a quiet flight."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from safety_ticks import CONTACT, TICK_NS, StubResponse, quiet_tick
+
+from ibvs_qp.command import Outcome, SafetyState
+from ibvs_qp.config import SafetySettings
+from ibvs_qp.config.vehicle import VehicleParams
+from ibvs_qp.safety.assurance import Assurance
+from ibvs_qp.safety.policy import Fault
+
+BEGIN = 200
+VEHICLE = VehicleParams()
+
+
+def first_found(
+    change: Callable[[int], dict[str, Any]], response: StubResponse | None = None, ticks: int = 500
+) -> dict[Fault, float]:
+    """Time from a change at tick `BEGIN` to the first detection of every fault [s]."""
+    assurance, quiet, found = Assurance(VEHICLE, SafetySettings()), StubResponse(), {}
+    for number in range(BEGIN + ticks):
+        changed = number >= BEGIN
+        tick = quiet_tick(number, **(change(number) if changed else {}))
+        assurance.watch(tick, response if changed and response else quiet)
+        for fault in tick.faults:
+            found.setdefault(fault, (number - BEGIN) * TICK_NS * 1e-9)
+    return found
+
+
+def test_a_quiet_flight_has_no_fault() -> None:
+    assert first_found(lambda number: {}) == {}
+
+
+STOPPED = BEGIN * TICK_NS
+
+
+@pytest.mark.parametrize(
+    ("fault", "latest_s", "change"),
+    [
+        (Fault.IMU_STALE, 0.03, lambda n: {"imu_ns": STOPPED}),
+        (Fault.WRENCH_STALE, 0.04, lambda n: {"wrench_ns": STOPPED}),
+        (Fault.IMAGE_STALE, 0.21, lambda n: {"image_ns": STOPPED, "picture": None}),
+        (Fault.PLANE_STALE, 0.31, lambda n: {"plane_ns": STOPPED}),
+        (Fault.IMU_FROZEN, 0.03, lambda n: {"inertial": 7}),
+        (Fault.WRENCH_FROZEN, 0.05, lambda n: {"wrench": 7}),
+        (Fault.IMAGE_FROZEN, 0.05, lambda n: {"picture": 7}),
+        (Fault.PUSH_HIGH, 0.11, lambda n: {"contact": CONTACT._replace(push=11.5)}),
+        (Fault.TILT, 0.11, lambda n: {"down": (math.sin(0.23), 0.0, math.cos(0.23))}),
+        (Fault.RATE, 0.11, lambda n: {"rate": (0.0, 2.5, 2.5)}),
+        (Fault.SPEED, 0.11, lambda n: {"speed": 0.8}),
+        (Fault.HEIGHT, 0.11, lambda n: {"height": -1.6}),
+        (Fault.WALL_GONE, 0.11, lambda n: {"contact": CONTACT._replace(in_contact=False, distance=0.05, push=0.0)}),
+        (Fault.SOLVER, 0.0, lambda n: {"outcome": Outcome.ANALYTIC_FALLBACK}),
+    ],
+)
+def test_a_fault_is_found_in_time_and_alone(
+    fault: Fault, latest_s: float, change: Callable[[int], dict[str, Any]]
+) -> None:
+    found = first_found(change)
+    assert set(found) == {fault} and found[fault] <= latest_s
+
+
+def test_a_contact_that_is_not_found_again_is_a_fault_after_a_while() -> None:
+    found = first_found(
+        lambda number: {"contact": CONTACT._replace(in_contact=False, distance=0.005, push=0.0)}, ticks=1400
+    )
+    assert set(found) == {Fault.CONTACT_LOST} and found[Fault.CONTACT_LOST] == pytest.approx(5.0, abs=0.01)
+
+
+def test_before_the_first_touch_no_contact_is_missed() -> None:
+    assurance = Assurance(VEHICLE, SafetySettings())
+    for number in range(2000):
+        tick = quiet_tick(number, contact=CONTACT._replace(in_contact=False, distance=0.2, push=0.0))
+        assurance.watch(tick, StubResponse(inertial_push=0.0))
+        assert not tick.faults
+
+
+def test_a_flipped_vehicle_is_terminated() -> None:
+    assurance = Assurance(VEHICLE, SafetySettings())
+    for number in range(100):
+        assurance.watch(quiet_tick(number, down=(0.95, 0.0, 0.31)), StubResponse())
+    assert assurance.state is SafetyState.TERMINATED
+    assert assurance.thrusts(np.full(6, 10.0), VEHICLE.thrust_min) is VEHICLE.thrust_min or np.array_equal(
+        assurance.thrusts(np.full(6, 10.0), VEHICLE.thrust_min), VEHICLE.thrust_min
+    )
+
+
+def test_mission_time_ends_the_flight() -> None:
+    assurance = Assurance(VEHICLE, SafetySettings(mission_s=1.0))
+    for number in range(300):
+        assurance.watch(quiet_tick(number), StubResponse())
+    assert assurance.state in (SafetyState.RETREAT, SafetyState.HOVER)
+
+
+@pytest.mark.parametrize(("inertial", "measured", "finds"), [(9.0, 0.0, True), (9.0, 5.0, False), (7.0, 0.0, False)])
+def test_a_push_must_be_measured_by_the_force_sensor(inertial: float, measured: float, finds: bool) -> None:
+    found = first_found(
+        lambda number: {"contact": CONTACT._replace(push=measured)}, StubResponse(inertial_push=inertial)
+    )
+    assert (Fault.PUSH_UNFELT in found) is finds
+
+
+def test_far_from_the_wall_wind_is_no_push() -> None:
+    found = first_found(
+        lambda number: {"contact": CONTACT._replace(push=0.0, distance=0.3, in_contact=False), "press": False},
+        StubResponse(inertial_push=20.0),
+    )
+    assert Fault.PUSH_UNFELT not in found
+
+
+def test_a_simulator_without_noise_may_repeat_its_values() -> None:
+    assurance = Assurance(VEHICLE, SafetySettings())
+    for number in range(1000):
+        tick = quiet_tick(number, inertial=0, wrench=0, picture=0)
+        assurance.watch(tick, StubResponse())
+        assert not tick.faults
+
+
+def test_without_a_camera_nothing_is_late() -> None:
+    """A loop of one's own may have neither plane nor lines."""
+    assurance = Assurance(VEHICLE, SafetySettings())
+    for number in range(200):
+        tick = quiet_tick(number, plane_ns=-1, image_ns=-1, picture=None)
+        assurance.watch(tick, StubResponse())
+        assert not tick.faults
+
+
+def test_supervision_can_be_switched_off() -> None:
+    assurance = Assurance(VEHICLE, SafetySettings(supervise=False))
+    for number in range(100):
+        tick = quiet_tick(number, down=(1.0, 0.0, 0.0))
+        assurance.watch(tick, StubResponse())
+    assert tick.faults and assurance.state is SafetyState.NOMINAL

@@ -1,0 +1,99 @@
+"""Rotors that do not follow: which, how much they give, and what is no rotor fault."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from rotor_layouts import OCTOROTOR
+
+from allocation.effectiveness import control_effectiveness
+from ibvs_qp.config import SafetySettings
+from ibvs_qp.config.vehicle import VehicleParams
+from ibvs_qp.safety.monitors.rotors import RotorMonitor
+
+VEHICLE = VehicleParams()
+MATRIX = control_effectiveness(VEHICLE.geometry)
+HOVER = np.full(6, 11.3)
+
+
+def monitor(vehicle: VehicleParams = VEHICLE) -> RotorMonitor:
+    return RotorMonitor(vehicle, control_effectiveness(vehicle.geometry), SafetySettings())
+
+
+def watched(missing: np.ndarray, ticks: int = 20) -> tuple[str, RotorMonitor]:
+    watch, text = monitor(), ""
+    for number in range(ticks):
+        text = watch.update(missing, 0.1, HOVER, 0.004 * number)
+    return text, watch
+
+
+@pytest.mark.parametrize("rotor", range(6))
+@pytest.mark.parametrize("gives", [0.0, 5.0, 25.0])
+def test_a_rotor_that_gives_another_thrust_is_named_with_it(rotor: int, gives: float) -> None:
+    missing = np.zeros(6)
+    missing[rotor] = 11.3 - gives
+    text, watch = watched(missing)
+    assert text == f"{VEHICLE.geometry.names[rotor]} gives {gives:.1f} N"
+    assert watch.limits is not None
+    lower, upper = watch.limits
+    assert (lower <= upper).all()
+    if gives < 11.3:
+        assert upper[rotor] == pytest.approx(gives + 0.5)
+    else:
+        assert lower[rotor] == pytest.approx(gives - 0.5)
+    others = np.arange(6) != rotor
+    assert (lower[others] == VEHICLE.thrust_min[others]).all() and (upper[others] == VEHICLE.thrust_max[others]).all()
+
+
+def test_two_rotors_at_once_are_told_apart() -> None:
+    missing = np.zeros(6)
+    missing[[1, 4]] = 6.0, 5.0
+    text, _ = watched(missing)
+    assert "mid_left" in text and text.count("gives") == 2
+
+
+@pytest.mark.parametrize("force", [(10.0, 0.0, 0.0), (0.0, 10.0, 0.0), (-10.0, 0.0, 0.0), (0.0, 0.0, 20.0)])
+def test_a_push_on_the_body_is_no_rotor_fault(force: tuple[float, float, float]) -> None:
+    text, watch = watched(-np.linalg.pinv(MATRIX) @ np.array([*force, 0.0, 0.0, 0.0]))
+    assert text == "" and watch.limits is None
+
+
+def test_a_short_peak_is_no_fault() -> None:
+    watch, missing = monitor(), np.array([10.0, 0, 0, 0, 0, 0])
+    for number in range(100):
+        assert not watch.update(missing if number % 10 < 8 else np.zeros(6), 0.1, HOVER, 0.004 * number)
+
+
+def test_a_stuck_rotor_is_limited_from_both_sides() -> None:
+    watch, lost = monitor(), np.array([3.0, 0, 0, 0, 0, 0])
+    for number in range(40):
+        watch.update(2.0 * lost, 0.1, HOVER, 0.004 * number)  # commanded 11.3, gives 5.3
+    thrusts = HOVER.copy()
+    thrusts[0] = 1.2
+    for number in range(40, 80):
+        watch.update(np.array([-4.1, 0, 0, 0, 0, 0]), 0.1, thrusts, 0.004 * number)  # commanded 1.2, still gives 5.3
+    assert watch.limits is not None
+    lower, upper = watch.limits
+    assert lower[0] == pytest.approx(4.8) and upper[0] == pytest.approx(5.8)
+
+
+@given(st.lists(st.floats(-60.0, 60.0), min_size=6, max_size=6))
+def test_limits_are_always_limits(missing: list[float]) -> None:
+    _, watch = watched(np.array(missing))
+    if watch.limits is not None:
+        lower, upper = watch.limits
+        assert (lower <= upper).all() and (upper <= VEHICLE.thrust_max).all() and np.isfinite(lower).all()
+
+
+@pytest.mark.parametrize("rotor", range(8))
+def test_more_rotors_than_dimensions_are_told_apart_too(rotor: int) -> None:
+    """A thrust missing at one of eight rotors spreads over the others in the least-squares sense."""
+    vehicle = VehicleParams(geometry=OCTOROTOR)
+    matrix = control_effectiveness(OCTOROTOR)
+    watch, lost = monitor(vehicle), np.zeros(8)
+    lost[rotor] = 8.0
+    for number in range(20):
+        text = watch.update(np.linalg.pinv(matrix) @ matrix @ lost, 0.1, np.full(8, 8.0), 0.004 * number)
+    assert text == f"{OCTOROTOR.names[rotor]} gives 0.0 N"
