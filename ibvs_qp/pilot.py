@@ -389,7 +389,7 @@ class Pilot:
 
     def _correct_motion(self, features: FeatureFrame, contact: ContactState) -> None:
         """Correct motion and lines at the time of capture."""
-        if features.plane is not None:
+        if features.plane is not None and self.contact.plane_ns == features.stamp_ns:
             normal, distance = plane_in_body(features.plane, self._tip_from_camera)
         elif contact.known:
             normal, distance = contact.normal, contact.distance

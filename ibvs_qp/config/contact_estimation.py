@@ -29,7 +29,6 @@ class ContactEstimationSettings:
         low=1.0,
         high=90.0,
     )
-    normal_frames: int = setting(30, "refused normals in a row that are taken after all: 1 s", low=1, high=1000)
     acceleration_filter_s: float = setting(
         6e-3,
         "filter of the acceleration that predicts the rate: a tenth of the motors' lag",

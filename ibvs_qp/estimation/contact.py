@@ -90,9 +90,8 @@ class ContactEstimator:
         interval = push.add(contact_wrench, wrench_stamp_ns, wall.normal, free)
         if interval is not None:
             touch.add_sample(push.push, push.push_noise)
-            blind = wall.known and stamp_ns - wall.accepted_ns > BLIND_NS
-            if blind and touch.pressed and not touch.in_contact:
-                wall.touch()
+            if touch.pressed and wall.known and stamp_ns - wall.accepted_ns > BLIND_NS:
+                wall.touch(stamp_ns)
             if touch.in_contact:
                 self._stiffness.add(push.push, -wall.distance, interval)
         if touch.update(stamp_ns, push.push, wall.distance):

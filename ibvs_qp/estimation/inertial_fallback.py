@@ -22,8 +22,8 @@ ANGLE_STD, RATE_STD, BIAS_STD = 2e-3, 0.01, 0.3
 ATTITUDE_STD, PICTURE_STD, GYRO_STD = 2e-3, 8e-3, 5e-3
 #: Refused beyond this many standard deviations.
 GATE_SIGMAS = 6.0
-#: The attitude is lost when its standard deviation exceeds this [rad]: 6 degrees.
-LOST_STD = math.radians(6.0)
+#: The attitude is lost when its standard deviation exceeds this [rad]: farther from level than a descent bears.
+LOST_STD = math.radians(20.0)
 
 
 class InertialFallback:

@@ -60,7 +60,7 @@ class WallDistance:
         self.normal, self.known = (1.0, 0.0, 0.0), False
         self._normals = np.zeros((HISTORY, 3))  # of the last ticks, by the slots of the filter's ticks
         self._jumps, self._first_jump, self._plane_ns = 0, (0, 0.0), -1
-        self._odd_normals, self.accepted_ns = 0, -1
+        self.accepted_ns = -1
         self.vibration.reset()
         self._filtered = self._lever_speed = self.rate_noise = 0.0
 
@@ -141,22 +141,21 @@ class WallDistance:
             self.accepted_ns = stamp_ns
         self._state = self._filter.state.tolist()
 
-    def touch(self) -> None:
-        """The tip touches the wall: its distance is zero, whatever the planes said before."""
-        self._filter.set_entry(DISTANCE, 0.0, TOUCH_STD)
+    def touch(self, stamp_ns: int) -> None:
+        """Correct with a tip that rests at the wall, whatever the drifting distance says."""
+        self._filter.correct_entry(stamp_ns, DISTANCE, 0.0, TOUCH_STD**2, gate=math.inf)
+        speed_std = self._settings.stationary_speed_std_m_s
+        self._filter.correct_entry(stamp_ns, SPEED, -self._lever_speed, speed_std**2, gate=math.inf)
         self._state = self._filter.state.tolist()
 
     def _trusts(self, stamp_ns: int, normal: Sequence[float]) -> bool:
-        """Whether a measured normal agrees with the one predicted by the gyro; or has disagreed for long."""
+        """Whether a measured normal agrees with the one predicted by the gyro.
+
+        A mirrored normal would turn the vehicle away, and be believed again and again; one that never agrees is a
+        wall that is lost (`ibvs_qp.safety`).
+        """
         settings, past = self._settings, self._normals[self._filter.ticks.slots_since(stamp_ns)[0]].tolist()
-        if dot(past, normal) >= math.cos(math.radians(settings.normal_gate_deg)) * math.hypot(*past):
-            self._odd_normals = 0
-            return True
-        self._odd_normals += 1
-        if self._odd_normals < settings.normal_frames:
-            return False
-        self._odd_normals, self.normal, self._normals[:] = 0, unit(normal), normal
-        return True
+        return dot(past, normal) >= math.cos(math.radians(settings.normal_gate_deg)) * math.hypot(*past)
 
     def _correct_distance(self, stamp_ns: int, distance: float, tip_stationary: bool) -> bool:
         """Correct distance and speed; a jump only once the next frames repeat it. Whether the plane is accepted."""

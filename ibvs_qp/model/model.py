@@ -168,7 +168,6 @@ class Model:
             "thrust_lower": self.thrust_lower,
             "thrust_upper": self.thrust_upper,
             "contact_weight": self.contact_weight,
-            "motor_thrusts": self._motors.thrusts,
         }.items():
             self.output(name, value)
 

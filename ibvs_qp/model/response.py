@@ -73,7 +73,8 @@ def missing_thrust(
 
     first-order low-passed (the moment by its momentum, without differentiating the gyro), in thrusts: :math:`-B^+ r`.
     What lasts for seconds, as a wrong mass, thrust coefficients and wind, is subtracted. The output "missing_noise"
-    is the standard deviation of one entry while the rotors follow.
+    is the standard deviation of one entry while the rotors follow, "motor_thrusts" are the lagged thrusts behind the
+    same low-pass filter: minus the missing thrust they are what the rotors give.
 
     Args:
         signals: Registry.
@@ -98,6 +99,9 @@ def missing_thrust(
     signals.remember("residual_momentum", ca.if_else(ready, moved, path))
     signals.remember("residual_started", ready)
     force = signals.remember("residual_force", ca.if_else(ready, old_force + gain * (force - old_force), old_force))
+    smooth = signals.state("motor_thrust_smooth", effectiveness.shape[1])
+    smooth = signals.remember("motor_thrust_smooth", smooth + gain * (motors.thrusts - smooth))
+    signals.output("motor_thrusts", smooth)
     residual = ca.vertcat(force, signals.remember("residual_moment", moment))
     missing = -ca.DM(np.linalg.pinv(effectiveness)) @ residual
     mean, time = signals.state("missing_mean", effectiveness.shape[1]), signals.state("missing_time")

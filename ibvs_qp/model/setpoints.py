@@ -190,7 +190,7 @@ class Setpoints:
 
     @property
     def motor_thrusts(self) -> np.ndarray:
-        """Thrusts behind the motors' lag at the last step [N], (n,): a view."""
+        """Thrusts behind the motors' lag and the filter of `missing_thrust` [N], (n,): a view."""
         return self.step.outputs["motor_thrusts"]
 
     @property

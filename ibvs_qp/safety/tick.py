@@ -38,7 +38,7 @@ class Response(Protocol):
 
     @property
     def motor_thrusts(self) -> np.ndarray:
-        """Thrusts behind the motors' lag [N], (n,)."""
+        """Thrusts behind the motors' lag and the filter of `missing_thrust` [N], (n,)."""
         ...
 
 

@@ -37,5 +37,5 @@ class YawTask(Task):
         stiffness = pivot_limited(model, gains.yaw_kp, soft, [line.vertical for line in model.lines])
         damping = -gains.yaw_kd * model.rate_ahead[2]
         facing = -stiffness * model.attitude.yaw + damping
-        braking = clamp(damping, -ROTOR_LOST_ACCELERATION, ROTOR_LOST_ACCELERATION)
-        return ca.if_else(model.attitude.tilted, braking, facing)
+        bounded = clamp(facing, -ROTOR_LOST_ACCELERATION, ROTOR_LOST_ACCELERATION)
+        return ca.if_else(model.attitude.tilted, bounded, facing)

@@ -54,7 +54,7 @@ class RotorMonitor:
         Args:
             missing: Missing thrust by the response of the vehicle [N], (n,).
             noise: Its standard deviation while the rotors follow [N].
-            thrusts: Thrusts behind the motors' lag by their model [N], (n,).
+            thrusts: Thrusts behind the motors' lag by their model, and behind the filter of ``missing`` [N], (n,).
             time_s: Time of the tick [s].
         """
         entries, least = missing.tolist(), FOUND if self._found else self._settings.missing_thrust_n
@@ -66,35 +66,28 @@ class RotorMonitor:
         return ", ".join(f"{name} gives {thrust:.1f} N" for name, thrust in self._found.items())
 
     def _suspect(self, missing: np.ndarray, thrusts: np.ndarray, time_s: float) -> None:
-        rotors = self._explain(missing)
+        rotors = self._explain(missing, 1 if self._found else MOST_ROTORS)
         if not self._persistence.update(bool(rotors), time_s):
             return
         for rotor in rotors:
             loss = float(missing[rotor] / self._signatures[rotor, rotor])
             self._limit(rotor, float(thrusts[rotor]) - loss, loss)
 
-    def _explain(self, missing: np.ndarray) -> Sequence[int]:
-        """Fewest rotors whose missing thrusts explain the rest."""
-        total, chosen = float(missing @ missing), list[int]()
-        for _ in range(MOST_ROTORS):
-            columns = self._signatures[:, chosen]
-            fitted = columns @ np.linalg.lstsq(columns, missing, rcond=None)[0] if chosen else 0.0
-            rest = missing - fitted
-            if chosen and float(rest @ rest) < UNEXPLAINED**2 * total:
-                return chosen
+    def _explain(self, missing: np.ndarray, most: int) -> Sequence[int]:
+        """Fewest rotors, ``most`` at most, whose missing thrusts explain what is missing; none if they do not."""
+        total, rest, chosen = float(missing @ missing), missing, list[int]()
+        while len(chosen) < most:
             chosen.append(int(np.argmax(np.abs(rest))))
-        columns = self._signatures[:, chosen]
-        rest = missing - columns @ np.linalg.lstsq(columns, missing, rcond=None)[0]
-        return chosen if float(rest @ rest) < UNEXPLAINED**2 * total else ()
+            columns = self._signatures[:, chosen]
+            rest = missing - columns @ np.linalg.lstsq(columns, missing, rcond=None)[0]
+            if float(rest @ rest) < UNEXPLAINED**2 * total:
+                return chosen
+        return ()
 
     def _limit(self, rotor: int, actual: float, loss: float) -> None:
-        """A rotor that gives too little has a new upper limit, one that gives too much a new lower one."""
+        """A rotor that gives too little has a new upper limit; one that gives too much is stuck at its thrust."""
         lower, upper = self.limits or (self._box[0].copy(), self._box[1].copy())
         actual = min(max(actual, 0.0), float(self._box[1][rotor]))
-        if loss > 0.0:
-            upper[rotor] = min(upper[rotor], actual + MARGIN)
-            lower[rotor] = min(lower[rotor], upper[rotor])
-        else:
-            lower[rotor] = max(lower[rotor], actual - MARGIN)
-            upper[rotor] = max(upper[rotor], lower[rotor])
+        upper[rotor] = actual + MARGIN
+        lower[rotor] = min(lower[rotor], upper[rotor]) if loss > 0.0 else max(actual - MARGIN, 0.0)
         self.limits, self._found[self._names[rotor]] = (lower, upper), actual
