@@ -51,7 +51,7 @@ class InertialFallback:
 
     def reset(self) -> None:
         """Not running."""
-        self.active, self._stamp = False, -1
+        self.active, self._stamp, self._corrected = False, -1, -1
         self.attitude: list[float] = [1.0, 0.0, 0.0, 0.0]
 
     @property
@@ -64,7 +64,14 @@ class InertialFallback:
         """Whether the attitude is too uncertain to fly by."""
         if not self.active:
             return False
-        return any(self._filter.variance(axis, self._stamp) > LOST_STD**2 for axis in range(3))
+        dt = (self._stamp - self._corrected) * 1e-9
+        ahead = np.array((1.0, dt, 0.5 * dt * dt))  # of angle, rate and bias at the last correction
+        noise = RATE_NOISE * dt**3 / 3.0 + BIAS_NOISE * dt**5 / 20.0
+        for axis in range(3):
+            entries = slice(axis, 9, 3)
+            if float(ahead @ self._filter.covariance[entries, entries] @ ahead) + noise > LOST_STD**2:
+                return True
+        return False
 
     def begin(
         self, attitude: Sequence[float], rate: Sequence[float], normal: Vector3, angles: Mapping[int, float]
@@ -106,6 +113,8 @@ class InertialFallback:
             state[RATE + axis] += dt * (acceleration[axis] + state[BIAS + axis])
         self._filter.remember(stamp_ns, state, dt)
         self._stamp = stamp_ns
+        if self._corrected < 0 or rate is not None or attitude is not None:
+            self._corrected = stamp_ns
         if rate is not None:
             for axis in range(3):
                 self._filter.correct_entry(stamp_ns, RATE + axis, rate[axis], GYRO_STD**2)
@@ -119,6 +128,7 @@ class InertialFallback:
         if frame.plane is None:
             return
         normal, _ = plane_in_body(frame.plane, self._tip_from_camera)
+        self._corrected = max(self._corrected, frame.stamp_ns)
         turned = cross(self._normal, add_scaled(self._normal, -1.0, normal))
         for axis in (1, 2):
             self._filter.correct_entry(frame.stamp_ns, ANGLE + axis, turned[axis], PICTURE_STD**2)

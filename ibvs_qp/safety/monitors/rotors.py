@@ -88,6 +88,6 @@ class RotorMonitor:
         """A rotor that gives too little has a new upper limit; one that gives too much is stuck at its thrust."""
         lower, upper = self.limits or (self._box[0].copy(), self._box[1].copy())
         actual = min(max(actual, 0.0), float(self._box[1][rotor]))
-        upper[rotor] = actual + MARGIN
+        upper[rotor] = min(actual + MARGIN, float(self._box[1][rotor]))
         lower[rotor] = min(lower[rotor], upper[rotor]) if loss > 0.0 else max(actual - MARGIN, 0.0)
         self.limits, self._found[self._names[rotor]] = (lower, upper), actual

@@ -1,0 +1,63 @@
+"""Steps of the attitude: absorbed at once, given back slowly; everything else passes unchanged."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from ibvs_qp.estimation.attitude_steps import RETURN_RATE, AttitudeSteps
+
+TICK = 0.004
+REST = (0.0, 0.0, 0.0)
+
+
+def quaternion(*euler_deg: float) -> list[float]:
+    x, y, z, w = Rotation.from_euler("xyz", euler_deg, degrees=True).as_quat().tolist()
+    return [w, x, y, z]
+
+
+def angle_deg(first: list[float], second: list[float]) -> float:
+    return math.degrees(2.0 * math.acos(min(1.0, abs(float(np.dot(first, second))))))
+
+
+def test_motion_and_noise_pass_unchanged() -> None:
+    steps, rng, roll = AttitudeSteps(), np.random.default_rng(0), 0.0
+    for _ in range(1000):
+        roll += math.degrees(2.0 * TICK)  # 2 rad/s
+        noisy = quaternion(roll, *rng.normal(0.0, 0.1, 2))
+        assert steps.update(noisy, (2.0, 0.0, 0.0), TICK) is None
+
+
+@pytest.mark.parametrize("step", [(2.0, 0.0, 0.0), (0.0, 3.0, 0.0), (0.0, 0.0, -30.0), (1.5, -2.0, 10.0)])
+def test_a_step_is_absorbed_and_given_back_at_its_rate(step: tuple[float, float, float]) -> None:
+    steps, before, after = AttitudeSteps(), quaternion(1.0, 2.0, 3.0), quaternion(*np.add((1.0, 2.0, 3.0), step))
+    assert steps.update(before, REST, TICK) is None
+    given = steps.update(after, REST, TICK)
+    assert given is not None and angle_deg(given, before) < 0.01
+    size, ticks = angle_deg(before, after), 1
+    while given is not None:
+        last, given = given, steps.update(after, REST, TICK)
+        moved = angle_deg(last, given or after)
+        assert moved <= math.degrees(RETURN_RATE) * TICK * 1.01 + 1e-5
+        ticks += 1
+    assert ticks * TICK == pytest.approx(size / math.degrees(RETURN_RATE), rel=0.02)
+
+
+def test_a_step_while_turning_leaves_the_turn() -> None:
+    steps, rate, roll = AttitudeSteps(), (1.0, 0.0, 0.0), 0.0
+    given: list[float] | None = None
+    for tick in range(250):
+        roll += math.degrees(TICK)
+        jumped = roll + (3.0 if tick >= 100 else 0.0)
+        given = steps.update(quaternion(jumped, 0.0, 0.0), rate, TICK)
+    assert given is not None and angle_deg(given, quaternion(roll, 0.0, 0.0)) == pytest.approx(0.3, abs=0.02)
+
+
+def test_the_sign_of_a_quaternion_means_nothing() -> None:
+    steps, attitude = AttitudeSteps(), quaternion(5.0, -4.0, 170.0)
+    assert steps.update(attitude, REST, TICK) is None
+    flipped = steps.update([-entry for entry in attitude], REST, TICK)
+    assert flipped is None or angle_deg(flipped, attitude) < 1e-3
