@@ -106,7 +106,9 @@ class Reference:
         contact: Press the wall (True) or keep the stand-off (False: lambda = 0).
         travel: Velocity in the wall plane that is planned at this push [m/s], (2,): reach is taken for it before it
             begins.
-        tilt: Roll and pitch [rad], (2,): level, except for a vehicle that lost a rotor.
+        tilt: Roll and pitch [rad], (2,): level, except for a vehicle that lost a rotor. Then only the tilt moves it.
+        trim: Roll and pitch [rad], (2,), at which a vehicle with a limited rotor hovers without a lateral force; it is
+            flown like a level one.
     """
 
     push_force: float = 0.0
@@ -116,6 +118,7 @@ class Reference:
     contact: bool = False
     tilt: np.ndarray = field(default_factory=lambda: np.zeros(2))
     travel: np.ndarray = field(default_factory=lambda: np.zeros(2))
+    trim: np.ndarray = field(default_factory=lambda: np.zeros(2))
 
 
 @dataclass(frozen=True, kw_only=True)

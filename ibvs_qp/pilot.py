@@ -425,6 +425,7 @@ class Pilot:
         elif self.assurance.state not in _FLYING and not self.painter.failed:
             self.painter.abandon(inputs, "; ".join(self.assurance.supervisor.reasons))
         target = self.painter.step(inputs)
+        self.rotor_loss.move_trim(dt)
         if not self.rotor_loss.lost:
             return target
         normal = np.array(contact.normal)
@@ -458,6 +459,7 @@ class Pilot:
             contact=target.contact,
             tilt=target.tilt,
             travel=target.travel,
+            trim=self.rotor_loss.trim,
         )
 
     def _measure(

@@ -91,7 +91,7 @@ class ContactEstimator:
         if interval is not None:
             touch.add_sample(push.push, push.push_noise)
             if touch.pressed and wall.known and stamp_ns - wall.accepted_ns > BLIND_NS:
-                wall.touch(stamp_ns)
+                wall.touch()
             if touch.in_contact:
                 self._stiffness.add(push.push, -wall.distance, interval)
         if touch.update(stamp_ns, push.push, wall.distance):

@@ -25,6 +25,9 @@ CHAIN = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [0.0, 0.0, 0.0]])
 DISTANCE_NOISE = 1e-10
 #: Standard deviations at the start: distance [m], speed [m/s], bias [m/s^2]; and of the first measured distance [m].
 INITIAL_STD, FIRST_DISTANCE_STD = np.array([0.05, 0.05, 0.1]), 0.01
+#: Without ticks for this long [ns], normal and speed are only as good as the next plane; standard deviation of a speed
+#: then [m/s].
+GAP_NS, GAP_SPEED_STD = 100_000_000, 0.5
 #: Standard deviation of the distance at a touch without planes [m].
 TOUCH_STD = 0.003
 #: Standard deviation of a speed from two planes a few frames apart [m/s], and least time between them [s].
@@ -60,7 +63,8 @@ class WallDistance:
         self.normal, self.known = (1.0, 0.0, 0.0), False
         self._normals = np.zeros((HISTORY, 3))  # of the last ticks, by the slots of the filter's ticks
         self._jumps, self._first_jump, self._plane_ns = 0, (0, 0.0), -1
-        self.accepted_ns = -1
+        self.accepted_ns = self._tick_ns = -1
+        self._gap = False
         self.vibration.reset()
         self._filtered = self._lever_speed = self.rate_noise = 0.0
 
@@ -109,6 +113,8 @@ class WallDistance:
         All vectors are in B, (3,); ``down`` is the unit vector of gravity. Without a specific
         force the speed is constant.
         """
+        self._gap = self._gap or 0 <= self._tick_ns < stamp_ns - GAP_NS
+        self._tick_ns = stamp_ns
         self.normal = normal = unit(add_scaled(self.normal, dt, cross(self.normal, angular_velocity)))
         self._lever_speed = lever_speed = dot(normal, cross(angular_velocity, self._tip))
         measured = 0.0
@@ -132,20 +138,21 @@ class WallDistance:
             return
         self._plane_ns = stamp_ns
         normal, distance = plane_in_body(plane, self._tip_from_camera)
-        if not self.known:
-            self.normal, self._normals[:], self.known = normal, normal, True
+        if not self.known or self._gap:
+            self.normal, self._normals[:] = normal, normal
             self._filter.set_entry(DISTANCE, distance, FIRST_DISTANCE_STD)
-            self.accepted_ns = stamp_ns
+            if self._gap:
+                self._filter.set_entry(SPEED, self._state[SPEED], GAP_SPEED_STD)
+            self.known, self._gap, self.accepted_ns = True, False, stamp_ns
         elif self._trusts(stamp_ns, normal) and self._correct_distance(stamp_ns, distance, tip_stationary):
             self._correct_normal(stamp_ns, normal)
             self.accepted_ns = stamp_ns
         self._state = self._filter.state.tolist()
 
-    def touch(self, stamp_ns: int) -> None:
-        """Correct with a tip that rests at the wall, whatever the drifting distance says."""
-        self._filter.correct_entry(stamp_ns, DISTANCE, 0.0, TOUCH_STD**2, gate=math.inf)
-        speed_std = self._settings.stationary_speed_std_m_s
-        self._filter.correct_entry(stamp_ns, SPEED, -self._lever_speed, speed_std**2, gate=math.inf)
+    def touch(self) -> None:
+        """The tip rests at the wall, whatever the drifting distance says; the accelerometer's bias stays."""
+        self._filter.set_entry(DISTANCE, 0.0, TOUCH_STD)
+        self._filter.set_entry(SPEED, -self._lever_speed, self._settings.stationary_speed_std_m_s)
         self._state = self._filter.state.tolist()
 
     def _trusts(self, stamp_ns: int, normal: Sequence[float]) -> bool:

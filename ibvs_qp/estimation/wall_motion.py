@@ -27,6 +27,8 @@ VELOCITY_STD, BIAS_STD, ODOMETER_STD = 0.05, 0.1, 1e-6
 #: Standard deviations after refused velocities: of the velocity [m/s], and of the bias that made it wrong [m/s^2]: 3
 #: degrees of attitude.
 RESTART_VELOCITY_STD, RESTART_BIAS_STD = 0.03, 0.5
+#: Without ticks for this long [ns], the velocity has this standard deviation [m/s].
+GAP_NS, GAP_VELOCITY_STD = 100_000_000, 0.5
 #: Least variance of a reported line offset [m^2].
 LEAST_VARIANCE = 1e-10
 
@@ -94,6 +96,9 @@ class WallMotion:
         self, stamp_ns: int, axes: WallAxes, specific_force: Sequence[float], omega: Sequence[float], dt: float
     ) -> None:
         """Integrate accelerometer [m/s^2] and gyro [rad/s] over dt [s]; the tip moves with the body's rotation, too."""
+        if 0 <= self._stamp < stamp_ns - GAP_NS:
+            for entry in range(2):
+                self._filter.set_entry(entry, self.state[entry], GAP_VELOCITY_STD)
         acceleration, swing = add_scaled(specific_force, GRAVITY, axes.gravity), cross(omega, self._tip)
         state = self.state.copy()
         velocity_right, velocity_down, bias_right, bias_down, *_ = state

@@ -58,8 +58,8 @@ def attitude(body: Body, contact: Contact, target: Target, rate_ahead: ca.SX) ->
     roll = ca.atan2(body.down[1], body.down[2])
     pitch = ca.asin(clamp(-body.down[0], -1.0, 1.0))
     yaw = ca.if_else(contact.known, -ca.atan2(contact.normal[1], contact.normal[0]), 0.0)
-    target_angles = ca.vertcat(target.roll, target.pitch)
-    tilted = ca.norm_2(target_angles) > 0.0
+    tilt, trim = ca.vertcat(target.roll, target.pitch), ca.vertcat(target.trim_roll, target.trim_pitch)
+    tilted, target_angles = ca.norm_2(tilt) > 0.0, tilt + trim
 
     # Near level the body rates are the angle rates; a tilted vehicle that turns about the vertical has body rates
     # in roll and pitch without changing either angle.

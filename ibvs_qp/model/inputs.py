@@ -126,6 +126,7 @@ class Target:
         press: 1 to press the wall.
         roll, pitch: Attitude [rad]; zero but for a vehicle that lost a rotor.
         travel_right, travel_down: Velocity planned at this push [m/s].
+        trim_roll, trim_pitch: Attitude of a level hover with a limited rotor [rad].
     """
 
     push: ca.SX
@@ -137,6 +138,8 @@ class Target:
     pitch: ca.SX
     travel_right: ca.SX
     travel_down: ca.SX
+    trim_roll: ca.SX
+    trim_pitch: ca.SX
 
     @classmethod
     def of(cls, signals: Signals) -> Target:

@@ -77,6 +77,7 @@ class StepInputs:
             press,
             *reference.tilt.tolist(),
             *reference.travel.tolist(),
+            *reference.trim.tolist(),
             # LINE, for every line
             *chain.from_iterable(self._lines),
         )

@@ -126,7 +126,9 @@ class Assurance:
             stop = reference.standoff if not reference.contact else max(last.contact.distance, LEAST_STOP)
             return dataclasses.replace(reference, velocity=_STILL, travel=_STILL, contact=pressing, standoff=stop)
         down = self.settings.descend_speed_m_s if state is SafetyState.DESCEND else 0.0
-        return Reference(standoff=self._retreat_m, velocity=np.array((0.0, down)), tilt=reference.tilt)
+        return Reference(
+            standoff=self._retreat_m, velocity=np.array((0.0, down)), tilt=reference.tilt, trim=reference.trim
+        )
 
     def wrench(self, response: Response) -> np.ndarray | None:
         """Contact wrench by inertial data [N, N m], (6,), in place of a faulty sensor's; None while that is good."""

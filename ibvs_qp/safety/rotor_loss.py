@@ -11,8 +11,11 @@ from allocation.least_squares import allocate_least_squares
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import GRAVITY
 
-#: Lateral force that a level hover may lack [N]: 1 deg of tilt replaces it.
-LATERAL_SHORTFALL = 1.0
+#: Lateral force that a level hover may lack [N]: a third of a degree of tilt replaces it.
+LATERAL_SHORTFALL = 0.3
+#: Up to this trim [rad] a vehicle flies as a level one, forces and yaw included: one rotor stuck or limited near its
+#: hover thrust. Beyond it only the tilt moves the vehicle, and yaw is free.
+LARGEST_TRIM = math.radians(8.0)
 #: Least distance between lower and upper limit for the allocation [N].
 LIMIT_GAP = 1e-6
 #: Largest commanded tilt [rad]; with the oscillation around it the vehicle stays within 25 deg (rotor-derate flights).
@@ -38,7 +41,8 @@ class RotorLoss:
     :math:`\varphi = \varphi_0 + a_{right}/g`, :math:`\theta = \theta_0 - a_n/g`.
 
     Attributes:
-        lost: Whether the present limits leave no level hover.
+        lost: Whether the present limits leave no hover near level.
+        trim: Attitude of a hover near level, rate limited [rad], (2,).
     """
 
     def __init__(self, vehicle: VehicleParams) -> None:
@@ -48,7 +52,7 @@ class RotorLoss:
 
     def reset(self) -> None:
         """All rotors as configured."""
-        self.lost = False
+        self.lost, self.trim = False, np.zeros(2)
         self._trim, self._tilt, self._limits = np.zeros(2), np.zeros(2), b""
 
     def update(self, limits: tuple[np.ndarray, np.ndarray] | None) -> bool:
@@ -63,9 +67,16 @@ class RotorLoss:
         lower = np.minimum(limits[0], limits[1])
         upper = np.maximum(limits[1], lower + LIMIT_GAP)
         front, right, down = (self._matrix @ allocate_least_squares(self._hover, self._matrix, lower, upper))[:3]
-        self.lost = math.hypot(front, right) > LATERAL_SHORTFALL
-        self._trim = np.array((math.atan2(-right, -down), math.atan2(front, -down))) if self.lost else np.zeros(2)
+        short = math.hypot(front, right) > LATERAL_SHORTFALL
+        self._trim = np.array((math.atan2(-right, -down), math.atan2(front, -down))) if short else np.zeros(2)
+        self.lost = math.hypot(*self._trim) > LARGEST_TRIM
         return self.lost and not before
+
+    def move_trim(self, dt: float) -> None:
+        """Move the trim by one tick of ``dt`` [s]."""
+        target, step = np.zeros(2) if self.lost else self._trim, TILT_RATE * dt
+        if (self.trim != target).any():
+            self.trim = self.trim + np.clip(target - self.trim, -step, step)
 
     def tilt(self, distance: float, closing: float, along: float, normal: np.ndarray, dt: float) -> np.ndarray:
         """Commanded roll and pitch [rad], (2,): the trim of the remaining force plus the retreat from the wall.

@@ -121,6 +121,7 @@ REFERENCE = FieldTable(
     _vector("velocity", 2, 20.0, "m/s", "not 2 finite values"),
     _vector("travel", 2, 20.0, "m/s", "not 2 finite values"),
     _vector("tilt", 2, 0.6, "rad"),
+    _vector("trim", 2, 0.6, "rad"),
 )
 
 
