@@ -22,12 +22,12 @@ def fault_figures(trace: Trace) -> dict[str, float]:
 
     Returns:
         ``struck``: 1 if the fault occurred. ``fault_s``: when. ``tilt_peak_deg``, ``tilt_contact_deg`` (in contact),
-        ``push_peak_n`` (1 kHz), ``speed_peak_m_s``, ``clearance_min_m``, ``away_m`` (largest distance from where the
-        fault struck). ``touching_s``: from the fault to the last contact, negative without. ``crashed``, ``landed``: 1
-        if the flight ended so. ``bad_thrusts``: ticks with a thrust that is not finite. ``box_excess_n``: largest
-        excess over the limits of the vehicle. ``rate_peak_n_s``: fastest change of a thrust. ``state``: most severe
-        state from the fault on; ``state_before``: likewise before it. ``to_STATE_s``: from the fault to that state or a
-        more severe one. ``unexplained``: changes of state without a reason.
+        ``push_peak_n`` (1 kHz), ``speed_peak_m_s``, ``clearance_min_m``. ``away_m``, ``advance_m``: farthest from
+        where the fault struck, and towards the wall. ``touching_s``: from the fault to the last contact. ``crashed``,
+        ``landed``: 1 if the flight ended so. ``bad_thrusts``: ticks with a thrust that is not finite.
+        ``box_excess_n``: largest excess over the limits of the vehicle. ``rate_peak_n_s``: fastest change of a thrust.
+        ``state``: most severe state from the fault on; ``state_before``: likewise before it. ``to_STATE_s``: from the
+        fault to that state or a more severe one. ``unexplained``: changes of state without a reason.
     """
     fault = event_time(trace, "fault")
     if not len(trace.t):
@@ -48,6 +48,7 @@ def fault_figures(trace: Trace) -> dict[str, float]:
         "clearance_min_m": float(np.min(trace.propeller_clearance)),
         "touching_s": float(max(trace.t[touching], default=-math.inf)) - fault,
         "away_m": peak(np.linalg.norm(trace.position[after] - origin, axis=1)),
+        "advance_m": max((trace.position[after] - origin)[:, 0], default=math.nan),
         "crashed": float(trace.reason.startswith(CRASH)),
         "landed": float(trace.reason == LANDED),
         **_commands(trace),
