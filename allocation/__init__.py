@@ -3,6 +3,7 @@
 from allocation.contact_reach import PushReach, hover_wrench, push_direction, push_reach, worst_push_reach
 from allocation.effectiveness import control_effectiveness
 from allocation.geometry import TAROT_T960, Rotor, RotorGeometry
+from allocation.hover_tilt import least_hover_tilt
 from allocation.least_squares import DEFAULT_ROW_WEIGHTS, allocate_least_squares
 from allocation.level_flight import level_polygon, worst_level_reach
 from allocation.pseudo_inverse import allocate_pseudo_inverse
@@ -23,6 +24,7 @@ __all__ = [
     "allocate_sequential",
     "control_effectiveness",
     "hover_wrench",
+    "least_hover_tilt",
     "level_polygon",
     "push_direction",
     "push_reach",

@@ -64,7 +64,7 @@ def stage_times(seed: int, features: str) -> dict[str, np.ndarray]:
         camera = world.stream.camera
         camera.capture = drawing.around("drawing", camera.capture)
     laps, pictures = [], []
-    while not pilot.painter.finished and world.plant.crashed is None and len(laps) < LONGEST_FLIGHT:
+    while not pilot.painter.finished and not world.plant.over and len(laps) < LONGEST_FLIGHT:
         drawing.spent, start = {}, time.perf_counter()
         frame = world.sense()
         sensed = time.perf_counter()

@@ -8,8 +8,10 @@ from collections.abc import Iterator
 from allocation.geometry import TAROT_T960
 from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import Measurement, Reference
+from sim.faults.fault import Fault
+from sim.faults.rotors import Derate
+from sim.faults.schedule import FaultSchedule
 from sim.flight.closed_loop import make_pilot
-from sim.flight.faults import Derate, Fault, FaultSchedule
 from sim.flight.jobs import Job, PaintJob, PressJob
 from sim.flight.options import FlightOptions, pilot_config
 from sim.flight.surroundings import World
@@ -78,7 +80,7 @@ def flown_ticks(scene: Scene, seed: int, job: Job, faults: tuple[Fault, ...], re
     pilot, world = make_pilot(scene, options, config, job), World(scene, options, config)
     schedule = FaultSchedule(faults)
     for _ in range(LONGEST_FLIGHT):
-        if pilot.painter.finished or world.plant.crashed:
+        if pilot.painter.finished or world.plant.over:
             return
         schedule.tick(world, pilot)
         world.act(pilot.step(world.sense()).thrusts)

@@ -100,6 +100,7 @@ def _commands() -> dict[str, type[Command]]:
     from sim.commands.detect import Detect
     from sim.commands.experiment import ExperimentCommand
     from sim.commands.explain import Explain
+    from sim.commands.faults import Faults
     from sim.commands.paint import Paint
     from sim.commands.sweep import Sweep
     from sim.commands.tune import Tune
@@ -113,6 +114,7 @@ def _commands() -> dict[str, type[Command]]:
         "explain": Explain,
         "sweep": Sweep,
         "tune": Tune,
+        "faults": Faults,
     }
 
 

@@ -10,7 +10,9 @@ from sim.evaluate import measures
 from sim.experiments import ALL, NAMES
 from sim.experiments.spec import Experiment, Flights, Value, experiment
 from sim.experiments.variants import VARIANTS, with_force_gain
-from sim.flight.faults import Derate, Fault, WindStep
+from sim.faults.air import WindStep
+from sim.faults.fault import Fault
+from sim.faults.rotors import Derate
 from sim.flight.jobs import PaintJob, PressJob
 from sim.flight.options import FlightOptions, default_preset, pilot_config
 from sim.sweep.design import FlightPlan, Parameter, Run

@@ -6,12 +6,13 @@ import time
 from collections.abc import Callable
 
 from ibvs_qp.pilot import Pilot, PilotConfig
-from sim.flight.faults import Fault, FaultSchedule
+from sim.faults.fault import Fault
+from sim.faults.schedule import FaultSchedule
 from sim.flight.jobs import Job, PaintJob
 from sim.flight.options import FlightOptions, pilot_config
 from sim.flight.recorder import Recorder
 from sim.flight.surroundings import World
-from sim.flight.trace import CRASH, Event, Trace
+from sim.flight.trace import CRASH, LANDED, Event, Trace
 from sim.rivals import rival_controller
 from sim.sensors.features import add_sigma_vs
 from sim.world.plant import TICK_NS
@@ -57,24 +58,30 @@ def fly(
         faults: Faults and their times.
 
     Returns:
-        The trace; incomplete with a reason when the flight crashed, timed out or was interrupted.
+        The trace; incomplete with a reason when the flight crashed, landed, timed out or was interrupted.
     """
     config, job = pilot_config(scene, options, config), job or PaintJob()
     pilot, world = make_pilot(scene, options, config, job), World(scene, options, config)
-    recorder, schedule = Recorder(scene, options, world, pilot), FaultSchedule(faults)
+    recorder, schedule = Recorder(scene, options, world, pilot), FaultSchedule(faults, options.seed)
     limit = BASE_TIME + STROKE_FACTOR * job.expected_s(config.painting)
     start, reason, tick = time.perf_counter(), "", 0
     try:
-        while not pilot.painter.finished:
+        command = None
+        while not pilot.painter.finished or schedule.watching:
             for text in schedule.tick(world, pilot):
                 recorder.note(tick * TICK_NS * 1e-9, "fault", text)
             frame = world.sense()
-            command = pilot.step(frame)
+            seen = schedule.seen(frame)
+            if seen is not None or command is None:  # without a tick of the pilot its last command stays in force
+                command = pilot.step(seen or frame)
             world.act(command.thrusts)
             recorder.tick(frame, command)
             tick += 1
             if world.plant.crashed:
                 reason = f"{CRASH}: {world.plant.crashed}"
+                break
+            if world.plant.landed:
+                reason = LANDED
                 break
             if tick * TICK_NS * 1e-9 > limit:
                 reason = f"time-out after {limit:.0f} s of flight"

@@ -12,6 +12,8 @@ from sim.world.scene import Scene
 
 #: Beginning of the reason of a flight that ended in a crash.
 CRASH = "crash"
+#: Reason of a flight that ended in a touchdown.
+LANDED = "landed"
 #: Meaning of every array of a trace (N control ticks, M physics steps, F pictures).
 FIELDS = {
     "t": "(N,) time since start [s]",

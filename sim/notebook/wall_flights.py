@@ -133,7 +133,7 @@ def record_flight(task: WallTask) -> RecordedFlight:
     )
     controller, ticks, records, stamps, thrusts = pilot.controller, [], [], [], []
     assert isinstance(controller, HybridController)
-    while not world.plant.crashed:
+    while not world.plant.over:
         frame = world.sense()
         command = pilot.step(frame)
         if pilot.painter.finished or pilot.painter.phase in ("retreat", "done"):

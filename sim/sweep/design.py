@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 from ibvs_qp.pilot import PilotConfig
-from sim.flight.faults import Fault
+from sim.faults.fault import Fault
 from sim.flight.jobs import Job, PaintJob
 from sim.flight.options import FlightOptions
 from sim.flight.trace import Trace

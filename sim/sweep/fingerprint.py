@@ -17,7 +17,7 @@ from ibvs_qp.config.settings import to_dict
 from sim.sweep.design import Block, Run
 
 #: Folders of `sim` that only describe or draw results: a change there needs no new flight.
-_AFTER_THE_FLIGHT = ("figures", "commands", "experiments", "notebook", "report", "tune")
+_AFTER_THE_FLIGHT = ("figures", "commands", "experiments", "fault_matrix", "notebook", "report", "tune")
 #: Suffixes of source files.
 _SOURCES = (".py", ".c", ".h")
 #: Hexadecimal digits of a hash: 64 bit.

@@ -50,13 +50,23 @@ def set_contact(model: mujoco.MjModel, *, stiffness: float, damping: float, fric
         damping: Contact damping [N s/m].
         friction: Coulomb coefficient mu [-].
     """
-    pair = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_PAIR, _PAIR)
-    bodies = model.geom_bodyid[[model.pair_geom1[pair], model.pair_geom2[pair]]]
-    inverse_mass = float(model.body_invweight0[bodies, 0].sum())
-    scale = (1.0 - IMPEDANCE) * inverse_mass
+    pair, scale = _pair(model)
     model.pair_solref[pair] = (-stiffness * scale, -damping * scale)
     # Friction rows have no position error, so only their damping acts; MuJoCo divides it by the impedance.
     model.pair_solreffriction[pair] = (-STICK_RATE * IMPEDANCE, -STICK_RATE * IMPEDANCE)
     model.pair_solimp[pair] = (IMPEDANCE, IMPEDANCE, 0.001, 0.5, 2.0)
     model.pair_friction[pair] = (friction, friction, 0.0, 0.0, 0.0)
     model.pair_margin[pair] = model.pair_gap[pair] = 0.0
+
+
+def contact_stiffness(model: mujoco.MjModel) -> float:
+    """Stiffness K of a model's contact pair [N/m]."""
+    pair, scale = _pair(model)
+    return -float(model.pair_solref[pair, 0]) / scale
+
+
+def _pair(model: mujoco.MjModel) -> tuple[int, float]:
+    """Index of the contact pair, and MuJoCo's numbers over physical stiffness and damping [1/kg]."""
+    pair = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_PAIR, _PAIR)
+    bodies = model.geom_bodyid[[model.pair_geom1[pair], model.pair_geom2[pair]]]
+    return pair, (1.0 - IMPEDANCE) * float(model.body_invweight0[bodies, 0].sum())

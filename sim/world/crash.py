@@ -1,4 +1,4 @@
-"""Crash conditions: propeller strike, ground contact, flip, non-finite state."""
+"""End of a flight by the truth: propeller strike, ground contact, flip, non-finite state, or a touchdown."""
 
 from __future__ import annotations
 
@@ -15,6 +15,24 @@ FLIP_DEG = 60.0
 
 #: The same as the least cosine of the tilt.
 FLIP_COSINE = math.cos(math.radians(FLIP_DEG))
+
+#: Fastest sink at ground contact that is a touchdown [m/s]: a fall from 18 mm, which legs take; PX4 lands at 0.7 m/s.
+TOUCHDOWN_SINK_M_S = 0.6
+#: Largest tilt of a touchdown [deg]: the largest that is assured in flight, far from where a vehicle on legs tips over.
+TOUCHDOWN_TILT_DEG = 15.0
+_TOUCHDOWN_COSINE = math.cos(math.radians(TOUCHDOWN_TILT_DEG))
+
+
+def has_landed(position: Sequence[float], rotation: Sequence[Sequence[float]], sink: float) -> bool:
+    """Whether a vehicle touches the ground slowly and level: a landing, not a crash.
+
+    Args:
+        position: Body origin, world NED [m], (3,).
+        rotation: Rows of the rotation B to I, (3, 3).
+        sink: Its velocity downwards [m/s].
+    """
+    level, low = rotation[2][2] >= _TOUCHDOWN_COSINE, position[2] > -GROUND_CLEARANCE_M
+    return low and level and sink <= TOUCHDOWN_SINK_M_S
 
 
 def crash_reason(

@@ -13,7 +13,7 @@ from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.model.bound_function import BoundFunction
 from sim.world.board import BoardGeometry
 from sim.world.clearance import PropellerClearance
-from sim.world.crash import crash_reason
+from sim.world.crash import crash_reason, has_landed
 from sim.world.errors import RotorErrors
 from sim.world.mjcf import STEPS_PER_TICK, build_model
 from sim.world.mujoco_frames import FLIP, FLIP_QUATERNION
@@ -31,7 +31,7 @@ TICK_NS = 4_000_000
 
 #: Crash reason after a non-finite command; physics stops from then on.
 NOT_FINITE = "non-finite thrust command"
-_SAFE = PLACES["safe"].start
+_SAFE, _SINK = PLACES["safe"].start, PLACES["velocity"].stop - 1
 
 
 class Plant(PlantReadings):
@@ -44,7 +44,10 @@ class Plant(PlantReadings):
     Attributes:
         time_ns: Simulated time since the start [ns].
         crashed: Why the flight is over (propeller strike, ground, flip, non-finite state), or None.
+        landed: Whether it is over because the vehicle touched down.
         wind: The air; its mean may be changed in flight.
+        gain: True over commanded thrust of every rotor, (n,); may be changed in flight.
+        outer_force: Force at the true centre of mass beside that of the air, world NED [N], or None.
         truth: Present readings, see `sim.world.readout.PLACES`; a view, valid until the next tick, read-only.
 
     Args:
@@ -72,6 +75,8 @@ class Plant(PlantReadings):
         self._factors = ThrustFactors(rotors, count, TICK_NS * 1e-9, seed) if rotors != RotorErrors() else None
         self.time_ns = 0
         self.crashed: str | None = None
+        self.landed = False
+        self.outer_force: tuple[float, float, float] | None = None
         self._bind()
         self._start(*start_pose(scene, self.vehicle, seed), hover_thrusts(self.vehicle))
 
@@ -89,7 +94,7 @@ class Plant(PlantReadings):
             (self.truth,),
         )
         self._wanted, self._air, self._lags = np.zeros(model.nu), np.zeros(3), np.zeros(model.nu)
-        self._gain = np.array(truth.thrust_gain)
+        self.gain = np.array(np.broadcast_to(truth.thrust_gain, model.nu), float)
         self._lag = model.actuator_dynprm[:, 0]
         lags = np.array((truth.motor_lag_up_s, truth.motor_lag_down_s))
         # Moment arm from the bare vehicle's centre of mass, where MuJoCo applies forces, to the whole one's.
@@ -120,16 +125,30 @@ class Plant(PlantReadings):
         if self.crashed == NOT_FINITE or not math.isfinite(sum(thrusts.tolist())):
             self.crashed, self.time_ns = self.crashed or NOT_FINITE, self.time_ns + TICK_NS
             return
-        wanted = thrusts * self._gain
+        wanted = thrusts * self.gain
         self._wanted[:] = wanted if self._factors is None else wanted * self._factors.next()
         self._air[:] = self.wind.force(self._centre_velocity.tolist())
+        if self.outer_force is not None:
+            self._air += self.outer_force
         self._drive()
         self._lag[:] = self._lags
         mujoco.mj_step(self.model, self.data, STEPS_PER_TICK)
         self.time_ns += TICK_NS
         self._read()
-        if self.truth.item(_SAFE) != 1.0 and self.crashed is None:
-            self.crashed = crash_reason(self.position.tolist(), self.rotation.tolist(), self.clearance)
+        if self.truth.item(_SAFE) != 1.0 and not self.over:
+            position, rotation = self.position.tolist(), self.rotation.tolist()
+            self.landed = has_landed(position, rotation, self.truth.item(_SINK))
+            self.crashed = None if self.landed else crash_reason(position, rotation, self.clearance)
+
+    @property
+    def over(self) -> bool:
+        """Whether the flight is over: crashed or landed."""
+        return self.landed or self.crashed is not None
+
+    def displace(self, offset: np.ndarray) -> None:
+        """Move the vehicle at once by an offset in the world, NED [m], (3,): as if everything else had moved back."""
+        self.data.qpos[:3] += FLIP * offset
+        self._read()
 
     @property
     def thrust_limits(self) -> tuple[np.ndarray, np.ndarray]:

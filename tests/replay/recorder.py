@@ -32,7 +32,8 @@ IMAGE_SIZE, PICTURE_RATE_HZ = (424, 240), 10.0
 def fly(name: str, case: Case) -> Recording:
     """Fly a case in the closed loop and keep what went into pilot and controller."""
     from sim.experiments.scenes import near_wall
-    from sim.flight.faults import Derate, FaultSchedule
+    from sim.faults.rotors import Derate
+    from sim.faults.schedule import FaultSchedule
     from sim.flight.options import FlightOptions, pilot_config
     from sim.flight.surroundings import World
 

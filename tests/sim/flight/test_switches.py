@@ -15,8 +15,8 @@ from ibvs_qp.analytic import PaperController
 from ibvs_qp.command import Outcome
 from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import Reference
+from sim.faults.rotors import Derate
 from sim.flight.closed_loop import fly
-from sim.flight.faults import Derate
 from sim.flight.options import FlightOptions
 
 LAWS = [HybridController, PaperController]

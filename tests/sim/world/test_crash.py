@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import pytest
 from plants import at_rest
 
 from ibvs_qp.config.vehicle import VehicleParams
@@ -58,6 +59,17 @@ def test_clearance_against_dense_sampling_of_the_discs():
         assert outer - 1e-4 <= found <= inner + spacing
         near_board += found < 0.08 - clearance.foremost(position, rotation) - 1e-6
     assert near_board > 5
+
+
+@pytest.mark.parametrize(
+    ("sink", "roll_deg", "end"),
+    [(0.55, 0.0, "landed"), (0.3, 14.0, "landed"), (0.65, 0.0, "hit the ground"), (0.3, 16.0, "hit the ground")],
+)
+def test_a_slow_level_touchdown_is_a_landing_and_no_crash(sink, roll_deg, end):
+    plant = at_rest(Plant(Scene()), np.array([-2.0, 0.0, -0.151]), (math.radians(roll_deg), 0.0, 0.0))
+    plant.data.qvel[2] = -sink
+    plant.step(plant.thrusts_actual)
+    assert plant.over and plant.landed == (end == "landed") and plant.crashed == (None if plant.landed else end)
 
 
 def test_ground_flip_and_bad_numbers_end_the_flight():

@@ -1,4 +1,4 @@
-"""Faults in flight: their time, their effect on the plant, and the limits reported to the pilot."""
+"""The camera's mount of the true vehicle, and the press job."""
 
 from __future__ import annotations
 
@@ -9,10 +9,8 @@ from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import rotation_from_quaternion
 from ibvs_qp.measurement import RgbdFrame
-from sim.evaluate.measures.loss import loss_figures
 from sim.experiments.scenes import near_wall
-from sim.flight.closed_loop import fly, make_pilot
-from sim.flight.faults import Derate, FaultSchedule, WindStep
+from sim.flight.closed_loop import fly
 from sim.flight.jobs import PressJob
 from sim.flight.options import FlightOptions, pilot_config
 from sim.flight.surroundings import World
@@ -22,66 +20,6 @@ from sim.world.scene import Scene
 from sim.world.true_vehicle import true_vehicle
 
 OPTIONS = FlightOptions(features="geometric", video=False)
-
-
-def world_and_pilot():
-    scene = near_wall()
-    config = pilot_config(scene, OPTIONS)
-    return World(scene, OPTIONS, config), make_pilot(scene, OPTIONS, config, PressJob())
-
-
-def test_a_fault_strikes_once_when_its_time_has_come():
-    world, pilot = world_and_pilot()
-    schedule = FaultSchedule((Derate(after="start", delay_s=0.1, rotor="mid_right", share=0.5),))
-    struck = []
-    for tick in range(50):
-        if schedule.tick(world, pilot):
-            struck.append(tick)
-        world.act(pilot.step(world.sense()).thrusts)
-    assert struck == [25]
-    low, high = world.plant.thrust_limits
-    assert high == pytest.approx([26.28, *[52.56] * 5]) and low == pytest.approx(1.2)
-    assert pilot.measurement is not None and pilot.measurement.thrust_max is not None
-    assert pilot.measurement.thrust_max == pytest.approx(high)
-
-
-def test_an_untold_fault_changes_the_plant_alone():
-    world, pilot = world_and_pilot()
-    Derate(rotor="mid_left", share=0.3, reported=False).strike(world, pilot)
-    assert pilot.thrust_limits is None
-    assert world.plant.thrust_limits[1][1] == pytest.approx(0.3 * 52.56)
-
-
-def test_a_stopped_rotor_gives_nothing_and_the_wall_is_given_up():
-    world, pilot = world_and_pilot()
-    Derate(rotor="rear_left", share=0.0).strike(world, pilot)
-    assert pilot.step(world.sense()).mode == "free" and pilot.painter.phase == "retreat"
-    for _ in range(200):
-        world.plant.step(np.full(6, 11.0))
-    assert world.plant.thrusts_actual[5] == pytest.approx(0.0, abs=1e-3)
-
-
-@pytest.mark.parametrize("rotor", ["front_left", pytest.param("mid_right", marks=pytest.mark.slow)])
-def test_a_vehicle_that_loses_a_rotor_while_pressing_leaves_the_wall_and_comes_down(rotor):
-    """The issue's figures; front_left leaves a force of 8 N towards the wall unless the vehicle tilts."""
-    fault = Derate(delay_s=1.0, rotor=rotor, share=0.0)
-    trace = fly(near_wall(), OPTIONS, job=PressJob(hold_s=8.0, descend_s=5.0), faults=(fault,))
-    figures = loss_figures(trace)
-    # Touch, ramp, loss of the rotor and the phases since: no thrust ever steps farther than the rate limit.
-    assert np.abs(np.diff(trace.thrusts[1:], axis=0)).max() <= 500.0 * 0.004 + 1e-6
-    assert trace.completed, trace.reason
-    assert figures["survived_s"] >= 4.99 and figures["detached"] == 1.0
-    assert figures["tilt_peak_deg"] <= 25.0 and 0.0 < figures["descent_peak_m_s"] <= 1.5
-
-
-def test_wind_pushes_from_the_step_on():
-    world, pilot = world_and_pilot()
-    text = WindStep(mean_m_s=(0.0, 8.0, 0.0)).strike(world, pilot)
-    for _ in range(25):
-        world.act(pilot.step(world.sense()).thrusts)
-    # 0.9 N per m/s of airspeed on 6 kg: 1.2 m/s^2 for 0.1 s, less what the pilot does against it.
-    assert 0.06 < world.plant.velocity[1] < 0.13
-    assert "wind steps" in text
 
 
 def test_press_job_holds_as_long_as_asked_whatever_the_push_does():

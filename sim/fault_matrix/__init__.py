@@ -1,0 +1,1 @@
+"""The fault matrix: every fault in contact and free, with and without the supervisor, judged and reported."""

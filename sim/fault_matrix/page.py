@@ -1,0 +1,157 @@
+"""The page of the fault matrix as Markdown; every number comes from the table of flights."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from ibvs_qp.config.vehicle import VehicleParams
+from sim.evaluate.table import markdown
+from sim.fault_matrix.attainable import Hover, in_words
+from sim.fault_matrix.criteria import (
+    ADVANCE_M,
+    LEAVE_S,
+    PUSH_N,
+    PUSH_RATIO,
+    SPEED_M_S,
+    TILT_CONTACT_DEG,
+    TILT_DEG,
+)
+from sim.fault_matrix.verdict import Judged, Verdict
+from sim.faults.scenario import WATCH_S
+
+#: Most failures that are listed for a row at a place.
+LISTED = 3
+_CRITERIA = """\
+A flight passes when no exception is raised; the thrusts of every tick are finite, within {low:g} to {high:g} N, and
+change by at most {rate:g} N/s; the vehicle does not crash (a slow level touchdown is a landing); by the truth its tilt
+stays within {tilt:g} deg ({contact:g} in contact) unless a rotor is lost, its push at 1 kHz within {ratio:g} times the
+reference and {push:g} N, its speed within {speed:g} m/s; the expected state is reached in time, every change of state
+has a reason, a job that must be completed is, and a vehicle that must retreat has left the wall {leave:g} s after the
+latest begin of the retreat and advanced by at most {advance:g} m. The flight goes on for {watch:g} s after the fault,
+whatever the strategy does.
+"""
+_LEGEND = """\
+*place*: in contact in the middle of the stroke, or free on the way to the wall. *passed*: flights with the supervisor.
+Tilt, push, speed and the time from the fault to the retreat are the worst of these flights (of the control flights
+where none was flown). *state*: most severe states reached. *control fails*: flights without the supervisor that break a
+criterion, and which; **bold** where they must and do not. †: no law could save the vehicle; only commands and states
+are judged.
+"""
+_ATTAINABLE = """\
+Least tilt at which the rotors carry the weight with no roll and pitch moment, by the facets of the attainable wrench
+set (`allocation/hover_tilt.py`), for the worst rotor. Where there is none up to 60 deg, no law can hold the vehicle in
+the air.
+"""
+_HEADS = ("fault", "place", "passed", "tilt deg", "push N", "speed m/s", "retreat s", "state", "control fails", "by")
+
+
+def page(verdicts: Sequence[Verdict], hovers: Sequence[Hover], lead: str, command: str, vehicle: VehicleParams) -> str:
+    """Markdown text of the page.
+
+    Args:
+        verdicts: The rows.
+        hovers: What faults of rotors leave.
+        lead: A sentence on what was flown.
+        command: Command that repeats it.
+        vehicle: Limits of the thrusts.
+    """
+    text = (
+        f"# Fault matrix\n\nGenerated from data by `{command}` (`sim/fault_matrix`); do not edit. {lead}\n\n"
+        f"{_criteria(vehicle)}\n## Verdict\n\n{_summary(verdicts)}\n## Rows\n\n{_LEGEND}\n{_table(verdicts)}"
+    )
+    chapters = {
+        "Flights that failed": _failures(verdicts),
+        "Rows that prove nothing": _idle(verdicts),
+        "What the rotors can still do": _hovers(hovers, verdicts),
+    }
+    return text + "".join(f"\n## {title}\n\n{chapter}" for title, chapter in chapters.items() if chapter)
+
+
+def _criteria(vehicle: VehicleParams) -> str:
+    return _CRITERIA.format(
+        low=float(vehicle.thrust_min[0]),
+        high=float(vehicle.thrust_max[0]),
+        rate=vehicle.thrust_rate_n_s,
+        tilt=TILT_DEG,
+        contact=TILT_CONTACT_DEG,
+        ratio=PUSH_RATIO,
+        push=PUSH_N,
+        speed=SPEED_M_S,
+        leave=LEAVE_S,
+        advance=ADVANCE_M,
+        watch=WATCH_S,
+    )
+
+
+def _summary(verdicts: Sequence[Verdict]) -> str:
+    flown = [verdict for verdict in verdicts if verdict.flown.n]
+    must = [verdict for verdict in verdicts if verdict.expected.control_fails and verdict.control.n]
+    lines = []
+    if flown:
+        flights, passed = sum(each.flown.n for each in flown), sum(each.flown.passed for each in flown)
+        met = sum(each.met for each in flown)
+        lines.append(f"With the supervisor {met} of {len(flown)} rows pass ({passed} of {flights} flights).")
+    if must:
+        proved = sum(not each.proves_nothing for each in must)
+        lines.append(f"Without it {proved} of the {len(must)} rows that must fail do.")
+    return " ".join(lines) + "\n"
+
+
+def _table(verdicts: Sequence[Verdict]) -> str:
+    return markdown(_HEADS, [_row(verdict) for verdict in verdicts], left=2)
+
+
+def _row(verdict: Verdict) -> tuple[str, ...]:
+    flown, control = verdict.flown, verdict.control
+    shown = flown if flown.n else control
+    passed = f"{flown.passed}/{flown.n}" if flown.n else "–"
+    fails = f"{control.n - control.passed}/{control.n}" if control.n else "–"
+    return (
+        verdict.row.name + (" †" if verdict.row.beyond else ""),
+        verdict.place,
+        passed if verdict.met else f"**{passed}**",
+        *(_number(shown.worst[name], 1) for name in ("tilt_peak_deg", "push_peak_n")),
+        _number(shown.worst["speed_peak_m_s"], 2),
+        _number(shown.retreat_s, 2),
+        ", ".join(flown.states),
+        f"**{fails}**" if verdict.proves_nothing else fails,
+        "; ".join(control.how[:LISTED]),
+    )
+
+
+def _number(value: float, digits: int) -> str:
+    return f"{value:.{digits}f}" if math.isfinite(value) else "–"
+
+
+def _failures(verdicts: Sequence[Verdict]) -> str:
+    lines = []
+    for verdict in verdicts:
+        for world, seed, criteria in verdict.flown.failures[:LISTED]:
+            what = "; ".join(criterion.text for criterion in criteria)
+            lines.append(f"- {verdict.row.name}, {verdict.place}, {world}, seed {seed}: {what}\n")
+        if (more := len(verdict.flown.failures) - LISTED) > 0:
+            lines.append(f"- {verdict.row.name}, {verdict.place}: {more} more\n")
+    return "".join(lines)
+
+
+def _idle(verdicts: Sequence[Verdict]) -> str:
+    idle = [verdict for verdict in verdicts if verdict.proves_nothing]
+    if not idle:
+        return ""
+    lines = (f"- {verdict.row.name}, {verdict.place} ({_ends(verdict.control)})\n" for verdict in idle)
+    return "Their control flights must fail, and pass:\n\n" + "".join(lines)
+
+
+def _ends(judged: Judged) -> str:
+    return "; ".join(judged.ends)
+
+
+def _hovers(hovers: Sequence[Hover], verdicts: Sequence[Verdict]) -> str:
+    if not hovers:
+        return ""
+    rows = [(hover.row, hover.world, in_words(hover.turning), in_words(hover.heading)) for hover in hovers]
+    heads = ("fault", "world", "least tilt, may turn, deg", "least tilt, heading held, deg")
+    beyond = {verdict.row.name: verdict.row.beyond for verdict in verdicts if verdict.row.beyond}
+    reasons = "".join(f"\n† {name}: {reason}.\n" for name, reason in beyond.items())
+    return f"{_ATTAINABLE}\n{markdown(heads, rows, left=2)}{reasons}"

@@ -1,0 +1,1 @@
+"""Faults in flight: of sensors, plant, clock and solver."""

@@ -1,0 +1,89 @@
+"""Faults of the inertial unit: gyro, accelerometer and attitude estimate."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ibvs_qp.config.settings import choice, setting
+from ibvs_qp.measurement import SensorFrame
+from sim.faults.fault import FrameFilter, SensorFault
+from sim.sensors.small_turns import multiply
+
+#: What the unit delivers, with the entries of each.
+OUTPUTS = {"attitude": 4, "angular_velocity": 3, "specific_force": 3}
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImuStuck(SensorFault):
+    """The same values again and again, with fresh stamps."""
+
+    def filter(self, rng: np.random.Generator) -> FrameFilter:
+        """Repeat the values of the first frame."""
+        last: dict[str, Any] = {}
+
+        def stuck(frame: SensorFrame) -> SensorFrame:
+            if not last:
+                last.update({name: getattr(frame, name).copy() for name in OUTPUTS})
+            return dataclasses.replace(frame, **last)
+
+        return stuck
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImuNan(SensorFault):
+    """Values that are no numbers."""
+
+    output: str = choice("all", "what is no number", ("all", *OUTPUTS))
+
+    def filter(self, rng: np.random.Generator) -> FrameFilter:
+        """NaN in every entry."""
+        bad: dict[str, Any] = {
+            name: np.full(size, math.nan) for name, size in OUTPUTS.items() if self.output in ("all", name)
+        }
+        return lambda frame: dataclasses.replace(frame, **bad)
+
+
+@dataclass(frozen=True, kw_only=True)
+class GyroBias(SensorFault):
+    """A rate is added; the attitude estimate stays as it is."""
+
+    rate_deg_s: tuple[float, float, float] = setting((3.0, 0.0, 0.0), "FRD", unit="deg/s", low=-360.0, high=360.0)
+
+    def filter(self, rng: np.random.Generator) -> FrameFilter:
+        """Add it."""
+        bias = np.radians(self.rate_deg_s)
+        return lambda frame: dataclasses.replace(frame, angular_velocity=frame.angular_velocity + bias)
+
+
+@dataclass(frozen=True, kw_only=True)
+class AttitudeStep(SensorFault):
+    """The attitude estimate is turned."""
+
+    turn_deg: tuple[float, float, float] = setting((3.0, 0.0, 0.0), "roll, pitch, yaw", unit="deg", low=-90, high=90)
+
+    def filter(self, rng: np.random.Generator) -> FrameFilter:
+        """Turn it in the body's axes, one angle after the other."""
+        turn = (1.0, 0.0, 0.0, 0.0)
+        for axis, degrees in enumerate(self.turn_deg):
+            half = 0.5 * math.radians(degrees)
+            about = [math.cos(half), 0.0, 0.0, 0.0]
+            about[axis + 1] = math.sin(half)
+            turn = multiply(turn, about)
+        return lambda frame: dataclasses.replace(frame, attitude=np.array(multiply(frame.attitude.tolist(), turn)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class AccelerometerBias(SensorFault):
+    """A specific force is added."""
+
+    force_m_s2: tuple[float, float, float] = setting((0.5, 0.0, 0.0), "FRD", unit="m/s^2", low=-100.0, high=100.0)
+
+    def filter(self, rng: np.random.Generator) -> FrameFilter:
+        """Add it."""
+        bias = np.array(self.force_m_s2)
+        return lambda frame: dataclasses.replace(frame, specific_force=frame.specific_force + bias)

@@ -1,0 +1,26 @@
+"""Every kind of fault by its name, as scenarios name it."""
+
+from __future__ import annotations
+
+from sim.faults.air import SidePush, WindStep
+from sim.faults.camera import CameraFrozen, CameraJitter, CameraLatency, CameraLost, CameraReordered
+from sim.faults.clock import ClockLeap, LoopStall, SlowLoop, TicksSkipped
+from sim.faults.fault import Fault
+from sim.faults.features import DepthFlipped, FeatureNan, LinesLost, PlaneLost, WrongLines
+from sim.faults.force_torque import ForceTorqueBias, ForceTorqueLost, ForceTorqueNan, ForceTorqueStuck, ForceTorqueZero
+from sim.faults.imu import AccelerometerBias, AttitudeStep, GyroBias, ImuNan, ImuStuck
+from sim.faults.rotors import Derate, RotorStuck, ThrustLoss
+from sim.faults.solver import SolverInfeasible, SolverSilent
+from sim.faults.wall import BoardMoved, OtherWall
+
+KINDS: dict[str, type[Fault]] = {
+    kind.__name__: kind
+    for kind in (
+        CameraLost, CameraLatency, CameraJitter, CameraReordered, CameraFrozen,
+        PlaneLost, LinesLost, WrongLines, DepthFlipped, FeatureNan,
+        ForceTorqueLost, ForceTorqueStuck, ForceTorqueNan, ForceTorqueZero, ForceTorqueBias,
+        ImuStuck, ImuNan, GyroBias, AttitudeStep, AccelerometerBias,
+        Derate, RotorStuck, ThrustLoss, WindStep, SidePush, OtherWall, BoardMoved,
+        ClockLeap, LoopStall, SlowLoop, TicksSkipped, SolverInfeasible, SolverSilent,
+    )
+}  # fmt: skip
