@@ -102,7 +102,6 @@ class Assured:
             image_ns=self._lines_ns,
             inertial=(attitude, rate, None if force is None else force.tolist()),
             wrench=checked.contact_wrench.tolist(),
-            picture=None,
             down=down,
             rate=rate,
             speed=speed,

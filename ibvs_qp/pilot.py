@@ -170,7 +170,6 @@ class Pilot:
         self._covariance = self.motion.velocity_variance * np.eye(3)
         self._plane: tuple[float, float, float, float] | None = None
         self._plane_stamp = self._image_stamp = self._imu_stamp = -1
-        self._picture: object = None
         self.thrust_limits: tuple[np.ndarray, np.ndarray] | None = None
         self.percept = None
         self.measurement: Measurement | None = None
@@ -281,7 +280,6 @@ class Pilot:
             faults[Fault.NO_HOVER] = ""
         if not any(name in self._gate.replaced for name in _INERTIAL):
             self._imu_stamp = frame.stamp_ns
-        picture, self._picture = self._picture, None
         right, down = motion.state[0:2]
         return Tick(
             stamp_ns=frame.stamp_ns,
@@ -291,7 +289,6 @@ class Pilot:
             image_ns=self._image_stamp,
             inertial=(now["attitude"], now["angular_velocity"], now["specific_force"]),
             wrench=now["wrench"],
-            picture=picture,
             down=down_in_body(self._attitude),
             rate=self._rate,
             speed=math.hypot(right, down, contact.speed),
@@ -324,9 +321,9 @@ class Pilot:
         features = frame.features if frame.image is None else self._process(frame.image)
         if features is None or not 0 <= self._stamp - features.stamp_ns <= self.config.camera.latest_s * 1e9:
             return None
-        self._image_stamp, self._picture = features.stamp_ns, _content(frame, features)
-        if Fault.IMAGE_FROZEN in self.assurance.faults:
+        if not self.assurance.is_news(_content(frame, features)):
             return None
+        self._image_stamp = features.stamp_ns
         if features.plane is not None:
             self._plane, self._plane_stamp = features.plane, features.stamp_ns
         return features
@@ -425,12 +422,13 @@ class Pilot:
         elif self.assurance.state not in _FLYING and not self.painter.failed:
             self.painter.abandon(inputs, "; ".join(self.assurance.supervisor.reasons))
         target = self.painter.step(inputs)
-        self.rotor_loss.move_trim(dt)
-        if not self.rotor_loss.lost:
+        rotors = self.rotor_loss
+        if not (rotors.lost or rotors.limited):
             return target
         normal = np.array(contact.normal)
         away = contact.distance + float(normal @ self._tip)
-        return dataclasses.replace(target, tilt=self.rotor_loss.tilt(away, contact.speed, motion.state[0], normal, dt))
+        tilt = rotors.tilt(away, contact.speed, motion.state[0], normal, dt)
+        return dataclasses.replace(target, tilt=tilt) if rotors.lost else dataclasses.replace(target, trim=tilt)
 
     def _thrust_limits(self) -> tuple[np.ndarray, np.ndarray] | None:
         """Limits reported by the drive, within those of rotors that do not follow."""
@@ -459,7 +457,7 @@ class Pilot:
             contact=target.contact,
             tilt=target.tilt,
             travel=target.travel,
-            trim=self.rotor_loss.trim,
+            trim=target.trim,
         )
 
     def _measure(

@@ -15,7 +15,7 @@ from ibvs_qp.measurement import FeatureFrame
 #: Order of the filter's state: rotation since the failure [rad], rate [rad/s], unmodelled acceleration [rad/s^2].
 ANGLE, RATE, BIAS = 0, 3, 6
 #: Spectral densities: of the rate by the motors' model [rad^2/s^3], and of what that model lacks [rad^2/s^5].
-RATE_NOISE, BIAS_NOISE = 0.2**2, 0.1**2
+RATE_NOISE, BIAS_NOISE = 0.05**2, 0.03**2
 #: Standard deviations at the failure: attitude [rad], rate [rad/s], unmodelled acceleration [rad/s^2].
 ANGLE_STD, RATE_STD, BIAS_STD = 2e-3, 0.01, 0.3
 #: Standard deviations of what remains: attitude and plane or line of a picture [rad], gyro [rad/s].

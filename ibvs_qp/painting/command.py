@@ -56,6 +56,7 @@ class PaintingCommand:
         guides: Lines to follow, each with its target offset [m].
         push: Push [N].
         tilt: Roll and pitch [rad], (2,).
+        trim: Roll and pitch of a vehicle with a limited rotor, flown like level [rad], (2,).
         travel: Velocity along the wall that is planned at this push (right, down) [m/s], (2,).
     """
 
@@ -66,3 +67,4 @@ class PaintingCommand:
     push: float
     tilt: np.ndarray = field(default_factory=lambda: ZERO)
     travel: np.ndarray = field(default_factory=lambda: ZERO)
+    trim: np.ndarray = field(default_factory=lambda: ZERO)

@@ -81,7 +81,11 @@ class Assurance:
     @property
     def limits(self) -> tuple[np.ndarray, np.ndarray] | None:
         """Lower and upper thrust limits [N], (n,) each, of rotors that do not follow; None while all do."""
-        return self._rotors.limits
+        return self._rotors.limits if self.settings.supervise else None
+
+    def is_news(self, picture: object) -> bool:
+        """Whether a picture differs from the last one, if the camera has noise; one that repeats shows nothing."""
+        return self._samples.add_picture(picture) or not self.settings.supervise
 
     def watch(self, tick: Tick, response: Response) -> SafetyState:
         """Compare one tick with all bounds.
@@ -133,7 +137,7 @@ class Assurance:
     def wrench(self, response: Response) -> np.ndarray | None:
         """Contact wrench by inertial data [N, N m], (6,), in place of a faulty sensor's; None while that is good."""
         last = self._last
-        if last is None or not any(fault in self.faults for fault in _WRENCH):
+        if last is None or not self.settings.supervise or not any(fault in self.faults for fault in _WRENCH):
             return None
         force = -max(response.inertial_push, 0.0) * np.array(last.contact.normal)
         return np.concatenate((force, np.cross(self._tip, force)))

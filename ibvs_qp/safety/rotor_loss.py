@@ -24,6 +24,8 @@ TILT_BOUND = math.radians(20.0)
 TILT_RATE = math.radians(40.0)
 #: Speed away from the wall [m/s] and distance of the centre of mass at which the retreat ends [m].
 ESCAPE_SPEED, ESCAPE_DISTANCE = 0.6, 1.8
+#: Speed with a rotor that is only limited [m/s].
+TRIMMED_SPEED = 0.15
 #: Distance error to speed [1/s] and velocity error to acceleration [1/s].
 DISTANCE_GAIN, VELOCITY_GAIN = 1.0, 1.5
 #: Largest commanded acceleration [m/s^2]: 7 deg of tilt beside the trim.
@@ -42,7 +44,7 @@ class RotorLoss:
 
     Attributes:
         lost: Whether the present limits leave no hover near level.
-        trim: Attitude of a hover near level, rate limited [rad], (2,).
+        limited: Whether they leave one near level, at an attitude of its own.
     """
 
     def __init__(self, vehicle: VehicleParams) -> None:
@@ -52,7 +54,7 @@ class RotorLoss:
 
     def reset(self) -> None:
         """All rotors as configured."""
-        self.lost, self.trim = False, np.zeros(2)
+        self.lost = self.limited = False
         self._trim, self._tilt, self._limits = np.zeros(2), np.zeros(2), b""
 
     def update(self, limits: tuple[np.ndarray, np.ndarray] | None) -> bool:
@@ -70,16 +72,13 @@ class RotorLoss:
         short = math.hypot(front, right) > LATERAL_SHORTFALL
         self._trim = np.array((math.atan2(-right, -down), math.atan2(front, -down))) if short else np.zeros(2)
         self.lost = math.hypot(*self._trim) > LARGEST_TRIM
+        self.limited = short and not self.lost
         return self.lost and not before
-
-    def move_trim(self, dt: float) -> None:
-        """Move the trim by one tick of ``dt`` [s]."""
-        target, step = np.zeros(2) if self.lost else self._trim, TILT_RATE * dt
-        if (self.trim != target).any():
-            self.trim = self.trim + np.clip(target - self.trim, -step, step)
 
     def tilt(self, distance: float, closing: float, along: float, normal: np.ndarray, dt: float) -> np.ndarray:
         """Commanded roll and pitch [rad], (2,): the trim of the remaining force plus the retreat from the wall.
+
+        A limited rotor leaves one force along the wall or its normal free; tilting controls it.
 
         Args:
             distance: Centre of mass to wall [m].
@@ -88,7 +87,8 @@ class RotorLoss:
             normal: Unit vector into the wall, in B, (3,).
             dt: Time since the last call [s].
         """
-        retreat = min(max(DISTANCE_GAIN * (ESCAPE_DISTANCE - distance), -ESCAPE_SPEED), ESCAPE_SPEED)
+        fastest = ESCAPE_SPEED if self.lost else TRIMMED_SPEED
+        retreat = min(max(DISTANCE_GAIN * (ESCAPE_DISTANCE - distance), -fastest), fastest)
         away, back = np.clip(
             (VELOCITY_GAIN * (retreat + closing), -VELOCITY_GAIN * along), -ACCELERATION_BOUND, ACCELERATION_BOUND
         )

@@ -52,7 +52,6 @@ class Tick:
         wrench_ns, plane_ns, image_ns: Stamps of the last accepted samples.
         inertial: Attitude, gyro and accelerometer as measured; anything that differs from sample to sample.
         wrench: Force sample as measured, likewise.
-        picture: Content of a new picture, likewise; None without a new one.
         down: Unit gravity in B, (3,).
         rate: Angular velocity [rad/s], (3,).
         speed: Estimated speed [m/s], NaN if unknown.
@@ -71,7 +70,6 @@ class Tick:
     image_ns: int
     inertial: object
     wrench: object
-    picture: object
     down: Sequence[float]
     rate: Sequence[float]
     speed: float

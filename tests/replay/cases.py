@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import ibvs_qp
-from ibvs_qp import HybridController, PaperController, Pilot, PilotConfig
+from ibvs_qp import HybridController, PaperController, Pilot, PilotConfig, SafetySettings
 
 from . import internals
 
@@ -42,7 +42,7 @@ class Case:
     inputs_of: str | None = None
 
     def config(self) -> PilotConfig:
-        """The preset with what the case changes."""
+        """The preset with what the case changes; replayed sensors do not answer the thrusts, so nothing supervises."""
         preset = PilotConfig.from_toml(PRESETS / f"{self.preset}.toml")
         return dataclasses.replace(
             preset,
@@ -50,6 +50,7 @@ class Case:
             painting=dataclasses.replace(preset.painting, push_n=self.push_n),
             vision=dataclasses.replace(preset.vision, paint_color=PAINT_COLOR),
             perception=self.perception,
+            safety=SafetySettings(supervise=False),
         )
 
     def pilot(self) -> Pilot:

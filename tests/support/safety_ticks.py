@@ -40,7 +40,6 @@ def quiet_tick(number: int, **changes: Any) -> Tick:
         "image_ns": now,
         "inertial": number,
         "wrench": number,
-        "picture": number,
         "down": (0.0, 0.0, 1.0),
         "rate": (0.0, 0.0, 0.0),
         "speed": 0.1,

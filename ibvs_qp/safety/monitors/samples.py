@@ -47,8 +47,6 @@ class SampleMonitor:
         if tick.wrench_ns != self._wrench_ns:
             self._wrench_ns = tick.wrench_ns
             self._wrench.add(tick.wrench)
-        if tick.picture is not None:
-            self._picture.add(tick.picture)
         for fault, monitor in (
             (Fault.IMU_FROZEN, self._imu),
             (Fault.WRENCH_FROZEN, self._wrench),
@@ -56,6 +54,11 @@ class SampleMonitor:
         ):
             if monitor.frozen:
                 faults[fault] = f"{monitor.equal + 1} equal samples in a row"
+
+    def add_picture(self, picture: object) -> bool:
+        """Count a new picture, anything that differs from picture to picture; whether it differs from the last one."""
+        self._picture.add(picture)
+        return not self._picture.repeats
 
 
 class FrozenInput:
@@ -87,6 +90,11 @@ class FrozenInput:
         self.equal, self._last = 0, sample
         self._different += 1
         self._lively = self._lively or self._different >= self._least
+
+    @property
+    def repeats(self) -> bool:
+        """Whether the last sample repeats the one before."""
+        return self._lively and self.equal > 0
 
     @property
     def frozen(self) -> bool:

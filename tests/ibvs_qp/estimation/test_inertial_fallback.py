@@ -75,7 +75,7 @@ def test_commanded_rotations_are_followed_without_pictures() -> None:
 def test_a_gyro_or_an_attitude_that_remains_is_used() -> None:
     for measured in ("gyro", "attitude"):
         start, rate = Rotation.identity(), np.array((0.05, -0.1, 0.2))
-        fallback = begun(start)
+        fallback = begun(start, tuple(rate.tolist()))
         for tick in range(1, 251):
             truth = start * Rotation.from_rotvec(rate * tick * TICK)
             gyro, attitude = (rate.tolist(), None) if measured == "gyro" else (None, as_list(truth))

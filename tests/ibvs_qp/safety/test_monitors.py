@@ -27,7 +27,11 @@ def first_found(
     assurance, quiet, found = Assurance(VEHICLE, SafetySettings()), StubResponse(), {}
     for number in range(BEGIN + ticks):
         changed = number >= BEGIN
-        tick = quiet_tick(number, **(change(number) if changed else {}))
+        values = change(number) if changed else {}
+        picture = values.pop("picture", number)
+        if picture is not None:
+            assurance.is_news(picture)
+        tick = quiet_tick(number, **values)
         assurance.watch(tick, response if changed and response else quiet)
         for fault in tick.faults:
             found.setdefault(fault, (number - BEGIN) * TICK_NS * 1e-9)
@@ -118,7 +122,8 @@ def test_far_from_the_wall_wind_is_no_push() -> None:
 def test_a_simulator_without_noise_may_repeat_its_values() -> None:
     assurance = Assurance(VEHICLE, SafetySettings())
     for number in range(1000):
-        tick = quiet_tick(number, inertial=0, wrench=0, picture=0)
+        assert assurance.is_news(0)
+        tick = quiet_tick(number, inertial=0, wrench=0)
         assurance.watch(tick, StubResponse())
         assert not tick.faults
 
@@ -127,7 +132,7 @@ def test_without_a_camera_nothing_is_late() -> None:
     """A loop of one's own may have neither plane nor lines."""
     assurance = Assurance(VEHICLE, SafetySettings())
     for number in range(200):
-        tick = quiet_tick(number, plane_ns=-1, image_ns=-1, picture=None)
+        tick = quiet_tick(number, plane_ns=-1, image_ns=-1)
         assurance.watch(tick, StubResponse())
         assert not tick.faults
 
