@@ -104,6 +104,15 @@ def allocate(setpoints: Setpoints, free: np.ndarray) -> np.ndarray:
     return function(matrix.dot(free), matrix, lower, upper)
 
 
+def allocate_in_box(setpoints: Setpoints, free: np.ndarray) -> np.ndarray:
+    """Thrusts within this tick's window whose wrench is nearest [N], (n,): the allocator of the program's fallback."""
+    clipped = clip(setpoints, free)
+    if np.array_equal(clipped, free):
+        return clipped
+    matrix = setpoints.effectiveness
+    return allocate_least_squares(matrix.dot(free), matrix, setpoints.lower, setpoints.upper)
+
+
 def analytic_setpoints(config: ControllerConfig) -> Setpoints:
     """Targets of the tasks without a program: the analytic law combines them itself."""
     model = Model(config)

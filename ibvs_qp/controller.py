@@ -12,7 +12,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ibvs_qp.analytic import analytic_thrusts
+from ibvs_qp.analytic import allocate_in_box, analytic_thrusts
 from ibvs_qp.command import Command, Outcome
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.estimation.contact_state import ContactState
@@ -120,7 +120,7 @@ class HybridController:
         self.engine.reset()
         self.setpoints.reset()
         self.gate.reset()
-        self._reference = Reference()
+        self._reference, self._recovery = Reference(), 0
 
     def step(self, measurement: Measurement, reference: Reference, contact: ContactState | None = None) -> Command:
         """Thrusts for one tick; never raises, never leaves the limits.
@@ -156,8 +156,12 @@ class HybridController:
         self.setpoints.update(checked, reference, contact)
         solution = self.engine.solve()
         if solution is None:
-            free, rejected = analytic_thrusts(self.setpoints), rejected + self._causes()
-            return clipped_command(self.setpoints, checked, reference, free, Outcome.ANALYTIC_FALLBACK, rejected)
+            self._recovery, rejected = self.config.solver.recovery_ticks, rejected + self._causes()
+        elif self._recovery > 0:
+            self._recovery, rejected = self._recovery - 1, (*rejected, "program: solved again, not yet for long")
+        if solution is None or self._recovery > 0:
+            free, outcome = analytic_thrusts(self.setpoints), Outcome.ANALYTIC_FALLBACK
+            return clipped_command(self.setpoints, checked, reference, free, outcome, rejected, allocate_in_box)
         if not self.config.thrust_rows:
             return clipped_command(self.setpoints, checked, reference, solution.thrusts, solution.outcome, rejected)
         return self._command(checked, reference, solution, rejected)

@@ -419,8 +419,8 @@ class Pilot:
         limits = self._thrust_limits()
         if limits is not None and self.rotor_loss.update(limits):
             self.painter.abandon(inputs, "no level hover is left")
-        elif self.assurance.state not in _FLYING and not self.painter.failed:
-            self.painter.abandon(inputs, "; ".join(self.assurance.supervisor.reasons))
+        elif self.assurance.state not in _FLYING and not self.painter.descending:
+            self.painter.stop(inputs, "; ".join(self.assurance.supervisor.reasons))
         target = self.painter.step(inputs)
         rotors = self.rotor_loss
         if not (rotors.lost or rotors.limited):

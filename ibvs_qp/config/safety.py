@@ -62,7 +62,6 @@ class SafetySettings:
     )
     landed_ratio: float = setting(0.3, "weight carried by the ground that counts as landed", low=0.05, high=1.0)
     landed_time_s: float = setting(0.3, "carried for this long", unit="s", low=0.05, high=5.0)
-    solver_good_ticks: int = setting(25, "good solutions in a row after a failure", low=1, high=10000)
 
     def __post_init__(self) -> None:
         """Validate."""

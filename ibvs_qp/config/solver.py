@@ -28,6 +28,9 @@ class SolverSettings:
     accept_residual: float = setting(
         1e-3, "largest residual of an accepted early stop, as thrust", unit="N", low=1e-9, high=10.0
     )
+    recovery_ticks: int = setting(
+        25, "good solutions in a row before the program flies again after none: 0.1 s", low=0, high=10000
+    )
 
     def __post_init__(self) -> None:
         """Validate."""

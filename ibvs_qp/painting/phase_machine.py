@@ -45,8 +45,17 @@ class PhaseMachine:
             self._time_out(inputs)
         return getattr(self, "_" + self.phase)(inputs, dt)
 
+    @property
+    def descending(self) -> bool:
+        """Whether it has left the wall for good."""
+        return self._given_up
+
     def abandon(self, inputs: PainterInput, reason: str) -> None:
         """Leave the wall for good: detach, retreat and descend."""
+        self.stop(inputs, reason)
+
+    def stop(self, inputs: PainterInput, reason: str) -> None:
+        """The same at the supervisor's command: the aim is not reached."""
         self.failed = True
         self._give_up(inputs, reason)
 

@@ -58,7 +58,8 @@ def fly(
         faults: Faults and their times.
 
     Returns:
-        The trace; incomplete with a reason when the flight crashed, landed, timed out or was interrupted.
+        The trace; incomplete with a reason when the flight crashed, timed out or was interrupted, and when it landed
+        although its strategy had not ended as planned.
     """
     config, job = pilot_config(scene, options, config), job or PaintJob()
     pilot, world = make_pilot(scene, options, config, job), World(scene, options, config)
@@ -95,7 +96,8 @@ def fly(
         world.close()
     trace = recorder.trace()
     trace.wall_time_s = time.perf_counter() - start  # includes the trace
-    trace.completed = not reason and pilot.painter.finished and not pilot.painter.failed
+    planned = not reason or (reason == LANDED and pilot.painter.descending)
+    trace.completed = planned and (pilot.painter.finished or bool(reason)) and not pilot.painter.failed
     trace.reason = reason or pilot.painter.reason
     if reason:
         trace.events.append(Event(t=tick * TICK_NS * 1e-9, kind="end", text=reason))

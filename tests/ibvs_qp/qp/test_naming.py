@@ -10,6 +10,7 @@ import pytest
 from controller_scenes import dense, line_references, measured
 
 from ibvs_qp.command import Command, Outcome
+from ibvs_qp.config import ControllerConfig, SolverSettings
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.controller import HybridController
 from ibvs_qp.limits import Limit
@@ -17,6 +18,9 @@ from ibvs_qp.measurement import Reference
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.rows import LimitRow, TaskRow
 from ibvs_qp.tasks import Task
+
+#: The program flies again at the first good solution.
+AT_ONCE = ControllerConfig(solver=SolverSettings(recovery_ticks=0))
 
 
 class LiftTask(Task):
@@ -57,7 +61,7 @@ def step(controller: HybridController, tick: int, **inputs: tuple[float, ...]) -
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("place", [0, 1])
 def test_a_parameter_that_is_no_number_is_named(value: float, place: int) -> None:
-    controller = HybridController(tasks=[LiftTask()])
+    controller = HybridController(AT_ONCE, tasks=[LiftTask()])
     assert step(controller, 0, lift=(10.0, 0.1)).rejected == ()
     broken = [10.0, 0.1]
     broken[place] = value
@@ -78,7 +82,7 @@ def test_a_task_that_turns_numbers_into_none_is_named() -> None:
 
 def test_a_weight_below_zero_is_named() -> None:
     """The program has no least cost then; a solver is not even asked."""
-    controller = HybridController(tasks=[LiftTask()])
+    controller = HybridController(AT_ONCE, tasks=[LiftTask()])
     for tick in range(3):
         command = step(controller, tick, lift=(10.0, -5e3))
         assert command.outcome is Outcome.ANALYTIC_FALLBACK
@@ -87,7 +91,7 @@ def test_a_weight_below_zero_is_named() -> None:
 
 
 def test_crossed_bounds_are_named() -> None:
-    controller = HybridController(limits=[ClimbLimit()])
+    controller = HybridController(AT_ONCE, limits=[ClimbLimit()])
     assert step(controller, 0, climb=(-5.0, 5.0)).rejected == ()
     command = step(controller, 1, climb=(2.0, 0.5))
     assert command.outcome is Outcome.ANALYTIC_FALLBACK

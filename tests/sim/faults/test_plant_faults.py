@@ -169,7 +169,8 @@ def test_a_board_that_moves_away_is_farther_and_the_speed_stays():
 @pytest.mark.parametrize("kind", [SolverSilent, SolverInfeasible])
 def test_a_failing_solver_gives_the_analytic_law_as_long_as_the_fault_lasts(kind):
     world, pilot = world_and_pilot()
-    commands = run(world, pilot, 30, (kind(after="start", delay_s=0.04, duration_s=0.04),))
+    back = 20 + pilot.config.controller.solver.recovery_ticks
+    commands = run(world, pilot, back + 10, (kind(after="start", delay_s=0.04, duration_s=0.04),))
     found = [str(command.outcome) for command in commands]
-    assert set(found[10:20]) == {"analytic_fallback"}
-    assert set(found[:10]) == {"solved"} and set(found[20:]) <= {"solved", "exact_fallback"}
+    assert set(found[10 : back - 1]) == {"analytic_fallback"}
+    assert set(found[:10]) == {"solved"} and set(found[back:]) <= {"solved", "exact_fallback"}
