@@ -20,6 +20,7 @@ from sim.flight.closed_loop import fly, make_pilot
 from sim.flight.jobs import PressJob
 from sim.flight.options import FlightOptions, pilot_config
 from sim.flight.surroundings import World
+from sim.flight.trace import LANDED
 from sim.world.plant import Plant
 from sim.world.scene import Scene
 
@@ -72,7 +73,7 @@ def test_a_vehicle_that_loses_a_rotor_while_pressing_leaves_the_wall_and_comes_d
     # Touch, ramp, loss of the rotor and the phases since: no thrust ever steps farther than the rate limit.
     assert np.abs(np.diff(trace.thrusts[1:], axis=0)).max() <= 500.0 * 0.004 + 1e-6
     assert trace.completed, trace.reason
-    assert figures["survived_s"] >= 4.99 and figures["detached"] == 1.0
+    assert (figures["survived_s"] >= 4.99 or trace.reason == LANDED) and figures["detached"] == 1.0
     assert figures["tilt_peak_deg"] <= 25.0 and 0.0 < figures["descent_peak_m_s"] <= 1.5
 
 
