@@ -23,7 +23,7 @@ TILT_BOUND = math.radians(20.0)
 #: Fastest change of the commanded tilt [rad/s].
 TILT_RATE = math.radians(40.0)
 #: Speed away from the wall [m/s] and distance of the centre of mass at which the retreat ends [m].
-ESCAPE_SPEED, ESCAPE_DISTANCE = 0.6, 1.8
+ESCAPE_SPEED, ESCAPE_DISTANCE = 0.4, 1.8
 #: Speed with a rotor that is only limited [m/s].
 TRIMMED_SPEED = 0.15
 #: Distance error to speed [1/s] and velocity error to acceleration [1/s].

@@ -17,7 +17,7 @@ UNEXPLAINED = 0.5
 MOST_ROTORS = 2
 #: A rotor that was found is followed down to this missing thrust [N].
 FOUND = 1.5
-#: Half width of the remaining limits of a rotor whose thrust is estimated [N].
+#: Half width of the remaining limits of a stuck rotor [N].
 MARGIN = 0.5
 
 
@@ -85,9 +85,9 @@ class RotorMonitor:
         return ()
 
     def _limit(self, rotor: int, actual: float, loss: float) -> None:
-        """A rotor that gives too little has a new upper limit; one that gives too much is stuck at its thrust."""
+        """A faulty rotor counts as stuck at its thrust: one that gives too little may not give less either."""
         lower, upper = self.limits or (self._box[0].copy(), self._box[1].copy())
         actual = min(max(actual, 0.0), float(self._box[1][rotor]))
-        upper[rotor] = min(actual + MARGIN, float(self._box[1][rotor]))
-        lower[rotor] = min(lower[rotor], upper[rotor]) if loss > 0.0 else max(actual - MARGIN, 0.0)
+        lower[rotor] = max(actual - MARGIN, 0.0)
+        upper[rotor] = actual if loss > 0.0 else min(actual + MARGIN, float(self._box[1][rotor]))
         self.limits, self._found[self._names[rotor]] = (lower, upper), actual

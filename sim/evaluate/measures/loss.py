@@ -18,7 +18,8 @@ def loss_figures(trace: Trace) -> dict[str, float]:
 
     Returns:
         ``survived_s``: from the loss to the crash, the landing or the planned end. ``yaw_turned_deg``: largest turn
-        from the heading at the loss, full turns included. ``push_spike_n``: largest push after the loss. Empty without a fault.
+        from the heading at the loss, full turns included. ``push_spike_n``: largest push after the loss. Empty without
+        a fault.
     """
     fault = event_time(trace, "fault")
     after = trace.t >= fault if not math.isnan(fault) else np.zeros(len(trace.t), bool)

@@ -40,7 +40,7 @@ def test_a_rotor_that_gives_another_thrust_is_named_with_it(rotor: int, gives: f
     lower, upper = watch.limits
     assert (lower <= upper).all()
     if gives < 11.3:
-        assert upper[rotor] == pytest.approx(gives + 0.5)
+        assert upper[rotor] == pytest.approx(gives) and lower[rotor] == pytest.approx(max(gives - 0.5, 0.0))
     else:
         assert lower[rotor] == pytest.approx(gives - 0.5)
     others = np.arange(6) != rotor
