@@ -46,12 +46,9 @@ from ibvs_qp.tasks import (
     VelocityTask,
     YawTask,
 )
+from ibvs_qp.validation.failure import raised
 from ibvs_qp.validation.measurement import MeasurementGate
-from ibvs_qp.validation.reference import check_reference
-
-#: Unallocated wrench of every tick without an active limit [N, N m].
-NO_WRENCH = np.zeros(6)
-NO_WRENCH.flags.writeable = False
+from ibvs_qp.validation.reference import ReferenceGate
 
 
 def default_tasks(config: ControllerConfig) -> list[Task]:
@@ -111,7 +108,8 @@ class HybridController:
         self.problem = qp_problem(self.config, tasks, limits, self.problem_kind)
         self.setpoints = Setpoints(self.problem.model, self.problem.values)
         self.engine = self.engine_kind(self.problem, self.config.solver, ProgramData(self.problem, self.setpoints.step))
-        self._gate = MeasurementGate(self.config.vehicle.geometry.count)
+        self._gate = MeasurementGate(self.config.vehicle.geometry.count, self.config.line_slots)
+        self._references = ReferenceGate(self.config.line_slots)
         self.reset()
 
     def reset(self) -> None:
@@ -119,10 +117,13 @@ class HybridController:
         self.engine.reset()
         self.setpoints.reset()
         self._gate.reset()
-        self._reference = Reference()
+        self._references.reset()
 
+    @np.errstate(all="ignore")  # a host may have numpy raise at every underflow
     def step(self, measurement: Measurement, reference: Reference, contact: ContactState | None = None) -> Command:
         """Thrusts for one tick; never raises, never leaves the limits.
+
+        Inputs are copied, so the caller may reuse its arrays; the command's arrays are the caller's.
 
         Args:
             measurement: State of the vehicle; fields that fail the checks are named in ``Command.rejected``.
@@ -133,33 +134,40 @@ class HybridController:
         Returns:
             The command with its explanation.
         """
+        try:
+            return self._answer(measurement, reference, contact)
+        except Exception as error:  # in flight nothing may raise; the reason is reported instead
+            return hover_command(self.setpoints, measurement, self._gate.inertial, (raised("step", error),))
+
+    def _answer(self, measurement: Measurement, reference: Reference, contact: ContactState | None) -> Command:
         checked, rejected = self._gate.check(measurement)
-        reference, refused = check_reference(reference, self._reference)
+        reference, refused = self._references.check(reference)
         contact, unusable = check_contact(contact)
-        self._reference, rejected = reference, rejected + refused + self._surplus_lines(reference) + unusable
+        rejected += refused + unusable
         if checked is None:
             return hover_command(self.setpoints, measurement, self._gate.inertial, rejected)
-        if self._gate.restarted:
-            self.setpoints.restart()
         self.setpoints.update(checked, reference, contact)
+        return self._gate.clock.answered(self._solved(checked, reference, rejected))
+
+    def _solved(self, measurement: Measurement, reference: Reference, rejected: tuple[str, ...]) -> Command:
         solution = self.engine.solve()
         if solution is None:
             free, rejected = analytic_thrusts(self.setpoints), rejected + self._causes()
-            return clipped_command(self.setpoints, checked, reference, free, Outcome.ANALYTIC_FALLBACK, rejected)
+            return clipped_command(self.setpoints, measurement, reference, free, Outcome.ANALYTIC_FALLBACK, rejected)
         if not self.config.thrust_rows:
-            return clipped_command(self.setpoints, checked, reference, solution.thrusts, solution.outcome, rejected)
-        return self._command(checked, reference, solution, rejected)
+            return clipped_command(self.setpoints, measurement, reference, solution.thrusts, solution.outcome, rejected)
+        return self._command(measurement, reference, solution, rejected)
 
     def _command(
         self, measurement: Measurement, reference: Reference, solution: AcceptedSolution, rejected: tuple[str, ...]
     ) -> Command:
         thrusts, setpoints, data = solution.thrusts, self.setpoints, self.engine.data
-        unallocated, limits, given_up = NO_WRENCH, (), 0.0
+        unallocated, limits, given_up = np.zeros(6), (), 0.0
         if solution.limited:
             unallocated = setpoints.effectiveness.dot(data.free - thrusts)
             limits = active_limits(self.problem, solution.x, solution.y)
             given_up = max(map(abs, unallocated.tolist()))
-        setpoints.note(thrusts, given_up)
+        own = setpoints.note(thrusts, given_up)
         return Command(
             stamp_ns=int(measurement.stamp_ns),
             thrusts=thrusts,
@@ -167,7 +175,7 @@ class HybridController:
             outcome=solution.outcome,
             mode=contact_mode(setpoints, reference),
             rejected=rejected + reach_note(setpoints, reference),
-            tasks=task_reports(self.problem, data, thrusts),
+            tasks=task_reports(self.problem, data, own),
             active_limits=limits,
             unallocated_wrench=unallocated,
             reach_margin=reach_margin(setpoints),
@@ -181,7 +189,3 @@ class HybridController:
             return (f"limits: no solution keeps all of {', '.join(self.engine.conflict)}",)
         faults = program_faults(self.problem, self.engine.data)
         return faults or ("program: no solver found a solution",)
-
-    def _surplus_lines(self, reference: Reference) -> tuple[str, ...]:
-        given, room = len(reference.lines), self.config.line_slots
-        return (f"reference.lines: {given} given, room for line_slots = {room}",) if given > room else ()

@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -35,7 +35,11 @@ from ibvs_qp.painting.command import PainterInput, PaintingCommand
 from ibvs_qp.painting.config import PaintingConfig
 from ibvs_qp.painting.painter import Painter
 from ibvs_qp.safety.rotor_loss import RotorLoss
+from ibvs_qp.validation.failure import raised
+from ibvs_qp.validation.features import check_features
+from ibvs_qp.validation.measurement import LINES_PER_SLOT, answered_stamp
 from ibvs_qp.validation.sensor_frame import SensorGate
+from ibvs_qp.validation.thrust_limits import ThrustLimits
 from ibvs_qp.vision.config import VisionConfig
 from ibvs_qp.vision.paper.config import PaperConfig
 from ibvs_qp.vision.percept import LineHint
@@ -107,9 +111,6 @@ class Controller(Protocol):
 class Pilot:
     """Vision, estimation, strategy and one of the two laws in a row; `step` needs no simulator.
 
-    Attributes:
-        thrust_limits: Lower and upper thrust limits that the drive reports [N], (n,) each, or None for the configured.
-
     Args:
         config: Configuration of the flight.
         painter: Strategy to follow; None paints.
@@ -129,7 +130,9 @@ class Pilot:
         self._tip, camera = np.array(vehicle.tip_position_m), np.array(vehicle.camera_position_m)
         self._tip_camera = to_camera(self._tip, camera).tolist()
         self._tip_from_camera = (self._tip - camera).tolist()
-        self._gate = SensorGate()
+        self._gate = SensorGate(self.config.camera.latest_s)
+        self._limits = ThrustLimits(vehicle.geometry.count)
+        self._most_lines = LINES_PER_SLOT * settings.line_slots
         self.tare = WrenchTare(vehicle, self.config.estimation)
         self._perception, self._seen_as = None, seen_as
         self.contact = ContactEstimator(settings)
@@ -152,7 +155,8 @@ class Pilot:
         self._covariance = self.motion.velocity_variance * np.eye(3)
         self._plane: tuple[float, float, float, float] | None = None
         self._plane_stamp = 0
-        self.thrust_limits: tuple[np.ndarray, np.ndarray] | None = None
+        self.thrust_limits = None
+        self._rejected: list[str] = []  # inputs of the tick that were refused before the controller
         self.percept = None
         self.measurement: Measurement | None = None
         self.reference = Reference()
@@ -160,12 +164,25 @@ class Pilot:
         self.controller_time_s = 0.0
 
     @property
+    def thrust_limits(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Lower and upper thrust limits that the drive reports [N], (n,) each, or None for the configured ones.
+
+        What is assigned is checked and copied; a refused value is named in the commands and leaves the last in force.
+        """
+        return self._limits.accepted
+
+    @thrust_limits.setter
+    def thrust_limits(self, limits: Any) -> None:
+        self._limits.assign(limits)
+
+    @property
     def setpoints(self):
         """The controller's set-points, for logs."""
         return self.controller.setpoints
 
+    @np.errstate(all="ignore")  # a host may have numpy raise at every underflow
     def step(self, frame: SensorFrame) -> Command:
-        """One control tick.
+        """One control tick; never raises. Inputs are copied, so the caller may reuse its arrays.
 
         Args:
             frame: Raw sensors; image or features only when there is a new picture.
@@ -173,14 +190,22 @@ class Pilot:
         Returns:
             The controller's command.
         """
-        checked, refused = self._gate.check(frame)
-        if checked is None:
-            command = self.controller.step(self.measurement, self.reference)  # type: ignore[arg-type]
-        else:
-            command = self._fly(checked)
-            if self._gate.clock.shift_ns:  # back to the time of the frames
-                command = dataclasses.replace(command, stamp_ns=frame.stamp_ns)
-        return command if not refused else dataclasses.replace(command, rejected=command.rejected + refused)
+        self._rejected = []
+        try:
+            checked, refused = self._gate.check(frame)
+            self._rejected += [*refused, *self._limits.rejected]
+            command = self._hold(frame) if checked is None else self._gate.clock.answered(self._fly(checked))
+        except Exception as error:  # in flight nothing may raise; the reason is reported instead
+            self._rejected.append(raised("pilot", error))
+            command = self._hold(frame)
+        if self._rejected:
+            return dataclasses.replace(command, rejected=(*command.rejected, *self._rejected))
+        return command
+
+    def _hold(self, frame: Any) -> Command:
+        """Command of a tick without a frame: the controller refuses a measurement of the same time, and holds."""
+        command = self.controller.step(self.measurement, self.reference)  # type: ignore[arg-type]
+        return dataclasses.replace(command, stamp_ns=answered_stamp(frame), rejected=())
 
     def _fly(self, frame: SensorFrame) -> Command:
         """The tick of a validated frame."""
@@ -227,10 +252,11 @@ class Pilot:
     # -------------------------------------------------------------- perception
 
     def _perceive(self, frame: SensorFrame) -> FeatureFrame | None:
-        """Features of a new picture, or None if its stamp is in the future or too old; stores their plane."""
+        """Sound features of a new picture, or None; stores their plane."""
         features = frame.features if frame.image is None else self._process(frame.image)
-        if features is None or not 0 <= self._stamp - features.stamp_ns <= self.config.camera.latest_s * 1e9:
+        if features is None:
             return None
+        features = check_features(features, self._most_lines, self._rejected)
         if features.plane is not None:
             self._plane, self._plane_stamp = features.plane, features.stamp_ns
         return features
@@ -249,6 +275,8 @@ class Pilot:
             velocity=self.measurement.velocity if self.measurement is not None else None,
             hints=self._hints(image.stamp_ns),
         )
+        if self.percept.refused:
+            self._rejected.append(f"image: {self.percept.refused}")
         seen = self.percept.features
         return seen if self._seen_as is None or seen is None else self._seen_as(seen)
 
@@ -298,6 +326,8 @@ class Pilot:
         elif contact.known:
             normal, distance = contact.normal, contact.distance
         else:
+            if features.lines:
+                self._rejected.append("features.lines: not used before the first plane")
             return
         gravity = down_in_body(self._history_attitude[self._slot(features.stamp_ns)])
         self.motion.correct(features, WallAxes.of(normal, gravity), distance)
@@ -381,4 +411,6 @@ class Pilot:
             ),
             thrust_min=low,
             thrust_max=high,
+            attitude_stamp_ns=frame.attitude_stamp_ns,
+            imu_stamp_ns=frame.imu_stamp_ns,
         )
