@@ -14,8 +14,9 @@ from ibvs_qp.model.model import Model
 from ibvs_qp.model.reporting import check_contact, clip, clipped_command, hover_command, reach_note
 from ibvs_qp.model.setpoints import LineSetpoint, Setpoints
 from ibvs_qp.tasks import LevelTask, LineTask, PushTask, StandoffTask, VelocityTask, YawTask
+from ibvs_qp.validation.failure import raised
 from ibvs_qp.validation.measurement import MeasurementGate, answered_stamp
-from ibvs_qp.validation.reference import check_reference
+from ibvs_qp.validation.reference import ReferenceGate
 
 #: Singular values below this fraction of the largest are dropped in the pseudo-inverse of L.
 RANK_TOLERANCE = 0.05
@@ -131,19 +132,26 @@ class PaperController:
     def __init__(self, config: ControllerConfig | None = None) -> None:
         self.config = config or ControllerConfig()
         self.setpoints = self._make_setpoints()
-        self.gate = MeasurementGate(self.config.vehicle.geometry.count)
+        self.gate = MeasurementGate(self.config.vehicle.geometry.count, self.config.line_slots)
+        self._references = ReferenceGate(self.config.line_slots)
         self.reset()
 
     def reset(self) -> None:
         """As after construction."""
         self.setpoints.reset()
         self.gate.reset()
-        self._reference = Reference()
+        self._references.reset()
 
+    @np.errstate(all="ignore")
     def step(self, measurement: Measurement, reference: Reference, contact: ContactState | None = None) -> Command:
         """Thrusts for one tick, within box and rate; never raises; arguments as of `HybridController.step`."""
-        checked, rejected = self.gate.check(measurement)
-        return self.respond(checked, rejected, reference, contact, answered_stamp(measurement))
+        try:
+            checked, rejected = self.gate.check(measurement)
+            command = self.respond(checked, rejected, reference, contact, answered_stamp(measurement))
+            return command if checked is None else self.gate.clock.answered(command)
+        except Exception as error:  # in flight nothing may raise; the reason is reported instead
+            stamp = answered_stamp(measurement)
+            return hover_command(self.setpoints, stamp, self.gate.inertial, (raised("step", error),))
 
     def respond(
         self,
@@ -153,16 +161,15 @@ class PaperController:
         contact: ContactState | None,
         stamp_ns: int,
     ) -> Command:
-        """Second half of `step`, after ``gate`` has checked the measurement; stamp_ns is that of the measurement."""
-        reference, refused = check_reference(reference, self._reference)
+        """Second half of `step`, in the time of ``gate.clock``, after the gate; stamp_ns is the one measured."""
+        reference, refused = self._references.check(reference)
         contact, unusable = check_contact(contact)
-        self._reference, rejected = reference, rejected + refused + unusable
+        rejected += refused + unusable
         if checked is None:
             return hover_command(self.setpoints, stamp_ns, self.gate.inertial, rejected)
-        if self.gate.restarted:
-            self.setpoints.restart()
         self.setpoints.update(checked, reference, contact)
-        return self._command(checked, reference, rejected + reach_note(self.setpoints, reference))
+        rejected += reach_note(self.setpoints, reference)
+        return self._command(checked, reference, rejected)
 
     def _make_setpoints(self) -> Setpoints:
         return analytic_setpoints(self.config)

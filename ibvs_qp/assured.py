@@ -67,22 +67,22 @@ class Assured:
         shown = assurance.explained(command)
         if checked is not None:
             assurance.watch(self._tick(checked, command, reference), setpoints)
-        return shown
+        return shown if checked is None else controller.gate.clock.answered(shown)
 
     def _tick(self, checked: Measurement, command: Command, reference: Reference) -> Tick:
         """The tick as the monitors see it, in monotonic time."""
         gate, setpoints = self.controller.gate, self.controller.setpoints
-        now, shift = gate.time_ns, gate.shift_ns
+        now = checked.stamp_ns
         if not any(name in gate.replaced for name in _ATTITUDE):
             self._attitude_ns = now
         if not any(name in gate.replaced for name in _INERTIAL):
             stamps = [stamp for stamp in (checked.attitude_stamp_ns, checked.imu_stamp_ns) if stamp is not None]
-            self._imu_ns = min([now, *(stamp + shift for stamp in stamps)])
-        self._wrench_ns = int(checked.wrench_stamp_ns) + shift
+            self._imu_ns = min([now, *stamps])
+        self._wrench_ns = checked.wrench_stamp_ns
         if checked.plane is not None:
-            self._plane_ns = max(self._plane_ns, int(checked.plane_stamp_ns) + shift)
-        if newest := max((int(line.stamp_ns) for line in checked.lines), default=0):
-            self._lines_ns = max(self._lines_ns, newest + shift)
+            self._plane_ns = max(self._plane_ns, checked.plane_stamp_ns)
+        if newest := max((line.stamp_ns for line in checked.lines), default=0):
+            self._lines_ns = max(self._lines_ns, newest)
         attitude, rate, force = checked.attitude.tolist(), checked.angular_velocity.tolist(), checked.specific_force
         speed, down = math.nan, down_in_body(attitude)
         if checked.velocity is not None:

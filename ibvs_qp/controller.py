@@ -46,12 +46,9 @@ from ibvs_qp.tasks import (
     VelocityTask,
     YawTask,
 )
+from ibvs_qp.validation.failure import raised
 from ibvs_qp.validation.measurement import MeasurementGate, answered_stamp
-from ibvs_qp.validation.reference import check_reference
-
-#: Unallocated wrench of every tick without an active limit [N, N m].
-NO_WRENCH = np.zeros(6)
-NO_WRENCH.flags.writeable = False
+from ibvs_qp.validation.reference import ReferenceGate
 
 
 def default_tasks(config: ControllerConfig) -> list[Task]:
@@ -112,7 +109,8 @@ class HybridController:
         self.problem = qp_problem(self.config, tasks, limits, self.problem_kind)
         self.setpoints = Setpoints(self.problem.model, self.problem.values)
         self.engine = self.engine_kind(self.problem, self.config.solver, ProgramData(self.problem, self.setpoints.step))
-        self.gate = MeasurementGate(self.config.vehicle.geometry.count)
+        self.gate = MeasurementGate(self.config.vehicle.geometry.count, self.config.line_slots)
+        self._references = ReferenceGate(self.config.line_slots)
         self.reset()
 
     def reset(self) -> None:
@@ -120,10 +118,14 @@ class HybridController:
         self.engine.reset()
         self.setpoints.reset()
         self.gate.reset()
-        self._reference, self._recovery = Reference(), 0
+        self._references.reset()
+        self._recovery = 0
 
+    @np.errstate(all="ignore")  # a host may have numpy raise at every underflow
     def step(self, measurement: Measurement, reference: Reference, contact: ContactState | None = None) -> Command:
         """Thrusts for one tick; never raises, never leaves the limits.
+
+        Inputs are copied, so the caller may reuse its arrays; the command's arrays are the caller's.
 
         Args:
             measurement: State of the vehicle; fields that fail the checks are named in ``Command.rejected``.
@@ -134,8 +136,13 @@ class HybridController:
         Returns:
             The command with its explanation.
         """
-        checked, rejected = self.gate.check(measurement)
-        return self.respond(checked, rejected, reference, contact, answered_stamp(measurement))
+        try:
+            checked, rejected = self.gate.check(measurement)
+            command = self.respond(checked, rejected, reference, contact, answered_stamp(measurement))
+            return command if checked is None else self.gate.clock.answered(command)
+        except Exception as error:  # in flight nothing may raise; the reason is reported instead
+            stamp = answered_stamp(measurement)
+            return hover_command(self.setpoints, stamp, self.gate.inertial, (raised("step", error),))
 
     def respond(
         self,
@@ -145,15 +152,16 @@ class HybridController:
         contact: ContactState | None,
         stamp_ns: int,
     ) -> Command:
-        """Second half of `step`, after ``gate`` has checked the measurement; stamp_ns is that of the measurement."""
-        reference, refused = check_reference(reference, self._reference)
+        """Second half of `step`, in the time of ``gate.clock``, after the gate; stamp_ns is the one measured."""
+        reference, refused = self._references.check(reference)
         contact, unusable = check_contact(contact)
-        self._reference, rejected = reference, rejected + refused + self._surplus_lines(reference) + unusable
+        rejected += refused + unusable
         if checked is None:
             return hover_command(self.setpoints, stamp_ns, self.gate.inertial, rejected)
-        if self.gate.restarted:
-            self.setpoints.restart()
         self.setpoints.update(checked, reference, contact)
+        return self._solved(checked, reference, rejected)
+
+    def _solved(self, measurement: Measurement, reference: Reference, rejected: tuple[str, ...]) -> Command:
         solution = self.engine.solve()
         if solution is None:
             self._recovery, rejected = self.config.solver.recovery_ticks, rejected + self._causes()
@@ -161,21 +169,21 @@ class HybridController:
             self._recovery, rejected = self._recovery - 1, (*rejected, "program: solved again, not yet for long")
         if solution is None or self._recovery > 0:
             free, outcome = analytic_thrusts(self.setpoints), Outcome.ANALYTIC_FALLBACK
-            return clipped_command(self.setpoints, checked, reference, free, outcome, rejected, allocate_in_box)
+            return clipped_command(self.setpoints, measurement, reference, free, outcome, rejected, allocate_in_box)
         if not self.config.thrust_rows:
-            return clipped_command(self.setpoints, checked, reference, solution.thrusts, solution.outcome, rejected)
-        return self._command(checked, reference, solution, rejected)
+            return clipped_command(self.setpoints, measurement, reference, solution.thrusts, solution.outcome, rejected)
+        return self._command(measurement, reference, solution, rejected)
 
     def _command(
         self, measurement: Measurement, reference: Reference, solution: AcceptedSolution, rejected: tuple[str, ...]
     ) -> Command:
         thrusts, setpoints, data = solution.thrusts, self.setpoints, self.engine.data
-        unallocated, limits, given_up = NO_WRENCH, (), 0.0
+        unallocated, limits, given_up = np.zeros(6), (), 0.0
         if solution.limited:
             unallocated = setpoints.effectiveness.dot(data.free - thrusts)
             limits = active_limits(self.problem, solution.x, solution.y)
             given_up = max(map(abs, unallocated.tolist()))
-        setpoints.note(thrusts, given_up)
+        own = setpoints.note(thrusts, given_up)
         return Command(
             stamp_ns=int(measurement.stamp_ns),
             thrusts=thrusts,
@@ -183,7 +191,7 @@ class HybridController:
             outcome=solution.outcome,
             mode=contact_mode(setpoints, reference),
             rejected=rejected + reach_note(setpoints, reference),
-            tasks=task_reports(self.problem, data, thrusts),
+            tasks=task_reports(self.problem, data, own),
             active_limits=limits,
             unallocated_wrench=unallocated,
             reach_margin=reach_margin(setpoints),
@@ -197,7 +205,3 @@ class HybridController:
             return (f"limits: no solution keeps all of {', '.join(self.engine.conflict)}",)
         faults = program_faults(self.problem, self.engine.data)
         return faults or ("program: no solver found a solution",)
-
-    def _surplus_lines(self, reference: Reference) -> tuple[str, ...]:
-        given, room = len(reference.lines), self.config.line_slots
-        return (f"reference.lines: {given} given, room for line_slots = {room}",) if given > room else ()

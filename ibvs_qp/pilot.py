@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -41,7 +41,11 @@ from ibvs_qp.safety.assurance import Assurance
 from ibvs_qp.safety.policy import Fault
 from ibvs_qp.safety.rotor_loss import RotorLoss
 from ibvs_qp.safety.tick import Tick
+from ibvs_qp.validation.failure import raised
+from ibvs_qp.validation.features import check_features
+from ibvs_qp.validation.measurement import LINES_PER_SLOT, answered_stamp
 from ibvs_qp.validation.sensor_frame import SensorGate
+from ibvs_qp.validation.thrust_limits import ThrustLimits
 from ibvs_qp.vision.config import VisionConfig
 from ibvs_qp.vision.paper.config import PaperConfig
 from ibvs_qp.vision.percept import LineHint
@@ -121,9 +125,6 @@ class Controller(Protocol):
 class Pilot:
     """Vision, estimation, strategy and one of the two laws in a row; `step` needs no simulator.
 
-    Attributes:
-        thrust_limits: Lower and upper thrust limits that the drive reports [N], (n,) each, or None for the configured.
-
     Args:
         config: Configuration of the flight.
         painter: Strategy to follow; None paints.
@@ -143,7 +144,9 @@ class Pilot:
         self._tip, camera = np.array(vehicle.tip_position_m), np.array(vehicle.camera_position_m)
         self._tip_camera = to_camera(self._tip, camera).tolist()
         self._tip_from_camera = (self._tip - camera).tolist()
-        self._gate = SensorGate()
+        self._gate = SensorGate(self.config.camera.latest_s)
+        self._limits = ThrustLimits(vehicle.geometry.count)
+        self._most_lines = LINES_PER_SLOT * settings.line_slots
         self._steps = AttitudeSteps()
         self._fallback = InertialFallback(self._tip_from_camera, settings.tick_s)
         self.tare = WrenchTare(vehicle, self.config.estimation)
@@ -170,7 +173,9 @@ class Pilot:
         self._covariance = self.motion.velocity_variance * np.eye(3)
         self._plane: tuple[float, float, float, float] | None = None
         self._plane_stamp = self._image_stamp = self._imu_stamp = -1
-        self.thrust_limits: tuple[np.ndarray, np.ndarray] | None = None
+        self.thrust_limits = None
+        self._leaps = 0
+        self._rejected: list[str] = []  # inputs of the tick that were refused before the controller
         self.percept = None
         self.measurement: Measurement | None = None
         self.reference = Reference()
@@ -178,12 +183,25 @@ class Pilot:
         self.controller_time_s = 0.0
 
     @property
+    def thrust_limits(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Lower and upper thrust limits that the drive reports [N], (n,) each, or None for the configured ones.
+
+        What is assigned is checked and copied; a refused value is named in the commands and leaves the last in force.
+        """
+        return self._limits.accepted
+
+    @thrust_limits.setter
+    def thrust_limits(self, limits: Any) -> None:
+        self._limits.assign(limits)
+
+    @property
     def setpoints(self):
         """The controller's set-points, for logs."""
         return self.controller.setpoints
 
+    @np.errstate(all="ignore")  # a host may have numpy raise at every underflow
     def step(self, frame: SensorFrame) -> Command:
-        """One control tick.
+        """One control tick; never raises. Inputs are copied, so the caller may reuse its arrays.
 
         Args:
             frame: Raw sensors; image or features only when there is a new picture.
@@ -191,20 +209,36 @@ class Pilot:
         Returns:
             The controller's command.
         """
-        checked, refused = self._gate.check(frame)
-        if checked is None:
-            command = self.controller.step(self.measurement, self.reference)  # type: ignore[arg-type]
-        else:
-            command = self._fly(checked)
-            if self._gate.clock.shift_ns:  # back to the time of the frames
-                command = dataclasses.replace(command, stamp_ns=frame.stamp_ns)
-        return command if not refused else dataclasses.replace(command, rejected=command.rejected + refused)
+        self._rejected = []
+        try:
+            checked, refused = self._gate.check(frame)
+            self._rejected += [*refused, *self._limits.rejected]
+            command = self._hold(frame) if checked is None else self._gate.clock.answered(self._fly(checked))
+        except Exception as error:  # in flight nothing may raise; the reason is reported instead
+            self._rejected.append(raised("pilot", error))
+            command = self._hold(frame)
+        if self._rejected:
+            return dataclasses.replace(command, rejected=(*command.rejected, *self._rejected))
+        return command
+
+    def _hold(self, frame: Any) -> Command:
+        """Command of a tick without a frame: the controller refuses a measurement of the same time, and holds."""
+        setpoints, stamp = self.setpoints, answered_stamp(frame)
+        fixed = self.assurance.thrusts(setpoints.last, setpoints.floor)
+        if fixed is not None:
+            return self.assurance.explained(fixed_command(setpoints, stamp, fixed, ()))
+        command = self.controller.step(self.measurement, self.reference)  # type: ignore[arg-type]
+        return self.assurance.explained(dataclasses.replace(command, stamp_ns=stamp, rejected=()))
 
     def _fly(self, frame: SensorFrame) -> Command:
         """The tick of a validated frame."""
         stamp, tick_s = frame.stamp_ns, self.config.controller.tick_s
         dt = tick_s if self._stamp < 0 else min((stamp - self._stamp) * 1e-9, LONGEST_TICK)
         self._first, self._stamp = stamp if self._first < 0 else self._first, stamp
+        if self._leaps != self._gate.clock.leaps:  # or the loop stood still for an unknown time
+            self._leaps = self._gate.clock.leaps
+            self.contact.doubt()
+            self.motion.doubt()
         frame = self._inertial(frame, dt)
         attitude, rate, force = self._attitude, self._rate, self._force
         down = down_in_body(attitude)
@@ -317,10 +351,11 @@ class Pilot:
     # -------------------------------------------------------------- perception
 
     def _perceive(self, frame: SensorFrame) -> FeatureFrame | None:
-        """Features of a new picture, or None if its stamp is in the future or too old; stores their plane."""
+        """Sound features of a new picture, or None; stores their plane."""
         features = frame.features if frame.image is None else self._process(frame.image)
-        if features is None or not 0 <= self._stamp - features.stamp_ns <= self.config.camera.latest_s * 1e9:
+        if features is None:
             return None
+        features = check_features(features, self._most_lines, self._rejected)
         if not self.assurance.is_news(_content(frame, features)):
             return None
         self._image_stamp = features.stamp_ns
@@ -342,6 +377,8 @@ class Pilot:
             velocity=self.measurement.velocity if self.measurement is not None else None,
             hints=self._hints(image.stamp_ns),
         )
+        if self.percept.refused:
+            self._rejected.append(f"image: {self.percept.refused}")
         seen = self.percept.features
         return seen if self._seen_as is None or seen is None else self._seen_as(seen)
 
@@ -391,6 +428,8 @@ class Pilot:
         elif contact.known:
             normal, distance = contact.normal, contact.distance
         else:
+            if features.lines:
+                self._rejected.append("features.lines: not used before the first plane")
             return
         if self._fallback.active:
             self._fallback.correct(features, distance)
@@ -497,6 +536,8 @@ class Pilot:
             ),
             thrust_min=low,
             thrust_max=high,
+            attitude_stamp_ns=frame.attitude_stamp_ns,
+            imu_stamp_ns=frame.imu_stamp_ns,
         )
 
 

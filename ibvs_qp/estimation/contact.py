@@ -50,6 +50,10 @@ class ContactEstimator:
         """Filtered push that counts as touch [N]."""
         return self._touch.threshold(self._push.push_noise)
 
+    def doubt(self) -> None:
+        """Ticks are missing for an unknown time."""
+        self._wall.doubt()
+
     @property
     def plane_ns(self) -> int:
         """Capture time of the last accepted plane, -1 before the first."""

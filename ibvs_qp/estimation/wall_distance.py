@@ -113,7 +113,8 @@ class WallDistance:
         All vectors are in B, (3,); ``down`` is the unit vector of gravity. Without a specific
         force the speed is constant.
         """
-        self._gap = self._gap or 0 <= self._tick_ns < stamp_ns - GAP_NS
+        if 0 <= self._tick_ns < stamp_ns - GAP_NS:
+            self.doubt()
         self._tick_ns = stamp_ns
         self.normal = normal = unit(add_scaled(self.normal, dt, cross(self.normal, angular_velocity)))
         self._lever_speed = lever_speed = dot(normal, cross(angular_velocity, self._tip))
@@ -148,6 +149,10 @@ class WallDistance:
             self._correct_normal(stamp_ns, normal)
             self.accepted_ns = stamp_ns
         self._state = self._filter.state.tolist()
+
+    def doubt(self) -> None:
+        """Ticks are missing: take normal and distance from the next plane, and an unknown speed."""
+        self._gap = True
 
     def touch(self) -> None:
         """The tip rests at the wall, whatever the drifting distance says; the accelerometer's bias stays."""

@@ -92,13 +92,17 @@ class WallMotion:
         """Trace of the velocity's covariance [m^2/s^2]."""
         return float(np.trace(self._filter.covariance[VELOCITY, VELOCITY]))
 
+    def doubt(self) -> None:
+        """Ticks are missing: the velocity is unknown."""
+        for entry in range(2):
+            self._filter.set_entry(entry, self.state[entry], GAP_VELOCITY_STD)
+
     def predict(
         self, stamp_ns: int, axes: WallAxes, specific_force: Sequence[float], omega: Sequence[float], dt: float
     ) -> None:
         """Integrate accelerometer [m/s^2] and gyro [rad/s] over dt [s]; the tip moves with the body's rotation, too."""
         if 0 <= self._stamp < stamp_ns - GAP_NS:
-            for entry in range(2):
-                self._filter.set_entry(entry, self.state[entry], GAP_VELOCITY_STD)
+            self.doubt()
         acceleration, swing = add_scaled(specific_force, GRAVITY, axes.gravity), cross(omega, self._tip)
         state = self.state.copy()
         velocity_right, velocity_down, bias_right, bias_down, *_ = state

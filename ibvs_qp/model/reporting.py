@@ -16,15 +16,33 @@ from ibvs_qp.safety.hover import hold_thrusts
 
 #: A thrust this far outside its window counts as clipped [N].
 CLIPPED = 1e-9
+#: Largest magnitude of what a caller's contact holds, in any of its units, and error of its normal's length.
+CONTACT_BOUND, UNIT_TOLERANCE = 1e6, 1e-3
+#: Types of its numbers.
+PLAIN_TYPES = {float, int, bool, np.float64, np.bool_}
 #: A push reduced by less than this is not reported [N].
 REDUCED = 1e-3
 
 
 def check_contact(contact: Any) -> tuple[ContactState | None, tuple[str, ...]]:
-    """The contact of a caller, or None and the rejection of anything else than a `ContactState`."""
-    if contact is None or isinstance(contact, ContactState):
-        return contact, ()
-    return None, ("contact: not a ContactState",)
+    """The contact of a caller if its numbers are sound; otherwise None, and the rejection of what is none."""
+    if contact is None:
+        return None, ()
+    if not isinstance(contact, ContactState):
+        return None, ("contact: not a ContactState",)
+    return (contact, ()) if _is_sound(contact) else (None, ("contact: not finite, or its normal has not length 1",))
+
+
+def _is_sound(contact: ContactState) -> bool:
+    """Whether all that enters the equations is finite; distance and depth are infinite while no wall is known."""
+    normal, known, distance = contact[:3]
+    numbers = (*contact[3:9], *contact[10:], *((distance, contact.depth) if known else ()))
+    if type(normal) is not tuple or len(normal) != 3:
+        return False
+    if not PLAIN_TYPES.issuperset(map(type, (*normal, known, *numbers))):
+        return False
+    length = math.hypot(*normal)
+    return abs(length - 1.0) <= UNIT_TOLERANCE and all([-CONTACT_BOUND <= value <= CONTACT_BOUND for value in numbers])
 
 
 def contact_mode(setpoints: Setpoints, reference: Reference) -> str:
@@ -52,12 +70,13 @@ def reach_note(setpoints: Setpoints, reference: Reference) -> tuple[str, ...]:
     friction = setpoints.reach_friction  # of the travel commanded, or planned at this push
     how = f"against friction {friction:.2f} along the travel" if friction > 0.0 else "standing still"
     if least > setpoints.reach:
-        result = "asked, the rotors cannot hold any push level,"
-    elif least - commanded >= REDUCED:
-        result = f"asked, below what the rotors can hold: least {least:.1f} N,"
-    else:
-        result = f"reduced to {setpoints.push_reference:.1f} N, the rotors' reach"
-    return (f"reference.push_force: {commanded:.1f} N {result} {how}",)
+        return (f"reference.push_force: {commanded:.1f} N asked, the rotors cannot hold any push level, {how}",)
+    low = least - commanded >= REDUCED
+    other = least if low else setpoints.push_reference
+    places = 3 if round(commanded, 1) == round(other, 1) else 1
+    result = "asked, below what the rotors can hold: least" if low else "reduced to"
+    end = "," if low else ", the rotors' reach"
+    return (f"reference.push_force: {commanded:.{places}f} N {result} {other:.{places}f} N{end} {how}",)
 
 
 def clip(setpoints: Setpoints, free: np.ndarray) -> np.ndarray:

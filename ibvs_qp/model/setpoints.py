@@ -87,6 +87,7 @@ class Setpoints:
     def reset(self) -> None:
         """As before the first measurement."""
         self._estimator.reset()
+        self._estimator_is_current = True
         self.contact = self._estimator.state
         self.step.reset()
         self.step.results[:] = 0.0
@@ -96,12 +97,6 @@ class Setpoints:
         self._change, self._given_up = np.zeros(len(self.floor)), 0.0
         self.normal[:], self.right[:], self.down[:] = np.eye(3)
         self.step.outputs["reach"][0], self.step.outputs["least_push"][0] = UNBOUNDED, 0.0
-
-    def restart(self) -> None:
-        """Reset all but the rotors, after a clock that was set back: the thrusts continue."""
-        last, change = self.last, self._change
-        self.reset()
-        self.last, self._change = last, change
 
     def pause(self) -> None:
         """Thrust window of a step without a measurement."""
@@ -117,6 +112,11 @@ class Setpoints:
         if self._stamp >= 0:
             dt = min(max((stamp - self._stamp) * 1e-9, 0.0), LONGEST_TICK)
         self._stamp = stamp
+        if contact is not None:
+            self._estimator_is_current = False
+        elif not self._estimator_is_current:
+            self._estimator.reset()  # its last sample is of unknown age
+            self._estimator_is_current = True
         self.contact = self._estimate_contact(measurement) if contact is None else contact
         self.step.advance()
         self._inputs.write(measurement, reference, self.contact, dt)
@@ -150,11 +150,17 @@ class Setpoints:
         values["thrust_low"][:] = lowest
         values["thrust_high"][:] = self.ceiling if high is None else np.maximum(np.minimum(high, self.ceiling), lowest)
 
-    def note(self, thrusts: np.ndarray, given_up: float) -> None:
-        """Store the commanded thrusts, and the largest force or moment given up (anti-windup), for the next step."""
+    def note(self, thrusts: np.ndarray, given_up: float) -> np.ndarray:
+        """Store the commanded thrusts, and the largest force or moment given up (anti-windup), for the next step.
+
+        Returns:
+            The stored copy: the caller of the controller may write into the command's own array.
+        """
+        own = thrusts.copy()
         if self.last is not None:
-            self._change = thrusts - self.last
-        self.last, self._given_up = thrusts, given_up
+            self._change = own - self.last
+        self.last, self._given_up = own, given_up
+        return own
 
     roll = _number("angles", 0, "Roll [rad].")
     pitch = _number("angles", 1, "Pitch [rad].")

@@ -1,36 +1,46 @@
-"""Time stamps: a monotonic time from a stream of stamps whose clock may stop, leap or be set back."""
+"""Time stamps: a monotonic time without leaps from a stream of stamps whose clock may stop, leap or be set back.
+
+The one rule of pilot and controllers. A sample may be stamped up to `LEAD_NS` ahead of its tick, because two clocks
+never agree exactly; farther ahead it is refused.
+"""
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
-import numpy as np
+from ibvs_qp.command import Command
+from ibvs_qp.validation.numbers import whole
 
-#: Largest step from the last stamp that is accepted at once [ns].
+#: Largest step from the last stamp that is accepted at once [ns]: a longer one is a leap.
 LEAP_NS = 1_000_000_000
-#: Consecutive stamps that must agree before a clock that was set back is followed.
-RESTART_STAMPS = 25
+#: Stamps behind must agree for this long, and so many of them, before the clock counts as set back [ns]: a queue of
+#: late samples is shorter.
+RESTART_NS, RESTART_STAMPS = 96_000_000, 5
 #: Stamps end here: 63 bits hold the sum of two.
 STAMP_END = 2**62
+#: Largest lead of a sample's stamp over the tick's [ns].
+LEAD_NS = 20_000_000
+#: Reason of a sample's stamp that is refused.
+NO_PAST_TIME = f"not a time in nanoseconds at most {LEAD_NS / 1e6:g} ms after the tick"
 
 
-def is_stamp(value: Any) -> bool:
-    """Whether a value is a time stamp: a whole number of nanoseconds below `STAMP_END`."""
-    if type(value) is not int and (not isinstance(value, (int, np.integer)) or isinstance(value, bool)):
-        return False
-    return bool(0 <= value < STAMP_END)
+def stamp_of(value: Any) -> int | None:
+    """A whole number of nanoseconds from 0 to `STAMP_END` as a plain integer; None for anything else."""
+    return whole(value, 0, STAMP_END - 1)
 
 
 class MonotonicClock:
-    """Maps stamps to a time that only increases.
+    """Maps stamps to a time that only increases, and in which no leap of the clock counts.
 
-    A stamp that leaps is refused, and so are the following ones until they agree with each other: two stamps ahead,
-    `RESTART_STAMPS` behind. A clock that was set back is then followed by a shift, so earlier times stay valid.
+    A stamp that leaps is refused, and so are the following ones until they agree with each other: two stamps ahead;
+    stamps behind for `RESTART_NS`. The clock is then followed by a shift, and the refused stamps count as time that
+    passed, each with its own step. Everything remembered in this time therefore keeps its age.
 
     Attributes:
         shift_ns: Added to a stamp to obtain the time.
         last_ns: Time of the last accepted stamp, -1 before the first.
-        restarted: Whether the last accepted stamp began a new time base, behind the old one.
+        leaps: Leaps so far. Whether the clock leapt or the loop stood still cannot be told apart.
     """
 
     def __init__(self) -> None:
@@ -38,7 +48,7 @@ class MonotonicClock:
 
     def reset(self) -> None:
         """As before the first stamp."""
-        self.shift_ns, self.last_ns, self.restarted = 0, -1, False
+        self.shift_ns, self.last_ns, self.leaps = 0, -1, 0
         self._odd_first = self._odd_last = -1
         self._odd_count = 0
 
@@ -48,23 +58,40 @@ class MonotonicClock:
         Returns:
             Why the stamp is refused; empty if it was accepted, and then `last_ns` is its time.
         """
-        if not is_stamp(stamp):
-            return "not a whole number of nanoseconds"
-        stamp = int(stamp)
+        stamp = stamp_of(stamp)
+        if stamp is None:
+            return f"not a whole number of nanoseconds from 0 to {STAMP_END:.2g}"
+        if self.last_ns < 0:  # a false first stamp near the end would leave no room for the time after it
+            self.shift_ns = -stamp if stamp >= STAMP_END // 2 else 0
         time = stamp + self.shift_ns
         if self.last_ns < 0 or 0 < time - self.last_ns <= LEAP_NS:
-            self.last_ns, self._odd_count, self.restarted = time, 0, False
+            self.last_ns, self._odd_count = time, 0
             return ""
         ahead = time > self.last_ns
+        if self._odd_count > 0 and stamp == self._odd_last:
+            return "the same as the last one"
         follows = self._odd_count > 0 and 0 < stamp - self._odd_last <= LEAP_NS
         if not follows:
             self._odd_first, self._odd_count = stamp, 0
-        step = stamp - self._odd_last
+        step, passed = stamp - self._odd_last, stamp - self._odd_first
         self._odd_last, self._odd_count = stamp, self._odd_count + 1
-        if not follows or not (ahead or self._odd_count >= RESTART_STAMPS):
+        if not follows or not (ahead or (passed >= RESTART_NS and self._odd_count >= RESTART_STAMPS)):
             return "far ahead of the last one" if ahead else "not after the last one"
-        self._odd_count, self.restarted = 0, not ahead
-        # The refused stamps behind count as time that passed, each with its own step.
-        self.last_ns = time if ahead else self.last_ns + stamp - self._odd_first + step
+        self._odd_count, self.leaps = 0, self.leaps + 1
+        self.last_ns += passed + step
         self.shift_ns = self.last_ns - stamp
         return ""
+
+    def sample_time(self, stamp: Any) -> int | None:
+        """Time of a sample of the tick accepted last; None for what is no stamp or too far ahead of the tick."""
+        stamp = stamp_of(stamp)
+        if stamp is None:
+            return None
+        time = stamp + self.shift_ns if self.shift_ns else stamp  # the same object, where nothing changes
+        return time if time <= self.last_ns + LEAD_NS else None
+
+    def answered(self, command: Command) -> Command:
+        """The command in the time of the stamps instead of this clock's."""
+        if not self.shift_ns:
+            return command
+        return dataclasses.replace(command, stamp_ns=command.stamp_ns - self.shift_ns)

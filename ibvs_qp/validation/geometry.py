@@ -1,57 +1,127 @@
-"""Checks of lines and planes."""
+"""Checks of lines and planes: what is accepted has plain numbers, converted where it had not."""
 
 from __future__ import annotations
 
-import math
-from typing import Any
+from collections.abc import Callable
+from operator import attrgetter, is_
+from typing import Any, TypeVar
 
 import numpy as np
 
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL, LineFeature, LineReference
-from ibvs_qp.validation.fields import is_number
+from ibvs_qp.validation.clock import STAMP_END
+from ibvs_qp.validation.numbers import FLOAT, matrix, number, text, vector, whole
 
 #: Largest rho [-] and theta [rad].
 LINE_BOUND = 1e6
-#: Largest entry of a plane, and of a plane divided by D [1/m].
-PLANE_BOUND, INVERSE_DEPTH_BOUND = 1e12, 1e3
+#: Largest variance: of what was not seen.
+VARIANCE_BOUND = 1e12
+#: Largest identity of a track: logs hold 64 bits.
+TRACK_BOUND = 2**63 - 1
+#: Largest entry of a plane divided by D [1/m].
+INVERSE_DEPTH_BOUND = 1e3
 #: Smallest inverse depth of a plane on the optical axis [1/m]: 20 m.
 INVERSE_DEPTH_MIN = 0.05
 
+Line = TypeVar("Line")
+Plane = tuple[float, float, float, float]
 
-def accepts_line(line: Any) -> bool:
-    """Whether a value is a `LineFeature` with finite parameters, a known role and a weight from 0 to 1."""
-    if not isinstance(line, LineFeature) or not (is_number(line.weight) and 0.0 <= line.weight <= 1.0):
-        return False
-    covariance = line.covariance
-    if type(covariance) is not np.ndarray or covariance.shape != (2, 2) or covariance.dtype.kind != "f":
-        return False
+_values = attrgetter("rho", "theta", "weight", "role", "kind", "stamp_ns", "track_id", "surface_side", "covariance")
+_PLAIN_PLANE = (float,) * 4
+_PLAIN = (float, float, float, str, str, int, int, int, np.ndarray)
+
+
+def read_lines(
+    lines: Any, read: Callable[[Any], Line | None], most: int, name: str, rejected: list[str]
+) -> tuple[Line, ...]:
+    """The accepted ones of the first ``most`` lines or line references; the tuple itself where it is plain.
+
+    Args:
+        lines: Whatever the caller passed.
+        read: `read_line` or `read_line_reference`.
+        most: So many are looked at, whatever their number: a tick has a deadline.
+        name: Of the input.
+        rejected: Receives name and reason of what is refused.
+    """
+    if type(lines) not in (tuple, list):
+        rejected.append(f"{name}: not a tuple of lines")
+        return ()
+    if len(lines) > most:
+        rejected.append(f"{name}: {len(lines)} given, only the first {most} are looked at")
+        lines = lines[:most]
+    accepted = tuple(map(read, lines))
+    if type(lines) is tuple and all(map(is_, accepted, lines)) and None not in accepted:
+        return lines
+    good = tuple([line for line in accepted if line is not None])
+    if faults := len(lines) - len(good):
+        rejected.append(f"{name}: {faults} malformed, not finite or of unknown role")
+    return good
+
+
+def read_line(line: Any) -> LineFeature | None:
+    """A `LineFeature` with plain numbers within bounds, or None; the line itself where nothing has to be converted."""
+    if not isinstance(line, LineFeature):
+        return None
+    values = _values(line)
+    if type(line) is not LineFeature or tuple(map(type, values)) != _PLAIN or values[-1].dtype != FLOAT:
+        line = _converted(line)
+        if line is None:
+            return None
+        values = _values(line)
+    rho, theta, weight, role, _, stamp, _, side, covariance = values
+    if covariance.shape != (2, 2) or not (role == HORIZONTAL or role == VERTICAL):
+        return None
     (a, b), (c, d) = covariance.tolist()
-    return math.isfinite(a + b + c + d) and _accepts_parameters(line)
+    good = (
+        abs(rho) <= LINE_BOUND
+        and abs(theta) <= LINE_BOUND
+        and 0.0 <= weight <= 1.0
+        and 0 <= stamp < STAMP_END
+        and -1 <= side <= 1
+        and 0.0 <= a <= VARIANCE_BOUND
+        and 0.0 <= d <= VARIANCE_BOUND
+        and abs(b) + abs(c) <= VARIANCE_BOUND
+    )
+    return line if good else None
 
 
-def accepts_line_reference(line: Any) -> bool:
-    """Whether a value is a `LineReference` with finite parameters and a known role."""
-    return isinstance(line, LineReference) and _accepts_parameters(line)
+def _converted(line: LineFeature) -> LineFeature | None:
+    """The line with plain numbers, in bounds or not; None where one is no number."""
+    values = {
+        "rho": number(line.rho),
+        "theta": number(line.theta),
+        "weight": number(line.weight),
+        "covariance": matrix(line.covariance, 2),
+        "role": text(line.role),
+        "kind": text(line.kind),
+        "stamp_ns": whole(line.stamp_ns, 0, STAMP_END - 1),
+        "track_id": whole(line.track_id, -TRACK_BOUND, TRACK_BOUND),
+        "surface_side": whole(line.surface_side, -1, 1),
+    }
+    return None if any([value is None for value in values.values()]) else LineFeature(**values)
 
 
-def accepts_plane(plane: Any) -> bool:
-    """Whether a value is a plane (A, B, C, D) in front of the camera with D != 0."""
-    if not isinstance(plane, (tuple, list, np.ndarray)) or len(plane) != 4:
-        return False
-    a, b, c, d = plane
-    if not (
-        _within(a, PLANE_BOUND) and _within(b, PLANE_BOUND) and _within(c, PLANE_BOUND) and _within(d, PLANE_BOUND)
-    ):
-        return False
+def read_line_reference(line: Any) -> LineReference | None:
+    """A `LineReference` with plain numbers within bounds and a known role, or None; the line itself if plain."""
+    if not isinstance(line, LineReference):
+        return None
+    given = line.rho, line.theta, line.role
+    rho, theta, role = number(given[0]), number(given[1]), text(given[2])
+    if rho is None or theta is None or not (role == HORIZONTAL or role == VERTICAL):
+        return None
+    if not (abs(rho) <= LINE_BOUND and abs(theta) <= LINE_BOUND):
+        return None
+    plain = type(line) is LineReference and all(map(is_, (rho, theta, role), given))
+    return line if plain else LineReference(rho=rho, theta=theta, role=role)
+
+
+def read_plane(plane: Any) -> Plane | None:
+    """A plane (A, B, C, D) in front of the camera with D != 0 as plain numbers, or None; the plane itself if plain."""
+    plain = type(plane) is tuple and tuple(map(type, plane)) == _PLAIN_PLANE
+    entries = plane if plain else vector(plane, 4)
+    if entries is None or entries[3] == 0.0:
+        return None
+    a, b, c, d = entries
     bound = INVERSE_DEPTH_BOUND
-    return d != 0.0 and abs(a / d) < bound and abs(b / d) < bound and INVERSE_DEPTH_MIN < -c / d < bound
-
-
-def _accepts_parameters(line: LineFeature | LineReference) -> bool:
-    role = line.role
-    known = isinstance(role, str) and (role == HORIZONTAL or role == VERTICAL)
-    return known and _within(line.rho, LINE_BOUND) and _within(line.theta, LINE_BOUND)
-
-
-def _within(value: Any, bound: float) -> bool:
-    return is_number(value) and -bound <= value <= bound
+    within = abs(a / d) < bound and abs(b / d) < bound and INVERSE_DEPTH_MIN < -c / d < bound
+    return None if not within else plane if plain else (a, b, c, d)

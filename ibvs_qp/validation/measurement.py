@@ -1,66 +1,63 @@
-"""Measurements: every field is checked; a rejected one is named and replaced by its last accepted value."""
+"""Measurements: every field is checked and copied; a rejected one is named and replaced by its last accepted value."""
 
 from __future__ import annotations
 
 import dataclasses
+import math
+from operator import gt
 from typing import Any
 
 import numpy as np
 
 from ibvs_qp.measurement import Measurement
-from ibvs_qp.validation.clock import MonotonicClock, is_stamp
-from ibvs_qp.validation.fields import measurement_table
-from ibvs_qp.validation.geometry import accepts_line, accepts_plane
+from ibvs_qp.validation.clock import NO_PAST_TIME, MonotonicClock, stamp_of
+from ibvs_qp.validation.fields import Entries, measurement_table, plain_instance
+from ibvs_qp.validation.geometry import read_line, read_lines, read_plane
+from ibvs_qp.validation.numbers import matrix
 
-#: Largest lead of a sensor's stamp over the tick's [ns].
-LEAD_NS = 20_000_000
+#: Lines looked at for every line that the program has room for: roles and order select among them.
+LINES_PER_SLOT = 4
 #: What a refused measurement lacks.
 _ALL = ("attitude", "angular_velocity", "specific_force", "contact_wrench", "plane", "lines")
 
 
 def answered_stamp(measurement: Any) -> int:
     """Stamp of an input of any type, 0 if it has none."""
-    stamp = measurement.stamp_ns if isinstance(measurement, Measurement) else None
-    return int(stamp) if stamp is not None and is_stamp(stamp) else 0
+    try:
+        stamp = stamp_of(measurement.stamp_ns)
+    except Exception:  # whatever an attribute of something else does
+        stamp = None
+    return 0 if stamp is None else stamp
 
 
 class MeasurementGate:
-    """Checks measurements for a controller; a good one passes unchanged.
+    """Checks measurements for a controller; plain ones pass as they are, of others it gets plain copies.
+
+    Only numbers of its own are kept from tick to tick, so that a caller may reuse its arrays.
 
     Attributes:
         replaced: Names of the fields that the last measurement lacked.
 
     Args:
         rotors: Number of rotors, the length of the thrust limits.
+        line_slots: Lines that the program has room for.
+
+    Attributes:
+        clock: Maps the measurements' stamps to the controller's time.
     """
 
-    def __init__(self, rotors: int) -> None:
-        self._table = measurement_table(rotors)
-        self._clock = MonotonicClock()
+    def __init__(self, rotors: int, line_slots: int) -> None:
+        self._table, self._most_lines = measurement_table(rotors), LINES_PER_SLOT * line_slots
+        self.clock = MonotonicClock()
         self.reset()
 
     def reset(self) -> None:
         """Forget the accepted values."""
-        self._clock.reset()
+        self.clock.reset()
         self._last = self._table.fallbacks
         self._measured = False
         self._wrench_stamp = 0
         self.replaced: tuple[str, ...] = ()
-
-    @property
-    def time_ns(self) -> int:
-        """Monotonic time of the last accepted measurement; -1 before the first."""
-        return self._clock.last_ns
-
-    @property
-    def shift_ns(self) -> int:
-        """Added to a stamp to obtain that time."""
-        return self._clock.shift_ns
-
-    @property
-    def restarted(self) -> bool:
-        """Whether the last measurement began a new time base, behind the old one."""
-        return self._clock.restarted
 
     @property
     def inertial(self) -> Measurement | None:
@@ -68,14 +65,10 @@ class MeasurementGate:
         if not self._measured:
             return None
         return Measurement(
-            stamp_ns=self._clock.last_ns - self._clock.shift_ns,
-            attitude=np.array(self._last["attitude"]),
-            angular_velocity=np.array(self._last["angular_velocity"]),
-            contact_wrench=np.array(self._last["contact_wrench"]),
-            wrench_stamp_ns=self._wrench_stamp,
+            stamp_ns=self.clock.last_ns, wrench_stamp_ns=self._wrench_stamp, **self._table.values(self._last)
         )
 
-    def check(self, measurement: Measurement) -> tuple[Measurement | None, tuple[str, ...]]:
+    def check(self, measurement: Any) -> tuple[Measurement | None, tuple[str, ...]]:
         """The measurement with rejected fields replaced, and what was rejected.
 
         Returns:
@@ -84,69 +77,87 @@ class MeasurementGate:
         self.replaced = _ALL
         if not isinstance(measurement, Measurement):
             return None, ("measurement: not a Measurement",)
-        if why := self._clock.accept(measurement.stamp_ns):
+        measurement = plain_instance(measurement, Measurement)
+        if why := self.clock.accept(measurement.stamp_ns):
             return None, (f"stamp_ns: {why}",)
         rejected: list[str] = []
-        changes: dict[str, Any] = {}
-        for field in self._table.faults(measurement):
-            rejected.append(field.rejection)
-            changes[field.name] = np.array(self._last[field.name]) if field.fallback else None
-        if "attitude" in changes and not self._measured:
-            self._clock.reset()  # time begins with the first attitude
-            return None, (rejected[0],)
-        stamp = int(measurement.stamp_ns)
-        self._check_wrench_stamp(measurement, stamp, rejected, changes)
-        _check_plane(measurement, stamp, rejected, changes)
-        _check_lines(measurement, rejected, changes)
-        _check_limit_order(measurement, rejected, changes)
-        self._last = self._table.entries(measurement, changes, self._last)
-        self._measured, self.replaced = True, tuple(changes)
+        entries, changes, refused = self._table.read(measurement, self._last, rejected)
+        if "attitude" in refused and not self._measured:
+            self.clock.reset()  # time begins with the first attitude
+            return None, tuple(rejected)
+        self._check_times(measurement, changes, rejected)
+        self._check_wrench_time(measurement, refused, entries, changes, rejected)
+        self._check_plane(measurement, changes, rejected)
+        lines = read_lines(measurement.lines, read_line, self._most_lines, "lines", rejected)
+        if lines is not measurement.lines:
+            changes["lines"] = lines
+        _check_covariance(measurement, changes, rejected)
+        _check_limit_order(entries, changes, rejected)
+        self._last, self._measured = entries, True
+        self.replaced = tuple(refused)
         return (dataclasses.replace(measurement, **changes) if changes else measurement), tuple(rejected)
 
-    def _check_wrench_stamp(
-        self, measurement: Measurement, stamp: int, rejected: list[str], changes: dict[str, Any]
+    def _check_times(self, measurement: Measurement, changes: dict[str, Any], rejected: list[str]) -> None:
+        """Stamp of the tick, and the optional ones of the inertial sensors: None for at the tick."""
+        if type(measurement.stamp_ns) is not int or self.clock.shift_ns:
+            changes["stamp_ns"] = self.clock.last_ns
+        if measurement.attitude_stamp_ns is not None:
+            self._check_time("attitude_stamp_ns", measurement.attitude_stamp_ns, changes, rejected)
+        if measurement.imu_stamp_ns is not None:
+            self._check_time("imu_stamp_ns", measurement.imu_stamp_ns, changes, rejected)
+
+    def _check_time(self, name: str, stamp: Any, changes: dict[str, Any], rejected: list[str]) -> int | None:
+        time = self.clock.sample_time(stamp)
+        if time is None:
+            rejected.append(f"{name}: {NO_PAST_TIME}")
+        if time is not stamp:
+            changes[name] = time
+        return time
+
+    def _check_wrench_time(
+        self,
+        measurement: Measurement,
+        refused: set[str],
+        entries: Entries,
+        changes: dict[str, Any],
+        rejected: list[str],
     ) -> None:
         """A fault of wrench or stamp replaces both: an old wrench with a new stamp would count as a new sample."""
-        past = _is_past(measurement.wrench_stamp_ns, stamp)
-        if not past:
-            rejected.append("wrench_stamp_ns: not a time before the tick")
-        if past and "contact_wrench" not in changes:
-            self._wrench_stamp = int(measurement.wrench_stamp_ns)
-        else:
-            changes["contact_wrench"] = np.array(self._last["contact_wrench"])
-            changes["wrench_stamp_ns"] = self._wrench_stamp
+        time = self._check_time("wrench_stamp_ns", measurement.wrench_stamp_ns, changes, rejected)
+        if time is not None and "contact_wrench" not in refused:
+            self._wrench_stamp = time
+            return
+        entries["contact_wrench"] = self._last["contact_wrench"]
+        changes["contact_wrench"] = np.array(entries["contact_wrench"])
+        changes["wrench_stamp_ns"] = self._wrench_stamp
+
+    def _check_plane(self, measurement: Measurement, changes: dict[str, Any], rejected: list[str]) -> None:
+        if measurement.plane is None:
+            return
+        plane = read_plane(measurement.plane)
+        time = self._check_time("plane_stamp_ns", measurement.plane_stamp_ns, changes, rejected)
+        if plane is None:
+            rejected.append("plane: not 4 finite values with D != 0 in front of the camera")
+        if plane is None or time is None:
+            changes |= {"plane": None, "plane_stamp_ns": 0}
+        elif plane is not measurement.plane:
+            changes["plane"] = plane
 
 
-def _check_plane(measurement: Measurement, stamp: int, rejected: list[str], changes: dict[str, Any]) -> None:
-    if measurement.plane is None:
+def _check_covariance(measurement: Measurement, changes: dict[str, Any], rejected: list[str]) -> None:
+    value = measurement.velocity_covariance
+    if value is None:
         return
-    if not accepts_plane(measurement.plane):
-        rejected.append("plane: not 4 finite values with D != 0 in front of the camera")
-        changes["plane"] = None
-    elif not _is_past(measurement.plane_stamp_ns, stamp):
-        rejected.append("plane_stamp_ns: not a time before the tick")
-        changes |= {"plane": None, "plane_stamp_ns": 0}
+    own = matrix(value, 3)
+    if own is None or not math.isfinite(sum(map(sum, own.tolist()))):
+        rejected.append("velocity_covariance: not 3 x 3 finite values")
+        own = None
+    if own is not value:
+        changes["velocity_covariance"] = own
 
 
-def _check_lines(measurement: Measurement, rejected: list[str], changes: dict[str, Any]) -> None:
-    if not isinstance(measurement.lines, tuple):
-        rejected.append("lines: not a tuple")
-        changes["lines"] = ()
-        return
-    accepted = tuple([line for line in measurement.lines if accepts_line(line)])
-    if faults := len(measurement.lines) - len(accepted):
-        rejected.append(f"lines: {faults} not finite or malformed")
-        changes["lines"] = accepted
-
-
-def _check_limit_order(measurement: Measurement, rejected: list[str], changes: dict[str, Any]) -> None:
-    low, high = measurement.thrust_min, measurement.thrust_max
-    if low is None or high is None or "thrust_min" in changes or "thrust_max" in changes:
-        return
-    if (low > high).any():
+def _check_limit_order(entries: Entries, changes: dict[str, Any], rejected: list[str]) -> None:
+    low, high = entries["thrust_min"], entries["thrust_max"]
+    if low is not None and high is not None and any(map(gt, low, high)):
         rejected.append("thrust_max: below thrust_min; raised to it")
         changes["thrust_max"] = np.maximum(low, high)
-
-
-def _is_past(stamp: Any, tick: int) -> bool:
-    return is_stamp(stamp) and stamp <= tick + LEAD_NS

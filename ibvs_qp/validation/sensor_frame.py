@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import dataclasses
 from typing import Any
 
-import numpy as np
-
 from ibvs_qp.measurement import SensorFrame
-from ibvs_qp.validation.clock import MonotonicClock, is_stamp
-from ibvs_qp.validation.fields import SENSOR_FRAME
+from ibvs_qp.validation.capture import CaptureGate
+from ibvs_qp.validation.clock import NO_PAST_TIME, MonotonicClock
+from ibvs_qp.validation.fields import SENSOR_FRAME, plain_instance
 
 
 class SensorGate:
     """Checks sensor frames for the pilot; one NaN in a filter would stay there for the rest of the flight.
+
+    Args:
+        latest_s: Pictures and features older than this at delivery are refused [s].
 
     Attributes:
         last: Last accepted numbers of every raw vector by name; those of the present frame where it is good.
@@ -21,54 +22,59 @@ class SensorGate:
         replaced: Names of what the last frame lacked.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, latest_s: float) -> None:
         self.clock = MonotonicClock()
+        self._captures = CaptureGate(self.clock, latest_s)
         self.reset()
 
     def reset(self) -> None:
         """Forget the accepted values; level and at rest until the first ones."""
         self.clock.reset()
+        self._captures.reset()
         self.last = SENSOR_FRAME.fallbacks
         self._wrench_stamp = 0
         self.replaced: tuple[str, ...] = ()
 
     def check(self, frame: Any) -> tuple[SensorFrame | None, tuple[str, ...]]:
-        """The frame in the pilot's time with rejected sensors replaced, and what was rejected.
+        """A copy of the frame in the pilot's time with rejected sensors replaced, and what was rejected.
 
         Returns:
             None for the frame when its stamp is refused.
         """
-        why = self.clock.accept(frame.stamp_ns) if isinstance(frame, SensorFrame) else "not in a sensor frame"
-        if why:
+        if not isinstance(frame, SensorFrame):
+            return None, ("sensor frame: not a SensorFrame",)
+        frame = plain_instance(frame, SensorFrame)
+        if why := self.clock.accept(frame.stamp_ns):
             return None, (f"sensor frame: stamp_ns {why}",)
-        if self.clock.shift_ns:
-            frame = _shifted(frame, self.clock.shift_ns)
-        changes: dict[str, Any] = {field.name: np.array(self.last[field.name]) for field in SENSOR_FRAME.faults(frame)}
-        self.last = SENSOR_FRAME.entries(frame, changes, self.last)
-        stamp = frame.wrench_stamp_ns
-        if "wrench" not in changes and is_stamp(stamp) and stamp <= frame.stamp_ns:
-            self._wrench_stamp = stamp
-        else:
-            changes["wrench_stamp_ns"] = self._wrench_stamp
-        for name, part in (("image", frame.image), ("features", frame.features)):
-            if part is not None and not is_stamp(getattr(part, "stamp_ns", None)):
-                changes[name] = None
-        self.replaced = tuple(changes)
-        if not changes:
-            return frame, ()
-        return dataclasses.replace(frame, **changes), tuple(f"sensor {name}: not sound" for name in changes)
+        rejected: list[str] = []
+        self.last, _, refused = SENSOR_FRAME.read(frame, self.last, rejected)
+        self.replaced = tuple(refused)
+        wrench_time = self._time("wrench_stamp_ns", frame.wrench_stamp_ns, rejected)
+        if wrench_time is not None and "wrench" not in refused:
+            self._wrench_stamp = wrench_time
+        image = self._captures.image(frame.image, rejected)
+        features = frame.features
+        if image is not None and features is not None:
+            rejected.append("features: not used beside an image")
+            features = None
+        checked = SensorFrame(
+            stamp_ns=self.clock.last_ns,
+            wrench_stamp_ns=self._wrench_stamp,
+            attitude_stamp_ns=self._optional_time("attitude_stamp_ns", frame.attitude_stamp_ns, rejected),
+            imu_stamp_ns=self._optional_time("imu_stamp_ns", frame.imu_stamp_ns, rejected),
+            image=image,
+            features=self._captures.features(features, rejected),
+            **SENSOR_FRAME.values(self.last),
+        )
+        return checked, tuple([f"sensor {reason}" for reason in rejected])
 
+    def _time(self, name: str, stamp: Any, rejected: list[str]) -> int | None:
+        """Time of a stamp; None for what is refused."""
+        time = self.clock.sample_time(stamp)
+        if time is None:
+            rejected.append(f"{name}: {NO_PAST_TIME}")
+        return time
 
-def _shifted(frame: SensorFrame, shift_ns: int) -> SensorFrame:
-    """The frame in the pilot's time; an invalid stamp stays and is rejected later."""
-    changes: dict[str, Any] = {"stamp_ns": frame.stamp_ns + shift_ns}
-    if is_stamp(frame.wrench_stamp_ns):
-        changes["wrench_stamp_ns"] = frame.wrench_stamp_ns + shift_ns
-    for name, part in (("image", frame.image), ("features", frame.features)):
-        if part is None or not is_stamp(getattr(part, "stamp_ns", None)):
-            continue
-        stamps = {"stamp_ns": part.stamp_ns + shift_ns}
-        if velocity_stamp := getattr(part, "velocity_stamp_ns", 0):
-            stamps["velocity_stamp_ns"] = velocity_stamp + shift_ns
-        changes[name] = dataclasses.replace(part, **stamps)
-    return dataclasses.replace(frame, **changes)
+    def _optional_time(self, name: str, stamp: Any, rejected: list[str]) -> int | None:
+        """Time of a stamp that may be None: at the tick."""
+        return None if stamp is None else self._time(name, stamp, rejected)

@@ -2,38 +2,57 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable
 
 import numpy as np
 
 from ibvs_qp.measurement import RgbdFrame
+from ibvs_qp.validation.numbers import described, vector
 
-#: Smallest picture that can be used [px].
-_SMALLEST = 64
+#: Smallest and largest side of a picture that can be used [px].
+_SMALLEST, _LARGEST = 64, 4096
+#: Smallest focal length, and largest entry of the intrinsics [px].
+_SHORTEST_FOCAL, _INTRINSICS_BOUND = 1.0, 1e5
+#: No RGB-D camera sees a surface as far as this [m]: a larger median is in millimetres.
+_FARTHEST = 100.0
+#: Distance of the pixels of that median [px].
+_SPARSE = 16
 
 
 def frame_problem(frame: RgbdFrame) -> str | None:
     """Why a picture cannot be used at all, or None if it can."""
     rgb, depth = frame.rgb, frame.depth
-    if not isinstance(rgb, np.ndarray) or rgb.ndim != 3 or rgb.shape[2] != 3:
-        return f"colour picture of shape {getattr(rgb, 'shape', None)}, (H, W, 3) is needed"
+    for name, part in (("colour", rgb), ("depth", depth)):
+        if type(part) is not np.ndarray:
+            return f"{name} picture is a {described(part)}, a plain array is needed"
+    if rgb.ndim != 3 or rgb.shape[2] != 3:
+        return f"colour picture of shape {rgb.shape}, (H, W, 3) is needed"
     if rgb.dtype != np.uint8:
         return f"colour picture of type {rgb.dtype}, uint8 is needed"
-    if not isinstance(depth, np.ndarray) or depth.shape != rgb.shape[:2]:
-        return f"depth picture of shape {getattr(depth, 'shape', None)}, {rgb.shape[:2]} is needed"
+    if depth.shape != rgb.shape[:2]:
+        return f"depth picture of shape {depth.shape}, {rgb.shape[:2]} is needed"
     if not np.issubdtype(depth.dtype, np.floating):
         return f"depth picture of type {depth.dtype}, metres in floating point are needed"
-    if min(rgb.shape[:2]) < _SMALLEST:
-        return f"picture of {rgb.shape[1]} x {rgb.shape[0]} px is too small"
-    try:
-        fx, fy, cx, cy = (float(number) for number in frame.intrinsics)
-    except (TypeError, ValueError):
-        fx = fy = cx = cy = math.nan
-    if not (math.isfinite(fx + fy + cx + cy) and min(fx, fy) > 1.0):
-        return f"intrinsics {frame.intrinsics} are not (fx, fy, cx, cy) in pixels"
-    return None
+    for limit, beyond in ((min(rgb.shape[:2]) < _SMALLEST, "small"), (max(rgb.shape[:2]) > _LARGEST, "large")):
+        if limit:
+            return f"picture of {rgb.shape[1]} x {rgb.shape[0]} px is too {beyond}"
+    entries = vector(frame.intrinsics, 4)
+    if entries is None or not all(abs(entry) <= _INTRINSICS_BOUND for entry in entries):
+        return f"intrinsics are not (fx, fy, cx, cy) in pixels but a {described(frame.intrinsics)}"
+    if min(entries[:2]) <= _SHORTEST_FOCAL:
+        return f"intrinsics {tuple(entries)} are not (fx, fy, cx, cy) in pixels"
+    return _unit_problem(depth)
+
+
+def _unit_problem(depth: np.ndarray) -> str | None:
+    """Why a depth picture is not in metres, or None if it may be."""
+    sparse = depth[::_SPARSE, ::_SPARSE]
+    known = sparse[(sparse > 0.0) & (sparse < np.inf)]  # false for NaN too
+    median = float(np.median(known)) if known.size else 0.0
+    if median <= _FARTHEST:
+        return None
+    return f"depth picture with a median of {median:.4g}: metres are needed, these look like millimetres"
 
 
 #: Tells the time of the stages [s]: by the wall. A bench puts the thread's own time here, undisturbed by neighbours.

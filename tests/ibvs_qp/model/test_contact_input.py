@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -35,14 +36,33 @@ def test_a_contact_that_is_none_is_rejected_by_name(law: type) -> None:
     np.testing.assert_array_equal(command.thrusts, other.thrusts)
 
 
+UNSOUND: list[dict[str, Any]] = [
+    {"distance": math.nan},
+    {"rate": math.inf},
+    {"push": 1e300},
+    {"ramp": "1"},
+    {"stiffness": 10**400},
+    {"normal": (0.0, 0.0, 0.0)},
+    {"normal": (1.0, 0.0)},
+    {"normal": np.array([1.0, 0.0, 0.0])},
+    {"contact_weight": np.zeros(2)},
+    {"known": None},
+]
+
+
 @pytest.mark.parametrize("law", LAWS)
-def test_a_contact_without_numbers_never_flies(law: type) -> None:
-    controller = law()
-    measurement = SmallVehicle(controller.config).measure(0)
-    controller.step(measurement, PRESS)
-    lost = controller.setpoints.contact._replace(distance=math.nan, rate=math.nan)
-    later = SmallVehicle(controller.config)
-    later.tick = 1
-    command = controller.step(later.measure(0), PRESS, lost)
+@pytest.mark.parametrize("unsound", UNSOUND)
+def test_an_unsound_contact_is_named_and_estimated_here_instead(law: type, unsound: dict[str, Any]) -> None:
+    controller, alone = law(), law()
+    vehicle = SmallVehicle(controller.config)
+    controller.step(vehicle.measure(0), PRESS)
+    known = controller.setpoints.contact
+    assert known.known
+    controller.step(vehicle.measure(0, stamp_ns=8_000_000), PRESS, known._replace(distance=0.05))
+    later = vehicle.measure(0, stamp_ns=12_000_000)
+    command = controller.step(later, PRESS, known._replace(**unsound))
+    assert command.rejected[:1] == ("contact: not finite, or its normal has not length 1",)
     assert np.isfinite(command.thrusts).all() and FLOOR <= command.thrusts.min() <= command.thrusts.max() <= CEILING
-    assert command.outcome is Outcome.HOLD
+    assert command.outcome is Outcome.SOLVED
+    alone.step(later, PRESS)
+    assert controller.setpoints.contact == alone.setpoints.contact, "as after a start: the last estimate was too old"

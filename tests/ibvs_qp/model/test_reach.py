@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
+import re
 
 import casadi as ca
 import numpy as np
@@ -115,3 +116,12 @@ def test_no_push_at_all_is_named_and_has_no_margin() -> None:
     said, margin, least = commanded(5.0, np.full(6, 8.0))
     assert math.isnan(least) and math.isnan(margin)
     assert "cannot hold any push" in said
+
+
+def test_a_small_reduction_is_shown() -> None:
+    """Not "5.0 N reduced to 5.0 N"."""
+    full = np.full(6, 52.56)
+    reach = commanded(0.0, full)[1]
+    said = commanded(0.97 * reach + 0.01, full)[0]
+    before, after = (float(number) for number in re.findall(r"([\d.]+) N", said))
+    assert before - after == pytest.approx(0.01, abs=2e-3), said

@@ -50,22 +50,52 @@ def line(**changes: object) -> LineFeature:
     return LineFeature(**(base | changes))  # type: ignore[arg-type]
 
 
+class Unhashable(str):
+    """A text that no dictionary takes."""
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+MASKED3 = np.ma.array([0.0, 1.0, 2.0], mask=[False, True, False])
+#: Has no float.
+HUGE = np.longdouble("1e4000")
+INERTIAL_STAMPS = ("attitude_stamp_ns", "imu_stamp_ns")
+#: Fields of a line beside its parameters, and what breaks them.
+BROKEN_LABELS: list[tuple[str, Any]] = [
+    *[("track_id", value) for value in (None, [], 1.5, "1", True)],
+    *[("stamp_ns", value) for value in (None, -1, 2**62, 0.5)],
+    *[("surface_side", value) for value in (None, 2, 0.5, [1])],
+    *[("kind", value) for value in (None, 1, [])],
+    *[
+        ("covariance", value)
+        for value in (-np.eye(2), np.full((2, 2), 1e300), np.full((2, 2), np.nan), np.ma.zeros((2, 2)))
+    ],
+    *[("role", value) for value in (Unhashable("oblique"), [], None, 1)],
+]
+
 #: Field, broken value, and the name that must appear in `rejected`.
 BROKEN_FIELDS: list[tuple[str, Any, str]] = [
     *[("attitude", value, "attitude") for value in (None, NAN3, np.zeros(4), np.full(4, np.nan), np.full(4, 9.0), "q")],
-    *[("attitude", value, "attitude") for value in ([1, 0, 0, 0], np.eye(4), np.array(["1", "0", "0", "0"]))],
+    *[("attitude", value, "attitude") for value in ([2, 0, 0, 0], np.eye(4), np.array(["1", "0", "0", "0"]))],
     *[("angular_velocity", value, "angular") for value in (None, NAN3, np.full(3, np.inf), np.zeros(2), 3.0)],
-    *[("angular_velocity", value, "angular") for value in (np.full(3, 1e300), np.array([None] * 3), [0, 0, 0])],
+    *[
+        ("angular_velocity", value, "angular")
+        for value in (np.full(3, 1e300), np.array([None] * 3), MASKED3, [None] * 3)
+    ],
     *[("specific_force", value, "specific_force") for value in (NAN3, np.full(3, 1e9), np.zeros((3, 1)), "x", 1)],
     *[("contact_wrench", value, "contact_") for value in (None, np.full(6, np.nan), np.zeros(3), 1e4 * np.ones(6))],
     *[("wrench_stamp_ns", value, "wrench_stamp_ns") for value in (None, 1.5, "now", math.nan, 2**80, 10**17)],
     *[("plane", value, "plane") for value in ((0, 0, math.nan, -1), (0, 0, 2.0, 0), (0, 0, -2.0, -1), 7, "abcd")],
     *[("plane", value, "plane") for value in ((1e200, 0, 2.0, -1), (0, 0, 10**400, -1), {1: 2, 3: 4, 5: 6, 7: 8})],
     *[("plane_stamp_ns", value, "plane") for value in (None, 0.5, "x", 2**80, 10**17, math.inf)],
-    *[("velocity", value, "velocity") for value in (NAN3, np.full(3, 1e5), np.zeros(2), (0, 0, 0), object())],
-    *[("lines", value, "lines") for value in (None, [line()], 3, "lines", (None,), (line(rho=math.nan),), (1, 2))],
-    *[("lines", (line(rho="0.1"),), "lines"), ("lines", (line(covariance=[[0, 0], [0, 0]]),), "lines")],
+    *[("velocity", value, "velocity") for value in (NAN3, np.full(3, 1e5), np.zeros(2), (0, 0), object())],
+    *[("lines", value, "lines") for value in (None, [line(), 3], 3, "lines", (None,), (line(rho=math.nan),), (1, 2))],
+    *[("lines", (line(rho="0.1"),), "lines"), ("lines", (line(covariance=[[0, 0], 0]),), "lines")],
     *[("lines", (line(role=np.array([1, 2])),), "lines"), ("lines", (line(covariance=np.zeros(2)),), "lines")],
+    *[("lines", (line(**{name: value}),), "lines") for name, value in BROKEN_LABELS],
+    *[("velocity_covariance", value, "velocity_covariance") for value in (np.full((3, 3), np.nan), np.eye(2), "x")],
+    *[("acceleration_bias", value, "acceleration_bias") for value in (NAN3, np.full(3, 9.0), "x", np.zeros(2))],
+    *[(name, value, name) for name in INERTIAL_STAMPS for value in (1.5, "now", -1, 2**80, 10**17, np.zeros(1))],
     *[("lines", (line(weight=math.inf),), "lines"), ("lines", (line(theta=10**400),), "lines")],
     *[("lines", (line(covariance=np.array([[None] * 2] * 2)),), "lines"), ("lines", (line(rho=np.zeros(2)),), "lines")],
     *[(name, value, name) for name in ("thrust_min", "thrust_max") for value in (np.full(6, np.nan), np.zeros(3), 5.0)],
@@ -83,11 +113,14 @@ BROKEN_REFERENCES: list[Any] = [
     Reference(standoff=math.inf),
     Reference(standoff=None),  # type: ignore[arg-type]
     Reference(velocity=np.array([math.nan, 0.0])),
-    Reference(velocity=(0.0, 0.0)),  # type: ignore[arg-type]
+    Reference(velocity=(0.0, "0")),  # type: ignore[arg-type]
+    Reference(push_force=True),
+    Reference(tilt=np.ma.zeros(2)),
     Reference(velocity=np.full(2, 1e200)),
     Reference(lines=None),  # type: ignore[arg-type]
     Reference(lines=(None,)),  # type: ignore[arg-type]
-    Reference(lines=[LineReference(rho=0.0, theta=0.0, role="vertical")]),  # type: ignore[arg-type]
+    Reference(lines={1: LineReference(rho=0.0, theta=0.0, role="vertical")}),  # type: ignore[arg-type]
+    Reference(lines=(LineReference(rho=0.0, theta=0.0, role=Unhashable("vertical" * 2)),)),
     Reference(lines=(LineReference(rho=math.nan, theta=0.0, role="vertical"),)),
     Reference(lines=(LineReference(rho="0", theta=0.0, role="vertical"),)),  # type: ignore[arg-type]
     Reference(lines=(LineReference(rho=0.0, theta=0.0, role=np.zeros(2)),)),  # type: ignore[arg-type]
@@ -130,6 +163,7 @@ def test_every_broken_field_is_named_and_survived(law: Callable[[], Any]) -> Non
         bad = controller.step(vehicle.measure(**{name: value}), good_reference())
         check(bad, last)
         assert any(entry.startswith(word) for entry in bad.rejected), (name, value, bad.rejected)
+        assert bad.outcome is Outcome.SOLVED
         vehicle.fly(bad.thrusts)
         after = controller.step(vehicle.measure(), good_reference())
         check(after, bad)
@@ -306,8 +340,121 @@ def test_a_good_measurement_passes_unchanged() -> None:
     limits = {"thrust_min": np.full(6, 2.0), "thrust_max": np.full(6, 20.0)}
     for good in ({}, limits, {"thrust_max": np.zeros(6)}, {"velocity": None, "plane": None, "specific_force": None}):
         seen = measured(1, **good)
-        checked, rejected = MeasurementGate(6).check(seen)
+        checked, rejected = MeasurementGate(6, 2).check(seen)
         assert checked is seen and rejected == ()
+
+
+def unusual(value: Any) -> Any:
+    """The same value as another type that holds it exactly."""
+    if isinstance(value, np.ndarray):
+        return value.tolist() if value.ndim == 1 else np.asfortranarray(value.astype(np.longdouble))
+    if isinstance(value, tuple):
+        return [unusual(entry) for entry in value]
+    if isinstance(value, LineFeature | LineReference):
+        return replace(value, **{field.name: unusual(getattr(value, field.name)) for field in fields(value)})
+    if isinstance(value, bool):
+        return np.bool_(value)
+    kinds = {int: np.uint64, float: np.float64, str: Unhashable}
+    return kinds[type(value)](value) if type(value) in kinds else value
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_good_value_is_accepted_in_every_type_that_holds_it(law: Callable[[], Any]) -> None:
+    controller, vehicle, _ = warmed(law)
+    twin, _, _ = warmed(law, 1)
+    for _ in range(5):
+        limits = {"thrust_max": np.full(6, 30.0), "thrust_min": np.full(6, 2.0)}
+        stamps = {name: (vehicle.tick + 1) * TICK_NS - 7 for name in INERTIAL_STAMPS}
+        seen = vehicle.measure(**limits, **stamps, velocity_covariance=np.eye(3), acceleration_bias=np.zeros(3))
+        wanted = replace(good_reference(), tilt=np.array([0.0, 0.25]))
+        other = replace(seen, **{field.name: unusual(getattr(seen, field.name)) for field in fields(seen)})
+        command = controller.step(
+            other, replace(wanted, **{field.name: unusual(getattr(wanted, field.name)) for field in fields(wanted)})
+        )
+        expected = twin.step(seen, wanted)
+        assert command.rejected == expected.rejected == () and type(command.stamp_ns) is int
+        np.testing.assert_array_equal(command.thrusts, expected.thrusts)
+        vehicle.fly(command.thrusts)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_set_back_while_the_wrench_is_broken_leaves_no_deaf_sensor(law: Callable[[], Any]) -> None:
+    controller, vehicle, _ = warmed(law)
+    vehicle.tick = 100_000  # 400 s
+    for broken in ({}, {}, {}, {"contact_wrench": np.full(6, math.nan)}):
+        controller.step(vehicle.measure(**broken), good_reference())
+        vehicle.tick += 1
+    vehicle.tick = 10
+    for tick in range(150):
+        push = np.array([-8.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+        broken = {"contact_wrench": np.full(6, math.nan) if tick < 40 else push}
+        command = controller.step(vehicle.measure(**broken), good_reference())
+        vehicle.tick += 1
+    assert command.outcome is Outcome.SOLVED
+    assert controller.setpoints.contact.push > 4.0
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("kind", [np.int32, np.uint64, np.int64, np.uint32])
+def test_stamps_of_numpy(law: Callable[[], Any], kind: type) -> None:
+    controller, vehicle, _ = warmed(law)
+    for tick in range(3):
+        stamp = kind((vehicle.tick + 1) * TICK_NS)
+        seen = vehicle.measure(stamp_ns=stamp, wrench_stamp_ns=stamp, plane_stamp_ns=stamp)
+        command = controller.step(seen, good_reference())
+        assert command.outcome is Outcome.SOLVED and command.rejected == (), tick
+        vehicle.fly(command.thrusts)
+    far = controller.step(vehicle.measure(stamp_ns=10**17), good_reference())
+    assert far.outcome is Outcome.HOLD
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_refused_thrust_limits_leave_the_last_ones_in_force(law: Callable[[], Any]) -> None:
+    controller, vehicle, _ = warmed(law)
+    weak = np.full(6, CEILING)
+    weak[1] = 3.0
+    for tick in range(20):
+        command = controller.step(vehicle.measure(thrust_max=weak if tick < 10 else NAN3), good_reference())
+        vehicle.tick += 1
+    assert command.thrusts[1] <= 3.0 + 1e-9 and "thrust_max: array of float64" in command.rejected[0]
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_what_raises_when_it_is_read_is_named_and_held(law: Callable[[], Any]) -> None:
+    class Raising(Measurement):
+        def __getattribute__(self, name: str) -> Any:
+            raise RuntimeError(name)
+
+    controller, vehicle, last = warmed(law)
+    bad = controller.step(object.__new__(Raising), good_reference())
+    check(bad, last)
+    assert bad.outcome is Outcome.HOLD and bad.stamp_ns == 0
+    assert bad.rejected[0].startswith("step: RuntimeError in __getattribute__, line ")
+    assert controller.step(vehicle.measure(), good_reference()).outcome is Outcome.SOLVED
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_host_that_lets_numpy_raise(law: Callable[[], Any]) -> None:
+    controller, vehicle, _ = warmed(law)
+    twin, _, _ = warmed(law, 1)
+    tiny = {
+        "contact_wrench": np.full(6, 1e-310),
+        "velocity": np.full(3, 1e-200),
+        "angular_velocity": np.full(3, 1e-300),
+    }
+    for tick in range(30):
+        seen = vehicle.measure(**tiny) if tick % 2 else vehicle.measure()
+        if tick % 5 == 3:  # of half precision the overflow comes at 65504
+            half = [replace(entry, rho=np.float16(-0.125), theta=np.float16(1.5)) for entry in seen.lines]
+            seen = replace(seen, lines=tuple(half))
+        if tick % 5 == 4:
+            seen = replace(seen, plane=(1e300, 1e300, 1e-300, -1e-300), velocity=np.full(3, HUGE))
+        with np.errstate(all="raise"):
+            command = controller.step(seen, good_reference())
+        expected = twin.step(seen, good_reference())
+        assert command.outcome is Outcome.SOLVED and command.rejected == expected.rejected
+        np.testing.assert_array_equal(command.thrusts, expected.thrusts)
+        vehicle.fly(command.thrusts)
 
 
 @pytest.fixture(scope="module", params=LAWS)

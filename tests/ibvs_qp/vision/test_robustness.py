@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import itertools
 import math
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -85,6 +86,11 @@ BROKEN = {
     "millimetres": RgbdFrame(
         rgb=GOOD.rgb, depth=(1000 * GOOD.depth).astype(np.uint16), intrinsics=INTRINSICS, stamp_ns=1
     ),
+    "millimetres as float": replace(GOOD, depth=1000 * GOOD.depth),
+    "masked depth": replace(GOOD, depth=np.ma.array(GOOD.depth)),
+    "large": replace(GOOD, rgb=np.broadcast_to(GOOD.rgb[:1], (5000, 640, 3)), depth=np.ones((5000, 640), np.float32)),
+    "far intrinsics": replace(GOOD, intrinsics=(600.0, 600.0, 1e300, 0.0)),
+    "intrinsics of text": replace(GOOD, intrinsics=("600", "600", "320", "240")),
     "zero depth": RgbdFrame(rgb=GOOD.rgb, depth=0 * GOOD.depth, intrinsics=INTRINSICS, stamp_ns=1),
     "NaN depth": RgbdFrame(rgb=GOOD.rgb, depth=np.nan * GOOD.depth, intrinsics=INTRINSICS, stamp_ns=1),
     "infinite depth": RgbdFrame(rgb=GOOD.rgb, depth=GOOD.depth + np.float32(np.inf), intrinsics=INTRINSICS, stamp_ns=1),
@@ -93,6 +99,15 @@ BROKEN = {
     "no intrinsics": RgbdFrame(rgb=GOOD.rgb, depth=GOOD.depth, intrinsics=None, stamp_ns=1),  # type: ignore[arg-type]
     "no picture": RgbdFrame(rgb=None, depth=None, intrinsics=INTRINSICS, stamp_ns=1),  # type: ignore[arg-type]
 }
+
+
+def test_a_wrong_unit_of_depth_is_named() -> None:
+    for name, reason in {
+        "millimetres": "depth picture of type uint16, metres in floating point are needed",
+        "millimetres as float": "metres are needed, these look like millimetres",
+    }.items():
+        refused = perception().process(BROKEN[name], attitude=LEVEL).refused
+        assert refused is not None and reason in refused
 
 
 @pytest.mark.parametrize("name", BROKEN)

@@ -73,6 +73,37 @@ def test_one_stamp_far_ahead_blinds_nobody(law: str) -> None:
         world.act(command.thrusts)
 
 
+@pytest.mark.parametrize("law", ["qp", "paper"])
+@pytest.mark.parametrize(
+    ("leap_ns", "ticks"),
+    [(3600 * SECOND, 10_000), (-50 * SECOND, 10_000), (2**62 - 100 * SECOND, 2), (3600 * SECOND, 2), (1, 1), (-1, 1)],
+)
+def test_leaps_of_any_size_are_recovered_from_and_no_time_that_passed(law: str, leap_ns: int, ticks: int) -> None:
+    """For good, or for two frames that agree with each other; meanwhile the F/T sensor fails."""
+    scene = short_scene(stroke_m=0.2, rows=1)
+    options = FlightOptions(law=law, features="geometric", video=False)
+    config = pilot_config(scene, options)
+    pilot, world = Pilot(config), World(scene, options, config)
+    for tick in range(450):
+        leaps = 300 <= tick < 300 + ticks
+        frame = moved(world.sense(), 60 * SECOND + leap_ns * leaps)
+        if 300 <= tick < 310:
+            frame = dataclasses.replace(frame, wrench=np.full(6, np.nan))
+        command = pilot.step(frame)
+        if tick >= 300 + 125:
+            assert command.outcome is Outcome.SOLVED and command.rejected == (), tick
+            assert command.stamp_ns == frame.stamp_ns
+        world.act(command.thrusts)
+    assert pilot.painter.phase in ("approach", "align") and not pilot.painter.finished
+    assert pilot.measurement is not None
+    assert abs(pilot.measurement.stamp_ns - 60 * SECOND - 450 * TICK_NS) < SECOND // 5, (
+        "time went on by the ticks alone"
+    )
+    newest = max(line.seen_ns for line in pilot.motion.lines.values())
+    for age_ns in (pilot.measurement.stamp_ns - newest, pilot.measurement.stamp_ns - pilot.measurement.wrench_stamp_ns):
+        assert 0 <= age_ns < 0.12 * SECOND
+
+
 def test_a_stamp_finds_the_nearest_tick_whatever_the_ticks_lengths() -> None:
     rng, ring = np.random.default_rng(0), StampRing(0.004)
     assert ring.age(0) is None

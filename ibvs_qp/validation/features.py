@@ -1,0 +1,54 @@
+"""Results of perception: what is unsound is dropped by name before a filter reads it."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from ibvs_qp.measurement import FeatureFrame
+from ibvs_qp.validation.fields import Field, plain_instance
+from ibvs_qp.validation.geometry import VARIANCE_BOUND, read_line, read_lines, read_plane
+from ibvs_qp.validation.numbers import matrix
+
+_VELOCITY = Field("velocity", 3, -20.0, 20.0, "m/s")
+#: Least eigenvalue of a covariance over the largest: below zero by rounding alone.
+LEAST_EIGENVALUE = -1e-9
+
+
+def check_features(features: FeatureFrame, most_lines: int, rejected: list[str]) -> FeatureFrame:
+    """The features whose every number is plain, finite and within bounds; what is not is dropped.
+
+    Args:
+        features: With a sound stamp.
+        most_lines: So many lines are looked at.
+        rejected: Receives the name and reason of what is dropped.
+    """
+    features = plain_instance(features, FeatureFrame)
+    plane = None if features.plane is None else read_plane(features.plane)
+    if plane is None and features.plane is not None:
+        rejected.append("features.plane: not 4 finite values with D != 0 in front of the camera")
+    lines = read_lines(features.lines, read_line, most_lines, "features.lines", rejected)
+    velocity, covariance = _velocity(features, rejected)
+    return dataclasses.replace(features, lines=lines, plane=plane, velocity=velocity, velocity_covariance=covariance)
+
+
+def _velocity(features: FeatureFrame, rejected: list[str]) -> tuple[np.ndarray | None, np.ndarray | None]:
+    """Velocity and its covariance; one without the other is none."""
+    if features.velocity is None:
+        return None, None
+    entries, covariance = _VELOCITY.entries(features.velocity), matrix(features.velocity_covariance, 3)
+    if entries is None or not _VELOCITY.accepts(entries):
+        rejected.append(f"features.{_VELOCITY.rejection(features.velocity)}")
+    elif covariance is None or not _is_covariance(covariance):
+        rejected.append("features.velocity_covariance: not 3 x 3, finite, symmetric and without negative variance")
+    else:
+        return np.array(entries), covariance.copy()
+    return None, None
+
+
+def _is_covariance(matrix: np.ndarray) -> bool:
+    if not (np.abs(matrix) <= VARIANCE_BOUND).all() or not np.allclose(matrix, matrix.T):
+        return False
+    smallest, *_, largest = np.linalg.eigvalsh(matrix).tolist()
+    return smallest >= LEAST_EIGENVALUE * largest

@@ -1,0 +1,72 @@
+"""Plain numbers of whatever a caller passes, or None for what is refused.
+
+Accepted are integers and floats of Python and numpy, alone, in lists, tuples and plain arrays of the right shape. A
+subclass of an array (masked, with units) is refused: its numbers may mean something else.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+FLOAT = np.dtype(float)
+#: Integers beyond this are no measurement in any unit, and have no float.
+NUMBER_BOUND = 1e300
+
+
+def whole(value: Any, low: int, high: int) -> int | None:
+    """A whole number within [low, high] as a plain integer."""
+    if type(value) is not int:
+        if not isinstance(value, (int, np.integer)) or isinstance(value, bool):
+            return None
+        value = int(value)
+    return value if low <= value <= high else None
+
+
+def number(value: Any) -> float | None:
+    """A number, maybe NaN or infinite, as a float."""
+    if type(value) is float:
+        return value
+    if not isinstance(value, (int, float, np.integer, np.floating)) or isinstance(value, bool):
+        return None
+    if isinstance(value, int) and not -NUMBER_BOUND <= value <= NUMBER_BOUND:  # an integer may have any size
+        return math.inf
+    return float(value)
+
+
+def vector(value: Any, size: int) -> list[float] | None:
+    """Entries of an array, list or tuple of that many numbers."""
+    if type(value) is np.ndarray:
+        if value.shape != (size,) or value.dtype.kind not in "fiu":
+            return None
+        return value.astype(float).tolist()
+    if type(value) not in (list, tuple) or len(value) != size:
+        return None
+    entries = [number(entry) for entry in value]
+    return None if None in entries else entries  # type: ignore[return-value]
+
+
+def matrix(value: Any, size: int) -> np.ndarray | None:
+    """A square array of numbers, any of them NaN or infinite, (size, size); the value itself where it is plain."""
+    if type(value) is np.ndarray:
+        if value.shape != (size, size) or value.dtype.kind not in "fiu":
+            return None
+        return value.astype(float, copy=False)
+    if type(value) not in (list, tuple) or len(value) != size:
+        return None
+    rows = [vector(row, size) for row in value]
+    return None if None in rows else np.array(rows)
+
+
+def text(value: Any) -> str | None:
+    """A text as a plain one: a subclass may have no hash."""
+    return value if type(value) is str else str.__str__(value) if isinstance(value, str) else None
+
+
+def described(value: Any) -> str:
+    """Type of a refused value, of a plain array also its entries and shape, in a few words whatever it is."""
+    if type(value) is np.ndarray:
+        return f"array of {str(value.dtype)[:20]} with shape {str(value.shape)[:40]}"
+    return type(value).__name__[:40]

@@ -1,0 +1,44 @@
+"""Thrust limits that the drive reports: checked and copied when they are assigned."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ibvs_qp.validation.fields import thrust_limit
+
+
+class ThrustLimits:
+    """Lower and upper limits in force.
+
+    Attributes:
+        accepted: The last accepted pair [N], (n,) each, not writeable; None for the configured limits.
+        rejected: Name and reason of what was assigned since and refused.
+
+    Args:
+        rotors: Number of rotors.
+    """
+
+    def __init__(self, rotors: int) -> None:
+        self._sides = [thrust_limit("thrust_min", rotors), thrust_limit("thrust_max", rotors)]
+        self.accepted: tuple[np.ndarray, np.ndarray] | None = None
+        self.rejected: list[str] = []
+
+    def assign(self, limits: Any) -> None:
+        """Take a pair of limits, or None; a refused one leaves the last in force."""
+        self.rejected = []
+        if limits is None:
+            self.accepted = None
+            return
+        if type(limits) not in (tuple, list) or len(limits) != 2:
+            self.rejected.append("thrust_limits: not a pair of lower and upper limits")
+            return
+        sides = [side.entries(value) for side, value in zip(self._sides, limits, strict=True)]
+        for side, entries, value in zip(self._sides, sides, limits, strict=True):
+            if entries is None or not side.accepts(entries):
+                self.rejected.append(f"thrust_limits: {side.rejection(value)}")
+        if not self.rejected:
+            low, high = np.array(sides)
+            low.flags.writeable = high.flags.writeable = False
+            self.accepted = low, high
