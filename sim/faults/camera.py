@@ -67,8 +67,7 @@ class CameraLatency(SensorFault):
         def delayed(frame: SensorFrame) -> SensorFrame:
             picture = picture_of(frame)
             if picture is not None:
-                due = frame.stamp_ns + round((self.extra_s + self.jitter_s * rng.random()) * _NS)
-                line.append((max(due, line[-1][0] + 1 if line else 0), picture))
+                line.append((frame.stamp_ns + round((self.extra_s + self.jitter_s * rng.random()) * _NS), picture))
             return with_picture(frame, line.pop(0)[1] if line and line[0][0] <= frame.stamp_ns else None)
 
         return delayed

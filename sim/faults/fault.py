@@ -55,6 +55,15 @@ _TIMING = {field.name for field in dataclasses.fields(Fault)}
 
 
 @dataclass(frozen=True, kw_only=True)
+class NoFault(Fault):
+    """Nothing happens: for false alarms."""
+
+    def strike(self, world: Surroundings, pilot: Pilot) -> str:
+        """Nothing changes."""
+        return self.words
+
+
+@dataclass(frozen=True, kw_only=True)
 class SensorFault(Fault):
     """A fault of what the pilot gets: sensors, time stamps, or the tick itself."""
 

@@ -20,7 +20,9 @@ OUTPUTS = {"attitude": 4, "angular_velocity": 3, "specific_force": 3}
 
 @dataclass(frozen=True, kw_only=True)
 class ImuStuck(SensorFault):
-    """The same values again and again, with fresh stamps."""
+    """The same values again and again."""
+
+    fresh: bool = setting(True, "with fresh stamps; otherwise with the old ones: no new samples come")
 
     def filter(self, rng: np.random.Generator) -> FrameFilter:
         """Repeat the values of the first frame."""
@@ -29,6 +31,8 @@ class ImuStuck(SensorFault):
         def stuck(frame: SensorFrame) -> SensorFrame:
             if not last:
                 last.update({name: getattr(frame, name).copy() for name in OUTPUTS})
+                if not self.fresh:
+                    last.update({name: frame.stamp_ns for name in ("attitude_stamp_ns", "imu_stamp_ns")})
             return dataclasses.replace(frame, **last)
 
         return stuck

@@ -58,3 +58,5 @@ def test_weak_rotors_hover_as_long_as_their_lift_suffices():
     # Hover takes 11.33 N of each rotor: 21.6 % of the full thrust.
     assert least_hover_tilt(FACETS, WEIGHT, LOWER, 0.25 * UPPER, hold_yaw=True) == 0.0
     assert least_hover_tilt(FACETS, WEIGHT, LOWER, 0.21 * UPPER) == math.inf
+    # With the weight 0.1 m ahead the front rotors need more than they have.
+    assert least_hover_tilt(FACETS, WEIGHT, LOWER, 0.25 * UPPER, centre=(0.1, 0.0, 0.0)) == math.inf

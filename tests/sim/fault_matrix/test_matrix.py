@@ -9,11 +9,13 @@ import pytest
 from good_flight import GOOD, VEHICLE
 
 from ibvs_qp.config.errors import ConfigError
-from sim.fault_matrix.attainable import hovers
+from sim.fault_matrix.attainable import hovers, limits_after
 from sim.fault_matrix.design import CONTROL, SUPERVISED, Choice, design, job_scene
 from sim.fault_matrix.page import page
 from sim.fault_matrix.verdict import verdicts
+from sim.faults.rotors import RotorStuck, ThrustLoss
 from sim.faults.scenario import Expected, Scenario, scenario, scenarios
+from sim.world.true_vehicle import true_vehicle
 
 ROWS = (
     Scenario(name="a", observable_s=0.1, contact=Expected(reach="retreat"), free=Expected(control_fails=False)),
@@ -105,6 +107,14 @@ def test_rows_beyond_saving_are_beyond_the_attainable_wrench_set():
     assert beyond and beyond == none
     level = {hover.row: hover.heading for hover in found if hover.world == "datasheet"}
     assert level["all rotors limited to 25 %, unreported"] == 0.0
+
+
+def test_a_loss_of_thrust_takes_the_same_share_of_the_limit():
+    vehicle = true_vehicle(job_scene("ideal"), VEHICLE)
+    rotor = vehicle.geometry.names[0]
+    lower, upper = limits_after(vehicle, 0.98, (ThrustLoss(rotor=rotor, share=0.2), RotorStuck(rotor="mid_left")))
+    assert upper == pytest.approx([0.98 * 0.2 * 52.56, 11.3, *[0.98 * 52.56] * 4])
+    assert lower == pytest.approx([1.2, 11.3, 1.2, 1.2, 1.2, 1.2])
 
 
 def test_a_row_with_other_faults_has_no_hover_to_show():

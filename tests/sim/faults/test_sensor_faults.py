@@ -155,6 +155,8 @@ def test_the_inertial_unit_is_stuck_or_not_a_number():
     first, *_, last = through(ImuStuck())
     assert np.array_equal(last[1].angular_velocity, first[0].angular_velocity) and last[1].stamp_ns == last[0].stamp_ns
     assert not np.array_equal(last[0].angular_velocity, first[0].angular_velocity)
+    first, *_, last = through(ImuStuck(fresh=False))
+    assert (last[1].attitude_stamp_ns, last[1].imu_stamp_ns) == (first[0].stamp_ns, first[0].stamp_ns)
     frame, got = through(ImuNan(output="specific_force"))[-1]
     assert np.isnan(got.specific_force).all() and got.attitude is frame.attitude
     assert np.isnan(through(ImuNan())[-1][1].attitude).all()
