@@ -58,8 +58,8 @@ _INERTIAL = ("attitude", "angular_velocity", "specific_force")
 FACING = 0.94
 #: States in which the strategy flies.
 _FLYING = (SafetyState.NOMINAL, SafetyState.DEGRADED)
-#: Rows and columns between the pixels by which pictures are compared.
-SPARSE = 16
+#: Pixels by which pictures are compared: every 16th row and column, of 4096 at most.
+_SPARSE = (slice(0, 4096, 16), slice(0, 4096, 16))
 #: Tip to wall before the first plane [m].
 ASSUMED_DISTANCE = 0.5
 
@@ -353,7 +353,7 @@ class Pilot:
     def _perceive(self, frame: SensorFrame) -> FeatureFrame | None:
         """Sound features of a new picture, or None; stores their plane."""
         features = frame.features if frame.image is None else self._process(frame.image)
-        if features is None:
+        if features is None or (frame.image is not None and self.percept is not None and self.percept.refused):
             return None
         features = check_features(features, self._most_lines, self._rejected)
         if not self.assurance.is_news(_content(frame, features)):
@@ -544,5 +544,5 @@ class Pilot:
 def _content(frame: SensorFrame, features: FeatureFrame) -> object:
     """What differs from picture to picture: sparse pixels, or the features themselves."""
     if frame.image is not None:
-        return frame.image.rgb[::SPARSE, ::SPARSE].tobytes(), frame.image.depth[::SPARSE, ::SPARSE].tobytes()
+        return frame.image.rgb[_SPARSE].tobytes(), frame.image.depth[_SPARSE].tobytes()
     return tuple(features.plane or ()), tuple([(line.rho, line.theta) for line in features.lines])
