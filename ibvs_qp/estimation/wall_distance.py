@@ -28,6 +28,8 @@ INITIAL_STD, FIRST_DISTANCE_STD = np.array([0.05, 0.05, 0.1]), 0.01
 #: Without ticks for this long [ns], normal and speed are only as good as the next plane; standard deviation of a speed
 #: then [m/s].
 GAP_NS, GAP_SPEED_STD = 100_000_000, 0.5
+#: Refused normals in a row that are taken after all: a third of a second; how often, until so many have agreed.
+ODD_PLANES, MOST_REOPENED, AGREED_PLANES = 10, 2, 150
 #: Standard deviation of the distance at a touch without planes [m].
 TOUCH_STD = 0.003
 #: Standard deviation of a speed from two planes a few frames apart [m/s], and least time between them [s].
@@ -65,6 +67,7 @@ class WallDistance:
         self._jumps, self._first_jump, self._plane_ns = 0, (0, 0.0), -1
         self.accepted_ns = self._tick_ns = -1
         self._gap = False
+        self._odd = self._agreed = self._reopened = 0
         self.vibration.reset()
         self._filtered = self._lever_speed = self.rate_noise = 0.0
 
@@ -161,13 +164,23 @@ class WallDistance:
         self._state = self._filter.state.tolist()
 
     def _trusts(self, stamp_ns: int, normal: Sequence[float]) -> bool:
-        """Whether a measured normal agrees with the one predicted by the gyro.
+        """Whether a measured normal agrees with the one predicted by the gyro, or has disagreed for long.
 
-        A mirrored normal would turn the vehicle away, and be believed again and again; one that never agrees is a
-        wall that is lost (`ibvs_qp.safety`).
+        A false gyro sample leaves the prediction wrong, so a normal is taken after all, but not again and again: a
+        mirrored one would turn the vehicle away. One that never agrees is a wall that is lost (`ibvs_qp.safety`).
         """
         settings, past = self._settings, self._normals[self._filter.ticks.slots_since(stamp_ns)[0]].tolist()
-        return dot(past, normal) >= math.cos(math.radians(settings.normal_gate_deg)) * math.hypot(*past)
+        if dot(past, normal) >= math.cos(math.radians(settings.normal_gate_deg)) * math.hypot(*past):
+            self._odd, self._agreed = 0, self._agreed + 1
+            if self._agreed >= AGREED_PLANES:
+                self._reopened = 0
+            return True
+        self._odd, self._agreed = self._odd + 1, 0
+        if self._odd < ODD_PLANES or self._reopened >= MOST_REOPENED:
+            return False
+        self._odd, self._reopened = 0, self._reopened + 1
+        self.normal, self._normals[:] = unit(normal), normal
+        return True
 
     def _correct_distance(self, stamp_ns: int, distance: float, tip_stationary: bool) -> bool:
         """Correct distance and speed; a jump only once the next frames repeat it. Whether the plane is accepted."""
