@@ -15,7 +15,7 @@ from ibvs_qp.model.reporting import check_contact, clip, clipped_command, hover_
 from ibvs_qp.model.setpoints import LineSetpoint, Setpoints
 from ibvs_qp.tasks import LevelTask, LineTask, PushTask, StandoffTask, VelocityTask, YawTask
 from ibvs_qp.validation.failure import raised
-from ibvs_qp.validation.measurement import MeasurementGate
+from ibvs_qp.validation.measurement import MeasurementGate, answered_stamp
 from ibvs_qp.validation.reference import ReferenceGate
 
 #: Singular values below this fraction of the largest are dropped in the pseudo-inverse of L.
@@ -123,34 +123,43 @@ class PaperController:
     def __init__(self, config: ControllerConfig | None = None) -> None:
         self.config = config or ControllerConfig()
         self.setpoints = self._make_setpoints()
-        self._gate = MeasurementGate(self.config.vehicle.geometry.count, self.config.line_slots)
+        self.gate = MeasurementGate(self.config.vehicle.geometry.count, self.config.line_slots)
         self._references = ReferenceGate(self.config.line_slots)
         self.reset()
 
     def reset(self) -> None:
         """As after construction."""
         self.setpoints.reset()
-        self._gate.reset()
+        self.gate.reset()
         self._references.reset()
 
     @np.errstate(all="ignore")
     def step(self, measurement: Measurement, reference: Reference, contact: ContactState | None = None) -> Command:
         """Thrusts for one tick, within box and rate; never raises; arguments as of `HybridController.step`."""
         try:
-            return self._answer(measurement, reference, contact)
+            checked, rejected = self.gate.check(measurement)
+            return self.respond(checked, rejected, reference, contact, answered_stamp(measurement))
         except Exception as error:  # in flight nothing may raise; the reason is reported instead
-            return hover_command(self.setpoints, measurement, self._gate.inertial, (raised("step", error),))
+            stamp_ns, reason = answered_stamp(measurement), raised("step", error)
+            return hover_command(self.setpoints, stamp_ns, self.gate.inertial, (reason,))
 
-    def _answer(self, measurement: Measurement, reference: Reference, contact: ContactState | None) -> Command:
-        checked, rejected = self._gate.check(measurement)
+    def respond(
+        self,
+        checked: Measurement | None,
+        rejected: tuple[str, ...],
+        reference: Reference,
+        contact: ContactState | None,
+        stamp_ns: int,
+    ) -> Command:
+        """Second half of `step`, after ``gate`` has checked the measurement; stamp_ns is that of the measurement."""
         reference, refused = self._references.check(reference)
         contact, unusable = check_contact(contact)
         rejected += refused + unusable
         if checked is None:
-            return hover_command(self.setpoints, measurement, self._gate.inertial, rejected)
+            return hover_command(self.setpoints, stamp_ns, self.gate.inertial, rejected)
         self.setpoints.update(checked, reference, contact)
         rejected += reach_note(self.setpoints, reference)
-        return self._gate.clock.answered(self._command(checked, reference, rejected))
+        return self.gate.clock.answered(self._command(checked, reference, rejected))
 
     def _make_setpoints(self) -> Setpoints:
         return analytic_setpoints(self.config)

@@ -47,7 +47,7 @@ from ibvs_qp.tasks import (
     YawTask,
 )
 from ibvs_qp.validation.failure import raised
-from ibvs_qp.validation.measurement import MeasurementGate
+from ibvs_qp.validation.measurement import MeasurementGate, answered_stamp
 from ibvs_qp.validation.reference import ReferenceGate
 
 
@@ -87,6 +87,7 @@ class HybridController:
     """The drop-in controller: measurement and reference in, rotor thrusts and their explanation out.
 
     Attributes:
+        gate: Checks of the measurements.
         problem_kind, engine_kind: Assembly and solution of the rows; a subclass may solve the same rows differently.
 
     Args:
@@ -108,7 +109,7 @@ class HybridController:
         self.problem = qp_problem(self.config, tasks, limits, self.problem_kind)
         self.setpoints = Setpoints(self.problem.model, self.problem.values)
         self.engine = self.engine_kind(self.problem, self.config.solver, ProgramData(self.problem, self.setpoints.step))
-        self._gate = MeasurementGate(self.config.vehicle.geometry.count, self.config.line_slots)
+        self.gate = MeasurementGate(self.config.vehicle.geometry.count, self.config.line_slots)
         self._references = ReferenceGate(self.config.line_slots)
         self.reset()
 
@@ -116,7 +117,7 @@ class HybridController:
         """As after construction, to the bit."""
         self.engine.reset()
         self.setpoints.reset()
-        self._gate.reset()
+        self.gate.reset()
         self._references.reset()
 
     @np.errstate(all="ignore")  # a host may have numpy raise at every underflow
@@ -135,19 +136,28 @@ class HybridController:
             The command with its explanation.
         """
         try:
-            return self._answer(measurement, reference, contact)
+            checked, rejected = self.gate.check(measurement)
+            return self.respond(checked, rejected, reference, contact, answered_stamp(measurement))
         except Exception as error:  # in flight nothing may raise; the reason is reported instead
-            return hover_command(self.setpoints, measurement, self._gate.inertial, (raised("step", error),))
+            stamp_ns, reason = answered_stamp(measurement), raised("step", error)
+            return hover_command(self.setpoints, stamp_ns, self.gate.inertial, (reason,))
 
-    def _answer(self, measurement: Measurement, reference: Reference, contact: ContactState | None) -> Command:
-        checked, rejected = self._gate.check(measurement)
+    def respond(
+        self,
+        checked: Measurement | None,
+        rejected: tuple[str, ...],
+        reference: Reference,
+        contact: ContactState | None,
+        stamp_ns: int,
+    ) -> Command:
+        """Second half of `step`, after ``gate`` has checked the measurement; stamp_ns is that of the measurement."""
         reference, refused = self._references.check(reference)
         contact, unusable = check_contact(contact)
         rejected += refused + unusable
         if checked is None:
-            return hover_command(self.setpoints, measurement, self._gate.inertial, rejected)
+            return hover_command(self.setpoints, stamp_ns, self.gate.inertial, rejected)
         self.setpoints.update(checked, reference, contact)
-        return self._gate.clock.answered(self._solved(checked, reference, rejected))
+        return self.gate.clock.answered(self._solved(checked, reference, rejected))
 
     def _solved(self, measurement: Measurement, reference: Reference, rejected: tuple[str, ...]) -> Command:
         solution = self.engine.solve()

@@ -38,6 +38,7 @@ from ibvs_qp.safety.rotor_loss import RotorLoss
 from ibvs_qp.validation.failure import raised
 from ibvs_qp.validation.features import check_features
 from ibvs_qp.validation.measurement import LINES_PER_SLOT, answered_stamp
+from ibvs_qp.validation.self_check import SelfCheck
 from ibvs_qp.validation.sensor_frame import SensorGate
 from ibvs_qp.validation.thrust_limits import ThrustLimits
 from ibvs_qp.vision.config import VisionConfig
@@ -133,6 +134,7 @@ class Pilot:
         self._gate = SensorGate(self.config.camera.latest_s)
         self._limits = ThrustLimits(vehicle.geometry.count)
         self._most_lines = LINES_PER_SLOT * settings.line_slots
+        self.self_check = SelfCheck(self.config.safety.self_check)
         self.tare = WrenchTare(vehicle, self.config.estimation)
         self._perception, self._seen_as = None, seen_as
         self.contact = ContactEstimator(settings)
@@ -145,7 +147,7 @@ class Pilot:
 
     def reset(self) -> None:
         """As after construction."""
-        parts = (self._gate, self.tare, self._perception, self.contact, self.motion)
+        parts = (self._gate, self.self_check, self.tare, self._perception, self.contact, self.motion)
         for part in (*parts, self.supervisor, self.painter, self.controller):
             if part is not None:
                 part.reset()
@@ -227,6 +229,7 @@ class Pilot:
             plane=self._plane,
             plane_stamp_ns=self._plane_stamp,
         )
+        self._check_axes(now, contact, dt)
         axes = WallAxes.of(contact.normal, down)
         self.motion.predict(stamp, axes, force, rate, dt)
         self._remember(attitude, rate, dt)
@@ -248,6 +251,12 @@ class Pilot:
         last = self.contact.state
         free = not last.in_contact and last.distance > self.config.estimation.tare_distance_m
         return self.tare.update(frame.wrench, frame.wrench_stamp_ns, specific_force, free)
+
+    def _check_axes(self, now: dict[str, Any], contact: ContactState, dt: float) -> None:
+        """Self-check with the raw sensors of the tick; it names what it found in every command."""
+        self.self_check.inertial(now["attitude"], now["angular_velocity"], now["specific_force"], dt)
+        self.self_check.contact(now["wrench"][:3], contact.push_noise, contact.normal, contact.distance, dt)
+        self._rejected += [f"self-check: {fault}" for fault in self.self_check.faults()]
 
     # -------------------------------------------------------------- perception
 

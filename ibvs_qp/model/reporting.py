@@ -13,7 +13,6 @@ from ibvs_qp.estimation.contact_state import ContactState
 from ibvs_qp.measurement import Measurement, Reference
 from ibvs_qp.model.setpoints import Setpoints
 from ibvs_qp.safety.hover import hold_thrusts
-from ibvs_qp.validation.measurement import answered_stamp
 
 #: A thrust this far outside its window counts as clipped [N].
 CLIPPED = 1e-9
@@ -113,13 +112,12 @@ def clipped_command(
 
 
 def hover_command(
-    setpoints: Setpoints, measurement: Measurement, inertial: Measurement | None, rejected: tuple[str, ...]
+    setpoints: Setpoints, stamp_ns: int, inertial: Measurement | None, rejected: tuple[str, ...]
 ) -> Command:
     """Command of a tick whose measurement was refused: hover by the last accepted inertial data, if any."""
     setpoints.pause()
     free = hold_thrusts(setpoints.config, inertial)
-    stamp = answered_stamp(measurement)
-    return _limited(setpoints, stamp, free, clip(setpoints, free), Outcome.HOLD, "hold", rejected)
+    return _limited(setpoints, stamp_ns, free, clip(setpoints, free), Outcome.HOLD, "hold", rejected)
 
 
 def _limited(

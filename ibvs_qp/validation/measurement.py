@@ -15,6 +15,8 @@ from ibvs_qp.validation.fields import Entries, measurement_table, plain_instance
 from ibvs_qp.validation.geometry import read_line, read_lines, read_plane
 from ibvs_qp.validation.numbers import matrix
 
+#: What a refused measurement lacks.
+_ALL = ("attitude", "angular_velocity", "specific_force", "contact_wrench", "plane", "lines")
 #: Lines looked at for every line that the program has room for: roles and order select among them.
 LINES_PER_SLOT = 4
 
@@ -39,6 +41,7 @@ class MeasurementGate:
 
     Attributes:
         clock: Maps the measurements' stamps to the controller's time.
+        replaced: Names of the fields that the last measurement lacked.
     """
 
     def __init__(self, rotors: int, line_slots: int) -> None:
@@ -52,6 +55,7 @@ class MeasurementGate:
         self._last = self._table.fallbacks
         self._measured = False
         self._wrench_stamp = 0
+        self.replaced: tuple[str, ...] = ()
 
     @property
     def inertial(self) -> Measurement | None:
@@ -68,6 +72,7 @@ class MeasurementGate:
         Returns:
             None for the measurement when its stamp is refused or no attitude was ever accepted.
         """
+        self.replaced = _ALL
         if not isinstance(measurement, Measurement):
             return None, ("measurement: not a Measurement",)
         measurement = plain_instance(measurement, Measurement)
@@ -86,7 +91,7 @@ class MeasurementGate:
             changes["lines"] = lines
         _check_covariance(measurement, changes, rejected)
         _check_limit_order(entries, changes, rejected)
-        self._last, self._measured = entries, True
+        self._last, self._measured, self.replaced = entries, True, tuple(refused)
         return (dataclasses.replace(measurement, **changes) if changes else measurement), tuple(rejected)
 
     def _check_times(self, measurement: Measurement, changes: dict[str, Any], rejected: list[str]) -> None:

@@ -19,6 +19,7 @@ class SensorGate:
     Attributes:
         last: Last accepted numbers of every raw vector by name; those of the present frame where it is good.
         clock: Maps the frames' stamps to the pilot's monotonic time.
+        replaced: Names of the raw vectors that the last frame lacked.
     """
 
     def __init__(self, latest_s: float) -> None:
@@ -32,6 +33,7 @@ class SensorGate:
         self._captures.reset()
         self.last = SENSOR_FRAME.fallbacks
         self._wrench_stamp = 0
+        self.replaced: tuple[str, ...] = ()
 
     def check(self, frame: Any) -> tuple[SensorFrame | None, tuple[str, ...]]:
         """A copy of the frame in the pilot's time with rejected sensors replaced, and what was rejected.
@@ -46,6 +48,7 @@ class SensorGate:
             return None, (f"sensor frame: stamp_ns {why}",)
         rejected: list[str] = []
         self.last, _, refused = SENSOR_FRAME.read(frame, self.last, rejected)
+        self.replaced = tuple(refused)
         wrench_time = self._time("wrench_stamp_ns", frame.wrench_stamp_ns, rejected)
         if wrench_time is not None and "wrench" not in refused:
             self._wrench_stamp = wrench_time
