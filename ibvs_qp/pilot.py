@@ -44,6 +44,7 @@ from ibvs_qp.safety.tick import Tick
 from ibvs_qp.validation.failure import raised
 from ibvs_qp.validation.features import check_features
 from ibvs_qp.validation.measurement import LINES_PER_SLOT, answered_stamp
+from ibvs_qp.validation.self_check import SelfCheck
 from ibvs_qp.validation.sensor_frame import SensorGate
 from ibvs_qp.validation.thrust_limits import ThrustLimits
 from ibvs_qp.vision.config import VisionConfig
@@ -147,6 +148,7 @@ class Pilot:
         self._gate = SensorGate(self.config.camera.latest_s)
         self._limits = ThrustLimits(vehicle.geometry.count)
         self._most_lines = LINES_PER_SLOT * settings.line_slots
+        self.self_check = SelfCheck(self.config.safety.self_check)
         self._steps = AttitudeSteps()
         self._fallback = InertialFallback(self._tip_from_camera, settings.tick_s)
         self.tare = WrenchTare(vehicle, self.config.estimation)
@@ -162,8 +164,9 @@ class Pilot:
 
     def reset(self) -> None:
         """As after construction."""
-        parts = (self._gate, self._steps, self._fallback, self.tare, self._perception, self.contact, self.motion)
-        for part in (*parts, self.rotor_loss, self.assurance, self.painter, self.controller):
+        sensing = (self._gate, self.self_check, self._steps, self._fallback, self.tare, self._perception)
+        flying = (self.contact, self.motion, self.rotor_loss, self.assurance, self.painter, self.controller)
+        for part in (*sensing, *flying):
             if part is not None:
                 part.reset()
         self._first = self._stamp = self._last_capture = -1
@@ -256,6 +259,7 @@ class Pilot:
             plane=self._plane,
             plane_stamp_ns=self._plane_stamp,
         )
+        self._check_axes(contact, dt)
         axes = WallAxes.of(contact.normal, down)
         self.motion.predict(stamp, axes, force, rate, dt)
         self._remember(attitude, rate, dt)
@@ -312,6 +316,8 @@ class Pilot:
             faults[Fault.NO_ATTITUDE] = "by motors' model and camera, too uncertain"
         if self.rotor_loss.lost:
             faults[Fault.NO_HOVER] = ""
+        if found := self.self_check.faults():
+            faults[Fault.INPUTS] = "; ".join(found)
         if not any(name in self._gate.replaced for name in _INERTIAL):
             self._imu_stamp = frame.stamp_ns
         right, down = motion.state[0:2]
@@ -347,6 +353,15 @@ class Pilot:
         last = self.contact.state
         free = not last.in_contact and last.distance > self.config.estimation.tare_distance_m
         return self.tare.update(frame.wrench, frame.wrench_stamp_ns, specific_force, free)
+
+    def _check_axes(self, contact: ContactState, dt: float) -> None:
+        """Self-check with those raw sensors that the tick has; it names what it found in every command."""
+        now, missing, check = self._gate.last, self._gate.replaced, self.self_check
+        if not any(name in missing for name in _INERTIAL):
+            check.inertial(now["attitude"], now["angular_velocity"], now["specific_force"], dt)
+        if "wrench" not in missing:
+            check.contact(now["wrench"][:3], contact.push_noise, contact.normal, contact.distance, dt)
+        self._rejected += [f"self-check: {fault}" for fault in check.faults()]
 
     # -------------------------------------------------------------- perception
 

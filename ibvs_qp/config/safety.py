@@ -12,6 +12,7 @@ class SafetySettings:
     """Limits of the monitors and motions of the supervisor."""
 
     supervise: bool = setting(True, "the supervisor acts; without it only the checks of inputs remain")
+    self_check: bool = setting(True, "find sensor data in other axes than FRD and NED before the first touch")
 
     image_age_s: float = setting(0.2, "oldest picture: latency, and two dropped ones", unit="s", low=0.05, high=5.0)
     plane_age_s: float = setting(0.3, "oldest wall plane", unit="s", low=0.05, high=5.0)

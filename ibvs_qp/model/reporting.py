@@ -18,6 +18,8 @@ from ibvs_qp.safety.hover import hold_thrusts
 CLIPPED = 1e-9
 #: Largest magnitude of what a caller's contact holds, in any of its units, and error of its normal's length.
 CONTACT_BOUND, UNIT_TOLERANCE = 1e6, 1e-3
+#: Place of the depth behind normal, known and distance.
+DEPTH = ContactState._fields.index("depth") - 3
 #: Types of its numbers.
 PLAIN_TYPES = {float, int, bool, np.float64, np.bool_}
 #: A push reduced by less than this is not reported [N].
@@ -35,14 +37,15 @@ def check_contact(contact: Any) -> tuple[ContactState | None, tuple[str, ...]]:
 
 def _is_sound(contact: ContactState) -> bool:
     """Whether all that enters the equations is finite; distance and depth are infinite while no wall is known."""
-    normal, known, distance = contact[:3]
-    numbers = (*contact[3:9], *contact[10:], *((distance, contact.depth) if known else ()))
+    normal, known, distance, *others = contact
     if type(normal) is not tuple or len(normal) != 3:
         return False
-    if not PLAIN_TYPES.issuperset(map(type, (*normal, known, *numbers))):
+    if not PLAIN_TYPES.issuperset(map(type, (*normal, *contact[1:]))):
         return False
+    if not known and others[DEPTH] == distance == math.inf:
+        distance = others[DEPTH] = 0.0
     length = math.hypot(*normal)
-    return abs(length - 1.0) <= UNIT_TOLERANCE and all([-CONTACT_BOUND <= value <= CONTACT_BOUND for value in numbers])
+    return abs(length - 1.0) <= UNIT_TOLERANCE and all([abs(value) <= CONTACT_BOUND for value in (distance, *others)])
 
 
 def contact_mode(setpoints: Setpoints, reference: Reference) -> str:

@@ -22,6 +22,8 @@ from ibvs_qp.model.step_function import StepFunction
 from ibvs_qp.model.thrust_window import thrust_window
 from ibvs_qp.safety.hover import hold_thrusts
 
+#: After a caller's own contact, an estimate older than this is not continued [ns]: the tip moved on meanwhile.
+ESTIMATE_LIFE_NS = 500_000_000
 #: Thrust step without a rate limit, before the first command [N].
 ANY_STEP = 1e6
 
@@ -87,7 +89,7 @@ class Setpoints:
     def reset(self) -> None:
         """As before the first measurement."""
         self._estimator.reset()
-        self._estimator_is_current = True
+        self._handed_on, self._estimated_ns = False, -1
         self.contact = self._estimator.state
         self.step.reset()
         self.step.results[:] = 0.0
@@ -112,12 +114,8 @@ class Setpoints:
         if self._stamp >= 0:
             dt = min(max((stamp - self._stamp) * 1e-9, 0.0), LONGEST_TICK)
         self._stamp = stamp
-        if contact is not None:
-            self._estimator_is_current = False
-        elif not self._estimator_is_current:
-            self._estimator.reset()  # its last sample is of unknown age
-            self._estimator_is_current = True
         self.contact = self._estimate_contact(measurement) if contact is None else contact
+        self._handed_on = self._handed_on or contact is not None
         self.step.advance()
         self._inputs.write(measurement, reference, self.contact, dt)
         self._write_rotors(measurement)
@@ -126,6 +124,9 @@ class Setpoints:
         self.step.evaluate()
 
     def _estimate_contact(self, measurement: Measurement) -> ContactState:
+        if self._handed_on and measurement.stamp_ns - self._estimated_ns > ESTIMATE_LIFE_NS:
+            self._estimator.reset()
+        self._handed_on, self._estimated_ns = False, measurement.stamp_ns
         force = measurement.specific_force
         return self._estimator.update(
             stamp_ns=measurement.stamp_ns,

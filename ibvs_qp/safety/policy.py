@@ -13,7 +13,7 @@ NOMINAL, DEGRADED, RETREAT, HOVER, DESCEND, TERMINATED = SafetyState
 class Fault(StrEnum):
     """Conditions that the monitors detect (`ibvs_qp.safety.monitors`)."""
 
-    INPUTS = "inputs fail the start-up check"
+    INPUTS = "sensor data in other axes"
     WRENCH_STALE = "no force sample"
     WRENCH_FROZEN = "force samples repeat"
     PUSH_UNFELT = "push that the force sensor does not measure"
@@ -70,7 +70,7 @@ _AT_ONCE = _rule((0.0, RETREAT))
 
 #: The reaction to every fault. From RETREAT on a state is never left for a milder one.
 POLICY: dict[Fault, Rule] = {
-    Fault.INPUTS: _rule((0.0, DEGRADED)),
+    Fault.INPUTS: _rule((0.0, DEGRADED), (0.1, RETREAT)),
     Fault.WRENCH_STALE: _rule((0.02, DEGRADED), (0.1, RETREAT)),
     Fault.WRENCH_FROZEN: _AT_ONCE,
     Fault.PUSH_UNFELT: _AT_ONCE,

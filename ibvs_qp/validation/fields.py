@@ -101,7 +101,7 @@ class FieldTable:
     """
 
     def __init__(self, *rows: Field) -> None:
-        self._rows = [(row, row.name, (row.size,), row.accepted_length) for row in rows]
+        self._rows = [(row, row.name, (row.size or -1,), row.accepted_length) for row in rows]
         self._values = attrgetter(*(row.name for row in rows))
         self.fallbacks: Entries = {row.name: list(row.fallback) or None for row in rows}
 

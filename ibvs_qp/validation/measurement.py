@@ -44,6 +44,7 @@ class MeasurementGate:
 
     Attributes:
         clock: Maps the measurements' stamps to the controller's time.
+        replaced: Names of the fields that the last measurement lacked.
     """
 
     def __init__(self, rotors: int, line_slots: int) -> None:
@@ -93,8 +94,7 @@ class MeasurementGate:
             changes["lines"] = lines
         _check_covariance(measurement, changes, rejected)
         _check_limit_order(entries, changes, rejected)
-        self._last, self._measured = entries, True
-        self.replaced = tuple(refused)
+        self._last, self._measured, self.replaced = entries, True, tuple(refused)
         return (dataclasses.replace(measurement, **changes) if changes else measurement), tuple(rejected)
 
     def _check_times(self, measurement: Measurement, changes: dict[str, Any], rejected: list[str]) -> None:

@@ -19,7 +19,7 @@ class SensorGate:
     Attributes:
         last: Last accepted numbers of every raw vector by name; those of the present frame where it is good.
         clock: Maps the frames' stamps to the pilot's monotonic time.
-        replaced: Names of what the last frame lacked.
+        replaced: Names of the raw vectors that the last frame lacked.
     """
 
     def __init__(self, latest_s: float) -> None:

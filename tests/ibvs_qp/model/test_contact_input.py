@@ -47,6 +47,8 @@ UNSOUND: list[dict[str, Any]] = [
     {"normal": np.array([1.0, 0.0, 0.0])},
     {"contact_weight": np.zeros(2)},
     {"known": None},
+    {"known": np.zeros(3)},
+    {"depth": math.inf},
 ]
 
 
@@ -58,8 +60,9 @@ def test_an_unsound_contact_is_named_and_estimated_here_instead(law: type, unsou
     controller.step(vehicle.measure(0), PRESS)
     known = controller.setpoints.contact
     assert known.known
-    controller.step(vehicle.measure(0, stamp_ns=8_000_000), PRESS, known._replace(distance=0.05))
-    later = vehicle.measure(0, stamp_ns=12_000_000)
+    for tick in range(1, 150):
+        controller.step(vehicle.measure(0, stamp_ns=tick * 4_000_000 + 4_000_000), PRESS, known._replace(distance=0.05))
+    later = vehicle.measure(0, stamp_ns=604_000_000)
     command = controller.step(later, PRESS, known._replace(**unsound))
     assert command.rejected[:1] == ("contact: not finite, or its normal has not length 1",)
     assert np.isfinite(command.thrusts).all() and FLOOR <= command.thrusts.min() <= command.thrusts.max() <= CEILING

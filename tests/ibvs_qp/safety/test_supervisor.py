@@ -26,7 +26,7 @@ def states(fault: Fault, *times: float) -> list[SafetyState]:
 @pytest.mark.parametrize(
     ("fault", "timeline"),
     [
-        (Fault.INPUTS, [(0.0, DEGRADED), (100.0, DEGRADED)]),
+        (Fault.INPUTS, [(0.0, DEGRADED), (0.2, RETREAT), (100.0, RETREAT)]),
         (Fault.WRENCH_STALE, [(0.0, NOMINAL), (0.02, DEGRADED), (0.1, RETREAT), (100.0, RETREAT)]),
         (Fault.WRENCH_FROZEN, [(0.0, RETREAT)]),
         (Fault.PUSH_UNFELT, [(0.0, RETREAT)]),

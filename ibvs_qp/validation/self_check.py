@@ -1,0 +1,62 @@
+"""Start-up self-check: sensor data in other axes than front-right-down and north-east-down, found before contact.
+
+Level and at rest many wrong conventions look right. So the check goes on until the first touch: accelerometer at
+rest, attitude against accelerometer and gyro, and the force of the first touch against the wall's normal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ibvs_qp.frames import down_in_body
+from ibvs_qp.validation.rest_check import RestCheck
+from ibvs_qp.validation.touch_check import TouchCheck
+from ibvs_qp.validation.turn_check import TurnCheck
+
+
+class SelfCheck:
+    """Checks the axes of attitude, inertial sensors and force sensor; `faults` names what it found.
+
+    Args:
+        enabled: Whether anything is checked.
+    """
+
+    def __init__(self, enabled: bool) -> None:
+        self._enabled = enabled
+        self.reset()
+
+    def reset(self) -> None:
+        """As before the first tick."""
+        self._rest, self._turn, self._touch = RestCheck(), TurnCheck(), TouchCheck()
+        self._done = not self._enabled
+
+    @property
+    def passed(self) -> bool:
+        """Whether the vehicle may approach the wall: the sensors agreed at rest, and nothing was found since."""
+        return self._done or (self._rest.passed and not self.faults())
+
+    def faults(self) -> tuple[str, ...]:
+        """What was found, in words; empty without a fault, and after a first touch with the right axes."""
+        return () if self._done else (*self._rest.faults, *self._turn.faults, *self._touch.faults)
+
+    def inertial(self, attitude: Sequence[float], rate: Sequence[float], force: Sequence[float], dt: float) -> None:
+        """Add a tick: quaternion B in I, gyro [rad/s], accelerometer [m/s^2], time since the last tick [s]."""
+        if self._done:
+            return
+        if not self._rest.passed:
+            self._rest.add(down_in_body(attitude), rate, force, dt)
+        self._turn.add(attitude, rate, dt)
+
+    def contact(self, raw: Sequence[float], noise: float, normal: Sequence[float], distance: float, dt: float) -> None:
+        """Add the force sensor of one tick.
+
+        Args:
+            raw: Its force, vehicle on tool [N], (3,).
+            noise: Standard deviation of the filtered push in free flight [N].
+            normal: Unit vector into the wall, in B, (3,).
+            distance: Tip to wall [m], infinite while unknown.
+            dt: Time since the last tick [s].
+        """
+        if not self._done:
+            self._touch.add(raw, noise, normal, distance, dt)
+            self._done = self._touch.passed and self.passed

@@ -1,0 +1,62 @@
+"""Turns of the attitude against those of the gyro."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+#: Turns are compared over this time [s], and judged once the gyro's of an axis have this root sum of squares [rad]:
+#: ten times the noise of a turn by two attitudes.
+TURN_TIME, LEAST_TURN = 0.25, math.radians(0.7)
+#: Correlation of both over the gyro's square, below which they oppose each other: 1 right, -1 with a wrong sign.
+OPPOSED = -0.5
+#: A turn of the attitude counts up to this multiple of the gyro's: yaw is arbitrary and may leap.
+LARGEST_RATIO = 2.0
+
+
+class TurnCheck:
+    """Finds an attitude that turns against the gyro about some axis: one is FRD, the other FLU.
+
+    Attributes:
+        faults: In words.
+    """
+
+    def __init__(self) -> None:
+        self._start: Sequence[float] | None = None
+        self._time, self._turn = 0.0, [0.0, 0.0, 0.0]
+        self._square, self._product, self._opposed = [0.0] * 3, [0.0] * 3, [False] * 3
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """Axes that turn the other way."""
+        axes = " and ".join([name for name, opposed in zip("xyz", self._opposed, strict=True) if opposed])
+        return (f"attitude: turns against the gyro about {axes}; one of both is FLU, not FRD",) if axes else ()
+
+    def add(self, attitude: Sequence[float], rate: Sequence[float], dt: float) -> None:
+        """Add a tick: quaternion B in I, gyro [rad/s], time since the last tick [s]."""
+        if self._start is None:
+            self._start = attitude
+            return
+        self._time += dt
+        self._turn = [turn + dt * entry for turn, entry in zip(self._turn, rate, strict=True)]
+        if self._time < TURN_TIME:
+            return
+        for axis, (seen, felt) in enumerate(zip(turned(self._start, attitude), self._turn, strict=True)):
+            largest = LARGEST_RATIO * abs(felt)
+            self._square[axis] += felt * felt
+            self._product[axis] += felt * min(max(seen, -largest), largest)
+            if self._square[axis] >= LEAST_TURN**2:
+                self._opposed[axis] = self._product[axis] < OPPOSED * self._square[axis]
+                self._square[axis] = self._product[axis] = 0.0
+        self._start, self._time, self._turn = attitude, 0.0, [0.0, 0.0, 0.0]
+
+
+def turned(start: Sequence[float], end: Sequence[float]) -> tuple[float, float, float]:
+    """Small rotation from one attitude (w, x, y, z) to another, in B [rad], (3,)."""
+    (a, b, c, d), (w, x, y, z) = start, end
+    sign = 2.0 if a * w + b * x + c * y + d * z >= 0.0 else -2.0
+    return (
+        sign * (a * x - b * w - c * z + d * y),
+        sign * (a * y + b * z - c * w - d * x),
+        sign * (a * z - b * y + c * x - d * w),
+    )
