@@ -67,6 +67,7 @@ def test_where_no_law_can_save_the_vehicle_commands_and_states_are_judged_alone(
     lost = {"crashed": 1.0, "tilt_peak_deg": 60.0, "speed_peak_m_s": 3.0, "push_peak_n": 40.0, "touching_s": 9.0}
     assert kinds(lost, row=row) == []
     assert kinds(lost | {"box_excess_n": 1.0, "to_retreat_s": None}, row=row) == ["thrust", "no retreat"]
+    assert "crash" in kinds(lost, row=row, supervised=False)
 
 
 def test_a_fault_to_be_survived_needs_the_completed_job_and_no_severe_state():
