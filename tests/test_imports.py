@@ -19,8 +19,8 @@ ORDER = {
         "analytic controller pilot"
     ).split(),
     "sim": (
-        "world scenes sensors rivals flight evaluate figures sweep report detection experiments tune notebook bench "
-        "commands"
+        "storage world scenes sensors rivals flight evaluate figures sweep report detection experiments tune notebook "
+        "bench commands"
     ).split(),
 }
 #: What every package must not import.

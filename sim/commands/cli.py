@@ -18,9 +18,16 @@ from typing import Protocol
 
 from ibvs_qp.config.errors import IbvsQpError
 from sim.commands.exit_codes import EXIT_INTERNAL, EXIT_INTERRUPTED, EXIT_USER
+from sim.storage.limits import LONGEST_SIDE
 
-#: One thread each: the matrices are small, and flights run side by side as processes.
-_THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+#: Environment of the libraries, read when they load. One thread each: the matrices are small, and flights run side by
+#: side as processes. OpenCV decodes no picture larger than `detect` takes, whatever a small file says.
+_ENVIRONMENT = {
+    "OMP_NUM_THREADS": "1",
+    "OPENBLAS_NUM_THREADS": "1",
+    "MKL_NUM_THREADS": "1",
+    "OPENCV_IO_MAX_IMAGE_PIXELS": str(LONGEST_SIDE**2),
+}
 
 #: Colours and frames in messages of the parser.
 _DECORATION = re.compile(r"\x1b\[[0-9;]*m|[\u2500-\u257f]")
@@ -53,8 +60,8 @@ def main(arguments: list[str] | None = None) -> int:
     Returns:
         The exit code.
     """
-    for variable in _THREAD_VARIABLES:
-        os.environ.setdefault(variable, "1")
+    for variable, value in _ENVIRONMENT.items():
+        os.environ.setdefault(variable, value)
     words = sys.argv[1:] if arguments is None else arguments
     try:
         with _own_output() if "--json" in words else contextlib.nullcontext():

@@ -18,6 +18,13 @@ if TYPE_CHECKING:
     from sim.flight.trace import Trace
 
 
+#: Arrays of the log that the explanation prints.
+_NEEDED = (
+    "phase", "outcome", "push_measured", "push_reference", "reach_margin", "contact_weight", "iterations", "thrusts",
+    "unallocated",
+)  # fmt: skip
+
+
 @dataclass(frozen=True, kw_only=True)
 class Explain:
     """Explain one tick of a flight: target and result of every task, active limits and their cost.
@@ -71,6 +78,10 @@ class Explain:
         trace = load_run(self.run_dir).get("qp")
         if trace is None or "program" not in trace.arrays:
             raise IbvsQpError(f"{self.run_dir} has no flight under the QP law; fly one with: ibvs-qp paint --law qp")
+        if missing := [name for name in _NEEDED if name not in trace.arrays]:
+            raise IbvsQpError(f"the log in {self.run_dir} lacks {', '.join(missing)}")
+        if not len(trace.t):
+            raise IbvsQpError(f"the flight in {self.run_dir} ended before its first tick")
         if self.seed is not None and self.seed != trace.seed:
             raise IbvsQpError(f"--seed {self.seed}: the run was flown with seed {trace.seed}")
         return trace

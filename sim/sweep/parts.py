@@ -51,9 +51,3 @@ def frame(rows: Sequence[dict[str, Any]]) -> pl.DataFrame:
 
 def _kind(value: Any) -> Any:
     return pl.Boolean if isinstance(value, bool) else pl.String if isinstance(value, str) else pl.Float64
-
-
-def join(files: Sequence[Path]) -> pl.DataFrame:
-    """One table of several parts, in the given order; a column that a part lacks is null there."""
-    tables = [pl.read_parquet(file) for file in files]
-    return pl.concat(tables, how="diagonal_relaxed") if tables else pl.DataFrame(schema=HEAD)

@@ -14,6 +14,7 @@ from sim.sweep.figures.boxes import draw_boxes
 from sim.sweep.figures.levels import chosen_figures, most_influential, varied
 from sim.sweep.figures.maps import draw_dependence, draw_figure_maps, draw_success_maps
 from sim.sweep.parts import HEAD
+from sim.sweep.tables import read_tables
 
 #: Number of parameters in the box plots and in the maps: those with the largest influence.
 MOST_BOXES, MOST_MAPS = 4, 3
@@ -37,11 +38,9 @@ def read_table(path: Path) -> tuple[pl.DataFrame, Path]:
     if not files:
         raise ConfigError(f"no table in {path}; {remedy}")
     try:
-        table = pl.concat([pl.read_parquet(file) for file in files], how="diagonal_relaxed")
-    except (pl.exceptions.PolarsError, OSError) as error:
-        raise ConfigError(f"{path} cannot be read: {str(error).splitlines()[0]}; {remedy}") from None
-    if missing := {"law", "seed", "completed", "reason"} - set(table.columns):
-        raise ConfigError(f"{path} is no table of flights: it lacks {', '.join(sorted(missing))}; {remedy}")
+        table = read_tables(files, ("law", "seed", "completed", "reason"))
+    except ConfigError as error:
+        raise ConfigError(f"{path}: {error}; {remedy}") from None
     if not table.height:
         raise ConfigError(f"{path} has no rows yet; fly the sweep first")
     head = [name for name in HEAD if name in table.columns]
