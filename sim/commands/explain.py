@@ -72,8 +72,9 @@ class Explain:
 
     def _flight(self) -> Trace:
         from sim.flight.flight_log import load_run
+        from sim.flight.unfinished import JOURNALS
 
-        if not (self.run_dir / "log.npz").exists():
+        if not (self.run_dir / "log.npz").exists() and not any(self.run_dir.glob(f"{JOURNALS}*")):
             raise IbvsQpError(f"{self.run_dir} is no run folder: it has no log.npz; give the folder that paint wrote")
         trace = load_run(self.run_dir).get("qp")
         if trace is None or "program" not in trace.arrays:

@@ -68,13 +68,13 @@ class Tune:
 
         self._check()
         notes = Console(stderr=True, quiet=self.json)
-        folder = RunFolder.create(self.out).path
-        plan = self._plan(folder)
-        try:
-            summary = self._search(plan, folder, words, notes)
-        except KeyboardInterrupt:
-            kept = f"flights are in {folder / 'parts'}" if self.trials_of else f"finished trials are in {plan.storage}"
-            return interrupted(words, folder, kept)
+        with RunFolder.open(self.out, resume=True) as run:
+            folder, plan = run.path, self._plan(run.path)
+            try:
+                summary = self._search(plan, folder, words, notes)
+            except KeyboardInterrupt:
+                parts, trials = f"flights are in {folder / 'parts'}", f"finished trials are in {plan.storage}"
+                return interrupted(words, folder, parts if self.trials_of else trials)
         print(as_json(summary) if self.json else f"Report: {summary['report']}\nPreset: {summary['preset']}")
         return 0
 

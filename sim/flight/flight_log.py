@@ -3,21 +3,33 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
 from ibvs_qp.config.files import UnreadableFile
 from sim.flight.log_check import check_arrays
 from sim.flight.trace import Event, Trace
+from sim.flight.unfinished import unfinished_run
 from sim.storage.arrays import read_npz
+from sim.storage.atomic import replacing
 from sim.storage.limits import LARGEST_ARRAYS, LARGEST_LOG
 from sim.world.scene import Scene, load_scene
 from sim.world.worlds import world_name
 
 
 def save_log(file: Path, traces: dict[str, Trace]) -> None:
-    """Write every array of every law into one npz file, named ``<law>/<array>``."""
+    """Write a log, complete or not at all.
+
+    Raises:
+        UnwritableFile: When the disk is full or the file cannot be written.
+    """
+    with replacing(file) as stream:
+        write_log(stream, traces)
+
+
+def write_log(stream: BinaryIO, traces: dict[str, Trace]) -> None:
+    """Write every array of every law in npz format, named ``<law>/<array>``."""
     content: dict[str, Any] = {}
     for law, trace in traces.items():
         arrays = dict(trace.arrays)
@@ -33,11 +45,11 @@ def save_log(file: Path, traces: dict[str, Trace]) -> None:
         arrays["preset"], arrays["world"] = np.array(trace.preset), np.array(world_name(trace.scene.errors))
         arrays["seed"], arrays["wall_time_s"] = np.array(trace.seed), np.array(trace.wall_time_s)
         content.update({f"{law}/{name}": values for name, values in arrays.items()})
-    np.savez_compressed(file, **content)
+    np.savez_compressed(stream, **content)
 
 
 def load_run(path: str | Path) -> dict[str, Trace]:
-    """Read the traces of a run folder back, without pictures.
+    """Read the traces of a run folder back, without pictures; of a killed run those ticks that reached the disk.
 
     Args:
         path: The run folder.
@@ -48,7 +60,10 @@ def load_run(path: str | Path) -> dict[str, Trace]:
     Raises:
         ConfigError: When a file is missing, damaged, or no log of a flight.
     """
-    file, scene = Path(path) / "log.npz", load_scene(Path(path) / "scene.toml")
+    file = Path(path) / "log.npz"
+    if not file.exists() and (left := unfinished_run(Path(path))):
+        return left
+    scene = load_scene(Path(path) / "scene.toml")
     arrays = read_npz(file, LARGEST_LOG, LARGEST_ARRAYS)
     traces: dict[str, Trace] = {}
     for law in dict.fromkeys(name.split("/")[0] for name in arrays):

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-import os
+import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import polars as pl
+
+from sim.storage.atomic import replacing
 
 #: Columns of every row, before parameters and figures.
 HEAD = {
@@ -32,11 +34,10 @@ def part_file(folder: Path, name: str) -> Path:
 
 
 def write_table(file: Path, table: pl.DataFrame) -> None:
-    """Write a table by an atomic rename, so that neither a reader nor a crash sees half a file."""
-    file.parent.mkdir(parents=True, exist_ok=True)
-    partial = file.with_name(f".{file.name}.{os.getpid()}")
-    table.write_parquet(partial)
-    partial.replace(file)
+    """Write a table so that neither a reader nor a crash sees half a file."""
+    with replacing(file) as stream:
+        table.write_parquet(content := io.BytesIO())
+        stream.write(content.getbuffer())
 
 
 def frame(rows: Sequence[dict[str, Any]]) -> pl.DataFrame:

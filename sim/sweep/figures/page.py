@@ -10,6 +10,7 @@ from matplotlib.figure import Figure as Canvas
 from ibvs_qp.config.errors import ConfigError
 from sim.evaluate.table import Figure, law_name, markdown
 from sim.figures.style import save, styled
+from sim.storage.atomic import write_text
 from sim.sweep.figures.boxes import draw_boxes
 from sim.sweep.figures.levels import chosen_figures, most_influential, varied
 from sim.sweep.figures.maps import draw_dependence, draw_figure_maps, draw_success_maps
@@ -73,7 +74,7 @@ def write_report(table: pl.DataFrame, folder: Path, title: str, chosen: tuple[st
             save(canvas, folder / "figures" / f"{name}.png")
             lines += [f"## {caption}", "", f"![{caption}](figures/{name}.png)", ""]
     page = folder / "report.md"
-    page.write_text("\n".join(lines).rstrip() + "\n", encoding="utf-8")
+    write_text(page, "\n".join(lines).rstrip() + "\n")
     return page
 
 
