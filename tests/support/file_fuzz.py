@@ -6,16 +6,27 @@ import contextlib
 import io
 import json
 import math
+import shutil
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import cv2
+import numpy as np
 from hypothesis import strategies as st
 
 from ibvs_qp.config.errors import IbvsQpError
 from ibvs_qp.config.settings import load_toml
 from ibvs_qp.pilot import PilotConfig
 from sim.commands.cli import main
+from sim.detection.manifest import COLUMNS
+from sim.detection.truth import FAMILIES, render_frame, sample_scene
+from sim.evaluate.metrics import compute_metrics
+from sim.flight.closed_loop import fly
 from sim.flight.flight_log import load_run
+from sim.flight.options import FlightOptions
+from sim.report.rundir import RunFolder
+from sim.sweep.parts import frame, write_table
 from sim.sweep.spec import load_spec
 from sim.world.errors import WorldErrors
 from sim.world.scene import Scene
@@ -33,7 +44,11 @@ _EDIT = st.tuples(
     st.integers(0, 8),
     st.sampled_from([token.encode() for token in TOKENS]) | st.binary(max_size=4),
 )
+Edits = list[tuple[float, int, bytes]]
 EDITS = st.lists(_EDIT, min_size=1, max_size=4)
+#: Length of the flight whose log is damaged [s].
+FLIGHT_S = 0.9
+FIGURES = {"force_rms_n": 0.1, "path_rms_m": 0.002}
 #: One value replaced: index of the line with a value, and the new value.
 VALUES = st.lists(st.tuples(st.integers(0, 10_000), st.sampled_from(TOKENS)), min_size=1, max_size=3)
 TOML_FILES = {
@@ -44,7 +59,7 @@ TOML_FILES = {
 }
 
 
-def edited(content: bytes, edits: list[tuple[float, int, bytes]]) -> bytes:
+def edited(content: bytes, edits: Edits) -> bytes:
     """The content with edits."""
     for where, removed, put in edits:
         place = min(int(where * len(content)), len(content))
@@ -84,13 +99,121 @@ def run(words: list[str]) -> Any:
     return json.loads(out.getvalue())
 
 
-def check_log(folder: Path, at: float) -> None:
+class Runs:
+    """A run of a short flight, the same as a killed process leaves it, a table and a frame, as origins of damaged ones.
+
+    Args:
+        folder: Folder of the originals.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.flown, self.killed = folder / "flown", folder / "killed"
+        journal = self.killed / "partial-1"
+        options = FlightOptions(features="geometric", video=False, journal=str(journal))
+
+        def stop(flown_s: float, *_: object) -> None:
+            if flown_s > FLIGHT_S:
+                raise KeyboardInterrupt
+
+        trace = fly(Scene(), options, stop)
+        run = RunFolder(self.flown)
+        table = {"seed": 0, "laws": {"qp": compute_metrics(trace)}, "version": "1"}
+        run.write_record({"qp": trace}, table)
+        rows = [
+            {"experiment": "x", "law": "qp", "variant": "run", "seed": seed, "completed": True, "reason": "", **FIGURES}
+            for seed in range(20)
+        ]
+        write_table(self.flown / "x.parquet", frame(rows))
+        truth = render_frame(sample_scene(FAMILIES["near wall"], 1))
+        self.frame = folder / "frame"
+        self.frame.mkdir()
+        step, units = 4, 5000.0
+        color, depth = truth.frame.rgb[::step, ::step], truth.frame.depth[::step, ::step]
+        cv2.imwrite(str(self.frame / "color.png"), color[..., ::-1])
+        cv2.imwrite(str(self.frame / "depth.png"), np.rint(depth * units).astype(np.uint16))
+        numbers = (*(value / step for value in truth.frame.intrinsics), units, *(value / step for value in truth.seed))
+        lines = (",".join(COLUMNS), ",".join(("color.png", "depth.png", *map(str, numbers))))
+        (self.frame / "manifest.csv").write_text("\n".join(lines) + "\n")
+
+    def check_edited(self, folder: Path, origin: Path, name: str, edits: Edits) -> None:
+        """A log with edits in one of its files: `load_run` and `explain` read or refuse it."""
+        _copy(origin, folder)
+        (folder / name).write_bytes(edited((origin / name).read_bytes(), edits))
+        check_log(folder)
+
+    def check_arrays(self, folder: Path, data: st.DataObject) -> None:
+        """A log with other values, shapes or types in some arrays."""
+        _copy(self.flown, folder)
+        with np.load(self.flown / "log.npz") as log:
+            arrays = {name: log[name] for name in log.files}
+        for name in data.draw(st.lists(st.sampled_from(sorted(arrays)), min_size=1, max_size=3)):
+            arrays[name] = data.draw(_OTHERS)(arrays[name])
+        np.savez(folder / "log.npz", **{name: array for name, array in arrays.items() if array is not None})
+        check_log(folder)
+
+    def check_summary(self, folder: Path, edits: Edits) -> None:
+        """`compare` of a summary with edits."""
+        (folder / "summary.json").write_bytes(edited((self.flown / "summary.json").read_bytes(), edits))
+        run(["compare", str(folder), str(self.flown)])
+        (folder / "summary.json").unlink()
+
+    def check_table(self, folder: Path, edits: Edits) -> None:
+        """`compare` of a table with edits."""
+        (folder / "x.parquet").write_bytes(edited((self.flown / "x.parquet").read_bytes(), edits))
+        run(["compare", str(folder), str(folder)])
+
+    def check_frames(self, folder: Path, name: str, edits: Edits) -> None:
+        """`detect` of a folder with edits in one file."""
+        _copy(self.frame, folder)
+        (folder / name).write_bytes(edited((self.frame / name).read_bytes(), edits))
+        run(["detect", "--sequence", str(folder), "--all"])
+
+
+def _copy(origin: Path, folder: Path) -> None:
+    shutil.copytree(origin, folder, dirs_exist_ok=True)
+
+
+def _repeated(array: np.ndarray) -> np.ndarray:
+    return np.concatenate([array, array]) if array.ndim else np.array([array, array])
+
+
+def _extreme(value: float) -> Callable[[np.ndarray], np.ndarray]:
+    def change(array: np.ndarray) -> np.ndarray:
+        if array.dtype.kind not in "fiu" or not array.size:
+            return array
+        changed = array.astype(float if array.dtype.kind != "f" else array.dtype)
+        with np.errstate(over="ignore"):
+            changed.flat[:: max(changed.size // 7, 1)] = value
+        return changed
+
+    return change
+
+
+#: Other arrays in the place of one; None leaves it out.
+_OTHERS = st.sampled_from(
+    [
+        *(_extreme(value) for value in (math.nan, math.inf, -math.inf, 1e308, -1e38, -1.0, 0.0, 1e18)),
+        _repeated,
+        lambda array: None,
+        lambda array: array[:0] if array.ndim else array,
+        lambda array: array[:-1] if array.ndim else array,
+        lambda array: array.reshape(-1),
+        lambda array: array.reshape(1, *array.shape),
+        lambda array: array.astype(str),
+        lambda array: np.array(["\ud800"] * len(array)) if array.ndim else np.array("\ud800"),
+        lambda array: np.array("a = " + "[" * 5000),
+        lambda array: np.zeros_like(array),
+    ]
+)
+
+
+def check_log(folder: Path) -> None:
     """`load_run` reads the folder or refuses it, and `explain` ends with JSON or one line."""
+    at = 0.5
     try:
         traces = load_run(folder)
     except IbvsQpError as error:
-        assert str(folder) in str(error) and "\n" not in str(error)
-        traces = {}
-    for trace in traces.values():
-        assert all(math.isfinite(t) for t in trace.t)
+        assert str(folder) in str(error)
+    else:
+        at = next((float(trace.t[len(trace.t) // 2]) for trace in traces.values() if len(trace.t)), at)
     run(["explain", str(folder), "--at", str(at)])
