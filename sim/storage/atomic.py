@@ -11,7 +11,7 @@ from typing import BinaryIO
 from ibvs_qp.config.errors import IbvsQpError
 
 
-class UnwritableFile(IbvsQpError):
+class UnwritableFile(IbvsQpError, OSError):
     """A file that the system does not let us write: full disk, no permission, read-only."""
 
 
@@ -32,6 +32,8 @@ def replaced(file: Path) -> Iterator[Path]:
             partial.replace(file)
         finally:
             partial.unlink(missing_ok=True)
+    except UnwritableFile:
+        raise  # another file, written meanwhile
     except OSError as error:
         raise UnwritableFile(f"cannot write {file}: {error.strerror or error}") from None
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import polars as pl
 
-from sim.storage.atomic import replacing
+from sim.storage.atomic import replaced
 
 #: Columns of every row, before parameters and figures.
 HEAD = {
@@ -35,9 +34,8 @@ def part_file(folder: Path, name: str) -> Path:
 
 def write_table(file: Path, table: pl.DataFrame) -> None:
     """Write a table so that neither a reader nor a crash sees half a file."""
-    with replacing(file) as stream:
-        table.write_parquet(content := io.BytesIO())
-        stream.write(content.getbuffer())
+    with replaced(file) as partial:
+        table.write_parquet(partial)
 
 
 def frame(rows: Sequence[dict[str, Any]]) -> pl.DataFrame:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import file_fuzz
 import pytest
-from file_fuzz import EDITS, TOML_FILES, VALUES
+from file_fuzz import EDITS, TOMLS, VALUES
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -23,9 +23,9 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> file_fuzz.Runs:
 
 
 @examples(4000)
-@given(st.sampled_from(list(TOML_FILES)), EDITS, VALUES)
+@given(st.sampled_from(list(TOMLS)), EDITS, VALUES)
 def test_toml(tmp_path: Path, kind: type | None, edits: file_fuzz.Edits, values: list[tuple[int, str]]) -> None:
-    text = TOML_FILES[kind].read_text()
+    text = TOMLS[kind]
     file_fuzz.check_toml(tmp_path, kind, file_fuzz.with_values(text, values).encode())
     file_fuzz.check_toml(tmp_path, kind, file_fuzz.edited(text.encode(), edits))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import io
 import json
 import math
@@ -16,7 +17,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from ibvs_qp.config.errors import IbvsQpError
-from ibvs_qp.config.settings import load_toml
+from ibvs_qp.config.settings import dump_toml, load_toml
 from ibvs_qp.pilot import PilotConfig
 from sim.commands.cli import main
 from sim.detection.manifest import COLUMNS
@@ -51,11 +52,12 @@ FLIGHT_S = 0.9
 FIGURES = {"force_rms_n": 0.1, "path_rms_m": 0.002}
 #: One value replaced: index of the line with a value, and the new value.
 VALUES = st.lists(st.tuples(st.integers(0, 10_000), st.sampled_from(TOKENS)), min_size=1, max_size=3)
-TOML_FILES = {
-    PilotConfig: ROOT / "ibvs_qp" / "presets" / "tarot_t960_qp.toml",
-    Scene: ROOT / "sim" / "scenes" / "default.toml",
-    WorldErrors: ROOT / "sim" / "world" / "profiles" / "harsh.toml",
-    None: ROOT / "sim" / "sweep" / "specs" / "robustness.toml",
+#: Valid TOML with every key of its kind; None is a sweep.
+TOMLS: dict[type | None, str] = {
+    PilotConfig: dump_toml(PilotConfig()),
+    Scene: dump_toml(Scene()),
+    WorldErrors: dump_toml(WorldErrors()),
+    None: (ROOT / "sim" / "sweep" / "specs" / "robustness.toml").read_text(),
 }
 
 
@@ -82,9 +84,20 @@ def check_toml(folder: Path, kind: type | None, content: bytes) -> None:
     file = folder / "x.toml"
     file.write_bytes(content)
     try:
-        load_spec(file) if kind is None else load_toml(kind, file)
+        found = load_spec(file).setups["qp"] if kind is None else load_toml(kind, file)
     except IbvsQpError as error:
         assert "x.toml" in str(error) and len(str(error)) < 20_000
+        return
+    assert all_finite(found)
+
+
+def all_finite(value: Any) -> bool:
+    """Whether every number of a settings tree is."""
+    if dataclasses.is_dataclass(value):
+        return all(all_finite(getattr(value, field.name)) for field in dataclasses.fields(value))
+    if isinstance(value, tuple):
+        return all(map(all_finite, value))
+    return not isinstance(value, float) or math.isfinite(value)
 
 
 def run(words: list[str]) -> Any:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import file_fuzz
 import pytest
-from file_fuzz import EDITS, TOML_FILES, VALUES
+from file_fuzz import EDITS, TOMLS, VALUES
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -20,15 +20,15 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> file_fuzz.Runs:
 
 
 @BOUNDED
-@given(st.sampled_from(list(TOML_FILES)), EDITS)
+@given(st.sampled_from(list(TOMLS)), EDITS)
 def test_toml_with_edits(tmp_path: Path, kind: type | None, edits: file_fuzz.Edits) -> None:
-    file_fuzz.check_toml(tmp_path, kind, file_fuzz.edited(TOML_FILES[kind].read_bytes(), edits))
+    file_fuzz.check_toml(tmp_path, kind, file_fuzz.edited(TOMLS[kind].encode(), edits))
 
 
 @BOUNDED
-@given(st.sampled_from(list(TOML_FILES)), VALUES)
+@given(st.sampled_from(list(TOMLS)), VALUES)
 def test_toml_with_other_values(tmp_path: Path, kind: type | None, values: list[tuple[int, str]]) -> None:
-    file_fuzz.check_toml(tmp_path, kind, file_fuzz.with_values(TOML_FILES[kind].read_text(), values).encode())
+    file_fuzz.check_toml(tmp_path, kind, file_fuzz.with_values(TOMLS[kind], values).encode())
 
 
 @BOUNDED
