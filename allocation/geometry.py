@@ -9,7 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from allocation.rotor import Rotor, unit
+from allocation.rotor import LARGEST_M, Rotor, unit
+
+#: Most rotors: the program grows with them, and a vehicle with more is a mistake.
+MOST_ROTORS = 64
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,12 +39,16 @@ class RotorGeometry:
 
     def __post_init__(self) -> None:
         """Refuse impossible geometries."""
+        most = f"must be at most {LARGEST_M:g} m"
         on_circle = any(rotor.position_m is None for rotor in self.rotors)
         checks = (
-            (len(self.rotors) >= 1, f"rotors: {len(self.rotors)} given, at least 1 is needed"),
+            (1 <= len(self.rotors) <= MOST_ROTORS, f"rotors: {len(self.rotors)} given, 1 to {MOST_ROTORS} are needed"),
             (self.circle_radius_m > 0 or not on_circle, f"circle_radius_m: {self.circle_radius_m} m, must be > 0 m"),
+            (abs(self.circle_radius_m) <= LARGEST_M, f"circle_radius_m: {self.circle_radius_m} m, {most}"),
+            (abs(self.hub_height_m) <= LARGEST_M, f"hub_height_m: {self.hub_height_m} m, {most}"),
             (abs(self.tilt_deg) < 90, f"tilt_deg: {self.tilt_deg} deg, must lie within (-90, 90) deg"),
             (self.torque_ratio_m >= 0, f"torque_ratio_m: {self.torque_ratio_m} m, must be >= 0 m"),
+            (self.torque_ratio_m <= LARGEST_M, f"torque_ratio_m: {self.torque_ratio_m} m, {most}"),
             (all(r.spin in (-1, 1) for r in self.rotors), "spin: every rotor needs +1 (CCW) or -1 (CW)"),
         )
         for good, message in checks:

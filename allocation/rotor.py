@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -12,6 +11,8 @@ import numpy as np
 UNIT_TOLERANCE = 2e-3
 #: Share of x in an axis beyond which a direction of the disc is found from y instead [-].
 ALONG_X = 0.99
+#: Largest length in a geometry [m]: ten times the largest vehicle that hovers; products of far larger ones overflow.
+LARGEST_M = 100.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,15 +39,21 @@ class Rotor:
         """Refuse impossible rotors."""
         place, axis, ratio = self.position_m, self.axis, self.torque_ratio_m
         length = 1.0 if axis is None else float(np.linalg.norm(axis))
+        angle, most = self.azimuth_deg or 0.0, f"at most {LARGEST_M:g} m"
         checks = (
             (self.azimuth_deg is not None or bool(place and axis), "azimuth_deg, or position_m and axis, is needed"),
-            (place is None or all(map(math.isfinite, place)), f"position_m: {place} m, must be finite"),
+            (abs(angle) <= 360.0, f"azimuth_deg: {angle} deg, must lie in [-360, 360] deg"),
+            (place is None or all(map(_near, place)), f"position_m: {place} m, must be finite, {most}"),
             (abs(length - 1.0) <= UNIT_TOLERANCE, f"axis: {axis} has the length {length:g}, must be a unit vector"),
-            (ratio is None or 0 <= ratio < math.inf, f"torque_ratio_m: {ratio} m, must be >= 0 m"),
+            (ratio is None or 0 <= ratio <= LARGEST_M, f"torque_ratio_m: {ratio} m, must be >= 0 m, {most}"),
         )
         for good, message in checks:
             if not good:
                 raise ValueError(f"{self.name}: {message}")
+
+
+def _near(value: float) -> bool:
+    return abs(value) <= LARGEST_M
 
 
 def unit(vector: Sequence[float]) -> np.ndarray:

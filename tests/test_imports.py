@@ -19,8 +19,8 @@ ORDER = {
         "analytic controller assured pilot"
     ).split(),
     "sim": (
-        "world scenes sensors rivals faults flight evaluate figures sweep report detection experiments fault_matrix "
-        "tune notebook bench commands"
+        "storage world scenes sensors rivals faults flight evaluate figures sweep report detection experiments "
+        "fault_matrix tune notebook bench commands"
     ).split(),
 }
 #: What every package must not import.

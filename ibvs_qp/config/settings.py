@@ -10,7 +10,6 @@ import dataclasses
 import difflib
 import math
 import numbers
-import tomllib
 import types
 import typing
 from pathlib import Path
@@ -18,7 +17,8 @@ from typing import Any, TypeVar
 
 import tomli_w
 
-from ibvs_qp.config.errors import ConfigError, out_of_range
+from ibvs_qp.config.errors import ConfigError, out_of_range, shown
+from ibvs_qp.config.toml_text import read_toml
 
 T = TypeVar("T")
 
@@ -92,8 +92,15 @@ def _check_number(name: str, value: Any, default: Any, meta: typing.Mapping[str,
     number = numbers.Integral if isinstance(default, int) else numbers.Real
     for entry in value if isinstance(value, tuple) else (value,):
         right_type = isinstance(entry, number) and not isinstance(entry, bool)
-        if not (right_type and math.isfinite(typing.cast(float, entry)) and low <= entry <= high):
+        if not (right_type and _is_finite(entry) and low <= entry <= high):
             raise out_of_range(name, value, unit, f"allowed is [{low:g}, {high:g}] {unit}".rstrip())
+
+
+def _is_finite(value: Any) -> bool:
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # an integer beyond every float
+        return False
 
 
 def from_dict(kind: type[T], table: dict[str, Any], path: str = "") -> T:
@@ -115,7 +122,7 @@ def from_dict(kind: type[T], table: dict[str, Any], path: str = "") -> T:
         if key not in known:
             near = difflib.get_close_matches(key, known, n=1)
             hint = f"; did you mean {near[0]!r}?" if near else f"; known keys: {', '.join(known)}"
-            raise ConfigError(f"unknown key {place!r}{hint}")
+            raise ConfigError(f"unknown key {shown(place)}{hint}")
         values[key] = _convert(known[key], value, place)
     try:
         return kind(**values)
@@ -140,28 +147,29 @@ def _convert(hint: Any, value: Any, place: str) -> Any:
         raise ConfigError(problems[0])
     if dataclasses.is_dataclass(hint) and isinstance(hint, type):
         if not isinstance(value, dict):
-            raise ConfigError(f"{place} must be a table, got {value!r}")
+            raise ConfigError(f"{place} must be a table, got {shown(value)}")
         return from_dict(hint, value, place)
     if origin is tuple:
         return _convert_tuple(hint, value, place)
     if origin is dict:
         if not isinstance(value, dict):
-            raise ConfigError(f"{place} must be a table, got {value!r}")
+            raise ConfigError(f"{place} must be a table, got {shown(value)}")
         return {key: _convert(typing.get_args(hint)[1], entry, f"{place}.{key}") for key, entry in value.items()}
     wanted = {float: (int, float), int: (int,), bool: (bool,), str: (str,), type(None): (type(None),)}.get(hint)
-    if wanted is None or not isinstance(value, wanted) or (hint in (int, float) and isinstance(value, bool)):
-        raise ConfigError(f"{place} = {value!r} is refused: a {getattr(hint, '__name__', hint)} is needed")
+    wrong = wanted is None or not isinstance(value, wanted) or (hint in (int, float) and isinstance(value, bool))
+    if wrong or (hint is float and isinstance(value, int) and not _is_finite(value)):
+        raise ConfigError(f"{place} = {shown(value)} is refused: a {getattr(hint, '__name__', hint)} is needed")
     return float(value) if hint is float else value
 
 
 def _convert_tuple(hint: Any, value: Any, place: str) -> tuple[Any, ...]:
     arguments = typing.get_args(hint)
     if not isinstance(value, (list, tuple)):
-        raise ConfigError(f"{place} = {value!r} is refused: a list is needed")
+        raise ConfigError(f"{place} = {shown(value)} is refused: a list is needed")
     if len(arguments) == 2 and arguments[1] is Ellipsis:
         return tuple(_convert(arguments[0], entry, place) for entry in value)
     if len(arguments) != len(value):
-        raise ConfigError(f"{place} = {value!r} is refused: a list of {len(arguments)} is needed")
+        raise ConfigError(f"{place} = {shown(value)} is refused: a list of {len(arguments)} is needed")
     return tuple(_convert(kind, entry, place) for kind, entry in zip(arguments, value, strict=True))
 
 
@@ -185,14 +193,9 @@ def load_toml(kind: type[T], file: str | Path) -> T:
     """Read a settings tree from a TOML file.
 
     Raises:
-        ConfigError: When the file is missing, is not TOML, or contains a refused value.
+        ConfigError: When the file cannot be read, is not TOML, or contains a refused value.
     """
-    try:
-        table = tomllib.loads(Path(file).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ConfigError(f"cannot read {file}: {error.strerror or error}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{file} is not valid TOML: {error}") from None
+    table = read_toml(file)
     try:
         return from_dict(kind, table)
     except ConfigError as error:

@@ -1,19 +1,29 @@
-"""C code as a shared library, translated once by the system's compiler and stored in the user's cache."""
+"""C code as a shared library, compiled once, stored in the user's cache, and verified before it is loaded.
+
+A library is code that runs with the user's rights, so the cache is trusted no further than its owner, permissions and
+content tell: the file's name ends in the hash of its content.
+"""
 
 from __future__ import annotations
 
-import functools
 import hashlib
+import logging
 import os
-import platform
-import shlex
-import shutil
-import subprocess
+import stat
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 
-#: Longest time of a compiler run [s].
-PATIENCE_S = 60.0
+from ibvs_qp.config.errors import IbvsQpError
+from ibvs_qp.config.files import read_bytes
+from ibvs_qp.model.compiler import compiler_version, run_compiler
+
+#: Digits of the hashes in a file's name: 96 bit each.
+_DIGITS = 24
+#: Largest library that is loaded [bytes]: a tick has 0.3 MB.
+_LARGEST = 64 << 20
+
+log = logging.getLogger(__name__)
 
 
 def cache_folder() -> Path:
@@ -22,46 +32,54 @@ def cache_folder() -> Path:
     return Path(own) if own else (Path(base) if base else Path.home() / ".cache") / "ibvs_qp"
 
 
-def compiler() -> list[str] | None:
-    """The C compiler's command (``CC``, else cc), or None where there is none."""
-    command = shlex.split(os.environ.get("CC", "cc"))
-    return command if command and shutil.which(command[0]) else None
-
-
-@functools.cache
-def wide_registers() -> tuple[str, ...]:
-    """The compiler's option for registers of 32 bytes where this machine has them: more at a time, the same bits."""
-    try:
-        known = Path("/proc/cpuinfo").read_text()
-    except OSError:
-        return ()  # another system: the compiler's own choice
-    return ("-mavx2",) if platform.machine() == "x86_64" and " avx2 " in known else ()
-
-
 def shared_library(name: str, code: str, command: list[str], flags: tuple[str, ...]) -> Path:
-    """Shared library of some C code, from the cache if it was translated before.
+    """Shared library of some C code, from the cache if it was compiled before and is what was compiled.
 
     Args:
         name: First part of the file's name.
         code: The C code.
-        command: The compiler's command, see `compiler`.
+        command: The compiler's command, see `ibvs_qp.model.compiler`.
         flags: Its options.
 
     Raises:
-        OSError: When the cache cannot be written or the compiler cannot be started.
-        subprocess.SubprocessError: When the compiler fails or takes too long.
+        OSError: When the cache cannot be written or others can write it, or the compiler cannot be started or takes
+            too long.
+        subprocess.SubprocessError: When the compiler fails.
     """
-    version = subprocess.run([*command, "--version"], capture_output=True, timeout=PATIENCE_S, check=True).stdout
-    key = hashlib.sha256(b"\0".join((code.encode(), version, " ".join((*command, *flags)).encode()))).hexdigest()
+    words = " ".join((*command, *flags)).encode()
+    key = _hash(b"\0".join((code.encode(), compiler_version(*command), words)))
     folder = cache_folder()
-    library = folder / f"{name}-{key[:24]}.so"
-    if library.exists():
-        return library
-    folder.mkdir(parents=True, exist_ok=True)
+    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    if not _only_ours(folder, stat.S_ISDIR):
+        raise PermissionError(f"{folder} must be a folder of this user that nobody else can write (chmod go-w)")
+    for library in folder.glob(f"{name}-{key}-*.so"):
+        if _intact(library):
+            return library
+        log.warning("%s is not what was compiled, or others can write it: compiled anew", library)
+        library.unlink()
     with tempfile.TemporaryDirectory(dir=folder) as scratch:
         source, made = Path(scratch) / f"{name}.c", Path(scratch) / f"{name}.so"
         source.write_text(code)
-        build = [*command, *flags, "-o", str(made), str(source), "-lm"]
-        subprocess.run(build, capture_output=True, timeout=PATIENCE_S, check=True)
+        run_compiler([*command, *flags, "-o", str(made), str(source), "-lm"])
+        made.chmod(0o700)
+        library = folder / f"{name}-{key}-{_hash(made.read_bytes())}.so"
         made.replace(library)  # at once: another process never loads half a file
     return library
+
+
+def _hash(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()[:_DIGITS]
+
+
+def _intact(library: Path) -> bool:
+    """Whether a file is this user's alone and has the content that its name tells."""
+    try:
+        return _only_ours(library, stat.S_ISREG) and library.stem.endswith("-" + _hash(read_bytes(library, _LARGEST)))
+    except (IbvsQpError, OSError):
+        return False
+
+
+def _only_ours(path: Path, is_kind: Callable[[int], bool]) -> bool:
+    """Whether a path is no link, of a kind, owned by this user, and writable by nobody else."""
+    found = path.lstat()
+    return is_kind(found.st_mode) and found.st_uid == os.geteuid() and not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ibvs_qp.command import ActiveLimit, TaskReport, TaskReports
+from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.qp.accept import ACTIVE_MULTIPLIER
 from ibvs_qp.qp.evaluator import ProgramData, RecordedProgram
 from ibvs_qp.qp.exact import ExactSolver
@@ -95,8 +96,14 @@ class TickReplay:
 
         Args:
             point: Inputs and states of the step as in `ProgramData.point`.
+
+        Raises:
+            ConfigError: When it is of another program, or not finite.
         """
         data, problem = self._data, self._problem
+        if point.shape != data.point.shape or not np.isfinite(point).all():
+            wanted = f"the program has {len(data.point)} finite inputs and states"
+            raise ConfigError(f"a recorded tick of {len(point)} numbers is refused: {wanted}")
         data.point[:] = point
         data.evaluate()
         solution, self.conflict = self._solve(), ()

@@ -10,7 +10,7 @@ import numpy as np
 
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.controller import HybridController
-from ibvs_qp.model.shared_library import compiler
+from ibvs_qp.model.compiler import compiler
 from ibvs_qp.qp.exact import ExactSolver
 from ibvs_qp.qp.offline import installed_solvers, solve_offline
 from sim.bench.reference_rival import mink_row

@@ -1,12 +1,13 @@
 """The console script ``ibvs-qp``: parse the arguments, run a command, map every result to an exit code.
 
 Exit codes: 0 flown and reported (also if a law did not complete), 1 internal error, 2 an error that the user can
-correct (one line on standard error), 130 Ctrl-C with the partial run written.
+correct (one line on standard error), 130 Ctrl-C and 143 SIGTERM with the partial run written.
 """
 
 from __future__ import annotations
 
 import contextlib
+import errno
 import io
 import itertools
 import os
@@ -17,11 +18,25 @@ from collections.abc import Iterator
 from typing import Protocol
 
 from ibvs_qp.config.errors import IbvsQpError
-from sim.commands.exit_codes import EXIT_INTERNAL, EXIT_INTERRUPTED, EXIT_USER
+from sim.commands.exit_codes import EXIT_INTERNAL, EXIT_INTERRUPTED, EXIT_TERMINATED, EXIT_USER
+from sim.flight.stop import sigterm_as_ctrl_c
+from sim.storage.limits import LONGEST_SIDE
 
-#: One thread each: the matrices are small, and flights run side by side as processes.
-_THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+#: Environment of the libraries, read when they load. One thread each: the matrices are small, and flights run side by
+#: side as processes. OpenCV decodes no picture larger than `detect` takes, whatever a small file says.
+_ENVIRONMENT = {
+    "OMP_NUM_THREADS": "1",
+    "OPENBLAS_NUM_THREADS": "1",
+    "MKL_NUM_THREADS": "1",
+    "OPENCV_IO_MAX_IMAGE_PIXELS": str(LONGEST_SIDE**2),
+}
 
+#: Errors of the system, not of the program: full disk or quota, file too large, read-only, no permission, broken disk.
+_SYSTEM_ERRORS = (
+    errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO,
+)  # fmt: skip
+#: Longest message [characters].
+_LONGEST = 1000
 #: Colours and frames in messages of the parser.
 _DECORATION = re.compile(r"\x1b\[[0-9;]*m|[\u2500-\u257f]")
 
@@ -53,23 +68,37 @@ def main(arguments: list[str] | None = None) -> int:
     Returns:
         The exit code.
     """
-    for variable in _THREAD_VARIABLES:
-        os.environ.setdefault(variable, "1")
-    words = sys.argv[1:] if arguments is None else arguments
+    for variable, value in _ENVIRONMENT.items():
+        os.environ.setdefault(variable, value)
+    with sigterm_as_ctrl_c() as terminated:
+        code = _run(sys.argv[1:] if arguments is None else arguments)
+    return EXIT_TERMINATED if code == EXIT_INTERRUPTED and terminated() else code
+
+
+def _run(words: list[str]) -> int:
+    """Run one command and map its result to an exit code."""
     try:
         with _own_output() if "--json" in words else contextlib.nullcontext():
             return _parse(words).run(words)
     except IbvsQpError as error:
         return _user_error(str(error))
+    except OSError as error:
+        if error.errno not in _SYSTEM_ERRORS:
+            return _internal_error()
+        return _user_error(f"{error.filename or 'the disk or the output'}: {error.strerror}")
     except KeyboardInterrupt:
         print("ibvs-qp: interrupted", file=sys.stderr)
         return EXIT_INTERRUPTED
     except SystemExit as stop:
         return stop.code if isinstance(stop.code, int) else 0
     except Exception:
-        traceback.print_exc()
-        print("ibvs-qp: internal error; please report it with the lines above", file=sys.stderr)
-        return EXIT_INTERNAL
+        return _internal_error()
+
+
+def _internal_error() -> int:
+    traceback.print_exc()
+    print("ibvs-qp: internal error; please report it with the lines above", file=sys.stderr)
+    return EXIT_INTERNAL
 
 
 @contextlib.contextmanager
@@ -151,7 +180,9 @@ def _one_line(text: str) -> str:
 
 
 def _user_error(message: str) -> int:
-    print("ibvs-qp: error: " + " ".join(message.split()), file=sys.stderr)
+    line = " ".join(message.split())
+    with contextlib.suppress(OSError):  # standard error may be on the full disk
+        print("ibvs-qp: error: " + (line if len(line) <= _LONGEST else f"{line[:_LONGEST]} ..."), file=sys.stderr)
     return EXIT_USER
 
 

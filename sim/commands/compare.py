@@ -130,8 +130,9 @@ class Compare:
                 name, file, self.law, range(self.seed, self.seed + self.seeds), self.features, self.quick, self.world
             )
         ]
-        folder = RunFolder.create(self.out).path
-        with sweep_progress(Console(stderr=True, quiet=self.json), "compare") as progress:
+        progress_bar = sweep_progress(Console(stderr=True, quiet=self.json), "compare")
+        with RunFolder.open(self.out, resume=True) as run, progress_bar as progress:
+            folder = run.path
             result = run_sweep(runs, folder / "parts", workers=self.jobs or usable_cores(), progress=progress)
         if "variant" not in result.table.columns:  # stopped before the first flight ended
             return result.table, result.table, folder, True

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from sim.detection.manifest import FrameEntry
 
 
+#: Largest coefficient of a lens [-]: those of wide lenses stay below 10.
+_LARGEST_DISTORTION = 100.0
 #: Options that a single frame needs besides --rgb.
 _CAMERA = ("fx", "fy", "cx", "cy")
 
@@ -100,11 +102,12 @@ class Detect:
 
     def _entries(self) -> list[FrameEntry]:
         """Frames of the command line, checked."""
-        from sim.detection.manifest import FrameEntry, read_manifest
+        from sim.detection.manifest import LARGEST_PX, FrameEntry, read_manifest
         from sim.detection.pictures import read_frame
 
-        if self.distortion is not None and not all(map(math.isfinite, self.distortion)):
-            raise ConfigError("--distortion must be five finite numbers: k1 k2 p1 p2 k3")
+        if self.distortion is not None and not all(abs(value) <= _LARGEST_DISTORTION for value in self.distortion):
+            limit = f"of size {_LARGEST_DISTORTION:g} at most"
+            raise ConfigError(f"--distortion must be five finite numbers {limit}: k1 k2 p1 p2 k3")
         if self.track and self.no_track:
             raise ConfigError("--track and --no-track exclude each other")
         if (self.rgb is None) == (self.sequence is None):
@@ -116,8 +119,9 @@ class Detect:
         if missing:
             raise ConfigError(f"--{missing[0]} is missing: a single frame needs --fx --fy --cx --cy")
         camera = tuple(float(getattr(self, name)) for name in _CAMERA)
-        if not all(map(math.isfinite, camera)) or min(camera[:2]) <= 1.0:
-            raise ConfigError("--fx and --fy must be above 1 px, and --fx --fy --cx --cy finite")
+        if not (min(camera[:2]) > 1.0 and all(abs(value) <= LARGEST_PX for value in camera)):
+            limit = f"{LARGEST_PX:g} px"
+            raise ConfigError(f"--fx and --fy must be above 1 px, and the size of --fx --fy --cx --cy at most {limit}")
         if not (math.isfinite(self.depth_units_per_metre) and self.depth_units_per_metre > 0.0):
             raise ConfigError(f"--depth-units-per-metre {self.depth_units_per_metre:g} is refused: it must be above 0")
         entry = FrameEntry(

@@ -1,4 +1,4 @@
 """Exit codes of ``ibvs-qp``."""
 
-#: Internal error, refused input, Ctrl-C with the partial run written.
-EXIT_INTERNAL, EXIT_USER, EXIT_INTERRUPTED = 1, 2, 130
+#: Internal error, refused input or file, Ctrl-C and SIGTERM with the partial run written.
+EXIT_INTERNAL, EXIT_USER, EXIT_INTERRUPTED, EXIT_TERMINATED = 1, 2, 130, 143

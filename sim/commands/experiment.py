@@ -59,16 +59,10 @@ class ExperimentCommand:
 
     def run(self, words: list[str]) -> int:
         """Fly the missing flights, write tables, figures and page, print the criteria."""
-        from importlib.metadata import version
-
         from rich.console import Console
 
-        from sim.experiments.design import Choice, chosen, designs
-        from sim.experiments.record import PARTS, write_page, write_summary, write_tables
-        from sim.experiments.record import summary as summarise
-        from sim.report.rundir import RunFolder, as_json
-        from sim.sweep import run_sweep
-        from sim.sweep.progress import sweep_progress
+        from sim.experiments.design import Choice, designs
+        from sim.report.rundir import RunFolder
 
         started = time.perf_counter()
         check_seed(self.seed)
@@ -79,7 +73,21 @@ class ExperimentCommand:
         _print_plan(Console() if self.plan else notes, runs)
         if self.plan:
             return 0
-        folder = RunFolder.create(self.out).path
+        with RunFolder.open(self.out, resume=True) as folder:
+            return self._fly(runs, folder.path, words, started, notes)
+
+    def _fly(self, runs: Sequence[Run], folder: Path, words: list[str], started: float, notes: Console) -> int:
+        from importlib.metadata import version
+
+        from rich.console import Console
+
+        from sim.experiments.design import chosen
+        from sim.experiments.record import PARTS, write_page, write_summary, write_tables
+        from sim.experiments.record import summary as summarise
+        from sim.report.rundir import as_json
+        from sim.sweep import run_sweep
+        from sim.sweep.progress import sweep_progress
+
         with sweep_progress(notes, self.name) as progress:
             result = run_sweep(runs, folder / PARTS, workers=self.jobs or usable_cores(), progress=progress)
         facts: dict[str, Any] = {

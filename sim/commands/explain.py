@@ -18,6 +18,13 @@ if TYPE_CHECKING:
     from sim.flight.trace import Trace
 
 
+#: Arrays of the log that the explanation prints.
+_NEEDED = (
+    "phase", "outcome", "push_measured", "push_reference", "reach_margin", "contact_weight", "iterations", "thrusts",
+    "unallocated",
+)  # fmt: skip
+
+
 @dataclass(frozen=True, kw_only=True)
 class Explain:
     """Explain one tick of a flight: target and result of every task, active limits and their cost.
@@ -65,12 +72,17 @@ class Explain:
 
     def _flight(self) -> Trace:
         from sim.flight.flight_log import load_run
+        from sim.flight.unfinished import JOURNALS
 
-        if not (self.run_dir / "log.npz").exists():
+        if not (self.run_dir / "log.npz").exists() and not any(self.run_dir.glob(f"{JOURNALS}*")):
             raise IbvsQpError(f"{self.run_dir} is no run folder: it has no log.npz; give the folder that paint wrote")
         trace = load_run(self.run_dir).get("qp")
         if trace is None or "program" not in trace.arrays:
             raise IbvsQpError(f"{self.run_dir} has no flight under the QP law; fly one with: ibvs-qp paint --law qp")
+        if missing := [name for name in _NEEDED if name not in trace.arrays]:
+            raise IbvsQpError(f"the log in {self.run_dir} lacks {', '.join(missing)}")
+        if not len(trace.t):
+            raise IbvsQpError(f"the flight in {self.run_dir} ended before its first tick")
         if self.seed is not None and self.seed != trace.seed:
             raise IbvsQpError(f"--seed {self.seed}: the run was flown with seed {trace.seed}")
         return trace

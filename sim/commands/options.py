@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import shlex
 import sys
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -13,6 +12,8 @@ from typing import Annotated, Any
 import tyro
 
 from ibvs_qp.config.errors import ConfigError, out_of_range
+from ibvs_qp.config.files import UnreadableFile, open_regular
+from ibvs_qp.config.toml_text import read_toml
 from sim.commands.exit_codes import EXIT_INTERRUPTED
 from sim.world.worlds import DEFAULT_WORLD, EXPERIMENT_WORLD
 
@@ -48,26 +49,21 @@ def check_count(option: str, value: int | None, low: int = 1, high: int | None =
         raise out_of_range(option, value, "", allowed)
 
 
-def check_readable(option: str, file: Path | None) -> None:
-    """Raise ConfigError if a file is given and cannot be read."""
+def check_readable(option: str, file: Path | None, largest: int = sys.maxsize) -> None:
+    """Raise ConfigError if a file is given and cannot be read, or has more bytes."""
     if file is None:
         return
     try:
-        file.open("rb").close()
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise ConfigError(f"cannot read {file}: {reason}; give an existing file with {option}") from None
+        open_regular(file, largest).close()
+    except UnreadableFile as error:
+        raise ConfigError(f"{error}; give an existing file with {option}") from None
 
 
 def check_preset(option: str, file: Path | None) -> None:
     """Raise ConfigError if a preset is given and is no readable TOML file; its keys are checked on use."""
     check_readable(option, file)
-    if file is None:
-        return
-    try:
-        tomllib.loads(file.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{file} is not valid TOML: {error}") from None
+    if file is not None:
+        read_toml(file)
 
 
 def check_mujoco() -> None:

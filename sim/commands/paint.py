@@ -56,6 +56,8 @@ class Paint:
     """Varies start pose, textures, clutter, noise and biases; the same seed repeats the flight."""
     out: Annotated[Path | None, optional("DIR")] = None
     """Run folder; default: runs/<UTC stamp>."""
+    overwrite: Annotated[bool, flag] = False
+    """Replace the run in --out, file by file, when the new one has been flown."""
     json: Annotated[bool, flag] = False
     """Print summary.json as one line on standard output, and nothing else."""
     view: Annotated[bool, flag] = False
@@ -104,14 +106,7 @@ class Paint:
         )
         pilot_config(scene, options)  # raises on an unusable preset before anything is shown or written
         laws = ("qp", "paper") if self.law == "both" else (self.law,)
-        folder = RunFolder.create(self.out)
         notes = Console(stderr=True, quiet=self.json)
-        try:
-            with flight_progress(notes, scene, laws) as progress:
-                flights = fly_laws(scene, options, laws, progress, workers=1 if self.view else None)
-        except BaseException:
-            folder.discard_if_empty()
-            raise
         facts = {
             "command": command_line(words),
             "seed": self.seed,
@@ -123,7 +118,11 @@ class Paint:
             "features": self.features,
             "vision": self.vision,
         }
-        return self._report(folder, flights, facts, started, notes)
+        with RunFolder.open(self.out, overwrite=self.overwrite) as folder:
+            options = dataclasses.replace(options, journal=str(folder.journal))
+            with flight_progress(notes, scene, laws) as progress:
+                flights = fly_laws(scene, options, laws, progress, workers=1 if self.view else None)
+            return self._report(folder, flights, facts, started, notes)
 
     def _report(
         self, folder: RunFolder, flights: dict[str, Flight], facts: dict, started: float, notes: Console
@@ -149,6 +148,7 @@ class Paint:
                 folder.write_report(traces, current(), video=not self.no_video)
         except KeyboardInterrupt:
             interrupted = True
+        folder.remove_stale()
         final = current()
         folder.write_summary(final)
         if self.json:

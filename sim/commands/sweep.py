@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import shutil
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -80,25 +79,31 @@ class Sweep:
         from sim.sweep.figures.page import read_table
 
         table, folder = read_table(path)
-        out = RunFolder.create(self.out or folder).path
-        page = write_report(table, out, f"Sweep {path.stem if path.is_file() else path.name}", self.figures)
+        title = f"Sweep {path.stem if path.is_file() else path.name}"
+        with RunFolder.open(self.out or folder, resume=True) as out:
+            page = write_report(table, out.path, title, self.figures)
         print(as_json({"schema": 1, "report": str(page), "flights": table.height}) if self.json else f"Report: {page}")
         return 0
 
     def _fly(self, words: list[str], notes: Console) -> int:
-        from sim.report.rundir import RunFolder, as_json, write_json
+        from sim.report.rundir import RunFolder
+
+        started, design = time.perf_counter(), self._design()
+        _print_plan(notes if not self.plan else type(notes)(), design)
+        if self.plan:
+            return 0
+        with RunFolder.open(self.out, resume=True) as folder:
+            return self._fly_into(folder.path, design, words, started, notes)
+
+    def _fly_into(self, folder: Path, design: Planned, words: list[str], started: float, notes: Console) -> int:
+        from sim.report.rundir import as_json, write_json
+        from sim.storage.atomic import write_text
         from sim.sweep import run_sweep
         from sim.sweep.figures import write_report
         from sim.sweep.parts import write_table
         from sim.sweep.progress import sweep_progress
 
-        started = time.perf_counter()
-        design = self._design()
         settings = design.spec.settings
-        _print_plan(notes if not self.plan else type(notes)(), design)
-        if self.plan:
-            return 0
-        folder = RunFolder.create(self.out).path
         with self._pool(notes) as pool, sweep_progress(notes, settings.name) as progress:
             result = run_sweep(
                 design,
@@ -110,7 +115,7 @@ class Sweep:
             )
         assert self.spec is not None
         if self.spec.resolve() != (folder / "spec.toml").resolve():
-            shutil.copyfile(self.spec, folder / "spec.toml")
+            write_text(folder / "spec.toml", self.spec.read_text(encoding="utf-8"))
         table = folder / f"{settings.name}.parquet"
         write_table(table, result.table)
         page = None

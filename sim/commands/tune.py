@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -17,6 +18,7 @@ from sim.commands.options import (
     interrupted,
     optional,
 )
+from sim.storage.limits import LARGEST_JOURNAL
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -66,13 +68,13 @@ class Tune:
 
         self._check()
         notes = Console(stderr=True, quiet=self.json)
-        folder = RunFolder.create(self.out).path
-        plan = self._plan(folder)
-        try:
-            summary = self._search(plan, folder, words, notes)
-        except KeyboardInterrupt:
-            kept = f"flights are in {folder / 'parts'}" if self.trials_of else f"finished trials are in {plan.storage}"
-            return interrupted(words, folder, kept)
+        with RunFolder.open(self.out, resume=True) as run:
+            folder, plan = run.path, self._plan(run.path)
+            try:
+                summary = self._search(plan, folder, words, notes)
+            except KeyboardInterrupt:
+                parts, trials = f"flights are in {folder / 'parts'}", f"finished trials are in {plan.storage}"
+                return interrupted(words, folder, parts if self.trials_of else trials)
         print(as_json(summary) if self.json else f"Report: {summary['report']}\nPreset: {summary['preset']}")
         return 0
 
@@ -84,6 +86,8 @@ class Tune:
             check_count(f"--{name}", getattr(self, name))
         check_preset("--preset", self.preset)
         check_readable("--trials-of", self.trials_of)
+        if self.storage and "://" not in self.storage and os.path.lexists(self.storage):
+            check_readable("--storage", Path(self.storage), LARGEST_JOURNAL)
         for name in ("trials", "flights", "storage"):
             if self.trials_of and getattr(self, name) != getattr(type(self)(), name):
                 raise ConfigError(f"--{name} configures a search, and --trials-of runs none; give one of them")

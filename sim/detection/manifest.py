@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import csv
+import io
+import itertools
 import math
 import re
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from ibvs_qp.config.errors import ConfigError
+from ibvs_qp.config.errors import ConfigError, shown
+from ibvs_qp.config.files import read_bytes
+from sim.storage.limits import LARGEST_MANIFEST, MOST_FRAMES
 
 #: Required columns; seed_u, seed_v and depth may be empty in a row.
 COLUMNS = ("color", "depth", "fx", "fy", "cx", "cy", "depth_units_per_m", "seed_u", "seed_v")
+#: Largest focal length, and largest distance of the principal point from the corner [px]: a hundred times those of any
+#: camera; far beyond, squares of image coordinates overflow.
+LARGEST_PX = 1e6
 #: PREFIX_NUMBER_color: consecutive numbers are a motion sequence.
 _NUMBERED = re.compile(r"(?P<prefix>.*)_(?P<number>\d+)_color$")
 
@@ -35,17 +43,17 @@ def read_manifest(folder: Path) -> list[FrameEntry]:
         ConfigError: When it is missing, lacks a column or has a value that is no number.
     """
     file = folder / "manifest.csv"
+    content = read_bytes(file, LARGEST_MANIFEST)
     try:
-        with file.open(newline="", encoding="utf-8-sig") as stream:
-            reader = csv.DictReader(stream, restval="")
-            missing = [name for name in COLUMNS if name not in (reader.fieldnames or ())]
-            if missing:
-                raise ConfigError(f"{file} lacks the column {missing[0]!r}; needed are {', '.join(COLUMNS)}")
-            rows = [{name: row[name].strip() for name in COLUMNS} for row in reader]
-    except OSError as error:
-        raise ConfigError(f"cannot read {file}: {error.strerror or error}") from None
+        reader = csv.DictReader(io.StringIO(content.decode("utf-8-sig"), newline=""), restval="")
+        missing = [name for name in COLUMNS if name not in (reader.fieldnames or ())]
+        if missing:
+            raise ConfigError(f"{file} lacks the column {missing[0]!r}; needed are {', '.join(COLUMNS)}")
+        rows = [{name: row[name].strip() for name in COLUMNS} for row in itertools.islice(reader, MOST_FRAMES)]
     except (UnicodeDecodeError, csv.Error) as error:
         raise ConfigError(f"{file} is no table of comma-separated values: {error}") from None
+    if len(rows) == MOST_FRAMES:
+        raise ConfigError(f"{file} names {MOST_FRAMES} frames or more")
     if not rows:
         raise ConfigError(f"{file} names no frame")
     return [_entry(folder, f"{file}, line {line}", row) for line, row in enumerate(rows, 2)]
@@ -71,14 +79,15 @@ def motion_sequences(entries: list[FrameEntry]) -> list[list[int]]:
 
 
 def _entry(folder: Path, place: str, row: dict[str, str]) -> FrameEntry:
-    def number(name: str, low: float = -math.inf) -> float:
+    def number(name: str, low: float = -math.inf, high: float = sys.float_info.max) -> float:
         try:
             value = float(row[name])
         except ValueError:
             value = math.nan
-        if not (math.isfinite(value) and value > low):
-            need = "a number" if low == -math.inf else f"a number above {low:g}"
-            raise ConfigError(f"{place}: {name} = {row[name]!r} is refused: {need} is needed")
+        if not low < value <= high:
+            need = "a number" + (f" above {low:g}" if low > -math.inf else "")
+            need += f", at most {high:g}" if high < sys.float_info.max else ""
+            raise ConfigError(f"{place}: {name} = {shown(row[name])} is refused: {need} is needed")
         return value
 
     if not row["color"]:
@@ -87,7 +96,12 @@ def _entry(folder: Path, place: str, row: dict[str, str]) -> FrameEntry:
         color=row["color"],
         depth=row["depth"],
         folder=folder,
-        intrinsics=(number("fx", 1.0), number("fy", 1.0), number("cx"), number("cy")),
+        intrinsics=(
+            number("fx", 1.0, LARGEST_PX),
+            number("fy", 1.0, LARGEST_PX),
+            number("cx", -LARGEST_PX, LARGEST_PX),
+            number("cy", -LARGEST_PX, LARGEST_PX),
+        ),
         depth_units_per_metre=number("depth_units_per_m", 0.0),
         seed=(number("seed_u"), number("seed_v")) if row["seed_u"] and row["seed_v"] else None,
     )

@@ -8,12 +8,11 @@ import cv2
 import numpy as np
 
 from ibvs_qp.config.errors import IbvsQpError
+from ibvs_qp.config.files import UnreadableFile, read_bytes
 from ibvs_qp.measurement import RgbdFrame
-
-#: Suffixes of array files.
-_ARRAYS = (".npy", ".npz")
-#: Largest side of a picture [px]: a larger one is a wrong file.
-_LARGEST_PX = 8192
+from sim.storage.arrays import read_npy, read_npz
+from sim.storage.limits import LARGEST_PICTURE, LONGEST_SIDE
+from sim.storage.quiet import no_library_output
 
 
 class PictureError(IbvsQpError):
@@ -64,7 +63,7 @@ def read_color(file: Path) -> np.ndarray:
         raise PictureError(f"{file} is no colour picture of 8 or 16 bits ({picture.dtype}, {channels} channels)")
     if channels == 1:
         return np.repeat(picture.reshape(*picture.shape[:2], 1), 3, axis=2)
-    if file.suffix.lower() in _ARRAYS:  # arrays are RGB already
+    if file.suffix.lower() in _READERS:  # arrays are RGB already
         return np.ascontiguousarray(picture[..., :3])
     code = cv2.COLOR_BGR2RGB if channels == 3 else cv2.COLOR_BGRA2RGB
     return cv2.cvtColor(picture, code)
@@ -91,23 +90,29 @@ def read_depth(file: Path, units_per_metre: float) -> np.ndarray:
 def _read(file: Path, what: str) -> np.ndarray:
     """Content of a file as an array of two or three dimensions."""
     try:
-        file.open("rb").close()
-    except OSError as error:
-        raise PictureError(f"cannot read the {what} picture {file}: {error.strerror or error}") from None
-    picture = _array(file) if file.suffix.lower() in _ARRAYS else cv2.imread(str(file), cv2.IMREAD_UNCHANGED)
-    if picture is None or picture.ndim not in (2, 3) or min(picture.shape[:2], default=0) < 1:
+        picture = _READERS.get(file.suffix.lower(), _decoded)(file)
+    except UnreadableFile as error:
+        raise PictureError(f"cannot read the {what} picture {file}: {error.reason}") from None
+    if picture is None or picture.ndim not in (2, 3) or min(picture.shape) < 1:
         raise PictureError(f"cannot read the {what} picture {file}: it is no picture (PNG, JPEG, TIFF, npy, npz)")
-    if max(picture.shape[:2]) > _LARGEST_PX:
-        raise PictureError(f"{file} is {picture.shape[1]} x {picture.shape[0]} px: at most {_LARGEST_PX} are read")
+    if max(picture.shape[:2]) > LONGEST_SIDE:
+        raise PictureError(f"{file} is {picture.shape[1]} x {picture.shape[0]} px: at most {LONGEST_SIDE} are read")
     return picture
 
 
-def _array(file: Path) -> np.ndarray | None:
-    try:
-        content = np.load(file, allow_pickle=False)
-        if isinstance(content, np.ndarray):
-            return content
-        with content:
-            return content[content.files[0]] if len(content.files) == 1 else None
-    except (OSError, ValueError, EOFError, KeyError):
-        return None
+def _decoded(file: Path) -> np.ndarray | None:
+    content = np.frombuffer(read_bytes(file, LARGEST_PICTURE), np.uint8)
+    with no_library_output():
+        try:
+            return cv2.imdecode(content, cv2.IMREAD_UNCHANGED)
+        except cv2.error:  # an empty file, or more pixels than OpenCV may decode
+            return None
+
+
+def _only_array(file: Path) -> np.ndarray | None:
+    arrays = list(read_npz(file, LARGEST_PICTURE, LARGEST_PICTURE).values())
+    return arrays[0] if len(arrays) == 1 else None
+
+
+#: Readers of array files by suffix.
+_READERS = {".npy": lambda file: read_npy(file, LARGEST_PICTURE), ".npz": _only_array}

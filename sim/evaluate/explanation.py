@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import functools
-import tomllib
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ibvs_qp.command import Outcome
+from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.settings import from_dict
+from ibvs_qp.config.toml_text import parse_toml
 from ibvs_qp.controller import qp_problem
 from ibvs_qp.pilot import PilotConfig
 from ibvs_qp.qp.explain import Explanation, LimitValue, TickReplay
@@ -29,7 +30,10 @@ def _replay(
     trace: Trace, tick: int, config: PilotConfig, solver: str | None = None
 ) -> tuple[TickReplay, Explanation | None]:
     """Solve the program of one tick again; the only access to the recorded inputs of the program."""
-    replay = TickReplay(_program(config.controller), solver)
+    problem = _program(config.controller)
+    if trace.thrusts.shape[1] != problem.model.rotors:
+        raise ConfigError(f"the log has {trace.thrusts.shape[1]} thrusts, its preset {problem.model.rotors} rotors")
+    replay = TickReplay(problem, solver)
     return replay, replay.explain(trace.arrays["program"][tick].astype(float))
 
 
@@ -41,8 +45,15 @@ def thrust_window(trace: Trace, tick: int, config: PilotConfig) -> tuple[np.ndar
 
 
 def flown_config(trace: Trace) -> PilotConfig:
-    """Configuration of a recorded flight."""
-    return from_dict(PilotConfig, tomllib.loads(trace.preset))
+    """Configuration of a recorded flight.
+
+    Raises:
+        ConfigError: When the log's preset is refused.
+    """
+    try:
+        return from_dict(PilotConfig, parse_toml(trace.preset, "preset"))
+    except ConfigError as error:
+        raise ConfigError(f"the log's preset is refused: {error}") from None
 
 
 def explain_tick(trace: Trace, tick: int, solver: str | None = None) -> tuple[PilotConfig, Explanation | None]:

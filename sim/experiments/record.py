@@ -17,6 +17,7 @@ from sim.experiments.variants import REFERENCES
 from sim.experiments.verdict import Verdict, verdicts
 from sim.figures.style import save, styled
 from sim.report.rundir import write_json
+from sim.storage.atomic import write_text
 from sim.sweep.paired import paired_differences, variant_differences
 from sim.sweep.parts import write_table
 from sim.sweep.statistics import cells
@@ -136,6 +137,6 @@ def write_page(
     shown = {folder / file for section in sections for _, file in section.figures.values()}
     for file in set((folder / FIGURES).glob("*.png")) - shown:
         file.unlink()
-    (folder / TABLES).write_text(tables_page(sections, lead, command, name), encoding="utf-8")
-    (folder / PAGE).write_text(results_page(sections, lead, command, name), encoding="utf-8")
+    write_text(folder / TABLES, tables_page(sections, lead, command, name))
+    write_text(folder / PAGE, results_page(sections, lead, command, name))
     return folder / PAGE

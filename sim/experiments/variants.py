@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from ibvs_qp.config import AngularRateSettings
 from ibvs_qp.config.settings import from_dict
+from ibvs_qp.config.toml_text import read_toml
 from ibvs_qp.pilot import PilotConfig
 from sim.flight.options import default_preset
 
@@ -42,7 +42,7 @@ class Variant:
 
 VARIANTS = {
     name: from_dict(Variant, table, name)
-    for name, table in tomllib.loads(Path(__file__).with_name("variants.toml").read_text(encoding="utf-8")).items()
+    for name, table in read_toml(Path(__file__).with_name("variants.toml")).items()
 }
 #: Reference variants of each variant.
 REFERENCES = {name: variant.against for name, variant in VARIANTS.items()}

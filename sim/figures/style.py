@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 
 from sim.evaluate.table import law_name
 from sim.flight.trace import Trace
+from sim.storage.atomic import replacing
 
 STYLE_FILE = Path(__file__).with_name("ibvs_qp.mplstyle")
 #: One colour per law, distinguishable by colour-blind readers (Okabe and Ito).
@@ -152,6 +153,6 @@ def law_patches(laws: Iterable[str] = ("qp", "paper")) -> list[Patch]:
 
 def save(figure: Figure, file: Path) -> Path:
     """Write a figure as PNG and return its path."""
-    file.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(file)
+    with replacing(file) as stream:
+        figure.savefig(stream, format="png")
     return file

@@ -3,17 +3,33 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
+from ibvs_qp.config.files import UnreadableFile
+from sim.flight.log_check import check_arrays
 from sim.flight.trace import Event, Trace
-from sim.world.scene import load_scene
+from sim.flight.unfinished import unfinished_run
+from sim.storage.arrays import read_npz
+from sim.storage.atomic import replacing
+from sim.storage.limits import LARGEST_ARRAYS, LARGEST_LOG
+from sim.world.scene import Scene, load_scene
 from sim.world.worlds import world_name
 
 
 def save_log(file: Path, traces: dict[str, Trace]) -> None:
-    """Write every array of every law into one npz file, named ``<law>/<array>``."""
+    """Write a log, complete or not at all.
+
+    Raises:
+        UnwritableFile: When the disk is full or the file cannot be written.
+    """
+    with replacing(file) as stream:
+        write_log(stream, traces)
+
+
+def write_log(stream: BinaryIO, traces: dict[str, Trace]) -> None:
+    """Write every array of every law in npz format, named ``<law>/<array>``."""
     content: dict[str, Any] = {}
     for law, trace in traces.items():
         arrays = dict(trace.arrays)
@@ -29,45 +45,65 @@ def save_log(file: Path, traces: dict[str, Trace]) -> None:
         arrays["preset"], arrays["world"] = np.array(trace.preset), np.array(world_name(trace.scene.errors))
         arrays["seed"], arrays["wall_time_s"] = np.array(trace.seed), np.array(trace.wall_time_s)
         content.update({f"{law}/{name}": values for name, values in arrays.items()})
-    np.savez_compressed(file, **content)
+    np.savez_compressed(stream, **content)
 
 
 def load_run(path: str | Path) -> dict[str, Trace]:
-    """Read the traces of a run folder back, without pictures.
+    """Read the traces of a run folder back, without pictures; of a killed run those ticks that reached the disk.
 
     Args:
         path: The run folder.
 
     Returns:
         One trace per law, in the order flown.
+
+    Raises:
+        ConfigError: When a file is missing, damaged, or no log of a flight.
     """
-    path = Path(path)
-    scene = load_scene(path / "scene.toml")
+    file = Path(path) / "log.npz"
+    if not file.exists() and (left := unfinished_run(Path(path))):
+        return left
+    scene = load_scene(Path(path) / "scene.toml")
+    arrays = read_npz(file, LARGEST_LOG, LARGEST_ARRAYS)
     traces: dict[str, Trace] = {}
-    with np.load(path / "log.npz") as log:
-        for law in dict.fromkeys(name.split("/")[0] for name in log.files):
-            arrays = {name.split("/", 1)[1]: log[name] for name in log.files if name.startswith(law + "/")}
-            completed, reason = arrays.pop("outcome_of_flight")
-            event_t, event_text = arrays.pop("event_t"), arrays.pop("event_text").reshape(-1, 2)
-            coverage = arrays.pop("coverage_percent", None)
-            arrays.pop("world", None)  # the scene holds the errors themselves
-            traces[law] = Trace(
-                scene=scene,
-                seed=int(arrays.pop("seed")),
-                law=law,
-                phases=tuple(map(str, arrays.pop("phases"))),
-                outcomes=tuple(map(str, arrays.pop("outcomes"))),
-                limits=tuple(map(str, arrays.pop("limits"))),
-                events=[
-                    Event(t=float(t), kind=str(k), text=str(x)) for t, (k, x) in zip(event_t, event_text, strict=True)
-                ],
-                completed=str(completed) == "True",
-                reason=str(reason),
-                preset=str(arrays.pop("preset", "")),
-                wall_time_s=float(arrays.pop("wall_time_s")),
-                canvas=arrays.pop("canvas", None),
-                canvas_px_per_m=float(arrays.pop("canvas_px_per_m", 0.0)),
-                coverage_mask=None if coverage is None else coverage.astype(np.float32) / 100,
-                arrays=arrays,
-            )
+    for law in dict.fromkeys(name.split("/")[0] for name in arrays):
+        own = {name.split("/", 1)[1]: values for name, values in arrays.items() if name.startswith(law + "/")}
+        try:
+            traces[law] = _trace(law, scene, own)
+        except KeyError as error:
+            raise UnreadableFile(file, f"no log of a flight: law {law!r} has no array {error}") from None
+        except (TypeError, ValueError, OverflowError) as error:
+            raise UnreadableFile(file, f"no log of a flight: law {law!r}: {error}") from None
     return traces
+
+
+def _trace(law: str, scene: Scene, arrays: dict[str, np.ndarray]) -> Trace:
+    """The trace of one law; the arrays that are not its own are taken out."""
+    check_arrays(arrays)
+    completed, reason = _texts(arrays.pop("outcome_of_flight"))
+    event_t, event_text = arrays.pop("event_t"), arrays.pop("event_text").reshape(-1, 2)
+    coverage = arrays.pop("coverage_percent", None)
+    arrays.pop("world", None)  # the scene holds the errors themselves
+    texts = [_texts(text) for text in event_text]
+    return Trace(
+        scene=scene,
+        seed=int(arrays.pop("seed")),
+        law=law,
+        phases=_texts(arrays.pop("phases")),
+        outcomes=_texts(arrays.pop("outcomes")),
+        limits=_texts(arrays.pop("limits")),
+        events=[Event(t=float(t), kind=kind, text=text) for t, (kind, text) in zip(event_t, texts, strict=True)],
+        completed=completed == "True",
+        reason=reason,
+        preset="".join(_texts(arrays.pop("preset", np.array("")))),
+        wall_time_s=float(arrays.pop("wall_time_s")),
+        canvas=arrays.pop("canvas", None),
+        canvas_px_per_m=float(arrays.pop("canvas_px_per_m", 0.0)),
+        coverage_mask=None if coverage is None else coverage.astype(np.float32) / 100,
+        arrays=arrays,
+    )
+
+
+def _texts(array: np.ndarray) -> tuple[str, ...]:
+    """Entries of an array of text that a terminal can print; ValueError for a surrogate or a number beyond Unicode."""
+    return tuple(str(entry).encode().decode() for entry in array.reshape(-1))

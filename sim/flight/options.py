@@ -22,7 +22,8 @@ class FlightOptions:
     """How to fly a scene; the defaults are the main job.
 
     With `machine_code` the C compiler, where there is one, compiles the controller's tick: the same flight to the bit,
-    faster. A `rival` is a control law of `sim.rivals`, flown on the law's preset instead of the law itself.
+    faster. A `rival` is a control law of `sim.rivals`, flown on the law's preset instead of the law itself. With a
+    `journal` the rows of the log are written to that folder while the flight goes on.
     """
 
     law: str = "qp"
@@ -36,6 +37,7 @@ class FlightOptions:
     video: bool = True
     machine_code: bool = False
     view: bool = False
+    journal: str = ""
 
 
 @functools.lru_cache(maxsize=4)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import functools
 import resource
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +16,7 @@ import joblib
 
 from sim.flight.closed_loop import INTERRUPTED, fly
 from sim.flight.options import FlightOptions
+from sim.flight.stop import handled_ctrl_c, live_with_parent
 from sim.flight.trace import Trace
 from sim.flight.video import pack_pictures
 from sim.world.scene import Scene
@@ -89,13 +89,15 @@ def _fly_apart(scene: Scene, jobs: dict[str, FlightOptions], progress: LawProgre
         try:
             with (
                 joblib.parallel_config(backend="loky", inner_max_num_threads=1),
-                _sigint(signal.SIG_IGN),  # workers inherit it, so Ctrl-C cannot hit their imports
+                handled_ctrl_c(signal.SIG_IGN),  # workers inherit it, so Ctrl-C cannot hit their imports
             ):
                 parallel = joblib.Parallel(n_jobs=len(jobs), batch_size=1, return_as="generator")  # type: ignore[arg-type]
                 results: Any = parallel(calls)
-            with _sigint(link.stop_flights):
+            with handled_ctrl_c(link.stop_flights):
                 return dict(zip(jobs, results, strict=True))
         except BrokenProcessPool:
+            if link.stopping:  # a stop of the whole group came before the worker could ignore it
+                raise KeyboardInterrupt from None
             raise RuntimeError("a process that flew a law died; was it out of memory?") from None
         finally:
             get_reusable_executor().shutdown(wait=False, kill_workers=True)
@@ -104,7 +106,7 @@ def _fly_apart(scene: Scene, jobs: dict[str, FlightOptions], progress: LawProgre
 def _fly_in_worker(scene: Scene, options: FlightOptions, news: Any, stop: Any) -> Flight:
     import cv2
 
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # `stop` ends the flight
+    live_with_parent()  # `stop` ends the flight
     cv2.setNumThreads(1)  # the laws share the cores as processes
 
     def report(flown_s: float, phase: str, real_time_factor: float) -> None:
@@ -123,10 +125,11 @@ class _Link:
         from multiprocessing.managers import SyncManager
 
         self._progress, self._manager = progress, SyncManager(ctx=get_context("spawn"))
+        self.stopping = False
 
     def __enter__(self) -> _Link:
-        with _sigint(signal.SIG_IGN):
-            self._manager.start()
+        with handled_ctrl_c(signal.SIG_IGN):
+            self._manager.start(live_with_parent)
         self.news, self.stop = self._manager.Queue(), self._manager.Event()
         self._reader = threading.Thread(target=self._pass_on, daemon=True)
         self._reader.start()
@@ -144,17 +147,5 @@ class _Link:
     def stop_flights(self, *_: Any) -> None:
         """Signal handler: end the flights; the next Ctrl-C raises."""
         signal.signal(signal.SIGINT, signal.default_int_handler)
+        self.stopping = True
         self.stop.set()
-
-
-@contextlib.contextmanager
-def _sigint(handler: Any) -> Iterator[None]:
-    """Handle Ctrl-C by a handler meanwhile, in the main thread; signals reach no other."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    previous = signal.signal(signal.SIGINT, handler)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, previous)

@@ -54,12 +54,13 @@ FIELDS = {
 }
 
 
-_LAW_NAMES = {"qp": "QP law", "paper": "analytic law"}
+#: Names of the laws in titles, headings and legends, in the order flown.
+LAWS = {"qp": "QP law", "paper": "analytic law"}
 
 
 def law_name(law: str) -> str:
     """Name of a law in titles, headings and legends."""
-    return _LAW_NAMES.get(law, law)
+    return LAWS.get(law, law)
 
 
 @dataclass(kw_only=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +9,11 @@ import numpy as np
 import polars as pl
 
 from ibvs_qp.config.errors import ConfigError
+from sim.storage.json_file import read_json
 from sim.sweep.paired import difference
 from sim.sweep.parts import PARAM, frame
 from sim.sweep.statistics import figure_names, median_interval
+from sim.sweep.tables import read_tables
 
 #: Columns that identify a flight, besides the parameters.
 _SAME = ("experiment", "law", "variant", "seed")
@@ -31,19 +32,19 @@ def read_run(path: Path) -> pl.DataFrame:
     if not names:
         advice = "give the folder of `ibvs-qp paint` or `ibvs-qp experiment`, or a preset (TOML)"
         raise ConfigError(f"{path} is no run: it has neither summary.json nor a table; {advice}")
-    return pl.concat([pl.read_parquet(path / f"{name}.parquet") for name in names], how="diagonal_relaxed")
+    return read_tables((path / f"{name}.parquet" for name in names), (*_SAME, "completed"))
 
 
 def _paint_rows(path: Path) -> pl.DataFrame:
+    content = read_json(path / "summary.json")
     try:
-        content = json.loads((path / "summary.json").read_text(encoding="utf-8"))
         rows = []
         for law, metrics in content["laws"].items():
             row: dict[str, Any] = {"experiment": "paint", "law": law, "variant": "run", "seed": content["seed"]}
             row |= {"completed": metrics["completed"], "reason": metrics["reason"], "version": content["version"]}
             rows.append(row | {name: value for name, value in metrics.items() if _is_number(value)})
         return frame(rows)
-    except (OSError, KeyError, TypeError, ValueError) as error:
+    except (AttributeError, KeyError, TypeError, ValueError, OverflowError) as error:
         raise ConfigError(f"{path / 'summary.json'} is not the summary of a run: {error}") from None
 
 

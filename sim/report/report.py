@@ -13,6 +13,7 @@ from typing import Any
 
 from sim.evaluate.table import LINES, law_name
 from sim.flight.trace import Trace
+from sim.storage.atomic import write_text
 
 _PAGE = Path(__file__).with_name("report_page.html")
 #: Packages whose versions can change a flight.
@@ -60,7 +61,7 @@ def write_report(
         command=escape(summary["command"]),
         facts=_table((), _facts(summary)),
     )
-    file.write_text(page, encoding="utf-8")
+    write_text(file, page)
 
 
 def _table(headings: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[int] = ()) -> str:

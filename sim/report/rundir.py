@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
-from collections.abc import Iterable
+import shutil
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -15,13 +17,17 @@ import numpy as np
 
 from ibvs_qp.config.errors import IbvsQpError
 from ibvs_qp.config.settings import dump_toml
-from sim.flight.flight_log import save_log
+from sim.flight.flight_log import write_log
 from sim.flight.side_by_side import Flight, own_peak_memory
 from sim.flight.trace import FIELDS, Trace
+from sim.flight.unfinished import JOURNALS
+from sim.storage.atomic import replaced, replacing, write_text
+from sim.storage.folder import locked_folder
 
 SCHEMA = 1
-#: Files of a run besides its figures.
+#: Files of a run besides its figures, and those that only `paint` writes.
 _FILES = ("report.html", "summary.json", "video.mp4", "scene.toml", "log.npz", "README.txt")
+_RECORD = ("log.npz", "summary.json")
 _README = """One run of ibvs-qp.
 
 report.html   all results on one page; open it in a browser, no other file is needed
@@ -54,6 +60,8 @@ class RunFolder:
     """Paths of one run."""
 
     path: Path
+    journal: Path | None = None  # folder of the rows that reach the disk in flight
+    before: frozenset[tuple[Path, int]] = frozenset()  # files of an earlier run, with their inodes
 
     @property
     def report(self) -> Path:
@@ -61,44 +69,45 @@ class RunFolder:
         return self.path / "report.html"
 
     @classmethod
-    def create(cls, out: Path | None) -> RunFolder:
-        """Create the folder, ``runs/<UTC stamp>`` by default, and check that it can be written.
+    @contextlib.contextmanager
+    def open(cls, out: Path | None, *, resume: bool = False, overwrite: bool = False) -> Iterator[RunFolder]:
+        """Create the folder, ``runs/<UTC stamp>`` by default, and hold it for this process.
+
+        Args:
+            out: The folder, or None.
+            resume: Whether the command continues what it finds there; only a run of `paint` is then refused.
+            overwrite: Whether a run in it may be replaced.
+
+        Yields:
+            The folder; it is removed at the end if it is empty.
 
         Raises:
-            IbvsQpError: If it cannot be written.
+            IbvsQpError: If it cannot be written, is in use, or is not empty.
         """
         path = _stamped(Path("runs")) if out is None else out
-        try:
-            path.mkdir(parents=True, exist_ok=True)
-            probe = path / ".write-test"
-            probe.write_bytes(b"")
-            probe.unlink()
-        except OSError as error:
-            reason = error.strerror or str(error)
-            raise IbvsQpError(f"cannot write run folder {path}: {reason}; give a writable folder with --out") from None
-        return cls(path)
-
-    def discard_if_empty(self) -> None:
-        """Remove the folder if it is empty."""
-        if self.path.exists() and not any(self.path.iterdir()):
-            self.path.rmdir()
+        with locked_folder(path):
+            used = any((path / name).exists() for name in _RECORD) if resume else any(path.iterdir())
+            if used and not overwrite:
+                advice = "it has the run of a flight" if resume else "--overwrite replaces a run in it"
+                raise IbvsQpError(f"run folder {path} is not empty: {advice}; give another folder with --out")
+            before = frozenset((file, file.stat().st_ino) for file in _own_files(path))
+            yield cls(path, _stamped(path, JOURNALS), before)
 
     def write_record(self, traces: dict[str, Trace], summary_table: dict[str, Any]) -> None:
         """Write log, scene, presets, summary and README before anything that could fail.
 
-        Files of an earlier run in the same folder are deleted first.
+        Each replaces that of an earlier run in the same folder when it is complete; the journals are then superfluous.
         """
-        for name in _FILES:
-            (self.path / name).unlink(missing_ok=True)
-        for trace in traces.values():
-            (self.path / "scene.toml").write_text(dump_toml(trace.scene), encoding="utf-8")
-        for law, trace in traces.items():
-            (self.path / f"preset_{law}.toml").write_text(trace.preset, encoding="utf-8")
-        save_log(self.path / "log.npz", traces)
+        with replacing(self.path / "log.npz") as stream:
+            write_log(stream, traces)  # if the disk is full, the log says so before another file is replaced
+            for law, trace in traces.items():
+                write_text(self.path / "scene.toml", dump_toml(trace.scene))
+                write_text(self.path / f"preset_{law}.toml", trace.preset)
         fields = "\n".join(f"  {name:<20} {text}" for name, text in FIELDS.items())
-        text = _README.format(seed=summary_table["seed"], path=self.path, fields=fields)
-        (self.path / "README.txt").write_text(text, encoding="utf-8")
+        write_text(self.path / "README.txt", _README.format(seed=summary_table["seed"], path=self.path, fields=fields))
         self.write_summary(summary_table)
+        for folder in self.path.glob(f"{JOURNALS}*"):
+            shutil.rmtree(folder, ignore_errors=True)
 
     def write_summary(self, summary_table: dict[str, Any]) -> None:
         """Write summary.json."""
@@ -112,14 +121,27 @@ class RunFolder:
 
         flown = {law: trace for law, trace in traces.items() if len(trace.t)}
         figures = draw_all(flown, self.path / "figures") if flown else {}
-        film = self.path / "video.mp4"
+        film = None
         if video and any(trace.pictures for trace in flown.values()):
-            write_video(flown, film)
-        write_report(self.report, flown, summary_table, figures, film if film.exists() else None)
+            with replaced(film := self.path / "video.mp4") as partial:
+                write_video(flown, partial)
+        write_report(self.report, flown, summary_table, figures, film)
+
+    def remove_stale(self) -> None:
+        """Remove what is left of an earlier run in the same folder: files that this run did not replace."""
+        for file, inode in self.before:
+            if file.exists() and file.stat().st_ino == inode:
+                file.unlink()
 
 
-def _stamped(parent: Path) -> Path:
-    stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
+def _own_files(path: Path) -> list[Path]:
+    """Files that a run wrote into a folder."""
+    found = [*(path / name for name in _FILES), *path.glob("preset_*.toml"), *path.glob("figures/*.png")]
+    return [file for file in found if file.exists()]
+
+
+def _stamped(parent: Path, prefix: str = "") -> Path:
+    stamp = prefix + datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
     path, number = parent / stamp, 1
     while path.exists():
         number += 1
@@ -171,7 +193,7 @@ def as_json(value: Any, indent: int | None = None) -> str:
 
 def write_json(file: Path, value: Any) -> None:
     """Write a JSON file for people too, with line breaks; non-finite numbers become null."""
-    file.write_text(as_json(value, indent=1) + "\n", encoding="utf-8")
+    write_text(file, as_json(value, indent=1) + "\n")
 
 
 def _finite(value: Any) -> Any:

@@ -11,9 +11,10 @@ import polars as pl
 
 from sim.sweep.design import Run
 from sim.sweep.fingerprint import listed_block
-from sim.sweep.parts import frame, join, part_file, write_table
+from sim.sweep.parts import frame, part_file, write_table
 from sim.sweep.planned import Planned
 from sim.sweep.pools import Pool, fly_local
+from sim.sweep.tables import read_tables
 
 #: Receives the finished runs, all runs, the runs already on disk before, and the finished fraction 0..1 of the expected
 #: flying time of the others.
@@ -68,4 +69,6 @@ def run_sweep(
     except KeyboardInterrupt:
         interrupted = True
     files = [part_file(folder, each.name) for each in blocks]
-    return SweepResult(table=join([file for file in files if file.exists()]), interrupted=interrupted, reused=reused)
+    return SweepResult(
+        table=read_tables(file for file in files if file.exists()), interrupted=interrupted, reused=reused
+    )

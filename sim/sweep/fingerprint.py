@@ -18,6 +18,8 @@ from sim.sweep.design import Block, Run
 
 #: Folders of `sim` that only describe or draw results: a change there needs no new flight.
 _AFTER_THE_FLIGHT = ("figures", "commands", "experiments", "fault_matrix", "notebook", "report", "tune")
+#: Options that do not make a flight another one.
+_NOT_HASHED = ("seed", "journal")
 #: Suffixes of source files.
 _SOURCES = (".py", ".c", ".h")
 #: Hexadecimal digits of a hash: 64 bit.
@@ -33,7 +35,7 @@ def digest(content: Any) -> str:
 def configuration_hash(run: Run) -> str:
     """Hash of scene, configuration, options, job and faults; all seeds of a cell in one scene have the same one."""
     plan = run.plan
-    options = {key: value for key, value in dataclasses.asdict(plan.options).items() if key != "seed"}
+    options = {key: value for key, value in dataclasses.asdict(plan.options).items() if key not in _NOT_HASHED}
     return digest(
         {
             "scene": to_dict(plan.scene),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import signal
 import traceback
 from importlib.metadata import version
 from pathlib import Path
@@ -14,7 +13,9 @@ from ibvs_qp.config.settings import dump_toml
 from sim.flight.closed_loop import fly
 from sim.flight.flight_log import save_log
 from sim.flight.side_by_side import INTERRUPTED
+from sim.flight.stop import ignore_stop
 from sim.flight.trace import Trace
+from sim.storage.atomic import write_text
 from sim.sweep.design import Block, Refusal, Run
 from sim.sweep.fingerprint import code_hash, configuration_hash
 from sim.sweep.parts import PARAM
@@ -29,7 +30,7 @@ def fly_block(block: Block, folder: Path, ignore_interrupt: bool = False) -> tup
     Args:
         block: The runs.
         folder: Folder of logs.
-        ignore_interrupt: Whether only the parent of this process handles Ctrl-C.
+        ignore_interrupt: Whether only the parent of this process handles Ctrl-C and SIGTERM.
 
     Returns:
         The name of the block, and a row per run.
@@ -38,7 +39,7 @@ def fly_block(block: Block, folder: Path, ignore_interrupt: bool = False) -> tup
         KeyboardInterrupt: On Ctrl-C; the block is then lost.
     """
     if ignore_interrupt:
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        ignore_stop()
     return block.name, [fly_run(run, folder / "logs" / f"{block.name}-{k}") for k, run in enumerate(block.make())]
 
 
@@ -89,8 +90,7 @@ def fly_run(run: Run | Refusal, log: Path | None = None) -> Row:
 
 def _store(trace: Trace, folder: Path) -> str:
     """Write the log of a flight in the layout of `sim.flight.flight_log.load_run`."""
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "scene.toml").write_text(dump_toml(trace.scene), encoding="utf-8")
+    write_text(folder / "scene.toml", dump_toml(trace.scene))
     trace.canvas = None  # the picture of the board is large, and only a run folder shows it
     save_log(folder / "log.npz", {trace.law: trace})
     return f"{folder.parent.name}/{folder.name}"

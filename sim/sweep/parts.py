@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import polars as pl
+
+from sim.storage.atomic import replaced
 
 #: Columns of every row, before parameters and figures.
 HEAD = {
@@ -32,11 +33,9 @@ def part_file(folder: Path, name: str) -> Path:
 
 
 def write_table(file: Path, table: pl.DataFrame) -> None:
-    """Write a table by an atomic rename, so that neither a reader nor a crash sees half a file."""
-    file.parent.mkdir(parents=True, exist_ok=True)
-    partial = file.with_name(f".{file.name}.{os.getpid()}")
-    table.write_parquet(partial)
-    partial.replace(file)
+    """Write a table so that neither a reader nor a crash sees half a file."""
+    with replaced(file) as partial:
+        table.write_parquet(partial)
 
 
 def frame(rows: Sequence[dict[str, Any]]) -> pl.DataFrame:
@@ -51,9 +50,3 @@ def frame(rows: Sequence[dict[str, Any]]) -> pl.DataFrame:
 
 def _kind(value: Any) -> Any:
     return pl.Boolean if isinstance(value, bool) else pl.String if isinstance(value, str) else pl.Float64
-
-
-def join(files: Sequence[Path]) -> pl.DataFrame:
-    """One table of several parts, in the given order; a column that a part lacks is null there."""
-    tables = [pl.read_parquet(file) for file in files]
-    return pl.concat(tables, how="diagonal_relaxed") if tables else pl.DataFrame(schema=HEAD)

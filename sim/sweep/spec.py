@@ -5,13 +5,13 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import re
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from ibvs_qp.config.errors import ConfigError, out_of_range
 from ibvs_qp.config.settings import choice, from_dict, setting, validate
+from ibvs_qp.config.toml_text import read_toml
 from ibvs_qp.pilot import PilotConfig
 from sim.flight.jobs import PaintJob, PressJob
 from sim.flight.options import FlightOptions, default_preset, pilot_config
@@ -69,12 +69,7 @@ def load_spec(file: Path) -> SweepSpec:
     Raises:
         ConfigError: With the file and the error in it.
     """
-    try:
-        table = tomllib.loads(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ConfigError(f"cannot read {file}: {error.strerror or error}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{file} is not valid TOML: {error}") from None
+    table = read_toml(file)
     try:
         return parse_spec(table, file.parent)
     except ConfigError as error:

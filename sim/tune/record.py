@@ -12,6 +12,7 @@ import polars as pl
 from sim.evaluate.table import law_name, markdown
 from sim.figures.style import save, styled
 from sim.report.rundir import write_json
+from sim.storage.atomic import write_text
 from sim.sweep.parts import write_table
 from sim.tune.choice import front, gain_over
 from sim.tune.figures import draw_front, draw_unseen
@@ -84,7 +85,7 @@ def write(outcome: Outcome, folder: Path) -> dict[str, Any]:
     if outcome.chosen is None:
         head = "# The shipped preset: no trial of the search may replace it."
     preset = with_gains(outcome.plan.shipped, gains).to_toml()
-    (folder / f"{law}.toml").write_text(f"{head}\n{preset}", encoding="utf-8")
+    write_text(folder / f"{law}.toml", f"{head}\n{preset}")
     record = {**summary, "ranges": RANGES, "all_trials": trial_rows(outcome.trials)}
     write_json(folder / f"{law}_trials.json", record)
     with styled():
@@ -93,7 +94,7 @@ def write(outcome: Outcome, folder: Path) -> dict[str, Any]:
         if outcome.table is not None:
             write_table(folder / f"{law}_unseen.parquet", outcome.table)
             save(draw_unseen(law, outcome.table), folder / "figures" / f"{law}-unseen.png")
-    (folder / f"report_{law}.md").write_text("\n".join(_page(outcome, summary)) + "\n", encoding="utf-8")
+    write_text(folder / f"report_{law}.md", "\n".join(_page(outcome, summary)) + "\n")
     return summary
 
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from ibvs_qp.config.errors import ConfigError
+from sim.storage.json_file import read_json
 from sim.tune.objectives import OBJECTIVES, Score
 from sim.tune.search import SearchPlan, Trials, start_gains
 from sim.tune.space import RANGES
@@ -33,10 +33,10 @@ def stored_trials(file: Path, plan: SearchPlan) -> tuple[Trials, str]:
     Raises:
         ConfigError: When the file is no such record, or of another search.
     """
+    record: dict[str, Any] = read_json(file)
     try:
-        record: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
         trials = {row.get("number", place): _trial(row) for place, row in enumerate(record["all_trials"])}
-    except (OSError, AttributeError, KeyError, TypeError, ValueError) as error:
+    except (AttributeError, KeyError, TypeError, ValueError, OverflowError) as error:
         reason = f"{type(error).__name__}: {error}"
         raise ConfigError(
             f"{file} is no record of a search ({reason}); give a LAW_trials.json with --trials-of"

@@ -1,6 +1,7 @@
 """Rotors with positions, axes and torque ratios of their own."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -75,3 +76,22 @@ def test_a_vehicle_file_may_state_free_rotors() -> None:
 def test_impossible_rotors_are_refused_by_name(rotor: dict[str, object], named: str) -> None:
     with pytest.raises(ConfigError, match=named):
         from_dict(RotorGeometry, {"rotors": [{"name": "odd", "spin": 1, **rotor}], "torque_ratio_m": 0.02})
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, 1e308])
+@pytest.mark.parametrize("name", ["circle_radius_m", "tilt_deg", "torque_ratio_m", "hub_height_m"])
+def test_a_geometry_has_finite_lengths(name: str, value: float) -> None:
+    with pytest.raises(ValueError, match=name):
+        replace(TAROT_T960, **{name: value})
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, 1e308])
+@pytest.mark.parametrize("name", ["azimuth_deg", "torque_ratio_m"])
+def test_a_rotor_has_finite_values(name: str, value: float) -> None:
+    with pytest.raises(ValueError, match=name):
+        replace(TAROT_T960.rotors[0], **{name: value})
+
+
+def test_the_number_of_rotors_is_limited() -> None:
+    with pytest.raises(ValueError, match="65 given, 1 to 64"):
+        replace(TAROT_T960, rotors=TAROT_T960.rotors[:1] * 65)

@@ -4,6 +4,7 @@
 # pyright: reportAttributeAccessIssue=false
 from __future__ import annotations
 
+import contextlib
 from typing import Any
 
 import mujoco
@@ -154,10 +155,8 @@ class GlScene:
             self._context = self._mjr = None
 
     def __del__(self) -> None:
-        try:
+        with contextlib.suppress(Exception):  # at the interpreter's end the libraries may be gone
             self.close()
-        except Exception:  # at the interpreter's end the libraries may be gone
-            pass
 
     def _current(self) -> None:
         """Other cameras, or MuJoCo's viewer, may have made their own context current."""

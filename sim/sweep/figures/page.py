@@ -10,10 +10,12 @@ from matplotlib.figure import Figure as Canvas
 from ibvs_qp.config.errors import ConfigError
 from sim.evaluate.table import Figure, law_name, markdown
 from sim.figures.style import save, styled
+from sim.storage.atomic import write_text
 from sim.sweep.figures.boxes import draw_boxes
 from sim.sweep.figures.levels import chosen_figures, most_influential, varied
 from sim.sweep.figures.maps import draw_dependence, draw_figure_maps, draw_success_maps
 from sim.sweep.parts import HEAD
+from sim.sweep.tables import read_tables
 
 #: Number of parameters in the box plots and in the maps: those with the largest influence.
 MOST_BOXES, MOST_MAPS = 4, 3
@@ -37,11 +39,9 @@ def read_table(path: Path) -> tuple[pl.DataFrame, Path]:
     if not files:
         raise ConfigError(f"no table in {path}; {remedy}")
     try:
-        table = pl.concat([pl.read_parquet(file) for file in files], how="diagonal_relaxed")
-    except (pl.exceptions.PolarsError, OSError) as error:
-        raise ConfigError(f"{path} cannot be read: {str(error).splitlines()[0]}; {remedy}") from None
-    if missing := {"law", "seed", "completed", "reason"} - set(table.columns):
-        raise ConfigError(f"{path} is no table of flights: it lacks {', '.join(sorted(missing))}; {remedy}")
+        table = read_tables(files, ("law", "seed", "completed", "reason"))
+    except ConfigError as error:
+        raise ConfigError(f"{path}: {error}; {remedy}") from None
     if not table.height:
         raise ConfigError(f"{path} has no rows yet; fly the sweep first")
     head = [name for name in HEAD if name in table.columns]
@@ -74,7 +74,7 @@ def write_report(table: pl.DataFrame, folder: Path, title: str, chosen: tuple[st
             save(canvas, folder / "figures" / f"{name}.png")
             lines += [f"## {caption}", "", f"![{caption}](figures/{name}.png)", ""]
     page = folder / "report.md"
-    page.write_text("\n".join(lines).rstrip() + "\n", encoding="utf-8")
+    write_text(page, "\n".join(lines).rstrip() + "\n")
     return page
 
 

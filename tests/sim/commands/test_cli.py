@@ -72,9 +72,12 @@ def test_log_reads_back_equal(flown, capsys):
 
 
 def test_second_run_leaves_nothing_stale(flown, capsys):
-    assert main(["paint", "--law", "qp", "--out", "run"]) == 0
-    assert main(["paint", "--law", "qp", "--out", "run", "--no-video"]) == 0
-    assert not (flown / "run" / "video.mp4").exists()
+    assert main(["paint", "--out", "run"]) == 0
+    (flown / "run" / "notes.txt").write_text("mine")
+    assert main(["paint", "--law", "qp", "--out", "run", "--no-video", "--overwrite"]) == 0
+    assert not (flown / "run" / "video.mp4").exists() and not (flown / "run" / "preset_paper.toml").exists()
+    assert set(load_run("run")) == {"qp"} and (flown / "run" / "notes.txt").read_text() == "mine"
+    assert not [file for file in (flown / "run").rglob("*") if file.name.startswith((".", "partial"))]
 
 
 def test_law_that_does_not_complete_is_still_reported(flown, capsys, monkeypatch):

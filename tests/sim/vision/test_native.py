@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from ibvs_qp.config.vehicle import VehicleParams
+from ibvs_qp.model import compiler
 from ibvs_qp.vision import (
     Perception,
     VisionConfig,
@@ -52,6 +53,7 @@ def shots() -> list[Shot]:
 def fresh(monkeypatch: pytest.MonkeyPatch):
     """Lets a test choose its compiler; what was translated for it is forgotten afterwards."""
     native_module.native.cache_clear()
+    monkeypatch.setattr(compiler, "PATIENCE_S", 300.0)  # on a busy machine
     yield monkeypatch
     native_module.native.cache_clear()
 
@@ -194,9 +196,9 @@ def test_board_light_and_paint_are_learned_as_numpy_does(shots: list[Shot], fres
     shape = (frame.rgb.shape[0], frame.rgb.shape[1])
     grid = CoarseGrid(shape, frame.intrinsics, np.zeros(shape, np.uint8), 80)
     surfaces = [percept.plane for percept in see(shots)[::2]]
-    for compiler in (None, "none"):
-        if compiler is not None:
-            fresh.setenv("CC", compiler)
+    for chosen in (None, "none"):
+        if chosen is not None:
+            fresh.setenv("CC", chosen)
         native_module.native.cache_clear()
         colors, results = SurfaceColors(None, paint, 42.0), []
         for (shot, surface), dimmed in itertools.product(zip(shots[::2], surfaces[::2], strict=True), (1.0, 0.7)):

@@ -1,0 +1,99 @@
+"""Traces of a flight whose process was killed, from the rows that its journal left."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ibvs_qp.config.errors import ConfigError
+from ibvs_qp.config.files import UnreadableFile, read_bytes
+from ibvs_qp.config.settings import from_dict
+from ibvs_qp.config.toml_text import parse_toml
+from ibvs_qp.pilot import PilotConfig
+from sim.flight.assemble import OUTCOMES, PHASES, Flown, LoggedRows, assemble
+from sim.flight.columns import split
+from sim.flight.journal import NOTES, ROWS, Heading
+from sim.flight.log_check import check_arrays
+from sim.flight.trace import LAWS, Event, Trace
+from sim.storage.limits import LARGEST_ARRAYS
+from sim.world.scene import Scene
+
+#: Beginning of the names of journals' folders in a run folder.
+JOURNALS = "partial-"
+#: Errors of content that no journal wrote.
+_DAMAGE = (ArithmeticError, AttributeError, ConfigError, LookupError, RecursionError, TypeError, ValueError)
+#: Reason of a flight without an end.
+KILLED = "the process of the flight was killed: its log ends here"
+
+
+def unfinished_run(path: Path) -> dict[str, Trace]:
+    """Traces of the newest journal in a run folder, one per law; none without a journal.
+
+    Raises:
+        ConfigError: When a journal is damaged elsewhere than at its end.
+    """
+    for folder in sorted(path.glob(f"{JOURNALS}*"), key=lambda each: each.stat().st_mtime, reverse=True):
+        files = [file for law in LAWS if (file := folder / f"{law}{NOTES}").exists()]
+        if files:
+            return {file.stem: _read(file) for file in files}
+    return {}
+
+
+def _read(file: Path) -> Trace:
+    content, rows = read_bytes(file, LARGEST_ARRAYS), read_bytes(file.with_suffix(ROWS), LARGEST_ARRAYS)
+    try:
+        first, *notes = _lines(content)
+        return _trace(Heading(**first), notes, rows)
+    except _DAMAGE as error:
+        raise UnreadableFile(file, f"no journal of a flight ({type(error).__name__}: {error})") from None
+
+
+def _lines(content: bytes) -> Iterator[dict[str, Any]]:
+    """The complete lines; the last one ends where the process died."""
+    *lines, _ = content.split(b"\n")
+    return map(json.loads, lines)
+
+
+def _trace(heading: Heading, notes: list[dict[str, Any]], content: bytes) -> Trace:
+    scene = from_dict(Scene, parse_toml(heading.scene, "scene"))
+    config = from_dict(PilotConfig, parse_toml(heading.preset, "preset"))
+    flown = Flown.of(scene, int(heading.seed), str(heading.law), config)
+    table = np.zeros(min(len(content) // heading.row.itemsize, sum(note["ticks"] for note in notes)), heading.row)
+    table.view(np.uint8)[:] = memoryview(content)[: table.nbytes]
+    columns = split(np.ascontiguousarray(table["log"]), heading.columns)
+    limits: dict[str, int] = {}
+    active = {
+        int(tick): [(limits.setdefault(name, len(limits)), price) for name, price in paid]
+        for note in notes
+        for tick, paid in note["limits"].items()
+        if int(tick) < len(table)
+    }
+    rows = LoggedRows(
+        columns=columns,
+        program=np.ascontiguousarray(table["program"]) if heading.program else None,
+        limits=tuple(limits),
+        active=active,
+        vision_ms=[value for note in notes for value in note["vision_ms"]],
+        thrust_limits=(flown.vehicle.thrust_min, flown.vehicle.thrust_max),
+    )
+    with np.errstate(all="ignore"):  # numbers from a file may be anything
+        arrays = assemble(flown, rows)
+    names = {"phases": PHASES, "outcomes": OUTCOMES, "limits": rows.limits}
+    check_arrays(arrays | {name: np.array(each) for name, each in names.items()})
+    end = Event(t=float(arrays["t"][-1]) if len(table) else 0.0, kind="end", text=KILLED)
+    return Trace(
+        scene=scene,
+        seed=flown.seed,
+        law=flown.law,
+        arrays=arrays,
+        phases=PHASES,
+        outcomes=OUTCOMES,
+        limits=rows.limits,
+        events=[*(Event(t=float(t), kind=kind, text=text) for note in notes for t, kind, text in note["events"]), end],
+        reason=KILLED,
+        preset=heading.preset,
+    )

@@ -1,0 +1,1 @@
+"""Files of the simulator: what is read from outside is bounded, what is written is complete or absent."""
