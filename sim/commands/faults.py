@@ -90,32 +90,33 @@ class Faults:
         _print_plan(Console() if self.plan else notes, runs, workers)
         if self.plan:
             return 0
-        folder = RunFolder.create(self.out).path
-        with sweep_progress(notes, NAME) as progress:
-            result = run_sweep(runs, folder / PARTS, workers=workers, progress=progress)
-        scenes = {world: job_scene(world) for world in choice.worlds}
-        vehicle = pilot_of("supervised").controller.vehicle
-        push_n = next(iter(scenes.values())).paint.push_n
-        judged = verdicts(choice.rows, result.table, push_n, vehicle)
-        facts: dict[str, Any] = {
-            "command": command_line(words),
-            "version": version("ibvs-qp"),
-            "quick": self.quick,
-            "seed": self.seed,
-            "worlds": list(choice.worlds),
-            "interrupted": result.interrupted,
-            "wall_time_s": time.perf_counter() - started,
-        }
-        content = summary(judged, folder, facts)
-        file = write(folder, result.table, content, self._page(judged, choice, result.table.height))
-        if self.json:
-            print(as_json(content))
-        else:
-            _print_verdicts(Console(), judged)
-            Console().print(f"Results: {file}", soft_wrap=True, highlight=False)
-        if result.interrupted:
-            return interrupted(words, folder, f"finished flights are in {folder}")
-        return 0
+        with RunFolder.open(self.out, resume=True) as opened:
+            folder = opened.path
+            with sweep_progress(notes, NAME) as progress:
+                result = run_sweep(runs, folder / PARTS, workers=workers, progress=progress)
+            scenes = {world: job_scene(world) for world in choice.worlds}
+            vehicle = pilot_of("supervised").controller.vehicle
+            push_n = next(iter(scenes.values())).paint.push_n
+            judged = verdicts(choice.rows, result.table, push_n, vehicle)
+            facts: dict[str, Any] = {
+                "command": command_line(words),
+                "version": version("ibvs-qp"),
+                "quick": self.quick,
+                "seed": self.seed,
+                "worlds": list(choice.worlds),
+                "interrupted": result.interrupted,
+                "wall_time_s": time.perf_counter() - started,
+            }
+            content = summary(judged, folder, facts)
+            file = write(folder, result.table, content, self._page(judged, choice, result.table.height))
+            if self.json:
+                print(as_json(content))
+            else:
+                _print_verdicts(Console(), judged)
+                Console().print(f"Results: {file}", soft_wrap=True, highlight=False)
+            if result.interrupted:
+                return interrupted(words, folder, f"finished flights are in {folder}")
+            return 0
 
     def _page(self, judged: Sequence[Verdict], choice: Choice, flights: int) -> str:
         from importlib.metadata import version
