@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from ibvs_qp.config.settings import setting
 from ibvs_qp.pilot import Pilot
 from sim.faults.fault import Fault, Surroundings
@@ -15,18 +13,21 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True, kw_only=True)
 class WindStep(Fault):
-    """The mean wind jumps to a value."""
+    """The mean wind changes to a value, at once or as a front that passes the vehicle."""
 
     mean_m_s: Vector = setting((0.0, 3.0, 0.0), "new mean wind, world NED", unit="m/s", low=-30.0, high=30.0)
+    rise_s: float = setting(
+        0.0, "time of the change: of a front, size of the vehicle over its speed", unit="s", low=0.0, high=60.0
+    )
 
     def strike(self, world: Surroundings, pilot: Pilot) -> str:
         """Change the wind."""
-        world.plant.wind.mean = np.array(self.mean_m_s)
+        world.plant.wind.change(self.mean_m_s, self.rise_s)
         return f"wind steps to {self.mean_m_s} m/s (north, east, down)"
 
     def end(self, world: Surroundings, pilot: Pilot) -> None:
         """The scene's wind again: a gust."""
-        world.plant.wind.mean = np.array(world.plant.scene.wind.mean_m_s)
+        world.plant.wind.change(world.plant.scene.wind.mean_m_s, self.rise_s)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -18,7 +18,7 @@ class Wind:
     r"""Drag in a mean wind plus a first-order Gauss-Markov gust force per world axis.
 
     The gust is :math:`g_{k+1} = a g_k + \sigma \sqrt{1 - a^2}\, n_k`, a = exp(-dt / tau); it starts in its
-    stationary distribution. Attribute ``mean`` (world NED [m/s]) may be changed at any time.
+    stationary distribution. Attribute ``mean`` (world NED [m/s]) may be changed at any time, or by `change`.
 
     Args:
         scene: Mean wind [m/s] (NED) and gust force [N rms per axis].
@@ -29,12 +29,18 @@ class Wind:
 
     def __init__(self, scene: WindScene, linear_drag: float, tick_s: float, generator: np.random.Generator) -> None:
         self.mean = np.array(scene.mean_m_s)
-        self._drag = linear_drag
+        self._drag, self._tick_s = linear_drag, tick_s
+        self._steps: list[np.ndarray] = []  # means of the ticks to come, the last first
         self._rms = scene.gust_n_rms
         self._decay = math.exp(-tick_s / GUST_TIME_CONSTANT_S)
         self._kick = self._rms * math.sqrt(1.0 - self._decay**2)
         self._normals = Normals(generator)
         self._gust = [self._rms * number for number in self._normals.take(3)]
+
+    def change(self, mean_m_s: Sequence[float], rise_s: float) -> None:
+        """Change the mean [m/s] (NED) evenly within a time [s]: a front that passes the vehicle."""
+        ticks = max(round(rise_s / self._tick_s), 1)
+        self._steps = list(np.linspace(np.array(mean_m_s), self.mean, ticks, endpoint=False))
 
     def force(self, velocity: Sequence[float]) -> tuple[float, float, float]:
         """Advance the gusts by one tick and return the force of the air, world NED [N].
@@ -42,6 +48,8 @@ class Wind:
         Args:
             velocity: Velocity of the centre of mass, world NED [m/s], (3,).
         """
+        if self._steps:
+            self.mean = self._steps.pop()
         mx, my, mz = self.mean.tolist()
         vx, vy, vz = velocity
         drag = self._drag
