@@ -30,7 +30,7 @@ from ibvs_qp.estimation.stamps import HISTORY
 from ibvs_qp.estimation.wall_lines import WallAxes, image_line
 from ibvs_qp.estimation.wall_motion import BIAS, WallMotion
 from ibvs_qp.estimation.wrench_tare import WrenchTare
-from ibvs_qp.frames import Vector3, add_scaled, down_in_body, plane_in_body, to_camera
+from ibvs_qp.frames import Vector3, add_scaled, down_in_body, plane_in_body, roll_pitch, to_camera
 from ibvs_qp.measurement import HORIZONTAL, FeatureFrame, LineReference, Measurement, Reference, RgbdFrame, SensorFrame
 from ibvs_qp.model.reporting import fixed_command
 from ibvs_qp.model.setpoints import Setpoints
@@ -57,6 +57,8 @@ HINT_SPAN = (0.10, 0.50)
 _INERTIAL = ("attitude", "angular_velocity", "specific_force")
 #: A vehicle turned farther from the wall than this does not use its pictures: cosine of 20 degrees.
 FACING = 0.94
+#: Tip to wall beyond which a tilting vehicle does not press [m].
+CLEAR = 0.02
 #: States in which the strategy flies.
 _FLYING = (SafetyState.NOMINAL, SafetyState.DEGRADED)
 #: Pixels by which pictures are compared: every 16th row and column, of 4096 at most.
@@ -470,18 +472,20 @@ class Pilot:
             push_reference=self.setpoints.push_reference,  # of the tick before: the controller runs after the painter
             tared=self.tare.ready,
         )
-        limits = self._thrust_limits()
-        if limits is not None and self.rotor_loss.update(limits):
+        limits, rotors = self._thrust_limits(), self.rotor_loss
+        tilted = rotors.tilts
+        if limits is not None and rotors.update(limits):
             self.painter.abandon(inputs, "no level hover is left")
         elif self.assurance.state not in _FLYING and not self.painter.descending:
             self.painter.stop(inputs, "; ".join(self.assurance.supervisor.reasons))
         target = self.painter.step(inputs)
-        rotors = self.rotor_loss
-        if not (rotors.lost or rotors.limited):
+        if not rotors.tilts:
             return target
-        normal = np.array(contact.normal)
+        if not tilted:
+            rotors.begin(roll_pitch(self._attitude))
+        normal, touching = np.array(contact.normal), contact.distance < CLEAR
         away = contact.distance + float(normal @ self._tip)
-        tilt = rotors.tilt(away, contact.speed, motion.state[0], normal, dt)
+        tilt = rotors.tilt(away, contact.speed, motion.state[0], normal, dt, touching=touching)
         return dataclasses.replace(target, tilt=tilt) if rotors.lost else dataclasses.replace(target, trim=tilt)
 
     def _thrust_limits(self) -> tuple[np.ndarray, np.ndarray] | None:

@@ -42,6 +42,7 @@ class Attitude:
         tilt_error: Roll and pitch minus their targets [rad], (2,).
         tilt_rate: Rates of roll and pitch [rad/s], (2,); tilt_rate_ahead: those after the lead.
         tilted: 1 for a vehicle that lost a rotor: it flies tilted, and cannot hold yaw.
+        trimmed: 1 for a vehicle with a rotor that is stuck: it moves along the wall by tilting.
     """
 
     roll: ca.SX
@@ -51,6 +52,7 @@ class Attitude:
     tilt_rate: ca.SX
     tilt_rate_ahead: ca.SX
     tilted: ca.SX
+    trimmed: ca.SX
 
 
 def attitude(body: Body, contact: Contact, target: Target, rate_ahead: ca.SX) -> Attitude:
@@ -76,4 +78,5 @@ def attitude(body: Body, contact: Contact, target: Target, rate_ahead: ca.SX) ->
         tilt_rate=swept(body.rate),
         tilt_rate_ahead=swept(rate_ahead),
         tilted=tilted,
+        trimmed=ca.norm_2(trim) > 0.0,
     )

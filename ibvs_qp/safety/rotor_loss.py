@@ -16,12 +16,15 @@ LATERAL_SHORTFALL = 0.3
 #: Up to this trim [rad] a vehicle flies as a level one, forces and yaw included: one rotor stuck or limited near its
 #: hover thrust. Beyond it only the tilt moves the vehicle, and yaw is free.
 LARGEST_TRIM = math.radians(8.0)
+#: A rotor whose limits are closer than this [N] is stuck: no level wrench controls the force in some direction then.
+STUCK_WIDTH = 2.0
 #: Least distance between lower and upper limit for the allocation [N].
 LIMIT_GAP = 1e-6
 #: Largest commanded tilt [rad]; with the oscillation around it the vehicle stays within 25 deg (rotor-derate flights).
 TILT_BOUND = math.radians(20.0)
-#: Fastest change of the commanded tilt [rad/s].
-TILT_RATE = math.radians(40.0)
+#: Fastest change of the commanded tilt [rad/s]. With a stuck rotor a moment comes with a force, maybe into the wall:
+#: slow at the wall.
+TILT_RATE, SLOW_TILT_RATE = math.radians(40.0), math.radians(10.0)
 #: Speed away from the wall [m/s] and distance of the centre of mass at which the retreat ends [m].
 ESCAPE_SPEED, ESCAPE_DISTANCE = 0.4, 1.8
 #: Speed with a rotor that is only limited [m/s].
@@ -45,6 +48,7 @@ class RotorLoss:
     Attributes:
         lost: Whether the present limits leave no hover near level.
         limited: Whether they leave one near level, at an attitude of its own.
+        stuck: Whether they leave a rotor one thrust only.
     """
 
     def __init__(self, vehicle: VehicleParams) -> None:
@@ -54,7 +58,7 @@ class RotorLoss:
 
     def reset(self) -> None:
         """All rotors as configured."""
-        self.lost = self.limited = False
+        self.lost = self.limited = self.stuck = False
         self._trim, self._tilt, self._limits = np.zeros(2), np.zeros(2), b""
 
     def update(self, limits: tuple[np.ndarray, np.ndarray] | None) -> bool:
@@ -73,9 +77,21 @@ class RotorLoss:
         self._trim = np.array((math.atan2(-right, -down), math.atan2(front, -down))) if short else np.zeros(2)
         self.lost = math.hypot(*self._trim) > LARGEST_TRIM
         self.limited = short and not self.lost
+        self.stuck = float(np.min(upper - lower)) < STUCK_WIDTH
         return self.lost and not before
 
-    def tilt(self, distance: float, closing: float, along: float, normal: np.ndarray, dt: float) -> np.ndarray:
+    def begin(self, attitude: tuple[float, float]) -> None:
+        """Start the commanded tilt from the present roll and pitch [rad]."""
+        self._tilt = np.array(attitude)
+
+    @property
+    def tilts(self) -> bool:
+        """Whether the vehicle moves by tilting."""
+        return self.lost or self.limited or self.stuck
+
+    def tilt(
+        self, distance: float, closing: float, along: float, normal: np.ndarray, dt: float, *, touching: bool = False
+    ) -> np.ndarray:
         """Commanded roll and pitch [rad], (2,): the trim of the remaining force plus the retreat from the wall.
 
         A limited rotor leaves one force along the wall or its normal free; tilting controls it.
@@ -86,6 +102,7 @@ class RotorLoss:
             along: Its speed to the right along the wall [m/s].
             normal: Unit vector into the wall, in B, (3,).
             dt: Time since the last call [s].
+            touching: Whether the tip is at the wall.
         """
         fastest, gain, bound = TRIMMED_SPEED, TRIMMED_VELOCITY_GAIN, TRIMMED_ACCELERATION_BOUND
         if self.lost:
@@ -96,6 +113,6 @@ class RotorLoss:
         ahead, right = -away * x - back * y, -away * y + back * x
         target = self._trim + np.array((right, -ahead)) / GRAVITY
         target *= min(1.0, TILT_BOUND / max(float(np.hypot(*target)), LEAST_TILT))
-        step = TILT_RATE * dt
+        step = (SLOW_TILT_RATE if touching and not self.lost else TILT_RATE) * dt
         self._tilt = self._tilt + np.clip(target - self._tilt, -step, step)
         return self._tilt

@@ -28,7 +28,8 @@ class VelocityTask(Task):
         free = ca.SX.ones(2) if paper else free_directions(model)
         weights, target = model.config.weights, velocity_command(model)
         extra = 0.0 if paper else model.tip_stationary * (stationary_sideways_weight(weights) - weights.velocity)
-        level = 1.0 - model.attitude.tilted  # a vehicle that lost a rotor moves sideways by tilting
+        # Without a rotor one force is not free. It shall be the one along the wall: there the vehicle tilts to move.
+        level = 1.0 - ca.fmax(model.attitude.tilted, model.attitude.trimmed)
         row_weights = ((weights.velocity + extra) * free[0] * level, weights.velocity * free[1])
         return [
             TaskRow(

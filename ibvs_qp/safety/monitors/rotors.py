@@ -15,8 +15,8 @@ from ibvs_qp.safety.monitors.persistence import Persistence
 UNEXPLAINED = 0.5
 #: Most rotors at once that are told apart.
 MOST_ROTORS = 2
-#: A rotor that was found is followed down to this missing thrust [N].
-FOUND = 1.5
+#: A rotor that was found is followed down to this missing thrust [N] and this many standard deviations.
+FOUND, FOUND_SIGMAS = 1.5, 3.0
 #: Half width of the remaining limits of a stuck rotor [N].
 MARGIN = 0.5
 
@@ -57,8 +57,11 @@ class RotorMonitor:
             thrusts: Thrusts behind the motors' lag by their model, and behind the filter of ``missing`` [N], (n,).
             time_s: Time of the tick [s].
         """
-        entries, least = missing.tolist(), FOUND if self._found else self._settings.missing_thrust_n
-        least = max(least, self._settings.missing_sigmas * noise)
+        entries, settings = missing.tolist(), self._settings
+        least, sigmas = settings.missing_thrust_n, settings.missing_sigmas
+        if self._found:
+            least, sigmas = FOUND, FOUND_SIGMAS
+        least = max(least, sigmas * noise)
         if max(entries) < least and min(entries) > -least:
             self._persistence.reset()
         else:
