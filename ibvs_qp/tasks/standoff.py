@@ -18,6 +18,8 @@ TOUCH_FORCE_BUDGET = 2.9
 SLOWING = 1.5
 #: Integral gain of the approach speed at the wall [1/s^2] and bound of its force [N].
 SEARCH_GAIN, SEARCH_BOUND = 6.0, 6.0
+#: With a rotor lost: weight at the wall, over that of a level vehicle [-], and distance beyond which it is zero [m].
+LOST_WEIGHT, LOST_NEAR = 0.02, 0.15
 #: Stand-off target while the tip shall touch [m]: behind the surface, so that the approach never stalls.
 TOUCH_TARGET = -0.03
 
@@ -47,13 +49,15 @@ class StandoffTask(Task):
 
     def rows(self, model: Model) -> list[TaskRow]:
         """One row in newtons, so that the blend with the push row is linear in lambda."""
-        level = 1.0 - model.attitude.tilted  # a vehicle that lost a rotor moves by tilting
+        # A vehicle that lost a rotor moves by tilting; but its free force shall not press while the wall is near.
+        near = clamp(1.0 - model.contact.distance / LOST_NEAR, 0.0, LOST_WEIGHT)
+        level = ca.if_else(model.attitude.tilted, near, 1.0)
         return [
             TaskRow(
                 name="standoff",
                 unit="N",
                 expression=model.force_along_normal,
-                target=model.output("standoff_command", self.force(model)),
+                target=model.output("standoff_command", ca.if_else(model.attitude.tilted, 0.0, self.force(model))),
                 weight=model.config.weights.push * (1.0 - model.contact_weight) * level,
             )
         ]
