@@ -44,10 +44,12 @@ class Rule:
 
     Attributes:
         stages: Pairs of time since the fault began [s] and state from then on, in the order of time.
+        bounds: Settings that detect it (`ibvs_qp.config.SafetySettings`), beside those of other parts.
         recovery_s: The fault counts as present for this long after its last detection [s].
     """
 
     stages: tuple[tuple[float, SafetyState], ...]
+    bounds: tuple[str, ...] = ()
     recovery_s: float = 0.5
 
     def state(self, present_s: float) -> SafetyState:
@@ -56,41 +58,38 @@ class Rule:
         return due[-1] if due else NOMINAL
 
 
-def _rule(*stages: tuple[float, SafetyState], recovery_s: float = 0.5) -> Rule:
-    return Rule(stages, recovery_s)
-
-
+_Stage = tuple[float, SafetyState]
+#: At once, because every further tick presses.
+_AT_ONCE: tuple[_Stage, ...] = ((0.0, RETREAT),)
 #: Blind to the wall's lines: stop, hold the contact for half a second, retreat, hover on inertial data, and descend
 #: before their drift reaches the wall.
-_BLIND = _rule((0.0, DEGRADED), (0.5, RETREAT), (6.0, HOVER), (8.0, DESCEND))
+_BLIND: tuple[_Stage, ...] = ((0.0, DEGRADED), (0.5, RETREAT), (6.0, HOVER), (8.0, DESCEND))
 #: Attitude by motors' model and camera: away from the wall, and down before the lines leave the picture.
-_UNSTEADY = _rule((0.0, DEGRADED), (0.2, RETREAT), (3.0, DESCEND))
-#: At once, because every further tick presses.
-_AT_ONCE = _rule((0.0, RETREAT))
+_UNSTEADY: tuple[_Stage, ...] = ((0.0, DEGRADED), (0.2, RETREAT), (3.0, DESCEND))
 
 #: The reaction to every fault. From RETREAT on a state is never left for a milder one.
 POLICY: dict[Fault, Rule] = {
-    Fault.INPUTS: _rule((0.0, DEGRADED), (0.1, RETREAT)),
-    Fault.WRENCH_STALE: _rule((0.02, DEGRADED), (0.1, RETREAT)),
-    Fault.WRENCH_FROZEN: _AT_ONCE,
-    Fault.PUSH_UNFELT: _AT_ONCE,
-    Fault.PUSH_HIGH: _AT_ONCE,
-    Fault.IMAGE_STALE: _BLIND,
-    Fault.IMAGE_FROZEN: _BLIND,
-    Fault.PLANE_STALE: _BLIND,
-    Fault.FILTER_REFUSES: _rule((0.0, DEGRADED), (2.0, RETREAT)),
-    Fault.NO_ATTITUDE: _rule((0.0, DEGRADED), (0.2, TERMINATED), recovery_s=0.0),
-    Fault.IMU_STALE: _UNSTEADY,
-    Fault.IMU_FROZEN: _UNSTEADY,
-    Fault.ROTOR: _AT_ONCE,
-    Fault.NO_HOVER: _rule((0.0, DESCEND)),
-    Fault.SOLVER: _rule((0.0, DEGRADED), (0.3, RETREAT)),
-    Fault.TILT: _AT_ONCE,
-    Fault.FLIP: _rule((0.2, TERMINATED)),
-    Fault.RATE: _AT_ONCE,
-    Fault.SPEED: _AT_ONCE,
-    Fault.HEIGHT: _rule((0.0, HOVER)),
-    Fault.WALL_GONE: _AT_ONCE,
-    Fault.CONTACT_LOST: _AT_ONCE,
-    Fault.MISSION_TIME: _AT_ONCE,
+    Fault.INPUTS: Rule(((0.0, DEGRADED), (0.1, RETREAT)), ("self_check",)),
+    Fault.WRENCH_STALE: Rule(((0.02, DEGRADED), (0.1, RETREAT)), ("wrench_age_s",)),
+    Fault.WRENCH_FROZEN: Rule(_AT_ONCE, ("frozen_samples",)),
+    Fault.PUSH_UNFELT: Rule(_AT_ONCE, ("unfelt_push_n", "unfelt_ratio", "push_time_s")),
+    Fault.PUSH_HIGH: Rule(_AT_ONCE, ("push_ratio", "push_floor_n", "push_time_s")),
+    Fault.IMAGE_STALE: Rule(_BLIND, ("image_age_s",)),
+    Fault.IMAGE_FROZEN: Rule(_BLIND, ("frozen_pictures",)),
+    Fault.PLANE_STALE: Rule(_BLIND, ("plane_age_s",)),
+    Fault.FILTER_REFUSES: Rule(((0.0, DEGRADED), (2.0, RETREAT)), ("refusal_s",)),
+    Fault.NO_ATTITUDE: Rule(((0.0, DEGRADED), (0.2, TERMINATED)), recovery_s=0.0),
+    Fault.IMU_STALE: Rule(_UNSTEADY, ("imu_age_s",)),
+    Fault.IMU_FROZEN: Rule(_UNSTEADY, ("frozen_imu_samples",)),
+    Fault.ROTOR: Rule(_AT_ONCE, ("missing_thrust_n", "missing_sigmas", "missing_time_s")),
+    Fault.NO_HOVER: Rule(((0.0, DESCEND),)),
+    Fault.SOLVER: Rule(((0.0, DEGRADED), (0.3, RETREAT))),
+    Fault.TILT: Rule(_AT_ONCE, ("tilt_deg", "envelope_time_s")),
+    Fault.FLIP: Rule(((0.2, TERMINATED),), ("flip_deg", "envelope_time_s")),
+    Fault.RATE: Rule(_AT_ONCE, ("rate_rad_s", "envelope_time_s")),
+    Fault.SPEED: Rule(_AT_ONCE, ("speed_m_s", "envelope_time_s")),
+    Fault.HEIGHT: Rule(((0.0, HOVER),), ("height_m", "envelope_time_s")),
+    Fault.WALL_GONE: Rule(_AT_ONCE, ("wall_gone_m", "envelope_time_s")),
+    Fault.CONTACT_LOST: Rule(_AT_ONCE, ("contact_lost_s",)),
+    Fault.MISSION_TIME: Rule(_AT_ONCE, ("mission_s",)),
 }
