@@ -413,6 +413,18 @@ def test_without_any_solver_the_analytic_law_answers(monkeypatch: pytest.MonkeyP
     np.testing.assert_allclose(command.thrusts, analytic_thrusts(controller.setpoints), atol=1e-9)
 
 
+def test_the_analytic_law_keeps_to_what_a_weak_rotor_has(monkeypatch: pytest.MonkeyPatch) -> None:
+    weak = np.full(6, CEILING)
+    weak[2] = 8.0
+    controller = HybridController()
+    for tick in range(5):
+        controller.step(measured(tick, thrust_max=weak), Reference(lines=line_references(2)))
+    monkeypatch.setattr(controller.engine.osqp, "solve", lambda *data, initial: None)
+    command = controller.step(measured(6, thrust_max=weak), Reference(lines=line_references(2)))
+    assert command.outcome is Outcome.ANALYTIC_FALLBACK and command.thrusts[2] <= 8.0 + 1e-9
+    assert (command.thrusts >= FLOOR).all() and command.active_limits[0].name.startswith("thrust_")
+
+
 def test_osqp_unbelieved_and_the_exact_solver_failing_leads_to_the_analytic_law() -> None:
     controller = from_the_last_solution(HybridController(ControllerConfig(solver=CUT_SHORT)))
     controller.engine.exact.solve = lambda *data: None  # type: ignore[method-assign]

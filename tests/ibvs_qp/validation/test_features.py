@@ -80,6 +80,14 @@ def test_a_bad_plane_is_dropped_alone(plane: Any) -> None:
 
 
 @pytest.mark.parametrize(
+    ("distance", "accepted"), [(19.0, True), (21.0, False), (1e9, False), (0.0011, True), (9e-4, False)]
+)
+def test_a_plane_farther_than_any_depth_camera_sees_is_dropped(distance: float, accepted: bool) -> None:
+    found, rejected = checked(replace(GOOD, plane=(0.0, 0.0, 1.0 / distance, -1.0)))
+    assert (found.plane is not None) == accepted == (not rejected)
+
+
+@pytest.mark.parametrize(
     "velocity", [np.full(3, math.nan), np.full(3, 25.0), np.zeros(2), "fast", 1.0, [0.0, 0.0, None]]
 )
 def test_a_bad_velocity_is_dropped_alone(velocity: Any) -> None:
