@@ -38,6 +38,7 @@ def test_a_file_whose_size_the_system_does_not_tell_is_bounded(tmp_path: Path) -
         read_bytes(file, 10)
 
 
+@pytest.mark.timeout(20)
 @pytest.mark.parametrize("kind", ["device", "terminal", "pipe", "socket", "folder", "loop", "missing", "huge"])
 def test_special_files_are_refused_at_once(tmp_path: Path, kind: str) -> None:
     began = time.monotonic()

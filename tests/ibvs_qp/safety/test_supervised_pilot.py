@@ -109,6 +109,20 @@ def test_inertial_samples_that_repeat_are_replaced(pilot: Pilot) -> None:
     assert not np.array_equal(pilot.measurement.angular_velocity, frozen.angular_velocity)
 
 
+def test_after_a_leap_of_the_clock_the_velocity_is_unknown(pilot: Pilot) -> None:
+    """Or the loop stood still for as long."""
+    vehicle = SensedVehicle()
+    flown(pilot, vehicle, QUIET)
+    assert pilot.motion.velocity_variance < 0.01
+    later = 3_600_000_000_000
+    for _ in range(2):
+        frame = vehicle.sense(features=None)
+        moved = {name: getattr(frame, name) + later for name in ("stamp_ns", "wrench_stamp_ns")}
+        pilot.step(dataclasses.replace(frame, **moved))
+        vehicle.tick += 1
+    assert pilot.motion.velocity_variance > 0.1
+
+
 def test_wrong_axes_stop_the_job_at_once(pilot: Pilot) -> None:
     flu = np.array([1.0, -1.0, -1.0])
     command = standing(pilot, 20, lambda frame: {"specific_force": flu * frame.specific_force})
