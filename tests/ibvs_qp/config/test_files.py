@@ -59,6 +59,7 @@ def test_what_the_system_refuses_is_named(tmp_path: Path, monkeypatch: pytest.Mo
         read_bytes(tmp_path, 10)
 
 
+@pytest.mark.timeout(20)
 @pytest.mark.parametrize("kind", [ControllerConfig, PilotConfig])
 @pytest.mark.parametrize("name", [*TOML, *BYTES])
 def test_hostile_toml_is_refused_in_a_short_line(tmp_path: Path, kind: type, name: str) -> None:
