@@ -38,6 +38,7 @@ def test_a_file_whose_size_the_system_does_not_tell_is_bounded(tmp_path: Path) -
         read_bytes(file, 10)
 
 
+@pytest.mark.timeout(20)
 @pytest.mark.parametrize("kind", ["device", "terminal", "pipe", "socket", "folder", "loop", "missing", "huge"])
 def test_special_files_are_refused_at_once(tmp_path: Path, kind: str) -> None:
     began = time.monotonic()
@@ -58,6 +59,7 @@ def test_what_the_system_refuses_is_named(tmp_path: Path, monkeypatch: pytest.Mo
         read_bytes(tmp_path, 10)
 
 
+@pytest.mark.timeout(20)
 @pytest.mark.parametrize("kind", [ControllerConfig, PilotConfig])
 @pytest.mark.parametrize("name", [*TOML, *BYTES])
 def test_hostile_toml_is_refused_in_a_short_line(tmp_path: Path, kind: type, name: str) -> None:

@@ -11,6 +11,7 @@ from controller_scenes import TICK_NS, Wall, attitude
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ibvs_qp.config import EstimationConfig
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.estimation.wall_lines import WallAxes, image_line, wall_line
 from ibvs_qp.estimation.wall_motion import ODOMETER, VELOCITY, TrackedLine, WallMotion
@@ -77,7 +78,7 @@ class Stroke:
         self.axes = axes_of(self.wall)
         self.late, self.noise = round(latency_s / TICK), noise
         self.rng, self.tick = np.random.default_rng(0), 0
-        self.tip = [np.zeros(2)]
+        self.tip, self.false_speed = [np.zeros(2)], 0.0
 
     def speed_at(self, tick: int) -> np.ndarray:
         """From rest to speed between two and three seconds."""
@@ -106,7 +107,7 @@ class Stroke:
             offset = self.offset(role, then) + self.rng.normal(0.0, self.noise)
             covariance = np.eye(2) * 1e-8
             found.append(self.wall.line(offset, tilt, role, covariance=covariance, track_id=identity + 1))
-        right, down = self.speed_at(then) + self.rng.normal(0.0, 3e-3, 2)
+        right, down = self.speed_at(then) + self.rng.normal(0.0, 3e-3, 2) + [self.false_speed, 0.0]
         velocity = np.array(self.axes.right) * right + np.array(self.axes.down) * down
         return FeatureFrame(
             lines=tuple(found),
@@ -143,6 +144,18 @@ def test_velocity_and_odometer_are_those_of_the_tip() -> None:
     np.testing.assert_allclose(stroke.motion.state[VELOCITY], [-0.1, 0.02], atol=3e-3)
     np.testing.assert_allclose(stroke.motion.state[ODOMETER], stroke.tip[stroke.tick], atol=5e-3)
     assert stroke.motion.velocity_age_s < 0.1
+
+
+def test_a_velocity_that_disagrees_is_refused_and_restarts_the_filter_once_it_lasts() -> None:
+    stroke = Stroke((0.0, 0.0), 0.060)
+    stroke.fly(3.0)
+    stroke.false_speed, longest = 0.3, EstimationConfig().refusal_s
+    stroke.fly(longest - 0.1)
+    assert abs(stroke.motion.state[0]) < 0.02, "refused"
+    assert stroke.motion.refused_s == pytest.approx(longest - 0.1, abs=0.1)
+    stroke.fly(0.3)
+    assert stroke.motion.state[0] == pytest.approx(0.3, abs=0.02)
+    assert stroke.motion.refused_s == 0.0 and stroke.motion.velocity_age_s < 0.1
 
 
 @pytest.mark.parametrize("latency", [0.060, 0.100])

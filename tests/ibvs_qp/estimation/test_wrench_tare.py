@@ -114,5 +114,6 @@ def test_old_and_broken_samples_change_nothing() -> None:
     ticks = settle(tare, 2.0)
     force = specific_force(0.0, 0.0)
     last = tare.update(sample(force, np.zeros(3)), (ticks + 1) * 10_000_000, force, True).copy()
+    assert np.isfinite(last).all()
     for stamp, raw in (((ticks + 1) * 10_000_000, 1e3 * np.ones(6)), (0, np.ones(6)), (2**60, np.full(6, np.nan))):
         np.testing.assert_array_equal(tare.update(raw, stamp, force, True), last)

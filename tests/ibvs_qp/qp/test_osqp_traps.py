@@ -40,6 +40,7 @@ from ibvs_qp.config import ControllerConfig, LimitSettings, SolverSettings
 from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import Reference
 from ibvs_qp.model.thrust_window import thrust_window
+from ibvs_qp.qp.accept import BOUND_SLIP
 from ibvs_qp.qp.osqp import MAX_ITERATIONS, SOLVED, SOLVED_INACCURATE, OsqpSolver, RawSolution
 
 #: What OSQP 1.1 writes into x when it found no solution: its NaN pattern read as a number.
@@ -411,6 +412,34 @@ def test_without_any_solver_the_analytic_law_answers(monkeypatch: pytest.MonkeyP
     command = controller.step(measured(6), Reference(lines=line_references(2)))
     assert command.outcome is Outcome.ANALYTIC_FALLBACK
     np.testing.assert_allclose(command.thrusts, analytic_thrusts(controller.setpoints), atol=1e-9)
+
+
+def test_the_tolerance_of_the_solver_takes_no_thrust_out_of_its_window(monkeypatch: pytest.MonkeyPatch) -> None:
+    controller, solve = flying(), OsqpSolver.solve
+    upper, shift = controller.engine.data.upper[:6], 0.5 * BOUND_SLIP
+
+    def beyond(self: OsqpSolver, *data: np.ndarray, initial: np.ndarray | None = None) -> RawSolution | None:
+        raw = solve(self, *data, initial=initial)
+        assert raw is not None
+        raw.x[:6] = upper + shift
+        return raw
+
+    monkeypatch.setattr(OsqpSolver, "solve", beyond)
+    command = controller.step(measured(6), Reference(lines=line_references(2)))
+    assert command.outcome is Outcome.SOLVED
+    np.testing.assert_array_equal(command.thrusts, upper)
+
+
+def test_the_analytic_law_keeps_to_what_a_weak_rotor_has(monkeypatch: pytest.MonkeyPatch) -> None:
+    weak = np.full(6, CEILING)
+    weak[2] = 8.0
+    controller = HybridController()
+    for tick in range(5):
+        controller.step(measured(tick, thrust_max=weak), Reference(lines=line_references(2)))
+    monkeypatch.setattr(controller.engine.osqp, "solve", lambda *data, initial: None)
+    command = controller.step(measured(6, thrust_max=weak), Reference(lines=line_references(2)))
+    assert command.outcome is Outcome.ANALYTIC_FALLBACK and command.thrusts[2] <= 8.0 + 1e-9
+    assert (command.thrusts >= FLOOR).all() and command.active_limits[0].name.startswith("thrust_")
 
 
 def test_osqp_unbelieved_and_the_exact_solver_failing_leads_to_the_analytic_law() -> None:

@@ -26,6 +26,13 @@ def test_tilt_and_rates_are_opposed() -> None:
     assert wrench[3] < 0.0 < wrench[4] and wrench[5] < 0.0
 
 
+@pytest.mark.parametrize("axis", range(3))
+def test_a_turn_alone_is_opposed(axis: int) -> None:
+    turning = 0.3 * np.eye(3)[axis]
+    moment = (MATRIX @ hold_thrusts(CONFIG, measured(0, attitude=attitude(), angular_velocity=turning)))[3:]
+    assert moment[axis] < -1e-3 and np.abs(np.delete(moment, axis)).max() < 1e-9
+
+
 def test_thrusts_stay_within_their_limits() -> None:
     thrusts = hold_thrusts(CONFIG, measured(0, attitude=attitude(2.0), angular_velocity=np.full(3, 30.0)))
     assert (thrusts >= FLOOR).all() and (thrusts <= CEILING).all()

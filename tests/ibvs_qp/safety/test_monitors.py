@@ -137,6 +137,15 @@ def test_without_a_camera_nothing_is_late() -> None:
         assert not tick.faults
 
 
+@pytest.mark.parametrize(("stamp", "fault"), [("imu_ns", Fault.IMU_STALE), ("wrench_ns", Fault.WRENCH_STALE)])
+def test_a_sensor_that_must_be_there_and_never_sent_is_late(stamp: str, fault: Fault) -> None:
+    assurance = Assurance(VEHICLE, SafetySettings())
+    for number in range(20):
+        tick = quiet_tick(number, **{stamp: -1})
+        assurance.watch(tick, StubResponse())
+    assert tick.faults == {fault: "none yet"}
+
+
 def test_supervision_can_be_switched_off() -> None:
     assurance = Assurance(VEHICLE, SafetySettings(supervise=False))
     for number in range(100):

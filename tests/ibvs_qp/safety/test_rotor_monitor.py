@@ -66,6 +66,12 @@ def test_a_short_peak_is_no_fault() -> None:
         assert not watch.update(missing if number % 10 < 8 else np.zeros(6), 0.1, HOVER, 0.004 * number)
 
 
+def test_what_the_noise_may_be_is_no_fault() -> None:
+    watch, missing = monitor(), np.array([4.0, 0, 0, 0, 0, 0])
+    found = [watch.update(missing, noise, HOVER, 0.1 * number) for number, noise in enumerate((1.0, 1.0, 0.3, 0.3))]
+    assert [bool(text) for text in found] == [False, False, False, True], "six standard deviations, for a while"
+
+
 def test_a_stuck_rotor_is_limited_from_both_sides() -> None:
     watch, lost = monitor(), np.array([3.0, 0, 0, 0, 0, 0])
     for number in range(40):

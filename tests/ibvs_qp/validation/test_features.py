@@ -48,6 +48,7 @@ BAD_LINES: list[dict[str, Any]] = [
         for value in (math.nan, math.inf, 1e300, None, "0", 10**400)
     ],
     *[{"covariance": value} for value in (None, -np.eye(2), np.full((2, 2), math.nan), [[1, 0], [0]], np.eye(3))],
+    *[{"covariance": np.array(value)} for value in ([[-1.0, 0], [0, 1]], [[1.0, 0], [0, -1]], [[1, math.nan], [0, 1]])],
     *[{"track_id": []}, {"role": "oblique"}, {"role": ["horizontal"]}, {"surface_side": 3}, {"kind": None}],
 ]
 
@@ -70,13 +71,21 @@ def test_what_are_no_lines(lines: Any) -> None:
     [
         *[(0.0, 0.0, 2.0, 0.0), (0.0, 0.0, 0.0, -1.0), (0.0, 0.0, -2.0, -1.0), (0.0, math.nan, 2.0, -1.0)],
         *[(1e6, 0.0, 2.0, -1.0), (0.0, 0.0, math.inf, -1.0), (0.0, 0.0, 2.0), [0.0] * 10**6, "abcd", np.zeros((4, 9))],
-        *[(0.0, 0.0, 10**400, -1.0), np.ma.array([0.0, 0.0, 2.0, -1.0]), (0.0, 0.0, 2.0, True), np.array(2.0)],
+        *[(0.0, 0.0, 10**400, -1.0), np.ma.array([0.0, 0.0, 2.0, -1.0]), (0.0, 0.0, -2.0, True), np.array(2.0)],
     ],
 )
 def test_a_bad_plane_is_dropped_alone(plane: Any) -> None:
     found, rejected = checked(replace(GOOD, plane=plane))
     assert found.plane is None and found.lines == GOOD.lines and found.velocity is not None
     assert rejected == ["features.plane: not 4 finite values with D != 0 in front of the camera"]
+
+
+@pytest.mark.parametrize(
+    ("distance", "accepted"), [(19.0, True), (21.0, False), (1e9, False), (0.0011, True), (9e-4, False)]
+)
+def test_a_plane_farther_than_any_depth_camera_sees_is_dropped(distance: float, accepted: bool) -> None:
+    found, rejected = checked(replace(GOOD, plane=(0.0, 0.0, 1.0 / distance, -1.0)))
+    assert (found.plane is not None) == accepted == (not rejected)
 
 
 @pytest.mark.parametrize(
@@ -103,5 +112,7 @@ def test_a_velocity_without_a_covariance_is_dropped(covariance: Any) -> None:
 
 def test_of_many_lines_a_few_are_looked_at() -> None:
     found, rejected = checked(replace(GOOD, lines=(LINE,) * 10**6))
+    count = len(found.lines)  # a million lines in a message take minutes
+    assert count == MOST
     assert found.lines == (LINE,) * MOST
     assert rejected == [f"features.lines: 1000000 given, only the first {MOST} are looked at"]

@@ -209,6 +209,14 @@ def test_a_refusal_names_field_value_and_what_is_allowed(gains: dict, brush: dic
     assert "damped at least 0.1" in str(refusal.value) and "Hz" in str(refusal.value)
 
 
+@pytest.mark.parametrize("kind", [ControllerConfig, PilotConfig])
+def test_a_file_whose_contact_would_ring_is_refused(tmp_path: Path, kind: type) -> None:
+    ringing, file = with_gains(force_kfp=3.0), tmp_path / "preset.toml"
+    file.write_text((ringing if kind is ControllerConfig else PilotConfig(controller=ringing)).to_toml())
+    with pytest.raises(ConfigError, match=r"preset\.toml: (controller\.)?gains\.force_kfp = 3\.0 is refused"):
+        kind.from_toml(file)
+
+
 def test_the_allowed_value_holds_and_a_little_more_does_not() -> None:
     with pytest.raises(ConfigError) as refusal:
         require_margin(with_gains(force_kfp=3.0))

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import tracemalloc
 import zipfile
 from pathlib import Path
 
 import numpy as np
 import pytest
-from hostile_files import NPY, npz
+from hostile_files import NPY, header, npy, npz
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -46,6 +47,15 @@ def test_headers_that_lie_allocate_nothing(tmp_path: Path, name: str) -> None:
         read_npy(tmp_path / "x.npy", LARGEST)
     with pytest.raises(UnreadableFile, match="no npz file of plain arrays"):
         read_npz(tmp_path / "x.npz", LARGEST, LARGEST)
+
+
+def test_a_lying_header_costs_no_memory(tmp_path: Path) -> None:
+    (tmp_path / "x.npy").write_bytes(npy(header((2**25,)), bytes(80)))
+    tracemalloc.start()
+    with pytest.raises(UnreadableFile, match="needs more bytes than the file has"):
+        read_npy(tmp_path / "x.npy", LARGEST)
+    assert tracemalloc.get_traced_memory()[1] < 2 * LARGEST
+    tracemalloc.stop()
 
 
 def test_an_archive_that_unpacks_to_more_than_its_limit(tmp_path: Path) -> None:
