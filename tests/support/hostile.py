@@ -23,7 +23,7 @@ class Mutator:
     """
 
     def __init__(self, choices: random.Random, lies: bool) -> None:
-        self.random, self._lies = choices, lies
+        self.random, self.lies = choices, lies
         self._things = [*THINGS, *REFUSED_NUMBERS, *((*ODD_NUMBERS, *ODD_VECTORS) if lies else ())]
 
     def thing(self) -> Any:
@@ -43,7 +43,7 @@ class Mutator:
             return self._sequence(value)
         if type(value) is int:
             return self._whole(value)
-        if isinstance(value, float) and self._lies and self.random.random() < 0.3:
+        if isinstance(value, float) and self.lies and self.random.random() < 0.3:
             return value * self.random.choice(_FACTORS)
         return self.thing()
 
@@ -63,7 +63,7 @@ class Mutator:
             numbers = REFUSED_NUMBERS[:8] if changed.dtype == object else REFUSED_NUMBERS[:6]
             changed.flat[self.random.randrange(changed.size)] = self.random.choice(numbers)
             return changed
-        if choice < 0.85 or not self._lies:
+        if choice < 0.85 or not self.lies:
             return _other_type(value, self.random.choice(_TYPES))
         return value * self.random.choice(_FACTORS) + self.random.choice(_OFFSETS)
 
@@ -75,7 +75,7 @@ class Mutator:
             entries[place] = self.mutate(entries[place])
         elif choice < 0.75:
             entries = entries * self.random.choice((0, 2, 7, 2000))
-        elif choice < 0.9 or not self._lies:
+        elif choice < 0.9 or not self.lies:
             entries.insert(0, self.thing())
         else:
             entries.reverse()
@@ -88,8 +88,8 @@ class Mutator:
         if choice < 0.6:
             return value + self.random.choice(LEAPS)
         if choice < 0.8:
-            kind = self.random.choice(INTEGERS)
-            return kind(value % 100 if kind is np.int8 else value % 2**31 if kind in (np.int32, np.uint32) else value)
+            kind, bound = self.random.choice(list(INTEGERS.items()))
+            return kind(value % bound)
         return self.thing()
 
 

@@ -19,6 +19,8 @@ from ibvs_qp.command import Command, Outcome, SafetyState
 
 #: Ticks of good inputs after which a flight agrees with one that saw no others: 0.5 s.
 RECOVERY = 125
+#: From the last recorded tick to the first one of the next lap [ns].
+LAP_STEP = 4_000_000
 #: Rounding of the rate limit [N].
 ROUNDING = 1e-9
 #: Beginnings of rejections that name a caught exception, which no input of these may cause.
@@ -33,14 +35,17 @@ class Subject:
         make: Makes it.
         case: Recording.
         first, ticks: Its ticks that are flown.
-        supervised: Whether a supervisor may change its mind for good about inputs that stay away.
+        agreed: Largest difference from an undisturbed flight half a second after hostile inputs that are refused [N];
+            None with a supervisor, which stays in a retreat that it began.
+        bare: Fly without accelerometer: no observer of forces remembers thrusts that the recorded vehicle did not feel.
     """
 
     make: Callable[[], Any]
     case: str
     first: int
     ticks: int = 700
-    supervised: bool = False
+    agreed: float | None = None
+    bare: bool = False
 
     @functools.cached_property
     def pilot(self) -> bool:
@@ -51,6 +56,8 @@ class Subject:
         """Recorded arguments of a step; nothing can be written into them."""
         flight, tick = recording(self.case), self.first + tick
         inputs = (flight.frames[tick],) if self.pilot else (flight.measurements[tick], flight.references[tick])
+        if self.bare:
+            inputs = (dataclasses.replace(inputs[0], specific_force=None), *inputs[1:])
         for array in arrays_in(inputs):
             array.flags.writeable = False
         return inputs
@@ -71,6 +78,20 @@ def undisturbed(subject: Subject) -> list[tuple[np.ndarray, tuple[str, ...]]]:
     return [(command.thrusts, command.rejected) for command in commands]
 
 
+def shifted(value: Any, shift_ns: int) -> Any:
+    """An input with all its stamps that are times shifted."""
+    changes = {
+        field.name: getattr(value, field.name) + shift_ns
+        for field in dataclasses.fields(value)
+        if field.name.endswith("stamp_ns") and getattr(value, field.name)
+    }
+    if getattr(value, "features", None) is not None:
+        changes["features"] = shifted(value.features, shift_ns)
+    if getattr(value, "lines", ()):
+        changes["lines"] = tuple([shifted(line, shift_ns) for line in value.lines])
+    return dataclasses.replace(value, **changes)
+
+
 class Violation(AssertionError):
     """An invariant that a step broke, with the inputs of that step."""
 
@@ -83,8 +104,8 @@ class Flight:
         calls, hostile_calls: Steps so far, and those of them with hostile inputs.
     """
 
-    def __init__(self, subject: Subject, mutator: Mutator) -> None:
-        self.subject, self.mutator, self.flown = subject, mutator, built(subject)
+    def __init__(self, subject: Subject, mutator: Mutator, flown: Any = None) -> None:
+        self.subject, self.mutator, self.flown = subject, mutator, flown or built(subject)
         setpoints = controller_of(self.flown).setpoints
         vehicle = setpoints.config.vehicle
         self._box = np.array(vehicle.thrust_min), np.array(vehicle.thrust_max)
@@ -96,7 +117,23 @@ class Flight:
     def restart(self) -> None:
         """From the first tick, as after construction."""
         self.flown.reset()
-        self.tick, self.disturbed, self._last = 0, False, None
+        self.tick, self.disturbed, self._last, self._lap_ns = 0, False, None, 0
+
+    def rewind(self) -> None:
+        """From the first tick, under a clock that goes on."""
+        first, last = (self.subject.good(tick)[0].stamp_ns for tick in (0, self.tick - 1))
+        self._lap_ns += last - first + LAP_STEP
+        self.tick, self.disturbed = 0, True
+
+    def recorded(self) -> tuple[Any, ...]:
+        """Good inputs of the tick, under the clock of the flight."""
+        inputs = self.subject.good(self.tick)
+        return (shifted(inputs[0], self._lap_ns), *inputs[1:]) if self._lap_ns else inputs
+
+    @property
+    def lied(self) -> bool:
+        """Whether the flight may remember a believable wrong value, or a supervisor what it did about others."""
+        return self.disturbed and (self.mutator.lies or self.subject.agreed is None)
 
     @property
     def left(self) -> int:
@@ -106,8 +143,10 @@ class Flight:
     def good(self, ticks: int = 1, reused: bool = False) -> Command:
         """Recorded ticks; ``reused``: the caller writes into its arrays afterwards."""
         for _ in range(min(ticks, self.left)):
-            inputs = self.subject.good(self.tick)
+            inputs = self.recorded()
             command = self.step(copy.deepcopy(inputs) if reused else inputs, spoil=reused)
+            if not self.disturbed and not np.array_equal(command.thrusts, self._twin[self.tick][0]):
+                raise Violation(f"tick {self.tick}: good inputs, other thrusts; arrays reused: {reused}")
             self.tick += 1
         return command
 
@@ -119,7 +158,7 @@ class Flight:
 
     def hostile_inputs(self) -> tuple[Any, ...]:
         """Of a tick: one or two of the arguments, and of a controller its third one, are hostile."""
-        inputs, mutator = list(self.subject.good(self.tick)), self.mutator
+        inputs, mutator = list(self.recorded()), self.mutator
         place = mutator.random.randrange(10)
         if self.subject.pilot:
             inputs[0] = mutator.mutate(inputs[0])
@@ -134,12 +173,17 @@ class Flight:
         return tuple(inputs)
 
     def agrees(self, ticks: int = RECOVERY) -> float:
-        """Largest difference from the undisturbed flight after so many good ticks [N]."""
+        """Largest difference from the undisturbed flight after so many good ticks [N]: small, and nothing rejected."""
         command = self.good(ticks)
         thrusts, rejected = self._twin[self.tick - 1]
         if rejected != command.rejected:
             raise Violation(f"tick {self.tick}: rejected {command.rejected}, undisturbed {rejected}")
-        return float(np.abs(command.thrusts - thrusts).max())
+        difference = float(np.abs(command.thrusts - thrusts).max())
+        if self.subject.agreed is not None and difference > self.subject.agreed:
+            raise Violation(
+                f"tick {self.tick}: {difference:.2f} N from the undisturbed flight after {ticks} good ticks"
+            )
+        return difference
 
     def step(self, inputs: tuple[Any, ...], spoil: bool = False) -> Command:
         """One step with all invariants checked; what the caller may write into afterwards is written into."""

@@ -82,5 +82,13 @@ ODD_VECTORS: list[Any] = _frozen(
 STAMPS: list[Any] = [0, 1, -1, 5, 2**31, 2**40, 2**61, 2**62 - 1, 2**62, 2**63, 2**64, 10**30, 0.5, True]
 #: Leaps of a stamp [ns].
 LEAPS = [-(10**12), -(10**9), -40_000_000, -4_000_000, -1, 0, 1, 19_000_000, 21_000_000, 900_000_000, 10**9 + 1, 36**9]
-#: Types of integers, and one that is none.
-INTEGERS: list[type] = [np.int8, np.int32, np.int64, np.uint64, np.uint32, np.float64, Count]
+#: Types of numbers that may hold a whole one, and the bound of what they are given.
+INTEGERS: dict[type, int] = {
+    np.int8: 100,
+    np.int32: 2**31,
+    np.uint32: 2**31,
+    np.int64: 2**63,
+    np.uint64: 2**63,
+    np.float64: 2**63,
+    Count: 2**80,
+}

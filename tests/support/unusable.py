@@ -117,9 +117,13 @@ def in_reference(value: Any) -> Iterator[str]:
 
 
 def in_contact(value: Any) -> Iterator[str]:
-    """What a contact must be refused for."""
-    if value is not None and not (isinstance(value, ContactState) and is_vector(value.normal, 3)):
+    """What a contact must be refused for; True and False count as the numbers that they are."""
+    if value is not None and not (isinstance(value, ContactState) and _is_triple(value.normal)):
         yield "contact"
+
+
+def _is_triple(value: Any) -> bool:
+    return type(value) is tuple and len(value) == 3 and all(isinstance(e, bool) or is_number(e) for e in value)
 
 
 def in_frame(value: Any) -> Iterator[str]:
