@@ -14,11 +14,13 @@ from ibvs_qp.controller import HybridController
 from ibvs_qp.estimation.contact_state import ContactState
 from ibvs_qp.frames import down_in_body
 from ibvs_qp.measurement import Measurement, Reference
-from ibvs_qp.model.reporting import fixed_command
+from ibvs_qp.model.reporting import fixed_command, hover_command
 from ibvs_qp.safety.assurance import Assurance
 from ibvs_qp.safety.policy import Fault
 from ibvs_qp.safety.tick import Tick
+from ibvs_qp.validation.failure import raised
 from ibvs_qp.validation.measurement import answered_stamp
+from ibvs_qp.validation.reference import ReferenceGate
 
 #: Fields without which a measurement has no inertial sample.
 _ATTITUDE = ("attitude", "angular_velocity")
@@ -41,33 +43,54 @@ class Assured:
     def __init__(self, controller: HybridController | PaperController, settings: SafetySettings | None = None) -> None:
         self.controller = controller
         self.assurance = Assurance(controller.config.vehicle, settings or SafetySettings())
+        self._references = ReferenceGate(controller.config.line_slots)
         self.reset()
 
     def reset(self) -> None:
         """As after construction."""
         self.controller.reset()
         self.assurance.reset()
+        self._references.reset()
         self._attitude_ns = self._imu_ns = self._wrench_ns = self._plane_ns = self._lines_ns = -1
         self._descended_m, self._time_ns = 0.0, -1
 
+    @np.errstate(all="ignore")  # a host may have numpy raise at every underflow
     def step(self, measurement: Measurement, reference: Reference, contact: ContactState | None = None) -> Command:
         """Thrusts for one tick, as `HybridController.step`; ``Command.safety`` is the state of the supervisor."""
-        controller, assurance, setpoints = self.controller, self.assurance, self.controller.setpoints
-        checked, rejected = controller.gate.check(measurement)
-        if isinstance(reference, Reference):
-            reference = assurance.supervised(reference)
-        flown, inertial = checked, assurance.wrench(setpoints)
-        if flown is not None and inertial is not None:
-            flown = dataclasses.replace(flown, contact_wrench=inertial, wrench_stamp_ns=flown.stamp_ns)
-        stamp, fixed = answered_stamp(measurement), assurance.thrusts(setpoints.last, setpoints.floor)
-        if fixed is None:
-            command = controller.respond(flown, rejected, reference, contact, stamp)
-        else:
-            command = fixed_command(setpoints, stamp, fixed, rejected)
-        shown = assurance.explained(command)
-        if checked is not None:
-            assurance.watch(self._tick(checked, command, reference), setpoints)
-        return shown if checked is None else controller.gate.clock.answered(shown)
+        stamp, command = answered_stamp(measurement), None
+        try:
+            reference, refused = self._references.check(reference)
+            checked, rejected = self.controller.gate.check(measurement)
+            reference = self.assurance.supervised(reference)
+            command = self._command(checked, (*rejected, *refused), reference, contact, stamp)
+            shown = self.assurance.explained(command)
+            if checked is None:
+                return shown
+            self.assurance.watch(self._tick(checked, command, reference), self.controller.setpoints)
+            return self.controller.gate.clock.answered(shown)
+        except Exception as error:  # in flight nothing may raise; thrusts that were found are not replaced
+            setpoints, inertial = self.controller.setpoints, self.controller.gate.inertial
+            command = command or hover_command(setpoints, stamp, inertial, ())
+            rejected = (*command.rejected, raised("assured", error))
+            return self.assurance.explained(dataclasses.replace(command, stamp_ns=stamp, rejected=rejected))
+
+    def _command(
+        self,
+        checked: Measurement | None,
+        rejected: tuple[str, ...],
+        reference: Reference,
+        contact: ContactState | None,
+        stamp_ns: int,
+    ) -> Command:
+        """Command of the law, or of the supervisor where it replaces the law."""
+        setpoints = self.controller.setpoints
+        fixed = self.assurance.thrusts(setpoints.last, setpoints.floor)
+        if fixed is not None:
+            return fixed_command(setpoints, stamp_ns if checked is None else checked.stamp_ns, fixed, rejected)
+        inertial = self.assurance.wrench(setpoints)
+        if checked is not None and inertial is not None:
+            checked = dataclasses.replace(checked, contact_wrench=inertial, wrench_stamp_ns=checked.stamp_ns)
+        return self.controller.respond(checked, rejected, reference, contact, stamp_ns)
 
     def _tick(self, checked: Measurement, command: Command, reference: Reference) -> Tick:
         """The tick as the monitors see it, in monotonic time."""
@@ -107,7 +130,7 @@ class Assured:
             speed=speed,
             height=-self._descended_m,
             contact=setpoints.contact,
-            press=bool(reference.contact) if isinstance(reference, Reference) else False,
+            press=reference.contact,
             push_reference=setpoints.push_reference,
             outcome=command.outcome,
             faults=faults,

@@ -181,6 +181,7 @@ class Pilot:
         self.thrust_limits = None
         self._leaps = 0
         self._rejected: list[str] = []  # inputs of the tick that were refused before the controller
+        self._commanded: Command | None = None  # of the tick, once there is one
         self.percept = None
         self.measurement: Measurement | None = None
         self.reference = Reference()
@@ -214,14 +215,17 @@ class Pilot:
         Returns:
             The controller's command.
         """
-        self._rejected = []
+        self._rejected, self._commanded = [], None
         try:
             checked, refused = self._gate.check(frame)
             self._rejected += [*refused, *self._limits.rejected]
             command = self._hold(frame) if checked is None else self._gate.clock.answered(self._fly(checked))
         except Exception as error:  # in flight nothing may raise; the reason is reported instead
             self._rejected.append(raised("pilot", error))
-            command = self._hold(frame)
+            if (command := self._commanded) is None:
+                command = self._hold(frame)
+            else:  # a second one would break the rate limit
+                command = dataclasses.replace(command, stamp_ns=answered_stamp(frame))
         if self._rejected:
             return dataclasses.replace(command, rejected=(*command.rejected, *self._rejected))
         return command
@@ -273,9 +277,9 @@ class Pilot:
         begin = time.perf_counter()
         command = self._command(contact)
         self.controller_time_s = time.perf_counter() - begin
-        shown = self.assurance.explained(command)
+        self._commanded = self.assurance.explained(command)
         self.assurance.watch(self._shown(frame, contact, command), self.setpoints)
-        return shown
+        return self._commanded
 
     def _inertial(self, frame: SensorFrame, dt: float) -> SensorFrame:
         """The frame with attitude, rate and specific force to fly by; those that fail are estimated."""

@@ -44,8 +44,9 @@ def _is_sound(contact: ContactState) -> bool:
         return False
     if not known and others[DEPTH] == distance == math.inf:
         distance = others[DEPTH] = 0.0
-    length = math.hypot(*normal)
-    return abs(length - 1.0) <= UNIT_TOLERANCE and all([abs(value) <= CONTACT_BOUND for value in (distance, *others)])
+    if not all([abs(value) <= CONTACT_BOUND for value in (*normal, known, distance, *others)]):
+        return False  # before the length: an integer may have none
+    return abs(math.hypot(*normal) - 1.0) <= UNIT_TOLERANCE
 
 
 def contact_mode(setpoints: Setpoints, reference: Reference) -> str:

@@ -48,6 +48,8 @@ UNSOUND: list[dict[str, Any]] = [
     {"contact_weight": np.zeros(2)},
     {"known": None},
     {"known": np.zeros(3)},
+    {"known": 10**400},
+    {"normal": (10**400, 0.0, 0.0)},
     {"depth": math.inf},
 ]
 

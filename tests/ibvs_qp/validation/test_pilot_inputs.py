@@ -154,6 +154,17 @@ def test_what_raises_when_it_is_read_is_named_and_held() -> None:
     assert sound(pilot.step(frames()[50]), bad).outcome is Outcome.SOLVED
 
 
+def test_a_monitor_that_fails_after_the_law_does_not_step_twice(monkeypatch: pytest.MonkeyPatch) -> None:
+    _, expected = flown_with({}, 60)
+    pilot, commands = flown_with({}, 50)
+    monkeypatch.setattr(pilot.assurance, "watch", lambda *_: 1 / 0)
+    last = commands[-1]
+    for tick in range(50, 60):
+        last = pilot.step(frames()[tick])
+        assert last.rejected[-1].startswith("pilot: ZeroDivisionError") and last.stamp_ns == frames()[tick].stamp_ns
+        np.testing.assert_array_equal(last.thrusts, expected[tick].thrusts)
+
+
 def test_a_host_that_lets_numpy_raise() -> None:
     odd = {tick: replace(frames()[tick], angular_velocity=np.full(3, np.longdouble("1e4000"))) for tick in (50, 51)}
     _, expected = flown_with(odd, 150)

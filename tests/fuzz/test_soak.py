@@ -1,0 +1,86 @@
+"""A flight of a million ticks with random faults needs no more memory and time per tick than at its beginning.
+
+``IBVS_QP_SOAK_TICKS`` is the number of ticks of the controller; a pilot flies a tenth of it.
+"""
+
+from __future__ import annotations
+
+import gc
+import os
+import random
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hostile import Mutator
+from hostile_flight import Flight, Subject
+from hostile_subjects import CONTROLLERS, PILOTS
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(3600)]
+
+TICKS = int(os.environ.get("IBVS_QP_SOAK_TICKS", "1000000"))
+#: Share of the ticks before the memory is measured, and of ticks with hostile inputs.
+WARM_UP, HOSTILE = 0.2, 0.2
+#: Growth that is allowed: of resident memory [bytes], of objects of Python, and of the time per tick.
+MEMORY, BLOCKS, TIME = 1_000_000, 2_000, 1.15
+#: Percentile of the times per tick that other processes do not change.
+UNDISTURBED = 25
+STATM = Path("/proc/self/statm")
+
+
+def resident() -> int:
+    gc.collect()
+    return int(STATM.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") if STATM.exists() else 0
+
+
+def fly(flight: Flight, hostile: bool) -> None:
+    if flight.left == 0:
+        flight.rewind()
+    if hostile:
+        flight.hostile()
+    else:
+        flight.good()
+
+
+def slowdown(old: Flight, new: Flight) -> float:
+    """Time of a tick of one that flew long over that of a new one, tick by tick: a busy machine slows down both.
+
+    Both begin anew, for the time of a tick depends on what flies: a clock that leapt, a retreat.
+    """
+    old.restart()
+    times: tuple[list[float], list[float]] = [], []
+    for _ in range(2 * old.subject.ticks):
+        for flight, found in zip((old, new), times, strict=True):
+            if flight.left == 0:
+                flight.rewind()
+            inputs, begin = flight.recorded(), time.thread_time()
+            flight.flown.step(*inputs)
+            found.append(time.thread_time() - begin)
+            flight.tick += 1
+    of_old, of_new = (float(np.percentile(found, UNDISTURBED)) for found in times)
+    return of_old / of_new
+
+
+def soak(subject: Subject, ticks: int) -> None:
+    """The recorded ticks again and again under one clock that goes on, a fifth of them hostile."""
+    mutator, choices = Mutator(random.Random(0), lies=True), random.Random(1)
+    flight, begin = Flight(subject, mutator), (0, 0)
+    for tick in range(ticks):
+        if tick == round(WARM_UP * ticks):
+            begin = resident(), sys.getallocatedblocks()
+        fly(flight, choices.random() < HOSTILE)
+    memory, blocks = resident() - begin[0], sys.getallocatedblocks() - begin[1]
+    slower = slowdown(flight, Flight(subject, mutator, subject.make()))
+    print(f"{ticks} ticks: {memory} bytes and {blocks} objects more, {slower:.2f} of the time of a new one")
+    assert memory < MEMORY and blocks < BLOCKS
+    assert slower < TIME
+
+
+def test_controller() -> None:
+    soak(CONTROLLERS["qp"], TICKS)
+
+
+def test_pilot() -> None:
+    soak(PILOTS["pilot"], TICKS // 10)
