@@ -254,6 +254,8 @@ class Pilot:
         wrench, wrench_stamp = self._contact_wrench(frame, force)
         # After a lost rotor the vehicle turns away from the wall, and its pictures show something else.
         turned = self.rotor_loss.lost and self.contact.state.normal[0] < FACING
+        if turned and (frame.features is not None or frame.image is not None):
+            self._rejected.append("picture: the vehicle is turned from the wall")
         features = None if turned else self._perceive(frame)
         contact = self.contact.update(
             stamp_ns=stamp,
