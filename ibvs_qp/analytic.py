@@ -133,21 +133,22 @@ class PaperController:
         self.config = config or ControllerConfig()
         self.setpoints = self._make_setpoints()
         self.gate = MeasurementGate(self.config.vehicle.geometry.count, self.config.line_slots)
-        self._references = ReferenceGate(self.config.line_slots)
+        self.references = ReferenceGate(self.config.line_slots)
         self.reset()
 
     def reset(self) -> None:
         """As after construction."""
         self.setpoints.reset()
         self.gate.reset()
-        self._references.reset()
+        self.references.reset()
 
     @np.errstate(all="ignore")
     def step(self, measurement: Measurement, reference: Reference, contact: ContactState | None = None) -> Command:
         """Thrusts for one tick, within box and rate; never raises; arguments as of `HybridController.step`."""
         try:
             checked, rejected = self.gate.check(measurement)
-            command = self.respond(checked, rejected, reference, contact, answered_stamp(measurement))
+            reference, refused = self.references.check(reference)
+            command = self.respond(checked, rejected + refused, reference, contact, answered_stamp(measurement))
             return command if checked is None else self.gate.clock.answered(command)
         except Exception as error:  # in flight nothing may raise; the reason is reported instead
             stamp = answered_stamp(measurement)
@@ -161,10 +162,9 @@ class PaperController:
         contact: ContactState | None,
         stamp_ns: int,
     ) -> Command:
-        """Second half of `step`, in the time of ``gate.clock``, after the gate; stamp_ns is the one measured."""
-        reference, refused = self._references.check(reference)
+        """Second half of `step`, in the time of ``gate.clock``, after both gates; stamp_ns is the one measured."""
         contact, unusable = check_contact(contact)
-        rejected += refused + unusable
+        rejected += unusable
         if checked is None:
             return hover_command(self.setpoints, stamp_ns, self.gate.inertial, rejected)
         self.setpoints.update(checked, reference, contact)

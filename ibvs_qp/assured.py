@@ -12,7 +12,7 @@ from ibvs_qp.command import Command
 from ibvs_qp.config import SafetySettings
 from ibvs_qp.controller import HybridController
 from ibvs_qp.estimation.contact_state import ContactState
-from ibvs_qp.frames import down_in_body
+from ibvs_qp.frames import dot, down_in_body
 from ibvs_qp.measurement import Measurement, Reference
 from ibvs_qp.model.reporting import fixed_command, hover_command
 from ibvs_qp.safety.assurance import Assurance
@@ -20,7 +20,6 @@ from ibvs_qp.safety.policy import Fault
 from ibvs_qp.safety.tick import Tick
 from ibvs_qp.validation.failure import raised
 from ibvs_qp.validation.measurement import answered_stamp
-from ibvs_qp.validation.reference import ReferenceGate
 
 #: Fields without which a measurement has no inertial sample.
 _ATTITUDE = ("attitude", "angular_velocity")
@@ -43,14 +42,12 @@ class Assured:
     def __init__(self, controller: HybridController | PaperController, settings: SafetySettings | None = None) -> None:
         self.controller = controller
         self.assurance = Assurance(controller.config.vehicle, settings or SafetySettings())
-        self._references = ReferenceGate(controller.config.line_slots)
         self.reset()
 
     def reset(self) -> None:
         """As after construction."""
         self.controller.reset()
         self.assurance.reset()
-        self._references.reset()
         self._attitude_ns = self._imu_ns = self._wrench_ns = self._plane_ns = self._lines_ns = -1
         self._descended_m, self._time_ns = 0.0, -1
 
@@ -59,8 +56,8 @@ class Assured:
         """Thrusts for one tick, as `HybridController.step`; ``Command.safety`` is the state of the supervisor."""
         stamp, command = answered_stamp(measurement), None
         try:
-            reference, refused = self._references.check(reference)
             checked, rejected = self.controller.gate.check(measurement)
+            reference, refused = self.controller.references.check(reference)
             reference = self.assurance.supervised(reference)
             command = self._command(checked, (*rejected, *refused), reference, contact, stamp)
             shown = self.assurance.explained(command)
@@ -96,15 +93,16 @@ class Assured:
         """The tick as the monitors see it, in monotonic time."""
         gate, setpoints = self.controller.gate, self.controller.setpoints
         now = checked.stamp_ns
-        if not any(name in gate.replaced for name in _ATTITUDE):
+        missing = gate.replaced
+        if not (missing and any(name in missing for name in _ATTITUDE)):
             self._attitude_ns = now
-        if not any(name in gate.replaced for name in _INERTIAL):
+        if not (missing and any(name in missing for name in _INERTIAL)):
             stamps = [stamp for stamp in (checked.attitude_stamp_ns, checked.imu_stamp_ns) if stamp is not None]
             self._imu_ns = min([now, *stamps])
         self._wrench_ns = checked.wrench_stamp_ns
         if checked.plane is not None:
             self._plane_ns = max(self._plane_ns, checked.plane_stamp_ns)
-        if newest := max((line.stamp_ns for line in checked.lines), default=0):
+        if newest := max([line.stamp_ns for line in checked.lines], default=0):
             self._lines_ns = max(self._lines_ns, newest)
         attitude, rate, force = checked.attitude.tolist(), checked.angular_velocity.tolist(), checked.specific_force
         speed, down = math.nan, down_in_body(attitude)
@@ -112,7 +110,7 @@ class Assured:
             velocity = checked.velocity.tolist()
             speed = math.hypot(*velocity)
             elapsed = (now - self._time_ns) * 1e-9 if self._time_ns >= 0 else 0.0
-            self._descended_m += elapsed * float(np.dot(velocity, down))
+            self._descended_m += elapsed * dot(velocity, down)
         self._time_ns = now
         faults: dict[Fault, str] = {}
         if now - self._attitude_ns > self.assurance.settings.imu_age_s * 1e9:

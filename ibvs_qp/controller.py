@@ -87,7 +87,7 @@ class HybridController:
     """The drop-in controller: measurement and reference in, rotor thrusts and their explanation out.
 
     Attributes:
-        gate: Checks of the measurements.
+        gate, references: Checks of the measurements and of the references.
         problem_kind, engine_kind: Assembly and solution of the rows; a subclass may solve the same rows differently.
 
     Args:
@@ -110,7 +110,7 @@ class HybridController:
         self.setpoints = Setpoints(self.problem.model, self.problem.values)
         self.engine = self.engine_kind(self.problem, self.config.solver, ProgramData(self.problem, self.setpoints.step))
         self.gate = MeasurementGate(self.config.vehicle.geometry.count, self.config.line_slots)
-        self._references = ReferenceGate(self.config.line_slots)
+        self.references = ReferenceGate(self.config.line_slots)
         self.reset()
 
     def reset(self) -> None:
@@ -118,7 +118,7 @@ class HybridController:
         self.engine.reset()
         self.setpoints.reset()
         self.gate.reset()
-        self._references.reset()
+        self.references.reset()
         self._recovery = 0
 
     @np.errstate(all="ignore")  # a host may have numpy raise at every underflow
@@ -138,7 +138,8 @@ class HybridController:
         """
         try:
             checked, rejected = self.gate.check(measurement)
-            command = self.respond(checked, rejected, reference, contact, answered_stamp(measurement))
+            reference, refused = self.references.check(reference)
+            command = self.respond(checked, rejected + refused, reference, contact, answered_stamp(measurement))
             return command if checked is None else self.gate.clock.answered(command)
         except Exception as error:  # in flight nothing may raise; the reason is reported instead
             stamp = answered_stamp(measurement)
@@ -152,10 +153,9 @@ class HybridController:
         contact: ContactState | None,
         stamp_ns: int,
     ) -> Command:
-        """Second half of `step`, in the time of ``gate.clock``, after the gate; stamp_ns is the one measured."""
-        reference, refused = self._references.check(reference)
+        """Second half of `step`, in the time of ``gate.clock``, after both gates; stamp_ns is the one measured."""
         contact, unusable = check_contact(contact)
-        rejected += refused + unusable
+        rejected += unusable
         if checked is None:
             return hover_command(self.setpoints, stamp_ns, self.gate.inertial, rejected)
         self.setpoints.update(checked, reference, contact)

@@ -110,6 +110,8 @@ class Assurance:
         if not self.settings.supervise:
             return self.state
         before, distance = self.state, tick.contact.distance
+        if before is SafetyState.NOMINAL and not tick.faults:
+            return self.supervisor.update(time_s, tick.faults)
         if any(fault in tick.faults for fault in _BLIND):
             self._retreat_m = max(self._retreat_m, self.settings.blind_retreat_m)
         retreated = distance > self._retreat_m - RETREAT_REACHED and not tick.contact.in_contact
@@ -137,7 +139,9 @@ class Assurance:
     def wrench(self, response: Response) -> np.ndarray | None:
         """Contact wrench by inertial data [N, N m], (6,), in place of a faulty sensor's; None while that is good."""
         last = self._last
-        if last is None or not self.settings.supervise or not any(fault in self.faults for fault in _WRENCH):
+        if last is None or not (last.faults and self.settings.supervise):
+            return None
+        if not any(fault in last.faults for fault in _WRENCH):
             return None
         force = -max(response.inertial_push, 0.0) * np.array(last.contact.normal)
         return np.concatenate((force, np.cross(self._tip, force)))

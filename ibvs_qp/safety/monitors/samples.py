@@ -17,10 +17,20 @@ class SampleMonitor:
     """Finds inputs that stopped, by their stamps, and inputs that repeat although their stamps go on."""
 
     def __init__(self, settings: SafetySettings) -> None:
-        self._settings = settings
+        self._limits = (  # age [ns], and whether the input must be there from the start
+            (Fault.IMU_STALE, round(1e9 * settings.imu_age_s), True),
+            (Fault.WRENCH_STALE, round(1e9 * settings.wrench_age_s), True),
+            (Fault.PLANE_STALE, round(1e9 * settings.plane_age_s), False),
+            (Fault.IMAGE_STALE, round(1e9 * settings.image_age_s), False),
+        )
         self._imu = FrozenInput(settings.frozen_imu_samples, LIVELY_SAMPLES)
         self._wrench = FrozenInput(settings.frozen_samples, LIVELY_SAMPLES)
         self._picture = FrozenInput(settings.frozen_pictures, LIVELY_PICTURES)
+        self._frozen = (
+            (Fault.IMU_FROZEN, self._imu),
+            (Fault.WRENCH_FROZEN, self._wrench),
+            (Fault.IMAGE_FROZEN, self._picture),
+        )
         self.reset()
 
     def reset(self) -> None:
@@ -31,28 +41,20 @@ class SampleMonitor:
 
     def update(self, tick: Tick) -> None:
         """Add the faults of the inputs of a tick."""
-        faults, settings, now = tick.faults, self._settings, tick.stamp_ns
-        for fault, stamp, limit, must in (
-            (Fault.IMU_STALE, tick.imu_ns, settings.imu_age_s, True),
-            (Fault.WRENCH_STALE, tick.wrench_ns, settings.wrench_age_s, True),
-            (Fault.PLANE_STALE, tick.plane_ns, settings.plane_age_s, False),
-            (Fault.IMAGE_STALE, tick.image_ns, settings.image_age_s, False),
-        ):
-            age = (now - stamp) * 1e-9
-            if age > limit and (must or stamp >= 0):
-                faults[fault] = f"{1e3 * age:.0f} ms old, limit {1e3 * limit:.0f} ms" if stamp >= 0 else "none yet"
+        faults, now = tick.faults, tick.stamp_ns
+        stamps = tick.imu_ns, tick.wrench_ns, tick.plane_ns, tick.image_ns
+        for (fault, limit, must), stamp in zip(self._limits, stamps, strict=True):
+            if now - stamp > limit and (must or stamp >= 0):
+                age_ms, limit_ms = 1e-6 * (now - stamp), 1e-6 * limit
+                faults[fault] = f"{age_ms:.0f} ms old, limit {limit_ms:.0f} ms" if stamp >= 0 else "none yet"
         if tick.imu_ns != self._imu_ns:
             self._imu_ns = tick.imu_ns
             self._imu.add(tick.inertial)
         if tick.wrench_ns != self._wrench_ns:
             self._wrench_ns = tick.wrench_ns
             self._wrench.add(tick.wrench)
-        for fault, monitor in (
-            (Fault.IMU_FROZEN, self._imu),
-            (Fault.WRENCH_FROZEN, self._wrench),
-            (Fault.IMAGE_FROZEN, self._picture),
-        ):
-            if monitor.frozen:
+        for fault, monitor in self._frozen:
+            if monitor.equal and monitor.frozen:
                 faults[fault] = f"{monitor.equal + 1} equal samples in a row"
 
     def add_picture(self, picture: object) -> bool:
