@@ -40,7 +40,7 @@ class Limit(ABC):
         return None if model.config.limits.hard_barriers else weight
 
 
-def barrier_bounds(angle: ca.SX, rate: ca.SX, bound: float, pole: float) -> tuple[ca.SX, ca.SX]:
+def barrier_bounds(angle: ca.SX, rate: ca.SX, bound: float | ca.SX, pole: float) -> tuple[ca.SX, ca.SX]:
     r"""Acceleration bounds of an exponential barrier with both poles at -p.
 
     For :math:`h = \bar\varphi - \varphi` demand :math:`\ddot h + 2p\dot h + p^2 h \ge 0`, so
