@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from sim.experiments.criteria_section import criteria_section
 from sim.experiments.impedance_section import impedance_section
-from sim.experiments.parts_section import parts_section
+from sim.experiments.parts_section import parts_section, rivals_section
 from sim.experiments.published_section import published_section, rates_section
 from sim.experiments.tables import Section
 from sim.experiments.verdict_section import verdict_section
@@ -37,6 +37,7 @@ def results_page(sections: Sequence[Section], lead: str, command: str, name: str
     for caption, file in overview[:1]:
         text += f"\n![{caption}]({file.as_posix()})\n\n*{caption}.*\n"
     chapters = {
+        "What weights and a horizon of one tick cost": rivals_section(flown),
         "Bounds": criteria_section(flown),
         "Impedance against direct force control": "".join(
             impedance_section(experiment, table) for experiment, table in flown if experiment.name == "force-hold"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from sim.evaluate.table import law_name, markdown
@@ -19,17 +19,10 @@ from sim.sweep.paired import variant_differences
 def parts_section(flown: Flown) -> str:
     """A row per variant, experiment, world and law: flights done, counts of outcomes, and the largest effect.
 
-    Allocators belong to the verdict, and direct force control has a section of its own.
+    Allocators belong to the verdict; direct force control and rivals have sections of their own.
     """
     rows, said = [], set()
-    entries = [
-        (experiment, columns, entry)
-        for experiment, table in flown
-        for columns in (measured(experiment, table),)
-        for entry in _differences(experiment, table, columns)
-        if "allocator" not in VARIANTS[entry["variant"]].switches and entry["variant"] != DIRECT
-    ]
-    entries.sort(key=lambda each: list(REFERENCES).index(each[2]["variant"]))
+    entries = _entries(flown, _is_part)
     groups = grouped(
         entries, lambda each: (each[2]["variant"], each[0].name, world_of(each[2]["params"]), each[2]["law"])
     )
@@ -55,6 +48,52 @@ def parts_section(flown: Flown) -> str:
              "variant better", "does not matter", "undecided", "too few pairs",
              "largest effect: variant minus reference")  # fmt: skip
     return capped(heads, rows) if rows else ""
+
+
+def rivals_section(flown: Flown) -> str:
+    """Other formulations in place of the QP: counts of outcomes, then every figure that differs by enough."""
+    text, rows = "", []
+    for rival, own in grouped(_entries(flown, lambda name: bool(VARIANTS[name].rival)), _variant).items():
+        count = Counter[Effect]()
+        for experiment, columns, entry in own:
+            for column in columns:
+                value = value_of(entry["differences"], column, entry["params"]) if column.better else None
+                if value is None:
+                    continue
+                outcome = effect(value, column)
+                count[outcome] += 1
+                if outcome in (Effect.FIRST, Effect.SECOND):
+                    side = "QP" if outcome is Effect.FIRST else f"*{rival}*"
+                    figure, place = f"{exact(value, column)} {column.unit}".rstrip(), cell(experiment, entry["params"])
+                    rows.append([side, column.label, place, figure, str(entry["n"])])
+        decided = sum(count.values()) - count[Effect.FEW]
+        text += (
+            f"- *{rival}*, {VARIANTS[rival].words}: of {decided} comparisons it is better in {count[Effect.SECOND]}, "
+            f"the QP in {count[Effect.FIRST]}; {count[Effect.IRRELEVANT]} do not matter, {count[Effect.OPEN]} are "
+            "undecided.\n"
+        )
+    heads = ("better", "figure of merit", "cell", "rival minus QP", "pairs")
+    return text + ("\n" + capped(heads, rows) if rows else "")
+
+
+def _variant(entry: tuple[Experiment, Sequence[Column], dict[str, Any]]) -> str:
+    return entry[2]["variant"]
+
+
+def _is_part(name: str) -> bool:
+    return "allocator" not in VARIANTS[name].switches and name != DIRECT and not VARIANTS[name].rival
+
+
+def _entries(flown: Flown, chosen: Callable[[str], bool]) -> list[tuple[Experiment, Sequence[Column], dict[str, Any]]]:
+    """Differences of the chosen variants, in the order of the variants."""
+    entries = [
+        (experiment, columns, entry)
+        for experiment, table in flown
+        for columns in (measured(experiment, table),)
+        for entry in _differences(experiment, table, columns)
+        if chosen(entry["variant"])
+    ]
+    return sorted(entries, key=lambda each: list(REFERENCES).index(_variant(each)))
 
 
 def _largest(experiment: Experiment, found: Sequence[tuple[Effect, dict[str, float], Column, dict[str, Any]]]) -> str:

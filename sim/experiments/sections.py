@@ -24,7 +24,7 @@ HEADINGS = {
     Effect.FEW: "too few pairs",
 }
 #: Most rows of one table of the page; tables.md has all.
-MOST_ROWS = 19
+MOST_ROWS = 15
 
 
 def capped(heads: Sequence[str], rows: Sequence[Sequence[str]], most: int = MOST_ROWS) -> str:
