@@ -121,6 +121,7 @@ class Assured:
             wrench_ns=self._wrench_ns,
             plane_ns=self._plane_ns,
             image_ns=self._lines_ns,
+            lines_ns=self._lines_ns,
             inertial=(attitude, rate, None if force is None else force.tolist()),
             wrench=checked.contact_wrench.tolist(),
             down=down,

@@ -177,7 +177,7 @@ class Pilot:
         self._history_attitude, self._history_turn = [[1.0, 0.0, 0.0, 0.0]] * HISTORY, [self._turn] * HISTORY
         self._covariance = self.motion.velocity_variance * np.eye(3)
         self._plane: tuple[float, float, float, float] | None = None
-        self._plane_stamp = self._image_stamp = self._imu_stamp = -1
+        self._plane_stamp = self._image_stamp = self._lines_stamp = self._imu_stamp = -1
         self.thrust_limits = None
         self._leaps = 0
         self._rejected: list[str] = []  # inputs of the tick that were refused before the controller
@@ -335,6 +335,7 @@ class Pilot:
             wrench_ns=frame.wrench_stamp_ns,
             plane_ns=self.contact.plane_ns,
             image_ns=self._image_stamp,
+            lines_ns=self._lines_stamp,
             inertial=(now["attitude"], now["angular_velocity"], now["specific_force"]),
             wrench=now["wrench"],
             down=down_in_body(self._attitude),
@@ -382,6 +383,8 @@ class Pilot:
         if not self.assurance.is_news(_content(frame, features)):
             return None
         self._image_stamp = features.stamp_ns
+        if features.lines:
+            self._lines_stamp = features.stamp_ns
         if features.plane is not None:
             self._plane, self._plane_stamp = features.plane, features.stamp_ns
         return features

@@ -16,6 +16,7 @@ class SafetySettings:
 
     image_age_s: float = setting(0.2, "oldest picture: latency, and two dropped ones", unit="s", low=0.05, high=5.0)
     plane_age_s: float = setting(0.3, "oldest wall plane", unit="s", low=0.05, high=5.0)
+    lines_age_s: float = setting(0.5, "oldest picture with a line", unit="s", low=0.1, high=10.0)
     wrench_age_s: float = setting(0.03, "oldest force sample: three periods at 100 Hz", unit="s", low=0.005, high=1.0)
     imu_age_s: float = setting(
         0.02, "oldest attitude, gyro or accelerometer: five ticks", unit="s", low=0.002, high=0.5
@@ -41,6 +42,10 @@ class SafetySettings:
         6.0, "and this many standard deviations in flight: 3 N in the datasheet world", low=2.0, high=50.0
     )
     missing_time_s: float = setting(0.04, "missing for this long is a fault", unit="s", low=0.0, high=1.0)
+    missing_lift_n: float = setting(
+        5.0, "lift that all rotors together may miss: a twelfth of the weight", unit="N", low=0.5, high=100.0
+    )
+    missing_lift_time_s: float = setting(0.1, "missing for this long is a fault", unit="s", low=0.0, high=1.0)
 
     tilt_deg: float = setting(12.0, "largest tilt", unit="deg", low=2.0, high=60.0)
     flip_deg: float = setting(60.0, "tilt that ends the flight", unit="deg", low=20.0, high=180.0)
@@ -56,7 +61,11 @@ class SafetySettings:
 
     retreat_m: float = setting(0.35, "tip to wall after a retreat", unit="m", low=0.1, high=3.0)
     blind_retreat_m: float = setting(
-        1.0, "the same without camera: the drift of inertial data stays below it", unit="m", low=0.1, high=10.0
+        3.0,
+        "the same without camera: farther than the flight still lasts, because the speed by inertial data drifts",
+        unit="m",
+        low=0.1,
+        high=10.0,
     )
     descend_speed_m_s: float = setting(
         0.25, "speed of a descent", unit="m/s", why="slow: nothing measures the height", low=0.05, high=1.0

@@ -13,6 +13,7 @@ import numpy as np
 
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.estimation.kalman import DelayedKalman
+from ibvs_qp.estimation.normal_turns import NormalTurns
 from ibvs_qp.estimation.stamps import HISTORY
 from ibvs_qp.estimation.vibration import VibrationNoise
 from ibvs_qp.frames import GRAVITY, add_scaled, cross, dot, plane_in_body, unit
@@ -55,6 +56,7 @@ class WallDistance:
         self.vibration = VibrationNoise(settings.vibration_time_s)
         gain = 1.0 - math.exp(-config.tick_s / settings.acceleration_filter_s)
         self._ratio = gain / (2.0 - gain)  # variance of filtered white noise per variance of a sample
+        self._turns = NormalTurns()
         self._filter = DelayedKalman(CHAIN, noise, INITIAL_STD, config.tick_s, settings.gate_sigmas)
         self.reset()
 
@@ -64,6 +66,8 @@ class WallDistance:
         self._state = self._filter.state.tolist()
         self.normal, self.known = (1.0, 0.0, 0.0), False
         self._normals = np.zeros((HISTORY, 3))  # of the last ticks, by the slots of the filter's ticks
+        self._yaw, self._yaws = 0.0, np.zeros(HISTORY)  # integrated gyro about the vertical [rad], likewise
+        self._turns.reset()
         self._jumps, self._first_jump, self._plane_ns = 0, (0, 0.0), -1
         self.accepted_ns = self._tick_ns = -1
         self._gap = False
@@ -133,15 +137,23 @@ class WallDistance:
         self._filter.noise[BIAS, BIAS] = density / self._settings.bias_time_s**2  # as fast in any vibration
         self._state = [distance - dt * (speed + lever_speed), speed + dt * (measured - bias), bias]
         self._filter.remember(stamp_ns, self._state, dt)
-        self._normals[self._filter.ticks.slot(0)] = normal
+        self._yaw += dt * dot(down, angular_velocity)
+        slot = self._filter.ticks.slot(0)
+        self._normals[slot], self._yaws[slot] = normal, self._yaw
         self.rate_noise = math.sqrt(self._filter.variance(SPEED, stamp_ns))
 
     def correct(self, plane: Sequence[float], stamp_ns: int, tip_stationary: bool) -> None:
-        """Correct with a plane (A, B, C, D) measured in C, at the time of its capture, if newer than the last one."""
+        """Correct with a plane (A, B, C, D) measured in C, at the time of its capture, if newer than the last one.
+
+        Planes of a camera with mirrored axes are refused for good.
+        """
         if stamp_ns <= self._plane_ns:
             return
         self._plane_ns = stamp_ns
         normal, distance = plane_in_body(plane, self._tip_from_camera)
+        self._turns.add(stamp_ns, normal, float(self._yaws[self._filter.ticks.slots_since(stamp_ns)[0]]))
+        if self._turns.mirrored:
+            return
         if not self.known or self._gap:
             self.normal, self._normals[:] = normal, normal
             self._filter.set_entry(DISTANCE, distance, FIRST_DISTANCE_STD)

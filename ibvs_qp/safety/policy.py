@@ -21,6 +21,7 @@ class Fault(StrEnum):
     IMAGE_STALE = "no picture"
     IMAGE_FROZEN = "pictures repeat"
     PLANE_STALE = "no wall plane"
+    LINES_STALE = "no line in sight"
     FILTER_REFUSES = "a filter refuses its measurements"
     NO_ATTITUDE = "no attitude, measured or estimated"
     IMU_STALE = "no inertial sample"
@@ -63,7 +64,7 @@ _Stage = tuple[float, SafetyState]
 _AT_ONCE: tuple[_Stage, ...] = ((0.0, RETREAT),)
 #: Blind to the wall's lines: stop, hold the contact for half a second, retreat, hover on inertial data, and descend
 #: before their drift reaches the wall.
-_BLIND: tuple[_Stage, ...] = ((0.0, DEGRADED), (0.5, RETREAT), (6.0, HOVER), (8.0, DESCEND))
+_BLIND: tuple[_Stage, ...] = ((0.0, DEGRADED), (0.5, RETREAT), (3.0, HOVER), (4.0, DESCEND))
 #: Attitude by motors' model and camera: away from the wall, and down before the lines leave the picture.
 _UNSTEADY: tuple[_Stage, ...] = ((0.0, DEGRADED), (0.2, RETREAT), (3.0, DESCEND))
 
@@ -74,9 +75,10 @@ POLICY: dict[Fault, Rule] = {
     Fault.WRENCH_FROZEN: Rule(_AT_ONCE, ("frozen_samples",)),
     Fault.PUSH_UNFELT: Rule(_AT_ONCE, ("unfelt_push_n", "unfelt_ratio", "push_time_s")),
     Fault.PUSH_HIGH: Rule(_AT_ONCE, ("push_ratio", "push_floor_n", "push_time_s")),
-    Fault.IMAGE_STALE: Rule(_BLIND, ("image_age_s",)),
+    Fault.IMAGE_STALE: Rule(_BLIND, ("image_age_s",), recovery_s=0.15),  # a late picture now and then is no blindness
     Fault.IMAGE_FROZEN: Rule(_BLIND, ("frozen_pictures",)),
     Fault.PLANE_STALE: Rule(_BLIND, ("plane_age_s",)),
+    Fault.LINES_STALE: Rule(((0.0, DEGRADED), (3.0, RETREAT)), ("lines_age_s",)),
     Fault.FILTER_REFUSES: Rule(((0.0, DEGRADED), (2.0, RETREAT)), ("refusal_s",)),
     Fault.NO_ATTITUDE: Rule(((0.0, DEGRADED), (0.2, TERMINATED)), recovery_s=0.0),
     Fault.IMU_STALE: Rule(_UNSTEADY, ("imu_age_s",)),

@@ -49,7 +49,7 @@ class Tick:
     Attributes:
         stamp_ns: Time of the tick.
         imu_ns: Stamp of the oldest of attitude, gyro and accelerometer, each the last accepted one.
-        wrench_ns, plane_ns, image_ns: Stamps of the last accepted samples.
+        wrench_ns, plane_ns, image_ns, lines_ns: Stamps of the last accepted samples, and of the last with a line.
         inertial: Attitude, gyro and accelerometer as measured; anything that differs from sample to sample.
         wrench: Force sample as measured, likewise.
         down: Unit gravity in B, (3,).
@@ -68,6 +68,7 @@ class Tick:
     wrench_ns: int
     plane_ns: int
     image_ns: int
+    lines_ns: int
     inertial: object
     wrench: object
     down: Sequence[float]

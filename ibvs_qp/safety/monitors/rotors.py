@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -17,6 +18,8 @@ UNEXPLAINED = 0.5
 MOST_ROTORS = 2
 #: A rotor that was found is followed down to this missing thrust [N] and this many standard deviations.
 FOUND, FOUND_SIGMAS = 1.5, 3.0
+#: A rotor that misses this share of its thrust, while the others miss some too, has reached a limit [-].
+WEAK = 0.25
 #: Half width of the remaining limits of a stuck rotor [N].
 MARGIN = 0.5
 
@@ -40,12 +43,15 @@ class RotorMonitor:
         # Column i: what a newton missing at rotor i looks like; with more than six rotors it spreads over others.
         self._signatures = np.linalg.pinv(effectiveness) @ effectiveness
         self._persistence = Persistence(settings.missing_time_s)
+        self._lift = Persistence(settings.missing_lift_time_s)
+        self._upwards = -effectiveness[2]
         self.reset()
 
     def reset(self) -> None:
         """All rotors follow."""
         self.limits: tuple[np.ndarray, np.ndarray] | None = None
         self._persistence.reset()
+        self._lift.reset()
         self._found: dict[str, float] = {}
 
     def update(self, missing: np.ndarray, noise: float, thrusts: np.ndarray, time_s: float) -> str:
@@ -66,7 +72,15 @@ class RotorMonitor:
             self._persistence.reset()
         else:
             self._suspect(missing, thrusts, time_s)
-        return ", ".join(f"{name} gives {thrust:.1f} N" for name, thrust in self._found.items())
+        words = [f"{name} gives {thrust:.1f} N" for name, thrust in self._found.items()]
+        lift, spread = float(self._upwards @ missing), settings.missing_sigmas * noise * math.sqrt(len(missing))
+        if self._lift.update(lift > max(settings.missing_lift_n, spread), time_s):
+            words.append(f"{lift:.1f} N of lift are missing")
+            # No gust and no push at the body: several rotors are weak. A small share of the thrust is a sagging battery.
+            for rotor in np.flatnonzero(missing > np.maximum(least, WEAK * thrusts)):
+                loss = float(missing[rotor] / self._signatures[rotor, rotor])
+                self._limit(rotor, float(thrusts[rotor]) - loss, loss, stuck=False)
+        return ", ".join(words)
 
     def _suspect(self, missing: np.ndarray, thrusts: np.ndarray, time_s: float) -> None:
         rotors = self._explain(missing, 1 if self._found else MOST_ROTORS)
@@ -87,10 +101,11 @@ class RotorMonitor:
                 return chosen
         return ()
 
-    def _limit(self, rotor: int, actual: float, loss: float) -> None:
+    def _limit(self, rotor: int, actual: float, loss: float, stuck: bool = True) -> None:
         """A faulty rotor counts as stuck at its thrust: one that gives too little may not give less either."""
         lower, upper = self.limits or (self._box[0].copy(), self._box[1].copy())
         actual = min(max(actual, 0.0), float(self._box[1][rotor]))
-        lower[rotor] = max(actual - MARGIN, 0.0)
+        if stuck:
+            lower[rotor] = max(actual - MARGIN, 0.0)
         upper[rotor] = actual if loss > 0.0 else min(actual + MARGIN, float(self._box[1][rotor]))
         self.limits, self._found[self._names[rotor]] = (lower, upper), actual

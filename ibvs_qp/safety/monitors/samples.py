@@ -22,6 +22,7 @@ class SampleMonitor:
             (Fault.WRENCH_STALE, round(1e9 * settings.wrench_age_s), True),
             (Fault.PLANE_STALE, round(1e9 * settings.plane_age_s), False),
             (Fault.IMAGE_STALE, round(1e9 * settings.image_age_s), False),
+            (Fault.LINES_STALE, round(1e9 * settings.lines_age_s), False),
         )
         self._imu = FrozenInput(settings.frozen_imu_samples, LIVELY_SAMPLES)
         self._wrench = FrozenInput(settings.frozen_samples, LIVELY_SAMPLES)
@@ -42,7 +43,7 @@ class SampleMonitor:
     def update(self, tick: Tick) -> None:
         """Add the faults of the inputs of a tick."""
         faults, now = tick.faults, tick.stamp_ns
-        stamps = tick.imu_ns, tick.wrench_ns, tick.plane_ns, tick.image_ns
+        stamps = tick.imu_ns, tick.wrench_ns, tick.plane_ns, tick.image_ns, tick.lines_ns
         for (fault, limit, must), stamp in zip(self._limits, stamps, strict=True):
             if now - stamp > limit and (must or stamp >= 0):
                 age_ms, limit_ms = 1e-6 * (now - stamp), 1e-6 * limit
