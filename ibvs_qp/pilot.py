@@ -55,10 +55,6 @@ from ibvs_qp.vision.percept import LineHint
 HINT_SPAN = (0.10, 0.50)
 #: Inertial sensors of a frame.
 _INERTIAL = ("attitude", "angular_velocity", "specific_force")
-#: A vehicle turned farther from the wall than this does not use its pictures: cosine of 20 degrees.
-FACING = 0.94
-#: Tip to wall beyond which a tilting vehicle does not press [m].
-CLEAR = 0.02
 #: States in which the strategy flies.
 _FLYING = (SafetyState.NOMINAL, SafetyState.DEGRADED)
 #: Pixels by which pictures are compared: every 16th row and column, of 4096 at most.
@@ -157,7 +153,7 @@ class Pilot:
         self._perception, self._seen_as = None, seen_as
         self.contact = ContactEstimator(settings)
         self.motion = WallMotion(self._tip, camera, settings.tick_s, self.config.estimation)
-        self.rotor_loss = RotorLoss(vehicle)
+        self.rotor_loss = RotorLoss(vehicle, settings.gains)
         self.assurance = Assurance(vehicle, self.config.safety)
         self.painter = painter or Painter(self.config.painting)
         law = HybridController if self.config.law == "qp" else PaperController
@@ -252,10 +248,12 @@ class Pilot:
         attitude, rate, force = self._attitude, self._rate, self._force
         down = down_in_body(attitude)
         wrench, wrench_stamp = self._contact_wrench(frame, force)
-        # After a lost rotor the vehicle turns away from the wall, and its pictures show something else.
-        turned = self.rotor_loss.lost and self.contact.state.normal[0] < FACING
-        if turned and (frame.features is not None or frame.image is not None):
-            self._rejected.append("picture: the vehicle is turned from the wall")
+        # After a lost rotor the vehicle turns away from the wall: its pictures show something else, and the force
+        # sensor measures the tool that swings round.
+        if turned := self.rotor_loss.turns(self.contact.state.normal[0]):
+            wrench = np.zeros(6)
+            if frame.features is not None or frame.image is not None:
+                self._rejected.append("picture: the vehicle is turned from the wall")
         features = None if turned else self._perceive(frame)
         contact = self.contact.update(
             stamp_ns=stamp,
@@ -492,9 +490,9 @@ class Pilot:
             return target
         if not tilted:
             rotors.begin(roll_pitch(self._attitude))
-        normal, touching = np.array(contact.normal), contact.distance < CLEAR
+        normal = np.array(contact.normal)
         away = contact.distance + float(normal @ self._tip)
-        tilt = rotors.tilt(away, contact.speed, motion.state[0], normal, dt, touching=touching)
+        tilt = rotors.tilt(away, contact.speed, motion.state[0], normal, dt)
         return dataclasses.replace(target, tilt=tilt) if rotors.lost else dataclasses.replace(target, trim=tilt)
 
     def _thrust_limits(self) -> tuple[np.ndarray, np.ndarray] | None:
@@ -539,7 +537,7 @@ class Pilot:
         velocity = covariance = None
         inertial = self.rotor_loss.lost or self.assurance.state not in _FLYING
         if inertial or self.motion.velocity_age_s < self.config.estimation.velocity_life_s:
-            (right, down, *_), rate = self.motion.state, contact.rate
+            (right, down, *_), rate = self.motion.state, -contact.speed if self.rotor_loss.lost else contact.rate
             rows = zip(axes.right, axes.down, axes.normal, strict=True)
             velocity = np.array([r * right + d * down - n * rate for r, d, n in rows])
             covariance = self._covariance

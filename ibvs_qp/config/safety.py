@@ -67,8 +67,19 @@ class SafetySettings:
         low=0.1,
         high=10.0,
     )
+    tilting_retreat_m: float = setting(
+        1.0, "the same with a faulty rotor: a vehicle that moves by tilting swings", unit="m", low=0.1, high=10.0
+    )
     descend_speed_m_s: float = setting(
         0.25, "speed of a descent", unit="m/s", why="slow: nothing measures the height", low=0.05, high=1.0
+    )
+    fast_descend_speed_m_s: float = setting(
+        0.5,
+        "speed of a descent with a rotor lost",
+        unit="m/s",
+        why="the vehicle turns ever faster: on the ground in 3 s; legs take 0.6 m/s",
+        low=0.05,
+        high=1.0,
     )
     landed_ratio: float = setting(0.3, "weight carried by the ground that counts as landed", low=0.05, high=1.0)
     landed_time_s: float = setting(0.3, "carried for this long", unit="s", low=0.05, high=5.0)

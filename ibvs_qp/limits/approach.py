@@ -22,12 +22,14 @@ class ApproachLimit(Limit):
     switch_setting = "limits.approach_barrier"
 
     def rows(self, model: Model) -> list[LimitRow]:
-        """One soft row in m/s^2; wide in contact, while the wall is unknown, and after a lost rotor."""
+        """One soft row in m/s^2; wide in contact, while the wall is unknown, and after a rotor is lost or stuck."""
         settings, contact, motion = model.config.limits, model.contact, approach(model)
         barrier = settings.approach_rate_1_s * (settings.approach_speed_ratio * motion.allowed + contact.rate)
         bound = barrier + motion.search / model.config.vehicle.mass_kg
         free = ca.logic_and(contact.known, ca.logic_not(contact.touching))
-        steady = ca.logic_and(free, ca.logic_not(model.attitude.tilted))  # a turning tip is no approach
+        # A turning tip is no approach; and where a rotor leaves no force along n, the price would be height.
+        faulty = ca.logic_or(model.attitude.tilted, model.attitude.trimmed)
+        steady = ca.logic_and(free, ca.logic_not(faulty))
         return [
             LimitRow(
                 name="approach_speed",

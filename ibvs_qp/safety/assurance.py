@@ -31,6 +31,8 @@ from ibvs_qp.safety.tick import Response, Tick
 #: Faults of the force sensor, and of the camera.
 _WRENCH = (Fault.WRENCH_STALE, Fault.WRENCH_FROZEN, Fault.PUSH_UNFELT)
 _BLIND = (Fault.IMAGE_STALE, Fault.IMAGE_FROZEN, Fault.PLANE_STALE)
+#: Faults after which the vehicle moves by tilting, less precisely.
+_TILTING = (Fault.ROTOR, Fault.NO_HOVER)
 #: Outcomes without a solution of the program.
 _UNSOLVED = (Outcome.ANALYTIC_FALLBACK, Outcome.HOLD)
 #: A retreat has ended this far before its distance [m].
@@ -114,6 +116,8 @@ class Assurance:
             return self.supervisor.update(time_s, tick.faults)
         if any(fault in tick.faults for fault in _BLIND):
             self._retreat_m = max(self._retreat_m, self.settings.blind_retreat_m)
+        if any(fault in tick.faults for fault in _TILTING):
+            self._retreat_m = max(self._retreat_m, self.settings.tilting_retreat_m)
         retreated = distance > self._retreat_m - RETREAT_REACHED and not tick.contact.in_contact
         grounded = before is SafetyState.DESCEND and response.carried_weight > self.settings.landed_ratio * self._weight
         landed = self._grounded.update(grounded, time_s)
@@ -131,10 +135,14 @@ class Assurance:
             pressing = reference.contact and last.contact.in_contact
             stop = reference.standoff if not reference.contact else max(last.contact.distance, LEAST_STOP)
             return dataclasses.replace(reference, velocity=_STILL, travel=_STILL, contact=pressing, standoff=stop)
-        down = self.settings.descend_speed_m_s if state is SafetyState.DESCEND else 0.0
-        return Reference(
-            standoff=self._retreat_m, velocity=np.array((0.0, down)), tilt=reference.tilt, trim=reference.trim
-        )
+        down = np.array((0.0, self._descend_speed)) if state is SafetyState.DESCEND else _STILL
+        return Reference(standoff=self._retreat_m, velocity=down, tilt=reference.tilt, trim=reference.trim)
+
+    @property
+    def _descend_speed(self) -> float:
+        """Speed of a descent [m/s]: fast without a hover, because the vehicle turns ever faster."""
+        fast = Fault.NO_HOVER in self.faults
+        return self.settings.fast_descend_speed_m_s if fast else self.settings.descend_speed_m_s
 
     def wrench(self, response: Response) -> np.ndarray | None:
         """Contact wrench by inertial data [N, N m], (6,), in place of a faulty sensor's; None while that is good."""

@@ -18,8 +18,10 @@ TOUCH_FORCE_BUDGET = 2.9
 SLOWING = 1.5
 #: Integral gain of the approach speed at the wall [1/s^2] and bound of its force [N].
 SEARCH_GAIN, SEARCH_BOUND = 6.0, 6.0
-#: With a rotor lost: weight at the wall, over that of a level vehicle [-], and distance beyond which it is zero [m].
-LOST_WEIGHT, LOST_NEAR = 0.02, 0.15
+#: With a rotor lost: weight over that of a level vehicle [-]: far below the moments, above effort and smoothness.
+LOST_WEIGHT = 0.1
+#: Likewise: speed away from the wall [m/s], speed error to acceleration [1/s], and its bound [m/s^2].
+LOST_SPEED, LOST_GAIN, LOST_BOUND = 0.4, 3.0, 3.0
 #: Stand-off target while the tip shall touch [m]: behind the surface, so that the approach never stalls.
 TOUCH_TARGET = -0.03
 
@@ -49,15 +51,14 @@ class StandoffTask(Task):
 
     def rows(self, model: Model) -> list[TaskRow]:
         """One row in newtons, so that the blend with the push row is linear in lambda."""
-        # A vehicle that lost a rotor moves by tilting; but its free force shall not press while the wall is near.
-        near = clamp(1.0 - model.contact.distance / LOST_NEAR, 0.0, LOST_WEIGHT)
-        level = ca.if_else(model.attitude.tilted, near, 1.0)
+        tilted = model.attitude.tilted
+        level = ca.if_else(tilted, LOST_WEIGHT, 1.0)  # what it cannot reach shall not cost moments
         return [
             TaskRow(
                 name="standoff",
                 unit="N",
                 expression=model.force_along_normal,
-                target=model.output("standoff_command", ca.if_else(model.attitude.tilted, 0.0, self.force(model))),
+                target=model.output("standoff_command", ca.if_else(tilted, _lost_force(model), self.force(model))),
                 weight=model.config.weights.push * (1.0 - model.contact_weight) * level,
             )
         ]
@@ -68,6 +69,16 @@ class StandoffTask(Task):
         landing = ca.logic_and(model.target.press, model.contact.distance < settings.touch_distance_m)
         damping = model.config.vehicle.mass_kg * ca.if_else(landing, settings.landing_kd, gains.standoff_kd)
         return ca.if_else(model.contact.known, damping * motion.speed_error + motion.search, 0.0)
+
+
+def _lost_force(model: Model) -> ca.SX:
+    """Force along n of a vehicle that lost a rotor and turns: its centre of mass keeps the distance [N]."""
+    tip, contact, target = ca.DM(model.config.vehicle.tip_position_m), model.contact, model.target
+    excess = contact.distance + ca.dot(contact.normal, tip) - ca.norm_2(tip) - target.standoff
+    speed = clamp(model.config.gains.standoff_kp * excess, -LOST_SPEED, LOST_SPEED)
+    error = speed - ca.dot(contact.normal, model.body.velocity)
+    acceleration = clamp(LOST_GAIN * error, -LOST_BOUND, LOST_BOUND)
+    return ca.if_else(contact.known, model.config.vehicle.mass_kg * acceleration, 0.0)
 
 
 def approach(model: Model) -> Approach:

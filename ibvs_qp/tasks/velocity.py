@@ -11,6 +11,8 @@ from ibvs_qp.model.rows import TaskRow
 from ibvs_qp.tasks.line import free_directions
 from ibvs_qp.tasks.task import Task
 
+#: Weight with a rotor lost or stuck, over that of a level vehicle [-]: the force that is left damps the drift.
+FAULTY_WEIGHT = 0.02
 #: Bound of the velocity integral as an acceleration [m/s^2].
 VELOCITY_INTEGRAL_BOUND = 0.8
 #: Least gain by which it is divided [1/s^2].
@@ -28,8 +30,9 @@ class VelocityTask(Task):
         free = ca.SX.ones(2) if paper else free_directions(model)
         weights, target = model.config.weights, velocity_command(model)
         extra = 0.0 if paper else model.tip_stationary * (stationary_sideways_weight(weights) - weights.velocity)
-        # Without a rotor one force is not free. It shall be the one along the wall: there the vehicle tilts to move.
-        level = 1.0 - ca.fmax(model.attitude.tilted, model.attitude.trimmed)
+        # Without a rotor one force is not free, and the vehicle tilts to move: at the wall the one into it counts more.
+        faulty = ca.fmax(model.attitude.tilted, model.attitude.trimmed)
+        level = 1.0 - faulty + FAULTY_WEIGHT * faulty
         row_weights = ((weights.velocity + extra) * free[0] * level, weights.velocity * free[1])
         return [
             TaskRow(

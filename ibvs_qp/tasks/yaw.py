@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import casadi as ca
 
 from ibvs_qp.model.inputs import clamp
@@ -10,8 +12,11 @@ from ibvs_qp.model.rows import TaskRow
 from ibvs_qp.model.stationary_tip import pivot_limited, pivot_stiffness
 from ibvs_qp.tasks.task import Task
 
-#: Largest yaw acceleration of a vehicle that lost a rotor [rad/s^2]: more would cost roll and pitch.
-ROTOR_LOST_ACCELERATION = 2.0
+#: With a rotor lost: largest yaw acceleration [rad/s^2] and weight over that of a level vehicle [-]. The moment that is
+#: left about the vertical has one sign; yaw takes what roll and pitch leave.
+LOST_ACCELERATION, LOST_WEIGHT = 2.0, 0.05
+#: Beyond this angle a vehicle that lost a rotor only damps the turn [rad].
+LARGEST_TURN = 0.5 * math.pi
 
 
 class YawTask(Task):
@@ -27,7 +32,7 @@ class YawTask(Task):
                 unit="rad/s^2",
                 expression=model.acceleration[5],
                 target=model.output("yaw_command", self.target(model)),
-                weight=ca.SX(model.config.weights.yaw),
+                weight=model.config.weights.yaw * ca.if_else(model.attitude.tilted, LOST_WEIGHT, 1.0),
             )
         ]
 
@@ -37,5 +42,6 @@ class YawTask(Task):
         stiffness = pivot_limited(model, gains.yaw_kp, soft, [line.vertical for line in model.lines])
         damping = -gains.yaw_kd * model.rate_ahead[2]
         facing = -stiffness * model.attitude.yaw + damping
-        bounded = clamp(facing, -ROTOR_LOST_ACCELERATION, ROTOR_LOST_ACCELERATION)
+        turned = ca.fabs(model.attitude.yaw) > LARGEST_TURN  # behind the seam at 180 degrees it would drive the spin
+        bounded = clamp(ca.if_else(turned, damping, facing), -LOST_ACCELERATION, LOST_ACCELERATION)
         return ca.if_else(model.attitude.tilted, bounded, facing)

@@ -105,7 +105,9 @@ def _outcome(flown: Flown, row: Scenario, expected: Expected) -> Iterator[Broken
         yield Broken("not completed", f"job not completed ({flown.reason})")
     if severity(expected.reach) < severity(SafetyState.RETREAT):
         return
-    if flown["touching_s"] > row.observable_s + expected.within_s + LEAVE_S:
+    if row.when_it_deviates and math.isnan(flown["deviates_s"]):
+        yield Broken("not observable", "no rotor ever differed from its command")
+    if flown["touching_s"] > _observable_s(flown, row) + expected.within_s + LEAVE_S:
         yield Broken("stays at the wall", f"in contact until {flown['touching_s']:.1f} s after the fault")
     if flown["advance_m"] > ADVANCE_M:
         yield Broken("advances", f"advances by {flown['advance_m']:.2f} m")
@@ -116,7 +118,7 @@ def _states(flown: Flown, row: Scenario, expected: Expected) -> Iterator[Broken]
     if flown["state_before"] > 0.0:
         yield Broken("false alarm", f"{STATES[int(flown['state_before'])]} before the fault")
     if severity(expected.reach) > 0:
-        took = flown[f"to_{expected.reach}_s"] - row.observable_s
+        took = flown[f"to_{expected.reach}_s"] - _observable_s(flown, row)
         if not took <= expected.within_s:
             never = math.isnan(took)
             when = "not reached" if never else f"{took:.2f} s after the fault could be observed"
@@ -126,6 +128,11 @@ def _states(flown: Flown, row: Scenario, expected: Expected) -> Iterator[Broken]
         yield Broken(f"{state} needless", f"{state}, no more than {expected.at_most} expected")
     if flown["unexplained"] > 0.0:
         yield Broken("no reason", "a change of state without a reason")
+
+
+def _observable_s(flown: Flown, row: Scenario) -> float:
+    """Time from the fault until it can be observed [s]."""
+    return row.observable_s + (flown["deviates_s"] if row.when_it_deviates else 0.0)
 
 
 def severity(state: str) -> int:

@@ -47,6 +47,7 @@ class Scenario(Checked):
     about: str = ""  # what the row is for, where its name does not say it
     faults: tuple[Fault, ...] = ()  # the faults, at the same time
     observable_s: float = setting(0.0, "time after which the fault can be observed", unit="s", low=0.0, high=60.0)
+    when_it_deviates: bool = setting(False, "it can be observed only once a rotor differs from its command, after that")
     contact: Expected | None = None  # in contact; None is not flown
     free: Expected | None = None  # on the way to the wall
     rotor_lost: bool = setting(False, "a rotor is lost: the bound on the tilt does not apply")

@@ -26,7 +26,7 @@ from ibvs_qp.model.inputs import clamp
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.stationary_tip import pivot_limited, pivot_stiffness
 from ibvs_qp.tasks.line import LineTask, free_directions, line_state
-from ibvs_qp.tasks.yaw import ROTOR_LOST_ACCELERATION
+from ibvs_qp.tasks.yaw import LOST_ACCELERATION
 from sim.rivals.horizon import MpcSettings
 
 
@@ -155,7 +155,7 @@ class Prediction:
         yaw = pivot_limited(model, 1.0, soft_yaw / gains.yaw_kp, [line.vertical for line in lines])
         level = 1.0 - attitude.tilted
         # A vehicle that lost a rotor cannot hold yaw: it brakes as the shipped law does.
-        braking = attitude.tilted * clamp(-gains.yaw_kd * rate[2], -ROTOR_LOST_ACCELERATION, ROTOR_LOST_ACCELERATION)
+        braking = attitude.tilted * clamp(-gains.yaw_kd * rate[2], -LOST_ACCELERATION, LOST_ACCELERATION)
         angles = ca.vertcat(attitude.tilt_error, attitude.yaw)
         drifts = ca.vertcat(attitude.tilt_rate - rate[:2], 0.0)
         weights = (settings.tilt, settings.tilt * pitch**2, settings.yaw * yaw**2 * level)

@@ -76,7 +76,7 @@ class RotorMonitor:
         lift, spread = float(self._upwards @ missing), settings.missing_sigmas * noise * math.sqrt(len(missing))
         if self._lift.update(lift > max(settings.missing_lift_n, spread), time_s):
             words.append(f"{lift:.1f} N of lift are missing")
-            # No gust and no push at the body: several rotors are weak. A small share of the thrust is a sagging battery.
+            # Several rotors are weak: no gust, no push at the body. A small share of the thrust is a sagging battery.
             for rotor in np.flatnonzero(missing > np.maximum(least, WEAK * thrusts)):
                 loss = float(missing[rotor] / self._signatures[rotor, rotor])
                 self._limit(rotor, float(thrusts[rotor]) - loss, loss, stuck=False)

@@ -7,12 +7,16 @@ import math
 import numpy as np
 
 from ibvs_qp.command import SafetyState
+from ibvs_qp.config.vehicle import VehicleParams
 from sim.evaluate.window import CONTACT_N, contact_clock, event_time, peak, tilt_deg
 from sim.flight.trace import CRASH, LANDED, Trace
 from sim.world.mjcf import STEPS_PER_TICK
 
 #: States of the supervisor in the order of severity; a figure holds a state as its place in this list.
 STATES = tuple(SafetyState)
+#: A rotor differs from its command beyond this [N]: the least thrust that the monitor of rotors may miss
+#: (`safety.missing_thrust_n`); wrong gains of sound rotors make up 1 N.
+DEVIATION_N = 2.5
 #: The attitude is judged from this time on [s]: the vehicle is released at hover.
 SETTLED_S = 1.0
 
@@ -23,7 +27,8 @@ def fault_figures(trace: Trace) -> dict[str, float]:
     Returns:
         ``struck``: 1 if the fault occurred. ``fault_s``: when. ``tilt_peak_deg``, ``tilt_contact_deg`` (in contact),
         ``push_peak_n`` (1 kHz), ``speed_peak_m_s``, ``clearance_min_m``. ``away_m``, ``advance_m``: farthest from
-        where the fault struck, and towards the wall. ``touching_s``: from the fault to the last contact. ``crashed``,
+        where the fault struck, and towards the wall. ``deviates_s``: from the fault until some rotor first differs
+        from its command, see `DEVIATION_N`. ``touching_s``: from the fault to the last contact. ``crashed``,
         ``landed``: 1 if the flight ended so. ``bad_thrusts``: ticks with a thrust that is not finite.
         ``box_excess_n``: largest excess over the limits of the vehicle. ``rate_peak_n_s``: fastest change of a thrust.
         ``state``: most severe state from the fault on; ``state_before``: likewise before it. ``to_STATE_s``: from the
@@ -49,11 +54,28 @@ def fault_figures(trace: Trace) -> dict[str, float]:
         "touching_s": float(max(trace.t[touching], default=-math.inf)) - fault,
         "away_m": peak(np.linalg.norm(trace.position[after] - origin, axis=1)),
         "advance_m": max((trace.position[after] - origin)[:, 0], default=math.nan),
+        "deviates_s": _deviation(trace, fault),
         "crashed": float(trace.reason.startswith(CRASH)),
         "landed": float(trace.reason == LANDED),
         **_commands(trace),
         **_states(trace, fault),
     }
+
+
+def _deviation(trace: Trace, fault: float) -> float:
+    """Time from the fault until a true thrust first differs from its command behind the motor lag [s]; NaN if never."""
+    if len(trace.t) < 2:
+        return math.nan
+    vehicle = VehicleParams()
+    tick_s = float(np.median(np.diff(trace.t)))
+    rise, fall = (1.0 - math.exp(-tick_s / lag) for lag in (vehicle.motor_lag_up_s, vehicle.motor_lag_down_s))
+    lagged = trace.thrusts_actual[0].copy()
+    for when, command, true in zip(trace.t, trace.thrusts, trace.thrusts_actual, strict=True):
+        step = command - lagged
+        lagged += np.where(step > 0.0, rise, fall) * step
+        if when >= fault and np.abs(lagged - true).max() > DEVIATION_N:
+            return float(when - fault)
+    return math.nan
 
 
 def _commands(trace: Trace) -> dict[str, float]:

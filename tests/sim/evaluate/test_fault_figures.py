@@ -86,3 +86,12 @@ def test_a_flight_without_the_fault_says_so():
     assert figures["struck"] == 0.0 and math.isnan(figures["fault_s"]) and math.isnan(figures["advance_m"])
     trace.arrays["t"] = trace.t[:0]
     assert fault_figures(trace) == {"struck": 0.0}
+
+
+def test_a_rotor_deviates_once_its_command_is_another_behind_the_motor_lag():
+    trace = flight()
+    trace.arrays |= {name: np.full(trace.thrusts.shape, 12.0) for name in ("thrusts", "thrusts_actual")}
+    assert math.isnan(fault_figures(trace)["deviates_s"])
+    tick = int(np.searchsorted(trace.t, FAULT_S + 1.0))
+    trace.thrusts[tick:, 2] = 16.0  # 1 - exp(-t / 45 ms) = 2.5 / 4 after 44 ms
+    assert fault_figures(trace)["deviates_s"] == pytest.approx(1.044, abs=0.006)

@@ -85,3 +85,11 @@ def test_without_the_supervisor_no_state_is_expected():
     figures = {"to_retreat_s": None, "state": 0.0, "unexplained": 1.0}
     assert kinds(figures, supervised=False) == []
     assert kinds(figures | {"touching_s": 9.0}, supervised=False) == ["stays at the wall"]
+
+
+def test_a_stuck_rotor_can_be_found_only_once_its_command_is_another():
+    row = Scenario(name="x", observable_s=0.1, rotor_lost=True, when_it_deviates=True)
+    late = {"to_retreat_s": 1.3, "touching_s": 2.3}
+    assert kinds(late | {"deviates_s": 1.0}, row=row) == []
+    assert kinds(late | {"deviates_s": 0.5}, row=row) == ["stays at the wall", "retreat late"]
+    assert "not observable" in kinds(late, row=row)
