@@ -68,7 +68,7 @@ class Tick:
     wrench_ns: int
     plane_ns: int
     image_ns: int
-    lines_ns: int
+    lines_ns: int = -1
     inertial: object
     wrench: object
     down: Sequence[float]

@@ -77,7 +77,7 @@ class RotorMonitor:
         if self._lift.update(lift > max(settings.missing_lift_n, spread), time_s):
             words.append(f"{lift:.1f} N of lift are missing")
             # Several rotors are weak: no gust, no push at the body. A small share of the thrust is a sagging battery.
-            for rotor in np.flatnonzero(missing > np.maximum(least, WEAK * thrusts)):
+            for rotor in np.flatnonzero(missing > np.maximum(least, WEAK * thrusts)).tolist():
                 loss = float(missing[rotor] / self._signatures[rotor, rotor])
                 self._limit(rotor, float(thrusts[rotor]) - loss, loss, stuck=False)
         return ", ".join(words)

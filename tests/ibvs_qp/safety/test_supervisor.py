@@ -32,6 +32,7 @@ def states(fault: Fault, *times: float) -> list[SafetyState]:
         (Fault.PUSH_UNFELT, [(0.0, RETREAT)]),
         (Fault.PUSH_HIGH, [(0.0, RETREAT)]),
         (Fault.IMAGE_STALE, [(0.0, DEGRADED), (0.49, DEGRADED), (0.5, RETREAT), (3.0, HOVER), (4.0, DESCEND)]),
+        (Fault.LINES_STALE, [(0.0, DEGRADED), (2.9, DEGRADED), (3.0, RETREAT), (100.0, RETREAT)]),
         (Fault.IMAGE_FROZEN, [(0.0, DEGRADED), (0.5, RETREAT), (3.0, HOVER), (4.0, DESCEND)]),
         (Fault.PLANE_STALE, [(0.0, DEGRADED), (0.5, RETREAT), (3.0, HOVER), (4.0, DESCEND)]),
         (Fault.FILTER_REFUSES, [(0.0, DEGRADED), (1.9, DEGRADED), (2.0, RETREAT)]),
@@ -80,7 +81,7 @@ def test_the_most_severe_fault_counts_and_is_the_reason() -> None:
 
 def test_degraded_ends_with_its_fault_after_the_recovery_time() -> None:
     machine = Supervisor()
-    assert machine.update(0.0, {Fault.IMAGE_STALE: ""}) is DEGRADED
+    assert machine.update(0.0, {Fault.PLANE_STALE: ""}) is DEGRADED
     assert machine.update(0.4, {}) is DEGRADED, "a fault that flickers must not flicker the state"
     assert machine.update(0.6, {}) is NOMINAL and machine.reasons == ()
 
