@@ -20,6 +20,8 @@ MOST_ROTORS = 2
 FOUND, FOUND_SIGMAS = 1.5, 3.0
 #: A rotor that misses this share of its thrust, while the others miss some too, has reached a limit [-].
 WEAK = 0.25
+#: As many faulty rotors have a common cause, a limit: they follow below it, and none gives too much.
+COMMON = 3
 #: Half width of the remaining limits of a stuck rotor [N].
 MARGIN = 0.5
 
@@ -53,6 +55,7 @@ class RotorMonitor:
         self._persistence.reset()
         self._lift.reset()
         self._found: dict[str, float] = {}
+        self._strong = set[int]()  # of them those that gave too much
 
     def update(self, missing: np.ndarray, noise: float, thrusts: np.ndarray, time_s: float) -> str:
         """Rotors that miss thrust, in words.
@@ -83,7 +86,7 @@ class RotorMonitor:
         return ", ".join(words)
 
     def _suspect(self, missing: np.ndarray, thrusts: np.ndarray, time_s: float) -> None:
-        rotors = self._explain(missing, 1 if self._found else MOST_ROTORS)
+        rotors = self._explain(missing, MOST_ROTORS)
         if not self._persistence.update(bool(rotors), time_s):
             return
         for rotor in rotors:
@@ -109,3 +112,7 @@ class RotorMonitor:
             lower[rotor] = max(actual - MARGIN, 0.0)
         upper[rotor] = actual if loss > 0.0 else min(actual + MARGIN, float(self._box[1][rotor]))
         self.limits, self._found[self._names[rotor]] = (lower, upper), actual
+        (self._strong.add if loss <= 0.0 else self._strong.discard)(rotor)
+        if len(self._found) >= COMMON:
+            lower[:], free = self._box[0], list(self._strong)
+            upper[free] = self._box[1][free]

@@ -103,3 +103,21 @@ def test_more_rotors_than_dimensions_are_told_apart_too(rotor: int) -> None:
     for number in range(20):
         text = watch.update(np.linalg.pinv(matrix) @ matrix @ lost, 0.1, np.full(8, 8.0), 0.004 * number)
     assert text == f"{OCTOROTOR.names[rotor]} gives 0.0 N"
+
+
+def test_all_rotors_at_a_limit_miss_lift_and_keep_their_lower_limits() -> None:
+    watch = monitor()
+    wanted, limit = np.full(6, 20.0), 13.0
+    for tick in range(60):
+        text = watch.update(wanted - limit, 0.1, wanted, tick * 0.004)
+    assert "N of lift are missing" in text and watch.limits is not None
+    lower, upper = watch.limits
+    assert np.abs(upper - limit).max() < 0.1 and (lower == VEHICLE.thrust_min).all()
+
+
+def test_a_sagging_battery_misses_lift_and_limits_no_rotor() -> None:
+    watch = monitor()
+    wanted = np.full(6, 11.0)
+    for tick in range(60):
+        text = watch.update(0.15 * wanted, 0.1, wanted, tick * 0.004)
+    assert "N of lift are missing" in text and watch.limits is None
