@@ -333,7 +333,7 @@ class Pilot:
             wrench_ns=frame.wrench_stamp_ns,
             plane_ns=self.contact.plane_ns,
             image_ns=self._image_stamp,
-            lines_ns=self._lines_stamp,
+            lines_ns=self._lines_stamp if self.reference.lines else -1,
             inertial=(now["attitude"], now["angular_velocity"], now["specific_force"]),
             wrench=now["wrench"],
             down=down_in_body(self._attitude),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import fnmatch
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -12,7 +11,7 @@ from ibvs_qp.pilot import PilotConfig
 from sim.evaluate.measures import fault_figures
 from sim.experiments.scenes import short_job
 from sim.faults.scenario import WATCH_S, Scenario, scenarios
-from sim.flight.options import FlightOptions, default_preset, pilot_config
+from sim.flight.options import FlightOptions, default_preset, pilot_config, unsupervised
 from sim.sweep.design import FlightPlan, Run
 from sim.world.scene import Scene
 from sim.world.worlds import in_world
@@ -77,7 +76,7 @@ def job_scene(world: str) -> Scene:
 def pilot_of(variant: str) -> PilotConfig:
     """The shipped preset of the QP law, with or without the supervisor."""
     preset = default_preset("qp")
-    return dataclasses.replace(preset, safety=dataclasses.replace(preset.safety, supervise=variant == SUPERVISED))
+    return preset if variant == SUPERVISED else unsupervised(preset)
 
 
 def design(choice: Choice) -> list[Run]:

@@ -47,6 +47,11 @@ def default_preset(law: str) -> PilotConfig:
     return PilotConfig.from_toml(file) if file.exists() else PilotConfig(law=law)
 
 
+def unsupervised(config: PilotConfig) -> PilotConfig:
+    """The same pilot without its supervisor, for studies of the laws and for control flights."""
+    return dataclasses.replace(config, safety=dataclasses.replace(config.safety, supervise=False))
+
+
 def pilot_config(scene: Scene, options: FlightOptions, config: PilotConfig | None = None) -> PilotConfig:
     """The pilot's configuration: preset, law, and the scene's paint job; nothing else of the scene.
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import polars as pl
 
-from sim.storage.atomic import replaced
+from sim.storage.atomic import replacing
 
 #: Columns of every row, before parameters and figures.
 HEAD = {
@@ -34,8 +35,9 @@ def part_file(folder: Path, name: str) -> Path:
 
 def write_table(file: Path, table: pl.DataFrame) -> None:
     """Write a table so that neither a reader nor a crash sees half a file."""
-    with replaced(file) as partial:
-        table.write_parquet(partial)
+    with replacing(file) as stream:  # written by Python: Polars hides why the system refuses a file
+        table.write_parquet(content := io.BytesIO())
+        stream.write(content.getbuffer())
 
 
 def frame(rows: Sequence[dict[str, Any]]) -> pl.DataFrame:

@@ -82,7 +82,7 @@ def test_a_wrong_file_is_named_and_the_sample_stands_in(tmp_path):
     for file, words in (
         (str(tmp_path / "none.parquet"), "no table in"),
         (str(other), "no table of flights"),
-        (__file__, "cannot be read"),
+        (__file__, "cannot read"),
     ):
         with pytest.raises(ConfigError, match=words):
             read_sweep(file)

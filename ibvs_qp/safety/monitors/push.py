@@ -12,6 +12,9 @@ NEAR_WALL = 0.06
 #: Push by inertial data, over the reference, that the sensor must measure, and its least value [-, N].
 UNFELT_OVER_REFERENCE, LEAST_UNFELT = 1.6, 4.0
 
+#: A push may follow its reference down for this long [s]: the tip leaves the wall after a touch ramp's time.
+RELEASE_S = 0.5
+
 
 class PushMonitor:
     """Compares the force sensor with the reference and with the push by inertial data.
@@ -24,16 +27,18 @@ class PushMonitor:
     def __init__(self, settings: SafetySettings) -> None:
         self._settings = settings
         self._high, self._unfelt = Persistence(settings.push_time_s), Persistence(settings.push_time_s)
+        self.reset()
 
     def reset(self) -> None:
         """As before the flight."""
         self._high.reset()
         self._unfelt.reset()
+        self._reference, self._since = 0.0, 0.0
 
     def update(self, tick: Tick, response: Response, time_s: float) -> None:
         """Add the faults of the push."""
         settings, contact = self._settings, tick.contact
-        push, reference, inertial = contact.push, tick.push_reference, response.inertial_push
+        push, reference, inertial = contact.push, self._recent(tick.push_reference, time_s), response.inertial_push
         bound = max(settings.push_ratio * reference, settings.push_floor_n)
         if self._high.update(push > bound, time_s):
             tick.faults[Fault.PUSH_HIGH] = f"{push:.1f} N, bound {bound:.1f} N"
@@ -41,3 +46,9 @@ class PushMonitor:
         unfelt = inertial > least and push < settings.unfelt_ratio * inertial and contact.distance < NEAR_WALL
         if self._unfelt.update(unfelt, time_s):
             tick.faults[Fault.PUSH_UNFELT] = f"{inertial:.1f} N, measured {push:.1f} N"
+
+    def _recent(self, reference: float, time_s: float) -> float:
+        """Largest reference while the push may still follow it [N]."""
+        if reference >= self._reference or time_s - self._since > RELEASE_S:
+            self._reference, self._since = reference, time_s
+        return self._reference

@@ -111,7 +111,7 @@ def test_without_seed_or_depth_lines_remain(tmp_path, capsys) -> None:
 def test_refusals_name_the_reason(tmp_path, capsys) -> None:
     color, depth = save(tmp_path)
     [frame] = seen(capsys, single(color, depth, units="1"))["frames"]
-    assert "units" in frame["refused"]
+    assert "millimetres" in frame["refused"]
     [frame] = seen(capsys, [*single(color, depth, seed=False), "--seed-pixel", "5000", "10"])["frames"]
     assert "outside" in frame["refused"]
     empty = tmp_path / "empty.png"

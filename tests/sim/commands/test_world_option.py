@@ -23,7 +23,7 @@ from sim.world.scene import Scene
 from sim.world.worlds import DEFAULT_WORLD, EXPERIMENT_WORLD, in_world
 
 PRESET = str(Path(ibvs_qp.__file__).parent / "presets" / "tarot_t960_qp.toml")
-PAINT = ["paint", "--law", "qp", "--no-video", "--json", "--out", "run"]
+PAINT = ["paint", "--law", "qp", "--no-video", "--json", "--out", "run", "--overwrite"]
 
 
 @pytest.fixture

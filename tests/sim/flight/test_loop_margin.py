@@ -25,7 +25,7 @@ from ibvs_qp.config.contact_margin import (
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.model import reach
 from ibvs_qp.pilot import Pilot, PilotConfig
-from sim.flight.options import PRESETS, FlightOptions, default_preset, pilot_config
+from sim.flight.options import PRESETS, FlightOptions, default_preset, pilot_config, unsupervised
 from sim.flight.surroundings import World
 from sim.world.scene import ForceTorqueScene, ImuScene, Scene
 
@@ -72,7 +72,7 @@ def pushed(
     """
     scene = quiet_scene(stiffness, latency, distance)
     options = FlightOptions(features="geometric", video=False)
-    config = pilot_config(scene, options)
+    config = unsupervised(pilot_config(scene, options))
     gained = dataclasses.replace(config.controller.gains, **gains)
     config = dataclasses.replace(config, controller=dataclasses.replace(config.controller, gains=gained))
     pilot, world = Pilot(config), World(scene, options, config)

@@ -10,7 +10,7 @@ from closed_loop_rigs import wall
 
 from sim.flight.closed_loop import fly
 from sim.flight.jobs import PressJob
-from sim.flight.options import FlightOptions, pilot_config
+from sim.flight.options import FlightOptions, pilot_config, unsupervised
 from sim.flight.trace import Trace
 from sim.world.scene import Scene
 
@@ -23,7 +23,7 @@ def press(push: float, friction: float, reach_check: bool = True, law: str = "qp
     scene = Scene(wall=wall(friction=friction))
     scene = dataclasses.replace(scene, paint=dataclasses.replace(scene.paint, push_n=push))
     options = FlightOptions(law=law, features="geometric", video=False)
-    config = pilot_config(scene, options)
+    config = unsupervised(pilot_config(scene, options))  # what the laws do by themselves
     config = dataclasses.replace(config, controller=dataclasses.replace(config.controller, reach_check=reach_check))
     return fly(scene, options, config=config, job=PressJob(hold_s=2.5 if slide_s else 8.0, slide_s=slide_s))
 

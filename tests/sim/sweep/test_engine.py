@@ -133,7 +133,7 @@ def test_parameters_of_all_kinds_share_a_table(flown, tmp_path):
 
 def test_a_part_appears_whole_or_not_at_all(flown, tmp_path, monkeypatch):
     def half(self, file):
-        file.write_bytes(b"PAR1 half of a fi")
+        file.write(b"PAR1 half of a fi")
         raise OSError("disk full")
 
     monkeypatch.setattr(pl.DataFrame, "write_parquet", half)
