@@ -86,7 +86,8 @@ class RotorMonitor:
         return ", ".join(words)
 
     def _suspect(self, missing: np.ndarray, thrusts: np.ndarray, time_s: float) -> None:
-        rotors = self._explain(missing, MOST_ROTORS)
+        # While one rotor is followed, what it still misses must not be ascribed to a pair.
+        rotors = self._explain(missing, 1 if len(self._found) == 1 else MOST_ROTORS)
         if not self._persistence.update(bool(rotors), time_s):
             return
         for rotor in rotors:
