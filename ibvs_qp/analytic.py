@@ -6,17 +6,14 @@ import numpy as np
 
 from allocation.least_squares import allocate_least_squares
 from allocation.sequential_desaturation import allocate_sequential
+from ibvs_qp.checked_law import CheckedLaw
 from ibvs_qp.command import Command, Outcome
 from ibvs_qp.config import ControllerConfig, Gains
-from ibvs_qp.estimation.contact_state import ContactState
 from ibvs_qp.measurement import Measurement, Reference
 from ibvs_qp.model.model import Model
-from ibvs_qp.model.reporting import check_contact, clip, clipped_command, hover_command, reach_note
+from ibvs_qp.model.reporting import clip, clipped_command, reach_note
 from ibvs_qp.model.setpoints import LineSetpoint, Setpoints
 from ibvs_qp.tasks import LevelTask, LineTask, PushTask, StandoffTask, VelocityTask, YawTask
-from ibvs_qp.validation.failure import raised
-from ibvs_qp.validation.measurement import MeasurementGate, answered_stamp
-from ibvs_qp.validation.reference import ReferenceGate
 
 #: Singular values below this fraction of the largest are dropped in the pseudo-inverse of L.
 RANK_TOLERANCE = 0.05
@@ -123,57 +120,21 @@ def analytic_setpoints(config: ControllerConfig) -> Setpoints:
     return Setpoints(model)
 
 
-class PaperController:
+class PaperController(CheckedLaw):
     """The paper's law with the same measurement, reference and command as the program.
 
     A subclass may replace the law: its set-points and its command.
     """
 
     def __init__(self, config: ControllerConfig | None = None) -> None:
-        self.config = config or ControllerConfig()
+        super().__init__(config or ControllerConfig())
         self.setpoints = self._make_setpoints()
-        self.gate = MeasurementGate(self.config.vehicle.geometry.count, self.config.line_slots)
-        self.references = ReferenceGate(self.config.line_slots)
         self.reset()
-
-    def reset(self) -> None:
-        """As after construction."""
-        self.setpoints.reset()
-        self.gate.reset()
-        self.references.reset()
-
-    @np.errstate(all="ignore")
-    def step(self, measurement: Measurement, reference: Reference, contact: ContactState | None = None) -> Command:
-        """Thrusts for one tick, within box and rate; never raises; arguments as of `HybridController.step`."""
-        try:
-            checked, rejected = self.gate.check(measurement)
-            reference, refused = self.references.check(reference)
-            command = self.respond(checked, rejected + refused, reference, contact, answered_stamp(measurement))
-            return command if checked is None else self.gate.clock.answered(command)
-        except Exception as error:  # in flight nothing may raise; the reason is reported instead
-            stamp = answered_stamp(measurement)
-            return hover_command(self.setpoints, stamp, self.gate.inertial, (raised("step", error),))
-
-    def respond(
-        self,
-        checked: Measurement | None,
-        rejected: tuple[str, ...],
-        reference: Reference,
-        contact: ContactState | None,
-        stamp_ns: int,
-    ) -> Command:
-        """Second half of `step`, in the time of ``gate.clock``, after both gates; stamp_ns is the one measured."""
-        contact, unusable = check_contact(contact)
-        rejected += unusable
-        if checked is None:
-            return hover_command(self.setpoints, stamp_ns, self.gate.inertial, rejected)
-        self.setpoints.update(checked, reference, contact)
-        rejected += reach_note(self.setpoints, reference)
-        return self._command(checked, reference, rejected)
 
     def _make_setpoints(self) -> Setpoints:
         return analytic_setpoints(self.config)
 
-    def _command(self, checked: Measurement, reference: Reference, rejected: tuple[str, ...]) -> Command:
+    def _command(self, measurement: Measurement, reference: Reference, rejected: tuple[str, ...]) -> Command:
+        rejected += reach_note(self.setpoints, reference)
         free = analytic_thrusts(self.setpoints)
-        return clipped_command(self.setpoints, checked, reference, free, Outcome.SOLVED, rejected, allocate)
+        return clipped_command(self.setpoints, measurement, reference, free, Outcome.SOLVED, rejected, allocate)

@@ -7,10 +7,9 @@ import math
 
 import numpy as np
 
-from ibvs_qp.analytic import PaperController
-from ibvs_qp.command import Command
+from ibvs_qp.checked_law import CheckedLaw, Inputs
+from ibvs_qp.command import Command, SafetyState
 from ibvs_qp.config import SafetySettings
-from ibvs_qp.controller import HybridController
 from ibvs_qp.estimation.contact_state import ContactState
 from ibvs_qp.frames import dot, down_in_body
 from ibvs_qp.measurement import Measurement, Reference
@@ -39,7 +38,7 @@ class Assured:
         settings: Bounds of the monitors and motions of the states.
     """
 
-    def __init__(self, controller: HybridController | PaperController, settings: SafetySettings | None = None) -> None:
+    def __init__(self, controller: CheckedLaw, settings: SafetySettings | None = None) -> None:
         self.controller = controller
         self.assurance = Assurance(controller.config.vehicle, settings or SafetySettings())
         self.reset()
@@ -56,14 +55,15 @@ class Assured:
         """Thrusts for one tick, as `HybridController.step`; ``Command.safety`` is the state of the supervisor."""
         stamp, command = answered_stamp(measurement), None
         try:
-            checked, rejected = self.controller.gate.check(measurement)
-            reference, refused = self.controller.references.check(reference)
-            reference = self.assurance.supervised(reference)
-            command = self._command(checked, (*rejected, *refused), reference, contact, stamp)
+            inputs = self.controller.check(measurement, reference, contact)
+            if self.assurance.state is not SafetyState.NOMINAL:
+                inputs = inputs._replace(reference=self.assurance.supervised(inputs.reference))
+            command = self._command(inputs)
             shown = self.assurance.explained(command)
-            if checked is None:
+            if inputs.measurement is None:
                 return shown
-            self.assurance.watch(self._tick(checked, command, reference), self.controller.setpoints)
+            tick = self._tick(inputs.measurement, command, inputs.reference)
+            self.assurance.watch(tick, self.controller.setpoints)
             return self.controller.gate.clock.answered(shown)
         except Exception as error:  # in flight nothing may raise; thrusts that were found are not replaced
             setpoints, inertial = self.controller.setpoints, self.controller.gate.inertial
@@ -71,23 +71,18 @@ class Assured:
             rejected = (*command.rejected, raised("assured", error))
             return self.assurance.explained(dataclasses.replace(command, stamp_ns=stamp, rejected=rejected))
 
-    def _command(
-        self,
-        checked: Measurement | None,
-        rejected: tuple[str, ...],
-        reference: Reference,
-        contact: ContactState | None,
-        stamp_ns: int,
-    ) -> Command:
+    def _command(self, inputs: Inputs) -> Command:
         """Command of the law, or of the supervisor where it replaces the law."""
-        setpoints = self.controller.setpoints
+        setpoints, checked = self.controller.setpoints, inputs.measurement
         fixed = self.assurance.thrusts(setpoints.last, setpoints.floor)
         if fixed is not None:
-            return fixed_command(setpoints, stamp_ns if checked is None else checked.stamp_ns, fixed, rejected)
+            stamp_ns = inputs.stamp_ns if checked is None else checked.stamp_ns
+            return fixed_command(setpoints, stamp_ns, fixed, inputs.rejected)
         inertial = self.assurance.wrench(setpoints)
         if checked is not None and inertial is not None:
             checked = dataclasses.replace(checked, contact_wrench=inertial, wrench_stamp_ns=checked.stamp_ns)
-        return self.controller.respond(checked, rejected, reference, contact, stamp_ns)
+            inputs = inputs._replace(measurement=checked)
+        return self.controller.respond(inputs)
 
     def _tick(self, checked: Measurement, command: Command, reference: Reference) -> Tick:
         """The tick as the monitors see it, in monotonic time."""
@@ -97,8 +92,8 @@ class Assured:
         if not (missing and any(name in missing for name in _ATTITUDE)):
             self._attitude_ns = now
         if not (missing and any(name in missing for name in _INERTIAL)):
-            stamps = [stamp for stamp in (checked.attitude_stamp_ns, checked.imu_stamp_ns) if stamp is not None]
-            self._imu_ns = min([now, *stamps])
+            attitude_ns, imu_ns = checked.attitude_stamp_ns, checked.imu_stamp_ns
+            self._imu_ns = min(now if attitude_ns is None else attitude_ns, now if imu_ns is None else imu_ns)
         self._wrench_ns = checked.wrench_stamp_ns
         if checked.plane is not None:
             self._plane_ns = max(self._plane_ns, checked.plane_stamp_ns)
@@ -121,7 +116,6 @@ class Assured:
             wrench_ns=self._wrench_ns,
             plane_ns=self._plane_ns,
             image_ns=self._lines_ns,
-            lines_ns=self._lines_ns,
             inertial=(attitude, rate, None if force is None else force.tolist()),
             wrench=checked.contact_wrench.tolist(),
             down=down,

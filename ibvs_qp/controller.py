@@ -13,17 +13,15 @@ from typing import ClassVar
 import numpy as np
 
 from ibvs_qp.analytic import allocate_in_box, analytic_thrusts
+from ibvs_qp.checked_law import CheckedLaw
 from ibvs_qp.command import Command, Outcome
 from ibvs_qp.config import ControllerConfig
-from ibvs_qp.estimation.contact_state import ContactState
 from ibvs_qp.limits import ApproachLimit, Limit, PushCeiling, ThrustLimit, TiltLimit, ViewLimit, YawLimit
 from ibvs_qp.measurement import Measurement, Reference
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.reporting import (
-    check_contact,
     clipped_command,
     contact_mode,
-    hover_command,
     reach_margin,
     reach_note,
 )
@@ -46,9 +44,6 @@ from ibvs_qp.tasks import (
     VelocityTask,
     YawTask,
 )
-from ibvs_qp.validation.failure import raised
-from ibvs_qp.validation.measurement import MeasurementGate, answered_stamp
-from ibvs_qp.validation.reference import ReferenceGate
 
 
 def default_tasks(config: ControllerConfig) -> list[Task]:
@@ -83,11 +78,10 @@ def qp_problem(
     return kind(Model(config), [*default_tasks(config), *tasks], [*default_limits(config), *limits])
 
 
-class HybridController:
+class HybridController(CheckedLaw):
     """The drop-in controller: measurement and reference in, rotor thrusts and their explanation out.
 
     Attributes:
-        gate, references: Checks of the measurements and of the references.
         problem_kind, engine_kind: Assembly and solution of the rows; a subclass may solve the same rows differently.
 
     Args:
@@ -105,63 +99,19 @@ class HybridController:
     def __init__(
         self, config: ControllerConfig | None = None, *, tasks: Sequence[Task] = (), limits: Sequence[Limit] = ()
     ) -> None:
-        self.config = config or ControllerConfig()
+        super().__init__(config or ControllerConfig())
         self.problem = qp_problem(self.config, tasks, limits, self.problem_kind)
         self.setpoints = Setpoints(self.problem.model, self.problem.values)
         self.engine = self.engine_kind(self.problem, self.config.solver, ProgramData(self.problem, self.setpoints.step))
-        self.gate = MeasurementGate(self.config.vehicle.geometry.count, self.config.line_slots)
-        self.references = ReferenceGate(self.config.line_slots)
         self.reset()
 
     def reset(self) -> None:
         """As after construction, to the bit."""
+        super().reset()
         self.engine.reset()
-        self.setpoints.reset()
-        self.gate.reset()
-        self.references.reset()
         self._recovery = 0
 
-    @np.errstate(all="ignore")  # a host may have numpy raise at every underflow
-    def step(self, measurement: Measurement, reference: Reference, contact: ContactState | None = None) -> Command:
-        """Thrusts for one tick; never raises, never leaves the limits.
-
-        Inputs are copied, so the caller may reuse its arrays; the command's arrays are the caller's.
-
-        Args:
-            measurement: State of the vehicle; fields that fail the checks are named in ``Command.rejected``.
-            reference: Targets.
-            contact: Wall and contact if the caller estimates them (`Pilot` does); None estimates them here from the
-                measurement.
-
-        Returns:
-            The command with its explanation.
-        """
-        try:
-            checked, rejected = self.gate.check(measurement)
-            reference, refused = self.references.check(reference)
-            command = self.respond(checked, rejected + refused, reference, contact, answered_stamp(measurement))
-            return command if checked is None else self.gate.clock.answered(command)
-        except Exception as error:  # in flight nothing may raise; the reason is reported instead
-            stamp = answered_stamp(measurement)
-            return hover_command(self.setpoints, stamp, self.gate.inertial, (raised("step", error),))
-
-    def respond(
-        self,
-        checked: Measurement | None,
-        rejected: tuple[str, ...],
-        reference: Reference,
-        contact: ContactState | None,
-        stamp_ns: int,
-    ) -> Command:
-        """Second half of `step`, in the time of ``gate.clock``, after both gates; stamp_ns is the one measured."""
-        contact, unusable = check_contact(contact)
-        rejected += unusable
-        if checked is None:
-            return hover_command(self.setpoints, stamp_ns, self.gate.inertial, rejected)
-        self.setpoints.update(checked, reference, contact)
-        return self._solved(checked, reference, rejected)
-
-    def _solved(self, measurement: Measurement, reference: Reference, rejected: tuple[str, ...]) -> Command:
+    def _command(self, measurement: Measurement, reference: Reference, rejected: tuple[str, ...]) -> Command:
         solution = self.engine.solve()
         if solution is None:
             self._recovery, rejected = self.config.solver.recovery_ticks, rejected + self._causes()
@@ -172,9 +122,9 @@ class HybridController:
             return clipped_command(self.setpoints, measurement, reference, free, outcome, rejected, allocate_in_box)
         if not self.config.thrust_rows:
             return clipped_command(self.setpoints, measurement, reference, solution.thrusts, solution.outcome, rejected)
-        return self._command(measurement, reference, solution, rejected)
+        return self._explained(measurement, reference, solution, rejected)
 
-    def _command(
+    def _explained(
         self, measurement: Measurement, reference: Reference, solution: AcceptedSolution, rejected: tuple[str, ...]
     ) -> Command:
         thrusts, setpoints, data = solution.thrusts, self.setpoints, self.engine.data

@@ -51,7 +51,7 @@ def shared_library(name: str, code: str, command: list[str], flags: tuple[str, .
     folder = cache_folder()
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     if not _only_ours(folder, stat.S_ISDIR):
-        raise PermissionError(f"{folder} must be a folder of this user that nobody else can write (chmod go-w)")
+        raise PermissionError(f"{folder} must belong to this user and be writable by its owner only (chmod go-w)")
     for library in folder.glob(f"{name}-{key}-*.so"):
         if _intact(library):
             return library
@@ -80,6 +80,6 @@ def _intact(library: Path) -> bool:
 
 
 def _only_ours(path: Path, is_kind: Callable[[int], bool]) -> bool:
-    """Whether a path is no link, of a kind, owned by this user, and writable by nobody else."""
+    """Whether a path is no link, of a kind, owned by this user, and writable by its owner only."""
     found = path.lstat()
     return is_kind(found.st_mode) and found.st_uid == os.geteuid() and not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
-#: Time between looks for the parent [s], and the exit code of a process without one, which nobody reads.
+#: Time between looks for the parent [s], and the exit code of a process without one.
 _WATCH_S, EXIT_ORPHAN = 1.0, 1
 
 
@@ -75,7 +75,7 @@ def ignore_stop() -> None:
 
 
 def live_with_parent() -> None:
-    """The same, and end when the parent was killed: it could stop nobody."""
+    """The same, and end when the parent was killed, since a killed parent stops no worker."""
     ignore_stop()
     threading.Thread(target=_watch, args=(os.getppid(),), daemon=True).start()
 

@@ -11,7 +11,7 @@ from ibvs_qp.controller import default_tasks
 from ibvs_qp.measurement import Measurement, Reference
 from ibvs_qp.model.bound_function import BoundFunction
 from ibvs_qp.model.model import Model
-from ibvs_qp.model.reporting import clipped_command, contact_mode, reach_margin
+from ibvs_qp.model.reporting import clipped_command, contact_mode, reach_margin, reach_note
 from ibvs_qp.model.setpoints import Setpoints
 from sim.rivals.condensed import CondensedProgram
 from sim.rivals.horizon import MpcSettings
@@ -70,20 +70,21 @@ class MpcController(PaperController):
         super().reset()
         self._solver.osqp.reset()
 
-    def _command(self, checked: Measurement, reference: Reference, rejected: tuple[str, ...]) -> Command:
+    def _command(self, measurement: Measurement, reference: Reference, rejected: tuple[str, ...]) -> Command:
         setpoints, solver = self.setpoints, self._solver
+        rejected += reach_note(setpoints, reference)
         self._condense()
         p, q, lower, upper = self.values
         found = solver.solve(p, q, self.program.a, lower, upper)
         if found is None:
             free = analytic_thrusts(setpoints)
-            return clipped_command(setpoints, checked, reference, free, Outcome.ANALYTIC_FALLBACK, rejected)
+            return clipped_command(setpoints, measurement, reference, free, Outcome.ANALYTIC_FALLBACK, rejected)
         thrusts = np.clip(found[0][: len(setpoints.lower)], setpoints.lower, setpoints.upper)
         limits = self._limits(thrusts, found[1])
         unallocated = setpoints.effectiveness @ (self._unlimited() - thrusts) if limits else np.zeros(6)
         setpoints.note(thrusts, float(np.abs(unallocated).max()))
         return Command(
-            stamp_ns=int(checked.stamp_ns),
+            stamp_ns=int(measurement.stamp_ns),
             thrusts=thrusts,
             wrench=setpoints.effectiveness @ thrusts,
             outcome=solver.outcome,

@@ -103,3 +103,13 @@ def test_a_host_that_lets_numpy_raise() -> None:
     with np.errstate(all="raise"):
         _, _, command = flown(velocity=np.full(3, 1e-200), contact_wrench=np.full(6, 1e-310))
     assert command.outcome is Outcome.SOLVED and command.rejected == ()
+
+
+def test_an_unusable_contact_is_named_also_while_the_supervisor_replaces_the_law() -> None:
+    assured, vehicle, _ = flown()
+    nan = assured.controller.setpoints.contact._replace(distance=math.nan, known=True)
+    for _ in range(20):
+        command = assured.step(vehicle.measure(attitude=None, angular_velocity=None), good_reference(), nan)
+        vehicle.fly(command.thrusts)
+        assert "contact: not finite, or its normal has not length 1" in command.rejected
+    assert command.outcome is Outcome.HOLD and command.safety is SafetyState.DEGRADED

@@ -235,9 +235,8 @@ class Flight:
         refused = command.rejected
         if self.subject.pilot:
             if not any(reason.startswith("sensor frame") for reason in refused):
-                names = unusable.in_frame(inputs[0])
-                untimely = any(reason.startswith("sensor features") for reason in refused)
-                yield from (name for name in names if not (untimely and name.startswith("features.")))
+                untimely = tuple(name for name in ("image", "features") if f"sensor {name}" in " ".join(refused))
+                yield from (name for name in unusable.in_frame(inputs[0]) if not name.startswith(untimely))
             return
         measurement, reference, *contact = inputs
         if not any(reason.startswith(("measurement", "stamp_ns")) for reason in refused):

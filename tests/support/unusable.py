@@ -123,7 +123,9 @@ def in_contact(value: Any) -> Iterator[str]:
 
 
 def _is_triple(value: Any) -> bool:
-    return type(value) is tuple and len(value) == 3 and all(isinstance(e, bool) or is_number(e) for e in value)
+    if type(value) is not tuple or len(value) != 3:
+        return False
+    return all(isinstance(entry, bool | np.bool_) or is_number(entry) for entry in value)
 
 
 def in_frame(value: Any) -> Iterator[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Sequence
 
 import numpy as np
@@ -44,15 +45,14 @@ class RotorMonitor:
         self._box = vehicle.thrust_min, vehicle.thrust_max
         # Column i: what a newton missing at rotor i looks like; with more than six rotors it spreads over others.
         self._signatures = np.linalg.pinv(effectiveness) @ effectiveness
-        self._persistence = Persistence(settings.missing_time_s)
         self._lift = Persistence(settings.missing_lift_time_s)
-        self._upwards = -effectiveness[2]
+        self._upwards = (-effectiveness[2]).tolist()
         self.reset()
 
     def reset(self) -> None:
         """All rotors follow."""
         self.limits: tuple[np.ndarray, np.ndarray] | None = None
-        self._persistence.reset()
+        self._suspects = dict[int, float]()  # since when [s]
         self._lift.reset()
         self._found: dict[str, float] = {}
         self._strong = set[int]()  # of them those that gave too much
@@ -68,15 +68,21 @@ class RotorMonitor:
         """
         entries, settings = missing.tolist(), self._settings
         least, sigmas = settings.missing_thrust_n, settings.missing_sigmas
+        most = max(max(entries), -min(entries))
+        lift = sum(map(operator.mul, self._upwards, entries))
+        if most < least and lift <= settings.missing_lift_n and not self._found:  # nearly every tick
+            self._suspects.clear()
+            self._lift.reset()
+            return ""
         if self._found:
             least, sigmas = FOUND, FOUND_SIGMAS
         least = max(least, sigmas * noise)
-        if max(entries) < least and min(entries) > -least:
-            self._persistence.reset()
+        if most < least:
+            self._suspects.clear()
         else:
             self._suspect(missing, thrusts, time_s)
         words = [f"{name} gives {thrust:.1f} N" for name, thrust in self._found.items()]
-        lift, spread = float(self._upwards @ missing), settings.missing_sigmas * noise * math.sqrt(len(missing))
+        spread = settings.missing_sigmas * noise * math.sqrt(len(missing))
         if self._lift.update(lift > max(settings.missing_lift_n, spread), time_s):
             words.append(f"{lift:.1f} N of lift are missing")
             # Several rotors are weak: no gust, no push at the body. A small share of the thrust is a sagging battery.
@@ -88,9 +94,12 @@ class RotorMonitor:
     def _suspect(self, missing: np.ndarray, thrusts: np.ndarray, time_s: float) -> None:
         # While one rotor is followed, what it still misses must not be ascribed to a pair.
         rotors = self._explain(missing, 1 if len(self._found) == 1 else MOST_ROTORS)
-        if not self._persistence.update(bool(rotors), time_s):
-            return
-        for rotor in rotors:
+        self._suspects = {rotor: self._suspects.get(rotor, time_s) for rotor in rotors}
+        for rotor, since in self._suspects.items():
+            # A rotor joins those found once it was suspected itself for long enough: while thrusts are shared out
+            # anew, others miss some for a tick.
+            if self._names[rotor] not in self._found and time_s - since < self._settings.missing_time_s:
+                continue
             loss = float(missing[rotor] / self._signatures[rotor, rotor])
             self._limit(rotor, float(thrusts[rotor]) - loss, loss)
 

@@ -54,9 +54,10 @@ class SampleMonitor:
         if tick.wrench_ns != self._wrench_ns:
             self._wrench_ns = tick.wrench_ns
             self._wrench.add(tick.wrench)
-        for fault, monitor in self._frozen:
-            if monitor.equal and monitor.frozen:
-                faults[fault] = f"{monitor.equal + 1} equal samples in a row"
+        if self._imu.equal or self._wrench.equal or self._picture.equal:
+            for fault, monitor in self._frozen:
+                if monitor.frozen:
+                    faults[fault] = f"{monitor.equal + 1} equal samples in a row"
 
     def add_picture(self, picture: object) -> bool:
         """Count a new picture, anything that differs from picture to picture; whether it differs from the last one."""

@@ -63,7 +63,7 @@ class SurveyPipeline:
 
         Args:
             frame: Colour and depth.
-            seed_pixel: (u, v) of a place on the surface [px], or None if nobody knows one.
+            seed_pixel: (u, v) of a place on the surface [px], or None if unknown.
 
         Returns:
             Plane, candidates and guides, or the reason why there is none; never raises on a bad picture.

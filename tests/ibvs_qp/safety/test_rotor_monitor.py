@@ -121,3 +121,16 @@ def test_a_sagging_battery_misses_lift_and_limits_no_rotor() -> None:
     for tick in range(60):
         text = watch.update(0.15 * wanted, 0.1, wanted, tick * 0.004)
     assert "N of lift are missing" in text and watch.limits is None
+
+
+def test_a_thrust_missed_for_some_ticks_takes_no_further_rotor_out() -> None:
+    """Thrusts are shared out anew once rotors are found; those that rise fast miss some behind their lag."""
+    missing = np.array([4.0, 2.6, 0.0, 0.0, 0.0, 0.0])
+    _, watch = watched(missing)
+    rising = np.array([2.3, 0.9, 0.2, 0.0, 0.6, 1.0])
+    for number in range(5):
+        text = watch.update(rising, 0.1, HOVER, 0.08 + 0.004 * number)
+    first, second, *others = VEHICLE.geometry.names
+    assert first in text and second in text and not any(name in text for name in others)
+    assert watch.limits is not None
+    np.testing.assert_array_equal(watch.limits[1][2:], VEHICLE.thrust_max[2:])

@@ -138,7 +138,7 @@ def test_a_folder_that_others_can_write_is_not_used(
     function = small()
     found = native.native() is None if kind == "vision" else machine_code(function) is function
     assert found and not list(cache.iterdir())
-    assert len(caplog.records) == 1 and "nobody else can write" in caplog.text
+    assert len(caplog.records) == 1 and "writable by its owner only" in caplog.text
     native.native.cache_clear()
 
 

@@ -12,6 +12,7 @@ from controller_scenes import FLOOR, line_references
 from small_vehicle import SmallVehicle
 
 from ibvs_qp.assured import Assured
+from ibvs_qp.checked_law import Inputs
 from ibvs_qp.command import Command, Outcome, SafetyState
 from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import Measurement, Reference
@@ -58,9 +59,9 @@ def test_a_lost_force_sensor_ends_the_press_and_is_replaced(assured: Assured, mo
     flown_by: list[Measurement | None] = []
     respond = assured.controller.respond
 
-    def noted(checked: Measurement | None, *rest: Any) -> Command:
-        flown_by.append(checked)
-        return respond(checked, *rest)
+    def noted(inputs: Inputs) -> Command:
+        flown_by.append(inputs.measurement)
+        return respond(inputs)
 
     monkeypatch.setattr(assured.controller, "respond", noted)
     vehicle = vehicle_of(assured)

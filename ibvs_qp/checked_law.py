@@ -1,0 +1,93 @@
+"""A control law behind the checks of its inputs: what the program's and the analytic controller share."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ibvs_qp.command import Command
+from ibvs_qp.config import ControllerConfig
+from ibvs_qp.estimation.contact_state import ContactState
+from ibvs_qp.measurement import Measurement, Reference
+from ibvs_qp.model.reporting import check_contact, hover_command
+from ibvs_qp.model.setpoints import Setpoints
+from ibvs_qp.validation.failure import raised
+from ibvs_qp.validation.measurement import MeasurementGate, answered_stamp
+from ibvs_qp.validation.reference import ReferenceGate
+
+
+class Inputs(NamedTuple):
+    """Checked inputs of one tick, in the time of the measurements' clock."""
+
+    stamp_ns: int  # of the measurement as it came
+    measurement: Measurement | None  # None if it was refused
+    reference: Reference
+    contact: ContactState | None
+    rejected: tuple[str, ...]  # what was refused, with the reason
+
+
+class CheckedLaw(ABC):
+    """Checks its inputs and never raises; a subclass is the law.
+
+    Attributes:
+        config: Everything it needs.
+        setpoints: Targets of the last step.
+        gate, references: Checks of the measurements and of the references.
+    """
+
+    setpoints: Setpoints
+
+    def __init__(self, config: ControllerConfig) -> None:
+        self.config = config
+        self.gate = MeasurementGate(config.vehicle.geometry.count, config.line_slots)
+        self.references = ReferenceGate(config.line_slots)
+
+    def reset(self) -> None:
+        """As after construction, to the bit."""
+        self.setpoints.reset()
+        self.gate.reset()
+        self.references.reset()
+
+    @np.errstate(all="ignore")  # a host may have numpy raise at every underflow
+    def step(self, measurement: Measurement, reference: Reference, contact: ContactState | None = None) -> Command:
+        """Thrusts for one tick; never raises, never leaves the limits.
+
+        Inputs are copied, so the caller may reuse its arrays; the command's arrays are the caller's.
+
+        Args:
+            measurement: State of the vehicle; fields that fail the checks are named in ``Command.rejected``.
+            reference: Targets.
+            contact: Wall and contact if the caller estimates them (`Pilot` does); None estimates them here from the
+                measurement.
+
+        Returns:
+            The command with its explanation.
+        """
+        try:
+            inputs = self.check(measurement, reference, contact)
+            command = self.respond(inputs)
+            return command if inputs.measurement is None else self.gate.clock.answered(command)
+        except Exception as error:  # in flight nothing may raise; the reason is reported instead
+            stamp = answered_stamp(measurement)
+            return hover_command(self.setpoints, stamp, self.gate.inertial, (raised("step", error),))
+
+    def check(self, measurement: Any, reference: Any, contact: Any) -> Inputs:
+        """First half of `step`."""
+        checked, rejected = self.gate.check(measurement)
+        reference, refused = self.references.check(reference)
+        contact, unusable = check_contact(contact)
+        return Inputs(answered_stamp(measurement), checked, reference, contact, rejected + refused + unusable)
+
+    def respond(self, inputs: Inputs) -> Command:
+        """Second half of `step`: hover by the last inertial data without a measurement, otherwise the law."""
+        stamp_ns, measurement, reference, contact, rejected = inputs
+        if measurement is None:
+            return hover_command(self.setpoints, stamp_ns, self.gate.inertial, rejected)
+        self.setpoints.update(measurement, reference, contact)
+        return self._command(measurement, reference, rejected)
+
+    @abstractmethod
+    def _command(self, measurement: Measurement, reference: Reference, rejected: tuple[str, ...]) -> Command:
+        """Command of the law at the present set-points."""
