@@ -58,6 +58,14 @@ class StampRing:
             after -= 1
         return len(stamps) - 1 - after
 
+    def nearest_slot(self, stamp_ns: int) -> int:
+        """Slot of the tick nearest to a stamp; outside the remembered time of the newest or the oldest one."""
+        age = self.age(stamp_ns)
+        if age is None:
+            newest = not self._stamps or stamp_ns > self._stamps[-1]
+            age = 0 if newest else len(self._stamps) - 1
+        return self.slot(age)
+
     def slots_since(self, stamp_ns: int) -> np.ndarray:
         """Slots of the tick nearest to a stamp and of every later one, oldest first, (age + 1,)."""
         return np.arange(self.now - (self.age(stamp_ns) or 0), self.now + 1) % HISTORY

@@ -1,4 +1,4 @@
-"""Pilot: raw sensor frames in, commands out.
+"""The pilot.
 
 One tick, in the order of `Pilot._fly`: validation, tare of the wrench, perception, contact, motion in the wall plane,
 strategy, reference, controller.
@@ -10,98 +10,47 @@ import dataclasses
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 
 from ibvs_qp.analytic import PaperController
 from ibvs_qp.command import Command, SafetyState
-from ibvs_qp.config import LONGEST_TICK, ControllerConfig, EstimationConfig, SafetySettings
-from ibvs_qp.config.contact_margin import require_margin
-from ibvs_qp.config.settings import choice, dump_toml, load_toml, setting, validate
+from ibvs_qp.config import LONGEST_TICK
 from ibvs_qp.controller import HybridController
-from ibvs_qp.estimation.attitude_steps import AttitudeSteps
 from ibvs_qp.estimation.contact import ContactEstimator
 from ibvs_qp.estimation.contact_state import ContactState
-from ibvs_qp.estimation.inertial_fallback import InertialFallback
-from ibvs_qp.estimation.stamps import HISTORY
 from ibvs_qp.estimation.wall_lines import WallAxes, image_line
 from ibvs_qp.estimation.wall_motion import BIAS, WallMotion
 from ibvs_qp.estimation.wrench_tare import WrenchTare
-from ibvs_qp.frames import Vector3, add_scaled, down_in_body, plane_in_body, roll_pitch, to_camera
-from ibvs_qp.measurement import HORIZONTAL, FeatureFrame, LineReference, Measurement, Reference, RgbdFrame, SensorFrame
+from ibvs_qp.frames import down_in_body, plane_in_body, roll_pitch, to_camera
+from ibvs_qp.measurement import FeatureFrame, Measurement, Reference, SensorFrame
 from ibvs_qp.model.reporting import fixed_command
 from ibvs_qp.model.setpoints import Setpoints
 from ibvs_qp.painting.command import PainterInput, PaintingCommand
-from ibvs_qp.painting.config import PaintingConfig
 from ibvs_qp.painting.painter import Painter
+from ibvs_qp.painting.reference import image_reference
+from ibvs_qp.pilot.attitude_history import AttitudeHistory
+from ibvs_qp.pilot.camera import CameraInput
+from ibvs_qp.pilot.config import PilotConfig
+from ibvs_qp.pilot.inertial import INERTIAL, InertialData
 from ibvs_qp.safety.assurance import Assurance
 from ibvs_qp.safety.policy import Fault
 from ibvs_qp.safety.rotor_loss import RotorLoss
 from ibvs_qp.safety.tick import Tick
 from ibvs_qp.validation.failure import raised
-from ibvs_qp.validation.features import check_features
-from ibvs_qp.validation.measurement import LINES_PER_SLOT, answered_stamp
+from ibvs_qp.validation.measurement import answered_stamp
 from ibvs_qp.validation.self_check import SelfCheck
 from ibvs_qp.validation.sensor_frame import SensorGate
 from ibvs_qp.validation.thrust_limits import ThrustLimits
-from ibvs_qp.vision.config import VisionConfig
-from ibvs_qp.vision.paper.config import PaperConfig
-from ibvs_qp.vision.percept import LineHint
+from ibvs_qp.vision.percept import LineHint, Percept
 
 #: Extent of the fresh edge ahead of the brush, normalised image x from the tip's side to the border.
 HINT_SPAN = (0.10, 0.50)
-#: Inertial sensors of a frame.
-_INERTIAL = ("attitude", "angular_velocity", "specific_force")
 #: States in which the strategy flies.
 _FLYING = (SafetyState.NOMINAL, SafetyState.DEGRADED)
-#: Pixels by which pictures are compared: every 16th row and column, of 4096 at most.
-_SPARSE = (slice(0, 4096, 16), slice(0, 4096, 16))
 #: Tip to wall before the first plane [m].
 ASSUMED_DISTANCE = 0.5
-
-
-@dataclass(frozen=True, kw_only=True)
-class CameraConfig:
-    """Settings of the camera beside the intrinsics, which come with every picture."""
-
-    latest_s: float = setting(0.30, "pictures older than this at delivery are refused", unit="s", low=0.01, high=2.0)
-
-    def __post_init__(self) -> None:
-        """Validate."""
-        validate(self)
-
-
-@dataclass(frozen=True, kw_only=True)
-class PilotConfig:
-    """Configuration of a flight."""
-
-    controller: ControllerConfig = field(default_factory=ControllerConfig)
-    camera: CameraConfig = field(default_factory=CameraConfig)
-    vision: VisionConfig = field(default_factory=VisionConfig)
-    estimation: EstimationConfig = field(default_factory=EstimationConfig)
-    painting: PaintingConfig = field(default_factory=PaintingConfig)
-    safety: SafetySettings = field(default_factory=SafetySettings)
-    perception: str = choice("own", "vision pipeline: the own one or the paper's", ("own", "paper"))
-    paper_vision: PaperConfig = field(default_factory=PaperConfig)
-    law: str = choice("qp", "control law", ("qp", "paper"))
-
-    def __post_init__(self) -> None:
-        """Validate."""
-        validate(self)
-
-    @classmethod
-    def from_toml(cls, file: str | Path) -> PilotConfig:
-        """Read a preset; one whose contact would ring is refused."""
-        config = load_toml(cls, file)
-        require_margin(config.controller, config.controller.brush, f"{file}: controller.")
-        return config
-
-    def to_toml(self) -> str:
-        """Write the preset as TOML text."""
-        return dump_toml(self)
 
 
 class Controller(Protocol):
@@ -145,14 +94,13 @@ class Pilot:
         self._tip_from_camera = (self._tip - camera).tolist()
         self._gate = SensorGate(self.config.camera.latest_s)
         self._limits = ThrustLimits(vehicle.geometry.count)
-        self._most_lines = LINES_PER_SLOT * settings.line_slots
         self.self_check = SelfCheck(self.config.safety.self_check)
-        self._steps = AttitudeSteps()
-        self._fallback = InertialFallback(self._tip_from_camera, settings.tick_s)
+        self._inertial = InertialData(self._tip_from_camera, settings.tick_s)
         self.tare = WrenchTare(vehicle, self.config.estimation)
-        self._perception, self._seen_as = None, seen_as
         self.contact = ContactEstimator(settings)
         self.motion = WallMotion(self._tip, camera, settings.tick_s, self.config.estimation)
+        self._history = AttitudeHistory(self.motion.ticks)
+        self._camera = CameraInput(self.config, self._history, seen_as)
         self.rotor_loss = RotorLoss(vehicle, settings.gains)
         self.assurance = Assurance(vehicle, self.config.safety)
         self.painter = painter or Painter(self.config.painting)
@@ -162,23 +110,18 @@ class Pilot:
 
     def reset(self) -> None:
         """As after construction."""
-        sensing = (self._gate, self.self_check, self._steps, self._fallback, self.tare, self._perception)
+        self._gate.reset()
+        self._inertial.reset(self._gate.last)
+        sensing = (self.self_check, self.tare, self._history, self._camera)
         flying = (self.contact, self.motion, self.rotor_loss, self.assurance, self.painter, self.controller)
         for part in (*sensing, *flying):
-            if part is not None:
-                part.reset()
-        self._first = self._stamp = self._last_capture = -1
-        self._attitude, self._rate, self._force = (self._gate.last[name] for name in _INERTIAL)
-        self._turn: Vector3 = (0.0, 0.0, 0.0)  # integrated gyro [rad]
-        self._history_attitude, self._history_turn = [[1.0, 0.0, 0.0, 0.0]] * HISTORY, [self._turn] * HISTORY
+            part.reset()
+        self._first = self._stamp = self._imu_stamp = -1
         self._covariance = self.motion.velocity_variance * np.eye(3)
-        self._plane: tuple[float, float, float, float] | None = None
-        self._plane_stamp = self._image_stamp = self._lines_stamp = self._imu_stamp = -1
         self.thrust_limits = None
         self._leaps = 0
         self._rejected: list[str] = []  # inputs of the tick that were refused before the controller
         self._commanded: Command | None = None  # of the tick, once there is one
-        self.percept = None
         self.measurement: Measurement | None = None
         self.reference = Reference()
         self.painting_command: PaintingCommand | None = None
@@ -195,6 +138,11 @@ class Pilot:
     @thrust_limits.setter
     def thrust_limits(self, limits: Any) -> None:
         self._limits.assign(limits)
+
+    @property
+    def percept(self) -> Percept | None:
+        """What perception found in the last picture."""
+        return self._camera.percept
 
     @property
     def setpoints(self):
@@ -244,8 +192,8 @@ class Pilot:
             self._leaps = self._gate.clock.leaps
             self.contact.doubt()
             self.motion.doubt()
-        frame = self._inertial(frame, dt)
-        attitude, rate, force = self._attitude, self._rate, self._force
+        frame = self._levelled(frame, dt)
+        attitude, rate, force = self._inertial.attitude, self._inertial.rate, self._inertial.force
         down = down_in_body(attitude)
         wrench, wrench_stamp = self._contact_wrench(frame, force)
         # After a lost rotor the vehicle turns away from the wall: its pictures show something else, and the force
@@ -262,13 +210,13 @@ class Pilot:
             down=down,
             contact_wrench=wrench,
             wrench_stamp_ns=wrench_stamp,
-            plane=self._plane,
-            plane_stamp_ns=self._plane_stamp,
+            plane=self._camera.plane,
+            plane_stamp_ns=self._camera.plane_ns,
         )
         self._check_axes(contact, dt)
         axes = WallAxes.of(contact.normal, down)
         self.motion.predict(stamp, axes, force, rate, dt)
-        self._remember(attitude, rate, dt)
+        self._history.remember(attitude, rate, dt)
         if features is not None:
             self._correct_motion(features, contact)
         target = self.painting_command = self._strategy(frame, contact, dt)
@@ -281,29 +229,17 @@ class Pilot:
         self.assurance.watch(self._shown(frame, contact, command), self.setpoints)
         return self._commanded
 
-    def _inertial(self, frame: SensorFrame, dt: float) -> SensorFrame:
-        """The frame with attitude, rate and specific force to fly by; those that fail are estimated."""
-        now, fallback, setpoints = self._gate.last, self._fallback, self.setpoints
-        missing = {name for name in _INERTIAL if name in self._gate.replaced}
+    def _levelled(self, frame: SensorFrame, dt: float) -> SensorFrame:
+        """The frame with the inertial data to fly by; those that fail are estimated."""
+        measured, inertial = self._gate.last, self._inertial
+        missing = {name for name in INERTIAL if name in self._gate.replaced}
         if Fault.IMU_FROZEN in self.assurance.faults:
-            missing = set(_INERTIAL)
+            missing = set(INERTIAL)
         if not missing:
-            fallback.reset()
-            self._attitude, self._rate, self._force = (now[name] for name in _INERTIAL)
-            if (continuous := self._steps.update(self._attitude, self._rate, dt)) is None:
-                return frame
-            self._attitude = continuous
-            return dataclasses.replace(frame, attitude=np.array(continuous))
-        if not fallback.active:
-            lines = {identity: line.angle for identity, line in self.motion.lines.items()}
-            fallback.begin(self._attitude, self._rate, self.contact.state.normal, lines)
-        measured = (None if name in missing else now[name] for name in _INERTIAL)
-        attitude, rate, force = measured
-        fallback.step(frame.stamp_ns, dt, setpoints.angular_acceleration, attitude, rate)
-        self._attitude, self._rate = attitude or fallback.attitude, rate or fallback.rate
-        self._force = force or setpoints.modelled_force
-        values = (self._attitude, self._rate, self._force)
-        return dataclasses.replace(frame, **dict(zip(_INERTIAL, map(np.array, values), strict=True)))
+            return inertial.measure(frame, measured, dt)
+        angles = {identity: line.angle for identity, line in self.motion.lines.items()}
+        normal = self.contact.state.normal
+        return inertial.estimate(frame, measured, missing, dt, motors=self.setpoints, normal=normal, angles=angles)
 
     def _command(self, contact: ContactState) -> Command:
         """Command of the law, or of the supervisor where it replaces the law."""
@@ -318,13 +254,13 @@ class Pilot:
         now, motion, faults = self._gate.last, self.motion, dict[Fault, str]()
         if motion.refused_s > self.config.safety.refusal_s:
             faults[Fault.FILTER_REFUSES] = f"camera velocity refused for {motion.refused_s:.1f} s"
-        if self._fallback.lost:
+        if self._inertial.lost:
             faults[Fault.NO_ATTITUDE] = "by motors' model and camera, too uncertain"
         if self.rotor_loss.lost:
             faults[Fault.NO_HOVER] = ""
         if found := self.self_check.faults():
             faults[Fault.INPUTS] = "; ".join(found)
-        if not any(name in self._gate.replaced for name in _INERTIAL):
+        if not any(name in self._gate.replaced for name in INERTIAL):
             self._imu_stamp = frame.stamp_ns
         right, down = motion.state[0:2]
         return Tick(
@@ -332,12 +268,12 @@ class Pilot:
             imu_ns=self._imu_stamp,
             wrench_ns=frame.wrench_stamp_ns,
             plane_ns=self.contact.plane_ns,
-            image_ns=self._image_stamp,
-            lines_ns=self._lines_stamp if self.reference.lines else -1,
+            image_ns=self._camera.image_ns,
+            lines_ns=self._camera.lines_ns if self.reference.lines else -1,
             inertial=(now["attitude"], now["angular_velocity"], now["specific_force"]),
             wrench=now["wrench"],
-            down=down_in_body(self._attitude),
-            rate=self._rate,
+            down=down_in_body(self._inertial.attitude),
+            rate=self._inertial.rate,
             speed=math.hypot(right, down, contact.speed),
             height=-motion.state[5],
             contact=contact,
@@ -364,7 +300,7 @@ class Pilot:
     def _check_axes(self, contact: ContactState, dt: float) -> None:
         """Self-check with those raw sensors that the tick has; it names what it found in every command."""
         now, missing, check = self._gate.last, self._gate.replaced, self.self_check
-        if not any(name in missing for name in _INERTIAL):
+        if not any(name in missing for name in INERTIAL):
             check.inertial(now["attitude"], now["angular_velocity"], now["specific_force"], dt)
         if "wrench" not in missing:
             check.contact(now["wrench"][:3], contact.push_noise, contact.normal, contact.distance, dt)
@@ -373,49 +309,10 @@ class Pilot:
     # -------------------------------------------------------------- perception
 
     def _perceive(self, frame: SensorFrame) -> FeatureFrame | None:
-        """Sound features of a new picture, or None; stores their plane."""
-        features = frame.features if frame.image is None else self._process(frame.image)
-        if features is None or (frame.image is not None and self.percept is not None and self.percept.refused):
-            return None
-        features = check_features(features, self._most_lines, self._rejected)
-        if not self.assurance.is_news(_content(frame, features)):
-            return None
-        self._image_stamp = features.stamp_ns
-        if features.lines:
-            self._lines_stamp = features.stamp_ns
-        if features.plane is not None:
-            self._plane, self._plane_stamp = features.plane, features.stamp_ns
-        return features
-
-    def _process(self, image: RgbdFrame) -> FeatureFrame | None:
-        """Run perception on a picture, with the gyro's turn since the last one."""
-        if self._perception is None:
-            self._perception = self._load_perception()
-        slot = self._slot(image.stamp_ns)
-        last = self._slot(self._last_capture) if self._last_capture >= 0 else slot
-        self._last_capture = image.stamp_ns
-        self.percept = self._perception.process(
-            image,
-            attitude=np.array(self._history_attitude[slot]),
-            rotation=np.subtract(self._history_turn[slot], self._history_turn[last]),
-            velocity=self.measurement.velocity if self.measurement is not None else None,
-            hints=self._hints(image.stamp_ns),
-        )
-        if self.percept.refused:
-            self._rejected.append(f"image: {self.percept.refused}")
-        seen = self.percept.features
-        return seen if self._seen_as is None or seen is None else self._seen_as(seen)
-
-    def _load_perception(self):
-        """The configured perception, loaded when the first picture comes."""
-        vehicle = self.config.controller.vehicle
-        if self.config.perception == "paper":
-            from ibvs_qp.vision.paper import PaperPerception
-
-            return PaperPerception(self.config.paper_vision, self.config.vision, vehicle)
-        from ibvs_qp.vision.perception import Perception
-
-        return Perception(self.config.vision, vehicle)
+        """Sound features of a new picture, or None."""
+        velocity = self.measurement.velocity if self.measurement is not None else None
+        hints = () if frame.image is None else self._hints(frame.image.stamp_ns)
+        return self._camera.perceive(frame, velocity, hints, self.assurance.is_news, self._rejected)
 
     def _hints(self, stamp_ns: int) -> tuple[LineHint, ...]:
         """Expected place of the fresh edge: at the brush, ahead of it, by lines and contact of the tick before."""
@@ -423,27 +320,13 @@ class Pilot:
         if expected is None or not contact.known:
             return ()
         offset, side = expected
-        axes = WallAxes.of(contact.normal, down_in_body(self._history_attitude[self._slot(stamp_ns)]))
+        axes = WallAxes.of(contact.normal, down_in_body(self._history.attitude(stamp_ns)))
         rho, theta, _ = image_line(offset, 0.5 * math.pi, axes, self._tip_from_camera, contact.distance)
         near, far = HINT_SPAN
         span = (near, far) if side > 0.0 else (-far, -near)
         return (LineHint(name="fresh", rho=rho, theta=theta, kind="paint", surface_side=-1, span=span),)
 
     # -------------------------------------------------------------- estimation
-
-    def _remember(self, attitude: list[float], rate: list[float], dt: float) -> None:
-        """Store attitude and integrated gyro of the tick for pictures that arrive late."""
-        self._turn = add_scaled(self._turn, dt, rate)
-        slot = self.motion.ticks.slot(0)
-        self._history_attitude[slot], self._history_turn[slot] = attitude, self._turn
-
-    def _slot(self, stamp_ns: int) -> int:
-        """Place in the history of the tick nearest to a stamp, or of the newest or the oldest one."""
-        ticks = self.motion.ticks
-        age = ticks.age(stamp_ns)
-        if age is None:
-            age = 0 if stamp_ns > self._stamp else min(HISTORY, ticks.now) - 1
-        return ticks.slot(age)
 
     def _correct_motion(self, features: FeatureFrame, contact: ContactState) -> None:
         """Correct motion and lines at the time of capture."""
@@ -455,9 +338,8 @@ class Pilot:
             if features.lines:
                 self._rejected.append("features.lines: not used before the first plane")
             return
-        if self._fallback.active:
-            self._fallback.correct(features, distance)
-        gravity = down_in_body(self._history_attitude[self._slot(features.stamp_ns)])
+        self._inertial.correct(features, distance)
+        gravity = down_in_body(self._history.attitude(features.stamp_ns))
         self.motion.correct(features, WallAxes.of(normal, gravity), distance)
         self._covariance = self.motion.velocity_variance * np.eye(3)  # changes nowhere else
 
@@ -489,7 +371,7 @@ class Pilot:
         if not rotors.tilts:
             return target
         if not tilted:
-            rotors.begin(roll_pitch(self._attitude))
+            rotors.begin(roll_pitch(self._inertial.attitude))
         normal = np.array(contact.normal)
         away = contact.distance + float(normal @ self._tip)
         tilt = rotors.tilt(away, contact.speed, motion.state[0], normal, dt)
@@ -504,26 +386,10 @@ class Pilot:
         return lower, np.maximum(np.minimum(reported[1], found[1]), lower)
 
     def _refer(self, target: PaintingCommand, contact: ContactState) -> Reference:
-        """Reference of a command; offsets in metres become rho = l / d at the measured distance."""
+        """Reference of a command at the measured distance."""
         _, tip_below, tip_ahead = self._tip_camera
         depth = tip_ahead + (contact.distance if contact.known else ASSUMED_DISTANCE)
-        references = []
-        for line, offset in target.guides:
-            if line.role == HORIZONTAL:
-                rho, theta = (offset + tip_below) / depth, 0.5 * math.pi
-            else:
-                rho, theta = offset / depth, 0.0
-            references.append(LineReference(rho=rho, theta=theta, role=line.role))
-        return Reference(
-            push_force=target.push,
-            standoff=target.standoff,
-            lines=tuple(references),
-            velocity=target.velocity,
-            contact=target.contact,
-            tilt=target.tilt,
-            travel=target.travel,
-            trim=target.trim,
-        )
+        return image_reference(target, depth, tip_below)
 
     def _measure(
         self,
@@ -553,8 +419,8 @@ class Pilot:
             contact_wrench=wrench,
             wrench_stamp_ns=wrench_stamp,
             lines=tuple([self.motion.feature(line, axes, distance, frame.stamp_ns) for line, _ in target.guides]),
-            plane=self._plane,
-            plane_stamp_ns=self._plane_stamp,
+            plane=self._camera.plane,
+            plane_stamp_ns=self._camera.plane_ns,
             velocity=velocity,
             velocity_covariance=covariance,
             acceleration_bias=np.array(
@@ -565,10 +431,3 @@ class Pilot:
             attitude_stamp_ns=frame.attitude_stamp_ns,
             imu_stamp_ns=frame.imu_stamp_ns,
         )
-
-
-def _content(frame: SensorFrame, features: FeatureFrame) -> object:
-    """What differs from picture to picture: sparse pixels, or the features themselves."""
-    if frame.image is not None:
-        return frame.image.rgb[_SPARSE].tobytes(), frame.image.depth[_SPARSE].tobytes()
-    return tuple(features.plane or ()), tuple([(line.rho, line.theta) for line in features.lines])

@@ -1,0 +1,122 @@
+"""From a new picture to sound features: perception, checks, and whether the picture shows anything new."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ibvs_qp.measurement import FeatureFrame, RgbdFrame, SensorFrame
+from ibvs_qp.pilot.attitude_history import AttitudeHistory
+from ibvs_qp.pilot.config import PilotConfig
+from ibvs_qp.validation.features import check_features
+from ibvs_qp.validation.measurement import LINES_PER_SLOT
+from ibvs_qp.vision.percept import LineHint
+
+#: Pixels by which pictures are compared: every 16th row and column, of 4096 at most.
+_SPARSE = (slice(0, 4096, 16), slice(0, 4096, 16))
+
+
+class CameraInput:
+    """Pictures or features of one flight.
+
+    Attributes:
+        percept: What perception found in the last picture, or None.
+        plane, plane_ns: Wall in the camera frame (nx, ny, nz, d) of the last features with one, and their stamp.
+        image_ns, lines_ns: Stamps of the last features, and of the last with a line; -1 for never.
+
+    Args:
+        config: Configuration of the flight.
+        history: Attitude and turn at the time of capture.
+        seen_as: Applied to the features of every picture, for studies of perception errors.
+    """
+
+    def __init__(
+        self,
+        config: PilotConfig,
+        history: AttitudeHistory,
+        seen_as: Callable[[FeatureFrame], FeatureFrame] | None,
+    ) -> None:
+        self._config, self._history, self._seen_as = config, history, seen_as
+        self._most_lines = LINES_PER_SLOT * config.controller.line_slots
+        self._perception = None
+
+    def reset(self) -> None:
+        """As before the first picture."""
+        if self._perception is not None:
+            self._perception.reset()
+        self.percept, self._capture_ns = None, -1
+        self.plane: tuple[float, float, float, float] | None = None
+        self.plane_ns = self.image_ns = self.lines_ns = -1
+
+    def perceive(
+        self,
+        frame: SensorFrame,
+        velocity: np.ndarray | None,
+        hints: tuple[LineHint, ...],
+        is_news: Callable[[object], bool],
+        rejected: list[str],
+    ) -> FeatureFrame | None:
+        """Sound features of a new picture, or None; stores their plane.
+
+        Args:
+            frame: The frame.
+            velocity: Of the tip in B [m/s], (3,), or None.
+            hints: Lines that are expected in the picture.
+            is_news: Whether a content differs from the last one.
+            rejected: Gets what is refused.
+        """
+        if frame.image is None:
+            features = frame.features
+        else:
+            features = self._process(frame.image, velocity, hints, rejected)
+        if features is None:
+            return None
+        features = check_features(features, self._most_lines, rejected)
+        if not is_news(_content(frame, features)):
+            return None
+        self.image_ns = features.stamp_ns
+        if features.lines:
+            self.lines_ns = features.stamp_ns
+        if features.plane is not None:
+            self.plane, self.plane_ns = features.plane, features.stamp_ns
+        return features
+
+    def _process(
+        self, image: RgbdFrame, velocity: np.ndarray | None, hints: tuple[LineHint, ...], rejected: list[str]
+    ) -> FeatureFrame | None:
+        """Run perception on a picture, with the gyro's turn since the last one; None for a refused picture."""
+        if self._perception is None:
+            self._perception = self._load_perception()
+        last_ns = self._capture_ns if self._capture_ns >= 0 else image.stamp_ns
+        self._capture_ns = image.stamp_ns
+        self.percept = self._perception.process(
+            image,
+            attitude=np.array(self._history.attitude(image.stamp_ns)),
+            rotation=self._history.turn(last_ns, image.stamp_ns),
+            velocity=velocity,
+            hints=hints,
+        )
+        if self.percept.refused:
+            rejected.append(f"image: {self.percept.refused}")
+            return None
+        seen = self.percept.features
+        return seen if self._seen_as is None or seen is None else self._seen_as(seen)
+
+    def _load_perception(self):
+        """The configured perception, loaded when the first picture comes."""
+        vehicle = self._config.controller.vehicle
+        if self._config.perception == "paper":
+            from ibvs_qp.vision.paper import PaperPerception
+
+            return PaperPerception(self._config.paper_vision, self._config.vision, vehicle)
+        from ibvs_qp.vision.perception import Perception
+
+        return Perception(self._config.vision, vehicle)
+
+
+def _content(frame: SensorFrame, features: FeatureFrame) -> object:
+    """What differs from picture to picture: sparse pixels, or the features themselves."""
+    if frame.image is not None:
+        return frame.image.rgb[_SPARSE].tobytes(), frame.image.depth[_SPARSE].tobytes()
+    return tuple(features.plane or ()), tuple([(line.rho, line.theta) for line in features.lines])
