@@ -9,6 +9,8 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    __version__: str
+
     from allocation import TAROT_T960, RotorGeometry, control_effectiveness
     from ibvs_qp.analytic import PaperController
     from ibvs_qp.assured import Assured
@@ -27,6 +29,7 @@ if TYPE_CHECKING:
         SensorFrame,
     )
     from ibvs_qp.pilot import Pilot, PilotConfig
+    from ibvs_qp.presets import preset
 
 __all__ = [
     "TAROT_T960",
@@ -53,7 +56,9 @@ __all__ = [
     "SensorFrame",
     "TaskReport",
     "VehicleParams",
+    "__version__",
     "control_effectiveness",
+    "preset",
 ]
 
 _HOMES = {
@@ -67,12 +72,17 @@ _HOMES = {
     "ibvs_qp.config.errors": ("ConfigError", "IbvsQpError"),
     "ibvs_qp.pilot": ("Pilot", "PilotConfig"),
     "ibvs_qp.config.vehicle": ("VehicleParams",),
+    "ibvs_qp.presets": ("preset",),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
 
 def __getattr__(name: str) -> Any:
     """Import a public name where it lives."""
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("ibvs-qp")
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(importlib.import_module(_HOME_OF.get(name, "ibvs_qp.measurement")), name)

@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[1]
 ORDER = {
     "ibvs_qp": (
         "frames measurement command analysis config validation estimation safety model tasks limits qp vision painting "
-        "checked_law analytic controller assured pilot"
+        "checked_law analytic controller assured pilot presets"
     ).split(),
     "sim": (
         "storage world scenes sensors rivals faults flight evaluate figures sweep report detection experiments "

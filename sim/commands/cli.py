@@ -7,6 +7,7 @@ correct (one line on standard error), 130 Ctrl-C and 143 SIGTERM with the partia
 from __future__ import annotations
 
 import contextlib
+import difflib
 import errno
 import io
 import itertools
@@ -17,6 +18,7 @@ import traceback
 from collections.abc import Iterator
 from typing import Protocol
 
+import ibvs_qp
 from ibvs_qp.config.errors import IbvsQpError
 from sim.commands.exit_codes import EXIT_INTERNAL, EXIT_INTERRUPTED, EXIT_TERMINATED, EXIT_USER
 from sim.flight.stop import sigterm_as_ctrl_c
@@ -70,6 +72,8 @@ def main(arguments: list[str] | None = None) -> int:
     """
     for variable, value in _ENVIRONMENT.items():
         os.environ.setdefault(variable, value)
+    if os.name != "posix":  # signals, owners of files and folders, atomic renames
+        return _user_error(f"{sys.platform} is not supported; Linux and macOS are")
     with sigterm_as_ctrl_c() as terminated:
         code = _run(sys.argv[1:] if arguments is None else arguments)
     return EXIT_TERMINATED if code == EXIT_INTERRUPTED and terminated() else code
@@ -152,6 +156,13 @@ def _parse(words: list[str]) -> Command:
     import tyro
 
     commands = _commands()
+    if words[:1] == ["--version"]:
+        print(f"ibvs-qp {ibvs_qp.__version__}")
+        raise SystemExit(0)
+    if words and not words[0].startswith("-") and words[0] not in commands:
+        near = difflib.get_close_matches(words[0], commands, n=1)
+        hint = f"did you mean {near[0]}?" if near else f"commands are {', '.join(commands)}"
+        raise SystemExit(_user_error(f"unknown command {words[0]}; {hint}"))
     message = io.StringIO()
     try:
         with contextlib.redirect_stderr(message):
@@ -176,7 +187,8 @@ def _one_line(text: str) -> str:
     body = list(itertools.takewhile(bool, lines[1:]))
     near = next((lines[i + 1 :] for i, line in enumerate(lines) if line.startswith("Perhaps you meant")), [])
     option = next((line.split()[0] for line in near if line), None)
-    return " ".join(body) + (f"; did you mean {option}?" if option else "")
+    text = re.sub(r"'None', |, 'None'", "", " ".join(body))  # the default of an option that is not given
+    return text + (f"; did you mean {option}?" if option else "")
 
 
 def _user_error(message: str) -> int:

@@ -11,12 +11,12 @@ import tyro
 from sim.commands.options import (
     World,
     check_count,
-    check_preset,
     check_seed,
     command_line,
     flag,
     interrupted,
     optional,
+    preset_file,
     usable_cores,
 )
 from sim.world.worlds import EXPERIMENT_WORLD
@@ -24,12 +24,8 @@ from sim.world.worlds import EXPERIMENT_WORLD
 if TYPE_CHECKING:
     import polars as pl
 
-#: Figures of the terminal table; the JSON line holds all.
-SHOWN = (
-    "path_rms_straight_m", "path_rms_corner_m", "path_rms_m", "force_rms_straight_n", "force_rms_corner_n",
-    "force_rms_n", "force_peak_n", "contact_share", "tilt_rms_deg", "tilt_peak_deg", "yaw_peak_deg",
-    "height_error_rms_m", "settle_s", "bounces", "coverage", "push_mean_n",
-)  # fmt: skip
+#: Differences of scenes and presets in the terminal; the JSON line holds all.
+MOST_CONDITIONS = 30
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -63,11 +59,19 @@ class Compare:
 
     def run(self, words: list[str]) -> int:
         """Read or fly both, and print the differences."""
+        from ibvs_qp.presets import FILES
+
+        a, b = (path if path.exists() else FILES.get(str(path), path) for path in (self.run_a, self.run_b))
+        return dataclasses.replace(self, run_a=a, run_b=b)._compare(words)
+
+    def _compare(self, words: list[str]) -> int:
         from sim.report.comparison import compare, read_run
+        from sim.report.conditions import differing_presets, differing_runs
         from sim.report.rundir import as_json
 
-        folder, stopped = None, False
-        if self._presets():
+        folder, stopped, presets = None, False, self._presets()
+        conditions = (differing_presets if presets else differing_runs)(self.run_a, self.run_b)
+        if presets:
             a, b, folder, stopped = self._fly()
         else:
             a, b = read_run(self.run_a), read_run(self.run_b)
@@ -81,11 +85,12 @@ class Compare:
                 "world": None if folder is None else self.world,
                 "run_dir": None if folder is None else str(folder),
                 "interrupted": stopped,
+                "conditions": conditions,
                 "cells": cells,
             }
             print(as_json(content))
         elif not stopped:
-            _print(cells, self.run_a, self.run_b)
+            _print(conditions, cells, self.run_a, self.run_b)
         if stopped and folder is not None:
             return interrupted(words, folder, f"finished flights are in {folder}")
         return 0
@@ -107,6 +112,9 @@ class Compare:
             raise ConfigError(
                 f"{file} is a file and {folder} a folder; give two run folders or two presets (TOML) to compare"
             )
+        if files[0]:
+            for name, file in (("RUN_A", self.run_a), ("RUN_B", self.run_b)):
+                preset_file(file, name)
         return files[0]
 
     def _fly(self) -> tuple[pl.DataFrame, pl.DataFrame, Path, bool]:
@@ -121,8 +129,6 @@ class Compare:
         check_seed(self.seed)
         check_count("--seeds", self.seeds)
         check_count("--jobs", self.jobs)
-        check_preset("RUN_A", self.run_a)
-        check_preset("RUN_B", self.run_b)
         runs = [
             run
             for name, file in (("a", self.run_a), ("b", self.run_b))
@@ -143,19 +149,32 @@ class Compare:
         return a, b, folder, result.interrupted
 
 
-def _print(cells: list[dict[str, Any]], a: Path, b: Path) -> None:
+def _print(conditions: list[dict[str, Any]], cells: list[dict[str, Any]], a: Path, b: Path) -> None:
     from rich.console import Console
+    from rich.markup import escape
 
-    from sim.evaluate.table import terminal_table
+    from sim.evaluate.table import LINES, terminal_table
+    from sim.report.conditions import ABSENT
 
-    headings = ("figure", f"A: {a.name}", f"B: {b.name}", "B - A", "95 % interval")
+    console, names = Console(), ("A", "B")
+    console.print(f"A: {a}\nB: {b}", soft_wrap=True, highlight=False)
+    shown = [(each["name"], str(each["a"]), str(each["b"])) for each in conditions[:MOST_CONDITIONS]]
+    if len(conditions) > MOST_CONDITIONS:
+        shown.append((f"{len(conditions) - MOST_CONDITIONS} more, see --json", "", ""))
+    if shown:
+        console.print(terminal_table(("flown under other conditions", *names), shown, wrap=names))
+    headings = ("figure", *names, "B - A", "95 %")
     for cell in cells:
         labels = [cell["experiment"], cell["law"], cell["variant"], *(f"{k} {v}" for k, v in cell["params"].items())]
         done = " and ".join(f"{count} of {cell['n']}" for count in cell["completed"])
         rows = []
-        for name, found in ((name, cell["differences"][name]) for name in SHOWN if name in cell["differences"]):
-            a_median, b_median, median, low, high = (found[key] for key in ("a", "b", "median", "low", "high"))
-            interval = f"{low:+.4g} to {high:+.4g}" if low != high else "one flight"
-            rows.append((name, f"{a_median:.4g}", f"{b_median:.4g}", f"{median:+.4g}", interval))
-        title = f"{', '.join(labels)}: completed {done}"
-        Console().print(terminal_table(headings, rows, title, wrap=headings[1:]))
+        for line in LINES:
+            if (found := cell["differences"].get(line.key)) is None:
+                continue
+            figures = [line.scale * found[key] for key in ("a", "b", "median", "low", "high")]
+            a_text, b_text = (f"{figure:.4g}" for figure in figures[:2])
+            median, low, high = (f"{figure:+.4g}" for figure in figures[2:])
+            interval = f"{low} to {high}" if low != high else ABSENT
+            label = f"{line.label} [{line.unit}]" if line.unit else line.label
+            rows.append((escape(label), a_text, b_text, median, interval))
+        console.print(terminal_table(headings, rows, f"{', '.join(labels)}: completed {done}"))

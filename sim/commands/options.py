@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import shlex
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -59,11 +60,51 @@ def check_readable(option: str, file: Path | None, largest: int = sys.maxsize) -
         raise ConfigError(f"{error}; give an existing file with {option}") from None
 
 
-def check_preset(option: str, file: Path | None) -> None:
-    """Raise ConfigError if a preset is given and is no readable TOML file; its keys are checked on use."""
-    check_readable(option, file)
-    if file is not None:
-        read_toml(file)
+def scene_file(file: Path | None, option: str = "--scene") -> Path | None:
+    """A scene file, or the shipped one of that name.
+
+    Raises:
+        ConfigError: When there is none, or it is a preset.
+    """
+    from sim.scenes import FILES
+
+    return _shipped_or_given(file, option, FILES, "scene")
+
+
+def preset_file(file: Path | None, option: str = "--preset") -> Path | None:
+    """A preset file, or the shipped one of that name; its values are checked on use.
+
+    Raises:
+        ConfigError: When there is none, or it is a scene.
+    """
+    from ibvs_qp.presets import FILES
+
+    return _shipped_or_given(file, option, FILES, "preset")
+
+
+def _shipped_or_given(file: Path | None, option: str, shipped: Mapping[str, Path], kind: str) -> Path | None:
+    if file is None:
+        return None
+    if not file.exists():
+        file = shipped.get(str(file), file)
+    try:
+        open_regular(file, sys.maxsize).close()
+    except UnreadableFile as error:
+        raise ConfigError(f"{error}; give an existing file with {option}, or one of {', '.join(shipped)}") from None
+    if (other := _kind(file)) not in (kind, None):
+        raise ConfigError(f"{option} {file}: this is a {other}, not a {kind}")
+    return file
+
+
+def _kind(file: Path) -> str | None:
+    """Whether a TOML file is a scene or a preset, by its sections; None if they do not tell."""
+    from ibvs_qp.pilot import PilotConfig
+    from sim.world.scene import Scene
+
+    preset, scene = ({field.name for field in dataclasses.fields(kind)} for kind in (PilotConfig, Scene))
+    found = set(read_toml(file))
+    kinds = [name for name, own in (("preset", preset - scene), ("scene", scene - preset)) if found & own]
+    return kinds[0] if len(kinds) == 1 else None
 
 
 def check_mujoco() -> None:

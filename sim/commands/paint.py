@@ -12,11 +12,12 @@ from sim.commands.exit_codes import EXIT_INTERRUPTED
 from sim.commands.options import (
     SceneWorld,
     check_mujoco,
-    check_readable,
     check_seed,
     command_line,
     flag,
     optional,
+    preset_file,
+    scene_file,
 )
 
 if TYPE_CHECKING:
@@ -38,10 +39,10 @@ class Paint:
     """
 
     scene: Annotated[Path | None, optional("FILE")] = None
-    """Scene file (TOML); default: the built-in scene, a C of two rows."""
+    """Scene file (TOML), or a shipped scene as dark_board; default: a C of two rows."""
     world: SceneWorld = None
     preset: Annotated[Path | None, optional("FILE")] = None
-    """Controller preset (TOML): vehicle model, gains, weights, limits; default: the built-in one."""
+    """Preset file (TOML), or a shipped one as octorotor_qp: vehicle, gains, weights, limits; default: the law's."""
     features: Literal["rendered", "geometric"] = "rendered"
     """Perception: rendered pictures through the vision pipeline, or a sensor model of lines."""
     vision: Literal["own", "paper"] = "own"
@@ -82,9 +83,8 @@ class Paint:
 
         started = time.perf_counter()
         check_seed(self.seed)
-        for option, file in (("--scene", self.scene), ("--preset", self.preset)):
-            check_readable(option, file)
-        scene = load_scene(self.scene) if self.scene else in_world(Scene(), self.world or DEFAULT_WORLD)
+        chosen, preset = scene_file(self.scene), preset_file(self.preset)
+        scene = load_scene(chosen) if chosen else in_world(Scene(), self.world or DEFAULT_WORLD)
         if self.world is not None:
             scene = in_world(scene, self.world)
         if self.view:
@@ -99,7 +99,7 @@ class Paint:
             vision=self.vision,
             camera=camera,
             image_size=size,
-            preset=str(self.preset) if self.preset else None,
+            preset=str(preset) if preset else None,
             video=not self.no_video,
             machine_code=True,
             view=self.view,

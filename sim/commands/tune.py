@@ -8,15 +8,16 @@ import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+import ibvs_qp
 from sim.commands.options import (
     check_count,
-    check_preset,
     check_readable,
     check_seed,
     command_line,
     flag,
     interrupted,
     optional,
+    preset_file,
 )
 from sim.storage.limits import LARGEST_JOURNAL
 
@@ -84,7 +85,7 @@ class Tune:
         check_seed(self.seed)
         for name in ("trials", "flights", "unseen", "jobs"):
             check_count(f"--{name}", getattr(self, name))
-        check_preset("--preset", self.preset)
+        preset_file(self.preset)
         check_readable("--trials-of", self.trials_of)
         if self.storage and "://" not in self.storage and os.path.lexists(self.storage):
             check_readable("--storage", Path(self.storage), LARGEST_JOURNAL)
@@ -94,13 +95,12 @@ class Tune:
 
     def _plan(self, folder: Path) -> SearchPlan:
         from ibvs_qp.pilot import PilotConfig
-        from sim.flight.options import default_preset
         from sim.tune.search import SearchPlan
 
-        start = PilotConfig.from_toml(self.preset) if self.preset else default_preset(self.law)
+        start = PilotConfig.from_toml(preset) if (preset := preset_file(self.preset)) else ibvs_qp.preset(self.law)
         return SearchPlan(
             shipped=dataclasses.replace(start, law=self.law),
-            other=default_preset("paper" if self.law == "qp" else "qp"),
+            other=ibvs_qp.preset("paper" if self.law == "qp" else "qp"),
             trials=self.trials,
             seed=self.seed,
             flights=self.flights,

@@ -6,6 +6,7 @@ import itertools
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
+import ibvs_qp
 from sim.evaluate import measures
 from sim.experiments import ALL, NAMES
 from sim.experiments.spec import Experiment, Flights, Value, experiment
@@ -14,7 +15,7 @@ from sim.faults.air import WindStep
 from sim.faults.fault import Fault
 from sim.faults.rotors import Derate
 from sim.flight.jobs import PaintJob, PressJob
-from sim.flight.options import FlightOptions, default_preset, pilot_config, unsupervised
+from sim.flight.options import FlightOptions, pilot_config, unsupervised
 from sim.sweep.design import FlightPlan, Parameter, Run
 from sim.sweep.setup import Setup, changed
 from sim.world.random_scene import EVALUATION, random_scene
@@ -103,7 +104,7 @@ def _setup(
         paths = (*experiment.paths.get(name, ()), *flights.paths.get(name, ()))
         values |= dict.fromkeys(paths, value)
         values |= experiment.named.get(name, {}).get(str(value), {})
-    pilot = unsupervised(VARIANTS[variant].apply(default_preset(law)))
+    pilot = unsupervised(VARIANTS[variant].apply(ibvs_qp.preset(law)))
     if FORCE_GAIN in level:
         pilot = with_force_gain(pilot, float(level[FORCE_GAIN]))
     job = PaintJob() if flights.measure.startswith("paint") else PressJob()

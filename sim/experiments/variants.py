@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import ibvs_qp
 from ibvs_qp.config import AngularRateSettings
 from ibvs_qp.config.settings import from_dict
 from ibvs_qp.config.toml_text import read_toml
 from ibvs_qp.pilot import PilotConfig
-from sim.flight.options import default_preset
 
 #: The gyro in full, and no lead.
 GYRO_ITSELF = AngularRateSettings(gyro_bandwidth_hz=1000.0, lead_s=0.0)
@@ -34,7 +34,7 @@ class Variant:
         """The configuration with the switches set."""
         changes: dict[str, Any] = dict(self.switches)
         if self.gains_of:
-            changes["gains"] = default_preset(self.gains_of).controller.gains
+            changes["gains"] = ibvs_qp.preset(self.gains_of).controller.gains
         if self.gyro_rate:
             changes["angular_rate"] = GYRO_ITSELF
         return dataclasses.replace(config, controller=dataclasses.replace(config.controller, **changes))

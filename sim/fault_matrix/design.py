@@ -6,12 +6,13 @@ import fnmatch
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import ibvs_qp
 from ibvs_qp.config.errors import ConfigError, out_of_range
 from ibvs_qp.pilot import PilotConfig
 from sim.evaluate.measures import fault_figures
 from sim.experiments.scenes import short_job
 from sim.faults.scenario import WATCH_S, Scenario, scenarios
-from sim.flight.options import FlightOptions, default_preset, pilot_config, unsupervised
+from sim.flight.options import FlightOptions, pilot_config, unsupervised
 from sim.sweep.design import FlightPlan, Run
 from sim.world.scene import Scene
 from sim.world.worlds import in_world
@@ -75,7 +76,7 @@ def job_scene(world: str) -> Scene:
 
 def pilot_of(variant: str) -> PilotConfig:
     """The shipped preset of the QP law, with or without the supervisor."""
-    preset = default_preset("qp")
+    preset = ibvs_qp.preset("qp")
     return preset if variant == SUPERVISED else unsupervised(preset)
 
 

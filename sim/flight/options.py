@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 from dataclasses import dataclass
-from pathlib import Path
 
 import ibvs_qp
 from ibvs_qp.config.errors import out_of_range
 from ibvs_qp.pilot import PilotConfig
 from sim.world.plant import TICK_NS
 from sim.world.scene import Scene
-
-#: Shipped presets, one per law.
-PRESETS = Path(ibvs_qp.__file__).parent / "presets"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,13 +35,6 @@ class FlightOptions:
     journal: str = ""
 
 
-@functools.lru_cache(maxsize=4)
-def default_preset(law: str) -> PilotConfig:
-    """The shipped preset of a law; both were tuned by the same search (docs/tuning.md)."""
-    file = PRESETS / f"tarot_t960_{law}.toml"
-    return PilotConfig.from_toml(file) if file.exists() else PilotConfig(law=law)
-
-
 def unsupervised(config: PilotConfig) -> PilotConfig:
     """The same pilot without its supervisor, for studies of the laws and for control flights."""
     return dataclasses.replace(config, safety=dataclasses.replace(config.safety, supervise=False))
@@ -64,7 +52,7 @@ def pilot_config(scene: Scene, options: FlightOptions, config: PilotConfig | Non
         ConfigError: If the controller expects another period than the one that is simulated.
     """
     if config is None:
-        config = PilotConfig.from_toml(options.preset) if options.preset else default_preset(options.law)
+        config = PilotConfig.from_toml(options.preset) if options.preset else ibvs_qp.preset(options.law)
     if round(config.controller.tick_s * 1e9) != TICK_NS:
         allowed = f"the simulated loop ticks every {TICK_NS * 1e-9:g} s"
         raise out_of_range("controller.tick_s", config.controller.tick_s, "s", allowed)

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import ibvs_qp
 from ibvs_qp.config.contact_margin import require_margin
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.settings import dump_toml
-from sim.flight.options import default_preset
 from sim.flight.trace import Trace
 from sim.notebook.knobs import KNOBS, knob_values, turned
 from sim.notebook.wall_flights import Setting, fly_setting
@@ -98,7 +98,7 @@ def analytic_setting(setting: Setting, own_gains: bool = True) -> Setting:
         setting: Setting of the QP law.
         own_gains: Take the gains of the analytic law's own preset, tuned by the same search; else those of `setting`.
     """
-    plain = default_preset("paper" if own_gains else "qp").controller
+    plain = ibvs_qp.preset("paper" if own_gains else "qp").controller
     changes = {name: getattr(plain, name) for name in ("weights", "limits", "solver")}
     changes |= {"gains": plain.gains} if own_gains else {}
     controller = dataclasses.replace(setting.pilot.controller, **changes)

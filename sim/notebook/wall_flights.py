@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+import ibvs_qp
 from allocation import control_effectiveness
 from ibvs_qp.controller import HybridController
 from ibvs_qp.pilot import PilotConfig
@@ -17,7 +18,7 @@ from sim.evaluate.path_error import CONTACT_N
 from sim.evaluate.window import board_tip, mean, peak, phase_window, rms, tilt_deg
 from sim.experiments.scenes import near_wall
 from sim.flight.closed_loop import fly, make_pilot
-from sim.flight.options import FlightOptions, default_preset, pilot_config
+from sim.flight.options import FlightOptions, pilot_config
 from sim.flight.surroundings import World
 from sim.flight.trace import Trace
 from sim.notebook.internals import Tick, TickRecord, WallJob, record_tick
@@ -38,7 +39,7 @@ SETTLED_S, HOVER_S = 1.1, 1.0
 class Setting(Setup):
     """Pilot configuration with its law, scene and seed; equal settings give the same flight to the bit."""
 
-    pilot: PilotConfig = field(default_factory=lambda: default_preset("qp"))
+    pilot: PilotConfig = field(default_factory=lambda: ibvs_qp.preset("qp"))
     scene: Scene = field(default_factory=near_wall)
     seed: int = 0
 
@@ -75,7 +76,7 @@ class WallTask:
 
     def setting(self, law: str) -> Setting:
         """Preset of a law with these switches, and the scene."""
-        preset = default_preset(law)
+        preset = ibvs_qp.preset(law)
         controller = dataclasses.replace(
             preset.controller, reach_check=self.reach_check, contact_feedforward=self.feedforward
         )

@@ -9,12 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import ibvs_qp
 from ibvs_qp.config.errors import ConfigError, out_of_range
 from ibvs_qp.config.settings import choice, from_dict, setting, validate
 from ibvs_qp.config.toml_text import read_toml
 from ibvs_qp.pilot import PilotConfig
 from sim.flight.jobs import PaintJob, PressJob
-from sim.flight.options import FlightOptions, default_preset, pilot_config
+from sim.flight.options import FlightOptions, pilot_config
 from sim.sweep.axes import Axis, make_axis
 from sim.sweep.setup import Setup, changed, value_at
 from sim.world.scene import Scene, load_scene
@@ -93,7 +94,7 @@ def parse_spec(table: dict[str, Any], folder: Path) -> SweepSpec:
     setups = {}
     for law, file in (("qp", settings.preset_qp), ("paper", settings.preset_paper)):
         if law in settings.laws:
-            pilot = PilotConfig.from_toml(folder / file) if file else default_preset(law)
+            pilot = PilotConfig.from_toml(folder / file) if file else ibvs_qp.preset(law)
             setups[law] = changed(Setup(scene=scene, pilot=pilot, job=JOBS[settings.job]()), sections["fixed"])
     first = setups[settings.laws[0]]
     grid, random = (

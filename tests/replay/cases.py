@@ -6,12 +6,11 @@ import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
 
-import ibvs_qp
 from ibvs_qp import HybridController, PaperController, Pilot, PilotConfig, SafetySettings
+from ibvs_qp.presets import FOLDER
 
 from . import internals
 
-PRESETS = Path(ibvs_qp.__file__).parent / "presets"
 DATA = Path(__file__).parent / "data"
 #: Colour of the paint, RGB, as in the default scene.
 PAINT_COLOR = (40, 90, 200)
@@ -43,7 +42,7 @@ class Case:
 
     def config(self) -> PilotConfig:
         """The preset with what the case changes; replayed sensors do not answer the thrusts, so nothing supervises."""
-        preset = PilotConfig.from_toml(PRESETS / f"{self.preset}.toml")
+        preset = PilotConfig.from_toml(FOLDER / f"{self.preset}.toml")
         return dataclasses.replace(
             preset,
             controller=dataclasses.replace(preset.controller, reach_check=self.reach_check),

@@ -11,12 +11,12 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+import ibvs_qp
 from ibvs_qp.config.contact_margin import contact_mode_damping
 from sim.experiments.figures.common import Drawn, Results
 from sim.experiments.spec import FigureSpec
 from sim.experiments.variants import VARIANTS, with_force_gain
 from sim.figures.style import law_name, new_figure
-from sim.flight.options import default_preset
 from sim.sweep.parts import PARAM
 from sim.sweep.statistics import select
 from sim.world.scene import ForceTorqueScene, WallScene
@@ -43,7 +43,7 @@ def predicted_damping(law: str, variant: str, gain: float, stiffness: float, del
         stiffness: Stiffness of the wall [N/m].
         delay_s: Latency of the force/torque sensor [s]; half a sample period is added.
     """
-    config = VARIANTS[variant].apply(with_force_gain(default_preset(law), gain)).controller
+    config = VARIANTS[variant].apply(with_force_gain(ibvs_qp.preset(law), gain)).controller
     age = delay_s + 0.5 / ForceTorqueScene().rate_hz
     return contact_mode_damping(config, stiffness, WallScene().damping_n_s_m, age).least_damping_ratio
 

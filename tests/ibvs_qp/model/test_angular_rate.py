@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from symbolic_block import Block
 
+import ibvs_qp
 from allocation import control_effectiveness
 from ibvs_qp.analysis.motion_loop import MotionLoop
 from ibvs_qp.config import AngularRateSettings, ConfigError, ControllerConfig
@@ -16,7 +17,6 @@ from ibvs_qp.config.motion_margin import LARGEST_SENSITIVITY, motion_sensitivity
 from ibvs_qp.model.angular_rate import estimated_rate
 from ibvs_qp.model.inputs import Body
 from ibvs_qp.model.motor_thrust import motor_thrust
-from sim.flight.options import default_preset
 
 TICK = 0.004
 #: Motors that rise and fall alike, so that the vehicle is linear.
@@ -113,7 +113,7 @@ def test_the_sensitivity_is_that_of_the_flown_loop(omega: float) -> None:
 
 @pytest.mark.parametrize("law", ["qp", "paper"])
 def test_the_shipped_gains_keep_their_distance_from_instability(law: str) -> None:
-    config = default_preset(law).controller
+    config = ibvs_qp.preset(law).controller
     assert max(motion_sensitivity(config).values()) <= LARGEST_SENSITIVITY
     late = dataclasses.replace(config, angular_rate=AngularRateSettings(gyro_bandwidth_hz=2.0, lead_s=0.0))
     assert motion_sensitivity(late)["attitude"] > motion_sensitivity(config)["attitude"]

@@ -16,9 +16,12 @@ import pytest
 from contract_schema import check_summary
 from made_up_flights import fake_fly
 
+import ibvs_qp
 import sim.flight.side_by_side
 from ibvs_qp.config.errors import ConfigError
+from ibvs_qp.presets import FILES
 from sim.commands.cli import main
+from sim.commands.options import preset_file
 from sim.flight.flight_log import load_run
 from sim.flight.options import FlightOptions
 from sim.world.scene import PaintScene, Scene
@@ -136,7 +139,12 @@ def test_interrupt_while_drawing_keeps_the_log(flown, capsys, monkeypatch):
         (["paint", "--camera", "filament"], ["--camera", "filament", "plane", "gl"]),
         (["paint", "--vision", "new"], ["--vision", "new", "own", "paper"]),
         (["paint", "--sead", "3"], ["--sead", "--seed"]),
+        (["paint", "--scene", "dark"], ["dark", "--scene", "dark_board"]),
+        (["paint", "--preset", "scene.toml"], ["--preset scene.toml: this is a scene, not a preset"]),
+        (["paint", "--scene", "key.toml"], ["--scene key.toml: this is a preset, not a scene"]),
         (["compare"], ["compare", "paint"]),
+        (["pain"], ["unknown command pain; did you mean paint?"]),
+        (["fly"], ["unknown command fly; commands are paint, "]),
         ([], ["paint", "--help"]),
     ],
 )
@@ -148,6 +156,7 @@ def test_user_errors_are_one_line(flown, capsys, words, needles):
     (flown / "key.toml").write_text("[controller.gains]\nline_pk = 1.0\n")
     (flown / "value.toml").write_text("[controller]\ntick_s = 9.0\n")
     (flown / "rings.toml").write_text("[controller.gains]\nforce_ksp = 4000.0\n")
+    (flown / "scene.toml").write_text("[wall]\nfriction = 0.3\n")
     (flown / "file").write_text("")
     before = sorted(flown.rglob("*"))
     assert main(words) == 2
@@ -158,6 +167,19 @@ def test_user_errors_are_one_line(flown, capsys, words, needles):
         assert needle in err
     assert "Traceback" not in err
     assert sorted(flown.rglob("*")) == before, "a rejected command writes nothing"
+
+
+def test_shipped_files_have_names(flown):
+    assert main(["paint", "--scene", "dark_board", "--law", "qp", "--out", "run"]) == 0
+    assert "width_m = 1.35" in (flown / "run" / "scene.toml").read_text()
+    assert preset_file(Path("octorotor_qp")) == FILES["octorotor_qp"]
+    (flown / "octorotor_qp").write_text("law = 'qp'\n")
+    assert preset_file(Path("octorotor_qp")) == Path("octorotor_qp"), "a file in the way is meant"
+
+
+def test_the_version_is_that_of_the_package(capsys):
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out == f"ibvs-qp {ibvs_qp.__version__}\n"
 
 
 def test_unwritable_folder(flown, capsys, monkeypatch):

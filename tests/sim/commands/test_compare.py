@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import pytest
 from synthetic_trace import Errors, synthetic_trace
 
-import ibvs_qp
 import sim.sweep.flying
+from ibvs_qp.presets import FOLDER
 from sim.commands.cli import main
 
-PRESETS = Path(ibvs_qp.__file__).parent / "presets"
-PAIR = [str(PRESETS / "tarot_t960_qp.toml"), str(PRESETS / "tarot_t960_paper.toml")]
+PAIR = [str(FOLDER / "tarot_t960_qp.toml"), str(FOLDER / "tarot_t960_paper.toml")]
 SHORT = ["--quick", "--features", "geometric", "--seeds", "1", "--jobs", "1", "--json"]
 
 

@@ -17,13 +17,13 @@ from synthetic_trace import synthetic_trace
 import sim.flight.side_by_side
 import sim.storage.parquet
 import sim.sweep.flying
+from ibvs_qp.presets import FOLDER
 from sim.commands.cli import main
 from sim.flight.flight_log import load_run, save_log
-from sim.flight.options import PRESETS
 
 pytestmark = pytest.mark.timeout(120)
 SPECIAL = ("device", "terminal", "pipe", "socket", "folder", "loop", "missing", "huge")
-QP = str(PRESETS / "tarot_t960_qp.toml")
+QP = str(FOLDER / "tarot_t960_qp.toml")
 CAMERA = "--fx 600 --fy 600 --cx 320 --cy 240".split()
 #: Commands that read TOML; the file takes the place of FILE.
 TOML_COMMANDS = (
@@ -128,7 +128,7 @@ def tables() -> dict[str, bytes]:
 
 
 def test_parquet(refuses: Callable[..., str], capfd: pytest.CaptureFixture[str]) -> None:
-    good = (PRESETS.parents[1] / "docs" / "experiments" / "all.parquet").read_bytes()
+    good = (FOLDER.parents[1] / "docs" / "experiments" / "all.parquet").read_bytes()
     random = np.random.default_rng(3)
     cases = {"empty": b"", "text": b"PAR1" * 100, "cut": good[:5000], "no end": good[:-4], "no start": good[500:]}
     for place in random.integers(len(good) - 3000, len(good) - 8, 60):  # the footer: some of these make Polars panic

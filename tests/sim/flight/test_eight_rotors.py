@@ -11,6 +11,7 @@ from rotor_layouts import OCTOROTOR
 from scipy.linalg import null_space
 from small_vehicle import SmallVehicle
 
+import ibvs_qp
 from allocation import control_effectiveness, push_reach
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.config.vehicle import VehicleParams
@@ -18,7 +19,7 @@ from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import Reference
 from sim.evaluate.metrics import compute_metrics
 from sim.flight.closed_loop import fly
-from sim.flight.options import FlightOptions, default_preset
+from sim.flight.options import FlightOptions
 
 #: Thrust of a 13 inch propeller's motor [N].
 FULL = 35.0
@@ -27,7 +28,7 @@ VEHICLE = VehicleParams(geometry=OCTOROTOR, thrust_max_n=FULL, propeller_radius_
 
 @pytest.mark.parametrize("law", ["qp", "paper"])
 def test_paints_in_the_closed_loop(law: str) -> None:
-    preset = default_preset(law)
+    preset = ibvs_qp.preset(law)
     config = dataclasses.replace(preset, controller=dataclasses.replace(preset.controller, vehicle=VEHICLE))
     scene = short_scene(stroke_m=0.3, rows=1)
     trace = fly(scene, FlightOptions(law=law, features="geometric", video=False), config=config)

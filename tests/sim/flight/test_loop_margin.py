@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from closed_loop_rigs import HoldPainter, run, short_scene, wall
 
+import ibvs_qp
 from ibvs_qp.analysis.contact_loop import ContactLoop
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.config.contact_margin import (
@@ -25,7 +26,8 @@ from ibvs_qp.config.contact_margin import (
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.model import reach
 from ibvs_qp.pilot import Pilot, PilotConfig
-from sim.flight.options import PRESETS, FlightOptions, default_preset, pilot_config, unsupervised
+from ibvs_qp.presets import FOLDER
+from sim.flight.options import FlightOptions, pilot_config, unsupervised
 from sim.flight.surroundings import World
 from sim.world.scene import ForceTorqueScene, ImuScene, Scene
 
@@ -187,7 +189,7 @@ def test_more_gain_and_a_switched_off_impedance_cost_damping() -> None:
     )
 
 
-@pytest.mark.parametrize("file", sorted(PRESETS.glob("*.toml")), ids=lambda file: Path(file).stem)
+@pytest.mark.parametrize("file", sorted(FOLDER.glob("*.toml")), ids=lambda file: Path(file).stem)
 def test_every_preset_keeps_the_margin(file: Path) -> None:
     margin = require_margin(PilotConfig.from_toml(file).controller)
     assert margin.least_damping_ratio >= LEAST_DAMPING_RATIO
@@ -233,7 +235,7 @@ def test_a_brush_cannot_be_inside_out() -> None:
 @pytest.mark.parametrize("law", ["qp", "paper"])
 @pytest.mark.parametrize("quiet", [1.0, 0.5, 0.2, 0.05, 0.0])
 def test_vibration_takes_no_contact_below_the_damping_of_its_wall(law: str, quiet: float) -> None:
-    config = default_preset(law).controller
+    config = ibvs_qp.preset(law).controller
     for stiffness in (500.0, 1500.0, 4000.0, 10_000.0):
         margin = contact_mode_damping(config, stiffness, 30.0, 0.009, quiet)
         assert margin.least_damping_ratio >= min(LEAST_DAMPING_RATIO, margin.passive_damping_ratio)

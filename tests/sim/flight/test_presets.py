@@ -12,6 +12,7 @@ import pytest
 from closed_loop_rigs import short_scene
 from rotor_layouts import OCTOROTOR
 
+import ibvs_qp
 from allocation import TAROT_T960, Rotor, RotorGeometry
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.config.contact_margin import BrushSettings
@@ -19,13 +20,14 @@ from ibvs_qp.config.settings import from_dict
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.painting.config import PaintingConfig
 from ibvs_qp.pilot import PilotConfig
+from ibvs_qp.presets import FOLDER
 from sim.evaluate.metrics import compute_metrics
 from sim.flight.closed_loop import fly
-from sim.flight.options import PRESETS, FlightOptions, default_preset
+from sim.flight.options import FlightOptions
 from sim.tune.finalists import Finalist, best_of
 from sim.tune.objectives import OBJECTIVES, Score
 
-FILES = sorted(PRESETS.glob("*.toml"))
+FILES = sorted(FOLDER.glob("*.toml"))
 #: What differs from the nominal vehicle, by the beginning of the file's name.
 OCTO_VEHICLE = VehicleParams(geometry=OCTOROTOR, thrust_max_n=35.0, propeller_radius_m=0.165)
 VEHICLES = {"tarot_t960": VehicleParams(), "octorotor": OCTO_VEHICLE}
@@ -88,7 +90,7 @@ def test_the_gains_are_those_that_the_kept_search_chose(law: str) -> None:
     assert best_of(finalists) == search["chosen"]
     numbers = {row["number"]: row for row in search["all_trials"]}
     chosen = start if search["chosen"] is None else {name: numbers[search["chosen"]][name] for name in start}
-    assert written(PRESETS / f"tarot_t960_{law}.toml")["controller"]["gains"] == chosen
+    assert written(FOLDER / f"tarot_t960_{law}.toml")["controller"]["gains"] == chosen
 
 
 def finalist(row: dict[str, Any]) -> Finalist:
@@ -101,12 +103,12 @@ def finalist(row: dict[str, Any]) -> Finalist:
 def test_the_presets_of_the_laws_are_those_that_fly_by_default() -> None:
     assert VEHICLES["tarot_t960"].geometry == TAROT_T960
     for law in ("qp", "paper"):
-        assert default_preset(law) == PilotConfig.from_toml(PRESETS / f"tarot_t960_{law}.toml")
+        assert ibvs_qp.preset(law) == PilotConfig.from_toml(FOLDER / f"tarot_t960_{law}.toml")
 
 
 def test_the_octorotor_paints() -> None:
     scene = short_scene(stroke_m=0.3, rows=1)
-    options = FlightOptions(features="geometric", video=False, preset=str(PRESETS / "octorotor_qp.toml"))
+    options = FlightOptions(features="geometric", video=False, preset=str(FOLDER / "octorotor_qp.toml"))
     trace = fly(scene, options)
     assert trace.completed and trace.thrusts.shape[1] == 8
     assert compute_metrics(trace)["force_rms_straight_n"] <= 0.35

@@ -7,9 +7,10 @@ from typing import Any
 
 import pytest
 
+import ibvs_qp
 from sim.evaluate.metrics import compute_metrics
 from sim.flight.closed_loop import fly
-from sim.flight.options import FlightOptions, default_preset
+from sim.flight.options import FlightOptions
 from sim.flight.trace import Trace
 from sim.world.errors import WorldErrors, world_errors
 from sim.world.plant_scene import PlantScene
@@ -77,7 +78,7 @@ def test_the_analytic_law_completes_in_every_world(world: str) -> None:
 
 @pytest.mark.parametrize("down_m", [-0.005, 0.005])
 def test_a_tip_that_is_not_where_it_should_be_keeps_the_second_row_at_its_place(down_m: float) -> None:
-    front, right, down = default_preset("qp").controller.vehicle.tip_position_m  # believed
+    front, right, down = ibvs_qp.preset("qp").controller.vehicle.tip_position_m  # believed
     metrics = compute_metrics(flown(WorldErrors(), plant=PlantScene(tip_position_m=(front, right, down + down_m))))
     rows = [row["path_rms_straight_m"] for row in metrics["rows"]]
     assert metrics["completed"] and rows[0] > 4e-3 and rows[1] < 2e-3

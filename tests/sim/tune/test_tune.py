@@ -9,11 +9,11 @@ from types import SimpleNamespace
 
 import pytest
 
+import ibvs_qp
 import sim.sweep.flying
 import sim.tune.flights
 from ibvs_qp.pilot import PilotConfig
 from sim.commands.cli import main
-from sim.flight.options import default_preset
 from sim.tune.choice import STEEP, allowed, contact_damping, cost, front, gain_over, less_damped, ranked
 from sim.tune.finalists import Finalist, best_of, fly_finalists
 from sim.tune.flights import CHOICE_SEED, REPORT_SEED, SEARCH_SEED, WORLD, checks, flights, scenes, seeds
@@ -66,7 +66,7 @@ def made_up_figures(trace):
 def plan(trials: int, storage: str, **changes) -> SearchPlan:
     settings = {"seed": 0, "flights": 1, "features": "geometric", "jobs": 1} | changes
     return SearchPlan(
-        shipped=default_preset("qp"), other=default_preset("paper"), trials=trials, storage=storage, **settings
+        shipped=ibvs_qp.preset("qp"), other=ibvs_qp.preset("paper"), trials=trials, storage=storage, **settings
     )
 
 
@@ -80,8 +80,8 @@ def searched(trials: int, storage: str, **changes):
 def test_the_search_begins_at_the_shipped_gains_and_betters_them(flown):
     trials = searched(80, "a.log")
     gains, shipped = trials[0]
-    assert gains == searched_gains(default_preset("qp")) and len(trials) == 80
-    assert trials[1][0] == searched_gains(default_preset("paper"))
+    assert gains == searched_gains(ibvs_qp.preset("qp")) and len(trials) == 80
+    assert trials[1][0] == searched_gains(ibvs_qp.preset("paper"))
     assert trials[2][0] == gains | BY_HAND
     best = ranked({number: each for number, (_, each) in trials.items()}, shipped)
     assert best and gain_over(trials[best[0]][1], shipped) < -0.3
@@ -137,7 +137,7 @@ def test_a_preset_close_to_instability_is_not_flown(flown, monkeypatch):
 
 
 def test_search_choice_and_report_fly_seeds_of_their_own():
-    config, flown = with_gains(default_preset("paper"), {"line_kp": 11.0}), scenes() | checks()
+    config, flown = with_gains(ibvs_qp.preset("paper"), {"line_kp": 11.0}), scenes() | checks()
     spans = [
         {run.seed for run in flights(flown, config, "tuned", seeds(first, seed, 10), "geometric")}
         for first in (SEARCH_SEED, CHOICE_SEED, REPORT_SEED)
@@ -214,13 +214,13 @@ def test_command_writes_preset_trials_figures_and_verdict(flown, capsys):
 
 
 def test_nothing_better_keeps_the_shipped_preset(flown, monkeypatch, capsys):
-    shipped = default_preset("paper").controller.gains
+    shipped = ibvs_qp.preset("paper").controller.gains
     for name in BEST:
         monkeypatch.setitem(BEST, name, getattr(shipped, name))
     assert main(["tune", "--law", "paper", "--trials", "4", "--json", "--out", "run"]) == 0
     content = json.loads(capsys.readouterr().out)
     assert content["chosen"] is None and content["unseen"] == []
-    assert PilotConfig.from_toml(content["preset"]) == default_preset("paper")
+    assert PilotConfig.from_toml(content["preset"]) == ibvs_qp.preset("paper")
     assert "shipped preset stays" in Path("run/report_paper.md").read_text()
 
 

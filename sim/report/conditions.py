@@ -1,0 +1,61 @@
+"""What two runs did not have in common: options, scene and presets, key by key."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from ibvs_qp.config.toml_text import parse_toml, read_toml
+from ibvs_qp.pilot import PilotConfig
+from sim.storage.json_file import read_json
+
+#: Facts of a run's summary that change its figures.
+FACTS = ("version", "seed", "world", "features", "vision", "camera", "image_size")
+#: A key that one side lacks.
+ABSENT = "–"
+
+
+def differing_runs(a: Path, b: Path) -> list[dict[str, Any]]:
+    """Differing facts, scene and presets of two `paint` runs; runs of experiments name theirs in their tables.
+
+    Args:
+        a: Run folder.
+        b: The other one.
+
+    Returns:
+        Per difference: name, and its value in a and b.
+    """
+    if not all((path / "summary.json").is_file() for path in (a, b)):
+        return []
+    first, second = (read_json(path / "summary.json") for path in (a, b))
+    pairs: list[tuple[str, dict[str, Any], dict[str, Any]]] = [
+        ("", {name: first.get(name) for name in FACTS}, {name: second.get(name) for name in FACTS})
+    ]
+    names = ["scene.toml", *sorted(file.name for file in a.glob("preset_*.toml"))]
+    for name in names:
+        if (a / name).is_file() and (b / name).is_file():
+            pairs.append((f"{Path(name).stem}.", read_toml(a / name), read_toml(b / name)))
+    found = [each for prefix, x, y in pairs for each in _differences(prefix, x, y)]
+    if any(each["name"] == "world" for each in found):  # which says it shorter than its numbers
+        found = [each for each in found if not each["name"].startswith("scene.errors.")]
+    return found
+
+
+def differing_presets(a: Path, b: Path) -> list[dict[str, Any]]:
+    """Differing keys of two presets, defaults filled in."""
+    first, second = (parse_toml(PilotConfig.from_toml(file).to_toml(), file) for file in (a, b))
+    return _differences("preset.", first, second)
+
+
+def _differences(prefix: str, a: dict[str, Any], b: dict[str, Any]) -> list[dict[str, Any]]:
+    x, y = _flat(prefix, a), _flat(prefix, b)
+    names = [*x, *(name for name in y if name not in x)]
+    pairs = ((name, x.get(name, ABSENT), y.get(name, ABSENT)) for name in names)
+    return [{"name": name, "a": first, "b": second} for name, first, second in pairs if first != second]
+
+
+def _flat(prefix: str, table: dict[str, Any]) -> dict[str, Any]:
+    flat: dict[str, Any] = {}
+    for name, value in table.items():
+        flat |= _flat(f"{prefix}{name}.", value) if isinstance(value, dict) else {prefix + name: value}
+    return flat
