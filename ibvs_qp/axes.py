@@ -1,0 +1,107 @@
+"""ROS's axes (body front-left-up, world east-north-up) to ours (front-right-down, north-east-down), and back.
+
+Both exchanges of axes are rotations by half a turn, so one function serves both directions:
+``swap_axes(swap_axes(value))`` is the value. Lines, planes and pictures are in the camera's optical frame
+(right-down-front), which ROS shares, and stay as they are; so does the reference in the wall plane (right, down).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from functools import singledispatch
+from typing import Any, TypeVar
+
+import numpy as np
+
+from ibvs_qp.command import Command
+from ibvs_qp.measurement import FeatureFrame, Measurement, Reference, SensorFrame
+
+Value = TypeVar("Value", Measurement, SensorFrame, FeatureFrame, Reference, Command)
+#: Signs of a vector in B: front stays, left is minus right, up is minus down; and of roll and pitch.
+_BODY, _ANGLES = np.array((1.0, -1.0, -1.0)), np.array((1.0, -1.0))
+
+
+def swap_vector(vector: Any) -> np.ndarray:
+    """A vector in the body frame, or a wrench, in the other axes.
+
+    Args:
+        vector: (x, y, z), or (force, moment), (3,) or (6,), any unit.
+
+    Returns:
+        (x, -y, -z) of each part.
+    """
+    array = np.asarray(vector, float)
+    return array * np.tile(_BODY, len(array) // 3)
+
+
+def swap_attitude(quaternion: Any) -> np.ndarray:
+    r"""Attitude of the body in the world, in the other axes of both.
+
+    .. math:: R_{NED \leftarrow FRD} = S\, R_{ENU \leftarrow FLU}\, \mathrm{diag}(1, -1, -1),
+
+    with S exchanging east and north and turning up into down.
+
+    Args:
+        quaternion: (w, x, y, z), (4,). ROS messages order it (x, y, z, w).
+
+    Returns:
+        (w, x, y, z), (4,).
+    """
+    w, x, y, z = np.asarray(quaternion, float)
+    return math.sqrt(0.5) * np.array((w + z, x + y, x - y, w - z))
+
+
+def swap_covariance(covariance: Any) -> np.ndarray:
+    """Covariance of a vector in the body frame, (3, 3), in the other axes."""
+    return np.asarray(covariance, float) * np.outer(_BODY, _BODY)
+
+
+@singledispatch
+def swap_axes(value: Value) -> Value:
+    """A measurement, sensor frame, feature frame, reference or command in the other axes.
+
+    Args:
+        value: In front-left-up and east-north-up, or in front-right-down and north-east-down.
+
+    Returns:
+        The same in the other ones; stamps, lines, planes and pictures unchanged.
+
+    Raises:
+        TypeError: For a value of another type.
+    """
+    raise TypeError(f"{type(value).__name__} has no axes to swap")
+
+
+def _changed(value: Any, vectors: tuple[str, ...], **others: Any) -> Any:
+    """Copy with vectors swapped; None stays None, and what ``others`` change by a function of the old value."""
+    swapped = {name: swap_vector(old) for name in vectors if (old := getattr(value, name)) is not None}
+    more = {name: swap(old) for name, swap in others.items() if (old := getattr(value, name)) is not None}
+    return dataclasses.replace(value, **swapped, **more)
+
+
+@swap_axes.register
+def _(value: Measurement) -> Measurement:
+    vectors = ("angular_velocity", "specific_force", "contact_wrench", "velocity", "acceleration_bias")
+    return _changed(value, vectors, attitude=swap_attitude, velocity_covariance=swap_covariance)
+
+
+@swap_axes.register
+def _(value: SensorFrame) -> SensorFrame:
+    vectors = ("angular_velocity", "specific_force", "wrench")
+    return _changed(value, vectors, attitude=swap_attitude, features=swap_axes)
+
+
+@swap_axes.register
+def _(value: FeatureFrame) -> FeatureFrame:
+    return _changed(value, ("velocity",), velocity_covariance=swap_covariance)
+
+
+@swap_axes.register
+def _(value: Reference) -> Reference:
+    return _changed(value, (), tilt=_ANGLES.__mul__, trim=_ANGLES.__mul__)
+
+
+@swap_axes.register
+def _(value: Command) -> Command:
+    return _changed(value, ("wrench", "unallocated_wrench"))
