@@ -28,7 +28,7 @@ if TYPE_CHECKING:
         RgbdFrame,
         SensorFrame,
     )
-    from ibvs_qp.pilot import Pilot, PilotConfig
+    from ibvs_qp.pilot import FlightStatus, Pilot, PilotConfig
     from ibvs_qp.presets import preset
 
 __all__ = [
@@ -39,6 +39,7 @@ __all__ = [
     "ConfigError",
     "ControllerConfig",
     "FeatureFrame",
+    "FlightStatus",
     "HybridController",
     "IbvsQpError",
     "LineFeature",
@@ -70,7 +71,7 @@ _HOMES = {
     "ibvs_qp.config.safety": ("SafetySettings",),
     "ibvs_qp.controller": ("HybridController",),
     "ibvs_qp.config.errors": ("ConfigError", "IbvsQpError"),
-    "ibvs_qp.pilot": ("Pilot", "PilotConfig"),
+    "ibvs_qp.pilot": ("FlightStatus", "Pilot", "PilotConfig"),
     "ibvs_qp.config.vehicle": ("VehicleParams",),
     "ibvs_qp.presets": ("preset",),
 }

@@ -2,5 +2,6 @@
 
 from ibvs_qp.pilot.config import PilotConfig
 from ibvs_qp.pilot.pilot import Controller, Pilot
+from ibvs_qp.pilot.status import FlightStatus
 
-__all__ = ["Controller", "Pilot", "PilotConfig"]
+__all__ = ["Controller", "FlightStatus", "Pilot", "PilotConfig"]

@@ -34,6 +34,7 @@ from ibvs_qp.pilot.attitude_history import AttitudeHistory
 from ibvs_qp.pilot.camera import CameraInput
 from ibvs_qp.pilot.config import PilotConfig
 from ibvs_qp.pilot.inertial import INERTIAL, InertialData
+from ibvs_qp.pilot.status import Event, FlightStatus
 from ibvs_qp.safety.assurance import Assurance
 from ibvs_qp.safety.policy import Fault
 from ibvs_qp.safety.rotor_loss import RotorLoss
@@ -138,6 +139,20 @@ class Pilot:
     @thrust_limits.setter
     def thrust_limits(self, limits: Any) -> None:
         self._limits.assign(limits)
+
+    @property
+    def status(self) -> FlightStatus:
+        """Where the flight stands after the last tick."""
+        painter, supervisor = self.painter, self.assurance.supervisor
+        ended = supervisor.state is SafetyState.TERMINATED
+        return FlightStatus(
+            phase=painter.phase,
+            finished=painter.finished or ended,
+            failed=painter.failed or ended,
+            reason="; ".join(supervisor.reasons) if ended else painter.reason,
+            safety=supervisor.state,
+            events=tuple(Event(*entry) for entry in painter.log),
+        )
 
     @property
     def percept(self) -> Percept | None:

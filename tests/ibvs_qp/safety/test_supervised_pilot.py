@@ -16,7 +16,7 @@ from ibvs_qp.command import Command, Outcome, SafetyState
 from ibvs_qp.measurement import SensorFrame
 from ibvs_qp.painting.command import PainterInput, PaintingCommand
 from ibvs_qp.painting.painter import Painter
-from ibvs_qp.pilot import Pilot, PilotConfig
+from ibvs_qp.pilot import FlightStatus, Pilot, PilotConfig
 
 #: Ticks before a fault: noise of the sensors has been seen.
 QUIET = 70
@@ -179,7 +179,12 @@ def test_a_rotor_that_does_not_follow_is_limited_beside_what_the_drive_reports(p
 
 def test_a_vehicle_on_its_side_gets_no_thrust_with_or_without_a_frame(pilot: Pilot) -> None:
     fallen = {"attitude": attitude(1.3)}
+    assert pilot.status == FlightStatus(
+        phase="start", finished=False, failed=False, reason="", safety=SafetyState.NOMINAL, events=()
+    )
     command = standing(pilot, 150, lambda frame: fallen)
+    status = pilot.status
+    assert status.finished and status.failed and "flipped" in status.reason and status.safety is command.safety
     assert command.safety is SafetyState.TERMINATED and command.outcome is Outcome.HOLD
     np.testing.assert_allclose(command.thrusts, FLOOR, atol=1e-6)
     broken = [pilot.step(None) for _ in range(5)]  # type: ignore[arg-type]

@@ -1,0 +1,37 @@
+"""Where a flight stands, for those who fly a Pilot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from ibvs_qp.command import SafetyState
+
+
+class Event(NamedTuple):
+    """A change of phase, or something that the strategy met."""
+
+    time_s: float  # since the first tick [s]
+    name: str  # phase or event
+    reason: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class FlightStatus:
+    """State of a flight after the last tick.
+
+    Attributes:
+        phase: Phase of the strategy: start, approach, align, press, paint, climb, retreat, done.
+        finished: Whether the flight has ended: nothing more happens, the vehicle may be taken over.
+        failed: Whether the job was not, or will not be, completed.
+        reason: Why it ended or failed; empty until then.
+        safety: State of the supervisor.
+        events: Phases and events so far, oldest first.
+    """
+
+    phase: str
+    finished: bool
+    failed: bool
+    reason: str
+    safety: SafetyState
+    events: tuple[Event, ...]
