@@ -9,16 +9,18 @@ import numpy as np
 
 from ibvs_qp.checked_law import CheckedLaw, Inputs
 from ibvs_qp.command import Command, SafetyState
-from ibvs_qp.config import SafetySettings
+from ibvs_qp.config import LONGEST_TICK, SafetySettings
 from ibvs_qp.estimation.contact_state import ContactState
-from ibvs_qp.frames import dot, down_in_body
+from ibvs_qp.frames import dot, down_in_body, roll_pitch
 from ibvs_qp.measurement import Measurement, Reference
 from ibvs_qp.model.reporting import fixed_command, hover_command
 from ibvs_qp.safety.assurance import Assurance
 from ibvs_qp.safety.policy import Fault
+from ibvs_qp.safety.rotor_loss import RotorLoss
 from ibvs_qp.safety.tick import Tick
 from ibvs_qp.validation.failure import raised
 from ibvs_qp.validation.measurement import answered_stamp
+from ibvs_qp.validation.self_check import SelfCheck
 
 #: Fields without which a measurement has no inertial sample.
 _ATTITUDE = ("attitude", "angular_velocity")
@@ -40,13 +42,18 @@ class Assured:
 
     def __init__(self, controller: CheckedLaw, settings: SafetySettings | None = None) -> None:
         self.controller = controller
-        self.assurance = Assurance(controller.config.vehicle, settings or SafetySettings())
+        vehicle, gains = controller.config.vehicle, controller.config.gains
+        self.assurance = Assurance(vehicle, settings or SafetySettings())
+        self.self_check = SelfCheck(self.assurance.settings.self_check)
+        self._rotors, self._tip = RotorLoss(vehicle, gains), vehicle.tip_position_m
         self.reset()
 
     def reset(self) -> None:
         """As after construction."""
         self.controller.reset()
         self.assurance.reset()
+        self.self_check.reset()
+        self._rotors.reset()
         self._attitude_ns = self._imu_ns = self._wrench_ns = self._plane_ns = self._lines_ns = -1
         self._descended_m, self._time_ns = 0.0, -1
 
@@ -58,16 +65,20 @@ class Assured:
             inputs = self.controller.check(measurement, reference, contact)
             if self.assurance.state is not SafetyState.NOMINAL:
                 inputs = inputs._replace(reference=self.assurance.supervised(inputs.reference))
+            if inputs.measurement is not None:
+                inputs = self._with_rotors(inputs, inputs.measurement)
             command = self._command(inputs)
             shown = self.assurance.explained(command)
             if inputs.measurement is None:
+                self.assurance.miss(self.controller.config.tick_s)
                 return shown
             tick = self._tick(inputs.measurement, command, inputs.reference)
             self.assurance.watch(tick, self.controller.setpoints)
             return self.controller.gate.clock.answered(shown)
         except Exception as error:  # in flight nothing may raise; thrusts that were found are not replaced
-            setpoints, inertial = self.controller.setpoints, self.controller.gate.inertial
-            command = command or hover_command(setpoints, stamp, inertial, ())
+            if command is None:
+                command = hover_command(self.controller.setpoints, stamp, self.controller.gate.inertial, ())
+                self.assurance.miss(self.controller.config.tick_s)
             rejected = (*command.rejected, raised("assured", error))
             return self.assurance.explained(dataclasses.replace(command, stamp_ns=stamp, rejected=rejected))
 
@@ -84,6 +95,31 @@ class Assured:
             inputs = inputs._replace(measurement=checked)
         return self.controller.respond(inputs)
 
+    def _with_rotors(self, inputs: Inputs, checked: Measurement) -> Inputs:
+        """Inputs with the limits of rotors that do not follow, and with the attitude at which those left carry it."""
+        low, high = checked.thrust_min, checked.thrust_max
+        if low is None and high is None and self.assurance.limits(None) is None:
+            return inputs
+        setpoints, rotors, tilted = self.controller.setpoints, self._rotors, self._rotors.tilts
+        limits = self.assurance.limits(
+            (setpoints.floor if low is None else low, setpoints.ceiling if high is None else high)
+        )
+        rotors.update(limits)
+        changes: dict[str, object] = {} if limits is None else {"thrust_min": limits[0], "thrust_max": limits[1]}
+        reference, contact = inputs.reference, setpoints.contact
+        if rotors.turns(contact.normal[0]):  # the force sensor measures the tool that swings round
+            changes["contact_wrench"] = np.zeros(6)
+        if rotors.tilts and self.assurance.settings.supervise:
+            if not tilted:
+                rotors.begin(roll_pitch(checked.attitude.tolist()))
+            normal, velocity = np.array(contact.normal), checked.velocity
+            along = 0.0 if velocity is None else float(setpoints.right @ velocity)
+            dt = (checked.stamp_ns - self._time_ns) * 1e-9 if self._time_ns >= 0 else self.controller.config.tick_s
+            away = contact.distance + float(normal @ np.array(self._tip))
+            tilt = rotors.tilt(away, contact.speed, along, normal, min(dt, LONGEST_TICK))
+            reference = dataclasses.replace(reference, **{"tilt" if rotors.lost else "trim": tilt})
+        return inputs._replace(measurement=dataclasses.replace(checked, **changes), reference=reference)
+
     def _tick(self, checked: Measurement, command: Command, reference: Reference) -> Tick:
         """The tick as the monitors see it, in monotonic time."""
         gate, setpoints = self.controller.gate, self.controller.setpoints
@@ -97,19 +133,26 @@ class Assured:
         self._wrench_ns = checked.wrench_stamp_ns
         if checked.plane is not None:
             self._plane_ns = max(self._plane_ns, checked.plane_stamp_ns)
-        if newest := max([line.stamp_ns for line in checked.lines], default=0):
-            self._lines_ns = max(self._lines_ns, newest)
+        newest = max([line.stamp_ns for line in checked.lines], default=0)
+        if newest > self._lines_ns and newest:
+            picture = tuple([(line.rho, line.theta) for line in checked.lines])
+            if self.assurance.is_news(picture):
+                self._lines_ns = newest
         attitude, rate, force = checked.attitude.tolist(), checked.angular_velocity.tolist(), checked.specific_force
         speed, down = math.nan, down_in_body(attitude)
+        dt = (now - self._time_ns) * 1e-9 if self._time_ns >= 0 else 0.0
         if checked.velocity is not None:
             velocity = checked.velocity.tolist()
             speed = math.hypot(*velocity)
-            elapsed = (now - self._time_ns) * 1e-9 if self._time_ns >= 0 else 0.0
-            self._descended_m += elapsed * dot(velocity, down)
+            self._descended_m += dt * dot(velocity, down)
         self._time_ns = now
         faults: dict[Fault, str] = {}
         if now - self._attitude_ns > self.assurance.settings.imu_age_s * 1e9:
             faults[Fault.NO_ATTITUDE] = "attitude or gyro missing"
+        if self._rotors.lost:
+            faults[Fault.NO_HOVER] = ""
+        if not self.self_check.done:
+            self._check_axes(checked, missing, faults, dt or self.controller.config.tick_s)
         return Tick(
             stamp_ns=now,
             imu_ns=self._imu_ns,
@@ -128,3 +171,16 @@ class Assured:
             outcome=command.outcome,
             faults=faults,
         )
+
+    def _check_axes(self, checked: Measurement, missing: tuple[str, ...], faults: dict[Fault, str], dt: float) -> None:
+        """Self-check with those sensors that the tick has; the contact wrench is that of the tool on the vehicle."""
+        check, contact = self.self_check, self.controller.setpoints.contact
+        if checked.specific_force is not None and not any(name in missing for name in _INERTIAL):
+            check.inertial(
+                checked.attitude.tolist(), checked.angular_velocity.tolist(), checked.specific_force.tolist(), dt
+            )
+        if "contact_wrench" not in missing:
+            tool = (-checked.contact_wrench[:3]).tolist()
+            check.contact(tool, contact.push_noise, contact.normal, contact.distance, dt)
+        if found := check.faults():
+            faults[Fault.INPUTS] = "; ".join(found)

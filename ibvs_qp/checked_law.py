@@ -17,6 +17,9 @@ from ibvs_qp.validation.failure import raised
 from ibvs_qp.validation.measurement import MeasurementGate, answered_stamp
 from ibvs_qp.validation.reference import ReferenceGate
 
+#: Without a measured velocity the integral alone moves the vehicle: a slide falls short.
+NO_VELOCITY = "velocity: missing, the reference's velocity is hardly followed"
+
 
 class Inputs(NamedTuple):
     """Checked inputs of one tick, in the time of the measurements' clock."""
@@ -78,6 +81,8 @@ class CheckedLaw(ABC):
         checked, rejected = self.gate.check(measurement)
         reference, refused = self.references.check(reference)
         contact, unusable = check_contact(contact)
+        if checked is not None and checked.velocity is None and reference.velocity.any():
+            unusable += (NO_VELOCITY,)
         return Inputs(answered_stamp(measurement), checked, reference, contact, rejected + refused + unusable)
 
     def respond(self, inputs: Inputs) -> Command:

@@ -15,6 +15,9 @@ class SafetySettings:
     self_check: bool = setting(True, "find sensor data in other axes than FRD and NED before the first touch")
 
     image_age_s: float = setting(0.2, "oldest picture: latency, and two dropped ones", unit="s", low=0.05, high=5.0)
+    first_picture_s: float = setting(
+        3.0, "first picture and wall plane after the start, where they are expected", unit="s", low=0.1, high=600.0
+    )
     plane_age_s: float = setting(0.3, "oldest wall plane", unit="s", low=0.05, high=5.0)
     lines_age_s: float = setting(0.5, "oldest picture with a line", unit="s", low=0.1, high=10.0)
     wrench_age_s: float = setting(0.03, "oldest force sample: three periods at 100 Hz", unit="s", low=0.005, high=1.0)

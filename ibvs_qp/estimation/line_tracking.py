@@ -24,6 +24,7 @@ class LineTracks:
 
     Attributes:
         lines: The lines by identity.
+        seen_ns: Capture of the last frame of which a line was accepted, -1 before the first.
 
     Args:
         motion: Filter whose state ends with `SLOTS` offsets; entries 0 and 1 are the velocity, 4 and 5 the odometer.
@@ -37,6 +38,7 @@ class LineTracks:
     def reset(self) -> None:
         """Drop every line."""
         self.lines: dict[int, TrackedLine] = {}
+        self.seen_ns = -1
         self._noise_rho, self._noise_theta = WhiteNoise(), WhiteNoise()  # of all lines: the prior of a new one
         self._filter.chain[LINES:, :] = 0.0
         for slot in range(SLOTS):
@@ -79,6 +81,7 @@ class LineTracks:
         if track.seen_ns != stamp:
             track.frames += 1
         track.seen_ns, track.news_ns = stamp, tick_ns
+        self.seen_ns = max(self.seen_ns, stamp)
         track.fresh_weight = min(1.0, track.frames / self._config.frames_to_trust) * line.weight
         track.surface_side, track.kind = measured.surface_side, line.kind or track.kind
         self._couple(track)

@@ -83,6 +83,11 @@ class WallMotion:
         return self._tracks.lines
 
     @property
+    def lines_ns(self) -> int:
+        """Capture of the last frame of which a line was accepted, -1 before the first [ns]."""
+        return self._tracks.seen_ns
+
+    @property
     def ticks(self) -> StampRing:
         """Stamps of the ticks remembered."""
         return self._filter.ticks

@@ -30,7 +30,7 @@ def check_contact(contact: Any) -> tuple[ContactState | None, tuple[str, ...]]:
     """The contact of a caller if its numbers are sound; otherwise None, and the rejection of what is none."""
     if contact is None:
         return None, ()
-    if not isinstance(contact, ContactState):
+    if not issubclass(type(contact), ContactState):
         return None, ("contact: not a ContactState",)
     return (contact, ()) if _is_sound(contact) else (None, ("contact: not finite, or its normal has not length 1",))
 

@@ -23,7 +23,7 @@ class CameraInput:
     Attributes:
         percept: What perception found in the last picture, or None.
         plane, plane_ns: Wall in the camera frame (nx, ny, nz, d) of the last features with one, and their stamp.
-        image_ns, lines_ns: Stamps of the last features, and of the last with a line; -1 for never.
+        image_ns: Stamp of the last features, -1 for never.
 
     Args:
         config: Configuration of the flight.
@@ -47,7 +47,7 @@ class CameraInput:
             self._perception.reset()
         self.percept, self._capture_ns = None, -1
         self.plane: tuple[float, float, float, float] | None = None
-        self.plane_ns = self.image_ns = self.lines_ns = -1
+        self.plane_ns = self.image_ns = -1
 
     def perceive(
         self,
@@ -74,10 +74,9 @@ class CameraInput:
             return None
         features = check_features(features, self._most_lines, rejected)
         if not is_news(_content(frame, features)):
+            rejected.append("picture: repeats the last one")
             return None
         self.image_ns = features.stamp_ns
-        if features.lines:
-            self.lines_ns = features.stamp_ns
         if features.plane is not None:
             self.plane, self.plane_ns = features.plane, features.stamp_ns
         return features

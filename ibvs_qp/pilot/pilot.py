@@ -192,6 +192,7 @@ class Pilot:
     def _hold(self, frame: Any) -> Command:
         """Command of a tick without a frame: the controller refuses a measurement of the same time, and holds."""
         setpoints, stamp = self.setpoints, answered_stamp(frame)
+        self.assurance.miss(self.config.controller.tick_s)
         fixed = self.assurance.thrusts(setpoints.last, setpoints.floor)
         if fixed is not None:
             return self.assurance.explained(fixed_command(setpoints, stamp, fixed, ()))
@@ -247,7 +248,7 @@ class Pilot:
     def _levelled(self, frame: SensorFrame, dt: float) -> SensorFrame:
         """The frame with the inertial data to fly by; those that fail are estimated."""
         measured, inertial = self._gate.last, self._inertial
-        missing = {name for name in INERTIAL if name in self._gate.replaced}
+        missing = {name for name in INERTIAL if name in self._gate.replaced} | self._stale(frame)
         if Fault.IMU_FROZEN in self.assurance.faults:
             missing = set(INERTIAL)
         if not missing:
@@ -255,6 +256,15 @@ class Pilot:
         angles = {identity: line.angle for identity, line in self.motion.lines.items()}
         normal = self.contact.state.normal
         return inertial.estimate(frame, measured, missing, dt, motors=self.setpoints, normal=normal, angles=angles)
+
+    def _stale(self, frame: SensorFrame) -> set[str]:
+        """Inertial sensors whose stamps are too old."""
+        oldest, stale = frame.stamp_ns - round(1e9 * self.config.safety.imu_age_s), set[str]()
+        if frame.attitude_stamp_ns is not None and frame.attitude_stamp_ns < oldest:
+            stale.add(INERTIAL[0])
+        if frame.imu_stamp_ns is not None and frame.imu_stamp_ns < oldest:
+            stale.update(INERTIAL[1:])
+        return stale
 
     def _command(self, contact: ContactState) -> Command:
         """Command of the law, or of the supervisor where it replaces the law."""
@@ -276,15 +286,16 @@ class Pilot:
         if found := self.self_check.faults():
             faults[Fault.INPUTS] = "; ".join(found)
         if not any(name in self._gate.replaced for name in INERTIAL):
-            self._imu_stamp = frame.stamp_ns
+            stamps = frame.attitude_stamp_ns, frame.imu_stamp_ns
+            self._imu_stamp = min([frame.stamp_ns, *(stamp for stamp in stamps if stamp is not None)])
         right, down = motion.state[0:2]
         return Tick(
             stamp_ns=frame.stamp_ns,
             imu_ns=self._imu_stamp,
             wrench_ns=frame.wrench_stamp_ns,
-            plane_ns=self.contact.plane_ns,
-            image_ns=self._camera.image_ns,
-            lines_ns=self._camera.lines_ns if self.reference.lines else -1,
+            plane_ns=self._due(self.contact.plane_ns),
+            image_ns=self._due(self._camera.image_ns),
+            lines_ns=self.motion.lines_ns if self.reference.lines else -1,
             inertial=(now["attitude"], now["angular_velocity"], now["specific_force"]),
             wrench=now["wrench"],
             down=down_in_body(self._inertial.attitude),
@@ -297,6 +308,11 @@ class Pilot:
             outcome=command.outcome,
             faults=faults,
         )
+
+    def _due(self, stamp_ns: int) -> int:
+        """Stamp of the last picture or plane; before the first one the time at which that was due, once it is past."""
+        due_ns = self._first + round(1e9 * self.config.safety.first_picture_s)
+        return due_ns if stamp_ns < 0 and self._stamp > due_ns else stamp_ns
 
     def _contact_wrench(self, frame: SensorFrame, specific_force: list[float]) -> tuple[np.ndarray, int]:
         """Contact wrench and its time: the tared one, or that of inertial data while the sensor is faulty."""
@@ -376,7 +392,7 @@ class Pilot:
             push_reference=self.setpoints.push_reference,  # of the tick before: the controller runs after the painter
             tared=self.tare.ready,
         )
-        limits, rotors = self._thrust_limits(), self.rotor_loss
+        limits, rotors = self.assurance.limits(self.thrust_limits), self.rotor_loss
         tilted = rotors.tilts
         if limits is not None and rotors.update(limits):
             self.painter.abandon(inputs, "no level hover is left")
@@ -391,14 +407,6 @@ class Pilot:
         away = contact.distance + float(normal @ self._tip)
         tilt = rotors.tilt(away, contact.speed, motion.state[0], normal, dt)
         return dataclasses.replace(target, tilt=tilt) if rotors.lost else dataclasses.replace(target, trim=tilt)
-
-    def _thrust_limits(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """Limits reported by the drive, within those of rotors that do not follow."""
-        reported, found = self.thrust_limits, self.assurance.limits
-        if reported is None or found is None:
-            return found if reported is None else reported
-        lower = np.maximum(reported[0], found[0])
-        return lower, np.maximum(np.minimum(reported[1], found[1]), lower)
 
     def _refer(self, target: PaintingCommand, contact: ContactState) -> Reference:
         """Reference of a command at the measured distance."""
@@ -424,7 +432,7 @@ class Pilot:
             covariance = self._covariance
         bias_right, bias_down = self.motion.state[BIAS]
         distance = contact.distance if contact.known else ASSUMED_DISTANCE
-        low, high = self._thrust_limits() or (None, None)
+        low, high = self.assurance.limits(self.thrust_limits) or (None, None)
         wrench, wrench_stamp = sample
         return Measurement(
             stamp_ns=frame.stamp_ns,

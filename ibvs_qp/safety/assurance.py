@@ -39,6 +39,8 @@ _UNSOLVED = (Outcome.ANALYTIC_FALLBACK, Outcome.HOLD)
 RETREAT_REACHED = 0.03
 #: Least distance at which a degraded vehicle that shall not touch the wall stops [m].
 LEAST_STOP = 0.05
+#: Lower and upper thrust limits [N], (n,) each.
+Limits = tuple[np.ndarray, np.ndarray]
 _STILL = np.zeros(2)
 _STILL.flags.writeable = False
 
@@ -68,7 +70,7 @@ class Assurance:
             part.reset()
         self._grounded.reset()
         self._last: Tick | None = None
-        self._first_ns, self._retreat_m = -1, self.settings.retreat_m
+        self._first_ns, self._time_s, self._retreat_m = -1, 0.0, self.settings.retreat_m
 
     @property
     def state(self) -> SafetyState:
@@ -80,10 +82,17 @@ class Assurance:
         """Faults of the last tick, with details."""
         return self._last.faults if self._last is not None else {}
 
-    @property
-    def limits(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """Lower and upper thrust limits [N], (n,) each, of rotors that do not follow; None while all do."""
-        return self._rotors.limits if self.settings.supervise else None
+    def limits(self, reported: Limits | None) -> Limits | None:
+        """Limits of rotors that do not follow, within those that the drive reports; None without either.
+
+        Args:
+            reported: Lower and upper thrust limits [N], (n,) each, or None for the configured ones.
+        """
+        found = self._rotors.limits if self.settings.supervise else None
+        if reported is None or found is None:
+            return found if reported is None else reported
+        lower = np.maximum(reported[0], found[0])
+        return lower, np.maximum(np.minimum(reported[1], found[1]), lower)
 
     def is_news(self, picture: object) -> bool:
         """Whether a picture differs from the last one, if the camera has noise; one that repeats shows nothing."""
@@ -97,7 +106,7 @@ class Assurance:
         """
         if self._first_ns < 0:
             self._first_ns = tick.stamp_ns
-        time_s = (tick.stamp_ns - self._first_ns) * 1e-9
+        time_s = self._time_s = max((tick.stamp_ns - self._first_ns) * 1e-9, self._time_s)
         self._last = tick
         self._samples.update(tick)
         self._push.update(tick, response, time_s)
@@ -125,6 +134,20 @@ class Assurance:
         if state is not before and math.isfinite(distance):  # a vehicle farther away stays there
             self._retreat_m = max(self._retreat_m, distance)
         return state
+
+    def miss(self, tick_s: float) -> SafetyState:
+        """Count a tick without a usable input; nothing can be compared with a bound.
+
+        Args:
+            tick_s: Nominal control period [s]: the input has no time of its own.
+
+        Returns:
+            The state, which holds for the next tick.
+        """
+        if self._first_ns < 0 or not self.settings.supervise:  # before the first good tick nothing flies
+            return self.state
+        self._time_s += tick_s
+        return self.supervisor.update(self._time_s, {Fault.NO_INPUT: ""})
 
     def supervised(self, reference: Reference) -> Reference:
         """The reference that the state allows in place of the caller's."""

@@ -23,6 +23,7 @@ class Fault(StrEnum):
     PLANE_STALE = "no wall plane"
     LINES_STALE = "no line in sight"
     FILTER_REFUSES = "a filter refuses its measurements"
+    NO_INPUT = "no usable input"
     NO_ATTITUDE = "no attitude, measured or estimated"
     IMU_STALE = "no inertial sample"
     IMU_FROZEN = "inertial samples repeat"
@@ -75,11 +76,14 @@ POLICY: dict[Fault, Rule] = {
     Fault.WRENCH_FROZEN: Rule(_AT_ONCE, ("frozen_samples",)),
     Fault.PUSH_UNFELT: Rule(_AT_ONCE, ("unfelt_push_n", "unfelt_ratio", "push_time_s")),
     Fault.PUSH_HIGH: Rule(_AT_ONCE, ("push_ratio", "push_floor_n", "push_time_s")),
-    Fault.IMAGE_STALE: Rule(_BLIND, ("image_age_s",), recovery_s=0.15),  # a late picture now and then is no blindness
+    # A late picture now and then is no blindness.
+    Fault.IMAGE_STALE: Rule(_BLIND, ("image_age_s", "first_picture_s"), recovery_s=0.15),
     Fault.IMAGE_FROZEN: Rule(_BLIND, ("frozen_pictures",)),
-    Fault.PLANE_STALE: Rule(_BLIND, ("plane_age_s",)),
+    Fault.PLANE_STALE: Rule(_BLIND, ("plane_age_s", "first_picture_s")),
     Fault.LINES_STALE: Rule(((0.0, DEGRADED), (3.0, RETREAT)), ("lines_age_s",)),
     Fault.FILTER_REFUSES: Rule(((0.0, DEGRADED), (2.0, RETREAT)), ("refusal_s",)),
+    # Hover by the last attitude meanwhile; a clock that leaps is followed after a tenth of a second.
+    Fault.NO_INPUT: Rule(((0.2, DEGRADED), (0.5, TERMINATED)), recovery_s=0.0),
     Fault.NO_ATTITUDE: Rule(((0.0, DEGRADED), (0.2, TERMINATED)), recovery_s=0.0),
     Fault.IMU_STALE: Rule(_UNSTEADY, ("imu_age_s",)),
     Fault.IMU_FROZEN: Rule(_UNSTEADY, ("frozen_imu_samples",)),

@@ -77,7 +77,7 @@ class Supervisor:
             self._since.setdefault(fault, time_s)
             self._seen[fault], self._details[fault] = time_s, detail
         for fault in [each for each in self._since if each not in faults]:
-            if time_s - self._seen[fault] > self._policy[fault].recovery_s:
+            if time_s - self._seen[fault] >= self._policy[fault].recovery_s:
                 del self._since[fault]
 
     def _text(self, fault: Fault) -> str:

@@ -52,7 +52,7 @@ class CaptureGate:
     def _part(self, name: str, part: Any, kind: type[Part], rejected: list[str]) -> Part | None:
         if part is None:
             return None
-        if not isinstance(part, kind):
+        if not issubclass(type(part), kind):
             rejected.append(f"{name}: {described(part)}, not {kind.__name__}")
             return None
         part = plain_instance(part, kind)

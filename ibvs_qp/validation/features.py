@@ -6,12 +6,14 @@ import dataclasses
 
 import numpy as np
 
-from ibvs_qp.measurement import FeatureFrame
+from ibvs_qp.measurement import HORIZONTAL, VERTICAL, FeatureFrame, LineFeature
 from ibvs_qp.validation.fields import Field, plain_instance
 from ibvs_qp.validation.geometry import VARIANCE_BOUND, read_line, read_lines, read_plane
 from ibvs_qp.validation.numbers import matrix
 
 _VELOCITY = Field("velocity", 3, -20.0, 20.0, "m/s")
+#: Identities of the first line of each role without one; further ones count down by two.
+_HORIZONTAL_ID, _VERTICAL_ID = -2, -3
 #: Least eigenvalue of a covariance over the largest: below zero by rounding alone.
 LEAST_EIGENVALUE = -1e-9
 
@@ -29,8 +31,25 @@ def check_features(features: FeatureFrame, most_lines: int, rejected: list[str])
     if plane is None and features.plane is not None:
         rejected.append("features.plane: not 4 finite values with D != 0 in front of the camera")
     lines = read_lines(features.lines, read_line, most_lines, "features.lines", rejected)
+    if not all([line.track_id for line in lines]):
+        lines = _identified(lines)
+    if len({line.track_id for line in lines}) < len(lines):
+        first = {line.track_id: line for line in reversed(lines)}
+        rejected.append(f"features.lines: {len(lines) - len(first)} with a track_id of another line")
+        lines = tuple(line for line in lines if first[line.track_id] is line)
     velocity, covariance = _velocity(features, rejected)
     return dataclasses.replace(features, lines=lines, plane=plane, velocity=velocity, velocity_covariance=covariance)
+
+
+def _identified(lines: tuple[LineFeature, ...]) -> tuple[LineFeature, ...]:
+    """Lines whose track_id is 0, none, identified by their role and their order in the frame."""
+    counts = {HORIZONTAL: _HORIZONTAL_ID, VERTICAL: _VERTICAL_ID}
+    identified = []
+    for line in lines:
+        if line.track_id == 0:
+            line, counts[line.role] = dataclasses.replace(line, track_id=counts[line.role]), counts[line.role] - 2
+        identified.append(line)
+    return tuple(identified)
 
 
 def _velocity(features: FeatureFrame, rejected: list[str]) -> tuple[np.ndarray | None, np.ndarray | None]:

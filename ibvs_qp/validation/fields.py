@@ -147,7 +147,19 @@ def plain_instance(source: Any, kind: type[Input]) -> Input:
     """An instance of exactly a type of input: a subclass may compute its attributes, which are read once."""
     if type(source) is kind:
         return source
-    return kind(**{field.name: getattr(source, field.name) for field in fields(kind)})  # type: ignore[arg-type]
+    values: dict[str, Any] = {field.name: _attribute(source, field.name) for field in fields(kind)}  # type: ignore
+    return kind(**values)
+
+
+class Unreadable:
+    """Stands for an attribute that raises when it is read."""
+
+
+def _attribute(source: Any, name: str) -> Any:
+    try:
+        return getattr(source, name)
+    except Exception:
+        return Unreadable()
 
 
 def _vector(name: str, size: int, bound: float, unit: str, **more: Any) -> Field:

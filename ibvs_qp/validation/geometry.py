@@ -10,7 +10,7 @@ import numpy as np
 
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL, LineFeature, LineReference
 from ibvs_qp.validation.clock import STAMP_END
-from ibvs_qp.validation.numbers import FLOAT, matrix, number, text, vector, whole
+from ibvs_qp.validation.numbers import FLOAT, attempt, matrix, number, text, vector, whole
 
 #: Largest rho [-] and theta [rad].
 LINE_BOUND = 1e6
@@ -49,7 +49,10 @@ def read_lines(
     if len(lines) > most:
         rejected.append(f"{name}: {len(lines)} given, only the first {most} are looked at")
         lines = lines[:most]
-    accepted = tuple(map(read, lines))
+    try:
+        accepted = tuple(map(read, lines))
+    except Exception:  # of a class of the caller's
+        accepted = tuple([attempt(read, line) for line in lines])
     if type(lines) is tuple and all(map(is_, accepted, lines)) and None not in accepted:
         return lines
     good = tuple([line for line in accepted if line is not None])
@@ -60,7 +63,7 @@ def read_lines(
 
 def read_line(line: Any) -> LineFeature | None:
     """A `LineFeature` with plain numbers within bounds, or None; the line itself where nothing has to be converted."""
-    if not isinstance(line, LineFeature):
+    if not issubclass(type(line), LineFeature):
         return None
     values = _values(line)
     if type(line) is not LineFeature or tuple(map(type, values)) != _PLAIN or values[-1].dtype != FLOAT:
@@ -103,7 +106,7 @@ def _converted(line: LineFeature) -> LineFeature | None:
 
 def read_line_reference(line: Any) -> LineReference | None:
     """A `LineReference` with plain numbers within bounds and a known role, or None; the line itself if plain."""
-    if not isinstance(line, LineReference):
+    if not issubclass(type(line), LineReference):
         return None
     given = line.rho, line.theta, line.role
     rho, theta, role = number(given[0]), number(given[1]), text(given[2])

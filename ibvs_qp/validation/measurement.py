@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ibvs_qp.measurement import Measurement
+from ibvs_qp.measurement import LineFeature, Measurement
 from ibvs_qp.validation.clock import NO_PAST_TIME, MonotonicClock, stamp_of
 from ibvs_qp.validation.fields import Entries, measurement_table, plain_instance
 from ibvs_qp.validation.geometry import read_line, read_lines, read_plane
@@ -17,6 +17,8 @@ from ibvs_qp.validation.numbers import matrix
 
 #: Lines looked at for every line that the program has room for: roles and order select among them.
 LINES_PER_SLOT = 4
+#: Lines older than this are refused [ns]: the latency of a camera, and some dropped pictures.
+OLDEST_LINE_NS = 300_000_000
 #: What a refused measurement lacks.
 _ALL = ("attitude", "angular_velocity", "specific_force", "contact_wrench", "plane", "lines")
 
@@ -57,7 +59,7 @@ class MeasurementGate:
         self.clock.reset()
         self._last = self._table.fallbacks
         self._measured = False
-        self._wrench_stamp = 0
+        self._wrench_stamp, self._stamps = 0, dict[str, int]()
         self.replaced: tuple[str, ...] = ()
 
     @property
@@ -76,7 +78,7 @@ class MeasurementGate:
             None for the measurement when its stamp is refused or no attitude was ever accepted.
         """
         self.replaced = _ALL
-        if not isinstance(measurement, Measurement):
+        if not issubclass(type(measurement), Measurement):
             return None, ("measurement: not a Measurement",)
         measurement = plain_instance(measurement, Measurement)
         if why := self.clock.accept(measurement.stamp_ns):
@@ -89,11 +91,9 @@ class MeasurementGate:
         self._check_times(measurement, changes, rejected)
         self._check_wrench_time(measurement, refused, entries, changes, rejected)
         self._check_plane(measurement, changes, rejected)
-        lines = read_lines(measurement.lines, read_line, self._most_lines, "lines", rejected)
-        if lines is not measurement.lines:
-            changes["lines"] = lines
+        self._check_lines(measurement, changes, rejected)
         _check_covariance(measurement, changes, rejected)
-        _check_limit_order(entries, changes, rejected)
+        self._check_limit_order(entries, changes, rejected)
         self._last, self._measured, self.replaced = entries, True, tuple(refused)
         return (dataclasses.replace(measurement, **changes) if changes else measurement), tuple(rejected)
 
@@ -101,10 +101,16 @@ class MeasurementGate:
         """Stamp of the tick, and the optional ones of the inertial sensors: None for at the tick."""
         if type(measurement.stamp_ns) is not int or self.clock.shift_ns:
             changes["stamp_ns"] = self.clock.last_ns
-        if measurement.attitude_stamp_ns is not None:
-            self._check_time("attitude_stamp_ns", measurement.attitude_stamp_ns, changes, rejected)
-        if measurement.imu_stamp_ns is not None:
-            self._check_time("imu_stamp_ns", measurement.imu_stamp_ns, changes, rejected)
+        for name, stamp in (
+            ("attitude_stamp_ns", measurement.attitude_stamp_ns),
+            ("imu_stamp_ns", measurement.imu_stamp_ns),
+        ):
+            if stamp is None:
+                continue
+            if (time := self._check_time(name, stamp, changes, rejected)) is not None:
+                self._stamps[name] = time
+            else:  # not None: that would count as sampled at the tick
+                changes[name] = self._stamps.get(name, 0)
 
     def _check_time(self, name: str, stamp: Any, changes: dict[str, Any], rejected: list[str]) -> int | None:
         time = self.clock.sample_time(stamp)
@@ -131,6 +137,40 @@ class MeasurementGate:
         changes["contact_wrench"] = np.array(entries["contact_wrench"])
         changes["wrench_stamp_ns"] = self._wrench_stamp
 
+    def _check_limit_order(self, entries: Entries, changes: dict[str, Any], rejected: list[str]) -> None:
+        """Limits that contradict each other are a fault of the drive's report: the last ones stay in force."""
+        low, high = entries["thrust_min"], entries["thrust_max"]
+        if low is None or high is None or not any(map(gt, low, high)):
+            return
+        rejected.append("thrust_max: below thrust_min; the last limits stay in force")
+        for name in ("thrust_min", "thrust_max"):
+            entries[name] = self._last[name]
+            changes[name] = None if self._last[name] is None else np.array(self._last[name])
+
+    def _check_lines(self, measurement: Measurement, changes: dict[str, Any], rejected: list[str]) -> None:
+        """Lines in the controller's time; 0 is no stamp."""
+        lines = read_lines(measurement.lines, read_line, self._most_lines, "lines", rejected)
+        now = self.clock.last_ns
+        sound = [not line.stamp_ns or 0 <= now - line.stamp_ns <= OLDEST_LINE_NS for line in lines]
+        if self.clock.shift_ns or not all(sound):
+            timed = tuple(line for line in map(self._timed, lines) if line is not None)
+            if late := len(lines) - len(timed):
+                rejected.append(
+                    f"lines: {late} with a stamp_ns over {OLDEST_LINE_NS / 1e6:g} ms old, or {NO_PAST_TIME}"
+                )
+            lines = timed
+        if lines is not measurement.lines:
+            changes["lines"] = lines
+
+    def _timed(self, line: LineFeature) -> LineFeature | None:
+        """A line in the controller's time; None for one too old or of the future."""
+        if line.stamp_ns == 0:
+            return line
+        time = self.clock.sample_time(line.stamp_ns)
+        if time is None or self.clock.last_ns - time > OLDEST_LINE_NS:
+            return None
+        return line if time == line.stamp_ns else dataclasses.replace(line, stamp_ns=time)
+
     def _check_plane(self, measurement: Measurement, changes: dict[str, Any], rejected: list[str]) -> None:
         if measurement.plane is None:
             return
@@ -154,10 +194,3 @@ def _check_covariance(measurement: Measurement, changes: dict[str, Any], rejecte
         own = None
     if own is not value:
         changes["velocity_covariance"] = own
-
-
-def _check_limit_order(entries: Entries, changes: dict[str, Any], rejected: list[str]) -> None:
-    low, high = entries["thrust_min"], entries["thrust_max"]
-    if low is not None and high is not None and any(map(gt, low, high)):
-        rejected.append("thrust_max: below thrust_min; raised to it")
-        changes["thrust_max"] = np.maximum(low, high)

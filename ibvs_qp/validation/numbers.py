@@ -7,7 +7,8 @@ subclass of an array (masked, with units) is refused: its numbers may mean somet
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Callable
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -16,19 +17,37 @@ FLOAT = np.dtype(float)
 NUMBER_BOUND = 1e300
 
 
+Read = TypeVar("Read")
+
+
+def attempt(read: Callable[[Any], Read | None], value: Any) -> Read | None:
+    """What is read of a value; None if it raises, whatever it is."""
+    try:
+        return read(value)
+    except Exception:  # of a class of the caller's
+        return None
+
+
 def whole(value: Any, low: int, high: int) -> int | None:
     """A whole number within [low, high] as a plain integer."""
     if type(value) is not int:
-        if not isinstance(value, (int, np.integer)) or isinstance(value, bool):
-            return None
-        value = int(value)
-    return value if low <= value <= high else None
+        value = attempt(_integer, value)
+    return value if value is not None and low <= value <= high else None
+
+
+def _integer(value: Any) -> int | None:
+    if not isinstance(value, (int, np.integer)) or isinstance(value, bool):
+        return None
+    plain = int(value)
+    return plain if type(plain) is int else None
 
 
 def number(value: Any) -> float | None:
     """A number, maybe NaN or infinite, as a float."""
-    if type(value) is float:
-        return value
+    return value if type(value) is float else attempt(_float, value)
+
+
+def _float(value: Any) -> float | None:
     if not isinstance(value, (int, float, np.integer, np.floating)) or isinstance(value, bool):
         return None
     if isinstance(value, int) and not -NUMBER_BOUND <= value <= NUMBER_BOUND:  # an integer may have any size
@@ -62,7 +81,7 @@ def matrix(value: Any, size: int) -> np.ndarray | None:
 
 def text(value: Any) -> str | None:
     """A text as a plain one: a subclass may have no hash."""
-    return value if type(value) is str else str.__str__(value) if isinstance(value, str) else None
+    return value if type(value) is str else str.__str__(value) if issubclass(type(value), str) else None
 
 
 def described(value: Any) -> str:

@@ -34,12 +34,12 @@ class ReferenceGate:
 
     def check(self, reference: Any) -> tuple[Reference, tuple[str, ...]]:
         """The new reference if all of it is accepted, otherwise the last one; and what was rejected."""
-        if not isinstance(reference, Reference):
+        if not issubclass(type(reference), Reference):
             return self.last, ("reference: not a Reference",)
         reference, rejected = plain_instance(reference, Reference), []
         entries, changes, _ = REFERENCE.read(reference, self._last, rejected)
         contact, lines, surplus = reference.contact, reference.lines, ()
-        if not isinstance(contact, (bool, np.bool_)):
+        if type(contact) not in (bool, np.bool_):
             rejected.append("contact: neither True nor False")
         if type(lines) in (tuple, list) and len(lines) > self._room:
             surplus = (f"reference.lines: {len(lines)} given, room for line_slots = {self._room}",)

@@ -17,6 +17,9 @@ from ibvs_qp.validation.turn_check import TurnCheck
 class SelfCheck:
     """Checks the axes of attitude, inertial sensors and force sensor; `faults` names what it found.
 
+    Attributes:
+        done: Whether nothing is left to check: after a first touch with the right axes, or disabled.
+
     Args:
         enabled: Whether anything is checked.
     """
@@ -28,20 +31,20 @@ class SelfCheck:
     def reset(self) -> None:
         """As before the first tick."""
         self._rest, self._turn, self._touch = RestCheck(), TurnCheck(), TouchCheck()
-        self._done = not self._enabled
+        self.done = not self._enabled
 
     @property
     def passed(self) -> bool:
         """Whether the vehicle may approach the wall: the sensors agreed at rest, and nothing was found since."""
-        return self._done or (self._rest.passed and not self.faults())
+        return self.done or (self._rest.passed and not self.faults())
 
     def faults(self) -> tuple[str, ...]:
         """What was found, in words; empty without a fault, and after a first touch with the right axes."""
-        return () if self._done else (*self._rest.faults, *self._turn.faults, *self._touch.faults)
+        return () if self.done else (*self._rest.faults, *self._turn.faults, *self._touch.faults)
 
     def inertial(self, attitude: Sequence[float], rate: Sequence[float], force: Sequence[float], dt: float) -> None:
         """Add a tick: quaternion B in I, gyro [rad/s], accelerometer [m/s^2], time since the last tick [s]."""
-        if self._done:
+        if self.done:
             return
         if not self._rest.passed:
             self._rest.add(down_in_body(attitude), rate, force, dt)
@@ -57,6 +60,6 @@ class SelfCheck:
             distance: Tip to wall [m], infinite while unknown.
             dt: Time since the last tick [s].
         """
-        if not self._done:
+        if not self.done:
             self._touch.add(raw, noise, normal, distance, dt)
-            self._done = self._touch.passed and self.passed
+            self.done = self._touch.passed and self.passed

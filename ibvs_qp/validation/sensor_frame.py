@@ -32,7 +32,7 @@ class SensorGate:
         self.clock.reset()
         self._captures.reset()
         self.last = SENSOR_FRAME.fallbacks
-        self._wrench_stamp = 0
+        self._wrench_stamp, self._stamps = 0, dict[str, int]()
         self.replaced: tuple[str, ...] = ()
 
     def check(self, frame: Any) -> tuple[SensorFrame | None, tuple[str, ...]]:
@@ -41,7 +41,7 @@ class SensorGate:
         Returns:
             None for the frame when its stamp is refused.
         """
-        if not isinstance(frame, SensorFrame):
+        if not issubclass(type(frame), SensorFrame):
             return None, ("sensor frame: not a SensorFrame",)
         frame = plain_instance(frame, SensorFrame)
         if why := self.clock.accept(frame.stamp_ns):
@@ -76,5 +76,9 @@ class SensorGate:
         return time
 
     def _optional_time(self, name: str, stamp: Any, rejected: list[str]) -> int | None:
-        """Time of a stamp that may be None: at the tick."""
-        return None if stamp is None else self._time(name, stamp, rejected)
+        """Time of a stamp that may be None: at the tick; a refused one is replaced by the last accepted one."""
+        if stamp is None:
+            return None
+        if (time := self._time(name, stamp, rejected)) is not None:
+            self._stamps[name] = time
+        return self._stamps.get(name, 0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections import deque
 from dataclasses import dataclass
 from typing import Any
 
@@ -36,6 +37,28 @@ class ImuStuck(SensorFault):
             return dataclasses.replace(frame, **last)
 
         return stuck
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImuLate(SensorFault):
+    """Samples arrive late, with the stamps of when they were taken."""
+
+    latency_s: float = setting(0.2, "time from sample to delivery", unit="s", low=0.0, high=2.0)
+
+    def filter(self, rng: np.random.Generator) -> FrameFilter:
+        """Deliver the sample of then, or the oldest since the fault began."""
+        taken = deque[SensorFrame]()
+
+        def late(frame: SensorFrame) -> SensorFrame:
+            taken.append(frame)
+            while len(taken) > 1 and taken[1].stamp_ns <= frame.stamp_ns - round(1e9 * self.latency_s):
+                taken.popleft()
+            old = taken[0]
+            values = {name: getattr(old, name) for name in OUTPUTS}
+            stamps = {"attitude_stamp_ns": old.stamp_ns, "imu_stamp_ns": old.stamp_ns}
+            return dataclasses.replace(frame, **values, **stamps)
+
+        return late
 
 
 @dataclass(frozen=True, kw_only=True)

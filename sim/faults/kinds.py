@@ -8,7 +8,7 @@ from sim.faults.clock import ClockLeap, LoopStall, SlowLoop, TicksSkipped
 from sim.faults.fault import Fault, NoFault
 from sim.faults.features import DepthFlipped, FeatureNan, LinesLost, PlaneLost, WrongLines
 from sim.faults.force_torque import ForceTorqueBias, ForceTorqueLost, ForceTorqueNan, ForceTorqueStuck, ForceTorqueZero
-from sim.faults.imu import AccelerometerBias, AttitudeStep, GyroBias, ImuNan, ImuStuck
+from sim.faults.imu import AccelerometerBias, AttitudeStep, GyroBias, ImuLate, ImuNan, ImuStuck
 from sim.faults.rotors import Derate, RotorStuck, ThrustLoss
 from sim.faults.solver import SolverInfeasible, SolverSilent
 from sim.faults.wall import BoardMoved, OtherWall
@@ -20,7 +20,7 @@ KINDS: dict[str, type[Fault]] = {
         CameraLost, CameraLatency, CameraJitter, CameraReordered, CameraFrozen,
         PlaneLost, LinesLost, WrongLines, DepthFlipped, FeatureNan,
         ForceTorqueLost, ForceTorqueStuck, ForceTorqueNan, ForceTorqueZero, ForceTorqueBias,
-        ImuStuck, ImuNan, GyroBias, AttitudeStep, AccelerometerBias,
+        ImuStuck, ImuLate, ImuNan, GyroBias, AttitudeStep, AccelerometerBias,
         Derate, RotorStuck, ThrustLoss, WindStep, SidePush, OtherWall, BoardMoved,
         ClockLeap, LoopStall, SlowLoop, TicksSkipped, SolverInfeasible, SolverSilent,
     )

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from controller_scenes import TICK_NS
+from controller_scenes import TICK_NS, line_references
 from hostile_values import Raising
 from references import good_reference
 from small_vehicle import SmallVehicle
@@ -17,6 +17,7 @@ from small_vehicle import SmallVehicle
 from ibvs_qp.assured import Assured
 from ibvs_qp.command import Command, Outcome, SafetyState
 from ibvs_qp.controller import HybridController
+from ibvs_qp.measurement import Measurement, Reference
 
 RATE_STEP = 500.0 * 0.004
 
@@ -113,3 +114,83 @@ def test_an_unusable_contact_is_named_also_while_the_supervisor_replaces_the_law
         vehicle.fly(command.thrusts)
         assert "contact: not finite, or its normal has not length 1" in command.rejected
     assert command.outcome is Outcome.HOLD and command.safety is SafetyState.DEGRADED
+
+
+def test_without_any_measurement_the_flight_ends() -> None:
+    assured, vehicle, _ = flown()
+    states = []
+    for _ in range(150):
+        command = assured.step(None, good_reference())  # type: ignore[arg-type]
+        vehicle.fly(command.thrusts)
+        states.append(command.safety)
+    assert states[40] is SafetyState.NOMINAL and states[60] is SafetyState.DEGRADED
+    assert states[-1] is SafetyState.TERMINATED and command.safety_reasons == ("no usable input",)
+
+
+def test_refused_measurements_between_good_ones_are_no_fault() -> None:
+    assured, vehicle, _ = flown()
+    for _ in range(100):
+        assured.step(None, good_reference())  # type: ignore[arg-type]
+        command = assured.step(vehicle.measure(), good_reference())
+        vehicle.fly(command.thrusts)
+        assert command.safety is SafetyState.NOMINAL
+
+
+def test_repeated_lines_with_fresh_stamps_are_no_pictures() -> None:
+    rng = np.random.default_rng(0)
+    assured, vehicle, _ = flown()
+    frozen = None
+    for tick in range(400):
+        seen = noisy(vehicle.measure(), rng)
+        if tick >= 200:
+            frozen = frozen or seen.lines
+            seen = replace(seen, lines=tuple(replace(line, stamp_ns=seen.stamp_ns) for line in frozen))
+        command = assured.step(seen, good_reference())
+        vehicle.fly(command.thrusts)
+        if tick == 199:
+            assert command.safety is SafetyState.NOMINAL
+    assert command.safety is SafetyState.RETREAT and command.safety_reasons[0].startswith("pictures repeat")
+
+
+def test_specific_force_in_other_axes_is_named() -> None:
+    assured = built(0)
+    assured.reset()
+    vehicle, flu = SmallVehicle(assured.controller.config), np.array([1.0, -1.0, -1.0])
+    for _ in range(60):
+        seen = vehicle.measure()
+        assert seen.specific_force is not None
+        command = assured.step(replace(seen, specific_force=flu * seen.specific_force), good_reference())
+        vehicle.tick += 1
+    assert command.safety is SafetyState.RETREAT
+    assert command.safety_reasons[0].startswith("sensor data in other axes: specific_force: ")
+
+
+@pytest.mark.parametrize("rotor", [0, 2])
+def test_a_lost_rotor_brings_the_vehicle_down_upright(rotor: int) -> None:
+    rng = np.random.default_rng(0)
+    assured = built(0)
+    assured.reset()
+    vehicle = SmallVehicle(assured.controller.config, distance=0.3)
+    for tick in range(1500):
+        command = assured.step(noisy(vehicle.measure(), rng), Reference(standoff=0.2, lines=line_references(2)))
+        left = command.thrusts.copy()
+        left[rotor] *= tick < 500
+        vehicle.fly(left)
+        assert vehicle.attitude.as_matrix()[2, 2] > math.cos(math.radians(30.0))
+    assert command.safety is SafetyState.DESCEND and "no level hover" in command.safety_reasons[0]
+    assert 0.2 < vehicle.velocity[2] < 1.0
+
+
+def noisy(seen: Measurement, rng: np.random.Generator) -> Measurement:
+    """As a vehicle measures: the monitors take sensors without noise for those of a simulator."""
+    assert seen.specific_force is not None
+    lines = tuple(
+        replace(line, rho=line.rho + rng.normal(0.0, 1e-5), stamp_ns=seen.stamp_ns) for line in seen.lines
+    )
+    return replace(
+        seen,
+        specific_force=seen.specific_force + rng.normal(0.0, 0.05, 3),
+        angular_velocity=seen.angular_velocity + rng.normal(0.0, 0.002, 3),
+        contact_wrench=seen.contact_wrench + rng.normal(0.0, 0.05, 6),
+        lines=lines,
+    )

@@ -83,7 +83,9 @@ class RotorMonitor:
             self._suspect(missing, thrusts, time_s)
         words = [f"{name} gives {thrust:.1f} N" for name, thrust in self._found.items()]
         spread = settings.missing_sigmas * noise * math.sqrt(len(missing))
-        if self._lift.update(lift > max(settings.missing_lift_n, spread), time_s):
+        # More than what the rotors give cannot be missing: the accelerometer is wrong then.
+        given = float(np.dot(self._upwards, thrusts)) + settings.missing_lift_n
+        if self._lift.update(max(settings.missing_lift_n, spread) < lift <= given, time_s):
             words.append(f"{lift:.1f} N of lift are missing")
             # Several rotors are weak: no gust, no push at the body. A small share of the thrust is a sagging battery.
             for rotor in np.flatnonzero(missing > np.maximum(least, WEAK * thrusts)).tolist():

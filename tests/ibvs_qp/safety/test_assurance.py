@@ -36,7 +36,7 @@ def watched(ticks: int, response: StubResponse | None = None, after: Assurance |
 def test_while_nominal_everything_is_the_callers() -> None:
     assurance = watched(100)
     assert assurance.supervised(PRESS) is PRESS and assurance.thrusts(LAST, FLOOR) is None
-    assert assurance.wrench(StubResponse()) is None and assurance.limits is None and assurance.faults == {}
+    assert assurance.wrench(StubResponse()) is None and assurance.limits(None) is None and assurance.faults == {}
 
 
 @pytest.mark.parametrize("contact", [CONTACT, FREE])
@@ -110,7 +110,8 @@ def test_a_rotor_that_does_not_follow_is_a_fault_with_limits() -> None:
     lost[2] = 8.0
     assurance = watched(30, StubResponse(missing_thrust=lost))
     assert assurance.state is SafetyState.RETREAT and Fault.ROTOR in assurance.faults
-    assert assurance.limits is not None and assurance.limits[1][2] == pytest.approx(3.3)
+    limits = assurance.limits(None)
+    assert limits is not None and limits[1][2] == pytest.approx(3.3)
 
 
 def test_repeated_pictures_of_a_camera_with_noise_are_no_news() -> None:

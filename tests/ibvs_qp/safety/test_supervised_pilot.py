@@ -191,3 +191,38 @@ def test_a_vehicle_on_its_side_gets_no_thrust_with_or_without_a_frame(pilot: Pil
     for command in broken:
         assert command.safety is SafetyState.TERMINATED and command.rejected
         np.testing.assert_allclose(command.thrusts, FLOOR, atol=1e-6)
+
+
+def test_without_a_frame_the_flight_ends(pilot: Pilot) -> None:
+    flown(pilot, SensedVehicle(), QUIET)
+    states = [pilot.step(None).safety for _ in range(150)]  # type: ignore[arg-type]
+    assert states[30] is SafetyState.NOMINAL and states[70] is SafetyState.DEGRADED
+    assert states[-1] is SafetyState.TERMINATED and pilot.status.finished
+
+
+def test_late_inertial_samples_are_replaced(pilot: Pilot) -> None:
+    """They are as noisy as ever, and their stamps tell the truth."""
+    vehicle, late = SensedVehicle(0.3), list[SensorFrame]()
+
+    def delayed(frame: SensorFrame) -> dict[str, Any]:
+        late.append(frame)
+        old = late[max(len(late) - 51, 0)]
+        names = ("attitude", "angular_velocity", "specific_force")
+        stamps = {"attitude_stamp_ns": old.stamp_ns, "imu_stamp_ns": old.stamp_ns}
+        return {name: getattr(old, name) for name in names} | stamps
+
+    flown(pilot, vehicle, QUIET)
+    flown(pilot, vehicle, 10, delayed)
+    command = flown(pilot, vehicle, 300, delayed)
+    assert command.safety in (SafetyState.RETREAT, SafetyState.HOVER)
+    assert command.safety_reasons[0].startswith("no inertial sample: ")
+    assert np.abs(vehicle.attitude.as_euler("xyz", degrees=True)).max() < 3.0
+
+
+def test_a_camera_that_never_sees_anything_is_a_fault(pilot: Pilot) -> None:
+    due = round(pilot.config.safety.first_picture_s / pilot.config.controller.tick_s)
+    vehicle = SensedVehicle(0.5)
+    assert flown(pilot, vehicle, due, lambda frame: {"features": None}).safety is SafetyState.NOMINAL
+    command = flown(pilot, vehicle, 250, lambda frame: {"features": None})
+    assert command.safety in (SafetyState.RETREAT, SafetyState.HOVER)
+    assert command.safety_reasons[0].startswith("no picture: ")

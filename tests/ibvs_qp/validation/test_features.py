@@ -13,7 +13,9 @@ from ibvs_qp.measurement import FeatureFrame, LineFeature
 from ibvs_qp.validation.features import check_features
 
 MOST = 4
-LINE = LineFeature(rho=0.1, theta=1.5, covariance=1e-6 * np.eye(2), role="horizontal", kind="board", surface_side=1)
+LINE = LineFeature(
+    rho=0.1, theta=1.5, covariance=1e-6 * np.eye(2), role="horizontal", kind="board", surface_side=1, track_id=7
+)
 GOOD = FeatureFrame(
     lines=(LINE, replace(LINE, track_id=1)),
     plane=(0.0, 0.1, 2.0, -1.0),
@@ -58,6 +60,19 @@ def test_a_bad_line_is_dropped_alone(bad: dict[str, Any]) -> None:
     found, rejected = checked(replace(GOOD, lines=(replace(LINE, **bad), LINE)))
     assert found.lines == (LINE,) and found.plane == GOOD.plane and found.velocity is not None
     assert rejected == ["features.lines: 1 malformed, not finite or of unknown role"]
+
+
+def test_lines_without_an_identity_get_one_by_role_and_order() -> None:
+    roles = ("horizontal", "vertical", "horizontal", "vertical")
+    found, rejected = checked(replace(GOOD, lines=tuple(replace(LINE, role=role, track_id=0) for role in roles)))
+    assert [line.track_id for line in found.lines] == [-2, -3, -4, -5] and rejected == []
+    alone, _ = checked(replace(GOOD, lines=(replace(LINE, role="vertical", track_id=0),)))
+    assert alone.lines[0].track_id == -3, "the same in every frame"
+
+
+def test_of_two_lines_with_one_identity_the_second_is_dropped() -> None:
+    found, rejected = checked(replace(GOOD, lines=(LINE, replace(LINE, rho=0.2))))
+    assert found.lines == (LINE,) and rejected == ["features.lines: 1 with a track_id of another line"]
 
 
 @pytest.mark.parametrize("lines", [None, 5, "lines", {1: LINE}, np.zeros(3), iter([LINE])])
@@ -111,8 +126,9 @@ def test_a_velocity_without_a_covariance_is_dropped(covariance: Any) -> None:
 
 
 def test_of_many_lines_a_few_are_looked_at() -> None:
-    found, rejected = checked(replace(GOOD, lines=(LINE,) * 10**6))
+    lines = tuple(replace(LINE, track_id=number + 1) for number in range(2 * MOST))
+    found, rejected = checked(replace(GOOD, lines=lines * (10**6 // len(lines))))
     count = len(found.lines)  # a million lines in a message take minutes
     assert count == MOST
-    assert found.lines == (LINE,) * MOST
+    assert found.lines == lines[:MOST]
     assert rejected == [f"features.lines: 1000000 given, only the first {MOST} are looked at"]

@@ -11,16 +11,19 @@ from typing import Any
 import numpy as np
 import pytest
 from controller_scenes import CEILING, FLOOR, TICK_NS, line_references, measured
+from hostile_values import Raising
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from references import good_reference
 from small_vehicle import SmallVehicle
 
 from ibvs_qp.analytic import PaperController
+from ibvs_qp.checked_law import NO_VELOCITY
 from ibvs_qp.command import Command, Outcome
 from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import LineFeature, LineReference, Measurement, Reference
-from ibvs_qp.validation.measurement import MeasurementGate
+from ibvs_qp.validation.clock import LEAD_NS
+from ibvs_qp.validation.measurement import OLDEST_LINE_NS, MeasurementGate
 
 LAWS = [HybridController, PaperController]
 RATE_STEP = 500.0 * 0.004
@@ -429,8 +432,70 @@ def test_what_raises_when_it_is_read_is_named_and_held(law: Callable[[], Any]) -
     bad = controller.step(object.__new__(Raising), good_reference())
     check(bad, last)
     assert bad.outcome is Outcome.HOLD and bad.stamp_ns == 0
-    assert bad.rejected[0].startswith("step: RuntimeError in __getattribute__, line ")
+    assert bad.rejected == ("stamp_ns: not a whole number of nanoseconds from 0 to 4.6e+18",)
     assert controller.step(vehicle.measure(), good_reference()).outcome is Outcome.SOLVED
+
+
+def raising(*_: Any) -> Any:
+    raise RuntimeError
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_law_that_raises_is_named_and_held(law: Callable[[], Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    controller, vehicle, last = warmed(law)
+    with monkeypatch.context() as broken:
+        broken.setattr(controller.setpoints, "update", raising)
+        bad = controller.step(vehicle.measure(), good_reference())
+    check(bad, last)
+    assert bad.outcome is Outcome.HOLD and bad.rejected[0].startswith("step: RuntimeError in raising, line ")
+    vehicle.tick += 1
+    assert controller.step(vehicle.measure(), good_reference()).outcome is Outcome.SOLVED
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("name", ["thrust_max", "velocity", "velocity_covariance", "plane", "lines", "specific_force"])
+def test_a_field_that_raises_is_dropped_alone(law: Callable[[], Any], name: str) -> None:
+    controller, vehicle, last = warmed(law)
+    seen = vehicle.measure()
+    values = {field.name: getattr(seen, field.name) for field in fields(Measurement)}
+    for value in ([Raising()] * 6, Raising()):
+        bad = controller.step(Measurement(**(values | {name: value})), good_reference())
+        check(bad, last)
+        assert bad.outcome is not Outcome.HOLD and all(reason.startswith(name) for reason in bad.rejected), bad.rejected
+        last = bad
+        values["stamp_ns"] += TICK_NS
+        values["wrench_stamp_ns"] += TICK_NS
+
+    class Lacking(Measurement):
+        def __getattribute__(self, attribute: str) -> Any:
+            return 1 / 0 if attribute == name else super().__getattribute__(attribute)
+
+    bad = controller.step(Lacking(**values), good_reference())
+    check(bad, last)
+    assert bad.outcome is not Outcome.HOLD and bad.rejected[0].startswith(name), bad.rejected
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_line_of_the_future_or_of_long_ago_is_named(law: Callable[[], Any]) -> None:
+    controller, vehicle, _ = warmed(law)
+    seen = vehicle.measure()
+    first, *others = seen.lines
+    late = seen.stamp_ns + 9 * 10**8  # so that a line may be too old
+    for number, stamp in enumerate((2**61, late + LEAD_NS + 20 * TICK_NS, late - OLDEST_LINE_NS - 1)):
+        lines = (replace(first, stamp_ns=stamp), *others)
+        now = late + number * TICK_NS
+        seen = replace(vehicle.measure(), stamp_ns=now, wrench_stamp_ns=now, plane_stamp_ns=now, lines=lines)
+        command = controller.step(seen, good_reference())
+        assert [reason[:20] for reason in command.rejected] == ["lines: 1 with a stam"], command.rejected
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_slide_without_a_velocity_is_named(law: Callable[[], Any]) -> None:
+    controller, vehicle, _ = warmed(law)
+    slide = replace(good_reference(), velocity=np.array([0.1, 0.0]))
+    assert controller.step(vehicle.measure(velocity=None), slide).rejected == (NO_VELOCITY,)
+    vehicle.tick += 1
+    assert controller.step(vehicle.measure(velocity=np.zeros(3)), slide).rejected == ()
 
 
 @pytest.mark.parametrize("law", LAWS)

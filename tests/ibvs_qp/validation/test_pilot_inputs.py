@@ -149,9 +149,22 @@ def test_what_raises_when_it_is_read_is_named_and_held() -> None:
 
     pilot, commands = flown_with({}, 50)
     bad = pilot.step(object.__new__(Raising))
-    assert bad.outcome is Outcome.HOLD and bad.rejected[0].startswith("pilot: RuntimeError in __getattribute__")
+    assert bad.outcome is Outcome.HOLD and bad.rejected[0].startswith("sensor frame: stamp_ns not a whole number")
     assert np.abs(bad.thrusts - commands[-1].thrusts).max() <= RATE_STEP + 1e-9
     assert sound(pilot.step(frames()[50]), bad).outcome is Outcome.SOLVED
+
+
+def test_an_estimator_that_raises_is_named_and_held(monkeypatch: pytest.MonkeyPatch) -> None:
+    def raising(**_: Any) -> Any:
+        raise RuntimeError
+
+    pilot, commands = flown_with({}, 50)
+    with monkeypatch.context() as broken:
+        broken.setattr(pilot.contact, "update", raising)
+        bad = pilot.step(frames()[50])
+    assert bad.outcome is Outcome.HOLD and bad.rejected[0].startswith("pilot: RuntimeError in raising")
+    assert np.abs(bad.thrusts - commands[-1].thrusts).max() <= RATE_STEP + 1e-9
+    assert sound(pilot.step(frames()[51]), bad).outcome is Outcome.SOLVED
 
 
 def test_a_monitor_that_fails_after_the_law_does_not_step_twice(monkeypatch: pytest.MonkeyPatch) -> None:
