@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+#: The interpreter's own attributes: those of an exception or of its type may be replaced by code that raises.
+_trace_of = BaseException.__dict__["__traceback__"].__get__
+_name_of = type.__dict__["__name__"].__get__
+#: Longest name of an exception's type [characters].
+_LONGEST_NAME = 40
+
 
 def raised(where: str, error: BaseException) -> str:
-    """What was raised and in which line; no text of the exception, which may be anything of a caller's."""
-    trace = error.__traceback__
+    """What was raised and in which line; never raises, and has no text of the exception, which may be a caller's."""
+    trace = _trace_of(error)
     while trace is not None and trace.tb_next is not None:
         trace = trace.tb_next
     place = "" if trace is None else f" in {trace.tb_frame.f_code.co_name}, line {trace.tb_lineno}"
-    return f"{where}: {type(error).__name__}{place}"
+    return f"{where}: {_name_of(type(error))[:_LONGEST_NAME]}{place}"

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ibvs_qp.validation.failure import raised
 from ibvs_qp.validation.fields import thrust_limit
 
 
@@ -25,9 +26,16 @@ class ThrustLimits:
         self.accepted: tuple[np.ndarray, np.ndarray] | None = None
         self.rejected: list[str] = []
 
+    @np.errstate(all="ignore")  # a host may have numpy raise where a number has no float
     def assign(self, limits: Any) -> None:
-        """Take a pair of limits, or None; a refused one leaves the last in force."""
+        """Take a pair of limits, or None; never raises, and a refused pair leaves the last in force."""
         self.rejected = []
+        try:
+            self._assign(limits)
+        except Exception as error:  # an entry may run code of the caller's
+            self.rejected = [raised("thrust_limits", error)]
+
+    def _assign(self, limits: Any) -> None:
         if limits is None:
             self.accepted = None
             return

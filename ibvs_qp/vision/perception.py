@@ -11,6 +11,7 @@ import numpy as np
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import R_BODY_CAMERA, down_in_body
 from ibvs_qp.measurement import FeatureFrame, RgbdFrame
+from ibvs_qp.validation.failure import raised
 from ibvs_qp.vision.checks import StageClock, finite_vector, frame_problem
 from ibvs_qp.vision.colors import SurfaceColors
 from ibvs_qp.vision.config import VisionConfig
@@ -101,7 +102,7 @@ class Perception:
                 turned, moved = finite_vector(rotation, 3), finite_vector(velocity, 3)
                 return self._process(frame, finite_vector(attitude, 4), turned, moved, hints, detect, seed_pixel)
         except Exception as error:  # in flight nothing may raise; the reason is reported instead
-            problem = f"picture not understood: {type(error).__name__}: {error}"
+            problem = raised("picture not understood", error)
         self._plane = None
         self._flow.reset()
         stamp = frame.stamp_ns if isinstance(frame.stamp_ns, int) else 0

@@ -37,3 +37,20 @@ def test_refused_limits_are_named_and_leave_the_last_in_force(broken: Any) -> No
     assert limits.rejected and all(reason.startswith("thrust_limits: ") for reason in limits.rejected)
     limits.assign((LOW, LOW))
     assert limits.rejected == [] and limits.accepted[1].tolist() == LOW
+
+
+class Unreadable(float):
+    """A number that raises when it is read."""
+
+    def __float__(self) -> float:
+        raise ValueError
+
+
+@pytest.mark.parametrize("broken", [np.full(6, np.longdouble("1e4000")), (Unreadable(1.0),) * 6])
+def test_a_pair_that_raises_when_it_is_read_is_refused_by_name(broken: Any) -> None:
+    limits = ThrustLimits(6)
+    limits.assign((LOW, HIGH))
+    with np.errstate(all="raise"):
+        limits.assign((broken, broken))
+    assert limits.rejected and all(reason.startswith("thrust_limits: ") for reason in limits.rejected)
+    assert limits.accepted is not None and limits.accepted[1].tolist() == HIGH
