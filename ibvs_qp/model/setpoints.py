@@ -155,9 +155,10 @@ class Setpoints:
         """Store the commanded thrusts, and the largest force or moment given up (anti-windup), for the next step.
 
         Returns:
-            The stored copy: the caller of the controller may write into the command's own array.
+            The stored copy, read-only: the caller of the controller may write into the command's own array.
         """
         own = thrusts.copy()
+        own.flags.writeable = False  # it is in the reports of the command, too
         if self.last is not None:
             self._change = own - self.last
         self.last, self._given_up = own, given_up
