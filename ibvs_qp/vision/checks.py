@@ -12,6 +12,11 @@ from ibvs_qp.validation.numbers import described, vector
 
 #: Smallest and largest side of a picture that can be used [px].
 _SMALLEST, _LARGEST = 64, 4096
+#: Largest picture in flight [px]: the widest of common RGB-D cameras. It takes 8 ms, one of 4096 x 4096 px 70 ms.
+MOST_PIXELS = 1920 * 1200
+#: A change of size or intrinsics costs 15 ms of masks and tables: only one that lasts so many pictures is
+#: followed, 0.17 s at 30 Hz, before an image is stale.
+STEADY_PICTURES = 5
 #: Smallest focal length, and largest entry of the intrinsics [px].
 _SHORTEST_FOCAL, _INTRINSICS_BOUND = 1.0, 1e5
 #: No RGB-D camera sees a surface as far as this [m]: a larger median is in millimetres.
@@ -43,6 +48,38 @@ def frame_problem(frame: RgbdFrame) -> str | None:
     if min(entries[:2]) <= _SHORTEST_FOCAL:
         return f"intrinsics {tuple(entries)} are not (fx, fy, cx, cy) in pixels"
     return _unit_problem(depth)
+
+
+class PictureGate:
+    """Checks the pictures of one flight; only a lasting change of size or intrinsics is followed."""
+
+    def __init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        """As before the first picture."""
+        self._camera: tuple[float, ...] | None = None  # height, width and intrinsics in use
+        self._other: tuple[float, ...] | None = None  # those of the last picture, if others
+        self._seen = 0
+
+    def problem(self, frame: RgbdFrame) -> str | None:
+        """Why a picture cannot be used, or None if it can."""
+        if problem := frame_problem(frame):
+            return problem
+        height, width = frame.depth.shape
+        if height * width > MOST_PIXELS:
+            return f"picture of {width} x {height} px is too large: in flight at most {MOST_PIXELS} px"
+        camera = (height, width, *frame.intrinsics)
+        if self._camera in (None, camera):
+            self._camera, self._other = camera, None
+            return None
+        self._seen = self._seen + 1 if self._other == camera else 1
+        self._other = camera
+        if self._seen < STEADY_PICTURES:
+            what = "size" if self._camera[:2] != camera[:2] else "intrinsics"
+            return f"another {what} than the pictures before, {self._seen} of {STEADY_PICTURES} until it is followed"
+        self._camera, self._other = camera, None
+        return None
 
 
 def _unit_problem(depth: np.ndarray) -> str | None:

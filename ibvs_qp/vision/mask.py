@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 
 import cv2
 import numpy as np
@@ -42,7 +43,7 @@ def vehicle_mask(
     _fill_rod(mask, vehicle, intrinsics, np.array([0.0, tip[1], tip[2]]), tip, vehicle.arm_radius_m)
     _fill_rod(mask, vehicle, intrinsics, tip - config.brush_length_m * axis, tip, 0.5 * brush_width_m)
     for hub, thrust_axis in zip(vehicle.geometry.positions, vehicle.geometry.axes, strict=True):
-        disc = _circle(hub, thrust_axis, vehicle.propeller_radius_m)
+        disc = hub + _circle(thrust_axis, vehicle.propeller_radius_m)
         _fill_hull(mask, _project(disc, vehicle, intrinsics))
     return _grow(mask, config.margin_px * shape[1] / REFERENCE_WIDTH)
 
@@ -58,13 +59,13 @@ def brush_zone(
     return _grow(zone, config.paint_margin_px * shape[1] / REFERENCE_WIDTH)
 
 
-def _circle(center: np.ndarray, axis: np.ndarray, radius: float) -> np.ndarray:
-    """Points of a circle around an axis, (n, 3)."""
+def _circle(axis: np.ndarray, radius: float) -> np.ndarray:
+    """Points of a circle around an axis, seen from its centre, (n, 3)."""
     helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
     first = np.cross(axis, helper)
     first /= np.linalg.norm(first)
     angle = np.linspace(0.0, 2.0 * np.pi, _CORNERS, endpoint=False)[:, None]
-    return center + radius * (np.cos(angle) * first + np.sin(angle) * np.cross(axis, first))
+    return radius * (np.cos(angle) * first + np.sin(angle) * np.cross(axis, first))
 
 
 def _project(points: np.ndarray, vehicle: VehicleParams, intrinsics: Intrinsics) -> np.ndarray:
@@ -80,8 +81,9 @@ def _fill_rod(
 ) -> None:
     """Fill the image of a round rod: hulls of neighbouring cross sections, so that perspective is kept."""
     axis = (end - start) / max(float(np.linalg.norm(end - start)), 1e-9)
+    circle = _circle(axis, radius)
     sections = [
-        _project(_circle(start + share * (end - start), axis, radius), vehicle, intrinsics)
+        _project(start + share * (end - start) + circle, vehicle, intrinsics)
         for share in np.linspace(0.0, 1.0, _STATIONS)
     ]
     for one, two in itertools.pairwise(sections):
@@ -97,5 +99,19 @@ def _fill_hull(mask: np.ndarray, pixels: np.ndarray) -> None:
 
 
 def _grow(mask: np.ndarray, margin: float) -> np.ndarray:
+    """The mask with a margin [px]; in cells where the picture is wider than the reference, which hide a little more.
+
+    The dilation's cost grows with the fourth power of the width: 0.3 s at 1920, 25 s at 4096 pixels.
+    """
+    rows, columns = mask.shape
+    cell = math.ceil(columns / REFERENCE_WIDTH)
+    if cell > 1:
+        padded = cv2.copyMakeBorder(mask, 0, -rows % cell, 0, -columns % cell, cv2.BORDER_CONSTANT)
+        height, width = padded.shape
+        means = cv2.resize(padded, (width // cell, height // cell), interpolation=cv2.INTER_AREA)
+        grown = _grow(np.where(means > 0, np.uint8(255), np.uint8(0)), margin / cell)
+        return np.ascontiguousarray(
+            cv2.resize(grown, (width, height), interpolation=cv2.INTER_NEAREST)[:rows, :columns]
+        )
     size = 2 * round(margin) + 1
     return cv2.dilate(mask, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))) if size > 1 else mask

@@ -12,7 +12,7 @@ from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import R_BODY_CAMERA, down_in_body
 from ibvs_qp.measurement import FeatureFrame, RgbdFrame
 from ibvs_qp.validation.failure import raised
-from ibvs_qp.vision.checks import StageClock, finite_vector, frame_problem
+from ibvs_qp.vision.checks import PictureGate, StageClock, finite_vector
 from ibvs_qp.vision.colors import SurfaceColors
 from ibvs_qp.vision.config import VisionConfig
 from ibvs_qp.vision.detect import Candidate, detect_lines
@@ -60,12 +60,12 @@ class Perception:
         )
         self._colors = SurfaceColors(config.board_color, config.paint_color, config.line.color_gate)
         self._layout: PictureLayout | None = None
-        self._exposure = ExposureSteps()
+        self._exposure, self._gate = ExposureSteps(), PictureGate()
         self.reset()
 
     def reset(self) -> None:
         """Forget everything seen: the same pictures then give the same bits."""
-        for part in (self._fitter, self._tracker, self._flow, self._colors, self._exposure):
+        for part in (self._gate, self._fitter, self._tracker, self._flow, self._colors, self._exposure):
             part.reset()
         self._plane: PlaneEstimate | None = None
         self._stamp_ns: int | None = None
@@ -97,7 +97,7 @@ class Perception:
             Features, plane, tracks and times.
         """
         try:
-            problem = frame_problem(frame)
+            problem = self._gate.problem(frame)
             if problem is None:
                 turned, moved = finite_vector(rotation, 3), finite_vector(velocity, 3)
                 return self._process(frame, finite_vector(attitude, 4), turned, moved, hints, detect, seed_pixel)

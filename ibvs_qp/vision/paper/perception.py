@@ -7,7 +7,7 @@ import numpy as np
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.measurement import FeatureFrame, RgbdFrame
 from ibvs_qp.validation.failure import raised
-from ibvs_qp.vision.checks import StageClock, finite_vector, frame_problem
+from ibvs_qp.vision.checks import PictureGate, StageClock, finite_vector
 from ibvs_qp.vision.config import VisionConfig
 from ibvs_qp.vision.detect import Candidate
 from ibvs_qp.vision.flow import SparseFlow
@@ -41,12 +41,13 @@ class PaperPerception:
     def __init__(self, config: PaperConfig, vision: VisionConfig, vehicle: VehicleParams) -> None:
         self._config, self._vision, self._vehicle = config, vision, vehicle
         self._camera_position = np.asarray(vehicle.camera_position_m, float)
-        self._flow = SparseFlow(vision.flow)
+        self._flow, self._gate = SparseFlow(vision.flow), PictureGate()
         self._layout: PictureLayout | None = None
         self.reset()
 
     def reset(self) -> None:
         """Forget everything seen."""
+        self._gate.reset()
         self._flow.reset()
         self._center: tuple[float, float] | None = None
         self._stamp_ns: int | None = None
@@ -68,7 +69,7 @@ class PaperPerception:
         Attitude, hints and ``detect`` change nothing: the vehicle is taken to be level and every picture is searched.
         """
         try:
-            problem = frame_problem(frame)
+            problem = self._gate.problem(frame)
             if problem is None:
                 return self._process(frame, finite_vector(rotation, 3), finite_vector(velocity, 3), seed_pixel)
         except Exception as error:  # in flight nothing may raise; the reason is reported instead

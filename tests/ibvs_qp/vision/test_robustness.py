@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import itertools
 import math
+import time
 from dataclasses import replace
 
 import cv2
@@ -16,6 +17,8 @@ from ibvs_qp.frames import align_line
 from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.vision import Perception, VisionConfig
 from ibvs_qp.vision.overlay import draw_overlay
+from ibvs_qp.vision.paper.config import PaperConfig
+from ibvs_qp.vision.paper.perception import PaperPerception
 
 INTRINSICS = (625.2, 625.2, 319.5, 239.5)
 SHAPE = (480, 640)
@@ -254,3 +257,47 @@ def test_overlay_keeps_the_picture_and_marks_the_line() -> None:
     assert (drawn[209:212, 500] != before[209:212, 500]).any()
     refused = eye.process(BROKEN["zero depth"], attitude=LEVEL)
     assert draw_overlay(picture.rgb, refused).shape == before.shape
+
+
+def resized(k: int, width: int, height: int) -> RgbdFrame:
+    """The board's picture in another size, by its rows and columns repeated."""
+    small = frame(k)
+    rows, columns = np.arange(height) * SHAPE[0] // height, np.arange(width) * SHAPE[1] // width
+    scale = width / SHAPE[1]
+    fx, fy, cx, cy = INTRINSICS
+    return replace(
+        small,
+        rgb=np.ascontiguousarray(small.rgb[rows][:, columns]),
+        depth=np.ascontiguousarray(small.depth[rows][:, columns]),
+        intrinsics=(fx * scale, fy * scale, cx * scale, cy * scale),
+    )
+
+
+@pytest.mark.parametrize("size", [(1920, 1080), (1201, 1601), (64, 4096)])
+def test_no_accepted_size_stalls(size: tuple[int, int]) -> None:
+    begin = time.perf_counter()
+    assert "too large" not in (perception().process(resized(0, *size), attitude=LEVEL).refused or "")
+    assert time.perf_counter() - begin < 0.25, "the masks alone took 0.3 s and more"
+
+
+@pytest.mark.parametrize(
+    "pipeline", [perception, lambda: PaperPerception(PaperConfig(), VisionConfig(), VehicleParams())]
+)
+def test_a_picture_beyond_full_hd_is_refused_in_flight(pipeline) -> None:
+    refused = pipeline().process(resized(0, 2048, 1536)).refused
+    assert refused is not None and "2048 x 1536 px is too large" in refused
+
+
+@pytest.mark.parametrize("what", ["size", "intrinsics"])
+def test_another_camera_is_followed_once_it_lasts(what: str) -> None:
+    def other(k: int) -> RgbdFrame:
+        return resized(k, 424, 240) if what == "size" else replace(frame(k), intrinsics=(620.0, 620.0, 319.5, 239.5))
+
+    eye = perception()
+    seen = [eye.process(other(k) if k % 2 else frame(k), attitude=LEVEL).refused for k in range(11)]
+    assert seen[::2] == [None] * 6
+    assert all(reason is not None and f"another {what}" in reason for reason in seen[1::2])
+    lasting = [eye.process(other(k), attitude=LEVEL).refused for k in range(11, 17)]
+    assert all(lasting[:4]) and lasting[4:] == [None, None]
+    eye.reset()
+    assert eye.process(frame(18), attitude=LEVEL).refused is None, "a new flight begins with any camera"

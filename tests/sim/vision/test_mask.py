@@ -56,3 +56,13 @@ def test_brush_width_and_tip_move_the_mask() -> None:
     assert mask_of(VehicleParams(), 0.12).sum() > mask_of(VehicleParams(), 0.08).sum()
     lower = mask_of(VehicleParams(tip_position_m=(0.70, 0.0, 0.05)))
     assert lower[195:210].any()
+
+
+@pytest.mark.parametrize("shape", [(720, 1280), (1081, 1921)])
+def test_a_large_picture_hides_what_a_small_one_does_and_a_cell_more(shape: tuple[int, int]) -> None:
+    """Masks of wide pictures are grown in cells of 2 to 4 pixels."""
+    large, cell = mask_of(VehicleParams(), shape=shape), -(-shape[1] // 640)
+    shrunk = mask_of(VehicleParams(), shape=(shape[0] // cell, shape[1] // cell))
+    sampled = large[cell // 2 :: cell, cell // 2 :: cell][: shrunk.shape[0], : shrunk.shape[1]]
+    assert (shrunk & ~sampled).mean() < 0.003
+    assert (sampled & ~shrunk).mean() < 0.01
