@@ -9,6 +9,7 @@ import numpy as np
 from ibvs_qp.measurement import FeatureFrame, RgbdFrame, SensorFrame
 from ibvs_qp.pilot.attitude_history import AttitudeHistory
 from ibvs_qp.pilot.config import PilotConfig
+from ibvs_qp.pilot.perception_loader import PerceptionLoader
 from ibvs_qp.validation.features import check_features
 from ibvs_qp.validation.measurement import LINES_PER_SLOT
 from ibvs_qp.vision.percept import LineHint
@@ -39,12 +40,18 @@ class CameraInput:
     ) -> None:
         self._config, self._history, self._seen_as = config, history, seen_as
         self._most_lines = LINES_PER_SLOT * config.controller.line_slots
-        self._perception = None
+        self._loader = PerceptionLoader(config)
+
+    def prepare(self, picture: RgbdFrame | None = None) -> None:
+        """Load perception and call every stage of it once; `Pilot.prepare`."""
+        self._loader.start(picture).join()
+        if self._loader.problem:
+            raise RuntimeError(self._loader.problem)
 
     def reset(self) -> None:
-        """As before the first picture."""
-        if self._perception is not None:
-            self._perception.reset()
+        """As before the first picture; perception stays loaded."""
+        if self._loader.perception is not None:
+            self._loader.perception.reset()
         self.percept, self._capture_ns = None, -1
         self.plane: tuple[float, float, float, float] | None = None
         self.plane_ns = self.image_ns = -1
@@ -85,11 +92,14 @@ class CameraInput:
         self, image: RgbdFrame, velocity: np.ndarray | None, hints: tuple[LineHint, ...], rejected: list[str]
     ) -> FeatureFrame | None:
         """Run perception on a picture, with the gyro's turn since the last one; None for a refused picture."""
-        if self._perception is None:
-            self._perception = self._load_perception()
+        if (perception := self._loader.perception) is None:
+            if not self._loader.problem:
+                self._loader.start()
+            rejected.append(f"image: {self._loader.problem}")
+            return None
         last_ns = self._capture_ns if self._capture_ns >= 0 else image.stamp_ns
         self._capture_ns = image.stamp_ns
-        self.percept = self._perception.process(
+        self.percept = perception.process(
             image,
             attitude=np.array(self._history.attitude(image.stamp_ns)),
             rotation=self._history.turn(last_ns, image.stamp_ns),
@@ -101,17 +111,6 @@ class CameraInput:
             return None
         seen = self.percept.features
         return seen if self._seen_as is None or seen is None else self._seen_as(seen)
-
-    def _load_perception(self):
-        """The configured perception, loaded when the first picture comes."""
-        vehicle = self._config.controller.vehicle
-        if self._config.perception == "paper":
-            from ibvs_qp.vision.paper import PaperPerception
-
-            return PaperPerception(self._config.paper_vision, self._config.vision, vehicle)
-        from ibvs_qp.vision.perception import Perception
-
-        return Perception(self._config.vision, vehicle)
 
 
 def _content(frame: SensorFrame, features: FeatureFrame) -> object:

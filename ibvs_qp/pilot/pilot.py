@@ -24,7 +24,7 @@ from ibvs_qp.estimation.wall_lines import WallAxes, image_line
 from ibvs_qp.estimation.wall_motion import BIAS, WallMotion
 from ibvs_qp.estimation.wrench_tare import WrenchTare
 from ibvs_qp.frames import down_in_body, plane_in_body, roll_pitch, to_camera
-from ibvs_qp.measurement import FeatureFrame, Measurement, Reference, SensorFrame
+from ibvs_qp.measurement import FeatureFrame, Measurement, Reference, RgbdFrame, SensorFrame
 from ibvs_qp.model.reporting import fixed_command
 from ibvs_qp.model.setpoints import Setpoints
 from ibvs_qp.painting.command import PainterInput, PaintingCommand
@@ -108,6 +108,19 @@ class Pilot:
         law = HybridController if self.config.law == "qp" else PaperController
         self.controller: Controller = controller or law(settings)
         self.reset()
+
+    def prepare(self, picture: RgbdFrame | None = None) -> None:
+        """Load perception before a flight with pictures; without it the first pictures are refused while it loads.
+
+        The first time it is translated into machine code, which takes seconds. Features need no perception.
+
+        Args:
+            picture: One of the camera to fly with: tables of its size and intrinsics are made, too. It is not kept.
+
+        Raises:
+            RuntimeError: When perception cannot be loaded.
+        """
+        self._camera.prepare(picture)
 
     def reset(self) -> None:
         """As after construction."""

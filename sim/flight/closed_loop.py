@@ -36,7 +36,10 @@ def make_pilot(scene: Scene, options: FlightOptions, config: PilotConfig, job: J
     rendered = options.features == "rendered"  # the sensor model of lines adds the same noise itself
     seen_as = (lambda frame: add_sigma_vs(frame, sigma, noise)) if rendered and sigma > 0.0 else None
     controller = rival_controller(options.rival, config.controller) if options.rival else None
-    return Pilot(config, job.strategy(config.painting), seen_as, controller)
+    pilot = Pilot(config, job.strategy(config.painting), seen_as, controller)
+    if rendered:
+        pilot.prepare()
+    return pilot
 
 
 def fly(

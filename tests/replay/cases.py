@@ -53,11 +53,15 @@ class Case:
         )
 
     def pilot(self) -> Pilot:
-        """A new pilot."""
+        """A new pilot, ready for what the case shows it."""
         config = self.config()
-        if self.hold_s is None:
-            return Pilot(config)
-        return Pilot(config, internals.pressing_strategy(config.painting, self.hold_s, descend_s=5.0))
+        painter = None
+        if self.hold_s is not None:
+            painter = internals.pressing_strategy(config.painting, self.hold_s, descend_s=5.0)
+        pilot = Pilot(config, painter)
+        if self.pictures:
+            pilot.prepare()
+        return pilot
 
     def controller(self) -> HybridController | PaperController:
         """A new controller."""

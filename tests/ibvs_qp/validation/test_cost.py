@@ -109,7 +109,8 @@ def test_no_giant_is_copied_into_a_pilot(giant: Any) -> None:
 
 def test_a_picture_beyond_any_camera_is_refused_by_name() -> None:
     pilot, frame = Pilot(), recording("rotor_loss").frames[0]
-    pilot.step(replace(frame, image=replace(PICTURE, stamp_ns=0, rgb=None)))  # loads vision
+    pilot.prepare()
+    pilot.step(frame)
     now = recording("rotor_loss").frames[1]
     command = in_time(lambda: pilot.step(replace(now, image=replace(PICTURE, stamp_ns=now.stamp_ns))))
     assert command.rejected == ("image: picture of 1000000 x 1000000 px is too large",)

@@ -31,6 +31,8 @@ from ibvs_qp.pilot import Pilot
 with open(sys.argv[1], "rb") as file:
     config, frames = pickle.load(file)
 pilot = Pilot(config)
+if any(frame.image is not None for frame in frames):
+    pilot.prepare()
 thrusts = [pilot.step(frame).thrusts for frame in frames]
 with open(sys.argv[2], "wb") as file:
     pickle.dump((thrusts, sorted(name for name in sys.modules if name.split(".")[0] in ("sim", "mujoco"))), file)
@@ -44,6 +46,8 @@ def test_same_thrusts_without_the_simulator(law: str, features: str, tmp_path: P
     options = FlightOptions(law=law, seed=5, features=features, video=False)
     config = pilot_config(scene, options)
     pilot, world = Pilot(config), World(scene, options, config)
+    if features == "rendered":
+        pilot.prepare()
     frames, thrusts = [], []
     for _ in range(1000):
         frames.append(world.sense())

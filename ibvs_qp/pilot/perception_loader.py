@@ -1,0 +1,96 @@
+"""The configured perception, loaded before the flight or beside it: at first it is translated, which takes seconds."""
+
+from __future__ import annotations
+
+import threading
+from typing import Protocol
+
+import numpy as np
+
+from ibvs_qp.measurement import RgbdFrame
+from ibvs_qp.pilot.config import PilotConfig
+from ibvs_qp.validation.failure import raised
+from ibvs_qp.vision.percept import LineHint, Percept
+
+#: Pictures that call every stage once, and the time between them [ns].
+_WARM_UP, _STEP_NS = 3, 33_333_333
+#: Size of the stand-in for a camera's picture [px], its focal length [px] and distance [m].
+_SIZE, _FOCAL, _DISTANCE = (480, 640), 600.0, 0.5
+
+
+class AnyPerception(Protocol):
+    """The own perception or the paper's."""
+
+    def reset(self) -> None:
+        """Forget everything seen."""
+        ...
+
+    def process(
+        self,
+        frame: RgbdFrame,
+        *,
+        attitude: np.ndarray | None = None,
+        rotation: np.ndarray | None = None,
+        velocity: np.ndarray | None = None,
+        hints: tuple[LineHint, ...] = (),
+    ) -> Percept:
+        """See one picture."""
+        ...
+
+
+class PerceptionLoader:
+    """Loads perception in a thread of its own; what it loads does not depend on when.
+
+    Attributes:
+        perception: The perception, None until it is loaded.
+        problem: Why there is none, "" while nothing loads.
+    """
+
+    def __init__(self, config: PilotConfig) -> None:
+        self._config = config
+        self.perception: AnyPerception | None = None
+        self.problem = ""
+        self._thread: threading.Thread | None = None
+
+    def start(self, picture: RgbdFrame | None = None) -> threading.Thread:
+        """Begin to load, unless it does already; `prepare` of the pilot describes the picture."""
+        if self._thread is None or not self._thread.is_alive():
+            self.problem = "perception is loading"
+            self._thread = threading.Thread(target=self._load, args=(picture,), daemon=True)
+            self._thread.start()
+        return self._thread
+
+    @np.errstate(all="ignore")  # as in a step
+    def _load(self, picture: RgbdFrame | None) -> None:
+        try:
+            perception = self.perception or self._construct()
+            picture = picture or _stand_in()
+            for index in range(_WARM_UP):
+                seen = RgbdFrame(
+                    rgb=picture.rgb, depth=picture.depth, intrinsics=picture.intrinsics, stamp_ns=index * _STEP_NS
+                )
+                perception.process(seen)
+            perception.reset()
+            self.perception, self.problem = perception, ""
+        except Exception as error:  # pictures are refused with this reason
+            self.problem = raised("perception", error)
+
+    def _construct(self) -> AnyPerception:
+        vehicle = self._config.controller.vehicle
+        if self._config.perception == "paper":
+            from ibvs_qp.vision.paper import PaperPerception
+
+            return PaperPerception(self._config.paper_vision, self._config.vision, vehicle)
+        from ibvs_qp.vision.perception import Perception
+
+        return Perception(self._config.vision, vehicle)
+
+
+def _stand_in() -> RgbdFrame:
+    """A bright surface with a level and an upright edge."""
+    height, width = _SIZE
+    rgb = np.full((height, width, 3), 60, np.uint8)
+    rgb[: height // 2, : 3 * width // 4] = 200
+    rgb += np.random.default_rng(0).integers(0, 8, rgb.shape, np.uint8)
+    intrinsics = (_FOCAL, _FOCAL, 0.5 * width, 0.5 * height)
+    return RgbdFrame(rgb=rgb, depth=np.full(_SIZE, _DISTANCE, np.float32), intrinsics=intrinsics, stamp_ns=0)
