@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from operator import gt
 from typing import Any
 
 import numpy as np
@@ -46,6 +47,8 @@ class ThrustLimits:
         for side, entries, value in zip(self._sides, sides, limits, strict=True):
             if entries is None or not side.accepts(entries):
                 self.rejected.append(f"thrust_limits: {side.rejection(value)}")
+        if not self.rejected and any(map(gt, *sides)):  # type: ignore[arg-type]
+            self.rejected.append("thrust_limits: thrust_max below thrust_min")
         if not self.rejected:
             low, high = np.array(sides)
             low.flags.writeable = high.flags.writeable = False

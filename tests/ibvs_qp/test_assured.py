@@ -184,9 +184,7 @@ def test_a_lost_rotor_brings_the_vehicle_down_upright(rotor: int) -> None:
 def noisy(seen: Measurement, rng: np.random.Generator) -> Measurement:
     """As a vehicle measures: the monitors take sensors without noise for those of a simulator."""
     assert seen.specific_force is not None
-    lines = tuple(
-        replace(line, rho=line.rho + rng.normal(0.0, 1e-5), stamp_ns=seen.stamp_ns) for line in seen.lines
-    )
+    lines = tuple(replace(line, rho=line.rho + rng.normal(0.0, 1e-5), stamp_ns=seen.stamp_ns) for line in seen.lines)
     return replace(
         seen,
         specific_force=seen.specific_force + rng.normal(0.0, 0.05, 3),

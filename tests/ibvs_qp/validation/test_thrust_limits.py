@@ -24,7 +24,8 @@ def test_accepted_limits_are_read_only_copies() -> None:
 
 
 @pytest.mark.parametrize(
-    "broken", [(LOW, [np.nan] * 6), (LOW, [1e9] * 6), ([-1e9] * 6, HIGH), (LOW, HIGH[:5]), (LOW,), None, "ab", 7]
+    "broken",
+    [(HIGH, LOW), (LOW, [np.nan] * 6), (LOW, [1e9] * 6), ([-1e9] * 6, HIGH), (LOW, HIGH[:5]), (LOW,), None, "ab", 7],
 )
 def test_refused_limits_are_named_and_leave_the_last_in_force(broken: Any) -> None:
     limits = ThrustLimits(6)
