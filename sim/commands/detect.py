@@ -95,9 +95,9 @@ class Detect:
         else:
             Console().print(frame_table(frames))
             for reason in refusals(frames):
-                Console().print(reason, highlight=False, soft_wrap=True)
+                print(reason)
             if folder is not None:
-                Console().print(f"Pictures: {folder}", soft_wrap=True, highlight=False)
+                print(f"Pictures: {folder}")
         return 0
 
     def _entries(self) -> list[FrameEntry]:

@@ -127,7 +127,7 @@ class ExperimentCommand:
         else:
             _print_verdicts(Console(), content)
             if page is not None:
-                Console().print(f"Results: {page}", soft_wrap=True, highlight=False)
+                print(f"Results: {page}")
         if result.interrupted:
             return interrupted(words, folder, f"finished flights are in {folder}")
         return 0

@@ -113,7 +113,7 @@ class Faults:
                 print(as_json(content))
             else:
                 _print_verdicts(Console(), judged)
-                Console().print(f"Results: {file}", soft_wrap=True, highlight=False)
+                print(f"Results: {file}")
             if result.interrupted:
                 return interrupted(words, folder, f"finished flights are in {folder}")
             return 0

@@ -156,7 +156,7 @@ class Paint:
         else:
             Console().print(figure_table(metrics))
             if folder.report.exists():
-                Console().print(f"Report: {folder.report}", soft_wrap=True, highlight=False)
+                print(f"Report: {folder.report}")
         if interrupted:
             print(f"ibvs-qp: interrupted; the partial run is in {folder.path}", file=sys.stderr)
         return EXIT_INTERRUPTED if interrupted else 0

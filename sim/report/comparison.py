@@ -9,7 +9,7 @@ import numpy as np
 import polars as pl
 
 from ibvs_qp.config.errors import ConfigError
-from sim.storage.json_file import read_json
+from sim.report.summary_file import read_laws
 from sim.sweep.paired import difference
 from sim.sweep.parts import PARAM, frame
 from sim.sweep.statistics import figure_names, median_interval
@@ -36,20 +36,9 @@ def read_run(path: Path) -> pl.DataFrame:
 
 
 def _paint_rows(path: Path) -> pl.DataFrame:
-    content = read_json(path / "summary.json")
-    try:
-        rows = []
-        for law, metrics in content["laws"].items():
-            row: dict[str, Any] = {"experiment": "paint", "law": law, "variant": "run", "seed": content["seed"]}
-            row |= {"completed": metrics["completed"], "reason": metrics["reason"], "version": content["version"]}
-            rows.append(row | {name: value for name, value in metrics.items() if _is_number(value)})
-        return frame(rows)
-    except (AttributeError, KeyError, TypeError, ValueError, OverflowError) as error:
-        raise ConfigError(f"{path / 'summary.json'} is not the summary of a run: {error}") from None
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
+    facts, laws = read_laws(path / "summary.json")
+    same = {"experiment": "paint", "variant": "run", "seed": facts["seed"], "version": facts["version"]}
+    return frame([metrics | same | {"law": law} for law, metrics in laws.items()])
 
 
 def compare(a: pl.DataFrame, b: pl.DataFrame) -> list[dict[str, Any]]:
@@ -66,7 +55,10 @@ def compare(a: pl.DataFrame, b: pl.DataFrame) -> list[dict[str, Any]]:
     if set(a["variant"]) == {"run"} and set(b["variant"]) == {"run"}:
         b = b.with_columns(pl.lit(a["seed"][0]).alias("seed"))
     params = [name for name in a.columns if name.startswith(PARAM) and name in b.columns]
-    both = a.join(b, on=[*_SAME, *params], suffix=".b", nulls_equal=True, maintain_order="left")
+    try:
+        both = a.join(b, on=[*_SAME, *params], suffix=".b", nulls_equal=True, maintain_order="left")
+    except pl.exceptions.PolarsError as error:  # a parameter of another type, a figure with the suffix
+        raise ConfigError(f"the two runs do not fit together: {str(error).splitlines()[0]}") from None
     if not both.height:
         raise ConfigError("the two runs share no flight (same experiment, law, variant, parameters and seed)")
     shared = [name for name in figure_names(a) if name in b.columns]

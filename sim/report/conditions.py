@@ -7,10 +7,8 @@ from typing import Any
 
 from ibvs_qp.config.toml_text import parse_toml, read_toml
 from ibvs_qp.pilot import PilotConfig
-from sim.storage.json_file import read_json
+from sim.report.summary_file import FACTS, read_facts
 
-#: Facts of a run's summary that change its figures.
-FACTS = ("version", "seed", "world", "features", "vision", "camera", "image_size")
 #: A key that one side lacks.
 ABSENT = "–"
 
@@ -24,12 +22,15 @@ def differing_runs(a: Path, b: Path) -> list[dict[str, Any]]:
 
     Returns:
         Per difference: name, and its value in a and b.
+
+    Raises:
+        ConfigError: When a file is none of a run.
     """
     if not all((path / "summary.json").is_file() for path in (a, b)):
         return []
-    first, second = (read_json(path / "summary.json") for path in (a, b))
+    first, second = (read_facts(path / "summary.json") for path in (a, b))
     pairs: list[tuple[str, dict[str, Any], dict[str, Any]]] = [
-        ("", {name: first.get(name) for name in FACTS}, {name: second.get(name) for name in FACTS})
+        ("", {name: first[name] for name in FACTS}, {name: second[name] for name in FACTS})
     ]
     names = ["scene.toml", *sorted(file.name for file in a.glob("preset_*.toml"))]
     for name in names:
