@@ -15,12 +15,12 @@ import os
 import re
 import sys
 import traceback
-from collections.abc import Iterator
 from typing import Protocol
 
 import ibvs_qp
-from ibvs_qp.config.errors import IbvsQpError
+from ibvs_qp.config.errors import ConfigError, IbvsQpError, shown
 from sim.commands.exit_codes import EXIT_INTERNAL, EXIT_INTERRUPTED, EXIT_TERMINATED, EXIT_USER
+from sim.commands.streams import drop_output, own_output, prepare_streams
 from sim.flight.stop import sigterm_as_ctrl_c
 from sim.storage.limits import LONGEST_SIDE
 
@@ -33,9 +33,11 @@ _ENVIRONMENT = {
     "OPENCV_IO_MAX_IMAGE_PIXELS": str(LONGEST_SIDE**2),
 }
 
-#: Errors of the system, not of the program: full disk or quota, file too large, read-only, no permission, broken disk.
+#: Errors of the system, not of the program: full disk or quota, file too large, read-only, no permission, broken disk,
+#: a name too long, a loop of links, a file for a folder or the reverse, a file that is gone, a reader that has left.
 _SYSTEM_ERRORS = (
-    errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO,
+    errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO, errno.ENAMETOOLONG,
+    errno.ELOOP, errno.ENOTDIR, errno.EISDIR, errno.ENOENT, errno.EEXIST, errno.EPIPE,
 )  # fmt: skip
 #: Longest message [characters].
 _LONGEST = 1000
@@ -74,6 +76,7 @@ def main(arguments: list[str] | None = None) -> int:
         os.environ.setdefault(variable, value)
     if os.name != "posix":  # signals, owners of files and folders, atomic renames
         return _user_error(f"{sys.platform} is not supported; Linux and macOS are")
+    prepare_streams()
     with sigterm_as_ctrl_c() as terminated:
         code = _run(sys.argv[1:] if arguments is None else arguments)
     return EXIT_TERMINATED if code == EXIT_INTERRUPTED and terminated() else code
@@ -82,21 +85,35 @@ def main(arguments: list[str] | None = None) -> int:
 def _run(words: list[str]) -> int:
     """Run one command and map its result to an exit code."""
     try:
-        with _own_output() if "--json" in words else contextlib.nullcontext():
-            return _parse(words).run(words)
+        _check_text(words)
+        with own_output() if "--json" in words else contextlib.nullcontext():
+            code = _code(words)
+        sys.stdout.flush()  # here, not at the end of the process: a full disk or a reader that left has a message
+        return code
     except IbvsQpError as error:
         return _user_error(str(error))
     except OSError as error:
         if error.errno not in _SYSTEM_ERRORS:
             return _internal_error()
+        drop_output()
         return _user_error(f"{error.filename or 'the disk or the output'}: {error.strerror}")
+    except MemoryError:
+        return _user_error("not enough memory")
     except KeyboardInterrupt:
         print("ibvs-qp: interrupted", file=sys.stderr)
         return EXIT_INTERRUPTED
-    except SystemExit as stop:
-        return stop.code if isinstance(stop.code, int) else 0
     except Exception:
         return _internal_error()
+
+
+def _code(words: list[str]) -> int:
+    """Exit code of a command, also of one that ends while its arguments are parsed."""
+    try:
+        return _parse(words).run(words)
+    except SystemExit as stop:
+        if isinstance(stop.__context__, BrokenPipeError):  # Rich ends the program when the reader has left
+            raise stop.__context__ from None
+        return stop.code if isinstance(stop.code, int) else 0
 
 
 def _internal_error() -> int:
@@ -105,26 +122,11 @@ def _internal_error() -> int:
     return EXIT_INTERNAL
 
 
-@contextlib.contextmanager
-def _own_output() -> Iterator[None]:
-    """Keep standard output for Python's own writes: C libraries write to standard error meanwhile.
-
-    OSQP prints "Solver interrupted" after Ctrl-C, which would stand before the line of JSON.
-    """
-    if sys.stdout is not sys.__stdout__ or sys.stdout.fileno() != 1:
-        yield  # somebody redirected it already
-        return
-    sys.stdout.flush()
-    copy = os.dup(1)
-    os.dup2(2, 1)
-    sys.stdout = os.fdopen(copy, "w", encoding=sys.stdout.encoding)
-    try:
-        yield
-    finally:
-        sys.stdout.flush()
-        os.dup2(copy, 1)
-        sys.stdout.close()
-        sys.stdout = sys.__stdout__
+def _check_text(words: list[str]) -> None:
+    """Raise ConfigError for an argument that no file of a run can repeat, and no file can be named."""
+    for word in words:
+        if "\0" in word or word != word.encode(errors="replace").decode():
+            raise ConfigError(f"the argument {shown(word)} is refused: it must be UTF-8 text without zero bytes")
 
 
 def _commands() -> dict[str, type[Command]]:
@@ -192,7 +194,7 @@ def _one_line(text: str) -> str:
 
 
 def _user_error(message: str) -> int:
-    line = " ".join(message.split())
+    line = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in " ".join(message.split()))
     with contextlib.suppress(OSError):  # standard error may be on the full disk
         print("ibvs-qp: error: " + (line if len(line) <= _LONGEST else f"{line[:_LONGEST]} ..."), file=sys.stderr)
     return EXIT_USER
