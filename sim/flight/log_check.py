@@ -10,6 +10,8 @@ from sim.flight.trace import FIELDS
 
 #: Arrays of indices and the arrays of names that they point into.
 _INDICES = {"phase": "phases", "outcome": "outcomes"}
+#: Arrays of names.
+_NAMES = {*_INDICES.values(), "limits"}
 
 
 def check_arrays(arrays: Mapping[str, np.ndarray]) -> None:
@@ -27,6 +29,10 @@ def check_arrays(arrays: Mapping[str, np.ndarray]) -> None:
         if array.dtype.kind not in "biuf" or len(letters) != array.ndim or fixed != array.shape:
             wanted = ", ".join(f"{x} = {sizes[x]}" if x in sizes else x for x in letters)
             raise ValueError(f"array {name} has shape {array.shape} of {array.dtype}, wanted are numbers ({wanted})")
+    for name in _NAMES & arrays.keys():
+        array = arrays[name]
+        if array.ndim != 1 or array.dtype.kind != "U":
+            raise ValueError(f"array {name} has shape {array.shape} of {array.dtype}, wanted is a list of names")
     if sizes.get("L", 0) < len(arrays["limits"]):
         raise ValueError(f"{len(arrays['limits'])} limits are named, the arrays have {sizes.get('L', 0)} columns")
     if not (np.isfinite(arrays["t"]).all() and (np.diff(arrays["t"]) > 0.0).all()):

@@ -34,3 +34,10 @@ def test_a_time_that_does_not_increase_is_refused(value: float) -> None:
 def test_an_index_without_a_name_is_refused(name: str, value: int) -> None:
     with pytest.raises(ValueError, match=f"array {name} has an index outside {name}s"):
         check_arrays(changed(name, 3, value))
+
+
+@pytest.mark.parametrize("names", ["phases", "outcomes", "limits"])
+@pytest.mark.parametrize("array", [np.zeros((1, 0)), np.array([["a", "b"]]), np.array("a"), np.arange(30)])
+def test_names_that_are_no_list_of_text_are_refused(names: str, array: np.ndarray) -> None:
+    with pytest.raises(ValueError, match=f"array {names} has shape"):
+        check_arrays(SOUND | {names: array})
