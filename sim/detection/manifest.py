@@ -22,6 +22,8 @@ COLUMNS = ("color", "depth", "fx", "fy", "cx", "cy", "depth_units_per_m", "seed_
 LARGEST_PX = 1e6
 #: PREFIX_NUMBER_color: consecutive numbers are a motion sequence.
 _NUMBERED = re.compile(r"(?P<prefix>.*)_(?P<number>\d+)_color$")
+#: Most digits of the number of a frame [-]: nanoseconds since 1970 have 19.
+MOST_DIGITS = 20
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,6 +94,10 @@ def _entry(folder: Path, place: str, row: dict[str, str]) -> FrameEntry:
 
     if not row["color"]:
         raise ConfigError(f"{place}: no colour file is named")
+    match = _NUMBERED.fullmatch(Path(row["color"]).stem)
+    if match and len(match["number"]) > MOST_DIGITS:
+        allowed = f"a frame's number has at most {MOST_DIGITS} digits"
+        raise ConfigError(f"{place}: color = {shown(row['color'])} is refused: {allowed}")
     return FrameEntry(
         color=row["color"],
         depth=row["depth"],

@@ -228,3 +228,9 @@ def test_extreme_options_of_one_frame(tmp_path: Path, capfd: pytest.CaptureFixtu
     seed = ["--seed-pixel", ROW["seed_u"], ROW["seed_v"], "--depth-units-per-metre", str(UNITS)]
     assert main(["detect", *files, *words, *seed, "--json"]) == 2
     assert capfd.readouterr().err.count("\n") == 1
+
+
+def test_a_frame_number_of_too_many_digits(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "manifest.csv").write_bytes(table([ROW | {"color": f"a_{'1' * 5000}_color.png"}]))
+    err = str(detect(tmp_path, capfd, (2,)))
+    assert "manifest.csv, line 2: color = " in err and "20 digits" in err
