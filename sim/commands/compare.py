@@ -11,6 +11,7 @@ import tyro
 from sim.commands.options import (
     World,
     check_count,
+    check_jobs,
     check_seed,
     command_line,
     flag,
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 
 #: Differences of scenes and presets in the terminal; the JSON line holds all.
 MOST_CONDITIONS = 30
+#: Most flights of each preset [-]: half a day on two cores.
+MOST_SEEDS = 1000
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -127,8 +130,8 @@ class Compare:
         from sim.sweep.progress import sweep_progress
 
         check_seed(self.seed)
-        check_count("--seeds", self.seeds)
-        check_count("--jobs", self.jobs)
+        check_count("--seeds", self.seeds, 1, MOST_SEEDS)
+        check_jobs(self.jobs)
         runs = [
             run
             for name, file in (("a", self.run_a), ("b", self.run_b))

@@ -14,7 +14,7 @@ import tyro
 
 from sim.commands.options import (
     World,
-    check_count,
+    check_jobs,
     check_seed,
     command_line,
     flag,
@@ -66,7 +66,7 @@ class ExperimentCommand:
 
         started = time.perf_counter()
         check_seed(self.seed)
-        check_count("--jobs", self.jobs)
+        check_jobs(self.jobs)
         notes = Console(stderr=True, quiet=self.json)
         choice = Choice(quick=self.quick, seed=self.seed, features=self.features, world=self.world)
         runs = designs(self.name, choice)

@@ -13,6 +13,7 @@ import tyro
 
 from sim.commands.options import (
     check_count,
+    check_jobs,
     check_seed,
     command_line,
     flag,
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
 
 #: Simulated over wall-clock time of one core, for the estimate of the plan [-]: measured on geometric flights.
 REAL_TIME_FACTOR = 5.0
+#: Most flights of a row, place and world [-]: ten times the record; the plan of all rows then takes 6 s.
+MOST_SEEDS = 200
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -75,8 +78,8 @@ class Faults:
 
         started = time.perf_counter()
         check_seed(self.seed)
-        check_count("--seeds", self.seeds)
-        check_count("--jobs", self.jobs)
+        check_count("--seeds", self.seeds, 1, MOST_SEEDS)
+        check_jobs(self.jobs)
         workers = self.jobs or usable_cores()
         choice = Choice(
             quick=self.quick,

@@ -28,6 +28,10 @@ SceneWorld = Annotated[
         metavar="NAME", help=f"{_WORLD}the scene file's errors; without one, {DEFAULT_WORLD}.", help_behavior_hint=""
     ),
 ]
+#: Largest seed [-]: that of a sweep; every seed that follows from it fits the 64 bits of a table.
+LARGEST_SEED = 2**31 - 1
+#: Most parallel processes [-]: one per core of the largest computers; each takes 0.2 GB.
+MOST_JOBS = 1024
 #: Help of a switch: no default is printed.
 flag = tyro.conf.arg(help_behavior_hint="")
 
@@ -38,16 +42,19 @@ def optional(metavar: str) -> Any:
 
 
 def check_seed(seed: int) -> None:
-    """Raise ConfigError for a negative seed."""
-    if seed < 0:
-        raise out_of_range("--seed", seed, "", "allowed are 0, 1, 2, ...")
+    """Raise ConfigError for a seed outside 0 to `LARGEST_SEED`."""
+    check_count("--seed", seed, 0, LARGEST_SEED)
 
 
-def check_count(option: str, value: int | None, low: int = 1, high: int | None = None) -> None:
+def check_count(option: str, value: int | None, low: int, high: int) -> None:
     """Raise ConfigError for a count outside its range; None means the command's default."""
-    if value is not None and not low <= value <= (value if high is None else high):
-        allowed = f"allowed are {low}, {low + 1}, {low + 2}, ..." if high is None else f"allowed is {low} to {high}"
-        raise out_of_range(option, value, "", allowed)
+    if value is not None and not low <= value <= high:
+        raise out_of_range(option, value, "", f"allowed is {low} to {high}")
+
+
+def check_jobs(jobs: int | None) -> None:
+    """Raise ConfigError for a number of parallel processes outside 1 to `MOST_JOBS`."""
+    check_count("--jobs", jobs, 1, MOST_JOBS)
 
 
 def check_readable(option: str, file: Path | None, largest: int = sys.maxsize) -> None:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from sim.commands.options import (
-    check_count,
+    check_jobs,
     check_seed,
     command_line,
     flag,
@@ -144,7 +144,7 @@ class Sweep:
         from ibvs_qp.config.errors import ConfigError
         from sim.sweep import Planned, load_spec
 
-        check_count("--jobs", self.jobs)
+        check_jobs(self.jobs)
         if self.dask and self.scheduler:
             raise ConfigError("--dask starts a local cluster and --scheduler uses a running one; give one of them")
         assert self.spec is not None

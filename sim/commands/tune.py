@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import ibvs_qp
 from sim.commands.options import (
     check_count,
+    check_jobs,
     check_readable,
     check_seed,
     command_line,
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from sim.tune.search import SearchPlan, Trials
+
+#: Most trials of a search [-]: their journal has half the size that is read, `LARGEST_JOURNAL`.
+MOST_TRIALS = 100_000
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -81,10 +85,12 @@ class Tune:
 
     def _check(self) -> None:
         from ibvs_qp.config.errors import ConfigError
+        from sim.tune.flights import SEED_STRIDE
 
         check_seed(self.seed)
-        for name in ("trials", "flights", "unseen", "jobs"):
-            check_count(f"--{name}", getattr(self, name))
+        for name, most in (("trials", MOST_TRIALS), ("flights", SEED_STRIDE), ("unseen", SEED_STRIDE)):
+            check_count(f"--{name}", getattr(self, name), 1, most)  # more seeds would be those of the next scene
+        check_jobs(self.jobs)
         preset_file(self.preset)
         check_readable("--trials-of", self.trials_of)
         if self.storage and "://" not in self.storage and os.path.lexists(self.storage):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import math
 from dataclasses import dataclass
@@ -12,6 +13,9 @@ import numpy as np
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.settings import choice, from_dict, setting, validate
 from sim.sweep.design import Parameter
+
+#: Longest list of values [-]: each is checked under each law, at 2 ms.
+MOST_VALUES = 1000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,7 +44,7 @@ class Axis:
 
     path: str  # dotted path
     values: tuple[Parameter, ...] = ()  # listed values, on a grid or to choose from; empty for a range to draw from
-    span: Span | None = None  # that range
+    span: Span | None = None  # the range of drawn or evenly spaced values
     whole: bool = False  # whether values are whole numbers
 
     def draw(self, fraction: float) -> Parameter:
@@ -52,8 +56,8 @@ class Axis:
 
     @property
     def ends(self) -> tuple[Parameter, ...]:
-        """Values to check before the sweep: all listed ones, or both ends of the range."""
-        return self.values or (self.draw(0.0), self.draw(1.0))
+        """Values to check before the sweep: all listed ones, or both ends of a range; its steps lie between them."""
+        return self.values if self.span is None else (self.draw(0.0), self.draw(1.0))
 
 
 def make_axis(section: str, path: str, given: Any, present: Any) -> Axis:
@@ -80,7 +84,8 @@ def make_axis(section: str, path: str, given: Any, present: Any) -> Axis:
         return axis
     if steps < 1:
         raise ConfigError(f"{place}.steps = {steps} is refused: a grid needs 1, 2, 3, ... values")
-    return Axis(path, tuple(dict.fromkeys(axis.draw(fraction) for fraction in np.linspace(0.0, 1.0, steps))))
+    values = dict.fromkeys(axis.draw(fraction) for fraction in np.linspace(0.0, 1.0, steps))
+    return dataclasses.replace(axis, values=tuple(values))
 
 
 @functools.lru_cache(maxsize=4)
@@ -103,6 +108,9 @@ def fractions(kind: str, samples: int, axes: int, seed: int) -> np.ndarray:
 def _listed(place: str, given: list[Any]) -> tuple[Parameter, ...]:
     if not given:
         raise ConfigError(f"{place} = [] is refused: at least one value is needed")
+    if len(given) > MOST_VALUES:
+        more = "more are a table with low, high and steps"
+        raise ConfigError(f"{place} = {len(given)} values is refused: a list has at most {MOST_VALUES}; {more}")
     for value in given:
         if not isinstance(value, (bool, int, float, str)):
             raise ConfigError(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -39,12 +38,7 @@ class Planned:
 
     def __len__(self) -> int:
         """Number of runs."""
-        settings = self.spec.settings
-        return max(1, settings.samples) * len(self._points) * len(settings.laws) * settings.seeds
-
-    @functools.cached_property
-    def _points(self) -> list[tuple[Parameter, ...]]:
-        return list(itertools.product(*(axis.values for axis in self.spec.grid)))
+        return self.spec.flights
 
     @functools.cached_property
     def base(self) -> str:
@@ -68,8 +62,11 @@ class Planned:
         settings, random = self.spec.settings, self.spec.random
         index, seed = divmod(index, settings.seeds)
         index, law = divmod(index, len(settings.laws))
-        sample, point = divmod(index, len(self._points))
-        params = dict(zip((axis.path for axis in self.spec.grid), self._points[point], strict=True))
+        values = {}
+        for axis in reversed(self.spec.grid):  # the last axis changes fastest
+            index, place = divmod(index, len(axis.values))
+            values[axis.path] = axis.values[place]
+        params, sample = {axis.path: values[axis.path] for axis in self.spec.grid}, index
         if random:
             drawn = fractions(settings.draw, settings.samples, len(random), settings.seed)[sample]
             params |= {axis.path: axis.draw(float(fraction)) for axis, fraction in zip(random, drawn, strict=True)}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,6 +25,8 @@ LAWS = ("qp", "paper")
 JOBS = {"paint": PaintJob, "press": PressJob}
 #: Sections of a spec with dotted paths.
 SECTIONS = ("fixed", "grid", "random")
+#: Most flights of a sweep [-]: a table of 43 columns then has `sim.storage.limits.MOST_CELLS`, the most that are read.
+MOST_FLIGHTS = 10_000_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,7 +44,7 @@ class SweepSettings:
     preset_paper: str = setting("", "preset of the analytic law")
     seed: int = setting(0, "first seed", low=0, high=2**31 - 1)
     seeds: int = setting(1, "flights of every point and law: seed, seed + 1, ...", low=1, high=1_000_000)
-    samples: int = setting(0, "number of draws of [random]", low=0, high=1_000_000_000)
+    samples: int = setting(0, "number of draws of [random]", low=0, high=MOST_FLIGHTS)
     draw: str = choice("random", "method of the draws", ("random", "sobol"))
     block_runs: int = setting(10, "runs per block: the most that an interrupt loses", low=1, high=100_000)
 
@@ -62,6 +65,12 @@ class SweepSpec:
     setups: dict[str, Setup]  # start values of every law, [fixed] included
     grid: tuple[Axis, ...]  # axes of the grid; every combination flies
     random: tuple[Axis, ...]  # drawn axes; every draw flies at every point of the grid
+
+    @property
+    def flights(self) -> int:
+        """Number of flights."""
+        points, settings = math.prod(len(axis.values) for axis in self.grid), self.settings
+        return max(1, settings.samples) * points * len(settings.laws) * settings.seeds
 
 
 def load_spec(file: Path) -> SweepSpec:
@@ -102,6 +111,9 @@ def parse_spec(table: dict[str, Any], folder: Path) -> SweepSpec:
         for name in ("grid", "random")
     )
     spec = SweepSpec(settings=settings, setups=setups, grid=grid, random=random)
+    if spec.flights > MOST_FLIGHTS:
+        allowed = f"at most {MOST_FLIGHTS} are flown"
+        raise out_of_range("samples x grid x laws x seeds", spec.flights, "flights", allowed)
     _check_values(spec, sections["fixed"])
     return spec
 
