@@ -155,12 +155,12 @@ class Compare:
 def _print(conditions: list[dict[str, Any]], cells: list[dict[str, Any]], a: Path, b: Path) -> None:
     from rich.console import Console
 
-    from sim.evaluate.table import LINES, terminal_table
+    from sim.evaluate.table import LINES, plain, terminal_table
     from sim.report.conditions import ABSENT
 
     console, names = Console(), ("A", "B")
     print(f"A: {a}\nB: {b}")
-    shown = [(_cell(each["name"]), _cell(each["a"]), _cell(each["b"])) for each in conditions[:MOST_CONDITIONS]]
+    shown = [(plain(each["name"]), plain(each["a"]), plain(each["b"])) for each in conditions[:MOST_CONDITIONS]]
     if len(conditions) > MOST_CONDITIONS:
         shown.append((f"{len(conditions) - MOST_CONDITIONS} more, see --json", "", ""))
     if shown:
@@ -178,13 +178,5 @@ def _print(conditions: list[dict[str, Any]], cells: list[dict[str, Any]], a: Pat
             median, low, high = (f"{figure:+.4g}" for figure in figures[2:])
             interval = f"{low} to {high}" if low != high else ABSENT
             label = f"{line.label} [{line.unit}]" if line.unit else line.label
-            rows.append((_cell(label), a_text, b_text, median, interval))
-        console.print(terminal_table(headings, rows, _cell(f"{', '.join(labels)}: completed {done}")))
-
-
-def _cell(value: Any) -> str:
-    """A value from a file of unknown origin, without effect on terminal or layout."""
-    from rich.markup import escape
-
-    text = str(value)
-    return escape(text if text.isprintable() else repr(text))
+            rows.append((plain(label), a_text, b_text, median, interval))
+        console.print(terminal_table(headings, rows, plain(f"{', '.join(labels)}: completed {done}")))

@@ -72,6 +72,7 @@ class Detect:
         from sim.detection.overlay import write_overlay
         from sim.detection.report import as_json, frame_table, refusals
         from sim.detection.run import detect_frames
+        from sim.evaluate.table import plain
 
         check_seed(self.seed)
         cv2.setNumThreads(1)
@@ -85,7 +86,7 @@ class Detect:
                 every=self.all,
                 track=not self.no_track,
                 distortion=self.distortion,
-                started=lambda entry: status.update(f"Detecting in {entry.color} ..."),
+                started=lambda entry: status.update(f"Detecting in {plain(entry.color)} ..."),
             )
         if folder is not None:
             for seen in frames:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ibvs_qp.vision.survey.detection import GUIDE_SIDES
 from sim.detection.run import FrameResult
-from sim.evaluate.table import terminal_table
+from sim.evaluate.table import plain, terminal_table
 from sim.report import rundir
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ def frame_table(results: list[FrameResult]) -> Table:
         surface = "none" if found.plane is None else f"{found.plane.distance_m:.3f} m"
         lines = {side: line for side in GUIDE_SIDES if (line := found.guides.get(side)) is not None}
         rows = [_guide_row(line, side) for side, line in lines.items()] or [("none", "", "", "")]
-        table.append((Path(result.entry.color).stem, surface, *rows[0], f"{result.time_ms:.0f}"))
+        table.append((plain(Path(result.entry.color).stem), surface, *rows[0], f"{result.time_ms:.0f}"))
         table += [("", "", *row, "") for row in rows[1:]]
     headings = ("frame", "surface", "guide", "middle, px", "slope", "conf.", "ms")
     return terminal_table(headings, table, text=("frame", "guide"))
@@ -87,7 +87,8 @@ def frame_table(results: list[FrameResult]) -> Table:
 
 def refusals(results: list[FrameResult]) -> list[str]:
     """One line with the reason for every frame without a surface."""
-    return [f"{Path(each.entry.color).name}: {each.detection.refused}" for each in results if each.detection.refused]
+    lines = (f"{Path(each.entry.color).name}: {each.detection.refused}" for each in results if each.detection.refused)
+    return [line if line.isprintable() else repr(line) for line in lines]
 
 
 def _guide_row(line: Any, side: str) -> tuple[str, str, str, str]:

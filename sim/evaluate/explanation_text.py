@@ -10,7 +10,7 @@ import numpy as np
 from ibvs_qp.config.contact_margin import LEAST_DAMPING_RATIO, least_margin
 from ibvs_qp.pilot import PilotConfig
 from sim.evaluate.explanation import rejections, thrust_window
-from sim.evaluate.table import terminal_table
+from sim.evaluate.table import plain, terminal_table
 
 if TYPE_CHECKING:
     from ibvs_qp.qp.explain import Explanation, LimitValue
@@ -60,11 +60,11 @@ def _headline(trace: Trace, tick: int, config: PilotConfig) -> list[str]:
     lowered = f" (job: {job:.2f} N, lowered by ramp or reach)" if 0.0 < reference < job - _REDUCED_N else ""
     reach = "reach unknown, or no push can be held" if math.isnan(margin) else f"{margin:.2f} N further within reach"
     headline = (
-        f"[bold]t = {trace.t[tick]:.3f} s[/], phase {phase}, lambda {trace.contact_weight[tick]:.2f}\n"
+        f"[bold]t = {trace.t[tick]:.3f} s[/], phase {plain(phase)}, lambda {trace.contact_weight[tick]:.2f}\n"
         f"push {push:.2f} N, commanded {reference:.2f} N{lowered}; {reach}\n"
-        f"{outcome} after {int(trace.iterations[tick])} iterations"
+        f"{plain(outcome)} after {int(trace.iterations[tick])} iterations"
     )
-    return [headline, *(f"Rejected at {event.t:.3f} s: {event.text}" for event in rejections(trace, tick))]
+    return [headline, *(f"Rejected at {event.t:.3f} s: {plain(event.text)}" for event in rejections(trace, tick))]
 
 
 def task_rows(explanation: Explanation) -> list[tuple[str, ...]]:

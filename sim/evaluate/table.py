@@ -112,6 +112,14 @@ def markdown(heads: Sequence[str], rows: Iterable[Sequence[str]], left: int | No
     return "\n".join([lines[0], "|" + rule, *lines[1:]]) + "\n"
 
 
+def plain(value: object) -> str:
+    """A value from a file of unknown origin, without markup and without effect on the terminal."""
+    from rich.markup import escape
+
+    text = str(value)
+    return escape(text if text.isprintable() else repr(text))
+
+
 def terminal_table(
     headings: Sequence[str],
     rows: Iterable[Sequence[str]],

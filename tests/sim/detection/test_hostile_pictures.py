@@ -234,3 +234,10 @@ def test_a_frame_number_of_too_many_digits(tmp_path: Path, capfd: pytest.Capture
     (tmp_path / "manifest.csv").write_bytes(table([ROW | {"color": f"a_{'1' * 5000}_color.png"}]))
     err = str(detect(tmp_path, capfd, (2,)))
     assert "manifest.csv, line 2: color = " in err and "20 digits" in err
+
+
+def test_names_have_no_effect_on_the_terminal(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "manifest.csv").write_bytes(table([ROW | {"color": "[/red]\x1b[31m.png"}]))
+    assert main(["detect", "--sequence", str(tmp_path)]) == 0
+    out = capfd.readouterr().out
+    assert "red]" in out and "\x1b" not in out
