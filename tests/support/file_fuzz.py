@@ -159,7 +159,7 @@ class Runs:
         _copy(self.flown, folder)
         with np.load(self.flown / "log.npz") as log:
             arrays = {name: log[name] for name in log.files}
-        for name in data.draw(st.lists(st.sampled_from(sorted(arrays)), min_size=1, max_size=3)):
+        for name in data.draw(st.lists(st.sampled_from(sorted(arrays)), min_size=1, max_size=3, unique=True)):
             arrays[name] = data.draw(_OTHERS)(arrays[name])
         np.savez(folder / "log.npz", **{name: array for name, array in arrays.items() if array is not None})
         check_log(folder)
