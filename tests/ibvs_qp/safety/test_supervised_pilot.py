@@ -216,6 +216,8 @@ def test_late_inertial_samples_are_replaced(pilot: Pilot) -> None:
     command = flown(pilot, vehicle, 300, delayed)
     assert command.safety in (SafetyState.RETREAT, SafetyState.HOVER)
     assert command.safety_reasons[0].startswith("no inertial sample: ")
+    assert pilot.measurement is not None
+    assert not np.array_equal(pilot.measurement.angular_velocity, late[-51].angular_velocity)
     assert np.abs(vehicle.attitude.as_euler("xyz", degrees=True)).max() < 3.0
 
 

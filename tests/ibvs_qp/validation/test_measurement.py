@@ -181,6 +181,8 @@ def test_a_broken_reference_leaves_the_last_good_one_in_force(law: Callable[[], 
         command = controller.step(vehicle.measure(), bad)
         check(command, last)
         assert any(entry.startswith("reference") for entry in command.rejected), bad
+        if not issubclass(type(bad), Reference):
+            assert command.rejected == ("reference: not a Reference",)
         expected = twin.step(same_vehicle.measure(), good_reference())
         np.testing.assert_array_equal(command.thrusts, expected.thrusts)
 
