@@ -158,7 +158,7 @@ class Setpoints:
             The stored copy, read-only: the caller of the controller may write into the command's own array.
         """
         own = thrusts.copy()
-        own.flags.writeable = False  # it is in the reports of the command, too
+        own.setflags(write=False)  # it is in the reports of the command, too
         if self.last is not None:
             self._change = own - self.last
         self.last, self._given_up = own, given_up
