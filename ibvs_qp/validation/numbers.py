@@ -6,16 +6,14 @@ subclass of an array (masked, with units) is refused: its numbers may mean somet
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Any, TypeVar
 
 import numpy as np
 
-FLOAT = np.dtype(float)
-#: Integers beyond this are no measurement in any unit, and have no float.
-NUMBER_BOUND = 1e300
+from ibvs_qp.validation.failure import type_name
 
+FLOAT = np.dtype(float)
 
 Read = TypeVar("Read")
 
@@ -43,15 +41,13 @@ def _integer(value: Any) -> int | None:
 
 
 def number(value: Any) -> float | None:
-    """A number, maybe NaN or infinite, as a float."""
+    """A number, maybe NaN or infinite, as a float; None for an integer beyond every float."""
     return value if type(value) is float else attempt(_float, value)
 
 
 def _float(value: Any) -> float | None:
     if not isinstance(value, (int, float, np.integer, np.floating)) or isinstance(value, bool):
         return None
-    if isinstance(value, int) and not -NUMBER_BOUND <= value <= NUMBER_BOUND:  # an integer may have any size
-        return math.inf
     return float(value)
 
 
@@ -88,4 +84,4 @@ def described(value: Any) -> str:
     """Type of a refused value, of a plain array also its entries and shape, in a few words whatever it is."""
     if type(value) is np.ndarray:
         return f"array of {str(value.dtype)[:20]} with shape {str(value.shape)[:40]}"
-    return type(value).__name__[:40]
+    return type_name(value)

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from ibvs_qp.validation.failure import raised
 from ibvs_qp.validation.fields import thrust_limit
 
 
@@ -31,12 +30,6 @@ class ThrustLimits:
     def assign(self, limits: Any) -> None:
         """Take a pair of limits, or None; never raises, and a refused pair leaves the last in force."""
         self.rejected = []
-        try:
-            self._assign(limits)
-        except Exception as error:  # an entry may run code of the caller's
-            self.rejected = [raised("thrust_limits", error)]
-
-    def _assign(self, limits: Any) -> None:
         if limits is None:
             self.accepted = None
             return

@@ -15,6 +15,7 @@ from ibvs_qp.assured import Assured
 from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import Measurement, SensorFrame
 from ibvs_qp.pilot import Pilot
+from ibvs_qp.validation.failure import raised
 
 
 def _raise(*_: Any) -> Any:
@@ -67,6 +68,20 @@ def raising(good: Any, kind: type, error: type[Exception]) -> Any:
         if field.name != "attitude":
             object.__setattr__(hostile, field.name, getattr(good, field.name))
     return hostile
+
+
+def test_an_exception_is_named_without_its_code() -> None:
+    caught: list[Exception] = []
+    for error in HOSTILE:
+        try:
+            raise error
+        except Exception as hostile:
+            caught.append(hostile)
+    told = [raised("here", hostile) for hostile in caught]  # out here: no test report can show a hostile context
+    assert [name.partition(" in ")[0] for name in told] == [
+        *("here: NoName", "here: NoTrace", "here: OddTrace", "here: NoText", "here: " + "N" * 40)
+    ]
+    assert all("in test_an_exception_is_named_without_its_code, line" in name for name in told)
 
 
 @pytest.mark.parametrize("name", STEPPED)

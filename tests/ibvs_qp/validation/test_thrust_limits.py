@@ -47,7 +47,17 @@ class Unreadable(float):
         raise ValueError
 
 
-@pytest.mark.parametrize("broken", [np.full(6, np.longdouble("1e4000")), (Unreadable(1.0),) * 6])
+class _Nameless(type):
+    @property
+    def __name__(cls) -> Any:
+        raise ValueError
+
+
+class Nameless(metaclass=_Nameless):
+    """Its type has no name."""
+
+
+@pytest.mark.parametrize("broken", [np.full(6, np.longdouble("1e4000")), (Unreadable(1.0),) * 6, Nameless()])
 def test_a_pair_that_raises_when_it_is_read_is_refused_by_name(broken: Any) -> None:
     limits = ThrustLimits(6)
     limits.assign((LOW, HIGH))
