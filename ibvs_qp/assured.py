@@ -11,7 +11,7 @@ from ibvs_qp.checked_law import CheckedLaw, Inputs
 from ibvs_qp.command import Command, SafetyState
 from ibvs_qp.config import LONGEST_TICK, SafetySettings
 from ibvs_qp.estimation.contact_state import ContactState
-from ibvs_qp.frames import dot, down_in_body, roll_pitch
+from ibvs_qp.frames import dot, down_in_body
 from ibvs_qp.measurement import Measurement, Reference
 from ibvs_qp.model.reporting import fixed_command, hover_command
 from ibvs_qp.safety.assurance import Assurance
@@ -45,7 +45,7 @@ class Assured:
         vehicle, gains = controller.config.vehicle, controller.config.gains
         self.assurance = Assurance(vehicle, settings or SafetySettings())
         self.self_check = SelfCheck(self.assurance.settings.self_check)
-        self._rotors, self._tip = RotorLoss(vehicle, gains), vehicle.tip_position_m
+        self._rotors = RotorLoss(vehicle, gains)
         self.reset()
 
     def reset(self) -> None:
@@ -55,7 +55,7 @@ class Assured:
         self.self_check.reset()
         self._rotors.reset()
         self._attitude_ns = self._imu_ns = self._wrench_ns = self._plane_ns = self._lines_ns = -1
-        self._descended_m, self._time_ns = 0.0, -1
+        self._descended_m, self._time_ns, self._dt = 0.0, -1, 0.0
 
     @np.errstate(all="ignore")  # a host may have numpy raise at every underflow
     def step(self, measurement: Measurement, reference: Reference, contact: ContactState | None = None) -> Command:
@@ -66,6 +66,8 @@ class Assured:
             if self.assurance.state is not SafetyState.NOMINAL:
                 inputs = inputs._replace(reference=self.assurance.supervised(inputs.reference))
             if inputs.measurement is not None:
+                now, tick_s = inputs.measurement.stamp_ns, self.controller.config.tick_s
+                self._dt, self._time_ns = (now - self._time_ns) * 1e-9 if self._time_ns >= 0 else tick_s, now
                 inputs = self._with_rotors(inputs, inputs.measurement)
             command = self._command(inputs)
             shown = self.assurance.explained(command)
@@ -74,6 +76,9 @@ class Assured:
                 return shown
             tick = self._tick(inputs.measurement, command, inputs.reference)
             self.assurance.watch(tick, self.controller.setpoints)
+            if found := self.self_check.faults():
+                named = tuple([f"self-check: {fault}" for fault in found])
+                shown = dataclasses.replace(shown, rejected=(*shown.rejected, *named))
             return self.controller.gate.clock.answered(shown)
         except Exception as error:  # in flight nothing may raise; thrusts that were found are not replaced
             if command is None:
@@ -97,28 +102,24 @@ class Assured:
 
     def _with_rotors(self, inputs: Inputs, checked: Measurement) -> Inputs:
         """Inputs with the limits of rotors that do not follow, and with the attitude at which those left carry it."""
-        low, high = checked.thrust_min, checked.thrust_max
-        if low is None and high is None and self.assurance.limits(None) is None:
+        if not self.assurance.settings.supervise:
             return inputs
-        setpoints, rotors, tilted = self.controller.setpoints, self._rotors, self._rotors.tilts
-        limits = self.assurance.limits(
-            (setpoints.floor if low is None else low, setpoints.ceiling if high is None else high)
-        )
-        rotors.update(limits)
-        changes: dict[str, object] = {} if limits is None else {"thrust_min": limits[0], "thrust_max": limits[1]}
-        reference, contact = inputs.reference, setpoints.contact
+        setpoints, rotors = self.controller.setpoints, self._rotors
+        low, high, found = checked.thrust_min, checked.thrust_max, self.assurance.limits(None)
+        changes: dict[str, np.ndarray] = {}
+        if low is not None or high is not None or found is not None:
+            low, high = setpoints.floor if low is None else low, setpoints.ceiling if high is None else high
+            low, high = self.assurance.limits((low, high)) or (low, high)
+            rotors.update((low, high))
+            if found is not None:
+                changes = {"thrust_min": low, "thrust_max": high}
+        contact, velocity = setpoints.contact, checked.velocity
         if rotors.turns(contact.normal[0]):  # the force sensor measures the tool that swings round
             changes["contact_wrench"] = np.zeros(6)
-        if rotors.tilts and self.assurance.settings.supervise:
-            if not tilted:
-                rotors.begin(roll_pitch(checked.attitude.tolist()))
-            normal, velocity = np.array(contact.normal), checked.velocity
-            along = 0.0 if velocity is None else float(setpoints.right @ velocity)
-            dt = (checked.stamp_ns - self._time_ns) * 1e-9 if self._time_ns >= 0 else self.controller.config.tick_s
-            away = contact.distance + float(normal @ np.array(self._tip))
-            tilt = rotors.tilt(away, contact.speed, along, normal, min(dt, LONGEST_TICK))
-            reference = dataclasses.replace(reference, **{"tilt" if rotors.lost else "trim": tilt})
-        return inputs._replace(measurement=dataclasses.replace(checked, **changes), reference=reference)
+        along = 0.0 if velocity is None else float(setpoints.right @ velocity)
+        if attitude := rotors.target(contact, checked.attitude.tolist(), along, min(self._dt, LONGEST_TICK)):
+            inputs = inputs._replace(reference=dataclasses.replace(inputs.reference, **attitude))
+        return inputs._replace(measurement=dataclasses.replace(checked, **changes)) if changes else inputs
 
     def _tick(self, checked: Measurement, command: Command, reference: Reference) -> Tick:
         """The tick as the monitors see it, in monotonic time."""
@@ -134,25 +135,25 @@ class Assured:
         if checked.plane is not None:
             self._plane_ns = max(self._plane_ns, checked.plane_stamp_ns)
         newest = max([line.stamp_ns for line in checked.lines], default=0)
-        if newest > self._lines_ns and newest:
+        if newest > max(self._lines_ns, 0):
             picture = tuple([(line.rho, line.theta) for line in checked.lines])
             if self.assurance.is_news(picture):
                 self._lines_ns = newest
         attitude, rate, force = checked.attitude.tolist(), checked.angular_velocity.tolist(), checked.specific_force
         speed, down = math.nan, down_in_body(attitude)
-        dt = (now - self._time_ns) * 1e-9 if self._time_ns >= 0 else 0.0
         if checked.velocity is not None:
             velocity = checked.velocity.tolist()
             speed = math.hypot(*velocity)
-            self._descended_m += dt * dot(velocity, down)
-        self._time_ns = now
+            self._descended_m += self._dt * dot(velocity, down)
         faults: dict[Fault, str] = {}
         if now - self._attitude_ns > self.assurance.settings.imu_age_s * 1e9:
             faults[Fault.NO_ATTITUDE] = "attitude or gyro missing"
         if self._rotors.lost:
             faults[Fault.NO_HOVER] = ""
         if not self.self_check.done:
-            self._check_axes(checked, missing, faults, dt or self.controller.config.tick_s)
+            self._check_axes(checked, missing)
+        if found := self.self_check.faults():
+            faults[Fault.INPUTS] = "; ".join(found)
         return Tick(
             stamp_ns=now,
             imu_ns=self._imu_ns,
@@ -172,9 +173,9 @@ class Assured:
             faults=faults,
         )
 
-    def _check_axes(self, checked: Measurement, missing: tuple[str, ...], faults: dict[Fault, str], dt: float) -> None:
+    def _check_axes(self, checked: Measurement, missing: tuple[str, ...]) -> None:
         """Self-check with those sensors that the tick has; the contact wrench is that of the tool on the vehicle."""
-        check, contact = self.self_check, self.controller.setpoints.contact
+        check, contact, dt = self.self_check, self.controller.setpoints.contact, self._dt
         if checked.specific_force is not None and not any(name in missing for name in _INERTIAL):
             check.inertial(
                 checked.attitude.tolist(), checked.angular_velocity.tolist(), checked.specific_force.tolist(), dt
@@ -182,5 +183,3 @@ class Assured:
         if "contact_wrench" not in missing:
             tool = (-checked.contact_wrench[:3]).tolist()
             check.contact(tool, contact.push_noise, contact.normal, contact.distance, dt)
-        if found := check.faults():
-            faults[Fault.INPUTS] = "; ".join(found)

@@ -3,39 +3,22 @@
 from __future__ import annotations
 
 import threading
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.pilot.config import PilotConfig
 from ibvs_qp.validation.failure import raised
-from ibvs_qp.vision.percept import LineHint, Percept
+
+if TYPE_CHECKING:
+    from ibvs_qp.vision.paper import PaperPerception
+    from ibvs_qp.vision.perception import Perception
 
 #: Pictures that call every stage once, and the time between them [ns].
 _WARM_UP, _STEP_NS = 3, 33_333_333
 #: Size of the stand-in for a camera's picture [px], its focal length [px] and distance [m].
 _SIZE, _FOCAL, _DISTANCE = (480, 640), 600.0, 0.5
-
-
-class AnyPerception(Protocol):
-    """The own perception or the paper's."""
-
-    def reset(self) -> None:
-        """Forget everything seen."""
-        ...
-
-    def process(
-        self,
-        frame: RgbdFrame,
-        *,
-        attitude: np.ndarray | None = None,
-        rotation: np.ndarray | None = None,
-        velocity: np.ndarray | None = None,
-        hints: tuple[LineHint, ...] = (),
-    ) -> Percept:
-        """See one picture."""
-        ...
 
 
 class PerceptionLoader:
@@ -48,7 +31,7 @@ class PerceptionLoader:
 
     def __init__(self, config: PilotConfig) -> None:
         self._config = config
-        self.perception: AnyPerception | None = None
+        self.perception: Perception | PaperPerception | None = None
         self.problem = ""
         self._thread: threading.Thread | None = None
 
@@ -75,7 +58,7 @@ class PerceptionLoader:
         except Exception as error:  # pictures are refused with this reason
             self.problem = raised("perception", error)
 
-    def _construct(self) -> AnyPerception:
+    def _construct(self) -> Perception | PaperPerception:
         vehicle = self._config.controller.vehicle
         if self._config.perception == "paper":
             from ibvs_qp.vision.paper import PaperPerception

@@ -23,7 +23,7 @@ from ibvs_qp.estimation.contact_state import ContactState
 from ibvs_qp.estimation.wall_lines import WallAxes, image_line
 from ibvs_qp.estimation.wall_motion import BIAS, WallMotion
 from ibvs_qp.estimation.wrench_tare import WrenchTare
-from ibvs_qp.frames import down_in_body, plane_in_body, roll_pitch, to_camera
+from ibvs_qp.frames import down_in_body, plane_in_body, to_camera
 from ibvs_qp.measurement import FeatureFrame, Measurement, Reference, RgbdFrame, SensorFrame
 from ibvs_qp.model.reporting import fixed_command
 from ibvs_qp.model.setpoints import Setpoints
@@ -306,8 +306,8 @@ class Pilot:
             stamp_ns=frame.stamp_ns,
             imu_ns=self._imu_stamp,
             wrench_ns=frame.wrench_stamp_ns,
-            plane_ns=self._due(self.contact.plane_ns),
-            image_ns=self._due(self._camera.image_ns),
+            plane_ns=self.contact.plane_ns,
+            image_ns=self._camera.image_ns,
             lines_ns=self.motion.lines_ns if self.reference.lines else -1,
             inertial=(now["attitude"], now["angular_velocity"], now["specific_force"]),
             wrench=now["wrench"],
@@ -320,12 +320,8 @@ class Pilot:
             push_reference=self.setpoints.push_reference,
             outcome=command.outcome,
             faults=faults,
+            has_camera=True,
         )
-
-    def _due(self, stamp_ns: int) -> int:
-        """Stamp of the last picture or plane; before the first one the time at which that was due, once it is past."""
-        due_ns = self._first + round(1e9 * self.config.safety.first_picture_s)
-        return due_ns if stamp_ns < 0 and self._stamp > due_ns else stamp_ns
 
     def _contact_wrench(self, frame: SensorFrame, specific_force: list[float]) -> tuple[np.ndarray, int]:
         """Contact wrench and its time: the tared one, or that of inertial data while the sensor is faulty."""
@@ -405,21 +401,13 @@ class Pilot:
             push_reference=self.setpoints.push_reference,  # of the tick before: the controller runs after the painter
             tared=self.tare.ready,
         )
-        limits, rotors = self.assurance.limits(self.thrust_limits), self.rotor_loss
-        tilted = rotors.tilts
-        if limits is not None and rotors.update(limits):
+        if self.rotor_loss.update(self.assurance.limits(self.thrust_limits)):
             self.painter.abandon(inputs, "no level hover is left")
         elif self.assurance.state not in _FLYING and not self.painter.descending:
             self.painter.stop(inputs, "; ".join(self.assurance.supervisor.reasons))
         target = self.painter.step(inputs)
-        if not rotors.tilts:
-            return target
-        if not tilted:
-            rotors.begin(roll_pitch(self._inertial.attitude))
-        normal = np.array(contact.normal)
-        away = contact.distance + float(normal @ self._tip)
-        tilt = rotors.tilt(away, contact.speed, motion.state[0], normal, dt)
-        return dataclasses.replace(target, tilt=tilt) if rotors.lost else dataclasses.replace(target, trim=tilt)
+        attitude = self.rotor_loss.target(contact, self._inertial.attitude, motion.state[0], dt)
+        return dataclasses.replace(target, **attitude) if attitude else target
 
     def _refer(self, target: PaintingCommand, contact: ContactState) -> Reference:
         """Reference of a command at the measured distance."""

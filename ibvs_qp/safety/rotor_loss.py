@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -10,7 +11,8 @@ from allocation.effectiveness import control_effectiveness
 from allocation.least_squares import allocate_least_squares
 from ibvs_qp.config.gains import Gains
 from ibvs_qp.config.vehicle import VehicleParams
-from ibvs_qp.frames import GRAVITY
+from ibvs_qp.estimation.contact_state import ContactState
+from ibvs_qp.frames import GRAVITY, roll_pitch
 
 #: Lateral force that a level hover may lack [N]: a third of a degree of tilt replaces it.
 LATERAL_SHORTFALL = 0.3
@@ -65,14 +67,14 @@ class RotorLoss:
     def __init__(self, vehicle: VehicleParams, gains: Gains | None = None) -> None:
         gains = gains or Gains()
         self._lead_s = gains.attitude_kd / gains.attitude_kp if gains.attitude_kp else 0.0
-        self._matrix = control_effectiveness(vehicle.geometry)
+        self._matrix, self._tip = control_effectiveness(vehicle.geometry), np.array(vehicle.tip_position_m)
         self._hover = np.array([0.0, 0.0, -vehicle.mass_kg * GRAVITY, 0.0, 0.0, 0.0])
         self.reset()
 
     def reset(self) -> None:
         """All rotors as configured."""
         self.lost = self.limited = self.stuck = False
-        self._turned, self._fixed = False, np.zeros((2, 2))
+        self._turned, self._tilting, self._fixed = False, False, np.zeros((2, 2))
         self._trim, self._tilt, self._limits = np.zeros(2), np.zeros(2), b""
 
     def update(self, limits: tuple[np.ndarray, np.ndarray] | None) -> bool:
@@ -97,19 +99,30 @@ class RotorLoss:
         self._fixed = _lateral_null_space(self._matrix[:, ~fixed])
         return self.lost and not before
 
-    def begin(self, attitude: tuple[float, float]) -> None:
-        """Start the commanded tilt from the present roll and pitch [rad]."""
-        self._tilt = np.array(attitude)
-
     def turns(self, facing: float) -> bool:
         """Whether it has turned away from the wall, by the cosine of the angle to the normal: it does so for good."""
         self._turned = self.lost and (self._turned or facing < FACING)
         return self._turned
 
-    @property
-    def tilts(self) -> bool:
-        """Whether the vehicle moves by tilting."""
-        return self.lost or self.limited or self.stuck
+    def target(
+        self, contact: ContactState, attitude: Sequence[float], along: float, dt: float
+    ) -> dict[str, np.ndarray]:
+        """Attitude to fly at [rad], (2,), by its name in a `Reference`; empty for a vehicle that flies level.
+
+        Args:
+            contact: Wall and speed towards it.
+            attitude: Quaternion B in I: the commanded tilt begins there.
+            along: Speed to the right along the wall [m/s].
+            dt: Time since the last call [s].
+        """
+        if not (self.lost or self.limited or self.stuck):
+            self._tilting = False
+            return {}
+        if not self._tilting:
+            self._tilting, self._tilt = True, np.array(roll_pitch(attitude))
+        normal = np.array(contact.normal)
+        distance = contact.distance + float(normal @ self._tip)
+        return {"tilt" if self.lost else "trim": self.tilt(distance, contact.speed, along, normal, dt)}
 
     def tilt(self, distance: float, closing: float, along: float, normal: np.ndarray, dt: float) -> np.ndarray:
         """Commanded roll and pitch [rad], (2,): the trim of the remaining force plus the retreat from the wall.

@@ -61,6 +61,7 @@ class Tick:
         push_reference: Push reference within reach [N].
         outcome: Of the controller's step.
         faults: Faults that the caller found; the monitors add theirs.
+        has_camera: Whether there must be pictures and a plane some time after the first tick.
     """
 
     stamp_ns: int
@@ -80,3 +81,4 @@ class Tick:
     push_reference: float
     outcome: Outcome
     faults: dict[Fault, str]
+    has_camera: bool = False

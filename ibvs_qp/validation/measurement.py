@@ -37,9 +37,6 @@ class MeasurementGate:
 
     Only numbers of its own are kept from tick to tick, so that a caller may reuse its arrays.
 
-    Attributes:
-        replaced: Names of the fields that the last measurement lacked.
-
     Args:
         rotors: Number of rotors, the length of the thrust limits.
         line_slots: Lines that the program has room for.

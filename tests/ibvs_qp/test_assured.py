@@ -163,6 +163,7 @@ def test_specific_force_in_other_axes_is_named() -> None:
         vehicle.tick += 1
     assert command.safety is SafetyState.RETREAT
     assert command.safety_reasons[0].startswith("sensor data in other axes: specific_force: ")
+    assert any(reason.startswith("self-check: specific_force: ") for reason in command.rejected)
 
 
 @pytest.mark.parametrize("rotor", [0, 2])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from ibvs_qp.config import SafetySettings
@@ -17,12 +18,17 @@ class SampleMonitor:
     """Finds inputs that stopped, by their stamps, and inputs that repeat although their stamps go on."""
 
     def __init__(self, settings: SafetySettings) -> None:
-        self._limits = (  # age [ns], and whether the input must be there from the start
-            (Fault.IMU_STALE, round(1e9 * settings.imu_age_s), True),
-            (Fault.WRENCH_STALE, round(1e9 * settings.wrench_age_s), True),
-            (Fault.PLANE_STALE, round(1e9 * settings.plane_age_s), False),
-            (Fault.IMAGE_STALE, round(1e9 * settings.image_age_s), False),
-            (Fault.LINES_STALE, round(1e9 * settings.lines_age_s), False),
+        imu, wrench, first = settings.imu_age_s, settings.wrench_age_s, settings.first_picture_s
+        # Oldest sample, and latest first one after the first tick [ns]; of a camera only where there is one.
+        self._limits = tuple(
+            (fault, round(1e9 * oldest), math.inf if latest is None else round(1e9 * latest), camera)
+            for fault, oldest, latest, camera in (
+                (Fault.IMU_STALE, imu, imu, False),
+                (Fault.WRENCH_STALE, wrench, wrench, False),
+                (Fault.PLANE_STALE, settings.plane_age_s, first, True),
+                (Fault.IMAGE_STALE, settings.image_age_s, first, True),
+                (Fault.LINES_STALE, settings.lines_age_s, None, True),
+            )
         )
         self._imu = FrozenInput(settings.frozen_imu_samples, LIVELY_SAMPLES)
         self._wrench = FrozenInput(settings.frozen_samples, LIVELY_SAMPLES)
@@ -38,16 +44,21 @@ class SampleMonitor:
         """As before the first tick."""
         for part in (self._imu, self._wrench, self._picture):
             part.reset()
-        self._imu_ns = self._wrench_ns = -1
+        self._first_ns = self._imu_ns = self._wrench_ns = -1
 
     def update(self, tick: Tick) -> None:
         """Add the faults of the inputs of a tick."""
         faults, now = tick.faults, tick.stamp_ns
+        if self._first_ns < 0:
+            self._first_ns = now
         stamps = tick.imu_ns, tick.wrench_ns, tick.plane_ns, tick.image_ns, tick.lines_ns
-        for (fault, limit, must), stamp in zip(self._limits, stamps, strict=True):
-            if now - stamp > limit and (must or stamp >= 0):
-                age_ms, limit_ms = 1e-6 * (now - stamp), 1e-6 * limit
-                faults[fault] = f"{age_ms:.0f} ms old, limit {limit_ms:.0f} ms" if stamp >= 0 else "none yet"
+        for (fault, oldest, latest, camera), stamp in zip(self._limits, stamps, strict=True):
+            if now - stamp <= oldest:  # nearly always
+                continue
+            if stamp >= 0:
+                faults[fault] = f"{1e-6 * (now - stamp):.0f} ms old, limit {1e-6 * oldest:.0f} ms"
+            elif now - self._first_ns > latest and (tick.has_camera or not camera):
+                faults[fault] = "none yet"
         if tick.imu_ns != self._imu_ns:
             self._imu_ns = tick.imu_ns
             self._imu.add(tick.inertial)

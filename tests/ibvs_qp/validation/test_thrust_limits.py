@@ -47,10 +47,12 @@ class Unreadable(float):
         raise ValueError
 
 
+def _raise(*_: Any) -> Any:
+    raise ValueError
+
+
 class _Nameless(type):
-    @property
-    def __name__(cls) -> Any:
-        raise ValueError
+    __name__ = property(_raise)  # type: ignore[assignment]
 
 
 class Nameless(metaclass=_Nameless):
