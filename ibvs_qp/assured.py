@@ -74,11 +74,14 @@ class Assured:
             if inputs.measurement is None:
                 self.assurance.miss(self.controller.config.tick_s)
                 return shown
-            tick = self._tick(inputs.measurement, command, inputs.reference)
-            self.assurance.watch(tick, self.controller.setpoints)
-            if found := self.self_check.faults():
+            found = self._check_axes(inputs.measurement)
+            if found:
                 named = tuple([f"self-check: {fault}" for fault in found])
                 shown = dataclasses.replace(shown, rejected=(*shown.rejected, *named))
+            tick = self._tick(inputs.measurement, command, inputs.reference)
+            if found:
+                tick.faults[Fault.INPUTS] = "; ".join(found)
+            self.assurance.watch(tick, self.controller.setpoints)
             return self.controller.gate.clock.answered(shown)
         except Exception as error:  # in flight nothing may raise; thrusts that were found are not replaced
             if command is None:
@@ -102,12 +105,13 @@ class Assured:
 
     def _with_rotors(self, inputs: Inputs, checked: Measurement) -> Inputs:
         """Inputs with the limits of rotors that do not follow, and with the attitude at which those left carry it."""
-        if not self.assurance.settings.supervise:
-            return inputs
         setpoints, rotors = self.controller.setpoints, self._rotors
         low, high, found = checked.thrust_min, checked.thrust_max, self.assurance.limits(None)
+        limited = low is not None or high is not None or found is not None
+        if not (limited or rotors.tilts) or not self.assurance.settings.supervise:
+            return inputs
         changes: dict[str, np.ndarray] = {}
-        if low is not None or high is not None or found is not None:
+        if limited:
             low, high = setpoints.floor if low is None else low, setpoints.ceiling if high is None else high
             low, high = self.assurance.limits((low, high)) or (low, high)
             rotors.update((low, high))
@@ -150,10 +154,6 @@ class Assured:
             faults[Fault.NO_ATTITUDE] = "attitude or gyro missing"
         if self._rotors.lost:
             faults[Fault.NO_HOVER] = ""
-        if not self.self_check.done:
-            self._check_axes(checked, missing)
-        if found := self.self_check.faults():
-            faults[Fault.INPUTS] = "; ".join(found)
         return Tick(
             stamp_ns=now,
             imu_ns=self._imu_ns,
@@ -173,13 +173,17 @@ class Assured:
             faults=faults,
         )
 
-    def _check_axes(self, checked: Measurement, missing: tuple[str, ...]) -> None:
+    def _check_axes(self, checked: Measurement) -> tuple[str, ...]:
         """Self-check with those sensors that the tick has; the contact wrench is that of the tool on the vehicle."""
         check, contact, dt = self.self_check, self.controller.setpoints.contact, self._dt
-        if checked.specific_force is not None and not any(name in missing for name in _INERTIAL):
+        if check.done:
+            return ()
+        missing = self.controller.gate.replaced
+        if checked.specific_force is not None and not (missing and any(name in missing for name in _INERTIAL)):
             check.inertial(
                 checked.attitude.tolist(), checked.angular_velocity.tolist(), checked.specific_force.tolist(), dt
             )
         if "contact_wrench" not in missing:
             tool = (-checked.contact_wrench[:3]).tolist()
             check.contact(tool, contact.push_noise, contact.normal, contact.distance, dt)
+        return check.faults()

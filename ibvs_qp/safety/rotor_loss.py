@@ -104,6 +104,11 @@ class RotorLoss:
         self._turned = self.lost and (self._turned or facing < FACING)
         return self._turned
 
+    @property
+    def tilts(self) -> bool:
+        """Whether the vehicle moves by tilting."""
+        return self.lost or self.limited or self.stuck
+
     def target(
         self, contact: ContactState, attitude: Sequence[float], along: float, dt: float
     ) -> dict[str, np.ndarray]:
@@ -115,7 +120,7 @@ class RotorLoss:
             along: Speed to the right along the wall [m/s].
             dt: Time since the last call [s].
         """
-        if not (self.lost or self.limited or self.stuck):
+        if not self.tilts:
             self._tilting = False
             return {}
         if not self._tilting:

@@ -22,15 +22,10 @@ class TurnCheck:
     """
 
     def __init__(self) -> None:
+        self.faults: tuple[str, ...] = ()
         self._start: Sequence[float] | None = None
         self._time, self._turn = 0.0, [0.0, 0.0, 0.0]
         self._square, self._product, self._opposed = [0.0] * 3, [0.0] * 3, [False] * 3
-
-    @property
-    def faults(self) -> tuple[str, ...]:
-        """Axes that turn the other way."""
-        axes = " and ".join([name for name, opposed in zip("xyz", self._opposed, strict=True) if opposed])
-        return (f"attitude: turns against the gyro about {axes}; one of both is FLU, not FRD",) if axes else ()
 
     def add(self, attitude: Sequence[float], rate: Sequence[float], dt: float) -> None:
         """Add a tick: quaternion B in I, gyro [rad/s], time since the last tick [s]."""
@@ -49,6 +44,8 @@ class TurnCheck:
                 self._opposed[axis] = self._product[axis] < OPPOSED * self._square[axis]
                 self._square[axis] = self._product[axis] = 0.0
         self._start, self._time, self._turn = attitude, 0.0, [0.0, 0.0, 0.0]
+        axes = " and ".join([name for name, opposed in zip("xyz", self._opposed, strict=True) if opposed])
+        self.faults = (f"attitude: turns against the gyro about {axes}; one of both is FLU, not FRD",) if axes else ()
 
 
 def turned(start: Sequence[float], end: Sequence[float]) -> tuple[float, float, float]:
