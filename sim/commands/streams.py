@@ -34,7 +34,7 @@ def own_output() -> Iterator[None]:
     OSQP prints "Solver interrupted" after Ctrl-C, which would stand before the line of JSON.
     """
     if sys.stdout is not sys.__stdout__ or sys.stdout.fileno() != 1:
-        yield  # somebody redirected it already
+        yield  # redirected already
         return
     sys.stdout.flush()
     copy = os.dup(1)

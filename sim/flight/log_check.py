@@ -32,7 +32,7 @@ def check_arrays(arrays: Mapping[str, np.ndarray]) -> None:
     for name in _NAMES & arrays.keys():
         array = arrays[name]
         if array.ndim != 1 or array.dtype.kind != "U":
-            raise ValueError(f"array {name} has shape {array.shape} of {array.dtype}, wanted is a list of names")
+            raise ValueError(f"array {name} has shape {array.shape} of {array.dtype}, expected a list of names")
     if sizes.get("L", 0) < len(arrays["limits"]):
         raise ValueError(f"{len(arrays['limits'])} limits are named, the arrays have {sizes.get('L', 0)} columns")
     if not (np.isfinite(arrays["t"]).all() and (np.diff(arrays["t"]) > 0.0).all()):

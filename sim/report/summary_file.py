@@ -71,7 +71,7 @@ def _typed(file: Path, name: str, value: Any, kind: type) -> Any:
     fits = type(value) is kind and (kind is not int or value in INTEGERS) and (kind is not str or _prints(value))
     if not fits:
         raise UnreadableFile(
-            file, f"not the summary of a run: {shown(name)} = {shown(value)}, wanted is a {kind.__name__}"
+            file, f"not the summary of a run: {shown(name)} = {shown(value)}, expected {kind.__name__}"
         )
     return value
 
