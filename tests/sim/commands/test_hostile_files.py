@@ -128,7 +128,9 @@ def tables() -> dict[str, bytes]:
 
 
 def test_parquet(refuses: Callable[..., str], capfd: pytest.CaptureFixture[str]) -> None:
-    good = (FOLDER.parents[1] / "docs" / "experiments" / "all.parquet").read_bytes()
+    table = pl.read_parquet(FOLDER.parents[1] / "docs" / "experiments" / "all.parquet").head(40)
+    table.write_parquet(stream := io.BytesIO())
+    good = stream.getvalue()
     random = np.random.default_rng(3)
     cases = {"empty": b"", "text": b"PAR1" * 100, "cut": good[:5000], "no end": good[:-4], "no start": good[500:]}
     for place in random.integers(len(good) - 3000, len(good) - 8, 60):  # the footer: some of these make Polars panic
