@@ -10,6 +10,7 @@ import numpy as np
 from ibvs_qp.command import Command
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.estimation.contact_state import ContactState
+from ibvs_qp.estimation.late_samples import LateSamples
 from ibvs_qp.measurement import Measurement, Reference
 from ibvs_qp.model.reporting import check_contact, hover_command
 from ibvs_qp.model.setpoints import Setpoints
@@ -46,12 +47,14 @@ class CheckedLaw(ABC):
         self.config = config
         self.gate = MeasurementGate(config.vehicle.geometry.count, config.line_slots)
         self.references = ReferenceGate(config.line_slots)
+        self._late = LateSamples(config.vehicle.camera_position_m)
 
     def reset(self) -> None:
         """As after construction, to the bit."""
         self.setpoints.reset()
         self.gate.reset()
         self.references.reset()
+        self._late.reset()
 
     @np.errstate(all="ignore")  # a host may have numpy raise at every underflow
     def step(self, measurement: Measurement, reference: Reference, contact: ContactState | None = None) -> Command:
@@ -90,6 +93,7 @@ class CheckedLaw(ABC):
         stamp_ns, measurement, reference, contact, rejected = inputs
         if measurement is None:
             return hover_command(self.setpoints, stamp_ns, self.gate.inertial, rejected)
+        measurement = self._late.carried(measurement)
         self.setpoints.update(measurement, reference, contact)
         return self._command(measurement, reference, rejected)
 

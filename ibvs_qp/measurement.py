@@ -74,6 +74,8 @@ class Measurement:
         thrust_max: Upper thrust limits [N], (n,), or None for the configured ones.
         attitude_stamp_ns: Time for which the attitude holds, or None: at the tick.
         imu_stamp_ns: Time at which gyro and accelerometer were sampled, or None: at the tick.
+        velocity_stamp_ns: Time for which the velocity holds, or None: at the tick. A late velocity and late lines are
+            carried to the tick by gyro, velocity and accelerometer.
     """
 
     stamp_ns: int
@@ -92,6 +94,7 @@ class Measurement:
     thrust_max: np.ndarray | None = None
     attitude_stamp_ns: int | None = None
     imu_stamp_ns: int | None = None
+    velocity_stamp_ns: int | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -17,7 +17,7 @@ from ibvs_qp.validation.numbers import matrix
 
 #: Lines looked at for every line that the program has room for: roles and order select among them.
 LINES_PER_SLOT = 4
-#: Lines older than this are refused [ns]: the latency of a camera, and some dropped pictures.
+#: Lines and velocities older than this are refused [ns]: the latency of a camera, and some dropped pictures.
 OLDEST_LINE_NS = 300_000_000
 #: What a refused measurement lacks.
 _ALL = ("attitude", "angular_velocity", "specific_force", "contact_wrench", "plane", "lines")
@@ -89,6 +89,7 @@ class MeasurementGate:
         self._check_wrench_time(measurement, refused, entries, changes, rejected)
         self._check_plane(measurement, changes, rejected)
         self._check_lines(measurement, changes, rejected)
+        self._check_velocity_time(measurement, changes, rejected)
         _check_covariance(measurement, changes, rejected)
         self._check_limit_order(entries, changes, rejected)
         self._last, self._measured, self.replaced = entries, True, tuple(refused)
@@ -159,14 +160,30 @@ class MeasurementGate:
         if lines is not measurement.lines:
             changes["lines"] = lines
 
+    def _check_velocity_time(self, measurement: Measurement, changes: dict[str, Any], rejected: list[str]) -> None:
+        """A velocity of an unknown time is none."""
+        stamp = measurement.velocity_stamp_ns
+        if stamp is None or measurement.velocity is None:
+            return
+        if (time := self._recent(stamp)) is None:
+            rejected.append(f"velocity_stamp_ns: over {OLDEST_LINE_NS / 1e6:g} ms old, or {NO_PAST_TIME}")
+            changes |= {"velocity": None, "velocity_stamp_ns": None}
+        elif time is not stamp:
+            changes["velocity_stamp_ns"] = time
+
     def _timed(self, line: LineFeature) -> LineFeature | None:
         """A line in the controller's time; None for one too old or of the future."""
         if line.stamp_ns == 0:
             return line
-        time = self.clock.sample_time(line.stamp_ns)
-        if time is None or self.clock.last_ns - time > OLDEST_LINE_NS:
-            return None
-        return line if time == line.stamp_ns else dataclasses.replace(line, stamp_ns=time)
+        time = self._recent(line.stamp_ns)
+        if time is None or time == line.stamp_ns:
+            return None if time is None else line
+        return dataclasses.replace(line, stamp_ns=time)
+
+    def _recent(self, stamp: Any) -> int | None:
+        """A stamp in the controller's time; None for one too old or of the future."""
+        time = self.clock.sample_time(stamp)
+        return None if time is None or self.clock.last_ns - time > OLDEST_LINE_NS else time
 
     def _check_plane(self, measurement: Measurement, changes: dict[str, Any], rejected: list[str]) -> None:
         if measurement.plane is None:

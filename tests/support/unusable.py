@@ -94,6 +94,9 @@ def in_measurement(value: Any) -> Iterator[str]:
         yield from bad_fields(value, (*_INERTIAL, "specific_force", "contact_wrench", "velocity", "acceleration_bias"))
         yield from bad_fields(value, ("thrust_min", "thrust_max", "plane"))
         yield from bad_stamps(value, int(value.stamp_ns))
+        stamp = value.velocity_stamp_ns
+        if value.velocity is not None and stamp is not None and not is_stamp(stamp):
+            yield "velocity"
         if not are_lines(value.lines):
             yield "lines"
 

@@ -98,7 +98,11 @@ BROKEN_FIELDS: list[tuple[str, Any, str]] = [
     *[("lines", (line(**{name: value}),), "lines") for name, value in BROKEN_LABELS],
     *[("velocity_covariance", value, "velocity_covariance") for value in (np.full((3, 3), np.nan), np.eye(2), "x")],
     *[("acceleration_bias", value, "acceleration_bias") for value in (NAN3, np.full(3, 9.0), "x", np.zeros(2))],
-    *[(name, value, name) for name in INERTIAL_STAMPS for value in (1.5, "now", -1, 2**80, 10**17, np.zeros(1))],
+    *[
+        (name, value, name)
+        for name in (*INERTIAL_STAMPS, "velocity_stamp_ns")
+        for value in (1.5, "now", -1, 2**80, 10**17, np.zeros(1))
+    ],
     *[("lines", (line(weight=math.inf),), "lines"), ("lines", (line(theta=10**400),), "lines")],
     *[("lines", (line(covariance=np.array([[None] * 2] * 2)),), "lines"), ("lines", (line(rho=np.zeros(2)),), "lines")],
     *[(name, value, name) for name in ("thrust_min", "thrust_max") for value in (np.full(6, np.nan), np.zeros(3), 5.0)],
