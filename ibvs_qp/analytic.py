@@ -33,13 +33,12 @@ def analytic_wrench(setpoints: Setpoints) -> np.ndarray:
     Returns:
         Wrench beyond feedback linearisation [N, N m], (6,).
     """
-    vehicle = setpoints.config.vehicle
     acceleration = _secondary_acceleration(setpoints)
     if lines := setpoints.lines:
         matrix, image_acceleration = _stacked_lines(lines, setpoints.config.gains)
         inverse = _pseudo_inverse(matrix)
         acceleration = inverse.dot(image_acceleration) + acceleration - inverse.dot(matrix.dot(acceleration))
-    wrench = np.array((*[vehicle.mass_kg] * 3, *vehicle.inertia_kg_m2)) * acceleration
+    wrench = setpoints.mass_matrix @ acceleration
     along = float(setpoints.normal.dot(wrench[:3]))
     wrench[:3] += setpoints.normal * setpoints.contact_weight * (setpoints.push_command - along)
     return wrench

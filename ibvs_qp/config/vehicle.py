@@ -7,8 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from allocation.geometry import TAROT_T960, RotorGeometry
-from ibvs_qp.config.errors import out_of_range
+from ibvs_qp.config.errors import ConfigError, out_of_range
 from ibvs_qp.config.settings import require_order, setting, validate
+
+#: Rounding of the largest moment of inertia against the sum of the others [-]: equal for a flat body.
+INERTIA_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -21,7 +24,14 @@ class VehicleParams:
     geometry: RotorGeometry = TAROT_T960
     mass_kg: float = setting(6.0, "all-up mass, tool included", unit="kg", low=0.5, high=50.0)
     inertia_kg_m2: tuple[float, float, float] = setting(
-        (0.22, 0.30, 0.48), "principal inertia about the centre of mass", unit="kg m^2", low=1e-3, high=50.0
+        (0.22, 0.30, 0.48),
+        "moments xx, yy, zz of the inertia about the centre of mass",
+        unit="kg m^2",
+        low=1e-3,
+        high=50.0,
+    )
+    inertia_products_kg_m2: tuple[float, float, float] = setting(
+        (0.0, 0.0, 0.0), "entries xy, xz, yz of the same inertia matrix", unit="kg m^2", low=-25.0, high=25.0
     )
     thrust_min_n: float | tuple[float, ...] = setting(
         1.2,
@@ -72,6 +82,10 @@ class VehicleParams:
             value = getattr(self, field)
             if isinstance(value, tuple) and len(value) != self.geometry.count:
                 raise out_of_range(field, value, "N", f"one number or {self.geometry.count} (one per rotor)")
+        xx, yy, zz = np.linalg.eigvalsh(self.inertia).tolist()  # in ascending order
+        if not 0.0 < xx <= yy <= zz <= xx + yy + INERTIA_TOLERANCE * zz:
+            products = f"{self.inertia_kg_m2} kg m^2 with the products {self.inertia_products_kg_m2}"
+            raise ConfigError(f"inertia_kg_m2 = {products} is refused: no rigid body has such an inertia")
         if np.any(self.thrust_min >= self.thrust_max):
             raise out_of_range("thrust_min_n", self.thrust_min_n, "N", "must lie below thrust_max_n on every rotor")
 
@@ -91,6 +105,14 @@ class VehicleParams:
         return 0.5 * (self.motor_lag_up_s + self.motor_lag_down_s)
 
     @property
+    def inertia(self) -> np.ndarray:
+        """Inertia J about the centre of mass, in B [kg m^2], (3, 3)."""
+        xy, xz, yz = self.inertia_products_kg_m2
+        return np.diag(self.inertia_kg_m2) + np.array([[0.0, xy, xz], [xy, 0.0, yz], [xz, yz, 0.0]])
+
+    @property
     def mass_matrix(self) -> np.ndarray:
         """Rigid-body mass matrix diag(m I, J), (6, 6)."""
-        return np.diag(np.concatenate((np.full(3, self.mass_kg), np.asarray(self.inertia_kg_m2))))
+        matrix = self.mass_kg * np.eye(6)
+        matrix[3:, 3:] = self.inertia
+        return matrix

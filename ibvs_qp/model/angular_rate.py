@@ -25,13 +25,13 @@ def estimated_rate(
     f = ``angular_rate.gyro_bandwidth_hz``. Above f the motors' model counts: the rotors do not see the gyro's noise,
     and a commanded rotation is not late.
     """
-    inertia = ca.DM(config.vehicle.inertia_kg_m2)
+    inertia = ca.sparsify(config.vehicle.inertia)
     outside = signals.state("external_moment", 3)
     if config.contact_feedforward:
         outside += signals.state("feedforward_moment", 3)
-    moment = ca.DM(effectiveness[3:]) @ motors.thrusts + outside - ca.cross(body.gyro, inertia * body.gyro)
+    moment = ca.DM(effectiveness[3:]) @ motors.thrusts + outside - ca.cross(body.gyro, inertia @ body.gyro)
     awake = ca.logic_and(motors.ready, body.dt > 0.0)
-    acceleration = ca.if_else(awake, moment / inertia, 0.0)
+    acceleration = ca.if_else(awake, ca.solve(inertia, moment), 0.0)
     gain = 1.0 - ca.exp(-2.0 * math.pi * config.angular_rate.gyro_bandwidth_hz * body.dt)
     predicted = signals.state("angular_rate", 3) + body.dt * acceleration
     rate = ca.if_else(awake, predicted + gain * (body.gyro - predicted), body.gyro)

@@ -66,7 +66,7 @@ def external_wrench(
 def _moment(signals: Signals, vehicle: VehicleParams, body: Body, known: ca.SX, awake: ca.SX, active: ca.SX) -> ca.SX:
     old, started = signals.state("external_moment", 3), signals.state("external_started")
     integral = signals.state("external_momentum", 3)
-    momentum = ca.DM(vehicle.inertia_kg_m2) * body.gyro
+    momentum = ca.sparsify(vehicle.inertia) @ body.gyro
     begun = ca.if_else(started, integral, momentum - old / MOMENT_BANDWIDTH)
     moved = begun + body.dt * (known - ca.cross(body.gyro, momentum) + old)
     new = clamp(MOMENT_BANDWIDTH * (momentum - moved), -MOMENT_BOUND, MOMENT_BOUND)

@@ -71,7 +71,7 @@ class Model:
         self.effectiveness = control_effectiveness(vehicle.geometry)
         self.thrust = ca.SX.sym("thrust", self.rotors)
         self.acceleration = ca.SX.sym("acceleration", 6)
-        self.wrench = ca.DM(vehicle.mass_matrix.diagonal()) * self.acceleration
+        self.wrench = ca.sparsify(vehicle.mass_matrix) @ self.acceleration
 
         self._motors = motor_thrust(signals, vehicle, body.dt)
         rate, angular_acceleration = estimated_rate(signals, config, self.effectiveness, body, self._motors)
@@ -91,7 +91,7 @@ class Model:
         static_wrench, friction = self._disturbances()
         inverse_mass = np.linalg.inv(vehicle.mass_matrix)
         self.acceleration_per_thrust = ca.DM(inverse_mass @ self.effectiveness)
-        self.free_acceleration = ca.DM(inverse_mass.diagonal()) * self.bias_wrench
+        self.free_acceleration = ca.sparsify(inverse_mass) @ self.bias_wrench
         self._rotor_limits()
         planned = self.wall.in_body(target.travel_right, target.travel_down)
         ahead = ca.if_else(ca.norm_2(self.travel) > STANDING_SPEED, self.travel, planned)
@@ -135,7 +135,7 @@ class Model:
         missing_thrust(signals, config, self.effectiveness, body, felt_moment, self._motors)
         known = ca.DM(self.effectiveness[:3]) @ self._motors.thrusts + body.wrench[:3] + external[:3]
         self.output("modelled_force", known / vehicle.mass_kg)
-        gyroscopic = -ca.cross(body.rate, ca.DM(vehicle.inertia_kg_m2) * body.rate)
+        gyroscopic = -ca.cross(body.rate, ca.sparsify(vehicle.inertia) @ body.rate)
         # The observer takes the accelerometer's bias for a force, and gravity leaks through the attitude's error.
         normal, along = self.wall.normal, body.acceleration_bias
         bias = contact.bias * normal + along - normal * ca.dot(normal, along)

@@ -89,7 +89,7 @@ def missing_thrust(
     gain = _gain(RESIDUAL_BANDWIDTH, body.dt)
     old_force, old_moment = signals.state("residual_force", 3), signals.state("residual_moment", 3)
     force = vehicle.mass_kg * body.specific_force - rotors[:3] - body.wrench[:3]
-    momentum = ca.DM(vehicle.inertia_kg_m2) * body.gyro
+    momentum = ca.sparsify(vehicle.inertia) @ body.gyro
     known = rotors[3:] + felt_moment - ca.cross(body.gyro, momentum)
     path, started = signals.state("residual_momentum", 3), signals.state("residual_started")
     ready = ca.logic_and(ca.logic_and(motors.ready, body.dt > 0.0), body.specific_force_known)

@@ -70,7 +70,7 @@ class Setpoints:
     def __init__(self, model: Model, extra: Sequence[ca.SX] = ()) -> None:
         config = self.config = model.config
         vehicle = config.vehicle
-        self.effectiveness = model.effectiveness
+        self.effectiveness, self.mass_matrix = model.effectiveness, vehicle.mass_matrix
         self.inverse = np.linalg.pinv(self.effectiveness)
         self._estimator = ContactEstimator(config)
         self.step = StepFunction(model.signals, extra, config.machine_code)

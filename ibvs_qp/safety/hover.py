@@ -26,7 +26,7 @@ def hold_thrusts(config: ControllerConfig, measurement: Measurement | None) -> n
         roll, pitch = roll_pitch(measurement.attitude)
         omega = measurement.angular_velocity
         wrench[:3] = -vehicle.mass_kg * GRAVITY * np.array(down_in_body(measurement.attitude))
-        wrench[3:] = np.array(vehicle.inertia_kg_m2) * np.array(
+        wrench[3:] = vehicle.inertia @ np.array(
             [
                 -gains.attitude_kp * roll - gains.attitude_kd * omega[0],
                 -gains.attitude_kp * pitch - gains.attitude_kd * omega[1],

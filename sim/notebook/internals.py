@@ -132,7 +132,7 @@ def _selected_thrusts(controller: HybridController) -> np.ndarray:
     """
     setpoints = controller.setpoints
     gains, vehicle, contact = setpoints.config.gains, setpoints.config.vehicle, setpoints.contact_weight
-    mass = np.concatenate((np.full(3, vehicle.mass_kg), np.asarray(vehicle.inertia_kg_m2)))
+    mass = vehicle.mass_matrix
     along = (contact * setpoints.push_command + (1.0 - contact) * setpoints.standoff_command) / vehicle.mass_kg
     right, down = setpoints.velocity_command
     acceleration = np.append(
@@ -150,7 +150,7 @@ def _selected_thrusts(controller: HybridController) -> np.ndarray:
         target.append(-(gains.theta_kp * level.angle_error + gains.theta_kd * level.angle_rate))
         inverse = np.linalg.pinv(matrix, rcond=RANK_TOLERANCE)
         acceleration = acceleration + inverse @ (np.array(target) - matrix @ acceleration)
-    return setpoints.inverse @ (mass * acceleration - setpoints.bias_wrench)
+    return setpoints.inverse @ (mass @ acceleration - setpoints.bias_wrench)
 
 
 def paper_profile(weight: float) -> ControllerConfig:

@@ -21,6 +21,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import casadi as ca
+import numpy as np
 
 from ibvs_qp.model.inputs import clamp
 from ibvs_qp.model.model import Model
@@ -68,7 +69,7 @@ class Prediction:
     def _generator(self) -> ca.SX:
         model, n, size = self._model, self._model.rotors, self.states
         vehicle = model.config.vehicle
-        inverse_mass = ca.diag(1.0 / ca.DM(vehicle.mass_matrix.diagonal()))
+        inverse_mass = ca.sparsify(np.linalg.inv(vehicle.mass_matrix))
         effectiveness = ca.DM(model.effectiveness)
         lag = vehicle.motor_lag_s
         force = effectiveness[:3, :] @ self._thrusts

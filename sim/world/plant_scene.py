@@ -26,8 +26,8 @@ class PlantScene:
     inertia_kg_m2: Vector | None = setting(
         None, "moments xx, yy, zz of the inertia about the true centre of mass", unit="kg m^2", low=0.01, high=10.0
     )
-    inertia_products_kg_m2: Vector = setting(
-        (0.0, 0.0, 0.0), "entries xy, xz, yz of the same inertia matrix", unit="kg m^2", low=-5.0, high=5.0
+    inertia_products_kg_m2: Vector | None = setting(
+        None, "entries xy, xz, yz of the same inertia matrix", unit="kg m^2", low=-5.0, high=5.0
     )
     thrust_gain: float | tuple[float, ...] = setting(
         1.0, "true over commanded thrust, one number or one per rotor", low=0.3, high=2.0

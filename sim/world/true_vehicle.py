@@ -24,7 +24,6 @@ class TrueVehicle(VehicleParams):
 
     Attributes:
         com_offset_m: True centre of mass from the body origin, which is the assumed one, FRD [m].
-        inertia_products_kg_m2: Entries xy, xz, yz of the inertia about the true centre of mass [kg m^2].
         thrust_gain: True over commanded thrust, one number or one per rotor [-].
         force_torque_turn_deg: Rotation vector from B to the axes of the force/torque sensor [deg].
         camera_turn_deg: Rotation vector from the camera that looks along +x to the real one, in B [deg].
@@ -32,7 +31,6 @@ class TrueVehicle(VehicleParams):
     """
 
     com_offset_m: Vector = (0.0, 0.0, 0.0)
-    inertia_products_kg_m2: Vector = (0.0, 0.0, 0.0)
     thrust_gain: float | tuple[float, ...] = 1.0
     force_torque_turn_deg: Vector = (0.0, 0.0, 0.0)
     camera_turn_deg: Vector = (0.0, 0.0, 0.0)
@@ -44,12 +42,6 @@ class TrueVehicle(VehicleParams):
         gain, count = self.thrust_gain, self.geometry.count
         if isinstance(gain, tuple) and len(gain) != count:
             raise out_of_range("thrust_gain", gain, "", f"one number or {count} (one per rotor)")
-
-    @property
-    def inertia(self) -> np.ndarray:
-        """Inertia about the true centre of mass, FRD [kg m^2], (3, 3)."""
-        xy, xz, yz = self.inertia_products_kg_m2
-        return np.diag(self.inertia_kg_m2) + np.array([[0.0, xy, xz], [xy, 0.0, yz], [xz, yz, 0.0]])
 
 
 def true_vehicle(scene: Scene, believed: VehicleParams, seed: int = 0) -> TrueVehicle:

@@ -23,7 +23,7 @@ class SmallVehicle:
     def __init__(self, config: ControllerConfig, distance: float = 0.1, stiffness: float = 2000.0) -> None:
         self.vehicle, self.dt = config.vehicle, config.tick_s
         self.matrix = control_effectiveness(self.vehicle.geometry)
-        self.mass, self.inertia = self.vehicle.mass_kg, np.array(self.vehicle.inertia_kg_m2)
+        self.mass, self.inertia = self.vehicle.mass_kg, self.vehicle.inertia
         self.tip = np.array(self.vehicle.tip_position_m)
         self.position, self.velocity, self.omega = np.zeros(3), np.zeros(3), np.zeros(3)
         self.attitude = Rotation.identity()
@@ -80,7 +80,7 @@ class SmallVehicle:
             force = wrench[:3] + (turn.T @ gust if gust is not None else 0.0)
             self.specific_force = force / self.mass
             self.velocity = self.velocity + step * (turn @ self.specific_force + [0.0, 0.0, 9.81])
-            spin = (wrench[3:] - cross(self.omega, self.inertia * self.omega)) / self.inertia
+            spin = np.linalg.solve(self.inertia, wrench[3:] - cross(self.omega, self.inertia @ self.omega))
             self.omega = self.omega + step * spin
             self.position = self.position + step * self.velocity
             self.attitude = self.attitude * Rotation.from_rotvec(step * self.omega)

@@ -64,7 +64,7 @@ def test_each_rotor_pushes_to_its_own_side():
     [
         (6.0, (0.22, 0.30, 0.48), (0.0, 0.0, 0.0)),
         (7.5, (0.275, 0.225, 0.36), (0.03, -0.02, 0.03)),
-        (5.0, (0.165, 0.225, 0.60), (-0.03, 0.03, -0.03)),
+        (5.0, (0.330, 0.350, 0.60), (-0.03, 0.03, -0.03)),
     ],
 )
 def test_mass_centre_and_inertia_are_the_scenes(mass, inertia, offset):
@@ -85,7 +85,7 @@ def test_mass_centre_and_inertia_are_the_scenes(mass, inertia, offset):
 
 def test_impossible_vehicles_are_refused():
     with pytest.raises(ConfigError, match=r"inertia_kg_m2 .* tool"):
-        Plant(Scene(plant=PlantScene(inertia_kg_m2=(0.22, 0.05, 0.48))))
+        Plant(Scene(plant=PlantScene(inertia_kg_m2=(0.05, 0.05, 0.05))))
     with pytest.raises(ConfigError, match=r"plant.tool_mass_kg .* mass_kg"):
         Plant(Scene(plant=PlantScene(mass_kg=4.0)), VehicleParams(tool_mass_kg=5.0))
     with pytest.raises(ConfigError, match=r"plant.thrust_max_n .* 6 .one per rotor"):
