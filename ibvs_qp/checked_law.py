@@ -11,6 +11,7 @@ from ibvs_qp.command import Command
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.estimation.contact_state import ContactState
 from ibvs_qp.estimation.late_samples import LateSamples
+from ibvs_qp.estimation.turned_camera import TurnedCamera
 from ibvs_qp.measurement import Measurement, Reference
 from ibvs_qp.model.reporting import check_contact, hover_command
 from ibvs_qp.model.setpoints import Setpoints
@@ -48,6 +49,7 @@ class CheckedLaw(ABC):
         self.gate = MeasurementGate(config.vehicle.geometry.count, config.line_slots)
         self.references = ReferenceGate(config.line_slots)
         self._late = LateSamples(config.vehicle.camera_position_m)
+        self._camera = TurnedCamera(config.vehicle.camera_turn_deg)
 
     def reset(self) -> None:
         """As after construction, to the bit."""
@@ -82,6 +84,10 @@ class CheckedLaw(ABC):
     def check(self, measurement: Any, reference: Any, contact: Any) -> Inputs:
         """First half of `step`."""
         checked, rejected = self.gate.check(measurement)
+        if checked is not None and not self._camera.straight:
+            unseen: list[str] = []
+            checked = self._camera.measurement(checked, unseen)
+            rejected += tuple(unseen)
         reference, refused = self.references.check(reference)
         contact, unusable = check_contact(contact)
         if checked is not None and checked.velocity is None and reference.velocity.any():

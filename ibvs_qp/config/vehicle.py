@@ -65,13 +65,23 @@ class VehicleParams:
     force_torque_position_m: tuple[float, float, float] = setting(
         (0.25, 0.0, 0.0), "force/torque sensor", unit="m", low=-3.0, high=3.0
     )
+    force_torque_turn_deg: tuple[float, float, float] = setting(
+        (0.0, 0.0, 0.0), "turn of its axes from those of B, rotation vector", unit="deg", low=-180.0, high=180.0
+    )
     tool_mass_kg: float = setting(0.35, "mass beyond the force/torque sensor", unit="kg", low=0.0, high=5.0)
     tool_position_m: tuple[float, float, float] = setting(
         (0.50, 0.0, 0.0), "centre of mass of the tool", unit="m", low=-3.0, high=3.0
     )
     arm_radius_m: float = setting(0.015, "radius of the arm", unit="m", low=0.001, high=0.2)
     camera_position_m: tuple[float, float, float] = setting(
-        (0.20, 0.0, 0.08), "camera centre, looking along +x", unit="m", low=-3.0, high=3.0
+        (0.20, 0.0, 0.08), "camera centre", unit="m", low=-3.0, high=3.0
+    )
+    camera_turn_deg: tuple[float, float, float] = setting(
+        (0.0, 0.0, 0.0),
+        "turn of the camera from looking along +x, rotation vector in B",
+        unit="deg",
+        low=-180.0,
+        high=180.0,
     )
 
     def __post_init__(self) -> None:

@@ -6,10 +6,12 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ibvs_qp.estimation.turned_camera import TurnedCamera
 from ibvs_qp.measurement import FeatureFrame, RgbdFrame, SensorFrame
 from ibvs_qp.pilot.attitude_history import AttitudeHistory
 from ibvs_qp.pilot.config import PilotConfig
 from ibvs_qp.pilot.perception_loader import PerceptionLoader
+from ibvs_qp.pilot.rectification import Rectification
 from ibvs_qp.validation.features import check_features
 from ibvs_qp.validation.measurement import LINES_PER_SLOT
 from ibvs_qp.vision.percept import LineHint
@@ -23,6 +25,7 @@ class CameraInput:
 
     Attributes:
         percept: What perception found in the last picture, or None.
+        picture: That picture, rectified, or None.
         plane, plane_ns: Wall in the camera frame (nx, ny, nz, d) of the last features with one, and their stamp.
         image_ns: Stamp of the last features, -1 for never.
 
@@ -41,6 +44,8 @@ class CameraInput:
         self._config, self._history, self._seen_as = config, history, seen_as
         self._most_lines = LINES_PER_SLOT * config.controller.line_slots
         self._loader = PerceptionLoader(config)
+        self._mount = TurnedCamera(config.controller.vehicle.camera_turn_deg)
+        self._rectification = Rectification(self._mount, config.camera)
 
     def prepare(self, picture: RgbdFrame | None = None) -> None:
         """Load perception and call every stage of it once; `Pilot.prepare`."""
@@ -52,7 +57,8 @@ class CameraInput:
         """As before the first picture; perception stays loaded."""
         if self._loader.perception is not None:
             self._loader.perception.reset()
-        self.percept, self._capture_ns = None, -1
+        self._rectification.reset()
+        self.percept, self.picture, self._capture_ns = None, None, -1
         self.plane: tuple[float, float, float, float] | None = None
         self.plane_ns = self.image_ns = -1
 
@@ -80,6 +86,8 @@ class CameraInput:
         if features is None:
             return None
         features = check_features(features, self._most_lines, rejected)
+        if frame.image is None:
+            features = self._mount.features(features, rejected)
         if not is_news(_content(frame, features)):
             rejected.append("picture: repeats the last one")
             return None
@@ -99,8 +107,9 @@ class CameraInput:
             return None
         last_ns = self._capture_ns if self._capture_ns >= 0 else image.stamp_ns
         self._capture_ns = image.stamp_ns
+        self.picture = self._rectification.picture(image)
         self.percept = perception.process(
-            image,
+            self.picture,
             attitude=np.array(self._history.attitude(image.stamp_ns)),
             rotation=self._history.turn(last_ns, image.stamp_ns),
             velocity=velocity,

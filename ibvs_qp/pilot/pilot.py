@@ -13,6 +13,7 @@ from collections.abc import Callable
 from typing import Any, Protocol
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from ibvs_qp.analytic import PaperController
 from ibvs_qp.command import Command, SafetyState
@@ -20,6 +21,7 @@ from ibvs_qp.config import LONGEST_TICK
 from ibvs_qp.controller import HybridController
 from ibvs_qp.estimation.contact import ContactEstimator
 from ibvs_qp.estimation.contact_state import ContactState
+from ibvs_qp.estimation.turned_camera import straightened
 from ibvs_qp.estimation.wall_lines import WallAxes, image_line
 from ibvs_qp.estimation.wall_motion import BIAS, WallMotion
 from ibvs_qp.estimation.wrench_tare import WrenchTare
@@ -97,6 +99,8 @@ class Pilot:
         self._limits = ThrustLimits(vehicle.geometry.count)
         self.self_check = SelfCheck(self.config.safety.self_check)
         self._inertial = InertialData(self._tip_from_camera, settings.tick_s)
+        turn = vehicle.force_torque_turn_deg
+        self._force_axes = Rotation.from_rotvec(turn, degrees=True).as_matrix() if any(turn) else None
         self.tare = WrenchTare(vehicle, self.config.estimation)
         self.contact = ContactEstimator(settings)
         self.motion = WallMotion(self._tip, camera, settings.tick_s, self.config.estimation)
@@ -106,7 +110,7 @@ class Pilot:
         self.assurance = Assurance(vehicle, self.config.safety)
         self.painter = painter or Painter(self.config.painting)
         law = HybridController if self.config.law == "qp" else PaperController
-        self.controller: Controller = controller or law(settings)
+        self.controller: Controller = controller or law(straightened(settings))
         self.reset()
 
     def prepare(self, picture: RgbdFrame | None = None) -> None:
@@ -168,6 +172,11 @@ class Pilot:
         )
 
     @property
+    def picture(self) -> RgbdFrame | None:
+        """The last picture as perception got it: rectified, and as of a camera that looks along +x."""
+        return self._camera.picture
+
+    @property
     def percept(self) -> Percept | None:
         """What perception found in the last picture."""
         return self._camera.percept
@@ -221,7 +230,7 @@ class Pilot:
             self._leaps = self._gate.clock.leaps
             self.contact.doubt()
             self.motion.doubt()
-        frame = self._levelled(frame, dt)
+        frame = self._levelled(self._in_body(frame), dt)
         attitude, rate, force = self._inertial.attitude, self._inertial.rate, self._inertial.force
         down = down_in_body(attitude)
         wrench, wrench_stamp = self._contact_wrench(frame, force)
@@ -242,7 +251,7 @@ class Pilot:
             plane=self._camera.plane,
             plane_stamp_ns=self._camera.plane_ns,
         )
-        self._check_axes(contact, dt)
+        self._check_axes(frame.wrench, contact, dt)
         axes = WallAxes.of(contact.normal, down)
         self.motion.predict(stamp, axes, force, rate, dt)
         self._history.remember(attitude, rate, dt)
@@ -257,6 +266,13 @@ class Pilot:
         self._commanded = self.assurance.explained(command)
         self.assurance.watch(self._shown(frame, contact, command), self.setpoints)
         return self._commanded
+
+    def _in_body(self, frame: SensorFrame) -> SensorFrame:
+        """The frame with force and moment of the sensor in axes of B."""
+        if self._force_axes is None:
+            return frame
+        force, moment = self._force_axes @ frame.wrench[:3], self._force_axes @ frame.wrench[3:]
+        return dataclasses.replace(frame, wrench=np.concatenate((force, moment)))
 
     def _levelled(self, frame: SensorFrame, dt: float) -> SensorFrame:
         """The frame with the inertial data to fly by; those that fail are estimated."""
@@ -337,13 +353,13 @@ class Pilot:
         free = not last.in_contact and last.distance > self.config.estimation.tare_distance_m
         return self.tare.update(frame.wrench, frame.wrench_stamp_ns, specific_force, free)
 
-    def _check_axes(self, contact: ContactState, dt: float) -> None:
+    def _check_axes(self, wrench: np.ndarray, contact: ContactState, dt: float) -> None:
         """Self-check with those raw sensors that the tick has; it names what it found in every command."""
         now, missing, check = self._gate.last, self._gate.replaced, self.self_check
         if not any(name in missing for name in INERTIAL):
             check.inertial(now["attitude"], now["angular_velocity"], now["specific_force"], dt)
         if "wrench" not in missing:
-            check.contact(now["wrench"][:3], contact.push_noise, contact.normal, contact.distance, dt)
+            check.contact(wrench[:3].tolist(), contact.push_noise, contact.normal, contact.distance, dt)
         self._rejected += [f"self-check: {fault}" for fault in check.faults()]
 
     # -------------------------------------------------------------- perception

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
+from ibvs_qp.estimation.turned_camera import straightened
 from ibvs_qp.pilot import Pilot, PilotConfig
 from sim.faults.fault import Fault
 from sim.faults.schedule import FaultSchedule
@@ -35,7 +36,7 @@ def make_pilot(scene: Scene, options: FlightOptions, config: PilotConfig, job: J
     sigma, noise = scene.features.sigma_vs, stream(options.seed, "sigma_vs")
     rendered = options.features == "rendered"  # the sensor model of lines adds the same noise itself
     seen_as = (lambda frame: add_sigma_vs(frame, sigma, noise)) if rendered and sigma > 0.0 else None
-    controller = rival_controller(options.rival, config.controller) if options.rival else None
+    controller = rival_controller(options.rival, straightened(config.controller)) if options.rival else None
     pilot = Pilot(config, job.strategy(config.painting), seen_as, controller)
     if rendered:
         pilot.prepare()

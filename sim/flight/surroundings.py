@@ -73,7 +73,7 @@ class World:
         position, quaternion, *motion = self._seen_from
         pose, seen = self._mount.pose(position, quaternion), [self._mount.velocity(part) for part in motion]
         if self.stream is None:
-            return self.sensors.sample(plant, None, self._features.tick(now, *pose, *seen))
+            return self.sensors.sample(plant, None, self._mount.features(self._features.tick(now, *pose, *seen)))
         image = self.stream.tick(now, *pose, np.concatenate(seen))
         return self.sensors.sample(plant, image=None if image is None else self._mount.picture(image))
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import rotation_from_quaternion
-from ibvs_qp.measurement import RgbdFrame
+from ibvs_qp.measurement import FeatureFrame, RgbdFrame
 from sim.sensors.small_turns import multiply
 from sim.world.true_vehicle import TrueVehicle, turn_quaternion
 
@@ -16,8 +16,8 @@ from sim.world.true_vehicle import TrueVehicle, turn_quaternion
 class CameraMount:
     """Pose of the body from which a camera at the believed place sees what the true one does.
 
-    The camera's own view of arm and brush stays that of the believed place: a few degrees move it by less than the
-    blur of its outline.
+    The camera's own view of arm and brush is that of the believed mount: a few degrees of error move it by less than
+    the blur of its outline.
 
     Attributes:
         vehicle: The vehicle to give to a camera: true, but for the place of the camera.
@@ -38,6 +38,8 @@ class CameraMount:
         self._turn, self._focal = turn_quaternion(true.camera_turn_deg), true.focal_ratio
         self._back = rotation_from_quaternion(self._turn).T
         self._turned = any(true.camera_turn_deg)
+        believed_turn = turn_quaternion(believed.camera_turn_deg)
+        self._believed_axes = rotation_from_quaternion(believed_turn) if any(believed.camera_turn_deg) else None
         self._none = not self._turned and np.array_equal(self._believed, self._true)
 
     def pose(self, position: np.ndarray, quaternion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -49,8 +51,17 @@ class CameraMount:
         return real - rotation_from_quaternion(turned) @ self._believed, turned
 
     def velocity(self, velocity: np.ndarray) -> np.ndarray:
-        """Velocity of the body in B [m/s], (3,), as a camera reports it that counts on its believed attitude."""
+        """Velocity of the body in B [m/s], (3,), in axes of B turned like the camera."""
         return self._back @ velocity if self._turned else velocity
+
+    def features(self, frame: FeatureFrame | None) -> FeatureFrame | None:
+        """Features with the velocity in B, as perception reports it by the believed mount."""
+        axes = self._believed_axes
+        if frame is None or axes is None or frame.velocity is None:
+            return frame
+        return dataclasses.replace(
+            frame, velocity=axes @ frame.velocity, velocity_covariance=axes @ frame.velocity_covariance @ axes.T
+        )
 
     def picture(self, frame: RgbdFrame) -> RgbdFrame:
         """The picture with the reported focal lengths."""

@@ -45,12 +45,12 @@ class PlantScene:
     tool_mass_kg: float | None = setting(None, "mass beyond the force/torque sensor", unit="kg", low=0.0, high=5.0)
     tool_position_m: Vector | None = setting(None, "centre of mass of the tool", unit="m", low=-3.0, high=3.0)
     force_torque_position_m: Vector | None = setting(None, "force/torque sensor", unit="m", low=-3.0, high=3.0)
-    force_torque_turn_deg: Vector = setting(
-        (0.0, 0.0, 0.0), "turn of the force/torque sensor, rotation vector FRD", unit="deg", low=-45.0, high=45.0
+    force_torque_turn_deg: Vector | None = setting(
+        None, "turn of the force/torque sensor, rotation vector FRD", unit="deg", low=-180.0, high=180.0
     )
     camera_position_m: Vector | None = setting(None, "camera centre", unit="m", low=-3.0, high=3.0)
-    camera_turn_deg: Vector = setting(
-        (0.0, 0.0, 0.0), "turn of the camera from looking along +x, rotation vector FRD", unit="deg", low=-10, high=10
+    camera_turn_deg: Vector | None = setting(
+        None, "turn of the camera from looking along +x, rotation vector FRD", unit="deg", low=-180.0, high=180.0
     )
     focal_ratio: float = setting(1.0, "reported over true focal length; needs pictures", low=0.8, high=1.2)
 

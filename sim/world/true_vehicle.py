@@ -25,15 +25,11 @@ class TrueVehicle(VehicleParams):
     Attributes:
         com_offset_m: True centre of mass from the body origin, which is the assumed one, FRD [m].
         thrust_gain: True over commanded thrust, one number or one per rotor [-].
-        force_torque_turn_deg: Rotation vector from B to the axes of the force/torque sensor [deg].
-        camera_turn_deg: Rotation vector from the camera that looks along +x to the real one, in B [deg].
         focal_ratio: Reported over true focal length [-].
     """
 
     com_offset_m: Vector = (0.0, 0.0, 0.0)
     thrust_gain: float | tuple[float, ...] = 1.0
-    force_torque_turn_deg: Vector = (0.0, 0.0, 0.0)
-    camera_turn_deg: Vector = (0.0, 0.0, 0.0)
     focal_ratio: float = 1.0
 
     def __post_init__(self) -> None:

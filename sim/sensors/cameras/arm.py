@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from allocation.rotor import perpendicular
 from ibvs_qp.config.vehicle import VehicleParams
@@ -55,7 +56,7 @@ def vehicle_layer(
     shape = (scene.camera.height, scene.camera.width)
     picture, mask = np.zeros((*shape, 4), np.uint8), np.zeros(shape, np.uint8)
     inverse_depth, propellers = np.zeros(shape, np.float32), np.zeros(shape, np.uint8)
-    camera = np.asarray(vehicle.camera_position_m)
+    camera, to_camera = np.asarray(vehicle.camera_position_m), _to_camera(vehicle)
     tip, base = np.asarray(vehicle.tip_position_m), np.asarray(vehicle.force_torque_position_m)
     ferrule = tip - np.array([BRUSH_LENGTH_M, 0.0, 0.0])
     color = np.array(brush_color(scene), float)
@@ -70,7 +71,7 @@ def vehicle_layer(
         slices.append((ferrule + (base - ferrule) * k / steps, vehicle.arm_radius_m, np.array(_ARM_COLOR, float)))
     fx, fy, cx, cy = intrinsics
     for center, radius, tone in slices:
-        x, y, z = R_BODY_CAMERA.T @ (center - camera)
+        x, y, z = to_camera @ (center - camera)
         if z < _NEAR_M:
             continue
         place = (round((fx * x / z + cx) * _ONE), round((fy * y / z + cy) * _ONE))
@@ -79,10 +80,17 @@ def vehicle_layer(
         cv2.circle(mask, place, size, 255.0, -1, cv2.LINE_8, _SHIFT)
         cv2.circle(inverse_depth, place, size, 1.0 / z, -1, cv2.LINE_8, _SHIFT)
     for hub, axis in zip(vehicle.geometry.positions, vehicle.geometry.axes, strict=True):
-        _draw_disc(propellers, hub - camera, axis, vehicle.propeller_radius_m, intrinsics)
+        rim = hub - camera + _circle(axis, vehicle.propeller_radius_m)
+        _fill(propellers, rim @ to_camera.T, intrinsics)
     return VehicleLayer(
         picture=picture, mask=mask, inverse_depth=inverse_depth, holes=_ragged_outline(mask, rng), propellers=propellers
     )
+
+
+def _to_camera(vehicle: VehicleParams) -> np.ndarray:
+    """Rotation from B to the axes of the camera, (3, 3)."""
+    turn = Rotation.from_rotvec(vehicle.camera_turn_deg, degrees=True).as_matrix()
+    return (turn @ R_BODY_CAMERA).T
 
 
 #: Cache of masks by everything that they depend on: every geometric flight needs one, and drawing takes 30 ms.
@@ -104,13 +112,16 @@ def shade_propellers(picture: np.ndarray, propellers: np.ndarray) -> None:
     cv2.copyTo(dimmed, propellers, picture)
 
 
-def _draw_disc(
-    mask: np.ndarray, center: np.ndarray, axis: np.ndarray, radius: float, intrinsics: tuple[float, float, float, float]
-) -> None:
+def _circle(axis: np.ndarray, radius: float) -> np.ndarray:
+    """Points around an axis, (n, 3)."""
     side = perpendicular(axis)
     angle = np.linspace(0.0, 2.0 * np.pi, 180, endpoint=False)[:, None]
-    rim = center + radius * (np.cos(angle) * side + np.sin(angle) * np.cross(axis, side))
-    points = clip_near(rim @ R_BODY_CAMERA, _NEAR_M)
+    return radius * (np.cos(angle) * side + np.sin(angle) * np.cross(axis, side))
+
+
+def _fill(mask: np.ndarray, outline: np.ndarray, intrinsics: tuple[float, float, float, float]) -> None:
+    """Draw a convex outline in camera axes, (n, 3)."""
+    points = clip_near(outline, _NEAR_M)
     if len(points) < 3:
         return
     fx, fy, cx, cy = intrinsics

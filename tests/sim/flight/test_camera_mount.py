@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -72,3 +74,16 @@ def test_a_focal_ratio_needs_pictures():
     scene = Scene(plant=PlantScene(focal_ratio=1.03))
     with pytest.raises(ConfigError, match="rendered"):
         World(scene, OPTIONS, pilot_config(scene, OPTIONS))
+
+
+def test_a_camera_pitched_by_12_degrees_and_a_force_sensor_on_its_side_hold_the_push():
+    config = pilot_config(near_wall(), OPTIONS)
+    vehicle = dataclasses.replace(
+        config.controller.vehicle, camera_turn_deg=(0.0, 12.0, 0.0), force_torque_turn_deg=(90.0, 0.0, 0.0)
+    )
+    config = dataclasses.replace(config, controller=dataclasses.replace(config.controller, vehicle=vehicle))
+    trace = fly(near_wall(), OPTIONS, job=PressJob(hold_s=3.0), config=config)
+    assert trace.completed, trace.reason
+    held = (trace.phase == trace.phases.index("press")) & (trace.contact_weight == 1.0)
+    late = trace.push_true[held][-500:]
+    assert np.sqrt(np.mean((late - 5.0) ** 2)) < 0.3

@@ -1,0 +1,97 @@
+"""Lines and planes of a camera with any mount, in the axes of one that looks along +x."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from ibvs_qp.config import ControllerConfig
+from ibvs_qp.frames import R_BODY_CAMERA
+from ibvs_qp.measurement import FeatureFrame, LineFeature, Measurement
+from ibvs_qp.validation.geometry import INVERSE_DEPTH_MIN, LINE_BOUND
+
+#: What is refused: it lies beside or behind a camera that looks along +x.
+OUT_OF_VIEW = "not in front of a camera that looks along +x"
+
+Plane = tuple[float, float, float, float]
+
+
+def straightened(config: ControllerConfig) -> ControllerConfig:
+    """Configuration of a controller whose measurements have their features in C already, as a pilot's."""
+    if not any(config.vehicle.camera_turn_deg):
+        return config
+    return dataclasses.replace(config, vehicle=dataclasses.replace(config.vehicle, camera_turn_deg=(0.0, 0.0, 0.0)))
+
+
+class TurnedCamera:
+    r"""Rotates features from the real camera to the camera frame C of `ibvs_qp.frames`.
+
+    A line is the plane through the camera :math:`m \cdot X = 0` with :math:`m = (\cos\theta, \sin\theta, -\rho)`, and
+    the wall is :math:`n \cdot X = d`; with :math:`X_C = R X`, :math:`m_C = R m` and :math:`n_C = R n`.
+
+    Attributes:
+        rotation: R, (3, 3).
+        straight: Whether it is the identity, so that nothing changes.
+
+    Args:
+        turn_deg: Rotation vector from a camera that looks along +x to the real one, in B [deg], (3,).
+    """
+
+    def __init__(self, turn_deg: Sequence[float]) -> None:
+        turn = Rotation.from_rotvec(turn_deg, degrees=True).as_matrix()
+        self.rotation = R_BODY_CAMERA.T @ turn @ R_BODY_CAMERA
+        self.straight = not any(turn_deg)
+
+    def features(self, frame: FeatureFrame, rejected: list[str]) -> FeatureFrame:
+        """Result of perception in C; names what cannot be seen from there."""
+        if self.straight:
+            return frame
+        lines, plane = self._lines(frame.lines, rejected), self._plane(frame.plane, rejected)
+        return dataclasses.replace(frame, lines=lines, plane=plane)
+
+    def measurement(self, measurement: Measurement, rejected: list[str]) -> Measurement:
+        """A measurement with its lines and its plane in C; names what cannot be seen from there."""
+        if self.straight:
+            return measurement
+        lines, plane = self._lines(measurement.lines, rejected), self._plane(measurement.plane, rejected)
+        return dataclasses.replace(measurement, lines=lines, plane=plane)
+
+    def _lines(self, lines: Iterable[LineFeature], rejected: list[str]) -> tuple[LineFeature, ...]:
+        turned = [self._line(line) for line in lines]
+        if lost := turned.count(None):
+            rejected.append(f"lines: {lost} {OUT_OF_VIEW}")
+        return tuple([line for line in turned if line is not None])
+
+    def _plane(self, plane: Sequence[float] | None, rejected: list[str]) -> Plane | None:
+        if plane is None:
+            return None
+        a, b, c = (self.rotation @ plane[:3]).tolist()
+        if c < INVERSE_DEPTH_MIN * -plane[3]:
+            rejected.append(f"plane: {OUT_OF_VIEW}")
+            return None
+        return a, b, c, float(plane[3])
+
+    def _line(self, line: LineFeature) -> LineFeature | None:
+        cos, sin = math.cos(line.theta), math.sin(line.theta)
+        x, y, z = (self.rotation @ (cos, sin, -line.rho)).tolist()
+        length = math.hypot(x, y)
+        if not abs(z) <= LINE_BOUND * length:
+            return None
+        rows = self.rotation @ np.array(((0.0, -sin), (0.0, cos), (-1.0, 0.0)))  # d(x, y, z) / d(rho, theta)
+        along = (x * rows[0] + y * rows[1]) / length**2
+        jacobian = np.array(((z * along - rows[2]) / length, (x * rows[1] - y * rows[0]) / length**2))
+        segment = line.segment
+        if segment is not None:
+            ends = np.column_stack((segment, np.ones(2))) @ self.rotation.T
+            segment = ends[:, :2] / ends[:, 2:] if (ends[:, 2] > 0.0).all() else None
+        return dataclasses.replace(
+            line,
+            rho=-z / length,
+            theta=math.atan2(y, x),
+            covariance=jacobian @ line.covariance @ jacobian.T,
+            segment=segment,
+        )
