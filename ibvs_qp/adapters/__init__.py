@@ -1,0 +1,1 @@
+"""Between this controller and other systems: parameters of autopilots, motor commands."""
