@@ -10,6 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+
+from allocation import control_effectiveness
 from ibvs_qp.config.angular_rate import AngularRateSettings
 from ibvs_qp.config.brush import BrushSettings
 from ibvs_qp.config.contact import ContactSettings
@@ -66,8 +69,12 @@ class ControllerConfig:
     )
 
     def __post_init__(self) -> None:
-        """Validate; the depths at which the push begins against the arm's length too."""
+        """Validate, also that the vehicle is fully actuated, and the depths at which the push begins."""
         validate(self)
+        matrix = control_effectiveness(self.vehicle.geometry)
+        if (rank := int(np.linalg.matrix_rank(matrix))) < len(matrix):
+            needed = f"they give {rank} of 6 directions of a wrench; 'ibvs-qp vehicle FILE' names the others"
+            raise out_of_range("vehicle.geometry", self.vehicle.geometry.count, "rotors", needed)
         arm = round(self.vehicle.tip_position_m[0] - self.vehicle.camera_position_m[0], 9)
         if self.contact.depth_min_m < arm:
             allowed = f"allowed is at least {arm:g} m, where the camera is when the tip touches"

@@ -139,6 +139,7 @@ def _commands() -> dict[str, type[Command]]:
     from sim.commands.paint import Paint
     from sim.commands.sweep import Sweep
     from sim.commands.tune import Tune
+    from sim.commands.vehicle import Vehicle
 
     return {
         "paint": Paint,
@@ -150,6 +151,7 @@ def _commands() -> dict[str, type[Command]]:
         "sweep": Sweep,
         "tune": Tune,
         "faults": Faults,
+        "vehicle": Vehicle,
     }
 
 

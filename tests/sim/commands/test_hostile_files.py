@@ -35,6 +35,7 @@ TOML_COMMANDS = (
     "experiment approach --quick --world FILE",
     "sweep FILE",
     "tune --preset FILE",
+    "vehicle FILE",
 )
 #: Commands that read other kinds.
 COMMANDS = (
