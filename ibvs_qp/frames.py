@@ -88,6 +88,13 @@ def rotation_from_quaternion(quaternion: Iterable[float]) -> np.ndarray:
     return np.array(rotation_rows(*map(float, quaternion)))
 
 
+def rotation_from_vector(vector: Sequence[float] | np.ndarray) -> np.ndarray:
+    """Rotation matrix of a rotation vector (axis times angle [rad]), shape (3, 3)."""
+    half = 0.5 * np.asarray(vector, float)
+    angle = float(np.linalg.norm(half))
+    return rotation_from_quaternion((math.cos(angle), *(half * np.sinc(angle / math.pi))))
+
+
 def down_in_body(quaternion: Iterable[float]) -> Vector3:
     """Unit vector of gravity (world down) in the body frame: the third row of the rotation B to I."""
     w, x, y, z = map(float, quaternion)

@@ -9,10 +9,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ibvs_qp.estimation.stamps import HISTORY
-from ibvs_qp.frames import GRAVITY, R_BODY_CAMERA, align_line, down_in_body
+from ibvs_qp.frames import GRAVITY, R_BODY_CAMERA, align_line, down_in_body, rotation_from_vector
 from ibvs_qp.measurement import LineFeature, Measurement
 
 #: What is later than this counts as late [ns]: half a tick at 250 Hz.
@@ -35,12 +34,12 @@ class Motion(NamedTuple):
     """Motion of the body from a stamp to the present, small angles.
 
     Attributes:
-        rotation: Axes of the present in those of the stamp.
+        rotation: Axes of the present in those of the stamp, (3, 3).
         shift: Way of the centre of mass [m], in axes of the present, (3,).
         change: Change of its velocity [m/s], (3,).
     """
 
-    rotation: Rotation
+    rotation: np.ndarray
     shift: np.ndarray
     change: np.ndarray
 
@@ -81,7 +80,7 @@ class LateSamples:
         self._add(measurement)
         if aged and measurement.velocity is not None and velocity_ns is not None:
             motion = self._since(velocity_ns, now)
-            velocity = motion.rotation.inv().apply(measurement.velocity) + motion.change
+            velocity = motion.rotation.T @ measurement.velocity + motion.change
             changes = {"velocity": velocity, "velocity_stamp_ns": now}
         if measurement.velocity is not None:
             self._velocity = changes.get("velocity", measurement.velocity).tolist()
@@ -115,13 +114,13 @@ class LateSamples:
             covered = min(covered, begin)
             if covered <= stamp_ns:
                 break
-        return Motion(Rotation.from_rotvec(angle), shift, change)
+        return Motion(rotation_from_vector(angle), shift, change)
 
     def _in_camera(self, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
         """Rotation matrix R^T and shift t of the camera, in its present axes."""
-        back = motion.rotation.inv()
-        shift = motion.shift + self._camera - back.apply(self._camera)
-        return R_BODY_CAMERA.T @ back.as_matrix() @ R_BODY_CAMERA, R_BODY_CAMERA.T @ shift
+        back = motion.rotation.T
+        shift = motion.shift + self._camera - back @ self._camera
+        return R_BODY_CAMERA.T @ back @ R_BODY_CAMERA, R_BODY_CAMERA.T @ shift
 
     def _plane(self, plane: Sequence[float], motion: Motion) -> tuple[np.ndarray, float]:
         """Normal and distance of the wall, n . X = d, in the present camera."""

@@ -7,10 +7,9 @@ import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ibvs_qp.config import ControllerConfig
-from ibvs_qp.frames import R_BODY_CAMERA
+from ibvs_qp.frames import R_BODY_CAMERA, rotation_from_vector
 from ibvs_qp.measurement import FeatureFrame, LineFeature, Measurement
 from ibvs_qp.validation.geometry import INVERSE_DEPTH_MIN, LINE_BOUND
 
@@ -42,7 +41,7 @@ class TurnedCamera:
     """
 
     def __init__(self, turn_deg: Sequence[float]) -> None:
-        turn = Rotation.from_rotvec(turn_deg, degrees=True).as_matrix()
+        turn = rotation_from_vector(np.radians(turn_deg))
         self.rotation = R_BODY_CAMERA.T @ turn @ R_BODY_CAMERA
         self.straight = not any(turn_deg)
 

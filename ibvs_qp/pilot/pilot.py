@@ -13,7 +13,6 @@ from collections.abc import Callable
 from typing import Any, Protocol
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ibvs_qp.analytic import PaperController
 from ibvs_qp.command import Command, SafetyState
@@ -25,7 +24,7 @@ from ibvs_qp.estimation.turned_camera import straightened
 from ibvs_qp.estimation.wall_lines import WallAxes, image_line
 from ibvs_qp.estimation.wall_motion import BIAS, WallMotion
 from ibvs_qp.estimation.wrench_tare import WrenchTare
-from ibvs_qp.frames import down_in_body, plane_in_body, to_camera
+from ibvs_qp.frames import down_in_body, plane_in_body, rotation_from_vector, to_camera
 from ibvs_qp.measurement import FeatureFrame, Measurement, Reference, RgbdFrame, SensorFrame
 from ibvs_qp.model.reporting import fixed_command
 from ibvs_qp.model.setpoints import Setpoints
@@ -100,7 +99,7 @@ class Pilot:
         self.self_check = SelfCheck(self.config.safety.self_check)
         self._inertial = InertialData(self._tip_from_camera, settings.tick_s)
         turn = vehicle.force_torque_turn_deg
-        self._force_axes = Rotation.from_rotvec(turn, degrees=True).as_matrix() if any(turn) else None
+        self._force_axes = rotation_from_vector(np.radians(turn)) if any(turn) else None
         self.tare = WrenchTare(vehicle, self.config.estimation)
         self.contact = ContactEstimator(settings)
         self.motion = WallMotion(self._tip, camera, settings.tick_s, self.config.estimation)

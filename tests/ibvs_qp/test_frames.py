@@ -22,6 +22,7 @@ from ibvs_qp.frames import (
     rotate,
     rotate_back,
     rotation_from_quaternion,
+    rotation_from_vector,
     rotation_rows,
     skew,
     to_camera,
@@ -122,3 +123,9 @@ def test_a_line_that_turns_through_a_seam_never_jumps(reference: float) -> None:
             assert aligned - reference == pytest.approx(slope, abs=1e-12)
         assert last is None or 0 < aligned - last < 0.02
         last = aligned
+
+
+def test_a_rotation_vector_turns_about_its_axis() -> None:
+    for vector in ([0.3, -0.2, 0.5], [0.0, 0.0, 0.0], [1e-9, 0.0, 0.0], [0.0, np.pi, 0.0]):
+        np.testing.assert_allclose(rotation_from_vector(vector), Rotation.from_rotvec(vector).as_matrix(), atol=1e-12)
+    assert np.array_equal(rotation_from_vector((0.0, 0.0, 0.0)), np.eye(3))
