@@ -65,3 +65,10 @@ def perpendicular(axis: np.ndarray) -> np.ndarray:
     """A unit vector in the plane of a propeller disc with this axis, (3,)."""
     side = np.cross(axis, [0.0, 1.0, 0.0] if abs(axis[0]) > ALONG_X else [1.0, 0.0, 0.0])
     return side / np.linalg.norm(side)
+
+
+def disc_rim(axis: np.ndarray, radius: float, points: int) -> np.ndarray:
+    """Points on the rim of a propeller disc, seen from its hub, (points, 3) [m]."""
+    side = perpendicular(axis)
+    angle = np.linspace(0.0, 2.0 * np.pi, points, endpoint=False)[:, None]
+    return radius * (np.cos(angle) * side + np.sin(angle) * np.cross(axis, side))

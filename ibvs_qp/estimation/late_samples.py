@@ -67,6 +67,7 @@ class LateSamples:
         """As before the first tick."""
         self._samples: deque[_Sample] = deque(maxlen=HISTORY)
         self._used, self._velocity = False, [0.0, 0.0, 0.0]
+        self._motions: dict[int, Motion] = {}  # of this tick, by stamp
 
     def carried(self, measurement: Measurement) -> Measurement:
         """The measurement with its lines and its velocity at the present time."""
@@ -102,8 +103,15 @@ class LateSamples:
             _Sample(begin, end, measurement.angular_velocity.tolist(), velocity, acceleration.tolist())
         )
         self._used = True
+        self._motions.clear()
 
     def _since(self, stamp_ns: int, now: int) -> Motion:
+        """Motion from a stamp to now; lines, plane and velocity of one picture share it."""
+        if stamp_ns not in self._motions:
+            self._motions[stamp_ns] = self._integrated(stamp_ns, now)
+        return self._motions[stamp_ns]
+
+    def _integrated(self, stamp_ns: int, now: int) -> Motion:
         angle, shift, change, covered = np.zeros(3), np.zeros(3), np.zeros(3), now
         for sample in reversed(self._samples):
             begin = stamp_ns if sample.begin_ns < 0 else max(sample.begin_ns, stamp_ns)

@@ -10,11 +10,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 import tyro
 
+from ibvs_qp.config.errors import out_of_range
 from sim.commands.options import flag, optional, preset_file
 
 if TYPE_CHECKING:
     from allocation.actuation import Actuation
     from ibvs_qp.config.vehicle import VehicleParams
+
+#: Endings of pictures.
+_PICTURES = (".png", ".pdf", ".svg")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -40,6 +44,8 @@ class Vehicle:
         from ibvs_qp.frames import GRAVITY
         from sim.report.rundir import as_json
 
+        if self.picture is not None and self.picture.suffix not in _PICTURES:
+            raise out_of_range("--picture", str(self.picture), "", f"its name ends in {', '.join(_PICTURES)}")
         vehicle = _read(self.file)
         tip, limits = np.array(vehicle.tip_position_m), (vehicle.thrust_min, vehicle.thrust_max)
         found = actuation(vehicle.geometry, vehicle.mass_kg * GRAVITY, tip, *limits)
@@ -79,11 +85,8 @@ def _read(file: Path) -> VehicleParams:
 
 
 def _draw(vehicle: VehicleParams, file: Path) -> None:
-    from ibvs_qp.config.errors import out_of_range
     from sim.figures.vehicle import vehicle_figure
 
-    if file.suffix not in (".png", ".pdf", ".svg"):
-        raise out_of_range("--picture", str(file), "", "allowed are names that end in .png, .pdf or .svg")
     vehicle_figure(vehicle).savefig(file)
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
-from scipy.spatial.transform import Rotation
 
-from allocation.rotor import perpendicular
+from allocation.rotor import disc_rim
 from ibvs_qp.config.vehicle import VehicleParams
+from ibvs_qp.frames import rotation_from_vector
 from sim.figures.style import new_figure, styled
 
 #: Views: title, body axes to the right and upwards with their signs, labels.
@@ -19,6 +19,8 @@ _VIEWS = (
 _SPIN_COLOURS = {1: "#0b6f9e", -1: "#d55e1a"}
 #: Length of a thrust axis, and of the camera's line of sight [m].
 _AXIS_M, _SIGHT_M = 0.15, 0.2
+#: Corners of a propeller disc [-].
+_RIM_POINTS = 60
 
 
 def vehicle_figure(vehicle: VehicleParams) -> Figure:
@@ -35,7 +37,9 @@ def vehicle_figure(vehicle: VehicleParams) -> Figure:
             rotors = enumerate(zip(geometry.rotors, geometry.positions, geometry.axes, strict=True))
             for number, (rotor, hub, axis) in rotors:
                 colour = _SPIN_COLOURS[rotor.spin]
-                axes.add_patch(Polygon(seen(_disc(hub, axis, vehicle.propeller_radius_m)), color=colour, alpha=0.25))
+                axes.add_patch(
+                    Polygon(seen(hub + disc_rim(axis, vehicle.propeller_radius_m, 60)), color=colour, alpha=0.25)
+                )
                 axes.plot(*seen(np.array((hub, hub + _AXIS_M * axis))).T, color=colour)
                 axes.plot(*seen(np.array((np.zeros(3), hub))).T, color="#777777", linewidth=0.6)
                 if above:
@@ -43,7 +47,7 @@ def vehicle_figure(vehicle: VehicleParams) -> Figure:
             base, tip, camera = map(
                 np.array, (vehicle.force_torque_position_m, vehicle.tip_position_m, vehicle.camera_position_m)
             )
-            sight = Rotation.from_rotvec(vehicle.camera_turn_deg, degrees=True).apply((_SIGHT_M, 0.0, 0.0))
+            sight = _SIGHT_M * rotation_from_vector(np.radians(vehicle.camera_turn_deg))[:, 0]
             axes.plot(*seen(np.array((base, tip))).T, color="#333333", linewidth=2.0)
             axes.plot(*seen(tip).T, "v", color="#333333", label="tip")
             axes.plot(*seen(base).T, "s", color="#333333", markersize=4, label="force/torque sensor")
@@ -53,10 +57,3 @@ def vehicle_figure(vehicle: VehicleParams) -> Figure:
             axes.set(title=title, xlabel=labels[0], ylabel=labels[1], aspect="equal")
         figure.axes[1].legend(fontsize=6, loc="upper center", bbox_to_anchor=(0.5, -0.9), ncols=2)
     return figure
-
-
-def _disc(hub: np.ndarray, axis: np.ndarray, radius: float) -> np.ndarray:
-    """Rim of a propeller disc, (n, 3)."""
-    side = perpendicular(axis)
-    angle = np.linspace(0.0, 2.0 * np.pi, 60, endpoint=False)[:, None]
-    return hub + radius * (np.cos(angle) * side + np.sin(angle) * np.cross(axis, side))

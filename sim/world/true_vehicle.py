@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -11,6 +10,7 @@ import numpy as np
 
 from ibvs_qp.config.errors import ConfigError, out_of_range
 from ibvs_qp.config.vehicle import VehicleParams
+from ibvs_qp.frames import quaternion_from_vector
 from sim.world.errors import WorldErrors
 from sim.world.plant_scene import Vector
 from sim.world.random_streams import Normals, stream
@@ -93,7 +93,4 @@ def _direction(seed: int, purpose: str) -> np.ndarray:
 
 def turn_quaternion(degrees: Sequence[float]) -> tuple[float, float, float, float]:
     """Quaternion (w, x, y, z) of a rotation vector [deg]."""
-    half = 0.5 * np.radians(degrees)
-    angle = float(np.linalg.norm(half))
-    x, y, z = (half * np.sinc(angle / math.pi)).tolist()
-    return math.cos(angle), x, y, z
+    return quaternion_from_vector(np.radians(degrees))

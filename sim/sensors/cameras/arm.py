@@ -7,15 +7,16 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from allocation.rotor import perpendicular
+from allocation.rotor import disc_rim
 from ibvs_qp.config.vehicle import VehicleParams
-from ibvs_qp.frames import R_BODY_CAMERA
+from ibvs_qp.frames import R_BODY_CAMERA, rotation_from_vector
 from sim.world.scene import Scene
 
 #: Length of the brush along the arm [m] and of the step between the slices it is drawn in.
 BRUSH_LENGTH_M, _SLICE_M = 0.04, 0.002
+#: Corners of a propeller disc [-].
+_RIM_POINTS = 180
 #: Least depth drawn [m].
 _NEAR_M = 0.05
 #: Fraction of the light that a spinning propeller blocks.
@@ -80,7 +81,7 @@ def vehicle_layer(
         cv2.circle(mask, place, size, 255.0, -1, cv2.LINE_8, _SHIFT)
         cv2.circle(inverse_depth, place, size, 1.0 / z, -1, cv2.LINE_8, _SHIFT)
     for hub, axis in zip(vehicle.geometry.positions, vehicle.geometry.axes, strict=True):
-        rim = hub - camera + _circle(axis, vehicle.propeller_radius_m)
+        rim = hub - camera + disc_rim(axis, vehicle.propeller_radius_m, _RIM_POINTS)
         _fill(propellers, rim @ to_camera.T, intrinsics)
     return VehicleLayer(
         picture=picture, mask=mask, inverse_depth=inverse_depth, holes=_ragged_outline(mask, rng), propellers=propellers
@@ -89,7 +90,7 @@ def vehicle_layer(
 
 def _to_camera(vehicle: VehicleParams) -> np.ndarray:
     """Rotation from B to the axes of the camera, (3, 3)."""
-    turn = Rotation.from_rotvec(vehicle.camera_turn_deg, degrees=True).as_matrix()
+    turn = rotation_from_vector(np.radians(vehicle.camera_turn_deg))
     return (turn @ R_BODY_CAMERA).T
 
 
@@ -110,13 +111,6 @@ def shade_propellers(picture: np.ndarray, propellers: np.ndarray) -> None:
     """Darken a picture, uint8 (H, W, C), in place under the propeller mask, as blades too fast to see do."""
     dimmed = cv2.convertScaleAbs(picture, alpha=1.0 - _PROPELLER_SHADE, beta=12.0)
     cv2.copyTo(dimmed, propellers, picture)
-
-
-def _circle(axis: np.ndarray, radius: float) -> np.ndarray:
-    """Points around an axis, (n, 3)."""
-    side = perpendicular(axis)
-    angle = np.linspace(0.0, 2.0 * np.pi, 180, endpoint=False)[:, None]
-    return radius * (np.cos(angle) * side + np.sin(angle) * np.cross(axis, side))
 
 
 def _fill(mask: np.ndarray, outline: np.ndarray, intrinsics: tuple[float, float, float, float]) -> None:
