@@ -27,6 +27,9 @@ VELOCITY_STD, BIAS_STD, ODOMETER_STD = 0.05, 0.1, 1e-6
 #: Standard deviations after refused velocities: of the velocity [m/s], and of the bias that made it wrong [m/s^2]: 3
 #: degrees of attitude.
 RESTART_VELOCITY_STD, RESTART_BIAS_STD = 0.03, 0.5
+#: Lines alone give the velocity where its standard deviation is below this [m/s], a fifth of a usual painting speed: a
+#: corner of a plain board has no points for the flow, but says all.
+KNOWN_STD = 0.02
 #: Without ticks for this long [ns], the velocity has this standard deviation [m/s].
 GAP_NS, GAP_VELOCITY_STD = 100_000_000, 0.5
 #: Least variance of a reported line offset [m^2].
@@ -38,7 +41,7 @@ class WallMotion:
 
     Attributes:
         state: Velocity (2), accelerometer bias (2), odometer (2), offset of every line slot, as plain floats.
-        velocity_age_s: Time since the capture of the last accepted velocity [s].
+        velocity_age_s: Time since the capture of the last accepted velocity, or of lines that give it [s].
         refused_s: How long the camera's velocities have been refused [s]; 0 while they are accepted.
 
     Args:
@@ -136,6 +139,9 @@ class WallMotion:
             measured = wall_line(line, axes, self._tip_from_camera, distance)
             if measured is not None:
                 self._tracks.correct(line, measured, frame.stamp_ns, self._stamp)
+        seen = self._tracks.seen_ns == frame.stamp_ns
+        if seen and max(self._filter.covariance[0, 0], self._filter.covariance[1, 1]) < KNOWN_STD**2:
+            self._velocity_stamp = frame.stamp_ns
         self.state = self._filter.state.tolist()
 
     def _correct_velocity(self, frame: FeatureFrame, axes: WallAxes) -> None:

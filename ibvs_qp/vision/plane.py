@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ibvs_qp.vision.colors import BOARD, PAINT
+from ibvs_qp.vision.colors import BOARD, OTHER, PAINT
 from ibvs_qp.vision.config import PlaneConfig
 from ibvs_qp.vision.grid import CoarseGrid
 from ibvs_qp.vision.hypotheses import judged_planes
@@ -61,7 +61,8 @@ class PlaneFitter:
         Args:
             grid: Where the samples lie.
             inverse: 1/Z of the samples [1/m], 0 where absent, (rows, columns).
-            seeds: Cells on which the surface may lie; the nearest valid one is taken: a brush meets it first.
+            seeds: Cells on which the surface may lie; the nearest valid one is taken: a brush meets it first. At the
+                same depth the first one counts: a row begins at its right end, so its left is surely on the surface.
             down: Gravity's direction in C, unit, (3,), or None if unknown.
             prefer: Colour labels of the samples for each seed, uint8 (rows, columns) each, or None.
 
@@ -70,6 +71,8 @@ class PlaneFitter:
         """
         values = seed_values(grid, inverse, seeds, self._config.seed_radius)
         order = sorted((index for index, value in enumerate(values) if value > 0), key=lambda index: -values[index])
+        if prefer is not None and len(order) > 1:
+            order = self._first_of_flush(order, values, seeds, prefer)
         reason = "no valid depth around the seed"
         for index in order:
             for wanted in (None,) if prefer is None else (prefer[index], None):
@@ -82,6 +85,22 @@ class PlaneFitter:
                     return result
                 reason = result
         return reason
+
+    def _first_of_flush(
+        self, order: list[int], values: list[float], seeds: list[tuple[int, int]], prefer: LabelsOfSeeds
+    ) -> list[int]:
+        """The order of seeds, with the first listed one in front where the nearest one differs from it by colour only.
+
+        A board that is flush with its wall cannot be told from it by depth.
+        """
+        flush = [index for index in order if values[index] > (1.0 - self._config.coarse_gate) * values[order[0]]]
+        first = min(flush)
+        if first == order[0]:
+            return order
+        labels = prefer[first]
+        if labels[seeds[first]] == OTHER or labels[seeds[order[0]]] != OTHER:
+            return order
+        return [first, *(index for index in order if index != first)]
 
     def track(
         self,

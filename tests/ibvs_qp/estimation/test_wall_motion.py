@@ -78,7 +78,7 @@ class Stroke:
         self.axes = axes_of(self.wall)
         self.late, self.noise = round(latency_s / TICK), noise
         self.rng, self.tick = np.random.default_rng(0), 0
-        self.tip, self.false_speed = [np.zeros(2)], 0.0
+        self.tip, self.false_speed, self.flows = [np.zeros(2)], 0.0, True
 
     def speed_at(self, tick: int) -> np.ndarray:
         """From rest to speed between two and three seconds."""
@@ -113,7 +113,7 @@ class Stroke:
             lines=tuple(found),
             plane=self.wall.plane,
             stamp_ns=then * TICK_NS,
-            velocity=velocity,
+            velocity=velocity if self.flows else None,
             velocity_covariance=np.eye(3) * 9e-6,
         )
 
@@ -144,6 +144,18 @@ def test_velocity_and_odometer_are_those_of_the_tip() -> None:
     np.testing.assert_allclose(stroke.motion.state[VELOCITY], [-0.1, 0.02], atol=3e-3)
     np.testing.assert_allclose(stroke.motion.state[ODOMETER], stroke.tip[stroke.tick], atol=5e-3)
     assert stroke.motion.velocity_age_s < 0.1
+
+
+def test_lines_in_both_directions_give_the_velocity_of_a_plain_board() -> None:
+    stroke = Stroke((-0.1, 0.02), 0.060)
+    stroke.flows = False
+    stroke.fly(6.0, (HORIZONTAL, VERTICAL))
+    np.testing.assert_allclose(stroke.motion.state[VELOCITY], [-0.1, 0.02], atol=5e-3)
+    assert stroke.motion.velocity_age_s < 0.1
+    stroke.fly(3.0, (HORIZONTAL,))  # along a level line nothing is seen
+    assert stroke.motion.velocity_age_s > 0.5
+    stroke.fly(1.0, ())
+    assert stroke.motion.velocity_age_s > 1.5
 
 
 def test_a_velocity_that_disagrees_is_refused_and_restarts_the_filter_once_it_lasts() -> None:

@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
+from ibvs_qp.vision.colors import BOARD, OTHER
 from ibvs_qp.vision.config import PlaneConfig
 from ibvs_qp.vision.grid import CoarseGrid
 from ibvs_qp.vision.plane import PlaneEstimate, PlaneFitter
@@ -134,3 +135,31 @@ def test_reset_repeats_the_same_bits() -> None:
     second = fitter.search(places, inverse, [SEED], DOWN, None)
     assert isinstance(first, PlaneEstimate) and isinstance(second, PlaneEstimate)
     assert np.array_equal(first.inverse_depth, second.inverse_depth)
+
+
+def test_a_board_flush_with_its_wall_is_the_surface_left_of_the_brush() -> None:
+    """Depth tells nothing there, so the noise would choose; the colour around the left seed decides."""
+    places, depth = grid(), 1.0 / inverse_plane(0.5)[2]
+    left, right = SEED, (17, 52)
+    board_is_left = np.zeros(places.shape, np.uint8)
+    board_is_left[:, :44] = BOARD
+    likeness = [board_is_left, np.where(board_is_left == BOARD, OTHER, BOARD).astype(np.uint8)]
+    for seed in range(10):
+        noise = 1.0 + 0.005 * np.random.default_rng(seed).standard_normal(SHAPE)
+        inverse = places.inverse_depth((depth * noise).astype(np.float32), 0.12, 6.0)
+        found = PlaneFitter(PlaneConfig()).search(places, inverse, [left, right], DOWN, likeness)
+        assert isinstance(found, PlaneEstimate), found
+        assert found.component[:, :40].mean() > 0.9 and not found.component[:, 48:].any()
+
+
+def test_a_wall_behind_the_board_is_not_the_surface_because_it_is_left_of_the_brush() -> None:
+    places = grid()
+    columns = np.arange(SHAPE[1])[None, :].repeat(SHAPE[0], axis=0)
+    depth = np.where(columns < 340, 0.55, 0.5).astype(np.float32)
+    labels = np.zeros(places.shape, np.uint8)
+    labels[:, :43] = BOARD
+    likeness = [labels, np.where(labels == BOARD, OTHER, BOARD).astype(np.uint8)]
+    inverse = places.inverse_depth(depth, 0.12, 6.0)
+    found = PlaneFitter(PlaneConfig()).search(places, inverse, [SEED, (17, 52)], DOWN, likeness)
+    assert isinstance(found, PlaneEstimate), found
+    assert found.distance_m == pytest.approx(0.5, abs=0.004)
