@@ -14,7 +14,7 @@ class Task(ABC):
 
     A task writes its rows once, when the program is built. Its file holds error, rate, gain, target, weight and row.
     An absent task has weight zero: rows never come or go. A target that changes between steps is a
-    `ibvs_qp.model.rows.Parameter` of the task (examples/my_task.py).
+    `ibvs_qp.model.rows.Parameter` of the task (examples/own_task.py).
 
     Attributes:
         weight_settings: Fields of `ibvs_qp.config.ControllerConfig` with the weights of its rows: one for all rows,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import re
 import runpy
 import subprocess
@@ -10,17 +11,22 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
+from ibvs_qp import ControllerConfig, Reference
 from ibvs_qp.controller import HybridController
 
 ROOT = Path(__file__).parents[2]
-EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
+
 NUMBER = re.compile(r"-?\d+\.\d+")
 #: Presets hold the settings of perception, which needs OpenCV; the controller alone does not.
-WITHOUT_OPENCV = ("plain_python", "my_task")
+WITHOUT_OPENCV = ("plain_python", "own_limit", "own_task")
+#: Modules of the others.
+SHARED = ("rigid_body", "drawn_camera")
+EXAMPLES = sorted(file.stem for file in (ROOT / "examples").glob("*.py") if file.stem not in SHARED)
 #: Runs a script where the simulator and everything that draws cannot be imported.
 ALONE = """
-import importlib.abc, runpy, sys
+import importlib.abc, os, runpy, sys
 
 class Missing(importlib.abc.MetaPathFinder):
     def find_spec(self, name, path=None, target=None):
@@ -28,7 +34,9 @@ class Missing(importlib.abc.MetaPathFinder):
             raise ImportError(f"{name} is not installed here")
 
 sys.meta_path.insert(0, Missing())
-runpy.run_path(sys.argv[1], run_name="__main__")
+sys.path.insert(0, os.path.dirname(sys.argv[1]))
+sys.argv = sys.argv[1:2]
+runpy.run_path(sys.argv[0], run_name="__main__")
 """
 
 
@@ -39,20 +47,22 @@ def run(script: Path) -> str:
     return done.stdout
 
 
-@pytest.fixture(scope="module")
-def printed() -> dict[str, str]:
-    assert {*WITHOUT_OPENCV, "own_vehicle"} <= {script.stem for script in EXAMPLES}
-    return {script.stem: run(script) for script in EXAMPLES}
+@functools.cache
+def printed(name: str) -> str:
+    return run(ROOT / "examples" / f"{name}.py")
 
 
-def test_every_example_runs_and_prints(printed: dict[str, str]) -> None:
-    assert all(text.strip() for text in printed.values())
+def test_every_example_has_a_test() -> None:
+    text = Path(__file__).read_text(encoding="utf-8")
+    missing = [name for name in EXAMPLES if f'printed("{name}")' not in text]
+    assert not missing
+    assert all(len((ROOT / "examples" / f"{name}.py").read_text().splitlines()) <= 70 for name in EXAMPLES)
 
 
-def test_plain_python_presses_and_slides(printed: dict[str, str]) -> None:
+def test_plain_python_presses_and_slides() -> None:
     rows = re.findall(
         r"([\d.]+) s +(\w+) +push +(-?[\d.]+) N +height error +([-+][\d.]+) mm +slid +([-+][\d.]+) m +(\w+)",
-        printed["plain_python"],
+        printed("plain_python"),
     )
     assert len(rows) == 12
     pressed = [row for row in rows if float(row[0]) >= 5.0]  # the last centimetre is flown at 12 mm/s
@@ -62,49 +72,103 @@ def test_plain_python_presses_and_slides(printed: dict[str, str]) -> None:
     assert float(rows[-1][4]) == pytest.approx(-0.35, abs=0.03)
 
 
-def test_plain_python_stays_short() -> None:
-    """The point of the example is that a vehicle of one's own takes a page."""
-    text = (ROOT / "examples" / "plain_python.py").read_text(encoding="utf-8")
-    assert len(text[text.index("class Vehicle") : text.index("def main")].splitlines()) <= 75
+def glue(name: str) -> int:
+    """Lines of an example after its imports, without texts."""
+    text = (ROOT / "examples" / f"{name}.py").read_text(encoding="utf-8")
+    lines = re.sub(r'""".*?"""', "", text, flags=re.DOTALL).splitlines()
+    first = max(index for index, line in enumerate(lines) if re.match(r"(from|import) ", line))
+    return sum(bool(line.strip()) for line in lines[first + 1 :])
 
 
-def test_my_task_moves_what_it_says_and_nothing_else(printed: dict[str, str]) -> None:
-    shipped, quiet, limited = (
-        [float(number) for number in NUMBER.findall(line)] for line in printed["my_task"].splitlines()
+def test_a_simulator_is_wired_up_in_few_lines() -> None:
+    assert glue("plain_python") <= 40
+    assert glue("other_simulator") + glue("rigid_body") <= 150
+
+
+def test_other_simulator_paints_two_rows_at_the_push_asked_for() -> None:
+    text = printed("other_simulator")
+    assert "failed: False all rows painted" in text and "fresh edge found" in text
+    middle, highest = map(float, re.findall(r"push ([\d.]+) N, at most ([\d.]+) N", text)[0])
+    assert middle == pytest.approx(5.0, abs=0.1) and highest < 6.0
+
+
+@pytest.mark.slow  # a flight with pictures
+def test_pilot_flies_a_job_by_drawn_pictures_of_a_plain_board_flush_with_its_wall() -> None:
+    text = printed("pilot")
+    assert "done, failed: False" in text and "fresh edge found" in text and "refused" not in text
+    begin, end = (float(re.findall(rf" ([\d.]+) s  {event}  row 1", text)[0]) for event in ("paint", "climb"))
+    assert end - begin < 7.0  # 0.4 m at 0.1 m/s: the lines give the velocity where the flow has no points
+
+
+def test_own_perception_finds_the_edge_below_the_brush() -> None:
+    found = re.findall(r"(\w+) +edge ([\d.]+) mm", printed("own_perception"))
+    assert len(found) == 5 and found[-1][0] in ("approach", "align")
+    assert [float(offset) for _, offset in found] == pytest.approx([50.0] * 5, abs=2.0)
+
+
+def test_own_detector_reports_an_honest_covariance() -> None:
+    sys.path.insert(0, str(ROOT / "examples"))
+    try:
+        example = runpy.run_path(str(ROOT / "examples" / "own_perception.py"))
+    finally:
+        sys.path.pop(0)
+    vehicle = example["Vehicle"](ControllerConfig().vehicle)
+    camera = example["DrawnCamera"](example["BOARD_M"])
+    left, right = np.array((0.85, -0.45, 0.05)), np.array((0.85, 0.05, 0.05))
+    for roll in (0.0, 3.0, 8.0):
+        vehicle.turn = Rotation.from_euler("x", roll, degrees=True)
+        picture = camera.picture(vehicle, 1)
+        line = example["line_of"](example["edge_pixels"](picture), picture, side=-1, track_id=1)
+        truth = vehicle.edge(left, right, 1, track=1)
+        error = np.array((line.rho - truth.rho, line.theta - truth.theta))
+        assert error @ np.linalg.solve(line.covariance, error) < 5.0**2
+
+
+def test_rgbd_files_are_read_and_seen() -> None:
+    text = printed("rgbd_files")
+    assert [float(far) for far in re.findall(r"wall at ([\d.]+) m", text)] == pytest.approx([0.65] * 3, abs=0.005)
+    lines = re.findall(r"board (horizontal|vertical) +rho ([-+][\d.]+) .* side -1", text)
+    assert len(lines) == 4  # after the first picture
+    assert dict(lines) == {"horizontal": "-0.0452", "vertical": "+0.0763"}
+
+
+def test_own_task_slows_the_rotors_it_names() -> None:
+    shipped, quiet = ([float(number) for number in NUMBER.findall(line)] for line in printed("own_task").splitlines())
+    assert max(quiet[0], quiet[7]) < 5.0 < 8.0 < min(shipped)
+    assert sum(quiet) == pytest.approx(sum(shipped), rel=0.01)
+
+
+def test_own_limit_bounds_the_climb_and_has_a_price() -> None:
+    shipped, limited = (
+        [float(number) for number in NUMBER.findall(line)] for line in printed("own_limit").splitlines()
     )
-    # Front rotors (two), climb, price.
-    assert max(quiet[:2]) < 5.0 < 9.0 < min(shipped[:2])
-    assert quiet[2] == pytest.approx(shipped[2], abs=0.01)
-    assert 0.5 <= limited[2] <= 0.65 and limited[3] > 10.0 and shipped[3] == quiet[3] == 0.0
-    text = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
-    told = text[text.index("as shipped ") :].splitlines()
-    for line, ours in zip(told, printed["my_task"].splitlines(), strict=False):
-        assert NUMBER.sub("", line).split() == NUMBER.sub("", ours).split()
-        numbers = [[float(number) for number in NUMBER.findall(words)] for words in (line, ours)]
-        assert numbers[0] == pytest.approx(numbers[1], rel=0.01, abs=0.02)
+    assert shipped[0] > 3.0 and shipped[1] == 0.0
+    assert 0.5 <= limited[0] <= 0.65 and limited[1] > 10.0
 
 
 def test_added_rows_are_named_and_absent_by_weight_zero() -> None:
-    example = runpy.run_path(str(ROOT / "examples" / "my_task.py"))
-    quiet, climb = example["QuietRotors"]("r0", "r7"), example["ClimbLimit"](50.0)
+    example = runpy.run_path(str(ROOT / "examples" / "own_task.py"))
+    climb = runpy.run_path(str(ROOT / "examples" / "own_limit.py"))["ClimbLimit"](50.0)
+    quiet = example["QuietRotors"]("r0", "r7")
     controller = HybridController(example["CONFIG"], tasks=[quiet], limits=[climb])
     plain = HybridController(example["CONFIG"])
     names = [row.name for row in controller.problem.task_rows]
     assert names[-2:] == ["quiet_r0", "quiet_r7"] and controller.problem.row_names[-1] == "climb"
     assert controller.problem.variable_names[-1] == "slack_climb"
     quiet.set_target(4.0)
-    command = controller.step(example["HOVER"], example["RISE"])
+    rise = Reference(standoff=0.3, velocity=np.array([0.0, -1.0]))
+    command = controller.step(example["HOVER"], rise)
     assert {"quiet_r0", "quiet_r7"} <= {task.name for task in command.tasks}
     controller.reset()
     quiet.set_target(4.0, weight=0.0)
-    ours, theirs = (one.step(example["HOVER"], example["RISE"]) for one in (controller, plain))
+    ours, theirs = (one.step(example["HOVER"], rise) for one in (controller, plain))
     np.testing.assert_allclose(ours.wrench, theirs.wrench, atol=5e-3)
     # Not the thrusts: what two redundant rotors share is left to the pull to the last thrusts, a thousand times weaker.
     assert "quiet_r0" not in {task.name for task in ours.tasks}
 
 
-def test_the_own_vehicle_hovers(printed: dict[str, str]) -> None:
-    text = printed["own_vehicle"]
+def test_the_own_vehicle_hovers() -> None:
+    text = printed("own_vehicle")
     assert "not actuated: nothing" in text and "solved: thrusts" in text
     low, high, push = map(float, re.findall(r"hover: ([\d.]+) to ([\d.]+) N; greatest push ([\d.]+) N", text)[0])
     assert 8.0 < low <= high < 12.0 and push > 20.0
