@@ -23,6 +23,14 @@ class ContactSettings:
         15.0, "standoff_kd in the last centimetre: 90 N s/m absorb a touch", unit="1/s", low=0.0, high=50.0
     )
     retreat_speed_m_s: float = setting(0.15, "speed away from the wall", unit="m/s", low=0.01, high=0.5)
+    retreat_time_s: float = setting(
+        10.0,
+        "longest flight to a stand-off: farther ones are flown to faster",
+        unit="s",
+        why="blind, an attitude off by 0.5 deg (0.09 m/s^2) must not bring the vehicle back before it lands",
+        low=2.0,
+        high=60.0,
+    )
     depth_min_m: float = setting(0.53, "camera to wall, lambda = 1 below", unit="m", low=0.1, high=3.0)
     depth_max_m: float = setting(0.63, "camera to wall, lambda = 0 above", unit="m", low=0.1, high=3.0)
     ramp_s: float = setting(

@@ -90,7 +90,9 @@ def _approach(model: Model) -> Approach:
     gains, contact = model.config.gains, model.contact
     error = contact.distance - ca.if_else(model.target.press, TOUCH_TARGET, model.target.standoff)
     allowed = approach_speed(model)
-    speed = ca.fmin(ca.fmax(gains.standoff_kp * error, -model.config.contact.retreat_speed_m_s), allowed)
+    settings = model.config.contact
+    retreat = ca.fmax(settings.retreat_speed_m_s, model.target.standoff / settings.retreat_time_s)
+    speed = ca.fmin(ca.fmax(gains.standoff_kp * error, -retreat), allowed)
     speed_error = speed + predicted_rate(model.config.vehicle, contact)
     search = model.output("search_force", _search(model, speed_error))
     return Approach(allowed=model.output("approach_speed", allowed), speed_error=speed_error, search=search)
