@@ -96,7 +96,7 @@ class TaskReports(Sequence[TaskReport]):
 
 @dataclass(frozen=True, kw_only=True)
 class ActiveLimit:
-    """An active limit: its side ("lower" or "upper"), multiplier |dJ*/d bound| per unit as price, and slack taken."""
+    """An active limit: its side ("lower" or "upper"), multiplier `|dJ*/d bound|` per unit as price, and slack taken."""
 
     name: str
     side: str

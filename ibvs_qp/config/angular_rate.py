@@ -9,7 +9,7 @@ from ibvs_qp.config.settings import setting, validate
 
 @dataclass(frozen=True, kw_only=True)
 class AngularRateSettings:
-    """Estimate of the angular velocity, and the lead against the motors' lag (docs/control.md)."""
+    """Estimate of the angular velocity, and the lead against the motors' lag (docs/how_it_works/model.md)."""
 
     gyro_bandwidth_hz: float = setting(
         12.5,

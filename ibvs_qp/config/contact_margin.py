@@ -108,7 +108,7 @@ def contact_mode_damping(
         stiffness: Of wall and brush together [N/m].
         damping: Of wall and brush together [N s/m].
         force_delay_s: Mean age of the force sample in use: latency plus half a sample period [s].
-        quiet: Weight of K_sd and K_fp, which vibration reduces (docs/control.md) [-].
+        quiet: Weight of K_sd and K_fp, which vibration reduces (docs/how_it_works/estimation.md) [-].
     """
     loop = contact_loop(config, stiffness, damping, force_delay_s, quiet)
     ratio, frequency = 1.0, 0.0

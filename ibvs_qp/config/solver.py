@@ -9,7 +9,7 @@ from ibvs_qp.config.settings import setting, validate
 
 @dataclass(frozen=True, kw_only=True)
 class SolverSettings:
-    """OSQP and the acceptance test; the values are measured on recorded flights (docs/control.md)."""
+    """OSQP and the acceptance test; the values are measured on recorded flights (docs/how_it_works/qp.md)."""
 
     max_iterations: int = setting(500, "deterministic deadline; an iteration takes about 0.5 us", low=1, high=100000)
     tolerance: float = setting(1e-6, "eps_abs; leaves at most 1e-3 N in the softest direction", low=1e-10, high=1e-1)

@@ -21,8 +21,8 @@ _HEAD = """\
 # Tasks and limits of the program
 
 Written by `python -m sim.report.catalogue` from the classes and their settings; a test compares the page with them.
-[control.md](control.md) explains the rows and how they work together, [extending.md](extending.md) how to add one. Rows
-are those of the shipped vehicle. Settings are named as in a preset's TOML, below `[controller]` in a pilot's preset.
+[model](how_it_works/model.md) explains how they work together, [your own](extending.md) how to add one. Rows are those
+of the shipped vehicle. Settings are named as in a preset's TOML, below `[controller]` in a pilot's preset.
 """
 
 _TASKS = """

@@ -9,7 +9,7 @@ LARGEST_LOG, LARGEST_ARRAYS = 1 << 30, 1 << 32
 LARGEST_JOURNAL = 1 << 30
 #: A summary, or the trials of a search [bytes]: 200 trials have 0.2 MB.
 LARGEST_JSON = 64 << 20
-#: A table of flights [bytes], and its rows times columns: a million flights of 43 columns have 130 MB (docs/scale.md).
+#: A table of flights [bytes], and its rows times columns: a million flights of 43 columns have 130 MB (docs/sweeps.md).
 LARGEST_TABLE, MOST_CELLS = 4 << 30, 500_000_000
 #: A picture as a file [bytes], and its longer side [px]: float depth of 8192 x 8192 px without compression.
 LARGEST_PICTURE, LONGEST_SIDE = 1 << 28, 8192

@@ -55,7 +55,7 @@ def _beyond(score: Score, shipped: Score) -> list[float]:
 
 
 def contact_damping(config: PilotConfig) -> float:
-    """Least damping ratio of the contact over the stiffness range of the preset's brush (docs/loop_margin.md)."""
+    """Least damping ratio of the contact over the stiffness range of the brush (docs/how_it_works/contact.md)."""
     return least_margin(config.controller, config.controller.brush).least_damping_ratio
 
 

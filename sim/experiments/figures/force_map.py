@@ -82,7 +82,8 @@ def map_caption(table: pl.DataFrame, holds: pl.DataFrame) -> str:
         head += ", but not at the shipped gains" if calm else ""
     else:
         head = "Direct force control does not oscillate in more cells than impedance"
-    tail = "; touch ramp, scheduled approach and the lag margin of the loop damp direct control (docs/loop_margin.md)"
+    tail = "; touch ramp, scheduled approach and the lag margin of the loop damp direct control "
+    tail += "(docs/how_it_works/contact.md)"
     return (
         f"{head}. Push deviation above {OSCILLATES_N:g} N or contact lost: {', '.join(parts)}"
         f"{_shipped_deviation(holds)}{tail if calm else ''}"

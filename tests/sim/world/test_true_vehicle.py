@@ -211,7 +211,7 @@ def test_wrong_entries_are_refused_by_name(plant: dict[str, object], named: str)
 
 
 def test_the_plant_of_the_documentation_flies() -> None:
-    page = (ROOT / "docs" / "plant.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "how_it_works" / "simulation.md").read_text(encoding="utf-8")
     table = tomllib.loads(page.split("```toml")[1].split("```")[0])
     plant = Plant(from_dict(Scene, table))
     hover = plant.thrusts_actual / np.array(table["plant"]["thrust_gain"])
