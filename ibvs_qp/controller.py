@@ -82,7 +82,8 @@ class HybridController(CheckedLaw):
     """The drop-in controller: measurement and reference in, rotor thrusts and their explanation out.
 
     Attributes:
-        problem_kind, engine_kind: Assembly and solution of the rows; a subclass may solve the same rows differently.
+        problem_kind: Assembly of the rows.
+        engine_kind: Their solution; a subclass may solve the same rows differently.
 
     Args:
         config: Everything it needs; the default flies the Tarot T960.

@@ -25,7 +25,9 @@ class Timing:
         ticks: Ticks so far.
         overruns: Ticks that ended after the next one was due; those due meanwhile are left out, not made up for.
         left_out: Ticks left out.
-        p50_us, p99_us, max_us: Duration of a tick [us], over the last 25,000.
+        p50_us: Median duration of a tick [us], over the last 25,000.
+        p99_us: Its 99th percentile [us].
+        max_us: Its largest value [us].
     """
 
     ticks: int

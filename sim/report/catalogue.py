@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -154,7 +155,8 @@ def _name(part: Task | Limit) -> str:
 
 
 def _summary(part: Task | Limit) -> str:
-    return (inspect.getdoc(type(part)) or "").split("\n")[0]
+    summary = (inspect.getdoc(type(part)) or "").split("\n")[0]
+    return re.sub(r":math:`([^`]+)`", r"$\1$", summary)
 
 
 def _superscript(unit: str) -> str:
