@@ -5,10 +5,10 @@ from __future__ import annotations
 import dataclasses
 
 import cv2
-import matplotlib
 import numpy as np
 from diagrams import BLUE, GREEN, INK, ORANGE
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 from panels import panels
 
 import ibvs_qp
@@ -73,43 +73,28 @@ def model() -> Figure:
 
 
 def painting() -> Figure:
-    """Board, path of the brush centre with its band, and the guides."""
-    plan = nominal_plan(SCENE)
-    width, height, brush = SCENE.board.width_m, SCENE.board.height_m, SCENE.paint.brush_width_m
-    figure, (axes,) = panels(2.9)
-    axes.add_patch(matplotlib.patches.Rectangle((0, 0), width, height, facecolor="#eeeee8", edgecolor=INK))
+    """Lower part of the board, path of the brush centre with its band, and the guides."""
+    plan, width, brush = nominal_plan(SCENE), SCENE.board.width_m, SCENE.paint.brush_width_m
+    figure, (axes,) = panels(2.6)
+    axes.add_patch(Rectangle((0, 0), width, SCENE.board.height_m, facecolor="#eeeee8", edgecolor=INK))
+    guides = ["guide of row 1: the board's bottom edge", "guide of row 2: the upper edge of row 1 as painted"]
     for segment in plan.segments:
-        if segment.kind == "row":
-            low, right = segment.points.min(axis=0), segment.points.max(axis=0)[0]
-            band = matplotlib.patches.Rectangle(
-                low - (0, brush / 2), right - low[0], brush, color="#9db8e6", alpha=0.35
-            )
-            axes.add_patch(band)
-        axes.annotate("", segment.points[-1], segment.points[0],
-                      arrowprops={"arrowstyle": "-|>", "color": BLUE, "linewidth": 1.6})  # fmt: skip
-        middle = segment.points.mean(axis=0)
-        name = f"{segment.kind} {segment.row}" if segment.kind == "row" else "climb"
-        axes.text(
-            middle[0] + (0.06 if name == "climb" else 0), middle[1] + 0.012, name, fontsize=8, ha="center", color=BLUE
-        )
-    first = plan.segments[0].points[0]
-    axes.text(first[0] + 0.01, first[1], "touch", fontsize=8, va="center")
-    axes.axhline(0, color=ORANGE, linewidth=2.5, xmin=0.05, xmax=0.95)
-    axes.text(
-        width / 2, -0.022, "guide of row 1: the board's bottom edge", fontsize=8, color=ORANGE, ha="center", va="top"
-    )
-    axes.axvline(0, color=GREEN, linewidth=2.5, ymin=0.12, ymax=0.97)
-    axes.text(0.012, height - 0.02, "stop edge of row 1, guide of the climb", fontsize=8, color=GREEN, va="top")
-    axes.text(
-        width / 2, 0.30, "guide of row 2: the upper edge of row 1 as painted", fontsize=8, color=ORANGE, ha="center"
-    )
-    axes.set(
-        xlim=(-0.05, width + 0.05),
-        ylim=(-0.1, height + 0.03),
-        aspect="equal",
-        xlabel="along the board [m]",
-        ylabel="up [m]",
-    )
+        low, high = segment.points.min(axis=0), segment.points.max(axis=0)
+        middle = (low + high) / 2
+        axes.annotate("", segment.points[-1], segment.points[0], arrowprops={"arrowstyle": "-|>", "color": BLUE})
+        if segment.kind == "climb":
+            axes.text(middle[0] + 0.015, high[1] - 0.014, "climb", fontsize=8, va="center", color=BLUE)
+            continue
+        axes.add_patch(Rectangle(low - (0, brush / 2), high[0] - low[0], brush, color="#9db8e6", alpha=0.35))
+        axes.text(middle[0], middle[1] + 0.008, f"row {segment.row}", fontsize=8, ha="center", color=BLUE)
+    axes.text(*(plan.segments[0].points[0] + (0, 0.008)), "touch", fontsize=8, ha="right")
+    heights = (0.0, plan.segments[0].points[0][1] + brush / 2)
+    for height, words, place in zip(heights, guides, (-0.03, 0.19), strict=True):
+        axes.plot((0, width), (height, height), color=ORANGE, linewidth=1.5, linestyle="--" if height else "-")
+        axes.text(width / 2, place, words, fontsize=8, color=ORANGE, ha="center", va="center")
+    axes.plot((0, 0), (0, 0.3), color=GREEN, linewidth=3)
+    axes.text(0.015, 0.26, "stop edge of row 1, guide of the climb", fontsize=8, color=GREEN, va="center")
+    axes.set(xlim=(-0.03, width + 0.03), ylim=(-0.06, 0.3), aspect="equal", xlabel="along the board [m]")
     return figure
 
 

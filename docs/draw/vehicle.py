@@ -88,7 +88,7 @@ def simulation() -> Figure:
     axes.axvspan(tip + gap, tip + gap + 0.03, color="#9a7b66")
     marks = {"centre of mass": (0, 0), "force/torque sensor": (VEHICLE.force_torque_position_m[0], 0),
              "camera": camera, "brush tip": (tip, 0)}  # fmt: skip
-    for number, (name, place) in enumerate(marks.items()):
+    for name, place in marks.items():
         axes.plot(*place, "o", color=INK, markersize=5)
         below = -0.06 if name == "camera" else 0.03
         axes.text(place[0] - (0.02 if name == "brush tip" else 0), place[1] + below, name, fontsize=8,
