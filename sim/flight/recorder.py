@@ -19,7 +19,7 @@ from sim.flight.journal import CHUNK_TICKS, Heading, Journal
 from sim.flight.options import FlightOptions
 from sim.flight.surroundings import World
 from sim.flight.trace import Event, Trace
-from sim.flight.video import pack_picture
+from sim.flight.pictures import pack_picture
 from sim.world.scene import Scene
 
 #: Pictures per second of the video [Hz].

@@ -116,7 +116,7 @@ class RunFolder:
     def write_report(self, traces: dict[str, Trace], summary_table: dict[str, Any], video: bool) -> None:
         """Draw the figures, the video and the report."""
         from sim.figures import draw_all
-        from sim.flight.video import write_video
+        from sim.video.film import write_video
         from sim.report.report import write_report
 
         flown = {law: trace for law, trace in traces.items() if len(trace.t)}

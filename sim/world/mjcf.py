@@ -16,10 +16,10 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from allocation.rotor import perpendicular
 from ibvs_qp.frames import GRAVITY
 from sim.world.contact import OPTION_XML, pair_xml, set_contact
-from sim.world.mujoco_frames import FLIP, FLIP_QUATERNION, quaternion_of_axes
+from sim.world.drawn_shape import tool_xml, vehicle_xml
+from sim.world.mujoco_frames import FLIP, FLIP_QUATERNION, rotor_quaternion
 from sim.world.rigid_body import RigidBody, bare_body, principal_axes, tool_body
 from sim.world.scene import Scene
 from sim.world.true_vehicle import TrueVehicle, turn_quaternion
@@ -60,26 +60,19 @@ def _inertial_xml(body: RigidBody) -> str:
     )
 
 
-def _rotors_xml(vehicle: TrueVehicle) -> tuple[str, str, str]:
-    """Rotor sites (z = thrust axis), their actuators (force along z, drag torque against the spin), and their discs."""
+def _rotors_xml(vehicle: TrueVehicle) -> tuple[str, str]:
+    """Rotor sites (z = thrust axis), and their actuators: force along z, drag torque against the spin."""
     geometry = vehicle.geometry
-    sites, actuators, discs = [], [], []
+    sites, actuators = [], []
     torques = -geometry.spins * geometry.torque_ratios
     for name, position, axis, torque in zip(geometry.names, geometry.positions, geometry.axes, torques, strict=True):
-        up, place = FLIP * axis, FLIP * position
-        side = perpendicular(up)
-        quaternion = quaternion_of_axes(np.column_stack((np.cross(side, up), side, up)))
-        frame = f'pos="{numbers(place)}" quat="{numbers(quaternion)}"'
+        frame = f'pos="{numbers(FLIP * position)}" quat="{numbers(rotor_quaternion(axis))}"'
         sites.append(f'<site name="{name}" {frame} size="0.01"/>')
-        size = numbers(vehicle.propeller_radius_m, 0.004)
-        discs.append(
-            f'<geom type="cylinder" size="{size}" {frame} contype="0" conaffinity="0" rgba=".2 .2 .2 .4" mass="0"/>'
-        )
         actuators.append(
             f'<general name="{name}" site="{name}" dyntype="filterexact" dynprm="{numbers(vehicle.motor_lag_up_s)}" '
             f'gainprm="1" gear="0 0 1 0 0 {numbers(torque)}"/>'
         )
-    return "\n".join(sites), "\n".join(actuators), "\n".join(discs)
+    return "\n".join(sites), "\n".join(actuators)
 
 
 def _surroundings_xml(scene: Scene) -> str:
@@ -103,15 +96,15 @@ def build_xml(scene: Scene, vehicle: TrueVehicle, drawn: bool = True) -> str:
 
     The contact plane is infinite: a box would push the tip out sideways near its rim and bound the penetration.
     """
-    sites, actuators, discs = _rotors_xml(vehicle)
+    sites, actuators = _rotors_xml(vehicle)
     tip, sensor = FLIP * vehicle.tip_position_m, FLIP * vehicle.force_torque_position_m
     sphere = tip - np.array([TIP_RADIUS_M, 0.0, 0.0])
     turn = FLIP_QUATERNION * turn_quaternion(vehicle.force_torque_turn_deg)
-    ends, radius = numbers(sensor, sphere), numbers(vehicle.arm_radius_m)
-    shape = f'name="arm" type="capsule" fromto="{ends}" size="{radius}"'
-    arm = f'<geom {shape} contype="0" conaffinity="0" rgba=".1 .1 .1 1"/>'
     # Geometry without contact costs MuJoCo time at every step.
-    surroundings, discs, arm = (_surroundings_xml(scene), discs, arm) if drawn else ("", "", "")
+    surroundings = body = tool = ""
+    if drawn:
+        surroundings, body = _surroundings_xml(scene), vehicle_xml(vehicle)
+        tool = tool_xml(vehicle, scene.paint.brush_width_m, scene.paint.color)
     return f"""<mujoco model="ibvs_qp">
   <compiler angle="radian" balanceinertia="true" autolimits="true"/>
   {OPTION_XML.format(gravity=numbers(GRAVITY))}
@@ -124,11 +117,11 @@ def build_xml(scene: Scene, vehicle: TrueVehicle, drawn: bool = True) -> str:
       {_inertial_xml(bare_body(vehicle))}
       <site name="imu"/>
       {sites}
-      {discs}
+      {body}
       <body name="tool">
         {_inertial_xml(tool_body(vehicle))}
         <site name="force_torque" pos="{numbers(sensor)}" quat="{numbers(turn)}"/>
-        {arm}
+        {tool}
         <geom name="tip" type="sphere" pos="{numbers(sphere)}" size="{numbers(TIP_RADIUS_M)}" contype="0"
           conaffinity="0"/>
       </body>

@@ -11,6 +11,8 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
+from allocation.rotor import perpendicular
+
 #: Diagonal of S; multiply a vector (..., 3) by it to change sides.
 FLIP = np.array([1.0, -1.0, -1.0])
 
@@ -23,3 +25,10 @@ def quaternion_of_axes(columns: np.ndarray) -> np.ndarray:
     quaternion = np.zeros(4)
     mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(columns).ravel())
     return quaternion
+
+
+def rotor_quaternion(axis: np.ndarray) -> np.ndarray:
+    """Quaternion (w, x, y, z) in MuJoCo's body frame of a rotor whose z is the thrust axis, given in FRD, (3,)."""
+    up = FLIP * axis
+    side = perpendicular(up)
+    return quaternion_of_axes(np.column_stack((np.cross(side, up), side, up)))

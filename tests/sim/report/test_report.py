@@ -11,7 +11,8 @@ from synthetic_trace import Errors, synthetic_trace
 
 from sim.evaluate.metrics import compute_metrics
 from sim.figures import FIGURES, draw_all
-from sim.flight.video import pack_pictures, unpack_picture, write_video
+from sim.flight.pictures import pack_pictures, unpack_picture
+from sim.video.film import write_video
 from sim.report.report import write_report
 from sim.report.rundir import RunFolder, summary
 from sim.world.scene import PaintScene, Scene

@@ -1,0 +1,150 @@
+"""The flight from outside: the vehicle at the wall, as a camera beside it sees it."""
+
+# MuJoCo's bindings carry no types.
+# pyright: reportAttributeAccessIssue=false
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import mujoco
+import numpy as np
+
+from ibvs_qp.config.settings import from_dict
+from ibvs_qp.config.toml_text import parse_toml
+from ibvs_qp.frames import rotation_from_quaternion
+from ibvs_qp.pilot import PilotConfig
+from sim.flight.surroundings import PAINTING_FORCE
+from sim.flight.trace import Trace
+from sim.video.backdrop import Backdrop
+from sim.video.outside_camera import OutsideCamera
+from sim.video.rasterizer import Rasterizer
+from sim.video.shadow import cast, darken, shadow
+from sim.video.triangles import Triangles, geom_triangles
+from sim.world.board import BoardGeometry
+from sim.world.canvas import Canvas
+from sim.world.mjcf import build_model
+from sim.world.mujoco_frames import FLIP
+from sim.world.true_vehicle import TrueVehicle, true_vehicle
+
+#: Resolution of the board's picture [px/m], and distance between its strokes [m]: finer than a pixel of the video.
+_BOARD_PX_M, _STROKE_M = 500.0, 0.002
+#: Places along the way that must be in the picture [-].
+_PLACES = 40
+#: Opacity below which a geom is drawn through: a disc that stands for a turning propeller.
+_SOLID = 0.99
+
+
+@dataclass(frozen=True)
+class VehicleShape:
+    """Surfaces of the vehicle in MuJoCo's body frame (front-left-up, origin at the assumed centre of mass)."""
+
+    solid: Triangles
+    discs: Triangles  # what is drawn through
+    opacity: float  # of the discs 0..1
+    points: np.ndarray  # corners of all parts, discs first [m], (V, 3)
+    starts: np.ndarray  # first corner of every part, (P,)
+    opacities: list[float]  # of every part, P
+
+    @classmethod
+    def of(cls, trace: Trace, vehicle: TrueVehicle) -> VehicleShape:
+        """Surfaces of the geoms that MuJoCo's own window shows."""
+        model, ids = build_model(trace.scene, vehicle)
+        data = mujoco.MjData(model)
+        data.qpos[:7] = (0, 0, 0, 1, 0, 0, 0)
+        mujoco.mj_kinematics(model, data)
+        geoms = np.flatnonzero(model.geom_bodyid >= ids.vehicle)
+        shows = model.geom_rgba[geoms, 3]
+        solid, discs = (
+            [each for geom in kind if (each := geom_triangles(model, data, geom)) is not None]
+            for kind in (geoms[shows > _SOLID], geoms[shows <= _SOLID])
+        )
+        opacity, parts = float(shows.min()), [*discs, *solid]
+        return cls(
+            solid=Triangles.joined(solid),
+            discs=Triangles.joined(discs),
+            opacity=opacity,
+            points=np.concatenate([part.points for part in parts]),
+            starts=np.cumsum([0, *(len(part.points) for part in parts[:-1])]),
+            opacities=[opacity] * len(discs) + [1.0] * len(solid),
+        )
+
+
+class OutsideView:
+    """Pictures of one flight from outside, in the order of its ticks.
+
+    Args:
+        trace: The flight.
+        camera: The camera; `scene_points` of several flights give one that shows them all.
+    """
+
+    def __init__(self, trace: Trace, camera: OutsideCamera) -> None:
+        self._trace, self._vehicle = trace, flown_vehicle(trace)
+        self._shape = VehicleShape.of(trace, self._vehicle)
+        self._canvas = Canvas(trace.scene, trace.seed, _BOARD_PX_M)
+        self._geometry = BoardGeometry(trace.scene)
+        self._rasterizer = Rasterizer(camera)
+        self._backdrop = Backdrop(self._canvas, self._rasterizer)
+        self._painted_to = 0
+        self._brush: tuple[float, float] | None = None
+
+    def draw(self, tick: int) -> np.ndarray:
+        """Picture at a tick, not before that of the last call: uint8 RGB (height, width, 3)."""
+        self._paint(tick)
+        self._backdrop.refresh()
+        drawer, shape, pose = self._rasterizer, self._shape, vehicle_pose(self._trace, self._vehicle, tick)
+        drawer.clear(self._backdrop.colour)
+        points = shape.points @ pose[:3, :3].T + pose[:3, 3]
+        dark = []
+        for depth_m in (0.0, self._trace.scene.board.gap_m):
+            parts = np.split(cast(points, depth_m), shape.starts[1:])
+            dark.append(shadow(drawer, parts, shape.opacities))
+        darken(drawer.colour, dark[1] + self._backdrop.on_board * (dark[0] - dark[1]))
+        drawer.draw(shape.solid, pose)
+        below = drawer.colour.copy()
+        drawer.draw(shape.discs, pose)
+        drawer.colour = cv2.addWeighted(drawer.colour, shape.opacity, below, 1.0 - shape.opacity, 0.0)
+        return drawer.finished()
+
+    def _paint(self, tick: int) -> None:
+        """Repeat the strokes of the flight up to a tick."""
+        trace = self._trace
+        for now in range(self._painted_to, tick + 1):
+            if trace.push_true[now] <= PAINTING_FORCE:
+                self._brush = None
+                continue
+            point = self._geometry.spot(*trace.tip[now, 1:].tolist())
+            if self._brush is None or np.hypot(point[0] - self._brush[0], point[1] - self._brush[1]) > _STROKE_M:
+                self._canvas.stroke(self._brush, point)
+                self._brush = point
+        self._painted_to = tick + 1
+
+
+def flown_vehicle(trace: Trace) -> TrueVehicle:
+    """The vehicle that flew: that of the preset, with the errors of scene and seed."""
+    config = from_dict(PilotConfig, parse_toml(trace.preset, "preset"))
+    return true_vehicle(trace.scene, config.controller.vehicle, trace.seed)
+
+
+def vehicle_pose(trace: Trace, vehicle: TrueVehicle, tick: int) -> np.ndarray:
+    """Homogeneous transform of MuJoCo's body frame into its world at a tick, (4, 4)."""
+    rotation = rotation_from_quaternion(trace.attitude[tick])
+    pose = np.eye(4)
+    pose[:3, :3] = FLIP[:, None] * rotation * FLIP
+    pose[:3, 3] = FLIP * (trace.tip[tick] - rotation @ np.array(vehicle.tip_position_m))
+    return pose
+
+
+def scene_points(trace: Trace) -> np.ndarray:
+    """What a picture of the whole flight must show: board, and rotors along the way, MuJoCo's world [m], (N, 3)."""
+    vehicle, board = flown_vehicle(trace), trace.scene.board
+    corners = BoardGeometry(trace.scene).point(
+        np.array([0, 1, 1, 0]) * board.width_m, np.array([0, 0, 1, 1]) * board.height_m
+    )
+    points = [FLIP * np.column_stack((np.zeros(4), corners))]
+    rotors = FLIP * vehicle.geometry.positions
+    rotors = rotors * (1.0 + vehicle.propeller_radius_m / np.linalg.norm(rotors, axis=1, keepdims=True))
+    for tick in np.linspace(0, len(trace.t) - 1, _PLACES).astype(int):
+        pose = vehicle_pose(trace, vehicle, tick)
+        points.append(rotors @ pose[:3, :3].T + pose[:3, 3])
+    return np.concatenate(points)

@@ -1,0 +1,84 @@
+"""One law's part of the video: title, the flight from outside, camera picture, push."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from sim.flight.pictures import unpack_picture
+from sim.flight.trace import Trace, law_name
+from sim.video.drawing import PAPER, law_ink, width_of, write
+from sim.video.outside import OutsideView
+from sim.video.outside_camera import OutsideCamera
+from sim.video.push_strip import PushStrip
+
+#: Sizes of the picture from outside and of the title; width of the camera picture beside a strip [px].
+OUTSIDE_SIZE, TITLE_HEIGHT, CAMERA_WIDTH = (640, 400), 36, 400
+#: Height of a strip below a picture [px].
+STRIP_HEIGHT = 150
+
+
+class Panel:
+    """Pictures of one flight, in the order of time.
+
+    Args:
+        trace: The flight.
+        camera: Of the view from outside; None leaves that out.
+        alone: Whether the flight is the only one, so that the parts stand side by side.
+    """
+
+    def __init__(self, trace: Trace, camera: OutsideCamera | None, alone: bool) -> None:
+        self._trace, self._alone = trace, alone
+        self._outside = None if camera is None else OutsideView(trace, camera)
+        self._times = np.array([t for t, _, _ in trace.pictures])
+        self._shown, self._picture = -1, np.zeros((0, 0, 3), np.uint8)
+        self._camera_size, strip = self._layout()
+        self._strip = PushStrip(trace, strip)
+
+    def _layout(self) -> tuple[tuple[int, int] | None, tuple[int, int]]:
+        """Sizes of camera picture and strip [px]; all heights and widths of the panel come out even."""
+        width, height = OUTSIDE_SIZE
+        if not self._trace.pictures:
+            return None, (width, STRIP_HEIGHT)
+        rows, columns = unpack_picture(self._trace.pictures[0][1]).shape[:2]
+        camera_width = width if self._outside is None else CAMERA_WIDTH
+        camera = camera_width, 2 * round(0.5 * camera_width * rows / columns)
+        if self._outside is None:
+            return camera, (width, STRIP_HEIGHT)
+        return camera, (camera_width, height - camera[1]) if self._alone else (width - camera_width, camera[1])
+
+    def draw(self, t: float) -> np.ndarray:
+        """The panel at a time not before that of the last call [s], uint8 RGB."""
+        tick = min(int(np.searchsorted(self._trace.t, t)), len(self._trace.t) - 1)
+        parts = [] if self._outside is None else [self._outside.draw(tick)]
+        strip = self._strip.draw(tick)
+        if self._camera_size is None:
+            parts.append(strip)
+        elif self._outside is None:
+            parts += [self._camera(t, self._camera_size), strip]
+        elif self._alone:
+            parts = [np.hstack((*parts, np.vstack((self._camera(t, self._camera_size), strip))))]
+        else:
+            parts.append(np.hstack((self._camera(t, self._camera_size), strip)))
+        body = np.vstack(parts)
+        return np.vstack((self._title(tick, body.shape[1]), body))
+
+    def _camera(self, t: float, size: tuple[int, int]) -> np.ndarray:
+        """The latest camera picture."""
+        index = max(int(np.searchsorted(self._times, t + 1e-9, side="right")) - 1, 0)
+        if index != self._shown:
+            self._shown = index
+            self._picture = cv2.resize(
+                unpack_picture(self._trace.pictures[index][1]), size, interpolation=cv2.INTER_AREA
+            )
+        return self._picture
+
+    def _title(self, tick: int, width: int) -> np.ndarray:
+        title = np.full((TITLE_HEIGHT, width, 3), PAPER, np.uint8)
+        row = int(self._trace.row[tick])
+        phase = self._trace.phases[int(self._trace.phase[tick])] + (f" (row {row})" if row else "")
+        time = f"{self._trace.t[tick]:.1f} s"
+        write(title, law_name(self._trace.law), (12, 25), 0.65, law_ink(self._trace.law), 2)
+        write(title, phase, (220, 25), 0.6)
+        write(title, time, (width - 12 - width_of(time, 0.6), 25), 0.6)
+        return title
