@@ -19,7 +19,7 @@ ORDER = {
         "vision painting checked_law analytic controller assured pilot presets"
     ).split(),
     "sim": (
-        "storage world scenes sensors rivals faults flight evaluate figures sweep report detection experiments "
+        "storage world scenes sensors rivals faults flight video evaluate figures sweep report detection experiments "
         "fault_matrix tune notebook bench commands"
     ).split(),
 }

@@ -62,12 +62,34 @@ class Paint:
     json: Annotated[bool, flag] = False
     """Print summary.json as one line on standard output, and nothing else."""
     view: Annotated[bool, flag] = False
-    """Show the flight in MuJoCo's viewer in real time, one law after the other; needs a display."""
+    """Show the flight in MuJoCo's window in real time, one law after the other; without a display the video does."""
     no_video: Annotated[bool, flag] = False
-    """Do not write a video."""
+    """Do not write the video: the vehicle from outside, camera pictures, push."""
 
     def run(self, words: list[str]) -> int:
         """Fly, write the run folder, print the figures; an option is rejected before any flight."""
+        return dataclasses.replace(self, **self._shown())._run(words)
+
+    def _shown(self) -> dict[str, bool]:
+        """`view` and `no_video` as far as this computer can; a note says what it cannot."""
+        from sim.flight.viewer import NoDisplay, check_display
+        from sim.video.film import missing_encoder
+
+        view, no_video = self.view, self.no_video
+        if not no_video and (missing := missing_encoder()):
+            print(f"ibvs-qp: {missing}", file=sys.stderr)
+            no_video = True
+        try:
+            if view:
+                check_display()
+        except NoDisplay as reason:
+            if no_video:
+                raise
+            print(f"ibvs-qp: {reason}; video.mp4 in the run folder will show the flight from outside", file=sys.stderr)
+            view = False
+        return {"view": view, "no_video": no_video}
+
+    def _run(self, words: list[str]) -> int:
         from rich.console import Console
 
         from sim.sensors.cameras import resolve_camera
@@ -76,7 +98,6 @@ class Paint:
         from sim.flight.options import FlightOptions, pilot_config
         from sim.flight.progress import flight_progress
         from sim.flight.side_by_side import fly_laws
-        from sim.flight.viewer import check_display
         from sim.report.rundir import RunFolder
         from sim.world.scene import Scene, load_scene
         from sim.world.worlds import DEFAULT_WORLD, in_world, world_name
@@ -87,8 +108,6 @@ class Paint:
         scene = load_scene(chosen) if chosen else in_world(Scene(), self.world or DEFAULT_WORLD)
         if self.world is not None:
             scene = in_world(scene, self.world)
-        if self.view:
-            check_display()
         size = _SIZES[self.image_size] if self.image_size else None
         camera, note = resolve_camera(self.camera)
         if note is not None:

@@ -17,9 +17,9 @@ from sim.flight.assemble import NUMBERS, OUTCOMES, PHASES, Flown, LoggedRows, as
 from sim.flight.columns import Columns
 from sim.flight.journal import CHUNK_TICKS, Heading, Journal
 from sim.flight.options import FlightOptions
+from sim.flight.pictures import pack_picture
 from sim.flight.surroundings import World
 from sim.flight.trace import Event, Trace
-from sim.flight.pictures import pack_picture
 from sim.world.scene import Scene
 
 #: Pictures per second of the video [Hz].

@@ -41,9 +41,8 @@ def check_display() -> None:
     Raises:
         NoDisplay: When there is no display, or it does not answer.
     """
-    instead = "leave --view out; the run folder's video.mp4 shows the flight"
     if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        raise NoDisplay(f"--view needs a display, and neither DISPLAY nor WAYLAND_DISPLAY is set; {instead}")
+        raise NoDisplay("--view needs a display, and neither DISPLAY nor WAYLAND_DISPLAY is set")
     try:
         import glfw
 
@@ -51,10 +50,10 @@ def check_display() -> None:
             warnings.simplefilter("ignore")
             answers = glfw.init()
     except Exception as error:
-        raise NoDisplay(f"--view cannot load the window library ({error}); {instead}") from None
+        raise NoDisplay(f"--view cannot load the window library ({error})") from None
     if not answers:
         name = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY") or "the display"
-        raise NoDisplay(f"--view: display {name} does not answer; {instead}")
+        raise NoDisplay(f"--view: display {name} does not answer")
 
 
 class FlightViewer:

@@ -15,8 +15,8 @@ from sim.experiments.scenes import changed, short_job
 from sim.figures.style import law_colour, new_figure
 from sim.flight.closed_loop import fly
 from sim.flight.options import FlightOptions
-from sim.flight.trace import Trace
 from sim.flight.pictures import unpack_picture
+from sim.flight.trace import Trace
 from sim.notebook.plots import RED
 from sim.notebook.short import unless_short
 from sim.notebook.table import table

@@ -13,6 +13,7 @@ from typing import Any
 
 from sim.evaluate.table import LINES, law_name
 from sim.flight.trace import Trace
+from sim.report.plain_words import FIGURES, OUTCOMES, limit_words
 from sim.storage.atomic import write_text
 
 _PAGE = Path(__file__).with_name("report_page.html")
@@ -57,7 +58,7 @@ def write_report(
         video=_video(video),
         figures="\n".join(_figure(caption, png) for caption, png in figures.values()),
         events="\n".join(_events(law, trace) for law, trace in traces.items()),
-        outcomes=_table((), _outcomes(laws), numbers=(2,)),
+        outcomes=_table(("law", "outcome or limit", "how often", "meaning"), _outcomes(laws), numbers=(2,)),
         command=escape(summary["command"]),
         facts=_table((), _facts(summary)),
     )
@@ -77,8 +78,11 @@ def _table(headings: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequ
 
 
 def _figures_of_merit(laws: dict[str, dict[str, Any]]) -> str:
-    rows = [(line.label, *(line.show(figures) for figures in laws.values()), line.unit) for line in LINES]
-    return _table(("", *map(law_name, laws), ""), rows, range(1, len(laws) + 1))
+    rows = [
+        (line.label, *(line.show(figures) for figures in laws.values()), line.unit, FIGURES.get(line.key, ""))
+        for line in LINES
+    ]
+    return _table(("", *map(law_name, laws), "unit", "meaning"), rows, range(1, len(laws) + 1))
 
 
 def _rows(laws: dict[str, dict[str, Any]]) -> str:
@@ -102,7 +106,9 @@ def _video(video: Path | None) -> str:
     if video is None:
         return ""
     name = escape(video.name)
-    return f'<h2>Video</h2><p><a href="{name}">{name}</a> in the folder of this report: camera view, phase, push.</p>'
+    words = "The vehicle from outside, what its camera sees with the edges found in it, and the push on the board."
+    player = f'<video controls muted loop playsinline preload="metadata" src="{name}"></video>'
+    return f'<figure>{player}<figcaption>{words} File: <a href="{name}">{name}</a></figcaption></figure>'
 
 
 def _events(law: str, trace: Trace) -> str:
@@ -113,13 +119,16 @@ def _events(law: str, trace: Trace) -> str:
     return f"<details open><summary>{title}</summary>{table}</details>"
 
 
-def _outcomes(laws: dict[str, dict[str, Any]]) -> list[tuple[str, str, str]]:
+def _outcomes(laws: dict[str, dict[str, Any]]) -> list[tuple[str, ...]]:
+    """Law, outcome or limit, how often, meaning; the most frequent first."""
     rows = []
     for law, figures in laws.items():
-        ticks = ((f"outcome {name}", f"{count} ticks") for name, count in figures["outcomes"].items() if count)
-        limits = figures["limits"].items()
-        active = ((f"limit {name} active", f"{100 * part:.2f} %") for name, part in limits if part and part > 0)
-        rows += [(law_name(law), *cells) for cells in (*ticks, *active)]
+        total = max(sum(figures["outcomes"].values()), 1)
+        outcomes = {name: (count / total, f"{count} ticks") for name, count in figures["outcomes"].items() if count}
+        limits = {name: (part, f"{100 * part:.2f} % of ticks") for name, part in figures["limits"].items() if part}
+        for kind, found, words in (("", outcomes, OUTCOMES.get), ("limit ", limits, limit_words)):
+            for name, (_, often) in sorted(found.items(), key=lambda each: -each[1][0]):
+                rows.append((law_name(law), kind + name.replace("_", " "), often, words(name) or ""))
     return rows
 
 

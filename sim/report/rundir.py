@@ -30,10 +30,10 @@ _FILES = ("report.html", "summary.json", "video.mp4", "scene.toml", "log.npz", "
 _RECORD = ("log.npz", "summary.json")
 _README = """One run of ibvs-qp.
 
-report.html   all results on one page; open it in a browser, no other file is needed
+report.html   all results on one page; open it in a browser (it plays video.mp4 beside it, and needs nothing else)
 summary.json  all figures (docs/metrics.md of the project defines them)
 figures/      the report's figures as PNG
-video.mp4     camera view, phase and force
+video.mp4     the vehicle from outside, camera view, phase and push (H.264)
 scene.toml    the scene; repeat the flight with: ibvs-qp paint --scene scene.toml --seed {seed}
 preset_*.toml configuration of the pilot under each law
 log.npz       every array, named <law>/<array>; load it with
@@ -116,13 +116,13 @@ class RunFolder:
     def write_report(self, traces: dict[str, Trace], summary_table: dict[str, Any], video: bool) -> None:
         """Draw the figures, the video and the report."""
         from sim.figures import draw_all
-        from sim.video.film import write_video
         from sim.report.report import write_report
+        from sim.video.film import write_video
 
         flown = {law: trace for law, trace in traces.items() if len(trace.t)}
         figures = draw_all(flown, self.path / "figures") if flown else {}
         film = None
-        if video and any(trace.pictures for trace in flown.values()):
+        if video and flown:
             with replaced(film := self.path / "video.mp4") as partial:
                 write_video(flown, partial)
         write_report(self.report, flown, summary_table, figures, film)

@@ -42,9 +42,7 @@ class Backdrop:
         self._light = np.float32(light_on(_OUTWARD[None])[0] / 255.0)
         self.colour = wall[..., :3] * self._light
         self.colour[_shows_floor(rasterizer, gap)] = np.array(_FLOOR, np.float32) * light_on(_UPWARD[None])
-        rims = canvas.geometry.point(
-            np.array([0, 1, 1, 0]) * board.width_m, np.array([1, 1, 0, 0]) * board.height_m
-        )
+        rims = canvas.geometry.point(np.array([0, 1, 1, 0]) * board.width_m, np.array([1, 1, 0, 0]) * board.height_m)
         outline = FLIP * np.column_stack((np.zeros(4), rims))
         darken(self.colour, shadow(rasterizer, [cast(outline, gap)], [1.0]))
         self._to_picture = _homography(rasterizer, canvas.texture, pad, rims, 0.0)
@@ -96,9 +94,7 @@ def _shows_floor(rasterizer: Rasterizer, wall_m: float) -> np.ndarray:
     across = (np.arange(width) + 0.5 - 0.5 * width) / focal
     upward = (0.5 * height - np.arange(height) - 0.5) / focal
     right, up, backward = camera.axes
-    ahead, rising = (
-        across * right[axis] + upward[:, None] * up[axis] - backward[axis] for axis in (0, 2)
-    )
+    ahead, rising = (across * right[axis] + upward[:, None] * up[axis] - backward[axis] for axis in (0, 2))
     with np.errstate(divide="ignore"):
         met = camera.eye[0] - camera.eye[2] / rising * ahead
     return (rising < 0.0) & (met < wall_m)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 from collections.abc import Iterable, Iterator
 from fractions import Fraction
 from pathlib import Path
@@ -20,6 +21,13 @@ FRAME_RATE_HZ = 10
 _QUALITY = 25
 #: Pictures between two that a player can jump to.
 _KEY_EVERY = 5 * FRAME_RATE_HZ
+
+
+def missing_encoder() -> str | None:
+    """What to say where no video can be written; None where one can."""
+    if importlib.util.find_spec("av") is None:
+        return "no video: it needs the package av, and nothing else does; pip install av"
+    return None
 
 
 def film_frames(traces: dict[str, Trace], rate_hz: float = FRAME_RATE_HZ) -> Iterator[np.ndarray]:

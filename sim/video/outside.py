@@ -106,6 +106,11 @@ class OutsideView:
         drawer.colour = cv2.addWeighted(drawer.colour, shape.opacity, below, 1.0 - shape.opacity, 0.0)
         return drawer.finished()
 
+    def background(self) -> np.ndarray:
+        """The picture of the last call without the vehicle and its shadow, uint8 RGB (height, width, 3)."""
+        self._rasterizer.clear(self._backdrop.colour)
+        return self._rasterizer.finished()
+
     def _paint(self, tick: int) -> None:
         """Repeat the strokes of the flight up to a tick."""
         trace = self._trace

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -62,7 +63,7 @@ class OutsideCamera:
         """Focal length [px]."""
         return 0.5 * self.size[1] / math.tan(math.radians(0.5 * FIELD_DEG))
 
-    @property
+    @cached_property
     def axes(self) -> np.ndarray:
         """Rows right, up and backward in the world, (3, 3): OpenGL's camera."""
         backward = (self.eye - self.target) / np.linalg.norm(self.eye - self.target)

@@ -42,7 +42,7 @@ class Rasterizer:
         self.colour = np.zeros((height, width, 3), np.float32)  # red, green, blue 0..1
         self.depth = np.ones((height, width), np.float32)  # OpenGL's, 1 is the far plane
         self._settings = cv2.TriangleRasterizeSettings()  # type: ignore[attr-defined]
-        self._settings.setCullingMode(cv2.RASTERIZE_CULLING_NONE)  # type: ignore[attr-defined]
+        self._settings.setCullingMode(cv2.RASTERIZE_CULLING_CW)  # type: ignore[attr-defined]
         self._settings.setShadingType(cv2.RASTERIZE_SHADING_SHADED)  # type: ignore[attr-defined]
         # the default mode leaves the depth buffer as it is, so nearer surfaces would not cover farther ones
         self._settings.setGlCompatibleMode(cv2.RASTERIZE_COMPAT_INVDEPTH)  # type: ignore[attr-defined]

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 #: Corners of a round geom's outline, and of a quarter circle of its caps.
-_ROUND, _QUARTER = 28, 4
+_ROUND, _QUARTER = 20, 2
 
 
 @dataclass(frozen=True)
@@ -49,10 +49,8 @@ def geom_triangles(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Tri
         points, normals, indices = _box(size)
     elif kind == kinds.mjGEOM_CYLINDER:
         radius, half = size[:2]
-        points, normals, indices = _revolved(
-            [(0, -half, 0, -1), (radius, -half, 0, -1), (radius, -half, 1, 0)]
-            + [(radius, half, 1, 0), (radius, half, 0, 1), (0, half, 0, 1)]
-        )
+        bottom = [(0, -half, 0, -1), (radius, -half, 0, -1), (radius, -half, 1, 0)]
+        points, normals, indices = _revolved([*bottom, (radius, half, 1, 0), (radius, half, 0, 1), (0, half, 0, 1)])
     elif kind in (kinds.mjGEOM_CAPSULE, kinds.mjGEOM_SPHERE):
         radius, half = size[0], (size[1] if kind == kinds.mjGEOM_CAPSULE else 0.0)
         angles = np.linspace(0.0, 0.5 * np.pi, _QUARTER + 1)

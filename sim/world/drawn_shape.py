@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from sim.world.mujoco_frames import FLIP, FLIP_QUATERNION, rotor_quaternion
+from sim.world.scene import Scene
 from sim.world.true_vehicle import TrueVehicle, turn_quaternion
 
 #: Radius of the hub's plates in distances of a rotor from the centre [-], and half their height [m].
@@ -19,8 +20,9 @@ _BATTERY_M, _CAMERA_M = (0.08, 0.035, 0.025), (0.0125, 0.045, 0.0125)
 _ARM_RADIUS_M, _MOTOR_M = 0.011, (0.026, 0.02)
 #: Half thickness of a propeller disc [m]; radius and half height of the force/torque sensor [m].
 _DISC_HALF_M, _SENSOR_M = 0.004, (0.035, 0.012)
-#: Length of the brush, and how far the tip stands out of it [m].
-_BRUSH_LENGTH_M, _BRUSH_GAP_M = 0.045, 0.002
+#: Length of the brush along the arm, and how far the tip stands out of it [m].
+BRUSH_LENGTH_M, _BRUSH_GAP_M = 0.04, 0.002
+_BRUSH_COLORS = ((240, 190, 40), (70, 180, 90), (205, 70, 170), (60, 190, 210))
 #: Colours (red, green, blue, opacity) 0..1; arms that point forward differ, so that the heading is visible.
 _DARK, _GREY, _FRONT, _DISC = "0.13 0.14 0.16 1", "0.38 0.40 0.43 1", "0.85 0.33 0.10 1", "0.35 0.42 0.50 0.32"
 _BATTERY, _METAL = "0.20 0.22 0.27 1", "0.66 0.68 0.70 1"
@@ -69,26 +71,23 @@ def vehicle_xml(vehicle: TrueVehicle) -> str:
     return "\n".join(parts)
 
 
-def tool_xml(vehicle: TrueVehicle, brush_width_m: float, color: tuple[float, ...]) -> str:
-    """Geoms of the tool beyond the force/torque sensor: sensor, arm, and a round brush behind the tip.
+def brush_color(scene: Scene) -> tuple[int, int, int]:
+    """A brush colour that differs clearly from board, paint and wall."""
+    others = np.array([scene.board.color, scene.paint.color, scene.wall.color], float)
+    return max(_BRUSH_COLORS, key=lambda color: float(np.linalg.norm(others - color, axis=1).min()))
 
-    Args:
-        vehicle: The vehicle.
-        brush_width_m: Diameter of the brush [m].
-        color: Of the paint, 0..255.
-    """
+
+def tool_xml(vehicle: TrueVehicle, scene: Scene) -> str:
+    """Geoms of the tool beyond the force/torque sensor: sensor, arm, and the round brush behind the tip."""
     sensor, tip = FLIP * vehicle.force_torque_position_m, FLIP * vehicle.tip_position_m
     along = (tip - sensor) / max(float(np.linalg.norm(tip - sensor)), 1e-9)
-    forward = np.array([1.0, 0.0, 0.0])
-    front = tip - _BRUSH_GAP_M * forward
-    back = front - _BRUSH_LENGTH_M * forward
-    paint = _numbers(np.array(color[:3]) / 255.0, 1.0)
+    front, back = (tip - np.array([length, 0.0, 0.0]) for length in (_BRUSH_GAP_M, BRUSH_LENGTH_M))
+    half, brush = _SENSOR_M[1] * along, _numbers(np.array(brush_color(scene)) / 255.0, 1.0)
     return "\n".join(
         (
-            _between("cylinder", sensor - _SENSOR_M[1] * along, sensor + _SENSOR_M[1] * along, _SENSOR_M[0], _METAL),
+            _between("cylinder", sensor - half, sensor + half, _SENSOR_M[0], _METAL),
             _between("capsule", sensor, back, vehicle.arm_radius_m, _DARK),
-            _between("cylinder", back, 0.5 * (back + front), 0.5 * brush_width_m, _GREY),
-            _between("cylinder", 0.5 * (back + front), front, 0.5 * brush_width_m, paint),
+            _between("cylinder", back, front, 0.5 * scene.paint.brush_width_m, brush),
         )
     )
 

@@ -103,8 +103,7 @@ def build_xml(scene: Scene, vehicle: TrueVehicle, drawn: bool = True) -> str:
     # Geometry without contact costs MuJoCo time at every step.
     surroundings = body = tool = ""
     if drawn:
-        surroundings, body = _surroundings_xml(scene), vehicle_xml(vehicle)
-        tool = tool_xml(vehicle, scene.paint.brush_width_m, scene.paint.color)
+        surroundings, body, tool = _surroundings_xml(scene), vehicle_xml(vehicle), tool_xml(vehicle, scene)
     return f"""<mujoco model="ibvs_qp">
   <compiler angle="radian" balanceinertia="true" autolimits="true"/>
   {OPTION_XML.format(gravity=numbers(GRAVITY))}

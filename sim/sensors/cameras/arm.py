@@ -11,10 +11,11 @@ import numpy as np
 from allocation.rotor import disc_rim
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import R_BODY_CAMERA, rotation_from_vector
+from sim.world.drawn_shape import BRUSH_LENGTH_M, brush_color
 from sim.world.scene import Scene
 
-#: Length of the brush along the arm [m] and of the step between the slices it is drawn in.
-BRUSH_LENGTH_M, _SLICE_M = 0.04, 0.002
+#: Step along the brush between the slices it is drawn in [m].
+_SLICE_M = 0.002
 #: Corners of a propeller disc [-].
 _RIM_POINTS = 180
 #: Least depth drawn [m].
@@ -22,7 +23,6 @@ _NEAR_M = 0.05
 #: Fraction of the light that a spinning propeller blocks.
 _PROPELLER_SHADE = 0.35
 _ARM_COLOR = (58, 60, 64)
-_BRUSH_COLORS = ((240, 190, 40), (70, 180, 90), (205, 70, 170), (60, 190, 210))
 _SHIFT, _ONE = 4, 16
 
 
@@ -35,12 +35,6 @@ class VehicleLayer:
     inverse_depth: np.ndarray  # 1/Z of arm and brush under the mask [1/m], float32 (H, W)
     holes: np.ndarray  # 255 where the depth step along the outline leaves no reading, uint8 (H, W)
     propellers: np.ndarray  # 255 where a propeller disc lies in front of the scene, uint8 (H, W)
-
-
-def brush_color(scene: Scene) -> tuple[int, int, int]:
-    """A brush colour that differs clearly from board, paint and wall."""
-    others = np.array([scene.board.color, scene.paint.color, scene.wall.color], float)
-    return max(_BRUSH_COLORS, key=lambda color: float(np.linalg.norm(others - color, axis=1).min()))
 
 
 def vehicle_layer(

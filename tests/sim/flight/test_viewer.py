@@ -10,26 +10,38 @@ import numpy as np
 import pytest
 
 from sim.commands import cli
+from sim.commands.paint import Paint
 from sim.flight import viewer
 from sim.flight.closed_loop import fly
 from sim.flight.options import FlightOptions
 from sim.world.scene import PaintScene, Scene, StartScene
 
 
-@pytest.mark.parametrize("display", [None, ":987"])
-def test_without_a_display_one_line_says_so(display, capsys, monkeypatch, tmp_path) -> None:
+@pytest.fixture(params=[None, ":987"])
+def no_display(request, monkeypatch):
+    """A computer without a display, or with one that does not answer; what a message must name."""
     pytest.importorskip("glfw")
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
-    if display:
-        monkeypatch.setenv("DISPLAY", display)
+    if request.param:
+        monkeypatch.setenv("DISPLAY", request.param)
         monkeypatch.setattr("glfw.init", lambda: False)
     monkeypatch.setattr(viewer.sys, "platform", "linux")
-    assert cli.main(["paint", "--view", "--out", str(tmp_path / "run")]) == 2
+    return request.param or "DISPLAY"
+
+
+def test_without_a_display_the_video_shows_the_flight_and_one_line_says_so(no_display, capsys) -> None:
+    assert Paint(view=True)._shown() == {"view": False, "no_video": False}
     out, err = capsys.readouterr()
     assert out == "" and err.count("\n") == 1
-    assert err.startswith("ibvs-qp: error: --view") and "display" in err and "video.mp4" in err
-    assert (display or "DISPLAY") in err
+    assert no_display in err and "video.mp4" in err
+
+
+def test_without_a_display_and_without_a_video_nothing_flies(no_display, capsys, tmp_path) -> None:
+    assert cli.main(["paint", "--view", "--no-video", "--out", str(tmp_path / "run")]) == 2
+    out, err = capsys.readouterr()
+    assert out == "" and err.count("\n") == 1
+    assert err.startswith("ibvs-qp: error: --view") and no_display in err
     assert not (tmp_path / "run").exists()
 
 

@@ -9,10 +9,13 @@ import numpy as np
 import pytest
 from synthetic_trace import Errors, synthetic_trace
 
+from ibvs_qp.command import Outcome
+from ibvs_qp.config import ControllerConfig
+from ibvs_qp.controller import default_limits, qp_problem
 from sim.evaluate.metrics import compute_metrics
+from sim.evaluate.table import LINES
 from sim.figures import FIGURES, draw_all
-from sim.flight.pictures import pack_pictures, unpack_picture
-from sim.video.film import write_video
+from sim.report import plain_words
 from sim.report.report import write_report
 from sim.report.rundir import RunFolder, summary
 from sim.world.scene import PaintScene, Scene
@@ -86,21 +89,20 @@ def test_figures_leave_global_settings_alone(traces, tmp_path):
     assert dict(matplotlib.rcParams) == before
 
 
-def test_video_shows_both_laws_for_the_whole_flight(traces, tmp_path):
-    write_video(traces, tmp_path / "video.mp4")
-    video = cv2.VideoCapture(str(tmp_path / "video.mp4"))
-    frames = video.get(cv2.CAP_PROP_FRAME_COUNT)
-    rate = video.get(cv2.CAP_PROP_FPS)
-    assert frames / rate == pytest.approx(float(traces["qp"].t[-1]), abs=0.2)
-    good, frame = video.read()
-    assert good and frame.shape[1] == 1280
+def test_report_plays_the_video_beside_it(traces, tmp_path):
+    folder = RunFolder(tmp_path)
+    metrics = {law: compute_metrics(trace) for law, trace in traces.items()}
+    folder.write_report(traces, summary(FACTS, folder, metrics, False, 12.3, 10**9), video=True)
+    page = folder.report.read_text(encoding="utf-8")
+    (name,) = re.findall(r"<video[^>]* src=\"([^\"]*)\"", page)
+    assert "/" not in name and (tmp_path / name).stat().st_size > 10_000, "a file of the same folder"
 
 
-def test_packed_pictures_look_the_same(traces):
-    trace = synthetic_trace()
-    smooth = np.tile(np.linspace(0, 255, 160).astype(np.uint8)[None, :, None], (120, 1, 3))
-    smooth[..., 2] = 10
-    trace.pictures = [(0.0, smooth, "paint")]
-    packed = pack_pictures(trace).pictures[0][1]
-    assert packed.ndim == 1
-    assert np.abs(unpack_picture(packed).astype(int) - smooth).mean() < 3.0
+def test_every_row_of_the_report_has_a_meaning(page):
+    assert set(plain_words.FIGURES) == {line.key for line in LINES}
+    assert set(plain_words.OUTCOMES) == set(Outcome)
+    config = ControllerConfig()
+    names = [row.name for limit in default_limits(config) for row in limit.rows(qp_problem(config).model)]
+    assert all(plain_words.limit_words(name) for name in names)
+    for words in (plain_words.FIGURES["coverage"], plain_words.OUTCOMES["solved"]):
+        assert words in page
