@@ -12,9 +12,11 @@ from string import Template
 from typing import Any
 
 from sim.evaluate.table import LINES, law_name
+from sim.flight.pictures import pack_picture
 from sim.flight.trace import Trace
 from sim.report.plain_words import FIGURES, OUTCOMES, limit_words
 from sim.storage.atomic import write_text
+from sim.video.film import still
 
 _PAGE = Path(__file__).with_name("report_page.html")
 #: Packages whose versions can change a flight.
@@ -23,6 +25,10 @@ _ROW_KEYS = (
     "stroke_m", "coverage", "path_rms_straight_m", "path_rms_corner_m", "path_max_m", "force_rms_straight_n",
     "force_rms_corner_n", "contact_share", "tilt_peak_deg", "yaw_peak_deg",
 )  # fmt: skip
+
+
+#: The picture shown before the video is played, as a fraction of its length [-].
+_POSTER = 0.7
 
 
 def write_report(
@@ -107,7 +113,11 @@ def _video(video: Path | None) -> str:
         return ""
     name = escape(video.name)
     words = "The vehicle from outside, what its camera sees with the edges found in it, and the push on the board."
-    player = f'<video controls muted loop playsinline preload="metadata" src="{name}"></video>'
+    poster = base64.b64encode(pack_picture(still(video, _POSTER)).tobytes()).decode("ascii")
+    player = (
+        f'<video controls muted loop playsinline preload="metadata" src="{name}" '
+        f'poster="data:image/jpeg;base64,{poster}"></video>'
+    )
     return f'<figure>{player}<figcaption>{words} File: <a href="{name}">{name}</a></figcaption></figure>'
 
 

@@ -78,3 +78,12 @@ def encode(frames: Iterable[np.ndarray], file: Path, rate_hz: int) -> None:
             container.mux(stream.encode(av.VideoFrame.from_ndarray(frame, format="rgb24")))
         if stream is not None:
             container.mux(stream.encode(None))
+
+
+def still(file: Path, fraction: float) -> np.ndarray:
+    """The picture before a fraction of a video's length that a player can jump to, uint8 RGB (height, width, 3)."""
+    import av
+
+    with av.open(str(file)) as container:
+        container.seek(round(fraction * (container.duration or 0)))
+        return next(container.decode(video=0)).to_ndarray(format="rgb24")

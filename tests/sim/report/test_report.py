@@ -96,6 +96,7 @@ def test_report_plays_the_video_beside_it(traces, tmp_path):
     page = folder.report.read_text(encoding="utf-8")
     (name,) = re.findall(r"<video[^>]* src=\"([^\"]*)\"", page)
     assert "/" not in name and (tmp_path / name).stat().st_size > 10_000, "a file of the same folder"
+    assert page.count('poster="data:image/jpeg;base64,') == 1, "a picture before it plays"
 
 
 def test_every_row_of_the_report_has_a_meaning(page):
