@@ -155,7 +155,8 @@ class Compare:
 def _print(conditions: list[dict[str, Any]], cells: list[dict[str, Any]], a: Path, b: Path) -> None:
     from rich.console import Console
 
-    from sim.evaluate.table import LINES, plain, terminal_table
+    from sim.evaluate.table import LINES, law_name, plain, terminal_table
+    from sim.report.comparison import PAINT_VARIANT
     from sim.report.conditions import ABSENT
 
     console, names = Console(), ("A", "B")
@@ -167,7 +168,9 @@ def _print(conditions: list[dict[str, Any]], cells: list[dict[str, Any]], a: Pat
         console.print(terminal_table(("flown under other conditions", *names), shown, wrap=names))
     headings = ("figure", *names, "B - A", "95 %")
     for cell in cells:
-        labels = [cell["experiment"], cell["law"], cell["variant"], *(f"{k} {v}" for k, v in cell["params"].items())]
+        variant = [] if cell["variant"] == PAINT_VARIANT else [cell["variant"]]
+        params = (f"{name} {value}" for name, value in cell["params"].items())
+        labels = [cell["experiment"], law_name(cell["law"]), *variant, *params]
         done = " and ".join(f"{count} of {cell['n']}" for count in cell["completed"])
         rows = []
         for line in LINES:

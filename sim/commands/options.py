@@ -6,7 +6,7 @@ import dataclasses
 import os
 import shlex
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -73,9 +73,7 @@ def scene_file(file: Path | None, option: str = "--scene") -> Path | None:
     Raises:
         ConfigError: When there is none, or it is a preset.
     """
-    from sim.scenes import FILES
-
-    return _shipped_or_given(file, option, FILES, "scene")
+    return _shipped_or_given(file, option, "scene")
 
 
 def preset_file(file: Path | None, option: str = "--preset") -> Path | None:
@@ -84,22 +82,26 @@ def preset_file(file: Path | None, option: str = "--preset") -> Path | None:
     Raises:
         ConfigError: When there is none, or it is a scene.
     """
-    from ibvs_qp.presets import FILES
-
-    return _shipped_or_given(file, option, FILES, "preset")
+    return _shipped_or_given(file, option, "preset")
 
 
-def _shipped_or_given(file: Path | None, option: str, shipped: Mapping[str, Path], kind: str) -> Path | None:
+def _shipped_or_given(file: Path | None, option: str, kind: str) -> Path | None:
+    from ibvs_qp import presets
+    from sim import scenes
+
     if file is None:
         return None
+    shipped = {"preset": presets.FILES, "scene": scenes.FILES}
+    given = file
     if not file.exists():
-        file = shipped.get(str(file), file)
+        file = next((files[str(file)] for files in shipped.values() if str(file) in files), file)
     try:
         open_regular(file, sys.maxsize).close()
     except UnreadableFile as error:
-        raise ConfigError(f"{error}; give an existing file with {option}, or one of {', '.join(shipped)}") from None
+        names = ", ".join(shipped[kind])
+        raise ConfigError(f"{error}; give an existing file with {option}, or one of {names}") from None
     if (other := _kind(file)) not in (kind, None):
-        raise ConfigError(f"{option} {file}: this is a {other}, not a {kind}")
+        raise ConfigError(f"{option} {given}: this is a {other}, not a {kind}")
     return file
 
 

@@ -17,6 +17,8 @@ from sim.sweep.tables import read_tables
 
 #: Columns that identify a flight, besides the parameters.
 _SAME = ("experiment", "law", "variant", "seed")
+#: Variant of the flights of a `paint` run, which has no others.
+PAINT_VARIANT = "run"
 
 
 def read_run(path: Path) -> pl.DataFrame:
@@ -37,7 +39,7 @@ def read_run(path: Path) -> pl.DataFrame:
 
 def _paint_rows(path: Path) -> pl.DataFrame:
     facts, laws = read_laws(path / "summary.json")
-    same = {"experiment": "paint", "variant": "run", "seed": facts["seed"], "version": facts["version"]}
+    same = {"experiment": "paint", "variant": PAINT_VARIANT, "seed": facts["seed"], "version": facts["version"]}
     return frame([metrics | same | {"law": law} for law, metrics in laws.items()])
 
 
@@ -52,7 +54,7 @@ def compare(a: pl.DataFrame, b: pl.DataFrame) -> list[dict[str, Any]]:
     Raises:
         ConfigError: If they share no flight.
     """
-    if set(a["variant"]) == {"run"} and set(b["variant"]) == {"run"}:
+    if set(a["variant"]) == {PAINT_VARIANT} == set(b["variant"]):
         b = b.with_columns(pl.lit(a["seed"][0]).alias("seed"))
     params = [name for name in a.columns if name.startswith(PARAM) and name in b.columns]
     try:

@@ -142,6 +142,8 @@ def test_interrupt_while_drawing_keeps_the_log(flown, capsys, monkeypatch):
         (["paint", "--scene", "dark"], ["dark", "--scene", "dark_board"]),
         (["paint", "--preset", "scene.toml"], ["--preset scene.toml: this is a scene, not a preset"]),
         (["paint", "--scene", "key.toml"], ["--scene key.toml: this is a preset, not a scene"]),
+        (["paint", "--preset", "dark_board"], ["--preset dark_board: this is a scene, not a preset"]),
+        (["paint", "--scene", "octorotor_qp"], ["--scene octorotor_qp: this is a preset, not a scene"]),
         (["compare"], ["compare", "paint"]),
         (["pain"], ["unknown command pain; did you mean paint?"]),
         (["fly"], ["unknown command fly; commands are paint, "]),

@@ -9,6 +9,7 @@ import pytest
 
 import ibvs_qp
 from ibvs_qp.presets import FILES
+from sim.commands.cli import main
 from sim.report.conditions import differing_presets, differing_runs
 
 
@@ -17,7 +18,8 @@ def runs(tmp_path: Path) -> tuple[Path, Path]:
     for name, world, slope in (("a", "ideal", 0.0), ("b", "harsh", 2.0)):
         folder = tmp_path / name
         folder.mkdir()
-        summary = {"version": "1", "seed": 0, "world": world}
+        laws = {"qp": {"completed": True, "reason": "done", "path_max_m": 0.004 + 0.001 * slope}}
+        summary = {"version": "1", "seed": 0, "world": world, "laws": laws}
         (folder / "summary.json").write_text(json.dumps(summary))
         scene = f"[board]\nslope_deg = {slope}\n[errors.gyro]\nbias_rad_s = {slope}\n"
         (folder / "scene.toml").write_text(scene)
@@ -32,6 +34,24 @@ def test_facts_scene_and_presets_are_compared_key_by_key(runs: tuple[Path, Path]
         {"name": "preset_qp.painting.push_n", "a": 5.0, "b": 7.0},
     ]
     assert differing_runs(runs[0], runs[0]) == []
+
+
+def test_the_command_names_them_first_and_labels_figures_as_paint_does(
+    runs: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["compare", *map(str, runs)]) == 0
+    text = capsys.readouterr().out
+    places = [
+        text.index(words)
+        for words in (
+            "flown under other conditions",
+            "scene.board.slope_deg",
+            "push_n",
+            "paint, QP law: completed 1 of 1",
+        )
+    ]
+    assert places == sorted(places)
+    assert "path error, largest [mm]" in text and "path_max_m" not in text
 
 
 def test_presets_differ_in_their_keys() -> None:
