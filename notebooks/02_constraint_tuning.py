@@ -4,15 +4,15 @@ __generated_with = "0.25.2"
 app = marimo.App(width="full", app_title="Constraint tuning")
 
 with app.setup:
+    import tempfile
+
     import marimo as mo
 
-    from ibvs_qp.pilot import PilotConfig
     from sim.notebook.dashboard import draw_dashboard
     from sim.notebook.knobs import GROUPS, KNOBS, knob_values
     from sim.notebook.picture import picture
-    from sim.notebook.tuning import TuningBench, compare_pair, save_setting, save_text
+    from sim.notebook.tuning import Start, TuningBench, compare_pair, save_setting, save_text
     from sim.notebook.wall_flights import Setting, flights_table, fly_setting
-    from sim.world.scene import load_scene
 
     FIGURES = (
         "first touch [s]",
@@ -60,44 +60,65 @@ def _():
     * a **soft limit** has a slack $s_j$ with the **slack weight** $p_j$: a large $p_j$ is nearly a hard limit, a small
       $p_j$ allows violations.
 
-    The controls are in the sidebar. On release of a control the closed loop flies again: the vehicle starts 15 cm in
-    front of the board, approaches, presses for 1.6 s and slides to the left along the board's lower edge. Plant,
-    contact, sensors with noise and delays, estimators and strategy are those of `ibvs-qp paint`; a sensor model of
-    lines replaces the camera (`--features geometric`).
+    The controls are in the sidebar. On release of a control the closed loop flies again, once with the last values if
+    several controls were moved meanwhile; *reset all* goes back to the preset, *load* begins with another one. The
+    vehicle starts 15 cm in front of the board, approaches, presses for 1.6 s and slides to the left along the board's
+    lower edge. Plant, contact, sensors with noise and delays, estimators and strategy are those of `ibvs-qp paint`; a
+    sensor model of lines replaces the camera (`--features geometric`).
     """)
     return
 
 
 @app.cell(hide_code=True)
 def _():
-    def _widget(knob, value):
-        if knob.low is None:
-            return mo.ui.switch(value=value, label=knob.label)
-        _look = {"label": knob.label, "show_value": True, "full_width": True}
-        return mo.ui.slider(
-            steps=knob.stops(value), value=value, debounce=True, **_look
-        )  # reports its value on release
-
-    bench = TuningBench()
-    controls = mo.ui.dictionary({name: _widget(KNOBS[name], value) for name, value in knob_values(bench.base).items()})
-    share_gains = mo.ui.switch(value=False, label="the analytic law uses the gains set here")
-    return bench, controls, share_gains
+    # Each control reports to this state by itself: steps that arrive during a flight become one flight of the last
+    # values. Elements of one mo.ui.dictionary would lose all but one of the controls moved meanwhile.
+    start, set_start = mo.state(Start())
+    return set_start, start
 
 
 @app.cell(hide_code=True)
-def _(controls, share_gains):
+def _(start):
+    turns, set_turns = mo.state({})
+
+    def _widget(knob, value):
+        def _turn(to):
+            set_turns(lambda earlier: earlier | {knob.path: to})
+
+        if knob.low is None:
+            return mo.ui.switch(value=value, label=knob.label, on_change=_turn)
+        _look = {"label": knob.label, "show_value": True, "full_width": True, "debounce": True}  # reports on release
+        return mo.ui.slider(steps=knob.stops(value), value=value, on_change=_turn, **_look)
+
+    bench = TuningBench(start().setting)
+    controls = {name: _widget(KNOBS[name], value) for name, value in knob_values(bench.base).items()}
+    share_gains = mo.ui.switch(value=False, label="the analytic law uses the gains set here")
+    return bench, controls, share_gains, turns
+
+
+@app.cell(hide_code=True)
+def _(set_start):
+    wanted = mo.ui.text(value="tarot_t960_qp", label="preset (name or file)", full_width=True)
+    load = mo.ui.button(label="load", on_change=lambda _: set_start(lambda now: now.load(wanted.value)))
+    reset = mo.ui.button(label="reset all", on_change=lambda _: set_start(lambda now: now.again()))
+    return load, reset, wanted
+
+
+@app.cell(hide_code=True)
+def _(controls, load, reset, share_gains, start, wanted):
     _groups = {
         title: mo.vstack([controls[knob.path] for knob in knobs], gap=0.3).style({"padding-right": "1.2rem"})
         for title, knobs in GROUPS.items()
     }
     _folded = mo.accordion({title: panel for title, panel in _groups.items() if title != "Task"}, multiple=True)
-    mo.sidebar([mo.md("### Task"), _groups["Task"], _folded, share_gains], width="22rem")
+    _preset = mo.vstack([wanted, mo.hstack([load, reset], justify="start"), mo.md(start().text())], gap=0.5)
+    mo.sidebar([_preset, mo.md("### Task"), _groups["Task"], _folded, share_gains], width="22rem")
     return
 
 
 @app.cell
-def _(bench, controls, share_gains):
-    comparison = bench.compare(controls.value, own_gains=not share_gains.value)
+def _(bench, share_gains, turns):
+    comparison = bench.compare(turns(), own_gains=not share_gains.value)
     return (comparison,)
 
 
@@ -109,9 +130,7 @@ def _(comparison):
 
 @app.cell(hide_code=True)
 def _(comparison):
-    _changes = "; ".join(comparison.changes) or "nothing, this is the shipped preset"
-    _refused = f"**Refused:** {comparison.refusal}. The figures show the setting before."
-    mo.md(_refused if comparison.refusal else f"**Changed:** {_changes}")
+    mo.md(comparison.changes_text())
     return
 
 
@@ -285,16 +304,17 @@ def _():
 @app.cell
 def _(at_the_limit, bench, comparison, controls):
     def test_sliders_begin_at_the_shipped_preset():
-        assert controls.value == knob_values(Setting())
+        assert {name: control.value for name, control in controls.items()} == knob_values(Setting())
         assert comparison.changes == () and not comparison.refusal
 
     def test_a_preset_comes_back_and_flies_the_same():
-        preset, scene = save_setting(at_the_limit.setting, "saved.toml")
-        again = Setting(pilot=PilotConfig.from_toml(preset), scene=load_scene(scene))
-        assert again == at_the_limit.setting
-        assert (fly_setting(again).thrusts == at_the_limit.now.thrusts).all()
-        saved = save_text(again, "saved.toml")
-        assert "ibvs-qp paint --preset saved.toml --scene saved.scene.toml --seed 0" in saved
+        with tempfile.TemporaryDirectory() as folder:
+            file = f"{folder}/saved.toml"
+            save_setting(at_the_limit.setting, file)
+            again = Start().load(file).setting
+            assert again == at_the_limit.setting
+            assert (fly_setting(again).thrusts == at_the_limit.now.thrusts).all()
+            assert f"ibvs-qp paint --preset {file} --scene {folder}/saved.scene.toml --seed 0" in save_text(again, file)
 
     def test_active_limits_have_a_multiplier():
         flown = at_the_limit.now

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
+from ibvs_qp.config.vehicle import VehicleParams
 from sim.evaluate.path_error import CONTACT_N
 from sim.evaluate.window import tilt_deg
 from sim.figures.style import REFERENCE, note_empty
 from sim.flight.trace import Trace
 from sim.notebook.plots import BLUE, ORANGE, RED
-from sim.notebook.tuning import Comparison
-from sim.notebook.vehicle import Case, vehicle_case
+from sim.notebook.tuning import Comparison, reach_note
+from sim.notebook.vehicle import Case
 from sim.notebook.wall_flights import HOVER_S
 
 #: Size of the figure [in] and place of its panels; a fixed layout takes half the time of a fitted one.
@@ -28,6 +31,8 @@ STYLES = {
 }
 #: Limits shown at most, and decades of their colour scale.
 MOST_LIMITS, DECADES = 7, 4.0
+#: The tilt bound is drawn below this many times the greatest tilt; top of its axes over what they show [-].
+NEAR_BOUND, TILT_HEADROOM = 1.5, 1.2
 #: One dot of force per so many ticks.
 EVERY = 8
 
@@ -44,6 +49,8 @@ def draw_dashboard(comparison: Comparison) -> Figure:
     _curves(push, flights, {name: trace.push_true for name, trace in flights.items()})
     push.plot(comparison.now.t, comparison.now.push_reference, **REFERENCE, label="reference")
     push.set(title="push on the board", ylabel="push [N]")
+    if note := reach_note(comparison.now):
+        push.annotate(f"reach check:\n{note}", (0.015, 0.95), xycoords="axes fraction", va="top", fontsize=8, color=RED)
 
     errors = {name: trace.line_error_px[:, 0] for name, trace in flights.items()}
     greatest = max(4.0, _greatest(flights, errors))
@@ -57,11 +64,13 @@ def draw_dashboard(comparison: Comparison) -> Figure:
     greatest = max(0.2, _greatest(flights, tilts))
     _curves(tilt, flights, tilts)
     bounds = comparison.setting.pilot.controller.limits
-    if bounds.tilt_barrier and bounds.tilt_deg < 1.5 * greatest:
+    top = greatest
+    if bounds.tilt_barrier and bounds.tilt_deg < NEAR_BOUND * greatest:
+        top = max(greatest, bounds.tilt_deg)
         tilt.axhline(bounds.tilt_deg, color=RED, linewidth=0.9, linestyle=(0, (5, 2)))
         tilt.annotate("bound on roll and on pitch", (0.01, bounds.tilt_deg), xycoords=("axes fraction", "data"),
                       va="bottom", fontsize=7, color=RED)  # fmt: skip
-    tilt.set(title="tilt of the vehicle", ylabel="tilt [°]", xlabel="time [s]", ylim=(0.0, 1.15 * greatest))
+    tilt.set(title="tilt of the vehicle", ylabel="tilt [°]", xlabel="time [s]", ylim=(0.0, TILT_HEADROOM * top))
 
     _draw_multipliers(limits, comparison)
 
@@ -70,7 +79,7 @@ def draw_dashboard(comparison: Comparison) -> Figure:
     room.set(title="room of the rotor that is nearest to a limit", ylabel="room [N]", xlabel="time [s]")
     room.set_ylim(bottom=-0.5)
 
-    _draw_reach(reach, flights)
+    _draw_reach(reach, flights, comparison)
     end = max(float(trace.t[-1]) for trace in flights.values())
     for axes in (push, error, tilt, limits, room):
         axes.set_xlim(0.0, end)
@@ -131,17 +140,16 @@ def _draw_multipliers(axes: Axes, comparison: Comparison) -> None:
     bar.minorticks_off()
 
 
-def _draw_reach(axes: Axes, flights: dict[str, Trace]) -> None:
+def _draw_reach(axes: Axes, flights: dict[str, Trace], comparison: Comparison) -> None:
     """Draw the forces attainable in level flight now and, as an outline, before; and dots for those in contact."""
-    cuts = {name: _rotors(flights[name]).level_cut() for name in ("QP now", "QP before")}
-    if len(cuts["QP now"]):
-        axes.fill(*cuts["QP now"].T, facecolor="#e9eef1", edgecolor="#888888", linewidth=0.9)
+    believed = comparison.setting.pilot.controller.vehicle
+    if believed.geometry.count == 6:
+        _draw_cuts(axes, *(_rotors(flights[name], believed).level_cut() for name in ("QP now", "QP before")))
     else:
-        axes.text(0.5, 0.9, "these rotors cannot carry the vehicle", transform=axes.transAxes, ha="center", fontsize=8)
-    axes.fill(*cuts["QP before"].T, facecolor="none", edgecolor=STYLES["QP before"]["color"], linewidth=0.5)
+        note_empty(axes, "the attainable set is drawn for six rotors only")
     for name, trace in flights.items():
         thrusts = trace.thrusts_actual[trace.push_true > CONTACT_N][::EVERY]
-        front, right = _rotors(trace).matrix[:2] @ thrusts.T
+        front, right = _rotors(trace, believed).matrix[:2] @ thrusts.T
         axes.plot(right, front, ".", color=STYLES[name]["color"], markersize=2.5)
     axes.axhline(0.0, color="#999999", linewidth=0.5)
     axes.axvline(0.0, color="#999999", linewidth=0.5)
@@ -150,7 +158,16 @@ def _draw_reach(axes: Axes, flights: dict[str, Trace]) -> None:
     axes.set(xlabel="force to the right [N]", ylabel="force to the front [N]")
 
 
-def _rotors(trace: Trace) -> Case:
-    """Vehicle with the mass and the thrust limits of a flight."""
-    low, high = float(trace.thrust_min[0]), float(trace.thrust_max[0])
-    return vehicle_case(mass_kg=trace.true_mass.item(), thrust_min_n=low, thrust_max_n=high)
+def _draw_cuts(axes: Axes, now: np.ndarray, before: np.ndarray) -> None:
+    if len(now):
+        axes.fill(*now.T, facecolor="#e9eef1", edgecolor="#888888", linewidth=0.9)
+    else:
+        axes.text(0.5, 0.9, "these rotors cannot carry the vehicle", transform=axes.transAxes, ha="center", fontsize=8)
+    axes.fill(*before.T, facecolor="none", edgecolor=STYLES["QP before"]["color"], linewidth=0.5)
+
+
+def _rotors(trace: Trace, believed: VehicleParams) -> Case:
+    """Vehicle with the mass and the thrust limits of a flight; all flights of a comparison have the same rotors."""
+    low, high = tuple(trace.thrust_min.tolist()), tuple(trace.thrust_max.tolist())
+    flown = {"mass_kg": trace.true_mass.item(), "thrust_min_n": low, "thrust_max_n": high}
+    return Case(vehicle=dataclasses.replace(believed, **flown))

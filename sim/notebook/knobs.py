@@ -47,8 +47,8 @@ GROUPS: dict[str, tuple[Knob, ...]] = {
         Knob("push [N]", "scene.paint.push_n", 1.0, 40.0, 0.5),
         Knob("sliding speed [m/s]", "scene.paint.speed_m_s", 0.02, 0.3, 0.01),
         Knob("approach speed [m/s]", _CONTACT + "approach_speed_m_s", 0.02, 0.3, 0.01),
-        Knob("within 10 cm [m/s]", _CONTACT + "close_speed_m_s", 0.02, 0.3, 0.01),
-        Knob("at the touch [m/s]", _CONTACT + "touch_speed_m_s", 0.01, 0.2, 0.01),
+        Knob("last 10 cm [m/s]", _CONTACT + "close_speed_m_s", 0.02, 0.3, 0.01),
+        Knob("last 1 cm [m/s]", _CONTACT + "touch_speed_m_s", 0.01, 0.2, 0.01),
     ),
     "World": (
         Knob("friction [-]", "scene.wall.friction", 0.0, 1.0, 0.05),

@@ -4,23 +4,33 @@ from __future__ import annotations
 
 import dataclasses
 import shlex
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 import ibvs_qp
 from ibvs_qp.config.contact_margin import require_margin
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.settings import dump_toml
+from ibvs_qp.pilot import PilotConfig
+from ibvs_qp.presets import FILES
+from sim.evaluate.window import phase_window
 from sim.flight.trace import Trace
 from sim.notebook.knobs import KNOBS, knob_values, turned
-from sim.notebook.wall_flights import Setting, fly_setting
+from sim.notebook.wall_flights import SETTLED_S, Setting, fly_setting, touch_time
+from sim.world.scene import load_scene
+
+#: A push lowered by less is not noted [N].
+_REDUCED_N = 0.05
 
 
 @dataclass(frozen=True, kw_only=True)
 class Comparison:
     """A flown setting beside the previous setting and the analytic law."""
 
+    base: Setting  # the preset with which the controls began
     setting: Setting  # the setting
     last_setting: Setting  # the setting before
     now: Trace  # flight of the setting under the QP law
@@ -35,13 +45,46 @@ class Comparison:
 
     @property
     def changes(self) -> tuple[str, ...]:
-        """Every changed knob, as "label: before → after"."""
-        before = knob_values(self.last_setting)
-        return tuple(
-            f"{KNOBS[name].label}: {_text(before[name])} → {_text(value)}"
-            for name, value in knob_values(self.setting).items()
-            if value != before[name]
-        )
+        """Every knob that differs from the preset, as "label: before → after"."""
+        return _differences(self.base, self.setting)
+
+    @property
+    def last_change(self) -> tuple[str, ...]:
+        """The same since the flight before."""
+        return _differences(self.last_setting, self.setting)
+
+    def changes_text(self) -> str:
+        """Refusal, all changes since the preset, and the last one, as markdown."""
+        if self.refusal:
+            return f"**Refused:** {self.refusal}. The figures show the setting before."
+        if not self.changes:
+            return "**Changed:** nothing, this is the preset"
+        lines = ["**Changed since the preset:**", "", *(f"- {each}" for each in self.changes)]
+        last = "; ".join(self.last_change)
+        return "\n".join([*lines, "", f"**Last step:** {last}"] if last else lines)
+
+
+def reach_note(trace: Trace) -> str:
+    """How far the reach check lowered the push of the job: "26.5 N reduced to 8.5 N"; empty where it did not.
+
+    The push at the end of the hold counts; while sliding it may rise again, when the friction has shown itself.
+    """
+    commanded, (_, held_to) = trace.scene.paint.push_n, phase_window(trace, "press")
+    before_end = np.flatnonzero(trace.t <= held_to)
+    if not len(before_end) or not np.isfinite(held_to):
+        return ""
+    lowered = float(trace.push_reference[before_end[-1]])
+    reduced = 0.0 < lowered < commanded - _REDUCED_N and trace.t[before_end[-1]] > touch_time(trace) + SETTLED_S
+    return f"{commanded:g} N reduced to {lowered:.1f} N" if reduced else ""
+
+
+def _differences(before: Setting, after: Setting) -> tuple[str, ...]:
+    old = knob_values(before)
+    return tuple(
+        f"{KNOBS[name].label}: {_text(old[name])} → {_text(value)}"
+        for name, value in knob_values(after).items()
+        if value != old[name]
+    )
 
 
 def _text(value: Any) -> str:
@@ -80,7 +123,8 @@ class TuningBench:
         else:
             last_setting = shown.last_setting if shown.setting == setting else shown.setting
         last = fly_setting(last_setting)
-        self._shown = Comparison(setting=setting, last_setting=last_setting, now=now, last=last, analytic=analytic)
+        flown = {"now": now, "last": last, "analytic": analytic}
+        self._shown = Comparison(base=self.base, setting=setting, last_setting=last_setting, **flown)
         return self._shown
 
 
@@ -105,6 +149,57 @@ def analytic_setting(setting: Setting, own_gains: bool = True) -> Setting:
     return dataclasses.replace(setting, pilot=dataclasses.replace(setting.pilot, controller=controller, law="paper"))
 
 
+def load_setting(preset: str) -> Setting:
+    """A setting from a preset: a shipped one by name, or a file, with the scene that `save_setting` put beside it.
+
+    Raises:
+        ConfigError: When it cannot be read, flies the analytic law, or the rotors have different limits.
+    """
+    file = Path(preset).expanduser()
+    if not file.exists():
+        file = FILES.get(preset, file)
+    if not file.exists():
+        raise ConfigError(f"{preset} does not exist; give a file, or one of {', '.join(FILES)}")
+    pilot, scene = PilotConfig.from_toml(file), _scene_file(file)
+    if pilot.law != "qp":
+        raise ConfigError(f"{preset} is a preset of the analytic law; the controls are those of the QP law")
+    setting = Setting(pilot=pilot, scene=load_scene(scene)) if scene.exists() else Setting(pilot=pilot)
+    for name, value in knob_values(setting).items():
+        if not isinstance(value, (bool, int, float)):
+            raise ConfigError(f"{preset}: {name} = {value} has a value for every rotor, a slider shows one")
+    return setting
+
+
+@dataclass(frozen=True, kw_only=True)
+class Start:
+    """Where the controls begin: a preset, and why another one was not loaded."""
+
+    setting: Setting = field(default_factory=Setting)
+    name: str = "the shipped preset"
+    refusal: str = ""
+    count: int = 0  # so that a reset is a change
+
+    def again(self) -> Start:
+        """The same, as a new value."""
+        return dataclasses.replace(self, refusal="", count=self.count + 1)
+
+    def load(self, preset: str) -> Start:
+        """Another preset, see `load_setting`; the same with the reason if that is refused."""
+        try:
+            return Start(setting=load_setting(preset), name=f"`{preset}`", count=self.count + 1)
+        except ConfigError as error:
+            return dataclasses.replace(self, refusal=str(error), count=self.count + 1)
+
+    def text(self) -> str:
+        """What the controls began with, as markdown."""
+        return f"**Not loaded:** {self.refusal}" if self.refusal else f"begun with {self.name}"
+
+
+def _scene_file(preset: Path) -> Path:
+    """File of the scene that belongs to a saved preset."""
+    return preset.with_name(preset.stem + ".scene.toml")
+
+
 def save_setting(setting: Setting, preset: str | Path) -> tuple[Path, Path]:
     """Write a setting as a preset and, beside it, a scene (friction, slope, gusts and push belong to the scene).
 
@@ -118,7 +213,7 @@ def save_setting(setting: Setting, preset: str | Path) -> tuple[Path, Path]:
     if file.suffix != ".toml":
         raise ConfigError(f"{file} is refused: the name of a preset ends in .toml")
     require_margin(setting.pilot.controller, setting.pilot.controller.brush)
-    scene = file.with_name(file.stem + ".scene.toml")
+    scene = _scene_file(file)
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(setting.pilot.to_toml(), encoding="utf-8")

@@ -61,6 +61,7 @@ def test_notebook_runs_and_has_test_cells(file):
 def test_cell(file, name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     run(file)[name]()
+    assert not list(tmp_path.iterdir()), "marimo's editor runs these tests when the notebook is opened"
 
 
 def sources(notebook) -> list[tuple[str, str]]:

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import re
 
 import cv2
 import numpy as np
@@ -11,12 +12,15 @@ from matplotlib.figure import Figure
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.pilot import PilotConfig
 from sim.commands import cli
+from sim.evaluate.window import tilt_deg
 from sim.figures.style import new_figure
+from sim.notebook.dashboard import draw_dashboard
 from sim.notebook.knobs import KNOBS, knob_values, turned
 from sim.notebook.picture import DOTS_PER_INCH, picture
+from sim.notebook.plots import RED
 from sim.notebook.short import SHORT_VARIABLE
-from sim.notebook.tuning import TuningBench, analytic_setting, save_setting
-from sim.notebook.wall_flights import Setting, flight_figures
+from sim.notebook.tuning import Start, TuningBench, analytic_setting, load_setting, reach_note, save_setting
+from sim.notebook.wall_flights import HOVER_S, Setting, flight_figures, fly_setting
 from sim.world.scene import load_scene
 
 
@@ -53,8 +57,51 @@ def test_a_comparison_reports_the_changes_and_their_effect():
     changed = bench.compare({"pilot.controller.weights.push": 5.0, "pilot.controller.reach_check": False})
     assert changed.changes == ("reach check: on → off", "push [1/(N)²]: 0.5 → 5")
     assert changed.last_setting == bench.base and not np.array_equal(changed.now.thrusts, changed.last.thrusts)
+    further = bench.compare({"pilot.controller.weights.push": 5.0, "pilot.controller.touch_ramp": False})
+    assert further.changes == ("ramp after touch: on → off", "push [1/(N)²]: 0.5 → 5"), "against the preset"
+    assert further.last_change == ("reach check: off → on", "ramp after touch: on → off")
+    assert bench.compare({}).changes == ()
+    changed = bench.compare({"pilot.controller.weights.push": 5.0, "pilot.controller.reach_check": False})
     refused = bench.compare({"pilot.controller.vehicle.thrust_max_n": 1.0})
     assert "thrust_max_n" in refused.refusal and refused.now is changed.now
+
+
+def test_a_push_that_was_reduced_is_named_with_both_values():
+    values = {"scene.paint.push_n": 26.5, "scene.wall.friction": 0.8}
+    reduced = fly_setting(turned(Setting(), values), hold_s=1.6)
+    match = re.fullmatch(r"26\.5 N reduced to (\d+\.\d) N", reach_note(reduced))
+    assert match and float(match[1]) == pytest.approx(8.5, abs=0.3)
+    unchecked = turned(Setting(), values | {"pilot.controller.reach_check": False})
+    assert reach_note(fly_setting(unchecked, hold_s=1.6)) == ""
+    assert reach_note(fly_setting(Setting())) == ""
+
+
+def test_the_tilt_bound_lies_inside_its_axes():
+    comparison = TuningBench().compare()
+    greatest = float(tilt_deg(comparison.now)[comparison.now.t > HOVER_S].max())
+    bound = 1.4 * greatest
+    near = dataclasses.replace(comparison, setting=turned(Setting(), {"pilot.controller.limits.tilt_deg": bound}))
+    (axes,) = (each for each in draw_dashboard(near).axes if each.get_title() == "tilt of the vehicle")
+    heights = [line.get_ydata()[0] for line in axes.lines if line.get_color() == RED]
+    assert heights == [bound] and axes.get_ylim()[1] > bound
+
+
+def test_a_preset_is_loaded_or_the_reason_named(tmp_path):
+    start = Start()
+    assert start.again() != start and start.again().setting == start.setting
+    setting = turned(Setting(), {"scene.wall.friction": 0.6, "pilot.controller.weights.push": 1.0})
+    save_setting(setting, tmp_path / "mine.toml")
+    assert start.load(str(tmp_path / "mine.toml")).setting == setting
+    eight = start.load("octorotor_qp")
+    assert eight.setting.pilot.controller.vehicle.geometry.count == 8 and "octorotor_qp" in eight.text()
+    for wrong, reason in (("tarot_t960_paper", "analytic law"), ("nothing.toml", "tarot_t960_qp")):
+        refused = eight.load(wrong)
+        assert refused.setting == eight.setting and reason in refused.text()
+
+
+def test_the_figure_of_eight_rotors_is_drawn():
+    bench = TuningBench(load_setting("octorotor_qp"))
+    assert picture(draw_dashboard, bench.compare()).png
 
 
 def test_a_picture_has_the_style_and_the_description_of_its_figure():
