@@ -111,8 +111,8 @@ def _(controls, load, reset, share_gains, start, wanted):
         for title, knobs in GROUPS.items()
     }
     _folded = mo.accordion({title: panel for title, panel in _groups.items() if title != "Task"}, multiple=True)
-    _preset = mo.vstack([wanted, mo.hstack([load, reset], justify="start"), mo.md(start().text())], gap=0.5)
-    mo.sidebar([_preset, mo.md("### Task"), _groups["Task"], _folded, share_gains], width="22rem")
+    _task = mo.md(f"{load} {reset} {start().text()}\n\n### Task")
+    mo.sidebar([wanted, _task, _groups["Task"], _folded, share_gains], width="22rem")
     return
 
 
