@@ -123,8 +123,9 @@ class TuningBench:
         else:
             last_setting = shown.last_setting if shown.setting == setting else shown.setting
         last = fly_setting(last_setting)
-        flown = {"now": now, "last": last, "analytic": analytic}
-        self._shown = Comparison(base=self.base, setting=setting, last_setting=last_setting, **flown)
+        self._shown = Comparison(
+            base=self.base, setting=setting, last_setting=last_setting, now=now, last=last, analytic=analytic
+        )
         return self._shown
 
 
