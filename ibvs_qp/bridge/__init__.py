@@ -1,0 +1,1 @@
+"""Bridge to PX4 over DDS, without ROS; experimental, needs the extra ``dds``."""

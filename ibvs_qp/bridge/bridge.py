@@ -1,0 +1,141 @@
+"""The bridge: messages of the vehicle in, commands of the pilot out, once a tick."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from ibvs_qp.bridge.config import BridgeConfig
+from ibvs_qp.bridge.dds import Participant
+from ibvs_qp.bridge.gate import BridgeState, Gate
+from ibvs_qp.bridge.inputs import MODE, Inputs
+from ibvs_qp.bridge.outputs import Outputs, Publisher
+from ibvs_qp.command import SafetyState
+from ibvs_qp.pilot import Pilot, PilotConfig
+from ibvs_qp.validation.self_check import SelfCheck
+
+#: Largest difference of a lens coefficient from the configured one [-].
+_LENS_ERROR = 1e-6
+
+
+@dataclass(frozen=True, kw_only=True)
+class BridgeStatus:
+    """What the bridge does.
+
+    Attributes:
+        state: Its state.
+        reason: Why.
+        phase: Phase of the flight, empty unless flying.
+        safety: State of the pilot's supervisor, empty unless flying.
+        commands: Set-points sent.
+        ignored: Messages left out, by role and reason.
+    """
+
+    state: BridgeState
+    reason: str
+    phase: str
+    safety: str
+    commands: int
+    ignored: dict[str, int]
+
+
+class Bridge:
+    """Flies a pilot on DDS messages. `tick` never raises because of a message.
+
+    Args:
+        config: Settings.
+        flight: Configuration of the flight.
+        clock: Clock of the stamps [ns]: that of ROS, to which PX4's stamps are synchronised.
+        pilot: Pilot to fly; None builds it. Its perception is loaded here.
+
+    Raises:
+        ConfigError: When DDS cannot start, or a setting does not fit the vehicle.
+    """
+
+    def __init__(
+        self,
+        config: BridgeConfig,
+        flight: PilotConfig,
+        clock: Callable[[], int] = time.time_ns,
+        pilot: Pilot | None = None,
+    ) -> None:
+        self.config, self._flight, self._clock = config, flight, clock
+        self._outputs = Outputs(config, flight.controller.vehicle)
+        participant = Participant(config.domain_id)
+        self.inputs, self._publisher = Inputs(config, participant, clock), Publisher(config, participant)
+        self.pilot = pilot or Pilot(flight)
+        self.pilot.prepare()
+        self.gate, self._check = Gate(config.check_s), SelfCheck(flight.safety.self_check)
+        self._alive_ns, self._next_alive_ns, self._last_ns, self._commands = round(1e9 / config.alive_hz), 0, -1, 0
+
+    @property
+    def status(self) -> BridgeStatus:
+        """State after the last tick."""
+        flight = self.pilot.status if self.gate.state is BridgeState.FLYING else None
+        return BridgeStatus(
+            state=self.gate.state,
+            reason=self.gate.reason,
+            phase=flight.phase if flight else "",
+            safety=str(flight.safety) if flight else "",
+            commands=self._commands,
+            ignored=dict(self.inputs.held.ignored),
+        )
+
+    def tick(self, now_ns: int) -> bool:
+        """Read, decide, fly and send; for `ibvs_qp.pilot.runner.run`.
+
+        Args:
+            now_ns: Monotonic time [ns].
+        """
+        self.inputs.poll(now_ns)
+        config, before = self.config, self.gate.state
+        lost = [role for role in ("imu", "attitude") if self.inputs.older(role, now_ns, config.link_timeout_s)]
+        missing = self._missing(now_ns, lost) if before is not BridgeState.FLYING else []
+        mode = None if self.inputs.older(MODE, now_ns, config.mode_timeout_s) else self.inputs.mode
+        state = self.gate.update(now_ns, lost, missing, None if mode is None else mode.engaged)
+        if state is BridgeState.FLYING:
+            if before is not state:
+                self.pilot.reset()
+            self._fly()
+        elif before is BridgeState.FLYING or (lost and not self._check.passed):
+            self._check.reset()
+        if self.gate.state in (BridgeState.READY, BridgeState.FLYING) and now_ns >= self._next_alive_ns:
+            self._next_alive_ns = now_ns + self._alive_ns
+            self._publisher.alive(self._outputs.alive(self._clock()))
+        self._last_ns = now_ns
+        return True
+
+    def _fly(self) -> None:
+        frame = self.inputs.held.frame(self._clock())
+        assert frame is not None and frame.imu_stamp_ns is not None
+        command = self.pilot.step(frame)
+        if command.safety is SafetyState.TERMINATED:
+            self.gate.stop(f"flight ended: {'; '.join(command.safety_reasons)}")
+            return
+        self._publisher.setpoints(self._outputs.setpoints(command, frame.imu_stamp_ns, self._clock()))
+        self._commands += 1
+
+    def _missing(self, now_ns: int, lost: list[str]) -> list[str]:
+        """What keeps the bridge from being ready, beside lost inputs: old sensors, wrong lens, faults in the axes."""
+        timeout, held = self.config.sensor_timeout_s, self.inputs.held
+        found = [role for role in ("wrench", "color", "depth") if self.inputs.older(role, now_ns, timeout)]
+        if "camera_info" not in self.inputs.arrived_ns:
+            found.append("camera_info")
+        elif not self._lens_agrees(held.distortion):
+            found.append("camera.distortion of the preset is not that of camera_info")
+        frame = None if lost else held.frame(self._clock())  # takes the picture as well: it is not kept for the flight
+        if frame is not None:
+            dt = 0.0 if self._last_ns < 0 else (now_ns - self._last_ns) * 1e-9
+            vectors = frame.attitude, frame.angular_velocity, frame.specific_force
+            self._check.inertial(*(vector.tolist() for vector in vectors), dt)
+        if not self._check.passed:
+            found += self._check.faults() or ("rest of the vehicle for the self-check",)
+        return found
+
+    def _lens_agrees(self, seen: tuple[float, ...]) -> bool:
+        """Whether the lens of the camera is the configured one; missing coefficients are 0."""
+        wanted = self._flight.camera.distortion
+        size = max(len(seen), len(wanted))
+        pairs = zip(*(each + (0.0,) * (size - len(each)) for each in (seen, wanted)), strict=True)
+        return all(abs(one - other) <= _LENS_ERROR for one, other in pairs)

@@ -1,0 +1,137 @@
+"""DDS topics as ROS 2 names them, with samples as bytes: nothing a sender writes is decoded in here."""
+
+from __future__ import annotations
+
+import functools
+from typing import Any
+
+from ibvs_qp.config.errors import ConfigError
+from ibvs_qp.ros.messages import encoded, typestore
+
+#: Samples that wait between two ticks: pictures are large, everything else is read in bursts.
+PICTURE_DEPTH, SAMPLE_DEPTH = 4, 64
+
+
+def dds_topic(name: str) -> str:
+    """Name of a ROS 2 topic in DDS: "/fmu/in/actuator_motors" is "rt/fmu/in/actuator_motors"."""
+    return f"rt{name}"
+
+
+def dds_type(name: str) -> str:
+    """Name of a ROS 2 type in DDS: "px4_msgs/msg/ActuatorMotors" is "px4_msgs::msg::dds_::ActuatorMotors_"."""
+    package, kind, message = name.split("/")
+    return f"{package}::{kind}::dds_::{message}_"
+
+
+class Participant:
+    """Readers and writers in one DDS domain, all best effort, volatile and of the last samples, as PX4's.
+
+    Args:
+        domain_id: ROS_DOMAIN_ID. CYCLONEDDS_URI configures the network (docs/px4.md).
+
+    Raises:
+        ConfigError: Without the extra ``dds``, or when DDS cannot start.
+    """
+
+    def __init__(self, domain_id: int) -> None:
+        try:
+            from cyclonedds.core import DDSException
+            from cyclonedds.domain import DomainParticipant
+        except ImportError:
+            raise ConfigError("the bridge needs the extra dds: pip install -c constraints.txt -e '.[dds]'") from None
+        try:
+            self._participant = DomainParticipant(domain_id)
+        except DDSException as error:
+            raise ConfigError(f"DDS cannot start in domain {domain_id} ({error}); see CYCLONEDDS_URI") from None
+
+    def reader(self, topic: str, name: str, depth: int = SAMPLE_DEPTH) -> Reader:
+        """Reader of a ROS 2 topic and type, with the last ``depth`` samples."""
+        from cyclonedds.sub import DataReader
+        from cyclonedds.topic import Topic
+
+        kind, qos = raw_type(name), _qos(depth)
+        return Reader(DataReader(self._participant, Topic(self._participant, dds_topic(topic), kind), qos=qos), depth)
+
+    def writer(self, topic: str, name: str) -> Writer:
+        """Writer of a ROS 2 topic and type."""
+        from cyclonedds.pub import DataWriter
+        from cyclonedds.topic import Topic
+
+        kind = raw_type(name)
+        writer = DataWriter(self._participant, Topic(self._participant, dds_topic(topic), kind), qos=_qos(1))
+        return Writer(writer, kind, name)
+
+
+class Reader:
+    """Reads samples as bytes."""
+
+    def __init__(self, reader: Any, depth: int) -> None:
+        self._reader, self._depth = reader, depth
+
+    def take(self) -> list[bytes]:
+        """The samples since the last call, as received, headers of CDR included."""
+        return [sample.data for sample in self._reader.take(self._depth) if hasattr(sample, "data")]
+
+
+class Writer:
+    """Writes messages of one type."""
+
+    def __init__(self, writer: Any, kind: Any, name: str) -> None:
+        self._writer, self._kind, self._name = writer, kind, name
+
+    def write(self, message: Any) -> None:
+        """Write a message of `ibvs_qp.ros.messages`."""
+        self.write_bytes(encoded(message, self._name))
+
+    def write_bytes(self, data: bytes) -> None:
+        """Write CDR, or what a test wants to pass for it."""
+        self._writer.write(self._kind(data))
+
+
+@functools.cache
+def raw_type(name: str) -> Any:
+    """The type of a message for DDS, whose samples keep the bytes in ``data``."""
+    from cyclonedds.idl import IdlStruct, make_idl_struct
+
+    nested = _fields(name)
+    kind: Any = make_idl_struct(name.split("/")[2] + "_", dds_type(name).replace("::", "."), nested, dataclassify=False)
+    assert issubclass(kind, IdlStruct)
+
+    def keep(self: Any, data: bytes) -> None:
+        self.data = bytes(data)
+
+    kind.__init__ = keep
+    kind.serialize = lambda self, **_: self.data
+    kind.deserialize = classmethod(lambda cls, data, **_: cls(data))
+    kind.deserialize_key = classmethod(lambda cls, data, **_: None)
+    return kind
+
+
+def _fields(name: str) -> dict[str, Any]:
+    return {field: _idl(description) for field, description in typestore().fielddefs[name][1]}
+
+
+def _idl(description: Any) -> Any:
+    """Type of a field in IDL from its description by rosbags: (kind, details)."""
+    from cyclonedds.idl import make_idl_struct, types
+    from rosbags.interfaces import Nodetype
+
+    kind, details = description
+    if kind == Nodetype.BASE:
+        return {"bool": bool, "string": str}.get(details[0]) or getattr(types, details[0])
+    if kind == Nodetype.NAME:
+        short, full = details.split("/")[2] + "_", dds_type(details).replace("::", ".")
+        return make_idl_struct(short, full, _fields(details))
+    element, size = _idl(details[0]), details[1]
+    return types.array[element, size] if kind == Nodetype.ARRAY else types.sequence[element]
+
+
+def _qos(depth: int) -> Any:
+    from cyclonedds.qos import Policy, Qos
+
+    return Qos(
+        Policy.Reliability.BestEffort,
+        Policy.Durability.Volatile,
+        Policy.History.KeepLast(depth),
+        Policy.DataRepresentation(use_cdrv0_representation=True),
+    )

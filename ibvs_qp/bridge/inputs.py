@@ -1,0 +1,111 @@
+"""What the bridge receives: samples and pictures of the vehicle, and PX4's mode."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from ibvs_qp.bridge.config import BridgeConfig
+from ibvs_qp.bridge.dds import PICTURE_DEPTH, SAMPLE_DEPTH, Participant
+from ibvs_qp.ros.held import HeldSamples
+from ibvs_qp.ros.messages import CAMERA_INFO, IMAGE, WRENCH, BadMessage, decoded
+from ibvs_qp.ros.topics import CAMERA, MOTION
+
+CONTROL_MODE = "px4_msgs/msg/VehicleControlMode"
+#: Role of PX4's mode, beside those of `ibvs_qp.ros.topics.ACCEPTED`.
+MODE = "mode"
+#: Places of flag_armed and flag_control_offboard_enabled in CDR [bytes]: behind header and time stamp.
+_ARMED, _OFFBOARD = 12, 16
+_CDR = (b"\0\0", b"\0\1")
+
+
+class ControlMode(NamedTuple):
+    """What matters of PX4's mode."""
+
+    armed: bool
+    offboard: bool
+
+    @property
+    def engaged(self) -> bool:
+        """Whether PX4 obeys the bridge's set-points."""
+        return self.armed and self.offboard
+
+
+def control_mode(data: bytes) -> ControlMode:
+    """The two flags of ``px4_msgs/VehicleControlMode``; what follows them differs between versions of PX4.
+
+    Raises:
+        BadMessage: When the bytes are too few, or the flags no booleans.
+    """
+    if len(data) <= _OFFBOARD or data[:2] not in _CDR or max(data[_ARMED : _OFFBOARD + 1]) > 1:
+        raise BadMessage("undecodable")
+    return ControlMode(bool(data[_ARMED]), bool(data[_OFFBOARD]))
+
+
+class Subscription(NamedTuple):
+    """A topic to read, as PX4 or ROS name it."""
+
+    role: str
+    topic: str
+    type_name: str
+    depth: int
+
+
+def subscriptions(config: BridgeConfig) -> tuple[Subscription, ...]:
+    """Topics that the bridge reads."""
+    types = {"imu": config.imu_type, "attitude": config.attitude_type, "wrench": WRENCH, "camera_info": CAMERA_INFO}
+    names = config.topics.names((*MOTION, *CAMERA))
+    found = [
+        Subscription(
+            role,
+            config.namespace + name if name.startswith("/fmu/") else name,
+            types.get(role, IMAGE),
+            PICTURE_DEPTH if role in ("color", "depth") else SAMPLE_DEPTH,
+        )
+        for role, name in names.items()
+    ]
+    mode = Subscription(MODE, f"{config.namespace}/fmu/out/vehicle_control_mode", CONTROL_MODE, SAMPLE_DEPTH)
+    return (*found, mode)
+
+
+class Inputs:
+    """Reads all topics once a tick.
+
+    Attributes:
+        held: Samples and pictures, and the messages that were left out.
+        mode: PX4's mode, None before the first one.
+        arrived_ns: When the last usable message of every role arrived, in the time of the ticks [ns].
+
+    Args:
+        config: Settings.
+        participant: Of the DDS domain.
+        clock: The clock of the stamps [ns].
+    """
+
+    def __init__(self, config: BridgeConfig, participant: Participant, clock: Callable[[], int]) -> None:
+        self._readers = {each.role: (participant.reader(*each[1:]), each) for each in subscriptions(config)}
+        self._attitude_in_imu = not config.topics.attitude
+        self.held = HeldSamples(config.topics, clock)
+        self.mode: ControlMode | None = None
+        self.arrived_ns: dict[str, int] = {}
+
+    def poll(self, now_ns: int) -> None:
+        """Take what arrived since the last tick; what cannot be used is counted."""
+        for role, (reader, topic) in self._readers.items():
+            for data in reader.take():
+                try:
+                    if role == MODE:
+                        self.mode = control_mode(data)
+                    elif not self.held.add(role, decoded(data, topic.type_name)):
+                        continue
+                except BadMessage as error:
+                    self.held.ignore(role, str(error))
+                    continue
+                self.arrived_ns[role] = now_ns
+                if role == "imu" and self._attitude_in_imu:
+                    self.arrived_ns["attitude"] = now_ns
+
+    def older(self, role: str, now_ns: int, limit_s: float) -> bool:
+        """Whether the last usable message of a role arrived longer ago than a limit [s], or never."""
+        arrived = self.arrived_ns.get(role)
+        return arrived is None or now_ns - arrived > round(1e9 * limit_s)

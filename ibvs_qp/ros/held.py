@@ -1,0 +1,133 @@
+"""From single messages to sensor frames: the last received samples are held; a picture is given once."""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ibvs_qp.measurement import RgbdFrame, SensorFrame
+from ibvs_qp.ros import pictures, samples
+from ibvs_qp.ros.messages import BadMessage
+from ibvs_qp.ros.stamps import from_ros
+from ibvs_qp.ros.topics import Topics
+
+#: Colour and depth pictures that wait for their partner; they arrive within a frame of each other.
+WAITING = 4
+#: A stamp of the system's clock lies at most this far ahead of it, and this far behind [ns].
+LEAD_NS, LATEST_NS = 20_000_000, 1_000_000_000
+
+
+class HeldSamples:
+    """Collects messages in the order of their arrival.
+
+    A frame has the last received sample of every sensor with its own stamp, whatever the order of the stamps: what is
+    late or stale is for the pilot to judge. Colour and depth are paired by the nearest stamps within ``pair_s``. A
+    message that cannot be used is left out and counted.
+
+    Attributes:
+        last: Last sample of each role.
+        ignored: Messages left out, by role and reason.
+        distortion: Of the last camera info.
+
+    Args:
+        topics: Axes of the force sensor, source of the attitude, and tolerance of the pairs.
+        clock: Time that stamps are compared with [ns]; None compares nothing, as for a recording.
+    """
+
+    def __init__(self, topics: Topics, clock: Callable[[], int] | None = None) -> None:
+        self._topics, self._clock = topics, clock
+        self.last: dict[str, samples.Sample] = {}
+        self.ignored = Counter[str]()
+        self.distortion: tuple[float, ...] = ()
+        self._intrinsics: tuple[float, float, float, float] | None = None
+        self._waiting: dict[str, deque[tuple[int, Any]]] = {name: deque(maxlen=WAITING) for name in ("color", "depth")}
+        self._picture: RgbdFrame | None = None
+
+    def add(self, role: str, value: Any) -> bool:
+        """Take a decoded message of a role of `ibvs_qp.ros.topics.ACCEPTED`; False if it cannot be used."""
+        try:
+            if role in self._waiting:
+                self._add_picture(role, value)
+            elif role == "camera_info":
+                self._intrinsics = pictures.to_intrinsics(value)
+                self.distortion = tuple(float(entry) for entry in value.d)
+            else:
+                self._add_sample(role, value)
+        except BadMessage as error:
+            self.ignore(role, str(error))
+            return False
+        except Exception:  # a bag may define a type of this name without the fields
+            self.ignore(role, "fields are not those of its type")
+            return False
+        return True
+
+    def ignore(self, role: str, reason: str) -> None:
+        """Count a message that is left out."""
+        self.ignored[f"{role}: {reason}"] += 1
+
+    def frame(self, stamp_ns: int) -> SensorFrame | None:
+        """Frame of a tick, with a picture that no frame had; None until every sensor was received."""
+        if any(role not in self.last for role in ("imu", "attitude", "wrench")):
+            return None
+        inertial, attitude, wrench = (self.last[role] for role in ("imu", "attitude", "wrench"))
+        return SensorFrame(
+            stamp_ns=stamp_ns,
+            attitude=attitude.values["attitude"],
+            angular_velocity=inertial.values["angular_velocity"],
+            specific_force=inertial.values["specific_force"],
+            wrench=wrench.values["wrench"],
+            wrench_stamp_ns=wrench.stamp_ns,
+            image=self.take_picture(),
+            attitude_stamp_ns=attitude.stamp_ns,
+            imu_stamp_ns=inertial.stamp_ns,
+        )
+
+    def take_picture(self) -> RgbdFrame | None:
+        """The last complete picture, once."""
+        picture, self._picture = self._picture, None
+        return picture
+
+    def _add_sample(self, role: str, value: Any) -> None:
+        if role == "imu":
+            sample = samples.inertial(value)
+            if not self._topics.attitude:
+                if "attitude" not in sample.values:
+                    raise BadMessage("has no orientation, and there is no attitude topic")
+                self._check_clock(sample.stamp_ns)
+                self.last["attitude"] = sample
+        elif role == "attitude":
+            sample = samples.attitude(value)
+        else:
+            sample = samples.wrench(value, self._topics.wrench_axes, self._topics.wrench_on)
+        self._check_clock(sample.stamp_ns)
+        self.last[role] = sample
+
+    def _check_clock(self, stamp_ns: int) -> None:
+        if self._clock is not None and not -LEAD_NS <= self._clock() - stamp_ns <= LATEST_NS:
+            raise BadMessage("stamp is not of this computer's clock, or too old")
+
+    def _add_picture(self, role: str, value: Any) -> None:
+        """Keep a picture, and complete the pair of the nearest stamps."""
+        pixels = pictures.to_rgb(value) if role == "color" else pictures.to_depth(value)
+        stamp = from_ros(value.header.stamp)
+        self._check_clock(stamp)
+        own, other = self._waiting[role], self._waiting["depth" if role == "color" else "color"]
+        nearest = min(other, key=lambda each: abs(each[0] - stamp), default=None)
+        if nearest is None or abs(nearest[0] - stamp) > round(self._topics.pair_s * 1e9):
+            own.append((stamp, pixels))
+            return
+        own.clear()
+        other.clear()
+        color, depth = ((stamp, pixels), nearest) if role == "color" else (nearest, (stamp, pixels))
+        if self._intrinsics is None:
+            raise BadMessage("no camera info yet")
+        self._complete(*color, depth[1], self._intrinsics)
+
+    def _complete(self, stamp_ns: int, rgb: np.ndarray, depth: np.ndarray, intrinsics: tuple[float, ...]) -> None:
+        if rgb.shape[:2] != depth.shape:
+            raise BadMessage("colour and depth differ in size")
+        fx, fy, cx, cy = intrinsics
+        self._picture = RgbdFrame(rgb=rgb, depth=depth, intrinsics=(fx, fy, cx, cy), stamp_ns=stamp_ns)

@@ -1,0 +1,119 @@
+"""``sensor_msgs/Image`` and ``CameraInfo`` to pictures and intrinsics, and back."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+import numpy as np
+
+from ibvs_qp.ros.messages import CAMERA_INFO, IMAGE, BadMessage, message
+from ibvs_qp.ros.stamps import header
+
+#: Channels of the colour encodings, in the order red, green, blue.
+_COLOURS = {
+    "rgb8": (3, (0, 1, 2)),
+    "bgr8": (3, (2, 1, 0)),
+    "rgba8": (4, (0, 1, 2)),
+    "bgra8": (4, (2, 1, 0)),
+    "mono8": (1, (0, 0, 0)),
+}
+#: Numbers of the depth encodings, and their unit [m] (REP 118).
+_DEPTHS = {"16UC1": ("u2", 1e-3), "32FC1": ("f4", 1.0)}
+#: Longest side of a picture [px].
+LONGEST_SIDE = 4096
+
+
+def to_rgb(image: Any) -> np.ndarray:
+    """Colour, uint8 (H, W, 3).
+
+    Raises:
+        BadMessage: For another encoding, or a size that does not fit the data.
+    """
+    if image.encoding not in _COLOURS:
+        raise BadMessage("encoding is no colour of 8 bits")
+    channels, order = _COLOURS[image.encoding]
+    pixels = _rows(image, channels).reshape(image.height, image.width, channels)
+    return np.ascontiguousarray(pixels[..., order])
+
+
+def to_depth(image: Any) -> np.ndarray:
+    """Depth [m], float32 (H, W), 0 where invalid.
+
+    Raises:
+        BadMessage: For another encoding, or a size that does not fit the data.
+    """
+    if image.encoding not in _DEPTHS:
+        raise BadMessage("encoding is not 16UC1 or 32FC1")
+    kind, unit = _DEPTHS[image.encoding]
+    number = np.dtype(kind).newbyteorder(">" if image.is_bigendian else "<")
+    metres = _rows(image, number.itemsize).view(number).astype(np.float32)
+    if unit != 1.0:
+        metres *= np.float32(unit)
+    return np.where(np.isfinite(metres) & (metres > 0.0), metres, np.float32(0.0))
+
+
+def to_intrinsics(info: Any) -> tuple[float, float, float, float]:
+    """(fx, fy, cx, cy) [px] of the raw picture.
+
+    Raises:
+        BadMessage: When they are no camera matrix.
+    """
+    k = np.asarray(info.k, float)
+    if not (np.isfinite(k).all() and min(k[0], k[4]) > 1.0):
+        raise BadMessage("no camera matrix")
+    return float(k[0]), float(k[4]), float(k[2]), float(k[5])
+
+
+def from_rgb(rgb: np.ndarray, stamp_ns: int) -> Any:
+    """``sensor_msgs/Image`` in rgb8."""
+    return _image(np.ascontiguousarray(rgb, np.uint8), "rgb8", stamp_ns)
+
+
+def from_depth(depth: np.ndarray, stamp_ns: int) -> Any:
+    """``sensor_msgs/Image`` in 32FC1: depth [m] without rounding."""
+    return _image(np.ascontiguousarray(depth, np.float32), "32FC1", stamp_ns)
+
+
+def from_intrinsics(intrinsics: tuple[float, ...], shape: tuple[int, ...], stamp_ns: int) -> Any:
+    """``sensor_msgs/CameraInfo`` of (fx, fy, cx, cy) [px] and a picture's shape, without distortion."""
+    fx, fy, cx, cy = intrinsics
+    k = np.array((fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0))
+    region = message("sensor_msgs/msg/RegionOfInterest", x_offset=0, y_offset=0, height=0, width=0, do_rectify=False)
+    return message(
+        CAMERA_INFO,
+        header=header(stamp_ns, "camera_color_optical_frame"),
+        height=shape[0],
+        width=shape[1],
+        distortion_model="plumb_bob",
+        d=np.zeros(5),
+        k=k,
+        r=np.eye(3).ravel(),
+        p=np.insert(k, (3, 6, 9), 0.0),
+        binning_x=0,
+        binning_y=0,
+        roi=region,
+    )
+
+
+def _rows(image: Any, pixel_bytes: int) -> np.ndarray:
+    """Bytes of the pixels, (H, W pixel_bytes), without the padding of the rows."""
+    height, width, step = int(image.height), int(image.width), int(image.step)
+    if not (1 <= height <= LONGEST_SIDE and 1 <= width <= LONGEST_SIDE):
+        raise BadMessage("size out of range")
+    if step < width * pixel_bytes or len(image.data) != height * step:
+        raise BadMessage("size does not fit the data")
+    return np.ascontiguousarray(np.asarray(image.data).reshape(height, step)[:, : width * pixel_bytes])
+
+
+def _image(pixels: np.ndarray, encoding: str, stamp_ns: int) -> Any:
+    return message(
+        IMAGE,
+        header=header(stamp_ns, "camera_color_optical_frame"),
+        height=pixels.shape[0],
+        width=pixels.shape[1],
+        encoding=encoding,
+        is_bigendian=int(sys.byteorder == "big"),
+        step=pixels.strides[0],
+        data=pixels.reshape(-1).view(np.uint8),
+    )

@@ -1,0 +1,65 @@
+"""Which topic carries what, and in which axes; a TOML file or code sets it."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from dataclasses import dataclass
+
+from ibvs_qp.config.errors import out_of_range
+from ibvs_qp.config.settings import choice, setting, validate
+from ibvs_qp.ros.messages import CAMERA_INFO, IMAGE, IMU, SENSOR_COMBINED, VEHICLE_ATTITUDE, WRENCH
+
+#: Types that every topic may have, the usual one first.
+ACCEPTED = {
+    "imu": (IMU, SENSOR_COMBINED),
+    "attitude": (VEHICLE_ATTITUDE, IMU),
+    "wrench": (WRENCH,),
+    "color": (IMAGE,),
+    "depth": (IMAGE,),
+    "camera_info": (CAMERA_INFO,),
+}
+#: Topics of pictures, and of everything else that a frame needs.
+CAMERA, MOTION = ("color", "depth", "camera_info"), ("imu", "attitude", "wrench")
+_NAME = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Topics:
+    """Topics of a vehicle; the camera's are those of RealSense's ROS wrapper with depth aligned to colour."""
+
+    imu: str = setting("/imu/data", "gyro and accelerometer: sensor_msgs/Imu, or px4_msgs/SensorCombined")
+    attitude: str = setting("", "px4_msgs/VehicleAttitude or sensor_msgs/Imu; empty for the orientation in imu")
+    wrench: str = setting("/ft_sensor/wrench", "force/torque sensor: geometry_msgs/WrenchStamped")
+    color: str = setting("/camera/camera/color/image_raw", "colour: sensor_msgs/Image, 8 bits per channel")
+    depth: str = setting(
+        "/camera/camera/aligned_depth_to_color/image_raw", "depth registered to colour: 16UC1 (mm) or 32FC1 (m)"
+    )
+    camera_info: str = setting("/camera/camera/color/camera_info", "sensor_msgs/CameraInfo of the colour pictures")
+    wrench_axes: str = choice("flu", "axes of the force sensor: front-left-up or front-right-down", ("flu", "frd"))
+    wrench_on: str = choice(
+        "tool", "whom the reported wrench acts on; a push reads +x on the tool", ("tool", "vehicle")
+    )
+    pair_s: float = setting(
+        0.005,
+        "largest difference of the stamps of colour and depth",
+        unit="s",
+        why="aligned ones agree",
+        low=0.0,
+        high=0.1,
+    )
+
+    def __post_init__(self) -> None:
+        """Validate numbers, choices and names."""
+        validate(self)
+        for role in ACCEPTED:
+            if not (_NAME.fullmatch(name := getattr(self, role)) or (name == "" and role == "attitude")):
+                raise out_of_range(role, name, "", "a topic's name begins with / and has letters, digits and _")
+
+    def names(self, roles: tuple[str, ...]) -> dict[str, str]:
+        """Topics by role; without attitude where the IMU's messages have it."""
+        return {role: name for role in roles if (name := getattr(self, role))}
+
+
+#: Topics with PX4's inertial sensors and attitude, as uXRCE-DDS publishes them.
+PX4_TOPICS = dataclasses.replace(Topics(), imu="/fmu/out/sensor_combined", attitude="/fmu/out/vehicle_attitude")
