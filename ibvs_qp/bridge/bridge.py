@@ -19,6 +19,18 @@ from ibvs_qp.validation.self_check import SelfCheck
 _LENS_ERROR = 1e-6
 
 
+def checks(config: BridgeConfig) -> tuple[str, ...]:
+    """What must hold before the bridge is ready, in words."""
+    return (
+        f"imu and attitude arrived within {config.link_timeout_s:g} s, wrench and pictures within "
+        f"{config.sensor_timeout_s:g} s, PX4's mode within {config.mode_timeout_s:g} s",
+        "their stamps are of this computer's clock",
+        "camera_info has the lens of the preset (camera.distortion)",
+        f"the vehicle was at rest or hovered, and for {config.check_s:g} s attitude, gyro and accelerometer agreed",
+        "PX4 was not armed in Offboard mode before",
+    )
+
+
 @dataclass(frozen=True, kw_only=True)
 class BridgeStatus:
     """What the bridge does.
@@ -27,7 +39,7 @@ class BridgeStatus:
         state: Its state.
         reason: Why.
         phase: Phase of the flight, empty unless flying.
-        safety: State of the pilot's supervisor, empty unless flying.
+        safety: State of the pilot's supervisor and its reasons, empty unless flying.
         commands: Set-points sent.
         ignored: Messages left out, by role and reason.
     """
@@ -43,11 +55,14 @@ class BridgeStatus:
 class Bridge:
     """Flies a pilot on DDS messages. `tick` never raises because of a message.
 
+    Attributes:
+        tick_s: Control period [s].
+
     Args:
         config: Settings.
         flight: Configuration of the flight.
         clock: Clock of the stamps [ns]: that of ROS, to which PX4's stamps are synchronised.
-        pilot: Pilot to fly; None builds it. Its perception is loaded here.
+        pilot: Pilot to fly; None builds it. Its perception is loaded here, and prepared for the first picture.
 
     Raises:
         ConfigError: When DDS cannot start, or a setting does not fit the vehicle.
@@ -61,11 +76,13 @@ class Bridge:
         pilot: Pilot | None = None,
     ) -> None:
         self.config, self._flight, self._clock = config, flight, clock
+        self.tick_s = flight.controller.tick_s
         self._outputs = Outputs(config, flight.controller.vehicle)
         participant = Participant(config.domain_id)
         self.inputs, self._publisher = Inputs(config, participant, clock), Publisher(config, participant)
         self.pilot = pilot or Pilot(flight)
         self.pilot.prepare()
+        self._prepared = False  # perception, for pictures of this camera
         self.gate, self._check = Gate(config.check_s), SelfCheck(flight.safety.self_check)
         self._alive_ns, self._next_alive_ns, self._last_ns, self._commands = round(1e9 / config.alive_hz), 0, -1, 0
 
@@ -77,7 +94,7 @@ class Bridge:
             state=self.gate.state,
             reason=self.gate.reason,
             phase=flight.phase if flight else "",
-            safety=str(flight.safety) if flight else "",
+            safety=" ".join((flight.safety, *self.pilot.assurance.supervisor.reasons)) if flight else "",
             commands=self._commands,
             ignored=dict(self.inputs.held.ignored),
         )
@@ -126,9 +143,14 @@ class Bridge:
             found.append("camera.distortion of the preset is not that of camera_info")
         frame = None if lost else held.frame(self._clock())  # takes the picture as well: it is not kept for the flight
         if frame is not None:
+            if frame.image is not None and not self._prepared:
+                self.pilot.prepare(frame.image)
+                self._prepared = True
             dt = 0.0 if self._last_ns < 0 else (now_ns - self._last_ns) * 1e-9
             vectors = frame.attitude, frame.angular_velocity, frame.specific_force
             self._check.inertial(*(vector.tolist() for vector in vectors), dt)
+        if not self._prepared:
+            found.append("a first picture")
         if not self._check.passed:
             found += self._check.faults() or ("rest of the vehicle for the self-check",)
         return found

@@ -131,6 +131,7 @@ def _check_text(words: list[str]) -> None:
 
 def _commands() -> dict[str, type[Command]]:
     from sim.commands.bench import Bench
+    from sim.commands.bridge import BridgeCommand
     from sim.commands.compare import Compare
     from sim.commands.detect import Detect
     from sim.commands.experiment import ExperimentCommand
@@ -152,6 +153,7 @@ def _commands() -> dict[str, type[Command]]:
         "tune": Tune,
         "faults": Faults,
         "vehicle": Vehicle,
+        "bridge": BridgeCommand,
     }
 
 

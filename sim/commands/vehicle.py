@@ -46,7 +46,7 @@ class Vehicle:
 
         if self.picture is not None and self.picture.suffix not in _PICTURES:
             raise out_of_range("--picture", str(self.picture), "", f"its name ends in {', '.join(_PICTURES)}")
-        vehicle = _read(self.file)
+        vehicle = read_vehicle(self.file)
         tip, limits = np.array(vehicle.tip_position_m), (vehicle.thrust_min, vehicle.thrust_max)
         found = actuation(vehicle.geometry, vehicle.mass_kg * GRAVITY, tip, *limits)
         if self.px4 is not None:
@@ -62,7 +62,7 @@ class Vehicle:
         return 0
 
 
-def _read(file: Path) -> VehicleParams:
+def read_vehicle(file: Path) -> VehicleParams:
     """Vehicle of a preset, of a file with [vehicle], or of PX4's parameters, whose rest is that of the Tarot T960."""
     from ibvs_qp.adapters.px4_rotors import read_px4
     from ibvs_qp.config.errors import ConfigError

@@ -1,0 +1,141 @@
+"""``ibvs-qp bridge``: fly a vehicle on PX4 over DDS; experimental."""
+
+from __future__ import annotations
+
+import dataclasses
+import gc
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from ibvs_qp.config.errors import out_of_range
+from sim.commands.options import flag, optional, preset_file
+
+if TYPE_CHECKING:
+    from ibvs_qp.bridge.bridge import Bridge
+    from ibvs_qp.bridge.config import BridgeConfig
+    from ibvs_qp.pilot import PilotConfig
+    from ibvs_qp.pilot.runner import Timing
+
+#: Longest run [s], a day, and time between two lines about a state that lasts [s].
+_LONGEST_S, _REPORT_S = 86400.0, 5.0
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class BridgeCommand:
+    """Fly a vehicle on PX4 over DDS, without ROS; experimental, never flown on hardware (docs/px4.md).
+
+    Example: ibvs-qp bridge --preset tarot_t960_qp --dry-run
+    """
+
+    preset: Annotated[Path, optional("FILE")] = Path("tarot_t960_qp")
+    """Preset of the flight, or the name of a shipped one; default: tarot_t960_qp."""
+    vehicle: Annotated[Path | None, optional("FILE")] = None
+    """Vehicle in place of the preset's: as of ``ibvs-qp vehicle``."""
+    config: Annotated[Path | None, optional("FILE")] = None
+    """Topics, output, time-outs and thrust curve of the bridge (TOML); default: PX4's topics and a RealSense."""
+    duration: Annotated[float | None, optional("S")] = None
+    """End after this time; default: at Ctrl-C."""
+    dry_run: Annotated[bool, flag] = False
+    """Print topics, types and checks, and connect to nothing."""
+    json: Annotated[bool, flag] = False
+    """Print one JSON line on standard output at the end, and nothing else."""
+
+    def run(self, words: list[str]) -> int:
+        """Fly, or print what would be done."""
+        from ibvs_qp.bridge.config import BridgeConfig
+        from sim.report.rundir import as_json
+
+        if self.duration is not None and not 0.0 < self.duration <= _LONGEST_S:
+            raise out_of_range("--duration", self.duration, "s", f"it lies above 0 and is at most {_LONGEST_S:g} s")
+        config = BridgeConfig() if self.config is None else BridgeConfig.from_toml(self.config)
+        flight = self._flight()
+        if self.dry_run:
+            plan = _plan(config, flight)
+            print(as_json(plan)) if self.json else _show(plan)
+            return 0
+        from ibvs_qp.bridge.bridge import Bridge
+
+        bridge = Bridge(config, flight)
+        timing = _fly(bridge, self.duration, quiet=self.json)
+        if self.json:
+            print(as_json({"schema": 1, **dataclasses.asdict(bridge.status), "timing": dataclasses.asdict(timing)}))
+        return 0
+
+    def _flight(self) -> PilotConfig:
+        from ibvs_qp.pilot import PilotConfig
+        from sim.commands.vehicle import read_vehicle
+
+        file = preset_file(self.preset)
+        assert file is not None
+        flight = PilotConfig.from_toml(file)
+        if self.vehicle is None:
+            return flight
+        controller = dataclasses.replace(flight.controller, vehicle=read_vehicle(self.vehicle))
+        return dataclasses.replace(flight, controller=controller)
+
+
+def _fly(bridge: Bridge, duration_s: float | None, *, quiet: bool) -> Timing:
+    from ibvs_qp.pilot.runner import run
+
+    reported_ns, end_ns, last = 0, None, ""
+
+    def tick(now_ns: int) -> bool:
+        nonlocal reported_ns, end_ns, last
+        bridge.tick(now_ns)
+        if end_ns is None:
+            end_ns = -1 if duration_s is None else now_ns + round(1e9 * duration_s)
+        state = f"{bridge.gate.state}: {bridge.gate.reason}"
+        if not quiet and (state != last or now_ns - reported_ns > round(1e9 * _REPORT_S)):
+            reported_ns, last = now_ns, state
+            print(_line(bridge), flush=True)
+        return not 0 < end_ns <= now_ns
+
+    gc.collect()
+    gc.freeze()  # what is loaded stays: the collector would visit it during the flight, for 20 ms each time
+    return run(tick, 1.0 / bridge.tick_s)
+
+
+def _line(bridge: Bridge) -> str:
+    status = bridge.status
+    flight = f"; phase {status.phase}, {status.safety}" if status.phase else ""
+    ignored = f"; ignored {sum(status.ignored.values())} messages" if status.ignored else ""
+    return f"{status.state}: {status.reason}{flight}; {status.commands} commands{ignored}"
+
+
+def _plan(config: BridgeConfig, flight: PilotConfig) -> dict[str, Any]:
+    """What the bridge reads, writes and waits for; refuses what does not fit the vehicle."""
+    from ibvs_qp.bridge.bridge import checks
+    from ibvs_qp.bridge.dds import dds_topic, dds_type
+    from ibvs_qp.bridge.inputs import subscriptions
+    from ibvs_qp.bridge.outputs import Outputs, publications
+
+    Outputs(config, flight.controller.vehicle)
+    reads = {each.topic: each.type_name for each in subscriptions(config)}
+
+    def named(topics: dict[str, str]) -> list[dict[str, str]]:
+        return [
+            {"topic": topic, "type": name, "dds_topic": dds_topic(topic), "dds_type": dds_type(name)}
+            for topic, name in topics.items()
+        ]
+
+    return {
+        "schema": 1,
+        "domain_id": config.domain_id,
+        "rate_hz": 1.0 / flight.controller.tick_s,
+        "subscribes": named(reads),
+        "publishes": named(publications(config)),
+        "checks": list(checks(config)),
+    }
+
+
+def _show(plan: dict[str, Any]) -> None:
+    width = max(len(each["topic"]) for title in ("subscribes", "publishes") for each in plan[title])
+    for title in ("subscribes", "publishes"):
+        for each in plan[title]:
+            print(f"{title:10}  {each['topic']:{width}}  {each['type']}")
+    example = plan["publishes"][0]
+    print(f"in DDS      domain {plan['domain_id']}; {example['dds_topic']} of {example['dds_type']}, and so on")
+    print(f"            best effort, volatile, keep last; {plan['rate_hz']:g} Hz")
+    print("PX4 enters Offboard mode only with the bridge's proof of life, which begins when:")
+    for check in plan["checks"]:
+        print(f"  - {check}")
