@@ -3,25 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from ibvs_qp.bridge.config import BridgeConfig
 from ibvs_qp.bridge.dds import PICTURE_DEPTH, SAMPLE_DEPTH, Participant
 from ibvs_qp.ros.held import HeldSamples
 from ibvs_qp.ros.messages import CAMERA_INFO, IMAGE, WRENCH, BadMessage, decoded
+from ibvs_qp.ros.stamps import from_px4
 from ibvs_qp.ros.topics import CAMERA, MOTION
 
 CONTROL_MODE = "px4_msgs/msg/VehicleControlMode"
 #: Role of PX4's mode, beside those of `ibvs_qp.ros.topics.ACCEPTED`.
 MODE = "mode"
-#: Places of flag_armed and flag_control_offboard_enabled in CDR [bytes]: behind header and time stamp.
-_ARMED, _OFFBOARD = 12, 16
-_CDR = (b"\0\0", b"\0\1")
+#: Places of timestamp, flag_armed and flag_control_offboard_enabled in CDR [bytes].
+_TIMESTAMP, _ARMED, _OFFBOARD = 4, 12, 16
+#: Byte orders by the header of CDR.
+_ORDERS: dict[bytes, Literal["big", "little"]] = {b"\0\0": "big", b"\0\1": "little"}
 
 
 class ControlMode(NamedTuple):
     """What matters of PX4's mode."""
 
+    stamp_ns: int
     armed: bool
     offboard: bool
 
@@ -32,14 +35,16 @@ class ControlMode(NamedTuple):
 
 
 def control_mode(data: bytes) -> ControlMode:
-    """The two flags of ``px4_msgs/VehicleControlMode``; what follows them differs between versions of PX4.
+    """Time and two flags of ``px4_msgs/VehicleControlMode``; what follows them differs between versions of PX4.
 
     Raises:
-        BadMessage: When the bytes are too few, or the flags no booleans.
+        BadMessage: When the bytes are too few, the flags no booleans, or the time is none.
     """
-    if len(data) <= _OFFBOARD or data[:2] not in _CDR or max(data[_ARMED : _OFFBOARD + 1]) > 1:
+    order = _ORDERS.get(data[:2])
+    if len(data) <= _OFFBOARD or order is None or max(data[_ARMED : _OFFBOARD + 1]) > 1:
         raise BadMessage("undecodable")
-    return ControlMode(bool(data[_ARMED]), bool(data[_OFFBOARD]))
+    stamp = from_px4(int.from_bytes(data[_TIMESTAMP:_ARMED], order))
+    return ControlMode(stamp, bool(data[_ARMED]), bool(data[_OFFBOARD]))
 
 
 class Subscription(NamedTuple):
@@ -95,7 +100,9 @@ class Inputs:
             for data in reader.take():
                 try:
                     if role == MODE:
-                        self.mode = control_mode(data)
+                        mode = control_mode(data)
+                        self.held.check_clock(mode.stamp_ns)  # DDS makes a boolean of any byte, but no time of ours
+                        self.mode = mode
                     elif not self.held.add(role, decoded(data, topic.type_name)):
                         continue
                 except BadMessage as error:

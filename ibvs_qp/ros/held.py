@@ -46,6 +46,7 @@ class HeldSamples:
         self._waiting: dict[str, deque[tuple[int, Any]]] = {name: deque(maxlen=WAITING) for name in ("color", "depth")}
         self._picture: RgbdFrame | None = None
 
+    @np.errstate(all="ignore")  # a host may have numpy raise for the NaN of a message
     def add(self, role: str, value: Any) -> bool:
         """Take a decoded message of a role of `ibvs_qp.ros.topics.ACCEPTED`; False if it cannot be used."""
         try:
@@ -90,30 +91,31 @@ class HeldSamples:
         picture, self._picture = self._picture, None
         return picture
 
+    def check_clock(self, stamp_ns: int) -> None:
+        """Raise BadMessage for a stamp that is not of the clock, or too old."""
+        if self._clock is not None and not -LEAD_NS <= self._clock() - stamp_ns <= LATEST_NS:
+            raise BadMessage("stamp is not of this computer's clock, or too old")
+
     def _add_sample(self, role: str, value: Any) -> None:
         if role == "imu":
             sample = samples.inertial(value)
             if not self._topics.attitude:
                 if "attitude" not in sample.values:
                     raise BadMessage("has no orientation, and there is no attitude topic")
-                self._check_clock(sample.stamp_ns)
+                self.check_clock(sample.stamp_ns)
                 self.last["attitude"] = sample
         elif role == "attitude":
             sample = samples.attitude(value)
         else:
             sample = samples.wrench(value, self._topics.wrench_axes, self._topics.wrench_on)
-        self._check_clock(sample.stamp_ns)
+        self.check_clock(sample.stamp_ns)
         self.last[role] = sample
-
-    def _check_clock(self, stamp_ns: int) -> None:
-        if self._clock is not None and not -LEAD_NS <= self._clock() - stamp_ns <= LATEST_NS:
-            raise BadMessage("stamp is not of this computer's clock, or too old")
 
     def _add_picture(self, role: str, value: Any) -> None:
         """Keep a picture, and complete the pair of the nearest stamps."""
         pixels = pictures.to_rgb(value) if role == "color" else pictures.to_depth(value)
         stamp = from_ros(value.header.stamp)
-        self._check_clock(stamp)
+        self.check_clock(stamp)
         own, other = self._waiting[role], self._waiting["depth" if role == "color" else "color"]
         nearest = min(other, key=lambda each: abs(each[0] - stamp), default=None)
         if nearest is None or abs(nearest[0] - stamp) > round(self._topics.pair_s * 1e9):

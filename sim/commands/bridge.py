@@ -55,10 +55,13 @@ class BridgeCommand:
             return 0
         from ibvs_qp.bridge.bridge import Bridge
 
-        bridge = Bridge(config, flight)
-        timing = _fly(bridge, self.duration, quiet=self.json)
-        if self.json:
-            print(as_json({"schema": 1, **dataclasses.asdict(bridge.status), "timing": dataclasses.asdict(timing)}))
+        bridge, timing = Bridge(config, flight), None
+        try:
+            timing = _fly(bridge, self.duration, quiet=self.json)
+        finally:
+            if self.json:
+                taken = None if timing is None else dataclasses.asdict(timing)
+                print(as_json({"schema": 1, **dataclasses.asdict(bridge.status), "timing": taken}))
         return 0
 
     def _flight(self) -> PilotConfig:

@@ -1,4 +1,4 @@
-"""``ibvs-qp detect``: surface plane, lines and guides in one frame or a folder of frames."""
+"""``ibvs-qp detect``: surface plane, lines and guides in one frame, a folder of frames or a ROS bag."""
 
 from __future__ import annotations
 
@@ -7,12 +7,17 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
+import tyro
+
 from ibvs_qp.config.errors import ConfigError
 from sim.commands.options import check_seed, flag, optional
 from sim.detection.methods import METHODS
 
 if TYPE_CHECKING:
+    from rich.status import Status
+
     from sim.detection.manifest import FrameEntry
+    from sim.detection.run import FrameResult
 
 
 #: Largest coefficient of a lens [-]: those of wide lenses stay below 10.
@@ -23,12 +28,16 @@ _CAMERA = ("fx", "fy", "cx", "cy")
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Detect:
-    """Find the surface and its edges in one RGB-D frame, or in every frame of a folder with a manifest.csv.
+    """Find the surface and its edges in one RGB-D frame, in a folder of frames with a manifest.csv, or in a ROS 2 bag.
 
     Example: ibvs-qp detect --rgb c.png --depth d.png --fx 607 --fy 607 --cx 321 --cy 242 --depth-units-per-metre 1000
     --seed-pixel 270 150 --overlay pictures
     """
 
+    bag: Annotated[Path | None, tyro.conf.Positional, optional("BAG")] = None
+    """ROS 2 bag: a folder, or a single .mcap or .db3 file; its pictures are a motion sequence (needs the extra ros)."""
+    topics: Annotated[Path | None, optional("FILE")] = None
+    """Topics of the bag (TOML: color, depth, camera_info); default: those of RealSense's ROS wrapper."""
     rgb: Annotated[Path | None, optional("FILE")] = None
     """Colour picture of one frame (8 or 16 bits)."""
     depth: Annotated[Path | None, optional("FILE")] = None
@@ -69,28 +78,15 @@ class Detect:
         import cv2
         from rich.console import Console
 
-        from sim.detection.overlay import write_overlay
         from sim.detection.report import as_json, frame_table, refusals
-        from sim.detection.run import detect_frames
-        from sim.evaluate.table import plain
 
         check_seed(self.seed)
         cv2.setNumThreads(1)
-        entries = self._entries()
+        self._check()
         folder = None if self.overlay is None else _folder(self.overlay)
         notes = Console(stderr=True, quiet=self.json)
         with notes.status("Detecting ...") as status:
-            frames = detect_frames(
-                entries,
-                self.method,
-                every=self.all,
-                track=not self.no_track,
-                distortion=self.distortion,
-                started=lambda entry: status.update(f"Detecting in {plain(entry.color)} ..."),
-            )
-        if folder is not None:
-            for seen in frames:
-                write_overlay(seen, folder)
+            frames = self._files(status, folder) if self.bag is None else self._pictures(self.bag, status, folder)
         if self.json:
             print(as_json(frames, self.method))
         else:
@@ -101,18 +97,73 @@ class Detect:
                 print(f"Pictures: {folder}")
         return 0
 
-    def _entries(self) -> list[FrameEntry]:
-        """Frames of the command line, checked."""
-        from sim.detection.manifest import LARGEST_PX, FrameEntry, read_manifest
-        from sim.detection.pictures import read_frame
+    def _files(self, status: Status, folder: Path | None) -> list[FrameResult]:
+        """Results of one frame or a folder."""
+        from sim.detection.overlay import write_overlay
+        from sim.detection.run import detect_frames
+        from sim.evaluate.table import plain
 
+        frames = detect_frames(
+            self._entries(),
+            self.method,
+            every=self.all,
+            track=not self.no_track,
+            distortion=self.distortion,
+            started=lambda entry: status.update(f"Detecting in {plain(entry.color)} ..."),
+        )
+        if folder is not None:
+            for seen in frames:
+                write_overlay(seen, folder)
+        return frames
+
+    def _pictures(self, path: Path, status: Status, folder: Path | None) -> list[FrameResult]:
+        """Results of the pictures of a bag."""
+        from ibvs_qp.config.settings import load_toml
+        from ibvs_qp.ros.bag import Bag
+        from ibvs_qp.ros.topics import Topics
+        from sim.detection.overlay import write_overlay
+        from sim.detection.run import detect_bag
+        from sim.evaluate.table import plain
+
+        bag = Bag(path, None if self.topics is None else load_toml(Topics, self.topics))
+
+        def finished(seen: FrameResult) -> None:
+            status.update(f"Detected in {plain(seen.entry.color)} ...")
+            if folder is not None:
+                write_overlay(seen, folder)
+
+        frames = detect_bag(
+            bag.pictures(),
+            path.name,
+            self.method,
+            every=self.all,
+            track=not self.no_track,
+            seed=self.seed_pixel,
+            distortion=self.distortion,
+            finished=finished,
+        )
+        if not frames:
+            ignored = ", ".join(f"{count} {reason}" for reason, count in bag.held.ignored.items())
+            raise ConfigError(f"{path} has no pair of colour and depth pictures" + (f" ({ignored})" if ignored else ""))
+        return frames
+
+    def _check(self) -> None:
+        """Raise ConfigError for options that contradict each other."""
         if self.distortion is not None and not all(abs(value) <= _LARGEST_DISTORTION for value in self.distortion):
             limit = f"of size {_LARGEST_DISTORTION:g} at most"
             raise ConfigError(f"--distortion must be five finite numbers {limit}: k1 k2 p1 p2 k3")
         if self.track and self.no_track:
             raise ConfigError("--track and --no-track exclude each other")
-        if (self.rgb is None) == (self.sequence is None):
-            raise ConfigError("give either --rgb FILE with its camera, or --sequence DIR")
+        if sum(each is not None for each in (self.bag, self.rgb, self.sequence)) != 1:
+            raise ConfigError("give either a ROS bag, --rgb FILE with its camera, or --sequence DIR")
+        if self.topics is not None and self.bag is None:
+            raise ConfigError("--topics is for a ROS bag")
+
+    def _entries(self) -> list[FrameEntry]:
+        """Frames of the command line, checked."""
+        from sim.detection.manifest import LARGEST_PX, FrameEntry, read_manifest
+        from sim.detection.pictures import read_frame
+
         if self.sequence is not None:
             return read_manifest(self.sequence)
         assert self.rgb is not None

@@ -1,10 +1,11 @@
-"""Frames through a method: in order within a motion sequence, alone otherwise."""
+"""Frames through a method: in order within a motion sequence, alone otherwise; of files or of a bag."""
 
 from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import Any
 
 from ibvs_qp.measurement import RgbdFrame
@@ -23,7 +24,7 @@ class FrameResult:
     """A frame and its detection."""
 
     entry: FrameEntry  # the entry of the manifest
-    frame: RgbdFrame | None  # the pictures, or None if they are unreadable
+    frame: RgbdFrame | None  # the pictures, or None if they are unreadable, or from a bag
     detection: Any  # result of the method, with the candidates to report
     time_ms: float  # wall-clock time of the method, without reading and without the list of all lines [ms]
 
@@ -59,6 +60,45 @@ def detect_frames(
     return [results[index] for index in range(len(entries))]
 
 
+def detect_bag(
+    pictures: Iterable[RgbdFrame],
+    name: str,
+    method_name: str,
+    *,
+    every: bool,
+    track: bool,
+    seed: tuple[float, float] | None = None,
+    distortion: tuple[float, ...] | None = None,
+    finished: Callable[[FrameResult], None] | None = None,
+) -> list[FrameResult]:
+    """Results of the pictures of a bag, one motion sequence; the pictures themselves are not kept.
+
+    Args:
+        pictures: In their order.
+        name: Of the bag: a picture is named NAME/NUMBER_STAMP.
+        method_name, every, track, distortion: As of `detect_frames`.
+        seed: Pixel on the surface in every picture, or None.
+        finished: Called with every result, which then has its picture.
+    """
+    results, method = list[FrameResult](), make_method(method_name)
+    follows = track and hasattr(method, "follow")
+    for index, frame in enumerate(pictures):
+        entry = FrameEntry(
+            color=f"{name}/{index:06d}_{frame.stamp_ns}",
+            depth="",
+            folder=Path(),
+            intrinsics=frame.intrinsics,
+            depth_units_per_metre=1.0,
+            seed=seed,
+        )
+        result = _found(entry, frame, method, every=every, follows=follows)
+        result = result if distortion is None else _straightened(result, distortion)
+        if finished is not None:
+            finished(result)
+        results.append(dataclasses.replace(result, frame=None))
+    return results
+
+
 def _detect(entry: FrameEntry, method: Any, *, every: bool, follows: bool, stamp_ns: int) -> FrameResult:
     color, depth = entry.folder / entry.color, entry.folder / entry.depth if entry.depth else None
     try:
@@ -67,6 +107,10 @@ def _detect(entry: FrameEntry, method: Any, *, every: bool, follows: bool, stamp
         if follows:
             method.reset()
         return FrameResult(entry=entry, frame=None, detection=Detection(refused=str(error)), time_ms=0.0)
+    return _found(entry, frame, method, every=every, follows=follows)
+
+
+def _found(entry: FrameEntry, frame: RgbdFrame, method: Any, *, every: bool, follows: bool) -> FrameResult:
     began = time.perf_counter()
     detection = (method.follow if follows else method.detect)(frame, entry.seed)
     elapsed = 1e3 * (time.perf_counter() - began)

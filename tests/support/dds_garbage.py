@@ -21,7 +21,7 @@ import numpy as np
 
 from ibvs_qp.bridge.config import BridgeConfig
 from ibvs_qp.bridge.dds import Participant, Writer
-from ibvs_qp.bridge.inputs import MODE, subscriptions
+from ibvs_qp.bridge.inputs import subscriptions
 from ibvs_qp.ros import pictures, samples
 from ibvs_qp.ros.messages import encoded
 
@@ -53,12 +53,10 @@ class Injector:
             self._socket.sendto(packet, ("127.0.0.1", port))
 
 
-def broken(role: str, rng: random.Random) -> bytes:
+def broken(rng: random.Random) -> bytes:
     """Bytes that are no message of any topic."""
     header = rng.choice((b"\0\1\0\0", b"\0\1\0\0", b"\0\0\0\0", b"\0\7\0\0", rng.randbytes(4)))
-    data = header + rng.randbytes(rng.choice((0, 1, 5, 12, 19, rng.randrange(1500, 3000))))
-    # Two flags of PX4's mode that are 0 or 1 would be a message.
-    return data[:8] + b"\xff" * max(0, len(data) - 8) if role == MODE else data
+    return header + rng.randbytes(rng.choice((0, 1, 5, 12, 19, rng.randrange(1500, 3000))))
 
 
 def wrong(role: str, rng: random.Random) -> Any:
@@ -108,7 +106,7 @@ def main() -> None:
             value = wrong(role, rng) if rng.random() < 0.5 else None
             value = oversized() if value is not None and index % OVERSIZED == 0 and name.endswith("Image") else value
             if value is None:
-                injector.inject(victim, broken(role, rng))
+                injector.inject(victim, broken(rng))
                 sent["injected"] += 1
             else:
                 writer.write_bytes(encoded(value, name))

@@ -1,0 +1,188 @@
+"""What arrives: hostile bytes, clocks and the mode of PX4, without a network."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rosbags", reason="needs the extra ros")
+
+from ibvs_qp.bridge.config import BridgeConfig
+from ibvs_qp.bridge.inputs import MODE, Inputs, control_mode, subscriptions
+from ibvs_qp.ros.messages import IMU, SENSOR_COMBINED, VEHICLE_ATTITUDE, WRENCH, BadMessage, encoded, message
+from ibvs_qp.ros.pictures import from_depth, from_intrinsics, from_rgb
+from ibvs_qp.ros.samples import to_imu, to_wrench
+
+NOW = 1_700_000_000_000_000_000
+
+
+class Queue:
+    """A reader, and a participant of nothing but readers."""
+
+    def __init__(self) -> None:
+        self.data: list[bytes] = []
+        self.readers: dict[str, Queue] = {}
+
+    def reader(self, topic: str, name: str, depth: int) -> Queue:
+        return self.readers.setdefault(topic, Queue())
+
+    def take(self) -> list[bytes]:
+        data, self.data = self.data, []
+        return data
+
+
+class Received:
+    """Inputs with queues in place of DDS."""
+
+    def __init__(self, **settings: object) -> None:
+        self.config, self.queue = BridgeConfig(**settings), Queue()  # type: ignore[arg-type]
+        self.now = NOW
+        self.inputs = Inputs(self.config, self.queue, lambda: self.now)  # type: ignore[arg-type]
+        self.topic = {each.role: each.topic for each in subscriptions(self.config)}
+
+    def send(self, role: str, *data: bytes) -> None:
+        self.queue.readers[self.topic[role]].data += data
+        self.inputs.poll(self.now)
+
+
+def combined(stamp_ns: int, **changes: object) -> bytes:
+    fields: dict[str, object] = {
+        "timestamp": stamp_ns // 1000,
+        "gyro_rad": np.zeros(3, np.float32),
+        "gyro_integral_dt": 4000,
+        "accelerometer_timestamp_relative": 0,
+        "accelerometer_m_s2": np.array([0, 0, -9.81], np.float32),
+        "accelerometer_integral_dt": 4000,
+        "accelerometer_clipping": 0,
+        "gyro_clipping": 0,
+        "accel_calibration_count": 0,
+        "gyro_calibration_count": 0,
+    }
+    return encoded(message(SENSOR_COMBINED, **(fields | changes)), SENSOR_COMBINED)
+
+
+def attitude(stamp_ns: int) -> bytes:
+    q = np.array([1, 0, 0, 0], np.float32)
+    fields = {"timestamp": stamp_ns // 1000, "timestamp_sample": stamp_ns // 1000, "quat_reset_counter": 0}
+    return encoded(message(VEHICLE_ATTITUDE, q=q, delta_q_reset=np.zeros(4, np.float32), **fields), VEHICLE_ATTITUDE)
+
+
+def mode(armed: int, offboard: int, more: int = 10, stamp_ns: int = NOW) -> bytes:
+    return b"\0\1\0\0" + (stamp_ns // 1000).to_bytes(8, "little") + bytes((armed, 0, 1, 0, offboard)) + bytes(more)
+
+
+def wrench(stamp_ns: int) -> bytes:
+    return encoded(to_wrench(stamp_ns, np.arange(6.0), "flu", "tool"), WRENCH)
+
+
+def test_a_frame_has_the_last_samples_with_their_stamps() -> None:
+    received = Received()
+    received.send("imu", combined(NOW - 9_000_000), combined(NOW - 5_000_000))
+    received.send("attitude", attitude(NOW - 3_000_000))
+    assert received.inputs.held.frame(NOW) is None
+    received.send("wrench", wrench(NOW - 1_000_000))
+    frame = received.inputs.held.frame(NOW)
+    assert frame is not None
+    stamps = frame.imu_stamp_ns, frame.attitude_stamp_ns, frame.wrench_stamp_ns, frame.stamp_ns
+    assert stamps == (NOW - 5_000_000, NOW - 3_000_000, NOW - 1_000_000, NOW)
+    np.testing.assert_array_equal(frame.wrench, np.arange(6.0))
+
+
+def test_ros_types_serve_as_well_and_the_imu_may_have_the_attitude() -> None:
+    topics = BridgeConfig().topics
+    received = Received(imu_type=IMU, topics=type(topics)(imu="/imu/data"))
+    value = to_imu(NOW, np.array([1.0, 0, 0, 0]), np.zeros(3), np.zeros(3))
+    received.send("imu", encoded(value, IMU))
+    received.send("wrench", wrench(NOW))
+    frame = received.inputs.held.frame(NOW)
+    assert frame is not None and abs(frame.attitude[0]) == pytest.approx(1.0)
+    assert not received.inputs.older("attitude", NOW, 0.01)
+
+
+def test_a_picture_is_given_once() -> None:
+    received = Received()
+    received.send(
+        "camera_info", encoded(from_intrinsics((9.0, 9.0, 2.0, 1.0), (4, 6), NOW), "sensor_msgs/msg/CameraInfo")
+    )
+    received.send("color", encoded(from_rgb(np.zeros((4, 6, 3), np.uint8), NOW), "sensor_msgs/msg/Image"))
+    received.send("depth", encoded(from_depth(np.ones((4, 6), np.float32), NOW + 4_000_000), "sensor_msgs/msg/Image"))
+    picture = received.inputs.held.take_picture()
+    assert picture is not None and picture.stamp_ns == NOW
+    assert received.inputs.held.take_picture() is None
+
+
+@pytest.mark.parametrize(
+    ("role", "send"), [("imu", combined), ("attitude", attitude), ("wrench", wrench)], ids=["imu", "attitude", "wrench"]
+)
+@pytest.mark.parametrize("offset_ns", [-1_001_000_000, 21_000_000, -NOW + 5_000_000_000])
+def test_stamps_of_another_clock_are_ignored(role: str, send: Callable[[int], bytes], offset_ns: int) -> None:
+    received = Received()
+    received.send(role, send(NOW + offset_ns))
+    assert role not in received.inputs.held.last and received.inputs.older(role, NOW, 1e6)
+    assert dict(received.inputs.held.ignored) == {f"{role}: stamp is not of this computer's clock, or too old": 1}
+
+
+@pytest.mark.parametrize(("armed", "offboard"), [(0, 0), (0, 1), (1, 0), (1, 1)])
+@pytest.mark.parametrize("more", [0, 7, 10, 14])  # the fields behind differ between versions of PX4
+def test_the_mode_of_px4(armed: int, offboard: int, more: int) -> None:
+    assert control_mode(mode(armed, offboard, more)).engaged == bool(armed and offboard)
+
+
+def test_a_mode_of_another_time_does_not_count() -> None:
+    """Random bytes on the topic would otherwise engage the bridge: DDS makes true of every byte but zero."""
+    received = Received()
+    for stamp in (NOW + 10**9, NOW - 2 * 10**9, 0):
+        received.send(MODE, mode(1, 1, stamp_ns=stamp))
+    assert received.inputs.mode is None and received.inputs.older(MODE, NOW, 1e6)
+    received.send(MODE, mode(1, 1))
+    assert received.inputs.mode is not None and received.inputs.mode.engaged
+
+
+@pytest.mark.parametrize("data", [b"", mode(1, 1)[:16], b"\0\7" + mode(1, 1)[2:], mode(2, 1), mode(1, 255)])
+def test_bytes_that_are_no_mode(data: bytes) -> None:
+    with pytest.raises(BadMessage):
+        control_mode(data)
+
+
+def test_a_hundred_thousand_broken_packets_change_nothing() -> None:
+    """Random bytes, and good messages with bytes changed, cut or added: never a raise, and no frame of nonsense."""
+    received, rng = Received(), random.Random(0)
+    good = {
+        "imu": combined(NOW),
+        "attitude": attitude(NOW),
+        "wrench": wrench(NOW),
+        "color": encoded(from_rgb(np.zeros((4, 6, 3), np.uint8), NOW), "sensor_msgs/msg/Image"),
+        "depth": encoded(from_depth(np.ones((4, 6), np.float32), NOW), "sensor_msgs/msg/Image"),
+        "camera_info": encoded(from_intrinsics((9.0, 9.0, 2.0, 1.0), (4, 6), NOW), "sensor_msgs/msg/CameraInfo"),
+        MODE: mode(0, 0),
+    }
+    sent = 0
+    while sent < 100_000:
+        role = rng.choice(list(good))
+        batch = []
+        for _ in range(64):
+            data = bytearray(good[role])
+            if (kind := rng.randrange(4)) == 0:
+                data = bytearray(rng.randbytes(rng.randrange(200)))
+            elif kind == 1:
+                del data[rng.randrange(len(data)) :]
+            elif kind == 2:
+                data += rng.randbytes(rng.randrange(4, 40))
+            else:
+                for _ in range(rng.randrange(1, 20)):
+                    data[rng.randrange(len(data))] = rng.randrange(256)
+            batch.append(bytes(data))
+        received.send(role, *batch)
+        sent += len(batch)
+        frame = received.inputs.held.frame(NOW)
+        if frame is not None:
+            vectors = frame.attitude, frame.angular_velocity, frame.specific_force, frame.wrench
+            assert all(np.isfinite(vector).all() for vector in vectors)
+            assert abs(np.linalg.norm(frame.attitude) - 1.0) < 0.01
+            assert all(abs(s - NOW) <= 10**9 for s in (frame.imu_stamp_ns, frame.wrench_stamp_ns) if s is not None)
+    assert len(received.inputs.held.ignored) < 60  # reasons are few, whatever comes
+    assert sum(received.inputs.held.ignored.values()) > 0.5 * sent
+    assert len(received.inputs.held._waiting["color"]) <= 4

@@ -1,0 +1,71 @@
+"""Commands to PX4's messages."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rosbags", reason="needs the extra ros")
+
+from allocation import control_effectiveness
+from ibvs_qp import Command, ConfigError, Outcome, VehicleParams
+from ibvs_qp.adapters.thrust_curve import ThrustCurve
+from ibvs_qp.bridge.config import BridgeConfig
+from ibvs_qp.bridge.outputs import Outputs, publications
+from ibvs_qp.ros.messages import encoded
+
+VEHICLE = VehicleParams()
+THRUSTS = np.array([1.2, 10.0, 20.0, 30.0, 40.0, 52.56])
+COMMAND = Command(
+    stamp_ns=1,
+    thrusts=THRUSTS,
+    wrench=control_effectiveness(VEHICLE.geometry) @ THRUSTS,
+    outcome=Outcome.SOLVED,
+    mode="free",
+    unallocated_wrench=np.zeros(6),
+)
+NOW, SAMPLE = 5_004_999, 5_000_000  # ns
+
+
+def test_motors_in_px4s_order_with_thrust_as_share_of_full() -> None:
+    ((topic, value),) = Outputs(BridgeConfig(), VEHICLE).setpoints(COMMAND, SAMPLE, NOW).items()
+    assert topic == "/fmu/in/actuator_motors"
+    np.testing.assert_allclose(value.control[:6], THRUSTS / 52.56, rtol=1e-6)
+    assert np.isnan(value.control[6:]).all() and value.control.shape == (12,) and value.reversible_flags == 0
+    assert (value.timestamp, value.timestamp_sample) == (5004, 5000)
+
+
+def test_the_curve_is_inverted_where_px4_does_not() -> None:
+    curve = ThrustCurve(thrust_max_n=60.0, quadratic=0.7)
+    ((_, value),) = Outputs(BridgeConfig(curve=curve), VEHICLE).setpoints(COMMAND, SAMPLE, NOW).items()
+    u = value.control[:6].astype(float)
+    np.testing.assert_allclose(60.0 * (0.7 * u**2 + 0.3 * u), THRUSTS, rtol=1e-5)
+
+
+def test_thrust_and_torque_are_bounded() -> None:
+    outputs = Outputs(BridgeConfig(output="thrust_and_torque"), VEHICLE)
+    values = outputs.setpoints(dataclasses.replace(COMMAND, wrench=1e4 * COMMAND.wrench), SAMPLE, NOW)
+    assert list(values) == ["/fmu/in/vehicle_thrust_setpoint", "/fmu/in/vehicle_torque_setpoint"]
+    for value in values.values():
+        assert (np.abs(value.xyz) <= 1.0).all() and value.xyz.dtype == np.float32
+
+
+@pytest.mark.parametrize(("output", "field"), [("motors", "direct_actuator"), ("thrust_and_torque",) * 2])
+def test_the_proof_of_life_names_the_kind(output: str, field: str) -> None:
+    config = BridgeConfig(output=output, namespace="/uav_1")
+    value = Outputs(config, VEHICLE).alive(NOW)
+    flags = [name for name in vars(value) if getattr(value, name) is True]
+    assert flags == [field] and value.timestamp == 5004
+    names = publications(config)
+    assert all(topic.startswith("/uav_1/fmu/in/") for topic in names)
+    encoded(value, names["/uav_1/fmu/in/offboard_control_mode"])
+
+
+def test_what_does_not_fit_the_vehicle_is_refused() -> None:
+    with pytest.raises(ConfigError, match=r"curve.thrust_max_n = 40.0 N .* at least 52.56 N"):
+        Outputs(BridgeConfig(curve=ThrustCurve(thrust_max_n=40.0)), VEHICLE)
+    for wrong in ({"output": "pwm"}, {"domain_id": 233}, {"link_timeout_s": 0.5}, {"imu_type": "x"}):
+        with pytest.raises(ConfigError, match=next(iter(wrong))):
+            BridgeConfig(**wrong)
