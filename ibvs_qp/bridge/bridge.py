@@ -147,8 +147,8 @@ class Bridge:
                 self.pilot.prepare(frame.image)
                 self._prepared = True
             dt = 0.0 if self._last_ns < 0 else (now_ns - self._last_ns) * 1e-9
-            vectors = frame.attitude, frame.angular_velocity, frame.specific_force
-            self._check.inertial(*(vector.tolist() for vector in vectors), dt)
+            rate, force = frame.angular_velocity.tolist(), frame.specific_force.tolist()
+            self._check.inertial(frame.attitude.tolist(), rate, force, dt)
         if not self._prepared:
             found.append("a first picture")
         if not self._check.passed:

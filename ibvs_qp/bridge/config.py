@@ -8,14 +8,14 @@ from pathlib import Path
 from ibvs_qp.adapters.thrust_curve import ThrustCurve
 from ibvs_qp.config.settings import choice, load_toml, setting, validate
 from ibvs_qp.ros.messages import IMU, SENSOR_COMBINED, VEHICLE_ATTITUDE
-from ibvs_qp.ros.topics import PX4_TOPICS, Topics
+from ibvs_qp.ros.topics import Px4Topics
 
 
 @dataclass(frozen=True, kw_only=True)
 class BridgeConfig:
     """What the bridge reads and writes, and when it stops."""
 
-    topics: Topics = PX4_TOPICS
+    topics: Px4Topics = field(default_factory=Px4Topics)
     imu_type: str = choice(SENSOR_COMBINED, "type of the topic imu", (SENSOR_COMBINED, IMU))
     attitude_type: str = choice(VEHICLE_ATTITUDE, "type of the topic attitude", (VEHICLE_ATTITUDE, IMU))
     output: str = choice(

@@ -91,11 +91,7 @@ class Writer:
 @functools.cache
 def raw_type(name: str) -> Any:
     """The type of a message for DDS, whose samples keep the bytes in ``data``."""
-    from cyclonedds.idl import IdlStruct, make_idl_struct
-
-    nested = _fields(name)
-    kind: Any = make_idl_struct(name.split("/")[2] + "_", dds_type(name).replace("::", "."), nested, dataclassify=False)
-    assert issubclass(kind, IdlStruct)
+    kind = _struct(name)
 
     def keep(self: Any, data: bytes) -> None:
         self.data = bytes(data)
@@ -107,21 +103,23 @@ def raw_type(name: str) -> Any:
     return kind
 
 
-def _fields(name: str) -> dict[str, Any]:
-    return {field: _idl(description) for field, description in typestore().fielddefs[name][1]}
+def _struct(name: str) -> Any:
+    from cyclonedds.idl import make_idl_struct
+
+    fields = {field: _idl(description) for field, description in typestore().fielddefs[name][1]}
+    return make_idl_struct(name.split("/")[2] + "_", dds_type(name).replace("::", "."), fields, dataclassify=False)
 
 
 def _idl(description: Any) -> Any:
     """Type of a field in IDL from its description by rosbags: (kind, details)."""
-    from cyclonedds.idl import make_idl_struct, types
+    from cyclonedds.idl import types
     from rosbags.interfaces import Nodetype
 
     kind, details = description
     if kind == Nodetype.BASE:
         return {"bool": bool, "string": str}.get(details[0]) or getattr(types, details[0])
     if kind == Nodetype.NAME:
-        short, full = details.split("/")[2] + "_", dds_type(details).replace("::", ".")
-        return make_idl_struct(short, full, _fields(details))
+        return _struct(details)
     element, size = _idl(details[0]), details[1]
     return types.array[element, size] if kind == Nodetype.ARRAY else types.sequence[element]
 

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from rosbags.highlevel import AnyReader
     from rosbags.interfaces import Connection
 
-#: Largest metadata and data file of a bag [bytes]: a terabyte holds five hours of raw pictures.
-LARGEST_METADATA, LARGEST_DATA = 4 << 20, 1 << 40
+#: Largest metadata and data file of a bag [bytes]: half a terabyte holds three hours of raw pictures.
+LARGEST_METADATA, LARGEST_DATA = 4 << 20, 1 << 39
 #: An IMU's message makes a frame unless the last frame is younger than this share of a tick: faster IMUs are thinned.
 LEAST_SHARE = 0.75
 _METADATA = "metadata.yaml"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import re
 from dataclasses import dataclass
 
@@ -61,5 +60,9 @@ class Topics:
         return {role: name for role in roles if (name := getattr(self, role))}
 
 
-#: Topics with PX4's inertial sensors and attitude, as uXRCE-DDS publishes them.
-PX4_TOPICS = dataclasses.replace(Topics(), imu="/fmu/out/sensor_combined", attitude="/fmu/out/vehicle_attitude")
+@dataclass(frozen=True, kw_only=True)
+class Px4Topics(Topics):
+    """Topics with PX4's inertial sensors and attitude, as uXRCE-DDS publishes them."""
+
+    imu: str = setting("/fmu/out/sensor_combined", "as of Topics")
+    attitude: str = setting("/fmu/out/vehicle_attitude", "as of Topics")

@@ -76,8 +76,11 @@ def detect_bag(
     Args:
         pictures: In their order.
         name: Of the bag: a picture is named NAME/NUMBER_STAMP.
-        method_name, every, track, distortion: As of `detect_frames`.
+        method_name: As of `detect_frames`, and so the following.
+        every: Whether the candidates are all lines.
+        track: Whether lines are tracked.
         seed: Pixel on the surface in every picture, or None.
+        distortion: Of the lens, or None.
         finished: Called with every result, which then has its picture.
     """
     results, method = list[FrameResult](), make_method(method_name)

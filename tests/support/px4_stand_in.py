@@ -41,7 +41,7 @@ from ibvs_qp.ros.messages import (
     typestore,
 )
 from ibvs_qp.ros.stamps import to_px4
-from ibvs_qp.ros.topics import PX4_TOPICS
+from ibvs_qp.ros.topics import Px4Topics
 
 #: Size, focal length [px] and principal point of the camera.
 SHAPE, FOCAL, CENTRE = (240, 424), 312.6, (211.5, 119.5)
@@ -129,7 +129,7 @@ class Camera:
 
 def run_camera(domain: int, rate_hz: float, camera: Camera, pose: Any) -> None:
     """Publish pictures of the pose that another process writes: position and quaternion."""
-    part, topics = Participant(domain), PX4_TOPICS
+    part, topics = Participant(domain), Px4Topics()
     color, depth = part.writer(topics.color, IMAGE), part.writer(topics.depth, IMAGE)
     info = part.writer(topics.camera_info, CAMERA_INFO)
     while True:
@@ -152,7 +152,7 @@ class StandIn:
         camera = Camera(self.vehicle.wall, self.vehicle.vehicle.camera_position_m)
         arguments = plan.domain, plan.picture_hz, camera, self._pose
         multiprocessing.Process(target=run_camera, args=arguments, daemon=True).start()
-        part, topics = Participant(plan.domain), PX4_TOPICS
+        part, topics = Participant(plan.domain), Px4Topics()
         self._imu = part.writer(topics.imu, SENSOR_COMBINED)
         self._attitude = part.writer(topics.attitude, VEHICLE_ATTITUDE)
         self._wrench = part.writer(topics.wrench, WRENCH)

@@ -15,6 +15,7 @@ from ibvs_qp.bridge.inputs import MODE, Inputs, control_mode, subscriptions
 from ibvs_qp.ros.messages import IMU, SENSOR_COMBINED, VEHICLE_ATTITUDE, WRENCH, BadMessage, encoded, message
 from ibvs_qp.ros.pictures import from_depth, from_intrinsics, from_rgb
 from ibvs_qp.ros.samples import to_imu, to_wrench
+from ibvs_qp.ros.topics import Px4Topics
 
 NOW = 1_700_000_000_000_000_000
 
@@ -92,8 +93,7 @@ def test_a_frame_has_the_last_samples_with_their_stamps() -> None:
 
 
 def test_ros_types_serve_as_well_and_the_imu_may_have_the_attitude() -> None:
-    topics = BridgeConfig().topics
-    received = Received(imu_type=IMU, topics=type(topics)(imu="/imu/data"))
+    received = Received(imu_type=IMU, topics=Px4Topics(imu="/imu/data", attitude=""))
     value = to_imu(NOW, np.array([1.0, 0, 0, 0]), np.zeros(3), np.zeros(3))
     received.send("imu", encoded(value, IMU))
     received.send("wrench", wrench(NOW))

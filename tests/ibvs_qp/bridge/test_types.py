@@ -10,10 +10,8 @@ import pytest
 pytest.importorskip("rosbags", reason="needs the extra ros")
 pytest.importorskip("cyclonedds", reason="needs the extra dds")
 
-from cyclonedds.idl import make_idl_struct
-
 from ibvs_qp.bridge.config import BridgeConfig
-from ibvs_qp.bridge.dds import _fields, dds_topic, dds_type, raw_type
+from ibvs_qp.bridge.dds import _struct, dds_topic, dds_type, raw_type
 from ibvs_qp.bridge.inputs import subscriptions
 from ibvs_qp.bridge.outputs import OFFBOARD_MODE, SETPOINTS
 from ibvs_qp.ros.messages import encoded, message, typestore
@@ -33,7 +31,7 @@ def test_names_are_mangled_as_ros_2_does() -> None:
 
 def filled(name: str, ours: bool) -> Any:
     """A message with a value in every field, for our encoder or for that of Cyclone DDS."""
-    kinds = {} if ours else {name: make_idl_struct("T", "T", _fields(name))}
+    kinds = {} if ours else {name: _struct(name)}
 
     def value(description: Any, kind: Any) -> Any:
         family, details = description

@@ -16,7 +16,7 @@ from ibvs_qp import ConfigError, Pilot, RgbdFrame, SensorFrame, preset
 from ibvs_qp.ros.bag import Bag, commands, sensor_frames
 from ibvs_qp.ros.messages import IMU, WRENCH, encoded, typestore
 from ibvs_qp.ros.samples import to_imu, to_wrench
-from ibvs_qp.ros.topics import PX4_TOPICS, Topics
+from ibvs_qp.ros.topics import Px4Topics, Topics
 from ibvs_qp.ros.write_bag import write_bag
 
 TICK = 4_000_000
@@ -28,7 +28,7 @@ def flight(ticks: int = 60) -> list[SensorFrame]:
     frames = []
     for tick in range(ticks):
         stamp = BEGIN + tick * TICK
-        attitude = rng.normal(0.0, 0.1, 4) + [1.0, 0.0, 0.0, 0.0]
+        attitude = rng.normal([1.0, 0.0, 0.0, 0.0], 0.1)
         image = RgbdFrame(
             rgb=rng.integers(0, 256, (12, 16, 3)).astype(np.uint8),
             depth=rng.uniform(0.3, 2.0, (12, 16)).astype(np.float32),
@@ -40,7 +40,7 @@ def flight(ticks: int = 60) -> list[SensorFrame]:
                 stamp_ns=stamp,
                 attitude=attitude / np.linalg.norm(attitude),
                 angular_velocity=rng.normal(0.0, 0.1, 3),
-                specific_force=rng.normal(0.0, 1.0, 3) + [0.0, 0.0, -9.81],
+                specific_force=rng.normal([0.0, 0.0, -9.81], 1.0),
                 wrench=rng.normal(0.0, 1.0, 6) if tick % 2 == 0 else frames[-1].wrench,
                 wrench_stamp_ns=BEGIN + (tick - tick % 2) * TICK - 1_000_000,
                 image=image if tick % 8 == 3 else None,
@@ -114,7 +114,7 @@ def test_a_pair_needs_close_stamps_and_equal_sizes(tmp_path: Path) -> None:
 def test_refusals_name_the_topic_and_those_that_would_fit(tmp_path: Path) -> None:
     write_bag(flight(5), tmp_path / "bag")
     with pytest.raises(ConfigError, match=r"no topic /fmu/out/sensor_combined for imu .*of such a type are /imu/data"):
-        list(sensor_frames(tmp_path / "bag", PX4_TOPICS))
+        list(sensor_frames(tmp_path / "bag", Px4Topics()))
     with pytest.raises(ConfigError, match=r"topic /imu/data for wrench has type 'sensor_msgs/msg/Imu', not geometry"):
         list(sensor_frames(tmp_path / "bag", Topics(wrench="/imu/data")))
     with pytest.raises(ConfigError, match=r"no topic /ft for wrench \(geometry_msgs/WrenchStamped\); of such a type"):

@@ -11,8 +11,17 @@ from scipy.spatial.transform import Rotation
 pytest.importorskip("rosbags", reason="needs the extra ros")
 
 from ibvs_qp.ros import pictures, samples, stamps
-from ibvs_qp.ros.messages import IMU, PX4_MSGS, SENSOR_COMBINED, VEHICLE_ATTITUDE, BadMessage, decoded, encoded, message
-from ibvs_qp.ros.messages import typestore
+from ibvs_qp.ros.messages import (
+    IMU,
+    PX4_MSGS,
+    SENSOR_COMBINED,
+    VEHICLE_ATTITUDE,
+    BadMessage,
+    decoded,
+    encoded,
+    message,
+    typestore,
+)
 
 NOW = 1_700_000_000_123_456_789
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])

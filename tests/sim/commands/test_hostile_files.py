@@ -36,6 +36,9 @@ TOML_COMMANDS = (
     "sweep FILE",
     "tune --preset FILE",
     "vehicle FILE",
+    "bridge --dry-run --config FILE",
+    "bridge --dry-run --vehicle FILE",
+    "detect bag --topics FILE",
 )
 #: Commands that read other kinds.
 COMMANDS = (
@@ -46,6 +49,7 @@ COMMANDS = (
     f"detect --rgb FILE {' '.join(CAMERA)}",
     f"detect --rgb color.png --depth FILE {' '.join(CAMERA)}",
     "detect --sequence FILE",
+    "detect FILE",
     "explain FILE --at 1",
     "compare FILE FILE",
 )
