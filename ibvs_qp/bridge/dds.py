@@ -96,9 +96,11 @@ def raw_type(name: str) -> Any:
     def keep(self: Any, data: bytes) -> None:
         self.data = bytes(data)
 
-    kind.__init__ = keep
+    def made(cls: Any, data: bytes, **_: Any) -> Any:
+        return cls(data)
+
+    kind.__init__, kind.deserialize = keep, classmethod(made)
     kind.serialize = lambda self, **_: self.data
-    kind.deserialize = classmethod(lambda cls, data, **_: cls(data))
     kind.deserialize_key = classmethod(lambda cls, data, **_: None)
     return kind
 

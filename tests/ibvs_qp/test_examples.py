@@ -172,3 +172,11 @@ def test_the_own_vehicle_hovers() -> None:
     assert "not actuated: nothing" in text and "solved: thrusts" in text
     low, high, push = map(float, re.findall(r"hover: ([\d.]+) to ([\d.]+) N; greatest push ([\d.]+) N", text)[0])
     assert 8.0 < low <= high < 12.0 and push > 20.0
+
+
+def test_the_bag_shows_the_board(printed: dict[str, str]) -> None:
+    text = printed["ros2_bag"]
+    assert text.startswith("250 frames, messages ignored: {}")
+    distance, edges = re.findall(r"tip ([\d.]+) m from the board, (\d) of its edges seen", text)[0]
+    assert float(distance) == pytest.approx(0.4, abs=0.002) and edges == "2"
+    assert "approach: guide" in text and "'solved': 2" in text
