@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from dds_loopback import environment, require_dds
 pytest.importorskip("rosbags", reason="needs the extra ros")
 
 from ibvs_qp import RgbdFrame, SensorFrame
+from ibvs_qp.ros.messages import typestore
 from ibvs_qp.ros.write_bag import write_bag
 from sim.commands.cli import main
 from sim.detection.truth import FAMILIES, render_frame, sample_scene
@@ -72,7 +74,22 @@ def test_a_bridge_that_hears_nothing_waits_and_ends(
     assert status["state"] == "waiting" and status["commands"] == 0 and 60 <= status["timing"]["ticks"] <= 80
 
 
-def bag(**changes: object) -> SensorFrame:
+@pytest.mark.parametrize(
+    ("library", "words", "extra"),
+    [("rosbags.typesys", ["detect", "bag"], "ros"), ("cyclonedds.domain", ["bridge", "--duration", "0.1"], "dds")],
+)
+def test_a_missing_extra_is_named(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, library: str, words: list[str], extra: str
+) -> None:
+    bag()
+    typestore.cache_clear()
+    monkeypatch.setitem(sys.modules, library, None)
+    assert main(words) == 2
+    error = capsys.readouterr().err
+    assert f"the extra {extra}: pip install -c constraints.txt -e '.[{extra}]'" in error and error.count("\n") == 1
+
+
+def bag() -> None:
     truth = render_frame(sample_scene(FAMILIES["near wall"], 1))
     image = truth.frame
     image = RgbdFrame(rgb=image.rgb, depth=image.depth, intrinsics=image.intrinsics, stamp_ns=10**9)
@@ -88,7 +105,6 @@ def bag(**changes: object) -> SensorFrame:
     write_bag([frame], "bag")
     assert truth.seed is not None
     Path("seed").write_text(" ".join(map(str, truth.seed)))
-    return frame
 
 
 def test_detect_reads_the_pictures_of_a_bag(capsys: pytest.CaptureFixture[str]) -> None:
