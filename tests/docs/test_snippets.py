@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from ibvs_qp.bridge.config import BridgeConfig
 from ibvs_qp.config.settings import from_dict
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.pilot import PilotConfig
@@ -40,6 +41,7 @@ KINDS: dict[str, Callable[[dict[str, Any]], object]] = {
     "scene": lambda table: from_dict(Scene, table),
     "sweep": lambda table: parse_spec(table, ROOT),
     "experiment": lambda table: from_dict(Experiment, table),
+    "bridge": lambda table: from_dict(BridgeConfig, table),
     "fault rows": lambda table: [scenario(row) for row in table["row"]],
 }
 
