@@ -10,7 +10,7 @@ import dataclasses
 import math
 import time
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -72,8 +72,21 @@ class Controller(Protocol):
         ...
 
 
+class LawCall(NamedTuple):
+    """What the law was given in a tick, and its command."""
+
+    measurement: Measurement | None  # None before the first
+    reference: Reference
+    contact: ContactState | None  # None in a tick without a frame
+    fixed: np.ndarray | None  # the supervisor's thrusts, which replace the law's [N], (n,); None while the law flies
+    command: Command
+
+
 class Pilot:
     """Vision, estimation, strategy and one of the two laws in a row; `step` needs no simulator.
+
+    Attributes:
+        observer: Called with every call of the law, for recordings; None for nobody. It must not raise.
 
     Args:
         config: Configuration of the flight.
@@ -108,6 +121,7 @@ class Pilot:
         self.rotor_loss = RotorLoss(vehicle, settings.gains)
         self.assurance = Assurance(vehicle, self.config.safety)
         self.painter = painter or Painter(self.config.painting)
+        self.observer: Callable[[LawCall], None] | None = None
         law = HybridController if self.config.law == "qp" else PaperController
         self.controller: Controller = controller or law(straightened(settings))
         self.reset()
@@ -212,12 +226,9 @@ class Pilot:
 
     def _hold(self, frame: Any) -> Command:
         """Command of a tick without a frame: the controller refuses a measurement of the same time, and holds."""
-        setpoints, stamp = self.setpoints, answered_stamp(frame)
+        stamp = answered_stamp(frame)
         self.assurance.miss(self.config.controller.tick_s)
-        fixed = self.assurance.thrusts(setpoints.last, setpoints.floor)
-        if fixed is not None:
-            return self.assurance.explained(fixed_command(setpoints, stamp, fixed, ()))
-        command = self.controller.step(self.measurement, self.reference)  # type: ignore[arg-type]
+        command = self._command(stamp, None)
         return self.assurance.explained(dataclasses.replace(command, stamp_ns=stamp, rejected=()))
 
     def _fly(self, frame: SensorFrame) -> Command:
@@ -260,7 +271,7 @@ class Pilot:
         self.reference = self.assurance.supervised(self._refer(target, contact))
         self.measurement = self._measure(frame, (wrench, wrench_stamp), axes, target, contact)
         begin = time.perf_counter()
-        command = self._command(contact)
+        command = self._command(stamp, contact)
         self.controller_time_s = time.perf_counter() - begin
         self._commanded = self.assurance.explained(command)
         self.assurance.watch(self._shown(frame, contact, command), self.setpoints)
@@ -294,13 +305,17 @@ class Pilot:
             stale.update(INERTIAL[1:])
         return stale
 
-    def _command(self, contact: ContactState) -> Command:
+    def _command(self, stamp_ns: int, contact: ContactState | None) -> Command:
         """Command of the law, or of the supervisor where it replaces the law."""
         setpoints = self.setpoints
         fixed = self.assurance.thrusts(setpoints.last, setpoints.floor)
         if fixed is not None:
-            return fixed_command(setpoints, self._stamp, fixed, ())
-        return self.controller.step(self.measurement, self.reference, contact)  # type: ignore[arg-type]
+            command = fixed_command(setpoints, stamp_ns, fixed, ())
+        else:
+            command = self.controller.step(self.measurement, self.reference, contact)  # type: ignore[arg-type]
+        if self.observer is not None:
+            self.observer(LawCall(self.measurement, self.reference, contact, fixed, command))
+        return command
 
     def _shown(self, frame: SensorFrame, contact: ContactState, command: Command) -> Tick:
         """The tick as the monitors see it."""
