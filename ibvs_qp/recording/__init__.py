@@ -8,18 +8,23 @@ from typing import TYPE_CHECKING, Any
 from ibvs_qp.config.errors import ConfigError
 
 if TYPE_CHECKING:
+    from ibvs_qp.recording.comparison import Difference, Replay, replay
     from ibvs_qp.recording.reader import RecordedFlight, read_log
     from ibvs_qp.recording.recorder import Recorder
-    from ibvs_qp.recording.comparison import Difference, Replay, replay
 
 _HOMES = {
     "ibvs_qp.recording.reader": ("RecordedFlight", "read_log"),
     "ibvs_qp.recording.recorder": ("Recorder",),
     "ibvs_qp.recording.comparison": ("Difference", "Replay", "replay"),
 }
-__all__ = ["Difference", "RecordedFlight", "Recorder", "Replay", "read_log", "replay"]
+__all__ = ["Difference", "RecordedFlight", "Recorder", "Replay", "read_log", "replay", "require_extra"]
 #: Top-level packages of the extra.
 _EXTRA = ("mcap", "mcap_protobuf", "google", "foxglove_schemas_protobuf")
+
+
+def require_extra() -> None:
+    """Raise ConfigError where the extra is not installed."""
+    __getattr__("Recorder")
 
 
 def __getattr__(name: str) -> Any:

@@ -75,9 +75,7 @@ def _depth(depth: np.ndarray, stamp_ns: int) -> RawImage:
     whole[(whole < 0.0) | (whole > DEEPEST)] = 0.0
     height, width = sparse.shape
     data = whole.astype("<u2").tobytes()
-    message = RawImage(
-        frame_id=DEPTH_CAMERA, width=width, height=height, encoding="16UC1", step=2 * width, data=data
-    )
+    message = RawImage(frame_id=DEPTH_CAMERA, width=width, height=height, encoding="16UC1", step=2 * width, data=data)
     message.timestamp.FromNanoseconds(stamp_ns)
     return message
 

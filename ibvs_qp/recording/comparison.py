@@ -130,9 +130,7 @@ def _differences(tick: int, ours: Command, recorded: Command, words: tuple[str, 
         mine, theirs = (np.atleast_1d(np.asarray(getattr(each, name), float)) for each in (ours, recorded))
         if mine.shape != theirs.shape:
             text = f"{mine.size} entries instead of {theirs.size}"
-            yield Difference(
-                tick=tick, stamp_ns=recorded.stamp_ns, field=name, amount=np.inf, unit=unit, text=text
-            )
+            yield Difference(tick=tick, stamp_ns=recorded.stamp_ns, field=name, amount=np.inf, unit=unit, text=text)
         elif mine.tobytes() != theirs.tobytes():
             with np.errstate(invalid="ignore"):
                 amount = float(np.nan_to_num(np.abs(mine - theirs), nan=np.inf).max())

@@ -31,7 +31,11 @@ def to_json(values: dict[str, Any]) -> str:
 
 
 def _plain(value: Any, depth: int) -> Any:
-    if value is None or type(value) in (bool, float, str) or (type(value) is int and value.bit_length() <= LONGEST_BITS):
+    if (
+        value is None
+        or type(value) in (bool, float, str)
+        or (type(value) is int and value.bit_length() <= LONGEST_BITS)
+    ):
         return value
     if type(value) is np.ndarray and value.dtype.kind in "fiub" and value.size <= MOST_ENTRIES:
         return {_ARRAY: str(value.dtype), "entries": value.tolist()}

@@ -13,7 +13,7 @@ from ibvs_qp.estimation.contact_state import ContactState
 from ibvs_qp.estimation.wall_lines import WallAxes
 from ibvs_qp.frames import down_in_body, rotate
 from ibvs_qp.measurement import Measurement, RgbdFrame, SensorFrame
-from ibvs_qp.recording import scene
+from ibvs_qp.recording import poses, shapes
 from ibvs_qp.recording.camera import CameraTopics
 from ibvs_qp.recording.messages import encode
 from ibvs_qp.recording.ticks import ControllerInput, ControlTick
@@ -64,7 +64,10 @@ class TickTopics:
         """
         tick, step_ns, dropped, push_reference = numbers
         measurement, reference, contact, fixed = given
-        sink.write(INPUT_TOPIC, encode(_input(tick, call, measurement, reference, contact, fixed)), own.stamp_ns or None)
+        exact = ControllerInput(
+            tick=tick, call=call, measurement=measurement, reference=reference, contact=contact, fixed_thrusts=fixed
+        )
+        sink.write(INPUT_TOPIC, encode(exact), own.stamp_ns or None)
         found, low, high = state
         if seen is not None:
             found = seen[0]
@@ -130,26 +133,20 @@ class TickTopics:
         """Write the pose at the wall; along it by a pilot's odometer, otherwise it is not known and 0."""
         now, vehicle = sink.stamp_ns, self._vehicle
         axes = WallAxes.of(contact.normal, down_in_body(measurement.attitude.tolist()))
-        rotation = scene.wall_from_body(axes.right, axes.down, axes.normal)
+        rotation = poses.wall_from_body(axes.right, axes.down, axes.normal)
         right, down = odometer
         tip = rotate(rotation, vehicle.tip_position_m)
         position = (-contact.distance - tip[0], -right - tip[1], -down - tip[2])
-        turn = scene.quaternion(rotation)
+        turn = poses.quaternion(rotation)
         frames = FrameTransforms()
-        scene.transform(frames, scene.WALL, scene.VEHICLE, position, turn, now)
+        poses.transform(frames, poses.WALL, poses.VEHICLE, position, turn, now)
         if abs(now - self._shape_ns) >= SHAPE_NS:
             self._shape_ns = now
-            scene.mounts(frames, vehicle, now)
-            sink.write("/vehicle/shape", scene.vehicle_scene(vehicle, scene.VEHICLE, now))
-            sink.write("/vehicle/points", scene.vehicle_points(vehicle, now))
-            sink.write("/wall/shape", scene.estimated_wall(now))
-            sink.write("/wall/points", scene.wall_points(now))
+            poses.mounts(frames, vehicle, now)
+            sink.write("/vehicle/shape", shapes.vehicle_scene(vehicle, poses.VEHICLE, now))
+            sink.write("/vehicle/points", shapes.vehicle_points(vehicle, now))
+            sink.write("/wall/shape", shapes.estimated_wall(now))
+            sink.write("/wall/points", shapes.wall_points(now))
         sink.write("/tf", frames)
-        sink.write("/vehicle/pose", scene.pose_in_frame(scene.WALL, position, turn, now))
-        sink.write("/vehicle/forces", scene.force_arrows(vehicle, own.thrusts, contact.push, contact.normal, now))
-
-
-def _input(tick: int, call: str, measurement: Any, reference: Any, contact: Any, fixed: Any) -> ControllerInput:
-    return ControllerInput(
-        tick=tick, call=call, measurement=measurement, reference=reference, contact=contact, fixed_thrusts=fixed
-    )
+        sink.write("/vehicle/pose", poses.pose_in_frame(poses.WALL, position, turn, now))
+        sink.write("/vehicle/forces", shapes.force_arrows(vehicle, own.thrusts, contact.push, contact.normal, now))

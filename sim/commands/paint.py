@@ -63,6 +63,8 @@ class Paint:
     """Print summary.json as one line on standard output, and nothing else."""
     view: Annotated[bool, flag] = False
     """Show the flight in MuJoCo's window in real time, one law after the other; without a display the video does."""
+    log: Literal["npz", "mcap"] = "npz"
+    """Log of the flight: log.npz is always written; mcap adds flight_LAW.mcap for Foxglove, Rerun and replay."""
     no_video: Annotated[bool, flag] = False
     """Do not write the video: the vehicle from outside, camera pictures, push."""
 
@@ -95,6 +97,7 @@ class Paint:
         from sim.sensors.cameras import resolve_camera
 
         check_mujoco()
+        from ibvs_qp.recording import require_extra
         from sim.flight.options import FlightOptions, pilot_config
         from sim.flight.progress import flight_progress
         from sim.flight.side_by_side import fly_laws
@@ -104,6 +107,8 @@ class Paint:
 
         started = time.perf_counter()
         check_seed(self.seed)
+        if self.log == "mcap":
+            require_extra()
         chosen, preset = scene_file(self.scene), preset_file(self.preset)
         scene = load_scene(chosen) if chosen else in_world(Scene(), self.world or DEFAULT_WORLD)
         if self.world is not None:
@@ -138,7 +143,7 @@ class Paint:
             "vision": self.vision,
         }
         with RunFolder.open(self.out, overwrite=self.overwrite) as folder:
-            options = dataclasses.replace(options, journal=str(folder.journal))
+            options = dataclasses.replace(options, journal=str(folder.journal), mcap=self.log == "mcap")
             with flight_progress(notes, scene, laws) as progress:
                 flights = fly_laws(scene, options, laws, progress, workers=1 if self.view else None)
             return self._report(folder, flights, facts, started, notes)
@@ -176,6 +181,8 @@ class Paint:
             Console().print(figure_table(metrics))
             if folder.report.exists():
                 print(f"Report: {folder.report}")
+            for file in folder.logs():
+                print(f"Log: {file}")
         if interrupted:
             print(f"ibvs-qp: interrupted; the partial run is in {folder.path}", file=sys.stderr)
         return EXIT_INTERRUPTED if interrupted else 0

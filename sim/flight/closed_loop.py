@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ibvs_qp.estimation.turned_camera import straightened
 from ibvs_qp.pilot import Pilot, PilotConfig
@@ -20,9 +22,14 @@ from sim.world.plant import TICK_NS
 from sim.world.random_streams import stream
 from sim.world.scene import Scene
 
+if TYPE_CHECKING:
+    from sim.flight.mcap_log import McapLog
+
 #: Called with simulated time [s], phase name and real-time factor.
 Progress = Callable[[float, str, float], None]
 
+#: Ending of MCAP logs.
+MCAP = ".mcap"
 #: Reason of a flight that Ctrl-C ended.
 INTERRUPTED = "interrupted"
 #: Control ticks between calls of the progress function.
@@ -41,6 +48,15 @@ def make_pilot(scene: Scene, options: FlightOptions, config: PilotConfig, job: J
     if rendered:
         pilot.prepare()
     return pilot
+
+
+def open_mcap(options: FlightOptions, world: World, pilot: Pilot) -> McapLog | None:
+    """The MCAP log of a flight in the folder of its journal, if it has one."""
+    if not options.mcap:
+        return None
+    from sim.flight.mcap_log import McapLog
+
+    return McapLog(Path(options.journal) / f"{options.law}{MCAP}", world, pilot)
 
 
 def fly(
@@ -68,6 +84,8 @@ def fly(
     config, job = pilot_config(scene, options, config), job or PaintJob()
     pilot, world = make_pilot(scene, options, config, job), World(scene, options, config)
     recorder, schedule = Recorder(scene, options, world, pilot), FaultSchedule(faults, options.seed)
+    log = open_mcap(options, world, pilot)
+    fly_tick = pilot.step if log is None else log.step
     limit = BASE_TIME + STROKE_FACTOR * job.expected_s(config.painting)
     start, reason, tick = time.perf_counter(), "", 0
     try:
@@ -75,12 +93,16 @@ def fly(
         while not pilot.painter.finished or schedule.watching:
             for text in schedule.tick(world, pilot):
                 recorder.note(tick * TICK_NS * 1e-9, "fault", text)
+                if log is not None:
+                    log.note("fault", text)
             frame = world.sense()
             seen = schedule.seen(frame)
             if seen is not None or command is None:  # without a tick of the pilot its last command stays in force
-                command = pilot.step(seen or frame)
+                command = fly_tick(seen or frame)
             world.act(command.thrusts)
             recorder.tick(frame, command)
+            if log is not None:
+                log.tick(frame.stamp_ns)
             tick += 1
             if world.plant.crashed:
                 reason = f"{CRASH}: {world.plant.crashed}"
@@ -98,6 +120,8 @@ def fly(
         reason = INTERRUPTED
     finally:
         world.close()
+        if log is not None and (problem := log.close()):
+            recorder.note(tick * TICK_NS * 1e-9, "log", problem)
     trace = recorder.trace()
     trace.wall_time_s = time.perf_counter() - start  # includes the trace
     planned = not reason or (reason == LANDED and pilot.painter.descending)

@@ -17,6 +17,7 @@ import numpy as np
 
 from ibvs_qp.config.errors import IbvsQpError
 from ibvs_qp.config.settings import dump_toml
+from sim.flight.closed_loop import MCAP
 from sim.flight.flight_log import write_log
 from sim.flight.side_by_side import Flight, own_peak_memory
 from sim.flight.trace import FIELDS, Trace
@@ -36,6 +37,7 @@ figures/      the report's figures as PNG
 video.mp4     the vehicle from outside, camera view, phase and push (H.264)
 scene.toml    the scene; repeat the flight with: ibvs-qp paint --scene scene.toml --seed {seed}
 preset_*.toml configuration of the pilot under each law
+flight_*.mcap log for Foxglove and Rerun, with --log mcap; check it with: ibvs-qp replay flight_qp.mcap
 log.npz       every array, named <law>/<array>; load it with
 
     import numpy as np
@@ -106,8 +108,15 @@ class RunFolder:
         fields = "\n".join(f"  {name:<20} {text}" for name, text in FIELDS.items())
         write_text(self.path / "README.txt", _README.format(seed=summary_table["seed"], path=self.path, fields=fields))
         self.write_summary(summary_table)
+        for law in traces:
+            if self.journal is not None and (made := self.journal / f"{law}{MCAP}").exists():
+                made.replace(self.path / f"flight_{law}{MCAP}")
         for folder in self.path.glob(f"{JOURNALS}*"):
             shutil.rmtree(folder, ignore_errors=True)
+
+    def logs(self) -> list[Path]:
+        """MCAP logs of the run."""
+        return sorted(self.path.glob(f"flight_*{MCAP}"))
 
     def write_summary(self, summary_table: dict[str, Any]) -> None:
         """Write summary.json."""
@@ -137,6 +146,7 @@ class RunFolder:
 def _own_files(path: Path) -> list[Path]:
     """Files that a run wrote into a folder."""
     found = [*(path / name for name in _FILES), *path.glob("preset_*.toml"), *path.glob("figures/*.png")]
+    found += path.glob(f"flight_*{MCAP}")
     return [file for file in found if file.exists()]
 
 

@@ -1,8 +1,4 @@
-"""The vehicle at the wall in three dimensions.
-
-Frame `WALL` has its origin at the wall, x into it, y to the left and z up, the wall as estimated; what is ahead of the
-tip at the start lies at y = z = 0. `VEHICLE` is B: front, right, down.
-"""
+"""Shapes of vehicle, wall and forces, for viewers in three dimensions."""
 
 from __future__ import annotations
 
@@ -10,18 +6,15 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.PackedElementField_pb2 import PackedElementField
 from foxglove_schemas_protobuf.PointCloud_pb2 import PointCloud
-from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 from foxglove_schemas_protobuf.SceneEntity_pb2 import SceneEntity
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
 from ibvs_qp.config.vehicle import VehicleParams
-from ibvs_qp.frames import R_BODY_CAMERA, Rotation3, cross
-from ibvs_qp.recording.camera import CAMERA, DEPTH_CAMERA
+from ibvs_qp.frames import cross
+from ibvs_qp.recording.poses import STRAIGHT, VEHICLE, WALL, Turn, place
 
-WALL, VEHICLE = "wall", "vehicle"
 #: Colours (r, g, b, a).
 ROTOR, ARM, BRUSH, BOARD = (0.25, 0.55, 0.85, 0.5), (0.5, 0.5, 0.5, 1.0), (0.16, 0.35, 0.8, 1.0), (0.9, 0.9, 0.88, 0.5)
 _THRUST, _PUSH = (1.0, 0.6, 0.0, 1.0), (0.9, 0.1, 0.1, 1.0)
@@ -35,54 +28,8 @@ _POINTS = 36
 Color = tuple[float, float, float, float]
 
 
-def quaternion(rotation: Sequence[Sequence[float]] | np.ndarray) -> tuple[float, float, float, float]:
-    """Quaternion (x, y, z, w) of a rotation matrix, (3, 3): the largest component is computed first."""
-    (a, b, c), (d, e, f), (g, h, i) = rotation
-    squares = 1 + a + e + i, 1 + a - e - i, 1 - a + e - i, 1 - a - e + i  # four times w^2, x^2, y^2, z^2
-    rows = (
-        (squares[0], h - f, c - g, d - b),
-        (h - f, squares[1], b + d, c + g),
-        (c - g, b + d, squares[2], f + h),
-        (d - b, c + g, f + h, squares[3]),
-    )
-    w, x, y, z = rows[squares.index(max(squares))]
-    scale = 1.0 / float(np.sqrt(w * w + x * x + y * y + z * z))
-    return x * scale, y * scale, z * scale, w * scale
-
-
-def place(pose: Any, position: Sequence[float], turn: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 1.0)) -> None:
-    """Fill a Foxglove pose: position [m], (3,), and quaternion (x, y, z, w)."""
-    pose.position.x, pose.position.y, pose.position.z = map(float, position)
-    pose.orientation.x, pose.orientation.y, pose.orientation.z, pose.orientation.w = turn
-
-
-def paint(target: Any, color: Color) -> None:
-    """Fill a Foxglove colour."""
+def _paint(target: Any, color: Color) -> None:
     target.r, target.g, target.b, target.a = color
-
-
-def transform(message: FrameTransforms, parent: str, child: str, position: Sequence[float], turn: Any, ns: int) -> None:
-    """Add the pose of a frame in another: position [m], (3,), and quaternion (x, y, z, w)."""
-    entry = message.transforms.add(parent_frame_id=parent, child_frame_id=child)
-    entry.timestamp.FromNanoseconds(ns)
-    entry.translation.x, entry.translation.y, entry.translation.z = map(float, position)
-    entry.rotation.x, entry.rotation.y, entry.rotation.z, entry.rotation.w = map(float, turn)
-
-
-def mounts(message: FrameTransforms, vehicle: VehicleParams, ns: int) -> None:
-    """Add the camera, rectified as perception gets it, and the tip to the vehicle."""
-    turn = quaternion(R_BODY_CAMERA.tolist())
-    transform(message, VEHICLE, CAMERA, vehicle.camera_position_m, turn, ns)
-    transform(message, VEHICLE, DEPTH_CAMERA, vehicle.camera_position_m, turn, ns)
-    transform(message, VEHICLE, "tip", vehicle.tip_position_m, (0.0, 0.0, 0.0, 1.0), ns)
-
-
-def pose_in_frame(frame: str, position: Sequence[float], turn: tuple[float, ...], ns: int) -> PoseInFrame:
-    """A pose by itself."""
-    message = PoseInFrame(frame_id=frame)
-    message.timestamp.FromNanoseconds(ns)
-    place(message.pose, position, turn)  # type: ignore[arg-type]
-    return message
 
 
 def _entity(update: SceneUpdate, frame: str, name: str, ns: int) -> SceneEntity:
@@ -100,21 +47,21 @@ def vehicle_scene(vehicle: VehicleParams, frame: str, ns: int, rotor: Color = RO
         place(disc.pose, position, _from_z(axis))
         disc.size.x = disc.size.y = 2.0 * vehicle.propeller_radius_m
         disc.size.z = _THIN
-        paint(disc.color, rotor)
+        _paint(disc.color, rotor)
     tip = np.array(vehicle.tip_position_m)
     arm = entity.cylinders.add(bottom_scale=1.0, top_scale=1.0)
     place(arm.pose, 0.5 * tip, _from_z(tip))
     arm.size.x = arm.size.y = 2.0 * vehicle.arm_radius_m
     arm.size.z = float(np.linalg.norm(tip))
-    paint(arm.color, ARM)
+    _paint(arm.color, ARM)
     brush, camera = entity.spheres.add(), entity.cubes.add()
     place(brush.pose, tip)
     place(camera.pose, vehicle.camera_position_m)
     for axis in "xyz":
         setattr(brush.size, axis, 4.0 * vehicle.arm_radius_m)
         setattr(camera.size, axis, _CAMERA)
-    paint(brush.color, BRUSH)
-    paint(camera.color, ARM)
+    _paint(brush.color, BRUSH)
+    _paint(camera.color, ARM)
     return update
 
 
@@ -148,22 +95,32 @@ def _cloud(points: np.ndarray, frame: str, ns: int) -> PointCloud:
     return message
 
 
-def wall_scene(frame: str, name: str, centre: Sequence[float], size: Sequence[float], color: Color, ns: int) -> SceneUpdate:
+def plate(
+    frame: str,
+    name: str,
+    centre: Sequence[float] | np.ndarray,
+    size: Sequence[float],
+    color: Color,
+    ns: int,
+    turn: Turn = STRAIGHT,
+) -> SceneUpdate:
     """A plate: centre and sides [m], (3,)."""
     update = SceneUpdate()
     cube = _entity(update, frame, name, ns).cubes.add()
-    place(cube.pose, centre)
+    place(cube.pose, centre, turn)
     cube.size.x, cube.size.y, cube.size.z = map(float, size)
-    paint(cube.color, color)
+    _paint(cube.color, color)
     return update
 
 
 def estimated_wall(ns: int) -> SceneUpdate:
     """The wall as estimated."""
-    return wall_scene(WALL, WALL, (0.5 * _THIN, 0.0, 0.0), (_THIN, _SIDE, _SIDE), BOARD, ns)
+    return plate(WALL, WALL, (0.5 * _THIN, 0.0, 0.0), (_THIN, _SIDE, _SIDE), BOARD, ns)
 
 
-def force_arrows(vehicle: VehicleParams, thrusts: np.ndarray, push: float, normal: Sequence[float], ns: int) -> SceneUpdate:
+def force_arrows(
+    vehicle: VehicleParams, thrusts: np.ndarray, push: float, normal: Sequence[float], ns: int
+) -> SceneUpdate:
     """Thrusts at the rotors, and the push at the tip along the wall's normal [N]."""
     update = SceneUpdate()
     entity = _entity(update, VEHICLE, "forces", ns)
@@ -178,23 +135,17 @@ def _arrow(entity: SceneEntity, start: Sequence[float], axis: Sequence[float], l
         shaft_length=0.8 * length, shaft_diameter=0.01, head_length=0.2 * length, head_diameter=0.025
     )
     place(arrow.pose, start, _turn((1.0, 0.0, 0.0), axis))
-    paint(arrow.color, color)
+    _paint(arrow.color, color)
 
 
-def _from_z(axis: Sequence[float]) -> tuple[float, float, float, float]:
+def _from_z(axis: Sequence[float]) -> Turn:
     return _turn((0.0, 0.0, 1.0), axis)
 
 
-def _turn(start: Sequence[float], end: Sequence[float]) -> tuple[float, float, float, float]:
+def _turn(start: Sequence[float], end: Sequence[float]) -> Turn:
     """Quaternion (x, y, z, w) of the shortest turn from one direction to another."""
     end = np.asarray(end, float) / np.linalg.norm(end)
     w = 1.0 + float(np.dot(start, end))
     x, y, z = cross(start, end) if w > 1e-9 else (start[1], start[2], start[0])  # opposite: half a turn
     length = float(np.sqrt(x * x + y * y + z * z + (w * w if w > 1e-9 else 0.0)))
     return x / length, y / length, z / length, (w if w > 1e-9 else 0.0) / length
-
-
-def wall_from_body(right: Sequence[float], down: Sequence[float], normal: Sequence[float]) -> Rotation3:
-    """Rotation from B to `WALL`, by the wall's axes in B."""
-    (rx, ry, rz), (dx, dy, dz), (nx, ny, nz) = right, down, normal
-    return (nx, ny, nz), (-rx, -ry, -rz), (-dx, -dy, -dz)
