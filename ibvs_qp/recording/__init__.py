@@ -9,15 +9,30 @@ from ibvs_qp.config.errors import ConfigError
 
 if TYPE_CHECKING:
     from ibvs_qp.recording.comparison import Difference, Replay, replay
+    from ibvs_qp.recording.other_preset import PresetComparison, compare_preset
     from ibvs_qp.recording.reader import RecordedFlight, read_log
     from ibvs_qp.recording.recorder import Recorder
+    from ibvs_qp.recording.repair_file import repair
 
 _HOMES = {
     "ibvs_qp.recording.reader": ("RecordedFlight", "read_log"),
+    "ibvs_qp.recording.other_preset": ("PresetComparison", "compare_preset"),
     "ibvs_qp.recording.recorder": ("Recorder",),
+    "ibvs_qp.recording.repair_file": ("repair",),
     "ibvs_qp.recording.comparison": ("Difference", "Replay", "replay"),
 }
-__all__ = ["Difference", "RecordedFlight", "Recorder", "Replay", "read_log", "replay", "require_extra"]
+__all__ = [
+    "Difference",
+    "PresetComparison",
+    "RecordedFlight",
+    "Recorder",
+    "Replay",
+    "compare_preset",
+    "read_log",
+    "repair",
+    "replay",
+    "require_extra",
+]
 #: Top-level packages of the extra.
 _EXTRA = ("mcap", "mcap_protobuf", "google", "foxglove_schemas_protobuf")
 

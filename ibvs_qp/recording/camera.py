@@ -57,8 +57,8 @@ class CameraTopics:
         self._seldom_ns = captured
         sink.write("/camera/depth", _depth(picture.depth, captured))
         sink.write("/camera/depth_calibration", _calibration(picture, captured, DEPTH_CAMERA, DEPTH_STEP))
-        if percept is not None:
-            sink.write("/camera/overlay", _jpeg(draw_overlay(picture.rgb, percept), captured))
+        if percept is not None:  # without tints: the control loop would wait for their arithmetic
+            sink.write("/camera/overlay", _jpeg(draw_overlay(picture.rgb, percept, tints=False), captured))
 
 
 def _jpeg(rgb: np.ndarray, stamp_ns: int) -> CompressedImage:

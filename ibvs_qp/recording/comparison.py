@@ -55,6 +55,7 @@ class Replay:
 
     Attributes:
         ticks: Ticks compared.
+        differing: Ticks that differ.
         first: First difference, or None.
         largest: Largest difference of every field of numbers that differs, and the first one of every other field.
         missing: Ticks missing after `ticks`: the replay ends there, because the state of the controller is unknown.
@@ -62,6 +63,7 @@ class Replay:
     """
 
     ticks: int = 0
+    differing: int = 0
     first: Difference | None = None
     largest: dict[str, Difference] = field(default_factory=dict)
     missing: int = 0
@@ -105,7 +107,9 @@ def replay(flight: RecordedFlight, controller: Any = None) -> Replay:
         if command is None or tick.command is None:
             continue
         result.ticks += 1
-        for found in _differences(tick.given.tick, command, tick.command, words):
+        differences = list(_differences(tick.given.tick, command, tick.command, words))
+        result.differing += bool(differences)
+        for found in differences:
             result.first = result.first or found
             before = result.largest.get(found.field)
             if before is None or found.amount > before.amount:
@@ -114,7 +118,7 @@ def replay(flight: RecordedFlight, controller: Any = None) -> Replay:
     return result
 
 
-def unbroken(flight: RecordedFlight, result: Replay) -> Iterator[RecordedTick]:
+def unbroken(flight: RecordedFlight, result: Any) -> Iterator[RecordedTick]:
     """The ticks up to the first gap; what is missing there goes into the result."""
     expected = 0
     for tick in flight.ticks():

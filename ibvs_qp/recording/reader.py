@@ -18,7 +18,7 @@ from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.files import UnreadableFile, open_regular
 from ibvs_qp.recording.heading import FORMAT, digest
 from ibvs_qp.recording.messages import decode, message_class
-from ibvs_qp.recording.ticks import ControllerInput, ControlTick
+from ibvs_qp.recording.ticks import RESET, ControllerInput, ControlTick
 from ibvs_qp.recording.topics import CONTROL_TOPIC, INPUT_TOPIC
 from ibvs_qp.recording.writer import METADATA
 
@@ -57,27 +57,27 @@ class RecordedFlight:
     def ticks(self) -> Iterator[RecordedTick]:
         """The ticks in their order, up to the end, or to the first damage."""
         self.complete = False
-        waiting: ControllerInput | None = None
         with open_regular(self.file, LARGEST_FILE) as stream:
-            try:
-                for topic, data in self._messages(stream):
-                    if topic == INPUT_TOPIC:
-                        waiting = decode(_parsed(ControllerInput, data), ControllerInput)
-                        if waiting.call == "reset":
-                            yield RecordedTick(waiting, None)
-                    elif waiting is not None:
-                        row = decode(_parsed(ControlTick, data), ControlTick)
-                        if row.tick == waiting.tick:
-                            yield RecordedTick(waiting, row.command)
-            except _DAMAGE:
-                return
+            yield from undamaged(self._ticks(stream))
+
+    def _ticks(self, stream: BinaryIO) -> Iterator[RecordedTick]:
+        waiting: ControllerInput | None = None
+        for topic, data in self._messages(stream):
+            if topic == INPUT_TOPIC:
+                waiting = decode(_parsed(ControllerInput, data), ControllerInput)
+                if waiting.call == RESET:
+                    yield RecordedTick(waiting, None)
+            elif waiting is not None:
+                row = decode(_parsed(ControlTick, data), ControlTick)
+                if row.tick == waiting.tick:
+                    yield RecordedTick(waiting, row.command)
 
     def _messages(self, stream: BinaryIO) -> Iterator[tuple[str, bytes]]:
         """Topic and content of the messages that replay needs."""
         topics: dict[int, str] = {}
-        for record in _records(stream):
+        for record in records(stream):
             if isinstance(record, Chunk):
-                for entry in _entries(record):
+                for entry in entries(record):
                     if isinstance(entry, Channel):
                         topics[entry.id] = entry.topic
                     elif isinstance(entry, Message) and topics.get(entry.channel_id) in (INPUT_TOPIC, CONTROL_TOPIC):
@@ -86,15 +86,26 @@ class RecordedFlight:
                 self.complete = True
 
 
+def undamaged(contents: Iterator[Any]) -> Iterator[Any]:
+    """What comes before the first damage."""
+    while True:
+        try:
+            yield next(contents)
+        except (StopIteration, *_DAMAGE):
+            return
+
+
 def _parsed(kind: type, data: bytes) -> Any:
     return message_class(kind).FromString(data)
 
 
-def _records(stream: BinaryIO) -> Iterator[Any]:
+def records(stream: BinaryIO) -> Iterator[Any]:
+    """Records of an MCAP file, chunks as they are."""
     return iter(StreamReader(stream, emit_chunks=True, record_size_limit=LARGEST_RECORD).records)
 
 
-def _entries(chunk: Chunk) -> list[Any]:
+def entries(chunk: Chunk) -> list[Any]:
+    """Schemas, channels and messages of a chunk."""
     if chunk.compression:
         raise ConfigError(f"its chunks are compressed ({chunk.compression}); write them plain with 'mcap decompress'")
     return breakup_chunk(chunk, validate_crc=True)
@@ -134,7 +145,7 @@ def read_log(file: str | Path) -> RecordedFlight:
 
 def _heading(stream: BinaryIO) -> dict[str, str] | None:
     """The metadata record of the recorder, which comes before the first chunk."""
-    for record in _records(stream):
+    for record in records(stream):
         if isinstance(record, Metadata) and record.name == METADATA:
             return record.metadata
         if isinstance(record, Chunk):
@@ -146,9 +157,9 @@ def _check_first(flight: RecordedFlight) -> None:
     """Refuse a log without a single tick, with the reason of the first chunk."""
     with open_regular(flight.file, LARGEST_FILE) as stream:
         try:
-            chunk = next((record for record in _records(stream) if isinstance(record, Chunk)), None)
+            chunk = next((record for record in records(stream) if isinstance(record, Chunk)), None)
             if chunk is not None:
-                _entries(chunk)
+                entries(chunk)
         except ConfigError as error:
             raise UnreadableFile(flight.file, str(error)) from None
         except _DAMAGE:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from operator import attrgetter
+import typing
 from typing import Any
 
 import numpy as np
@@ -10,24 +10,33 @@ import numpy as np
 from ibvs_qp.command import Command
 from ibvs_qp.measurement import FeatureFrame, LineFeature, Measurement, Reference, RgbdFrame, SensorFrame
 
-_FIELDS = {
-    kind: attrgetter(*kind.__dataclass_fields__)
-    for kind in (Command, FeatureFrame, LineFeature, Measurement, Reference, RgbdFrame, SensorFrame)
-}
-#: Longest tuple or list whose entries are copied; inputs have a few lines.
-_MOST = 100
+_KINDS = (Command, FeatureFrame, LineFeature, Measurement, Reference, RgbdFrame, SensorFrame)
+#: Fields of each that are, or may be, arrays, and those that hold instances of them; the others cannot be changed.
+_ARRAYS, _NESTED = (
+    {kind: tuple(name for name, hint in typing.get_type_hints(kind).items() if wanted(hint)) for kind in _KINDS}
+    for wanted in (
+        lambda hint: np.ndarray in (hint, *typing.get_args(hint)) or "tuple[float" in str(hint),
+        lambda hint: any(str(name) in str(hint) for name in ("LineFeature", "FeatureFrame", "RgbdFrame")),
+    )
+)
 
 
 def copied(value: Any) -> Any:
-    """The same value with arrays of its own; a dataclass of another type is returned as it is."""
+    """The same input with arrays of its own; what is no such input is returned as it is."""
     kind = type(value)
-    if kind is np.ndarray:
-        return value.copy()
-    if kind in (tuple, list) and len(value) <= _MOST:
-        return kind([copied(entry) for entry in value]) if value else value
-    values = _FIELDS.get(kind)
-    if values is None:
+    if kind not in _ARRAYS:
         return value
     twin = object.__new__(kind)
-    twin.__dict__.update(zip(kind.__dataclass_fields__, map(copied, values(value)), strict=True))
+    fields = twin.__dict__
+    fields.update(value.__dict__)
+    for name in _ARRAYS[kind]:
+        entry = fields[name]
+        if entry is not None:
+            fields[name] = entry.copy() if type(entry) is np.ndarray else list(entry) if type(entry) is list else entry
+    for name in _NESTED[kind]:
+        entry = fields[name]
+        if type(entry) in (tuple, list):
+            fields[name] = tuple([copied(each) for each in entry])
+        elif entry is not None:
+            fields[name] = copied(entry)
     return twin

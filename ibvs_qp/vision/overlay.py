@@ -18,23 +18,24 @@ _TINT, _TICK_PX, _TEXT = 0.22, 14, 0.42
 _FONT, _PAD_PX, _CLEAR_PX = cv2.FONT_HERSHEY_SIMPLEX, 3, 10
 
 
-def draw_overlay(rgb: np.ndarray, percept: Percept, *, words: bool = True) -> np.ndarray:
+def draw_overlay(rgb: np.ndarray, percept: Percept, *, words: bool = True, tints: bool = True) -> np.ndarray:
     """Draw surface, mask, tracks and velocity into a copy of the picture.
 
     Args:
         rgb: The picture, uint8 (H, W, 3).
         percept: What was seen in it.
         words: Whether to write what each track is, and distance and velocity; too small to read in print.
+        tints: Whether to tint surface and mask, which takes milliseconds.
 
     Returns:
         uint8 (H, W, 3).
     """
     result = np.ascontiguousarray(rgb).copy()
     height, width = result.shape[:2]
-    if percept.plane is not None:
+    if tints and percept.plane is not None:
         region = cv2.resize(percept.plane.component.astype(np.uint8), (width, height), interpolation=cv2.INTER_NEAREST)
         _tint(result, region > 0, _SURFACE)
-    if percept.mask is not None and percept.mask.shape == (height, width):
+    if tints and percept.mask is not None and percept.mask.shape == (height, width):
         _tint(result, percept.mask > 0, _MASK)
     if percept.intrinsics is not None:
         segments = [denormalise(track.segment, percept.intrinsics) for track in percept.tracks]

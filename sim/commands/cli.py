@@ -138,6 +138,7 @@ def _commands() -> dict[str, type[Command]]:
     from sim.commands.explain import Explain
     from sim.commands.faults import Faults
     from sim.commands.paint import Paint
+    from sim.commands.replay import ReplayCommand
     from sim.commands.sweep import Sweep
     from sim.commands.tune import Tune
     from sim.commands.vehicle import Vehicle
@@ -154,6 +155,7 @@ def _commands() -> dict[str, type[Command]]:
         "faults": Faults,
         "vehicle": Vehicle,
         "bridge": BridgeCommand,
+        "replay": ReplayCommand,
     }
 
 

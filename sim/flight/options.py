@@ -18,8 +18,8 @@ class FlightOptions:
 
     With `machine_code` the C compiler, where there is one, compiles the controller's tick: the same flight to the bit,
     faster. A `rival` is a control law of `sim.rivals`, flown on the law's preset instead of the law itself. With a
-    `journal` the rows of the log are written to that folder while the flight goes on, with `mcap` a log for Foxglove and
-    Rerun, too.
+    `journal` the rows of the log are written to that folder while the flight goes on, with `mcap` an MCAP log,
+    too.
     """
 
     law: str = "qp"

@@ -1,0 +1,120 @@
+"""``ibvs-qp replay``: a recorded controller on its recorded inputs, or another preset on them."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
+
+from ibvs_qp.config.errors import ConfigError
+from sim.commands.options import flag, optional, preset_file
+
+if TYPE_CHECKING:
+    from ibvs_qp.recording import PresetComparison, RecordedFlight, Replay
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class ReplayCommand:
+    """Run the recorded controller on the inputs of a log: the same commands to the bit, or where not.
+
+    Example: ibvs-qp replay runs/one/flight_qp.mcap --preset tarot_t960_paper
+    """
+
+    log: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="LOG")]
+    """MCAP log of paint --log mcap, or of ibvs_qp.recording.Recorder; also what a killed process left."""
+    preset: Annotated[Path | None, optional("FILE")] = None
+    """Preset file (TOML), or a shipped one: show what it would have commanded on the same inputs instead."""
+    repair: Annotated[Path | None, optional("FILE")] = None
+    """Write the log again with its end and index, for viewers that refuse what a killed process left."""
+    json: Annotated[bool, flag] = False
+    """Print one JSON line on standard output, and nothing else."""
+
+    def run(self, words: list[str]) -> int:
+        """Replay and print."""
+        from ibvs_qp.pilot import PilotConfig
+        from ibvs_qp.recording import compare_preset, read_log, repair, replay
+        from sim.report.rundir import as_json
+
+        flight = read_log(self.log)
+        file = preset_file(self.preset)
+        preset = None if file is None else PilotConfig.from_toml(file)
+        if self.repair is not None:
+            repair(flight, self.repair)
+        try:
+            result = replay(flight) if preset is None else compare_preset(flight, preset)
+        except ConfigError as error:
+            raise ConfigError(f"{self.log}: {error}") from None
+        if self.json:
+            print(as_json(_summary(flight, result)))
+        else:
+            print("\n".join(_text(flight, result)))
+            if self.repair is not None:
+                print(f"Written: {self.repair}")
+        return 0
+
+
+def _summary(flight: RecordedFlight, result: Replay | PresetComparison) -> dict[str, Any]:
+    facts = {name: flight.facts[name] for name in ("version", "kind", "law")}
+    return {"schema": 1, "log": str(flight.file), **facts, **dataclasses.asdict(result), "same": result.same}
+
+
+def _text(flight: RecordedFlight, result: Replay | PresetComparison) -> list[str]:
+    from ibvs_qp import __version__
+    from ibvs_qp.recording import PresetComparison
+
+    lines = _preset_text(result) if isinstance(result, PresetComparison) else _replay_text(result)
+    if flight.facts["version"] != __version__:
+        lines.append(f"Recorded by version {flight.facts['version']}; this is {__version__}.")
+    if result.missing:
+        lines.append(f"The replay ends where {result.missing} ticks are missing: the queue of the log was full.")
+    if not result.complete:
+        lines.append("The log has no end: its process was killed, or the file is damaged there.")
+    return lines
+
+
+def _replay_text(result: Replay) -> list[str]:
+    if result.first is None:
+        return [f"Same to the bit over {result.ticks} ticks."]
+    first = result.first
+    lines = [
+        f"Differs: {result.differing} of {result.ticks} ticks; first at tick {first.tick}, {_seconds(first.stamp_ns)}:"
+        f" {first.field} {_amount(first.amount, first.unit, first.text)}."
+    ]
+    for name, each in result.largest.items():
+        where = "largest" if math.isfinite(each.amount) else "first"
+        amount = _amount(each.amount, each.unit, each.text)
+        lines.append(f"  {name}: {where} at tick {each.tick}, {_seconds(each.stamp_ns)}: {amount}")
+    return lines
+
+
+def _preset_text(result: PresetComparison) -> list[str]:
+    if result.same:
+        return [f"The preset commands the same to the bit over {result.ticks} ticks."]
+    lines = [
+        f"The preset's commands on the recorded inputs, {result.ticks} ticks:",
+        f"  thrusts: difference {result.thrust_rms_n:.3f} N rms, {result.thrust_peak_n:.3f} N peak at tick"
+        f" {result.peak_tick}",
+    ]
+    if result.push_ticks:
+        lines.append(
+            f"  push task, {result.push_ticks} ticks: asks for {result.push_preset_n:.3f} N on average instead of"
+            f" {result.push_recorded_n:.3f} N, difference {result.push_rms_n:.3f} N rms"
+        )
+    for name in sorted({*result.limits_recorded, *result.limits_preset}):
+        before, after = (
+            limits.get(name, 0) / result.ticks for limits in (result.limits_recorded, result.limits_preset)
+        )
+        lines.append(f"  limit {name}: active in {after:.1%} of the ticks instead of {before:.1%}")
+    lines.append("Inputs are the recorded ones: what the vehicle would have done under the preset is not in them.")
+    return lines
+
+
+def _seconds(stamp_ns: int) -> str:
+    return f"{stamp_ns * 1e-9:.3f} s"
+
+
+def _amount(amount: float, unit: str, text: str) -> str:
+    return text or f"by {amount:.3g} {unit}".rstrip()
