@@ -58,7 +58,7 @@ class Replay:
         differing: Ticks that differ.
         first: First difference, or None.
         largest: Largest difference of every field of numbers that differs, and the first one of every other field.
-        missing: Ticks missing after `ticks`: the replay ends there, because the state of the controller is unknown.
+        missing: Ticks missing after those compared: the replay ends there, because the controller's state is unknown.
         complete: Whether the file has its end; otherwise its writer was killed, or it is damaged.
     """
 
@@ -127,6 +127,7 @@ def unbroken(flight: RecordedFlight, result: Any) -> Iterator[RecordedTick]:
             return
         expected += 1
         yield tick
+    result.missing = max((flight.count or 0) - expected, 0)
 
 
 def _differences(tick: int, ours: Command, recorded: Command, words: tuple[str, ...]) -> Iterator[Difference]:

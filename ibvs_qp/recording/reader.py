@@ -20,7 +20,7 @@ from ibvs_qp.recording.heading import FORMAT, digest
 from ibvs_qp.recording.messages import decode, message_class
 from ibvs_qp.recording.ticks import RESET, ControllerInput, ControlTick
 from ibvs_qp.recording.topics import CONTROL_TOPIC, INPUT_TOPIC
-from ibvs_qp.recording.writer import METADATA
+from ibvs_qp.recording.writer import END, METADATA
 
 #: Largest log [bytes]: an hour of pictures at 4 MB/s. Largest record in it: a chunk has 0.1 s.
 LARGEST_FILE, LARGEST_RECORD = 1 << 34, 1 << 26
@@ -48,15 +48,17 @@ class RecordedFlight:
         file: The file.
         facts: Its heading: version, kind, law, config and so on (`ibvs_qp.recording.heading`).
         complete: Whether the last pass of `ticks` came to the end that `Recorder.close` writes.
+        count: Ticks flown, as this end says; some may be missing in the log.
     """
 
     file: Path
     facts: Mapping[str, str]
     complete: bool = False
+    count: int | None = None
 
     def ticks(self) -> Iterator[RecordedTick]:
         """The ticks in their order, up to the end, or to the first damage."""
-        self.complete = False
+        self.complete, self.count = False, None
         with open_regular(self.file, LARGEST_FILE) as stream:
             yield from undamaged(self._ticks(stream))
 
@@ -82,6 +84,8 @@ class RecordedFlight:
                         topics[entry.id] = entry.topic
                     elif isinstance(entry, Message) and topics.get(entry.channel_id) in (INPUT_TOPIC, CONTROL_TOPIC):
                         yield topics[entry.channel_id], entry.data
+            elif isinstance(record, Metadata) and record.name == END:
+                self.count = int(record.metadata["ticks"])
             elif isinstance(record, Footer):
                 self.complete = True
 

@@ -45,7 +45,7 @@ class Recorder:
         self._limits = inputs["thrust_low"], inputs["thrust_high"]
         self._call: LawCall | None = None
         self._topics = TickTopics(self._law.config.vehicle)
-        self.writer = LogWriter(file, heading(flown))
+        self.writer = LogWriter(file, heading(flown), lambda: {"ticks": str(self._tick)})
         if self._pilot is not None:
             self._pilot.observer = self._observe
 

@@ -17,8 +17,8 @@ from mcap_protobuf.schema import register_schema
 
 from ibvs_qp.config.errors import IbvsQpError
 
-#: Name of the metadata record.
-METADATA = "ibvs_qp"
+#: Names of the metadata records at begin and end.
+METADATA, END = "ibvs_qp", "ibvs_qp_end"
 #: Topic of what happened, in words.
 LOG_TOPIC = "/log"
 #: Longest time between writes to the file [s]: what a killed process loses, beside the queue.
@@ -68,9 +68,11 @@ class Sink:
         """End the chunk and hand everything to the system."""
         self._writer.flush()
 
-    def finish(self) -> None:
-        """Write the index and close the file."""
+    def finish(self, metadata: Mapping[str, str]) -> None:
+        """Write facts known at the end and the index, and close the file."""
         try:
+            self._writer.flush()
+            self._writer.add_metadata(END, dict(metadata))
             self._writer.finish()
         finally:
             self._stream.close()
@@ -88,13 +90,15 @@ class LogWriter:
 
     Args:
         file: The file; it is replaced.
-        metadata: Facts for the metadata record.
+        metadata: Facts for the first metadata record.
+        end: Called at the end for those of the last one.
 
     Raises:
         IbvsQpError: When the file cannot be written.
     """
 
-    def __init__(self, file: str | Path, metadata: Mapping[str, str]) -> None:
+    def __init__(self, file: str | Path, metadata: Mapping[str, str], end: Callable[[], Mapping[str, str]]) -> None:
+        self._end = end
         self._file, self._queue = Path(file), deque[tuple[Encoder, tuple[Any, ...]]]()
         try:
             self._file.parent.mkdir(parents=True, exist_ok=True)
@@ -107,18 +111,18 @@ class LogWriter:
         self._thread.start()
         atexit.register(self.close)
 
-    def offer(self, encode: Encoder, *data: Any, room: int = ROOM) -> bool:
+    def offer(self, encode: Encoder, *data: Any, room: int | None = None) -> bool:
         """Hand over what the thread shall pass to ``encode(sink, *data)``; never waits, never raises.
 
         Args:
             encode: Writes messages to the `Sink`; runs in the thread.
             data: Its arguments, which nobody may change any more.
-            room: Refuse with so many items in the queue.
+            room: Refuse with so many items in the queue, `ROOM` by default.
 
         Returns:
             Whether it was taken.
         """
-        if len(self._queue) >= room or self._closing.is_set():
+        if len(self._queue) >= (room or ROOM) or self._closing.is_set():
             self.dropped += 1
             return False
         self._queue.append((encode, data))
@@ -139,7 +143,7 @@ class LogWriter:
         try:
             self._work()
             self._tell_dropped()
-            self._sink.finish()
+            self._sink.finish(self._end())
         except OSError as error:
             self.problem = f"cannot write the log {self._file}: {error.strerror or error}; it ends there"
         except Exception as error:
