@@ -121,13 +121,13 @@ def replay(flight: RecordedFlight, controller: Any = None) -> Replay:
 def unbroken(flight: RecordedFlight, result: Any) -> Iterator[RecordedTick]:
     """The ticks up to the first gap; what is missing there goes into the result."""
     expected = 0
-    for tick in flight.ticks():
-        if tick.given.tick != expected:
+    for tick in flight.ticks():  # to its end, which says whether the log is complete
+        if tick.given.tick != expected and not result.missing:
             result.missing = tick.given.tick - expected
-            return
-        expected += 1
-        yield tick
-    result.missing = max((flight.count or 0) - expected, 0)
+        if not result.missing:
+            expected += 1
+            yield tick
+    result.missing = result.missing or max((flight.count or 0) - expected, 0)
 
 
 def _differences(tick: int, ours: Command, recorded: Command, words: tuple[str, ...]) -> Iterator[Difference]:

@@ -51,6 +51,7 @@ COMMANDS = (
     "detect --sequence FILE",
     "detect FILE",
     "explain FILE --at 1",
+    "replay FILE",
     "compare FILE FILE",
 )
 
@@ -88,6 +89,13 @@ def test_special_files(tmp_path: Path, refuses: Callable[..., str], command: str
     cv2.imwrite("color.png", np.zeros((8, 8, 3), np.uint8))
     file = special_files(tmp_path, ".toml" if command in TOML_COMMANDS else ".x")[kind]
     assert kind in refuses(command, file)
+
+
+@pytest.mark.parametrize("name", BYTES)
+def test_mcap(refuses: Callable[..., str], name: str) -> None:
+    """More of them: tests/ibvs_qp/recording/test_reader.py."""
+    Path("x.mcap").write_bytes(BYTES[name])
+    assert "x.mcap: it is no MCAP file" in refuses("replay x.mcap")
 
 
 @pytest.mark.parametrize("name", [*TOML, *BYTES])
