@@ -51,7 +51,7 @@ class CameraTopics:
         sink.write("/camera/image", _jpeg(picture.rgb, captured), stamp_ns)
         sink.write("/camera/calibration", _calibration(picture, captured, CAMERA, 1))
         if percept is not None:
-            sink.write("/camera/detections", annotations(percept, captured))
+            sink.write("/camera/detections", detections(percept, captured))
         if captured - self._seldom_ns < SELDOM_NS:
             return
         self._seldom_ns = captured
@@ -95,7 +95,7 @@ def _calibration(picture: RgbdFrame, stamp_ns: int, frame_id: str, step: int) ->
     return message
 
 
-def annotations(percept: Percept, stamp_ns: int) -> ImageAnnotations:
+def detections(percept: Percept, stamp_ns: int) -> ImageAnnotations:
     """Tracked lines with identity, kind and weight; distance of the wall, or why there is none."""
     message = ImageAnnotations()
     if percept.intrinsics is not None:

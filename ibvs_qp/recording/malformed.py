@@ -39,7 +39,7 @@ def _plain(value: Any, depth: int) -> Any:
         return value
     if type(value) is np.ndarray and value.dtype.kind in "fiub" and value.size <= MOST_ENTRIES:
         return {_ARRAY: str(value.dtype), "entries": value.tolist()}
-    if type(value) in (list, tuple) and len(value) <= MOST_ENTRIES and depth < 4:
+    if isinstance(value, list | tuple) and len(value) <= MOST_ENTRIES and depth < 4:
         return [_plain(entry, depth + 1) for entry in value]
     return {_OTHER: type(value).__name__}
 

@@ -18,7 +18,8 @@ from ibvs_qp.frames import R_BODY_CAMERA, Rotation3
 from ibvs_qp.recording.camera import CAMERA, DEPTH_CAMERA
 
 WALL, VEHICLE = "wall", "vehicle"
-#: Quaternion (x, y, z, w).
+#: Three numbers; quaternion (x, y, z, w).
+Vector = Sequence[float] | np.ndarray
 Turn = tuple[float, float, float, float]
 STRAIGHT: Turn = (0.0, 0.0, 0.0, 1.0)
 
@@ -38,15 +39,13 @@ def quaternion(rotation: Sequence[Sequence[float]] | np.ndarray) -> Turn:
     return x * scale, y * scale, z * scale, w * scale
 
 
-def place(pose: Any, position: Sequence[float], turn: Turn = STRAIGHT) -> None:
+def place(pose: Any, position: Vector, turn: Turn = STRAIGHT) -> None:
     """Fill a Foxglove pose: position [m], (3,), and quaternion (x, y, z, w)."""
     pose.position.x, pose.position.y, pose.position.z = map(float, position)
     pose.orientation.x, pose.orientation.y, pose.orientation.z, pose.orientation.w = turn
 
 
-def transform(
-    frames: FrameTransforms, parent: str, child: str, position: Sequence[float] | np.ndarray, turn: Turn, ns: int
-) -> None:
+def transform(frames: FrameTransforms, parent: str, child: str, position: Vector, turn: Turn, ns: int) -> None:
     """Add the pose of a frame in another: position [m], (3,), and quaternion (x, y, z, w)."""
     entry = frames.transforms.add(parent_frame_id=parent, child_frame_id=child)
     entry.timestamp.FromNanoseconds(ns)
@@ -62,7 +61,7 @@ def mounts(message: FrameTransforms, vehicle: VehicleParams, ns: int) -> None:
     transform(message, VEHICLE, "tip", vehicle.tip_position_m, STRAIGHT, ns)
 
 
-def pose_in_frame(frame: str, position: Sequence[float], turn: Turn, ns: int) -> PoseInFrame:
+def pose_in_frame(frame: str, position: Vector, turn: Turn, ns: int) -> PoseInFrame:
     """A pose by itself."""
     message = PoseInFrame(frame_id=frame)
     message.timestamp.FromNanoseconds(ns)

@@ -66,9 +66,10 @@ class RecordedFlight:
         waiting: ControllerInput | None = None
         for topic, data in self._messages(stream):
             if topic == INPUT_TOPIC:
-                waiting = decode(_parsed(ControllerInput, data), ControllerInput)
-                if waiting.call == RESET:
-                    yield RecordedTick(waiting, None)
+                given: ControllerInput = decode(_parsed(ControllerInput, data), ControllerInput)
+                waiting = given
+                if given.call == RESET:
+                    yield RecordedTick(given, None)
             elif waiting is not None:
                 row = decode(_parsed(ControlTick, data), ControlTick)
                 if row.tick == waiting.tick:

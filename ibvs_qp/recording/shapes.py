@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,8 +11,8 @@ from foxglove_schemas_protobuf.SceneEntity_pb2 import SceneEntity
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
 from ibvs_qp.config.vehicle import VehicleParams
-from ibvs_qp.frames import cross
-from ibvs_qp.recording.poses import STRAIGHT, VEHICLE, WALL, Turn, place
+from ibvs_qp.frames import Vector3, cross, dot
+from ibvs_qp.recording.poses import STRAIGHT, VEHICLE, WALL, Turn, Vector, place
 
 #: Colours (r, g, b, a).
 ROTOR, ARM, BRUSH, BOARD = (0.25, 0.55, 0.85, 0.5), (0.5, 0.5, 0.5, 1.0), (0.16, 0.35, 0.8, 1.0), (0.9, 0.9, 0.88, 0.5)
@@ -98,8 +97,8 @@ def _cloud(points: np.ndarray, frame: str, ns: int) -> PointCloud:
 def plate(
     frame: str,
     name: str,
-    centre: Sequence[float] | np.ndarray,
-    size: Sequence[float],
+    centre: Vector,
+    size: Vector,
     color: Color,
     ns: int,
     turn: Turn = STRAIGHT,
@@ -118,9 +117,7 @@ def estimated_wall(ns: int) -> SceneUpdate:
     return plate(WALL, WALL, (0.5 * _THIN, 0.0, 0.0), (_THIN, _SIDE, _SIDE), BOARD, ns)
 
 
-def force_arrows(
-    vehicle: VehicleParams, thrusts: np.ndarray, push: float, normal: Sequence[float], ns: int
-) -> SceneUpdate:
+def force_arrows(vehicle: VehicleParams, thrusts: np.ndarray, push: float, normal: Vector, ns: int) -> SceneUpdate:
     """Thrusts at the rotors, and the push at the tip along the wall's normal [N]."""
     update = SceneUpdate()
     entity = _entity(update, VEHICLE, "forces", ns)
@@ -130,7 +127,7 @@ def force_arrows(
     return update
 
 
-def _arrow(entity: SceneEntity, start: Sequence[float], axis: Sequence[float], length: float, color: Color) -> None:
+def _arrow(entity: SceneEntity, start: Vector, axis: Vector, length: float, color: Color) -> None:
     arrow = entity.arrows.add(
         shaft_length=0.8 * length, shaft_diameter=0.01, head_length=0.2 * length, head_diameter=0.025
     )
@@ -138,14 +135,14 @@ def _arrow(entity: SceneEntity, start: Sequence[float], axis: Sequence[float], l
     _paint(arrow.color, color)
 
 
-def _from_z(axis: Sequence[float]) -> Turn:
+def _from_z(axis: Vector) -> Turn:
     return _turn((0.0, 0.0, 1.0), axis)
 
 
-def _turn(start: Sequence[float], end: Sequence[float]) -> Turn:
+def _turn(start: Vector3, end: Vector) -> Turn:
     """Quaternion (x, y, z, w) of the shortest turn from one direction to another."""
-    end = np.asarray(end, float) / np.linalg.norm(end)
-    w = 1.0 + float(np.dot(start, end))
-    x, y, z = cross(start, end) if w > 1e-9 else (start[1], start[2], start[0])  # opposite: half a turn
+    unit = (np.asarray(end, float) / np.linalg.norm(end)).tolist()
+    w = 1.0 + dot(start, unit)
+    x, y, z = cross(start, unit) if w > 1e-9 else (start[1], start[2], start[0])  # opposite: half a turn
     length = float(np.sqrt(x * x + y * y + z * z + (w * w if w > 1e-9 else 0.0)))
     return x / length, y / length, z / length, (w if w > 1e-9 else 0.0) / length

@@ -153,6 +153,7 @@ class Paint:
     ) -> int:
         from rich.console import Console
 
+        from ibvs_qp.recording.layouts import FOLDER as LAYOUTS
         from sim.evaluate.metrics import compute_metrics
         from sim.evaluate.table import figure_table
         from sim.flight.side_by_side import INTERRUPTED
@@ -182,7 +183,7 @@ class Paint:
             if folder.report.exists():
                 print(f"Report: {folder.report}")
             for file in folder.logs():
-                print(f"Log: {file}")
+                print(f"Log: {file}; layouts for Foxglove and Rerun: {LAYOUTS}")
         if interrupted:
             print(f"ibvs-qp: interrupted; the partial run is in {folder.path}", file=sys.stderr)
         return EXIT_INTERRUPTED if interrupted else 0

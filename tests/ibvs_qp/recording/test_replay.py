@@ -56,7 +56,7 @@ def test_a_supervised_pilot_replays_to_the_bit(tmp_path: Path) -> None:
     frames = [given[0] for _, given in zip(range(600), inputs, strict=False)]
     states = set()
     with Recorder(tmp_path / "a.mcap", Pilot(config)) as recorder:
-        for lap in range(2):
+        for _ in range(2):
             for index, frame in enumerate(frames):
                 states.add(recorder.step(frame if index % 50 and index < 300 else None).safety)
                 recorder.writer.wait_for_room()
@@ -114,7 +114,7 @@ def test_a_preset_is_compared(tmp_path: Path) -> None:
     assert not result.same and result.ticks == 1700 and 0.0 < result.thrust_rms_n < result.thrust_peak_n
     assert result.push_ticks > 100 and result.push_recorded_n != result.push_preset_n
     assert sum(result.limits_recorded.values()) > sum(result.limits_preset.values())
-    with pytest.raises(ConfigError, match="8 rotors.* 6"):
+    with pytest.raises(ConfigError, match=r"8 rotors.* 6"):
         compare_preset(flight, preset("octorotor_qp"))
 
 

@@ -54,9 +54,7 @@ run(tick)
 def test_a_killed_process_leaves_nearly_all_ticks(tmp_path: Path) -> None:
     """At most 0.2 s are lost, and 97 % of 10 s and more are kept."""
     file = tmp_path / "a.mcap"
-    process = subprocess.Popen(
-        [sys.executable, "-c", FLY, str(file)], stdout=subprocess.PIPE, text=True, cwd=ROOT
-    )
+    process = subprocess.Popen([sys.executable, "-c", FLY, str(file)], stdout=subprocess.PIPE, text=True, cwd=ROOT)
     assert process.stdout is not None
     for line in process.stdout:
         flown_ticks, dropped = map(int, line.split())
@@ -133,7 +131,8 @@ def test_an_encoder_that_fails_ends_no_log(tmp_path: Path) -> None:
     assert writer.offer(fail) and writer.offer(lambda sink: sink.note(2, "x", "after"))
     writer.close()
     with open(tmp_path / "a.mcap", "rb") as stream:
-        texts = [m.message for *_, m in make_reader(stream, decoder_factories=[DecoderFactory()]).iter_decoded_messages()]
+        reader = make_reader(stream, decoder_factories=[DecoderFactory()])
+        texts = [message.message for *_, message in reader.iter_decoded_messages()]
     assert texts == ["not written: ZeroDivisionError: no such value", "after"] and not writer.problem
 
 
@@ -150,7 +149,7 @@ def test_a_full_disk_ends_the_log_and_not_the_flight(tmp_path: Path, monkeypatch
 
 
 def test_a_file_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(IbvsQpError, match="cannot write the log .*: Is a directory"):
+    with pytest.raises(IbvsQpError, match=r"cannot write the log .*: Is a directory"):
         Recorder(tmp_path, HybridController())
     (tmp_path / "file").touch()
     with pytest.raises(IbvsQpError, match="cannot write the log"):
@@ -176,7 +175,8 @@ def test_inputs_of_any_type_do_not_raise(tmp_path: Path, odd: tuple[Any, ...]) -
 
 def test_a_recorder_that_is_never_closed_ends_its_file(tmp_path: Path) -> None:
     code = FLY.replace("return True", "return ticks < 50")
-    done = subprocess.run([sys.executable, "-c", code, str(tmp_path / "a.mcap")], cwd=ROOT, capture_output=True, text=True)
+    words = [sys.executable, "-c", code, str(tmp_path / "a.mcap")]
+    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     result = replay(read_log(tmp_path / "a.mcap"))
     assert result.complete and result.ticks == 50 and result.same
