@@ -1,6 +1,6 @@
 """A flight recorder for a loop of your own: record, replay to the bit, and see what other settings would command.
 
-Open ``flight.mcap`` in Foxglove or Rerun as well. Needs the extra log: pip install 'ibvs-qp[log]'.
+Open ``flight.mcap`` in Foxglove or Rerun as well. Needs the extra ``log``.
 """
 
 import dataclasses

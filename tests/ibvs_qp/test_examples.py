@@ -174,8 +174,15 @@ def test_the_own_vehicle_hovers() -> None:
     assert 8.0 < low <= high < 12.0 and push > 20.0
 
 
-def test_the_bag_shows_the_board(printed: dict[str, str]) -> None:
-    text = printed["ros2_bag"]
+def test_a_log_replays_to_the_bit_and_shows_what_weaker_rotors_would_have_commanded() -> None:
+    text = printed("replay_log")
+    assert "1000 ticks recorded" in text and "same to the bit: True" in text
+    differing, most_n = re.findall(r"rotors of 12 N: (\d+) ticks differ.*by ([\d.]+) N", text, re.DOTALL)[0]
+    assert int(differing) > 900 and 1.0 < float(most_n) < 3.0
+
+
+def test_the_bag_shows_the_board() -> None:
+    text = printed("ros2_bag")
     assert text.startswith("250 frames, messages ignored: {}")
     distance, edges = re.findall(r"tip ([\d.]+) m from the board, (\d) of its edges seen", text)[0]
     assert float(distance) == pytest.approx(0.4, abs=0.002) and edges == "2"
