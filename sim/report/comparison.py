@@ -34,7 +34,7 @@ def read_run(path: Path) -> pl.DataFrame:
     if not names:
         advice = "give the folder of `ibvs-qp paint` or `ibvs-qp experiment`, or a preset (TOML)"
         raise ConfigError(f"{path} is no run: it has neither summary.json nor a table; {advice}")
-    return read_tables((path / f"{name}.parquet" for name in names), (*_SAME, "completed"))
+    return read_tables((path / f"{name}.parquet" for name in names), (*_SAME, "completed"), foreign=True)
 
 
 def _paint_rows(path: Path) -> pl.DataFrame:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import polars as pl
@@ -9,6 +12,19 @@ import polars as pl
 from ibvs_qp.config.files import UnreadableFile, open_regular
 from sim.storage.limits import LARGEST_TABLE, MOST_CELLS
 from sim.storage.quiet import no_library_output
+
+#: Decodes the files of its arguments, and prints a line before each: the last one is that which ended it.
+_DECODE = """
+import pathlib, sys
+from sim.storage.parquet import read_parquet
+from ibvs_qp.config.files import UnreadableFile
+for file in sys.argv[1:]:
+    print(flush=True)
+    try:
+        read_parquet(pathlib.Path(file))
+    except UnreadableFile:
+        pass
+"""
 
 
 def read_parquet(file: Path) -> pl.DataFrame:
@@ -26,3 +42,17 @@ def read_parquet(file: Path) -> pl.DataFrame:
             return pl.read_parquet(stream)
         except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError, ValueError, OverflowError) as error:
             raise UnreadableFile(file, f"no Parquet table ({str(error).splitlines()[0]})") from None
+
+
+def refuse_what_aborts(files: Sequence[Path]) -> None:
+    """Decode files that this package did not write in a process of its own, before ours reads them.
+
+    Polars allocates what a damaged length says, and aborts its process where that is more than the memory.
+
+    Raises:
+        UnreadableFile: When decoding a file ended that process.
+    """
+    words = [sys.executable, "-c", _DECODE, *(str(file) for file in files)]
+    done = subprocess.run(words, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, check=False)
+    if done.returncode:
+        raise UnreadableFile(files[max(done.stdout.count(b"\n") - 1, 0)], "no Parquet table (Polars cannot decode it)")

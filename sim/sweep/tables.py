@@ -9,20 +9,24 @@ import polars as pl
 
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.files import UnreadableFile
-from sim.storage.parquet import read_parquet
+from sim.storage.parquet import read_parquet, refuse_what_aborts
 from sim.sweep.parts import HEAD, PARAM
 
 
-def read_tables(files: Iterable[Path], needed: Sequence[str] = ()) -> pl.DataFrame:
+def read_tables(files: Iterable[Path], needed: Sequence[str] = (), *, foreign: bool = False) -> pl.DataFrame:
     """One table of several files, in the given order; a column that a file lacks is null there.
 
     Args:
         files: Parquet files.
         needed: Columns that the table must have.
+        foreign: Whether the files are a user's and not parts of this run.
 
     Raises:
         ConfigError: When a file is no table of flights, or a needed column is missing.
     """
+    files = list(files)
+    if foreign and files:
+        refuse_what_aborts(files)
     tables = [_typed(file, read_parquet(file)) for file in files]
     try:
         table = pl.concat(tables, how="diagonal_relaxed") if tables else pl.DataFrame(schema=HEAD)

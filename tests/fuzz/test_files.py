@@ -45,8 +45,13 @@ def test_journals(tmp_path: Path, runs: file_fuzz.Runs, name: str, edits: file_f
 
 @examples(4000)
 @given(EDITS)
-def test_summaries_and_tables(tmp_path: Path, runs: file_fuzz.Runs, edits: file_fuzz.Edits) -> None:
+def test_summaries(tmp_path: Path, runs: file_fuzz.Runs, edits: file_fuzz.Edits) -> None:
     runs.check_summary(tmp_path, edits)
+
+
+@examples(100)  # each starts two processes
+@given(EDITS)
+def test_tables(tmp_path: Path, runs: file_fuzz.Runs, edits: file_fuzz.Edits) -> None:
     runs.check_table(tmp_path, edits)
 
 

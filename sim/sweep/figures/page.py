@@ -39,7 +39,7 @@ def read_table(path: Path) -> tuple[pl.DataFrame, Path]:
     if not files:
         raise ConfigError(f"no table in {path}; {remedy}")
     try:
-        table = read_tables(files, ("law", "seed", "completed", "reason"))
+        table = read_tables(files, ("law", "seed", "completed", "reason"), foreign=True)
     except ConfigError as error:
         raise ConfigError(f"{path}: {error}; {remedy}") from None
     if not table.height:

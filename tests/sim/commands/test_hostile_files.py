@@ -17,6 +17,8 @@ from synthetic_trace import synthetic_trace
 import sim.flight.side_by_side
 import sim.storage.parquet
 import sim.sweep.flying
+import sim.sweep.tables
+from ibvs_qp.config.files import UnreadableFile
 from ibvs_qp.presets import FOLDER
 from sim.commands.cli import main
 from sim.flight.flight_log import load_run, save_log
@@ -140,7 +142,11 @@ def tables() -> dict[str, bytes]:
     return found
 
 
-def test_parquet(refuses: Callable[..., str], capfd: pytest.CaptureFixture[str]) -> None:
+def test_parquet(
+    refuses: Callable[..., str], capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # none of these ends the process; that is tested in tests/sim/storage/test_parquet.py
+    monkeypatch.setattr(sim.sweep.tables, "refuse_what_aborts", lambda files: None)
     table = pl.read_parquet(FOLDER.parents[1] / "docs" / "experiments" / "all.parquet").head(40)
     table.write_parquet(stream := io.BytesIO())
     good = stream.getvalue()
@@ -161,11 +167,11 @@ def test_parquet(refuses: Callable[..., str], capfd: pytest.CaptureFixture[str])
         refuses("sweep --report a")
 
 
-def test_a_table_of_few_bytes_and_many_cells(refuses: Callable[..., str], monkeypatch: pytest.MonkeyPatch) -> None:
-    Path("a").mkdir()
-    pl.select(pl.repeat(1.0, 100_000).alias("a")).write_parquet("a/all.parquet")
+def test_a_table_of_few_bytes_and_many_cells(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pl.select(pl.repeat(1.0, 100_000).alias("a")).write_parquet(tmp_path / "all.parquet")
     monkeypatch.setattr(sim.storage.parquet, "MOST_CELLS", 99_999)
-    assert "100000 cells" in refuses("compare a a")
+    with pytest.raises(UnreadableFile, match="100000 cells"):
+        sim.storage.parquet.read_parquet(tmp_path / "all.parquet")
 
 
 @pytest.fixture(scope="module")

@@ -55,7 +55,7 @@ def test_summaries_with_edits(tmp_path: Path, runs: file_fuzz.Runs, edits: file_
     runs.check_summary(tmp_path, edits)
 
 
-@BOUNDED
+@settings(BOUNDED, max_examples=5)  # each starts two processes
 @given(EDITS)
 def test_tables_with_edits(tmp_path: Path, runs: file_fuzz.Runs, edits: file_fuzz.Edits) -> None:
     runs.check_table(tmp_path, edits)
