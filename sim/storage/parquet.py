@@ -53,6 +53,6 @@ def refuse_what_aborts(files: Sequence[Path]) -> None:
         UnreadableFile: When decoding a file ended that process.
     """
     words = [sys.executable, "-c", _DECODE, *(str(file) for file in files)]
-    done = subprocess.run(words, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, check=False)
+    done = subprocess.run(words, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, check=False)  # nosec B603
     if done.returncode:
         raise UnreadableFile(files[max(done.stdout.count(b"\n") - 1, 0)], "no Parquet table (Polars cannot decode it)")
