@@ -27,8 +27,8 @@ VELOCITY_STD, BIAS_STD, ODOMETER_STD = 0.05, 0.1, 1e-6
 #: Standard deviations after refused velocities: of the velocity [m/s], and of the bias that made it wrong [m/s^2]: 3
 #: degrees of attitude.
 RESTART_VELOCITY_STD, RESTART_BIAS_STD = 0.03, 0.5
-#: Lines alone give the velocity where its standard deviation is below this [m/s], a fifth of a usual painting speed: a
-#: corner of a plain board has no points for the flow, but says all.
+#: Lines alone give the velocity where its standard deviation is below this [m/s], a fifth of a usual painting speed. A
+#: plain board's corner has no points for the flow, but its two edges fix both components.
 KNOWN_STD = 0.02
 #: Without ticks for this long [ns], the velocity has this standard deviation [m/s].
 GAP_NS, GAP_VELOCITY_STD = 100_000_000, 0.5

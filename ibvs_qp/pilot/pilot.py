@@ -86,7 +86,7 @@ class Pilot:
     """Vision, estimation, strategy and one of the two laws in a row; `step` needs no simulator.
 
     Attributes:
-        observer: Called with every call of the law, for recordings; None for nobody. It must not raise.
+        observer: Called after every call of the law, for recordings; None disables it. It must not raise.
 
     Args:
         config: Configuration of the flight.

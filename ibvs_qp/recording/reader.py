@@ -123,7 +123,7 @@ def read_log(file: str | Path) -> RecordedFlight:
         file: The file, complete or as a killed process left it.
 
     Returns:
-        The flight; its ticks are read when they are asked for.
+        The flight; its ticks are read lazily.
 
     Raises:
         UnreadableFile: When it is missing, special, too large, no MCAP file, no log of this package, or of another

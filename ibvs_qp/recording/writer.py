@@ -116,7 +116,7 @@ class LogWriter:
 
         Args:
             encode: Writes messages to the `Sink`; runs in the thread.
-            data: Its arguments, which nobody may change any more.
+            data: Its arguments; the caller must not modify them afterwards.
             room: Refuse with so many items in the queue, `ROOM` by default.
 
         Returns:
@@ -169,7 +169,7 @@ class LogWriter:
             encode(self._sink, *data)
         except OSError:
             raise
-        except Exception as error:  # of values that nobody foresaw; the rest of the log shall not end for it
+        except Exception as error:  # one bad record must not end the log
             self._sink.note(Log.ERROR, "log", f"not written: {type(error).__name__}: {error}")
 
     def _tell_dropped(self) -> None:
