@@ -52,12 +52,12 @@ class CameraTopics:
         sink.write("/camera/calibration", _calibration(picture, captured, CAMERA, 1))
         if percept is not None:
             sink.write("/camera/detections", detections(percept, captured))
-        if captured - self._seldom_ns < SELDOM_NS:
+        if abs(captured - self._seldom_ns) < SELDOM_NS:
             return
         self._seldom_ns = captured
         sink.write("/camera/depth", _depth(picture.depth, captured))
         sink.write("/camera/depth_calibration", _calibration(picture, captured, DEPTH_CAMERA, DEPTH_STEP))
-        if percept is not None:  # without tints: the control loop would wait for their arithmetic
+        if percept is not None:  # without tints: their arithmetic would hold up the control loop
             sink.write("/camera/overlay", _jpeg(draw_overlay(picture.rgb, percept, tints=False), captured))
 
 

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from ibvs_qp.command import ActiveLimit, Command
+from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.model.reporting import fixed_command
-from ibvs_qp.recording.heading import CONTROLLER, PILOT, flown_controller
+from ibvs_qp.recording.header import CONTROLLER, PILOT, flown_controller
 from ibvs_qp.recording.messages import encode
 from ibvs_qp.recording.reader import RecordedFlight, RecordedTick
-from ibvs_qp.recording.ticks import RESET, SUPERVISOR
+from ibvs_qp.recording.ticks import RESET
 
 #: Fields that are compared, and their units; durations differ from run to run, tasks follow from thrusts and inputs.
 NUMBERS = {
@@ -71,17 +72,24 @@ class Replay:
 
     @property
     def same(self) -> bool:
-        """Whether all ticks are the same to the bit."""
-        return self.first is None
+        """Whether ticks were compared, and all are the same to the bit."""
+        return self.ticks > 0 and self.first is None
 
 
 def step(controller: Any, tick: RecordedTick) -> Command | None:
-    """Command of a controller for one recorded tick; None for a reset, and where the law was not asked."""
+    """Command of a controller for one recorded tick; None for a reset.
+
+    Raises:
+        ConfigError: When the supervisor's thrusts are those of another number of rotors.
+    """
     given = tick.given
     if given.call == RESET:
         controller.reset()
         return None
-    if given.call == SUPERVISOR and given.fixed_thrusts is not None and tick.command is not None:
+    if given.fixed_thrusts is not None and tick.command is not None:
+        rotors, fixed = controller.config.vehicle.geometry.count, len(given.fixed_thrusts)
+        if fixed != rotors:
+            raise ConfigError(f"tick {given.tick}: {fixed} thrusts of the supervisor, {rotors} rotors of the law")
         return fixed_command(controller.setpoints, tick.command.stamp_ns, given.fixed_thrusts, ())
     return controller.step(given.measurement, given.reference, given.contact)
 
@@ -97,7 +105,8 @@ def replay(flight: RecordedFlight, controller: Any = None) -> Replay:
         Equal to the bit, or where not.
 
     Raises:
-        ConfigError: When the recorded controller cannot be built, because it had tasks, limits or a law of its own.
+        ConfigError: When the recorded controller cannot be built, because it had tasks, limits or a law of its own, or
+            the log has another number of rotors.
     """
     controller = flown_controller(flight.facts) if controller is None else controller
     words = WORDS if flight.facts["kind"] in (PILOT, CONTROLLER) else (*WORDS, *_SAFETY)

@@ -14,7 +14,7 @@ from ibvs_qp.config.errors import out_of_range
 from ibvs_qp.estimation.turned_camera import straightened
 from ibvs_qp.pilot import PilotConfig
 from ibvs_qp.recording.comparison import step, unbroken
-from ibvs_qp.recording.heading import ASSURED, LAWS, PILOT, flown_controller
+from ibvs_qp.recording.header import ASSURED, LAWS, PILOT, flown_controller
 from ibvs_qp.recording.reader import RecordedFlight
 from ibvs_qp.recording.ticks import STEP
 
@@ -29,7 +29,7 @@ class PresetComparison:
         thrust_peak_n: Largest thrust difference [N].
         peak_tick: Its tick.
         push_ticks: Ticks with a weight on the push task under both.
-        push_recorded_n: Mean force that the recorded push task asks for [N], NaN without such ticks.
+        push_recorded_n: Mean force that the recorded push task commands [N], NaN without such ticks.
         push_preset_n: The same of the preset.
         push_rms_n: Root mean square of the difference [N].
         limits_recorded: Ticks at which each limit was active.
@@ -53,8 +53,8 @@ class PresetComparison:
 
     @property
     def same(self) -> bool:
-        """Whether all thrusts are the same to the bit."""
-        return self.thrust_peak_n == 0.0
+        """Whether ticks were compared, and all thrusts are the same to the bit."""
+        return self.ticks > 0 and self.thrust_peak_n == 0.0
 
 
 def compare_preset(flight: RecordedFlight, preset: PilotConfig) -> PresetComparison:
@@ -77,7 +77,7 @@ def compare_preset(flight: RecordedFlight, preset: PilotConfig) -> PresetCompari
     if counts[0] != counts[1]:
         raise out_of_range("--preset", f"{counts[1]} rotors", "", f"the log has {counts[0]}")
     result = PresetComparison()
-    squares, entries, asked = 0.0, 0, []
+    squares, entries, pushes = 0.0, 0, []
     for tick in unbroken(flight, result):
         ours, theirs = step(recorded, tick), step(other, tick)
         if ours is None or theirs is None or tick.given.call != STEP:
@@ -89,13 +89,13 @@ def compare_preset(flight: RecordedFlight, preset: PilotConfig) -> PresetCompari
         _count(result.limits_recorded, (limit.name for limit in ours.active_limits))
         _count(result.limits_preset, (limit.name for limit in theirs.active_limits))
         if all(law.setpoints.contact_weight > 0.0 for law in laws):
-            asked.append([law.setpoints.push_command for law in laws])
+            pushes.append([law.setpoints.push_command for law in laws])
     result.thrust_rms_n = math.sqrt(squares / max(entries, 1))
-    if asked:
-        pushes = np.array(asked)
+    if pushes:
+        before, after = np.transpose(pushes)
         result.push_ticks = len(pushes)
-        result.push_recorded_n, result.push_preset_n = pushes.mean(axis=0).tolist()
-        result.push_rms_n = float(np.sqrt(np.mean((pushes[:, 1] - pushes[:, 0]) ** 2)))
+        result.push_recorded_n, result.push_preset_n = float(before.mean()), float(after.mean())
+        result.push_rms_n = float(np.sqrt(np.mean((after - before) ** 2)))
     result.complete = flight.complete
     return result
 

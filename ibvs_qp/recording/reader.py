@@ -16,15 +16,16 @@ from mcap.stream_reader import StreamReader, breakup_chunk
 from ibvs_qp.command import Command
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.files import UnreadableFile, open_regular
-from ibvs_qp.recording.heading import FORMAT, digest
+from ibvs_qp.recording.header import FORMAT, PILOT, digest
+from ibvs_qp.recording.malformed import from_json
 from ibvs_qp.recording.messages import decode, message_class
-from ibvs_qp.recording.ticks import RESET, ControllerInput, ControlTick
+from ibvs_qp.recording.ticks import RESET, STEP, SUPERVISOR, ControllerInput, ControlTick
 from ibvs_qp.recording.topics import CONTROL_TOPIC, INPUT_TOPIC
 from ibvs_qp.recording.writer import END, METADATA
 
 #: Largest log [bytes]: an hour of pictures at 4 MB/s. Largest record in it: a chunk has 0.1 s.
 LARGEST_FILE, LARGEST_RECORD = 1 << 34, 1 << 26
-#: Facts of the heading that replay needs.
+#: Facts of the header that replay needs.
 _NEEDED = ("version", "kind", "law", "config", "config_sha256", "safety", "rows")
 #: Errors of content that no recorder wrote.
 _DAMAGE = (
@@ -46,7 +47,7 @@ class RecordedFlight:
 
     Attributes:
         file: The file.
-        facts: Its heading: version, kind, law, config and so on (`ibvs_qp.recording.heading`).
+        facts: Its header: version, kind, law, config and so on (`ibvs_qp.recording.header`).
         complete: Whether the last pass of `ticks` came to the end that `Recorder.close` writes.
         count: Ticks flown, as this end says; some may be missing in the log.
     """
@@ -66,14 +67,24 @@ class RecordedFlight:
         waiting: ControllerInput | None = None
         for topic, data in self._messages(stream):
             if topic == INPUT_TOPIC:
-                given: ControllerInput = decode(_parsed(ControllerInput, data), ControllerInput)
-                waiting = given
-                if given.call == RESET:
-                    yield RecordedTick(given, None)
+                waiting = self._input(data)
+                if waiting.call == RESET:
+                    yield RecordedTick(waiting, None)
             elif waiting is not None:
-                row = decode(_parsed(ControlTick, data), ControlTick)
-                if row.tick == waiting.tick:
-                    yield RecordedTick(waiting, row.command)
+                message = message_class(ControlTick).FromString(data)
+                _check_plain(message)
+                _check_plain(message.command)
+                if message.tick == waiting.tick:
+                    yield RecordedTick(waiting, decode(message.command, Command))
+
+    def _input(self, data: bytes) -> ControllerInput:
+        message = message_class(ControllerInput).FromString(data)
+        _check_plain(message, but=("measurement", "reference", "contact"))
+        given: ControllerInput = decode(message, ControllerInput)
+        calls = (STEP, SUPERVISOR, RESET) if self.facts["kind"] == PILOT else (STEP, RESET)
+        if given.call not in calls or (given.fixed_thrusts is None) == (given.call == SUPERVISOR):
+            raise ValueError(f"call {given.call[:20]!r}")
+        return given
 
     def _messages(self, stream: BinaryIO) -> Iterator[tuple[str, bytes]]:
         """Topic and content of the messages that replay needs."""
@@ -88,7 +99,7 @@ class RecordedFlight:
             elif isinstance(record, Metadata) and record.name == END:
                 self.count = int(record.metadata["ticks"])
             elif isinstance(record, Footer):
-                self.complete = True
+                self.complete = self.count is not None
 
 
 def undamaged(contents: Iterator[Any]) -> Iterator[Any]:
@@ -100,8 +111,10 @@ def undamaged(contents: Iterator[Any]) -> Iterator[Any]:
             return
 
 
-def _parsed(kind: type, data: bytes) -> Any:
-    return message_class(kind).FromString(data)
+def _check_plain(message: Any, but: tuple[str, ...] = ()) -> None:
+    """Refuse malformed fields, except for inputs that the controller must meet again."""
+    if message.malformed and not from_json(message.malformed).keys() <= set(but):
+        raise ValueError("malformed fields")
 
 
 def records(stream: BinaryIO) -> Iterator[Any]:
@@ -131,7 +144,7 @@ def read_log(file: str | Path) -> RecordedFlight:
     """
     with open_regular(file, LARGEST_FILE) as stream:
         try:
-            facts = _heading(stream)
+            facts = _header(stream)
         except InvalidMagic:
             raise UnreadableFile(file, "it is no MCAP file") from None
         except _DAMAGE as error:
@@ -142,13 +155,13 @@ def read_log(file: str | Path) -> RecordedFlight:
         reason = f"it has format {facts.get('format', '')[:20]!r}, this version reads {FORMAT!r}"
         raise UnreadableFile(file, reason)
     if any(name not in facts for name in _NEEDED) or digest(facts["config"]) != facts["config_sha256"]:
-        raise UnreadableFile(file, "its heading is damaged")
+        raise UnreadableFile(file, "its header is damaged")
     flight = RecordedFlight(Path(file), facts)
     _check_first(flight)
     return flight
 
 
-def _heading(stream: BinaryIO) -> dict[str, str] | None:
+def _header(stream: BinaryIO) -> dict[str, str] | None:
     """The metadata record of the recorder, which comes before the first chunk."""
     for record in records(stream):
         if isinstance(record, Metadata) and record.name == METADATA:

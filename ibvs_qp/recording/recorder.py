@@ -10,7 +10,7 @@ from ibvs_qp.assured import Assured
 from ibvs_qp.checked_law import CheckedLaw
 from ibvs_qp.command import Command
 from ibvs_qp.pilot import LawCall, Pilot
-from ibvs_qp.recording.heading import heading
+from ibvs_qp.recording.header import header
 from ibvs_qp.recording.snapshot import copied
 from ibvs_qp.recording.ticks import RESET, STEP, SUPERVISOR, ControllerInput
 from ibvs_qp.recording.topics import TickTopics
@@ -41,11 +41,12 @@ class Recorder:
         self._pilot = flown if isinstance(flown, Pilot) else None
         self._law: Any = flown if isinstance(flown, CheckedLaw) else flown.controller
         self._setpoints, self._pictures, self._tick = self._law.setpoints, pictures, 0
+        self._names = ("measurement", "reference", "contact") if self._pilot is None else ("frame",)
         inputs = self._setpoints.step.inputs
         self._limits = inputs["thrust_low"], inputs["thrust_high"]
         self._call: LawCall | None = None
         self._topics = TickTopics(self._law.config.vehicle)
-        self.writer = LogWriter(file, heading(flown), lambda: {"ticks": str(self._tick)})
+        self.writer = LogWriter(file, header(flown), lambda: {"ticks": str(self._tick)})
         if self._pilot is not None:
             self._pilot.observer = self._observe
 
@@ -82,7 +83,7 @@ class Recorder:
         command = self._flown.step(*inputs, **named)
         step_ns = time.perf_counter_ns() - begin
         try:
-            self._record((*inputs, *named.values()), command, step_ns)
+            self._record(dict(zip(self._names, inputs, strict=False)) | named, command, step_ns)
         except Exception:  # of inputs of any type: the flight goes on, and the gap in the ticks shows it
             self.writer.dropped += 1
         self._tick += 1
@@ -107,24 +108,21 @@ class Recorder:
     def _observe(self, call: LawCall) -> None:
         self._call = call
 
-    def _record(self, inputs: tuple[Any, ...], command: Command, step_ns: int) -> None:
+    def _record(self, inputs: dict[str, Any], command: Command, step_ns: int) -> None:
         setpoints, (low, high) = self._setpoints, self._limits
         numbers = (self._tick, step_ns, self.writer.dropped, setpoints.push_reference)
         state = (setpoints.contact, low.copy(), high.copy())
         if self._pilot is None:
-            measurement, reference, *contact = inputs
-            given = copied(measurement), copied(reference), contact[0] if contact else None, None
+            given = copied(inputs["measurement"]), copied(inputs["reference"]), inputs.get("contact"), None
             self.writer.offer(self._topics.write_tick, numbers, state, STEP, given, copied(command), command)
             return
         call, pilot = self._call, self._pilot
-        if call is None:  # the law was not reached: nothing of it changed
-            given, own = (None, pilot.reference, None, None), copied(command)
-        else:
-            given, own = (call.measurement, call.reference, call.contact, call.fixed), copied(call.command)
-        kind = STEP if call is None or call.fixed is None else SUPERVISOR
+        assert call is not None  # every step of a pilot calls its law or replaces it
+        kind = STEP if call.fixed is None else SUPERVISOR
+        given, own = (call.measurement, call.reference, call.contact, call.fixed), copied(call.command)
         seen = (pilot.contact.state, *pilot.motion.state[4:6])
         self.writer.offer(self._topics.write_tick, numbers, state, kind, given, own, command, pilot.painter.phase, seen)
-        frame = inputs[0]
+        frame = inputs["frame"]
         image = frame.image
         self.writer.offer(self._topics.write_frame, copied(frame) if image is None else _without_picture(frame))
         if image is not None and self._pictures and pilot.picture is not None:

@@ -26,10 +26,15 @@ def repair(flight: RecordedFlight, file: str | Path) -> None:
     """
     try:
         with open_regular(flight.file, LARGEST_FILE) as stream, open(file, "xb") as target:
-            writer = Writer(target, compression=CompressionType.NONE)
-            writer.start(profile="")
-            _copy(undamaged(_contents(stream)), writer)
-            writer.finish()
+            try:
+                writer = Writer(target, compression=CompressionType.NONE)
+                writer.start(profile="")
+                _copy(undamaged(_contents(stream)), writer)
+                writer.finish()
+                target.flush()
+            except BaseException:
+                Path(file).unlink()  # half a file would refuse the next attempt
+                raise
     except OSError as error:
         raise IbvsQpError(f"cannot write {file}: {error.strerror or error}") from None
 

@@ -52,7 +52,7 @@ class ControlTick:
         thrust_low_n: Lower thrust limits in force [N], (n,).
         thrust_high_n: Upper thrust limits in force [N], (n,).
         step_us: Duration of the step [us].
-        dropped: Ticks that were not logged so far, because the writer was late.
+        dropped: Entries that were not logged so far, because the writer was late.
         command: Command of the law, or of what replaced it.
     """
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import contextlib
 import threading
 import time
 from collections import deque
@@ -25,9 +26,9 @@ LOG_TOPIC = "/log"
 FLUSH_S = 0.1
 #: Pause of the thread without work [s].
 IDLE_S = 0.01
-#: Items in the queue beyond which nothing is taken: 4 s at 250 Hz.
+#: Items in the queue beyond which nothing is taken: at 250 Hz 4 s of a controller, 2 s of a pilot with two a tick.
 ROOM = 1000
-#: Items beyond which no pictures are taken: 1 s, 60 MB of pictures.
+#: Items beyond which no pictures are taken: 0.5 s of a pilot, 30 MB of pictures.
 PICTURE_ROOM = ROOM // 4
 #: Longest wait for the rest of the queue at the end [s].
 CLOSE_S = 30.0
@@ -70,11 +71,14 @@ class Sink:
 
     def finish(self, metadata: Mapping[str, str]) -> None:
         """Write facts known at the end and the index, and close the file."""
-        try:
-            self._writer.flush()
-            self._writer.add_metadata(END, dict(metadata))
-            self._writer.finish()
-        finally:
+        self._writer.flush()
+        self._writer.add_metadata(END, dict(metadata))
+        self._writer.finish()
+        self._stream.close()
+
+    def abandon(self) -> None:
+        """Close the file as it is."""
+        with contextlib.suppress(OSError):  # of what is still buffered, after an error that was reported
             self._stream.close()
 
 
@@ -138,16 +142,20 @@ class LogWriter:
         self._closing.set()
         atexit.unregister(self.close)
         self._thread.join(CLOSE_S)
+        if self._thread.is_alive():
+            self.problem = f"the log {self._file} was not finished within {CLOSE_S:g} s"
 
     def _run(self) -> None:
         try:
             self._work()
-            self._tell_dropped()
+            self._note_dropped()
             self._sink.finish(self._end())
         except OSError as error:
             self.problem = f"cannot write the log {self._file}: {error.strerror or error}; it ends there"
         except Exception as error:
             self.problem = f"the log {self._file} ends early ({type(error).__name__}: {error})"
+        finally:
+            self._sink.abandon()
         self._closing.set()
         self._queue.clear()
 
@@ -156,7 +164,7 @@ class LogWriter:
         while self._queue or not self._closing.is_set():
             if self._queue:
                 encode, data = self._queue.popleft()
-                self._tell_dropped()
+                self._note_dropped()
                 self._encode(encode, data)
             else:
                 self._closing.wait(IDLE_S)
@@ -172,7 +180,7 @@ class LogWriter:
         except Exception as error:  # one bad record must not end the log
             self._sink.note(Log.ERROR, "log", f"not written: {type(error).__name__}: {error}")
 
-    def _tell_dropped(self) -> None:
+    def _note_dropped(self) -> None:
         if (dropped := self.dropped) > self._noted:
             text = f"{dropped - self._noted} entries are missing from here: the queue of the log was full"
             self._noted = dropped

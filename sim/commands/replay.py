@@ -69,15 +69,18 @@ def _text(flight: RecordedFlight, result: Replay | PresetComparison) -> list[str
     if flight.facts["version"] != __version__:
         lines.append(f"Recorded by version {flight.facts['version']}; this is {__version__}.")
     if result.missing:
-        lines.append(f"The replay ends where {result.missing} ticks are missing: the queue of the log was full.")
+        lines.append(f"The replay ends where {result.missing} ticks are missing in the log.")
     if not result.complete:
         lines.append("The log has no end: its process was killed, or the file is damaged there.")
     return lines
 
 
+NOTHING = "Nothing was compared: the log has no ticks up to its first gap."
+
+
 def _replay_text(result: Replay) -> list[str]:
     if result.first is None:
-        return [f"Same to the bit over {result.ticks} ticks."]
+        return [f"Same to the bit over {result.ticks} ticks."] if result.ticks else [NOTHING]
     first = result.first
     lines = [
         f"Differs: {result.differing} of {result.ticks} ticks; first at tick {first.tick}, {_seconds(first.stamp_ns)}:"
@@ -91,6 +94,8 @@ def _replay_text(result: Replay) -> list[str]:
 
 
 def _preset_text(result: PresetComparison) -> list[str]:
+    if not result.ticks:
+        return [NOTHING]
     if result.same:
         return [f"The preset commands the same to the bit over {result.ticks} ticks."]
     lines = [
@@ -100,7 +105,7 @@ def _preset_text(result: PresetComparison) -> list[str]:
     ]
     if result.push_ticks:
         lines.append(
-            f"  push task, {result.push_ticks} ticks: asks for {result.push_preset_n:.3f} N on average instead of"
+            f"  push task, {result.push_ticks} ticks: commands {result.push_preset_n:.3f} N on average instead of"
             f" {result.push_recorded_n:.3f} N, difference {result.push_rms_n:.3f} N rms"
         )
     for name in sorted({*result.limits_recorded, *result.limits_preset}):

@@ -22,7 +22,7 @@ ROWS, NOTES = ".rows", ".jsonl"
 
 
 @dataclass(frozen=True)
-class Heading:
+class Header:
     """The first line of the notes."""
 
     law: str
@@ -43,16 +43,16 @@ class Journal:
 
     Args:
         folder: Folder of the files.
-        heading: The first line.
+        header: The first line.
 
     Raises:
         IbvsQpError: When the files cannot be written; likewise `append`.
     """
 
-    def __init__(self, folder: Path, heading: Heading) -> None:
-        self._folder, self._row = folder, heading.row
+    def __init__(self, folder: Path, header: Header) -> None:
+        self._folder, self._row = folder, header.row
         self._files: list[BinaryIO] = []
-        self._call(lambda: self._open(heading))
+        self._call(lambda: self._open(header))
 
     def append(self, logs: Sequence[np.ndarray], programs: Sequence[np.ndarray], note: dict[str, Any]) -> None:
         """Append a chunk: rows of the log and of the program, and what else happened.
@@ -74,11 +74,11 @@ class Journal:
         for file in self._files:
             file.close()
 
-    def _open(self, heading: Heading) -> None:
+    def _open(self, header: Header) -> None:
         self._folder.mkdir(parents=True, exist_ok=True)
         for suffix in (NOTES, ROWS):
-            self._files.append(open(self._folder / f"{heading.law}{suffix}", "wb", buffering=0))
-        self._write((json.dumps(vars(heading)) + "\n").encode(), b"")
+            self._files.append(open(self._folder / f"{header.law}{suffix}", "wb", buffering=0))
+        self._write((json.dumps(vars(header)) + "\n").encode(), b"")
 
     def _write(self, *contents: bytes) -> None:
         for file, content in zip(self._files, contents, strict=True):

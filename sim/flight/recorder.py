@@ -15,7 +15,7 @@ from ibvs_qp.pilot import Pilot
 from ibvs_qp.vision.overlay import draw_overlay
 from sim.flight.assemble import NUMBERS, OUTCOMES, PHASES, Flown, LoggedRows, assemble, logged_signals
 from sim.flight.columns import Columns
-from sim.flight.journal import CHUNK_TICKS, Heading, Journal
+from sim.flight.journal import CHUNK_TICKS, Header, Journal
 from sim.flight.options import FlightOptions
 from sim.flight.pictures import pack_picture
 from sim.flight.surroundings import World
@@ -76,8 +76,8 @@ class Recorder:
         if options.journal:
             scene_text, preset = dump_toml(world.scene), pilot.config.to_toml()
             points = 0 if self._program is None else len(self._program)
-            heading = Heading(options.law, options.seed, scene_text, preset, widths, points)
-            self._journal = Journal(Path(options.journal), heading)
+            header = Header(options.law, options.seed, scene_text, preset, widths, points)
+            self._journal = Journal(Path(options.journal), header)
 
     def tick(self, frame: SensorFrame, command: Command) -> None:
         """Log one tick, after the plant has moved."""

@@ -16,7 +16,7 @@ from ibvs_qp.config.toml_text import parse_toml
 from ibvs_qp.pilot import PilotConfig
 from sim.flight.assemble import OUTCOMES, PHASES, Flown, LoggedRows, assemble
 from sim.flight.columns import split
-from sim.flight.journal import NOTES, ROWS, Heading
+from sim.flight.journal import NOTES, ROWS, Header
 from sim.flight.log_check import check_arrays
 from sim.flight.trace import LAWS, Event, Trace
 from sim.storage.limits import LARGEST_ARRAYS
@@ -47,7 +47,7 @@ def _read(file: Path) -> Trace:
     content, rows = read_bytes(file, LARGEST_ARRAYS), read_bytes(file.with_suffix(ROWS), LARGEST_ARRAYS)
     try:
         first, *notes = _lines(content)
-        return _trace(Heading(**first), notes, rows)
+        return _trace(Header(**first), notes, rows)
     except _DAMAGE as error:
         raise UnreadableFile(file, f"no journal of a flight ({type(error).__name__}: {error})") from None
 
@@ -58,13 +58,13 @@ def _lines(content: bytes) -> Iterator[dict[str, Any]]:
     return map(json.loads, lines)
 
 
-def _trace(heading: Heading, notes: list[dict[str, Any]], content: bytes) -> Trace:
-    scene = from_dict(Scene, parse_toml(heading.scene, "scene"))
-    config = from_dict(PilotConfig, parse_toml(heading.preset, "preset"))
-    flown = Flown.of(scene, int(heading.seed), str(heading.law), config)
-    table = np.zeros(min(len(content) // heading.row.itemsize, sum(note["ticks"] for note in notes)), heading.row)
+def _trace(header: Header, notes: list[dict[str, Any]], content: bytes) -> Trace:
+    scene = from_dict(Scene, parse_toml(header.scene, "scene"))
+    config = from_dict(PilotConfig, parse_toml(header.preset, "preset"))
+    flown = Flown.of(scene, int(header.seed), str(header.law), config)
+    table = np.zeros(min(len(content) // header.row.itemsize, sum(note["ticks"] for note in notes)), header.row)
     table.view(np.uint8)[:] = memoryview(content)[: table.nbytes]
-    columns = split(np.ascontiguousarray(table["log"]), heading.columns)
+    columns = split(np.ascontiguousarray(table["log"]), header.columns)
     limits: dict[str, int] = {}
     active = {
         int(tick): [(limits.setdefault(name, len(limits)), price) for name, price in paid]
@@ -74,7 +74,7 @@ def _trace(heading: Heading, notes: list[dict[str, Any]], content: bytes) -> Tra
     }
     rows = LoggedRows(
         columns=columns,
-        program=np.ascontiguousarray(table["program"]) if heading.program else None,
+        program=np.ascontiguousarray(table["program"]) if header.program else None,
         limits=tuple(limits),
         active=active,
         vision_ms=[value for note in notes for value in note["vision_ms"]],
@@ -95,5 +95,5 @@ def _trace(heading: Heading, notes: list[dict[str, Any]], content: bytes) -> Tra
         limits=rows.limits,
         events=[*(Event(t=float(t), kind=kind, text=text) for note in notes for t, kind, text in note["events"]), end],
         reason=KILLED,
-        preset=heading.preset,
+        preset=header.preset,
     )

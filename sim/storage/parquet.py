@@ -52,7 +52,9 @@ def refuse_what_aborts(files: Sequence[Path]) -> None:
     Raises:
         UnreadableFile: When decoding a file ended that process.
     """
-    words = [sys.executable, "-c", _DECODE, *(str(file) for file in files)]
-    done = subprocess.run(words, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, check=False)  # nosec B603
+    words = [sys.executable, "-P", "-c", _DECODE, *(str(file) for file in files)]  # imports nothing from the folder
+    done = subprocess.run(words, capture_output=True, check=False)  # nosec B603
+    if done.returncode > 0:  # an error of the decoder, not of a file
+        raise RuntimeError(done.stderr.decode(errors="replace"))
     if done.returncode:
         raise UnreadableFile(files[max(done.stdout.count(b"\n") - 1, 0)], "no Parquet table (Polars cannot decode it)")

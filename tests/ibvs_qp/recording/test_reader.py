@@ -12,7 +12,7 @@ from recorded_flights import record
 
 from ibvs_qp.config.files import UnreadableFile
 from ibvs_qp.recording import read_log, replay
-from ibvs_qp.recording.heading import digest
+from ibvs_qp.recording.header import digest
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +30,7 @@ def refused(file: Path, content: bytes) -> str:
 
 
 def made(file: Path, facts: dict[str, str] | None, compression: CompressionType = CompressionType.NONE) -> bytes:
-    """An MCAP file with a heading and one message of another's."""
+    """An MCAP file with a header and one message of another's."""
     with open(file, "wb") as stream:
         writer = Writer(stream, compression=compression)
         writer.start()
@@ -42,7 +42,7 @@ def made(file: Path, facts: dict[str, str] | None, compression: CompressionType 
     return file.read_bytes()
 
 
-def heading(**changes: str) -> dict[str, str]:
+def header(**changes: str) -> dict[str, str]:
     facts = dict.fromkeys(("kind", "law", "safety", "rows"), "") | {"version": "1", "format": "1", "config": "a"}
     return facts | {"config_sha256": digest("a")} | changes
 
@@ -52,11 +52,11 @@ def test_what_is_no_log_is_refused_with_its_reason(tmp_path: Path, good: bytes) 
     assert refused(file, b"no log of a flight") == "it is no MCAP file"
     assert "no whole MCAP file" in refused(file, good[:30])
     assert "no log of ibvs_qp" in refused(file, made(file, None))
-    assert "format '2'" in refused(file, made(file, heading(format="2")))
-    assert "heading is damaged" in refused(file, made(file, heading(config="b")))
-    assert "heading is damaged" in refused(file, made(file, {"format": "1"}))
-    assert "no ticks" in refused(file, made(file, heading()))
-    assert "compressed (zstd)" in refused(file, made(file, heading(), CompressionType.ZSTD))
+    assert "format '2'" in refused(file, made(file, header(format="2")))
+    assert "header is damaged" in refused(file, made(file, header(config="b")))
+    assert "header is damaged" in refused(file, made(file, {"format": "1"}))
+    assert "no ticks" in refused(file, made(file, header()))
+    assert "compressed (zstd)" in refused(file, made(file, header(), CompressionType.ZSTD))
 
 
 def test_a_log_cut_anywhere_is_read_up_to_there_or_refused(tmp_path: Path, good: bytes) -> None:

@@ -19,8 +19,9 @@ import ibvs_qp.recording.recorder
 import ibvs_qp.recording.writer
 from ibvs_qp import ControllerConfig, HybridController, Pilot, PilotConfig, SafetySettings, preset
 from ibvs_qp.command import SafetyState
-from ibvs_qp.config.errors import ConfigError
+from ibvs_qp.config.errors import ConfigError, IbvsQpError
 from ibvs_qp.recording import Recorder, compare_preset, read_log, repair, replay
+from sim.commands.cli import main
 from tests.replay.cases import CASES
 
 
@@ -167,7 +168,7 @@ def test_a_repaired_log_has_the_same_ticks(tmp_path: Path) -> None:
     assert before.same and 100 < before.ticks < 600 and not before.complete
     repair(cut, tmp_path / "mended.mcap")
     after = replay(read_log(tmp_path / "mended.mcap"))
-    assert after.same and after.ticks == before.ticks and after.complete
+    assert after.same and after.ticks == before.ticks and not after.complete  # the end is lost
     with open(tmp_path / "mended.mcap", "rb") as stream:
         assert sum(1 for _ in make_reader(stream).iter_messages(topics=["/control"])) >= after.ticks
     with pytest.raises(Exception, match="cannot write"):
@@ -181,7 +182,46 @@ def test_pilots_configurations_survive(tmp_path: Path) -> None:
         pass
     from ibvs_qp.config.settings import from_dict
     from ibvs_qp.config.toml_text import parse_toml
-    from ibvs_qp.recording.heading import heading
+    from ibvs_qp.recording.header import header
 
-    assert from_dict(PilotConfig, parse_toml(heading(Pilot(config))["config"], "x")) == config
+    assert from_dict(PilotConfig, parse_toml(header(Pilot(config))["config"], "x")) == config
     assert np.isfinite(config.controller.tick_s)
+
+
+def test_without_a_tick_nothing_is_the_same(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A log of a reset, and one whose first tick is missing."""
+    with Recorder(tmp_path / "a.mcap", HybridController()) as recorder:
+        recorder.reset()
+    subject, inputs = flown("rotor_loss", "controller")
+    with Recorder(tmp_path / "b.mcap", subject) as recorder:
+        recorder._tick = 1
+        recorder.step(*next(inputs))
+    for file, missing in ((tmp_path / "a.mcap", 0), (tmp_path / "b.mcap", 1)):
+        flight = read_log(file)
+        for result in (replay(flight), compare_preset(flight, preset("qp"))):
+            assert (result.same, result.ticks, result.missing) == (False, 0, missing)
+        for words in ([], ["--preset", "tarot_t960_qp"]):
+            assert main(["replay", str(file), *words]) == 0
+            assert "Nothing was compared" in capsys.readouterr().out
+
+
+def test_inputs_by_name_are_recorded_in_their_places(tmp_path: Path) -> None:
+    subject, inputs = flown("rotor_loss", "controller")
+    with Recorder(tmp_path / "a.mcap", subject) as recorder:
+        for _, (measurement, reference) in zip(range(20), inputs, strict=False):
+            recorder.step(reference=reference, measurement=measurement)
+    result = replay(read_log(tmp_path / "a.mcap"))
+    assert result.same and result.ticks == 20 and recorder.dropped == 0
+
+
+def test_a_failed_repair_leaves_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    record(tmp_path / "a.mcap", "rotor_loss", "controller", 100)
+
+    def fail(*_: Any) -> None:
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patch, pytest.raises(IbvsQpError, match="No space left"):
+        patch.setattr("ibvs_qp.recording.repair_file._copy", fail)
+        repair(read_log(tmp_path / "a.mcap"), tmp_path / "b.mcap")
+    repair(read_log(tmp_path / "a.mcap"), tmp_path / "b.mcap")
+    assert replay(read_log(tmp_path / "b.mcap")).complete

@@ -140,12 +140,13 @@ def test_an_encoder_that_fails_ends_no_log(tmp_path: Path) -> None:
 def test_a_full_disk_ends_the_log_and_not_the_flight(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     subject, inputs = flown("rotor_loss", "controller")
     with Recorder(tmp_path / "a.mcap", subject) as recorder:
-        recorder.writer._sink._stream.close()
+        stream = recorder.writer._sink._stream
         monkeypatch.setattr(recorder.writer._sink._writer, "_Writer__stream", open("/dev/full", "wb"))
         for _, given in zip(range(200), inputs, strict=False):
             assert recorder.step(*given).thrusts.all()
         recorder.close()
     assert "cannot write the log" in recorder.problem and "No space left" in recorder.problem
+    assert stream.closed
 
 
 def test_a_file_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
@@ -203,3 +204,12 @@ def test_without_the_extra_one_line_names_it() -> None:
 
 def test_the_record_helper_waits_for_the_writer(tmp_path: Path) -> None:
     assert record(tmp_path / "a.mcap", "rotor_loss", "pilot", 400).dropped == 0
+
+
+def test_a_writer_that_does_not_finish_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ibvs_qp.recording.writer, "CLOSE_S", 0.05)
+    writer, held = LogWriter(tmp_path / "a.mcap", {}, dict), Held()
+    assert writer.offer(held) and held.started.wait(10.0)
+    writer.close()
+    assert "was not finished within 0.05 s" in writer.problem
+    held.go.set()

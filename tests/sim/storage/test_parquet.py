@@ -11,6 +11,7 @@ import pytest
 
 from ibvs_qp.config.files import UnreadableFile
 from sim.commands.cli import main
+from sim.storage.parquet import refuse_what_aborts
 from sim.sweep.parts import frame, write_table
 from sim.sweep.tables import read_tables
 
@@ -38,3 +39,16 @@ def test_compare_says_so_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixtu
     shutil.copy(DAMAGED, tmp_path / "x.parquet")
     assert main(["compare", str(tmp_path), str(tmp_path)]) == 2
     assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_the_decoder_imports_nothing_from_the_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_table(whole := tmp_path / "whole.parquet", frame([{"experiment": "x", "seed": 1}]))
+    (tmp_path / "polars.py").write_text("raise SystemExit(3)\n")
+    monkeypatch.chdir(tmp_path)
+    refuse_what_aborts([whole])
+
+
+def test_an_error_of_the_decoder_is_not_one_of_the_file(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sim.storage.parquet._DECODE", "import nothing_of_this_name")
+    with pytest.raises(RuntimeError, match="nothing_of_this_name"):
+        refuse_what_aborts([DAMAGED])

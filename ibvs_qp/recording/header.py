@@ -28,7 +28,7 @@ PILOT, ASSURED, CONTROLLER = "pilot", "assured", "controller"
 _PACKAGES = ("numpy", "casadi", "osqp")
 
 
-def heading(flown: Pilot | Assured | CheckedLaw) -> dict[str, str]:
+def header(flown: Pilot | Assured | CheckedLaw) -> dict[str, str]:
     """Facts of the metadata record."""
     law: Any = flown if isinstance(flown, CheckedLaw) else flown.controller
     kind = PILOT if isinstance(flown, Pilot) else ASSURED if isinstance(flown, Assured) else CONTROLLER
