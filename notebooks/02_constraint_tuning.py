@@ -231,8 +231,9 @@ def _(push_first):
 @app.cell(hide_code=True)
 def _():
     mo.md(r"""
-    **A bad force law: eleven times the force gain, no damping, no ramp.** The contact is a spring $k$ with a damper under
-    the mass $m$, and this force law makes it ring. The *force ceiling* bounds the push by the poles of the contact,
+    **A bad force law: eleven times the force gain, no damping, no ramp.** The contact is a spring $k$ with a damper
+    under the mass $m$, and this force law makes it ring. The *force ceiling* bounds the push by the poles of the
+    contact,
 
     $$
     F_n \;\le\; f_\text{max} + 2\sqrt{k m}\;\dot e_s ,
