@@ -1,6 +1,7 @@
 """Lines from your own detector: pixels to `LineFeature` with a covariance, and a `FeatureFrame` for the pilot.
 
-The detector here takes the steepest change of brightness in every column and fits a line: replace `edge_pixels`.
+The detector here takes the steepest change of brightness in every column and fits a line: replace `edge_pixels`. The
+wall plane comes from the simulator's truth: fit yours to the depth.
 """
 
 import numpy as np
@@ -53,9 +54,7 @@ def main() -> None:
         stamp_ns, features = 4_000_000 * tick, None
         if tick % 8 == 0:
             picture = camera.picture(vehicle, stamp_ns)
-            line = line_of(
-                edge_pixels(picture), picture, side=-1, track_id=1
-            )  # the board lies above: against the normal
+            line = line_of(edge_pixels(picture), picture, side=-1, track_id=1)  # the board is above: side -1
             features = FeatureFrame(lines=(line,), plane=vehicle.plane(), stamp_ns=stamp_ns)
         vehicle.fly(pilot.step(vehicle.sense(stamp_ns, features=features)).thrusts)
         if tick % 100 == 0 and (found := pilot.motion.lines.get(1)):

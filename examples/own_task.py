@@ -1,6 +1,6 @@
 """A task of your own: slow the propellers beside the brush, so that their wash does not reach wet paint.
 
-The vehicle has eight rotors: the other six replace the force of the slow ones.
+The vehicle has eight rotors: to keep the moment zero r3 and r4, opposite, slow down as well; four replace the force.
 """
 
 import numpy as np

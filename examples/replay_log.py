@@ -1,6 +1,6 @@
 """A flight recorder for a loop of your own: record, replay to the bit, and see what other settings would command.
 
-Open ``flight.mcap`` in Foxglove or Rerun as well. Needs the extra ``log``.
+Foxglove and Rerun open the file as well. Needs ``pip install -c constraints.txt -e '.[log]'``.
 """
 
 import dataclasses
@@ -40,7 +40,7 @@ recorder.close()
 
 flight = read_log(file)
 same = replay(flight)
-print(f"{same.ticks} ticks recorded in {file.stat().st_size / 1e6:.1f} MB; same to the bit: {same.same}")
+print(f"{same.ticks} ticks recorded in {file} ({file.stat().st_size / 1e6:.1f} MB); same to the bit: {same.same}")
 
 limits = dataclasses.replace(config.vehicle, thrust_max_n=12.0)
 weaker = replay(flight, HybridController(dataclasses.replace(config, vehicle=limits)))

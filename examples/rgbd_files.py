@@ -2,6 +2,7 @@
 
 ``python examples/rgbd_files.py FOLDER`` reads every ``NAME_color.png`` with ``NAME_depth.png`` (16 bit, millimetres,
 registered to the colours) in the order of their names; without a folder it writes and reads three pictures of its own.
+Lines are listed from their second picture on, so the first picture has none.
 ``ibvs-qp detect`` does more: manifests, sequences, pictures with the lines drawn in.
 """
 

@@ -1,7 +1,7 @@
-"""A ROS 2 bag through the pilot, without ROS: what it saw and decided. Needs the extra ``ros``.
+"""A ROS 2 bag through the pilot, without ROS: what it saw and decided.
 
-The bag is made up here: a second of hovering. Give your own instead: ``Bag(path, Topics(imu="/imu", ...))``.
-Run it with ``python examples/ros2_bag.py``.
+It needs ``pip install -c constraints.txt -e '.[ros]'``. The bag is made up here: a second of hovering.
+Give your own instead: ``Bag(path, Topics(imu="/imu", ...))``.
 """
 
 import tempfile

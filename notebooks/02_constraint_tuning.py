@@ -36,7 +36,7 @@ def _():
     \mathbb{R}^6$ and the slacks $s \ge 0$ of its soft limits:
 
     $$
-    \min_{u,\,s}\;\; \sum_k w_k \,\bigl\| A_k\,\dot\nu(u) - b_k \bigr\|^2 \;+\; \sum_j p_j\, s_j^2
+    \min_{u,\,s}\;\; \tfrac12 \sum_k w_k \,\bigl\| A_k\,\dot\nu(u) - b_k \bigr\|^2 \;+\; \tfrac12 \sum_j p_j\, s_j^2
     \qquad \text{with} \qquad
     \dot\nu(u) = M^{-1}\,(B\,u + h),
     $$
@@ -175,12 +175,13 @@ def _():
 
     **A push beyond reach: 34 N without the reach check.** The flight before has the check on, and its push stays far
     below 34 N: the check follows the ray of pushes $w(f)=f\,[d;\,p{\times}d]-h$ to the first facet of $\mathcal{W}$ and
-    limits the reference to 97 % of that push. At rest that would be 29.7 N. But a slide follows, on a wall whose
-    friction has not been measured yet, so $d$ includes the largest sideways friction of a brush, 0.8, and 8.5 N remain
+    limits the reference to 97 % of that push. At rest that would be about 29 N. But a slide follows, on a wall whose
+    friction has not been measured yet, so $d$ includes the largest sideways friction of a brush, 0.8, and 8.4 N remain
     until the slide has shown less. Without the check, rotor limits are active from the end of the ramp on. The program
     then gives up the task with the smallest weight, the push. It ends 4 N short at rest, and more while sliding,
     because friction needs thrust too. Tilt stays below one degree and the tip within a millimetre of its row. The
-    analytic law clips: it holds the push and loses the attitude, with a tilt of 35 degrees.
+    analytic law clips its thrusts and leans into the wall. At 18 degrees the supervisor, which allows 12, ends the
+    flight.
     """)
     return
 
@@ -202,10 +203,11 @@ def _(at_the_limit):
 def _():
     mo.md(r"""
     **Reversed priorities: the weight of the push from 0.5 to 5000, at the same 34 N without the check.** The flight
-    before has the shipped weight. This one weight decides which task deviates: now the vehicle leans into the wall by
-    up to 19 degrees, because leaning converts lift into push, and reaches its 34 N. The multipliers rise from about ten
-    to about ten thousand: a newton of thrust saves more cost when the weight of its effect is larger. The analytic law
-    has no such parameter; the geometry decides what the clipped thrusts lose.
+    before has the shipped weight. This one weight decides which task deviates: now the vehicle leans into the wall,
+    because leaning converts lift into push. The push error while holding falls from 4.0 to 1.9 N rms, until the
+    supervisor ends the flight at a tilt of 13 degrees. The multipliers rise from about ten to above ten thousand: a
+    newton of thrust saves more cost when the weight of its effect is larger. The analytic law has no such parameter;
+    the geometry decides what the clipped thrusts lose.
     """)
     return
 
@@ -229,17 +231,18 @@ def _(push_first):
 @app.cell(hide_code=True)
 def _():
     mo.md(r"""
-    **A bad force law: six times the force gain, no damping, no ramp.** The contact is a spring $k$ with a damper under
-    the mass $m$, and this force law makes it ring. The *force ceiling* bounds the push by the poles of the contact,
+    **A bad force law: eleven times the force gain, no damping, no ramp.** The contact is a spring $k$ with a damper
+    under the mass $m$, and this force law makes it ring. The *force ceiling* bounds the push by the poles of the
+    contact,
 
     $$
     F_n \;\le\; f_\text{max} + 2\sqrt{k m}\;\dot e_s ,
     $$
 
     with $\dot e_s < 0$ while the tip approaches, so that it brakes the tip before the spring is compressed. The flight
-    before has no ceiling: 17 N instead of 7 N at the peak, and the tip loses contact again and again. Without the
-    approach barrier as well, the tip strikes with 33 N. The ceiling is active in every sixth tick, and the push still
-    oscillates. With the shipped gains it is never active.
+    before has no ceiling: 17 N instead of 7 N at the peak, and the tip loses contact again and again. (Without the
+    approach barrier as well, the tip strikes with 34 N, and the supervisor ends the flight.) The ceiling is active in
+    every sixth tick, and the push still oscillates. With the shipped gains it is never active.
     """)
     return
 

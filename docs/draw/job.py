@@ -10,7 +10,6 @@ from diagrams import BLUE, GREEN, INK, ORANGE
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from panels import panels
-from sim.flight.video import unpack_picture
 
 import ibvs_qp
 from ibvs_qp.config.contact_margin import contact_mode_damping
@@ -19,6 +18,7 @@ from sim.evaluate.paint_plan import nominal_plan
 from sim.flight.closed_loop import fly
 from sim.flight.jobs import PressJob
 from sim.flight.options import FlightOptions
+from sim.flight.pictures import unpack_picture
 from sim.report.catalogue import Setting
 from sim.world.scene import Scene
 

@@ -156,7 +156,7 @@ def load_setting(preset: str) -> Setting:
     Raises:
         ConfigError: When it cannot be read, flies the analytic law, or the rotors have different limits.
     """
-    file = Path(preset).expanduser()
+    file = _path(preset)
     if not file.exists():
         file = FILES.get(preset, file)
     if not file.exists():
@@ -196,6 +196,13 @@ class Start:
         return f"**Not loaded:** {self.refusal}" if self.refusal else f"begun with {self.name}"
 
 
+def _path(name: str | Path) -> Path:
+    try:
+        return Path(name).expanduser()
+    except RuntimeError as error:  # no such user
+        raise ConfigError(f"{name} is refused: {error}") from None
+
+
 def _scene_file(preset: Path) -> Path:
     """File of the scene that belongs to a saved preset."""
     return preset.with_name(preset.stem + ".scene.toml")
@@ -210,7 +217,7 @@ def save_setting(setting: Setting, preset: str | Path) -> tuple[Path, Path]:
     Raises:
         ConfigError: When a file cannot be written, or the contact would ring with this preset.
     """
-    file = Path(preset).expanduser()
+    file = _path(preset)
     if file.suffix != ".toml":
         raise ConfigError(f"{file} is refused: the name of a preset ends in .toml")
     require_margin(setting.pilot.controller, setting.pilot.controller.brush)
@@ -219,8 +226,8 @@ def save_setting(setting: Setting, preset: str | Path) -> tuple[Path, Path]:
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(setting.pilot.to_toml(), encoding="utf-8")
         scene.write_text(dump_toml(setting.scene), encoding="utf-8")
-    except OSError as error:
-        raise ConfigError(f"cannot write {file}: {error.strerror or error}") from None
+    except (OSError, ValueError) as error:
+        raise ConfigError(f"cannot write {file}: {getattr(error, 'strerror', None) or error}") from None
     return file, scene
 
 

@@ -30,8 +30,8 @@ _TASKS = """
 ## Tasks
 
 A row costs `weight * (achieved - target)^2 / 2`, so a weight is per squared unit of its row and the cost has no unit.
-The table lists full weights. At a tick, lambda and 1 - lambda blend push and stand-off; the weight of a line decreases
-with the quality of its fit and is zero without the line; the velocity rows lose weight in directions that a line fixes;
+The table lists full weights. At a tick, lambda and 1 - lambda blend push and stand-off; the weight of a line falls
+as its variance rises and is zero without the line; the velocity rows lose weight in directions that a line fixes;
 while friction holds the tip, `velocity_right` has the weight of `height` (`ibvs_qp/tasks/velocity.py`).
 
 """

@@ -7,7 +7,7 @@ FIGURES = {
     "completed": "Whether the vehicle painted every row, climbed between them and backed away from the wall.",
     "reason": "Why the flight ended.",
     "duration_s": "Simulated time from start to end.",
-    "real_time_factor": "Simulated time over computing time: 1 keeps up with the clock. Says nothing about the flight.",
+    "real_time_factor": "Simulated over computing time; 1 keeps up with the clock. It does not measure flight quality.",
     "stroke_m": "Length of the shortest painted row; good: the length that the scene asks for.",
     "coverage": "Share of the wanted stripes that has paint on it; good: near 100 %.",
     "path_rms_straight_m": "Typical distance of the brush from the ideal line on straight parts; smaller is better.",
@@ -38,7 +38,7 @@ OUTCOMES = {
     "inaccurate_accepted": "The solver ended with less accuracy, and the result passed the checks.",
     "capped_accepted": "The solver used up its iterations, and the result passed the checks.",
     "exact_fallback": "The solver's result failed the checks; the exact solver answered instead.",
-    "analytic_fallback": "No solution of the program passed the checks; the analytic law flew this tick.",
+    "analytic_fallback": "No solution passed the checks, now or shortly before; the analytic law flew this tick.",
     "hold": "Inputs were missing or unusable: the vehicle carried its weight and kept level.",
 }
 #: Meaning of the limits by the beginning of their names.

@@ -17,9 +17,10 @@ ROOT = Path(__file__).parents[2]
 _BLOCK = re.compile(r"<!-- (?P<places>[\w/. ]+): generated -->\n.*?<!-- end of texts -->", re.DOTALL)
 #: Folders and modules that step in flight or say why a flight ended: every sentence in them is a message.
 _IN_FLIGHT = (
-    "ibvs_qp/assured.py ibvs_qp/checked_law.py ibvs_qp/controller.py ibvs_qp/estimation ibvs_qp/model/compiler.py "
-    "ibvs_qp/model/machine_code.py ibvs_qp/model/reporting.py ibvs_qp/model/shared_library.py ibvs_qp/painting "
-    "ibvs_qp/pilot ibvs_qp/qp/infeasible.py ibvs_qp/safety ibvs_qp/validation ibvs_qp/vision"
+    "ibvs_qp/assured.py ibvs_qp/bridge/bridge.py ibvs_qp/bridge/gate.py ibvs_qp/checked_law.py ibvs_qp/controller.py "
+    "ibvs_qp/estimation ibvs_qp/model/compiler.py ibvs_qp/model/machine_code.py ibvs_qp/model/reporting.py "
+    "ibvs_qp/model/shared_library.py ibvs_qp/painting ibvs_qp/pilot ibvs_qp/qp/infeasible.py ibvs_qp/safety "
+    "ibvs_qp/validation ibvs_qp/vision"
 ).split()
 #: Elsewhere messages are the texts of errors: raised, or prepared in a variable of such a name.
 _PREPARED = re.compile(r"advice|allowed|checks|instead|kind|message|most|need|problem|reason|remedy|words|REMEDY|KINDS")
@@ -27,6 +28,8 @@ _PREPARED = re.compile(r"advice|allowed|checks|instead|kind|message|most|need|pr
 _INTERNAL = ("sim/notebook", "sim/report/refusals.py", "sim/rivals/solver.py", "sim/experiments/relevance.py")
 #: Calls whose texts document settings.
 _DOCUMENTS = {"setting", "choice", "_weight", "_poles", "_slack_weight", "_vector", "split"}
+#: What a logger fills in, and marks of a console.
+_FILLED_IN, _MARKUP = re.compile(r"%[rs]"), re.compile(r"\[(bold|/)\]")
 #: Errors that only a fault of the project's own code raises.
 _OWN_FAULTS = {"AttributeError", "KeyError", "MemoryError", "RuntimeError", "LookupError", "TypeError"}
 
@@ -65,7 +68,7 @@ def _sentences(node: ast.AST) -> Iterator[str]:
         return
     if (text := _text(node)) is not None:
         if " " in text.strip() and re.search(r"[a-z]{2}", text):
-            yield " ".join(text.split())
+            yield _FILLED_IN.sub("…", " ".join(_MARKUP.sub("", text).split()))
         return
     for child in ast.iter_child_nodes(node):
         yield from _sentences(child)

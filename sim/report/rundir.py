@@ -35,7 +35,7 @@ report.html   all results on one page; open it in a browser (it plays video.mp4 
 summary.json  all figures (docs/metrics.md of the project defines them)
 figures/      the report's figures as PNG
 video.mp4     the vehicle from outside, camera view, phase and push (H.264)
-scene.toml    the scene; repeat the flight with: ibvs-qp paint --scene scene.toml --seed {seed}
+scene.toml    the scene; the command that flew it: {command}
 preset_*.toml configuration of the pilot under each law
 flight_*.mcap log for Foxglove and Rerun, with --log mcap; check it with: ibvs-qp replay flight_qp.mcap
 log.npz       every array, named <law>/<array>; load it with
@@ -106,7 +106,8 @@ class RunFolder:
                 write_text(self.path / "scene.toml", dump_toml(trace.scene))
                 write_text(self.path / f"preset_{law}.toml", trace.preset)
         fields = "\n".join(f"  {name:<20} {text}" for name, text in FIELDS.items())
-        write_text(self.path / "README.txt", _README.format(seed=summary_table["seed"], path=self.path, fields=fields))
+        command = summary_table["command"]
+        write_text(self.path / "README.txt", _README.format(command=command, path=self.path, fields=fields))
         self.write_summary(summary_table)
         for law in traces:
             if self.journal is not None and (made := self.journal / f"{law}{MCAP}").exists():

@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 
 from sim.flight.trace import Trace
+from sim.video.drawing import PAPER
 from sim.video.outside import scene_points
 from sim.video.outside_camera import OutsideCamera
 from sim.video.panel import OUTSIDE_SIZE, Panel
@@ -48,7 +49,9 @@ def film_frames(traces: dict[str, Trace], rate_hz: float = FRAME_RATE_HZ) -> Ite
     end = max(float(trace.t[-1]) for trace in traces.values())
     for number in range(int(end * rate_hz) + 1):
         drawn = [panel.draw(number / rate_hz) for panel in panels]
-        yield np.hstack(drawn)
+        height = max(map(len, drawn))  # a law without a picture has a lower panel
+        below = [np.full((height - len(panel), *panel.shape[1:]), PAPER, np.uint8) for panel in drawn]
+        yield np.hstack([np.vstack(pair) for pair in zip(drawn, below, strict=True)])
 
 
 def write_video(traces: dict[str, Trace], file: Path) -> None:

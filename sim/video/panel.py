@@ -42,7 +42,7 @@ class Panel:
             return None, (width, STRIP_HEIGHT)
         rows, columns = unpack_picture(self._trace.pictures[0][1]).shape[:2]
         camera_width = width if self._outside is None else CAMERA_WIDTH
-        camera = camera_width, 2 * round(0.5 * camera_width * rows / columns)
+        camera = camera_width, min(2 * round(0.5 * camera_width * rows / columns), 3 * camera_width // 4)
         if self._outside is None:
             return camera, (width, STRIP_HEIGHT)
         return camera, (camera_width, height - camera[1]) if self._alone else (width - camera_width, camera[1])
@@ -64,13 +64,15 @@ class Panel:
         return np.vstack((self._title(tick, body.shape[1]), body))
 
     def _camera(self, t: float, size: tuple[int, int]) -> np.ndarray:
-        """The latest camera picture."""
+        """The latest camera picture; a tall one has paper beside it."""
         index = max(int(np.searchsorted(self._times, t + 1e-9, side="right")) - 1, 0)
         if index != self._shown:
+            taken, (width, height) = unpack_picture(self._trace.pictures[index][1]), size
+            shown = min(width, 2 * round(0.5 * height * taken.shape[1] / taken.shape[0]))
+            side = (width - shown) // 2
+            self._picture = np.full((height, width, 3), PAPER, np.uint8)
+            self._picture[:, side : side + shown] = cv2.resize(taken, (shown, height), interpolation=cv2.INTER_AREA)
             self._shown = index
-            self._picture = cv2.resize(
-                unpack_picture(self._trace.pictures[index][1]), size, interpolation=cv2.INTER_AREA
-            )
         return self._picture
 
     def _title(self, tick: int, width: int) -> np.ndarray:

@@ -42,11 +42,17 @@ def test_every_exit_code_is_told() -> None:
         ('allowed = "one number per rotor"', False, ["one number per rotor"]),
         ('raise out_of_range("mass", 1, "kg", "must lie above zero")', False, ["must lie above zero"]),
         ('"""A docstring of words."""\nx: float = setting(1.0, "a doc of words")', True, []),
+        ('logger.warning("CC = %r: [bold]no command[/]", name)', True, ["CC = …: no command"]),
         ('raise RuntimeError("a fault of our own")', False, []),
     ],
 )
 def test_texts_of_a_module(source: str, in_flight: bool, found: list[str]) -> None:
     assert refusals.texts_of(source, in_flight) == found
+
+
+def test_the_reasons_of_the_bridge_are_found() -> None:
+    bridge, gate = (refusals.refusals()[f"ibvs_qp/bridge/{name}.py"] for name in ("bridge", "gate"))
+    assert {"a first picture", "flight ended: …"} <= set(bridge) and "link lost: …" in gate
 
 
 def test_a_new_refusal_is_missed_on_the_page(monkeypatch: pytest.MonkeyPatch) -> None:

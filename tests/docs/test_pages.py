@@ -5,6 +5,8 @@ from __future__ import annotations
 import ast
 import importlib
 import re
+import runpy
+import sys
 from pathlib import Path
 
 import pytest
@@ -86,3 +88,9 @@ def test_pictures_are_used_and_small() -> None:
     for picture in (DOCS / "pictures").iterdir():
         assert f"pictures/{picture.name})" in text, picture.name
         assert picture.stat().st_size <= 150_000, picture.name
+
+
+def test_the_programs_that_draw_the_pictures_import(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(DOCS / "draw")
+    monkeypatch.setattr(sys, "argv", ["draw", "none of them"])
+    assert runpy.run_path(str(DOCS / "draw" / "__main__.py"))["PICTURES"]

@@ -21,6 +21,7 @@ from sim.commands import cli
 from sim.experiments.spec import Experiment
 from sim.faults.scenario import scenario
 from sim.sweep.spec import parse_spec
+from sim.world.errors import WorldErrors
 from sim.world.scene import Scene
 
 ROOT = Path(__file__).parents[2]
@@ -39,6 +40,7 @@ KINDS: dict[str, Callable[[dict[str, Any]], object]] = {
     "vehicle": lambda table: from_dict(VehicleParams, table["vehicle"]),
     "pilot": lambda table: from_dict(PilotConfig, table),
     "scene": lambda table: from_dict(Scene, table),
+    "world": lambda table: from_dict(WorldErrors, table),
     "sweep": lambda table: parse_spec(table, ROOT),
     "experiment": lambda table: from_dict(Experiment, table),
     "bridge": lambda table: from_dict(BridgeConfig, table),

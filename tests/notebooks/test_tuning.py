@@ -148,3 +148,10 @@ def test_a_preset_that_would_ring_is_not_saved(tmp_path):
     assert not (tmp_path / "ringing.toml").exists()
     with pytest.raises(ConfigError, match=r"ends in \.toml"):
         save_setting(Setting(), tmp_path / "preset.txt")
+
+
+@pytest.mark.parametrize("name", ["~no_such_user_here/x.toml", "nul\0.toml"])
+def test_a_name_that_is_no_path_is_refused(name):
+    assert Start().load(name).refusal
+    with pytest.raises(ConfigError):
+        save_setting(Setting(), name)

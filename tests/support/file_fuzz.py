@@ -130,7 +130,7 @@ class Runs:
 
         trace = fly(Scene(), options, stop)
         run = RunFolder(self.flown)
-        table = {"seed": 0, "laws": {"qp": compute_metrics(trace)}, "version": "1"}
+        table = {"seed": 0, "laws": {"qp": compute_metrics(trace)}, "version": "1", "command": "none"}
         run.write_record({"qp": trace}, table)
         rows = [
             {"experiment": "x", "law": "qp", "variant": "run", "seed": seed, "completed": True, "reason": "", **FIGURES}

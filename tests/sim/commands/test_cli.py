@@ -62,6 +62,7 @@ def test_json_is_one_line_and_equals_the_file(flown, capsys):
     assert run.parent == Path("runs") and run.name.endswith("Z")
     assert json.loads((run / "summary.json").read_text()) == summary
     assert not (run / "video.mp4").exists()
+    assert summary["command"] in (run / "README.txt").read_text(), "with all options that change the flight"
 
 
 def test_log_reads_back_equal(flown, capsys):

@@ -54,6 +54,17 @@ def test_any_set_of_parts_makes_pictures_of_one_even_size(traces, laws, pictures
     assert height % 2 == 0 and width % 2 == 0
 
 
+@pytest.mark.parametrize("laws", [("qp",), ("qp", "paper")])
+def test_a_portrait_camera_and_a_law_without_a_picture_yet_make_one_even_size(laws):
+    chosen = {law: synthetic_trace(scene=SCENE, law=law, pictures=0) for law in laws}
+    chosen["qp"].pictures = [(0.0, np.full((640, 480, 3), 7, np.uint8), "paint")]
+    frames = list(film_frames(chosen, rate_hz=0.3))
+    ((height, width, _),) = {frame.shape for frame in frames}
+    assert height % 2 == 0 and width % 2 == 0
+    rows, columns = np.nonzero((frames[0] == 7).all(axis=2))
+    assert np.ptp(rows) + 1 == pytest.approx(4 / 3 * (np.ptp(columns) + 1), abs=2.0), "not stretched"
+
+
 def test_an_opencv_without_triangles_leaves_the_view_from_outside_out(traces, monkeypatch):
     whole = next(iter(film_frames(traces)))
     monkeypatch.delattr(cv2, "triangleRasterize")
