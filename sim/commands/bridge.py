@@ -136,7 +136,7 @@ def _plan(config: BridgeConfig, flight: PilotConfig) -> dict[str, Any]:
     from ibvs_qp.bridge.inputs import subscriptions
     from ibvs_qp.bridge.outputs import Outputs, publications
 
-    Outputs(config, flight.controller.vehicle)
+    curve = Outputs(config, flight.controller.vehicle).curve
     reads = {each.topic: each.type_name for each in subscriptions(config)}
 
     def named(topics: dict[str, str]) -> list[dict[str, str]]:
@@ -151,7 +151,8 @@ def _plan(config: BridgeConfig, flight: PilotConfig) -> dict[str, Any]:
         "rate_hz": 1.0 / flight.controller.tick_s,
         "subscribes": named(reads),
         "publishes": named(publications(config)),
-        "checks": list(checks(config)),
+        "curve": {"thrust_max_n": curve.thrust_max_n, "quadratic": curve.quadratic},
+        "checks": list(checks(config, flight)),
     }
 
 
@@ -163,6 +164,8 @@ def _show(plan: dict[str, Any]) -> None:
     example = plan["publishes"][0]
     print(f"in DDS      domain {plan['domain_id']}; {example['dds_topic']} of {example['dds_type']}, and so on")
     print(f"            best effort, volatile, keep last; {plan['rate_hz']:g} Hz")
+    curve = plan["curve"]
+    print(f"rotors      {curve['thrust_max_n']:g} N at full command, quadratic share {curve['quadratic']:g}")
     print("PX4 enters Offboard mode only with the bridge's proof of life, which begins when:")
     for check in plan["checks"]:
         print(f"  - {check}")
