@@ -38,6 +38,7 @@ def test_lines_that_come_faster_than_they_are_read_are_dropped(pipe: tuple[int, 
     assert len(text) < 100 and text[-1] == "end"
 
 
+@pytest.mark.timeout(10)
 def test_a_stopped_terminal_does_not_stop_the_loop(pipe: tuple[int, int], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(status_lines, "LAST_S", 0.1)
     room = fcntl.fcntl(pipe[1], fcntl.F_GETPIPE_SZ)
@@ -50,11 +51,16 @@ def test_a_stopped_terminal_does_not_stop_the_loop(pipe: tuple[int, int], monkey
     os.read(pipe[0], room)  # so that the thread ends
 
 
-def test_a_closed_output_does_not_raise(pipe: tuple[int, int]) -> None:
-    reading, writing = os.pipe()
-    os.close(reading)
-    lines = StatusLines(writing)
-    lines.put("first")
+def test_lines_go_on_after_an_error_of_the_output(pipe: tuple[int, int]) -> None:
+    room = fcntl.fcntl(pipe[1], fcntl.F_GETPIPE_SZ)
+    os.set_blocking(pipe[1], False)
+    os.write(pipe[1], bytes(room))
+    lines = StatusLines(pipe[1])
+    lines.put("refused")
+    while lines._newest:
+        time.sleep(0.01)
+    time.sleep(0.05)
+    os.read(pipe[0], room)
     lines.close("end")
-    assert not lines._thread.is_alive()
-    os.close(writing)
+    os.set_blocking(pipe[0], False)
+    assert os.read(pipe[0], 100).endswith(b"end\n")
