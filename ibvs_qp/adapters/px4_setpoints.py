@@ -1,7 +1,7 @@
-r"""Wrench to PX4's normalised thrust and torque set-points.
+r"""Wrench to PX4's normalised thrust and torque setpoints.
 
 PX4's pseudo-inverse allocation (`ControlAllocationPseudoInverse`) divides every column of the mixer
-:math:`M = (B\,\mathrm{diag}(C_T))^+` by a scale s of its own, so the set-point of a wrench w is :math:`s \odot w`:
+:math:`M = (B\,\mathrm{diag}(C_T))^+` by a scale s of its own, so the setpoint of a wrench w is :math:`s \odot w`:
 PX4 then commands :math:`M w`, up to what it rounds to zero and what it limits.
 """
 
@@ -16,7 +16,7 @@ _LEAST_TORQUE, _LEAST_THRUST = 1e-3, float(np.finfo(np.float32).eps)
 
 
 def setpoint_scale(geometry: RotorGeometry, thrust_max_n: float) -> np.ndarray:
-    """Set-point per wrench, for vehicles whose allocation PX4 normalises (multirotors): 1/N and 1/(N m), (6,).
+    """Setpoint per wrench, for vehicles whose allocation PX4 normalises (multirotors): 1/N and 1/(N m), (6,).
 
     Args:
         geometry: Rotors, in the order of CA_ROTORn_*.

@@ -9,22 +9,25 @@ from dataclasses import dataclass
 from ibvs_qp.bridge.config import BridgeConfig
 from ibvs_qp.bridge.dds import Participant
 from ibvs_qp.bridge.gate import BridgeState, Gate
-from ibvs_qp.bridge.inputs import MODE, Inputs
+from ibvs_qp.bridge.inputs import MODE, PAIR, Inputs
 from ibvs_qp.bridge.outputs import Outputs, Publisher
 from ibvs_qp.command import SafetyState
 from ibvs_qp.pilot import Pilot, PilotConfig
 from ibvs_qp.validation.self_check import SelfCheck
 
-#: Largest difference of a lens coefficient from the configured one [-].
-_LENS_ERROR = 1e-6
+#: Sensors without which nothing flies.
+_INERTIAL = ("imu", "attitude")
 
 
-def checks(config: BridgeConfig) -> tuple[str, ...]:
+def checks(config: BridgeConfig, flight: PilotConfig) -> tuple[str, ...]:
     """What must hold before the bridge is ready, in words."""
     return (
         f"imu and attitude arrived within {config.link_timeout_s:g} s, wrench and pictures within "
         f"{config.sensor_timeout_s:g} s, PX4's mode within {config.mode_timeout_s:g} s",
         "their stamps are of this computer's clock",
+        f"imu and attitude were at most {1e3 * flight.safety.imu_age_s:g} ms old by their stamps in every tick of the "
+        "self-check",
+        f"colour and depth are pairs, by stamps within {1e3 * config.topics.pair_s:g} ms, of the size in camera_info",
         "camera_info has the lens of the preset (camera.distortion)",
         f"the vehicle was at rest or hovered, and for {config.check_s:g} s attitude, gyro and accelerometer agreed",
         "PX4 was not armed in Offboard mode before",
@@ -40,7 +43,7 @@ class BridgeStatus:
         reason: Why.
         phase: Phase of the flight, empty unless flying.
         safety: State of the pilot's supervisor and its reasons, empty unless flying.
-        commands: Set-points sent.
+        commands: Ticks with setpoints.
         ignored: Messages left out, by role and reason.
     """
 
@@ -83,6 +86,7 @@ class Bridge:
         self.pilot = pilot or Pilot(flight)
         self.pilot.prepare()
         self._prepared = False  # perception, for pictures of this camera
+        self._oldest_s = flight.safety.imu_age_s
         self.gate, self._check = Gate(config.check_s), SelfCheck(flight.safety.self_check)
         self._alive_ns, self._next_alive_ns, self._last_ns, self._commands = round(1e9 / config.alive_hz), 0, -1, 0
 
@@ -106,17 +110,26 @@ class Bridge:
             now_ns: Monotonic time [ns].
         """
         self.inputs.poll(now_ns)
-        config, before = self.config, self.gate.state
-        lost = [role for role in ("imu", "attitude") if self.inputs.older(role, now_ns, config.link_timeout_s)]
+        config, before, clock_ns = self.config, self.gate.state, self._clock()
+        ages = {role: self.inputs.age_s(role, clock_ns) for role in _INERTIAL}
+        limit = config.link_timeout_s
+        lost = [role for role, age in ages.items() if age > limit or self.inputs.older(role, now_ns, limit)]
         missing = self._missing(now_ns, lost) if before is not BridgeState.FLYING else []
+        if before in (BridgeState.WAITING, BridgeState.CHECKING):  # one late sample does not end a readiness
+            missing += [
+                f"{role}: {1e3 * age:.0f} ms old, at most {1e3 * self._oldest_s:g} ms"
+                for role, age in ages.items()
+                if age > self._oldest_s and role not in lost
+            ]
         mode = None if self.inputs.older(MODE, now_ns, config.mode_timeout_s) else self.inputs.mode
         state = self.gate.update(now_ns, lost, missing, None if mode is None else mode.engaged)
         if state is BridgeState.FLYING:
             if before is not state:
                 self.pilot.reset()
             self._fly()
-        elif before is BridgeState.FLYING or (lost and not self._check.passed):
-            self._check.reset()
+        if self.gate.state is not BridgeState.FLYING:
+            if BridgeState.FLYING in (before, state) or (lost and not self._check.passed):
+                self._check.reset()
         if self.gate.state in (BridgeState.READY, BridgeState.FLYING) and now_ns >= self._next_alive_ns:
             self._next_alive_ns = now_ns + self._alive_ns
             self._publisher.alive(self._outputs.alive(self._clock()))
@@ -137,9 +150,11 @@ class Bridge:
         """What keeps the bridge from being ready, beside lost inputs: old sensors, wrong lens, faults in the axes."""
         timeout, held = self.config.sensor_timeout_s, self.inputs.held
         found = [role for role in ("wrench", "color", "depth") if self.inputs.older(role, now_ns, timeout)]
-        if "camera_info" not in self.inputs.arrived_ns:
+        if not found and self.inputs.older(PAIR, now_ns, timeout):
+            found.append("pairs of colour and depth (topics.pair_s)")
+        if held.camera is None:
             found.append("camera_info")
-        elif not self._lens_agrees(held.distortion):
+        elif not held.camera.has_lens(self._flight.camera.distortion):
             found.append("camera.distortion of the preset is not that of camera_info")
         frame = None if lost else held.frame(self._clock())  # takes the picture as well: it is not kept for the flight
         if frame is not None:
@@ -149,15 +164,6 @@ class Bridge:
             dt = 0.0 if self._last_ns < 0 else (now_ns - self._last_ns) * 1e-9
             rate, force = frame.angular_velocity.tolist(), frame.specific_force.tolist()
             self._check.inertial(frame.attitude.tolist(), rate, force, dt)
-        if not self._prepared:
-            found.append("a first picture")
         if not self._check.passed:
             found += self._check.faults() or ("rest of the vehicle for the self-check",)
         return found
-
-    def _lens_agrees(self, seen: tuple[float, ...]) -> bool:
-        """Whether the lens of the camera is the configured one; missing coefficients are 0."""
-        wanted = self._flight.camera.distortion
-        size = max(len(seen), len(wanted))
-        pairs = zip(*(each + (0.0,) * (size - len(each)) for each in (seen, wanted)), strict=True)
-        return all(abs(one - other) <= _LENS_ERROR for one, other in pairs)

@@ -1,4 +1,4 @@
-"""DDS topics as ROS 2 names them, with samples as bytes: nothing a sender writes is decoded in here."""
+"""DDS topics as ROS 2 names them, with samples as bytes; this module decodes none of them."""
 
 from __future__ import annotations
 

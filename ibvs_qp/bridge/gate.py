@@ -7,7 +7,7 @@ from enum import StrEnum
 
 
 class BridgeState(StrEnum):
-    """State of the bridge; it sends proof of life while ready and flying, set-points while flying, else nothing."""
+    """State of the bridge; it sends proof of life while ready and flying, setpoints while flying, else nothing."""
 
     WAITING = "waiting"
     CHECKING = "checking"
@@ -34,6 +34,7 @@ class Gate:
     def __init__(self, check_s: float) -> None:
         self._check_ns = round(1e9 * check_s)
         self._sound_ns: int | None = None  # since when nothing is missing and nothing was found
+        self._fault = ""  # the last one of this preparation
         self.state, self.reason = BridgeState.WAITING, "no message yet"
 
     def update(self, now_ns: int, lost: Sequence[str], missing: Sequence[str], engaged: bool | None) -> BridgeState:
@@ -43,7 +44,7 @@ class Gate:
             now_ns: Time of the tick [ns].
             lost: Inputs without which nothing flies, that are too old.
             missing: What else keeps the bridge from being ready: old inputs, faults of the self-check.
-            engaged: Whether PX4 is armed and in Offboard mode; None if it does not tell.
+            engaged: Whether PX4 is armed and in Offboard mode; None if its mode is too old.
         """
         if self.state is BridgeState.FLYING:
             if lost or engaged is None:
@@ -62,7 +63,7 @@ class Gate:
         self.state, self.reason = BridgeState.STOPPED, reason
 
     def _restart(self, reason: str) -> None:
-        self.state, self.reason, self._sound_ns = BridgeState.CHECKING, reason, None
+        self.state, self.reason, self._sound_ns, self._fault = BridgeState.CHECKING, reason, None, ""
 
     def _prepare(self, now_ns: int, problems: Sequence[str], engaged: bool | None) -> None:
         if self.state is BridgeState.READY and not problems and engaged:
@@ -74,10 +75,11 @@ class Gate:
             problems = [*problems, "PX4 is armed and in Offboard mode already"]
         if problems:
             self.state, self.reason, self._sound_ns = BridgeState.WAITING, ", ".join(problems), None
+            self._fault = f"; last fault: {self.reason}"
             return
         if self._sound_ns is None:
             self._sound_ns = now_ns
         if now_ns - self._sound_ns >= self._check_ns:
             self.state, self.reason = BridgeState.READY, "switch PX4 to Offboard mode"
         else:
-            self.state, self.reason = BridgeState.CHECKING, "self-check"
+            self.state, self.reason = BridgeState.CHECKING, f"self-check{self._fault}"

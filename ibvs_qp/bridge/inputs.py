@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Literal, NamedTuple
 
@@ -13,8 +14,12 @@ from ibvs_qp.ros.stamps import from_px4
 from ibvs_qp.ros.topics import CAMERA, MOTION
 
 CONTROL_MODE = "px4_msgs/msg/VehicleControlMode"
-#: Role of PX4's mode, beside those of `ibvs_qp.ros.topics.ACCEPTED`.
-MODE = "mode"
+#: Roles beside those of `ibvs_qp.ros.topics.ACCEPTED`: PX4's mode, and a colour picture with its depth.
+MODE, PAIR = "mode", "pair"
+#: Largest picture [bytes]: 1920 x 1080 px of four bytes; decoding takes 15 ms.
+LARGEST_PICTURE = 4 * 1920 * 1080
+#: Largest message of any other type, and of a picture without its pixels [bytes]: 1 kB, and names of frames.
+LARGEST_MESSAGE = 4096
 #: Places of timestamp, flag_armed and flag_control_offboard_enabled in CDR [bytes].
 _TIMESTAMP, _ARMED, _OFFBOARD = 4, 12, 16
 #: Byte orders by the header of CDR.
@@ -30,7 +35,7 @@ class ControlMode(NamedTuple):
 
     @property
     def engaged(self) -> bool:
-        """Whether PX4 obeys the bridge's set-points."""
+        """Whether PX4 accepts the bridge's setpoints."""
         return self.armed and self.offboard
 
 
@@ -54,6 +59,11 @@ class Subscription(NamedTuple):
     topic: str
     type_name: str
     depth: int
+
+    @property
+    def largest(self) -> int:
+        """Largest message that is decoded [bytes]."""
+        return LARGEST_MESSAGE + (LARGEST_PICTURE if self.type_name == IMAGE else 0)
 
 
 def subscriptions(config: BridgeConfig) -> tuple[Subscription, ...]:
@@ -98,10 +108,13 @@ class Inputs:
         """Take what arrived since the last tick; what cannot be used is counted."""
         for role, (reader, topic) in self._readers.items():
             for data in reader.take():
+                pairs = self.held.pairs
                 try:
+                    if len(data) > topic.largest:
+                        raise BadMessage("too large")
                     if role == MODE:
                         mode = control_mode(data)
-                        self.held.check_clock(mode.stamp_ns)  # DDS makes a boolean of any byte, but no time of ours
+                        self.held.check_clock(mode.stamp_ns)  # random bytes are a mode, but seldom with a present time
                         self.mode = mode
                     elif not self.held.add(role, decoded(data, topic.type_name)):
                         continue
@@ -109,8 +122,15 @@ class Inputs:
                     self.held.ignore(role, str(error))
                     continue
                 self.arrived_ns[role] = now_ns
+                if self.held.pairs > pairs:
+                    self.arrived_ns[PAIR] = now_ns
                 if role == "imu" and self._attitude_in_imu:
                     self.arrived_ns["attitude"] = now_ns
+
+    def age_s(self, role: str, clock_ns: int) -> float:
+        """Age of the last sample of a role by its stamp [s], at a time of the clock [ns]; infinite before the first."""
+        sample = self.held.last.get(role)
+        return math.inf if sample is None else 1e-9 * (clock_ns - sample.stamp_ns)
 
     def older(self, role: str, now_ns: int, limit_s: float) -> bool:
         """Whether the last usable message of a role arrived longer ago than a limit [s], or never."""

@@ -12,13 +12,13 @@ from ibvs_qp.adapters.px4_setpoints import setpoint_scale
 from ibvs_qp.bridge.config import BridgeConfig
 from ibvs_qp.bridge.dds import Participant
 from ibvs_qp.command import Command
-from ibvs_qp.config.errors import ConfigError, out_of_range
+from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.ros.messages import message
 from ibvs_qp.ros.stamps import to_px4
 
 OFFBOARD_MODE = "px4_msgs/msg/OffboardControlMode"
-#: Topics and types of the two kinds of set-points.
+#: Topics and types of the two kinds of setpoints.
 SETPOINTS = {
     "motors": {"/fmu/in/actuator_motors": "px4_msgs/msg/ActuatorMotors"},
     "thrust_and_torque": {
@@ -40,6 +40,9 @@ def publications(config: BridgeConfig) -> dict[str, str]:
 class Outputs:
     """Builds the messages of one vehicle.
 
+    Attributes:
+        curve: Of its rotors.
+
     Args:
         config: Settings.
         vehicle: Its rotors are PX4's CA_ROTORn_*, in the same order.
@@ -49,17 +52,13 @@ class Outputs:
     """
 
     def __init__(self, config: BridgeConfig, vehicle: VehicleParams) -> None:
-        self._config, self._curve = config, config.curve
+        self._config, self.curve = config, config.curve.of(vehicle)
         if vehicle.geometry.count > MOST_PX4_ROTORS:
             raise ConfigError(f"{vehicle.geometry.count} rotors are refused: PX4 has at most {MOST_PX4_ROTORS}")
-        largest = float(np.max(vehicle.thrust_max))
-        if self._curve.thrust_max_n < largest:
-            allowed = f"at least {largest:g} N, the vehicle's thrust_max_n"
-            raise out_of_range("curve.thrust_max_n", self._curve.thrust_max_n, "N", allowed)
-        self._scale = setpoint_scale(vehicle.geometry, self._curve.thrust_max_n)
+        self._scale = setpoint_scale(vehicle.geometry, self.curve.thrust_max_n)
 
     def alive(self, now_ns: int) -> Any:
-        """Proof of life, which also tells PX4 the kind of the set-points."""
+        """Proof of life, with the kind of the setpoints."""
         flags = {name: name == _FIELD[self._config.output] for name in _FIELDS}
         return message(OFFBOARD_MODE, timestamp=to_px4(now_ns), **flags)
 
@@ -74,7 +73,7 @@ class Outputs:
         times = {"timestamp": to_px4(now_ns), "timestamp_sample": to_px4(sample_ns)}
         if self._config.output == "motors":
             control = np.full(MOST_PX4_ROTORS, math.nan, np.float32)  # NaN stops those that do not exist
-            control[: len(command.thrusts)] = self._curve.commands(command.thrusts)
+            control[: len(command.thrusts)] = self.curve.commands(command.thrusts)
             values = [{"reversible_flags": 0, "control": control}]
         else:
             setpoint = np.clip(self._scale * command.wrench, -1.0, 1.0).astype(np.float32)
@@ -98,6 +97,6 @@ class Publisher:
         self._writers[self._alive_topic].write(value)
 
     def setpoints(self, values: dict[str, Any]) -> None:
-        """Write set-points by topic."""
+        """Write setpoints by topic."""
         for topic, value in values.items():
             self._writers[topic].write(value)

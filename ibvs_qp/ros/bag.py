@@ -4,26 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ibvs_qp.command import Command
 from ibvs_qp.config.errors import ConfigError, shown
-from ibvs_qp.config.files import open_regular
 from ibvs_qp.measurement import RgbdFrame, SensorFrame
 from ibvs_qp.pilot import Pilot
 from ibvs_qp.ros.held import HeldSamples
-from ibvs_qp.ros.messages import typestore
+from ibvs_qp.ros.open_bag import OpenBag
 from ibvs_qp.ros.topics import ACCEPTED, CAMERA, MOTION, Topics
 
 if TYPE_CHECKING:
-    from rosbags.highlevel import AnyReader
     from rosbags.interfaces import Connection
 
-#: Largest metadata and data file of a bag [bytes]: half a terabyte holds three hours of raw pictures.
-LARGEST_METADATA, LARGEST_DATA = 4 << 20, 1 << 39
 #: An IMU's message makes a frame unless the last frame is younger than this share of a tick: faster IMUs are thinned.
 LEAST_SHARE = 0.75
-_METADATA = "metadata.yaml"
 
 
 class Bag:
@@ -45,18 +40,20 @@ class Bag:
         self.path, self.topics = Path(path), topics or Topics()
         self.held = HeldSamples(self.topics)
 
-    def sensor_frames(self, period_s: float = 0.004) -> Iterator[SensorFrame]:
-        """Frames for `ibvs_qp.Pilot.step`.
+    def sensor_frames(self, period_s: float = 0.004, distortion: tuple[float, ...] = ()) -> Iterator[SensorFrame]:
+        """Frames for `ibvs_qp.Pilot.step`; without pictures where the bag has no topic of colour.
 
         Args:
             period_s: Tick of the controller [s].
+            distortion: Coefficients of the lens that the pilot rectifies [-]: its ``camera.distortion``.
 
         Raises:
-            ConfigError: When the bag cannot be read, lacks a topic, or has one of another type.
+            ConfigError: When the bag cannot be read, lacks a topic, has one of another type, or has another lens.
         """
         least_ns, last = round(LEAST_SHARE * 1e9 * period_s), None
-        optional = CAMERA if self._has_pictures() else ()
-        for role, _ in self._pass((*MOTION, *optional)):
+        for role in self._pass(MOTION, CAMERA):
+            if role == "camera_info":
+                self._check_lens(distortion)
             if role != "imu":
                 continue
             stamp = self.held.last["imu"].stamp_ns
@@ -67,7 +64,7 @@ class Bag:
                 yield frame
 
     def pictures(self) -> Iterator[RgbdFrame]:
-        """Pictures in their order.
+        """Pictures in their order, as taken: ``held.camera`` has the lens.
 
         Raises:
             ConfigError: As `sensor_frames`.
@@ -76,27 +73,37 @@ class Bag:
             if (picture := self.held.take_picture()) is not None:
                 yield picture
 
-    def _pass(self, roles: tuple[str, ...]) -> Iterator[tuple[str, Any]]:
-        """Every usable message of the roles, after it was added to the held samples."""
+    def _pass(self, roles: tuple[str, ...], camera: tuple[str, ...] = ()) -> Iterator[str]:
+        """Roles of all usable messages, each after its message was added to the held samples.
+
+        Args:
+            roles: Roles to read.
+            camera: Further ones, where the bag has the topic of the colour pictures.
+        """
         self.held = HeldSamples(self.topics)
-        with _Open(self.path) as reader:
+        with OpenBag(self.path) as reader:
+            if any(each.topic == self.topics.color for each in reader.connections):
+                roles = (*roles, *camera)
             chosen = self._connections(reader, roles)
-            for connection, data in reader.messages([each for each, _ in chosen.values()]):
-                for role in (role for each, role in chosen.values() if each.topic == connection.topic):
+            for connection, data in reader.messages(list(chosen.values())):
+                for role in (role for role, each in chosen.items() if each.topic == connection.topic):
                     try:
                         value = reader.deserialize(data, connection.msgtype)
                     except Exception:
                         self.held.ignore(role, "undecodable")
                         continue
                     if self.held.add(role, value):
-                        yield role, value
+                        yield role
 
-    def _has_pictures(self) -> bool:
-        """Whether the bag has the topic of the colour pictures; then it needs the others of the camera as well."""
-        with _Open(self.path) as reader:
-            return any(each.topic == self.topics.color for each in reader.connections)
+    def _check_lens(self, distortion: tuple[float, ...]) -> None:
+        camera = self.held.camera
+        if camera is not None and not camera.has_lens(distortion):
+            raise ConfigError(
+                f"{self.path}: the lens of camera_info has distortion {camera.distortion}, not {distortion}: set the "
+                "pilot's camera.distortion, and the argument distortion of sensor_frames"
+            )
 
-    def _connections(self, reader: _Open, roles: tuple[str, ...]) -> dict[str, tuple[Connection, str]]:
+    def _connections(self, reader: OpenBag, roles: tuple[str, ...]) -> dict[str, Connection]:
         found = {}
         for role, name in self.topics.names(roles).items():
             connection = next((each for each in reader.connections if each.topic == name), None)
@@ -107,7 +114,7 @@ class Bag:
             if connection.msgtype not in ACCEPTED[role]:
                 kind = shown(connection.msgtype)
                 raise ConfigError(f"{self.path}: topic {name} for {role} has type {kind}, not {_names(role)}")
-            found[role] = connection, role
+            found[role] = connection
         return found
 
 
@@ -129,61 +136,6 @@ def commands(frames: Iterable[SensorFrame], pilot: Pilot) -> Iterator[tuple[Sens
             pilot.prepare(frame.image)
             prepared = True
         yield frame, pilot.step(frame)
-
-
-class _Open:
-    """An open bag: whatever the library raises becomes one line of ConfigError."""
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-
-    def __enter__(self) -> _Open:
-        _check_files(self._path)
-        store = typestore()  # names the extra where it is missing
-        from rosbags.highlevel import AnyReader
-
-        try:
-            self._reader: AnyReader = AnyReader([self._path], default_typestore=store)
-            self._reader.open()
-            self._reader.typestore.max_sequence_length = store.max_sequence_length
-        except Exception as error:
-            raise self._unreadable(error) from None
-        self.connections = list(self._reader.connections)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._reader.close()
-
-    def deserialize(self, data: bytes, name: str) -> Any:
-        """Decode a message by the bag's own definitions, or by ours where it has none."""
-        return self._reader.deserialize(data, name)
-
-    def messages(self, connections: list[Connection]) -> Iterator[tuple[Connection, bytes]]:
-        """Messages of some connections in the order of recording."""
-        stream = self._reader.messages(connections)
-        while True:
-            try:
-                connection, _, data = next(stream)
-            except StopIteration:
-                return
-            except Exception as error:
-                raise self._unreadable(error) from None
-            yield connection, data
-
-    def _unreadable(self, error: Exception) -> ConfigError:
-        reason = " ".join(f"{type(error).__name__}: {error}".split())
-        return ConfigError(f"{self._path} is no readable ROS 2 bag ({shown(reason)[1:-1]})")
-
-
-def _check_files(path: Path) -> None:
-    """Open every file of a bag before the library does: only regular ones, of bounded size."""
-    if not path.is_dir():
-        open_regular(path, LARGEST_DATA).close()
-        return
-    open_regular(path / _METADATA, LARGEST_METADATA).close()
-    for file in sorted(path.iterdir()):
-        if file.name != _METADATA:
-            open_regular(file, LARGEST_DATA).close()
 
 
 def _names(role: str) -> str:

@@ -13,11 +13,12 @@ from ibvs_qp.ros import pictures, samples
 from ibvs_qp.ros.messages import BadMessage
 from ibvs_qp.ros.stamps import from_ros
 from ibvs_qp.ros.topics import Topics
+from ibvs_qp.validation.clock import LEAD_NS
 
 #: Colour and depth pictures that wait for their partner; they arrive within a frame of each other.
 WAITING = 4
-#: A stamp of the system's clock lies at most this far ahead of it, and this far behind [ns].
-LEAD_NS, LATEST_NS = 20_000_000, 1_000_000_000
+#: A stamp of the system's clock lies at most this far behind it [ns].
+LATEST_NS = 1_000_000_000
 
 
 class HeldSamples:
@@ -30,7 +31,8 @@ class HeldSamples:
     Attributes:
         last: Last sample of each role.
         ignored: Messages left out, by role and reason.
-        distortion: Of the last camera info.
+        camera: Of the last camera info, None before it.
+        pairs: Complete pictures so far.
 
     Args:
         topics: Axes of the force sensor, source of the attitude, and tolerance of the pairs.
@@ -41,8 +43,8 @@ class HeldSamples:
         self._topics, self._clock = topics, clock
         self.last: dict[str, samples.Sample] = {}
         self.ignored = Counter[str]()
-        self.distortion: tuple[float, ...] = ()
-        self._intrinsics: tuple[float, float, float, float] | None = None
+        self.camera: pictures.Camera | None = None
+        self.pairs = 0
         self._waiting: dict[str, deque[tuple[int, Any]]] = {name: deque(maxlen=WAITING) for name in ("color", "depth")}
         self._picture: RgbdFrame | None = None
 
@@ -53,8 +55,7 @@ class HeldSamples:
             if role in self._waiting:
                 self._add_picture(role, value)
             elif role == "camera_info":
-                self._intrinsics = pictures.to_intrinsics(value)
-                self.distortion = tuple(float(entry) for entry in value.d)
+                self.camera = pictures.to_camera(value)
             else:
                 self._add_sample(role, value)
         except BadMessage as error:
@@ -100,10 +101,8 @@ class HeldSamples:
         if role == "imu":
             sample = samples.inertial(value)
             if not self._topics.attitude:
-                if "attitude" not in sample.values:
-                    raise BadMessage("has no orientation, and there is no attitude topic")
                 self.check_clock(sample.stamp_ns)
-                self.last["attitude"] = sample
+                self.last["attitude"] = samples.attitude(value)
         elif role == "attitude":
             sample = samples.attitude(value)
         else:
@@ -124,12 +123,14 @@ class HeldSamples:
         own.clear()
         other.clear()
         color, depth = ((stamp, pixels), nearest) if role == "color" else (nearest, (stamp, pixels))
-        if self._intrinsics is None:
+        if self.camera is None:
             raise BadMessage("no camera info yet")
-        self._complete(*color, depth[1], self._intrinsics)
+        self._complete(*color, depth[1], self.camera)
 
-    def _complete(self, stamp_ns: int, rgb: np.ndarray, depth: np.ndarray, intrinsics: tuple[float, ...]) -> None:
+    def _complete(self, stamp_ns: int, rgb: np.ndarray, depth: np.ndarray, camera: pictures.Camera) -> None:
         if rgb.shape[:2] != depth.shape:
             raise BadMessage("colour and depth differ in size")
-        fx, fy, cx, cy = intrinsics
-        self._picture = RgbdFrame(rgb=rgb, depth=depth, intrinsics=(fx, fy, cx, cy), stamp_ns=stamp_ns)
+        if depth.shape != camera.shape:  # binning and a region of interest change it as well, and with it the pixels
+            raise BadMessage("size is not that of camera_info")
+        self._picture = RgbdFrame(rgb=rgb, depth=depth, intrinsics=camera.intrinsics, stamp_ns=stamp_ns)
+        self.pairs += 1

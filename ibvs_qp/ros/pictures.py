@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 import sys
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from ibvs_qp.pilot.config import DISTORTION_SIZES
 from ibvs_qp.ros.messages import CAMERA_INFO, IMAGE, BadMessage, message
 from ibvs_qp.ros.stamps import header
 
@@ -22,6 +24,29 @@ _COLOURS = {
 _DEPTHS = {"16UC1": ("u2", 1e-3), "32FC1": ("f4", 1.0)}
 #: Longest side of a picture [px].
 LONGEST_SIDE = 4096
+#: Lens models of ROS with OpenCV's coefficients.
+LENS_MODELS = ("plumb_bob", "rational_polynomial")
+#: Largest difference of the coefficients of one lens [-].
+LENS_ERROR = 1e-6
+
+
+class Camera(NamedTuple):
+    """Camera of the raw pictures.
+
+    Attributes:
+        intrinsics: (fx, fy, cx, cy) [px].
+        shape: Height and width [px].
+        distortion: Coefficients of the lens in OpenCV's order.
+    """
+
+    intrinsics: tuple[float, float, float, float]
+    shape: tuple[int, int]
+    distortion: tuple[float, ...]
+
+    def has_lens(self, distortion: tuple[float, ...]) -> bool:
+        """Whether the lens has these coefficients; missing ones are 0."""
+        pairs = itertools.zip_longest(self.distortion, distortion, fillvalue=0.0)
+        return all(abs(one - other) <= LENS_ERROR for one, other in pairs)
 
 
 def to_rgb(image: Any) -> np.ndarray:
@@ -53,16 +78,21 @@ def to_depth(image: Any) -> np.ndarray:
     return np.where(np.isfinite(metres) & (metres > 0.0), metres, np.float32(0.0))
 
 
-def to_intrinsics(info: Any) -> tuple[float, float, float, float]:
-    """(fx, fy, cx, cy) [px] of the raw picture.
+def to_camera(info: Any) -> Camera:
+    """Camera of a ``sensor_msgs/CameraInfo``.
 
     Raises:
-        BadMessage: When they are no camera matrix.
+        BadMessage: Without a camera matrix, or when OpenCV has no such lens.
     """
     k = np.asarray(info.k, float)
     if not (np.isfinite(k).all() and min(k[0], k[4]) > 1.0):
         raise BadMessage("no camera matrix")
-    return float(k[0]), float(k[4]), float(k[2]), float(k[5])
+    if info.distortion_model not in LENS_MODELS:
+        raise BadMessage("distortion_model is not plumb_bob or rational_polynomial")
+    if len(info.d) not in DISTORTION_SIZES or not np.isfinite(info.d).all():
+        raise BadMessage(f"d has not {', '.join(map(str, DISTORTION_SIZES))} finite coefficients")
+    intrinsics = float(k[0]), float(k[4]), float(k[2]), float(k[5])
+    return Camera(intrinsics, (int(info.height), int(info.width)), tuple(map(float, info.d)))
 
 
 def from_rgb(rgb: np.ndarray, stamp_ns: int) -> Any:

@@ -16,8 +16,10 @@ from ibvs_qp.ros.stamps import from_px4, from_ros, header
 
 #: Largest difference of a quaternion's length from 1 [-].
 LENGTH_ERROR = 0.01
-#: ROS's mark of an IMU without orientation: the first entry of its covariance.
-NO_ORIENTATION = -1.0
+#: First entry of a covariance whose quantity the IMU does not measure (REP 145).
+ABSENT = -1.0
+#: PX4's RELATIVE_TIMESTAMP_INVALID: there is no accelerometer.
+NO_ACCELEROMETER = 0x7FFFFFFF
 _UNKNOWN = np.zeros(9)
 
 
@@ -29,23 +31,25 @@ class Sample(NamedTuple):
 
 
 def inertial(value: Any) -> Sample:
-    """Angular velocity, specific force and, where ROS's message has one, attitude.
+    """Angular velocity and specific force.
 
     Args:
         value: ``sensor_msgs/Imu`` or ``px4_msgs/SensorCombined``.
 
     Raises:
-        BadMessage: When a number is not finite.
+        BadMessage: When a number is not finite, or the message marks one of both as absent.
     """
     if value.__msgtype__ == SENSOR_COMBINED:
+        if value.accelerometer_timestamp_relative == NO_ACCELEROMETER:
+            raise BadMessage("accelerometer is invalid")
         vectors = {"angular_velocity": value.gyro_rad, "specific_force": value.accelerometer_m_s2}
         return Sample(from_px4(value.timestamp), {name: _finite(vector) for name, vector in vectors.items()})
+    if ABSENT in (value.angular_velocity_covariance[0], value.linear_acceleration_covariance[0]):
+        raise BadMessage("has no angular velocity or no linear acceleration")
     values = {
         "angular_velocity": swap_vector(_finite(_xyz(value.angular_velocity))),
         "specific_force": swap_vector(_finite(_xyz(value.linear_acceleration))),
     }
-    if value.orientation_covariance[0] != NO_ORIENTATION:
-        values |= attitude(value).values
     return Sample(from_ros(value.header.stamp), values)
 
 
@@ -56,11 +60,13 @@ def attitude(value: Any) -> Sample:
         value: ``px4_msgs/VehicleAttitude`` or ``sensor_msgs/Imu``.
 
     Raises:
-        BadMessage: When it is no unit quaternion.
+        BadMessage: When it is no unit quaternion, or the message marks it as absent.
     """
     if value.__msgtype__ == VEHICLE_ATTITUDE:
         stamp, quaternion = from_px4(value.timestamp_sample), _unit(value.q)
     else:
+        if value.orientation_covariance[0] == ABSENT:
+            raise BadMessage("has no orientation")
         ros = value.orientation
         stamp, quaternion = from_ros(value.header.stamp), swap_attitude(_unit((ros.w, ros.x, ros.y, ros.z)))
     return Sample(stamp, {"attitude": quaternion})

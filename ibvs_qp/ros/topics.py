@@ -23,6 +23,12 @@ CAMERA, MOTION = ("color", "depth", "camera_info"), ("imu", "attitude", "wrench"
 _NAME = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 
 
+def check_name(field: str, name: str) -> None:
+    """Raise ConfigError for what is no absolute name of ROS 2."""
+    if not _NAME.fullmatch(name):
+        raise out_of_range(field, name, "", "a topic's name begins with / and has letters, digits and _")
+
+
 @dataclass(frozen=True, kw_only=True)
 class Topics:
     """Topics of a vehicle; the camera's are those of RealSense's ROS wrapper with depth aligned to colour."""
@@ -52,8 +58,8 @@ class Topics:
         """Validate numbers, choices and names."""
         validate(self)
         for role in ACCEPTED:
-            if not (_NAME.fullmatch(name := getattr(self, role)) or (name == "" and role == "attitude")):
-                raise out_of_range(role, name, "", "a topic's name begins with / and has letters, digits and _")
+            if getattr(self, role) or role != "attitude":
+                check_name(role, getattr(self, role))
 
     def names(self, roles: tuple[str, ...]) -> dict[str, str]:
         """Topics by role; without attitude where the IMU's messages have it."""

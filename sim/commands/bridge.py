@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from ibvs_qp.bridge.config import BridgeConfig
     from ibvs_qp.pilot import PilotConfig
     from ibvs_qp.pilot.runner import Timing
+    from sim.commands.status_lines import StatusLines
 
 #: Longest run [s], a day, and time between two lines about a state that lasts [s].
 _LONGEST_S, _REPORT_S = 86400.0, 5.0
@@ -43,6 +44,8 @@ class BridgeCommand:
     def run(self, words: list[str]) -> int:
         """Fly, or print what would be done."""
         from ibvs_qp.bridge.config import BridgeConfig
+        from sim.commands.status_lines import StatusLines
+        from sim.flight.stop import handled_ctrl_c
         from sim.report.rundir import as_json
 
         if self.duration is not None and not 0.0 < self.duration <= _LONGEST_S:
@@ -55,13 +58,19 @@ class BridgeCommand:
             return 0
         from ibvs_qp.bridge.bridge import Bridge
 
-        bridge, timing = Bridge(config, flight), None
+        bridge, timing, lines = Bridge(config, flight), None, None if self.json else StatusLines()
+        interrupts = list[bool]()
         try:
-            timing = _fly(bridge, self.duration, quiet=self.json)
+            with handled_ctrl_c(lambda *_: interrupts.append(True)):  # the tick ends first
+                timing = _fly(bridge, self.duration, lines, interrupts)
         finally:
-            if self.json:
+            if lines is not None:
+                lines.close(_summary(bridge, timing))
+            else:
                 taken = None if timing is None else dataclasses.asdict(timing)
                 print(as_json({"schema": 1, **dataclasses.asdict(bridge.status), "timing": taken}))
+        if interrupts:
+            raise KeyboardInterrupt
         return 0
 
     def _flight(self) -> PilotConfig:
@@ -77,7 +86,8 @@ class BridgeCommand:
         return dataclasses.replace(flight, controller=controller)
 
 
-def _fly(bridge: Bridge, duration_s: float | None, *, quiet: bool) -> Timing:
+def _fly(bridge: Bridge, duration_s: float | None, lines: StatusLines | None, interrupts: list[bool]) -> Timing:
+    """Run the loop until its duration or an interrupt ends it."""
     from ibvs_qp.pilot.runner import run
 
     reported_ns, end_ns, last = 0, None, ""
@@ -88,10 +98,10 @@ def _fly(bridge: Bridge, duration_s: float | None, *, quiet: bool) -> Timing:
         if end_ns is None:
             end_ns = -1 if duration_s is None else now_ns + round(1e9 * duration_s)
         state = f"{bridge.gate.state}: {bridge.gate.reason}"
-        if not quiet and (state != last or now_ns - reported_ns > round(1e9 * _REPORT_S)):
+        if lines is not None and (state != last or now_ns - reported_ns > round(1e9 * _REPORT_S)):
             reported_ns, last = now_ns, state
-            print(_line(bridge), flush=True)
-        return not 0 < end_ns <= now_ns
+            lines.put(_line(bridge))
+        return not (interrupts or 0 < end_ns <= now_ns)
 
     gc.collect()
     gc.freeze()  # what is loaded stays: the collector would visit it during the flight, for 20 ms each time
@@ -101,8 +111,22 @@ def _fly(bridge: Bridge, duration_s: float | None, *, quiet: bool) -> Timing:
 def _line(bridge: Bridge) -> str:
     status = bridge.status
     flight = f"; phase {status.phase}, {status.safety}" if status.phase else ""
-    ignored = f"; ignored {sum(status.ignored.values())} messages" if status.ignored else ""
+    ignored = ""
+    if counts := status.ignored:
+        ignored = f"; ignored {sum(counts.values())} messages, most: {max(counts, key=lambda reason: counts[reason])}"
     return f"{status.state}: {status.reason}{flight}; {status.commands} commands{ignored}"
+
+
+def _summary(bridge: Bridge, timing: Timing | None) -> str:
+    """Last lines: status, every reason of an ignored message, and timing."""
+    lines = [_line(bridge)]
+    lines += [f"ignored {count} times: {reason}" for reason, count in sorted(bridge.status.ignored.items())]
+    if timing is not None:
+        lines.append(
+            f"{timing.ticks} ticks, {timing.overruns} overruns; duration of a tick: median {timing.p50_us:.0f} us, "
+            f"99 % {timing.p99_us:.0f} us, largest {timing.max_us:.0f} us"
+        )
+    return "\n".join(lines)
 
 
 def _plan(config: BridgeConfig, flight: PilotConfig) -> dict[str, Any]:
@@ -112,7 +136,7 @@ def _plan(config: BridgeConfig, flight: PilotConfig) -> dict[str, Any]:
     from ibvs_qp.bridge.inputs import subscriptions
     from ibvs_qp.bridge.outputs import Outputs, publications
 
-    Outputs(config, flight.controller.vehicle)
+    curve = Outputs(config, flight.controller.vehicle).curve
     reads = {each.topic: each.type_name for each in subscriptions(config)}
 
     def named(topics: dict[str, str]) -> list[dict[str, str]]:
@@ -127,7 +151,8 @@ def _plan(config: BridgeConfig, flight: PilotConfig) -> dict[str, Any]:
         "rate_hz": 1.0 / flight.controller.tick_s,
         "subscribes": named(reads),
         "publishes": named(publications(config)),
-        "checks": list(checks(config)),
+        "curve": {"thrust_max_n": curve.thrust_max_n, "quadratic": curve.quadratic},
+        "checks": list(checks(config, flight)),
     }
 
 
@@ -139,6 +164,8 @@ def _show(plan: dict[str, Any]) -> None:
     example = plan["publishes"][0]
     print(f"in DDS      domain {plan['domain_id']}; {example['dds_topic']} of {example['dds_type']}, and so on")
     print(f"            best effort, volatile, keep last; {plan['rate_hz']:g} Hz")
+    curve = plan["curve"]
+    print(f"rotors      {curve['thrust_max_n']:g} N at full command, quadratic share {curve['quadratic']:g}")
     print("PX4 enters Offboard mode only with the bridge's proof of life, which begins when:")
     for check in plan["checks"]:
         print(f"  - {check}")

@@ -53,7 +53,8 @@ class Detect:
     depth_units_per_metre: float = 1000.0
     """Depth values per metre: 1000 for millimetres, 5000 for TUM, 1 for metres."""
     distortion: Annotated[tuple[float, float, float, float, float] | None, optional("K1 K2 P1 P2 K3")] = None
-    """Lens distortion in OpenCV's order; rho and theta then describe the undistorted lines."""
+    """Lens distortion in OpenCV's order; rho and theta then describe the undistorted lines. Default: that of the bag's
+    camera_info, else none."""
     seed_pixel: Annotated[tuple[float, float] | None, optional("U V")] = None
     """A pixel on the surface; without it: lines only, no surface and no guides."""
     sequence: Annotated[Path | None, optional("DIR")] = None
@@ -133,8 +134,7 @@ class Detect:
                 write_overlay(seen, folder)
 
         frames = detect_bag(
-            bag.pictures(),
-            path.name,
+            bag,
             self.method,
             every=self.all,
             track=not self.no_track,

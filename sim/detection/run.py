@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.vision.survey.detection import Detection
@@ -14,6 +14,9 @@ from ibvs_qp.vision.survey.distortion import undistorted_line
 from sim.detection.manifest import FrameEntry, motion_sequences
 from sim.detection.methods import make_method
 from sim.detection.pictures import PictureError, read_frame
+
+if TYPE_CHECKING:
+    from ibvs_qp.ros.bag import Bag
 
 #: Frame interval of a sequence of unknown rate [ns]: 30 Hz.
 _INTERVAL_NS = 33_333_333
@@ -61,8 +64,7 @@ def detect_frames(
 
 
 def detect_bag(
-    pictures: Iterable[RgbdFrame],
-    name: str,
+    bag: Bag,
     method_name: str,
     *,
     every: bool,
@@ -74,20 +76,19 @@ def detect_bag(
     """Results of the pictures of a bag, one motion sequence; the pictures themselves are not kept.
 
     Args:
-        pictures: In their order.
-        name: Of the bag: a picture is named NAME/NUMBER_STAMP.
+        bag: The bag; a picture is named BAG/NUMBER_STAMP.
         method_name: As of `detect_frames`, and so the following.
         every: Whether the candidates are all lines.
         track: Whether lines are tracked.
         seed: Pixel on the surface in every picture, or None.
-        distortion: Of the lens, or None.
+        distortion: Of the lens; None for that of the bag's camera info.
         finished: Called with every result, which then has its picture.
     """
     results, method = list[FrameResult](), make_method(method_name)
     follows = track and hasattr(method, "follow")
-    for index, frame in enumerate(pictures):
+    for index, frame in enumerate(bag.pictures()):
         entry = FrameEntry(
-            color=f"{name}/{index:06d}_{frame.stamp_ns}",
+            color=f"{bag.path.name}/{index:06d}_{frame.stamp_ns}",
             depth="",
             folder=Path(),
             intrinsics=frame.intrinsics,
@@ -95,7 +96,9 @@ def detect_bag(
             seed=seed,
         )
         result = _found(entry, frame, method, every=every, follows=follows)
-        result = result if distortion is None else _straightened(result, distortion)
+        assert bag.held.camera is not None  # it makes a picture complete
+        lens = bag.held.camera.distortion if distortion is None else distortion
+        result = _straightened(result, lens) if any(lens) else result
         if finished is not None:
             finished(result)
         results.append(dataclasses.replace(result, frame=None))

@@ -71,7 +71,7 @@ class Px4:
         self.plan, self.engaged, self.failsafe_s = plan, False, None
         self.alive_us: int | None = None
         self.alive_times: list[float] = []
-        self.early = 0  # set-points outside Offboard mode
+        self.early = 0  # setpoints outside Offboard mode
         self.sent: list[tuple[float, float, float]] = []  # arrival, sending, and inertial data that it answers [s]
         self.thrusts: np.ndarray | None = None
 

@@ -1,4 +1,4 @@
-"""Thrust and torque set-points against PX4's allocation, written out as PX4 does it."""
+"""Thrust and torque setpoints against PX4's allocation, written out as PX4 does it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ibvs_qp.presets import preset
 
 
 def px4_motors(geometry: RotorGeometry, coefficient: float, setpoint: np.ndarray) -> np.ndarray:
-    """Motors of a set-point (thrust, torque) by `ControlAllocationPseudoInverse`, entry by entry.
+    """Motors of a setpoint (thrust, torque) by `ControlAllocationPseudoInverse`, entry by entry.
 
     PX4 orders axes roll, pitch, yaw, x, y, z.
     """

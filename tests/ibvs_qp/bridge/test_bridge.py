@@ -34,23 +34,29 @@ class World:
         self.bridge = Bridge(config, flight, clock=lambda: self.now, pilot=Pilot(flight))
         self.topics = {each.role: each.topic for each in subscriptions(config)}
         self.silent: set[str] = set()
+        self.late: dict[str, int] = {}  # delay of stamps by role [ns]
+        self.every = 1  # ticks between two attitudes
+        self.camera_shape, self.lens = (24, 32), "plumb_bob"
         self.engaged = self.flipped = False
 
     def go(self, ticks: int = 1) -> BridgeState:
         for _ in range(ticks):
             self.now += TICK
+            stamp = {role: self.now - self.late.get(role, 0) for role in self.topics}
+            info = from_intrinsics((30.0, 30.0, 15.0, 11.0), self.camera_shape, self.now)
+            info.distortion_model = self.lens
             force = np.array([0, 0, 9.81 if self.flipped else -9.81], np.float32)
             sent = {
-                "imu": combined(self.now, accelerometer_m_s2=force),
-                "attitude": attitude(self.now),
+                "imu": combined(stamp["imu"], accelerometer_m_s2=force),
+                "attitude": attitude(stamp["attitude"]),
                 "wrench": wrench(self.now),
                 MODE: mode(int(self.engaged), int(self.engaged), stamp_ns=self.now),
-                "camera_info": encoded(
-                    from_intrinsics((30.0, 30.0, 15.0, 11.0), (24, 32), self.now), "sensor_msgs/msg/CameraInfo"
-                ),
+                "camera_info": encoded(info, "sensor_msgs/msg/CameraInfo"),
                 "color": encoded(from_rgb(np.zeros((24, 32, 3), np.uint8), self.now), "sensor_msgs/msg/Image"),
-                "depth": encoded(from_depth(np.ones((24, 32), np.float32), self.now), "sensor_msgs/msg/Image"),
+                "depth": encoded(from_depth(np.ones((24, 32), np.float32), stamp["depth"]), "sensor_msgs/msg/Image"),
             }
+            if self.now // TICK % self.every:
+                del sent["attitude"]
             for role, data in sent.items():
                 if role not in self.silent:
                     self.dds.readers[self.topics[role]].data.append(data)
@@ -103,6 +109,58 @@ def test_every_input_is_needed_before_and_only_inertial_data_and_mode_in_flight(
     assert (world.bridge.gate.state is STOPPED) == (role in ("imu", "attitude", MODE))
 
 
+@pytest.mark.parametrize("role", ["imu", "attitude"])
+def test_data_that_arrive_late_never_make_it_ready(world: World, role: str) -> None:
+    world.late = {role: 300_000_000}
+    assert world.go(400) is WAITING and world.bridge.gate.reason.startswith(f"{role}, ") and world.sent(ALIVE) == []
+
+
+@pytest.mark.parametrize("role", ["imu", "attitude"])
+def test_data_that_become_late_stop_the_flight_though_messages_arrive(world: World, role: str) -> None:
+    world.go(100)
+    world.engaged = True
+    assert world.go(10) is FLYING
+    world.late = {role: 90_000_000}
+    assert world.go(10) is FLYING  # the pilot estimates them so long
+    world.late = {role: 110_000_000}
+    assert world.go() is STOPPED and world.bridge.gate.reason == f"link lost: {role}"
+
+
+def test_a_sample_that_is_sent_again_does_not_count_as_fresh(world: World) -> None:
+    world.go(100)
+    world.engaged = True
+    world.go(10)
+    for _ in range(26):  # 0.104 s
+        world.late["attitude"] = world.late.get("attitude", 0) + TICK
+        world.go()
+    assert world.bridge.gate.state is STOPPED and world.bridge.gate.reason == "link lost: attitude"
+
+
+def test_an_attitude_of_50_hz_never_makes_it_ready(world: World) -> None:
+    world.every, world.late = 5, {"attitude": 6_000_000}  # PX4's default, and 6 ms on its way
+    states = {world.go() for _ in range(400)}
+    assert states == {WAITING, CHECKING} and world.sent(ALIVE) == []
+    assert "last fault: attitude: 22 ms old, at most 20 ms" in world.bridge.gate.reason
+    world.every = 2
+    assert world.go(100) is READY
+
+
+def test_one_late_sample_does_not_end_a_readiness(world: World) -> None:
+    assert world.go(100) is READY
+    world.silent = {"attitude"}
+    assert world.go(8) is READY
+
+
+def test_setpoints_end_soon_after_the_mode_is_silent(world: World) -> None:
+    """PX4 may have left Offboard mode unseen, and its own setpoints then collide with ours."""
+    world.go(100)
+    world.engaged = True
+    world.go(10)
+    world.silent = {MODE}
+    assert world.go(round(0.6e9 / TICK)) is FLYING  # PX4 sends it every 0.5 s
+    assert world.go(round(0.12e9 / TICK)) is STOPPED
+
+
 def test_a_stopped_bridge_sends_nothing(world: World) -> None:
     world.go(100)
     world.engaged = True
@@ -128,8 +186,13 @@ def test_the_end_of_the_flight_ends_the_proof_of_life(world: World, monkeypatch:
 
     monkeypatch.setattr(world.bridge.pilot, "step", terminated)
     world.sent(MOTORS), world.sent(ALIVE)
+    assert world.go() is STOPPED and not world.bridge._check.passed  # the next flight needs a rest again
     assert world.go(100) is STOPPED and world.bridge.gate.reason == "flight ended: landed"
     assert world.sent(MOTORS) == [] and world.sent(ALIVE) == []
+    world.engaged = False
+    assert world.go(100) is READY
+    world.engaged = True
+    assert world.go() is STOPPED and not world.bridge._check.passed  # it ends in its first tick
 
 
 def test_every_flight_begins_anew(world: World, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -146,6 +209,23 @@ def test_every_flight_begins_anew(world: World, monkeypatch: pytest.MonkeyPatch)
 def test_wrong_axes_are_named_and_keep_it_from_being_ready(world: World) -> None:
     world.flipped = True
     assert world.go(400) is WAITING and "FLU" in world.bridge.gate.reason and world.sent(ALIVE) == []
+
+
+def test_pictures_must_fit_their_camera_info(world: World) -> None:
+    world.camera_shape = (480, 640)
+    assert world.go(200) is WAITING and world.bridge.gate.reason == "depth"
+    assert "depth: size is not that of camera_info" in world.bridge.status.ignored
+
+
+def test_pictures_must_come_in_pairs(world: World) -> None:
+    assert world.go(100) is READY
+    world.late = {"depth": 50_000_000}
+    assert world.go(130) is WAITING and "pairs of colour and depth" in world.bridge.gate.reason
+
+
+def test_a_lens_of_another_model_is_no_camera(world: World) -> None:
+    world.lens = "equidistant"
+    assert world.go(200) is WAITING and "camera_info" in world.bridge.gate.reason
 
 
 def test_the_lens_of_the_camera_must_be_the_configured_one(monkeypatch: pytest.MonkeyPatch) -> None:

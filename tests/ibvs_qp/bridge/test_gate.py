@@ -39,6 +39,7 @@ def test_ready_only_after_the_whole_check() -> None:
     assert flight.go(20) is CHECKING
     assert flight.go(missing=["wrench"]) is WAITING and flight.gate.reason == "wrench"
     assert flight.go(25) is CHECKING  # it begins anew
+    assert flight.gate.reason == "self-check; last fault: wrench"
     assert flight.go(2) is READY
 
 

@@ -96,6 +96,17 @@ def test_a_mode_of_another_time_does_not_count() -> None:
     assert received.inputs.mode is not None and received.inputs.mode.engaged
 
 
+@pytest.mark.parametrize("role", ["camera_info", "color", "imu", MODE])
+def test_messages_beyond_a_size_are_left_out_before_they_are_decoded(
+    monkeypatch: pytest.MonkeyPatch, role: str
+) -> None:
+    monkeypatch.setattr("ibvs_qp.bridge.inputs.decoded", lambda data, name: pytest.fail("decoded"))
+    received = Received()
+    largest = {each.role: each.largest for each in subscriptions(received.config)}[role]
+    received.send(role, mode(1, 1, more=largest))
+    assert dict(received.inputs.held.ignored) == {f"{role}: too large": 1} and received.inputs.mode is None
+
+
 @pytest.mark.parametrize("data", [b"", mode(1, 1)[:16], b"\0\7" + mode(1, 1)[2:], mode(2, 1), mode(1, 255)])
 def test_bytes_that_are_no_mode(data: bytes) -> None:
     with pytest.raises(BadMessage):

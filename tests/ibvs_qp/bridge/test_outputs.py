@@ -11,8 +11,7 @@ pytest.importorskip("rosbags", reason="needs the extra ros")
 
 from allocation import control_effectiveness
 from ibvs_qp import Command, ConfigError, Outcome, VehicleParams
-from ibvs_qp.adapters.thrust_curve import ThrustCurve
-from ibvs_qp.bridge.config import BridgeConfig
+from ibvs_qp.bridge.config import BridgeConfig, RotorCurve
 from ibvs_qp.bridge.outputs import Outputs, publications
 from ibvs_qp.ros.messages import encoded
 
@@ -37,8 +36,16 @@ def test_motors_in_px4s_order_with_thrust_as_share_of_full() -> None:
     assert (value.timestamp, value.timestamp_sample) == (5004, 5000)
 
 
+@pytest.mark.parametrize("curve", [RotorCurve(), RotorCurve(quadratic=0.5)])
+def test_full_command_is_the_full_thrust_of_the_vehicle_at_hand(curve: RotorCurve) -> None:
+    weaker = dataclasses.replace(VEHICLE, thrust_max_n=35.0)
+    command = dataclasses.replace(COMMAND, thrusts=np.full(6, 35.0))
+    ((_, value),) = Outputs(BridgeConfig(curve=curve), weaker).setpoints(command, SAMPLE, NOW).items()
+    np.testing.assert_allclose(value.control[:6], 1.0, rtol=1e-6)
+
+
 def test_the_curve_is_inverted_where_px4_does_not() -> None:
-    curve = ThrustCurve(thrust_max_n=60.0, quadratic=0.7)
+    curve = RotorCurve(thrust_max_n=60.0, quadratic=0.7)
     ((_, value),) = Outputs(BridgeConfig(curve=curve), VEHICLE).setpoints(COMMAND, SAMPLE, NOW).items()
     u = value.control[:6].astype(float)
     np.testing.assert_allclose(60.0 * (0.7 * u**2 + 0.3 * u), THRUSTS, rtol=1e-5)
@@ -65,7 +72,18 @@ def test_the_proof_of_life_names_the_kind(output: str, field: str) -> None:
 
 def test_what_does_not_fit_the_vehicle_is_refused() -> None:
     with pytest.raises(ConfigError, match=r"curve.thrust_max_n = 40.0 N .* at least 52.56 N"):
-        Outputs(BridgeConfig(curve=ThrustCurve(thrust_max_n=40.0)), VEHICLE)
-    for wrong in ({"output": "pwm"}, {"domain_id": 233}, {"link_timeout_s": 0.5}, {"imu_type": "x"}):
+        Outputs(BridgeConfig(curve=RotorCurve(thrust_max_n=40.0)), VEHICLE)
+    unequal = dataclasses.replace(VEHICLE, thrust_max_n=(50.0, 50.0, 50.0, 50.0, 50.0, 40.0))
+    with pytest.raises(ConfigError, match=r"curve.thrust_max_n = None N .* rotors of different thrust_max_n"):
+        Outputs(BridgeConfig(), unequal)
+    Outputs(BridgeConfig(curve=RotorCurve(thrust_max_n=50.0)), unequal)
+    for wrong in (
+        {"output": "pwm"},
+        {"domain_id": 233},
+        {"link_timeout_s": 0.5},
+        {"imu_type": "x"},
+        {"namespace": "uav_1"},
+        {"namespace": "/uav_1/"},
+    ):
         with pytest.raises(ConfigError, match=next(iter(wrong))):
             BridgeConfig(**wrong)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -10,11 +12,13 @@ import pytest
 
 pytest.importorskip("rosbags", reason="needs the extra ros")
 
-from rosbags.rosbag2 import Writer
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
 from ibvs_qp import ConfigError, Pilot, RgbdFrame, SensorFrame, preset
+from ibvs_qp.ros import open_bag
 from ibvs_qp.ros.bag import Bag, commands, sensor_frames
-from ibvs_qp.ros.messages import IMU, WRENCH, encoded, typestore
+from ibvs_qp.ros.messages import CAMERA_INFO, IMAGE, IMU, WRENCH, encoded, typestore
+from ibvs_qp.ros.pictures import from_depth, from_intrinsics, from_rgb
 from ibvs_qp.ros.samples import to_imu, to_wrench
 from ibvs_qp.ros.topics import Px4Topics, Topics
 from ibvs_qp.ros.write_bag import write_bag
@@ -109,6 +113,84 @@ def test_a_pair_needs_close_stamps_and_equal_sizes(tmp_path: Path) -> None:
     bag = Bag(tmp_path / "bag", Topics(depth="/camera/camera/color/image_raw"))
     assert list(bag.pictures()) == []
     assert set(bag.held.ignored) == {"depth: encoding is not 16UC1 or 32FC1"}
+
+
+def camera_bag(path: Path, mode: str = "NONE", storage: str = "MCAP", side: int = 8, **lens: object) -> Path:
+    """A bag of one grey picture whose camera info has these fields."""
+    info = from_intrinsics((9.0, 9.0, 2.0, 1.0), (side, side), BEGIN)
+    for name, value in lens.items():
+        setattr(info, name, value)
+    sent = {
+        "camera_info": (CAMERA_INFO, info),
+        "color": (IMAGE, from_rgb(np.zeros((side, side, 3), np.uint8), BEGIN)),
+        "depth": (IMAGE, from_depth(np.ones((side, side), np.float32), BEGIN)),
+        "wrench": (WRENCH, to_wrench(BEGIN, np.zeros(6), "flu", "tool")),
+        "imu": (IMU, to_imu(BEGIN, np.array([1.0, 0, 0, 0]), np.zeros(3), np.zeros(3))),
+    }
+    writer = Writer(path, version=8, storage_plugin=StoragePlugin[storage])
+    writer.set_compression(CompressionMode[mode], CompressionFormat.ZSTD)
+    with writer:
+        for time, (role, (kind, value)) in enumerate(sent.items(), 1):
+            connection = writer.add_connection(getattr(Topics(), role), kind, typestore=typestore())
+            writer.write(connection, time, encoded(value, kind))
+    return path
+
+
+def test_another_lens_than_the_pilots_is_refused(tmp_path: Path) -> None:
+    bag = Bag(camera_bag(tmp_path / "bag", d=np.array([0.1, 0.0, 0.0, 0.0, 0.0])))
+    with pytest.raises(ConfigError, match=r"distortion \(0.1, 0.0, 0.0, 0.0, 0.0\), not \(\)"):
+        list(bag.sensor_frames())
+    assert [frame.image is not None for frame in bag.sensor_frames(distortion=(0.1, 0.0, 0.0, 0.0))] == [True]
+    assert len(list(bag.pictures())) == 1 and bag.held.camera is not None and bag.held.camera.distortion[0] == 0.1
+
+
+def test_pictures_of_another_size_than_their_camera_info_are_left_out(tmp_path: Path) -> None:
+    bag = Bag(camera_bag(tmp_path / "bag", width=9))
+    assert not list(bag.pictures()) and dict(bag.held.ignored) == {"depth: size is not that of camera_info": 1}
+
+
+COMPRESSED = [("STORAGE", "MCAP"), ("MESSAGE", "MCAP"), ("MESSAGE", "SQLITE3")]
+
+
+@pytest.mark.parametrize(("mode", "storage"), COMPRESSED)
+def test_compressed_bags_are_read_up_to_a_size(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, mode: str, storage: str
+) -> None:
+    path = camera_bag(tmp_path / "bag", mode, storage, side=2048)
+    assert sum(file.stat().st_size for file in path.iterdir()) < 100_000
+    assert len(list(Bag(path).pictures())) == 1
+    monkeypatch.setattr(open_bag, "LARGEST_UNPACKED", 1 << 20)
+    tracemalloc.start()
+    try:
+        with pytest.raises(ConfigError, match="a compressed part is cut, or has more than 1048576 bytes"):
+            list(Bag(path).pictures())
+        assert tracemalloc.get_traced_memory()[1] < 8 << 20  # without the limit 12 MB and more
+    finally:
+        tracemalloc.stop()
+
+
+def test_lz4_has_the_same_limit() -> None:
+    lz4 = pytest.importorskip("lz4.frame")
+    data = lz4.compress(bytes(1000))
+    assert open_bag._lz4(data, 1000) == bytes(1000)
+    for size, cut in ((999, None), (1000, -1)):
+        with pytest.raises(ValueError, match="compressed part"):
+            open_bag._lz4(data[:cut], size)
+
+
+def test_bags_compressed_as_whole_files_are_refused_before_they_are_unpacked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = camera_bag(tmp_path / "bag", "FILE")
+    monkeypatch.setattr(open_bag, "_opened", lambda path: pytest.fail("the library unpacks the files"))
+    with pytest.raises(ConfigError, match=r"compressed as whole files; .*ros2 bag convert"):
+        list(sensor_frames(path))
+
+
+def test_a_bag_is_opened_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    times, opened = itertools.count(1), open_bag._opened
+    monkeypatch.setattr(open_bag, "_opened", lambda path: opened(path) if next(times) == 1 else pytest.fail("again"))
+    assert len(list(sensor_frames(camera_bag(tmp_path / "bag")))) == 1
 
 
 def test_refusals_name_the_topic_and_those_that_would_fit(tmp_path: Path) -> None:

@@ -63,7 +63,7 @@ def test_an_imu_at_rest_reads_up_in_ros_and_minus_down_here() -> None:
     assert back.stamp_ns == NOW
     np.testing.assert_array_equal(back.values["specific_force"], [0.0, 0.0, -9.81])
     np.testing.assert_array_equal(back.values["angular_velocity"], [0.1, 0.2, 0.3])
-    np.testing.assert_allclose(back.values["attitude"], LEVEL, atol=1e-15)
+    np.testing.assert_allclose(samples.attitude(value).values["attitude"], LEVEL, atol=1e-15)
 
 
 def test_facing_north_is_a_yaw_of_90_degrees_in_ros() -> None:
@@ -91,13 +91,13 @@ def test_px4_is_in_our_axes() -> None:
     np.testing.assert_allclose(sample.values["attitude"], [0.8, 0.0, 0.6, 0.0], rtol=1e-6)
 
 
-def px4_imu(gyro: list[float], force: list[float]):
+def px4_imu(gyro: list[float], force: list[float], accelerometer_us: int = 0):
     return message(
         SENSOR_COMBINED,
         timestamp=5000,
         gyro_rad=np.array(gyro, np.float32),
         gyro_integral_dt=4000,
-        accelerometer_timestamp_relative=0,
+        accelerometer_timestamp_relative=accelerometer_us,
         accelerometer_m_s2=np.array(force, np.float32),
         accelerometer_integral_dt=4000,
         accelerometer_clipping=0,
@@ -125,9 +125,21 @@ def test_numbers_that_are_no_numbers_are_bad() -> None:
     value = samples.to_imu(NOW, LEVEL, np.zeros(3), np.zeros(3))
     value.orientation.w = value.orientation.z = 0.0  # what a driver without orientation sends
     with pytest.raises(BadMessage, match="quaternion"):
-        samples.inertial(value)
-    value.orientation_covariance = np.array([-1.0, *np.zeros(8)])
-    assert "attitude" not in samples.inertial(value).values
+        samples.attitude(value)
+
+
+@pytest.mark.parametrize("absent", ["orientation", "angular_velocity", "linear_acceleration"])
+def test_what_an_imu_marks_as_absent_is_bad(absent: str) -> None:
+    value = samples.to_imu(NOW, LEVEL, np.zeros(3), np.zeros(3))
+    setattr(value, f"{absent}_covariance", np.array([-1.0, *np.zeros(8)]))
+    with pytest.raises(BadMessage, match=absent.split("_")[0]):
+        samples.attitude(value) if absent == "orientation" else samples.inertial(value)
+
+
+def test_an_invalid_accelerometer_of_px4_is_bad() -> None:
+    with pytest.raises(BadMessage, match="accelerometer"):
+        samples.inertial(px4_imu(gyro=[0, 0, 0], force=[0, 0, -9.81], accelerometer_us=2**31 - 1))
+    samples.inertial(px4_imu(gyro=[0, 0, 0], force=[0, 0, -9.81], accelerometer_us=-800))
 
 
 def test_colours_and_padded_rows() -> None:
@@ -173,13 +185,34 @@ def test_pictures_whose_size_does_not_fit_are_bad(changes: dict[str, object]) ->
         pictures.to_rgb(value)
 
 
-def test_intrinsics_return_and_no_camera_is_bad() -> None:
+def test_a_camera_returns() -> None:
     info = pictures.from_intrinsics((600.0, 601.0, 320.5, 240.5), (480, 640), NOW)
-    assert pictures.to_intrinsics(info) == (600.0, 601.0, 320.5, 240.5)
+    assert pictures.to_camera(info) == ((600.0, 601.0, 320.5, 240.5), (480, 640), (0.0,) * 5)
     np.testing.assert_array_equal(info.p.reshape(3, 4)[:, :3], info.k.reshape(3, 3))
-    info.k = np.zeros(9)  # an uncalibrated camera
-    with pytest.raises(BadMessage):
-        pictures.to_intrinsics(info)
+
+
+@pytest.mark.parametrize(
+    ("changes", "named"),
+    [
+        ({"k": np.zeros(9)}, "camera matrix"),  # an uncalibrated camera
+        ({"distortion_model": "equidistant", "d": np.zeros(4)}, "distortion_model"),
+        ({"d": np.zeros(4_000_000)}, "coefficients"),
+        ({"d": np.array([np.nan, 0, 0, 0])}, "coefficients"),
+    ],
+)
+def test_cameras_of_another_model_are_bad(changes: dict[str, object], named: str) -> None:
+    info = pictures.from_intrinsics((600.0, 601.0, 320.5, 240.5), (480, 640), NOW)
+    for name, wrong in changes.items():
+        setattr(info, name, wrong)
+    with pytest.raises(BadMessage, match=named):
+        pictures.to_camera(info)
+
+
+def test_a_lens_is_the_same_with_zeros_for_missing_coefficients() -> None:
+    camera = pictures.Camera((1.0, 1.0, 0.0, 0.0), (4, 6), (0.1, 0.0, 0.0, 0.0, 0.0))
+    assert (
+        camera.has_lens((0.1, 0.0, 0.0, 0.0)) and not camera.has_lens(()) and not camera.has_lens((0.1, 0.0, 0.01, 0.0))
+    )
 
 
 @pytest.mark.parametrize("file", sorted(PX4_MSGS.glob("*.msg")), ids=lambda file: file.stem)

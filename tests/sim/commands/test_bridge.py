@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
+import shutil
+import signal
+import subprocess
 import sys
 from pathlib import Path
 
@@ -12,6 +16,7 @@ from dds_loopback import environment, require_dds
 
 pytest.importorskip("rosbags", reason="needs the extra ros")
 
+import ibvs_qp.ros.write_bag as write_bag_module
 from ibvs_qp import RgbdFrame, SensorFrame
 from ibvs_qp.ros.messages import typestore
 from ibvs_qp.ros.write_bag import write_bag
@@ -74,6 +79,45 @@ def test_a_bridge_that_hears_nothing_waits_and_ends(
     assert status["state"] == "waiting" and status["commands"] == 0 and 60 <= status["timing"]["ticks"] <= 80
 
 
+@pytest.mark.parametrize("preset", ["tarot_t960_qp", "octorotor_qp"])
+def test_a_dry_run_shows_the_thrust_at_full_command_that_px4_gets_too(
+    capsys: pytest.CaptureFixture[str], preset: str
+) -> None:
+    assert main(["vehicle", preset, "--px4", "v.params"]) == 0
+    capsys.readouterr()
+    assert main(["bridge", "--preset", preset, "--dry-run", "--json"]) == 0
+    full = json.loads(capsys.readouterr().out)["curve"]["thrust_max_n"]
+    assert f"CA_ROTOR0_CT\t{full:g}\t" in Path("v.params").read_text()
+    assert main(["bridge", "--preset", preset, "--dry-run"]) == 0
+    assert f"rotors      {full:g} N at full command" in capsys.readouterr().out
+
+
+def started(*words: str, **streams: object) -> subprocess.Popen[bytes]:
+    require_dds()
+    Path("b.toml").write_text("domain_id = 221\n")
+    command = [sys.executable, "-m", "sim.commands.cli", "bridge", "--config", "b.toml", *words]
+    return subprocess.Popen(command, env=environment(), **streams)  # type: ignore[call-overload]
+
+
+def test_a_reader_that_left_does_not_end_the_bridge() -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    with started("--duration", "0.5", stdout=writing) as process:
+        os.close(writing)
+        assert process.wait(60) == 0
+
+
+def test_ctrl_c_ends_with_the_timing(tmp_path: Path) -> None:
+    with started(stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:
+        assert process.stdout is not None
+        first = process.stdout.readline()
+        process.send_signal(signal.SIGINT)
+        last = process.stdout.read().decode().splitlines()
+        assert process.wait(60) == 130
+    assert first.startswith(b"waiting: imu") and last[-2].startswith("waiting: imu")
+    assert " ticks, " in last[-1] and " overruns; " in last[-1]
+
+
 @pytest.mark.parametrize(
     ("library", "words", "extra"),
     [("rosbags.typesys", ["detect", "bag"], "ros"), ("cyclonedds.domain", ["bridge", "--duration", "0.1"], "dds")],
@@ -115,6 +159,29 @@ def test_detect_reads_the_pictures_of_a_bag(capsys: pytest.CaptureFixture[str]) 
     assert frame["color"] == "bag/000000_1000000000" and frame["refused"] is None
     assert sum(guide is not None for guide in frame["guides"].values()) >= 2
     assert [file.name for file in Path("drawn").iterdir()] == ["bag_000000_1000000000_overlay.png"]
+
+
+def test_detect_straightens_the_lines_of_the_lens_in_the_bag(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def seen(*words: str) -> list[list[float]]:
+        assert main(["detect", "bag", "--json", "--all", *words]) == 0
+        (frame,) = json.loads(capsys.readouterr().out)["frames"]
+        return [[line["rho"], line["theta"]] for line in frame["candidates"]]
+
+    bag()
+    plain, straight = seen(), seen("--distortion", "0.2", "0", "0", "0", "0")
+    made = write_bag_module.pictures.from_intrinsics
+
+    def bent(*words: object) -> object:
+        info = made(*words)  # type: ignore[arg-type]
+        info.d = np.array([0.2, 0.0, 0.0, 0.0, 0.0])
+        return info
+
+    monkeypatch.setattr(write_bag_module.pictures, "from_intrinsics", bent)
+    shutil.rmtree("bag")
+    bag()
+    assert seen() == straight != plain == seen("--distortion", "0", "0", "0", "0", "0")
 
 
 @pytest.mark.parametrize(

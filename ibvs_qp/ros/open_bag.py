@@ -1,0 +1,137 @@
+"""An open bag of ROS 2: files of bounded size, compressed parts that unpack to a bounded size, one line per error."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ibvs_qp.config.errors import ConfigError, shown
+from ibvs_qp.config.files import open_regular, read_bytes
+from ibvs_qp.ros.messages import typestore
+
+if TYPE_CHECKING:
+    from rosbags.highlevel import AnyReader
+    from rosbags.interfaces import Connection
+
+#: Largest metadata and data file of a bag [bytes]: half a terabyte holds three hours of raw pictures.
+LARGEST_METADATA, LARGEST_DATA = 4 << 20, 1 << 39
+#: Largest chunk and message after decompression [bytes]: four pictures of `ibvs_qp.ros.messages.MOST_ENTRIES`.
+LARGEST_UNPACKED = 1 << 28
+_METADATA = "metadata.yaml"
+
+
+class OpenBag:
+    """A bag as a context. Whatever the library raises becomes one line of ConfigError.
+
+    Attributes:
+        connections: Topics with their types.
+
+    Args:
+        path: As of `ibvs_qp.ros.bag.Bag`.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    def __enter__(self) -> OpenBag:
+        """Open it.
+
+        Raises:
+            ConfigError: When it cannot be read, or is compressed as a whole.
+        """
+        _check_files(self._path)
+        store = typestore()  # names the extra where it is missing
+        try:
+            self._mode = _compression_mode(self._path)
+        except Exception as error:
+            raise self._unreadable(error) from None
+        if self._mode == "file":
+            raise ConfigError(f"{self._path} is compressed as whole files; decompress them with 'ros2 bag convert'")
+        try:
+            self._reader = _opened(self._path)
+            self._reader.typestore.max_sequence_length = store.max_sequence_length
+        except Exception as error:
+            raise self._unreadable(error) from None
+        self.connections = list(self._reader.connections)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close it."""
+        self._reader.close()
+
+    def deserialize(self, data: bytes, name: str) -> Any:
+        """Decode a message by the bag's own definitions, or by ours where it has none."""
+        return self._reader.deserialize(data, name)
+
+    def messages(self, connections: list[Connection]) -> Iterator[tuple[Connection, bytes]]:
+        """Messages of some connections in the order of recording."""
+        stream = self._reader.messages(connections)
+        while True:
+            try:
+                connection, _, data = next(stream)
+                data = _zstd(data, LARGEST_UNPACKED) if self._mode == "message" else data
+            except StopIteration:
+                return
+            except Exception as error:
+                raise self._unreadable(error) from None
+            yield connection, data
+
+    def _unreadable(self, error: Exception) -> ConfigError:
+        reason = " ".join(f"{type(error).__name__}: {error}".split())
+        return ConfigError(f"{self._path} is no readable ROS 2 bag ({shown(reason)[1:-1]})")
+
+
+def _check_files(path: Path) -> None:
+    """Open every file of a bag before the library does: only regular ones, of bounded size."""
+    if not path.is_dir():
+        open_regular(path, LARGEST_DATA).close()
+        return
+    open_regular(path / _METADATA, LARGEST_METADATA).close()
+    for file in sorted(path.iterdir()):
+        if file.name != _METADATA:
+            open_regular(file, LARGEST_DATA).close()
+
+
+def _compression_mode(path: Path) -> str:
+    """Mode "file" or "message", empty for none: the library unpacks files before it returns the metadata."""
+    if not path.is_dir():
+        return ""
+    from ruamel.yaml import YAML
+
+    table = YAML(typ="safe").load(read_bytes(path / _METADATA, LARGEST_METADATA))
+    return str(table["rosbag2_bagfile_information"].get("compression_mode", "")).lower()
+
+
+def _opened(path: Path) -> AnyReader:
+    """The library's reader, which leaves compressed messages as they are, and unpacks chunks by the functions below."""
+    from rosbags.highlevel import AnyReader
+    from rosbags.rosbag2 import storage_mcap
+
+    storage_mcap.DECOMPRESSORS.update(zstd=_zstd, lz4=_lz4)
+    reader = AnyReader([path], default_typestore=typestore())
+    reader.open()
+    rosbag2: Any = reader.readers[0]
+    rosbag2.storage.metadata = rosbag2.storage.metadata._replace(compression_mode=None)
+    return reader
+
+
+def _zstd(data: bytes, size: int) -> bytes:
+    from rosbags.rosbag2.storage_mcap import zstd
+
+    return _unpacked(zstd.ZstdDecompressor(), data, size)
+
+
+def _lz4(data: bytes, size: int) -> bytes:
+    from lz4.frame import LZ4FrameDecompressor
+
+    return _unpacked(LZ4FrameDecompressor(), data, size)
+
+
+def _unpacked(decompressor: Any, data: bytes, size: int) -> bytes:
+    """A frame of at most a size and at most `LARGEST_UNPACKED` [bytes]."""
+    largest = min(size, LARGEST_UNPACKED)
+    raw = decompressor.decompress(data, largest + 1)
+    if len(raw) > largest or not decompressor.eof:
+        raise ValueError(f"a compressed part is cut, or has more than {largest} bytes")
+    return raw
