@@ -87,7 +87,7 @@ def to_camera(info: Any) -> Camera:
     k = np.asarray(info.k, float)
     if not (np.isfinite(k).all() and min(k[0], k[4]) > 1.0):
         raise BadMessage("no camera matrix")
-    if info.distortion_model not in LENS_MODELS:
+    if info.distortion_model not in (LENS_MODELS if np.any(info.d) else (*LENS_MODELS, "")):  # simulators name none
         raise BadMessage("distortion_model is not plumb_bob or rational_polynomial")
     if len(info.d) not in DISTORTION_SIZES or not np.isfinite(info.d).all():
         raise BadMessage(f"d has not {', '.join(map(str, DISTORTION_SIZES))} finite coefficients")

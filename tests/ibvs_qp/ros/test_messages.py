@@ -189,6 +189,8 @@ def test_a_camera_returns() -> None:
     info = pictures.from_intrinsics((600.0, 601.0, 320.5, 240.5), (480, 640), NOW)
     assert pictures.to_camera(info) == ((600.0, 601.0, 320.5, 240.5), (480, 640), (0.0,) * 5)
     np.testing.assert_array_equal(info.p.reshape(3, 4)[:, :3], info.k.reshape(3, 3))
+    info.distortion_model, info.d = "", np.zeros(0)  # as of a simulator
+    assert pictures.to_camera(info).distortion == ()
 
 
 @pytest.mark.parametrize(
@@ -196,6 +198,7 @@ def test_a_camera_returns() -> None:
     [
         ({"k": np.zeros(9)}, "camera matrix"),  # an uncalibrated camera
         ({"distortion_model": "equidistant", "d": np.zeros(4)}, "distortion_model"),
+        ({"distortion_model": "", "d": np.array([0.1, 0, 0, 0])}, "distortion_model"),
         ({"d": np.zeros(4_000_000)}, "coefficients"),
         ({"d": np.array([np.nan, 0, 0, 0])}, "coefficients"),
     ],
