@@ -48,6 +48,7 @@ def test_a_lost_link_ends_in_px4s_failsafe_within_half_a_second(tmp_path: Path, 
     assert "flying" not in states[states.index("stopped") :]
 
 
+@pytest.mark.slow
 def test_wrong_axes_never_become_ready(tmp_path: Path, domain: int) -> None:
     """Without proof of life PX4 enters no Offboard mode, armed or not."""
     flown = dds_loopback.fly(tmp_path, domain, duration_s=3.0, wait_s=8.0, flip_axes=True)

@@ -10,9 +10,10 @@ import sys
 import time
 
 _SOLVING = """
-import os, sys, numpy as np
+import os, signal, sys, numpy as np
 from controller_scenes import pack, random_tick
 from ibvs_qp.controller import HybridController
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it
 controller, caught = HybridController(), 0
 pack(controller, *random_tick(np.random.default_rng(0), 2))
 data, solver = controller.engine.data, controller.engine.osqp

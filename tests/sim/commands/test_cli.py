@@ -76,7 +76,8 @@ def test_log_reads_back_equal(flown, capsys):
 
 
 def test_second_run_leaves_nothing_stale(flown, capsys):
-    assert main(["paint", "--out", "run"]) == 0
+    assert main(["paint", "--out", "run", "--no-video"]) == 0
+    (flown / "run" / "video.mp4").touch()
     (flown / "run" / "notes.txt").write_text("mine")
     assert main(["paint", "--law", "qp", "--out", "run", "--no-video", "--overwrite"]) == 0
     assert not (flown / "run" / "video.mp4").exists() and not (flown / "run" / "preset_paper.toml").exists()
@@ -232,7 +233,13 @@ def _paint(out: Path, *words: str) -> list[str]:
     return [sys.executable, "-c", program, "paint", "--features", "geometric", "--json", "--out", str(out), *words]
 
 
-@pytest.mark.parametrize("group", [False, True], ids=["parent alone", "whole group, as a terminal does"])
+@pytest.mark.parametrize(
+    "group",
+    [
+        pytest.param(False, marks=pytest.mark.slow, id="parent alone"),
+        pytest.param(True, id="whole group, as a terminal does"),
+    ],
+)
 def test_ctrl_c_ends_both_processes_with_a_partial_run(tmp_path, group):
     """Eight rows, for a flight that no machine has finished before the signal."""
     (tmp_path / "long.toml").write_text("[paint]\nrows = 8\n")

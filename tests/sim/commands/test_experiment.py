@@ -137,8 +137,9 @@ def test_the_page_says_how_to_redo_it_with_the_same_choices(flown, tmp_path):
     assert "too few for such an interval" in page and "-0.00" not in page and "_n_m" not in page
 
 
-def test_plan_flies_nothing(flown, tmp_path, capsys):
-    assert main(["experiment", "all", "--plan"]) == 0
+@pytest.mark.parametrize("size", [["--quick"], pytest.param([], marks=pytest.mark.slow)])
+def test_plan_flies_nothing(flown, tmp_path, capsys, size):
+    assert main(["experiment", "all", "--plan", *size]) == 0
     assert "all: " in capsys.readouterr().out
     assert not flown and not list(tmp_path.iterdir())
 

@@ -169,7 +169,9 @@ def test_rows_on_the_disk_are_the_rows_flown(tmp_path: Path, monkeypatch: pytest
     assert len(load_run(tmp_path)["qp"].t) == len(whole.t) - 1
 
 
-@pytest.mark.parametrize("group", [False, True], ids=["parent alone", "whole group"])
+@pytest.mark.parametrize(
+    "group", [pytest.param(False, marks=pytest.mark.slow, id="parent alone"), pytest.param(True, id="whole group")]
+)
 def test_sigterm_writes_the_partial_run(tmp_path: Path, group: bool) -> None:
     process = start(tmp_path / "run")
     wait_for_rows(tmp_path / "run", 2)

@@ -183,6 +183,7 @@ def test_laws_in_place_of_the_qp_are_compared_with_it_and_without_an_analytic_la
     assert page.index("What weights") < page.index("## Bounds")
 
 
+@pytest.mark.slow
 def test_the_page_of_a_whole_record_is_short():
     sections = [Section(experiment=experiment(name), table=made_up(name), figures={}) for name in NAMES]
     page = results_page(sections, "Made up.", "ibvs-qp experiment {name}", "all")

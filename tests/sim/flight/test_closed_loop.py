@@ -16,7 +16,7 @@ from sim.world.plant_scene import PlantScene
 from sim.world.scene import CameraScene, ForceTorqueScene
 
 
-@pytest.mark.parametrize("law", ["qp", "paper"])
+@pytest.mark.parametrize("law", ["qp", pytest.param("paper", marks=pytest.mark.slow)])
 def test_hold_at_high_friction_does_not_hunt(law: str) -> None:
     """20 s at mu 0.8: feeding the measured force forward would hunt and lose contact (design, section 4.3)."""
     log = hold(short_scene(wall=wall(friction=0.8)), law, 20.0)
@@ -28,7 +28,7 @@ def test_hold_at_high_friction_does_not_hunt(law: str) -> None:
     assert np.ptp(log["tip"][500:], axis=0).max() <= 0.004
 
 
-@pytest.mark.parametrize("law", ["qp", "paper"])
+@pytest.mark.parametrize("law", ["qp", pytest.param("paper", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("friction", [0.3, 0.8])
 def test_slide(law: str, friction: float) -> None:
     trace, metrics = fly_geometric(short_scene(wall=wall(friction=friction)), law)

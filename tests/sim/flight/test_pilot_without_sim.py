@@ -39,8 +39,15 @@ with open(sys.argv[2], "wb") as file:
 """
 
 
-@pytest.mark.parametrize("law", ["qp", "paper"])
-@pytest.mark.parametrize("features", ["rendered", "geometric"])
+@pytest.mark.parametrize(
+    ("features", "law"),
+    [
+        ("geometric", "qp"),
+        ("geometric", "paper"),
+        ("rendered", "qp"),
+        pytest.param("rendered", "paper", marks=pytest.mark.slow),
+    ],
+)
 def test_same_thrusts_without_the_simulator(law: str, features: str, tmp_path: Path) -> None:
     scene = short_scene(stroke_m=0.2, rows=1)
     options = FlightOptions(law=law, seed=5, features=features, video=False)

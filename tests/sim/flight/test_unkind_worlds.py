@@ -29,7 +29,7 @@ def one_error(section: str, **values: float) -> WorldErrors:
     return dataclasses.replace(ideal, **{section: dataclasses.replace(getattr(ideal, section), **values)})
 
 
-@pytest.mark.parametrize("law", ["qp", "paper"])
+@pytest.mark.parametrize("law", ["qp", pytest.param("paper", marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
     "errors",
     [
@@ -69,7 +69,7 @@ def test_motors_slower_than_believed_cost_little_with_the_estimated_angular_rate
     assert metrics["path_rms_straight_m"] < 4e-3 and metrics["tilt_rms_deg"] < 1.2
 
 
-@pytest.mark.parametrize("world", ["datasheet", "harsh"])
+@pytest.mark.parametrize("world", ["datasheet", pytest.param("harsh", marks=pytest.mark.slow)])
 def test_the_analytic_law_completes_in_every_world(world: str) -> None:
     metrics = compute_metrics(flown(world_errors(world), "paper"))
     assert metrics["completed"], metrics["reason"]

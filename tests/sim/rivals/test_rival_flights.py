@@ -15,6 +15,7 @@ from sim.flight.options import FlightOptions
 from sim.rivals import RIVALS, rival_controller
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rival", RIVALS)
 def test_a_rival_paints(rival):
     options = FlightOptions(rival=rival, features="geometric", video=False, machine_code=True)

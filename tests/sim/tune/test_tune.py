@@ -224,6 +224,7 @@ def test_nothing_better_keeps_the_shipped_preset(flown, monkeypatch, capsys):
     assert "shipped preset stays" in Path("run/report_paper.md").read_text()
 
 
+@pytest.mark.slow
 def test_a_kept_record_gives_the_same_choice_without_the_flights_of_the_search(flown, capsys):
     assert main(["tune", "--trials", "24", "--unseen", "4", "--json", "--out", "run"]) == 0
     once = json.loads(capsys.readouterr().out)
@@ -237,6 +238,7 @@ def test_a_kept_record_gives_the_same_choice_without_the_flights_of_the_search(f
     assert "`ibvs-qp tune --law qp --unseen 4 --trials-of run/qp_trials.json`" in Path("again/qp.toml").read_text()
 
 
+@pytest.mark.slow
 def test_a_killed_trial_does_not_shift_the_numbers_of_a_kept_record(flown, capsys):
     assert main(["tune", "--trials", "24", "--unseen", "4", "--json", "--out", "run"]) == 0
     once = json.loads(capsys.readouterr().out)

@@ -189,6 +189,7 @@ def test_perception_survives_what_is_no_picture() -> None:
     assert good.refused is None and good.features.plane is not None
 
 
+@pytest.mark.slow
 def test_a_flight_on_the_papers_pipeline_ends_with_a_report(tmp_path, capsys) -> None:
     scene = tmp_path / "short.toml"
     scene.write_text("[board]\nwidth_m = 0.4\n[paint]\nrows = 1\nstroke_m = 0.3\n")

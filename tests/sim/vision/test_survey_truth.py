@@ -23,7 +23,7 @@ def run(family: str, count: int, first: int = 0) -> Errors:
     return measure_family(scenes, lambda truth: SurveyPipeline().detect(truth.frame, truth.seed))
 
 
-@pytest.mark.parametrize("count", [pytest.param(6, id="quick"), pytest.param(20, id="all", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [pytest.param(3, id="quick"), pytest.param(20, id="all", marks=pytest.mark.slow)])
 def test_edges_are_found_to_a_fraction_of_a_pixel(count: int) -> None:
     total = Errors()
     for family in CLEAR:
