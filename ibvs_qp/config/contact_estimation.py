@@ -54,7 +54,9 @@ class ContactEstimationSettings:
     jump_m: float = setting(
         0.05, "a plane this far from the expected distance is refused at first", unit="m", low=0.005, high=1.0
     )
-    jump_frames: int = setting(5, "jumps in a row after which the new distance is accepted", low=1, high=100)
+    refused_frames: int = setting(
+        5, "planes beyond the gate in a row, on one side, after which distance and speed start anew", low=1, high=100
+    )
     normal_gain: float = setting(0.15, "correction of the normal per frame: mean of six frames", low=0.001, high=1.0)
     stationary_after_s: float = setting(
         0.3, "time from touch until the tip counts as stationary", unit="s", low=0.0, high=5.0

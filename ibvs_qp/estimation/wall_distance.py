@@ -68,7 +68,7 @@ class WallDistance:
         self._normals = np.zeros((HISTORY, 3))  # of the last ticks, by the slots of the filter's ticks
         self._yaw, self._yaws = 0.0, np.zeros(HISTORY)  # integrated gyro about the vertical [rad], likewise
         self._turns.reset()
-        self._jumps, self._first_jump, self._plane_ns = 0, (0, 0.0), -1
+        self._refused, self._nearer, self._first_refused, self._plane_ns = 0, False, (0, 0.0), -1
         self.accepted_ns = self._tick_ns = -1
         self._gap = False
         self._odd = self._agreed = self._reopened = 0
@@ -195,32 +195,36 @@ class WallDistance:
         return True
 
     def _correct_distance(self, stamp_ns: int, distance: float, tip_stationary: bool) -> bool:
-        """Correct distance and speed; a jump only once the next frames repeat it. Whether the plane is accepted."""
+        """Correct distance and speed; whether the plane is accepted.
+
+        A plane beyond the gate counts little, and a jump not at all, until the next ones lie on the same side: then
+        the filter is wrong, and starts again.
+        """
         settings, kalman = self._settings, self._filter
         deviation = settings.stationary_distance_std_m if tip_stationary else settings.distance_std_m
         if kalman.correct_entry(stamp_ns, DISTANCE, distance, deviation**2):
             if tip_stationary:
                 kalman.correct_entry(stamp_ns, SPEED, -self._lever_speed, settings.stationary_speed_std_m_s**2)
-            self._jumps = 0
+            self._refused = 0
             return True
         past = kalman.at(stamp_ns)
         if past is None:
             return False
-        if abs(distance - past[DISTANCE]) < settings.jump_m:
-            self._jumps = 0
-            return kalman.correct_entry(stamp_ns, DISTANCE, distance, settings.outlier_std_m**2, gate=math.inf)
-        self._jumps += 1
-        if self._jumps == 1:
-            self._first_jump = stamp_ns, distance
-        if self._jumps < settings.jump_frames:
+        nearer = bool(distance < past[DISTANCE])
+        self._refused = self._refused + 1 if nearer == self._nearer else 1
+        if self._refused == 1:
+            self._first_refused, self._nearer = (stamp_ns, distance), nearer
+        if self._refused >= settings.refused_frames:
+            self._refused = 0
+            self._restart(stamp_ns, distance)
+            return True
+        if abs(distance - past[DISTANCE]) >= settings.jump_m:
             return False
-        self._jumps = 0
-        self._restart(stamp_ns, distance)
-        return True
+        return kalman.correct_entry(stamp_ns, DISTANCE, distance, settings.outlier_std_m**2, gate=math.inf)
 
     def _restart(self, stamp_ns: int, distance: float) -> None:
         """Take distance and speed from the refused planes: a filter that refuses them has a wrong speed as well."""
-        then, first = self._first_jump
+        then, first = self._first_refused
         kalman, elapsed = self._filter, max((stamp_ns - then) * 1e-9, SHORTEST_JUMPS)
         kalman.restart()
         kalman.set_entry(SPEED, (first - distance) / elapsed - self._lever_speed, JUMP_SPEED_STD)

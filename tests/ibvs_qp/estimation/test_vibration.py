@@ -73,6 +73,14 @@ def test_a_wandering_bias_leaves_no_standing_speed(sigma: float) -> None:
     assert abs(after.mean()) < 1.5e-3
 
 
+@pytest.mark.parametrize("leap", [-0.5, 0.5])
+def test_an_attitude_that_leaps_by_3_degrees_leaves_no_false_speed_after_a_second(leap: float) -> None:
+    """A filter sure of its bias refuses the planes; the tip then pressed with 14 N."""
+    _, rates = fly(12.0, sigma=0.06, leap=leap)
+    half, second = 1500 + 125, 1500 + 250  # after the leap
+    assert abs(rates[half:second]).max() < 0.1 and abs(rates[second:]).max() < 0.03
+
+
 @pytest.mark.parametrize("degrees", [-1.5, 1.5])
 def test_gravity_through_an_attitude_error_is_learnt(degrees: float) -> None:
     wall, _ = fly(8.0, tilt=math.radians(degrees), sigma=0.06)
@@ -89,7 +97,7 @@ def test_the_noise_of_the_rate_is_known_and_no_plane_is_refused(sigma: float) ->
 
 def test_a_filter_that_refuses_restarts_with_distance_and_speed() -> None:
     wall, _ = fly(4.0)
-    ticks = 8 * (CONFIG.contact.estimation.jump_frames - 1) + 1
+    ticks = 8 * (CONFIG.contact.estimation.refused_frames - 1) + 1
     for tick in range(ticks):  # the wall moves away at 0.2 m/s after a leap of 0.3 m; the accelerometer shows nothing
         stamp = (1001 + tick) * 4_000_000
         wall.predict(stamp, TICK, (0.0, 0.0, 0.0), (0.0, 0.0, -9.81), DOWN)

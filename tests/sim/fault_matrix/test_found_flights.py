@@ -27,3 +27,20 @@ def test_blind_an_attitude_that_wanders_does_not_bring_the_vehicle_back_to_the_w
 @pytest.mark.parametrize(("row", "place", "seed"), [("plane lost", "contact", 2), ("camera lost", "free", 9)])
 def test_the_same_after_contact_and_with_another_wander(row, place, seed):
     assert not failures(row, place, "datasheet", seed)
+
+
+def test_a_leap_of_the_attitude_does_not_press_with_14_n():
+    assert not failures("attitude step 3 deg in pitch", "free", "ideal", 1)
+
+
+@pytest.mark.slow  # three more of the same kind
+@pytest.mark.parametrize(
+    ("row", "place", "seed"),
+    [
+        ("attitude step 3 deg in pitch", "free", 6),
+        ("attitude step 2 deg in pitch", "free", 7),
+        ("accelerometer step -0.2 m/s^2 along the normal", "contact", 1),
+    ],
+)
+def test_nor_does_another_one_or_one_of_the_accelerometer(row, place, seed):
+    assert not failures(row, place, "ideal", seed)
