@@ -23,6 +23,9 @@ FOUND, FOUND_SIGMAS = 1.5, 3.0
 WEAK = 0.25
 #: As many faulty rotors have a common cause, a limit: they follow below it, and none gives too much.
 COMMON = 3
+#: A ceiling with a common cause rises at this rate while no thrust is missing [N/s]: one found while the thrusts change
+#: fast is too low to hover with.
+RISE_N_S = 2.0
 #: Half width of the remaining limits of a stuck rotor [N].
 MARGIN = 0.5
 
@@ -56,6 +59,7 @@ class RotorMonitor:
         self._lift.reset()
         self._found: dict[str, float] = {}
         self._strong = set[int]()  # of them those that gave too much
+        self._time_s = 0.0
 
     def update(self, missing: np.ndarray, noise: float, thrusts: np.ndarray, time_s: float) -> str:
         """Rotors that miss thrust, in words.
@@ -67,6 +71,7 @@ class RotorMonitor:
             time_s: Time of the tick [s].
         """
         entries, settings = missing.tolist(), self._settings
+        dt, self._time_s = time_s - self._time_s, time_s
         least, sigmas = settings.missing_thrust_n, settings.missing_sigmas
         most = max(max(entries), -min(entries))
         lift = sum(map(operator.mul, self._upwards, entries))
@@ -79,6 +84,7 @@ class RotorMonitor:
         least = max(least, sigmas * noise)
         if most < least:
             self._suspects.clear()
+            self._rise(dt)
         else:
             self._suspect(missing, thrusts, time_s)
         words = [f"{name} gives {thrust:.1f} N" for name, thrust in self._found.items()]
@@ -115,6 +121,11 @@ class RotorMonitor:
             if float(rest @ rest) < UNEXPLAINED**2 * total:
                 return chosen
         return ()
+
+    def _rise(self, dt: float) -> None:
+        """Ceilings with a common cause, one tick later."""
+        if self.limits is not None and len(self._found) >= COMMON:
+            self.limits = self.limits[0], np.minimum(self.limits[1] + RISE_N_S * dt, self._box[1])
 
     def _limit(self, rotor: int, actual: float, loss: float, stuck: bool = True) -> None:
         """A faulty rotor counts as stuck at its thrust: one that gives too little may not give less either."""

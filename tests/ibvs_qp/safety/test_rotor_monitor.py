@@ -134,3 +134,24 @@ def test_a_thrust_missed_for_some_ticks_takes_no_further_rotor_out() -> None:
     assert first in text and second in text and not any(name in text for name in others)
     assert watch.limits is not None
     np.testing.assert_array_equal(watch.limits[1][2:], VEHICLE.thrust_max[2:])
+
+
+def test_a_ceiling_with_a_common_cause_rises_while_no_thrust_is_missing() -> None:
+    """Found while the thrusts changed fast, ceilings were 2.5 N too low, and the vehicle could not hover any more."""
+    watch, wanted = monitor(), np.full(6, 20.0)
+    for tick in range(60):
+        watch.update(wanted - 10.5, 0.1, wanted, tick * 0.004)
+    for tick in range(60, 310):
+        watch.update(np.zeros(6), 0.1, HOVER, tick * 0.004)
+    assert watch.limits is not None
+    np.testing.assert_allclose(watch.limits[1], 10.5 + 2.0, atol=0.1)
+    for tick in range(310, 20_000):
+        watch.update(np.zeros(6), 0.1, HOVER, tick * 0.004)
+    assert (watch.limits[1] == VEHICLE.thrust_max).all()
+
+
+def test_the_ceiling_of_a_single_stuck_rotor_stays() -> None:
+    _, watch = watched(np.array([6.0, 0, 0, 0, 0, 0]))
+    for number in range(20, 300):
+        watch.update(np.zeros(6), 0.1, HOVER, 0.004 * number)
+    assert watch.limits is not None and watch.limits[1][0] == pytest.approx(5.3)
