@@ -15,6 +15,9 @@ from sim.commands.options import flag, optional, preset_file
 if TYPE_CHECKING:
     from ibvs_qp.recording import PresetComparison, RecordedFlight, Replay
 
+#: Answer for a log without a tick to compare.
+NOTHING = "Nothing was compared: the log has no ticks up to its first gap."
+
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class ReplayCommand:
@@ -73,9 +76,6 @@ def _text(flight: RecordedFlight, result: Replay | PresetComparison) -> list[str
     if not result.complete:
         lines.append("The log has no end: its process was killed, or the file is damaged there.")
     return lines
-
-
-NOTHING = "Nothing was compared: the log has no ticks up to its first gap."
 
 
 def _replay_text(result: Replay) -> list[str]:
