@@ -82,9 +82,6 @@ class MeasurementGate:
             return None, (f"stamp_ns: {why}",)
         rejected: list[str] = []
         entries, changes, refused = self._table.read(measurement, self._last, rejected)
-        if "attitude" in refused and not self._measured:
-            self.clock.reset()  # time begins with the first attitude
-            return None, tuple(rejected)
         self._check_times(measurement, changes, rejected)
         self._check_wrench_time(measurement, refused, entries, changes, rejected)
         self._check_plane(measurement, changes, rejected)
@@ -92,6 +89,10 @@ class MeasurementGate:
         self._check_velocity_time(measurement, changes, rejected)
         _check_covariance(measurement, changes, rejected)
         self._check_limit_order(entries, changes, rejected)
+        if "attitude" in refused and not self._measured:
+            self.reset()  # time begins with the first attitude
+            self.replaced = _ALL
+            return None, tuple(rejected)
         self._last, self._measured, self.replaced = entries, True, tuple(refused)
         return (dataclasses.replace(measurement, **changes) if changes else measurement), tuple(rejected)
 

@@ -1,4 +1,5 @@
-"""A force sample is a value and its time: where one of both is broken, both of the last sample stay."""
+"""What the check of a measurement keeps from tick to tick: a force sample goes with its time, and all begins with the
+first attitude."""
 
 from __future__ import annotations
 
@@ -31,3 +32,12 @@ def test_value_and_time_of_a_force_sample_go_together(broken: dict[str, Any]) ->
     checked, rejected = gate.check(measured(2, contact_wrench=SECOND))
     assert checked is not None and rejected == ()
     assert checked.contact_wrench.tolist() == SECOND.tolist() and checked.wrench_stamp_ns == 3 * TICK_NS
+
+
+def test_before_the_first_attitude_all_else_is_named_too_and_nothing_is_kept() -> None:
+    gate = MeasurementGate(6, 2)
+    checked, rejected = gate.check(measured(1, attitude=None, wrench_stamp_ns=10**12, plane=np.zeros(4)))
+    assert checked is None
+    assert [reason.split(":")[0] for reason in rejected] == ["attitude", "wrench_stamp_ns", "plane"]
+    checked, rejected = gate.check(measured(0))  # earlier than the refused one: time has not begun
+    assert checked is not None and rejected == ()
