@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
+import functools
 import math
 import numbers
 import types
@@ -114,8 +115,7 @@ def from_dict(kind: type[T], table: dict[str, Any], path: str = "") -> T:
     Raises:
         ConfigError: On an unknown key, a value of the wrong type or out of range.
     """
-    hints = typing.get_type_hints(kind)
-    known = {field.name: hints[field.name] for field in dataclasses.fields(kind) if field.init}  # type: ignore[arg-type]
+    known = _settable(kind)
     values: dict[str, Any] = {}
     for key, value in table.items():
         place = f"{path}.{key}" if path else key
@@ -133,6 +133,13 @@ def from_dict(kind: type[T], table: dict[str, Any], path: str = "") -> T:
         ValueError,
     ) as error:  # from a dataclass of another package, or for a missing field without default
         raise ConfigError(f"{path or 'table'}: {error}") from None
+
+
+@functools.cache
+def _settable(kind: type) -> dict[str, Any]:
+    """Types of the fields of a dataclass by name."""
+    hints = typing.get_type_hints(kind)
+    return {field.name: hints[field.name] for field in dataclasses.fields(kind) if field.init}
 
 
 def _convert(hint: Any, value: Any, place: str) -> Any:

@@ -17,7 +17,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background
 controller, caught = HybridController(), 0
 pack(controller, *random_tick(np.random.default_rng(0), 2))
 data, solver = controller.engine.data, controller.engine.osqp
-while caught < 10:
+while caught < 4:
     try:
         print("solving", file=sys.stderr, flush=True)
         while True:
@@ -31,7 +31,7 @@ os._exit(0)
 
 #: Signals that may be lost: one that arrives during the last iteration of a solve, after OSQP's last look at it. One
 #: that was not answered for so long is lost [s].
-LOST, PATIENCE_S = 5, 2.0
+LOST, PATIENCE_S = 3, 2.0
 #: Until the process is in OSQP, where it spends 97 % of its time [s].
 SOLVING_S = 0.02
 
