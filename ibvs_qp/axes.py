@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from functools import singledispatch
 from typing import Any, TypeVar
 
 import numpy as np
@@ -57,7 +56,6 @@ def swap_covariance(covariance: Any) -> np.ndarray:
     return np.asarray(covariance, float) * np.outer(_BODY, _BODY)
 
 
-@singledispatch
 def swap_axes(value: Value) -> Value:
     """A measurement, sensor frame, feature frame, reference or command in the other axes.
 
@@ -70,6 +68,19 @@ def swap_axes(value: Value) -> Value:
     Raises:
         TypeError: For a value of another type.
     """
+    match value:
+        case Measurement():
+            vectors = ("angular_velocity", "specific_force", "contact_wrench", "velocity", "acceleration_bias")
+            return _changed(value, vectors, attitude=swap_attitude, velocity_covariance=swap_covariance)
+        case SensorFrame():
+            vectors = ("angular_velocity", "specific_force", "wrench")
+            return _changed(value, vectors, attitude=swap_attitude, features=swap_axes)
+        case FeatureFrame():
+            return _changed(value, ("velocity",), velocity_covariance=swap_covariance)
+        case Reference():
+            return _changed(value, (), tilt=_ANGLES.__mul__, trim=_ANGLES.__mul__)
+        case Command():
+            return _changed(value, ("wrench", "unallocated_wrench"))
     raise TypeError(f"{type(value).__name__} has no axes to swap")
 
 
@@ -78,30 +89,3 @@ def _changed(value: Any, vectors: tuple[str, ...], **others: Any) -> Any:
     swapped = {name: swap_vector(old) for name in vectors if (old := getattr(value, name)) is not None}
     more = {name: swap(old) for name, swap in others.items() if (old := getattr(value, name)) is not None}
     return dataclasses.replace(value, **swapped, **more)
-
-
-@swap_axes.register
-def _(value: Measurement) -> Measurement:
-    vectors = ("angular_velocity", "specific_force", "contact_wrench", "velocity", "acceleration_bias")
-    return _changed(value, vectors, attitude=swap_attitude, velocity_covariance=swap_covariance)
-
-
-@swap_axes.register
-def _(value: SensorFrame) -> SensorFrame:
-    vectors = ("angular_velocity", "specific_force", "wrench")
-    return _changed(value, vectors, attitude=swap_attitude, features=swap_axes)
-
-
-@swap_axes.register
-def _(value: FeatureFrame) -> FeatureFrame:
-    return _changed(value, ("velocity",), velocity_covariance=swap_covariance)
-
-
-@swap_axes.register
-def _(value: Reference) -> Reference:
-    return _changed(value, (), tilt=_ANGLES.__mul__, trim=_ANGLES.__mul__)
-
-
-@swap_axes.register
-def _(value: Command) -> Command:
-    return _changed(value, ("wrench", "unallocated_wrench"))
