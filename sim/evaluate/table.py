@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Container, Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -99,15 +99,15 @@ def figure_table(metrics: dict[str, dict[str, Any]]) -> Table:
     return terminal_table(headings, rows, text=("figure", "unit"), wrap=headings[1:-1])
 
 
-def markdown(heads: Sequence[str], rows: Iterable[Sequence[str]], left: int | None = None) -> str:
+def markdown(heads: Sequence[str], rows: Iterable[Sequence[str]], left: Container[int] | None = None) -> str:
     """A Markdown table that ends with a line break.
 
     Args:
         heads: Headings of the columns.
         rows: Cells of every row.
-        left: Number of left-aligned columns, the others are numbers; None leaves the alignment open.
+        left: Indices of the left-aligned columns, the others are numbers; None leaves the alignment open.
     """
-    rule = "".join("---|" if left is None else ":--|" if place < left else "--:|" for place in range(len(heads)))
+    rule = "".join("---|" if left is None else ":--|" if place in left else "--:|" for place in range(len(heads)))
     lines = ["|" + "|".join(f" {cell} " if cell else " " for cell in line) + "|" for line in (heads, *rows)]
     return "\n".join([lines[0], "|" + rule, *lines[1:]]) + "\n"
 

@@ -38,12 +38,17 @@ where none was flown). *state*: most severe states reached. *control fails*: fli
 criterion, and which; **bold** where they must and do not. †: no law could save the vehicle; only commands and states
 are judged.
 """
+_BORNE = """\
+The other {borne} need not: there validation, estimation, the law or the strategy bears the fault. They do not show that
+the supervisor is needed."""
 _ATTAINABLE = """\
 Least tilt at which the rotors carry the weight with no roll and pitch moment, by the facets of the attainable wrench
 set (`allocation/hover_tilt.py`), for the worst rotor. Where there is none up to 60 deg, no law can hold the vehicle in
 the air.
 """
 _HEADS = ("fault", "place", "passed", "tilt deg", "push N", "speed m/s", "retreat s", "state", "control fails", "by")
+#: Columns of `_HEADS` that hold words.
+_TEXT = (0, 1, 7, 9)
 
 
 def page(verdicts: Sequence[Verdict], hovers: Sequence[Hover], lead: str, command: str, vehicle: VehicleParams) -> str:
@@ -95,11 +100,13 @@ def _summary(verdicts: Sequence[Verdict]) -> str:
     if must:
         proved = sum(not each.proves_nothing for each in must)
         lines.append(f"Without it {proved} of the {len(must)} rows that must fail do.")
+    if borne := sum(not verdict.expected.control_fails and verdict.control.n > 0 for verdict in verdicts):
+        lines.append(_BORNE.format(borne=borne))
     return " ".join(lines) + "\n"
 
 
 def _table(verdicts: Sequence[Verdict]) -> str:
-    return markdown(_HEADS, [_row(verdict) for verdict in verdicts], left=2)
+    return markdown(_HEADS, [_row(verdict) for verdict in verdicts], left=_TEXT)
 
 
 def _row(verdict: Verdict) -> tuple[str, ...]:
@@ -154,4 +161,4 @@ def _hovers(hovers: Sequence[Hover], verdicts: Sequence[Verdict]) -> str:
     heads = ("fault", "world", "least tilt, may turn, deg", "least tilt, heading held, deg")
     beyond = {verdict.row.name: verdict.row.beyond for verdict in verdicts if verdict.row.beyond}
     reasons = "".join(f"\n† {name}: {reason}.\n" for name, reason in beyond.items())
-    return f"{_ATTAINABLE}\n{markdown(heads, rows, left=2)}{reasons}"
+    return f"{_ATTAINABLE}\n{markdown(heads, rows, left=range(2))}{reasons}"

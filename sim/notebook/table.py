@@ -25,4 +25,4 @@ def table(header: Sequence[str], rows: Iterable[Sequence[object]], left: int = 1
         left: How many columns, from the first, are aligned left; the others are aligned right.
     """
     texts = ([number(cell) if isinstance(cell, float) else str(cell) for cell in line] for line in rows)
-    return markdown(header, texts, left).rstrip()
+    return markdown(header, texts, range(left)).rstrip()

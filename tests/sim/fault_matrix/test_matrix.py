@@ -68,6 +68,7 @@ def test_the_page_names_what_failed_and_what_proves_nothing():
     text = page(verdicts(ROWS, FLIGHTS, 5.0, VEHICLE), [], "Eight flights.", "ibvs-qp faults", VEHICLE)
     assert "`ibvs-qp faults`" in text and "within 1.2 to 52.56 N" in text
     assert "2 of 3 rows pass (3 of 4 flights)" in text and "1 of the 2 rows that must fail do" in text
+    assert "The other 1 need not: there validation" in text
     assert "| a | contact | **1/2** | 3.0 | 13.0 | 0.30 | 0.39 | retreat | 1/1 | crash |" in text
     assert "- a, contact, ideal, seed 1: push 13.0 N" in text
     assert "- b, contact (retreated)" in text and "| **0/2** |" in text
