@@ -62,7 +62,8 @@ def page(verdicts: Sequence[Verdict], hovers: Sequence[Hover], lead: str, comman
         vehicle: Limits of the thrusts.
     """
     text = (
-        f"# Fault matrix\n\nGenerated from data by `{command}` (`sim/fault_matrix`); do not edit. {lead}\n\n"
+        f"# Results of the fault matrix\n\n"
+        f"Generated from data by `{command}` (`sim/fault_matrix`); do not edit. {lead}\n\n"
         f"{_criteria(vehicle)}\n## Verdict\n\n{_summary(verdicts)}\n## Rows\n\n{_LEGEND}\n{_table(verdicts)}"
     )
     chapters = {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import polars as pl
 import pytest
@@ -14,9 +15,10 @@ from sim.fault_matrix.design import CONTROL, SUPERVISED, Choice, design, job_sce
 from sim.fault_matrix.page import page
 from sim.fault_matrix.verdict import verdicts
 from sim.faults.rotors import RotorStuck, ThrustLoss
-from sim.faults.scenario import Expected, Scenario, scenario, scenarios
+from sim.faults.scenario import PLACES, Expected, Scenario, scenario, scenarios
 from sim.world.true_vehicle import true_vehicle
 
+ROOT = Path(__file__).parents[3]
 ROWS = (
     Scenario(name="a", observable_s=0.1, contact=Expected(reach="retreat"), free=Expected(control_fails=False)),
     Scenario(name="b", contact=Expected(reach="retreat")),
@@ -72,6 +74,16 @@ def test_the_page_names_what_failed_and_what_proves_nothing():
     assert "| a | contact | **1/2** | 3.0 | 13.0 | 0.30 | 0.39 | retreat | 1/1 | crash |" in text
     assert "- a, contact, ideal, seed 1: push 13.0 N" in text
     assert "- b, contact (retreated)" in text and "| **0/2** |" in text
+
+
+def test_the_record_has_every_row_and_each_passes():
+    """A row that is added or renamed needs new flights."""
+    lines = (ROOT / "docs" / "faults.md").read_text(encoding="utf-8").splitlines()
+    cells = [[cell.strip() for cell in line.split("|")[1:4]] for line in lines if line.endswith("|")]
+    found = {(name.removesuffix(" †"), place): passed for name, place, passed in cells if place in PLACES}
+    rows = scenarios()
+    assert set(found) == {(row.name, place) for row in rows for place in row.places}
+    assert set(found.values()) == {"40/40"}
 
 
 def test_control_flights_alone_make_a_page():
