@@ -104,7 +104,9 @@ def _setup(
         paths = (*experiment.paths.get(name, ()), *flights.paths.get(name, ()))
         values |= dict.fromkeys(paths, value)
         values |= experiment.named.get(name, {}).get(str(value), {})
-    pilot = unsupervised(VARIANTS[variant].apply(ibvs_qp.preset(law)))
+    pilot = VARIANTS[variant].apply(ibvs_qp.preset(law))
+    if not flights.supervised:
+        pilot = unsupervised(pilot)
     if FORCE_GAIN in level:
         pilot = with_force_gain(pilot, float(level[FORCE_GAIN]))
     job = PaintJob() if flights.measure.startswith("paint") else PressJob()

@@ -52,6 +52,7 @@ class Flights:
     fault: str = choice("none", "what goes wrong after touch", ("none", "derate", "wind step"))
     fault_delay_s: float = setting(0.0, "time from touch to the fault", unit="s", low=0.0)
     features: str = choice("", "overrides the command line", ("", "rendered", "geometric"))
+    supervised: bool = False  # whether the supervisor flies along: a lost rotor is its case
     rendered_only: bool = False  # whether the flights need rendered pictures
     keep: bool = True  # whether the log of the first seed is stored
 
