@@ -15,8 +15,8 @@ ROOT = Path(__file__).parents[1]
 #: Folders in the order of their imports: each imports only from earlier ones (docs/development.md).
 ORDER = {
     "ibvs_qp": (
-        "frames measurement command axes analysis config adapters validation estimation safety model tasks limits qp "
-        "vision painting checked_law analytic controller assured pilot presets recording ros bridge"
+        "frames measurement command axes analysis config adapters symbolic validation estimation safety model tasks "
+        "limits qp vision painting checked_law analytic controller assured pilot presets recording ros bridge"
     ).split(),
     "sim": (
         "storage world scenes sensors rivals faults flight video evaluate figures sweep report detection experiments "

@@ -5,19 +5,85 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+import casadi as ca
 import numpy as np
 
 from ibvs_qp.config import LONGEST_TICK, ContactSettings, ControllerConfig
 from ibvs_qp.estimation.contact_state import ContactState
-from ibvs_qp.estimation.push import PushFilter
-from ibvs_qp.estimation.stiffness import StiffnessEstimator
-from ibvs_qp.estimation.touch import TouchDetector
-from ibvs_qp.estimation.wall_distance import WallDistance
+from ibvs_qp.estimation.motion_history import MotionHistory
+from ibvs_qp.estimation.push import FIRST_PUSH_VARIANCE, PushFilter
+from ibvs_qp.estimation.stamps import sample_interval
+from ibvs_qp.estimation.stiffness import stiffness
+from ibvs_qp.estimation.touch import TouchDetector, touch_threshold
+from ibvs_qp.estimation.wall_distance import Plane, Tick, WallDistance
+from ibvs_qp.symbolic.logic import both, no, where
+from ibvs_qp.symbolic.signals import Signals
+from ibvs_qp.symbolic.step_function import StepFunction
 
-#: Without a plane for this long [ns], a push means that the tip touches, whatever the drifting distance says.
-BLIND_NS = 300_000_000
+#: Without a plane for this long [s], a push means that the tip touches, whatever the drifting distance says.
+BLIND_S = 0.3
 #: The push noise is learned beyond this multiple of `contact_distance_m`.
 FREE_DISTANCES = 2.0
+#: Entries of the estimate as results of the function, in the order of `ContactState` behind the normal.
+SCALARS = ContactState._fields[1:]
+#: Those that are true or false, and those that are infinite while no wall is known.
+FLAGS, UNKNOWN = ("known", "in_contact", "stiffness_known"), ("distance", "depth")
+
+
+def contact_state(
+    signals: Signals, config: ControllerConfig, tick: Tick, plane: Plane, wrench: ca.SX, interval: ca.SX
+) -> dict[str, ca.SX]:
+    """The estimate of one tick as expressions, by the names of `ContactState`.
+
+    Args:
+        signals: Registry.
+        config: Geometry and `contact` settings.
+        tick: Inertial data.
+        plane: Last measured plane.
+        wrench: Tared wrench ON the vehicle at the centre of mass, FRD [N, N m], (6,).
+        interval: Time since the last force sample [s], 0 without a new one.
+    """
+    settings, estimation = config.contact, config.contact.estimation
+    history = MotionHistory(signals, tick.elapsed, tick.rate, tick.acceleration, config.tick_s)
+    touch = TouchDetector(signals, config, tick.elapsed)
+    wall = WallDistance(signals, config, tick, history)
+    wall.correct(plane, both(touch.in_contact, touch.time - plane.age > estimation.stationary_after_s))
+    free = both(no(touch.in_contact), wall.distance > FREE_DISTANCES * settings.contact_distance_m)
+    push = PushFilter(signals, settings, wrench, interval, wall.normal, free)
+    touch.add_sample(interval > 0.0, push.push, push.push_noise)
+    wall.touch(both(interval > 0.0, touch.pressed, wall.known, wall.since_plane > BLIND_S))
+    pressing = where(touch.in_contact, interval, 0.0)
+    touched = touch.update(push.push, wall.distance)
+    slope = stiffness(signals, settings, push.push, -wall.distance, pressing, touched)
+    wall.store()
+    return {
+        "normal": wall.normal,
+        "known": wall.known,
+        "distance": wall.distance,
+        "rate": wall.rate,
+        "acceleration": wall.acceleration,
+        "rate_noise": wall.rate_noise,
+        "acceleration_noise": ca.sqrt(wall.variance),
+        "bias": wall.bias,
+        "speed": wall.speed,
+        "depth": wall.depth,
+        "push": push.push,
+        "push_noise": push.push_noise,
+        "across_noise": push.moment_noise / config.vehicle.tip_position_m[0],
+        "in_contact": touch.in_contact,
+        "time_since_touch": touch.time,
+        "ramp": touch.ramp,
+        "contact_weight": touch.ramp * depth_weight(settings, wall.depth),
+        "stiffness": slope.value,
+        "stiffness_known": slope.known,
+        "plane_accepted": wall.accepted,
+    }
+
+
+def depth_weight(settings: ContactSettings, depth: ca.SX) -> ca.SX:
+    r"""Lambda without its ramp: :math:`\tfrac12(1+\cos(\pi (d-d_{min})/(d_{max}-d_{min})))`, 1 below and 0 above."""
+    ratio = (depth - settings.depth_min_m) / (settings.depth_max_m - settings.depth_min_m)
+    return 0.5 * (1.0 + ca.cos(math.pi * ca.fmin(ca.fmax(ratio, 0.0), 1.0)))
 
 
 class ContactEstimator:
@@ -25,39 +91,67 @@ class ContactEstimator:
 
     Attributes:
         state: Result of the last update.
+        plane_ns: Capture time of the last accepted plane, -1 before the first.
 
     Args:
         config: Geometry and `contact` settings.
     """
 
     def __init__(self, config: ControllerConfig) -> None:
-        self._settings, self._tick_s, self._tip_ahead = config.contact, config.tick_s, config.vehicle.tip_position_m[0]
-        self._wall = WallDistance(config)
-        self._push = PushFilter(config.contact)
-        self._touch = TouchDetector(config)
-        self._stiffness = StiffnessEstimator(config.contact)
+        self._config, signals = config, Signals()
+        tick = Tick(
+            dt=signals.input("dt"),
+            elapsed=signals.input("elapsed"),
+            rate=signals.input("rate", 3),
+            force=signals.input("force", 3),
+            force_known=signals.input("force_known"),
+            down=signals.input("down", 3),
+            doubt=signals.input("doubt"),
+        )
+        plane = Plane(new=signals.input("plane_new"), age=signals.input("plane_age"), values=signals.input("plane", 4))
+        wrench, interval = signals.input("wrench", 6), signals.input("interval")
+        for name, value in contact_state(signals, config, tick, plane, wrench, interval).items():
+            signals.output(name, value)
+        self._step = StepFunction(signals, to_machine_code=config.machine_code)
+        self._plane = np.array([0.0, 0.0, 1.0, -1.0])
         self.reset()
 
     def reset(self) -> None:
         """Return to the state before the first measurement."""
-        for part in (self._wall, self._push, self._touch, self._stiffness):
-            part.reset()
-        self._stamp = -1
-        self.state = self._collect(-1)
+        self._step.reset()
+        self._stamp = self._wrench_ns = self._plane_ns = self.plane_ns = -1
+        self._doubt = False
+        config = self._config
+        self.state = ContactState(
+            normal=(1.0, 0.0, 0.0),
+            known=False,
+            distance=math.inf,
+            rate=0.0,
+            acceleration=0.0,
+            rate_noise=0.0,
+            acceleration_noise=0.0,
+            bias=0.0,
+            speed=0.0,
+            depth=math.inf,
+            push=0.0,
+            push_noise=math.sqrt(FIRST_PUSH_VARIANCE),
+            across_noise=0.0,
+            in_contact=False,
+            time_since_touch=0.0,
+            ramp=0.0 if config.touch_ramp else 1.0,
+            contact_weight=0.0,
+            stiffness=config.contact.estimation.assumed_stiffness_n_m,
+            stiffness_known=False,
+        )
 
     @property
     def touch_threshold(self) -> float:
         """Filtered push that counts as touch [N]."""
-        return self._touch.threshold(self._push.push_noise)
+        return float(touch_threshold(self._config, self.state.push_noise))
 
     def doubt(self) -> None:
         """Ticks are missing for an unknown time."""
-        self._wall.doubt()
-
-    @property
-    def plane_ns(self) -> int:
-        """Capture time of the last accepted plane, -1 before the first."""
-        return self._wall.accepted_ns
+        self._doubt = True
 
     def update(
         self,
@@ -83,55 +177,37 @@ class ContactEstimator:
             plane: (A, B, C, D) of the wall in C, or None.
             plane_stamp_ns: Time at which it was measured.
         """
-        wall, push, touch = self._wall, self._push, self._touch
-        dt = self._tick_s if self._stamp < 0 else min(max((stamp_ns - self._stamp) * 1e-9, 0.0), LONGEST_TICK)
+        elapsed = self._config.tick_s if self._stamp < 0 else max((stamp_ns - self._stamp) * 1e-9, 0.0)
         self._stamp = stamp_ns
-        wall.predict(stamp_ns, dt, angular_velocity, specific_force, down)
-        if plane is not None:
-            stationary = touch.time_since_touch(plane_stamp_ns) > self._settings.estimation.stationary_after_s
-            wall.correct(plane, plane_stamp_ns, stationary)
-        free = not touch.in_contact and wall.distance > FREE_DISTANCES * self._settings.contact_distance_m
-        interval = push.add(contact_wrench, wrench_stamp_ns, wall.normal, free)
-        if interval is not None:
-            touch.add_sample(push.push, push.push_noise)
-            if touch.pressed and wall.known and stamp_ns - wall.accepted_ns > BLIND_NS:
-                wall.touch()
-            if touch.in_contact:
-                self._stiffness.add(push.push, -wall.distance, interval)
-        if touch.update(stamp_ns, push.push, wall.distance):
-            self._stiffness.start()
-        self.state = self._collect(stamp_ns)
-        return self.state
-
-    def _collect(self, stamp_ns: int) -> ContactState:
-        wall, push, touch = self._wall, self._push, self._touch
-        depth, ramp = wall.depth, touch.ramp(stamp_ns)
-        return ContactState(
-            normal=wall.normal,
-            known=wall.known,
-            distance=wall.distance,
-            rate=wall.rate,
-            acceleration=wall.acceleration,
-            rate_noise=wall.rate_noise,
-            acceleration_noise=math.sqrt(wall.vibration.variance),
-            bias=wall.bias,
-            speed=wall.speed,
-            depth=depth,
-            push=push.push,
-            push_noise=push.push_noise,
-            across_noise=push.moment_noise / self._tip_ahead,
-            in_contact=touch.in_contact,
-            time_since_touch=touch.time_since_touch(stamp_ns),
-            ramp=ramp,
-            contact_weight=ramp * depth_weight(self._settings, depth),
-            stiffness=self._stiffness.value,
-            stiffness_known=self._stiffness.known,
+        new_plane = plane is not None and plane_stamp_ns > self._plane_ns
+        if plane is not None and new_plane:
+            self._plane_ns, self._plane[:] = plane_stamp_ns, plane
+        interval = 0.0
+        if wrench_stamp_ns > self._wrench_ns:
+            interval, self._wrench_ns = sample_interval(wrench_stamp_ns, self._wrench_ns), wrench_stamp_ns
+        self._step.advance()
+        self._step.values[:] = (
+            min(elapsed, LONGEST_TICK),
+            elapsed,
+            *angular_velocity,
+            *((0.0, 0.0, 0.0) if specific_force is None else specific_force),
+            specific_force is not None,
+            *down,
+            self._doubt,
+            new_plane,
+            (stamp_ns - self._plane_ns) * 1e-9 if new_plane else 0.0,
+            *self._plane,
+            *contact_wrench.tolist(),
+            interval,
         )
-
-
-def depth_weight(settings: ContactSettings, depth: float) -> float:
-    r"""Lambda without its ramp: :math:`\tfrac12(1+\cos(\pi (d-d_{min})/(d_{max}-d_{min})))`, 1 below and 0 above."""
-    ratio = (depth - settings.depth_min_m) / (settings.depth_max_m - settings.depth_min_m)
-    if ratio >= 1.0:
-        return 0.0
-    return 1.0 if ratio <= 0.0 else 0.5 * (1.0 + math.cos(math.pi * ratio))
+        self._doubt = False
+        self._step.evaluate()
+        normal, *values = self._step.results[:3].tolist(), *self._step.results[3:].tolist()
+        state = dict(zip(SCALARS, values, strict=False))
+        state |= {name: bool(state[name]) for name in FLAGS}
+        if not state["known"]:
+            state |= dict.fromkeys(UNKNOWN, math.inf)
+        if values[-1]:
+            self.plane_ns = plane_stamp_ns
+        self.state = ContactState(tuple(normal), **state)
+        return self.state

@@ -3,43 +3,53 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
-#: Turns are compared over this time [ns], and judged once the gyro's have this root sum of squares [rad]: five times
+import casadi as ca
+
+from ibvs_qp.symbolic.logic import both, either, no, where
+from ibvs_qp.symbolic.signals import Signals
+
+#: Turns are compared over this time [s], and judged once the gyro's have this root sum of squares [rad]: five times
 #: the noise of a turn by two normals of 0.6 deg each over the threshold's distance from a right sign.
-TURN_NS, LEAST_TURN = 250_000_000, math.radians(3.0)
+TURN_S, LEAST_TURN = 0.25, math.radians(3.0)
 #: Correlation of both over the gyro's square, below which they oppose each other: 1 right, -1 mirrored.
 OPPOSED = -0.5
 
 
-class NormalTurns:
-    """Finds a normal that turns against the vehicle's yaw; following it would turn the vehicle to the wall's side.
+def wrapped(angle: ca.SX) -> ca.SX:
+    """The same angle within -pi and pi [rad]."""
+    return angle - 2.0 * math.pi * ca.floor((angle + math.pi) / (2.0 * math.pi))
 
-    Attributes:
-        mirrored: Whether it was found.
+
+def mirrored_normal(signals: Signals, new: ca.SX, since_last: ca.SX, normal: ca.SX, yaw: ca.SX) -> ca.SX:
+    """Whether the normal turns against the vehicle's yaw; following it would turn the vehicle to the wall's side.
+
+    Args:
+        signals: Registry.
+        new: Whether a normal was measured in this tick.
+        since_last: Time from the capture of the last measured normal to this one's [s].
+        normal: The normal in B, (3,).
+        yaw: Integrated yaw at its capture [rad].
     """
-
-    def __init__(self) -> None:
-        self.reset()
-
-    def reset(self) -> None:
-        """As before the first plane."""
-        self.mirrored = False
-        self._start: tuple[int, float, float] | None = None
-        self._square = self._product = 0.0
-
-    def add(self, stamp_ns: int, normal: Sequence[float], turn: float) -> None:
-        """Add a measured normal in B, (3,), of a capture time [ns], and the integrated yaw of that time [rad]."""
-        seen = -math.atan2(normal[1], normal[0])  # the wall turns the other way in B
-        if self._start is None:
-            self._start = stamp_ns, seen, turn
-        then, first, begun = self._start
-        if stamp_ns - then < TURN_NS:
-            return
-        self._start = stamp_ns, seen, turn
-        felt = turn - begun
-        self._square += felt * felt
-        self._product += felt * math.remainder(seen - first, math.tau)
-        if self._square >= LEAST_TURN**2:
-            self.mirrored = self.mirrored or self._product < OPPOSED * self._square
-            self._square = self._product = 0.0
+    names = ("started", "time", "seen", "yaw", "square", "product", "found")
+    started, time, first, begun, square, product, found = (signals.state(f"turns.{name}") for name in names)
+    seen = -ca.atan2(normal[1], normal[0])  # the wall turns the other way in B
+    time = where(started, time + since_last, 0.0)
+    due = both(new, started, time >= TURN_S)
+    felt, turned = wrapped(yaw - begun), wrapped(seen - first)
+    square, product = square + where(due, felt * felt, 0.0), product + where(due, felt * turned, 0.0)
+    judged = both(due, square >= LEAST_TURN**2)
+    found = either(found, both(judged, product < OPPOSED * square))
+    begins = both(new, either(no(started), due))
+    kept = {
+        "started": either(started, new),
+        "time": where(begins, 0.0, where(new, time, signals.state("turns.time"))),
+        "seen": where(begins, seen, first),
+        "yaw": where(begins, yaw, begun),
+        "square": where(judged, 0.0, square),
+        "product": where(judged, 0.0, product),
+        "found": found,
+    }
+    for name, value in kept.items():
+        signals.remember(f"turns.{name}", value)
+    return found

@@ -3,69 +3,60 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
-import numpy as np
+import casadi as ca
 
 from ibvs_qp.config import ContactSettings
-from ibvs_qp.estimation.stamps import sample_interval
-from ibvs_qp.frames import dot
+from ibvs_qp.symbolic.logic import where
+from ibvs_qp.symbolic.signals import Signals
 
 #: Variance of the filtered push before free flight shows it [N^2].
 FIRST_PUSH_VARIANCE = 0.02
 
 
 class PushFilter:
-    """Filtered push and contact moment.
+    """Filtered push and contact moment of one tick.
 
     Attributes:
         push: Filtered push [N].
+        push_noise: Its standard deviation in free flight [N].
+        moment_noise: Standard deviation of a filtered moment in free flight [N m].
 
     Args:
+        signals: Registry.
         settings: Filter and averaging time.
+        wrench: Contact wrench ON the vehicle [N, N m], (6,).
+        interval: Time since the last force sample [s]; 0 when there is no new one.
+        normal: Unit vector into the wall, in B, (3,).
+        free: Whether the vehicle flies away from the wall: a sample is noise.
     """
 
-    def __init__(self, settings: ContactSettings) -> None:
-        self._settings = settings
-        self.reset()
-
-    def reset(self) -> None:
-        """Return to the state before the first sample."""
-        self._stamp = -1
-        self.push = 0.0
-        self._push_mean, self._push_variance = 0.0, FIRST_PUSH_VARIANCE
-        self._moment, self._moment_variance = [0.0, 0.0, 0.0], 0.0
-
-    @property
-    def push_noise(self) -> float:
-        """Standard deviation of the filtered push in free flight [N]."""
-        return math.sqrt(self._push_variance)
-
-    @property
-    def moment_noise(self) -> float:
-        """Standard deviation of a filtered moment in free flight [N m]."""
-        return math.sqrt(self._moment_variance)
-
-    def add(self, wrench: np.ndarray, stamp_ns: int, normal: Sequence[float], free: bool) -> float | None:
-        """Filter the contact wrench ON the vehicle [N, N m], (6,), of one force sample.
-
-        A sample in ``free`` flight, away from the wall, is noise. Returns the time since the last sample [s]; None if
-        this sample is not a new one.
-        """
-        if stamp_ns <= self._stamp:
-            return None
-        dt = sample_interval(stamp_ns, self._stamp)
-        self._stamp = stamp_ns
-        sample = wrench.tolist()
-        gain = 1.0 - math.exp(-2.0 * math.pi * self._settings.force_filter_hz * dt)
-        self.push += gain * (-dot(sample, normal) - self.push)
-        self._moment = [old + gain * (new - old) for old, new in zip(self._moment, sample[3:], strict=True)]
-        if free:
-            self._learn_noise(min(1.0, dt / self._settings.estimation.noise_time_s))
-        return dt
-
-    def _learn_noise(self, gain: float) -> None:
-        self._push_mean += gain * (self.push - self._push_mean)
-        self._push_variance += gain * ((self.push - self._push_mean) ** 2 - self._push_variance)
+    def __init__(
+        self,
+        signals: Signals,
+        settings: ContactSettings,
+        wrench: ca.SX,
+        interval: ca.SX,
+        normal: ca.SX,
+        free: ca.SX,
+    ) -> None:
+        push, mean, moment_variance = (signals.state(f"push.{name}") for name in ("value", "mean", "moment_variance"))
+        variance = signals.state("push.variance", start=FIRST_PUSH_VARIANCE)
+        moment = signals.state("push.moment", 3)
+        gain = 1.0 - ca.exp(-2.0 * math.pi * settings.force_filter_hz * interval)
+        push = push + gain * (-ca.dot(wrench[:3], normal) - push)
+        moment = moment + gain * (wrench[3:] - moment)
+        learn = where(free, ca.fmin(1.0, interval / settings.estimation.noise_time_s), 0.0)
+        mean = mean + learn * (push - mean)
+        variance = variance + learn * ((push - mean) ** 2 - variance)
         # Half the squared length: two of the three moments come from forces across the tip.
-        self._moment_variance += gain * (0.5 * dot(self._moment, self._moment) - self._moment_variance)
+        moment_variance = moment_variance + learn * (0.5 * ca.sumsqr(moment) - moment_variance)
+        for name, value in {
+            "value": push,
+            "mean": mean,
+            "variance": variance,
+            "moment": moment,
+            "moment_variance": moment_variance,
+        }.items():
+            signals.remember(f"push.{name}", value)
+        self.push, self.push_noise, self.moment_noise = push, ca.sqrt(variance), ca.sqrt(moment_variance)

@@ -3,56 +3,65 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
+
+import casadi as ca
 
 from ibvs_qp.config import ContactSettings
+from ibvs_qp.symbolic.logic import both, either, where
+from ibvs_qp.symbolic.signals import Signals
 
 #: Samples needed before a slope is computed.
 LEAST_SAMPLES = 30
+#: Smallest divisor: of the counts [-] and of the covariance [N m].
+_LEAST = 1e-30
 
 
-class StiffnessEstimator:
+class Stiffness(NamedTuple):
+    """Stiffness [N/m], the assumed one until it is known, and whether it was measured."""
+
+    value: ca.SX
+    known: ca.SX
+
+
+def stiffness(
+    signals: Signals,
+    settings: ContactSettings,
+    push: ca.SX,
+    penetration: ca.SX,
+    interval: ca.SX,
+    touched: ca.SX,
+) -> Stiffness:
     """Slope of push against penetration over a press, by least squares with the running means removed.
 
-    Attributes:
-        value: Stiffness [N/m]; the assumed one until it is known.
-        known: Whether it was measured.
+    At a touch it starts anew; the last estimate remains until a better one exists.
 
     Args:
+        signals: Registry.
         settings: Force filter and `estimation` settings.
+        push: Filtered push [N].
+        penetration: Of the tip [m].
+        interval: Time since the last force sample in contact [s]; 0 when there is no new one.
+        touched: Whether a contact begins in this tick, after the sample.
     """
-
-    def __init__(self, settings: ContactSettings) -> None:
-        self._settings = settings
-        self.reset()
-
-    def reset(self) -> None:
-        """Forget the estimate."""
-        self.value, self.known = self._settings.estimation.assumed_stiffness_n_m, False
-        self.start()
-
-    def start(self) -> None:
-        """Start anew at a touch; the last estimate remains until a better one exists."""
-        self._time, self._count, self._depth = 0.0, 0, math.nan
-        self._x = self._y = self._xy = self._yy = 0.0  # sums of penetration, push and their products
-
-    def add(self, push: float, penetration: float, dt: float) -> None:
-        """Add one filtered push [N] and the penetration [m], ``dt`` [s] after the last."""
-        settings = self._settings.estimation
-        self._time += dt
-        if self._time > settings.stiffness_time_s:
-            return
-        # The same filter as the push, so that both lag alike.
-        gain = 1.0 - math.exp(-2.0 * math.pi * self._settings.force_filter_hz * dt)
-        self._depth = x = penetration if math.isnan(self._depth) else self._depth + gain * (penetration - self._depth)
-        self._count += 1
-        self._x, self._y = self._x + x, self._y + push
-        self._xy, self._yy = self._xy + x * push, self._yy + push * push
-        mean_x, mean_y = self._x / self._count, self._y / self._count
-        variance = self._yy / self._count - mean_y * mean_y
-        covariance = self._xy / self._count - mean_x * mean_y
-        # Regress penetration on push: the push is the cleaner signal, so the slope is not biased low.
-        pressed = variance > settings.stiffness_push_spread_n**2 and self._count > LEAST_SAMPLES
-        if pressed and covariance > 0.0:
-            slope = variance / covariance
-            self.value = min(max(slope, settings.stiffness_min_n_m), settings.stiffness_max_n_m)
-            self.known = True
+    own = settings.estimation
+    value = signals.state("stiffness.value", start=own.assumed_stiffness_n_m)
+    known, time, count, depth = (signals.state(f"stiffness.{name}") for name in ("known", "time", "count", "depth"))
+    sums = signals.state("stiffness.sums", 4)
+    time = time + interval
+    counted = both(interval > 0.0, time <= own.stiffness_time_s)
+    # The same filter as the push, so that both lag alike.
+    gain = where(count > 0.0, 1.0 - ca.exp(-2.0 * math.pi * settings.force_filter_hz * interval), 1.0)
+    depth = where(counted, depth + gain * (penetration - depth), depth)
+    count = count + where(counted, 1.0, 0.0)
+    sample = ca.vertcat(depth, push, depth * push, push * push)
+    sums = sums + where(counted, sample, ca.SX.zeros(4))
+    x, y, xy, yy = ca.vertsplit(sums / ca.fmax(count, 1.0))
+    variance, covariance = yy - y * y, xy - x * y
+    # Regress penetration on push: the push is the cleaner signal, so the slope is not biased low.
+    pressed = both(counted, variance > own.stiffness_push_spread_n**2, count > LEAST_SAMPLES, covariance > 0.0)
+    slope = ca.fmin(ca.fmax(variance / ca.fmax(covariance, _LEAST), own.stiffness_min_n_m), own.stiffness_max_n_m)
+    value, known = where(pressed, slope, value), either(known, pressed)
+    for name, kept in {"time": time, "count": count, "depth": depth, "sums": sums}.items():
+        signals.remember(f"stiffness.{name}", where(touched, 0.0 * kept, kept))
+    return Stiffness(signals.remember("stiffness.value", value), signals.remember("stiffness.known", known))

@@ -2,7 +2,20 @@
 
 from __future__ import annotations
 
+import casadi as ca
+
 from ibvs_qp.config import ControllerConfig
+from ibvs_qp.symbolic.logic import both, either, no, where
+from ibvs_qp.symbolic.signals import Signals
+
+#: Time since an event that has not happened [s].
+NEVER_S = 1e6
+
+
+def touch_threshold(config: ControllerConfig, push_noise: ca.SX | float) -> ca.SX | float:
+    """Filtered push that counts as touch [N], given its standard deviation in free flight [N]."""
+    least, noise = config.contact.touch_force_n, config.contact.touch_sigmas * push_noise
+    return max(least, noise) if isinstance(noise, float) else ca.fmax(least, noise)
 
 
 class TouchDetector:
@@ -14,76 +27,67 @@ class TouchDetector:
       `contact_distance_m`.
 
     Attributes:
-        in_contact: The state.
+        in_contact: The state; before `update` that of the last tick.
+        time: Time in contact [s], 0 while free.
+        pressed: After `add_sample`, whether enough force samples in a row exceeded the threshold.
 
     Args:
+        signals: Registry.
         config: Its `contact` settings and the switch `touch_ramp`.
+        elapsed: Time since the last tick [s].
     """
 
-    def __init__(self, config: ControllerConfig) -> None:
-        self._settings, self._ramps = config.contact, config.touch_ramp
-        self.reset()
+    def __init__(self, signals: Signals, config: ControllerConfig, elapsed: ca.SX) -> None:
+        self._signals, self._config, self._settings = signals, config, config.contact
+        state = signals.state
+        self.in_contact, self._samples = state("touch.in_contact"), state("touch.samples")
+        self.time = self.in_contact * (state("touch.time") + elapsed)
+        self._since_loss = state("touch.since_loss", start=NEVER_S) + elapsed
+        self._weak_for = state("touch.weak_for") + elapsed
+        self._weak = state("touch.weak")
+        self._ramp_start = state("touch.ramp_start")  # where the ramp of this contact starts, or the last one stopped
 
-    def reset(self) -> None:
-        """Return to the state before the first sample."""
-        self.in_contact = False
-        self._samples = 0  # in a row above the threshold
-        self._touch_ns = self._loss_ns = -1
-        self._weak_ns = -1  # since when the push is below the loss force
-        self._ramp_start_s = 0.0  # where the ramp of this contact starts; while free, where the last one stopped
+    def add_sample(self, new: ca.SX, push: ca.SX, push_noise: ca.SX) -> None:
+        """Count a filtered force sample [N] towards a touch, if it is new."""
+        above = push > touch_threshold(self._config, push_noise)
+        self._samples = where(new, where(above, self._samples + 1.0, 0.0), self._samples)
+        self.pressed = self._samples >= self._settings.touch_samples
 
-    def threshold(self, push_noise: float) -> float:
-        """Filtered push that counts as touch [N], given its standard deviation in free flight [N]."""
-        return max(self._settings.touch_force_n, self._settings.touch_sigmas * push_noise)
+    def update(self, push: ca.SX, distance: ca.SX) -> ca.SX:
+        """Decide on touch and loss by filtered push [N] and distance of the tip [m]; whether a contact begins."""
+        settings, estimation = self._settings, self._settings.estimation
+        touches = both(no(self.in_contact), self.pressed, distance < settings.contact_distance_m)
+        bounced = self._since_loss < estimation.bounce_time_s
+        latest = where(bounced, estimation.bounce_ramp * settings.ramp_s, 0.0)
 
-    def add_sample(self, push: float, push_noise: float) -> None:
-        """Count one filtered force sample [N] towards a touch."""
-        self._samples = self._samples + 1 if push > self.threshold(push_noise) else 0
+        weak = both(self.in_contact, push < settings.loss_force_n)
+        weak_for = where(self._weak, self._weak_for, 0.0)
+        lost = both(
+            self.in_contact,
+            either(both(weak, weak_for >= settings.loss_time_s), distance > settings.contact_distance_m),
+        )
+        start = where(touches, ca.fmin(self._ramp_start, latest), self._ramp_start + where(lost, self.time, 0.0))
+        self.in_contact = where(lost, 0.0, either(self.in_contact, touches))
+        self.time = where(either(touches, lost), 0.0, self.time)
+        for name, value in {
+            "in_contact": self.in_contact,
+            "samples": where(lost, 0.0, self._samples),
+            "time": self.time,
+            "since_loss": where(lost, 0.0, ca.fmin(self._since_loss, NEVER_S)),
+            "weak": weak,
+            "weak_for": weak_for,
+            "ramp_start": start,
+        }.items():
+            self._signals.remember(f"touch.{name}", value)
+        self._ramp_start = start
+        return touches
 
     @property
-    def pressed(self) -> bool:
-        """Whether enough force samples in a row exceeded the threshold."""
-        return self._samples >= self._settings.touch_samples
-
-    def update(self, stamp_ns: int, push: float, distance: float) -> bool:
-        """Decide on touch and loss at one tick by filtered push [N] and distance of the tip [m]; True at a touch."""
-        if not self.in_contact:
-            settings = self._settings
-            touches = self.pressed and distance < settings.contact_distance_m
-            if touches:
-                self._touch(stamp_ns)
-            return touches
-        if self._lost(stamp_ns, push, distance):
-            self._ramp_start_s += self.time_since_touch(stamp_ns)
-            self._loss_ns, self.in_contact, self._samples = stamp_ns, False, 0
-        return False
-
-    def time_since_touch(self, stamp_ns: int) -> float:
-        """Time in contact [s], 0 while free."""
-        return (stamp_ns - self._touch_ns) * 1e-9 if self.in_contact else 0.0
-
-    def ramp(self, stamp_ns: int) -> float:
+    def ramp(self) -> ca.SX:
         """0 at touch to 1 after `ramp_s`, and 0 while free; always 1 without `touch_ramp`.
 
         After a loss of less than `bounce_time_s` it resumes where it stopped.
         """
-        if not self._ramps:
-            return 1.0
-        if not self.in_contact:
-            return 0.0
-        return min((self._ramp_start_s + self.time_since_touch(stamp_ns)) / self._settings.ramp_s, 1.0)
-
-    def _touch(self, stamp_ns: int) -> None:
-        estimation = self._settings.estimation
-        bounced = self._loss_ns >= 0 and (stamp_ns - self._loss_ns) * 1e-9 < estimation.bounce_time_s
-        latest = estimation.bounce_ramp * self._settings.ramp_s if bounced else 0.0
-        self._ramp_start_s = min(self._ramp_start_s, latest)
-        self.in_contact, self._touch_ns, self._weak_ns = True, stamp_ns, -1
-
-    def _lost(self, stamp_ns: int, push: float, distance: float) -> bool:
-        if push >= self._settings.loss_force_n:
-            self._weak_ns = -1
-        elif self._weak_ns < 0:
-            self._weak_ns = stamp_ns
-        weak = self._weak_ns >= 0 and (stamp_ns - self._weak_ns) * 1e-9 >= self._settings.loss_time_s
-        return weak or distance > self._settings.contact_distance_m
+        if not self._config.touch_ramp:
+            return ca.SX(1.0)
+        return self.in_contact * ca.fmin((self._ramp_start + self.time) / self._settings.ramp_s, 1.0)

@@ -7,232 +7,272 @@ accelerometer and depth only corrects it (design section 4.2).
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from typing import NamedTuple
 
+import casadi as ca
 import numpy as np
 
 from ibvs_qp.config import ControllerConfig
-from ibvs_qp.estimation.kalman import DelayedKalman
-from ibvs_qp.estimation.normal_turns import NormalTurns
-from ibvs_qp.estimation.stamps import HISTORY
-from ibvs_qp.estimation.vibration import VibrationNoise
-from ibvs_qp.frames import GRAVITY, add_scaled, cross, dot, plane_in_body, unit
+from ibvs_qp.estimation.late_kalman import LateKalman
+from ibvs_qp.estimation.motion_history import MotionHistory
+from ibvs_qp.estimation.normal_turns import mirrored_normal, wrapped
+from ibvs_qp.estimation.vibration import noise_density, vibration_variance
+from ibvs_qp.frames import GRAVITY, R_BODY_CAMERA
+from ibvs_qp.symbolic.logic import both, either, no, where
+from ibvs_qp.symbolic.signals import Signals
 
 #: Order of the filter's state: distance [m], speed of the centre of mass into the wall [m/s], accelerometer bias.
 DISTANCE, SPEED, BIAS = 0, 1, 2
-#: d/dt (distance, speed, bias) = CHAIN (distance, speed, bias) + measured acceleration.
-CHAIN = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [0.0, 0.0, 0.0]])
 #: Spectral density of the distance itself [m^2/s]: nearly none.
 DISTANCE_NOISE = 1e-10
 #: Standard deviations at the start: distance [m], speed [m/s], bias [m/s^2]; and of the first measured distance [m].
-INITIAL_STD, FIRST_DISTANCE_STD = np.array([0.05, 0.05, 0.1]), 0.01
-#: Without ticks for this long [ns], normal and speed are only as good as the next plane; standard deviation of a speed
+INITIAL_STD, FIRST_DISTANCE_STD = (0.05, 0.05, 0.1), 0.01
+#: Without ticks for this long [s], normal and speed are only as good as the next plane; standard deviation of a speed
 #: then [m/s].
-GAP_NS, GAP_SPEED_STD = 100_000_000, 0.5
+GAP_S, GAP_SPEED_STD = 0.1, 0.5
 #: Refused normals in a row that are taken after all: a third of a second; how often, until so many have agreed.
 ODD_PLANES, MOST_REOPENED, AGREED_PLANES = 10, 2, 150
 #: Standard deviation of the distance at a touch without planes [m].
 TOUCH_STD = 0.003
 #: Standard deviation of a speed from two planes a few frames apart [m/s], and least time between them [s].
 JUMP_SPEED_STD, SHORTEST_JUMPS = 0.05, 0.05
+#: Age of a plane that never came [s], and distance of a wall that was never seen [m].
+NEVER_S, FAR_AWAY = 1e6, 1e3
+
+
+class Tick(NamedTuple):
+    """Inertial data of one tick, in B."""
+
+    dt: ca.SX  # bounded time since the last tick [s]
+    elapsed: ca.SX  # time since the last tick [s]
+    rate: ca.SX  # gyro [rad/s], (3,)
+    force: ca.SX  # accelerometer [m/s^2], (3,)
+    force_known: ca.SX  # whether there is one
+    down: ca.SX  # unit gravity, (3,)
+    doubt: ca.SX  # whether ticks are missing for an unknown time
+
+    @property
+    def acceleration(self) -> ca.SX:
+        """Acceleration without gravity [m/s^2], (3,); zero without accelerometer."""
+        return where(self.force_known, self.force + GRAVITY * self.down, ca.SX.zeros(3))
+
+
+class Plane(NamedTuple):
+    """A measured plane."""
+
+    new: ca.SX  # whether it is later than the last one
+    age: ca.SX  # time since its capture [s]
+    values: ca.SX  # (A, B, C, D) in C, (4,)
 
 
 class WallDistance:
-    """Filter of the wall normal and of distance, speed and accelerometer bias along it.
+    """Filter of the wall normal and of distance, speed and accelerometer bias along it: one tick.
+
+    The state at a plane's capture is the present one, carried back along the motion since (`MotionHistory`).
 
     Attributes:
         normal: Unit vector into the wall, in B, (3,).
         known: Whether a plane was measured since the start.
+        accepted: Whether this tick's plane was accepted.
+        since_plane: Time since the capture of the last accepted plane [s].
         rate_noise: Standard deviation of the rate [m/s].
-        accepted_ns: Capture time of the last accepted plane, -1 before the first.
-        vibration: Noise of the acceleration along the normal.
+        variance: Of one sample of the acceleration along the normal [m^2/s^4].
     """
 
-    def __init__(self, config: ControllerConfig) -> None:
+    def __init__(self, signals: Signals, config: ControllerConfig, tick: Tick, history: MotionHistory) -> None:
+        self._signals, self._tick, self._history = signals, tick, history
         self._settings = settings = config.contact.estimation
-        self._tip = config.vehicle.tip_position_m
-        self._tip_from_camera = np.subtract(self._tip, config.vehicle.camera_position_m).tolist()
-        noise = np.array([DISTANCE_NOISE, 0.0, 0.0])  # the others follow the vibration
-        self.vibration = VibrationNoise(settings.vibration_time_s)
-        gain = 1.0 - math.exp(-config.tick_s / settings.acceleration_filter_s)
-        self._ratio = gain / (2.0 - gain)  # variance of filtered white noise per variance of a sample
-        self._turns = NormalTurns()
-        self._filter = DelayedKalman(CHAIN, noise, INITIAL_STD, config.tick_s, settings.gate_sigmas)
-        self.reset()
+        self._tip = ca.DM(config.vehicle.tip_position_m)
+        self._tip_from_camera = ca.DM(np.subtract(config.vehicle.tip_position_m, config.vehicle.camera_position_m))
+        self.known = signals.state("wall.known")
+        self.since_plane = signals.state("wall.since_plane", start=NEVER_S) + tick.elapsed
+        self._gap = either(signals.state("wall.gap"), tick.elapsed > GAP_S, tick.doubt)
+        self._kalman = LateKalman(signals, INITIAL_STD, tick.elapsed)
+        self.accepted = ca.SX(0.0)
+        self._predict(config.tick_s, settings.acceleration_filter_s)
 
-    def reset(self) -> None:
-        """Return to the state before the first plane."""
-        self._filter.reset()
-        self._state = self._filter.state.tolist()
-        self.normal, self.known = (1.0, 0.0, 0.0), False
-        self._normals = np.zeros((HISTORY, 3))  # of the last ticks, by the slots of the filter's ticks
-        self._yaw, self._yaws = 0.0, np.zeros(HISTORY)  # integrated gyro about the vertical [rad], likewise
-        self._turns.reset()
-        self._refused, self._nearer, self._first_refused, self._plane_ns = 0, False, (0, 0.0), -1
-        self.accepted_ns = self._tick_ns = -1
-        self._gap = False
-        self._odd = self._agreed = self._reopened = 0
-        self.vibration.reset()
-        self._filtered = self._lever_speed = self.rate_noise = 0.0
-
-    @property
-    def distance(self) -> float:
-        """Tip to wall [m], infinite while unknown."""
-        return self._state[DISTANCE] if self.known else math.inf
-
-    @property
-    def rate(self) -> float:
-        """Rate of the distance [m/s]: of the centre of mass, and of the tip that rotates with the body."""
-        return -self._state[SPEED] - self._lever_speed if self.known else 0.0
-
-    @property
-    def acceleration(self) -> float:
-        """Filtered second derivative of the distance [m/s^2], weighted by its ratio of signal to noise."""
-        return self._filtered / (
-            1.0 + self._ratio * self.vibration.variance / self._settings.acceleration_quiet_m_s2**2
+    def _predict(self, tick_s: float, filter_s: float) -> None:
+        """Rotate the normal with the gyro and integrate the accelerometer along it; without one, speed is constant."""
+        signals, tick, settings = self._signals, self._tick, self._settings
+        normal = signals.state("wall.normal", 3, (1.0, 0.0, 0.0))
+        normal = normal + tick.dt * ca.cross(normal, tick.rate)
+        self.normal = normal / ca.norm_2(normal)
+        self._lever_speed = ca.dot(self.normal, ca.cross(tick.rate, self._tip))
+        measured = ca.dot(self.normal, tick.acceleration)
+        distance, speed, bias = ca.vertsplit(signals.state("wall.state", 3))
+        filtered, gain = signals.state("wall.filtered"), 1.0 - ca.exp(-tick.dt / filter_s)
+        self._filtered = signals.remember("wall.filtered", filtered + gain * (bias - measured - filtered))
+        self.variance = vibration_variance(signals, measured, tick.dt, settings.vibration_time_s)
+        ratio = 1.0 - math.exp(-tick_s / filter_s)
+        self._ratio = ratio / (2.0 - ratio)  # variance of filtered white noise per variance of a sample
+        density = noise_density(self.variance, settings.acceleration_noise, tick.dt)
+        # The bias is learnt as fast in any vibration.
+        self._kalman.noise = (DISTANCE_NOISE, density, density / settings.bias_time_s**2)
+        self._state = ca.vertcat(
+            distance - tick.dt * (speed + self._lever_speed), speed + tick.dt * (measured - bias), bias
         )
+        self.rate_noise = ca.sqrt(self._kalman.variance(SPEED))
+        yaw = signals.state("wall.yaw") + tick.dt * ca.dot(tick.down, tick.rate)
+        self._yaw = signals.remember("wall.yaw", wrapped(yaw))
 
-    @property
-    def bias(self) -> float:
-        """Measured minus true acceleration along the normal [m/s^2]; 0 while no wall is known."""
-        return self._state[BIAS] if self.known else 0.0
+    def correct(self, plane: Plane, tip_stationary: ca.SX) -> None:
+        """Correct with a plane at the time of its capture; those of a camera with mirrored axes are refused for good."""
+        signals, kalman = self._signals, self._kalman
+        seen, distance = self._seen(plane.values)
+        past, past_normal, past_yaw = self._at(plane.age)
+        last_age = signals.state("wall.last_age") + self._tick.elapsed
+        signals.remember("wall.last_age", where(plane.new, plane.age, last_age))
+        mirrored = mirrored_normal(signals, plane.new, last_age - plane.age, seen, past_yaw)
+        new = both(plane.new, no(mirrored))
+        first = both(new, either(no(self.known), self._gap))
+        trusted, past_normal = self._trusts(both(new, no(first)), seen, past_normal)
+        covered = self._history.covers(plane.age)
+        kalman.go_to(both(trusted, covered), plane.age)
+        corrected = self._correct_distance(both(trusted, covered), plane.age, distance, past, tip_stationary)
+        kalman.set_entry(first, DISTANCE, FIRST_DISTANCE_STD)
+        kalman.set_entry(both(first, self._gap), SPEED, GAP_SPEED_STD)
+        self._set(first, DISTANCE, distance)
+        self.accepted = either(first, corrected)
+        moved = self.normal + self._settings.normal_gain * (seen - past_normal)
+        self.normal = where(first, seen, where(corrected, moved / ca.norm_2(moved), self.normal))
+        self.known, self._gap = either(self.known, first), both(self._gap, no(first))
+        self.since_plane = where(self.accepted, plane.age, self.since_plane)
 
-    @property
-    def speed(self) -> float:
-        """Speed of the centre of mass into the wall [m/s]."""
-        return -self.rate - self._lever_speed
+    def _seen(self, plane: ca.SX) -> tuple[ca.SX, ca.SX]:
+        """Normal in B and distance of the tip by a plane in C; see `ibvs_qp.frames.plane_in_body`."""
+        scaled = ca.DM(R_BODY_CAMERA) @ (-plane[:3] / plane[3])
+        length = ca.norm_2(scaled)
+        return scaled / length, (1.0 - ca.dot(scaled, self._tip_from_camera)) / length
 
-    @property
-    def depth(self) -> float:
-        """Camera to wall along the normal [m], infinite while unknown."""
-        return self.distance + dot(self.normal, self._tip_from_camera)
+    def _at(self, age: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+        """State, normal and yaw at a past time: the present ones, carried back."""
+        normal, angle = self.normal, ca.SX.zeros(3)
+        distance, speed, bias = ca.vertsplit(self._state)
+        for part in self._history.since(age):
+            before = speed - ca.dot(normal, part.change) + bias * part.duration
+            turned = ca.dot(normal, ca.cross(part.angle, self._tip))
+            distance, speed = distance + 0.5 * part.duration * (before + speed) + turned, before
+            angle = angle + part.angle
+        turn = ca.cross(normal, angle)
+        past = normal - turn + 0.5 * ca.cross(turn, angle)
+        return ca.vertcat(distance, speed, bias), past / ca.norm_2(past), self._yaw - ca.dot(self._tick.down, angle)
 
-    def predict(
-        self,
-        stamp_ns: int,
-        dt: float,
-        angular_velocity: Sequence[float],
-        specific_force: Sequence[float] | None,
-        down: Sequence[float],
-    ) -> None:
-        """Rotate the normal with the gyro [rad/s] and integrate the accelerometer [m/s^2] along it over dt [s].
-
-        All vectors are in B, (3,); ``down`` is the unit vector of gravity. Without a specific
-        force the speed is constant.
-        """
-        if 0 <= self._tick_ns < stamp_ns - GAP_NS:
-            self.doubt()
-        self._tick_ns = stamp_ns
-        self.normal = normal = unit(add_scaled(self.normal, dt, cross(self.normal, angular_velocity)))
-        self._lever_speed = lever_speed = dot(normal, cross(angular_velocity, self._tip))
-        measured = 0.0
-        if specific_force is not None:
-            measured = dot(normal, add_scaled(specific_force, GRAVITY, down))
-        distance, speed, bias = self._state
-        gain = 1.0 - math.exp(-dt / self._settings.acceleration_filter_s)
-        self._filtered += gain * (bias - measured - self._filtered)
-        self.vibration.add(measured, dt)
-        density = self.vibration.density(self._settings.acceleration_noise, dt)
-        self._filter.noise[SPEED, SPEED] = density
-        self._filter.noise[BIAS, BIAS] = density / self._settings.bias_time_s**2  # as fast in any vibration
-        self._state = [distance - dt * (speed + lever_speed), speed + dt * (measured - bias), bias]
-        self._filter.remember(stamp_ns, self._state, dt)
-        self._yaw += dt * dot(down, angular_velocity)
-        slot = self._filter.ticks.slot(0)
-        self._normals[slot], self._yaws[slot] = normal, self._yaw
-        self.rate_noise = math.sqrt(self._filter.variance(SPEED, stamp_ns))
-
-    def correct(self, plane: Sequence[float], stamp_ns: int, tip_stationary: bool) -> None:
-        """Correct with a plane (A, B, C, D) measured in C, at the time of its capture, if newer than the last one.
-
-        Planes of a camera with mirrored axes are refused for good.
-        """
-        if stamp_ns <= self._plane_ns:
-            return
-        self._plane_ns = stamp_ns
-        normal, distance = plane_in_body(plane, self._tip_from_camera)
-        self._turns.add(stamp_ns, normal, float(self._yaws[self._filter.ticks.slots_since(stamp_ns)[0]]))
-        if self._turns.mirrored:
-            return
-        if not self.known or self._gap:
-            self.normal, self._normals[:] = normal, normal
-            self._filter.set_entry(DISTANCE, distance, FIRST_DISTANCE_STD)
-            if self._gap:
-                self._filter.set_entry(SPEED, self._state[SPEED], GAP_SPEED_STD)
-            self.known, self._gap, self.accepted_ns = True, False, stamp_ns
-        elif self._trusts(stamp_ns, normal) and self._correct_distance(stamp_ns, distance, tip_stationary):
-            self._correct_normal(stamp_ns, normal)
-            self.accepted_ns = stamp_ns
-        self._state = self._filter.state.tolist()
-
-    def doubt(self) -> None:
-        """Ticks are missing: take normal and distance from the next plane, and an unknown speed."""
-        self._gap = True
-
-    def touch(self) -> None:
-        """The tip rests at the wall, whatever the drifting distance says; the accelerometer's bias stays."""
-        self._filter.set_entry(DISTANCE, 0.0, TOUCH_STD)
-        self._filter.set_entry(SPEED, -self._lever_speed, self._settings.stationary_speed_std_m_s)
-        self._state = self._filter.state.tolist()
-
-    def _trusts(self, stamp_ns: int, normal: Sequence[float]) -> bool:
+    def _trusts(self, new: ca.SX, seen: ca.SX, past: ca.SX) -> tuple[ca.SX, ca.SX]:
         """Whether a measured normal agrees with the one predicted by the gyro, or has disagreed for long.
 
         A false gyro sample leaves the prediction wrong, so a normal is taken after all, but not again and again: a
         mirrored one would turn the vehicle away. One that never agrees is a wall that is lost (`ibvs_qp.safety`).
-        """
-        settings, past = self._settings, self._normals[self._filter.ticks.slots_since(stamp_ns)[0]].tolist()
-        if dot(past, normal) >= math.cos(math.radians(settings.normal_gate_deg)) * math.hypot(*past):
-            self._odd, self._agreed = 0, self._agreed + 1
-            if self._agreed >= AGREED_PLANES:
-                self._reopened = 0
-            return True
-        self._odd, self._agreed = self._odd + 1, 0
-        if self._odd < ODD_PLANES or self._reopened >= MOST_REOPENED:
-            return False
-        self._odd, self._reopened = 0, self._reopened + 1
-        self.normal, self._normals[:] = unit(normal), normal
-        return True
 
-    def _correct_distance(self, stamp_ns: int, distance: float, tip_stationary: bool) -> bool:
+        Returns:
+            The answer, and the normal expected at the capture: the measured one where that was taken after all.
+        """
+        odd, agreed, reopened = (self._signals.state(f"wall.{name}") for name in ("odd", "agreed", "reopened"))
+        agrees = both(new, ca.dot(past, seen) >= math.cos(math.radians(self._settings.normal_gate_deg)))
+        differs = both(new, no(agrees))
+        agreed = where(agrees, agreed + 1.0, where(differs, 0.0, agreed))
+        odd = where(agrees, 0.0, odd + differs)
+        reopened = where(both(agrees, agreed >= AGREED_PLANES), 0.0, reopened)
+        reopens = both(differs, odd >= ODD_PLANES, reopened < MOST_REOPENED)
+        self._signals.remember("wall.odd", where(reopens, 0.0, odd))
+        self._signals.remember("wall.agreed", ca.fmin(agreed, AGREED_PLANES))
+        self._signals.remember("wall.reopened", reopened + reopens)
+        self.normal = where(reopens, seen, self.normal)
+        return either(agrees, reopens), where(reopens, seen, past)
+
+    def _correct_distance(self, new: ca.SX, age: ca.SX, distance: ca.SX, past: ca.SX, tip_stationary: ca.SX) -> ca.SX:
         """Correct distance and speed; whether the plane is accepted.
 
         A plane beyond the gate counts little, and a jump not at all, until the next ones lie on the same side: then
         the filter is wrong, and starts again.
         """
-        settings, kalman = self._settings, self._filter
-        deviation = settings.stationary_distance_std_m if tip_stationary else settings.distance_std_m
-        if kalman.correct_entry(stamp_ns, DISTANCE, distance, deviation**2):
-            if tip_stationary:
-                kalman.correct_entry(stamp_ns, SPEED, -self._lever_speed, settings.stationary_speed_std_m_s**2)
-            self._refused = 0
-            return True
-        past = kalman.at(stamp_ns)
-        if past is None:
-            return False
-        nearer = bool(distance < past[DISTANCE])
-        self._refused = self._refused + 1 if nearer == self._nearer else 1
-        if self._refused == 1:
-            self._first_refused, self._nearer = (stamp_ns, distance), nearer
-        if self._refused >= settings.refused_frames:
-            self._refused = 0
-            self._restart(stamp_ns, distance)
-            return True
-        if abs(distance - past[DISTANCE]) >= settings.jump_m:
-            return False
-        return kalman.correct_entry(stamp_ns, DISTANCE, distance, settings.outlier_std_m**2, gate=math.inf)
+        settings, kalman, signals = self._settings, self._kalman, self._signals
+        deviation = where(tip_stationary, settings.stationary_distance_std_m, settings.distance_std_m)
+        within = both(new, kalman.within(DISTANCE, distance - past[DISTANCE], deviation**2, settings.gate_sigmas))
+        outlier, nearer = both(new, no(within)), distance < past[DISTANCE]
+        refused, side = signals.state("wall.refused"), signals.state("wall.nearer")
+        refused = where(both(refused > 0.0, nearer == side), refused + 1.0, 1.0)
+        first_age = signals.state("wall.first_age") + self._tick.elapsed
+        first_distance = signals.state("wall.first_distance")
+        starts = both(outlier, refused <= 1.0)
+        first_age, first_distance = where(starts, age, first_age), where(starts, distance, first_distance)
+        restart = both(outlier, refused >= settings.refused_frames)
+        counts_little = both(outlier, no(restart), ca.fabs(distance - past[DISTANCE]) < settings.jump_m)
+        accepted = either(within, restart, counts_little)
+        kept = where(either(within, restart), 0.0, where(outlier, refused, signals.state("wall.refused")))
+        for name, value in {
+            "refused": kept,
+            "nearer": where(outlier, nearer, side),
+            "first_age": ca.fmin(first_age, NEVER_S),
+            "first_distance": first_distance,
+        }.items():
+            signals.remember(f"wall.{name}", value)
 
-    def _restart(self, stamp_ns: int, distance: float) -> None:
-        """Take distance and speed from the refused planes: a filter that refuses them has a wrong speed as well."""
-        then, first = self._first_refused
-        kalman, elapsed = self._filter, max((stamp_ns - then) * 1e-9, SHORTEST_JUMPS)
-        kalman.restart()
-        kalman.set_entry(SPEED, (first - distance) / elapsed - self._lever_speed, JUMP_SPEED_STD)
-        kalman.set_entry(DISTANCE, distance, FIRST_DISTANCE_STD)
+        variance = where(within, deviation**2, settings.outlier_std_m**2)
+        innovation = ca.vertcat(distance, -self._lever_speed) - past[:2]
+        at_capture, now = kalman.correct(either(within, counts_little), DISTANCE, innovation[DISTANCE], variance, age)
+        # The tip stands: so does the body, but for its rotation.
+        slip, speed_variance = innovation[SPEED] - at_capture[SPEED], settings.stationary_speed_std_m_s**2
+        stands = both(within, tip_stationary, kalman.within(SPEED, slip, speed_variance, settings.gate_sigmas))
+        _, further = kalman.correct(stands, SPEED, slip, speed_variance, age)
+        self._state = self._state + now + further
+        # A filter that refuses for long has a wrong speed as well: both from the refused planes.
+        interval = ca.fmax(first_age - age, SHORTEST_JUMPS)
+        kalman.restart(restart, (FIRST_DISTANCE_STD, JUMP_SPEED_STD, INITIAL_STD[BIAS]))
+        self._set(restart, SPEED, (first_distance - distance) / interval - self._lever_speed)
+        self._set(restart, DISTANCE, distance)
+        return accepted
 
-    def _correct_normal(self, stamp_ns: int, normal: Sequence[float]) -> None:
-        """Move the normal of the capture, and equally every later one, towards the measured one."""
-        slots = self._filter.ticks.slots_since(stamp_ns)
-        change = self._settings.normal_gain * (np.array(normal) - self._normals[slots[0]])
-        self._normals[slots] += change
-        self.normal = unit((np.array(self.normal) + change).tolist())
+    def touch(self, happens: ca.SX) -> None:
+        """The tip rests at the wall, whatever the drifting distance says; the accelerometer's bias stays."""
+        self._kalman.set_entry(happens, DISTANCE, TOUCH_STD)
+        self._kalman.set_entry(happens, SPEED, self._settings.stationary_speed_std_m_s)
+        self._set(happens, DISTANCE, ca.SX(0.0))
+        self._set(happens, SPEED, -self._lever_speed)
+
+    def _set(self, condition: ca.SX, index: int, value: ca.SX) -> None:
+        entries = ca.vertsplit(self._state)
+        entries[index] = where(condition, value, entries[index])
+        self._state = ca.vertcat(*entries)
+
+    def store(self) -> None:
+        """Remember the states for the next tick."""
+        for name, value in {
+            "normal": self.normal,
+            "state": self._state,
+            "known": self.known,
+            "gap": self._gap,
+            "since_plane": ca.fmin(self.since_plane, NEVER_S),
+        }.items():
+            self._signals.remember(f"wall.{name}", value)
+        self._kalman.store()
+
+    @property
+    def distance(self) -> ca.SX:
+        """Tip to wall [m], `FAR_AWAY` while unknown."""
+        return where(self.known, self._state[DISTANCE], FAR_AWAY)
+
+    @property
+    def rate(self) -> ca.SX:
+        """Rate of the distance [m/s]: of the centre of mass, and of the tip that rotates with the body."""
+        return where(self.known, -self._state[SPEED] - self._lever_speed, 0.0)
+
+    @property
+    def acceleration(self) -> ca.SX:
+        """Filtered second derivative of the distance [m/s^2], weighted by its ratio of signal to noise."""
+        quiet = self._settings.acceleration_quiet_m_s2
+        return self._filtered / (1.0 + self._ratio * self.variance / quiet**2)
+
+    @property
+    def bias(self) -> ca.SX:
+        """Measured minus true acceleration along the normal [m/s^2]; 0 while no wall is known."""
+        return where(self.known, self._state[BIAS], 0.0)
+
+    @property
+    def speed(self) -> ca.SX:
+        """Speed of the centre of mass into the wall [m/s]."""
+        return -self.rate - self._lever_speed
+
+    @property
+    def depth(self) -> ca.SX:
+        """Camera to wall along the normal [m], about `FAR_AWAY` while unknown."""
+        return self.distance + ca.dot(self.normal, self._tip_from_camera)

@@ -10,7 +10,7 @@ import numpy as np
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.model.inputs import Body
 from ibvs_qp.model.motor_thrust import MotorThrust
-from ibvs_qp.model.signals import Signals
+from ibvs_qp.symbolic.signals import Signals
 
 
 def estimated_rate(

@@ -8,7 +8,7 @@ import numpy as np
 from ibvs_qp.config import ControllerConfig, VehicleParams
 from ibvs_qp.model.inputs import Body, Contact, clamp
 from ibvs_qp.model.motor_thrust import MotorThrust
-from ibvs_qp.model.signals import Signals
+from ibvs_qp.symbolic.signals import Signals
 
 #: Bandwidth of the force observer in free flight, and in contact in the wall's plane [rad/s]; along the normal it is
 #: `contact.gust_bandwidth_rad_s`. In the plane a faster one mistakes changing friction for an external force: at

@@ -13,7 +13,7 @@ import casadi as ca
 
 from ibvs_qp.config import ContactSettings, ControllerConfig
 from ibvs_qp.model.inputs import Body, Contact
-from ibvs_qp.model.signals import Signals
+from ibvs_qp.symbolic.signals import Signals
 
 #: Commanded speed above which the tip is meant to slide [m/s].
 SLIDING_COMMAND = 0.01

@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as ca
 
 from ibvs_qp.model.inputs import Body, Contact, clamp
-from ibvs_qp.model.signals import Signals
+from ibvs_qp.symbolic.signals import Signals
 
 #: Friction assumed while nothing is known (the plant's nominal brush) and plausible range.
 ASSUMED_FRICTION, FRICTION_RANGE = 0.3, (0.02, 1.2)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 
 import casadi as ca
 
-from ibvs_qp.model.signals import Signals
+from ibvs_qp.symbolic.signals import Signals
 
 #: Inputs that are arrays, and their sizes, in the order of packing (`ibvs_qp.model.packing`).
 ARRAYS = {

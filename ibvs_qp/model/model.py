@@ -24,8 +24,8 @@ from ibvs_qp.model.motor_thrust import motor_thrust
 from ibvs_qp.model.reach import STANDING_SPEED, push_reach, push_reference
 from ibvs_qp.model.response import carried_weight, inertial_push, missing_thrust
 from ibvs_qp.model.rows import Parameter
-from ibvs_qp.model.signals import Signals
 from ibvs_qp.model.thrust_window import thrust_window
+from ibvs_qp.symbolic.signals import Signals
 
 T = TypeVar("T")
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from ibvs_qp.config import VehicleParams
-from ibvs_qp.model.signals import Signals
+from ibvs_qp.symbolic.signals import Signals
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,7 +8,7 @@ from ibvs_qp.estimation.contact_state import ContactState
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL, Measurement, Reference
 from ibvs_qp.model.inputs import ARRAYS, CONTACT, LINE, SCALARS, TARGET
 from ibvs_qp.model.pairing import LinePairing
-from ibvs_qp.model.step_function import StepFunction
+from ibvs_qp.symbolic.step_function import StepFunction
 
 #: Distance while the wall is unknown [m]; finite, for the equations.
 FAR_AWAY = 1e3

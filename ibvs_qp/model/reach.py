@@ -8,7 +8,7 @@ import numpy as np
 from allocation.wrench_facets import ON_PLANE, RELATIVE_ZERO, WrenchFacets
 from ibvs_qp.config import ControllerConfig, VehicleParams
 from ibvs_qp.model.inputs import Body, Contact, Target, clamp
-from ibvs_qp.model.signals import Signals
+from ibvs_qp.symbolic.signals import Signals
 
 #: Reach when nothing bounds it [N].
 UNBOUNDED = 1e6

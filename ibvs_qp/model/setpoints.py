@@ -18,9 +18,9 @@ from ibvs_qp.model.interaction_matrix import line_interaction_matrix
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.packing import StepInputs
 from ibvs_qp.model.reach import UNBOUNDED
-from ibvs_qp.model.step_function import StepFunction
 from ibvs_qp.model.thrust_window import thrust_window
 from ibvs_qp.safety.hover import hold_thrusts
+from ibvs_qp.symbolic.step_function import StepFunction
 
 #: After a caller's own contact, an estimate older than this is not continued [ns]: the tip moved on meanwhile.
 ESTIMATE_LIFE_NS = 500_000_000

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ibvs_qp.model.step_function import StepFunction
 from ibvs_qp.qp.problem import QpProblem
+from ibvs_qp.symbolic.step_function import StepFunction
 
 
 class ProgramData:

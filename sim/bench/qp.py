@@ -10,9 +10,9 @@ import numpy as np
 
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.controller import HybridController
-from ibvs_qp.model.compiler import compiler
 from ibvs_qp.qp.exact import ExactSolver
 from ibvs_qp.qp.offline import installed_solvers, solve_offline
+from ibvs_qp.symbolic.compiler import compiler
 from sim.bench.reference_rival import mink_row
 from sim.bench.stages import stage_medians
 from sim.bench.ticks import Tick, by_flight, recorded_ticks

@@ -9,10 +9,10 @@ from ibvs_qp.command import ActiveLimit, Command, Outcome
 from ibvs_qp.config import ControllerConfig, SolverSettings
 from ibvs_qp.controller import default_tasks
 from ibvs_qp.measurement import Measurement, Reference
-from ibvs_qp.model.bound_function import BoundFunction
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.reporting import clipped_command, contact_mode, reach_margin, reach_note
 from ibvs_qp.model.setpoints import Setpoints
+from ibvs_qp.symbolic.bound_function import BoundFunction
 from sim.rivals.condensed import CondensedProgram
 from sim.rivals.horizon import MpcSettings
 from sim.rivals.prediction import Prediction

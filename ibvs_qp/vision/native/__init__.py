@@ -14,8 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ibvs_qp.model.compiler import compiler, wide_registers
-from ibvs_qp.model.shared_library import shared_library
+from ibvs_qp.symbolic.compiler import compiler, wide_registers
+from ibvs_qp.symbolic.shared_library import shared_library
 
 #: The files, in the order in which they are joined.
 FILES = (

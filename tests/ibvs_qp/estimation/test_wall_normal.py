@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from ibvs_qp.config import ControllerConfig
-from ibvs_qp.estimation.wall_distance import AGREED_PLANES, GAP_NS, MOST_REOPENED, ODD_PLANES, WallDistance
+from ibvs_qp.estimation.contact import ContactEstimator
+from ibvs_qp.estimation.wall_distance import AGREED_PLANES, GAP_S, MOST_REOPENED, ODD_PLANES
 
-TICK, TICK_NS = 0.004, 4_000_000
+TICK_S, TICK_NS = 0.004, 4_000_000
 CONFIG = ControllerConfig()
 AHEAD = CONFIG.vehicle.tip_position_m[0] - CONFIG.vehicle.camera_position_m[0]
 DISTANCE = 0.3
@@ -28,25 +29,33 @@ class Watched:
     """A vehicle at rest that is shown one plane per tick."""
 
     def __init__(self) -> None:
-        self.wall, self.tick = WallDistance(CONFIG), 0
+        self.estimator, self.tick = ContactEstimator(CONFIG), 0
 
     def show(self, degrees: float, planes: int = 1, distance: float = DISTANCE, pause: int = 1) -> float:
         """Angle of the normal afterwards [deg]."""
         for _ in range(planes):
             self.tick += pause
-            self.wall.predict(self.tick * TICK_NS, TICK, REST, GRAVITY, DOWN)
-            self.wall.correct(plane(degrees, distance), self.tick * TICK_NS, False)
+            self.wall = self.estimator.update(
+                stamp_ns=self.tick * TICK_NS,
+                angular_velocity=REST,
+                specific_force=GRAVITY,
+                down=DOWN,
+                contact_wrench=np.zeros(6),
+                wrench_stamp_ns=0,
+                plane=plane(degrees, distance),
+                plane_stamp_ns=self.tick * TICK_NS,
+            )
         return math.degrees(math.atan2(self.wall.normal[1], self.wall.normal[0]))
 
 
 def test_a_normal_that_disagrees_is_refused_until_it_lasts() -> None:
     seen = Watched()
     assert seen.show(0.0, 20) == pytest.approx(0.0)
-    accepted = seen.wall.accepted_ns
+    accepted = seen.estimator.plane_ns
     assert seen.show(-25.0, ODD_PLANES - 1) == pytest.approx(0.0, abs=1e-9)
-    assert seen.wall.accepted_ns == accepted
+    assert seen.estimator.plane_ns == accepted
     assert seen.show(-25.0) == pytest.approx(-25.0, abs=1e-6)
-    assert seen.wall.accepted_ns > accepted
+    assert seen.estimator.plane_ns > accepted
 
 
 def test_one_that_agrees_in_between_begins_the_count_anew() -> None:
@@ -72,7 +81,7 @@ def test_it_is_taken_twice_and_then_no_more_until_many_agreed() -> None:
 def test_after_a_gap_the_next_plane_counts_as_the_first() -> None:
     seen = Watched()
     seen.show(0.0, 20)
-    gap = GAP_NS // TICK_NS + 1
+    gap = round(GAP_S / TICK_S) + 1
     assert seen.show(-25.0, distance=0.6, pause=gap) == pytest.approx(-25.0, abs=1e-6)
     assert seen.wall.distance == pytest.approx(0.6, abs=1e-6)
     known = Watched()

@@ -23,7 +23,7 @@ from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import Measurement, Reference
 from ibvs_qp.model.reach import push_reach as live_push_reach
-from ibvs_qp.model.signals import Signals
+from ibvs_qp.symbolic.signals import Signals
 
 #: Into a wall straight ahead.
 FRONT = np.array([1.0, 0.0, 0.0])

@@ -12,7 +12,7 @@ from closed_loop_rigs import short_scene
 
 from ibvs_qp.config.settings import dump_toml
 from ibvs_qp.controller import qp_problem
-from ibvs_qp.model.signals import places
+from ibvs_qp.symbolic.signals import places
 from sim.commands.cli import main
 from sim.evaluate.explanation import explain_tick, flown_config
 from sim.evaluate.explanation_text import explanation_tables

@@ -16,7 +16,7 @@ import casadi as ca
 import pytest
 
 from ibvs_qp.model import compiler as compiler_module
-from ibvs_qp.model.machine_code import machine_code
+from ibvs_qp.symbolic.machine_code import machine_code
 from ibvs_qp.vision import native
 
 pytestmark = [

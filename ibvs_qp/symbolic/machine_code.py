@@ -14,8 +14,8 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 
-from ibvs_qp.model.compiler import compiler
-from ibvs_qp.model.shared_library import shared_library
+from ibvs_qp.symbolic.compiler import compiler
+from ibvs_qp.symbolic.shared_library import shared_library
 
 #: How the code is translated: -O1 takes 1 s for a tick of 4000 instructions, and -O3 gives code no faster.
 FLAGS = ("-O1", "-fPIC", "-shared", "-ffp-contract=off")

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import casadi as ca
 import numpy as np
 
-from ibvs_qp.model.bound_function import BoundFunction
-from ibvs_qp.model.machine_code import machine_code
-from ibvs_qp.model.signals import Signals, places, stack
+from ibvs_qp.symbolic.bound_function import BoundFunction
+from ibvs_qp.symbolic.machine_code import machine_code
+from ibvs_qp.symbolic.signals import Signals, places, stack
 
 
 class StepFunction:

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from ibvs_qp.config.errors import IbvsQpError
 from ibvs_qp.config.files import read_bytes
-from ibvs_qp.model.compiler import compiler_version, run_compiler
+from ibvs_qp.symbolic.compiler import compiler_version, run_compiler
 
 #: Digits of the hashes in a file's name: 96 bit each.
 _DIGITS = 24
@@ -38,7 +38,7 @@ def shared_library(name: str, code: str, command: list[str], flags: tuple[str, .
     Args:
         name: First part of the file's name.
         code: The C code.
-        command: The compiler's command, see `ibvs_qp.model.compiler`.
+        command: The compiler's command, see `ibvs_qp.symbolic.compiler`.
         flags: Its options.
 
     Raises:

@@ -1,0 +1,72 @@
+"""Motion of the body over the last half second, for samples that arrive late."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import casadi as ca
+
+from ibvs_qp.symbolic.logic import Number, both, where
+from ibvs_qp.symbolic.signals import Signals
+
+#: Length of a bin [s]: four ticks at 250 Hz, a tenth of a rotor's or the brush's time constants. Bins: half a second,
+#: far beyond any camera's latency.
+BIN_S, BINS = 0.016, 32
+#: A sample may lie this far ahead of the newest tick, and before the oldest, in nominal ticks [-].
+AHEAD, BEFORE = 1.5, 0.5
+#: Smallest duration of a bin in a division [s].
+_LEAST_S = 1e-9
+
+
+class Step(NamedTuple):
+    """Part of one bin that lies after a past time."""
+
+    duration: ca.SX  # [s]
+    angle: ca.SX  # rotation vector in B [rad], (3,)
+    change: ca.SX  # change of the velocity in B [m/s], (3,)
+
+
+class MotionHistory:
+    r"""Integrals of angular velocity and acceleration in bins of `BIN_S`, the newest first.
+
+    A late sample is carried to the present by the integrals since its capture; within a bin they grow linearly.
+
+    Args:
+        signals: Registry.
+        elapsed: Time since the last tick [s].
+        rate: Angular velocity in B [rad/s], (3,).
+        acceleration: Acceleration without gravity in B [m/s^2], (3,).
+        tick_s: Nominal control period [s].
+    """
+
+    def __init__(self, signals: Signals, elapsed: ca.SX, rate: ca.SX, acceleration: ca.SX, tick_s: float) -> None:
+        self._tick_s = tick_s
+        added = (elapsed, elapsed * rate, elapsed * acceleration)
+        names = ("history.duration", "history.angle", "history.change")
+        old = [
+            ca.reshape(signals.state(name, part.numel() * BINS), -1, BINS)
+            for name, part in zip(names, added, strict=True)
+        ]
+        full = old[0][0] + elapsed > BIN_S
+        self._bins = []
+        for name, bins, part in zip(names, old, added, strict=True):
+            shifted = ca.horzcat(part, bins[:, :-1])
+            grown = ca.horzcat(bins[:, 0] + part, bins[:, 1:])
+            self._bins.append(where(full, shifted, grown))
+            signals.remember(name, ca.vec(self._bins[-1]))
+
+    def covers(self, age: ca.SX) -> ca.SX:
+        """Whether a sample of an age [s] lies within the time remembered."""
+        length = ca.sum2(self._bins[0])
+        return both(age >= -AHEAD * self._tick_s, age <= length + BEFORE * self._tick_s)
+
+    def since(self, age: ca.SX) -> Iterator[Step]:
+        """Parts of the bins after a time ``age`` [s] ago, the newest first."""
+        duration, angle, change = self._bins
+        begin: Number = 0.0
+        for place in range(BINS):
+            length = duration[place]
+            share = ca.fmin(ca.fmax((age - begin) / ca.fmax(length, _LEAST_S), 0.0), 1.0)
+            yield Step(share * length, share * angle[:, place], share * change[:, place])
+            begin = begin + length
