@@ -116,7 +116,7 @@ class WallDistance:
         self._yaw = signals.remember("wall.yaw", wrapped(yaw))
 
     def correct(self, plane: Plane, tip_stationary: ca.SX) -> None:
-        """Correct with a plane at the time of its capture; those of a camera with mirrored axes are refused for good."""
+        """Correct with a plane at its capture; those of a camera with mirrored axes are refused for good."""
         signals, kalman = self._signals, self._kalman
         seen, distance = self._seen(plane.values)
         past, past_normal, past_yaw = self._at(plane.age)
