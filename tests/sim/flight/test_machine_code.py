@@ -15,8 +15,8 @@ from small_vehicle import SmallVehicle
 from ibvs_qp.analytic import PaperController
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.controller import HybridController
-from ibvs_qp.model import compiler
-from ibvs_qp.model import machine_code as module
+from ibvs_qp.symbolic import compiler
+from ibvs_qp.symbolic import machine_code as module
 from ibvs_qp.symbolic.machine_code import machine_code
 
 needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler on this machine")

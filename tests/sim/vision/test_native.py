@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ibvs_qp.config.vehicle import VehicleParams
-from ibvs_qp.model import compiler
+from ibvs_qp.symbolic import compiler
 from ibvs_qp.vision import (
     Perception,
     VisionConfig,
