@@ -25,10 +25,11 @@ class Step(NamedTuple):
     duration: ca.SX  # [s]
     angle: ca.SX  # rotation vector in B [rad], (3,)
     change: ca.SX  # change of the velocity in B [m/s], (3,)
+    way: ca.SX  # way of the centre of mass in B [m], (3,); zero in a history without velocities
 
 
 class MotionHistory:
-    r"""Integrals of angular velocity and acceleration in bins of `BIN_S`, the newest first.
+    r"""Integrals of angular velocity, acceleration and velocity in bins of `BIN_S`, the newest first.
 
     A late sample is carried to the present by the integrals since its capture; within a bin they grow linearly.
 
@@ -38,12 +39,24 @@ class MotionHistory:
         rate: Angular velocity in B [rad/s], (3,).
         acceleration: Acceleration without gravity in B [m/s^2], (3,).
         tick_s: Nominal control period [s].
+        velocity: Velocity in B [m/s], (3,), or None where no way is needed.
     """
 
-    def __init__(self, signals: Signals, elapsed: ca.SX, rate: ca.SX, acceleration: ca.SX, tick_s: float) -> None:
+    def __init__(
+        self,
+        signals: Signals,
+        elapsed: ca.SX,
+        rate: ca.SX,
+        acceleration: ca.SX,
+        tick_s: float,
+        velocity: ca.SX | None = None,
+    ) -> None:
         self._tick_s = tick_s
-        added = (elapsed, elapsed * rate, elapsed * acceleration)
-        names = ("history.duration", "history.angle", "history.change")
+        added = [elapsed, elapsed * rate, elapsed * acceleration]
+        names = ["history.duration", "history.angle", "history.change"]
+        if velocity is not None:
+            added.append(elapsed * velocity)
+            names.append("history.way")
         old = [
             ca.reshape(signals.state(name, part.numel() * BINS), -1, BINS)
             for name, part in zip(names, added, strict=True)
@@ -63,10 +76,11 @@ class MotionHistory:
 
     def since(self, age: ca.SX) -> Iterator[Step]:
         """Parts of the bins after a time ``age`` [s] ago, the newest first."""
-        duration, angle, change = self._bins
+        duration, angle, change, *ways = self._bins
         begin: Number = 0.0
         for place in range(BINS):
             length = duration[place]
             share = ca.fmin(ca.fmax((age - begin) / ca.fmax(length, _LEAST_S), 0.0), 1.0)
-            yield Step(share * length, share * angle[:, place], share * change[:, place])
+            way = share * ways[0][:, place] if ways else ca.SX.zeros(3)
+            yield Step(share * length, share * angle[:, place], share * change[:, place], way)
             begin = begin + length

@@ -6,7 +6,7 @@ import math
 
 import casadi as ca
 
-from ibvs_qp.symbolic.logic import both, either, no, where
+from ibvs_qp.symbolic.logic import both, either, no, where, wrapped
 from ibvs_qp.symbolic.signals import Signals
 
 #: Turns are compared over this time [s], and judged once the gyro's have this root sum of squares [rad]: five times
@@ -14,11 +14,6 @@ from ibvs_qp.symbolic.signals import Signals
 TURN_S, LEAST_TURN = 0.25, math.radians(3.0)
 #: Correlation of both over the gyro's square, below which they oppose each other: 1 right, -1 mirrored.
 OPPOSED = -0.5
-
-
-def wrapped(angle: ca.SX) -> ca.SX:
-    """The same angle within -pi and pi [rad]."""
-    return angle - 2.0 * math.pi * ca.floor((angle + math.pi) / (2.0 * math.pi))
 
 
 def mirrored_normal(signals: Signals, new: ca.SX, since_last: ca.SX, normal: ca.SX, yaw: ca.SX) -> ca.SX:

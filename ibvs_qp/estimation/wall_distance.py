@@ -15,10 +15,10 @@ import numpy as np
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.estimation.late_kalman import LateKalman
 from ibvs_qp.estimation.motion_history import MotionHistory
-from ibvs_qp.estimation.normal_turns import mirrored_normal, wrapped
+from ibvs_qp.estimation.normal_turns import mirrored_normal
 from ibvs_qp.estimation.vibration import noise_density, vibration_variance
 from ibvs_qp.frames import GRAVITY, R_BODY_CAMERA
-from ibvs_qp.symbolic.logic import both, either, no, where
+from ibvs_qp.symbolic.logic import both, either, no, where, wrapped
 from ibvs_qp.symbolic.signals import Signals
 
 #: Order of the filter's state: distance [m], speed of the centre of mass into the wall [m/s], accelerometer bias.

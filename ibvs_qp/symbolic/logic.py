@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 
 import casadi as ca
 
@@ -27,3 +28,8 @@ def either(*conditions: ca.SX) -> ca.SX:
 def no(condition: ca.SX) -> ca.SX:
     """Whether a condition does not hold."""
     return ca.logic_not(condition)
+
+
+def wrapped(angle: ca.SX) -> ca.SX:
+    """The same angle within -pi and pi [rad]."""
+    return angle - 2.0 * math.pi * ca.floor((angle + math.pi) / (2.0 * math.pi))
