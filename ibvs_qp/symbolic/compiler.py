@@ -23,13 +23,17 @@ _spent_s = 0.0
 
 def compiler() -> list[str] | None:
     """The C compiler's command (``CC``, else cc), or None where there is none."""
-    given = os.environ.get("CC", "cc")
+    command = list(_words(os.environ.get("CC", "cc")))
+    return command if os.name == "posix" and command and shutil.which(command[0]) else None
+
+
+@functools.cache  # a command that is none is reported once, however many functions are translated
+def _words(given: str) -> tuple[str, ...]:
     try:
-        command = shlex.split(given)
+        return tuple(shlex.split(given))
     except ValueError as error:
         log.warning("CC = %r is no command: %s", given, error)
-        return None
-    return command if os.name == "posix" and command and shutil.which(command[0]) else None
+        return ()
 
 
 @functools.cache
