@@ -45,7 +45,7 @@ def contact_state(
     """
     settings, estimation = config.contact, config.contact.estimation
     history = MotionHistory(signals, tick.elapsed, tick.rate, tick.acceleration, config.tick_s)
-    touch = TouchDetector(signals, config, tick.elapsed)
+    touch = TouchDetector(signals, config, tick.dt)
     wall = WallDistance(signals, config, tick, history)
     wall.correct(plane, both(touch.in_contact, touch.time - plane.age > estimation.stationary_after_s))
     free = both(no(touch.in_contact), wall.distance > FREE_DISTANCES * settings.contact_distance_m)

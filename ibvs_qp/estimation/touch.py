@@ -34,16 +34,16 @@ class TouchDetector:
     Args:
         signals: Registry.
         config: Its `contact` settings and the switch `touch_ramp`.
-        elapsed: Time since the last tick [s].
+        dt: Bounded time since the last tick [s]: a stamp far ahead must not end the ramp.
     """
 
-    def __init__(self, signals: Signals, config: ControllerConfig, elapsed: ca.SX) -> None:
+    def __init__(self, signals: Signals, config: ControllerConfig, dt: ca.SX) -> None:
         self._signals, self._config, self._settings = signals, config, config.contact
         state = signals.state
         self.in_contact, self._samples = state("touch.in_contact"), state("touch.samples")
-        self.time = self.in_contact * (state("touch.time") + elapsed)
-        self._since_loss = state("touch.since_loss", start=NEVER_S) + elapsed
-        self._weak_for = state("touch.weak_for") + elapsed
+        self.time = self.in_contact * (state("touch.time") + dt)
+        self._since_loss = state("touch.since_loss", start=NEVER_S) + dt
+        self._weak_for = state("touch.weak_for") + dt
         self._weak = state("touch.weak")
         self._ramp_start = state("touch.ramp_start")  # where the ramp of this contact starts, or the last one stopped
 
