@@ -10,7 +10,6 @@ import numpy as np
 from ibvs_qp.command import Command
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.estimation.contact_state import ContactState
-from ibvs_qp.estimation.late_samples import LateSamples
 from ibvs_qp.estimation.turned_camera import TurnedCamera
 from ibvs_qp.measurement import Measurement, Reference
 from ibvs_qp.model.reporting import check_contact, hover_command
@@ -48,7 +47,6 @@ class CheckedLaw(ABC):
         self.config = config
         self.gate = MeasurementGate(config.vehicle.geometry.count, config.line_slots)
         self.references = ReferenceGate(config.line_slots)
-        self._late = LateSamples(config.vehicle.camera_position_m)
         self._camera = TurnedCamera(config.vehicle.camera_turn_deg)
 
     def reset(self) -> None:
@@ -56,7 +54,6 @@ class CheckedLaw(ABC):
         self.setpoints.reset()
         self.gate.reset()
         self.references.reset()
-        self._late.reset()
 
     @np.errstate(all="ignore")  # a host may have numpy raise at every underflow
     def step(self, measurement: Measurement, reference: Reference, contact: ContactState | None = None) -> Command:
@@ -99,7 +96,6 @@ class CheckedLaw(ABC):
         stamp_ns, measurement, reference, contact, rejected = inputs
         if measurement is None:
             return hover_command(self.setpoints, stamp_ns, self.gate.inertial, rejected)
-        measurement = self._late.carried(measurement)
         self.setpoints.update(measurement, reference, contact)
         return self._command(measurement, reference, rejected)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -31,7 +32,13 @@ FLAGS, UNKNOWN = ("known", "in_contact", "stiffness_known"), ("distance", "depth
 
 
 def contact_state(
-    signals: Signals, config: ControllerConfig, tick: Tick, plane: Plane, wrench: ca.SX, interval: ca.SX
+    signals: Signals,
+    config: ControllerConfig,
+    tick: Tick,
+    history: MotionHistory,
+    plane: Plane,
+    wrench: ca.SX,
+    interval: ca.SX,
 ) -> dict[str, ca.SX]:
     """The estimate of one tick as expressions, by the names of `ContactState`.
 
@@ -39,12 +46,12 @@ def contact_state(
         signals: Registry.
         config: Geometry and `contact` settings.
         tick: Inertial data.
+        history: Motion up to this tick.
         plane: Last measured plane.
         wrench: Tared wrench ON the vehicle at the centre of mass, FRD [N, N m], (6,).
         interval: Time since the last force sample [s], 0 without a new one.
     """
     settings, estimation = config.contact, config.contact.estimation
-    history = MotionHistory(signals, tick.elapsed, tick.rate, tick.acceleration, config.tick_s)
     touch = TouchDetector(signals, config, tick.dt)
     wall = WallDistance(signals, config, tick, history)
     wall.correct(plane, both(touch.in_contact, touch.time - plane.age > estimation.stationary_after_s))
@@ -110,7 +117,8 @@ class ContactEstimator:
         )
         plane = Plane(new=signals.input("plane_new"), age=signals.input("plane_age"), values=signals.input("plane", 4))
         wrench, interval = signals.input("wrench", 6), signals.input("interval")
-        for name, value in contact_state(signals, config, tick, plane, wrench, interval).items():
+        history = MotionHistory(signals, tick.elapsed, tick.rate, tick.acceleration, config.tick_s)
+        for name, value in contact_state(signals, config, tick, history, plane, wrench, interval).items():
             signals.output(name, value)
         self._step = StepFunction(signals, to_machine_code=config.machine_code)
         self._plane = np.array([0.0, 0.0, 1.0, -1.0])
@@ -121,28 +129,7 @@ class ContactEstimator:
         self._step.reset()
         self._stamp = self._wrench_ns = self._plane_ns = self.plane_ns = -1
         self._doubt = False
-        config = self._config
-        self.state = ContactState(
-            normal=(1.0, 0.0, 0.0),
-            known=False,
-            distance=math.inf,
-            rate=0.0,
-            acceleration=0.0,
-            rate_noise=0.0,
-            acceleration_noise=0.0,
-            bias=0.0,
-            speed=0.0,
-            depth=math.inf,
-            push=0.0,
-            push_noise=math.sqrt(FIRST_PUSH_VARIANCE),
-            across_noise=0.0,
-            in_contact=False,
-            time_since_touch=0.0,
-            ramp=0.0 if config.touch_ramp else 1.0,
-            contact_weight=0.0,
-            stiffness=config.contact.estimation.assumed_stiffness_n_m,
-            stiffness_known=False,
-        )
+        self.state = no_contact(self._config)
 
     @property
     def touch_threshold(self) -> float:
@@ -202,12 +189,43 @@ class ContactEstimator:
         )
         self._doubt = False
         self._step.evaluate()
-        normal, *values = self._step.results[:3].tolist(), *self._step.results[3:].tolist()
-        state = dict(zip(SCALARS, values, strict=False))
-        state |= {name: bool(state[name]) for name in FLAGS}
-        if not state["known"]:
-            state |= dict.fromkeys(UNKNOWN, math.inf)
+        values = self._step.results.tolist()
+        self.state = read_contact(values)
         if values[-1]:
             self.plane_ns = plane_stamp_ns
-        self.state = ContactState(tuple(normal), **state)
         return self.state
+
+
+def no_contact(config: ControllerConfig) -> ContactState:
+    """The estimate before the first measurement."""
+    return ContactState(
+        normal=(1.0, 0.0, 0.0),
+        known=False,
+        distance=math.inf,
+        rate=0.0,
+        acceleration=0.0,
+        rate_noise=0.0,
+        acceleration_noise=0.0,
+        bias=0.0,
+        speed=0.0,
+        depth=math.inf,
+        push=0.0,
+        push_noise=math.sqrt(FIRST_PUSH_VARIANCE),
+        across_noise=0.0,
+        in_contact=False,
+        time_since_touch=0.0,
+        ramp=0.0 if config.touch_ramp else 1.0,
+        contact_weight=0.0,
+        stiffness=config.contact.estimation.assumed_stiffness_n_m,
+        stiffness_known=False,
+    )
+
+
+def read_contact(values: Sequence[float]) -> ContactState:
+    """The estimate from the results of `contact_state` in their order: the normal first."""
+    state: dict[str, Any] = dict(zip(SCALARS, values[3:], strict=False))
+    state |= {name: bool(state[name]) for name in FLAGS}
+    if not state["known"]:
+        state |= dict.fromkeys(UNKNOWN, math.inf)
+    normal = values[0], values[1], values[2]
+    return ContactState(normal, **state)

@@ -1,4 +1,4 @@
-"""Inputs of the step function: body, contact, reference and lines, as symbols in the order of packing."""
+"""Inputs of the law at the present: body, contact, reference and lines, as symbols."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import casadi as ca
 
 from ibvs_qp.symbolic.signals import Signals
 
-#: Inputs that are arrays, and their sizes, in the order of packing (`ibvs_qp.model.packing`).
+#: Inputs that are arrays, and their sizes; `ibvs_qp.model.tick` computes them from the sensors.
 ARRAYS = {
     "attitude": 4,
     "angular_velocity": 3,
@@ -51,11 +51,10 @@ class Body:
     @classmethod
     def of(cls, signals: Signals) -> Body:
         """Declare the inputs."""
-        w, x, y, z = ca.vertsplit(signals.input("attitude", 4))
         gyro = signals.input("angular_velocity", 3)
         return cls(
             dt=signals.input("dt"),
-            down=ca.vertcat(2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
+            down=gravity_direction(signals.input("attitude", 4)),
             gyro=gyro,
             rate=gyro,
             specific_force=signals.input("specific_force", 3),
@@ -179,14 +178,14 @@ def _names(kind: type, but: str = "") -> tuple[str, ...]:
     return tuple(field.name for field in fields(kind) if field.name != but)
 
 
-#: Scalar inputs of contact, reference and every line, in the order of packing.
+#: Scalar inputs of contact, reference and every line.
 CONTACT, TARGET, LINE = _names(Contact, "normal"), _names(Target), _names(Line, "index")
 #: Outputs of every line, "line_0.error" and so on (`ibvs_qp.tasks.line.LineState`).
 LINE_OUTPUTS = "error rate integral rho_error rho_rate angle_error angle_rate weight".split()
 
 
 def declare_inputs(signals: Signals, lines: int) -> None:
-    """Declare everything that is packed at every step, first of all inputs, so that it is one block."""
+    """Declare what every tick has, first of all inputs."""
     for name, size in ARRAYS.items():
         signals.input(name, size)
     for name in SCALARS:
@@ -195,6 +194,12 @@ def declare_inputs(signals: Signals, lines: int) -> None:
     Target.of(signals)
     for index in range(lines):
         Line.of(signals, index)
+
+
+def gravity_direction(attitude: ca.SX) -> ca.SX:
+    """Unit gravity in B, (3,), by a quaternion; see `ibvs_qp.frames.down_in_body`."""
+    w, x, y, z = ca.vertsplit(attitude)
+    return ca.vertcat(2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y))
 
 
 def clamp(value: ca.SX, low: float | ca.SX, high: float | ca.SX) -> ca.SX:

@@ -1,47 +1,66 @@
-"""Measurement, reference and contact into the inputs of the step function, in one block."""
+"""Measurement, reference and contact into the inputs of the tick, in one block; stamps become ages."""
 
 from __future__ import annotations
 
 from itertools import chain
 
 from ibvs_qp.estimation.contact_state import ContactState
+from ibvs_qp.estimation.wall_distance import FAR_AWAY
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL, Measurement, Reference
-from ibvs_qp.model.inputs import ARRAYS, CONTACT, LINE, SCALARS, TARGET
+from ibvs_qp.model.inputs import TARGET
 from ibvs_qp.model.pairing import LinePairing
-from ibvs_qp.symbolic.step_function import StepFunction
-
-#: Distance while the wall is unknown [m]; finite, for the equations.
-FAR_AWAY = 1e3
+from ibvs_qp.model.tick import ARRAYS, GIVEN, LINE, SCALARS, TickFunction
 
 _ZERO = (0.0, 0.0, 0.0)
+#: Contact of a caller that has none.
+_NOT_GIVEN = (0.0, 1.0) + (0.0,) * (sum(GIVEN.values()) - 2)
+#: Plane before the first one: in front of the camera, for the equations.
+_NO_PLANE = (0.0, 0.0, 1.0, -1.0)
+#: Places in the entries of a line.
+_PRESENT, _VERTICAL, _CHANGED = LINE.index("present"), LINE.index("vertical"), LINE.index("changed")
 
 
 class StepInputs:
-    """Packs the inputs that `ibvs_qp.model.inputs` declares; entry by entry that costs four times as much.
+    """Packs the inputs that `ibvs_qp.model.tick` declares; entry by entry that costs four times as much."""
 
-    Attributes:
-        present: Indices of the lines present at this step, and their roles.
-    """
-
-    def __init__(self, step: StepFunction, lines: int) -> None:
-        self._step, self._pairing = step, LinePairing(lines)
+    def __init__(self, step: TickFunction, lines: int) -> None:
+        self._pairing = LinePairing(lines)
         self._lines = [[0.0] * len(LINE) for _ in range(lines)]
-        count = sum(ARRAYS.values()) + len(SCALARS) + len(CONTACT) + len(TARGET) + lines * len(LINE)
+        self._present = [step.inputs[f"line_{index}.present"] for index in range(lines)]
+        count = sum(ARRAYS.values()) + len(SCALARS) + sum(GIVEN.values()) + len(TARGET) + lines * len(LINE)
         self._block = step.values[:count]
         self.reset()
 
     def reset(self) -> None:
         """Forget all pairs of lines and references."""
         self._pairing.reset()
-        self.present: list[tuple[int, str]] = []
+        self._paired: list[int] = []
+        self._plane, self._plane_age = _NO_PLANE, 0.0
         for line in self._lines:
             line[:] = [0.0] * len(LINE)
 
-    def write(self, measurement: Measurement, reference: Reference, contact: ContactState, dt: float) -> None:
-        """Pack a validated measurement (not its thrust limits), reference, contact and time since the last step [s]."""
+    @property
+    def present(self) -> list[tuple[int, str]]:
+        """Indices of the lines that the last evaluation took, in the order of their references, and their roles."""
+        taken = [index for index in self._paired if self._present[index][0]]
+        return [(index, VERTICAL if self._lines[index][_VERTICAL] else HORIZONTAL) for index in taken]
+
+    def write(
+        self, measurement: Measurement, reference: Reference, contact: ContactState | None, elapsed: float
+    ) -> None:
+        """Pack a validated measurement (not its thrust limits) and reference.
+
+        Args:
+            measurement: The measurement.
+            reference: The reference.
+            contact: Contact of a caller, None to estimate it.
+            elapsed: Time since the last tick [s].
+        """
         force, velocity, bias = measurement.specific_force, measurement.velocity, measurement.acceleration_bias
-        press, known = reference.contact, contact.known
-        self._pair(measurement, reference, known)
+        stamp, velocity_ns = measurement.stamp_ns, measurement.velocity_stamp_ns
+        if measurement.plane is not None:
+            self._plane, self._plane_age = measurement.plane, 1e-9 * (stamp - measurement.plane_stamp_ns)
+        self._pair(measurement, reference)
         self._block[:] = (
             *measurement.attitude.tolist(),
             *measurement.angular_velocity.tolist(),
@@ -49,32 +68,22 @@ class StepInputs:
             *(_ZERO if force is None else force.tolist()),
             *(_ZERO if velocity is None else velocity.tolist()),
             *(_ZERO if bias is None else bias.tolist()),
-            *contact.normal,
+            *self._plane,
             # SCALARS
-            dt,
+            elapsed,
             force is not None,
             velocity is not None,
-            contact.contact_weight if press else 0.0,
-            # CONTACT
-            known,
-            contact.distance if known else FAR_AWAY,
-            contact.rate,
-            contact.acceleration,
-            contact.rate_noise,
-            contact.acceleration_noise,
-            contact.bias,
-            contact.push,
-            contact.push_noise,
-            contact.across_noise,
-            contact.in_contact,
-            contact.ramp,
-            contact.stiffness,
-            contact.stiffness_known,
+            0.0 if velocity_ns is None else 1e-9 * (stamp - velocity_ns),
+            1e-9 * (stamp - measurement.wrench_stamp_ns),
+            measurement.plane is not None,
+            self._plane_age,
+            # GIVEN
+            *(_NOT_GIVEN if contact is None else _given(contact)),
             # TARGET
             reference.push_force,
             reference.standoff,
             *reference.velocity.tolist(),
-            press,
+            reference.contact,
             *reference.tilt.tolist(),
             *reference.travel.tolist(),
             *reference.trim.tolist(),
@@ -82,15 +91,37 @@ class StepInputs:
             *chain.from_iterable(self._lines),
         )
 
-    def _pair(self, measurement: Measurement, reference: Reference, wall_known: bool) -> None:
+    def _pair(self, measurement: Measurement, reference: Reference) -> None:
         """Assign lines to indices; an index that changes its reference loses integral and rate."""
-        for index in self._pairing.assign(reference.lines):
-            for state in ("integral", "last"):
-                self._step.states[f"line_{index}_{state}"][:] = 0.0
-        for line in self._lines:
-            line[0] = 0.0  # absent; the other entries stay, so that its equations stay finite
-        self.present = []
-        if wall_known:
-            for index, entries in self._pairing.pairs(measurement.lines, reference.lines):
-                self._lines[index][:] = entries
-                self.present.append((index, VERTICAL if entries[1] else HORIZONTAL))
+        freed, stamp = self._pairing.assign(reference.lines), measurement.stamp_ns
+        for index, line in enumerate(self._lines):
+            line[_PRESENT], line[_CHANGED] = 0.0, index in freed  # the other entries stay: finite equations
+        self._paired = []
+        for index, line, target in self._pairing.pairs(measurement.lines, reference.lines):
+            vertical, age = line.role == VERTICAL, 1e-9 * (stamp - line.stamp_ns) if line.stamp_ns else 0.0
+            measured = (1.0, vertical, line.rho, line.theta, target.rho, target.theta)
+            self._lines[index][:_CHANGED] = (*measured, line.weight, line.covariance.item(0), age)
+            self._paired.append(index)
+
+
+def _given(contact: ContactState) -> tuple[float, ...]:
+    """Entries of a caller's contact."""
+    return (
+        1.0,
+        *contact.normal,
+        contact.contact_weight,
+        contact.known,
+        contact.distance if contact.known else FAR_AWAY,
+        contact.rate,
+        contact.acceleration,
+        contact.rate_noise,
+        contact.acceleration_noise,
+        contact.bias,
+        contact.push,
+        contact.push_noise,
+        contact.across_noise,
+        contact.in_contact,
+        contact.ramp,
+        contact.stiffness,
+        contact.stiffness_known,
+    )

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-from ibvs_qp.frames import align_line
-from ibvs_qp.measurement import VERTICAL, LineFeature, LineReference
-
-#: Lines farther than this from the optical axis are ignored: the interaction matrix degenerates [normalised].
-RHO_BOUND = 1.5
+from ibvs_qp.measurement import LineFeature, LineReference
 
 
 class LinePairing:
@@ -46,17 +42,13 @@ class LinePairing:
 
     def pairs(
         self, lines: tuple[LineFeature, ...], references: tuple[LineReference, ...]
-    ) -> list[tuple[int, tuple[float, ...]]]:
-        """Index and entries (`ibvs_qp.model.inputs.LINE`) of every line with a reference."""
+    ) -> list[tuple[int, LineFeature, LineReference]]:
+        """Index, line and reference of every line with a reference, in the order of the references."""
         found = []
         for reference, (role, order) in zip(references, self._keys, strict=False):
             line = _nth(lines, role, order)
-            if line is None or not -RHO_BOUND < line.rho < RHO_BOUND:
-                continue
-            rho, theta = align_line(line.rho, line.theta, reference.theta)
-            place = (rho, theta, reference.rho, reference.theta)
-            entries = (1.0, float(role == VERTICAL), *place, line.weight, line.covariance.item(0))
-            found.append((self._indices[role, order], entries))
+            if line is not None:
+                found.append((self._indices[role, order], line, reference))
         return found
 
 

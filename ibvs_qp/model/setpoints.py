@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from ibvs_qp.config import LONGEST_TICK
-from ibvs_qp.estimation.contact import ContactEstimator
+from ibvs_qp.estimation.contact import no_contact, read_contact
 from ibvs_qp.estimation.contact_state import ContactState
-from ibvs_qp.frames import camera_twist_matrix, down_in_body
+from ibvs_qp.frames import camera_twist_matrix
 from ibvs_qp.measurement import Measurement, Reference
 from ibvs_qp.model.inputs import LINE_OUTPUTS
 from ibvs_qp.model.interaction_matrix import line_interaction_matrix
@@ -19,11 +18,9 @@ from ibvs_qp.model.model import Model
 from ibvs_qp.model.packing import StepInputs
 from ibvs_qp.model.reach import UNBOUNDED
 from ibvs_qp.model.thrust_window import thrust_window
+from ibvs_qp.model.tick import TickFunction
 from ibvs_qp.safety.hover import hold_thrusts
-from ibvs_qp.symbolic.step_function import StepFunction
 
-#: After a caller's own contact, an estimate older than this is not continued [ns]: the tip moved on meanwhile.
-ESTIMATE_LIFE_NS = 500_000_000
 #: Thrust step without a rate limit, before the first command [N].
 ANY_STEP = 1e6
 
@@ -61,6 +58,7 @@ class Setpoints:
     """Targets, bias wrench, reach and thrust window of one step, and the data of the program built on the same model.
 
     Attributes:
+        model: The equations.
         contact: Wall and contact at this step.
         step: The compiled function.
         free: Fraction of the directions right and down that no line fixes, (2,).
@@ -70,27 +68,27 @@ class Setpoints:
     def __init__(self, model: Model, extra: Sequence[ca.SX] = ()) -> None:
         config = self.config = model.config
         vehicle = config.vehicle
+        self.model = model
         self.effectiveness, self.mass_matrix = model.effectiveness, vehicle.mass_matrix
         self.inverse = np.linalg.pinv(self.effectiveness)
-        self._estimator = ContactEstimator(config)
-        self.step = StepFunction(model.signals, extra, config.machine_code)
-        self._parameters = [(self.step.inputs[entry.name], entry) for entry in model.parameters]
+        self.step = TickFunction(model, extra)
+        self._sensed = sensed = self.step.sensed
+        self._parameters = [(sensed[entry.name], entry) for entry in model.parameters]
         self._inputs = StepInputs(self.step, config.line_slots)
         self._twist = camera_twist_matrix(np.array(vehicle.camera_position_m))
         self.result, out = self.step.results.item, self.step.outputs
+        self._estimate = sum(len(view) for name, view in out.items() if name.startswith("estimate."))  # comes first
         self.normal, self.right, self.down = out["normal"], out["axis_right"], out["axis_down"]
         self.bias_wrench, self.velocity_command = out["bias_wrench"], out["velocity_command"]
         self.free, self.lower, self.upper = out["free"], out["thrust_lower"], out["thrust_upper"]
-        self.floor, self.ceiling = self.step.inputs["thrust_floor"], self.step.inputs["thrust_ceiling"]
+        self.floor, self.ceiling = sensed["thrust_floor"], sensed["thrust_ceiling"]
         self.floor[:], self.ceiling[:] = vehicle.thrust_min, vehicle.thrust_max
         self._rate_step = vehicle.thrust_rate_n_s * config.tick_s
         self.reset()
 
     def reset(self) -> None:
         """As before the first measurement."""
-        self._estimator.reset()
-        self._handed_on, self._estimated_ns = False, -1
-        self.contact = self._estimator.state
+        self.contact = no_contact(self.config)
         self.step.reset()
         self.step.results[:] = 0.0
         self._inputs.reset()
@@ -110,38 +108,21 @@ class Setpoints:
 
     def update(self, measurement: Measurement, reference: Reference, contact: ContactState | None = None) -> None:
         """Evaluate the step function for validated inputs; without a contact it is estimated here."""
-        stamp, dt = measurement.stamp_ns, self.config.tick_s
+        stamp, elapsed = measurement.stamp_ns, self.config.tick_s
         if self._stamp >= 0:
-            dt = min(max((stamp - self._stamp) * 1e-9, 0.0), LONGEST_TICK)
+            elapsed = max((stamp - self._stamp) * 1e-9, 0.0)
         self._stamp = stamp
-        self.contact = self._estimate_contact(measurement) if contact is None else contact
-        self._handed_on = self._handed_on or contact is not None
         self.step.advance()
-        self._inputs.write(measurement, reference, self.contact, dt)
+        self._inputs.write(measurement, reference, contact, elapsed)
         self._write_rotors(measurement)
         for view, parameter in self._parameters:
             view[:] = parameter.value
         self.step.evaluate()
-
-    def _estimate_contact(self, measurement: Measurement) -> ContactState:
-        if self._handed_on and measurement.stamp_ns - self._estimated_ns > ESTIMATE_LIFE_NS:
-            self._estimator.reset()
-        self._handed_on, self._estimated_ns = False, measurement.stamp_ns
-        force = measurement.specific_force
-        return self._estimator.update(
-            stamp_ns=measurement.stamp_ns,
-            angular_velocity=measurement.angular_velocity.tolist(),
-            specific_force=None if force is None else force.tolist(),
-            down=down_in_body(measurement.attitude.tolist()),
-            contact_wrench=measurement.contact_wrench,
-            wrench_stamp_ns=measurement.wrench_stamp_ns,
-            plane=measurement.plane,
-            plane_stamp_ns=measurement.plane_stamp_ns,
-        )
+        self.contact = read_contact(self.step.results[: self._estimate].tolist()) if contact is None else contact
 
     def _write_rotors(self, measurement: Measurement) -> None:
         """Last thrusts and limits; limits of a measurement hold within those of the vehicle."""
-        values, low, high = self.step.inputs, measurement.thrust_min, measurement.thrust_max
+        values, low, high = self._sensed, measurement.thrust_min, measurement.thrust_max
         started = self.last is not None
         values["thrust_last"][:] = self.last if started else hold_thrusts(self.config, measurement)
         values["thrust_change"][:], values["commanded"][0] = self._change, started

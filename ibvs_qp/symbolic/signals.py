@@ -56,6 +56,31 @@ class Signals:
         return ca.vertcat(*(self._next.get(name, symbol) for name, symbol in self.states.items()))
 
 
+class GatedSignals(Signals):
+    """View of a registry whose states begin anew, or stay as they are, on a condition.
+
+    Args:
+        signals: The registry.
+        restart: The states of this tick are those of a reset.
+        hold: The next states are the present ones.
+    """
+
+    def __init__(self, signals: Signals, restart: ca.SX, hold: ca.SX) -> None:
+        super().__init__()
+        self._signals, self._restart, self._hold = signals, restart, hold
+        self.inputs, self.outputs = signals.inputs, signals.outputs
+
+    def state(self, name: str, size: int = 1, start: float | Sequence[float] = 0.0) -> ca.SX:
+        """Symbol of a state, or its start value."""
+        symbol = self._signals.state(name, size, start)
+        return ca.if_else(self._restart, ca.DM(self._signals.starts[name]), symbol)
+
+    def remember(self, name: str, value: ca.SX) -> ca.SX:
+        """Set the value of a state at the next step, unless it stays; returns it."""
+        self._signals.remember(name, ca.if_else(self._hold, self._signals.states[name], value))
+        return value
+
+
 def places(symbols: dict[str, ca.SX]) -> dict[str, slice]:
     """Place of each named symbol in the stack of all of them."""
     layout, start = {}, 0

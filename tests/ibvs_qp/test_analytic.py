@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from controller_scenes import CEILING, FLOOR, TICK_NS, Wall, attitude, line_references, measured, random_tick
+from law_only import evaluate_law
 from small_vehicle import SmallVehicle
 
 from allocation import control_effectiveness
@@ -29,7 +30,7 @@ def terms_of(seed: int, lines: int, share: float) -> Setpoints:
     setpoints = analytic_setpoints(CONFIG)
     setpoints.update(*random_tick(np.random.default_rng(seed), lines))
     setpoints.step.inputs["contact_weight"][0] = share
-    setpoints.step.evaluate()
+    evaluate_law(setpoints)
     return setpoints
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from law_only import evaluate_law
 from scipy.spatial.transform import Rotation
 
 from ibvs_qp.config import ControllerConfig
@@ -153,7 +154,7 @@ def pack(
     inputs["thrust_step"][0], inputs["commanded"][0] = 1e6, 0.0
     if share is not None:
         inputs["contact_weight"][0] = share
-    setpoints.step.evaluate()  # once more, from the same states
+    evaluate_law(setpoints, controller.problem.values)  # once more, from the same states
 
 
 def exact_thrusts(controller: HybridController) -> np.ndarray:

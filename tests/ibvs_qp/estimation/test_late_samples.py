@@ -12,10 +12,10 @@ from small_vehicle import SmallVehicle
 
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.controller import HybridController
-from ibvs_qp.estimation.late_samples import LateSamples
 from ibvs_qp.measurement import Measurement, Reference
 
 CONFIG = ControllerConfig()
+REFERENCE = Reference(standoff=0.2, lines=line_references(2))
 
 
 def moving() -> SmallVehicle:
@@ -41,33 +41,36 @@ def delayed(now: Measurement, then: Measurement) -> Measurement:
     )
 
 
-def errors(now: Measurement, other: Measurement) -> tuple[float, float]:
-    """Largest difference of the lines, and of the velocity [m/s]."""
-    lines = [(a.rho - b.rho, np.sin(a.theta - b.theta)) for a, b in zip(now.lines, other.lines, strict=True)]
-    assert now.velocity is not None and other.velocity is not None
-    return float(np.abs(lines).max()), float(np.abs(now.velocity - other.velocity).max())
+def present(controller: HybridController, seen: Measurement) -> tuple[np.ndarray, np.ndarray]:
+    """Lines (rho, theta) and velocity [m/s] that the law takes for those of now."""
+    command = controller.step(seen, REFERENCE)
+    assert command.rejected == ()
+    lines = [(line.rho, line.theta) for line in controller.setpoints.lines]
+    return np.array(lines), controller.setpoints.step.inputs["velocity"].copy()
 
 
 @pytest.mark.parametrize("ticks", [5, 15, 40])
 def test_lines_and_velocity_of_some_ticks_ago_are_those_of_now(ticks: int) -> None:
-    vehicle, late, seen = moving(), LateSamples(CONFIG.vehicle.camera_position_m), deque[Measurement]()
+    vehicle, seen, late = moving(), deque[Measurement](), HybridController(CONFIG)
     for _ in range(80):
         seen.append(stamped(vehicle.measure()))
         now, then = seen[-1], seen[max(len(seen) - 1 - ticks, 0)]
-        carried = late.carried(delayed(now, then))
+        lines, velocity = present(late, delayed(now, then))
         vehicle.fly(vehicle.thrusts * 1.02)
-    assert all(line.stamp_ns == now.stamp_ns for line in carried.lines)
-    before, after = errors(now, then), errors(now, carried)
-    assert after[0] < 0.05 * before[0] and after[1] < 0.15 * before[1]
+    (true, speed), (old, old_speed) = present(HybridController(CONFIG), now), present(HybridController(CONFIG), then)
+    assert len(lines) == 2
+    assert np.abs(lines - true).max() < 0.05 * np.abs(old - true).max()
+    assert np.abs(velocity - speed).max() < 0.15 * np.abs(old_speed - speed).max()
 
 
 def test_what_is_not_late_stays_as_it_is() -> None:
-    vehicle, late = moving(), LateSamples(CONFIG.vehicle.camera_position_m)
+    vehicle, controller = moving(), HybridController(CONFIG)
     for _ in range(3):
-        seen = stamped(vehicle.measure())
-        assert late.carried(seen) is seen
-        unstamped = vehicle.measure()
-        assert late.carried(unstamped) is unstamped
+        for seen in (stamped(vehicle.measure()), vehicle.measure(stamp_ns=vehicle.measure().stamp_ns + 1_000_000)):
+            lines, velocity = present(controller, seen)
+            assert seen.velocity is not None
+            np.testing.assert_array_equal(velocity, seen.velocity)
+            np.testing.assert_allclose(lines[:, 0], [line.rho for line in seen.lines])
         vehicle.fly(vehicle.thrusts)
 
 
@@ -81,7 +84,7 @@ def test_a_controller_with_late_features_flies_the_same_path() -> None:
         for _ in range(500):
             seen.append(stamped(vehicle.measure()))
             given = delayed(seen[-1], seen[0]) if delay else seen[-1]
-            command = controller.step(given, Reference(standoff=0.2, lines=line_references(2)))
+            command = controller.step(given, REFERENCE)
             assert command.rejected == ()
             vehicle.fly(command.thrusts)
             path.append(vehicle.position)

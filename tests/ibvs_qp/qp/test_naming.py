@@ -49,7 +49,7 @@ class ClimbLimit(Limit):
 def step(controller: HybridController, tick: int, **inputs: tuple[float, ...]) -> Command:
     """One tick with the parameters of tasks and limits of one's own."""
     for name, values in inputs.items():
-        controller.setpoints.step.inputs[name][:] = values
+        controller.setpoints.step.sensed[name][:] = values
     command = controller.step(measured(tick), Reference(lines=line_references(2)))
     assert np.isfinite(command.thrusts).all()
     return command

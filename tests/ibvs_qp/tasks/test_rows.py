@@ -17,6 +17,7 @@ from controller_scenes import (
     pack,
     random_tick,
 )
+from law_only import evaluate_law
 from scipy.spatial.transform import Rotation
 
 from allocation import control_effectiveness
@@ -89,7 +90,7 @@ def test_line_rows_are_the_motion_of_the_line_at_the_tip(
     pack(controller, tick, reference, share=share)
     if held:  # touching, and no speed is asked for: friction holds the tip, which turns with the body as it is
         controller.setpoints.step.inputs["contact.touching"][0] = 1.0
-        controller.setpoints.step.evaluate()
+        evaluate_law(controller.setpoints, controller.problem.values)
     slot = 0 if role == HORIZONTAL else 1  # a slot belongs to a reference, found or not
     rng = np.random.default_rng(5)
     turn_share = 1.0 if held else 1.0 - share * (1.0 - controller.config.gains.body_rotation_gain)
@@ -280,7 +281,7 @@ def test_rows_of_view_push_and_approach_by_hand(controller: HybridController) ->
         assert value[name] - bounds[name][1] == pytest.approx(along - room, abs=1e-9)
         assert bounds["push_ceiling"][1] > 1e3  # in free air the ceiling is wide
         inputs["contact.touching"][0] = 1.0
-        setpoints.step.evaluate()
+        evaluate_law(setpoints, controller.problem.values)
         _, _, a, lower, upper = dense(controller)
         index = controller.problem.row_names.index("push_ceiling")
         stiffness = inputs["contact.stiffness"].item()
