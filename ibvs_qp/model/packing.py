@@ -73,7 +73,7 @@ class StepInputs:
             elapsed,
             force is not None,
             velocity is not None,
-            0.0 if velocity_ns is None else 1e-9 * (stamp - velocity_ns),
+            0.0 if velocity is None or velocity_ns is None else 1e-9 * (stamp - velocity_ns),
             1e-9 * (stamp - measurement.wrench_stamp_ns),
             measurement.plane is not None,
             self._plane_age,
