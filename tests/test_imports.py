@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[1]
 ORDER = {
     "ibvs_qp": (
         "frames measurement command axes analysis config adapters symbolic validation estimation safety model tasks "
-        "limits qp vision painting checked_law analytic controller assured pilot presets recording ros bridge"
+        "limits qp vision painting checked_law analytic controller export assured pilot presets recording ros bridge"
     ).split(),
     "sim": (
         "storage world scenes sensors rivals faults flight video evaluate figures sweep report detection experiments "

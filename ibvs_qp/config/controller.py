@@ -7,6 +7,7 @@ quadratic program.
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -64,9 +65,6 @@ class ControllerConfig:
         "(lateral force yields first), or weighted least squares within the limits",
         ("clip", "sequential", "box"),
     )
-    machine_code: bool = setting(
-        False, "translate the tick with the C compiler, if there is one: the same bits, 1 s once, 25 us less per tick"
-    )
 
     def __post_init__(self) -> None:
         """Validate, also that the vehicle is fully actuated, and the depths at which the push begins."""
@@ -79,6 +77,15 @@ class ControllerConfig:
         if self.contact.depth_min_m < arm:
             allowed = f"allowed is at least {arm:g} m, where the camera is when the tip touches"
             raise out_of_range("contact.depth_min_m", self.contact.depth_min_m, "m", allowed)
+
+    def on_backend(self, backend: str) -> ControllerConfig:
+        """The same with another solver backend."""
+        return dataclasses.replace(self, solver=dataclasses.replace(self.solver, backend=backend))
+
+    @property
+    def compiled(self) -> bool:
+        """Whether the equations become machine code as well."""
+        return self.solver.backend == "compiled"
 
     @classmethod
     def from_toml(cls, file: str | Path) -> ControllerConfig:

@@ -120,7 +120,7 @@ class ContactEstimator:
         history = MotionHistory(signals, tick.elapsed, tick.rate, tick.acceleration, config.tick_s)
         for name, value in contact_state(signals, config, tick, history, plane, wrench, interval).items():
             signals.output(name, value)
-        self._step = StepFunction(signals, to_machine_code=config.machine_code)
+        self._step = StepFunction(signals, to_machine_code=config.compiled)
         self._plane = np.array([0.0, 0.0, 1.0, -1.0])
         self.reset()
 

@@ -1,4 +1,4 @@
-"""Motion of the body over the last half second, for samples that arrive late."""
+"""Motion of the body over the last third of a second, for samples that arrive late."""
 
 from __future__ import annotations
 
@@ -7,14 +7,13 @@ from typing import NamedTuple
 
 import casadi as ca
 
+from ibvs_qp.estimation.stamps import AHEAD, BEFORE
 from ibvs_qp.symbolic.logic import Number, both, where
 from ibvs_qp.symbolic.signals import Signals
 
-#: Length of a bin [s]: four ticks at 250 Hz, a tenth of a rotor's or the brush's time constants. Bins: half a second,
-#: far beyond any camera's latency.
-BIN_S, BINS = 0.016, 32
-#: A sample may lie this far ahead of the newest tick, and before the oldest, in nominal ticks [-].
-AHEAD, BEFORE = 1.5, 0.5
+#: Length of a bin [s]: four ticks at 250 Hz, a tenth of a rotor's or the brush's time constants. Bins: 0.32 s, which
+#: covers the oldest line that counts (0.3 s).
+BIN_S, BINS = 0.016, 20
 #: Smallest duration of a bin in a division [s].
 _LEAST_S = 1e-9
 

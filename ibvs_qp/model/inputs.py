@@ -1,25 +1,21 @@
-"""Inputs of the law at the present: body, contact, reference and lines, as symbols."""
+"""Inputs of the law at the present, as symbols: body, contact, reference and lines.
+
+`ibvs_qp.model.tick` computes them from the sensors.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from types import SimpleNamespace
+from typing import Any
 
 import casadi as ca
 
+from ibvs_qp.config import Gains
 from ibvs_qp.symbolic.signals import Signals
 
-#: Inputs that are arrays, and their sizes; `ibvs_qp.model.tick` computes them from the sensors.
-ARRAYS = {
-    "attitude": 4,
-    "angular_velocity": 3,
-    "contact_wrench": 6,
-    "specific_force": 3,
-    "velocity": 3,
-    "acceleration_bias": 3,
-    "normal": 3,
-}
-#: Scalars that follow the arrays: time step [s], whether specific force and velocity are known, lambda.
-SCALARS = ("dt", "specific_force_known", "velocity_known", "contact_weight")
+#: Gain of an integral in the division that bounds it: one of zero has a bound as well.
+LEAST_GAIN = 1e-6
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -184,22 +180,15 @@ CONTACT, TARGET, LINE = _names(Contact, "normal"), _names(Target), _names(Line, 
 LINE_OUTPUTS = "error rate integral rho_error rho_rate angle_error angle_rate weight".split()
 
 
-def declare_inputs(signals: Signals, lines: int) -> None:
-    """Declare what every tick has, first of all inputs."""
-    for name, size in ARRAYS.items():
-        signals.input(name, size)
-    for name in SCALARS:
-        signals.input(name)
-    Contact.of(signals)
-    Target.of(signals)
-    for index in range(lines):
-        Line.of(signals, index)
-
-
 def gravity_direction(attitude: ca.SX) -> ca.SX:
     """Unit gravity in B, (3,), by a quaternion; see `ibvs_qp.frames.down_in_body`."""
     w, x, y, z = ca.vertsplit(attitude)
     return ca.vertcat(2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y))
+
+
+def gain_inputs(signals: Signals) -> Any:
+    """Symbols of the gains under the names of `Gains`: they may change at run time."""
+    return SimpleNamespace(**{field.name: signals.input(f"gains.{field.name}") for field in fields(Gains)})
 
 
 def clamp(value: ca.SX, low: float | ca.SX, high: float | ca.SX) -> ca.SX:

@@ -19,7 +19,7 @@ from ibvs_qp.model.camera_view import camera_view
 from ibvs_qp.model.external_wrench import external_wrench
 from ibvs_qp.model.feedforward import SLIDING_COMMAND, contact_feedforward
 from ibvs_qp.model.friction import cautious_friction, estimated_friction
-from ibvs_qp.model.inputs import Body, Contact, Line, Target, declare_inputs
+from ibvs_qp.model.inputs import Body, Contact, Line, Target, gain_inputs
 from ibvs_qp.model.motor_thrust import motor_thrust
 from ibvs_qp.model.reach import STANDING_SPEED, push_reach, push_reference
 from ibvs_qp.model.response import carried_weight, inertial_push, missing_thrust
@@ -39,7 +39,11 @@ class Model:
     The bias wrench h is the sum of gravity, the gyroscopic moment, the observed external wrench and the contact
     feed-forward. Rows are written in `thrust` and `acceleration`; `ibvs_qp.qp.problem` eliminates the acceleration.
 
+    Args:
+        config: Everything it needs; its gains are inputs ``gains.line_kp`` and so on.
+
     Attributes:
+        gains: The feedback gains, symbols under the names of `ibvs_qp.config.Gains`.
         thrust: u [N], (n,).
         acceleration: nu_dot in B [m/s^2, rad/s^2], (6,).
         wrench: M nu_dot, the net wrench without contact [N, N m], (6,).
@@ -62,10 +66,10 @@ class Model:
         self.config, self.signals, self.parameters = config, Signals(), list[Parameter]()
         self._cache: dict[tuple[object, ...], object] = {}
         vehicle, signals = config.vehicle, self.signals
-        declare_inputs(signals, config.line_slots)
         body, self.contact, self.target = Body.of(signals), Contact.of(signals), Target.of(signals)
         self.lines = [Line.of(signals, index) for index in range(config.line_slots)]
         self.contact_weight = signals.input("contact_weight")
+        self.gains = gain_inputs(signals)
 
         self.rotors = vehicle.geometry.count
         self.effectiveness = control_effectiveness(vehicle.geometry)
@@ -191,7 +195,7 @@ class Model:
         """
         if self.config.line_profile == "paper":
             return ca.SX(1.0)
-        reduction = 1.0 - self.config.gains.body_rotation_gain
+        reduction = 1.0 - self.gains.body_rotation_gain
         return 1.0 - self.contact_weight * (1.0 - self.tip_stationary) * reduction
 
     @property

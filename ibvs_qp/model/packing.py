@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from itertools import chain
 
 from ibvs_qp.estimation.contact_state import ContactState
@@ -28,7 +29,8 @@ class StepInputs:
         self._lines = [[0.0] * len(LINE) for _ in range(lines)]
         self._present = [step.inputs[f"line_{index}.present"] for index in range(lines)]
         count = sum(ARRAYS.values()) + len(SCALARS) + sum(GIVEN.values()) + len(TARGET) + lines * len(LINE)
-        self._block = step.values[:count]
+        self._memory = memoryview(step.values[:count])  # type: ignore[arg-type]
+        self._pack = struct.Struct(f"{count}d").pack_into  # half as long as an assignment to an array
         self.reset()
 
     def reset(self) -> None:
@@ -61,7 +63,9 @@ class StepInputs:
         if measurement.plane is not None:
             self._plane, self._plane_age = measurement.plane, 1e-9 * (stamp - measurement.plane_stamp_ns)
         self._pair(measurement, reference)
-        self._block[:] = (
+        self._pack(
+            self._memory,
+            0,
             *measurement.attitude.tolist(),
             *measurement.angular_velocity.tolist(),
             *measurement.contact_wrench.tolist(),

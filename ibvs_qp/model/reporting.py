@@ -51,17 +51,17 @@ def _is_sound(contact: ContactState) -> bool:
 
 def contact_mode(setpoints: Setpoints, reference: Reference) -> str:
     """Contact phase: "contact", "approach" or "free"."""
-    if setpoints.contact.in_contact:
+    if setpoints.in_contact:
         return "contact"
     return "approach" if reference.contact else "free"
 
 
 def reach_margin(setpoints: Setpoints) -> float:
     """Further push possible at the present contact [N]; NaN while no wall is known, or none is possible."""
-    contact, reach = setpoints.contact, setpoints.reach
-    if not contact.known or setpoints.least_push > reach:
+    push, reach = setpoints.contact_push, setpoints.reach
+    if math.isnan(push) or setpoints.least_push > reach:
         return math.nan
-    return reach - contact.push if contact.push > 0.0 else reach
+    return reach - push if push > 0.0 else reach
 
 
 def reach_note(setpoints: Setpoints, reference: Reference) -> tuple[str, ...]:

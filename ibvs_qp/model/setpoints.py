@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -59,7 +60,6 @@ class Setpoints:
 
     Attributes:
         model: The equations.
-        contact: Wall and contact at this step.
         step: The compiled function.
         free: Fraction of the directions right and down that no line fixes, (2,).
         last: Last commanded thrusts [N], (n,), None before the first.
@@ -78,17 +78,22 @@ class Setpoints:
         self._twist = camera_twist_matrix(np.array(vehicle.camera_position_m))
         self.result, out = self.step.results.item, self.step.outputs
         self._estimate = sum(len(view) for name, view in out.items() if name.startswith("estimate."))  # comes first
+        self._touching, self._known, self._push = (
+            self.step.inputs[f"contact.{name}"].item for name in ("touching", "known", "push")
+        )
         self.normal, self.right, self.down = out["normal"], out["axis_right"], out["axis_down"]
         self.bias_wrench, self.velocity_command = out["bias_wrench"], out["velocity_command"]
         self.free, self.lower, self.upper = out["free"], out["thrust_lower"], out["thrust_upper"]
         self.floor, self.ceiling = sensed["thrust_floor"], sensed["thrust_ceiling"]
         self.floor[:], self.ceiling[:] = vehicle.thrust_min, vehicle.thrust_max
+        for name, gain in vars(config.gains).items():
+            sensed[f"gains.{name}"][:] = gain
         self._rate_step = vehicle.thrust_rate_n_s * config.tick_s
         self.reset()
 
     def reset(self) -> None:
         """As before the first measurement."""
-        self.contact = no_contact(self.config)
+        self._contact: ContactState | None = no_contact(self.config)
         self.step.reset()
         self.step.results[:] = 0.0
         self._inputs.reset()
@@ -118,7 +123,7 @@ class Setpoints:
         for view, parameter in self._parameters:
             view[:] = parameter.value
         self.step.evaluate()
-        self.contact = read_contact(self.step.results[: self._estimate].tolist()) if contact is None else contact
+        self._contact = contact
 
     def _write_rotors(self, measurement: Measurement) -> None:
         """Last thrusts and limits; limits of a measurement hold within those of the vehicle."""
@@ -144,6 +149,23 @@ class Setpoints:
             self._change = own - self.last
         self.last, self._given_up = own, given_up
         return own
+
+    @property
+    def contact(self) -> ContactState:
+        """Wall and contact at this step: the caller's, or the estimate, which is read when it is wanted."""
+        if self._contact is None:
+            self._contact = read_contact(self.step.results[: self._estimate].tolist())
+        return self._contact
+
+    @property
+    def in_contact(self) -> bool:
+        """Whether the tip touches the wall at this step."""
+        return self._touching() != 0.0
+
+    @property
+    def contact_push(self) -> float:
+        """Filtered push on the wall at this step [N]; NaN while no wall is known."""
+        return self._push() if self._known() else math.nan
 
     roll = _number("angles", 0, "Roll [rad].")
     pitch = _number("angles", 1, "Pitch [rad].")

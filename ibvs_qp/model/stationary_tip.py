@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import casadi as ca
 
@@ -14,7 +15,7 @@ from ibvs_qp.model.model import Model
 STIFFNESS_FRACTION = 1.0 / 3.0
 
 
-def pivot_stiffness(config: ControllerConfig) -> tuple[float, float]:
+def pivot_stiffness(config: ControllerConfig, gains: Any = None) -> tuple[Any, Any]:
     r"""Stiffness of pitch and yaw while friction holds the tip and no line fixes its place [1/s^2].
 
     The vehicle turns about the tip, L ahead. The fed-forward contact moment is T late, and the late part of it is the
@@ -24,8 +25,12 @@ def pivot_stiffness(config: ControllerConfig) -> tuple[float, float]:
     .. math:: K_p < K_d \Big(\frac{J}{m L^2 T} + K_v\Big),
 
     84 in pitch and 116 in yaw for the shipped vehicle and gains of the program.
+
+    Args:
+        config: Vehicle and delay of the feed-forward.
+        gains: Numbers or symbols; those of the configuration by default.
     """
-    vehicle, gains = config.vehicle, config.gains
+    vehicle, gains = config.vehicle, gains or config.gains
     swing = max(vehicle.mass_kg * vehicle.tip_position_m[0] ** 2 * moment_lag(config), 1e-9)
     _, pitch, yaw = vehicle.inertia_kg_m2
     return (
@@ -34,7 +39,7 @@ def pivot_stiffness(config: ControllerConfig) -> tuple[float, float]:
     )
 
 
-def pivot_limited(model: Model, stiffness: float, pivot: float, guides: Sequence[ca.SX]) -> ca.SX:
+def pivot_limited(model: Model, stiffness: Any, pivot: Any, guides: Sequence[ca.SX]) -> ca.SX:
     """Stiffness of an axis [1/s^2], reduced while friction alone holds the tip.
 
     Args:
@@ -48,4 +53,4 @@ def pivot_limited(model: Model, stiffness: float, pivot: float, guides: Sequence
     guided = ca.SX(0.0)
     for line, guide in zip(model.lines, guides, strict=True):
         guided = ca.fmax(guided, guide * line.present * line.confidence)
-    return stiffness + model.tip_stationary * (1.0 - guided) * (min(stiffness, pivot) - stiffness)
+    return stiffness + model.tip_stationary * (1.0 - guided) * (ca.fmin(stiffness, pivot) - stiffness)

@@ -87,7 +87,7 @@ class TickFunction(StepFunction):
 
     def __init__(self, model: Model, extra: Sequence[ca.SX] = ()) -> None:
         signals, results = tick_signals(model, extra)
-        super().__init__(signals, results, model.config.machine_code)
+        super().__init__(signals, results, model.config.compiled)
         self.sensed, (self.point, *self.extra) = self.inputs, self.extra
         self.inputs = {name: self.point[place] for name, place in places(model.signals.inputs).items()}
 

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from ibvs_qp.command import Outcome
 from ibvs_qp.config import SolverSettings
+from ibvs_qp.qp.compiled import CompiledSolver, compiled_solver
 from ibvs_qp.qp.evaluator import ProgramData
 from ibvs_qp.qp.exact import ExactSolver
 from ibvs_qp.qp.infeasible import conflicting_rows
 from ibvs_qp.qp.osqp import MAX_ITERATIONS, SOLVED, SOLVED_INACCURATE, OsqpSolver, RawSolution
 from ibvs_qp.qp.problem import QpProblem
+from ibvs_qp.qp.solution import ACTIVE_MULTIPLIER, BOUND_SLIP, AcceptedSolution, Tried
 
 #: Outcome by OSQP's status; with any other status the iterate means nothing.
 OUTCOMES = {
@@ -21,25 +22,6 @@ OUTCOMES = {
     SOLVED_INACCURATE: Outcome.INACCURATE_ACCEPTED,
     MAX_ITERATIONS: Outcome.CAPPED_ACCEPTED,
 }
-#: A row whose multiplier exceeds this is active [cost per unit of the row]. OSQP projects on the bounds, so a free row
-#: has a multiplier of 1e-12 at most; where a row is just touched, its multiplier is uncertain by about `tolerance`
-#: times the coupling between rows, 1e-4.
-ACTIVE_MULTIPLIER = 1e-3
-#: Largest violation of a hard row in a solved program [N of thrust]; thrusts are clipped to their bounds.
-BOUND_SLIP = 1e-2
-
-
-@dataclass(slots=True)
-class AcceptedSolution:
-    """Thrusts within their bounds (n,), primal x, multipliers y, how they were found, and whether a row is active."""
-
-    thrusts: np.ndarray
-    x: np.ndarray
-    y: np.ndarray
-    outcome: Outcome
-    iterations: int
-    seconds: float
-    limited: bool
 
 
 class QpEngine:
@@ -54,7 +36,9 @@ class QpEngine:
 
     def __init__(self, problem: QpProblem, settings: SolverSettings, data: ProgramData) -> None:
         self.problem, self.settings, self.data = problem, settings, data
-        self.osqp, self.exact = OsqpSolver(problem, settings), ExactSolver(problem)
+        compiled = compiled_solver(problem, settings, data) if settings.backend == "compiled" else None
+        self.osqp: OsqpSolver | CompiledSolver = compiled or OsqpSolver(problem, settings)
+        self.exact = ExactSolver(problem)
         self._rotors = n = problem.model.rotors
         self._program = data.p, data.q, data.a, data.lower, data.upper
         self._lower, self._upper = data.lower[:n], data.upper[:n]
@@ -69,19 +53,26 @@ class QpEngine:
     def solve(self) -> AcceptedSolution | None:
         """Solve the program of this tick; None if neither solver has a solution."""
         self.conflict = ()
-        raw = self.osqp.solve(*self._program, initial=None if self._limited else self.data.unlimited)
-        if raw is None:
-            return None
-        outcome = self.accepts(raw)
-        if outcome is not None:
-            return self._accepted(raw.x, raw.y, outcome, raw)
+        if isinstance(self.osqp, CompiledSolver):
+            accepted, tried = self.osqp.solve()
+        else:
+            accepted, tried = self._interpreted(self.osqp)
+        if accepted is not None or tried is None:
+            return accepted
         exact = self.exact.solve(*self._program)
         if exact is not None:
             self.osqp.warm_start(*exact)
-            return self._accepted(*exact, Outcome.EXACT_FALLBACK, raw)
+            return self._accepted(*exact, Outcome.EXACT_FALLBACK, tried)
         self.conflict = conflicting_rows(self.problem, self.data)
         self.reset()
         return None
+
+    def _interpreted(self, solver: OsqpSolver) -> tuple[AcceptedSolution | None, Tried | None]:
+        raw = solver.solve(*self._program, initial=None if self._limited else self.data.unlimited)
+        if raw is None:
+            return None, None
+        tried, outcome = Tried(raw.iterations, raw.seconds), self.accepts(raw)
+        return None if outcome is None else self._accepted(raw.x, raw.y, outcome, tried), tried
 
     def accepts(self, raw: RawSolution) -> Outcome | None:
         """Acceptance test: status, finiteness, bounds, residuals; None if the answer fails it.
@@ -114,7 +105,7 @@ class QpEngine:
         data = self.data
         return float(np.abs(x + np.linalg.solve(data.hessian(), data.q + data.rows().T @ y)).max())
 
-    def _accepted(self, x: np.ndarray, y: np.ndarray, outcome: Outcome, raw: RawSolution) -> AcceptedSolution:
+    def _accepted(self, x: np.ndarray, y: np.ndarray, outcome: Outcome, tried: Tried) -> AcceptedSolution:
         thrusts = np.minimum(np.maximum(x[: self._rotors], self._lower), self._upper)
         self._limited = max(map(abs, y.tolist())) > ACTIVE_MULTIPLIER
-        return AcceptedSolution(thrusts, x, y, outcome, raw.iterations, raw.seconds, self._limited)
+        return AcceptedSolution(thrusts, x, y, outcome, *tried, self._limited)

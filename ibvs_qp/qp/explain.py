@@ -9,11 +9,11 @@ import numpy as np
 
 from ibvs_qp.command import ActiveLimit, TaskReport, TaskReports
 from ibvs_qp.config.errors import ConfigError
-from ibvs_qp.qp.accept import ACTIVE_MULTIPLIER
 from ibvs_qp.qp.evaluator import ProgramData, RecordedProgram
 from ibvs_qp.qp.exact import ExactSolver
 from ibvs_qp.qp.infeasible import conflicting_rows
 from ibvs_qp.qp.problem import QpProblem
+from ibvs_qp.qp.solution import ACTIVE_MULTIPLIER
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -55,7 +55,7 @@ def _library(function: ca.Function, command: list[str]) -> Path:
     """Shared library of the function, from the cache if it was translated before."""
     generator = ca.CodeGenerator(function.name())
     generator.add(function)
-    return shared_library(function.name(), generator.dump(), command, FLAGS)
+    return shared_library(function.name(), {f"{function.name()}.c": generator.dump()}, command, FLAGS)
 
 
 def _agree(function: ca.Function, other: ca.Function) -> bool:

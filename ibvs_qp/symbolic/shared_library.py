@@ -11,7 +11,7 @@ import logging
 import os
 import stat
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from ibvs_qp.config.errors import IbvsQpError
@@ -32,12 +32,12 @@ def cache_folder() -> Path:
     return Path(own) if own else (Path(base) if base else Path.home() / ".cache") / "ibvs_qp"
 
 
-def shared_library(name: str, code: str, command: list[str], flags: tuple[str, ...]) -> Path:
+def shared_library(name: str, sources: Mapping[str, str], command: list[str], flags: tuple[str, ...]) -> Path:
     """Shared library of some C code, from the cache if it was compiled before and is what was compiled.
 
     Args:
         name: First part of the file's name.
-        code: The C code.
+        sources: C files and headers by name, all compiled together.
         command: The compiler's command, see `ibvs_qp.symbolic.compiler`.
         flags: Its options.
 
@@ -47,7 +47,8 @@ def shared_library(name: str, code: str, command: list[str], flags: tuple[str, .
         subprocess.SubprocessError: When the compiler fails.
     """
     words = " ".join((*command, *flags)).encode()
-    key = _hash(b"\0".join((code.encode(), compiler_version(*command), words)))
+    content = "\0".join((*sources, *sources.values())).encode()
+    key = _hash(b"\0".join((content, compiler_version(*command), words)))
     folder = cache_folder()
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     if not _only_ours(folder, stat.S_ISDIR):
@@ -58,9 +59,11 @@ def shared_library(name: str, code: str, command: list[str], flags: tuple[str, .
         log.warning("%s is not what was compiled, or others can write it: compiled anew", library)
         library.unlink()
     with tempfile.TemporaryDirectory(dir=folder) as scratch:
-        source, made = Path(scratch) / f"{name}.c", Path(scratch) / f"{name}.so"
-        source.write_text(code)
-        run_compiler([*command, *flags, "-o", str(made), str(source), "-lm"])
+        made = Path(scratch) / f"{name}.so"
+        for file, code in sources.items():
+            (Path(scratch) / file).write_text(code)
+        units = sorted(str(Path(scratch) / file) for file in sources if file.endswith(".c"))
+        run_compiler([*command, *flags, f"-I{scratch}", "-o", str(made), *units, "-lm"])
         made.chmod(0o700)
         library = folder / f"{name}-{key}-{_hash(made.read_bytes())}.so"
         made.replace(library)  # at once: another process never loads half a file

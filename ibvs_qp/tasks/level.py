@@ -31,7 +31,7 @@ class LevelTask(Task):
 
     def targets(self, model: Model) -> ca.SX:
         """Roll and pitch accelerations [rad/s^2], (2,); softer in pitch while friction alone holds the tip."""
-        gains, (soft, _) = model.config.gains, pivot_stiffness(model.config)
+        gains, (soft, _) = model.gains, pivot_stiffness(model.config, model.gains)
         level = [1.0 - line.vertical for line in model.lines]
         stiffness = ca.vertcat(gains.attitude_kp, pivot_limited(model, gains.attitude_kp, soft, level))
         return -stiffness * model.attitude.tilt_error - gains.attitude_kd * model.attitude.tilt_rate_ahead

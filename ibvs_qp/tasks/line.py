@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from ibvs_qp.model.inputs import LINE_OUTPUTS, Line, clamp
+from ibvs_qp.model.inputs import LEAST_GAIN, LINE_OUTPUTS, Line, clamp
 from ibvs_qp.model.interaction_matrix import endpoint_line_row, symbolic_line_rows
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.rows import TaskRow
@@ -91,12 +91,12 @@ class LineTask(Task):
 
     def target(self, model: Model) -> ca.SX:
         """Image acceleration of the error [1/s^2]."""
-        gains, line = model.config.gains, line_state(model, self.index)
+        gains, line = model.gains, line_state(model, self.index)
         return -(gains.line_kp * line.error + gains.line_kd * line.rate + gains.line_ki * line.integral)
 
     def angle_target(self, model: Model) -> ca.SX:
         """Image acceleration of the angle [rad/s^2]."""
-        gains, line = model.config.gains, line_state(model, self.index)
+        gains, line = model.gains, line_state(model, self.index)
         return -(gains.theta_kp * line.angle_error + gains.theta_kd * line.angle_rate)
 
 
@@ -147,11 +147,9 @@ def _differentiated(model: Model, line: Line, error: ca.SX, rate: ca.SX) -> ca.S
 
 def _integral(model: Model, line: Line, error: ca.SX) -> ca.SX:
     """Integral of the bounded error; it stops while the line is absent, the tip stuck or a thrust limited."""
-    gain, name = model.config.gains.line_ki, f"line_{line.index}_integral"
+    gain, name = model.gains.line_ki, f"line_{line.index}_integral"
     integral = model.signals.state(name)
-    if gain <= 0.0:
-        return integral
-    bound = INTEGRAL_BOUND / gain
+    bound = INTEGRAL_BOUND / ca.fmax(gain, LEAST_GAIN)
     moved = clamp(integral + model.body.dt * error * line.confidence, -bound, bound)
     integrate = ca.logic_and(line.present, model.integrate_in_plane)
     return model.signals.remember(name, ca.if_else(integrate, moved, integral))

@@ -29,7 +29,7 @@ class PaperLineTask(LineTask):
 
     def target(self, model: Model) -> ca.SX:
         """Image acceleration of rho [1/s^2]."""
-        gains, line = model.config.gains, line_state(model, self.index)
+        gains, line = model.gains, line_state(model, self.index)
         return -(gains.line_kp * line.rho_error + gains.line_kd * line.rho_rate + gains.line_ki * line.integral)
 
     def rows(self, model: Model) -> list[TaskRow]:

@@ -6,15 +6,13 @@ import casadi as ca
 
 from ibvs_qp.config import VehicleParams
 from ibvs_qp.model.feedforward import moment_lag
-from ibvs_qp.model.inputs import Contact, clamp
+from ibvs_qp.model.inputs import LEAST_GAIN, Contact, clamp
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.rows import TaskRow
 from ibvs_qp.tasks.task import Task
 
 #: Bound of the force integral as a force [N].
 FORCE_INTEGRAL_BOUND = 8.0
-#: Least gain by which it is divided [1/s].
-LEAST_GAIN = 1e-6
 
 
 class PushTask(Task):
@@ -42,7 +40,7 @@ class PushTask(Task):
 
     def force(self, model: Model) -> ca.SX:
         """The force law [N]."""
-        gains, contact = model.config.gains, model.contact
+        gains, contact = model.gains, model.contact
         reference = model.push_reference * contact.ramp
         error = reference - contact.push
         # On stiff walls the loop gain rises with the stiffness; the proportional gain falls with it.
@@ -65,7 +63,7 @@ class PushTask(Task):
         coming = model.contact_weight * reference
         expected = ca.if_else(pressing, expected + late * (coming - expected), 0.0)
         error = signals.remember("push_expected", expected) - contact.push
-        bound = FORCE_INTEGRAL_BOUND / max(model.config.gains.force_kfi, LEAST_GAIN)
+        bound = FORCE_INTEGRAL_BOUND / ca.fmax(model.gains.force_kfi, LEAST_GAIN)
         moving = ca.logic_or(model.integrate, error * old < 0.0)
         step = ca.if_else(moving, model.body.dt, 0.0) * model.contact_weight
         moved = clamp(old + step * error, -bound, bound)
@@ -76,7 +74,7 @@ class PushTask(Task):
         config, contact = model.config, model.contact
         if not config.impedance:
             return ca.SX(0.0)
-        gains = config.gains
+        gains = model.gains
         damping = _quiet(model) * gains.force_ksd * predicted_rate(config.vehicle, contact)
         force = gains.force_ksp * contact.distance + damping
         return ca.if_else(contact.known, force, 0.0)

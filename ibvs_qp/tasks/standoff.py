@@ -65,7 +65,7 @@ class StandoffTask(Task):
 
     def force(self, model: Model) -> ca.SX:
         """The approach law [N]."""
-        gains, settings, motion = model.config.gains, model.config.contact, approach(model)
+        gains, settings, motion = model.gains, model.config.contact, approach(model)
         landing = ca.logic_and(model.target.press, model.contact.distance < settings.touch_distance_m)
         damping = model.config.vehicle.mass_kg * ca.if_else(landing, settings.landing_kd, gains.standoff_kd)
         return ca.if_else(model.contact.known, damping * motion.speed_error + motion.search, 0.0)
@@ -75,7 +75,7 @@ def _lost_force(model: Model) -> ca.SX:
     """Force along n of a vehicle that lost a rotor and turns: its centre of mass keeps the distance [N]."""
     tip, contact, target = ca.DM(model.config.vehicle.tip_position_m), model.contact, model.target
     excess = contact.distance + ca.dot(contact.normal, tip) - ca.norm_2(tip) - target.standoff
-    speed = clamp(model.config.gains.standoff_kp * excess, -LOST_SPEED, LOST_SPEED)
+    speed = clamp(model.gains.standoff_kp * excess, -LOST_SPEED, LOST_SPEED)
     error = speed - ca.dot(contact.normal, model.body.velocity)
     acceleration = clamp(LOST_GAIN * error, -LOST_BOUND, LOST_BOUND)
     return ca.if_else(contact.known, model.config.vehicle.mass_kg * acceleration, 0.0)
@@ -87,7 +87,7 @@ def approach(model: Model) -> Approach:
 
 
 def _approach(model: Model) -> Approach:
-    gains, contact = model.config.gains, model.contact
+    gains, contact = model.gains, model.contact
     error = contact.distance - ca.if_else(model.target.press, TOUCH_TARGET, model.target.standoff)
     allowed = approach_speed(model)
     settings = model.config.contact

@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as ca
 
 from ibvs_qp.config import Weights
-from ibvs_qp.model.inputs import clamp
+from ibvs_qp.model.inputs import LEAST_GAIN, clamp
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.rows import TaskRow
 from ibvs_qp.tasks.line import free_directions
@@ -15,8 +15,6 @@ from ibvs_qp.tasks.task import Task
 FAULTY_WEIGHT = 0.02
 #: Bound of the velocity integral as an acceleration [m/s^2].
 VELOCITY_INTEGRAL_BOUND = 0.8
-#: Least gain by which it is divided [1/s^2].
-LEAST_GAIN = 1e-6
 
 
 class VelocityTask(Task):
@@ -61,8 +59,8 @@ def velocity_command(model: Model) -> ca.SX:
 
 
 def _commands(model: Model) -> list[ca.SX]:
-    gains, body, free = model.config.gains, model.body, free_directions(model)
-    bound = VELOCITY_INTEGRAL_BOUND / max(gains.velocity_ki, LEAST_GAIN)
+    gains, body, free = model.gains, model.body, free_directions(model)
+    bound = VELOCITY_INTEGRAL_BOUND / ca.fmax(gains.velocity_ki, LEAST_GAIN)
     axes = ((model.wall.right, model.target.velocity_right), (model.wall.down, model.target.velocity_down))
     commands = []
     for axis, (direction, target) in enumerate(axes):

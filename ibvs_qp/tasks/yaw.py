@@ -38,7 +38,7 @@ class YawTask(Task):
 
     def target(self, model: Model) -> ca.SX:
         """Yaw acceleration [rad/s^2]; softer while friction alone holds the tip sideways."""
-        gains, (_, soft) = model.config.gains, pivot_stiffness(model.config)
+        gains, (_, soft) = model.gains, pivot_stiffness(model.config, model.gains)
         stiffness = pivot_limited(model, gains.yaw_kp, soft, [line.vertical for line in model.lines])
         damping = -gains.yaw_kd * model.rate_ahead[2]
         facing = -stiffness * model.attitude.yaw + damping

@@ -97,10 +97,12 @@ class FieldTable:
         rows: The rows.
 
     Attributes:
+        rows: The rows.
         fallbacks: Entries in force until an input was accepted, by name.
     """
 
     def __init__(self, *rows: Field) -> None:
+        self.rows = rows
         self._rows = [(row, row.name, (row.size or -1,), row.accepted_length) for row in rows]
         self._values = attrgetter(*(row.name for row in rows))
         self.fallbacks: Entries = {row.name: list(row.fallback) or None for row in rows}

@@ -54,7 +54,7 @@ def bench_loop(seed: int, progress: Callable[[str], None]) -> Bench:
 
 def stage_times(seed: int, features: str) -> dict[str, np.ndarray]:
     """Time of every stage of `STAGES` at every tick of a short flight after its first second [us], (N,) each."""
-    scene, options = Scene(), FlightOptions(seed=seed, features=features, video=False, machine_code=True)
+    scene, options = Scene(), FlightOptions(seed=seed, features=features, video=False, compiled=True)
     scene = dataclasses.replace(scene, paint=dataclasses.replace(scene.paint, rows=1, stroke_m=STROKE_M))
     config, job = pilot_config(scene, options), PaintJob()
     pilot, world = make_pilot(scene, options, config, job), World(scene, options, config)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import gc
 from collections.abc import Callable
 
@@ -42,9 +41,9 @@ def bench_qp(count: int, seed: int, sample: int, progress: Callable[[str], None]
     few = ticks[: max(len(ticks) // 5, WARM_UP)]
     progress("the controller's step")
     config = ControllerConfig()
-    compiled = dataclasses.replace(config, machine_code=True)
+    compiled = config.on_backend("compiled")
     step, iterations, outcomes = _steps(HybridController(compiled), ticks, "step")
-    progress("the step without machine code")
+    progress("the step in Python")
     interpreted, _, _ = _steps(HybridController(config), few, "step_interpreted")
     progress("rivals")
     rivals, differences = _rivals(HybridController(config), ticks, sample)

@@ -1,51 +1,41 @@
-"""Time of every stage of a tick: pack, evaluate, update of OSQP's data, solve, unpack."""
+"""Time of every stage of a tick: check and pack, evaluate the equations, solve the program, explain."""
 
 from __future__ import annotations
 
 import time
-from typing import Any
 
 import numpy as np
 
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.controller import HybridController
 from sim.bench.ticks import Tick, by_flight
-from sim.bench.timing import Stopwatch
 
-
-class _TimedWorkspace:
-    """OSQP's extension object, which has no writable attributes, with its calls timed."""
-
-    def __init__(self, inner: Any, watch: Stopwatch) -> None:
-        self._inner = inner
-        self.update_data_vec = watch.around("update", inner.update_data_vec)
-        self.update_data_mat = watch.around("update", inner.update_data_mat)
-        self.solve = watch.around("solve", inner.solve)
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._inner, name)
+#: Stages of a tick, in their order.
+STAGES = ("pack", "evaluate", "solve", "explain")
 
 
 def stage_medians(config: ControllerConfig, ticks: list[Tick]) -> dict[str, float]:
     """Median time of every stage of a step [us]; it includes the time of the measurement itself."""
-    controller, watch = HybridController(config), Stopwatch()
-    engine, step = controller.engine, controller.setpoints.step
-    step.evaluate = watch.around("evaluate", step.evaluate)
-    engine.solve = watch.around("engine", engine.solve)  # type: ignore[method-assign]
-    table: dict[str, list[float]] = {name: [] for name in ("pack", "evaluate", "update", "solve", "unpack")}
+    controller = HybridController(config)
+    engine, step, times = controller.engine, controller.setpoints.step, []
+    evaluate, solve = step.evaluate, engine.solve
+
+    def timed_evaluate() -> None:
+        marks.append(time.perf_counter_ns())
+        evaluate()
+        marks.append(time.perf_counter_ns())
+
+    def timed_solve():
+        found = solve()
+        marks.append(time.perf_counter_ns())
+        return found
+
+    step.evaluate = timed_evaluate
+    engine.solve = timed_solve  # type: ignore[method-assign]
     for measurement, reference in by_flight(controller, ticks):
-        inner = getattr(engine.osqp, "_inner", None)
-        if inner is not None and not isinstance(inner, _TimedWorkspace):  # a reset makes a new workspace
-            engine.osqp._inner = _TimedWorkspace(inner, watch)
-        watch.spent = {}
-        start = time.perf_counter_ns()
+        marks = [time.perf_counter_ns()]
         controller.step(measurement, reference)
-        total, spent = 1e-3 * (time.perf_counter_ns() - start), watch.spent
-        if "solve" not in spent:  # the first solve of a workspace
-            continue
-        stages = {name: spent[name] for name in ("evaluate", "update", "solve")}
-        stages["unpack"] = spent["engine"] - spent["update"] - spent["solve"]
-        stages["pack"] = total - spent["engine"] - spent["evaluate"]
-        for name, duration in stages.items():
-            table[name].append(duration)
-    return {name: float(np.median(times)) for name, times in table.items() if times}
+        marks.append(time.perf_counter_ns())
+        if len(marks) == len(STAGES) + 1:  # not a hover
+            times.append(np.diff(marks))
+    return dict(zip(STAGES, (1e-3 * np.median(times, axis=0)).tolist(), strict=True))

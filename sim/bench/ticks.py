@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from allocation.geometry import TAROT_T960
 from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import Measurement, Reference
+from ibvs_qp.pilot import PilotConfig
 from sim.faults.fault import Fault
 from sim.faults.rotors import Derate
 from sim.faults.schedule import FaultSchedule
@@ -22,6 +23,9 @@ LONGEST_FLIGHT = 30_000
 
 #: Commanded push beyond reach [N].
 HARD_PUSH_N = 35.0
+
+#: Length of a press [s].
+PRESS_S = 10.0
 
 Tick = tuple[Measurement, Reference]
 
@@ -86,3 +90,15 @@ def flown_ticks(scene: Scene, seed: int, job: Job, faults: tuple[Fault, ...], re
         world.act(pilot.step(world.sense()).thrusts)
         if pilot.measurement is not None:
             yield pilot.measurement, pilot.reference
+
+
+def press_ticks(config: PilotConfig, count: int) -> list[Tick]:
+    """Ticks of a press at a wall nearby, with a configuration's vehicle and law."""
+    scene, options = Scene(), FlightOptions(features="geometric", video=False)
+    pilot, world = make_pilot(scene, options, config, PressJob(hold_s=PRESS_S)), World(scene, options, config)
+    ticks: list[Tick] = []
+    while len(ticks) < count and not (pilot.painter.finished or world.plant.over):
+        world.act(pilot.step(world.sense()).thrusts)
+        if pilot.measurement is not None:
+            ticks.append((pilot.measurement, pilot.reference))
+    return ticks

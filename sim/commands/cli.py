@@ -136,6 +136,7 @@ def _commands() -> dict[str, type[Command]]:
     from sim.commands.detect import Detect
     from sim.commands.experiment import ExperimentCommand
     from sim.commands.explain import Explain
+    from sim.commands.export_c import ExportC
     from sim.commands.faults import Faults
     from sim.commands.paint import Paint
     from sim.commands.replay import ReplayCommand
@@ -154,6 +155,7 @@ def _commands() -> dict[str, type[Command]]:
         "tune": Tune,
         "faults": Faults,
         "vehicle": Vehicle,
+        "export-c": ExportC,
         "bridge": BridgeCommand,
         "replay": ReplayCommand,
     }

@@ -125,7 +125,7 @@ class Paint:
             image_size=size,
             preset=str(preset) if preset else None,
             video=not self.no_video,
-            machine_code=True,
+            compiled=True,
             view=self.view,
         )
         pilot_config(scene, options)  # raises on an unusable preset before anything is shown or written

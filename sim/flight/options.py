@@ -16,10 +16,9 @@ from sim.world.scene import Scene
 class FlightOptions:
     """How to fly a scene; the defaults are the main job.
 
-    With `machine_code` the C compiler, where there is one, compiles the controller's tick: the same flight to the bit,
-    faster. A `rival` is a control law of `sim.rivals`, flown on the law's preset instead of the law itself. With a
-    `journal` the rows of the log are written to that folder while the flight goes on, with `mcap` an MCAP log,
-    too.
+    With `compiled` the controller runs as C code where there is a compiler: the same flight to the bit, faster. A
+    `rival` is a control law of `sim.rivals`, flown on the law's preset instead of the law itself. With a `journal` the
+    rows of the log are written to that folder while the flight goes on, with `mcap` an MCAP log, too.
     """
 
     law: str = "qp"
@@ -31,7 +30,7 @@ class FlightOptions:
     image_size: tuple[int, int] | None = None
     preset: str | None = None
     video: bool = True
-    machine_code: bool = False
+    compiled: bool = False
     view: bool = False
     journal: str = ""
     mcap: bool = False
@@ -71,8 +70,8 @@ def pilot_config(scene: Scene, options: FlightOptions, config: PilotConfig | Non
     )
     vision = dataclasses.replace(config.vision, paint_color=paint.color, brush_width_m=paint.brush_width_m)
     controller = config.controller
-    if options.machine_code:
-        controller = dataclasses.replace(controller, machine_code=True)
+    if options.compiled:
+        controller = controller.on_backend("compiled")
     return dataclasses.replace(
         config,
         controller=controller,

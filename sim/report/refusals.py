@@ -19,6 +19,7 @@ _BLOCK = re.compile(r"<!-- (?P<places>[\w/. ]+): generated -->\n.*?<!-- end of t
 _IN_FLIGHT = (
     "ibvs_qp/assured.py ibvs_qp/bridge/bridge.py ibvs_qp/bridge/gate.py ibvs_qp/checked_law.py ibvs_qp/controller.py "
     "ibvs_qp/estimation ibvs_qp/symbolic/compiler.py ibvs_qp/symbolic/machine_code.py ibvs_qp/model/reporting.py "
+    "ibvs_qp/qp/compiled.py "
     "ibvs_qp/symbolic/shared_library.py ibvs_qp/painting ibvs_qp/pilot ibvs_qp/qp/infeasible.py ibvs_qp/safety "
     "ibvs_qp/validation ibvs_qp/vision"
 ).split()

@@ -7,9 +7,10 @@ from scipy import sparse
 
 from ibvs_qp.command import Outcome
 from ibvs_qp.config import SolverSettings
-from ibvs_qp.qp.accept import ACTIVE_MULTIPLIER, AcceptedSolution, QpEngine
+from ibvs_qp.qp.accept import QpEngine
 from ibvs_qp.qp.evaluator import ProgramData
 from ibvs_qp.qp.problem import QpProblem
+from ibvs_qp.qp.solution import ACTIVE_MULTIPLIER, AcceptedSolution
 from sim.rivals.priorities import PriorityProblem
 from sim.rivals.solver import BackedSolver
 

@@ -47,7 +47,7 @@ def write_webp(frames: Iterable[np.ndarray], file: Path) -> None:
 
 def main(file: Path) -> None:
     """Fly the default scene with seed 0 and write its animation."""
-    scene, options = in_world(Scene(), DEFAULT_WORLD), FlightOptions(machine_code=True)
+    scene, options = in_world(Scene(), DEFAULT_WORLD), FlightOptions(compiled=True)
     write_webp(film_frames({"qp": fly(scene, options)}, RATE_HZ / SPEED_UP), file)
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ibvs_qp.controller import HybridController
-from ibvs_qp.qp.accept import ACTIVE_MULTIPLIER, AcceptedSolution
 from ibvs_qp.qp.evaluator import ProgramData
+from ibvs_qp.qp.solution import ACTIVE_MULTIPLIER, AcceptedSolution
 
 #: Largest thrust difference to the exact solution on limited ticks and on all others [N].
 LIMITED_N, FREE_N = 2e-2, 1e-3

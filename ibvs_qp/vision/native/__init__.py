@@ -48,7 +48,7 @@ def native() -> ctypes.CDLL | None:
     try:
         folder = Path(__file__).parent
         code = "".join((folder / name).read_text() for name in FILES)
-        return ctypes.CDLL(str(shared_library("vision", code, command, (*FLAGS, *wide_registers()))))
+        return ctypes.CDLL(str(shared_library("vision", {"vision.c": code}, command, (*FLAGS, *wide_registers()))))
     except (OSError, subprocess.SubprocessError) as error:
         log.warning("vision runs on numpy: %s", error)
         return None

@@ -199,6 +199,15 @@ def test_ramp_rises_from_touch_and_can_be_switched_off() -> None:
     assert bare.state.ramp == 1.0
 
 
+def test_a_stamp_far_ahead_does_not_end_the_ramp() -> None:
+    press = Press()
+    press.feel(3.0, 0.0, 0.1)
+    ramp = press.state.ramp
+    press.tick += round(10.0 / 0.004)  # a clock that jumps by ten seconds
+    press.feel(3.0, 0.0, 0.004)
+    assert press.state.in_contact and ramp < press.state.ramp < 0.5
+
+
 def test_lambda_falls_from_one_to_zero_with_depth() -> None:
     config = ControllerConfig(touch_ramp=False)
     settings, weights = config.contact, []

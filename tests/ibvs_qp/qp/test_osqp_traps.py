@@ -40,8 +40,8 @@ from ibvs_qp.config import ControllerConfig, LimitSettings, SolverSettings
 from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import Reference
 from ibvs_qp.model.thrust_window import thrust_window
-from ibvs_qp.qp.accept import BOUND_SLIP
 from ibvs_qp.qp.osqp import MAX_ITERATIONS, SOLVED, SOLVED_INACCURATE, OsqpSolver, RawSolution
+from ibvs_qp.qp.solution import BOUND_SLIP
 
 #: What OSQP 1.1 writes into x when it found no solution: its NaN pattern read as a number.
 GARBAGE = 2143289344.0

@@ -29,7 +29,7 @@ def test_bench_qp_as_json(capsys: pytest.CaptureFixture[str]) -> None:
         "casadi_daqp",
     } <= set(rows)
     assert set(rows["step"]) == {"name", "size", "p50_us", "p90_us", "p99_us", "p999_us", "max_us", "misses"}
-    assert set(table["stages_us"]) == {"pack", "evaluate", "update", "solve", "unpack"}
+    assert set(table["stages_us"]) == {"pack", "evaluate", "solve", "explain"}
     assert table["ratios"]["qpsolvers_osqp"] > 1.0
     assert sum(table["outcomes"].values()) == table["ticks"] == 1200
     assert table["osqp_iterates_share"] == 1.0 and "0" not in table["iterations"]

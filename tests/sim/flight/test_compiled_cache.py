@@ -199,8 +199,8 @@ def test_any_command_falls_back(
 
 def test_with_a_broken_command_a_flight_begins_in_a_new_process(tmp_path: Path) -> None:
     program = (
-        "from ibvs_qp import ControllerConfig, HybridController; import dataclasses; "
-        "HybridController(dataclasses.replace(ControllerConfig(), machine_code=True)); print('ready')"
+        "from ibvs_qp import ControllerConfig, HybridController; "
+        "HybridController(ControllerConfig().on_backend('compiled')); print('ready')"
     )
     environment = {**os.environ, "CC": "cc '"}
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, env=environment)

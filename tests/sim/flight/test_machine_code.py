@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-from dataclasses import replace
 from pathlib import Path
 
 import casadi as ca
@@ -40,7 +39,7 @@ def small() -> ca.Function:
 def test_a_flight_on_machine_code_is_the_same_flight_to_the_bit(law: type, own_cache: Path) -> None:
     thrusts = []
     for compiled in (False, True):
-        controller = law(replace(ControllerConfig(), machine_code=compiled))
+        controller = law(ControllerConfig().on_backend("compiled" if compiled else "python"))
         vehicle = SmallVehicle(controller.config)
         for _ in range(300):
             command = controller.step(vehicle.measure(), good_reference())
@@ -64,7 +63,7 @@ def test_without_a_compiler_the_function_itself_serves(monkeypatch: pytest.Monke
     monkeypatch.setenv("CC", "no-such-compiler")
     function = small()
     assert machine_code(function) is function
-    controller = HybridController(replace(ControllerConfig(), machine_code=True))
+    controller = HybridController(ControllerConfig().on_backend("compiled"))
     assert controller.step(SmallVehicle(controller.config).measure(), good_reference()).outcome == "solved"
 
 

@@ -17,7 +17,7 @@ from sim.flight.surroundings import World
 from sim.world.errors import world_errors
 
 FLU = np.array([1.0, -1.0, -1.0])
-OPTIONS = FlightOptions(features="geometric", video=False, machine_code=True)
+OPTIONS = FlightOptions(features="geometric", video=False, compiled=True)
 
 
 def found(ticks: int, seen_as: Callable[[SensorFrame], SensorFrame], enabled: bool = True) -> tuple[Pilot, list[str]]:

@@ -20,7 +20,7 @@ from sim.world.scene import Scene
 def flown(errors: WorldErrors, law: str = "qp", seed: int = 0, stroke_m: float = 0.5, **scene: Any) -> Trace:
     """A paint job on geometric features in a world."""
     paint = dataclasses.replace(Scene().paint, stroke_m=stroke_m)
-    options = FlightOptions(law=law, seed=seed, features="geometric", video=False, machine_code=True)
+    options = FlightOptions(law=law, seed=seed, features="geometric", video=False, compiled=True)
     return fly(Scene(paint=paint, errors=errors, **scene), options)
 
 

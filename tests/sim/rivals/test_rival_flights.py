@@ -18,7 +18,7 @@ from sim.rivals import RIVALS, rival_controller
 @pytest.mark.slow
 @pytest.mark.parametrize("rival", RIVALS)
 def test_a_rival_paints(rival):
-    options = FlightOptions(rival=rival, features="geometric", video=False, machine_code=True)
+    options = FlightOptions(rival=rival, features="geometric", video=False, compiled=True)
     trace = fly(short_job(0.4, rows=1), options)
     assert trace.completed, trace.reason
     figures = compute_metrics(trace)

@@ -1,0 +1,1 @@
+"""The controller as a self-contained C library."""

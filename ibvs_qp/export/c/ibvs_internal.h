@@ -1,0 +1,62 @@
+/* What the files of the library share. */
+#ifndef IBVS_INTERNAL_H
+#define IBVS_INTERNAL_H
+
+#include <stddef.h>
+#include <string.h>
+
+#include "ibvs_math.h"
+#include "ibvs_qp.h"
+
+/* One row of a table of bounds: entries of a vector within [low, high]. */
+typedef struct {
+  size_t value, flag;   /* offsets in the structure; flag: NO_FLAG where the entry is not optional */
+  uint32_t size;
+  ibvs_real low, high;
+  bool unit_length;     /* the length must be 1 instead */
+  bool held;            /* the last accepted value stays in force where one is refused */
+  uint32_t rejected;    /* bit of ibvs_command.rejected */
+} ibvs_field;
+#define IBVS_NO_FLAG ((size_t)-1)
+
+/* Generated (ibvs_tables.c). */
+extern const ibvs_field ibvs_measurement_fields[IBVS_MEASUREMENT_FIELDS];
+extern const ibvs_field ibvs_reference_fields[IBVS_REFERENCE_FIELDS];
+extern const ibvs_measurement ibvs_first_measurement;
+extern const ibvs_reference ibvs_first_reference;
+extern const ibvs_gains ibvs_default_gains, ibvs_least_gains, ibvs_largest_gains;
+extern const ibvs_real ibvs_start_states[IBVS_STATES];
+extern const ibvs_real ibvs_thrust_floor[IBVS_ROTORS], ibvs_thrust_ceiling[IBVS_ROTORS];
+extern const ibvs_real ibvs_effectiveness[6][IBVS_ROTORS], ibvs_inverse[IBVS_ROTORS][6];
+extern const ibvs_real ibvs_mass_matrix[6][6], ibvs_allocation_weights[6];
+
+/* ibvs_tick.c, generated */
+void ibvs_tick(const ibvs_real *const *arguments, ibvs_real *const *results);
+
+/* clock.c */
+void ibvs_clock_reset(ibvs_controller *c);
+bool ibvs_clock_accept(ibvs_controller *c, int64_t stamp_ns);
+bool ibvs_sample_time(const ibvs_controller *c, int64_t stamp_ns, int64_t *time_ns);
+
+/* validate.c */
+bool ibvs_check_measurement(ibvs_controller *c, const ibvs_measurement *given, ibvs_measurement *own,
+                            uint32_t *rejected);
+bool ibvs_check_reference(ibvs_controller *c, const ibvs_reference *given);
+bool ibvs_check_gains(ibvs_controller *c);
+
+/* pack.c */
+void ibvs_pack(ibvs_controller *c, const ibvs_measurement *m);
+
+/* fallback.c */
+void ibvs_hold_thrusts(const ibvs_controller *c, ibvs_real thrusts[IBVS_ROTORS]);
+void ibvs_analytic_thrusts(const ibvs_controller *c, ibvs_real thrusts[IBVS_ROTORS]);
+
+/* pseudo_inverse.c */
+void ibvs_apply_pseudo_inverse(const ibvs_real *rows, uint32_t count, ibvs_real *values, ibvs_real solution[6]);
+
+/* allocate.c */
+void ibvs_allocate(const ibvs_real free[IBVS_ROTORS], const ibvs_real *lower, const ibvs_real *upper,
+                   ibvs_real thrusts[IBVS_ROTORS]);
+void ibvs_wrench(const ibvs_real thrusts[IBVS_ROTORS], ibvs_real wrench[6]);
+
+#endif

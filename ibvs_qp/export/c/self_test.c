@@ -1,0 +1,151 @@
+/* Replays the recorded flight in two instances, then flies it again with broken inputs.
+ *
+ * self_test [COUNT]: so many ticks with broken inputs, 20,000 without. Returns 0 where all holds. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "ibvs_internal.h"
+#include "ibvs_recorded_ticks.h"
+
+#define DEFAULT_BROKEN 20000
+#define ROUNDING ((ibvs_real)1e-4) /* of the rate limit [N] */
+
+static ibvs_controller one, other;
+static uint64_t seed = UINT64_C(0x9E3779B97F4A7C15);
+
+static uint32_t below(uint32_t end) { /* xorshift */
+  seed ^= seed << 13;
+  seed ^= seed >> 7;
+  seed ^= seed << 17;
+  return (uint32_t)(seed >> 33) % end;
+}
+
+/* Largest difference of the thrusts [N]; the second instance is reset half way and must not matter. */
+static double replay(void) {
+  ibvs_command command, second;
+  double largest = 0;
+  ibvs_init(&one);
+  ibvs_init(&other);
+  for (uint32_t tick = 0; tick < IBVS_RECORDED_TICKS; ++tick) {
+    ibvs_step(&one, &ibvs_recorded_measurements[tick], &ibvs_recorded_references[tick], &command);
+    if (tick == IBVS_RECORDED_TICKS / 2) {
+      ibvs_reset(&other);
+    }
+    ibvs_step(&other, &ibvs_recorded_measurements[tick], &ibvs_recorded_references[tick], &second);
+    for (uint32_t i = 0; i < IBVS_ROTORS; ++i) {
+      largest = fmax(largest, fabs((double)(command.thrusts[i] - ibvs_recorded_thrusts[tick][i])));
+    }
+  }
+  return largest;
+}
+
+static ibvs_real broken_number(ibvs_real value) {
+  const ibvs_real numbers[] = {(ibvs_real)NAN, (ibvs_real)INFINITY, -(ibvs_real)INFINITY, (ibvs_real)1e30,
+                               (ibvs_real)-1e30, 0, (ibvs_real)1e-40, -value, value * 1000, value + 1};
+  return numbers[below(sizeof numbers / sizeof numbers[0])];
+}
+
+static int64_t broken_stamp(int64_t value) {
+  const int64_t stamps[] = {0, -1, INT64_MIN, INT64_MAX, IBVS_STAMP_END - 1};
+  const int64_t steps[] = {500000000, -500000000, INT64_C(5000000000), 1, -1};
+  const uint32_t choice = below(10);
+  if (choice < 5) {
+    return stamps[choice];
+  }
+  return value > -IBVS_STAMP_END && value < IBVS_STAMP_END ? value + steps[choice - 5] : 0;
+}
+
+static void break_entries(ibvs_real *entries, uint32_t count) {
+  const uint32_t place = below(count);
+  entries[place] = broken_number(entries[place]);
+}
+
+static void break_measurement(ibvs_measurement *m) {
+  switch (below(16)) {
+    case 0: m->stamp_ns = broken_stamp(m->stamp_ns); break;
+    case 1: break_entries(m->attitude, 4); break;
+    case 2: break_entries(m->angular_velocity, 3); break;
+    case 3: break_entries(m->specific_force, 3); break;
+    case 4: break_entries(m->contact_wrench, 6); break;
+    case 5: m->wrench_stamp_ns = broken_stamp(m->wrench_stamp_ns); break;
+    case 6: break_entries(m->velocity, 3); break;
+    case 7: m->velocity_stamp_ns = broken_stamp(m->velocity_stamp_ns); m->has_velocity_stamp = true; break;
+    case 8: break_entries(m->plane, 4); break;
+    case 9: m->plane_stamp_ns = broken_stamp(m->plane_stamp_ns); break;
+    case 10: m->has_thrust_max = true; break_entries(m->thrust_max, IBVS_ROTORS); break;
+    case 11: m->has_thrust_min = true; break_entries(m->thrust_min, IBVS_ROTORS); break;
+    case 12: m->line_count = below(3) == 0 ? UINT32_MAX : below(IBVS_MOST_LINES + 2); break;
+    case 13: m->lines[0].rho = broken_number(m->lines[0].rho); break;
+    case 14: m->lines[0].stamp_ns = broken_stamp(m->lines[0].stamp_ns); break;
+    default: m->has_specific_force = m->has_velocity = m->has_plane = false; break;
+  }
+}
+
+static void break_reference(ibvs_reference *r) {
+  switch (below(6)) {
+    case 0: r->push_force = broken_number(r->push_force); break;
+    case 1: r->standoff = broken_number(r->standoff); break;
+    case 2: break_entries(r->velocity, 2); break;
+    case 3: break_entries(r->tilt, 2); break;
+    case 4: r->line_count = below(2) == 0 ? UINT32_MAX : below(IBVS_LINES + 1); break;
+    default: r->lines[0].theta = broken_number(r->lines[0].theta); break;
+  }
+}
+
+/* Whether the thrusts are finite, within their limits and within the rate limit. */
+static bool sound(const ibvs_command *command, const ibvs_real *before) {
+  for (uint32_t i = 0; i < IBVS_ROTORS; ++i) {
+    const ibvs_real thrust = command->thrusts[i];
+    if (!(thrust >= ibvs_thrust_floor[i] && thrust <= ibvs_thrust_ceiling[i])) {
+      return false;
+    }
+    if (before != NULL && !(r_fabs(thrust - before[i]) <= IBVS_RATE_STEP + ROUNDING)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+static uint32_t fly_broken(uint32_t count) {
+  ibvs_command command;
+  ibvs_real before[IBVS_ROTORS];
+  uint32_t unsound = 0;
+  bool commanded = false;
+  for (uint32_t k = 0; k < count; ++k) {
+    const uint32_t tick = k % IBVS_RECORDED_TICKS;
+    if (tick == 0) {
+      ibvs_reset(&one);
+      commanded = false;
+    }
+    ibvs_measurement m = ibvs_recorded_measurements[tick];
+    ibvs_reference r = ibvs_recorded_references[tick];
+    while (below(3) != 0) {
+      break_measurement(&m);
+    }
+    if (below(3) == 0) {
+      break_reference(&r);
+    }
+    if (below(50) == 0) {
+      one.gains.attitude_kp = broken_number(one.gains.attitude_kp);
+    }
+    ibvs_step(&one, &m, &r, &command);
+    unsound += sound(&command, commanded ? before : NULL) ? 0 : 1;
+    memcpy(before, command.thrusts, sizeof before);
+    commanded = true;
+  }
+  return unsound;
+}
+
+int main(int count, char **words) {
+  const double largest = replay();
+  const bool agrees = largest <= (double)IBVS_RECORDED_TOLERANCE;
+  const uint32_t broken = count > 1 ? (uint32_t)strtoul(words[1], NULL, 10) : DEFAULT_BROKEN;
+  const uint32_t unsound = fly_broken(broken);
+  printf("%s: %d recorded ticks, largest difference %.3g N of %.3g N\n", agrees ? "passed" : "FAILED",
+         IBVS_RECORDED_TICKS, largest, (double)IBVS_RECORDED_TOLERANCE);
+  printf("%s: %u ticks with broken inputs, %u unsound commands\n", unsound == 0 ? "passed" : "FAILED",
+         (unsigned)broken, (unsigned)unsound);
+  return agrees && unsound == 0 ? 0 : 1;
+}

@@ -1,0 +1,171 @@
+/* Every input is checked; a refused one is replaced by its last accepted value. See ibvs_qp.validation. */
+#include "ibvs_internal.h"
+
+static ibvs_real *entries(void *structure, const ibvs_field *field) {
+  return (ibvs_real *)(void *)((char *)structure + field->value);
+}
+
+static const ibvs_real *const_entries(const void *structure, const ibvs_field *field) {
+  return (const ibvs_real *)(const void *)((const char *)structure + field->value);
+}
+
+static bool *flag_of(void *structure, const ibvs_field *field) {
+  return (bool *)((char *)structure + field->flag);
+}
+
+static bool within(const ibvs_real *values, const ibvs_field *field) {
+  if (field->unit_length) {
+    ibvs_real square = 0;
+    for (uint32_t i = 0; i < field->size; ++i) {
+      square += values[i] * values[i];
+    }
+    return r_fabs(square - 1) <= IBVS_UNIT_TOLERANCE;
+  }
+  for (uint32_t i = 0; i < field->size; ++i) {
+    if (!(values[i] >= field->low && values[i] <= field->high)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+/* Entries in force: accepted, or the last ones where they are held, or none. */
+static void check_fields(const ibvs_controller *c, ibvs_measurement *own, uint32_t *rejected) {
+  for (uint32_t i = 0; i < IBVS_MEASUREMENT_FIELDS; ++i) {
+    const ibvs_field *field = &ibvs_measurement_fields[i];
+    const bool optional = field->flag != IBVS_NO_FLAG;
+    if ((optional && !*flag_of(own, field)) || within(entries(own, field), field)) {
+      continue;
+    }
+    *rejected |= field->rejected;
+    memcpy(entries(own, field), const_entries(&c->last, field), field->size * sizeof(ibvs_real));
+    if (optional) {
+      *flag_of(own, field) = field->held && *(const bool *)((const char *)&c->last + field->flag);
+    }
+  }
+}
+
+static void check_limit_order(const ibvs_controller *c, ibvs_measurement *own, uint32_t *rejected) {
+  bool crossed = false;
+  for (uint32_t i = 0; i < IBVS_ROTORS; ++i) {
+    crossed = crossed || own->thrust_min[i] > own->thrust_max[i];
+  }
+  if (!own->has_thrust_min || !own->has_thrust_max || !crossed) {
+    return;
+  }
+  *rejected |= IBVS_REJECT_THRUST_ORDER;
+  own->has_thrust_min = c->last.has_thrust_min;
+  own->has_thrust_max = c->last.has_thrust_max;
+  memcpy(own->thrust_min, c->last.thrust_min, sizeof own->thrust_min);
+  memcpy(own->thrust_max, c->last.thrust_max, sizeof own->thrust_max);
+}
+
+static void check_plane(const ibvs_controller *c, ibvs_measurement *own, uint32_t *rejected) {
+  if (!own->has_plane) {
+    return;
+  }
+  const ibvs_real *plane = own->plane, d = plane[3];
+  const bool good = ibvs_finite(plane, 4) && d != 0 && r_fabs(plane[0] / d) < IBVS_INVERSE_DEPTH_BOUND &&
+                    r_fabs(plane[1] / d) < IBVS_INVERSE_DEPTH_BOUND && -plane[2] / d > IBVS_INVERSE_DEPTH_MIN &&
+                    -plane[2] / d < IBVS_INVERSE_DEPTH_BOUND;
+  if (!good || !ibvs_sample_time(c, own->plane_stamp_ns, &own->plane_stamp_ns)) {
+    *rejected |= IBVS_REJECT_PLANE;
+    own->has_plane = false;
+  }
+}
+
+/* A sample's stamp in the controller's time, unless the sample is too old. */
+static bool recent(const ibvs_controller *c, int64_t *stamp_ns) {
+  return ibvs_sample_time(c, *stamp_ns, stamp_ns) && c->last_ns - *stamp_ns <= IBVS_OLDEST_LINE_NS;
+}
+
+static bool good_line(const ibvs_line *line) {
+  return r_fabs(line->rho) <= IBVS_LINE_BOUND && r_fabs(line->theta) <= IBVS_LINE_BOUND && line->weight >= 0 &&
+         line->weight <= 1 && line->variance >= 0 && line->variance <= IBVS_VARIANCE_BOUND &&
+         (line->role == IBVS_HORIZONTAL || line->role == IBVS_VERTICAL);
+}
+
+static void check_lines(const ibvs_controller *c, ibvs_measurement *own, uint32_t *rejected) {
+  uint32_t count = own->line_count, kept = 0;
+  if (count > IBVS_MOST_LINES) {
+    *rejected |= IBVS_REJECT_LINES;
+    count = IBVS_MOST_LINES;
+  }
+  for (uint32_t i = 0; i < count; ++i) {
+    ibvs_line line = own->lines[i];
+    if (good_line(&line) && (line.stamp_ns == 0 || recent(c, &line.stamp_ns))) {
+      own->lines[kept] = line;
+      kept += 1;
+    } else {
+      *rejected |= IBVS_REJECT_LINES;
+    }
+  }
+  own->line_count = kept;
+}
+
+bool ibvs_check_measurement(ibvs_controller *c, const ibvs_measurement *given, ibvs_measurement *own,
+                            uint32_t *rejected) {
+  if (!ibvs_clock_accept(c, given->stamp_ns)) {
+    *rejected |= IBVS_REJECT_STAMP;
+    return false;
+  }
+  *own = *given;
+  own->stamp_ns = c->last_ns;
+  check_fields(c, own, rejected);
+  const bool in_time = ibvs_sample_time(c, given->wrench_stamp_ns, &own->wrench_stamp_ns);
+  if (!in_time) {
+    *rejected |= IBVS_REJECT_WRENCH_STAMP;
+  }
+  if (!in_time || (*rejected & IBVS_REJECT_CONTACT_WRENCH) != 0) { /* an old wrench is no new sample */
+    memcpy(own->contact_wrench, c->last.contact_wrench, sizeof own->contact_wrench);
+    own->wrench_stamp_ns = c->last.wrench_stamp_ns;
+  }
+  check_plane(c, own, rejected);
+  check_lines(c, own, rejected);
+  if (own->has_velocity && own->has_velocity_stamp && !recent(c, &own->velocity_stamp_ns)) {
+    *rejected |= IBVS_REJECT_VELOCITY_STAMP;
+    own->has_velocity = false;
+  }
+  check_limit_order(c, own, rejected);
+  if ((*rejected & IBVS_REJECT_ATTITUDE) != 0 && !c->measured) { /* time begins with the first attitude */
+    ibvs_clock_reset(c);
+    c->last = ibvs_first_measurement;
+    return false;
+  }
+  c->last = *own;
+  c->measured = true;
+  return true;
+}
+
+bool ibvs_check_reference(ibvs_controller *c, const ibvs_reference *given) {
+  ibvs_reference own = *given;
+  if (own.line_count > IBVS_LINES) {
+    own.line_count = IBVS_LINES;
+  }
+  for (uint32_t i = 0; i < IBVS_REFERENCE_FIELDS; ++i) {
+    if (!within(entries(&own, &ibvs_reference_fields[i]), &ibvs_reference_fields[i])) {
+      return false;
+    }
+  }
+  for (uint32_t i = 0; i < own.line_count; ++i) {
+    const ibvs_line_reference *line = &own.lines[i];
+    if (!(r_fabs(line->rho) <= IBVS_LINE_BOUND && r_fabs(line->theta) <= IBVS_LINE_BOUND) ||
+        !(line->role == IBVS_HORIZONTAL || line->role == IBVS_VERTICAL)) {
+      return false;
+    }
+  }
+  c->reference = own;
+  return given->line_count <= IBVS_LINES;
+}
+
+bool ibvs_check_gains(ibvs_controller *c) {
+  const ibvs_real *gains = &c->gains.IBVS_FIRST_GAIN, *least = &ibvs_least_gains.IBVS_FIRST_GAIN;
+  const ibvs_real *largest = &ibvs_largest_gains.IBVS_FIRST_GAIN;
+  for (uint32_t i = 0; i < IBVS_GAINS; ++i) {
+    if (!(gains[i] >= least[i] && gains[i] <= largest[i])) {
+      return false;
+    }
+  }
+  c->gains_in_force = c->gains;
+  return true;
+}

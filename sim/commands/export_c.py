@@ -1,0 +1,49 @@
+"""``ibvs-qp export-c``: the controller as a self-contained C library."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from sim.commands.options import flag, optional, preset_file
+
+#: Recorded ticks in the library's self-test: as many as reach into the push.
+RECORDED_TICKS = 2500
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class ExportC:
+    """Write the controller as a C11 library: generated equations, OSQP without malloc, self-test and benchmark.
+
+    Example: ibvs-qp export-c controller --float && make -C controller test
+    """
+
+    folder: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DIR")]
+    """New or empty folder."""
+    preset: Annotated[Path | None, optional("FILE")] = None
+    """Preset (TOML) or the name of a shipped one; vehicle, limits and weights are compiled in."""
+    float: Annotated[bool, flag] = False
+    """Single precision, for a microcontroller without a double-precision unit."""
+
+    def run(self, words: list[str]) -> int:
+        """Write the library."""
+        from ibvs_qp.config.errors import ConfigError
+        from ibvs_qp.export.library import write_library
+        from ibvs_qp.export.recorded import write_recorded
+        from ibvs_qp.pilot import PilotConfig
+        from sim.bench.ticks import press_ticks
+
+        if self.folder.exists() and (not self.folder.is_dir() or any(self.folder.iterdir())):
+            raise ConfigError(f"DIR: {self.folder} exists and is not an empty folder")
+        chosen = preset_file(self.preset, "--preset")
+        settings = PilotConfig() if chosen is None else PilotConfig.from_toml(chosen)
+        if settings.law != "qp":
+            raise ConfigError(f"law: {settings.law!r}; the library flies the quadratic program, so it must be 'qp'")
+        write_library(self.folder, settings.controller, self.float)
+        write_recorded(self.folder, settings.controller, press_ticks(settings, RECORDED_TICKS), self.float)
+        print(f"Written: {self.folder}")
+        print(f"Build and test it: make -C {self.folder} test")
+        return 0

@@ -1,0 +1,55 @@
+"""Whole flights with the C library in closed loop: the main job, with figures inside the record's intervals."""
+
+from __future__ import annotations
+
+import functools
+from pathlib import Path
+from typing import Any
+
+import joblib
+import numpy as np
+import polars as pl
+import pytest
+from c_flown import CFlown
+from c_library import needs_compiler
+
+import sim.rivals
+from sim.evaluate.metrics import compute_metrics
+from sim.flight.closed_loop import fly
+from sim.flight.options import FlightOptions
+from sim.sweep.statistics import median_interval
+from sim.world.scene import Scene
+from sim.world.worlds import in_world
+
+pytestmark = [pytest.mark.slow, needs_compiler]
+
+RECORD = Path(__file__).parents[3] / "docs" / "experiments" / "all.parquet"
+FIGURES = ("path_rms_straight_m", "force_rms_straight_n", "tilt_rms_deg")
+SEEDS = range(10)
+
+
+def paint(seed: int, single: bool) -> tuple[bool, str, dict[str, Any]]:
+    sim.rivals.RIVALS["c"] = functools.partial(CFlown, single=single)
+    trace = fly(in_world(Scene(), "datasheet"), FlightOptions(rival="c", seed=seed, video=False))
+    return trace.completed, trace.reason, compute_metrics(trace)
+
+
+@pytest.mark.parametrize("single", [False, True])
+def test_the_main_job_flies_with_the_library_as_the_record_says(single: bool) -> None:
+    record = pl.read_parquet(RECORD).filter(
+        (pl.col("experiment") == "paint")
+        & (pl.col("law") == "qp")
+        & (pl.col("variant") == "standard")
+        & (pl.col("param.world") == "datasheet")
+    )
+    assert len(record) == len(SEEDS)
+    flights = joblib.Parallel(n_jobs=2)(joblib.delayed(paint)(seed, single) for seed in SEEDS)
+    for completed, reason, figures in flights:
+        assert completed, reason
+        outcomes = figures["outcomes"]
+        assert outcomes["analytic_fallback"] == outcomes["hold"] == 0
+    for name in FIGURES:
+        interval = median_interval(record[name].to_numpy())
+        median = float(np.median([figures[name] for _, _, figures in flights]))
+        print(f"{name}: {median:.4g}, record {interval}")
+        assert interval["low"] <= median <= interval["high"]
