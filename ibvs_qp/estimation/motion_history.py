@@ -11,9 +11,11 @@ from ibvs_qp.estimation.stamps import AHEAD, BEFORE
 from ibvs_qp.symbolic.logic import Number, both, where
 from ibvs_qp.symbolic.signals import Signals
 
-#: Length of a bin [s]: four ticks at 250 Hz, a tenth of a rotor's or the brush's time constants. Bins: 0.32 s, which
-#: covers the oldest line that counts (0.3 s).
+#: Least length of a full bin [s]: four ticks at 250 Hz, a tenth of a rotor's or the brush's time constants. All bins but
+#: the newest are full: 0.304 s at least, whatever the ticks, which covers the oldest line that counts (0.3 s).
 BIN_S, BINS = 0.016, 20
+#: Rounding of the sum of a bin's ticks [s], far below a tick.
+_ROUNDING_S = 1e-6
 #: Smallest duration of a bin in a division [s].
 _LEAST_S = 1e-9
 
@@ -28,7 +30,7 @@ class Step(NamedTuple):
 
 
 class MotionHistory:
-    r"""Integrals of angular velocity, acceleration and velocity in bins of `BIN_S`, the newest first.
+    r"""Integrals of angular velocity, acceleration and velocity in bins of `BIN_S` or a tick more, the newest first.
 
     A late sample is carried to the present by the integrals since its capture; within a bin they grow linearly.
 
@@ -60,7 +62,7 @@ class MotionHistory:
             ca.reshape(signals.state(name, part.numel() * BINS), -1, BINS)
             for name, part in zip(names, added, strict=True)
         ]
-        full = old[0][0] + elapsed > BIN_S
+        full = old[0][0] > BIN_S - _ROUNDING_S
         self._bins = []
         for name, bins, part in zip(names, old, added, strict=True):
             shifted = ca.horzcat(part, bins[:, :-1])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from symbolic_block import Block
 
@@ -33,6 +33,8 @@ def history() -> Block:
     ticks=st.lists(st.sampled_from([0.002, 0.004, 0.004, 0.008, 0.02]), min_size=200, max_size=220),
     hertz=st.floats(0.0, 3.0),
 )
+@example(age=0.3, ticks=[0.002] * 200, hertz=0.0)
+@example(age=0.3, ticks=[0.002, 0.02] * 100, hertz=0.0)
 @settings(max_examples=10, deadline=None)
 def test_a_smooth_motion_is_integrated_to_the_age_asked_for(age, ticks, hertz):
     block, times, now = history(), [], 0.0
