@@ -1,0 +1,61 @@
+"""Compilation of the kernels, and the one line about it."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+
+#: Numbers of a fraction by zero are those of IEEE 754, sums keep their order, and products and sums are not contracted:
+#: all processors give the same bits.
+_OPTIONS = {"nogil": True, "error_model": "numpy", "fastmath": False}
+
+log = logging.getLogger(__name__)
+_kernels: list[tuple[Any, str]] = []
+
+
+def kernel(signature: str) -> Callable[[Callable[..., Any]], Any]:
+    """Compile a function for one signature, at the latest when it is first called.
+
+    Args:
+        signature: Types of result and arguments in numba's words, such as ``"i8(f8[:, ::1], u1[::1])"``.
+    """
+
+    def decorate(function: Callable[..., Any]) -> Any:
+        compiled = _cached(function)
+        _kernels.append((compiled, signature))
+        return compiled
+
+    return decorate
+
+
+def inner(function: Callable[..., Any]) -> Any:
+    """A part of kernels, compiled with them for the types that they pass."""
+    return _cached(function)
+
+
+def _cached(function: Callable[..., Any]) -> Any:
+    try:
+        return numba.njit(cache=True, **_OPTIONS)(function)
+    except RuntimeError:  # neither the package nor the user's cache folder can be written
+        return numba.njit(**_OPTIONS)(function)
+
+
+def prepare() -> None:
+    """Compile every kernel that is not yet, and say so in one line: the first time it takes up to 25 s."""
+    from ibvs_qp.vision.kernels import everything  # noqa: F401 - registers all of them
+
+    if not all(_stored(compiled) for compiled, _ in _kernels if not compiled.signatures):
+        log.warning("vision is compiled, once: up to 25 s")
+    for compiled, signature in _kernels:
+        if not compiled.signatures:
+            compiled.compile(signature)
+
+
+def _stored(compiled: Any) -> bool:
+    """Whether there is machine code of an earlier process."""
+    folder = compiled.stats.cache_path
+    return folder is not None and any(Path(folder).glob(f"*.{compiled.py_func.__name__}-*.nbi"))
