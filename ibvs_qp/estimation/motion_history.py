@@ -11,8 +11,8 @@ from ibvs_qp.estimation.stamps import AHEAD, BEFORE
 from ibvs_qp.symbolic.logic import Number, both, where
 from ibvs_qp.symbolic.signals import Signals
 
-#: Least length of a full bin [s]: four ticks at 250 Hz, a tenth of a rotor's or the brush's time constants. All bins but
-#: the newest are full: 0.304 s at least, whatever the ticks, which covers the oldest line that counts (0.3 s).
+#: Least length of a full bin [s]: four ticks at 250 Hz, a tenth of a rotor's or the brush's time constants. All bins
+#: but the newest are full: 0.304 s at least, whatever the ticks, which covers the oldest line that counts (0.3 s).
 BIN_S, BINS = 0.016, 20
 #: Rounding of the sum of a bin's ticks [s], far below a tick.
 _ROUNDING_S = 1e-6

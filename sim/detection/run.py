@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ibvs_qp.measurement import RgbdFrame
-from ibvs_qp.vision.survey.detection import Detection
-from ibvs_qp.vision.survey.distortion import undistorted_line
+from sim.detection.detection import Detection
+from sim.detection.distortion import undistorted_line
 from sim.detection.manifest import FrameEntry, motion_sequences
 from sim.detection.methods import make_method
 from sim.detection.pictures import PictureError, read_frame

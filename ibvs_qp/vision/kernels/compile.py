@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import logging
 from collections.abc import Callable
 from pathlib import Path
@@ -39,23 +40,34 @@ def inner(function: Callable[..., Any]) -> Any:
 
 def _cached(function: Callable[..., Any]) -> Any:
     try:
-        return numba.njit(cache=True, **_OPTIONS)(function)
+        compiled = numba.njit(cache=True, **_OPTIONS)(function)
     except RuntimeError:  # neither the package nor the user's cache folder can be written
         return numba.njit(**_OPTIONS)(function)
+    for index in _indices(compiled):
+        if index.stat().st_mtime < _newest():
+            index.unlink(missing_ok=True)
+    return compiled
+
+
+@functools.cache
+def _newest() -> float:
+    """Time of the last change of any kernel: numba itself watches only the file of an entry point."""
+    return max(file.stat().st_mtime for file in Path(__file__).parent.glob("*.py"))
+
+
+def _indices(compiled: Any) -> list[Path]:
+    """Files that list the stored machine code of a kernel."""
+    folder, function = compiled.stats.cache_path, compiled.py_func
+    module = function.__module__.rpartition(".")[2]
+    return [] if folder is None else list(Path(folder).glob(f"{module}.{function.__name__}-*.nbi"))
 
 
 def prepare() -> None:
     """Compile every kernel that is not yet, and say so in one line: the first time it takes up to 25 s."""
     from ibvs_qp.vision.kernels import everything  # noqa: F401 - registers all of them
 
-    if not all(_stored(compiled) for compiled, _ in _kernels if not compiled.signatures):
+    if not all(compiled.signatures or _indices(compiled) for compiled, _ in _kernels):
         log.warning("vision is compiled, once: up to 25 s")
     for compiled, signature in _kernels:
         if not compiled.signatures:
             compiled.compile(signature)
-
-
-def _stored(compiled: Any) -> bool:
-    """Whether there is machine code of an earlier process."""
-    folder = compiled.stats.cache_path
-    return folder is not None and any(Path(folder).glob(f"*.{compiled.py_func.__name__}-*.nbi"))

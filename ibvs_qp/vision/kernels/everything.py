@@ -1,5 +1,27 @@
 """Imports every module of kernels, so that `prepare` finds them."""
 
-from ibvs_qp.vision.kernels import labels
+from ibvs_qp.vision.kernels import (
+    borders,
+    colors,
+    fit_lines,
+    flow,
+    flow_points,
+    hypotheses,
+    labels,
+    plane,
+    samples,
+    segments,
+)
 
-__all__ = ["labels"]
+__all__ = [
+    "borders",
+    "colors",
+    "fit_lines",
+    "flow",
+    "flow_points",
+    "hypotheses",
+    "labels",
+    "plane",
+    "samples",
+    "segments",
+]
