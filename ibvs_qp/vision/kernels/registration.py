@@ -54,8 +54,8 @@ def cover(
 ) -> None:
     """Depth in the target of a row of readings, (w,), and the rows and columns that they cover, (4, w).
 
-    Rows are from ``covered[0]`` to before ``covered[1]``, columns from ``covered[2]`` to before ``covered[3]``; none for
-    what is out of view. One loop without jumps: the processor takes several readings at once.
+    Rows are from ``covered[0]`` to before ``covered[1]``, columns from ``covered[2]`` to before ``covered[3]``; none
+    for what is out of view. One loop without jumps: the processor takes several readings at once.
     """
     rows, columns = np.float32(shape[0]), np.float32(shape[1])
     (wide, high), (a, b, c) = (half[0], half[1]), (shift[0], shift[1], shift[2])

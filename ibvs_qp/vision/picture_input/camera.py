@@ -23,7 +23,7 @@ _LARGEST = 4096
 
 
 class RgbdCamera:
-    """Mono to colour, units to metres, depth to colour, and the lens removed; tables are made at a camera's first frame.
+    """Mono to colour, units to metres, depth to colour, the lens removed; tables are made at the first frame.
 
     Attributes:
         lens: Lens and mount of the colour camera.

@@ -1,4 +1,4 @@
-"""Raw pictures of any common type as the types of perception; what is of no such type is left for its checks to name."""
+"""Raw pictures of any common type as the types of perception; what is of none is left to its checks."""
 
 from __future__ import annotations
 

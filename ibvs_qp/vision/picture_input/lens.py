@@ -54,13 +54,17 @@ class Lens:
         """Normalised points without the lens, (n, 2), of those behind it."""
         points = cv2.undistortPoints(seen[:, None], np.eye(3), self.distortion)[:, 0]
         with np.errstate(all="ignore"):
+            error = self._error(points, seen)
             for _ in range(_STEPS):
-                error = seen - _bent(np.column_stack((points, np.ones(len(points)))), np.eye(3), self.distortion)
                 if not (np.abs(error) > _ACCURACY).any():
                     break
                 points = points + error
+                error = self._error(points, seen)
         points[~(np.abs(error).max(axis=1) < _NO_RAY)] = np.nan
         return points
+
+    def _error(self, points: np.ndarray, seen: np.ndarray) -> np.ndarray:
+        return seen - _bent(np.column_stack((points, np.ones(len(points)))), np.eye(3), self.distortion)
 
     def pixels(self, points: np.ndarray, intrinsics: Sequence[float]) -> np.ndarray:
         """Pixels of the real camera, (n, 2), of normalised points of the ideal one, (n, 2)."""

@@ -65,7 +65,7 @@ class RgbdCameraSettings:
             raise out_of_range("depth_intrinsics", self.depth_intrinsics, "px", allowed)
         if not self.registered and not self.depth_translation_m:
             raise ConfigError(
-                "depth_translation_m is missing: depth_intrinsics are of a depth camera beside the colour's"
+                "depth_translation_m is missing: depth_intrinsics are of a depth camera beside"
             )
         for name in ("depth_distortion", "depth_rotation", "depth_translation_m"):
             if self.registered and getattr(self, name):

@@ -19,6 +19,7 @@ PLANE = (0.15, -0.1, 1.9, -1.0)
 PICTURE = RgbdFrame(rgb=np.zeros((*SHAPE, 3), np.uint8), depth=np.zeros(SHAPE), intrinsics=INTRINSICS, stamp_ns=0)
 VELOCITY, RATE = np.array((0.05, 0.2, -0.15)), np.array((0.1, -0.15, 0.2))
 LENS = (-0.12, 0.05, 0.001, -0.001, 0.0)
+TURNED = Lens(LENS, cv2.Rodrigues(np.array((0.02, -0.03, 0.4)))[0])
 #: Two points of every line at the stamp, normalised.
 LINES = {
     "upright": ((-0.25, -0.35), (-0.22, 0.35)),
@@ -67,7 +68,7 @@ def worst_px(found: LineFeature, points: np.ndarray) -> float:
 
 @pytest.mark.parametrize("name", LINES)
 @pytest.mark.parametrize(
-    "mounted", [Lens(), Lens(LENS, cv2.Rodrigues(np.array((0.02, -0.03, 0.4)))[0])], ids=["", "lens"]
+    "mounted", [Lens(), TURNED], ids=["", "lens"]
 )
 def test_a_line_is_where_it_is_at_the_stamp(name: str, mounted: Lens) -> None:
     first, last = np.array(LINES[name])

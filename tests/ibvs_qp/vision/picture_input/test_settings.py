@@ -35,7 +35,7 @@ VECTOR = (0.02, -0.3, 0.1)
         ({**BESIDE, "depth_distortion": (0.1,)}, "depth_distortion = .* so many coefficients"),
         (
             {"depth_rotation": VECTOR},
-            "depth_intrinsics are missing: depth_rotation is for depth that is not registered",
+            "depth_intrinsics are missing: depth_rotation is for depth",
         ),
     ],
 )
