@@ -31,8 +31,8 @@ def through_device(picture: np.ndarray, scene: TruthScene, times: int) -> np.nda
         after_s = (pixels[:, 1] - cy) / (scene.camera[1] - 1) * device.readout_s
         velocity = image_velocity(points[:, 0], points[:, 1], plane, scene.twist)
         points = points - after_s[:, None] * np.stack(velocity, axis=-1)
-    places = ((points * (fx, fy) + (cx, cy) + 0.5) * times - 0.5).astype(np.float32).T.reshape(2, height, width)
-    return cv2.remap(picture, *places, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    columns, rows = ((points * (fx, fy) + (cx, cy) + 0.5) * times - 0.5).astype(np.float32).T.reshape(2, height, width)
+    return cv2.remap(picture, columns, rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
 
 
 def exposure_gain(scene: TruthScene, rng: np.random.Generator) -> float:

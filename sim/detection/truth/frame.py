@@ -42,7 +42,9 @@ class TruthFrame:
     plane: np.ndarray  # (a, b, c) of 1/Z = a x + b y + c of the board
     seed: tuple[float, float]  # (u, v) of a point on the board [px]
     mask: np.ndarray  # pixels that the vehicle covers, bool (H, W)
-    raw: RgbdFrame | None = None  # what the device delivers: distorted, depth in its own picture; None for an ideal camera
+    raw: RgbdFrame | None = (
+        None  # what the device delivers: distorted, depth in its own picture; None for an ideal camera
+    )
 
 
 def render_frame(scene: TruthScene, stamp_ns: int = 0, noise_seed: int | None = None) -> TruthFrame:

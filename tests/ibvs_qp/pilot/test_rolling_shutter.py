@@ -67,9 +67,7 @@ def worst_px(found: LineFeature, points: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize("name", LINES)
-@pytest.mark.parametrize(
-    "mounted", [Lens(), TURNED], ids=["", "lens"]
-)
+@pytest.mark.parametrize("mounted", [Lens(), TURNED], ids=["", "lens"])
 def test_a_line_is_where_it_is_at_the_stamp(name: str, mounted: Lens) -> None:
     first, last = np.array(LINES[name])
     points = first + np.linspace(0.0, 1.0, 60)[:, None] * (last - first)

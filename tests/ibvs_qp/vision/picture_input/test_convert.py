@@ -45,9 +45,8 @@ def test_a_value_beyond_the_bits_in_use_is_white() -> None:
 
 @pytest.mark.parametrize("kind", [np.uint16, ">u2", np.int32, np.float32, np.float64])
 def test_depth_of_a_stated_unit_becomes_metres(kind: type) -> None:
-    found = picture(
-        np.zeros((80, 100, 3), np.uint8), depth, depth_units_per_metre=5000.0
-    )
+    depth = np.full((80, 100), 3750).astype(kind)
+    found = picture(np.zeros((80, 100, 3), np.uint8), depth, depth_units_per_metre=5000.0)
     assert frame_problem(found) is None and found.depth.dtype == np.float32
     assert np.allclose(found.depth, 0.75, rtol=1e-6)
 

@@ -84,9 +84,7 @@ def test_what_the_depth_camera_cannot_see_has_no_depth_and_what_is_nearer_hides(
     board, wall = seen_by_color_camera(BOARD)[60:180], seen_by_color_camera(WALL)[60:180]
     columns = np.arange(SHAPE[1])
     inside = found[:, (columns > left + 2) & (columns < right - 2)]
-    assert np.abs(inside - board[:, (columns > left + 2) & (columns < right - 2)]).max() < 2e-3, (
-        "no wall in it"
-    )
+    assert np.abs(inside - board[:, (columns > left + 2) & (columns < right - 2)]).max() < 2e-3, "no wall in it"
     # The depth camera stands 5 cm to the right: 305 px * 5 cm * (1.4 - 0.9) / m = 7.6 px left of the board are hidden.
     shadow = found[:, (columns > left - 5) & (columns < left - 2)]
     assert (shadow == 0.0).mean() > 0.95
