@@ -9,6 +9,7 @@ from ibvs_qp.vision.kernels import (
     hypotheses,
     labels,
     plane,
+    registration,
     samples,
     segments,
 )
@@ -22,6 +23,7 @@ __all__ = [
     "hypotheses",
     "labels",
     "plane",
+    "registration",
     "samples",
     "segments",
 ]

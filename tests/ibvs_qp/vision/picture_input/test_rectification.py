@@ -7,14 +7,11 @@ import dataclasses
 import cv2
 import numpy as np
 import pytest
-from recorded_inputs import recording
 
-from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.estimation.turned_camera import TurnedCamera
 from ibvs_qp.measurement import RgbdFrame
-from ibvs_qp.pilot import Pilot, PilotConfig
-from ibvs_qp.pilot.config import CameraConfig
-from ibvs_qp.pilot.rectification import Rectification
+from ibvs_qp.vision.picture_input.camera import RgbdCamera
+from ibvs_qp.vision.picture_input.settings import RgbdCameraSettings
 
 SIZE, INTRINSICS = (240, 320), (300.0, 310.0, 155.0, 118.0)
 #: Of a wide lens: 12 px in the corners.
@@ -59,7 +56,7 @@ def test_a_rectified_picture_is_that_of_a_straight_camera_without_a_lens(case: s
     turn, distortion = CASES[case]
     camera = TurnedCamera(turn)
     seen, expected = picture(camera.rotation, distortion), picture(np.eye(3), ())
-    found = Rectification(camera, CameraConfig(distortion=distortion)).picture(seen)
+    found = RgbdCamera(RgbdCameraSettings(distortion=distortion), camera.rotation).picture(seen)
     inside = found.depth > 0.0
     assert inside.mean() > (0.5 if turn[0] == 90.0 else 0.75)
     core = cv2.erode(inside.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
@@ -71,27 +68,10 @@ def test_a_rectified_picture_is_that_of_a_straight_camera_without_a_lens(case: s
 
 def test_nothing_to_rectify_changes_nothing() -> None:
     seen = picture(np.eye(3), ())
-    assert Rectification(TurnedCamera((0.0, 0.0, 0.0)), CameraConfig()).picture(seen) is seen
+    assert RgbdCamera().picture(seen) is seen
 
 
 def test_a_picture_that_perception_refuses_is_passed_on() -> None:
-    rectification = Rectification(TurnedCamera((0.0, 5.0, 0.0)), CameraConfig())
+    camera = RgbdCamera(mount=TurnedCamera((0.0, 5.0, 0.0)).rotation)
     seen = dataclasses.replace(picture(np.eye(3), ()), rgb="no picture")  # type: ignore[arg-type]
-    assert rectification.picture(seen) is seen
-
-
-def test_the_number_of_coefficients_is_checked() -> None:
-    with pytest.raises(ConfigError, match=r"distortion = .* so many coefficients: 0, 4, 5, 8, 12, 14"):
-        CameraConfig(distortion=(0.1, 0.2))
-
-
-def test_a_force_sensor_in_other_axes_flies_the_same() -> None:
-    """Turned by a right angle about x: its y is our z, its z our -y."""
-    config = PilotConfig()
-    vehicle = dataclasses.replace(config.controller.vehicle, force_torque_turn_deg=(90.0, 0.0, 0.0))
-    own = dataclasses.replace(config, controller=dataclasses.replace(config.controller, vehicle=vehicle))
-    straight, turned = Pilot(config), Pilot(own)
-    for frame in recording("rotor_loss").frames[:300]:
-        x, y, z, a, b, c = frame.wrench
-        other = dataclasses.replace(frame, wrench=np.array((x, z, -y, a, c, -b)))
-        assert turned.step(other).thrusts == pytest.approx(straight.step(frame).thrusts, abs=1e-6)
+    assert camera.picture(seen) is seen
