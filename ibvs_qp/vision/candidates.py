@@ -23,6 +23,8 @@ from ibvs_qp.vision.trim import trimmed
 _SHORTEST_PX = 40.0
 #: Lines nearer than this are one, and a segment this near to a known line is that one [px at 640].
 _SAME_PX, _KNOWN_PX = 2.5, 8.0
+#: A longer line on the same edge is taken if it has this share of the best one's score.
+_LONGER_SHARE = 0.8
 #: Score from which a line is said to border the surface.
 BORDER = 0.2
 #: Confidence of an edge of paint whose two sides have the colours of paint and board.
@@ -104,11 +106,20 @@ def find_candidates(
     chosen = np.sort(chosen)
     fits = fit_segments(segments[chosen], picture, config.line, colors, beyond[chosen], contents=painted)
     found = judge_lines([fit for fit in fits if fit is not None], picture, depth, surface, colors, tilt)
+    return _each_edge_once(found, _SAME_PX * picture.scale)
+
+
+def _each_edge_once(lines: list[Candidate], limit_px: float) -> list[Candidate]:
+    """The best line of every edge, best first: a longer one is more exact, unless it is much worse."""
     kept: list[Candidate] = []
-    for line in sorted(found, key=lambda entry: -entry.score):
-        if not any(_same_edge(line, other, _SAME_PX * picture.scale) for other in kept):
+    for line in sorted(lines, key=lambda entry: -entry.score):
+        same = next((k for k, other in enumerate(kept) if _same_edge(line, other, limit_px)), None)
+        if same is None:
             kept.append(line)
-    return kept
+        elif line.kind == kept[same].kind and line.line.length_px > kept[same].line.length_px:
+            if line.score >= _LONGER_SHARE * kept[same].score:
+                kept[same] = line
+    return sorted(kept, key=lambda entry: -entry.score)
 
 
 def judge_lines(

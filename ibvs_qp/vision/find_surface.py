@@ -14,7 +14,7 @@ from ibvs_qp.vision.grid import CoarseGrid
 from ibvs_qp.vision.ground import connected, ground_color
 from ibvs_qp.vision.grow import grown_plane
 from ibvs_qp.vision.plane import PlaneEstimate, PlaneFitter
-from ibvs_qp.vision.surface_region import SurfaceRegion, alike_colors, middle_cell, samples_on
+from ibvs_qp.vision.surface_region import SurfaceRegion, alike_colors, filled, middle_cell, samples_on
 
 #: Where more than this share of all readings lies on one plane, a wall may be part of it.
 _FLUSH_SHARE = 0.40
@@ -109,15 +109,15 @@ def _around_seed(
         if isinstance(again, PlaneEstimate):
             plane = again
             cells = samples_on(grid, inverse, plane, middle_cell(own))
-    if even is None and _flush(cells, inverse):  # noise may hide the wall until the plane is exact
+    flush = even is not None or _flush(cells, inverse)
+    if even is None and flush:  # noise may hide the wall until the plane is exact
         even = evenly_lit(frame.rgb, grid, cells & alike, seed)
     if even is not None:  # what else has its depth is the wall
         cells, alike = cells & even, alike | even
-    elif _flush(cells, inverse):
+    elif flush:
         alike = prefer == BOARD
-    return SurfaceRegion(
-        grid=grid, plane=plane, cells=cells, colored=cells & alike, color=color, by_light=even is not None
-    )
+        cells = cells & (filled(connected(cells & alike, grid, middle_cell(cells & alike))) > 0)
+    return SurfaceRegion(grid=grid, plane=plane, cells=cells, colored=cells & alike, color=color, by_light=flush)
 
 
 def followed_region(

@@ -34,6 +34,8 @@ from ibvs_qp.vision.tracks import LineTracker
 
 #: Pictures after a start in which lines are searched often: colours are learned in the first one.
 _WARM_UP = 8
+#: Half width of the search strips where points of the surface tell the camera's motion [px at 640].
+_SEEN_STRIP_PX = 8.0
 
 
 class Perception:
@@ -129,13 +131,14 @@ class Perception:
         tilt = None if down is None else float(np.arctan2(-down[0], down[1]))
         interval = 0.0 if self._stamp_ns is None else max((frame.stamp_ns - self._stamp_ns) * 1e-9, 0.0)
         self._stamp_ns = frame.stamp_ns
-        motion, turn = self._motion(frame, rotation, velocity, interval)
+        motion, turn, seen = self._motion(frame, rotation, velocity, interval)
         before = None if self._plane is None else self._plane.inverse_depth
         refused = self._fit_plane(frame, motion, down, seed_pixel)
         clock.lap("plane")
         surface = None if self._plane is None else self._plane.inverse_depth
         picture = Picture.of(frame.rgb, layout.mask, frame.intrinsics, frame.depth, surface)
-        self._tracker.advance(picture, motion, before, interval, self._colors, tilt or 0.0)
+        strip = _SEEN_STRIP_PX if seen else self._config.line.strip_px
+        self._tracker.advance(picture, motion, before, interval, self._colors, tilt or 0.0, strip)
         self._tracker.hints(hints, picture, self._colors, tilt or 0.0)
         clock.lap("tracks")
         candidates = self._detect(picture, frame, down, tilt, detect)
@@ -187,19 +190,19 @@ class Perception:
 
     def _motion(
         self, frame: RgbdFrame, rotation: np.ndarray | None, velocity: np.ndarray | None, interval: float
-    ) -> tuple[CameraMotion, np.ndarray]:
-        """Motion of the camera since the last picture, and turn of the body: by gyro, else by the surface's points."""
+    ) -> tuple[CameraMotion, np.ndarray, bool]:
+        """Motion of the camera, turn of the body, and whether the surface's points tell them instead of the gyro."""
         if rotation is not None:
             self._grey = None
-            return CameraMotion.of_body(rotation, velocity, interval, self._camera_position), rotation
+            return CameraMotion.of_body(rotation, velocity, interval, self._camera_position), rotation, False
         small, factor = half_resolution(frame.rgb)
         before, self._grey = self._grey, cv2.cvtColor(small, cv2.COLOR_RGB2GRAY)
         if before is not None and self._plane is not None and self._region is not None:
             region = dataclasses.replace(self._region, plane=self._plane)
             seen = surface_motion(before, self._grey, factor, region, frame.intrinsics)
             if seen is not None:
-                return seen, cv2.Rodrigues(R_BODY_CAMERA @ seen.rotation @ R_BODY_CAMERA.T)[0].ravel()
-        return CameraMotion.of_body(np.zeros(3), velocity, interval, self._camera_position), np.zeros(3)
+                return seen, cv2.Rodrigues(R_BODY_CAMERA @ seen.rotation @ R_BODY_CAMERA.T)[0].ravel(), True
+        return CameraMotion.of_body(np.zeros(3), velocity, interval, self._camera_position), np.zeros(3), False
 
     def _fit_plane(
         self,

@@ -64,13 +64,14 @@ class LineTracker:
         interval_s: float,
         colors: SurfaceColors,
         tilt: float,
+        strip_px: float,
     ) -> None:
-        """Predict every track into this picture and refine it there."""
+        """Predict every track into this picture and refine it there, within half a strip's width [px at 640]."""
         for track in self.tracks:
             track.rho, track.theta = motion.line(track.rho, track.theta, plane)
             track.role = role_of(track.theta, tilt)
             track.age += 1
-        for track, line in zip(self.tracks, self._refined(picture, colors), strict=True):
+        for track, line in zip(self.tracks, self._refined(picture, colors, strip_px), strict=True):
             self._update(track, line, interval_s)
         self._drop()
 
@@ -133,7 +134,7 @@ class LineTracker:
         self.tracks.append(_track_of(self._next_id, candidate, hint))
         self._next_id += 1
 
-    def _refined(self, picture: Picture, colors: SurfaceColors) -> list[RefinedLine | None]:
+    def _refined(self, picture: Picture, colors: SurfaceColors, strip_px: float) -> list[RefinedLine | None]:
         """Healthy fits of all tracks around their predictions."""
         queries = [
             LineQuery(
@@ -148,7 +149,7 @@ class LineTracker:
             for track in self.tracks
         ]
         config = self._config.line
-        width = config.strip_px * picture.scale
+        width = strip_px * picture.scale
         found = refine_lines(picture, queries, half_width_px=width, config=config, colors=colors)
         return [line if line is not None and self._healthy(line, picture) else None for line in found]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import importlib
 import logging
 from collections.abc import Callable
 from pathlib import Path
@@ -64,8 +65,7 @@ def _indices(compiled: Any) -> list[Path]:
 
 def prepare() -> None:
     """Compile every kernel that is not yet, and say so in one line: the first time it takes up to 25 s."""
-    from ibvs_qp.vision.kernels import everything  # noqa: F401 - registers all of them
-
+    importlib.import_module("ibvs_qp.vision.kernels.everything")
     if not all(compiled.signatures or _indices(compiled) for compiled, _ in _kernels):
         log.warning("vision is compiled, once: up to 25 s")
     for compiled, signature in _kernels:
