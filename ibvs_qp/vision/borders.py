@@ -83,7 +83,7 @@ def score_borders(
     grown = length / (length + _HALF_LENGTH_PX * picture.scale)
     grown = grown * np.sqrt(np.minimum(length / np.maximum(_FULL_SHARE * beyond[:, 2], 1.0), 1.0))
     scores = evidence[:, :, 0] * grown[:, None] * np.maximum(0.0, 1.0 - beyond[:, :2] / _SHARE_BEYOND)
-    if region.by_light:  # a wall has the surface's depth, its joints the surface's colour
+    if region.by_color:  # a wall has the surface's depth, its joints the surface's colour
         scores = scores * np.minimum(evidence[:, :, 3] / _MOSTLY, 1.0)
     best, each = np.where(scores[:, 0] >= scores[:, 1], 0, 1), np.arange(len(ends))
     return Borders(

@@ -23,8 +23,8 @@ from ibvs_qp.vision.trim import trimmed
 _SHORTEST_PX = 40.0
 #: Lines nearer than this are one, and a segment this near to a known line is that one [px at 640].
 _SAME_PX, _KNOWN_PX = 2.5, 8.0
-#: A longer line on the same edge is taken if it has this share of the best one's score.
-_LONGER_SHARE = 0.8
+#: A longer line on an edge is taken if its further part has this share of the better one's score.
+_FURTHER_SHARE = 0.5
 #: Score from which a line is said to border the surface.
 BORDER = 0.2
 #: Confidence of an edge of paint whose two sides have the colours of paint and board.
@@ -116,10 +116,18 @@ def _each_edge_once(lines: list[Candidate], limit_px: float) -> list[Candidate]:
         same = next((k for k, other in enumerate(kept) if _same_edge(line, other, limit_px)), None)
         if same is None:
             kept.append(line)
-        elif line.kind == kept[same].kind and line.line.length_px > kept[same].line.length_px:
-            if line.score >= _LONGER_SHARE * kept[same].score:
-                kept[same] = line
+        elif line.kind == kept[same].kind and _adds(line, kept[same]):
+            kept[same] = line
     return sorted(kept, key=lambda entry: -entry.score)
+
+
+def _adds(longer: Candidate, line: Candidate) -> bool:
+    """Whether a longer line on an edge is such an edge in its further part, too: scores are means along lines."""
+    more = longer.line.length_px - line.line.length_px
+    if more <= 0.0:
+        return False
+    further = (longer.score * longer.line.length_px - line.score * line.line.length_px) / more
+    return further >= _FURTHER_SHARE * line.score
 
 
 def judge_lines(

@@ -69,8 +69,12 @@ def find_surface(
     if color is None:
         color = np.median(coarse[(labels[index] == BOARD) & plane.component].astype(float), axis=0)
     cells = samples_on(grid, inverse, plane, seeds[index])
-    alike = colors.like(coarse, color) == BOARD if _flush(cells, inverse) else alike_colors(coarse, color)
-    return SurfaceRegion(grid=grid, plane=plane, cells=cells, colored=cells & alike, color=color)
+    if not (flush := _flush(cells, inverse)):
+        alike = alike_colors(coarse, color)
+    else:
+        alike = colors.like(coarse, color) == BOARD
+        cells = _without_wall(cells, alike, grid)
+    return SurfaceRegion(grid=grid, plane=plane, cells=cells, colored=cells & alike, color=color, by_color=flush)
 
 
 def _around_seed(
@@ -116,8 +120,8 @@ def _around_seed(
         cells, alike = cells & even, alike | even
     elif flush:
         alike = prefer == BOARD
-        cells = cells & (filled(connected(cells & alike, grid, middle_cell(cells & alike))) > 0)
-    return SurfaceRegion(grid=grid, plane=plane, cells=cells, colored=cells & alike, color=color, by_light=flush)
+        cells = _without_wall(cells, alike, grid)
+    return SurfaceRegion(grid=grid, plane=plane, cells=cells, colored=cells & alike, color=color, by_color=flush)
 
 
 def followed_region(
@@ -128,11 +132,14 @@ def followed_region(
     coarse = grid.sample(frame.rgb)
     inverse = grid.inverse_depth(frame.depth, config.distance_min_m, config.distance_max_m)
     cells = samples_on(grid, inverse, plane, middle_cell(plane.component))
-    if colors.light is None and not _flush(cells, inverse):
+    flush = _flush(cells, inverse)
+    if colors.light is None and not flush:
         alike = alike_colors(coarse, colors.board)
     else:  # a wall may be among them, and may have the board's colour in another light than its own
         alike = colors.label(coarse, colors.levels_at(*grid.pixels)) == BOARD
-    return SurfaceRegion(grid=grid, plane=plane, cells=cells, colored=cells & alike, color=colors.board)
+    if flush:
+        cells = _without_wall(cells, alike, grid)
+    return SurfaceRegion(grid=grid, plane=plane, cells=cells, colored=cells & alike, color=colors.board, by_color=flush)
 
 
 def _labels(
@@ -149,6 +156,12 @@ def _labels(
         return labels
     board = labels == BOARD
     return np.where(board & ~connected(board, grid, seed), np.uint8(OTHER), labels)
+
+
+def _without_wall(cells: np.ndarray, alike: np.ndarray, grid: CoarseGrid) -> np.ndarray:
+    """Samples that depth cannot tell from a wall, without what the surface's colour does not enclose."""
+    own = cells & alike
+    return cells & (filled(connected(own, grid, middle_cell(own))) > 0) if own.any() else cells
 
 
 def _flush(cells: np.ndarray, inverse: np.ndarray) -> bool:

@@ -25,7 +25,7 @@ class SurfaceRegion:
         cells: Samples on it by depth, bool (rows, columns).
         colored: Those of them that have its colour, bool (rows, columns).
         color: Its colour where nothing is printed or painted on it, RGB (3,).
-        by_light: Whether light tells it from a wall that depth cannot tell it from; `cells` are without the wall then.
+        by_color: Whether colour or light tell it from a wall that depth cannot; `cells` are without the wall then.
     """
 
     grid: CoarseGrid
@@ -33,7 +33,7 @@ class SurfaceRegion:
     cells: np.ndarray
     colored: np.ndarray
     color: np.ndarray
-    by_light: bool = False
+    by_color: bool = False
 
     def end_band(self, width: int) -> np.ndarray:
         """Samples within so many cells of the surface's end, by depth or by colour, bool (rows, columns)."""

@@ -22,6 +22,8 @@ from ibvs_qp.vision.track import Track
 _DRIFT = np.diag([2e-3**2, 2e-3**2])
 #: Confidence of a line that the caller expected and that is found there.
 _EXPECTED_CONFIDENCE = 0.8
+#: A detected line this many times as long as the track that follows its edge replaces its line.
+_LONGER = 1.2
 #: Squared cosine of the angle below which two lines cannot be one.
 _PARALLEL = 0.9
 
@@ -116,8 +118,11 @@ class LineTracker:
             if not candidate.kind or candidate.score < self._config.detect.min_score:
                 continue
             fresh = _track_of(0, candidate)
-            if not any(self._same(track, fresh, picture) for track in self.tracks):
+            same = next((track for track in self.tracks if self._same(track, fresh, picture)), None)
+            if same is None:
                 self._start(candidate)
+            elif same.kind == candidate.kind and candidate.line.length_px > _LONGER * same.line.length_px:
+                same.adopt(candidate.line)
 
     def judge(
         self, picture: Picture, depth: np.ndarray, surface: SurfaceRegion, colors: SurfaceColors, tilt: float | None
