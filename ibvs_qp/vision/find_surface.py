@@ -69,12 +69,7 @@ def find_surface(
     if color is None:
         color = np.median(coarse[(labels[index] == BOARD) & plane.component].astype(float), axis=0)
     cells = samples_on(grid, inverse, plane, seeds[index])
-    if not (flush := _flush(cells, inverse)):
-        alike = alike_colors(coarse, color)
-    else:
-        alike = colors.like(coarse, color) == BOARD
-        cells = _without_wall(cells, alike, grid)
-    return SurfaceRegion(grid=grid, plane=plane, cells=cells, colored=cells & alike, color=color, by_color=flush)
+    return _region(grid, coarse, plane, cells, color, colors, colors.like(coarse, color), inverse, False)
 
 
 def _around_seed(
@@ -125,21 +120,46 @@ def _around_seed(
 
 
 def followed_region(
-    frame: RgbdFrame, grid: CoarseGrid, config: PlaneConfig, plane: PlaneEstimate, colors: SurfaceColors
+    frame: RgbdFrame,
+    grid: CoarseGrid,
+    config: PlaneConfig,
+    plane: PlaneEstimate,
+    colors: SurfaceColors,
+    before: SurfaceRegion | None,
 ) -> SurfaceRegion:
-    """The samples of a surface whose plane, on this grid, and colour are known."""
+    """The samples of a surface whose plane, on this grid, and colour are known; ``before`` is the region so far."""
     assert colors.board is not None
     coarse = grid.sample(frame.rgb)
     inverse = grid.inverse_depth(frame.depth, config.distance_min_m, config.distance_max_m)
     cells = samples_on(grid, inverse, plane, middle_cell(plane.component))
+    labels = colors.label(coarse, colors.levels_at(*grid.pixels))
+    return _region(
+        grid, coarse, plane, cells, colors.board, colors, labels, inverse, before is not None and before.by_color
+    )
+
+
+def _region(
+    grid: CoarseGrid,
+    coarse: np.ndarray,
+    plane: PlaneEstimate,
+    cells: np.ndarray,
+    color: np.ndarray,
+    colors: SurfaceColors,
+    labels: np.ndarray,
+    inverse: np.ndarray,
+    by_color: bool,
+) -> SurfaceRegion:
+    """The samples on a plane; where a wall may be among them, those that the colours of board and paint enclose.
+
+    A wall may have the board's colour in another light than its own: then only its very colour counts. Without the
+    paint's colour nothing is left out, for what is painted may part the board; unless colour told it before.
+    """
     flush = _flush(cells, inverse)
-    if colors.light is None and not flush:
-        alike = alike_colors(coarse, colors.board)
-    else:  # a wall may be among them, and may have the board's colour in another light than its own
-        alike = colors.label(coarse, colors.levels_at(*grid.pixels)) == BOARD
-    if flush:
-        cells = _without_wall(cells, alike, grid)
-    return SurfaceRegion(grid=grid, plane=plane, cells=cells, colored=cells & alike, color=colors.board, by_color=flush)
+    alike = labels == BOARD if flush or colors.light is not None else alike_colors(coarse, color)
+    enclosed = flush and (by_color or colors.paint is not None)
+    if enclosed:
+        cells = _without_wall(cells, labels != OTHER, grid)
+    return SurfaceRegion(grid=grid, plane=plane, cells=cells, colored=cells & alike, color=color, by_color=enclosed)
 
 
 def _labels(

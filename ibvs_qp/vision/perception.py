@@ -268,7 +268,7 @@ class Perception:
         self._colors.learn(coarse, plane.component)
         plane = self._in_its_light(plane, frame, coarse, down)
         if (searched is None or searched.plane is not plane) and self._colors.board is not None:
-            searched = followed_region(frame, self._grid, self._config.plane, plane, self._colors)
+            searched = followed_region(frame, self._grid, self._config.plane, plane, self._colors, searched)
         assert searched is not None
         self._region = searched
         return searched

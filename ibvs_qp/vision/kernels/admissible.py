@@ -10,8 +10,8 @@ from ibvs_qp.vision.kernels.labels import label_of, level_at
 from ibvs_qp.vision.kernels.strips import clamped
 
 #: A reading farther from the surface than this share of depth is not on it: on the far side of a border, 2.6 sigma of
-#: 0.5 % + 0.5 % noise; on the surface's own side, what real cameras are off by within 4 px of a border.
-_OFF_FAR, _OFF_NEAR = 0.018, 0.05
+#: 0.5 % + 0.5 % noise; on the surface's own side, more than real cameras are off by within 4 px of a border (7 %).
+_OFF_FAR, _OFF_NEAR = 0.018, 0.08
 #: Steps of the table of demands: label behind, depth off the surface before and behind, the surface's side, and kind.
 _LABEL_BEHIND, _OFF_BEFORE, _OFF_BEHIND, _SIDE_STEP, _KIND_STEP = 3, 9, 18, 36, 72
 #: The kind of line that demands nothing, and that which demands a step of depth as well: the surface's border.
