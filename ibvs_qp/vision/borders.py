@@ -72,8 +72,8 @@ def score_borders(
         np.ascontiguousarray(region.color, float),
         region.cells.view(np.uint8),
         _CELLS_BESIDE * grid.stride,
-        grid.stride,
-        grid.offset,
+        float(grid.stride),
+        float(grid.offset),
         evidence,
     )
     rows, columns = np.nonzero(region.colored)

@@ -27,6 +27,8 @@ _SAME_PX, _KNOWN_PX = 2.5, 8.0
 _FURTHER_SHARE = 0.5
 #: Score from which a line is said to border the surface.
 BORDER = 0.2
+#: A segment of a lower score before it is fitted will be no border after that.
+_HOPELESS = 0.05
 #: Confidence of an edge of paint whose two sides have the colours of paint and board.
 _PAINT_CONFIDENCE = 0.9
 #: Share of a line along which a side must show a colour, and along which depth rules out an edge of paint.
@@ -89,24 +91,33 @@ def find_candidates(
     region, painted = surface.end_band(config.detect.band_cells), colors.paint_distinct
     if painted:
         region = region | (cv2.dilate(surface.cells.view(np.uint8), np.ones((5, 5), np.uint8)) > 0)
-    segments = edge_segments(picture, surface.grid, region)
-    if tilt is not None:
-        segments = segments[_near_axes(segments, tilt, math.radians(config.detect.half_range_deg))]
+    segments = edge_segments(picture, surface.grid, region, tilt, config.detect.half_range_deg)
     segments = segments[[not any(_covered(segment, line, picture) for line in known) for segment in segments]]
     if len(segments) == 0:
         return []
-    pieces = trimmed(segments, surface, _SHORTEST_PX * picture.scale)
-    beyond = np.repeat((FIT_BEYOND, 0.0), (len(segments), len(pieces)))
-    segments = np.vstack((segments, pieces))
-    rough = score_borders(segments.reshape(-1, 2, 2), normals_of(segments.reshape(-1, 2, 2)), picture, depth, surface)
-    chosen = np.argsort(-rough.score, kind="stable")[: config.detect.candidates]
+    rough, most = _rough_scores(segments, picture, depth, surface), config.detect.candidates
+    best = np.argsort(-rough, kind="stable")[:most]
+    best = best[rough[best] > _HOPELESS]
+    pieces = trimmed(segments[best], surface, _SHORTEST_PX * picture.scale)
+    chosen = [segments[best], pieces]
     if painted:
-        longest = np.argsort(-_lengths(segments) * _differing(segments, colors, surface, picture), kind="stable")
-        chosen = np.union1d(chosen, longest[: config.detect.candidates // 2])
-    chosen = np.sort(chosen)
-    fits = fit_segments(segments[chosen], picture, config.line, colors, beyond[chosen], contents=painted)
+        share = _differing(segments, colors, surface, picture)
+        share[best] = 0.0
+        chosen.insert(
+            0, segments[np.argsort(-_lengths(segments) * share, kind="stable")[: np.sum(share > _SHOWS)]][:most]
+        )
+    beyond = np.full(sum(map(len, chosen)), FIT_BEYOND)
+    beyond[len(beyond) - len(pieces) :] = 0.0
+    segments = np.vstack(chosen)
+    fits = fit_segments(segments, picture, config.line, colors, beyond, contents=painted)
     found = judge_lines([fit for fit in fits if fit is not None], picture, depth, surface, colors, tilt)
     return _each_edge_once(found, _SAME_PX * picture.scale)
+
+
+def _rough_scores(segments: np.ndarray, picture: Picture, depth: np.ndarray, surface: SurfaceRegion) -> np.ndarray:
+    """Scores of segments (n, 4) as ends of the surface before they are fitted, (n,)."""
+    pixels = segments.reshape(-1, 2, 2)
+    return score_borders(pixels, normals_of(pixels), picture, depth, surface).score
 
 
 def _each_edge_once(lines: list[Candidate], limit_px: float) -> list[Candidate]:
@@ -202,13 +213,6 @@ def normals_of(pixels: np.ndarray) -> np.ndarray:
 
 def _lengths(segments: np.ndarray) -> np.ndarray:
     return np.hypot(segments[:, 2] - segments[:, 0], segments[:, 3] - segments[:, 1])
-
-
-def _near_axes(segments: np.ndarray, tilt: float, within: float) -> np.ndarray:
-    """Whether segments (n, 4) are within an angle of level or upright, bool (n,)."""
-    angle = np.arctan2(segments[:, 3] - segments[:, 1], segments[:, 2] - segments[:, 0]) - tilt
-    quarter = 0.5 * math.pi
-    return np.abs((angle + 0.5 * quarter) % quarter - 0.5 * quarter) <= within
 
 
 def _differing(segments: np.ndarray, colors: SurfaceColors, surface: SurfaceRegion, picture: Picture) -> np.ndarray:

@@ -38,8 +38,21 @@ def half_resolution(rgb: np.ndarray) -> tuple[np.ndarray, int]:
     return cv2.resize(rgb, (width // 2, height // 2), interpolation=cv2.INTER_AREA), 2
 
 
-def edge_segments(picture: Picture, grid: CoarseGrid, region: np.ndarray) -> np.ndarray:
-    """Straight edges in marked samples, bool (rows, columns), longest first: end points u1, v1, u2, v2 [px], (n, 4)."""
+def edge_segments(
+    picture: Picture, grid: CoarseGrid, region: np.ndarray, tilt: float | None, within_deg: float
+) -> np.ndarray:
+    """Straight edges in marked samples, longest first.
+
+    Args:
+        picture: Colour and mask.
+        grid: Where the samples lie.
+        region: The marked ones, bool (rows, columns).
+        tilt: Angle of gravity in the picture from down [rad], None if unknown.
+        within_deg: With a tilt, edges this near to level and upright are looked for [deg].
+
+    Returns:
+        End points u1, v1, u2, v2 [px], (n, 4).
+    """
     small, factor = half_resolution(picture.rgb)
     found = np.empty((_MOST, SEGMENT))
     count = find_segments(
@@ -50,6 +63,8 @@ def edge_segments(picture: Picture, grid: CoarseGrid, region: np.ndarray) -> np.
         max(grid.stride // factor, 1),
         _GRADIENT,
         _SHORTEST_PX * picture.scale / factor,
+        math.nan if tilt is None else tilt,
+        within_deg,
         found,
     )
     ends = found[:count, :4] * factor + 0.5 * (factor - 1)  # pixel centres

@@ -22,14 +22,15 @@ _TURN = 14
 _NEAR_FIRST, _NEAR = 2.0, 1.5
 #: Largest gap between neighbours on a segment: a length [px] and a share of the run before it.
 _GAP, _GAP_SHARE = 6.0, 0.3
-#: Least share of a segment's length that has points, and of the shortest one that has votes.
-_DENSE, _VOTED = 0.4, 0.6
+#: Least points per length of a segment, and least votes per length of the shortest one [1/px]: level and upright edges
+#: have a point on every other pixel.
+_DENSE, _VOTED = 0.25, 0.4
 #: Peaks of the vote that are looked at, and the height from which on they are not told apart.
-_TRIED, _HIGHEST = 200, 4095
+_TRIED, _HIGHEST = 120, 4095
 #: Columns of a point: column, row, gradient direction, magnitude. Of a segment: ends, points.
 POINT, SEGMENT = 5, 5
 #: Most points: the strongest ones vote.
-_MOST = 4000
+_MOST = 2500
 #: Levels of a gradient's magnitude, for the choice of the strongest.
 _LEVELS = 362
 
@@ -96,8 +97,9 @@ def _edge_points(small, mask, factor, region, stride, threshold, points):
             for c in range(max(cell * stride, 1), min((cell + 1) * stride, columns - 1)):
                 if strength[r, c] == 0 or mask[factor * r, factor * c] != 0:
                     continue
-                ridge, _, _ = _is_ridge(strength, gradient, r, c)
-                if ridge:
+                ridge, dr, dc = _is_ridge(strength, gradient, r, c)
+                # along level and upright edges every other place tells enough
+                if ridge and not (dc == 0 and c % 2) and not (dr == 0 and r % 2):
                     places[count] = r * columns + c
                     levels[int(math.sqrt(strength[r, c]))] += 1
                     count += 1
@@ -126,6 +128,17 @@ def _edge_points(small, mask, factor, region, stride, threshold, points):
 
 
 @inner
+def _wanted_degrees(tilt, within):
+    """Whether normals of each whole degree are wanted: near level and upright for a tilt [rad], all without one."""
+    wanted = np.ones(_ANGLES, np.uint8)
+    if not math.isnan(tilt):
+        for k in range(_ANGLES):
+            off = (k - math.degrees(tilt) + 45.0) % 90.0 - 45.0
+            wanted[k] = abs(off) <= within
+    return wanted
+
+
+@inner
 def _by_direction(points, count, first):
     """Order of the points by the whole degree of their gradient; ``first`` receives where each degree begins."""
     degrees = np.empty(count, np.int64)
@@ -142,7 +155,7 @@ def _by_direction(points, count, first):
 
 
 @inner
-def _peaks(points, order, first, middle, threshold, least, cosine, sine, normals, distances):
+def _peaks(points, order, first, wanted, middle, threshold, least, cosine, sine, normals, distances):
     """Voted lines, best first: degree of the normal and distance from the middle; returns how many."""
     reach = int(math.hypot(middle[0], middle[1])) + 2
     wide = 2 * reach + 1
@@ -154,12 +167,15 @@ def _peaks(points, order, first, middle, threshold, least, cosine, sine, normals
             weight = 2 if points[i, 4] > 2.0 * threshold else 1
             for turn in range(-_VOTES_WITHIN, _VOTES_WITHIN + 1):
                 k = (degree + turn) % _ANGLES
+                if wanted[k] == 0:
+                    continue
                 votes[k, int(u * cosine[k] + v * sine[k] + reach + 0.5)] += weight
     heights, places = np.empty(votes.size // 4, np.int64), np.empty(votes.size // 4, np.int64)
     levels, count = np.zeros(_HIGHEST + 1, np.int64), 0
     for k in range(_ANGLES):
-        up, down = votes[(k + 1) % _ANGLES], votes[(k - 1) % _ANGLES]
-        row = votes[k]
+        if wanted[k] == 0:
+            continue
+        up, down, row = votes[(k + 1) % _ANGLES], votes[(k - 1) % _ANGLES], votes[k]
         for r in range(1, wide - 1):
             own = row[r]
             if own < least or own <= row[r - 1] or own < row[r + 1] or own <= down[r] or own < up[r]:
@@ -241,8 +257,8 @@ def _cut(points, held, count, middle, nx, ny, rho, shortest, used, segments, kep
     return kept
 
 
-@kernel("i8(u1[:, :, ::1], u1[:, ::1], i8, u1[:, ::1], i8, f8, f8, f8[:, ::1])")
-def find_segments(small, mask, factor, region, stride, threshold, shortest, segments):
+@kernel("i8(u1[:, :, ::1], u1[:, ::1], i8, u1[:, ::1], i8, f8, f8, f8, f8, f8[:, ::1])")
+def find_segments(small, mask, factor, region, stride, threshold, shortest, tilt, within, segments):
     """Segments of a picture, those with most votes first.
 
     Args:
@@ -253,6 +269,8 @@ def find_segments(small, mask, factor, region, stride, threshold, shortest, segm
         stride: Side of a cell [px].
         threshold: Least gradient, over two pixels [grey levels].
         shortest: Least length [px].
+        tilt: Angle of gravity in the picture from down [rad]; NaN if it is unknown.
+        within: With a tilt, segments this near to level and upright are wanted [deg].
         segments: Receives u1, v1, u2, v2 [px] and number of points, (n, 5). The brighter side lies to the right of the
             way from the first end to the second.
 
@@ -266,9 +284,9 @@ def find_segments(small, mask, factor, region, stride, threshold, shortest, segm
     for k in range(_ANGLES):
         cosine[k], sine[k] = math.cos(math.radians(k)), math.sin(math.radians(k))
     first, least = np.zeros(_ANGLES + 1, np.int64), int(_VOTED * shortest)
-    order = _by_direction(points, count, first)
+    order, wanted = _by_direction(points, count, first), _wanted_degrees(tilt, within)
     normals, distances = np.empty(_TRIED, np.int64), np.empty(_TRIED, np.int64)
-    tried = _peaks(points, order, first, middle, threshold, least, cosine, sine, normals, distances)
+    tried = _peaks(points, order, first, wanted, middle, threshold, least, cosine, sine, normals, distances)
     used, held, kept = np.zeros(count, np.uint8), np.empty(count, np.int64), 0
     for peak in range(tried):
         k, rho = normals[peak], float(distances[peak])
