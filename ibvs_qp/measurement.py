@@ -126,7 +126,7 @@ class Reference:
 
 @dataclass(frozen=True, kw_only=True)
 class RgbdFrame:
-    """One registered colour and depth picture.
+    """One registered colour and depth picture; the Pilot also takes raw ones, of the camera in its ``[camera]``.
 
     Attributes:
         rgb: uint8 (H, W, 3).

@@ -11,10 +11,12 @@ from ibvs_qp.measurement import FeatureFrame, RgbdFrame, SensorFrame
 from ibvs_qp.pilot.attitude_history import AttitudeHistory
 from ibvs_qp.pilot.config import PilotConfig
 from ibvs_qp.pilot.perception_loader import PerceptionLoader
-from ibvs_qp.pilot.rectification import Rectification
+from ibvs_qp.pilot.rolling_shutter import RollingShutter
 from ibvs_qp.validation.features import check_features
 from ibvs_qp.validation.measurement import LINES_PER_SLOT
+from ibvs_qp.vision.checks import PictureGate
 from ibvs_qp.vision.percept import LineHint
+from ibvs_qp.vision.picture_input.camera import RgbdCamera
 
 #: Pixels by which pictures are compared: every 16th row and column, of 4096 at most.
 _SPARSE = (slice(0, 4096, 16), slice(0, 4096, 16))
@@ -25,7 +27,7 @@ class CameraInput:
 
     Attributes:
         percept: What perception found in the last picture, or None.
-        picture: That picture, rectified, or None.
+        picture: That picture, registered and rectified, or None.
         plane, plane_ns: Wall in the camera frame (nx, ny, nz, d) of the last features with one, and their stamp.
         image_ns: Stamp of the last features, -1 for never.
 
@@ -45,10 +47,16 @@ class CameraInput:
         self._most_lines = LINES_PER_SLOT * config.controller.line_slots
         self._loader = PerceptionLoader(config)
         self._mount = TurnedCamera(config.controller.vehicle.camera_turn_deg)
-        self._rectification = Rectification(self._mount, config.camera)
+        self._pictures = PictureGate()
+        self._camera = RgbdCamera(config.camera, self._mount.rotation, self._pictures.problem)
+        place = np.array(config.controller.vehicle.camera_position_m)
+        self._shutter = RollingShutter(config.camera.readout_s, self._camera.lens, place)
 
     def prepare(self, picture: RgbdFrame | None = None) -> None:
         """Load perception and call every stage of it once; `Pilot.prepare`."""
+        if picture is not None:
+            picture = self._camera.picture(picture)
+            self._pictures.reset()
         self._loader.start(picture).join()
         if self._loader.problem:
             raise RuntimeError(self._loader.problem)
@@ -57,7 +65,7 @@ class CameraInput:
         """As before the first picture; perception stays loaded."""
         if self._loader.perception is not None:
             self._loader.perception.reset()
-        self._rectification.reset()
+        self._pictures.reset()
         self.percept, self.picture, self._capture_ns = None, None, -1
         self.plane: tuple[float, float, float, float] | None = None
         self.plane_ns = self.image_ns = -1
@@ -107,7 +115,7 @@ class CameraInput:
             return None
         last_ns = self._capture_ns if self._capture_ns >= 0 else image.stamp_ns
         self._capture_ns = image.stamp_ns
-        self.picture = self._rectification.picture(image)
+        self.picture = self._camera.picture(image)
         self.percept = perception.process(
             self.picture,
             attitude=np.array(self._history.attitude(image.stamp_ns)),
@@ -119,6 +127,10 @@ class CameraInput:
             rejected.append(f"image: {self.percept.refused}")
             return None
         seen = self.percept.features
+        if seen is not None:
+            plane = self.plane if seen.plane is None else seen.plane
+            motion = seen.velocity if velocity is None else velocity
+            seen = self._shutter.features(seen, self.picture, plane, motion, self._history.rate(image.stamp_ns))
         return seen if self._seen_as is None or seen is None else self._seen_as(seen)
 
 

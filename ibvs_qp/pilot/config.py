@@ -7,34 +7,25 @@ from pathlib import Path
 
 from ibvs_qp.config import ControllerConfig, EstimationConfig, SafetySettings
 from ibvs_qp.config.contact_margin import require_margin
-from ibvs_qp.config.errors import out_of_range
 from ibvs_qp.config.settings import choice, dump_toml, load_toml, setting, validate
 from ibvs_qp.painting.config import PaintingConfig
 from ibvs_qp.vision.config import VisionConfig
 from ibvs_qp.vision.paper.config import PaperConfig
-
-#: Numbers of coefficients of OpenCV's lens models.
-DISTORTION_SIZES = (0, 4, 5, 8, 12, 14)
+from ibvs_qp.vision.picture_input.settings import RgbdCameraSettings
 
 
 @dataclass(frozen=True, kw_only=True)
-class CameraConfig:
-    """Settings of the camera beside the intrinsics, which come with every picture."""
+class CameraConfig(RgbdCameraSettings):
+    """Settings of the camera beside the colour intrinsics, which come with every picture."""
 
     latest_s: float = setting(0.30, "pictures older than this at delivery are refused", unit="s", low=0.01, high=2.0)
-    distortion: tuple[float, ...] = setting(
-        (),
-        "coefficients of the lens, k1 k2 p1 p2 k3 ... of OpenCV's calibrateCamera; none for rectified pictures",
-        low=-100.0,
-        high=100.0,
+    readout_s: float = setting(
+        0.0,
+        "rolling shutter of the colour picture: first to last row, the stamp is that of the row cy; 0 for a global one",
+        unit="s",
+        low=0.0,
+        high=0.1,
     )
-
-    def __post_init__(self) -> None:
-        """Validate."""
-        validate(self)
-        if len(self.distortion) not in DISTORTION_SIZES:
-            sizes = ", ".join(map(str, DISTORTION_SIZES))
-            raise out_of_range("distortion", self.distortion, "", f"so many coefficients: {sizes}")
 
 
 @dataclass(frozen=True, kw_only=True)

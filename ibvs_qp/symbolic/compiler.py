@@ -5,16 +5,14 @@ from __future__ import annotations
 import functools
 import logging
 import os
-import platform
 import shlex
 import shutil
 import signal
 import subprocess
 import tempfile
 import time
-from pathlib import Path
 
-#: Time that compilers may take in one process [s], all runs together: a tick and the loops of vision need 3 s.
+#: Time that compilers may take in one process [s], all runs together: a tick and its solver need 4 s.
 PATIENCE_S = 10.0
 
 log = logging.getLogger(__name__)
@@ -34,16 +32,6 @@ def _words(given: str) -> tuple[str, ...]:
     except ValueError as error:
         log.warning("CC = %r is no command: %s", given, error)
         return ()
-
-
-@functools.cache
-def wide_registers() -> tuple[str, ...]:
-    """The compiler's option for registers of 32 bytes where this machine has them: more at a time, the same bits."""
-    try:
-        known = Path("/proc/cpuinfo").read_text()
-    except OSError:
-        return ()  # another system: the compiler's own choice
-    return ("-mavx2",) if platform.machine() == "x86_64" and " avx2 " in known else ()
 
 
 @functools.cache

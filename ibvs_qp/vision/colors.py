@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import ctypes
+import math
 
 import numpy as np
 
-from ibvs_qp.vision.board_samples import board_median, squared_distances
 from ibvs_qp.vision.grid import CoarseGrid
-from ibvs_qp.vision.label_tables import BOARD, OTHER, PAINT, TABLE_SIZE, LabelTables, places_in_table
+from ibvs_qp.vision.kernels.colors import board_color, light_of, painted_light
+from ibvs_qp.vision.kernels.labels import BOARD, OTHER, PAINT, UNKNOWN, labels_of, like_colors
+from ibvs_qp.vision.label_tables import LabelTables
 from ibvs_qp.vision.light import LightField, fit_light
-from ibvs_qp.vision.light_samples import gates_of, is_even
-from ibvs_qp.vision.native import native, place
-from ibvs_qp.vision.native_colors import even_natively, seeds_natively
-from ibvs_qp.vision.paint_light import paint_as_lit, paint_seen_natively
+from ibvs_qp.vision.light_samples import is_even
 
 __all__ = ["BOARD", "OTHER", "PAINT", "SurfaceColors"]
 
@@ -23,6 +21,11 @@ _BLEND = 0.2
 _EVEN = (0,)
 #: Colours nearer to each other than this share of the gate cannot be told apart.
 _DISTINCT = 0.8
+#: Fewer samples tell nothing of the board, or of the paint.
+_LEAST_BOARD, _LEAST_PAINT = 8, 12
+#: Light on the paint nearer than this to that in which it was named needs no correction [ln]: the gate holds it.
+_AS_NAMED = 0.08
+_NO_LEVELS = np.empty(0, np.uint8)
 
 
 class SurfaceColors:
@@ -32,7 +35,7 @@ class SurfaceColors:
         """Take the known colours (RGB 0..255) and the distance within which a colour matches."""
         self._given = None if board is None else np.asarray(board, np.float32)
         self._named = None if paint is None else np.asarray(paint, np.float32)
-        self._gate = gate
+        self._gate = float(gate)
         self.reset()
 
     def reset(self) -> None:
@@ -53,8 +56,9 @@ class SurfaceColors:
         """
         if self._given is not None or self.light is not None:
             return
-        median = board_median(colors, component, self.paint, self.board, self._gate)
-        if median is not None:
+        surface = np.ascontiguousarray(component, bool).reshape(-1)
+        count, median = board_color(_flat(colors), surface, _or_empty(self.paint), _or_empty(self.board), self._gate)
+        if count >= _LEAST_BOARD:
             self.board = median if self.board is None else self.board + _BLEND * (median - self.board)
 
     def surely_even(self, colors: np.ndarray, places: np.ndarray) -> bool:
@@ -62,10 +66,10 @@ class SurfaceColors:
 
         False also where only `learn_light` can tell.
         """
-        library = native()
-        if library is None or self.light is not None or self.board is None:
+        if self.light is not None or self.board is None:
             return False
-        return is_even(*even_natively(library, colors, places, self.paint, self.board, gates_of(self._gate))[::-1])
+        _, _, tinted, even = light_of(_taken(colors, places), self.board, _or_empty(self.paint), self._gate)
+        return is_even(int(np.count_nonzero(even)), int(np.count_nonzero(tinted)))
 
     def learn_light(
         self,
@@ -84,11 +88,10 @@ class SurfaceColors:
         """
         if self.board is None:
             return False
-        if self.paint is not None:
-            bare = squared_distances(samples.astype(np.float32), self.paint) > self._gate**2
-            samples, places = samples[bare], places[bare]
-        fixed = self._given is not None
-        found = fit_light(samples, places, self.board, self._gate, shape, intrinsics, self.light, anchored=fixed)
+        fixed, paint = self._given is not None, _or_empty(self.paint)
+        found = fit_light(
+            samples, places, self.board, self._gate, shape, intrinsics, self.light, paint=paint, anchored=fixed
+        )
         self.light = None if found is None else found[0]
         if found is not None and not fixed:
             self.board = found[1]
@@ -98,16 +101,13 @@ class SurfaceColors:
         """See how bright the paint is, among colours uint8 (rows, columns, 3) at flat places beside the brush, (n,)."""
         if self.board is None or self._named is None:
             return
-        library = native()
-        if library is not None and self.light is None:
-            seen = paint_seen_natively(library, colors, places, self._named, self.board, self._gate)
-        else:
-            samples = colors.reshape(-1, 3).take(places, axis=0).astype(np.float32)
-            if self.light is not None:
-                light = self.light.at(grid.design[:, :2].take(places, axis=0))
-                samples = samples / np.exp(light).astype(np.float32)[:, None]
-            seen = paint_as_lit(samples, self._named, self.board, self._gate)
-        self.paint = self.paint if seen is None else seen
+        samples = _taken(colors, places)
+        if self.light is not None:
+            light = self.light.at(grid.design[:, :2].take(places, axis=0))
+            samples = samples / np.exp(light).astype(np.float32)[:, None]
+        count, found = painted_light(samples, self._named, self.board, self._gate)
+        if count >= _LEAST_PAINT:
+            self.paint = self._named if abs(math.log(found)) < _AS_NAMED else np.float32(found) * self._named
 
     def levels_at(self, u: np.ndarray, v: np.ndarray) -> np.ndarray | None:
         """Level of light at pixels, for `label`; None where the light is even."""
@@ -122,16 +122,8 @@ class SurfaceColors:
         """OTHER, BOARD or PAINT for colours uint8 (..., 3) in light of some level; all OTHER for an unknown board."""
         if self.board is None:
             return np.zeros(colors.shape[:-1], np.uint8)
-        library = native()
-        if library is not None:
-            colors, labels = np.ascontiguousarray(colors), np.empty(colors.shape[:-1], np.uint8)
-            lit = None if levels is None else np.ascontiguousarray(np.broadcast_to(levels, labels.shape))
-            parts = (lit, self.table(), labels)
-            count = ctypes.c_long(labels.size)
-            library.labels_of(place(colors), count, *(place(part) for part in parts))
-            return labels
-        places = places_in_table(colors)
-        return self.table().take(places if levels is None else places + levels.astype(np.intp) * TABLE_SIZE)
+        lit = _NO_LEVELS if levels is None else np.broadcast_to(levels, colors.shape[:-1]).flatten()
+        return labels_of(_flat(colors), lit, self.table()).reshape(colors.shape[:-1])
 
     def table(self) -> np.ndarray:
         """Labels of all colours, one table after the other for every level of light; the board must be known."""
@@ -141,28 +133,13 @@ class SurfaceColors:
 
     def like_around(self, grid: CoarseGrid, colors: np.ndarray, seed: tuple[int, int], radius: int) -> np.ndarray:
         """Labels of samples by the colour around a seed: BOARD for what looks like it, uint8 (rows, columns)."""
-        [around] = self._around(grid, colors, [seed], radius)
-        library = native()
-        if library is not None:
-            return self._like_natively(library, colors, around)
-        return self._like_with_numpy(colors, around)
+        return self.like(colors, self._around(grid, colors, [seed], radius)[0])
 
-    def _like_natively(self, library: ctypes.CDLL, colors: np.ndarray, around: np.ndarray) -> np.ndarray:
-        paint, apart = self.paint, self._gate**2
-        if paint is not None and _apart(paint, around) <= apart:
-            paint = None
-        colors, labels = np.ascontiguousarray(colors), np.empty(colors.shape[:-1], np.uint8)
-        gate, count = ctypes.c_float(apart), ctypes.c_long(labels.size)
-        library.like_colors(place(colors), count, *(place(part) for part in (around, paint)), gate, place(labels))
-        return labels
-
-    def _like_with_numpy(self, colors: np.ndarray, around: np.ndarray) -> np.ndarray:
-        """The same where there is no machine code."""
-        samples = colors.reshape(-1, 3).astype(np.float32)
-        labels = (squared_distances(samples, around) < self._gate**2).view(np.uint8)
-        if self.paint is not None and _apart(self.paint, around) > self._gate**2:
-            labels[(squared_distances(samples, self.paint) < self._gate**2) & (labels == OTHER)] = PAINT
-        return labels.reshape(colors.shape[:-1])
+    def like(self, colors: np.ndarray, color: np.ndarray) -> np.ndarray:
+        """Labels of colours uint8 (..., 3): BOARD for what looks like one (3,), uint8 (...)."""
+        color = np.ascontiguousarray(color, np.float32)
+        paint = UNKNOWN if self.paint is None or _apart(self.paint, color) <= self._gate**2 else self.paint
+        return like_colors(_flat(colors), color, paint, self._gate).reshape(colors.shape[:-1])
 
     def bare(
         self, grid: CoarseGrid, colors: np.ndarray, seeds: list[tuple[int, int]], radius: int
@@ -178,10 +155,7 @@ class SurfaceColors:
     @staticmethod
     def _around(grid: CoarseGrid, colors: np.ndarray, seeds: list[tuple[int, int]], radius: int) -> np.ndarray:
         """Median colours of the samples around seeds, float32 (n, 3)."""
-        library, places = native(), grid.windows(seeds, radius)
-        if library is not None:
-            return seeds_natively(library, colors, places)
-        windows = np.sort(colors.reshape(-1, 3).take(places, axis=0), axis=1)
+        windows = np.sort(_flat(colors).take(grid.windows(seeds, radius), axis=0), axis=1)
         return windows[:, windows.shape[1] // 2].astype(np.float32)
 
     @property
@@ -190,6 +164,21 @@ class SurfaceColors:
         if self.board is None or self.paint is None:
             return False
         return _apart(self.paint, self.board) > (_DISTINCT * self._gate) ** 2
+
+
+def _or_empty(color: np.ndarray | None) -> np.ndarray:
+    """A colour as kernels take it: empty if unknown."""
+    return UNKNOWN if color is None else color
+
+
+def _flat(colors: np.ndarray) -> np.ndarray:
+    """Colours (..., 3) as kernels take them: in one list, (n, 3)."""
+    return np.ascontiguousarray(colors).reshape(-1, 3)
+
+
+def _taken(colors: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Colours uint8 (rows, columns, 3) at flat places (n,), float32 (n, 3)."""
+    return _flat(colors).take(places, axis=0).astype(np.float32)
 
 
 def _apart(one: np.ndarray, two: np.ndarray) -> float:

@@ -73,16 +73,19 @@ class MaskConfig(_Checked):
 class DetectConfig(_Checked):
     """Search for lines without a prediction."""
 
-    half_range_deg: float = setting(14.0, "angles searched around level and upright", unit="deg", low=2.0, high=40.0)
-    angle_step_deg: float = setting(
-        0.5, "step of the vote; 1 px over 115 px of half picture", unit="deg", low=0.1, high=3.0
+    half_range_deg: float = setting(
+        14.0,
+        "lines this near to level and upright are looked at where gravity is known",
+        unit="deg",
+        low=2.0,
+        high=45.0,
     )
-    gradient_min: float = setting(
-        20.0, "weakest Sobel answer that votes (noise: sigma 4)", unit="grey levels", low=1.0, high=1000.0
+    band_cells: int = setting(
+        4, "half width of the band around the surface's end in which its edges are sought (32 px)", low=1, high=20
     )
     min_length: float = setting(0.10, "shortest line, share of the picture's width", low=0.01, high=1.0)
-    candidates: int = setting(8, "candidates refined per detection", low=1, high=100)
-    period: int = setting(20, "frames between detections of either direction while tracks live", low=1, high=1000)
+    candidates: int = setting(16, "segments fitted to a fraction of a pixel per detection", low=1, high=100)
+    period: int = setting(20, "frames between detections while tracks live", low=1, high=1000)
     lost_period: int = setting(3, "frames between detections while nothing is tracked", low=1, high=1000)
     min_score: float = setting(0.25, "weakest candidate that may start a track", low=0.0, high=1.0)
 
@@ -127,8 +130,11 @@ class TrackConfig(_Checked):
         0.30, "healthy: share of unmasked profiles in the segment that agree", low=0.05, high=1.0
     )
     rms_max_px: float = setting(0.8, "healthy: residual rms", unit="px", low=0.05, high=10.0)
+    confidence_min: float = setting(
+        0.3, "less certain lines are followed, but are no features for control", low=0.0, high=1.0
+    )
     duplicate_px: float = setting(4.0, "two tracks of one kind nearer than this are one", unit="px", low=0.5, high=50.0)
-    capacity: int = setting(8, "most tracks kept", low=1, high=64)
+    capacity: int = setting(12, "most tracks kept", low=1, high=64)
 
 
 @dataclass(frozen=True, kw_only=True)

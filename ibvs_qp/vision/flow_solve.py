@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -11,10 +10,9 @@ import numpy as np
 
 from ibvs_qp.frames import R_BODY_CAMERA
 from ibvs_qp.vision.config import FlowConfig
-from ibvs_qp.vision.flow_numpy import depths_with_numpy, root_with_numpy, solve_with_numpy
+from ibvs_qp.vision.kernels.flow import robust_velocity
+from ibvs_qp.vision.kernels.flow_points import information_roots, point_depths
 from ibvs_qp.vision.mask import Intrinsics
-from ibvs_qp.vision.native import native
-from ibvs_qp.vision.native_flow import depths_natively, root_natively, solve_natively
 
 #: A point within this many residual sigmas of the surface takes the surface's depth, which is far less noisy.
 _ON_PLANE_SIGMAS = 4.0
@@ -22,8 +20,9 @@ _ON_PLANE_SIGMAS = 4.0
 _SOBEL_NOISE = 12.0 / 64.0
 #: Distance of the four further places at which the depth of a point is read, and how many must be valid [px].
 _CROSS_PX, _READINGS = 2, 3
-#: Columns of the system of `solve_velocity`: velocity and turn.
+#: Columns of the sums of `solve_velocity`: velocity and turn.
 _V, _TURN = slice(0, 3), slice(4, 7)
+_NO_SURFACE = np.empty(0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,25 +66,21 @@ def information_root(grey: np.ndarray, points: np.ndarray, config: FlowConfig) -
     Information is the structure tensor over the window, noise removed, per noise variance, with a floor on the
     error that structure cannot lower: along a lone edge it vanishes (aperture).
     """
-    if len(points) == 0:
-        return np.zeros((0, 2, 2))
-    library, variance = native(), config.grey_sigma**2
+    variance = config.grey_sigma**2
     floor = 2.0 * config.window_px**2 * _SOBEL_NOISE * variance
-    root = root_with_numpy if library is None else functools.partial(root_natively, library)
-    return root(grey, points, config.window_px // 2, floor, variance, config.pixel_sigma**2)
+    return information_roots(grey, points, config.window_px // 2, floor, variance, config.pixel_sigma**2)
 
 
 def inverse_depths(
     bearings: np.ndarray, depth: np.ndarray, intrinsics: Intrinsics, plane: FlowSurface | None
 ) -> np.ndarray:
     """1/Z of normalised points (n, 2): the surface's where they lie on it, else their own, 0 if unknown, (n,)."""
-    if len(bearings) == 0:
-        return np.zeros(0)
-    library, surface, gate = native(), None, 0.0
+    surface, gate = _NO_SURFACE, 0.0
     if plane is not None:
-        surface, gate = plane.inverse_depth, max(_ON_PLANE_SIGMAS * plane.residual_sigma, 0.01)
-    wanted = bearings, depth, intrinsics, surface, gate, _CROSS_PX, _READINGS
-    return depths_with_numpy(*wanted) if library is None else depths_natively(library, *wanted)
+        surface = np.ascontiguousarray(plane.inverse_depth, float)
+        gate = max(_ON_PLANE_SIGMAS * float(plane.residual_sigma), 0.01)
+    depth = np.ascontiguousarray(depth, np.float32)
+    return point_depths(bearings, depth, np.array(intrinsics, float), surface, gate, _CROSS_PX, _READINGS)
 
 
 def unturned(bearings: np.ndarray, rotation: np.ndarray) -> np.ndarray:
@@ -130,36 +125,27 @@ def solve_velocity(
     Returns:
         The velocity, or the reason why there is none.
     """
-    prior, library = 1.0 / config.prior_m_s**2, native()
-    solve = solve_with_numpy if library is None else functools.partial(solve_natively, library)
-    solved = solve(
-        still,
-        end,
-        inverse,
-        root,
-        scale=focal * interval,
-        interval=interval,
-        prior=prior,
-        gate_sigmas=config.gate_sigmas,
+    prior = 1.0 / config.prior_m_s**2
+    velocity, sums, square, total, agreeing = robust_velocity(
+        still, end, inverse, root, focal * interval, interval, prior, config.gate_sigmas
     )
-    if solved is None:
+    if not len(velocity):
         return "the points determine no velocity"
-    (*velocity, square, total, agreeing), sums = solved
     if agreeing < config.min_points:
         return "too few points agree"
     if math.hypot(*velocity) > config.speed_max_m_s:
         return "faster than possible"
     spread = max(square / max(2.0 * total - 3.0, 1.0), 1.0)
     spreads = np.array((1.0, spread))[:, None, None]
-    with_prior, spread_out = np.linalg.inv(sums[_V, _V] + np.eye(3) * prior / spreads) * spreads
-    leak = with_prior @ sums[_V, _TURN] * (config.rotation_sigma_rad / interval)
+    with_prior, spread_out = np.linalg.inv(sums[:, _V] + np.eye(3) * prior / spreads) * spreads
+    leak = with_prior @ sums[:, _TURN] * (config.rotation_sigma_rad / interval)
     covariance = spread_out + leak @ leak.T
     covariance = R_BODY_CAMERA @ covariance @ R_BODY_CAMERA.T
     (wx, wy, wz), (px, py, pz) = (rotation / interval).tolist(), camera_position.tolist()
     lever = np.array([wy * pz - wz * py, wz * px - wx * pz, wx * py - wy * px])
     return FlowVelocity(
-        velocity=R_BODY_CAMERA @ np.array(velocity) - lever,
+        velocity=R_BODY_CAMERA @ velocity - lever,
         covariance=0.5 * (covariance + covariance.T),
         stamp_ns=0,
-        points=int(agreeing),
+        points=agreeing,
     )

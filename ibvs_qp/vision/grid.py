@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import ctypes
 import functools
 
 import cv2
 import numpy as np
 
+from ibvs_qp.vision.kernels.samples import sample_depths
 from ibvs_qp.vision.mask import Intrinsics
-from ibvs_qp.vision.native import native, place
 
 #: Whole pixels need no table of fractions.
 _WHOLE = np.empty((0, 0), np.uint16)
@@ -28,6 +27,7 @@ class CoarseGrid:
         free: Samples the vehicle does not hide, bool (rows, columns).
         places: (u, v) of the samples [px], int16 (rows, columns, 2).
         pixels: The same, columns and rows apart, (rows, columns) each.
+        axes: Normalised x and y of the samples, (rows, columns) each.
         design: Columns x, y, 1 in normalised coordinates, (rows * columns, 3).
     """
 
@@ -40,7 +40,7 @@ class CoarseGrid:
         fx, fy, cx, cy = intrinsics
         u, v = np.arange(self.offset, width, self.stride), np.arange(self.offset, height, self.stride)
         self.shape = (len(v), len(u))
-        x, y = np.meshgrid((u - cx) / fx, (v - cy) / fy)
+        self.axes = x, y = np.meshgrid((u - cx) / fx, (v - cy) / fy)
         self.design = np.column_stack((x.ravel(), y.ravel(), np.ones(x.size)))
         along, across = np.meshgrid(u, v)
         self.places = np.stack((along, across), axis=2).astype(np.int16)
@@ -57,20 +57,20 @@ class CoarseGrid:
 
     def inverse_depth(self, depth: np.ndarray, nearest: float, farthest: float) -> np.ndarray:
         """1/Z at the samples [1/m], 0 where the depth is absent, not finite or out of range, (rows, columns)."""
-        library = native()
-        if library is not None and depth.dtype == np.float32 and depth.flags.c_contiguous:
-            inverse, size = np.empty(self.shape), (ctypes.c_long(depth.shape[1]), ctypes.c_long(self.free.size))
-            limits = ctypes.c_double(nearest), ctypes.c_double(farthest)
-            library.sample_depths(place(depth), size[0], place(self.places), size[1], *limits, place(inverse))
-            return inverse
-        z = self.sample(depth).astype(np.float64)
-        good = (z > nearest) & (z < farthest)  # false for NaN too
-        return np.divide(1.0, z, out=np.zeros_like(z), where=good)
+        depth, inverse = np.ascontiguousarray(depth, np.float32), np.empty(self.shape)
+        sample_depths(depth, self.places.reshape(-1, 2), float(nearest), float(farthest), inverse.reshape(-1))
+        return inverse
 
     def cell(self, x: float, y: float) -> tuple[int, int]:
         """Row and column of the sample nearest to a normalised point (may lie outside the grid)."""
         fx, fy, cx, cy = self.intrinsics
         return round((fy * y + cy - self.offset) / self.stride), round((fx * x + cx - self.offset) / self.stride)
+
+    def cell_at(self, u: float, v: float) -> tuple[int, int]:
+        """Row and column of the sample nearest to a pixel of the picture."""
+        rows, columns = self.shape
+        row, column = round((v - self.offset) / self.stride), round((u - self.offset) / self.stride)
+        return min(max(row, 0), rows - 1), min(max(column, 0), columns - 1)
 
     def window(self, cell: tuple[int, int], radius: int) -> tuple[slice, slice]:
         """Slices of the square window around a cell, cut at the border of the grid."""

@@ -25,17 +25,19 @@ class PictureLayout:
         seeds: Cells beside the brush.
     """
 
-    def __init__(self, frame: RgbdFrame, config: VisionConfig, vehicle: VehicleParams) -> None:
+    def __init__(self, frame: RgbdFrame, config: VisionConfig, vehicle: VehicleParams | None) -> None:
         """Draw the masks and lay the grid for pictures like this one."""
         shape = (frame.rgb.shape[0], frame.rgb.shape[1])
         self._key = (shape, tuple(frame.intrinsics))
-        self.mask = vehicle_mask(vehicle, config.brush_width_m, config.mask, frame.intrinsics, shape)
-        zone = brush_zone(vehicle, config.brush_width_m, config.mask, frame.intrinsics, shape)
+        self.mask = zone = np.zeros(shape, np.uint8)
+        if vehicle is not None:
+            self.mask = vehicle_mask(vehicle, config.brush_width_m, config.mask, frame.intrinsics, shape)
+            zone = brush_zone(vehicle, config.brush_width_m, config.mask, frame.intrinsics, shape)
         self.excluded = np.ascontiguousarray((self.mask | zone)[: shape[0] // 2 * 2 : 2, : shape[1] // 2 * 2 : 2])
         self.grid = CoarseGrid(shape, frame.intrinsics, self.mask, config.plane.grid_columns)
         self.beside_brush = np.flatnonzero(self.grid.free & (self.grid.sample(zone) > 0))
         self.follower = PlaneFollower(config.plane, shape, frame.intrinsics, self.mask)
-        self.seeds = seed_cells(self.grid, vehicle, config.brush_width_m)
+        self.seeds = [] if vehicle is None else seed_cells(self.grid, vehicle, config.brush_width_m)
 
     def fits(self, frame: RgbdFrame) -> bool:
         """Whether a picture has this size and camera."""

@@ -7,20 +7,12 @@ from functools import cached_property
 
 import numpy as np
 
-from ibvs_qp.vision.light_samples import (
-    LEAST,
-    LEFT_OUT,
-    SURE,
-    UNEVEN,
-    distances,
-    is_even,
-    left_by_two_materials,
-    tinted_and_even,
-)
+from ibvs_qp.vision.kernels.colors import SURE, UNEVEN, light_of
+from ibvs_qp.vision.kernels.labels import CELL_BITS, UNKNOWN
+from ibvs_qp.vision.light_samples import LEAST, LEFT_OUT, distances, is_even, left_by_two_materials
 
-#: Side of the cells of constant light [px, as a power of two], and the step between two levels of light [ln]: half of
-#: it is a seventh of the gate of a white board.
-CELL_BITS, STEP = 4, 0.03
+#: Step between two levels of light [ln]: half of it is a seventh of the gate of a white board.
+STEP = 0.03
 #: Light is held between these levels [steps]: 0.4 to 2.5 times the light of the reference.
 _LEVELS = 30
 #: A field that is already known is kept down to this difference of light, less than what makes a new one [ln].
@@ -104,6 +96,7 @@ def fit_light(
     intrinsics: tuple[float, float, float, float],
     before: LightField | None = None,
     *,
+    paint: np.ndarray = UNKNOWN,
     anchored: bool = False,
 ) -> tuple[LightField, np.ndarray] | None:
     """How the light falls on the surface, grown from where the surface's colour is known.
@@ -119,13 +112,14 @@ def fit_light(
         shape: (height, width) of the picture [px].
         intrinsics: Of the picture [px].
         before: The field of the pictures before, or None for even light.
+        paint: Colour of the paint, which is left out, RGB float32 (3,), empty if unknown.
         anchored: Whether the surface's colour is known, so that its light in the middle of the picture is sought too.
 
     Returns:
         The field and the surface's colour in its reference light; None where the light is even, or cannot be told.
     """
-    colors, size = colors.astype(np.float32), max(float(board @ board), 1.0)
-    light, cut, tinted, even = tinted_and_even(colors, board, gate)
+    colors, board = colors.astype(np.float32), board.astype(np.float32)
+    light, cut, tinted, even = light_of(colors, board, paint, gate)
     held, count = int(np.count_nonzero(even)), int(np.count_nonzero(tinted))
     if count < LEAST or (before is None and is_even(held, count)):
         return None
@@ -148,7 +142,8 @@ def fit_light(
         solution = np.linalg.solve(part.T @ part + len(part) * np.diag(_PULL), part.T @ logarithm[telling])
         expected = design @ solution
     left = float(np.abs((logarithm - expected)[telling]).sum())
-    if left > _UNEXPLAINED * left_by_two_materials(logarithm[telling], SURE * gate / size**0.5):
+    band = SURE * gate / max(float(board @ board), 1.0) ** 0.5
+    if left > _UNEXPLAINED * left_by_two_materials(logarithm[telling], band):
         return None
     if not anchored:
         expected, solution[0] = expected - solution[0], 0.0

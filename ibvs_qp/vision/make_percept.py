@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from ibvs_qp.measurement import FeatureFrame, LineFeature, RgbdFrame
-from ibvs_qp.vision.detect import Candidate
+from ibvs_qp.vision.candidates import Candidate
 from ibvs_qp.vision.flow_solve import FlowVelocity
-from ibvs_qp.vision.percept import Percept
+from ibvs_qp.vision.guides import GuideKeeper
+from ibvs_qp.vision.percept import Percept, no_guides
 from ibvs_qp.vision.surface import PlaneEstimate
 from ibvs_qp.vision.track import Track
 
@@ -21,8 +22,10 @@ def make_percept(
     refused: str | None,
     mask: np.ndarray,
     times: dict[str, float],
+    guides: GuideKeeper | None = None,
+    least_confidence: float = 0.0,
 ) -> Percept:
-    """Result of one picture; only confirmed tracks of positive weight become features."""
+    """Result of one picture; only confirmed and certain tracks of positive weight become features."""
     tracks = tuple(track.state() for track in followed)
     lines = tuple(
         LineFeature(
@@ -38,7 +41,7 @@ def make_percept(
             kind=track.kind,
         )
         for track in tracks
-        if track.confirmed and track.weight > 0.0
+        if track.confirmed and track.weight > 0.0 and track.confidence >= least_confidence
     )
     moving = flow if isinstance(flow, FlowVelocity) else None
     features = FeatureFrame(
@@ -53,6 +56,7 @@ def make_percept(
         features=features,
         plane=plane,
         tracks=tracks,
+        guides=no_guides() if guides is None else guides.choose(tracks),
         candidates=candidates,
         refused=refused,
         velocity_refused=None if moving is not None else str(flow),

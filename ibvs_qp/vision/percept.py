@@ -7,8 +7,16 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ibvs_qp.measurement import FeatureFrame
-from ibvs_qp.vision.detect import Candidate
+from ibvs_qp.vision.candidates import Candidate
 from ibvs_qp.vision.plane import PlaneEstimate
+
+#: The four guides, by the side of the surface on which they lie.
+GUIDE_SIDES = ("top", "bottom", "left", "right")
+
+
+def no_guides() -> dict[str, TrackState | None]:
+    """All four guides absent."""
+    return dict.fromkeys(GUIDE_SIDES)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,7 +63,8 @@ class TrackState:
         inlier_share: Share of profiles that agree.
         rms_px: Residual [px].
         length_px: Length of the segment [px].
-        score: Score of the detection it started from, or 1 for a hint.
+        score: 0..1, ranks the tracks of one picture; 1 for a hint.
+        confidence: 0..1, share of such lines that are what `kind` says; it falls while the line is not seen.
         borders_plane: Whether depth said that the surface ends there.
         hint: Name of the hint it answers, or "".
     """
@@ -77,6 +86,7 @@ class TrackState:
     rms_px: float
     length_px: float
     score: float
+    confidence: float
     borders_plane: bool
     hint: str
 
@@ -89,6 +99,7 @@ class Percept:
         features: Lines, plane and velocity for an estimator or a controller.
         plane: The surface, or None.
         tracks: All tracks, tentative ones included.
+        guides: Track of the surface's own top, bottom, left and right edge, None where none is seen.
         candidates: Lines found by a detection in this picture (empty where none ran).
         refused: Why there is no plane or nothing at all, or None.
         velocity_refused: Why there is no velocity, or None.
@@ -100,6 +111,7 @@ class Percept:
     features: FeatureFrame
     plane: PlaneEstimate | None = None
     tracks: tuple[TrackState, ...] = ()
+    guides: dict[str, TrackState | None] = field(default_factory=no_guides)
     candidates: tuple[Candidate, ...] = ()
     refused: str | None = None
     velocity_refused: str | None = None

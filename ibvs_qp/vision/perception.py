@@ -1,9 +1,8 @@
-"""One picture in, features out: surface, tracked lines and velocity. Start reading here."""
+"""One picture in, features out: surface, tracked lines, guides and velocity. Start reading here."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
 
 import cv2
 import numpy as np
@@ -12,12 +11,17 @@ from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import R_BODY_CAMERA, down_in_body
 from ibvs_qp.measurement import FeatureFrame, RgbdFrame
 from ibvs_qp.validation.failure import raised
+from ibvs_qp.vision.candidates import Candidate, find_candidates
 from ibvs_qp.vision.checks import PictureGate, StageClock, finite_vector
 from ibvs_qp.vision.colors import SurfaceColors
 from ibvs_qp.vision.config import VisionConfig
-from ibvs_qp.vision.detect import Candidate, detect_lines
+from ibvs_qp.vision.edge_segments import half_resolution
+from ibvs_qp.vision.ego_motion import surface_motion
 from ibvs_qp.vision.exposure import ExposureSteps
+from ibvs_qp.vision.find_surface import find_surface, followed_region
 from ibvs_qp.vision.flow import SparseFlow
+from ibvs_qp.vision.guides import GuideKeeper
+from ibvs_qp.vision.kernels import prepare
 from ibvs_qp.vision.layout import PictureLayout
 from ibvs_qp.vision.light_samples import on_surface
 from ibvs_qp.vision.make_percept import make_percept
@@ -25,34 +29,31 @@ from ibvs_qp.vision.motion import CameraMotion
 from ibvs_qp.vision.percept import LineHint, Percept
 from ibvs_qp.vision.picture import Picture
 from ibvs_qp.vision.plane import PlaneEstimate, PlaneFitter
+from ibvs_qp.vision.surface_region import SurfaceRegion
 from ibvs_qp.vision.tracks import LineTracker
 
 #: Pictures after a start in which lines are searched often: colours are learned in the first one.
 _WARM_UP = 8
-
-
-class _Likenesses:
-    """Labels by colour for every seed, made when they are looked at: mostly the first seed does."""
-
-    def __init__(self, make: Callable[[int], np.ndarray]) -> None:
-        self._make = make
-
-    def __getitem__(self, index: int, /) -> np.ndarray:
-        return self._make(index)
+#: Half width of the search strips where points of the surface tell the camera's motion [px at 640].
+_SEEN_STRIP_PX = 8.0
 
 
 class Perception:
-    """Surface, lines and velocity from RGB-D pictures, gyro and attitude.
+    """Surface, lines and velocity from RGB-D pictures; attitude, gyro, vehicle and colours help where they are known.
 
     Every picture: the surface is refitted from its prediction, every track is refined in a narrow strip around its
-    prediction, points are followed. Every few pictures level and upright lines are searched in turn; while nothing is
-    tracked, both at once.
+    prediction, points are followed. Every few pictures lines are searched at the end of the surface. Without a gyro
+    the camera's motion is that of the surface's points.
+
+    Args:
+        config: Settings.
+        vehicle: Geometry of the vehicle in the picture; None for a camera alone, whose surface is named by a seed.
     """
 
-    def __init__(self, config: VisionConfig, vehicle: VehicleParams) -> None:
-        """Take settings and geometry; start without memory."""
+    def __init__(self, config: VisionConfig, vehicle: VehicleParams | None) -> None:
+        prepare()
         self._config, self._vehicle = config, vehicle
-        self._camera_position = np.asarray(vehicle.camera_position_m, float)
+        self._camera_position = np.zeros(3) if vehicle is None else np.asarray(vehicle.camera_position_m, float)
         self._fitter, self._tracker, self._flow = (
             PlaneFitter(config.plane),
             LineTracker(config),
@@ -60,16 +61,19 @@ class Perception:
         )
         self._colors = SurfaceColors(config.board_color, config.paint_color, config.line.color_gate)
         self._layout: PictureLayout | None = None
-        self._exposure, self._gate = ExposureSteps(), PictureGate()
+        self._exposure, self._gate, self._guides = ExposureSteps(), PictureGate(), GuideKeeper()
         self.reset()
 
     def reset(self) -> None:
         """Forget everything seen: the same pictures then give the same bits."""
-        for part in (self._gate, self._fitter, self._tracker, self._flow, self._colors, self._exposure):
+        parts = (self._gate, self._fitter, self._tracker, self._flow, self._colors, self._exposure, self._guides)
+        for part in parts:
             part.reset()
         self._plane: PlaneEstimate | None = None
+        self._region: SurfaceRegion | None = None
+        self._grey: np.ndarray | None = None
         self._stamp_ns: int | None = None
-        self._since_detection, self._frames, self._upright_next = self._config.detect.period, 0, False
+        self._since_detection, self._frames = self._config.detect.period, 0
 
     def process(
         self,
@@ -87,14 +91,14 @@ class Perception:
         Args:
             frame: Colour and depth with intrinsics and capture time.
             attitude: Quaternion B in I at capture, (4,), or None for an upright camera of unknown attitude.
-            rotation: Turn of the body since the picture before, in B [rad], (3,), or None for none.
+            rotation: Turn of the body since the picture before, in B [rad], (3,), or None if no gyro tells it.
             velocity: Velocity of the centre of mass in B [m/s] for the prediction, (3,), or None.
             hints: Lines the caller expects.
             detect: Search for new lines in this picture in any case.
-            seed_pixel: (u, v) of a place on the surface, or None for the places beside the brush.
+            seed_pixel: (u, v) of a place on the surface [px], for its search; None for the places beside the brush.
 
         Returns:
-            Features, plane, tracks and times.
+            Features, plane, tracks, guides and times.
         """
         try:
             problem = self._gate.problem(frame)
@@ -103,16 +107,12 @@ class Perception:
                 return self._process(frame, finite_vector(attitude, 4), turned, moved, hints, detect, seed_pixel)
         except Exception as error:  # in flight nothing may raise; the reason is reported instead
             problem = raised("picture not understood", error)
-        self._plane = None
+        self._plane, self._grey = None, None
         self._flow.reset()
         stamp = frame.stamp_ns if isinstance(frame.stamp_ns, int) else 0
         return Percept(
             features=FeatureFrame(lines=(), plane=None, stamp_ns=stamp), refused=problem, velocity_refused=problem
         )
-
-    def _at_one_exposure(self, frame: RgbdFrame) -> RgbdFrame:
-        levelled = self._exposure.level(frame.rgb, frame.stamp_ns)
-        return frame if levelled is frame.rgb else dataclasses.replace(frame, rgb=levelled)
 
     def _process(
         self,
@@ -125,34 +125,28 @@ class Perception:
         seed_pixel: tuple[float, float] | None,
     ) -> Percept:
         clock = StageClock()
-        frame = self._at_one_exposure(frame)
-        if self._layout is None or not self._layout.fits(frame):
-            self._layout = PictureLayout(frame, self._config, self._vehicle)
-            self._plane = None
-            self._tracker.reset()
-            self._flow.reset()
-        self._grid = self._layout.grid
+        frame = self._plain(frame)
+        layout = self._laid_out(frame)
         down = None if attitude is None else R_BODY_CAMERA.T @ np.array(down_in_body(attitude))
-        tilt = 0.0 if down is None else float(np.arctan2(-down[0], down[1]))
-        turn = np.zeros(3) if rotation is None else rotation
+        tilt = None if down is None else float(np.arctan2(-down[0], down[1]))
         interval = 0.0 if self._stamp_ns is None else max((frame.stamp_ns - self._stamp_ns) * 1e-9, 0.0)
-        motion = CameraMotion.of_body(turn, velocity, interval, self._camera_position)
         self._stamp_ns = frame.stamp_ns
+        motion, turn, seen = self._motion(frame, rotation, velocity, interval)
         before = None if self._plane is None else self._plane.inverse_depth
-        self._coarse: np.ndarray | None = None  # the picture's colours on the grid, where the surface was searched
         refused = self._fit_plane(frame, motion, down, seed_pixel)
         clock.lap("plane")
         surface = None if self._plane is None else self._plane.inverse_depth
-        picture = Picture.of(frame.rgb, self._layout.mask, frame.intrinsics, frame.depth, surface)
-        self._tracker.advance(picture, motion, before, interval, self._colors, tilt)
-        self._tracker.hints(hints, picture, self._colors, tilt)
+        picture = Picture.of(frame.rgb, layout.mask, frame.intrinsics, frame.depth, surface)
+        strip = _SEEN_STRIP_PX if seen else self._config.line.strip_px
+        self._tracker.advance(picture, motion, before, interval, self._colors, tilt or 0.0, strip)
+        self._tracker.hints(hints, picture, self._colors, tilt or 0.0)
         clock.lap("tracks")
-        candidates = self._detect(picture, frame, down, detect)
+        candidates = self._detect(picture, frame, down, tilt, detect)
         clock.lap("detect")
         flow = self._flow.update(
             frame.rgb,
             frame.depth,
-            self._layout.excluded,
+            layout.excluded,
             frame.intrinsics,
             frame.stamp_ns,
             turn,
@@ -162,9 +156,53 @@ class Perception:
             busy=self._since_detection == 0,
         )
         clock.lap("flow")
+        followed = self._tracker.tracks
         return make_percept(
-            frame, self._tracker.tracks, self._plane, flow, tuple(candidates), refused, self._layout.mask, clock.times
+            frame,
+            followed,
+            self._plane,
+            flow,
+            tuple(candidates),
+            refused,
+            layout.mask,
+            clock.times,
+            self._guides,
+            self._config.track.confidence_min,
         )
+
+    def _plain(self, frame: RgbdFrame) -> RgbdFrame:
+        """The picture as the kernels read it, at the exposure of the first one."""
+        rgb = np.require(self._exposure.level(frame.rgb, frame.stamp_ns), np.uint8, ("C", "W"))
+        depth = np.require(frame.depth, np.float32, ("C", "W"))
+        if rgb is frame.rgb and depth is frame.depth:
+            return frame
+        return dataclasses.replace(frame, rgb=rgb, depth=depth)
+
+    def _laid_out(self, frame: RgbdFrame) -> PictureLayout:
+        """Masks and grid of the picture; for another size or camera new ones, and nothing is followed into it."""
+        if self._layout is None or not self._layout.fits(frame):
+            self._layout = PictureLayout(frame, self._config, self._vehicle)
+            self._plane, self._grey = None, None
+            self._tracker.reset()
+            self._flow.reset()
+        self._grid = self._layout.grid
+        return self._layout
+
+    def _motion(
+        self, frame: RgbdFrame, rotation: np.ndarray | None, velocity: np.ndarray | None, interval: float
+    ) -> tuple[CameraMotion, np.ndarray, bool]:
+        """Motion of the camera, turn of the body, and whether the surface's points tell them instead of the gyro."""
+        if rotation is not None:
+            self._grey = None
+            return CameraMotion.of_body(rotation, velocity, interval, self._camera_position), rotation, False
+        small, factor = half_resolution(frame.rgb)
+        before, self._grey = self._grey, cv2.cvtColor(small, cv2.COLOR_RGB2GRAY)
+        if before is not None and self._plane is not None and self._region is not None:
+            region = dataclasses.replace(self._region, plane=self._plane)
+            seen = surface_motion(before, self._grey, factor, region, frame.intrinsics)
+            if seen is not None:
+                return seen, cv2.Rodrigues(R_BODY_CAMERA @ seen.rotation @ R_BODY_CAMERA.T)[0].ravel(), True
+        return CameraMotion.of_body(np.zeros(3), velocity, interval, self._camera_position), np.zeros(3), False
 
     def _fit_plane(
         self,
@@ -174,11 +212,11 @@ class Perception:
         seed_pixel: tuple[float, float] | None,
     ) -> str | None:
         """Follow the surface or search it; returns the reason when there is none."""
-        config = self._config.plane
-        assert self._layout is not None
-        if self._plane is not None and seed_pixel is None:
+        config, layout = self._config.plane, self._layout
+        assert layout is not None
+        if self._plane is not None:
             before, predicted = self._plane, motion.plane(self._plane.inverse_depth)
-            tracked = self._layout.follower.follow(
+            tracked = layout.follower.follow(
                 frame.rgb, frame.depth, predicted, before.residual_sigma, self._colors, down
             )
             if (
@@ -187,42 +225,23 @@ class Perception:
             ):
                 self._plane = tracked
                 return None
-        coarse = self._coarse = self._grid.sample(frame.rgb)
-        prefer = None if self._colors.board is None else self._labels(coarse)
-        inverse = self._grid.inverse_depth(frame.depth, config.distance_min_m, config.distance_max_m)
-        seeds = self._layout.seeds
+        seeds = layout.seeds
         if seed_pixel is not None:
             u, v = seed_pixel
-            rows, columns = self._grid.shape
-            cell = (
-                round((v - self._grid.offset) / self._grid.stride),
-                round((u - self._grid.offset) / self._grid.stride),
-            )
-            if not (0 <= cell[0] < rows and 0 <= cell[1] < columns):
+            height, width = frame.depth.shape
+            if not (0 <= u < width and 0 <= v < height):
                 self._plane = None
-                return f"seed pixel ({u:g}, {v:g}) lies outside the picture"
-            seeds = [cell]
-        elif prefer is None:
-            seeds = self._colors.bare(self._grid, coarse, seeds, config.seed_radius)
-        # a wall a few centimetres behind differs in colour, hardly in depth: before the board is known, the colour
-        # around each seed stands for it
-        wanted = _Likenesses(
-            lambda index: (
-                self._colors.like_around(self._grid, coarse, seeds[index], config.seed_radius)
-                if prefer is None
-                else prefer
-            )
-        )
-        found = self._fitter.search(self._grid, inverse, seeds, down, wanted)
-        self._plane = found if isinstance(found, PlaneEstimate) else None
-        return None if isinstance(found, PlaneEstimate) else found
+                return f"seed pixel ({u:g}, {v:g}) lies outside the picture of {width} x {height} px"
+            seeds = [self._grid.cell_at(u, v)]
+        found = find_surface(frame, self._grid, self._fitter, config, seeds, self._colors, down, seed_pixel is None)
+        if isinstance(found, str):
+            self._plane = None
+            return found
+        self._plane, self._region = found.plane, found
+        return None
 
     def _detect(
-        self,
-        picture: Picture,
-        frame: RgbdFrame,
-        down: np.ndarray | None,
-        wanted: bool,
+        self, picture: Picture, frame: RgbdFrame, down: np.ndarray | None, tilt: float | None, wanted: bool
     ) -> list[Candidate]:
         """Search for lines when it is time to, or when asked."""
         self._since_detection += 1
@@ -230,32 +249,29 @@ class Perception:
         settings = self._config.detect
         confirmed = any(track.confirmed for track in self._tracker.tracks)
         calm = confirmed and self._frames > _WARM_UP and not wanted
-        period = max(1, settings.period // 2) if calm else settings.lost_period
+        period = settings.period if calm else settings.lost_period
         if self._plane is None or not (self._since_detection >= period or wanted):
             return []
         self._since_detection = 0
-        self._upright_next = not self._upright_next
-        directions = (self._upright_next,) if calm else (False, True)
+        surface = self._surface_now(frame, down)
+        self._tracker.judge(picture, frame.depth, surface, self._colors, tilt)
         followed = tuple(track.line for track in self._tracker.tracks if calm and track.settled)
-        coarse = self._grid.sample(frame.rgb) if self._coarse is None else self._coarse
-        surface = self._whole_surface(frame, coarse, down)
-        self._colors.learn(coarse, surface.component)
-        surface = self._in_its_light(surface, frame, coarse, down)
-        labels = np.maximum(self._labels(coarse), 1) * surface.component
-        candidates = detect_lines(
-            picture,
-            frame.depth,
-            surface,
-            self._grid,
-            labels,
-            self._colors,
-            self._config,
-            down,
-            directions,
-            followed,
-        )
+        candidates = find_candidates(picture, frame.depth, surface, self._colors, self._config, tilt, followed)
         self._tracker.offer(candidates, picture)
         return candidates
+
+    def _surface_now(self, frame: RgbdFrame, down: np.ndarray | None) -> SurfaceRegion:
+        """The surface on the full coarse grid; colours and light are learned on it."""
+        assert self._plane is not None
+        coarse, searched = self._grid.sample(frame.rgb), self._region
+        plane = self._whole_plane(frame, coarse, down)
+        self._colors.learn(coarse, plane.component)
+        plane = self._in_its_light(plane, frame, coarse, down)
+        if (searched is None or searched.plane is not plane) and self._colors.board is not None:
+            searched = followed_region(frame, self._grid, self._config.plane, plane, self._colors, searched)
+        assert searched is not None
+        self._region = searched
+        return searched
 
     def _labels(self, coarse: np.ndarray) -> np.ndarray:
         """Colour labels of the samples in the light that falls on them."""
@@ -281,7 +297,7 @@ class Perception:
         refit = self._fitter.track(grid, inverse, surface.inverse_depth, down, self._labels(coarse))
         return refit if isinstance(refit, PlaneEstimate) else surface
 
-    def _whole_surface(self, frame: RgbdFrame, coarse: np.ndarray, down: np.ndarray | None) -> PlaneEstimate:
+    def _whole_plane(self, frame: RgbdFrame, coarse: np.ndarray, down: np.ndarray | None) -> PlaneEstimate:
         """The surface on the full coarse grid, for a search of lines; followed on a coarser one between searches."""
         assert self._plane is not None
         if self._plane.component.shape == self._grid.shape:

@@ -7,23 +7,19 @@ from typing import Protocol
 
 import numpy as np
 
-from ibvs_qp.vision.colors import BOARD, OTHER, PAINT
+from ibvs_qp.vision.colors import OTHER
 from ibvs_qp.vision.config import PlaneConfig
 from ibvs_qp.vision.grid import CoarseGrid
 from ibvs_qp.vision.hypotheses import judged_planes
-from ibvs_qp.vision.native import native
-from ibvs_qp.vision.native_plane import NativePlane, Refit, estimate_of
-from ibvs_qp.vision.robust import MAD_TO_SIGMA, median
+from ibvs_qp.vision.refit_plane import PlaneRefit
 from ibvs_qp.vision.seeds import seed_values
-from ibvs_qp.vision.surface import BLOCK, PlaneEstimate, connected_samples, plane_covariance, surface_problem
+from ibvs_qp.vision.surface import PlaneEstimate
 
-#: Samples used to judge the spread of residuals; more cost time and change nothing.
-_JUDGED = 400
+#: Side of the blocks over which residuals are averaged to measure their correlation [samples].
+_BLOCK = 8
 #: Gate of what looks like paint in either round, share of the board's: a wall that looks like paint must not get in, so
 #: what looks like it counts in the last round only, and has to fit twice as well.
 _PAINT_GATES = (0.0, 0.5)
-#: Smallest determinant of the normal matrix, share of the product of its diagonal.
-_FLAT = 1e-6
 
 
 class LabelsOfSeeds(Protocol):
@@ -41,7 +37,7 @@ class PlaneFitter:
         """Take the settings and start its own random generator."""
         self._config = config
         self._grid: CoarseGrid | None = None
-        self._native: NativePlane | None = None
+        self._refit: PlaneRefit | None = None
         self.reset()
 
     def reset(self) -> None:
@@ -150,71 +146,9 @@ class PlaneFitter:
         prefer: np.ndarray | None,
     ) -> PlaneEstimate | str:
         """Two rounds of least squares within gates that the residuals set, around a start."""
-        if grid is not self._grid:
-            library, self._grid = native(), grid
-            self._native = None
-            if library is not None:
-                least = self._config.min_samples
-                self._native = NativePlane(library, self._config, grid, grid.design, least, BLOCK, _PAINT_GATES)
-        if self._native is not None:
-            refit = self._native.refit(inverse, prefer, start, seed=seed)
-            if refit is not None:
-                return estimate_of(refit, down, self._config) if isinstance(refit, Refit) else refit
-        return self._refine_with_numpy(grid, inverse, start, seed, down, prefer)
-
-    def _refine_with_numpy(
-        self,
-        grid: CoarseGrid,
-        inverse: np.ndarray,
-        start: np.ndarray,
-        seed: tuple[int, int] | None,
-        down: np.ndarray | None,
-        prefer: np.ndarray | None,
-    ) -> PlaneEstimate | str:
-        """The same where there is no machine code, and to say what it computes."""
-        config, design, flat = self._config, grid.design, inverse.ravel()
-        usable = (flat > 0) & grid.free.ravel()
-        seen = int(np.count_nonzero(usable))
-        if seen < config.min_samples:
-            return "too few valid depth samples"
-        board = paint = None
-        if prefer is not None:
-            board, paint = prefer.ravel() == BOARD, prefer.ravel() == PAINT
-        plane, gate, component, sigma, count = start, config.coarse_gate, np.zeros(0, bool), 0.0, 0
-        normal_matrix = np.eye(3)
-        for last in (False, True):
-            predicted = design @ plane
-            relative = flat / np.maximum(predicted, 1e-3) - 1.0
-            size = np.abs(relative)
-            inlier = usable & (size < gate)
-            if board is not None and paint is not None:
-                colored = inlier & board
-                colored |= inlier & paint & (size < _PAINT_GATES[last] * gate)
-                inlier = colored if int(np.count_nonzero(colored)) >= config.min_samples else inlier
-            component = connected_samples(inlier.reshape(grid.shape), grid, seed).ravel()
-            chosen = np.flatnonzero(component)
-            count = len(chosen)
-            if count < config.min_samples:
-                return "too few samples on the surface"
-            spread = relative.take(chosen[:: max(1, count // _JUDGED)])
-            sigma = MAD_TO_SIGMA * median(np.abs(spread - median(spread)))
-            gate = min(max(config.fine_gate_sigmas * sigma, config.fine_gate_low), config.fine_gate_high)
-            samples = design.take(chosen, axis=0)
-            normal_matrix = samples.T @ samples
-            if np.linalg.det(normal_matrix) < _FLAT * math.prod(normal_matrix.diagonal().tolist()):
-                return "samples on the surface lie on one line"
-            plane = np.linalg.solve(normal_matrix, samples.T @ flat.take(chosen))
-        problem = surface_problem(plane, down, self._config)
-        if problem is not None:
-            return problem
-        length = math.hypot(*plane)
-        residual = np.where(component, flat - design @ plane, 0.0)
-        return PlaneEstimate(
-            inverse_depth=plane,
-            covariance=plane_covariance(residual, normal_matrix, count, grid, plane, config.common_mode_m),
-            normal=-plane / length,
-            distance_m=1.0 / length,
-            inlier_share=count / max(seen, 1),
-            residual_sigma=sigma,
-            component=component.reshape(grid.shape),
-        )
+        if self._refit is None or grid is not self._grid:
+            self._grid, least = grid, self._config.min_samples
+            self._refit = PlaneRefit(
+                self._config, grid, grid.design, least=least, block=_BLOCK, paint_gates=_PAINT_GATES
+            )
+        return self._refit.refit(inverse, prefer, start, down, seed=seed)

@@ -9,7 +9,7 @@ import numpy as np
 
 from ibvs_qp.frames import align_line
 from ibvs_qp.vision.config import LineConfig
-from ibvs_qp.vision.fit_lines import LineFit
+from ibvs_qp.vision.fits import Fits, LineFit, Profiles
 from ibvs_qp.vision.query import LineView
 
 _NO_SIDES, _NO_PIXELS = np.zeros((2, 0, 3), np.uint8), np.zeros((0, 2))
@@ -45,46 +45,6 @@ class RefinedLine:
     step: np.ndarray
     sides: np.ndarray
     pixels: np.ndarray
-
-
-@dataclass(frozen=True)
-class Profiles:
-    """Where the profiles of a batch of L lines lie: K columns of every line.
-
-    Attributes:
-        views: The lines, each level in its own view, (L).
-        u: Columns of the profiles, (L, K).
-        side: Distance of the two sides from the edge [px].
-    """
-
-    views: list[LineView]
-    u: np.ndarray
-    side: int
-
-
-@dataclass
-class Fits:
-    """Results of a batch of L lines with K profiles, each in its own view.
-
-    Attributes:
-        lines: The fitted lines.
-        support: Profiles that agree, bool (L, K).
-        visible: Profiles that could be seen, bool (L, K).
-        count: How many agree, (L).
-        seen: Profiles within the run that agree or could be seen, (L).
-        runs: First and last supporting profile, (L).
-        steps: Colour behind minus colour before, along +v, (L) of 3.
-        alive: Whether there is a line at all, (L).
-    """
-
-    lines: list[LineFit]
-    support: np.ndarray
-    visible: np.ndarray
-    count: list[int]
-    seen: list[int]
-    runs: list[tuple[int, int]]
-    steps: list[list[float]]
-    alive: list[bool]
 
 
 def finish_lines(

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import ctypes
-import functools
-
 import numpy as np
 
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import to_camera
 from ibvs_qp.vision.grid import CoarseGrid
-from ibvs_qp.vision.native import native, place
 
 #: Distances of the seeds from the tip's image, in brush radii: just outside the brush, then farther.
 _STEPS = (1.7, 2.6)
@@ -41,26 +37,9 @@ def seed_values(grid: CoarseGrid, inverse: np.ndarray, seeds: list[tuple[int, in
     """
     if not seeds:
         return []
-    library = native()
-    values = values_with_numpy if library is None else functools.partial(values_natively, library)
-    return values(inverse, grid.free, grid.windows(seeds, radius), 2 * radius + 1)
-
-
-def values_natively(
-    library: ctypes.CDLL, inverse: np.ndarray, free: np.ndarray, windows: np.ndarray, least: int
-) -> list[float]:
-    """Median 1/Z [1/m] of windows (n, w) of flat places, 0 where fewer than ``least`` of their samples have one."""
-    inverse, free = np.ascontiguousarray(inverse, float), np.ascontiguousarray(free)
-    values, sizes = np.empty(len(windows)), (*windows.shape, least)
-    parts = (inverse, free, windows)
-    library.seed_values(*(place(part) for part in parts), *(ctypes.c_long(size) for size in sizes), place(values))
-    return values.tolist()
-
-
-def values_with_numpy(inverse: np.ndarray, free: np.ndarray, windows: np.ndarray, least: int) -> list[float]:
-    """The same where there is no machine code."""
+    windows, least = grid.windows(seeds, radius), 2 * radius + 1
     known = inverse.reshape(-1).take(windows)
-    known[~free.reshape(-1).take(windows) | ~(known > 0.0)] = np.inf
+    known[~grid.free.reshape(-1).take(windows) | ~(known > 0.0)] = np.inf
     known.sort(axis=1)
     counts = np.count_nonzero(known < np.inf, axis=1).tolist()
     return [float(row[count // 2]) if count >= least else 0.0 for row, count in zip(known, counts, strict=True)]

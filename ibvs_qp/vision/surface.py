@@ -11,9 +11,6 @@ import numpy as np
 from ibvs_qp.vision.config import PlaneConfig
 from ibvs_qp.vision.grid import CoarseGrid
 
-#: Side of the blocks over which residuals are averaged to measure their correlation [cells].
-BLOCK = 8
-
 
 @dataclass(frozen=True, kw_only=True)
 class PlaneEstimate:
@@ -72,22 +69,26 @@ def connected_samples(inlier: np.ndarray, grid: CoarseGrid, seed: tuple[int, int
 
 
 def plane_covariance(
-    residual: np.ndarray,
-    normal_matrix: np.ndarray,
-    count: int,
-    grid: CoarseGrid,
     plane: np.ndarray,
-    common_mode: float,
+    normal_matrix_inverse: np.ndarray,
+    squares: tuple[float, float],
+    count: int,
+    common_mode_m: float,
 ) -> np.ndarray:
-    """Least-squares covariance, inflated by the correlation of the residuals over blocks, plus the common mode."""
-    rows, columns = (size // BLOCK for size in grid.shape)
-    square = residual.reshape(grid.shape)[: rows * BLOCK, : columns * BLOCK]
-    sums = square.reshape(rows, BLOCK, columns, BLOCK).sum(axis=(1, 3))
-    total = float(np.vdot(residual, residual))
-    inflation = max(1.0, float(np.vdot(sums, sums)) / total) if total > 0 else 1.0
-    variance = total / max(count - 3, 1)
-    inverse_length = math.hypot(*plane)
-    return (
-        np.linalg.inv(normal_matrix) * variance * inflation
-        + np.outer(plane, plane) * (common_mode * inverse_length) ** 2
-    )
+    """Least-squares covariance, inflated by the correlation of the residuals over blocks, plus the common mode.
+
+    Args:
+        plane: (a, b, c), (3,).
+        normal_matrix_inverse: Inverse of the normal matrix, (3, 3).
+        squares: Sum of the squares of the residuals, and of their sums over blocks [1/m^2].
+        count: Samples of the surface.
+        common_mode_m: Depth error common to one frame [m].
+
+    Returns:
+        Covariance of (a, b, c), (3, 3).
+    """
+    total, blocks = squares
+    inflation = max(1.0, blocks / total) if total > 0.0 else 1.0
+    variance = total / max(count - 3.0, 1.0) * inflation
+    common = common_mode_m**2 * float(plane @ plane)
+    return normal_matrix_inverse * variance + plane[:, None] * plane * common

@@ -12,6 +12,10 @@ from ibvs_qp.vision.refined import RefinedLine
 
 #: Share of the new step in a track's running colour step.
 _STEP_BLEND = 0.2
+#: Share of the new value in its score and confidence.
+_JUDGED_BLEND = 0.5
+#: A line is searched beyond its ends by this share of its length: it grows into view that fast.
+_BEYOND = 0.25
 
 
 @dataclass
@@ -24,6 +28,7 @@ class Track:
     kind: str
     surface_side: int
     score: float
+    confidence: float
     borders_plane: bool
     hint: str = ""
     weight: float = 0.0
@@ -47,6 +52,19 @@ class Track:
         axis = 1 if abs(math.cos(self.theta)) > abs(math.sin(self.theta)) else 0
         (first, last) = self.line.segment[:, axis].tolist()
         return (first, last) if first <= last else (last, first)
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """Range along x or y in which it is searched: somewhat beyond what was seen last, normalised."""
+        first, last = self.extent
+        more = _BEYOND * (last - first)
+        return first - more, last + more
+
+    def judge(self, score: float, confidence: float, borders: bool) -> None:
+        """Take what its two sides show in a picture."""
+        self.score += _JUDGED_BLEND * (score - self.score)
+        self.confidence += _JUDGED_BLEND * (confidence - self.confidence)
+        self.borders_plane = self.borders_plane or borders
 
     def adopt(self, line: RefinedLine) -> None:
         """Take a fresh fit."""
@@ -73,6 +91,7 @@ class Track:
             rms_px=self.line.rms_px,
             length_px=self.line.length_px,
             score=self.score,
+            confidence=self.confidence,
             borders_plane=self.borders_plane,
             hint=self.hint,
         )

@@ -6,21 +6,43 @@ import math
 
 import numpy as np
 
+from ibvs_qp.vision.candidates import Candidate, judge_lines, role_of
 from ibvs_qp.vision.colors import SurfaceColors
 from ibvs_qp.vision.config import VisionConfig
-from ibvs_qp.vision.detect import Candidate, role_of
 from ibvs_qp.vision.lines import refine_lines
 from ibvs_qp.vision.motion import CameraMotion
 from ibvs_qp.vision.percept import LineHint
-from ibvs_qp.vision.picture import Picture
+from ibvs_qp.vision.picture import Picture, denormalise
 from ibvs_qp.vision.query import LineQuery
 from ibvs_qp.vision.refined import RefinedLine
+from ibvs_qp.vision.surface_region import SurfaceRegion
 from ibvs_qp.vision.track import Track
 
 #: Uncertainty added per frame on prediction alone: rho and theta, standard deviations.
 _DRIFT = np.diag([2e-3**2, 2e-3**2])
+#: Confidence of a line that the caller expected and that is found there.
+_EXPECTED_CONFIDENCE = 0.8
+#: A detected line this many times as long as the track that follows its edge replaces its line.
+_LONGER = 1.2
 #: Squared cosine of the angle below which two lines cannot be one.
 _PARALLEL = 0.9
+
+
+def _track_of(identity: int, candidate: Candidate, hint: str = "") -> Track:
+    """A new track of a detected line."""
+    track = Track(
+        identity,
+        candidate.line,
+        candidate.role,
+        candidate.kind,
+        candidate.surface_side,
+        candidate.score,
+        candidate.confidence,
+        candidate.borders_plane,
+        hint,
+    )
+    track.adopt(candidate.line)
+    return track
 
 
 class LineTracker:
@@ -44,13 +66,14 @@ class LineTracker:
         interval_s: float,
         colors: SurfaceColors,
         tilt: float,
+        strip_px: float,
     ) -> None:
-        """Predict every track into this picture and refine it there."""
+        """Predict every track into this picture and refine it there, within half a strip's width [px at 640]."""
         for track in self.tracks:
             track.rho, track.theta = motion.line(track.rho, track.theta, plane)
             track.role = role_of(track.theta, tilt)
             track.age += 1
-        for track, line in zip(self.tracks, self._refined(picture, colors), strict=True):
+        for track, line in zip(self.tracks, self._refined(picture, colors, strip_px), strict=True):
             self._update(track, line, interval_s)
         self._drop()
 
@@ -76,57 +99,54 @@ class LineTracker:
             least = self._config.detect.min_length * picture.mask.shape[1]
             if line is None or line.length_px < least or not self._healthy(line, picture):
                 continue
-            self._start(line, role_of(line.theta, tilt), hint.kind, hint.surface_side, 1.0, False, hint.name)
+            expected = Candidate(
+                line=line,
+                pixels=denormalise(line.segment, picture.intrinsics),
+                role=role_of(line.theta, tilt),
+                kind=hint.kind,
+                surface_side=hint.surface_side,
+                borders_plane=False,
+                score=1.0,
+                confidence=_EXPECTED_CONFIDENCE,
+            )
+            self._start(expected, hint.name)
         self._merge(picture)
 
     def offer(self, candidates: list[Candidate], picture: Picture) -> None:
         """Start tracks from detected lines that nothing follows yet; refresh what is known of the others."""
         for candidate in candidates:
-            if not candidate.identity.kind or candidate.score < self._config.detect.min_score:
+            if not candidate.kind or candidate.score < self._config.detect.min_score:
                 continue
-            fresh = Track(
-                0,
-                candidate.line,
-                candidate.role,
-                candidate.identity.kind,
-                candidate.identity.surface_side,
-                candidate.score,
-                False,
-            )
-            fresh.adopt(candidate.line)
+            fresh = _track_of(0, candidate)
             same = next((track for track in self.tracks if self._same(track, fresh, picture)), None)
-            if same is not None:
-                same.borders_plane = same.borders_plane or candidate.identity.borders_plane
-                same.score = max(same.score, candidate.score)
-            elif len(self.tracks) < self._config.track.capacity:
-                identity = candidate.identity
-                self._start(
-                    candidate.line,
-                    candidate.role,
-                    identity.kind,
-                    identity.surface_side,
-                    candidate.score,
-                    identity.borders_plane,
-                    "",
-                )
+            if same is None:
+                self._start(candidate)
+            elif same.kind == candidate.kind and candidate.line.length_px > _LONGER * same.line.length_px:
+                same.adopt(candidate.line)
 
-    def _start(
-        self, line: RefinedLine, role: str, kind: str, side: int, score: float, borders: bool, hint: str
+    def judge(
+        self, picture: Picture, depth: np.ndarray, surface: SurfaceRegion, colors: SurfaceColors, tilt: float | None
     ) -> None:
+        """Score anew what the lines seen in this picture border."""
+        seen = [track for track in self.tracks if track.lost_s == 0.0 and track.kind == "board"]
+        lines = [track.line for track in seen]
+        for track, found in zip(seen, judge_lines(lines, picture, depth, surface, colors, tilt), strict=True):
+            track.judge(found.score, found.confidence, found.borders_plane)
+
+    def _start(self, candidate: Candidate, hint: str = "") -> None:
         if len(self.tracks) >= self._config.track.capacity:
             return
-        track = Track(self._next_id, line, role, kind, side, score, borders, hint)
-        track.adopt(line)
+        self.tracks.append(_track_of(self._next_id, candidate, hint))
         self._next_id += 1
-        self.tracks.append(track)
 
-    def _refined(self, picture: Picture, colors: SurfaceColors) -> list[RefinedLine | None]:
+    def _refined(self, picture: Picture, colors: SurfaceColors, strip_px: float) -> list[RefinedLine | None]:
         """Healthy fits of all tracks around their predictions."""
         queries = [
             LineQuery(
                 rho=track.rho,
                 theta=track.theta,
                 step=track.step,
+                span=track.span,
                 extent=track.extent,
                 kind=track.kind,
                 surface_side=track.surface_side,
@@ -134,7 +154,7 @@ class LineTracker:
             for track in self.tracks
         ]
         config = self._config.line
-        width = config.strip_px * picture.scale
+        width = strip_px * picture.scale
         found = refine_lines(picture, queries, half_width_px=width, config=config, colors=colors)
         return [line if line is not None and self._healthy(line, picture) else None for line in found]
 
@@ -147,7 +167,9 @@ class LineTracker:
         track.hits = [*track.hits, line is not None][-config.confirm_window :]
         if line is None:
             track.lost_s += interval_s
+            left = max(0.0, 1.0 - interval_s / max(config.hold_s, 1e-3))
             track.weight = max(0.0, track.weight - interval_s / max(config.hold_s, 1e-3))
+            track.confidence *= left
             track.covariance = track.covariance + _DRIFT
             return
         track.adopt(line)

@@ -16,6 +16,7 @@ from sim.detection.methods import METHODS
 if TYPE_CHECKING:
     from rich.status import Status
 
+    from ibvs_qp.vision.picture_input.settings import RgbdCameraSettings
     from sim.detection.manifest import FrameEntry
     from sim.detection.run import FrameResult
 
@@ -50,11 +51,13 @@ class Detect:
     """Column of the principal point, pixel centres at integers."""
     cy: Annotated[float | None, optional("PX")] = None
     """Row of the principal point."""
-    depth_units_per_metre: float = 1000.0
-    """Depth values per metre: 1000 for millimetres, 5000 for TUM, 1 for metres."""
+    depth_units_per_metre: Annotated[float | None, optional("UNITS")] = None
+    """Depth values per metre: 1000 for millimetres (default without --camera), 5000 for TUM, 1 for metres."""
+    camera: Annotated[Path | None, optional("FILE")] = None
+    """TOML file with [camera] as of a preset: lenses, and the place of a depth camera beside the colour's."""
     distortion: Annotated[tuple[float, float, float, float, float] | None, optional("K1 K2 P1 P2 K3")] = None
-    """Lens distortion in OpenCV's order; rho and theta then describe the undistorted lines. Default: that of the bag's
-    camera_info, else none."""
+    """Lens distortion in OpenCV's order; pictures are rectified, pixels stay those of the picture as taken. Default:
+    that of --camera or of the bag's camera_info, else none."""
     seed_pixel: Annotated[tuple[float, float] | None, optional("U V")] = None
     """A pixel on the surface; without it: lines only, no surface and no guides."""
     sequence: Annotated[Path | None, optional("DIR")] = None
@@ -109,7 +112,6 @@ class Detect:
             self.method,
             every=self.all,
             track=not self.no_track,
-            distortion=self.distortion,
             started=lambda entry: status.update(f"Detecting in {plain(entry.color)} ..."),
         )
         if folder is not None:
@@ -139,7 +141,7 @@ class Detect:
             every=self.all,
             track=not self.no_track,
             seed=self.seed_pixel,
-            distortion=self.distortion,
+            settings=self._settings(),
             finished=finished,
         )
         if not frames:
@@ -159,13 +161,32 @@ class Detect:
         if self.topics is not None and self.bag is None:
             raise ConfigError("--topics is for a ROS bag")
 
+    def _settings(self) -> RgbdCameraSettings | None:
+        """The camera of the options, or None if they state nothing of it."""
+        from ibvs_qp.config.settings import from_dict
+        from ibvs_qp.config.toml_text import read_toml
+        from ibvs_qp.pilot.config import CameraConfig
+        from ibvs_qp.vision.picture_input.settings import RgbdCameraSettings
+
+        if self.camera is None:
+            return None if self.distortion is None else RgbdCameraSettings(distortion=self.distortion)
+        table = read_toml(self.camera)
+        if not isinstance(table.get("camera"), dict):
+            raise ConfigError(f"{self.camera} has no [camera]")
+        try:
+            settings = from_dict(CameraConfig, table["camera"], "camera")
+        except ConfigError as error:
+            raise ConfigError(f"{self.camera}: {error}") from None
+        return settings if self.distortion is None else dataclasses.replace(settings, distortion=self.distortion)
+
     def _entries(self) -> list[FrameEntry]:
         """Frames of the command line, checked."""
+        from ibvs_qp.vision.picture_input.settings import RgbdCameraSettings
         from sim.detection.manifest import LARGEST_PX, FrameEntry, read_manifest
         from sim.detection.pictures import read_frame
 
         if self.sequence is not None:
-            return read_manifest(self.sequence)
+            return read_manifest(self.sequence, self._settings())
         assert self.rgb is not None
         missing = [name for name in _CAMERA if getattr(self, name) is None]
         if missing:
@@ -174,18 +195,22 @@ class Detect:
         if not (min(camera[:2]) > 1.0 and all(abs(value) <= LARGEST_PX for value in camera)):
             limit = f"{LARGEST_PX:g} px"
             raise ConfigError(f"--fx and --fy must be above 1 px, and the size of --fx --fy --cx --cy at most {limit}")
-        if not (math.isfinite(self.depth_units_per_metre) and self.depth_units_per_metre > 0.0):
-            raise ConfigError(f"--depth-units-per-metre {self.depth_units_per_metre:g} is refused: it must be above 0")
+        settings, units = self._settings(), self.depth_units_per_metre
+        if units is None:
+            units = 1000.0 if self.camera is None or settings is None else settings.depth_units_per_metre
+        if not (math.isfinite(units) and units > 0.0):
+            raise ConfigError(f"--depth-units-per-metre {units:g} is refused: it must be above 0")
         entry = FrameEntry(
             color=str(self.rgb),
             depth="" if self.depth is None else str(self.depth),
             folder=Path(),
             intrinsics=(camera[0], camera[1], camera[2], camera[3]),
-            depth_units_per_metre=self.depth_units_per_metre,
+            depth_units_per_metre=units,
             seed=self.seed_pixel,
+            camera=settings or RgbdCameraSettings(),
         )
         read_frame(
-            self.rgb, self.depth, entry.intrinsics, entry.depth_units_per_metre
+            self.rgb, self.depth, entry.intrinsics, entry.depth_units_per_metre, camera=entry.camera
         )  # raises on unusable files before any work
         return [entry]
 

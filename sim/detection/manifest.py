@@ -8,15 +8,26 @@ import itertools
 import math
 import re
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from ibvs_qp.config.errors import ConfigError, shown
 from ibvs_qp.config.files import read_bytes
+from ibvs_qp.vision.picture_input.settings import RgbdCameraSettings
 from sim.storage.limits import LARGEST_MANIFEST, MOST_FRAMES
 
 #: Required columns; seed_u, seed_v and depth may be empty in a row.
 COLUMNS = ("color", "depth", "fx", "fy", "cx", "cy", "depth_units_per_m", "seed_u", "seed_v")
+#: Optional columns: settings of the camera by name, their numbers separated by blanks; empty for those of the command.
+CAMERA_COLUMNS = (
+    "distortion",
+    "color_bits",
+    "depth_intrinsics",
+    "depth_distortion",
+    "depth_rotation",
+    "depth_translation_m",
+)
 #: Largest focal length, and largest distance of the principal point from the corner [px]: a hundred times those of any
 #: camera; far beyond, squares of image coordinates overflow.
 LARGEST_PX = 1e6
@@ -36,10 +47,15 @@ class FrameEntry:
     intrinsics: tuple[float, float, float, float]  # (fx, fy, cx, cy) [px]
     depth_units_per_metre: float  # depth values per metre
     seed: tuple[float, float] | None  # (u, v) of a point on the surface [px], or None
+    camera: RgbdCameraSettings = field(default_factory=RgbdCameraSettings)  # lenses and depth camera
 
 
-def read_manifest(folder: Path) -> list[FrameEntry]:
+def read_manifest(folder: Path, camera: RgbdCameraSettings | None = None) -> list[FrameEntry]:
     """Read a folder's manifest.csv.
+
+    Args:
+        folder: The folder.
+        camera: Settings of what no column states.
 
     Raises:
         ConfigError: When it is missing, lacks a column or has a value that is no number.
@@ -51,14 +67,16 @@ def read_manifest(folder: Path) -> list[FrameEntry]:
         missing = [name for name in COLUMNS if name not in (reader.fieldnames or ())]
         if missing:
             raise ConfigError(f"{file} lacks the column {missing[0]!r}; needed are {', '.join(COLUMNS)}")
-        rows = [{name: row[name].strip() for name in COLUMNS} for row in itertools.islice(reader, MOST_FRAMES)]
+        names = [*COLUMNS, *(name for name in CAMERA_COLUMNS if name in (reader.fieldnames or ()))]
+        rows = [{name: row[name].strip() for name in names} for row in itertools.islice(reader, MOST_FRAMES)]
     except (UnicodeDecodeError, csv.Error) as error:
         raise ConfigError(f"{file} is no table of comma-separated values: {error}") from None
     if len(rows) == MOST_FRAMES:
         raise ConfigError(f"{file} names {MOST_FRAMES} frames or more")
     if not rows:
         raise ConfigError(f"{file} names no frame")
-    return [_entry(folder, f"{file}, line {line}", row) for line, row in enumerate(rows, 2)]
+    default = camera or RgbdCameraSettings()
+    return [_entry(folder, f"{file}, line {line}", row, default) for line, row in enumerate(rows, 2)]
 
 
 def motion_sequences(entries: list[FrameEntry]) -> list[list[int]]:
@@ -80,7 +98,7 @@ def motion_sequences(entries: list[FrameEntry]) -> list[list[int]]:
     return sorted(groups)
 
 
-def _entry(folder: Path, place: str, row: dict[str, str]) -> FrameEntry:
+def _entry(folder: Path, place: str, row: dict[str, str], camera: RgbdCameraSettings) -> FrameEntry:
     def number(name: str, low: float = -math.inf, high: float = sys.float_info.max) -> float:
         try:
             value = float(row[name])
@@ -110,4 +128,22 @@ def _entry(folder: Path, place: str, row: dict[str, str]) -> FrameEntry:
         ),
         depth_units_per_metre=number("depth_units_per_m", 0.0),
         seed=(number("seed_u"), number("seed_v")) if row["seed_u"] and row["seed_v"] else None,
+        camera=_camera(place, row, camera),
     )
+
+
+def _camera(place: str, row: dict[str, str], default: RgbdCameraSettings) -> RgbdCameraSettings:
+    """Settings with those that a row states."""
+    stated: dict[str, Any] = {}
+    for name in CAMERA_COLUMNS:
+        if not (words := row.get(name, "").split()):
+            continue
+        try:
+            stated[name] = int(words[0]) if name == "color_bits" else tuple(map(float, words))
+        except ValueError:
+            need = "numbers separated by blanks are needed"
+            raise ConfigError(f"{place}: {name} = {shown(row[name])} is refused: {need}") from None
+    try:
+        return replace(default, **stated)
+    except ConfigError as error:
+        raise ConfigError(f"{place}: {error}") from None

@@ -6,14 +6,14 @@ import importlib
 from typing import Any
 
 #: Module and class of every method; imported on use, for a quick help of the command.
-METHODS = {"own": ("ibvs_qp.vision.survey", "SurveyPipeline"), "paper": ("sim.detection.paper", "PaperMethod")}
+METHODS = {"own": ("sim.detection.own", "OwnMethod"), "paper": ("sim.detection.paper", "PaperMethod")}
 
 
 def make_method(name: str) -> Any:
     """A new pipeline with its default settings.
 
     Returns:
-        An object with `detect(frame, seed_pixel)`, which returns an `ibvs_qp.vision.survey.Detection`. It may also
+        An object with `detect(frame, seed_pixel)`, which returns an `sim.detection.detection.Detection`. It may also
         have `every_line(frame)`, all lines of the whole picture, and `follow(frame, seed_pixel)` with `reset()`, which
         continues a motion sequence.
 

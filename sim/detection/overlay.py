@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from ibvs_qp.config.errors import ConfigError
-from ibvs_qp.vision.survey.draw import draw_detection
+from sim.detection.draw import draw_detection
 from sim.detection.run import FrameResult
 
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from ibvs_qp.measurement import RgbdFrame
-from ibvs_qp.vision.detect import Candidate
+from ibvs_qp.vision.candidates import Candidate
 from ibvs_qp.vision.paper import PaperPipeline
 from ibvs_qp.vision.picture import denormalise
-from ibvs_qp.vision.survey import DetectedLine, Detection
+from sim.detection.detection import DetectedLine, Detection
 
 #: The published pipeline rates no line: every line, guide or not, has this confidence [-].
 PAPER_CONFIDENCE = 0.5
@@ -44,7 +44,7 @@ def _common(number: int, candidate: Candidate, frame: RgbdFrame) -> DetectedLine
         covariance=line.covariance,
         score=candidate.score,
         confidence=PAPER_CONFIDENCE,
-        borders_plane=candidate.identity.surface_side != 0,
-        surface_side=candidate.identity.surface_side,
+        borders_plane=candidate.surface_side != 0,
+        surface_side=candidate.surface_side,
         line_id=number,
     )

@@ -10,6 +10,8 @@ import numpy as np
 from ibvs_qp.config.errors import IbvsQpError
 from ibvs_qp.config.files import UnreadableFile, read_bytes
 from ibvs_qp.measurement import RgbdFrame
+from ibvs_qp.vision.picture_input.convert import to_color
+from ibvs_qp.vision.picture_input.settings import RgbdCameraSettings
 from sim.storage.arrays import read_npy, read_npz
 from sim.storage.limits import LARGEST_PICTURE, LONGEST_SIDE
 from sim.storage.quiet import no_library_output
@@ -25,8 +27,9 @@ def read_frame(
     intrinsics: tuple[float, float, float, float],
     depth_units_per_metre: float,
     stamp_ns: int = 0,
+    camera: RgbdCameraSettings | None = None,
 ) -> RgbdFrame:
-    """Read a registered pair of pictures.
+    """Read a pair of pictures.
 
     Args:
         color: Colour or grey picture, 8 or 16 bits.
@@ -34,35 +37,34 @@ def read_frame(
         intrinsics: (fx, fy, cx, cy) [px].
         depth_units_per_metre: Depth values per metre.
         stamp_ns: Time of capture.
+        camera: The camera, or None for one whose depth is registered to colour.
 
     Raises:
-        PictureError: When a file cannot be read or both pictures differ in size.
+        PictureError: When a file cannot be read or both pictures differ in size and depth is to be registered.
     """
-    rgb = read_color(color)
+    camera = camera or RgbdCameraSettings()
+    rgb = read_color(color, camera.color_bits)
     height, width = rgb.shape[:2]
     metres = np.zeros((height, width), np.float32) if depth is None else read_depth(depth, depth_units_per_metre)
-    if metres.shape != (height, width):
+    if camera.registered and metres.shape != (height, width):
         raise PictureError(
             f"{depth} is {metres.shape[-1]} x {metres.shape[0]} px but {color} is {width} x {height} px: "
-            "depth must be registered to colour"
+            "depth must be registered to colour, or depth_intrinsics given"
         )
     return RgbdFrame(rgb=rgb, depth=metres, intrinsics=intrinsics, stamp_ns=stamp_ns)
 
 
-def read_color(file: Path) -> np.ndarray:
-    """RGB, uint8 (H, W, 3); 16 bits become 8, grey becomes three equal channels.
+def read_color(file: Path, bits: int = 16) -> np.ndarray:
+    """RGB, uint8 (H, W, 3); 16 bits, of which so many are in use, become 8, grey becomes three equal channels.
 
     Raises:
         PictureError: When the file is no such picture.
     """
     picture = _read(file, "colour")
-    if picture.dtype == np.uint16:
-        picture = (picture >> 8).astype(np.uint8)
+    picture = to_color(picture, bits)
     channels = 1 if picture.ndim == 2 else picture.shape[2]
-    if picture.dtype != np.uint8 or channels not in (1, 3, 4):
+    if picture.dtype != np.uint8 or channels not in (3, 4):
         raise PictureError(f"{file} is no colour picture of 8 or 16 bits ({picture.dtype}, {channels} channels)")
-    if channels == 1:
-        return np.repeat(picture.reshape(*picture.shape[:2], 1), 3, axis=2)
     if file.suffix.lower() in _READERS:  # arrays are RGB already
         return np.ascontiguousarray(picture[..., :3])
     code = cv2.COLOR_BGR2RGB if channels == 3 else cv2.COLOR_BGRA2RGB

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ibvs_qp.vision.survey.detection import GUIDE_SIDES
+from sim.detection.detection import GUIDE_SIDES
 from sim.detection.run import FrameResult
 from sim.evaluate.table import plain, terminal_table
 from sim.report import rundir

@@ -28,7 +28,7 @@ _PREPARED = re.compile(r"advice|allowed|checks|instead|kind|message|most|need|pr
 #: Notebooks, experiments and renderings of the project itself refuse nothing that a user gives.
 _INTERNAL = ("sim/notebook", "sim/report/refusals.py", "sim/rivals/solver.py", "sim/experiments/relevance.py")
 #: Calls whose texts document settings.
-_DOCUMENTS = {"setting", "choice", "_weight", "_poles", "_slack_weight", "_vector", "split"}
+_DOCUMENTS = {"setting", "choice", "_weight", "_poles", "_slack_weight", "_vector", "split", "kernel"}
 #: What a logger fills in, and marks of a console.
 _FILLED_IN, _MARKUP = re.compile(r"%[rs]"), re.compile(r"\[(bold|/)\]")
 #: Errors that only a fault of the project's own code raises.

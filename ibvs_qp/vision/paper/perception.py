@@ -7,9 +7,9 @@ import numpy as np
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.measurement import FeatureFrame, RgbdFrame
 from ibvs_qp.validation.failure import raised
+from ibvs_qp.vision.candidates import Candidate
 from ibvs_qp.vision.checks import PictureGate, StageClock, finite_vector
 from ibvs_qp.vision.config import VisionConfig
-from ibvs_qp.vision.detect import Candidate
 from ibvs_qp.vision.flow import SparseFlow
 from ibvs_qp.vision.layout import PictureLayout
 from ibvs_qp.vision.make_percept import make_percept
@@ -150,10 +150,11 @@ class PaperPerception:
             track_id=track_id,
             line=chosen.line,
             role=chosen.role,
-            kind=chosen.identity.kind,
-            surface_side=chosen.identity.surface_side,
+            kind=chosen.kind,
+            surface_side=chosen.surface_side,
             score=chosen.score,
-            borders_plane=chosen.identity.borders_plane,
+            confidence=chosen.confidence,
+            borders_plane=chosen.borders_plane,
             weight=1.0,
             age=self._age[track_id],
             confirmed=True,

@@ -8,14 +8,15 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL
-from ibvs_qp.vision.classify import LineIdentity
-from ibvs_qp.vision.detect import Candidate
+from ibvs_qp.vision.candidates import Candidate
 from ibvs_qp.vision.mask import Intrinsics
 from ibvs_qp.vision.paper.box import SurfaceBox
 from ibvs_qp.vision.picture import normalise, normalised_line
 from ibvs_qp.vision.refined import RefinedLine
 from ibvs_qp.vision.surface import PlaneEstimate
 
+#: The published pipeline rates no line: every line has this confidence [-].
+CONFIDENCE = 0.5
 #: Length that earns the full score, share of the picture's width; as in the own detection.
 _FULL_LENGTH = 0.4
 _NO_SIDES, _NO_PIXELS, _NO_STEP = np.zeros((2, 0, 3), np.uint8), np.zeros((0, 2)), np.zeros(3)
@@ -50,7 +51,7 @@ class PaperDetection:
         guides["top"] = self.horizontal
         if self.vertical is not None:
             # the surface lies along the normal's side: right of a left edge
-            rightwards = self.vertical.identity.surface_side * math.cos(self.vertical.line.theta) > 0.0
+            rightwards = self.vertical.surface_side * math.cos(self.vertical.line.theta) > 0.0
             guides["left" if rightwards else "right"] = self.vertical
         return guides
 
@@ -101,8 +102,12 @@ def candidate(
     return Candidate(
         line=line,
         role=VERTICAL if upright else HORIZONTAL,
-        identity=LineIdentity(surface_side=side, borders_plane=min(abs(place - near), abs(place - far)) <= margin),
+        pixels=ends,
+        kind="",
+        surface_side=side,
+        borders_plane=min(abs(place - near), abs(place - far)) <= margin,
         score=min(1.0, length / (_FULL_LENGTH * width)),
+        confidence=CONFIDENCE,
     )
 
 

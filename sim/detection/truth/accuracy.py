@@ -12,7 +12,7 @@ import numpy as np
 
 from ibvs_qp.frames import align_line
 from ibvs_qp.vision.picture import normalise
-from ibvs_qp.vision.survey.detection import GUIDE_SIDES, Detection
+from sim.detection.detection import GUIDE_SIDES, Detection
 from sim.detection.methods import METHODS, make_method
 from sim.detection.truth.frame import TrueLine, TruthFrame, render_frame
 from sim.detection.truth.scenes import FAMILIES, TruthScene, sample_scene

@@ -9,6 +9,8 @@ import numpy as np
 
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.measurement import RgbdFrame
+from ibvs_qp.vision.picture_input.camera import RgbdCamera
+from sim.detection.truth.device_depth import device_depth
 from sim.detection.truth.picture import paint_picture
 from sim.detection.truth.range import measure_depth
 from sim.detection.truth.scenes import TruthScene
@@ -40,6 +42,9 @@ class TruthFrame:
     plane: np.ndarray  # (a, b, c) of 1/Z = a x + b y + c of the board
     seed: tuple[float, float]  # (u, v) of a point on the board [px]
     mask: np.ndarray  # pixels that the vehicle covers, bool (H, W)
+    raw: RgbdFrame | None = (
+        None  # what the device delivers: distorted, depth in its own picture; None for an ideal camera
+    )
 
 
 def render_frame(scene: TruthScene, stamp_ns: int = 0, noise_seed: int | None = None) -> TruthFrame:
@@ -49,18 +54,28 @@ def render_frame(scene: TruthScene, stamp_ns: int = 0, noise_seed: int | None = 
         scene: The scene.
         stamp_ns: Time of capture.
         noise_seed: Seed of the noise for frames of one sequence; None takes the seed of the scene.
+
+    Raises:
+        ValueError: For the vehicle's arm in the picture of a device: it is drawn in registered pictures only.
     """
+    if scene.arm and scene.device is not None:
+        raise ValueError("a device takes no picture with the arm")
     rng = np.random.default_rng(np.random.SeedSequence([scene.seed if noise_seed is None else noise_seed, 0x6E6F]))
     width, height, _ = scene.camera
     rgb = paint_picture(scene, rng)
-    inverse = _inverse_depths(scene)
     mask, layer = np.zeros((height, width), bool), None
     if scene.arm:
         flight = Scene(camera=CameraScene(width=width, height=height))
         layer = vehicle_layer(flight, VehicleParams(), scene.intrinsics, rng)
         mask = layer.mask > 0
         rgb[mask] = layer.picture[mask, :3]
-    depth = measure_depth(scene, inverse, rng)
+    frame, raw = None, None
+    if scene.device is None:
+        depth = measure_depth(scene, _inverse_depths(scene), rng)
+    else:
+        depth = device_depth(scene, scene.device, rng)
+        raw = RgbdFrame(rgb=rgb, depth=depth, intrinsics=scene.intrinsics, stamp_ns=stamp_ns)
+        frame = RgbdCamera(scene.device.settings).picture(raw)
     if layer is not None:
         depth[mask] = 1.0 / layer.inverse_depth[mask]
         depth[(layer.holes > 0) & ~mask] = 0.0
@@ -77,7 +92,8 @@ def render_frame(scene: TruthScene, stamp_ns: int = 0, noise_seed: int | None = 
         strokes[f"{number} top"] = true_line(scene, (left, top), (right, top), mask)
         strokes[f"{number} bottom"] = true_line(scene, (left, bottom), (right, bottom), mask)
     return TruthFrame(
-        frame=RgbdFrame(rgb=rgb, depth=depth, intrinsics=scene.intrinsics, stamp_ns=stamp_ns),
+        frame=frame or RgbdFrame(rgb=rgb, depth=depth, intrinsics=scene.intrinsics, stamp_ns=stamp_ns),
+        raw=raw,
         edges={name: line for name, line in edges.items() if len(line.pixels)},
         strokes={name: line for name, line in strokes.items() if len(line.pixels)},
         plane=plane_of(scene, 0.0),

@@ -7,6 +7,7 @@ import functools
 import cv2
 import numpy as np
 
+from sim.detection.truth.device_picture import exposure_gain, through_device
 from sim.detection.truth.scenes import TruthScene
 from sim.world.clutter import clutter_board
 from sim.world.textures import flat, shade, smooth_noise, wall_surface
@@ -31,6 +32,8 @@ def paint_picture(scene: TruthScene, rng: np.random.Generator) -> np.ndarray:
         board = board * (1.0 - coverage) + coverage * np.array(color, np.float32)
     coverage = quad_coverage(scene, scene.corners)[..., None]
     picture = coverage * board + (1.0 - coverage) * wall
+    if scene.device is not None:
+        picture = through_device(picture, scene, SUPERSAMPLING) * np.float32(exposure_gain(scene, rng))
     picture = cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA)
     light = np.linspace(1.0 - scene.shading, 1.0 + scene.shading, width, dtype=np.float32)[None, :, None]
     picture = picture * light

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field, replace
 import cv2
 import numpy as np
 
+from sim.detection.truth.devices import ORBBEC, REALSENSE_D435, Device
+
 #: RGB colours of boards and paints.
 LIGHT = ((228, 230, 222), (214, 205, 188), (196, 204, 214))
 _DARK = ((52, 56, 62), (70, 48, 44), (38, 60, 56))
@@ -41,6 +43,9 @@ class TruthScene:
     smear_px: float = 0.0  # largest outward shift of a depth step by the depth camera [px]
     arm: bool = False  # whether arm and brush of the vehicle are in view
     camera: tuple[int, int, float] = (640, 480, 610.0)  # (width, height, focal length) [px]
+    device: Device | None = None  # the real camera that takes the pictures; None for an ideal, registered one
+    # velocity [m/s] and angular velocity [rad/s] of the camera in its axes, for the rows of the device's shutter
+    twist: tuple[float, float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     seed: int = 0  # of textures, clutter and noise
 
     @property
@@ -74,9 +79,12 @@ class Variation:
     strokes: int = 1
 
 
+#: Slow flight along the board before a device with a rolling shutter: 0.6 px of slant over the picture.
+_DRIFT = (0.02, 0.01, 0.0, 0.0, 0.01, 0.0)
 #: Families of scenes: a board 5 cm and 1.2 m before a brick wall, 2 cm before plaster near the camera, 1.5 cm
 #: before brick (too near for depth), dark on light, turned and oblique, printed, moving, smeared as by real depth
-#: cameras, and hard: faint, noisy, 1.5 cm before the wall, with undetectable edges and low confidence.
+#: cameras, hard: faint, noisy, 1.5 cm before the wall, with undetectable edges and low confidence; and of real devices,
+#: from their raw pictures.
 FAMILIES = {
     "near wall": Variation(),
     "far wall": Variation(base=TruthScene(gap_m=1.2)),
@@ -106,6 +114,8 @@ FAMILIES = {
         ),
     ),
     "small picture": Variation(base=TruthScene(camera=(424, 240, 312.6), gap_m=0.05)),
+    "realsense_d435": Variation(base=TruthScene(gap_m=0.15, device=REALSENSE_D435, twist=_DRIFT)),
+    "orbbec": Variation(base=TruthScene(gap_m=0.15, camera=(640, 480, 554.0), device=ORBBEC, twist=_DRIFT)),
 }
 
 

@@ -17,7 +17,6 @@ import pytest
 
 from ibvs_qp.symbolic import compiler as compiler_module
 from ibvs_qp.symbolic.machine_code import machine_code
-from ibvs_qp.vision import native
 
 pytestmark = [
     pytest.mark.timeout(120),
@@ -93,20 +92,14 @@ def give_away(library: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("damage", [cut, flip, plant, link, open_to_all, open_to_the_group, pipe, give_away])
-@pytest.mark.parametrize("kind", ["controller", "vision"])
 def test_a_library_that_is_not_what_was_compiled_is_compiled_anew(
     cache: Path,
     tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
     caplog: pytest.LogCaptureFixture,
-    kind: str,
     damage: Callable[[Path, Path], None],
 ) -> None:
-    monkeypatch.setattr(native, "FILES", ("native.h", "samples.c"))  # a second to compile them all
-
     def load() -> bool:
-        native.native.cache_clear()
-        return native.native() is not None if kind == "vision" else machine_code(small()).class_name() == "External"
+        return machine_code(small()).class_name() == "External"
 
     assert load()
     (library,) = cache.glob("*.so")
@@ -124,22 +117,15 @@ def test_a_library_that_is_not_what_was_compiled_is_compiled_anew(
     assert again.read_bytes() == content and stat.S_IMODE(again.lstat().st_mode) == 0o700
     assert len(caplog.records) == 1 and "compiled anew" in caplog.text
     assert not (tmp_path / "loaded").exists()
-    native.native.cache_clear()
 
 
 @pytest.mark.parametrize("mode", [0o777, 0o770, 0o1777])
-@pytest.mark.parametrize("kind", ["controller", "vision"])
-def test_a_folder_that_others_can_write_is_not_used(
-    cache: Path, caplog: pytest.LogCaptureFixture, kind: str, mode: int
-) -> None:
+def test_a_folder_that_others_can_write_is_not_used(cache: Path, caplog: pytest.LogCaptureFixture, mode: int) -> None:
     cache.mkdir()
     cache.chmod(mode)
-    native.native.cache_clear()
     function = small()
-    found = native.native() is None if kind == "vision" else machine_code(function) is function
-    assert found and not list(cache.iterdir())
+    assert machine_code(function) is function and not list(cache.iterdir())
     assert len(caplog.records) == 1 and "writable by its owner only" in caplog.text
-    native.native.cache_clear()
 
 
 def test_a_folder_of_somebody_else_or_a_link_is_not_used(
@@ -174,14 +160,12 @@ def test_a_hanging_compiler_has_its_time_once(
     hanging.chmod(0o700)
     monkeypatch.setenv("CC", str(hanging))
     monkeypatch.setattr(compiler_module, "PATIENCE_S", 0.5)
-    native.native.cache_clear()
     function, began = small(), time.monotonic()
-    assert machine_code(function) is function and machine_code(function) is function and native.native() is None
+    assert machine_code(function) is function and machine_code(function) is function
     assert time.monotonic() - began < 3.0
-    assert len(caplog.records) == 3 and "hanging is given 0.5 s in all" in caplog.text
+    assert len(caplog.records) == 2 and "hanging is given 0.5 s in all" in caplog.text
     sleeping = subprocess.run(["ps", "-eo", "args"], capture_output=True, text=True).stdout
     assert "sleep 61" not in sleeping.splitlines()
-    native.native.cache_clear()
 
 
 @pytest.mark.parametrize("command", ["cc '", 'cc "', "", "no-such-compiler", ".", "/dev/null", "false", "cc --no-such"])
@@ -189,12 +173,10 @@ def test_any_command_falls_back(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, command: str
 ) -> None:
     monkeypatch.setenv("CC", command)
-    native.native.cache_clear()
     function = small()
     with caplog.at_level(logging.INFO):
-        assert machine_code(function) is function and native.native() is None
+        assert machine_code(function) is function
     assert caplog.records and not any("\n" in record.getMessage() for record in caplog.records)
-    native.native.cache_clear()
 
 
 def test_with_a_broken_command_a_flight_begins_in_a_new_process(tmp_path: Path) -> None:

@@ -82,7 +82,7 @@ def test_bottom_edge_of_clean_frames(name: str, stride: int) -> None:
             offsets.append(offset)
             angles.append(angle)
             assert found.horizontal.role == HORIZONTAL
-            assert found.horizontal.identity.surface_side == -1, "the board lies above, the normal points down"
+            assert found.horizontal.surface_side == -1, "the board lies above, the normal points down"
             normal, range_m = world.plane(position, attitude)
             normals.append(math.degrees(math.acos(min(1.0, float(found.plane.normal @ normal)))))
             distances.append(abs(found.plane.distance_m - range_m))
@@ -101,7 +101,7 @@ def test_first_upright_line_at_the_ends_of_a_stroke_is_the_edge_there(along: flo
     assert found.vertical is not None
     offset, angle = misfit(found.vertical.line, world.line(*edges(world)[name], position, attitude), world.focal)
     assert offset < PX and angle < DEG
-    assert found.vertical.identity.surface_side == (-1 if name == "right" else 1)
+    assert found.vertical.surface_side == (-1 if name == "right" else 1)
     assert found.guides[name] is found.vertical and found.guides[other] is None
     assert found.guides["top"] is found.horizontal and found.guides["bottom"] is None
 

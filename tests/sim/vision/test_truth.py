@@ -69,7 +69,7 @@ def test_a_cold_start_in_row_2_tells_board_from_paint() -> None:
     shot = next(itertools.islice(mission_shots((640, 480), 16, 1, vehicle), 12, None))
     config = VisionConfig(paint_color=paint.color, brush_width_m=paint.brush_width_m)
     percept = Perception(config, vehicle).process(shot.frame, attitude=shot.attitude, detect=True)
-    sure = [(entry.identity.kind, entry.role) for entry in percept.candidates if entry.score >= 0.8]
+    sure = [(entry.kind, entry.role) for entry in percept.candidates if entry.confidence >= 0.8]
     assert percept.plane is not None and percept.plane.inlier_share > 0.5
     assert sure.count(("board", "horizontal")) == 1, "the lower border"
     assert sure.count(("paint", "horizontal")) >= 2, "row 1's lower edge, its upper edge ahead, row 2's fresh one"

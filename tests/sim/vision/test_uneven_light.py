@@ -6,10 +6,9 @@ import dataclasses
 
 import numpy as np
 import pytest
-from rendered_scenes import Flight, World, board_edge, perceive, row_edge, scene_of, stroke_row
+from rendered_scenes import Flight, World, board_edge, row_edge, scene_of, stroke_row
 
 from ibvs_qp.measurement import RgbdFrame
-from ibvs_qp.vision import native as native_module
 from ibvs_qp.vision.light import STEP, LightField, fit_light, products
 
 FRAMES, SETTLE = 14, 8
@@ -76,25 +75,6 @@ def test_paint_is_known_in_other_exposures(exposure: float) -> None:
     assert flight.false == 0
     for score in flight.scores.values():
         score.check()
-
-
-def test_numpy_sees_the_same_in_uneven_light(monkeypatch: pytest.MonkeyPatch) -> None:
-    seen = []
-    for compiler in (None, "none"):
-        if compiler is not None:
-            monkeypatch.setenv("CC", compiler)
-        native_module.native.cache_clear()
-        world, start, _ = row_1("default", "left-right", 0.4)
-        rows = []
-        for percept, _, _, _ in perceive(
-            world, start - 0.1 / 30.0 * np.arange(12), world.geometry.row_height(1), np.zeros(12), 2, 1
-        ):
-            assert percept.plane is not None
-            rows.append([*percept.plane.inverse_depth, *(line.rho for line in percept.features.lines)])
-        seen.append(rows)
-    native_module.native.cache_clear()
-    for one, two in zip(*seen, strict=True):
-        np.testing.assert_allclose(one, two, rtol=1e-5, atol=1e-6)
 
 
 def places(count: int) -> np.ndarray:

@@ -1,0 +1,304 @@
+"""Straight segments of the edges of a picture, of any direction: oriented edge points vote for directed lines.
+
+A Hough transform in which a point votes only for normals near its own gradient, so that lines of either polarity and of
+every direction are found in one pass (O'Gorman and Clowes, 1976). Lines are taken best first; each keeps its points.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ibvs_qp.vision.kernels.compile import inner, kernel
+
+#: Steps of the angle of a line's normal over the full circle [deg]: the normal points to the brighter side.
+_ANGLES = 360
+#: A point votes for normals within this angle of its own gradient, and supports one within the larger angle [deg].
+_VOTES_WITHIN, _AGREES_WITHIN = 12, 25
+#: Largest turn of a voted normal by the fit to its points [deg].
+_TURN = 14
+#: A point within this distance of a line supports it, at first and after the fit [px of the searched picture].
+_NEAR_FIRST, _NEAR = 2.0, 1.5
+#: Largest gap between neighbours on a segment: a length [px] and a share of the run before it.
+_GAP, _GAP_SHARE = 6.0, 0.3
+#: Least points per length of a segment, and least votes per length of the shortest one [1/px]: level and upright edges
+#: have a point on every other pixel.
+_DENSE, _VOTED = 0.25, 0.4
+#: Peaks of the vote that are looked at, and the height from which on they are not told apart.
+_TRIED, _HIGHEST = 120, 4095
+#: Columns of a point: column, row, gradient direction, magnitude. Of a segment: ends, points.
+POINT, SEGMENT = 5, 5
+#: Most points: the strongest ones vote.
+_MOST = 2500
+#: Levels of a gradient's magnitude, for the choice of the strongest.
+_LEVELS = 362
+
+
+@inner
+def _gradient(small, r, c):
+    """Change of the channel that changes most, to the right and down, and its squared length."""
+    best = right = down = np.int64(0)
+    for k in range(3):
+        x = np.int64(small[r, c + 1, k]) - np.int64(small[r, c - 1, k])
+        y = np.int64(small[r + 1, c, k]) - np.int64(small[r - 1, c, k])
+        size = x * x + y * y
+        if size > best:
+            best, right, down = size, x, y
+    return best, right, down
+
+
+@inner
+def _gradients(small, region, stride, least, strength, gradient):
+    """Gradients of at least some squared length in the wanted cells."""
+    rows, columns, _ = small.shape
+    for r in range(1, rows - 1):
+        row = min(r // stride, region.shape[0] - 1)
+        for cell in range(region.shape[1]):
+            if region[row, cell] == 0:
+                continue
+            for c in range(max(cell * stride, 1), min((cell + 1) * stride, columns - 1)):
+                size, right, down = _gradient(small, r, c)
+                if size > least:
+                    strength[r, c] = size
+                    gradient[r, c, 0] = right
+                    gradient[r, c, 1] = down
+
+
+@inner
+def _is_ridge(strength, gradient, r, c):
+    """Whether a gradient is largest along itself, and the step to its neighbours along it."""
+    right, down = gradient[r, c, 0], gradient[r, c, 1]
+    if 5 * abs(down) < 2 * abs(right):
+        dr, dc = 0, 1
+    elif 5 * abs(right) < 2 * abs(down):
+        dr, dc = 1, 0
+    else:
+        dr, dc = (1 if (right > 0) == (down > 0) else -1), 1
+    own = strength[r, c]
+    return own >= strength[r - dr, c - dc] and own > strength[r + dr, c + dc], dr, dc
+
+
+@inner
+def _edge_points(small, mask, factor, region, stride, threshold, points):
+    """Edge points that nothing hides, the strongest where there are too many; returns how many."""
+    rows, columns, _ = small.shape
+    strength = np.zeros((rows, columns), np.int32)
+    gradient = np.empty((rows, columns, 2), np.int16)
+    _gradients(small, region, stride, threshold * threshold, strength, gradient)
+    levels = np.zeros(_LEVELS, np.int64)
+    places = np.empty(rows * columns, np.int32)
+    count = 0
+    for r in range(1, rows - 1):
+        row = min(r // stride, region.shape[0] - 1)
+        for cell in range(region.shape[1]):
+            if region[row, cell] == 0:
+                continue
+            for c in range(max(cell * stride, 1), min((cell + 1) * stride, columns - 1)):
+                if strength[r, c] == 0 or mask[factor * r, factor * c] != 0:
+                    continue
+                ridge, dr, dc = _is_ridge(strength, gradient, r, c)
+                # along level and upright edges every other place tells enough
+                if ridge and not (dc == 0 and c % 2) and not (dr == 0 and r % 2):
+                    places[count] = r * columns + c
+                    levels[int(math.sqrt(strength[r, c]))] += 1
+                    count += 1
+    weakest, stronger = _LEVELS - 1, levels[_LEVELS - 1]
+    while weakest > 0 and stronger + levels[weakest - 1] <= _MOST:
+        weakest -= 1
+        stronger += levels[weakest]
+    kept = 0
+    for k in range(count):
+        r = places[k] // columns
+        c = places[k] - r * columns
+        size = math.sqrt(strength[r, c])
+        if size < weakest:
+            continue
+        _, dr, dc = _is_ridge(strength, gradient, r, c)
+        before, behind = math.sqrt(strength[r - dr, c - dc]), math.sqrt(strength[r + dr, c + dc])
+        bend = before - 2.0 * size + behind
+        shift = 0.5 * (before - behind) / bend if bend < 0.0 else 0.0
+        points[kept, 0] = c + shift * dc
+        points[kept, 1] = r + shift * dr
+        points[kept, 2] = gradient[r, c, 0] / size
+        points[kept, 3] = gradient[r, c, 1] / size
+        points[kept, 4] = size
+        kept += 1
+    return kept
+
+
+@inner
+def _wanted_degrees(tilt, within):
+    """Whether normals of each whole degree are wanted: near level and upright for a tilt [rad], all without one."""
+    wanted = np.ones(_ANGLES, np.uint8)
+    if not math.isnan(tilt):
+        for k in range(_ANGLES):
+            off = (k - math.degrees(tilt) + 45.0) % 90.0 - 45.0
+            wanted[k] = abs(off) <= within
+    return wanted
+
+
+@inner
+def _by_direction(points, count, first):
+    """Order of the points by the whole degree of their gradient; ``first`` receives where each degree begins."""
+    degrees = np.empty(count, np.int64)
+    for i in range(count):
+        degrees[i] = round(math.degrees(math.atan2(points[i, 3], points[i, 2]))) % _ANGLES
+        first[degrees[i] + 1] += 1
+    for k in range(_ANGLES):
+        first[k + 1] += first[k]
+    order, filled = np.empty(count, np.int64), first[:_ANGLES].copy()
+    for i in range(count):
+        order[filled[degrees[i]]] = i
+        filled[degrees[i]] += 1
+    return order
+
+
+@inner
+def _peaks(points, order, first, wanted, middle, threshold, least, cosine, sine, normals, distances):
+    """Voted lines, best first: degree of the normal and distance from the middle; returns how many."""
+    reach = int(math.hypot(middle[0], middle[1])) + 2
+    wide = 2 * reach + 1
+    votes = np.zeros((_ANGLES, wide), np.int32)
+    for degree in range(_ANGLES):
+        for j in range(first[degree], first[degree + 1]):
+            i = order[j]
+            u, v = points[i, 0] - middle[0], points[i, 1] - middle[1]
+            weight = 2 if points[i, 4] > 2.0 * threshold else 1
+            for turn in range(-_VOTES_WITHIN, _VOTES_WITHIN + 1):
+                k = (degree + turn) % _ANGLES
+                if wanted[k] == 0:
+                    continue
+                votes[k, int(u * cosine[k] + v * sine[k] + reach + 0.5)] += weight
+    heights, places = np.empty(votes.size // 4, np.int64), np.empty(votes.size // 4, np.int64)
+    levels, count = np.zeros(_HIGHEST + 1, np.int64), 0
+    for k in range(_ANGLES):
+        if wanted[k] == 0:
+            continue
+        up, down, row = votes[(k + 1) % _ANGLES], votes[(k - 1) % _ANGLES], votes[k]
+        for r in range(1, wide - 1):
+            own = row[r]
+            if own < least or own <= row[r - 1] or own < row[r + 1] or own <= down[r] or own < up[r]:
+                continue
+            heights[count], places[count] = own, k * wide + r
+            levels[min(own, _HIGHEST)] += 1
+            count += 1
+    lowest, higher = _HIGHEST, levels[_HIGHEST]
+    while lowest > least and higher + levels[lowest - 1] <= _TRIED:
+        lowest -= 1
+        higher += levels[lowest]
+    kept = 0
+    for k in range(count):  # of noise there are thousands, so only the highest are sorted
+        if heights[k] >= lowest and kept < _TRIED:
+            heights[kept], places[kept] = -heights[k], places[k]
+            kept += 1
+    best = np.argsort(heights[:kept], kind="mergesort")
+    for k in range(kept):
+        normals[k] = places[best[k]] // wide
+        distances[k] = places[best[k]] - normals[k] * wide - reach
+    return kept
+
+
+@inner
+def _supporters(points, order, first, used, middle, degree, within, nx, ny, rho, near, held):
+    """Free points near a line whose gradients agree with its normal; returns how many."""
+    agree, count = math.cos(math.radians(_AGREES_WITHIN)), 0
+    for turn in range(-within, within + 1):
+        k = (degree + turn) % _ANGLES
+        for j in range(first[k], first[k + 1]):
+            i = order[j]
+            away = (points[i, 0] - middle[0]) * nx + (points[i, 1] - middle[1]) * ny - rho
+            if used[i] == 0 and abs(away) <= near and points[i, 2] * nx + points[i, 3] * ny >= agree:
+                held[count] = i
+                count += 1
+    return count
+
+
+@inner
+def _through(points, held, count, middle, nx, ny, rho):
+    """The line through points by least squares; the given one where it would turn too far."""
+    u = v = uu = uv = vv = 0.0
+    for j in range(count):
+        x, y = points[held[j], 0] - middle[0], points[held[j], 1] - middle[1]
+        u += x
+        v += y
+        uu += x * x
+        uv += x * y
+        vv += y * y
+    u, v = u / count, v / count
+    direction = 0.5 * math.atan2(2.0 * (uv / count - u * v), (uu / count - u * u) - (vv / count - v * v))
+    ax, ay = -math.sin(direction), math.cos(direction)
+    if ax * nx + ay * ny < 0.0:
+        ax, ay = -ax, -ay
+    if ax * nx + ay * ny < math.cos(math.radians(_TURN)):
+        return nx, ny, rho
+    return ax, ay, u * ax + v * ay
+
+
+@inner
+def _cut(points, held, count, middle, nx, ny, rho, shortest, used, segments, kept):
+    """Segments of a line between gaps of its points; their points are used. Returns how many segments there are now."""
+    along = np.empty(count)
+    for j in range(count):
+        along[j] = (points[held[j], 1] - middle[1]) * nx - (points[held[j], 0] - middle[0]) * ny
+    by, start = np.argsort(along, kind="mergesort"), 0
+    for j in range(1, count + 1):
+        low, high = along[by[start]], along[by[j - 1]]
+        if j < count and along[by[j]] - high <= _GAP + _GAP_SHARE * (high - low):
+            continue
+        if high - low >= shortest and j - start >= _DENSE * (high - low) and kept < len(segments):
+            segments[kept, 0], segments[kept, 1] = middle[0] + rho * nx - low * ny, middle[1] + rho * ny + low * nx
+            segments[kept, 2], segments[kept, 3] = middle[0] + rho * nx - high * ny, middle[1] + rho * ny + high * nx
+            segments[kept, 4] = j - start
+            kept += 1
+            for m in range(start, j):
+                used[held[by[m]]] = 1
+        start = j
+    return kept
+
+
+@kernel("i8(u1[:, :, ::1], u1[:, ::1], i8, u1[:, ::1], i8, f8, f8, f8, f8, f8[:, ::1])")
+def find_segments(small, mask, factor, region, stride, threshold, shortest, tilt, within, segments):
+    """Segments of a picture, those with most votes first.
+
+    Args:
+        small: Picture, at a lower resolution, (h, w, 3).
+        mask: Non-zero where the vehicle hides the view, at full resolution, (H, W).
+        factor: Pixels of the mask per pixel of the picture.
+        region: Non-zero on the cells in which segments are wanted, (rows, columns).
+        stride: Side of a cell [px].
+        threshold: Least gradient, over two pixels [grey levels].
+        shortest: Least length [px].
+        tilt: Angle of gravity in the picture from down [rad]; NaN if it is unknown.
+        within: With a tilt, segments this near to level and upright are wanted [deg].
+        segments: Receives u1, v1, u2, v2 [px] and number of points, (n, 5). The brighter side lies to the right of the
+            way from the first end to the second.
+
+    Returns:
+        How many there are.
+    """
+    points = np.empty((_MOST + 1, POINT))
+    count = _edge_points(small, mask, factor, region, stride, threshold, points)
+    middle = (0.5 * (small.shape[1] - 1), 0.5 * (small.shape[0] - 1))
+    cosine, sine = np.empty(_ANGLES), np.empty(_ANGLES)
+    for k in range(_ANGLES):
+        cosine[k], sine[k] = math.cos(math.radians(k)), math.sin(math.radians(k))
+    first, least = np.zeros(_ANGLES + 1, np.int64), int(_VOTED * shortest)
+    order, wanted = _by_direction(points, count, first), _wanted_degrees(tilt, within)
+    normals, distances = np.empty(_TRIED, np.int64), np.empty(_TRIED, np.int64)
+    tried = _peaks(points, order, first, wanted, middle, threshold, least, cosine, sine, normals, distances)
+    used, held, kept = np.zeros(count, np.uint8), np.empty(count, np.int64), 0
+    for peak in range(tried):
+        k, rho = normals[peak], float(distances[peak])
+        nx, ny = cosine[k], sine[k]
+        near = _supporters(points, order, first, used, middle, k, _AGREES_WITHIN + 1, nx, ny, rho, _NEAR_FIRST, held)
+        if near < least:
+            continue
+        nx, ny, rho = _through(points, held, near, middle, nx, ny, rho)
+        wide = _AGREES_WITHIN + _TURN + 1
+        near = _supporters(points, order, first, used, middle, k, wide, nx, ny, rho, _NEAR, held)
+        if near >= least:
+            kept = _cut(points, held, near, middle, nx, ny, rho, shortest, used, segments, kept)
+        if kept == len(segments):
+            break
+    return kept

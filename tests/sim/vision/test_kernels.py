@@ -1,0 +1,31 @@
+"""Kernels of vision: compiled before the first picture, each for the one signature that it declares."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+
+from ibvs_qp.config.vehicle import VehicleParams
+from ibvs_qp.vision import Perception, VisionConfig
+from ibvs_qp.vision.kernels import compile as compiling
+from ibvs_qp.vision.kernels import prepare
+from sim.bench.mission import mission_shots
+
+
+def test_no_picture_waits_for_a_compiler() -> None:
+    """An argument of another type (an integer, a picture that must not be written) would compile a kernel in flight."""
+    prepare()
+    assert all(len(kernel.signatures) == 1 for kernel, _ in compiling._kernels)
+    vehicle = VehicleParams()
+    follows, searches = (Perception(VisionConfig(paint_color=(40, 90, 200)), vehicle) for _ in range(2))
+    alone = Perception(VisionConfig(), None)
+    for number, shot in enumerate(itertools.islice(mission_shots((424, 240), 20, 3, vehicle), 20)):
+        for array in (shot.frame.rgb, shot.frame.depth):
+            array.setflags(write=number % 2 == 0)
+        follows.process(shot.frame, attitude=shot.attitude, rotation=shot.rotation, velocity=shot.velocity)
+        searches.reset()
+        searches.process(shot.frame, attitude=shot.attitude, detect=True)
+        alone.process(shot.frame, seed_pixel=(100.0, 60.0), velocity=np.zeros(3))
+    compiled = {kernel.py_func.__name__: len(kernel.signatures) for kernel, _ in compiling._kernels}
+    assert set(compiled.values()) == {1}, compiled
