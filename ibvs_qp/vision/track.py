@@ -71,6 +71,11 @@ class Track:
         self.line, self.rho, self.theta, self.covariance = line, line.rho, line.theta, line.covariance
         self.step = line.step if not self.step.any() else self.step + _STEP_BLEND * (line.step - self.step)
 
+    def become(self, other: Track) -> None:
+        """Be what another track on the same edge is; the identity and the line stay."""
+        self.kind, self.borders_plane, self.confidence = other.kind, other.borders_plane, other.confidence
+        self.surface_side = other.surface_side if math.cos(self.theta - other.theta) > 0.0 else -other.surface_side
+
     def state(self) -> TrackState:
         """Frozen copy for the outside."""
         return TrackState(

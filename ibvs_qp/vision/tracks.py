@@ -110,7 +110,7 @@ class LineTracker:
                 confidence=_EXPECTED_CONFIDENCE,
             )
             self._start(expected, hint.name)
-        self._merge(picture)
+        self._merge(picture, colors)
 
     def offer(self, candidates: list[Candidate], picture: Picture) -> None:
         """Start tracks from detected lines that nothing follows yet; refresh what is known of the others."""
@@ -190,8 +190,8 @@ class LineTracker:
             )
         ]
 
-    def _merge(self, picture: Picture) -> None:
-        """Of two tracks on one edge the older stays."""
+    def _merge(self, picture: Picture, colors: SurfaceColors) -> None:
+        """Of two tracks on one edge the older stays; it is what a caller expects there if no colour tells."""
         kept: list[Track] = []
         for track in self.tracks:
             twin = next((other for other in kept if self._same(other, track, picture)), None)
@@ -199,6 +199,8 @@ class LineTracker:
                 kept.append(track)
             elif track.hint and not twin.hint:
                 twin.hint = track.hint
+                if not colors.paint_distinct:
+                    twin.become(track)
         self.tracks = kept
 
     def _same(self, one: Track, two: Track, picture: Picture) -> bool:
