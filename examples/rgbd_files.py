@@ -44,10 +44,10 @@ def main(folder: Path) -> None:
     config = preset("qp")
     perception = Perception(config.vision, config.controller.vehicle)
     for index, color in enumerate(sorted(folder.glob("*_color.png")), start=1):
-        percept = perception.process(read(color, index * PERIOD_NS))
-        wall = f"wall at {percept.plane.distance_m:.3f} m" if percept.plane else f"no wall: {percept.refused}"
+        perceived = perception.process(read(color, index * PERIOD_NS))
+        wall = f"wall at {perceived.plane.distance_m:.3f} m" if perceived.plane else f"no wall: {perceived.refused}"
         print(f"{color.name}: {wall}")
-        for line in percept.features.lines:
+        for line in perceived.features.lines:
             sigma_px = INTRINSICS[0] * np.sqrt(line.covariance[0, 0])
             print(
                 f"  {line.kind:5s} {line.role:10s} rho {line.rho:+.4f} ({sigma_px:.2f} px)  "

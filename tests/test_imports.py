@@ -23,6 +23,11 @@ ORDER = {
         "fault_matrix tune notebook bench commands"
     ).split(),
 }
+#: Rooms of vision in the order of its stages: data passes forward.
+STAGES = (
+    "robust config kernels checks picture appearance surface flow lines layout perception_result overlay "
+    "make_result paper perception"
+).split()
 #: What every package must not import.
 FORBIDDEN = {
     "allocation": {"ibvs_qp", "sim", "notebooks", "mujoco", "casadi", "osqp", "cv2"},
@@ -110,6 +115,20 @@ def test_rooms_depend_one_way(package: str) -> None:
                 continue  # the package's own page of public names, and modules of one room
             later = order.index(other.split(".")[1]) > order.index(room)
             assert not later, f"{name} imports {other}: {room} stands before {other.split('.')[1]}"
+
+
+def test_no_stage_of_vision_reaches_back() -> None:
+    for name, used in imported_modules("ibvs_qp").items():
+        room = stage_of(name)
+        for other in used:
+            later = None not in (room, stage_of(other)) and STAGES.index(stage_of(other)) > STAGES.index(room)
+            assert not later, f"{name} imports {other}: {room} stands before {stage_of(other)}"
+
+
+def stage_of(module: str) -> str | None:
+    """Room of a module of vision."""
+    parts = module.split(".")
+    return parts[2] if parts[:2] == ["ibvs_qp", "vision"] and len(parts) > 2 else None
 
 
 @pytest.mark.parametrize("package", ORDER)

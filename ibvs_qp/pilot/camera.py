@@ -15,8 +15,8 @@ from ibvs_qp.pilot.rolling_shutter import RollingShutter
 from ibvs_qp.validation.features import check_features
 from ibvs_qp.validation.measurement import LINES_PER_SLOT
 from ibvs_qp.vision.checks import PictureGate
-from ibvs_qp.vision.percept import LineHint
-from ibvs_qp.vision.picture_input.camera import RgbdCamera
+from ibvs_qp.vision.lines.line_state import LineHint
+from ibvs_qp.vision.picture.camera import RgbdCamera
 
 #: Pixels by which pictures are compared: every 16th row and column, of 4096 at most.
 _SPARSE = (slice(0, 4096, 16), slice(0, 4096, 16))
@@ -26,7 +26,7 @@ class CameraInput:
     """Pictures or features of one flight.
 
     Attributes:
-        percept: What perception found in the last picture, or None.
+        perception_result: What perception found in the last picture, or None.
         picture: That picture, registered and rectified, or None.
         plane, plane_ns: Wall in the camera frame (nx, ny, nz, d) of the last features with one, and their stamp.
         image_ns: Stamp of the last features, -1 for never.
@@ -66,7 +66,7 @@ class CameraInput:
         if self._loader.perception is not None:
             self._loader.perception.reset()
         self._pictures.reset()
-        self.percept, self.picture, self._capture_ns = None, None, -1
+        self.perception_result, self.picture, self._capture_ns = None, None, -1
         self.plane: tuple[float, float, float, float] | None = None
         self.plane_ns = self.image_ns = -1
 
@@ -116,17 +116,17 @@ class CameraInput:
         last_ns = self._capture_ns if self._capture_ns >= 0 else image.stamp_ns
         self._capture_ns = image.stamp_ns
         self.picture = self._camera.picture(image)
-        self.percept = perception.process(
+        self.perception_result = perception.process(
             self.picture,
             attitude=np.array(self._history.attitude(image.stamp_ns)),
             rotation=self._history.turn(last_ns, image.stamp_ns),
             velocity=velocity,
             hints=hints,
         )
-        if self.percept.refused:
-            rejected.append(f"image: {self.percept.refused}")
+        if self.perception_result.refused:
+            rejected.append(f"image: {self.perception_result.refused}")
             return None
-        seen = self.percept.features
+        seen = self.perception_result.features
         if seen is not None:
             plane = self.plane if seen.plane is None else seen.plane
             motion = seen.velocity if velocity is None else velocity

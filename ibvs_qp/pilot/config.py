@@ -11,7 +11,7 @@ from ibvs_qp.config.settings import choice, dump_toml, load_toml, setting, valid
 from ibvs_qp.painting.config import PaintingConfig
 from ibvs_qp.vision.config import VisionConfig
 from ibvs_qp.vision.paper.config import PaperConfig
-from ibvs_qp.vision.picture_input.settings import RgbdCameraSettings
+from ibvs_qp.vision.picture.settings import RgbdCameraSettings
 
 
 @dataclass(frozen=True, kw_only=True)

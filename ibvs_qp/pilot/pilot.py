@@ -45,7 +45,8 @@ from ibvs_qp.validation.measurement import answered_stamp
 from ibvs_qp.validation.self_check import SelfCheck
 from ibvs_qp.validation.sensor_frame import SensorGate
 from ibvs_qp.validation.thrust_limits import ThrustLimits
-from ibvs_qp.vision.percept import LineHint, Percept
+from ibvs_qp.vision.lines.line_state import LineHint
+from ibvs_qp.vision.perception_result import PerceptionResult
 
 #: Extent of the fresh edge ahead of the brush, normalised image x from the tip's side to the border.
 HINT_SPAN = (0.10, 0.50)
@@ -190,9 +191,9 @@ class Pilot:
         return self._camera.picture
 
     @property
-    def percept(self) -> Percept | None:
+    def perception_result(self) -> PerceptionResult | None:
         """What perception found in the last picture."""
-        return self._camera.percept
+        return self._camera.perception_result
 
     @property
     def setpoints(self):

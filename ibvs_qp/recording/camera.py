@@ -12,9 +12,10 @@ from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
 from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.recording.writer import Sink
+from ibvs_qp.vision.lines.line_state import TrackState
 from ibvs_qp.vision.overlay import draw_overlay
-from ibvs_qp.vision.percept import Percept, TrackState
-from ibvs_qp.vision.picture import denormalise
+from ibvs_qp.vision.perception_result import PerceptionResult
+from ibvs_qp.vision.picture.picture import denormalise
 
 #: Frames of the pictures: optical axis along z, x to the right, y down.
 CAMERA, DEPTH_CAMERA = "camera", "depth_camera"
@@ -38,27 +39,27 @@ class CameraTopics:
     def __init__(self) -> None:
         self._seldom_ns = -SELDOM_NS
 
-    def __call__(self, sink: Sink, picture: RgbdFrame, percept: Percept | None, stamp_ns: int) -> None:
+    def __call__(self, sink: Sink, picture: RgbdFrame, perceived: PerceptionResult | None, stamp_ns: int) -> None:
         """Write one picture.
 
         Args:
             sink: The file.
             picture: The rectified picture.
-            percept: What was seen in it, or None.
+            perceived: What was seen in it, or None.
             stamp_ns: Time of the tick; the messages carry the time of capture.
         """
         captured = picture.stamp_ns
         sink.write("/camera/image", _jpeg(picture.rgb, captured), stamp_ns)
         sink.write("/camera/calibration", _calibration(picture, captured, CAMERA, 1))
-        if percept is not None:
-            sink.write("/camera/detections", detections(percept, captured))
+        if perceived is not None:
+            sink.write("/camera/detections", detections(perceived, captured))
         if abs(captured - self._seldom_ns) < SELDOM_NS:
             return
         self._seldom_ns = captured
         sink.write("/camera/depth", _depth(picture.depth, captured))
         sink.write("/camera/depth_calibration", _calibration(picture, captured, DEPTH_CAMERA, DEPTH_STEP))
-        if percept is not None:  # without tints: their arithmetic would hold up the control loop
-            sink.write("/camera/overlay", _jpeg(draw_overlay(picture.rgb, percept, tints=False), captured))
+        if perceived is not None:  # without tints: their arithmetic would hold up the control loop
+            sink.write("/camera/overlay", _jpeg(draw_overlay(picture.rgb, perceived, tints=False), captured))
 
 
 def _jpeg(rgb: np.ndarray, stamp_ns: int) -> CompressedImage:
@@ -95,14 +96,14 @@ def _calibration(picture: RgbdFrame, stamp_ns: int, frame_id: str, step: int) ->
     return message
 
 
-def detections(percept: Percept, stamp_ns: int) -> ImageAnnotations:
+def detections(perceived: PerceptionResult, stamp_ns: int) -> ImageAnnotations:
     """Tracked lines with identity, kind and weight; distance of the wall, or why there is none."""
     message = ImageAnnotations()
-    if percept.intrinsics is not None:
-        for track in percept.tracks:
-            _annotate(message, track, denormalise(track.segment, percept.intrinsics).tolist(), stamp_ns)
-    refused = percept.refused or "no surface"
-    text = f"{percept.plane.distance_m:.3f} m" if percept.plane is not None else refused
+    if perceived.intrinsics is not None:
+        for track in perceived.tracks:
+            _annotate(message, track, denormalise(track.segment, perceived.intrinsics).tolist(), stamp_ns)
+    refused = perceived.refused or "no surface"
+    text = f"{perceived.plane.distance_m:.3f} m" if perceived.plane is not None else refused
     _label(message, text, (6.0, 6.0 + _FONT_PX), (1.0, 1.0, 1.0), stamp_ns)
     return message
 

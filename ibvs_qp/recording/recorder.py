@@ -126,9 +126,9 @@ class Recorder:
         image = frame.image
         self.writer.offer(self._topics.write_frame, copied(frame) if image is None else _without_picture(frame))
         if image is not None and self._pictures and pilot.picture is not None:
-            percept = pilot.percept
+            perceived = pilot.perception_result
             picture = copied(pilot.picture)
-            self.writer.offer(self._topics.write_picture, picture, percept, command.stamp_ns, room=PICTURE_ROOM)
+            self.writer.offer(self._topics.write_picture, picture, perceived, command.stamp_ns, room=PICTURE_ROOM)
 
 
 def _without_picture(frame: Any) -> Any:

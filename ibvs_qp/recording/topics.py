@@ -18,7 +18,7 @@ from ibvs_qp.recording.camera import CameraTopics
 from ibvs_qp.recording.messages import encode
 from ibvs_qp.recording.ticks import ControllerInput, ControlTick
 from ibvs_qp.recording.writer import Sink
-from ibvs_qp.vision.percept import Percept
+from ibvs_qp.vision.perception_result import PerceptionResult
 
 INPUT_TOPIC, CONTROL_TOPIC, SENSORS_TOPIC = "/controller/input", "/control", "/sensors"
 #: Least time between poses, and between shapes that do not change [ns].
@@ -102,9 +102,9 @@ class TickTopics:
         """Write the raw sensors of a pilot's tick."""
         sink.write(SENSORS_TOPIC, encode(frame, SensorFrame))
 
-    def write_picture(self, sink: Sink, picture: RgbdFrame, percept: Percept | None, stamp_ns: int) -> None:
+    def write_picture(self, sink: Sink, picture: RgbdFrame, perceived: PerceptionResult | None, stamp_ns: int) -> None:
         """Write a picture and what was seen in it."""
-        self._camera(sink, picture, percept, stamp_ns)
+        self._camera(sink, picture, perceived, stamp_ns)
 
     def write_note(self, sink: Sink, name: str, text: str) -> None:
         """Write a line."""

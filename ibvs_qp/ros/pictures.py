@@ -10,7 +10,7 @@ import numpy as np
 
 from ibvs_qp.ros.messages import CAMERA_INFO, IMAGE, BadMessage, message
 from ibvs_qp.ros.stamps import header
-from ibvs_qp.vision.picture_input.settings import DISTORTION_SIZES
+from ibvs_qp.vision.picture.settings import DISTORTION_SIZES
 
 #: Channels of the colour encodings, in the order red, green, blue.
 _COLOURS = {

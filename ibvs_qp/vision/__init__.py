@@ -11,14 +11,15 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from ibvs_qp.model.interaction_matrix import endpoint_line_row, line_interaction_matrix
     from ibvs_qp.vision.config import VisionConfig
-    from ibvs_qp.vision.percept import LineHint, Percept, TrackState
+    from ibvs_qp.vision.lines.line_state import LineHint, TrackState
     from ibvs_qp.vision.perception import Perception
-    from ibvs_qp.vision.plane import PlaneEstimate
+    from ibvs_qp.vision.perception_result import PerceptionResult
+    from ibvs_qp.vision.surface.plane import PlaneEstimate
 
 __all__ = [
     "LineHint",
-    "Percept",
     "Perception",
+    "PerceptionResult",
     "PlaneEstimate",
     "TrackState",
     "VisionConfig",
@@ -32,13 +33,13 @@ _HOMES = {
         "endpoint_line_row",
         "line_interaction_matrix",
     ),
-    "ibvs_qp.vision.percept": (
+    "ibvs_qp.vision.lines.line_state": (
         "LineHint",
-        "Percept",
         "TrackState",
     ),
+    "ibvs_qp.vision.perception_result": ("PerceptionResult",),
     "ibvs_qp.vision.perception": ("Perception",),
-    "ibvs_qp.vision.plane": ("PlaneEstimate",),
+    "ibvs_qp.vision.surface.plane": ("PlaneEstimate",),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 

@@ -7,10 +7,10 @@ import numpy as np
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.vision.config import VisionConfig
-from ibvs_qp.vision.follow_plane import PlaneFollower
-from ibvs_qp.vision.grid import CoarseGrid
-from ibvs_qp.vision.mask import brush_zone, vehicle_mask
-from ibvs_qp.vision.seeds import seed_cells
+from ibvs_qp.vision.picture.grid import CoarseGrid
+from ibvs_qp.vision.picture.mask import brush_zone, vehicle_mask
+from ibvs_qp.vision.surface.follow_plane import PlaneFollower
+from ibvs_qp.vision.surface.seeds import seed_cells
 
 
 class PictureLayout:

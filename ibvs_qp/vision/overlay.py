@@ -5,8 +5,9 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from ibvs_qp.vision.percept import Percept, TrackState
-from ibvs_qp.vision.picture import denormalise
+from ibvs_qp.vision.lines.line_state import TrackState
+from ibvs_qp.vision.perception_result import PerceptionResult
+from ibvs_qp.vision.picture.picture import denormalise
 
 #: RGB colours: surface tint, mask tint, tracks by kind, tentative or lost tracks, text and its ground.
 _SURFACE, _MASK = (60, 220, 90), (200, 60, 60)
@@ -18,12 +19,12 @@ _TINT, _TICK_PX, _TEXT = 0.22, 14, 0.42
 _FONT, _PAD_PX, _CLEAR_PX = cv2.FONT_HERSHEY_SIMPLEX, 3, 10
 
 
-def draw_overlay(rgb: np.ndarray, percept: Percept, *, words: bool = True, tints: bool = True) -> np.ndarray:
+def draw_overlay(rgb: np.ndarray, seen: PerceptionResult, *, words: bool = True, tints: bool = True) -> np.ndarray:
     """Draw surface, mask, tracks and velocity into a copy of the picture.
 
     Args:
         rgb: The picture, uint8 (H, W, 3).
-        percept: What was seen in it.
+        seen: What was seen in it.
         words: Whether to write what each track is, and distance and velocity; too small to read in print.
         tints: Whether to tint surface and mask, which takes milliseconds.
 
@@ -32,19 +33,19 @@ def draw_overlay(rgb: np.ndarray, percept: Percept, *, words: bool = True, tints
     """
     result = np.ascontiguousarray(rgb).copy()
     height, width = result.shape[:2]
-    if tints and percept.plane is not None:
-        region = cv2.resize(percept.plane.component.astype(np.uint8), (width, height), interpolation=cv2.INTER_NEAREST)
+    if tints and seen.plane is not None:
+        region = cv2.resize(seen.plane.component.astype(np.uint8), (width, height), interpolation=cv2.INTER_NEAREST)
         _tint(result, region > 0, _SURFACE)
-    if tints and percept.mask is not None and percept.mask.shape == (height, width):
-        _tint(result, percept.mask > 0, _MASK)
-    if percept.intrinsics is not None:
-        segments = [denormalise(track.segment, percept.intrinsics) for track in percept.tracks]
-        for track, ends in zip(percept.tracks, segments, strict=True):
+    if tints and seen.mask is not None and seen.mask.shape == (height, width):
+        _tint(result, seen.mask > 0, _MASK)
+    if seen.intrinsics is not None:
+        segments = [denormalise(track.segment, seen.intrinsics) for track in seen.tracks]
+        for track, ends in zip(seen.tracks, segments, strict=True):
             _draw_track(result, track, ends)
-        for track, ends in zip(percept.tracks, segments, strict=True) if words else ():  # last: no line covers a label
+        for track, ends in zip(seen.tracks, segments, strict=True) if words else ():  # last: no line covers a label
             _label_track(result, track, ends)
     if words:
-        _write(result, _caption(percept), (6, height - 8))
+        _write(result, _caption(seen), (6, height - 8))
     return result
 
 
@@ -84,12 +85,12 @@ def _label_track(picture: np.ndarray, track: TrackState, ends: np.ndarray) -> No
     _write(picture, text, (round(x - 0.5 * width), round(y + 0.5 * height)))
 
 
-def _caption(percept: Percept) -> str:
-    if percept.plane is None:
-        return percept.refused or "no surface"
-    parts = [f"{percept.plane.distance_m:.3f} m"]
-    if percept.features.velocity is not None:
-        parts.append("v " + " ".join(f"{1e3 * value:+.0f}" for value in percept.features.velocity) + " mm/s")
+def _caption(seen: PerceptionResult) -> str:
+    if seen.plane is None:
+        return seen.refused or "no surface"
+    parts = [f"{seen.plane.distance_m:.3f} m"]
+    if seen.features.velocity is not None:
+        parts.append("v " + " ".join(f"{1e3 * value:+.0f}" for value in seen.features.velocity) + " mm/s")
     return "  ".join(parts)
 
 

@@ -11,26 +11,27 @@ from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import R_BODY_CAMERA, down_in_body
 from ibvs_qp.measurement import FeatureFrame, RgbdFrame
 from ibvs_qp.validation.failure import raised
-from ibvs_qp.vision.candidates import Candidate, find_candidates
+from ibvs_qp.vision.appearance.colors import SurfaceColors
+from ibvs_qp.vision.appearance.light_samples import on_surface
 from ibvs_qp.vision.checks import PictureGate, StageClock, finite_vector
-from ibvs_qp.vision.colors import SurfaceColors
 from ibvs_qp.vision.config import VisionConfig
-from ibvs_qp.vision.edge_segments import half_resolution
-from ibvs_qp.vision.ego_motion import surface_motion
-from ibvs_qp.vision.exposure import ExposureSteps
-from ibvs_qp.vision.find_surface import find_surface, followed_region
-from ibvs_qp.vision.flow import SparseFlow
-from ibvs_qp.vision.guides import GuideKeeper
+from ibvs_qp.vision.flow.camera_motion import CameraMotion
+from ibvs_qp.vision.flow.ego_motion import surface_motion
+from ibvs_qp.vision.flow.sparse_flow import SparseFlow
 from ibvs_qp.vision.kernels import prepare
 from ibvs_qp.vision.layout import PictureLayout
-from ibvs_qp.vision.light_samples import on_surface
-from ibvs_qp.vision.make_percept import make_percept
-from ibvs_qp.vision.motion import CameraMotion
-from ibvs_qp.vision.percept import LineHint, Percept
-from ibvs_qp.vision.picture import Picture
-from ibvs_qp.vision.plane import PlaneEstimate, PlaneFitter
-from ibvs_qp.vision.surface_region import SurfaceRegion
-from ibvs_qp.vision.tracks import LineTracker
+from ibvs_qp.vision.lines.candidates import Candidate, find_candidates
+from ibvs_qp.vision.lines.edge_segments import half_resolution
+from ibvs_qp.vision.lines.guides import GuideKeeper
+from ibvs_qp.vision.lines.line_state import LineHint
+from ibvs_qp.vision.lines.tracks import LineTracker
+from ibvs_qp.vision.make_result import make_result
+from ibvs_qp.vision.perception_result import PerceptionResult
+from ibvs_qp.vision.picture.exposure import ExposureSteps
+from ibvs_qp.vision.picture.picture import Picture
+from ibvs_qp.vision.surface.find_surface import find_surface, followed_region
+from ibvs_qp.vision.surface.plane import PlaneEstimate, PlaneFitter
+from ibvs_qp.vision.surface.region import SurfaceRegion
 
 #: Pictures after a start in which lines are searched often: colours are learned in the first one.
 _WARM_UP = 8
@@ -85,7 +86,7 @@ class Perception:
         hints: tuple[LineHint, ...] = (),
         detect: bool = False,
         seed_pixel: tuple[float, float] | None = None,
-    ) -> Percept:
+    ) -> PerceptionResult:
         """See one picture; never raises, a picture that cannot be used is refused with a reason.
 
         Args:
@@ -110,7 +111,7 @@ class Perception:
         self._plane, self._grey = None, None
         self._flow.reset()
         stamp = frame.stamp_ns if isinstance(frame.stamp_ns, int) else 0
-        return Percept(
+        return PerceptionResult(
             features=FeatureFrame(lines=(), plane=None, stamp_ns=stamp), refused=problem, velocity_refused=problem
         )
 
@@ -123,7 +124,7 @@ class Perception:
         hints: tuple[LineHint, ...],
         detect: bool,
         seed_pixel: tuple[float, float] | None,
-    ) -> Percept:
+    ) -> PerceptionResult:
         clock = StageClock()
         frame = self._plain(frame)
         layout = self._laid_out(frame)
@@ -157,7 +158,7 @@ class Perception:
         )
         clock.lap("flow")
         followed = self._tracker.tracks
-        return make_percept(
+        return make_result(
             frame,
             followed,
             self._plane,

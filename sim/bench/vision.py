@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from ibvs_qp.config.vehicle import VehicleParams
-from ibvs_qp.vision import Percept, Perception, VisionConfig, checks
+from ibvs_qp.vision import Perception, PerceptionResult, VisionConfig, checks
 from ibvs_qp.vision.layout import PictureLayout
 from ibvs_qp.vision.paper import PaperPipeline
 from sim.bench.mission import PERIOD_NS, Shot, mission_shots
@@ -73,24 +73,24 @@ class _Rivals:
 
     def _track(self, rows: dict[str, Row], shot: Shot, seed: _Seed, number: int) -> dict[str, float]:
         place = seed if number == 0 else None
-        percept = rows["whole_frame"].measure(
+        perceived = rows["whole_frame"].measure(
             lambda: self._tracker.process(
                 shot.frame, attitude=shot.attitude, rotation=shot.rotation, velocity=shot.velocity, seed_pixel=place
             )
         )
-        times = percept.time_ms
-        searched = bool(percept.candidates) or times.get("detect", 0.0) > _SEARCH_MS
-        if percept.plane is not None and not searched:
-            rows["tracked_frame"].times_us.append(_sum_us(percept, _TRACKED))
-        if percept.features.velocity is not None:
+        times = perceived.time_ms
+        searched = bool(perceived.candidates) or times.get("detect", 0.0) > _SEARCH_MS
+        if perceived.plane is not None and not searched:
+            rows["tracked_frame"].times_us.append(_sum_us(perceived, _TRACKED))
+        if perceived.features.velocity is not None:
             rows["velocity"].times_us.append(1e3 * times["flow"])
         return {name: times[name] for name in ("plane", "tracks", "flow") if name in times}
 
     def _detect(self, rows: dict[str, Row], shot: Shot, seed: _Seed, number: int) -> dict[str, float]:
         self._detector.reset()
-        percept = self._detector.process(shot.frame, attitude=shot.attitude, detect=True, seed_pixel=seed)
-        rows["detection"].times_us.append(_sum_us(percept, _DETECTION))
-        return {f"detection_{name}": percept.time_ms[name] for name in _DETECTION if name in percept.time_ms}
+        perceived = self._detector.process(shot.frame, attitude=shot.attitude, detect=True, seed_pixel=seed)
+        rows["detection"].times_us.append(_sum_us(perceived, _DETECTION))
+        return {f"detection_{name}": perceived.time_ms[name] for name in _DETECTION if name in perceived.time_ms}
 
     def _run_paper(self, rows: dict[str, Row], shot: Shot, seed: _Seed, number: int) -> dict[str, float]:
         paper = self._paper
@@ -105,8 +105,8 @@ class _Rivals:
         return {}
 
 
-def _sum_us(percept: Percept, stages: Iterable[str]) -> float:
-    return 1e3 * sum(percept.time_ms.get(name, 0.0) for name in stages)
+def _sum_us(perceived: PerceptionResult, stages: Iterable[str]) -> float:
+    return 1e3 * sum(perceived.time_ms.get(name, 0.0) for name in stages)
 
 
 def bench_vision(

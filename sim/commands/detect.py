@@ -16,7 +16,7 @@ from sim.detection.methods import METHODS
 if TYPE_CHECKING:
     from rich.status import Status
 
-    from ibvs_qp.vision.picture_input.settings import RgbdCameraSettings
+    from ibvs_qp.vision.picture.settings import RgbdCameraSettings
     from sim.detection.manifest import FrameEntry
     from sim.detection.run import FrameResult
 
@@ -166,7 +166,7 @@ class Detect:
         from ibvs_qp.config.settings import from_dict
         from ibvs_qp.config.toml_text import read_toml
         from ibvs_qp.pilot.config import CameraConfig
-        from ibvs_qp.vision.picture_input.settings import RgbdCameraSettings
+        from ibvs_qp.vision.picture.settings import RgbdCameraSettings
 
         if self.camera is None:
             return None if self.distortion is None else RgbdCameraSettings(distortion=self.distortion)
@@ -181,7 +181,7 @@ class Detect:
 
     def _entries(self) -> list[FrameEntry]:
         """Frames of the command line, checked."""
-        from ibvs_qp.vision.picture_input.settings import RgbdCameraSettings
+        from ibvs_qp.vision.picture.settings import RgbdCameraSettings
         from sim.detection.manifest import LARGEST_PX, FrameEntry, read_manifest
         from sim.detection.pictures import read_frame
 

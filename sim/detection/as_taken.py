@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from ibvs_qp.measurement import RgbdFrame
-from ibvs_qp.vision.picture import denormalise, normalise
-from ibvs_qp.vision.picture_input.lens import Lens
+from ibvs_qp.vision.picture.lens import Lens
+from ibvs_qp.vision.picture.picture import denormalise, normalise
 
 #: Farthest a point may lie from the corner, in widths of the picture: a lens model bends what is far outside anywhere.
 _FARTHEST = 2.0

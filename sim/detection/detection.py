@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ibvs_qp.vision.refined import RefinedLine
-from ibvs_qp.vision.surface import PlaneEstimate
+from ibvs_qp.vision.lines.refined import RefinedLine
+from ibvs_qp.vision.surface.estimate import PlaneEstimate
 
 #: The four guides, by the side of the surface on which they lie.
 GUIDE_SIDES = ("top", "bottom", "left", "right")

@@ -14,7 +14,7 @@ from typing import Any
 
 from ibvs_qp.config.errors import ConfigError, shown
 from ibvs_qp.config.files import read_bytes
-from ibvs_qp.vision.picture_input.settings import RgbdCameraSettings
+from ibvs_qp.vision.picture.settings import RgbdCameraSettings
 from sim.storage.limits import LARGEST_MANIFEST, MOST_FRAMES
 
 #: Required columns; seed_u, seed_v and depth may be empty in a row.

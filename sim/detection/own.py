@@ -9,10 +9,11 @@ import numpy as np
 
 from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.vision import Perception, VisionConfig
-from ibvs_qp.vision.candidates import Candidate
 from ibvs_qp.vision.checks import frame_problem
-from ibvs_qp.vision.percept import Percept, TrackState
-from ibvs_qp.vision.picture import denormalise
+from ibvs_qp.vision.lines.candidates import Candidate
+from ibvs_qp.vision.lines.line_state import TrackState
+from ibvs_qp.vision.perception_result import PerceptionResult
+from ibvs_qp.vision.picture.picture import denormalise
 from sim.detection.detection import DetectedLine, Detection
 from sim.detection.whole_picture import every_line
 
@@ -59,24 +60,24 @@ class OwnMethod:
         problem = frame_problem(frame) or (NO_SEED if seed_pixel is None else None)
         if problem is not None:
             return Detection(refused=problem, time_ms=_since(started))
-        percept = self._perception.process(frame, seed_pixel=seed_pixel, detect=not tracked)
-        tracks = {track.track_id: _of_track(track, frame) for track in percept.tracks}
+        found = self._perception.process(frame, seed_pixel=seed_pixel, detect=not tracked)
+        tracks = {track.track_id: _of_track(track, frame) for track in found.tracks}
         lines = list(tracks.values())
-        lines += [_of_candidate(found) for found in _untracked(percept)]
+        lines += [_of_candidate(entry) for entry in _untracked(found)]
         return Detection(
-            plane=percept.plane,
-            refused=percept.refused,
+            plane=found.plane,
+            refused=found.refused,
             candidates=tuple(sorted(_numbered(lines), key=lambda line: -line.score)),
-            guides={side: None if track is None else tracks[track.track_id] for side, track in percept.guides.items()},
+            guides={side: None if track is None else tracks[track.track_id] for side, track in found.guides.items()},
             tracked=tracked,
             time_ms=_since(started),
         )
 
 
-def _untracked(percept: Percept) -> list[Candidate]:
+def _untracked(found: PerceptionResult) -> list[Candidate]:
     """Candidates that started no track in this picture and are none."""
-    fits = [track.segment for track in percept.tracks]
-    return [entry for entry in percept.candidates if not any(np.array_equal(entry.line.segment, fit) for fit in fits)]
+    fits = [track.segment for track in found.tracks]
+    return [entry for entry in found.candidates if not any(np.array_equal(entry.line.segment, fit) for fit in fits)]
 
 
 def _of_track(track: TrackState, frame: RgbdFrame) -> DetectedLine:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from ibvs_qp.measurement import RgbdFrame
-from ibvs_qp.vision.candidates import Candidate
+from ibvs_qp.vision.lines.candidates import Candidate
 from ibvs_qp.vision.paper import PaperPipeline
-from ibvs_qp.vision.picture import denormalise
+from ibvs_qp.vision.picture.picture import denormalise
 from sim.detection.detection import DetectedLine, Detection
 
 #: The published pipeline rates no line: every line, guide or not, has this confidence [-].

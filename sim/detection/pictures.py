@@ -10,8 +10,8 @@ import numpy as np
 from ibvs_qp.config.errors import IbvsQpError
 from ibvs_qp.config.files import UnreadableFile, read_bytes
 from ibvs_qp.measurement import RgbdFrame
-from ibvs_qp.vision.picture_input.convert import to_color
-from ibvs_qp.vision.picture_input.settings import RgbdCameraSettings
+from ibvs_qp.vision.picture.convert import to_color
+from ibvs_qp.vision.picture.settings import RgbdCameraSettings
 from sim.storage.arrays import read_npy, read_npz
 from sim.storage.limits import LARGEST_PICTURE, LONGEST_SIDE
 from sim.storage.quiet import no_library_output

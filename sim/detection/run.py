@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ibvs_qp.measurement import RgbdFrame
-from ibvs_qp.vision.picture_input.camera import RgbdCamera
-from ibvs_qp.vision.picture_input.settings import RgbdCameraSettings
+from ibvs_qp.vision.picture.camera import RgbdCamera
+from ibvs_qp.vision.picture.settings import RgbdCameraSettings
 from sim.detection.as_taken import as_taken, ideal_pixel
 from sim.detection.detection import Detection
 from sim.detection.manifest import FrameEntry, motion_sequences

@@ -103,11 +103,11 @@ class Recorder:
             self._active[self._ticks] = paid
         if command.rejected or len(painter.log) != self._logged or command.safety is not self._safety:
             self._note_events(time_s, command)
-        if frame.image is not None and pilot.percept is not None and pilot.picture is not None:
-            self._vision.append(sum(pilot.percept.time_ms.values()))
+        if frame.image is not None and pilot.perception_result is not None and pilot.picture is not None:
+            self._vision.append(sum(pilot.perception_result.time_ms.values()))
             if self._options.video and time_s >= self._next_picture:
                 self._next_picture = time_s + 1.0 / VIDEO_RATE
-                picture = pack_picture(draw_overlay(pilot.picture.rgb, pilot.percept))
+                picture = pack_picture(draw_overlay(pilot.picture.rgb, pilot.perception_result))
                 self._pictures.append((time_s, picture, phase))
         self._ticks += 1
         if self._journal is not None and self._ticks % CHUNK_TICKS == 0:

@@ -23,9 +23,9 @@ def program(controller: Any) -> dict[str, np.ndarray] | None:
     return {"P": data.hessian(), "A": data.rows()} | copies
 
 
-def percept(pilot: Pilot) -> FeatureFrame | None:
+def perceived(pilot: Pilot) -> FeatureFrame | None:
     """Lines, plane and velocity that vision found in the last picture, or None before the first."""
-    return None if pilot.percept is None else pilot.percept.features
+    return None if pilot.perception_result is None else pilot.perception_result.features
 
 
 def controller_inputs(pilot: Pilot) -> tuple[Measurement, Reference]:

@@ -55,13 +55,13 @@ class _Outputs:
 def replay_pilot(case: Case, recording: Recording) -> Table:
     """Sensor frames and thrust limits through a new pilot."""
     pilot, outputs = case.pilot(), _Outputs()
-    percepts: list[FeatureFrame | None] = []
+    results: list[FeatureFrame | None] = []
     for frame, limits in zip(recording.frames, recording.thrust_limits, strict=True):
         pilot.thrust_limits = limits
         outputs.add(pilot.step(frame), lambda: internals.program(pilot.controller))
-        percepts.append(None if frame.image is None else internals.percept(pilot))
+        results.append(None if frame.image is None else internals.perceived(pilot))
     table = outputs.table()
-    return table | with_prefix("percept_", feature_table(percepts, float)) if case.pictures else table
+    return table | with_prefix("percept_", feature_table(results, float)) if case.pictures else table
 
 
 def replay_controller(case: Case, recording: Recording) -> Table:

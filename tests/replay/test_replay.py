@@ -1,4 +1,4 @@
-"""Recorded flights through pilot and controller, open loop: same thrusts, programs, percepts and refusals as before."""
+"""Recorded flights through pilot and controller, open loop: same thrusts, programs, results and refusals as before."""
 
 from __future__ import annotations
 

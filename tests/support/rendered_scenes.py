@@ -94,7 +94,7 @@ def perceive(
     sway: float = 1.0,
     hints=(),
 ):
-    """Fly along a path with small sway; yields (percept, position, attitude, true body velocity at mid-interval)."""
+    """Fly along a path with small sway; yields (perceived, position, attitude, true body velocity at mid-interval)."""
     rng = np.random.default_rng(seed)
     perception = Perception(
         VisionConfig(paint_color=world.scene.paint.color, brush_width_m=world.scene.paint.brush_width_m), VEHICLE
@@ -120,16 +120,16 @@ def perceive(
             true_velocity = 0.5 * middle.T @ (position - before_position) / (INTERVAL_NS * 1e-9)
             turn = turn + rng.normal(0.0, 6e-5, 3)
         told = hints(position, attitude) if callable(hints) else hints
-        percept = perception.process(frame, attitude=attitude, rotation=turn, velocity=velocity, hints=told)
-        yield percept, position, attitude, true_velocity
-        velocity = percept.features.velocity
+        perceived = perception.process(frame, attitude=attitude, rotation=turn, velocity=velocity, hints=told)
+        yield perceived, position, attitude, true_velocity
+        velocity = perceived.features.velocity
         before_attitude, before_position = attitude, position
 
 
-def nearest(percept, truth: tuple[float, float], kind: str):
+def nearest(perceived, truth: tuple[float, float], kind: str):
     """Live line of a kind with the least distance from the truth: (line, offset, angle error), or None."""
     best = None
-    for line in percept.features.lines:
+    for line in perceived.features.lines:
         if line.kind != kind:
             continue
         rho, theta = align_line(line.rho, line.theta, truth[1])
@@ -147,10 +147,10 @@ class Score:
     def __init__(self, focal: float) -> None:
         self.focal, self.offset, self.angle, self.frames = focal, [], [], 0
 
-    def add(self, percept, truth: tuple[float, float], kind: str) -> None:
+    def add(self, perceived, truth: tuple[float, float], kind: str) -> None:
         """Count a frame; a line farther than 4 px is not found."""
         self.frames += 1
-        found = nearest(percept, truth, kind)
+        found = nearest(perceived, truth, kind)
         if found is not None and abs(found[1]) * self.focal < 4.0:
             self.offset.append(abs(found[1]) * self.focal)
             self.angle.append(math.degrees(abs(found[2])))
@@ -189,11 +189,13 @@ def edges(world: World) -> dict[str, tuple[tuple[float, float], tuple[float, flo
     return {"bottom": ((0, 0), (w, 0)), "left": ((0, 0), (0, h)), "right": ((w, 0), (w, h)), "top": ((0, h), (w, h))}
 
 
-def plane_errors(world: World, percept, position: np.ndarray, attitude: np.ndarray) -> tuple[float, float]:
+def plane_errors(world: World, perceived, position: np.ndarray, attitude: np.ndarray) -> tuple[float, float]:
     """Distance error [m] and angle of the normal from the truth [deg]."""
     normal, distance = world.plane(position, attitude)
-    assert percept.plane is not None, percept.refused
-    return percept.plane.distance_m - distance, math.degrees(math.acos(min(1.0, float(percept.plane.normal @ normal))))
+    assert perceived.plane is not None, perceived.refused
+    return perceived.plane.distance_m - distance, math.degrees(
+        math.acos(min(1.0, float(perceived.plane.normal @ normal)))
+    )
 
 
 class Flight:
@@ -209,27 +211,27 @@ class Flight:
 
     def run(self, *arguments, **keywords) -> Flight:
         """Fly and score, arguments as of `perceive`."""
-        for percept, position, attitude, velocity in perceive(self.world, *arguments, **keywords):
+        for perceived, position, attitude, velocity in perceive(self.world, *arguments, **keywords):
             self.frames += 1
-            distance, normal = plane_errors(self.world, percept, position, attitude)
+            distance, normal = plane_errors(self.world, perceived, position, attitude)
             self.distance.append(distance)
             self.normal.append(normal)
-            if percept.features.velocity is not None and velocity is not None:
-                error = percept.features.velocity - velocity
+            if perceived.features.velocity is not None and velocity is not None:
+                error = perceived.features.velocity - velocity
                 self.velocity.append(error)
-                self.normalised.append(float(error @ np.linalg.solve(percept.features.velocity_covariance, error)))
-            self._count_false(percept, position, attitude)
+                self.normalised.append(float(error @ np.linalg.solve(perceived.features.velocity_covariance, error)))
+            self._count_false(perceived, position, attitude)
             if self.frames > self.settle:
                 for name, (first, second, kind) in self.lines.items():
-                    self.scores[name].add(percept, self.world.line(first, second, position, attitude), kind)
+                    self.scores[name].add(perceived, self.world.line(first, second, position, attitude), kind)
         return self
 
-    def _count_false(self, percept, position: np.ndarray, attitude: np.ndarray) -> None:
+    def _count_false(self, perceived, position: np.ndarray, attitude: np.ndarray) -> None:
         """Live lines that are no edge of board or paint, or one of the wrong kind or surface side."""
         rows = [row_edge(self.world, row, side) for row in (1, 2) for side in (1, -1)]
         true = [board_edge(self.world, name) for name in ("bottom", "left", "right", "top")] + rows
         center = np.array([0.5 * self.world.scene.board.width_m, 0.5 * self.world.scene.board.height_m])
-        for line in percept.features.lines:
+        for line in perceived.features.lines:
             good = False
             for first, second, kind in true:
                 if kind != line.kind:

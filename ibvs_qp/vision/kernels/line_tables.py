@@ -5,7 +5,7 @@ from __future__ import annotations
 #: A predicted line v = SLOPE u + LEVEL in the view in which it is level: the columns looked at [px]; the line; rows of
 #: the view and the flat distances of its pixels; columns between which the line is known to lie [px]; whether its
 #: colour step along +v is known, and this step; the polarity of a new line along +v; what its sides must look like
-#: (`ibvs_qp.vision.admissible`); whether the surface lies behind it; whether it is the border of the surface; and
+#: (`ibvs_qp.vision.lines.admissible`); whether the surface lies behind it; whether it is the border of the surface; and
 #: 1/Z = SURFACE_U u + SURFACE_V v + SURFACE of the surface.
 (
     BEGIN, SPAN, SLOPE, LEVEL, HEIGHT, ROW_STEP, COLUMN_STEP, SEEN_FROM, SEEN_TO, KNOWN, RED, GREEN, BLUE, POLARITY,

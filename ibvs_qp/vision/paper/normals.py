@@ -5,8 +5,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from ibvs_qp.vision.mask import Intrinsics
 from ibvs_qp.vision.paper.config import PaperConfig
+from ibvs_qp.vision.picture.mask import Intrinsics
 
 #: Largest number of a 16-bit picture.
 _LARGEST = 65535.0

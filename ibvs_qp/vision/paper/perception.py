@@ -7,18 +7,19 @@ import numpy as np
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.measurement import FeatureFrame, RgbdFrame
 from ibvs_qp.validation.failure import raised
-from ibvs_qp.vision.candidates import Candidate
 from ibvs_qp.vision.checks import PictureGate, StageClock, finite_vector
 from ibvs_qp.vision.config import VisionConfig
-from ibvs_qp.vision.flow import SparseFlow
+from ibvs_qp.vision.flow.camera_motion import CameraMotion
+from ibvs_qp.vision.flow.sparse_flow import SparseFlow
 from ibvs_qp.vision.layout import PictureLayout
-from ibvs_qp.vision.make_percept import make_percept
-from ibvs_qp.vision.motion import CameraMotion
+from ibvs_qp.vision.lines.candidates import Candidate
+from ibvs_qp.vision.lines.line_state import LineHint
+from ibvs_qp.vision.lines.track import Track
+from ibvs_qp.vision.make_result import make_result
 from ibvs_qp.vision.paper.config import PaperConfig
 from ibvs_qp.vision.paper.pipeline import PaperPipeline
 from ibvs_qp.vision.paper.result import PaperDetection
-from ibvs_qp.vision.percept import LineHint, Percept
-from ibvs_qp.vision.track import Track
+from ibvs_qp.vision.perception_result import PerceptionResult
 
 #: Identities of the two lines: the paper knows no others, whichever edge is topmost or first at the moment.
 TOPMOST_TRACK, FIRST_TRACK = 1, 2
@@ -63,7 +64,7 @@ class PaperPerception:
         hints: tuple[LineHint, ...] = (),
         detect: bool = False,
         seed_pixel: tuple[float, float] | None = None,
-    ) -> Percept:
+    ) -> PerceptionResult:
         """See one picture; never raises. Arguments as for `ibvs_qp.vision.Perception.process`.
 
         Attitude, hints and ``detect`` change nothing: the vehicle is taken to be level and every picture is searched.
@@ -78,7 +79,7 @@ class PaperPerception:
         self._flow.reset()
         stamp = frame.stamp_ns if isinstance(frame.stamp_ns, int) else 0
         features = FeatureFrame(lines=(), plane=None, stamp_ns=stamp)
-        return Percept(features=features, refused=problem, velocity_refused=problem)
+        return PerceptionResult(features=features, refused=problem, velocity_refused=problem)
 
     def _process(
         self,
@@ -86,7 +87,7 @@ class PaperPerception:
         rotation: np.ndarray | None,
         velocity: np.ndarray | None,
         seed_pixel: tuple[float, float] | None,
-    ) -> Percept:
+    ) -> PerceptionResult:
         if self._layout is None or not self._layout.fits(frame):
             self._layout = PictureLayout(frame, self._vision, self._vehicle)
             self._pipeline = PaperPipeline(self._config, self._layout.mask)
@@ -116,7 +117,7 @@ class PaperPerception:
             self._track(track_id, entry)
             for track_id, entry in ((TOPMOST_TRACK, found.horizontal), (FIRST_TRACK, found.vertical))
         ]
-        return make_percept(
+        return make_result(
             frame,
             [track for track in followed if track is not None],
             found.plane,

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ibvs_qp.frames import align_line
-from ibvs_qp.vision.picture import normalise
+from ibvs_qp.vision.picture.picture import normalise
 from sim.detection.detection import GUIDE_SIDES, Detection
 from sim.detection.methods import METHODS, make_method
 from sim.detection.truth.frame import TrueLine, TruthFrame, render_frame

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from ibvs_qp.frames import rotation_from_vector
-from ibvs_qp.vision.picture_input.lens import Lens
+from ibvs_qp.vision.picture.lens import Lens
 from sim.detection.truth.devices import Device
 from sim.detection.truth.scenes import TruthScene
 

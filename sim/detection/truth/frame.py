@@ -9,7 +9,7 @@ import numpy as np
 
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.measurement import RgbdFrame
-from ibvs_qp.vision.picture_input.camera import RgbdCamera
+from ibvs_qp.vision.picture.camera import RgbdCamera
 from sim.detection.truth.device_depth import device_depth
 from sim.detection.truth.picture import paint_picture
 from sim.detection.truth.range import measure_depth

@@ -64,12 +64,12 @@ def draw_snapshots(trace: Trace) -> Figure:
         ticks = range(tick - LEAD_FRAMES * FRAME_TICKS, tick + 1, FRAME_TICKS)
         frames = [camera.capture(trace.position[at], trace.attitude[at], round(trace.t[at] * 1e9)) for at in ticks]
         perception = Perception(VisionConfig(paint_color=trace.scene.paint.color), VehicleParams())
-        frame, percept = [
+        frame, perceived = [
             (frame, perception.process(frame, attitude=trace.attitude[at], rotation=np.zeros(3), velocity=None))
             for at, frame in zip(ticks, frames, strict=True)
         ][-1]
-        above.imshow(draw_overlay(frame.rgb, percept, words=False))
-        below.imshow(normal_picture(frame, percept.features.plane if percept.features else None))
+        above.imshow(draw_overlay(frame.rgb, perceived, words=False))
+        below.imshow(normal_picture(frame, perceived.features.plane if perceived.features else None))
         above.set_title(f"t = {trace.t[tick]:.1f} s, row {int(trace.row[tick])}")
         for axes in (above, below):
             axes.set_axis_off()

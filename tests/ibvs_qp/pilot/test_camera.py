@@ -47,11 +47,11 @@ def test_a_picture_before_perception_is_refused_by_name_and_blocks_no_step(gate:
         begin = time.perf_counter()
         command = pilot.step(frame)
         assert time.perf_counter() - begin < LONGEST_STEP
-        assert command.rejected == (LOADING,) and pilot.percept is None
+        assert command.rejected == (LOADING,) and pilot.perception_result is None
     pilot.reset()
     gate.set()
     pilot.prepare()
-    assert pilot.step(seen[0]).rejected == () and pilot.percept is not None
+    assert pilot.step(seen[0]).rejected == () and pilot.perception_result is not None
 
 
 @pytest.mark.parametrize("perception", ["own", "paper"])
@@ -66,8 +66,8 @@ def test_a_prepared_pilot_sees_its_first_picture(perception: str) -> None:
         assert LOADING not in commands[0].rejected
         for pilot, command in zip(pilots[1:], commands[1:], strict=True):
             np.testing.assert_array_equal(command.thrusts, commands[0].thrusts)
-            assert pilot.percept is not None and pilots[0].percept is not None
-            assert pilot.percept.features.plane == pilots[0].percept.features.plane
+            assert pilot.perception_result is not None and pilots[0].perception_result is not None
+            assert pilot.perception_result.features.plane == pilots[0].perception_result.features.plane
     pilots[0].reset()
     assert LOADING not in pilots[0].step(seen[0]).rejected, "a reset keeps what is loaded"
 

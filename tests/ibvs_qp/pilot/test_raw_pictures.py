@@ -47,8 +47,12 @@ def mono(image: RgbdFrame) -> dict[str, Any]:
 def test_16_bit_depth_of_a_stated_unit_gives_the_same_plane() -> None:
     plain, made = pilot(), pilot(depth_units_per_metre=1000.0)
     assert fly(plain, lambda _: {}) == fly(made, millimetres)
-    assert made.percept is not None and made.percept.features is not None and plain.percept is not None
-    assert made.percept.features.plane == pytest.approx(plain.percept.features.plane, abs=2e-3)
+    assert (
+        made.perception_result is not None
+        and made.perception_result.features is not None
+        and plain.perception_result is not None
+    )
+    assert made.perception_result.features.plane == pytest.approx(plain.perception_result.features.plane, abs=2e-3)
     assert made.picture is not None and made.picture.depth.dtype == np.float32
 
 
@@ -60,7 +64,11 @@ def test_16_bit_depth_without_a_unit_is_refused_by_name() -> None:
 def test_a_mono_camera_flies() -> None:
     made = pilot()
     assert not [reason for reason in fly(made, mono) if reason.startswith("image")]
-    assert made.percept is not None and made.percept.features is not None and made.percept.features.plane is not None
+    assert (
+        made.perception_result is not None
+        and made.perception_result.features is not None
+        and made.perception_result.features.plane is not None
+    )
     assert made.picture is not None and (made.picture.rgb == made.picture.rgb[..., :1]).all()
 
 
@@ -71,8 +79,12 @@ def test_depth_of_a_camera_beside_gives_the_same_plane() -> None:
     plain = pilot()
     made = pilot(depth_intrinsics=tuple(map(float, first.intrinsics)), depth_translation_m=(0.0, 0.0, 0.0))
     assert fly(plain, lambda _: {}) == fly(made, lambda _: {})
-    assert made.percept is not None and made.percept.features is not None and plain.percept is not None
-    assert made.percept.features.plane == pytest.approx(plain.percept.features.plane, abs=2e-3)
+    assert (
+        made.perception_result is not None
+        and made.perception_result.features is not None
+        and plain.perception_result is not None
+    )
+    assert made.perception_result.features.plane == pytest.approx(plain.perception_result.features.plane, abs=2e-3)
 
 
 def test_the_readout_time_moves_the_lines_of_a_turning_camera() -> None:
@@ -81,7 +93,7 @@ def test_the_readout_time_moves_the_lines_of_a_turning_camera() -> None:
         for frame in frames():
             turning = dataclasses.replace(frame, angular_velocity=np.array((0.0, 0.0, 0.4)))
             each.step(turning)
-    assert plain.percept is not None and made.percept is not None
-    assert plain.percept.features.lines == () or plain.motion.lines.keys() == made.motion.lines.keys()
+    assert plain.perception_result is not None and made.perception_result is not None
+    assert plain.perception_result.features.lines == () or plain.motion.lines.keys() == made.motion.lines.keys()
     pairs = [(line.offset, made.motion.lines[key].offset) for key, line in plain.motion.lines.items()]
     assert pairs and any(abs(one - other) > 1e-4 for one, other in pairs)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ibvs_qp.vision.colors import BOARD, OTHER, PAINT, SurfaceColors
-from ibvs_qp.vision.grid import CoarseGrid
+from ibvs_qp.vision.appearance.colors import BOARD, OTHER, PAINT, SurfaceColors
 from ibvs_qp.vision.kernels.colors import light_of
 from ibvs_qp.vision.kernels.labels import UNKNOWN
+from ibvs_qp.vision.picture.grid import CoarseGrid
 
 GATE, WHITE, RED = 42.0, (200, 204, 196), (180, 40, 50)
 SHAPE = (120, 160)

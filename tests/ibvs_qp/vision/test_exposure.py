@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ibvs_qp.vision.exposure import ExposureSteps
+from ibvs_qp.vision.picture.exposure import ExposureSteps
 
 FRAME_NS = 33_000_000
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from ibvs_qp.frames import R_BODY_CAMERA
 from ibvs_qp.vision.config import FlowConfig
-from ibvs_qp.vision.flow_solve import (
+from ibvs_qp.vision.flow.solve_velocity import (
     FlowSurface,
     FlowVelocity,
     expected_points,

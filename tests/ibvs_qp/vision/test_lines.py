@@ -6,11 +6,11 @@ import cv2
 import numpy as np
 import pytest
 
-from ibvs_qp.vision.colors import SurfaceColors
+from ibvs_qp.vision.appearance.colors import SurfaceColors
 from ibvs_qp.vision.config import LineConfig
-from ibvs_qp.vision.lines import refine_lines
-from ibvs_qp.vision.picture import Picture
-from ibvs_qp.vision.query import LineQuery
+from ibvs_qp.vision.lines.query import LineQuery
+from ibvs_qp.vision.lines.refine_lines import refine_lines
+from ibvs_qp.vision.picture.picture import Picture
 
 FOCAL, SIZE = 600.0, (480, 640)
 INTRINSICS = (FOCAL, FOCAL, 319.5, 239.5)

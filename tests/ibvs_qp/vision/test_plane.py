@@ -8,10 +8,10 @@ import cv2
 import numpy as np
 import pytest
 
-from ibvs_qp.vision.colors import BOARD, OTHER
+from ibvs_qp.vision.appearance.colors import BOARD, OTHER
 from ibvs_qp.vision.config import PlaneConfig
-from ibvs_qp.vision.grid import CoarseGrid
-from ibvs_qp.vision.plane import PlaneEstimate, PlaneFitter
+from ibvs_qp.vision.picture.grid import CoarseGrid
+from ibvs_qp.vision.surface.plane import PlaneEstimate, PlaneFitter
 
 FOCAL, SHAPE = 625.2, (480, 640)
 INTRINSICS = (FOCAL, FOCAL, 319.5, 239.5)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ibvs_qp.vision.grid import CoarseGrid
 from ibvs_qp.vision.kernels.hypotheses import judge_planes
 from ibvs_qp.vision.kernels.labels import BOARD, PAINT
 from ibvs_qp.vision.kernels.plane import choose_samples, fit_plane, residual_squares
 from ibvs_qp.vision.kernels.samples import sample_depths, sample_means
-from ibvs_qp.vision.surface import connected_samples
+from ibvs_qp.vision.picture.grid import CoarseGrid
+from ibvs_qp.vision.surface.estimate import connected_samples
 
 PLANE, SHAPE = np.array([0.3, -0.2, 2.0]), (12, 20)
 

@@ -51,11 +51,11 @@ def test_top_edge_of_the_board_by_detection_alone() -> None:
         units = float(row["depth_units_per_m"])
         depth = (cv2.imread(str(FOLDER / row["depth"]), cv2.IMREAD_UNCHANGED) / units).astype(np.float32)
         seed = float(row["seed_u"]), float(row["seed_v"])
-        percept = Perception(config, HAND_HELD).process(
+        perceived = Perception(config, HAND_HELD).process(
             RgbdFrame(rgb=rgb, depth=depth, intrinsics=intrinsics, stamp_ns=1), seed_pixel=seed
         )
-        assert percept.plane is not None, (row["color"], percept.refused)
-        best = max((c for c in percept.candidates if c.role == "horizontal"), key=lambda c: c.score)
+        assert perceived.plane is not None, (row["color"], perceived.refused)
+        best = max((c for c in perceived.candidates if c.role == "horizontal"), key=lambda c: c.score)
         offsets.append(offset_px(best.line, marks[row["color"]], intrinsics))
     assert len(offsets) >= 10
     assert sum(offset < 4.0 for offset in offsets) >= len(offsets) - 1, np.round(offsets, 1)

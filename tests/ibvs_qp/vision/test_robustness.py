@@ -119,19 +119,19 @@ def test_broken_pictures_are_refused_and_forgotten(name: str) -> None:
     first = eye.process(BROKEN[name], attitude=LEVEL)
     assert first.refused and first.features.plane is None and not first.features.lines
     for k in range(6):
-        percept = eye.process(frame(k), attitude=LEVEL, rotation=np.zeros(3))
+        perceived = eye.process(frame(k), attitude=LEVEL, rotation=np.zeros(3))
     again = eye.process(BROKEN[name], attitude=LEVEL)
     assert again.refused and again.features.plane is None
-    percept = eye.process(frame(8), attitude=LEVEL, rotation=np.zeros(3))
-    assert percept.refused is None and percept.features.lines
+    perceived = eye.process(frame(8), attitude=LEVEL, rotation=np.zeros(3))
+    assert perceived.refused is None and perceived.features.lines
 
 
 @pytest.mark.parametrize("bad", [np.full(3, np.nan), np.zeros(2), "text"])
 def test_bad_gyro_and_attitude_do_not_raise(bad) -> None:
     eye = perception()
     for k in range(3):
-        percept = eye.process(frame(k), attitude=np.full(4, np.nan), rotation=bad, velocity=bad)
-    assert percept is not None
+        perceived = eye.process(frame(k), attitude=np.full(4, np.nan), rotation=bad, velocity=bad)
+    assert perceived is not None
 
 
 def test_random_noise_pictures_never_raise_and_give_no_lines() -> None:
@@ -152,15 +152,15 @@ def test_flat_pictures_without_any_edge() -> None:
         rng = np.random.default_rng(k)
         rgb = np.clip(BOARD + rng.normal(0, 2.0, (*SHAPE, 3)), 0, 255).astype(np.uint8)
         depth = (0.5 * (1 + 0.005 * rng.standard_normal(SHAPE))).astype(np.float32)
-        percept = eye.process(
+        perceived = eye.process(
             RgbdFrame(rgb=rgb, depth=depth, intrinsics=INTRINSICS, stamp_ns=(k + 1) * STEP_NS), attitude=LEVEL
         )
-        assert percept.plane is not None and not percept.features.lines
-        velocity = percept.features.velocity
+        assert perceived.plane is not None and not perceived.features.lines
+        velocity = perceived.features.velocity
         if velocity is None:
-            assert percept.velocity_refused
+            assert perceived.velocity_refused
         else:  # noise corners may be followed: then the covariance says that it is worth nothing
-            sigma = np.sqrt(np.diag(percept.features.velocity_covariance))
+            sigma = np.sqrt(np.diag(perceived.features.velocity_covariance))
             assert (np.abs(velocity) < 5.0 * sigma).all()
 
 
@@ -168,11 +168,11 @@ def test_lone_edge_shows_only_the_motion_across_it() -> None:
     eye = perception()
     plain = np.broadcast_to(np.array([120.0, 100.0, 90.0]), (*SHAPE, 3))
     for k in range(12):
-        percept = eye.process(frame(k, edge_v=210.0 + 2.0 * k, wall=plain), attitude=LEVEL, rotation=np.zeros(3))
-    if percept.features.velocity is None:
-        assert percept.velocity_refused
+        perceived = eye.process(frame(k, edge_v=210.0 + 2.0 * k, wall=plain), attitude=LEVEL, rotation=np.zeros(3))
+    if perceived.features.velocity is None:
+        assert perceived.velocity_refused
         return
-    covariance = percept.features.velocity_covariance
+    covariance = perceived.features.velocity_covariance
     assert covariance is not None
     assert math.sqrt(covariance[1, 1]) > 10.0 * math.sqrt(covariance[2, 2]) or math.sqrt(covariance[1, 1]) > 0.1
 
@@ -187,10 +187,10 @@ def test_roll_sweep_through_every_seam_without_a_jump() -> None:
         turn = np.array([-step if k else 0.0, 0.0, 0.0])
         # the pictures turn about the camera: the body's own centre then moves so that the lever arm cancels
         velocity = -np.cross(turn, camera) / (STEP_NS * 1e-9)
-        percept = eye.process(frame(k, roll=roll, edge_v=220.0), attitude=attitude, rotation=turn, velocity=velocity)
+        perceived = eye.process(frame(k, roll=roll, edge_v=220.0), attitude=attitude, rotation=turn, velocity=velocity)
         if k < 4:
             continue
-        lines = [line for line in percept.features.lines if line.kind == "board"]
+        lines = [line for line in perceived.features.lines if line.kind == "board"]
         assert len(lines) == 1
         identity = identity or lines[0].track_id
         assert lines[0].track_id == identity and lines[0].weight > 0.0
@@ -207,8 +207,8 @@ def test_roll_sweep_through_every_seam_without_a_jump() -> None:
 def test_loss_fades_and_is_held_no_longer_than_allowed() -> None:
     eye = perception()
     for k in range(8):
-        percept = eye.process(frame(k), attitude=LEVEL, rotation=np.zeros(3))
-    track = percept.features.lines[0].track_id
+        perceived = eye.process(frame(k), attitude=LEVEL, rotation=np.zeros(3))
+    track = perceived.features.lines[0].track_id
     blank = np.broadcast_to(np.array([128.0, 128.0, 128.0]), (*SHAPE, 3))
     weights = []
     for k in range(8, 24):
@@ -216,14 +216,14 @@ def test_loss_fades_and_is_held_no_longer_than_allowed() -> None:
         hidden = RgbdFrame(
             rgb=np.ascontiguousarray(blank, np.uint8), depth=good.depth, intrinsics=INTRINSICS, stamp_ns=good.stamp_ns
         )
-        percept = eye.process(hidden, attitude=LEVEL, rotation=np.zeros(3))
-        weights.append(next((line.weight for line in percept.features.lines if line.track_id == track), 0.0))
+        perceived = eye.process(hidden, attitude=LEVEL, rotation=np.zeros(3))
+        weights.append(next((line.weight for line in perceived.features.lines if line.track_id == track), 0.0))
     assert weights[0] > 0.8
     assert all(0.0 <= a - b <= 0.15 for a, b in itertools.pairwise(weights) if a > 0.0)
     assert weights[10] == 0.0
     for k in range(24, 32):
-        percept = eye.process(frame(k), attitude=LEVEL, rotation=np.zeros(3))
-    assert any(line.kind == "board" and line.weight == 1.0 for line in percept.features.lines)
+        perceived = eye.process(frame(k), attitude=LEVEL, rotation=np.zeros(3))
+    assert any(line.kind == "board" and line.weight == 1.0 for line in perceived.features.lines)
 
 
 def test_new_line_needs_two_pictures() -> None:
@@ -238,8 +238,8 @@ def test_covariance_of_the_line_is_honest() -> None:
     for seed in range(12):
         eye = perception()
         for k in range(3):
-            percept = eye.process(frame(k, seed=seed), attitude=LEVEL, rotation=np.zeros(3))
-        line = percept.features.lines[0]
+            perceived = eye.process(frame(k, seed=seed), attitude=LEVEL, rotation=np.zeros(3))
+        line = perceived.features.lines[0]
         error = np.array([line.rho, line.theta]) - truth
         distances.append(float(error @ np.linalg.solve(line.covariance, error)))
     assert np.mean(distances) < 6.0  # 2 expected
@@ -249,9 +249,9 @@ def test_overlay_keeps_the_picture_and_marks_the_line() -> None:
     eye = perception()
     for k in range(4):
         picture = frame(k)
-        percept = eye.process(picture, attitude=LEVEL, rotation=np.zeros(3))
+        perceived = eye.process(picture, attitude=LEVEL, rotation=np.zeros(3))
     before = picture.rgb.copy()
-    drawn = draw_overlay(picture.rgb, percept)
+    drawn = draw_overlay(picture.rgb, perceived)
     assert drawn.shape == before.shape and drawn.dtype == np.uint8
     assert np.array_equal(picture.rgb, before)
     assert (drawn[209:212, 500] != before[209:212, 500]).any()

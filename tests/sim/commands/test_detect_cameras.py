@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import tomli_w
 
-from ibvs_qp.vision.picture_input.lens import Lens
+from ibvs_qp.vision.picture.lens import Lens
 from sim.commands.cli import main
 from sim.detection.truth import FAMILIES, TruthFrame, render_frame, sample_scene
 from sim.detection.truth.accuracy import line_errors

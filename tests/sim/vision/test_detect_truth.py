@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from ibvs_qp.frames import align_line
-from ibvs_qp.vision.guides import GuideKeeper
-from ibvs_qp.vision.percept import TrackState
+from ibvs_qp.vision.lines.guides import GuideKeeper
+from ibvs_qp.vision.lines.line_state import TrackState
 from sim.detection.own import OwnMethod
 from sim.detection.truth import FAMILIES, TruthScene, Variation, render_frame, sample_scene
 from sim.detection.truth.accuracy import Errors, line_errors, measure_family

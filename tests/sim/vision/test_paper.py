@@ -13,9 +13,9 @@ from rendered_scenes import VEHICLE, World, edges, quaternion, scene_of, stroke_
 from ibvs_qp.frames import align_line
 from ibvs_qp.measurement import HORIZONTAL, RgbdFrame
 from ibvs_qp.vision import VisionConfig
-from ibvs_qp.vision.mask import vehicle_mask
 from ibvs_qp.vision.paper import PaperConfig, PaperPerception, PaperPipeline
 from ibvs_qp.vision.paper.normals import NormalImage
+from ibvs_qp.vision.picture.mask import vehicle_mask
 from sim.commands import cli
 from sim.world.scene import Scene
 
@@ -183,8 +183,8 @@ def test_perception_survives_what_is_no_picture() -> None:
     perception = PaperPerception(PaperConfig(), VisionConfig(), VEHICLE)
     bad = frame_of(np.zeros(SHAPE, np.float32))
     for frame in (bad, dataclasses.replace(bad, depth=None), dataclasses.replace(bad, intrinsics=(0.0, 0.0, 0.0, 0.0))):
-        percept = perception.process(frame, rotation=np.full(3, np.nan))  # type: ignore[arg-type]
-        assert percept.refused and not percept.features.lines and percept.features.plane is None
+        perceived = perception.process(frame, rotation=np.full(3, np.nan))  # type: ignore[arg-type]
+        assert perceived.refused and not perceived.features.lines and perceived.features.plane is None
     good = perception.process(frame_of(np.full(SHAPE, 0.5, np.float32)))
     assert good.refused is None and good.features.plane is not None
 

@@ -89,13 +89,13 @@ def test_row_2_guide_is_never_its_own_edge(name: str) -> None:
     score = Score(world.focal)
     path = left + 0.1 / 30.0 * np.arange(90)
     hints = (guide_hint(world),)
-    for percept, position, attitude, _ in perceive(
+    for perceived, position, attitude, _ in perceive(
         world, path, world.geometry.row_height(2), np.zeros(90), 3, 2, 0.4, hints
     ):
         frames += 1
         if frames <= SETTLE:
             continue
-        guides = [track for track in percept.tracks if track.hint == "guide"]
+        guides = [track for track in perceived.tracks if track.hint == "guide"]
         target = world.line(truth[0], truth[1], position, attitude)
         for track in guides:
             middle = track.segment.mean(axis=0)
@@ -104,7 +104,7 @@ def test_row_2_guide_is_never_its_own_edge(name: str) -> None:
             right_ones += good
             wrong += not good
             assert track.segment[:, 0].max() > 0.3, "the guide lies ahead of the brush"
-        score.add(percept, target, "paint")
+        score.add(perceived, target, "paint")
     assert wrong == 0
     assert right_ones == frames - SETTLE
     score.check()
@@ -123,14 +123,14 @@ def test_climb_keeps_the_bottom_edge_and_ends_on_the_guide() -> None:
     truth, bottom = row_edge(world, 1, 1), board_edge(world, "bottom")
     hints, identities, guides = (guide_hint(world),), set(), 0
     flight = perceive(world, along, up, np.zeros(len(along)), 4, 1, 0.4, hints)
-    for k, (percept, position, attitude, _) in enumerate(flight):
+    for k, (perceived, position, attitude, _) in enumerate(flight):
         if k < still:
             continue
-        found = nearest(percept, world.line(bottom[0], bottom[1], position, attitude), "board")
+        found = nearest(perceived, world.line(bottom[0], bottom[1], position, attitude), "board")
         assert found is not None and abs(found[1]) * world.focal < 1.0
         identities.add(found[0].track_id)
         target = world.line(truth[0], truth[1], position, attitude)
-        for track in percept.tracks:
+        for track in perceived.tracks:
             if track.hint == "guide" and k >= 38:
                 middle = track.segment.mean(axis=0)
                 offset = middle @ np.array([math.cos(target[1]), math.sin(target[1])]) - target[0]

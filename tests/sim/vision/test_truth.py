@@ -22,7 +22,7 @@ INTERVAL_NS = 33_333_333
 
 
 def see(seed: int):
-    """Percept and truth of the last of some pictures of one row-2 view."""
+    """PerceptionResult and truth of the last of some pictures of one row-2 view."""
     scene = row_2_scene(seed)
     eye = Perception(VisionConfig(paint_color=scene.strokes[0][1]), VehicleParams())
     below = -0.08 + 0.072 - 0.04  # upper edge of row 1 below the optical axis [m]
@@ -37,17 +37,17 @@ def see(seed: int):
     )
     for k in range(PICTURES):
         truth = render_frame(scene, (k + 1) * INTERVAL_NS, noise_seed=10_000 * seed + k)
-        percept = eye.process(truth.frame, attitude=attitude_of(scene), rotation=np.zeros(3), hints=(hint,))
-    return percept, truth
+        perceived = eye.process(truth.frame, attitude=attitude_of(scene), rotation=np.zeros(3), hints=(hint,))
+    return perceived, truth
 
 
 @pytest.mark.parametrize("count", [pytest.param(4, id="quick"), pytest.param(60, id="all", marks=pytest.mark.slow)])
 def test_row_2_takes_the_guide_in_every_picture(count: int) -> None:
     offsets, angles = [], []
     for seed in range(count):
-        percept, truth = see(seed)
-        assert percept.plane is not None, percept.refused
-        [guide] = [track for track in percept.tracks if track.hint == "guide"]
+        perceived, truth = see(seed)
+        assert perceived.plane is not None, perceived.refused
+        [guide] = [track for track in perceived.tracks if track.hint == "guide"]
         assert guide.confirmed and guide.seen
         fx, _, cx, _ = truth.frame.intrinsics
         edge = truth.strokes["0 top"]
@@ -68,8 +68,8 @@ def test_a_cold_start_in_row_2_tells_board_from_paint() -> None:
     vehicle, paint = VehicleParams(), Scene().paint
     shot = next(itertools.islice(mission_shots((640, 480), 16, 1, vehicle), 12, None))
     config = VisionConfig(paint_color=paint.color, brush_width_m=paint.brush_width_m)
-    percept = Perception(config, vehicle).process(shot.frame, attitude=shot.attitude, detect=True)
-    sure = [(entry.kind, entry.role) for entry in percept.candidates if entry.confidence >= 0.8]
-    assert percept.plane is not None and percept.plane.inlier_share > 0.5
+    perceived = Perception(config, vehicle).process(shot.frame, attitude=shot.attitude, detect=True)
+    sure = [(entry.kind, entry.role) for entry in perceived.candidates if entry.confidence >= 0.8]
+    assert perceived.plane is not None and perceived.plane.inlier_share > 0.5
     assert sure.count(("board", "horizontal")) == 1, "the lower border"
     assert sure.count(("paint", "horizontal")) >= 2, "row 1's lower edge, its upper edge ahead, row 2's fresh one"

@@ -9,7 +9,7 @@ import pytest
 from rendered_scenes import Flight, World, board_edge, row_edge, scene_of, stroke_row
 
 from ibvs_qp.measurement import RgbdFrame
-from ibvs_qp.vision.light import STEP, LightField, fit_light, products
+from ibvs_qp.vision.appearance.light import STEP, LightField, fit_light, products
 
 FRAMES, SETTLE = 14, 8
 #: Exposure that keeps a white board in 1.4 times the light below white.

@@ -7,8 +7,8 @@ import pytest
 
 from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.vision.checks import frame_problem
-from ibvs_qp.vision.picture_input.camera import RgbdCamera
-from ibvs_qp.vision.picture_input.settings import RgbdCameraSettings
+from ibvs_qp.vision.picture.camera import RgbdCamera
+from ibvs_qp.vision.picture.settings import RgbdCameraSettings
 
 INTRINSICS = (100.0, 100.0, 49.5, 39.5)
 GREY = np.arange(80 * 100, dtype=np.uint16).reshape(80, 100) % 251

@@ -10,8 +10,8 @@ import pytest
 
 from ibvs_qp.estimation.turned_camera import TurnedCamera
 from ibvs_qp.measurement import RgbdFrame
-from ibvs_qp.vision.picture_input.camera import RgbdCamera
-from ibvs_qp.vision.picture_input.settings import RgbdCameraSettings
+from ibvs_qp.vision.picture.camera import RgbdCamera
+from ibvs_qp.vision.picture.settings import RgbdCameraSettings
 
 SIZE, INTRINSICS = (240, 320), (300.0, 310.0, 155.0, 118.0)
 #: Of a wide lens: 12 px in the corners.

@@ -11,8 +11,8 @@ import pytest
 from ibvs_qp.frames import rotation_from_vector
 from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.vision.checks import PictureGate
-from ibvs_qp.vision.picture_input.camera import RgbdCamera
-from ibvs_qp.vision.picture_input.settings import RgbdCameraSettings
+from ibvs_qp.vision.picture.camera import RgbdCamera
+from ibvs_qp.vision.picture.settings import RgbdCameraSettings
 
 SHAPE, INTRINSICS = (240, 320), (305.0, 305.0, 160.0, 121.0)
 DEPTH_SHAPE, DEPTH_INTRINSICS = (200, 340), (180.0, 182.0, 171.0, 98.0)

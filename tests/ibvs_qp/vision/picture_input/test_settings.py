@@ -9,7 +9,7 @@ import pytest
 
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.frames import rotation_from_vector
-from ibvs_qp.vision.picture_input.settings import RgbdCameraSettings
+from ibvs_qp.vision.picture.settings import RgbdCameraSettings
 
 BESIDE: dict[str, Any] = {"depth_intrinsics": (400.0, 400.0, 319.5, 239.5), "depth_translation_m": (0.015, 0.0, 0.0)}
 VECTOR = (0.02, -0.3, 0.1)

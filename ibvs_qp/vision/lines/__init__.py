@@ -1,0 +1,1 @@
+"""Lines: search, sub-pixel fit, judgement, tracks and guides."""

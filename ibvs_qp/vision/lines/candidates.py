@@ -1,0 +1,251 @@
+"""Search for lines without a prediction: edges near the end of the surface and of the paint, fitted and scored."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from ibvs_qp.measurement import HORIZONTAL, VERTICAL
+from ibvs_qp.vision.appearance.colors import BOARD, PAINT, SurfaceColors
+from ibvs_qp.vision.config import VisionConfig
+from ibvs_qp.vision.lines.borders import Borders, score_borders
+from ibvs_qp.vision.lines.confidence import line_confidence
+from ibvs_qp.vision.lines.edge_segments import FIT_BEYOND, edge_segments, fit_segments
+from ibvs_qp.vision.lines.refined import RefinedLine
+from ibvs_qp.vision.lines.trim import trimmed
+from ibvs_qp.vision.picture.picture import Picture, denormalise
+from ibvs_qp.vision.surface.region import SurfaceRegion
+
+#: Shortest piece of a segment that is looked at where the surface ends before the segment does [px at 640].
+_SHORTEST_PX = 40.0
+#: Lines nearer than this are one, and a segment this near to a known line is that one [px at 640].
+_SAME_PX, _KNOWN_PX = 2.5, 8.0
+#: A longer line on an edge is taken if its further part has this share of the better one's score.
+_FURTHER_SHARE = 0.5
+#: Score from which a line is said to border the surface.
+BORDER = 0.2
+#: A segment of a lower score before it is fitted will be no border after that.
+_HOPELESS = 0.05
+#: Confidence of an edge of paint whose two sides have the colours of paint and board.
+_PAINT_CONFIDENCE = 0.9
+#: Share of a line along which a side must show a colour, and along which depth rules out an edge of paint.
+_SHOWS, _DEPTH_STEP = 0.6, 0.5
+#: Distance from a line at which its two sides are read for a first look [px at 640].
+_BESIDE_PX = 4.0
+#: Length that earns the full score of an edge of paint, share of the picture's width.
+_FULL_LENGTH = 0.4
+
+
+@dataclass(frozen=True, kw_only=True)
+class Candidate:
+    """A detected line, and what it is.
+
+    Attributes:
+        line: The fitted line.
+        pixels: Its visible end points [px], (2, 2).
+        role: "horizontal" or "vertical", relative to gravity where it is known.
+        kind: "board" (border of the surface), "paint" (edge of paint) or "".
+        surface_side: +1 or -1, the side of the normal on which the (unpainted) surface lies, 0 if unknown.
+        borders_plane: Whether the surface ends there.
+        score: 0..1, ranks the lines of one picture.
+        confidence: 0..1, share of such lines that are what `kind` says.
+    """
+
+    line: RefinedLine
+    pixels: np.ndarray
+    role: str
+    kind: str
+    surface_side: int
+    borders_plane: bool
+    score: float
+    confidence: float
+
+
+def find_candidates(
+    picture: Picture,
+    depth: np.ndarray,
+    surface: SurfaceRegion,
+    colors: SurfaceColors,
+    config: VisionConfig,
+    tilt: float | None,
+    known: tuple[RefinedLine, ...] = (),
+) -> list[Candidate]:
+    """Find lines at the end of the surface, and edges of paint on it where its colour is known, best first.
+
+    Args:
+        picture: Colour and mask.
+        depth: Depth [m], (H, W).
+        surface: The surface.
+        colors: What board and paint look like.
+        config: Settings.
+        tilt: Angle of gravity in the picture from down [rad]; lines near level and upright only are then looked at.
+            None if it is unknown.
+        known: Lines that need no search.
+
+    Returns:
+        Candidates, no two on the same edge.
+    """
+    region, painted = surface.end_band(config.detect.band_cells), colors.paint_distinct
+    if painted:
+        region = region | (cv2.dilate(surface.cells.view(np.uint8), np.ones((5, 5), np.uint8)) > 0)
+    segments = edge_segments(picture, surface.grid, region, tilt, config.detect.half_range_deg)
+    segments = segments[[not any(_covered(segment, line, picture) for line in known) for segment in segments]]
+    if len(segments) == 0:
+        return []
+    rough, most = _rough_scores(segments, picture, depth, surface), config.detect.candidates
+    best = np.argsort(-rough, kind="stable")[:most]
+    best = best[rough[best] > _HOPELESS]
+    pieces = trimmed(segments[best], surface, _SHORTEST_PX * picture.scale)
+    chosen = [segments[best], pieces]
+    if painted:
+        share = _differing(segments, colors, surface, picture)
+        share[best] = 0.0
+        chosen.insert(
+            0, segments[np.argsort(-_lengths(segments) * share, kind="stable")[: np.sum(share > _SHOWS)]][:most]
+        )
+    beyond = np.full(sum(map(len, chosen)), FIT_BEYOND)
+    beyond[len(beyond) - len(pieces) :] = 0.0
+    segments = np.vstack(chosen)
+    fits = fit_segments(segments, picture, config.line, colors, beyond, contents=painted)
+    found = judge_lines([fit for fit in fits if fit is not None], picture, depth, surface, colors, tilt)
+    return _each_edge_once(found, _SAME_PX * picture.scale)
+
+
+def _rough_scores(segments: np.ndarray, picture: Picture, depth: np.ndarray, surface: SurfaceRegion) -> np.ndarray:
+    """Scores of segments (n, 4) as ends of the surface before they are fitted, (n,)."""
+    pixels = segments.reshape(-1, 2, 2)
+    return score_borders(pixels, normals_of(pixels), picture, depth, surface).score
+
+
+def _each_edge_once(lines: list[Candidate], limit_px: float) -> list[Candidate]:
+    """The best line of every edge, best first: a longer one is more exact, unless it is much worse."""
+    kept: list[Candidate] = []
+    for line in sorted(lines, key=lambda entry: -entry.score):
+        same = next((k for k, other in enumerate(kept) if _same_edge(line, other, limit_px)), None)
+        if same is None:
+            kept.append(line)
+        elif line.kind == kept[same].kind and _adds(line, kept[same]):
+            kept[same] = line
+    return sorted(kept, key=lambda entry: -entry.score)
+
+
+def _adds(longer: Candidate, line: Candidate) -> bool:
+    """Whether a longer line on an edge is such an edge in its further part, too: scores are means along lines."""
+    more = longer.line.length_px - line.line.length_px
+    if more <= 0.0:
+        return False
+    further = (longer.score * longer.line.length_px - line.score * line.line.length_px) / more
+    return further >= _FURTHER_SHARE * line.score
+
+
+def judge_lines(
+    fits: list[RefinedLine],
+    picture: Picture,
+    depth: np.ndarray,
+    surface: SurfaceRegion,
+    colors: SurfaceColors,
+    tilt: float | None,
+) -> list[Candidate]:
+    """Tell of fitted lines what they are, with score and confidence."""
+    if not fits:
+        return []
+    pixels = np.array([denormalise(fit.segment, picture.intrinsics) for fit in fits])
+    theta = np.array([fit.theta for fit in fits])
+    normals = normals_of(pixels)
+    normals *= np.sign(np.vecdot(normals, np.column_stack((np.cos(theta), np.sin(theta)))))[:, None]
+    borders = score_borders(pixels, normals, picture, depth, surface)
+    return [_candidate(fit, pixels[k], borders, k, picture, colors, tilt) for k, fit in enumerate(fits)]
+
+
+def _candidate(
+    fit: RefinedLine,
+    pixels: np.ndarray,
+    borders: Borders,
+    index: int,
+    picture: Picture,
+    colors: SurfaceColors,
+    tilt: float | None,
+) -> Candidate:
+    """A fitted line with what its two sides say."""
+    paint_side = 0 if borders.depth[index] > _DEPTH_STEP else _board_beside_paint(fit, colors)
+    if paint_side:
+        kind, side, confidence = "paint", paint_side, _PAINT_CONFIDENCE
+        length = min(fit.length_px / (_FULL_LENGTH * picture.mask.shape[1]), 1.0)
+        score = (0.4 + 0.6 * length) * fit.inlier_share
+    else:
+        score = float(borders.score[index]) * fit.inlier_share
+        kind, side = "board" if float(borders.score[index]) > BORDER else "", int(borders.side[index])
+        confidence = line_confidence(borders, index, fit)
+    return Candidate(
+        line=fit,
+        pixels=pixels,
+        role=role_of(fit.theta, 0.0 if tilt is None else tilt),
+        kind=kind,
+        surface_side=side,
+        borders_plane=kind == "board",
+        score=score,
+        confidence=confidence,
+    )
+
+
+def _board_beside_paint(fit: RefinedLine, colors: SurfaceColors) -> int:
+    """Side of the board, +1 or -1, if the other one shows paint; 0 otherwise."""
+    if not colors.paint_distinct or fit.sides.size == 0:
+        return 0
+    labels = colors.label(fit.sides, colors.levels_at(*fit.pixels.T))
+    board, paint = ((labels == kind).mean(axis=1) >= _SHOWS for kind in (BOARD, PAINT))
+    return 1 if board[1] and paint[0] else -1 if board[0] and paint[1] else 0
+
+
+def role_of(theta: float, tilt: float) -> str:
+    """Role of a line by the angle of its normal from gravity's direction in the picture."""
+    return HORIZONTAL if abs(math.sin(theta - tilt)) >= abs(math.cos(theta - tilt)) else VERTICAL
+
+
+def normals_of(pixels: np.ndarray) -> np.ndarray:
+    """Unit vectors across segments (n, 2, 2), (n, 2)."""
+    run = pixels[:, 1] - pixels[:, 0]
+    return np.column_stack((-run[:, 1], run[:, 0])) / np.hypot(*run.T)[:, None]
+
+
+def _lengths(segments: np.ndarray) -> np.ndarray:
+    return np.hypot(segments[:, 2] - segments[:, 0], segments[:, 3] - segments[:, 1])
+
+
+def _differing(segments: np.ndarray, colors: SurfaceColors, surface: SurfaceRegion, picture: Picture) -> np.ndarray:
+    """Share of each segment (n, 4) along which one side shows the board and the other the paint, (n,)."""
+    share = np.linspace(0.05, 0.95, 16)[:, None]
+    places = segments[:, None, :2] + share * (segments[:, None, 2:] - segments[:, None, :2])
+    across = _BESIDE_PX * picture.scale * normals_of(segments.reshape(-1, 2, 2))[:, None]
+    height, width = picture.mask.shape
+    labels = []
+    for sign in (-1.0, 1.0):
+        at = np.rint(places + sign * across).astype(np.intp)
+        u, v = np.clip(at[..., 0], 0, width - 1), np.clip(at[..., 1], 0, height - 1)
+        labels.append(colors.label(picture.rgb[v, u], colors.levels_at(u, v)))
+    one, two = labels
+    return ((one != two) & (one > 0) & (two > 0)).mean(axis=1)
+
+
+def _covered(segment: np.ndarray, line: RefinedLine, picture: Picture) -> bool:
+    """Whether a segment runs along a known line."""
+    pixels = denormalise(line.segment, picture.intrinsics)
+    return _beside(segment.reshape(2, 2), pixels, _KNOWN_PX * picture.scale)
+
+
+def _same_edge(one: Candidate, two: Candidate, limit_px: float) -> bool:
+    return _beside(one.pixels, two.pixels, limit_px)
+
+
+def _beside(one: np.ndarray, two: np.ndarray, limit_px: float) -> bool:
+    """Whether two segments (2, 2) [px] run along one edge where they overlap."""
+    run = two[1] - two[0]
+    length = float(np.hypot(*run))
+    normal = np.array([-run[1], run[0]]) / length
+    if np.abs((one - two[0]) @ normal).max() > limit_px:
+        return False
+    along = np.sort((one - two[0]) @ run / length)
+    return bool(along[1] > 0.0 and along[0] < length)

@@ -1,0 +1,131 @@
+"""Straight edges of a picture, found at half resolution and fitted at full resolution."""
+
+from __future__ import annotations
+
+import math
+
+import cv2
+import numpy as np
+
+from ibvs_qp.vision.appearance.colors import SurfaceColors
+from ibvs_qp.vision.config import REFERENCE_WIDTH, LineConfig
+from ibvs_qp.vision.kernels.segments import SEGMENT, find_segments
+from ibvs_qp.vision.lines.query import LineQuery
+from ibvs_qp.vision.lines.refine_lines import refine_lines
+from ibvs_qp.vision.lines.refined import RefinedLine
+from ibvs_qp.vision.picture.grid import CoarseGrid
+from ibvs_qp.vision.picture.picture import Picture, normalised_line
+
+#: Pictures of less than this scale are searched at full resolution.
+_SMALL = 0.9
+#: Weakest gradient of an edge, over two pixels [grey levels], shortest segment [px at 640], and most of them.
+_GRADIENT, _SHORTEST_PX, _MOST = 6.0, 20.0, 60
+#: Half width of the strip in which a segment is fitted [px at 640].
+_REFINE_PX = 4.0
+#: A segment is fitted beyond its ends by this share of its length: detectors stop short.
+FIT_BEYOND = 0.15
+#: Segments fitted in one batch: those of a batch share the number of profiles.
+_BATCH = 8
+#: Distance at which the change of brightness across a segment is read [px].
+_ACROSS_PX = 2.0
+
+
+def half_resolution(rgb: np.ndarray) -> tuple[np.ndarray, int]:
+    """Picture at half resolution (a small one as it is), uint8 (h, w, 3), and the factor back to its pixels."""
+    height, width = rgb.shape[:2]
+    if max(height, width) < _SMALL * REFERENCE_WIDTH:
+        return rgb, 1
+    return cv2.resize(rgb, (width // 2, height // 2), interpolation=cv2.INTER_AREA), 2
+
+
+def edge_segments(
+    picture: Picture, grid: CoarseGrid, region: np.ndarray, tilt: float | None, within_deg: float
+) -> np.ndarray:
+    """Straight edges in marked samples, longest first.
+
+    Args:
+        picture: Colour and mask.
+        grid: Where the samples lie.
+        region: The marked ones, bool (rows, columns).
+        tilt: Angle of gravity in the picture from down [rad], None if unknown.
+        within_deg: With a tilt, edges this near to level and upright are looked for [deg].
+
+    Returns:
+        End points u1, v1, u2, v2 [px], (n, 4).
+    """
+    small, factor = half_resolution(picture.rgb)
+    found = np.empty((_MOST, SEGMENT))
+    count = find_segments(
+        small,
+        picture.mask,
+        factor,
+        np.ascontiguousarray(region).view(np.uint8),
+        max(grid.stride // factor, 1),
+        _GRADIENT,
+        _SHORTEST_PX * picture.scale / factor,
+        math.nan if tilt is None else tilt,
+        within_deg,
+        found,
+    )
+    ends = found[:count, :4] * factor + 0.5 * (factor - 1)  # pixel centres
+    return ends[np.argsort(-np.hypot(ends[:, 2] - ends[:, 0], ends[:, 3] - ends[:, 1]), kind="stable")]
+
+
+def fit_segments(
+    segments: np.ndarray,
+    picture: Picture,
+    config: LineConfig,
+    colors: SurfaceColors,
+    beyond: np.ndarray | None = None,
+    contents: bool = False,
+) -> list[RefinedLine | None]:
+    """Sub-pixel fits of segments.
+
+    Args:
+        segments: End points (u1, v1, u2, v2) [px], (n, 4).
+        picture: Colour and camera.
+        config: Settings of the fit.
+        colors: Of the surface.
+        beyond: Share of its length by which each is fitted beyond its ends, (n,); `FIT_BEYOND` unless given.
+        contents: Whether the colours of both sides are wanted.
+
+    Returns:
+        One fit for every segment, None where nothing supports one.
+    """
+    shares = np.full(len(segments), FIT_BEYOND) if beyond is None else beyond
+    fits: list[RefinedLine | None] = []
+    queries = [_query(segment, picture, share) for segment, share in zip(segments, shares.tolist(), strict=True)]
+    for start in range(0, len(queries), _BATCH):
+        fits += refine_lines(
+            picture,
+            queries[start : start + _BATCH],
+            half_width_px=_REFINE_PX * picture.scale,
+            config=config,
+            colors=colors,
+            contents=contents,
+        )
+    return fits
+
+
+def _query(segment: np.ndarray, picture: Picture, beyond: float) -> LineQuery:
+    u1, v1, u2, v2 = segment.tolist()
+    fx, fy, cx, cy = picture.intrinsics
+    rho, theta = normalised_line(v1 - v2, u2 - u1, u1 * v2 - u2 * v1, picture.intrinsics)
+    upright = abs(math.cos(theta)) > abs(math.sin(theta))
+    low, high = sorted(((v1 - cy) / fy, (v2 - cy) / fy) if upright else ((u1 - cx) / fx, (u2 - cx) / fx))
+    more = beyond * (high - low)
+    return LineQuery(rho=rho, theta=theta, polarity=_polarity(segment, theta, picture), span=(low - more, high + more))
+
+
+def _polarity(segment: np.ndarray, theta: float, picture: Picture) -> int:
+    """+1 or -1 if the picture gets brighter or darker along the normal."""
+    height, width = picture.mask.shape
+    share = np.linspace(0.1, 0.9, 17)[:, None]
+    places = segment[:2] + share * (segment[2:] - segment[:2])
+    normal = _ACROSS_PX * picture.scale * np.array([math.cos(theta), math.sin(theta)])
+    change = 0
+    for sign in (-1, 1):
+        at = np.round(places + sign * normal).astype(np.intp)
+        u, v = np.clip(at[:, 0], 0, width - 1), np.clip(at[:, 1], 0, height - 1)
+        change = change + sign * picture.rgb[v, u].astype(int).sum()
+    return 1 if change >= 0 else -1

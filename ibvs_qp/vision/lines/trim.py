@@ -1,0 +1,60 @@
+"""Segments cut off where the surface ends: a joint of the wall may run on where an edge of the surface stops."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from ibvs_qp.vision.surface.region import SurfaceRegion, filled
+
+#: Distance from a segment at which the surface's samples must lie beside it [cells], and places looked at along it.
+_CELLS_BESIDE, _PLACES = 1.5, 48
+#: A segment beside which the surface lies for more than this share of its length stays whole.
+_WHOLE = 0.95
+
+
+def trimmed(segments: np.ndarray, surface: SurfaceRegion, shortest_px: float) -> np.ndarray:
+    """The pieces beside the surface of those segments that reach beyond it.
+
+    The eye that finds segments joins an edge of the surface and a joint of the wall that prolongs it a pixel or two
+    aside; a fit to both is wrong by a part of that.
+
+    Args:
+        segments: End points (u1, v1, u2, v2) [px], (n, 4).
+        surface: The surface.
+        shortest_px: Shorter pieces are left out [px].
+
+    Returns:
+        End points, one piece for every segment that is cut at most, (m, 4) [px].
+    """
+    grid, ends = surface.grid, segments.reshape(-1, 2, 2)
+    region = cv2.morphologyEx(filled(surface.colored), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)) > 0
+    run = ends[:, 1] - ends[:, 0]
+    length = np.hypot(*run.T)
+    share = (np.arange(_PLACES) + 0.5) / _PLACES
+    places = ends[:, :1] + share[:, None] * run[:, None]
+    offset = _CELLS_BESIDE * grid.stride * (np.column_stack((-run[:, 1], run[:, 0])) / length[:, None])[:, None]
+    sides = []
+    for sign in (-1.0, 1.0):
+        cells = np.rint((places + sign * offset - grid.offset) / grid.stride).astype(np.intp)
+        columns, rows = cells[..., 0], cells[..., 1]
+        inside = (rows >= 0) & (rows < grid.shape[0]) & (columns >= 0) & (columns < grid.shape[1])
+        rows, columns = np.clip(rows, 0, grid.shape[0] - 1), np.clip(columns, 0, grid.shape[1] - 1)
+        sides.append(inside & region[rows, columns])
+    beside = np.where((sides[0].sum(axis=1) >= sides[1].sum(axis=1))[:, None], *sides)
+    first, count = _longest_runs(beside)
+    kept = (count < _WHOLE * _PLACES) & (count * length >= shortest_px * _PLACES)
+    start, end = ((edge / _PLACES)[:, None] * run + ends[:, 0] for edge in (first, first + count))
+    return np.hstack((start, end))[kept]
+
+
+def _longest_runs(marks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """First place and number of places of the longest run in every row of bool (n, K), (n,) each."""
+    length = np.zeros(marks.shape, np.intp)
+    running = np.zeros(len(marks), np.intp)
+    for place in range(marks.shape[1]):
+        running = np.where(marks[:, place], running + 1, 0)
+        length[:, place] = running
+    last = np.argmax(length, axis=1)
+    count = length[np.arange(len(marks)), last]
+    return last + 1 - count, count

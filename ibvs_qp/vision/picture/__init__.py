@@ -1,0 +1,1 @@
+"""Pictures of an RGB-D camera: conversion, rectification, registration, masks, coarse grid."""

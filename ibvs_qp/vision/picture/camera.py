@@ -1,0 +1,107 @@
+"""The raw pictures of an RGB-D camera as the one registered, rectified picture that perception takes."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ibvs_qp.measurement import RgbdFrame
+from ibvs_qp.vision.checks import frame_problem
+from ibvs_qp.vision.picture.convert import to_color, to_metres
+from ibvs_qp.vision.picture.lens import Lens
+from ibvs_qp.vision.picture.rectification import Rectification
+from ibvs_qp.vision.picture.settings import RgbdCameraSettings
+
+if TYPE_CHECKING:
+    from ibvs_qp.vision.picture.registration import Registration
+
+#: Longest side of a depth picture [px].
+_LARGEST = 4096
+
+
+class RgbdCamera:
+    """Mono to colour, units to metres, depth to colour, the lens removed; tables are made at the first frame.
+
+    Attributes:
+        lens: Lens and mount of the colour camera.
+
+    Args:
+        settings: The camera.
+        mount: Rotation from the colour camera's axes to the camera frame C of `ibvs_qp.frames`, (3, 3), or None.
+        problem: Why a picture cannot be used, or None if it can.
+    """
+
+    def __init__(
+        self,
+        settings: RgbdCameraSettings | None = None,
+        mount: np.ndarray | None = None,
+        problem: Callable[[RgbdFrame], str | None] = frame_problem,
+    ) -> None:
+        self._settings, self._problem = settings or RgbdCameraSettings(), problem
+        self.lens = Lens(self._settings.distortion, mount)
+        self._key: tuple[object, ...] = ()
+        self._rectification: Rectification | None = None
+        self._registration: Registration | None = None
+        if not self._settings.registered:  # compiled here, not at the first picture in flight
+            self._new_registration((1, 1), (1, 1), (1.0, 1.0, 0.0, 0.0)).depth(np.ones((1, 1), np.float32))
+
+    def picture(self, raw: RgbdFrame) -> RgbdFrame:
+        """The picture for perception; of one that it refuses, what can be read.
+
+        Args:
+            raw: Colour or mono, uint8 or uint16, (H, W) or (H, W, 3); depth in the stated unit, (h, w), of the same
+                size where it is registered; intrinsics of the colour picture.
+        """
+        settings = self._settings
+        rgb, depth = to_color(raw.rgb, settings.color_bits), to_metres(raw.depth, settings.depth_units_per_metre)
+        frame = raw
+        if rgb is not raw.rgb or depth is not raw.depth:
+            frame = dataclasses.replace(raw, rgb=rgb, depth=depth)
+        if not settings.registered:
+            return self._registered(frame)
+        if self.lens.none or self._problem(frame) is not None:
+            return frame
+        self._prepare(frame)
+        assert self._rectification is not None
+        return dataclasses.replace(frame, rgb=self._rectification.color(rgb), depth=self._rectification.depth(depth))
+
+    def _registered(self, frame: RgbdFrame) -> RgbdFrame:
+        if not (_is_depth(frame.depth) and type(frame.rgb) is np.ndarray):
+            return frame
+        # The checks are for registered pictures; the sizes of the two differ here.
+        unknown = dataclasses.replace(frame, depth=np.broadcast_to(np.float32(0.0), frame.rgb.shape[:2]))
+        if self._problem(unknown) is not None:
+            return unknown
+        self._prepare(frame)
+        assert self._registration is not None
+        rgb = frame.rgb if self._rectification is None else self._rectification.color(frame.rgb)
+        return dataclasses.replace(frame, rgb=rgb, depth=self._registration.depth(frame.depth))
+
+    def _prepare(self, frame: RgbdFrame) -> None:
+        """Make the tables of a camera of another size or other intrinsics than the last one."""
+        shape, intrinsics = frame.rgb.shape[:2], tuple(frame.intrinsics)
+        key = frame.depth.shape, shape, intrinsics
+        if key == self._key:
+            return
+        if not self.lens.none:
+            self._rectification = Rectification(self.lens, shape, intrinsics)
+        if not self._settings.registered:
+            self._registration = self._new_registration(frame.depth.shape, shape, intrinsics)
+        self._key = key
+
+    def _new_registration(
+        self, depth: tuple[int, int], color: tuple[int, int], intrinsics: tuple[float, ...]
+    ) -> Registration:
+        from ibvs_qp.vision.picture.registration import Registration
+
+        return Registration(self._settings, self.lens.rotation, (depth, color), intrinsics)
+
+
+def _is_depth(depth: np.ndarray) -> bool:
+    """Whether a depth picture, in metres by its type, can be registered."""
+    if type(depth) is not np.ndarray or depth.ndim != 2 or depth.dtype.kind != "f":
+        return False
+    return 0 < min(depth.shape) and max(depth.shape) <= _LARGEST

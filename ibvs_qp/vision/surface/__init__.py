@@ -1,0 +1,1 @@
+"""The surface in the picture: its plane, its samples and where it ends."""
