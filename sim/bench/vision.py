@@ -88,7 +88,9 @@ class _Rivals:
 
     def _detect(self, rows: dict[str, Row], shot: Shot, seed: _Seed, number: int) -> dict[str, float]:
         self._detector.reset()
-        perceived = self._detector.process(shot.frame, attitude=shot.attitude, detect=True, seed_pixel=seed)
+        perceived = self._detector.process(
+            shot.frame, attitude=shot.attitude, rotation=shot.rotation, detect=True, seed_pixel=seed
+        )
         rows["detection"].times_us.append(_sum_us(perceived, _DETECTION))
         return {f"detection_{name}": perceived.time_ms[name] for name in _DETECTION if name in perceived.time_ms}
 

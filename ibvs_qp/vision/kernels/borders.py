@@ -8,8 +8,6 @@ import numpy as np
 
 from ibvs_qp.vision.kernels.compile import inner, kernel
 
-#: Places looked at along a line.
-PLACES = 32
 #: What a depth reading says.
 UNSEEN, ON, FARTHER, NEARER = 0, 1, 2, 3
 #: Distances within which the surface must be seen on its own side, beyond which it must not be, and within which it
@@ -24,8 +22,8 @@ _COLOR_ONLY, _DEPTH_ONLY = 0.75, 0.5
 #: A colour is the surface's if it is its colour in a light this much weaker or stronger, up to this share of the
 #: colour's size and this distance [grey levels].
 _DIMMER, _BRIGHTER, _CHROMA, _GREY = 0.68, 1.4, 0.10, 14.0
-#: Fewest places of a line that nothing hides.
-_LEAST_PLACES = 8
+#: Least share of the places along a line that nothing hides.
+_LEAST_SHARE = 0.25
 #: Columns of the evidence of one side: score, by depth, by colour, share beside the surface.
 EVIDENCE = 4
 
@@ -139,10 +137,25 @@ def _beside(cells, pixels, nx, ny, distance, stride, offset):
 
 @kernel(
     "void(u1[:, :, ::1], f4[:, ::1], u1[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8, f8[::1],"
-    " u1[:, ::1], f8, f8, f8, f8[:, :, ::1])"
+    " u1[:, ::1], f8, f8, f8, i8, f8[:, :, ::1])"
 )
 def border_evidence(
-    rgb, depth, mask, pixels, normals, depth_px, color_px, plane, gate, color, cells, distance, stride, offset, evidence
+    rgb,
+    depth,
+    mask,
+    pixels,
+    normals,
+    depth_px,
+    color_px,
+    plane,
+    gate,
+    color,
+    cells,
+    distance,
+    stride,
+    offset,
+    places,
+    evidence,
 ):
     """Evidence that the surface ends at lines, with the surface along their normals, and against them.
 
@@ -161,6 +174,7 @@ def border_evidence(
         distance: Distance from a line at which these must lie beside it [px].
         stride: Distance of the samples [px].
         offset: Place of the first [px].
+        places: Places looked at along a line.
         evidence: Receives score, share by depth, share by colour and share beside the samples, (n, 2, 4).
     """
     states = np.empty((2, len(depth_px)), np.int64)
@@ -170,8 +184,8 @@ def border_evidence(
         sums[:] = 0.0
         count = 0
         nx, ny = normals[i, 0], normals[i, 1]
-        for k in range(PLACES):
-            share = (k + 0.5) / PLACES
+        for k in range(places):
+            share = (k + 0.5) / places
             u = pixels[i, 0] + share * (pixels[i, 2] - pixels[i, 0])
             v = pixels[i, 1] + share * (pixels[i, 3] - pixels[i, 1])
             free = True
@@ -202,7 +216,7 @@ def border_evidence(
         for side in range(2):
             sign = 1.0 if side == 0 else -1.0
             evidence[i, side, 3] = _beside(cells, pixels[i], sign * nx, sign * ny, distance, stride, offset)
-            if count < _LEAST_PLACES:
+            if count < _LEAST_SHARE * places:
                 evidence[i, side, 0] = evidence[i, side, 1] = evidence[i, side, 2] = 0.0
                 continue
             seen, ended, covered, stops, changes, own = sums[side] / count

@@ -19,6 +19,8 @@ _CELLS_BEYOND, _SHARE_BEYOND = 2.0, 0.25
 #: Distance from a line at which the surface's samples must lie beside it [cells], and the share of the line beside
 #: which they must: prints, holes and corners are no samples.
 _CELLS_BESIDE, _MOSTLY = 1.5, 0.75
+#: Places looked at along a line.
+PLACES = 32
 #: Length that earns half of what a long line earns [px at 640].
 _HALF_LENGTH_PX = 12.0
 #: A border this long, as a share of the surface's size along it, earns all.
@@ -45,7 +47,12 @@ class Borders:
 
 
 def score_borders(
-    pixels: np.ndarray, normals: np.ndarray, picture: Picture, depth: np.ndarray, region: SurfaceRegion
+    pixels: np.ndarray,
+    normals: np.ndarray,
+    picture: Picture,
+    depth: np.ndarray,
+    region: SurfaceRegion,
+    places: int = PLACES,
 ) -> Borders:
     """Score lines as ends of the surface.
 
@@ -55,6 +62,7 @@ def score_borders(
         picture: Colour, mask and camera.
         depth: Depth [m], (H, W).
         region: The surface.
+        places: Places looked at along each line.
     """
     grid, ends, normals = region.grid, np.ascontiguousarray(pixels.reshape(-1, 4)), np.ascontiguousarray(normals)
     (a, b, c), (fx, fy, cx, cy) = region.plane.inverse_depth.tolist(), picture.intrinsics
@@ -74,6 +82,7 @@ def score_borders(
         _CELLS_BESIDE * grid.stride,
         float(grid.stride),
         float(grid.offset),
+        places,
         evidence,
     )
     rows, columns = np.nonzero(region.colored)

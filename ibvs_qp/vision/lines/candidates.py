@@ -11,7 +11,7 @@ import numpy as np
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL
 from ibvs_qp.vision.appearance.colors import BOARD, PAINT, SurfaceColors
 from ibvs_qp.vision.config import VisionConfig
-from ibvs_qp.vision.lines.borders import Borders, score_borders
+from ibvs_qp.vision.lines.borders import PLACES, Borders, score_borders
 from ibvs_qp.vision.lines.confidence import line_confidence
 from ibvs_qp.vision.lines.edge_segments import FIT_BEYOND, edge_segments, fit_segments
 from ibvs_qp.vision.lines.refined import RefinedLine
@@ -35,6 +35,8 @@ _PAINT_CONFIDENCE = 0.9
 _SHOWS, _DEPTH_STEP = 0.6, 0.5
 #: Distance from a line at which its two sides are read for a first look [px at 640].
 _BESIDE_PX = 4.0
+#: Samples this far apart are near each other: two cells.
+_NEAR_CELLS = np.ones((5, 5), np.uint8)
 #: Length that earns the full score of an edge of paint, share of the picture's width.
 _FULL_LENGTH = 0.4
 
@@ -90,7 +92,7 @@ def find_candidates(
     """
     region, painted = surface.end_band(config.detect.band_cells), colors.paint_distinct
     if painted:
-        region = region | (cv2.dilate(surface.cells.view(np.uint8), np.ones((5, 5), np.uint8)) > 0)
+        region = region | _end_of_paint(picture, surface, colors)
     segments = edge_segments(picture, surface.grid, region, tilt, config.detect.half_range_deg)
     segments = segments[[not any(_covered(segment, line, picture) for line in known) for segment in segments]]
     if len(segments) == 0:
@@ -114,10 +116,19 @@ def find_candidates(
     return _each_edge_once(found, _SAME_PX * picture.scale)
 
 
+def _end_of_paint(picture: Picture, surface: SurfaceRegion, colors: SurfaceColors) -> np.ndarray:
+    """Samples near both paint and board, bool (rows, columns)."""
+    grid = surface.grid
+    labels = colors.label(grid.sample(picture.rgb), colors.levels_at(*grid.pixels))
+    on = cv2.dilate(surface.cells.view(np.uint8), _NEAR_CELLS)
+    board, paint = (cv2.dilate((labels == kind).view(np.uint8), _NEAR_CELLS) for kind in (BOARD, PAINT))
+    return (on & board & paint) > 0
+
+
 def _rough_scores(segments: np.ndarray, picture: Picture, depth: np.ndarray, surface: SurfaceRegion) -> np.ndarray:
     """Scores of segments (n, 4) as ends of the surface before they are fitted, (n,)."""
     pixels = segments.reshape(-1, 2, 2)
-    return score_borders(pixels, normals_of(pixels), picture, depth, surface).score
+    return score_borders(pixels, normals_of(pixels), picture, depth, surface, PLACES // 2).score
 
 
 def _each_edge_once(lines: list[Candidate], limit_px: float) -> list[Candidate]:

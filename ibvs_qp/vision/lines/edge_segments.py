@@ -14,7 +14,8 @@ from ibvs_qp.vision.lines.query import LineQuery
 from ibvs_qp.vision.lines.refine_lines import refine_lines
 from ibvs_qp.vision.lines.refined import RefinedLine
 from ibvs_qp.vision.picture.grid import CoarseGrid
-from ibvs_qp.vision.picture.picture import Picture, normalised_line
+from ibvs_qp.vision.picture.mask import Intrinsics
+from ibvs_qp.vision.picture.picture import Picture, normalise
 
 #: Pictures of less than this scale are searched at full resolution.
 _SMALL = 0.9
@@ -94,7 +95,9 @@ def fit_segments(
     """
     shares = np.full(len(segments), FIT_BEYOND) if beyond is None else beyond
     fits: list[RefinedLine | None] = []
-    queries = [_query(segment, picture, share) for segment, share in zip(segments, shares.tolist(), strict=True)]
+    lines = _normalised_lines(segments, picture.intrinsics)
+    found = zip(segments.tolist(), *lines, _polarities(segments, lines[1], picture), shares.tolist(), strict=True)
+    queries = [_query(*entry, picture) for entry in found]
     for start in range(0, len(queries), _BATCH):
         fits += refine_lines(
             picture,
@@ -107,25 +110,32 @@ def fit_segments(
     return fits
 
 
-def _query(segment: np.ndarray, picture: Picture, beyond: float) -> LineQuery:
-    u1, v1, u2, v2 = segment.tolist()
+def _query(ends: list[float], rho: float, theta: float, polarity: int, beyond: float, picture: Picture) -> LineQuery:
     fx, fy, cx, cy = picture.intrinsics
-    rho, theta = normalised_line(v1 - v2, u2 - u1, u1 * v2 - u2 * v1, picture.intrinsics)
+    u1, v1, u2, v2 = ends
     upright = abs(math.cos(theta)) > abs(math.sin(theta))
     low, high = sorted(((v1 - cy) / fy, (v2 - cy) / fy) if upright else ((u1 - cx) / fx, (u2 - cx) / fx))
     more = beyond * (high - low)
-    return LineQuery(rho=rho, theta=theta, polarity=_polarity(segment, theta, picture), span=(low - more, high + more))
+    return LineQuery(rho=rho, theta=theta, polarity=polarity, span=(low - more, high + more))
 
 
-def _polarity(segment: np.ndarray, theta: float, picture: Picture) -> int:
-    """+1 or -1 if the picture gets brighter or darker along the normal."""
+def _normalised_lines(segments: np.ndarray, intrinsics: Intrinsics) -> tuple[list[float], list[float]]:
+    """Distances and angles of the lines through segments (n, 4) [px]."""
+    x, y = normalise(segments.reshape(-1, 2, 2), intrinsics).transpose(2, 1, 0)
+    across, down = y[0] - y[1], x[1] - x[0]
+    rho = (across * x[0] + down * y[0]) / np.hypot(across, down)
+    return rho.tolist(), np.arctan2(down, across).tolist()
+
+
+def _polarities(segments: np.ndarray, theta: list[float], picture: Picture) -> list[int]:
+    """+1 or -1 where the picture gets brighter or darker along a line's normal."""
     height, width = picture.mask.shape
     share = np.linspace(0.1, 0.9, 17)[:, None]
-    places = segment[:2] + share * (segment[2:] - segment[:2])
-    normal = _ACROSS_PX * picture.scale * np.array([math.cos(theta), math.sin(theta)])
-    change = 0
+    places = segments[:, None, :2] + share * (segments[:, None, 2:] - segments[:, None, :2])
+    normals = _ACROSS_PX * picture.scale * np.column_stack((np.cos(theta), np.sin(theta)))[:, None]
+    change = np.zeros(len(segments), int)
     for sign in (-1, 1):
-        at = np.round(places + sign * normal).astype(np.intp)
-        u, v = np.clip(at[:, 0], 0, width - 1), np.clip(at[:, 1], 0, height - 1)
-        change = change + sign * picture.rgb[v, u].astype(int).sum()
-    return 1 if change >= 0 else -1
+        at = np.rint(places + sign * normals).astype(np.intp)
+        u, v = np.clip(at[..., 0], 0, width - 1), np.clip(at[..., 1], 0, height - 1)
+        change += sign * picture.rgb[v, u].sum(axis=(1, 2), dtype=int)
+    return np.where(change >= 0, 1, -1).tolist()

@@ -50,11 +50,8 @@ def trimmed(segments: np.ndarray, surface: SurfaceRegion, shortest_px: float) ->
 
 def _longest_runs(marks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """First place and number of places of the longest run in every row of bool (n, K), (n,) each."""
-    length = np.zeros(marks.shape, np.intp)
-    running = np.zeros(len(marks), np.intp)
-    for place in range(marks.shape[1]):
-        running = np.where(marks[:, place], running + 1, 0)
-        length[:, place] = running
+    place = np.arange(marks.shape[1])
+    length = place - np.maximum.accumulate(np.where(marks, -1, place), axis=1)  # since the last unmarked place
     last = np.argmax(length, axis=1)
     count = length[np.arange(len(marks)), last]
     return last + 1 - count, count
