@@ -1,4 +1,4 @@
-"""Real RGB-D frames with marked lines, where they are present: the board's top edge by detection alone."""
+"""The pilot's perception on real RGB-D frames with marked lines, where they are present."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ import pytest
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.vision import Perception, VisionConfig
-from ibvs_qp.vision.config import PlaneConfig
 
 FOLDER = Path(os.environ.get("IBVS_QP_REAL_FRAMES", Path(__file__).parents[4] / "shared" / "data" / "real_open"))
 pytestmark = pytest.mark.skipif(
@@ -22,6 +21,8 @@ pytestmark = pytest.mark.skipif(
 )
 #: A hand-held camera has no arm in view: the tool lies behind it.
 HAND_HELD = VehicleParams(camera_position_m=(2.0, 0.0, 0.0))
+#: Between two pictures of the sequence.
+PERIOD_NS = 33_333_333
 
 
 def rows(name: str) -> list[dict[str, str]]:
@@ -39,24 +40,36 @@ def offset_px(line, marked: dict[str, str], intrinsics: tuple[float, float, floa
     )
 
 
-def test_top_edge_of_the_board_by_detection_alone() -> None:
+def angle_deg(line, marked: dict[str, str]) -> float:
+    """Angle between a line and the marked one [deg]."""
+    return math.degrees(abs(math.remainder(line.theta - float(marked["theta_rad"]), math.pi)))
+
+
+def picture(row: dict[str, str], stamp_ns: int) -> RgbdFrame:
+    """A frame of the manifest."""
+    rgb = cv2.cvtColor(cv2.imread(str(FOLDER / row["color"])), cv2.COLOR_BGR2RGB)
+    depth = cv2.imread(str(FOLDER / row["depth"]), cv2.IMREAD_UNCHANGED) / float(row["depth_units_per_m"])
+    intrinsics = (float(row["fx"]), float(row["fy"]), float(row["cx"]), float(row["cy"]))
+    return RgbdFrame(rgb=rgb, depth=depth.astype(np.float32), intrinsics=intrinsics, stamp_ns=stamp_ns)
+
+
+@pytest.mark.parametrize("followed", [False, True])
+def test_top_and_right_edge_of_the_board_without_gyro_and_attitude(followed: bool) -> None:
     frames = [row for row in rows("manifest.csv") if row["color"].startswith("board") and row["seed_u"]]
-    marks = {row["color"]: row for row in rows("lines.csv") if row["line"] == "board_top"}
-    # hand-held: the board may lean and stand oblique
-    config = VisionConfig(plane=PlaneConfig(max_lean_deg=89.0, max_oblique_deg=75.0))
-    offsets = []
-    for row in frames:
-        intrinsics = (float(row["fx"]), float(row["fy"]), float(row["cx"]), float(row["cy"]))
-        rgb = cv2.cvtColor(cv2.imread(str(FOLDER / row["color"])), cv2.COLOR_BGR2RGB)
-        units = float(row["depth_units_per_m"])
-        depth = (cv2.imread(str(FOLDER / row["depth"]), cv2.IMREAD_UNCHANGED) / units).astype(np.float32)
-        seed = float(row["seed_u"]), float(row["seed_v"])
-        perceived = Perception(config, HAND_HELD).process(
-            RgbdFrame(rgb=rgb, depth=depth, intrinsics=intrinsics, stamp_ns=1), seed_pixel=seed
-        )
+    marks = {(row["color"], row["line"]): row for row in rows("lines.csv")}
+    perception, offsets = Perception(VisionConfig(), HAND_HELD), {"top": [], "right": []}
+    for number, row in enumerate(frames):
+        if not followed:
+            perception.reset()
+        seed = None if followed and number else (float(row["seed_u"]), float(row["seed_v"]))
+        frame = picture(row, (number + 1) * PERIOD_NS)
+        perceived = perception.process(frame, seed_pixel=seed, detect=not followed)
         assert perceived.plane is not None, (row["color"], perceived.refused)
-        best = max((c for c in perceived.candidates if c.role == "horizontal"), key=lambda c: c.score)
-        offsets.append(offset_px(best.line, marks[row["color"]], intrinsics))
-    assert len(offsets) >= 10
-    assert sum(offset < 4.0 for offset in offsets) >= len(offsets) - 1, np.round(offsets, 1)
-    assert np.median(offsets) < 1.0
+        for side, found in offsets.items():
+            guide, marked = perceived.guides[side], marks[row["color"], f"board_{side}"]
+            assert guide is not None and angle_deg(guide, marked) < 2.0, (row["color"], side)
+            assert not followed or number == 0 or guide.confirmed
+            found.append(offset_px(guide, marked, frame.intrinsics))
+    assert len(frames) >= 10
+    for side, found in offsets.items():
+        assert max(found) < 4.0 and np.median(found) < 0.5, (side, np.round(found, 2))
