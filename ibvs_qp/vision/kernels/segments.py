@@ -188,14 +188,18 @@ def _peaks(points, order, first, wanted, middle, threshold, least, cosine, sine,
         lowest -= 1
         higher += levels[lowest]
     kept = 0
-    for k in range(count):  # of noise there are thousands, so only the highest are sorted
-        if heights[k] >= lowest and kept < _TRIED:
-            heights[kept], places[kept] = -heights[k], places[k]
-            kept += 1
-    best = np.argsort(heights[:kept], kind="mergesort")
+    for k in range(count):  # of noise there are thousands, so only the highest are sorted, by insertion
+        if heights[k] < lowest or kept == _TRIED:
+            continue
+        place, height, own = kept, heights[k], places[k]
+        while place > 0 and heights[place - 1] < height:
+            heights[place], places[place] = heights[place - 1], places[place - 1]
+            place -= 1
+        heights[place], places[place] = height, own
+        kept += 1
     for k in range(kept):
-        normals[k] = places[best[k]] // wide
-        distances[k] = places[best[k]] - normals[k] * wide - reach
+        normals[k] = places[k] // wide
+        distances[k] = places[k] - normals[k] * wide - reach
     return kept
 
 
@@ -236,24 +240,39 @@ def _through(points, held, count, middle, nx, ny, rho):
 
 
 @inner
-def _cut(points, held, count, middle, nx, ny, rho, shortest, used, segments, kept):
-    """Segments of a line between gaps of its points; their points are used. Returns how many segments there are now."""
-    along = np.empty(count)
+def _cut(points, held, count, middle, nx, ny, rho, shortest, used, segments, kept, bins):
+    """Segments of a line between gaps of its points; their points are used. Returns how many segments there are now.
+
+    ``bins`` holds number, lowest and highest place of the points on every pixel along a line: nothing need be sorted.
+    """
+    bins[:, 0] = 0.0
+    half = len(bins) // 2
     for j in range(count):
-        along[j] = (points[held[j], 1] - middle[1]) * nx - (points[held[j], 0] - middle[0]) * ny
-    by, start = np.argsort(along, kind="mergesort"), 0
-    for j in range(1, count + 1):
-        low, high = along[by[start]], along[by[j - 1]]
-        if j < count and along[by[j]] - high <= _GAP + _GAP_SHARE * (high - low):
+        along = (points[held[j], 1] - middle[1]) * nx - (points[held[j], 0] - middle[0]) * ny
+        one = bins[int(along + half)]
+        one[1] = along if one[0] == 0.0 else min(one[1], along)
+        one[2] = along if one[0] == 0.0 else max(one[2], along)
+        one[0] += 1.0
+    low, high, size = 0.0, 0.0, 0.0
+    for k in range(len(bins) + 1):
+        last = k == len(bins)
+        if not last and bins[k, 0] == 0.0:
             continue
-        if high - low >= shortest and j - start >= _DENSE * (high - low) and kept < len(segments):
+        if not last and size > 0.0 and bins[k, 1] - high <= _GAP + _GAP_SHARE * (high - low):
+            high = bins[k, 2]
+            size += bins[k, 0]
+            continue
+        if size > 0.0 and high - low >= shortest and size >= _DENSE * (high - low) and kept < len(segments):
             segments[kept, 0], segments[kept, 1] = middle[0] + rho * nx - low * ny, middle[1] + rho * ny + low * nx
             segments[kept, 2], segments[kept, 3] = middle[0] + rho * nx - high * ny, middle[1] + rho * ny + high * nx
-            segments[kept, 4] = j - start
+            segments[kept, 4] = size
             kept += 1
-            for m in range(start, j):
-                used[held[by[m]]] = 1
-        start = j
+            for j in range(count):
+                along = (points[held[j], 1] - middle[1]) * nx - (points[held[j], 0] - middle[0]) * ny
+                if low <= along <= high:
+                    used[held[j]] = 1
+        if not last:
+            low, high, size = bins[k, 1], bins[k, 2], bins[k, 0]
     return kept
 
 
@@ -287,6 +306,7 @@ def find_segments(small, mask, factor, region, stride, threshold, shortest, tilt
     order, wanted = _by_direction(points, count, first), _wanted_degrees(tilt, within)
     normals, distances = np.empty(_TRIED, np.int64), np.empty(_TRIED, np.int64)
     tried = _peaks(points, order, first, wanted, middle, threshold, least, cosine, sine, normals, distances)
+    bins = np.empty((2 * int(math.hypot(middle[0], middle[1])) + 6, 3))
     used, held, kept = np.zeros(count, np.uint8), np.empty(count, np.int64), 0
     for peak in range(tried):
         k, rho = normals[peak], float(distances[peak])
@@ -298,7 +318,7 @@ def find_segments(small, mask, factor, region, stride, threshold, shortest, tilt
         wide = _AGREES_WITHIN + _TURN + 1
         near = _supporters(points, order, first, used, middle, k, wide, nx, ny, rho, _NEAR, held)
         if near >= least:
-            kept = _cut(points, held, near, middle, nx, ny, rho, shortest, used, segments, kept)
+            kept = _cut(points, held, near, middle, nx, ny, rho, shortest, used, segments, kept, bins)
         if kept == len(segments):
             break
     return kept
