@@ -25,7 +25,7 @@ ORDER = {
 }
 #: Rooms of vision in the order of its stages: data passes forward.
 STAGES = (
-    "robust config kernels checks picture appearance surface flow lines layout perception_result overlay "
+    "robust config kernels checks picture appearance surface flow lines perception_result overlay "
     "make_result paper perception"
 ).split()
 #: What every package must not import.

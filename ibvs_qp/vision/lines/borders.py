@@ -86,8 +86,8 @@ def score_borders(
         evidence,
     )
     rows, columns = np.nonzero(region.colored)
-    places = np.column_stack((columns, rows)) * float(grid.stride) + grid.offset
-    samples_beyond(places, ends, normals, _CELLS_BEYOND * grid.stride, beyond)
+    samples = np.column_stack((columns, rows)) * float(grid.stride) + grid.offset
+    samples_beyond(samples, ends, normals, _CELLS_BEYOND * grid.stride, beyond)
     length = np.hypot(ends[:, 2] - ends[:, 0], ends[:, 3] - ends[:, 1])
     grown = length / (length + _HALF_LENGTH_PX * picture.scale)
     grown = grown * np.sqrt(np.minimum(length / np.maximum(_FULL_SHARE * beyond[:, 2], 1.0), 1.0))

@@ -120,9 +120,9 @@ def _end_of_paint(picture: Picture, surface: SurfaceRegion, colors: SurfaceColor
     """Samples near both paint and board, bool (rows, columns)."""
     grid = surface.grid
     labels = colors.label(grid.sample(picture.rgb), colors.levels_at(*grid.pixels))
-    on = cv2.dilate(surface.cells.view(np.uint8), _NEAR_CELLS)
-    board, paint = (cv2.dilate((labels == kind).view(np.uint8), _NEAR_CELLS) for kind in (BOARD, PAINT))
-    return (on & board & paint) > 0
+    marks = surface.cells, labels == BOARD, labels == PAINT
+    near = [cv2.dilate(cells.view(np.uint8), _NEAR_CELLS) > 0 for cells in marks]
+    return near[0] & near[1] & near[2]
 
 
 def _rough_scores(segments: np.ndarray, picture: Picture, depth: np.ndarray, surface: SurfaceRegion) -> np.ndarray:

@@ -11,7 +11,6 @@ from ibvs_qp.vision.checks import PictureGate, StageClock, finite_vector
 from ibvs_qp.vision.config import VisionConfig
 from ibvs_qp.vision.flow.camera_motion import CameraMotion
 from ibvs_qp.vision.flow.sparse_flow import SparseFlow
-from ibvs_qp.vision.layout import PictureLayout
 from ibvs_qp.vision.lines.candidates import Candidate
 from ibvs_qp.vision.lines.line_state import LineHint
 from ibvs_qp.vision.lines.track import Track
@@ -20,6 +19,7 @@ from ibvs_qp.vision.paper.config import PaperConfig
 from ibvs_qp.vision.paper.pipeline import PaperPipeline
 from ibvs_qp.vision.paper.result import PaperDetection
 from ibvs_qp.vision.perception_result import PerceptionResult
+from ibvs_qp.vision.surface.layout import PictureLayout
 
 #: Identities of the two lines: the paper knows no others, whichever edge is topmost or first at the moment.
 TOPMOST_TRACK, FIRST_TRACK = 1, 2
