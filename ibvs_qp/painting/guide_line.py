@@ -89,9 +89,10 @@ class GuideLine:
         found = self.fresh(inputs)
         if found is None:
             found = self._board_edge(inputs, row)
-            if found is not None:
-                # The lost guide has misled: slide from the present offset to the nominal one.
-                self._board, self.target = found.track_id, found.offset
+            self._board = self._board if found is None else found.track_id
+        if found is not None:
+            # The lost guide had another target, or has misled: slide from the present offset to the nominal one.
+            self.target = found.offset
         return self._change(found)
 
     def fresh(self, inputs: PainterInput, displacement: float = 0.0) -> TrackedLine | None:

@@ -104,7 +104,7 @@ class LineConfig(_Checked):
     inlier_px: float = setting(
         1.5, "a profile whose peak lies within this supports the line", unit="px", low=0.2, high=10.0
     )
-    bridge: int = setting(3, "unsupported profiles bridged within a segment", low=0, high=50)
+    bridge_px: float = setting(30.0, "longest gap bridged within a segment", unit="px", low=0.0, high=500.0)
     min_profiles: int = setting(7, "fewer supporting profiles are no line", low=4, high=100)
     bias_px: float = setting(0.02, "systematic error of the fit: sampling, blur, lens", unit="px", low=0.0, high=5.0)
     color_gate: float = setting(

@@ -22,13 +22,15 @@ from ibvs_qp.vision.kernels.strips import gather
 _STEP_SHARE = 0.12
 #: The same of the smallest allowed contrast, for faint lines.
 _FAINT_SHARE = 0.3
+#: No longer gap than this share of the searched length is bridged.
+_BRIDGED_SHARE = 0.3
 #: Colour steps smaller than this have no direction [grey levels].
 _STEP_MIN = 1e-3
 
 
 @kernel(
     "void(u1[:, :, ::1], u1[:, ::1], f4[::1], u1[::1], u1[::1], u1[::1],"
-    " f8[:, ::1], i8, i8, f8, f8, i8, i8,"
+    " f8[:, ::1], i8, i8, f8, f8, f8, i8,"
     " f8[:, ::1], f8[:, ::1], u1[:, ::1], u1[:, ::1], u1[:, :, :, ::1])"
 )
 def fit_lines(
@@ -43,7 +45,7 @@ def fit_lines(
     side: int,
     contrast_min: float,
     gate: float,
-    bridge: int,
+    bridge: float,
     min_profiles: int,
     found: np.ndarray,
     u: np.ndarray,
@@ -65,7 +67,7 @@ def fit_lines(
         side: Distance from an edge at which its two sides are looked at [px].
         contrast_min: Least colour step of a line [grey levels].
         gate: Distance within which a profile agrees with a line [px].
-        bridge: Visible misses in a row that do not end a line.
+        bridge: Longest gap of visible misses that does not end a line [px].
         min_profiles: Least profiles that must agree.
         found: Filled with the fits, (L, FIT_COLUMNS) of `line_tables`.
         u: Filled with the columns of the profiles [px], (L, K).
@@ -106,7 +108,9 @@ def fit_lines(
         # one line far from its prediction has all of them looked for anew
         if not agreed and not consensus(u[line], row[line], support[line], gate, distance[line]):
             alive = False
-        count = keep_run(support[line], visible[line], distance[line], alive, gate, bridge, min_profiles, found[line])
+        length = max(u[line, profiles - 1] - u[line, 0], 1.0)
+        missing = int(min(bridge / length, _BRIDGED_SHARE) * (profiles - 1))
+        count = keep_run(support[line], visible[line], distance[line], alive, gate, missing, min_profiles, found[line])
         level, slope, center, level_variance, slope_variance, rms = robust_line(
             u[line], row[line], support[line], count, scratch[0], scratch[1]
         )

@@ -23,6 +23,9 @@ from ibvs_qp.vision.surface.region import SurfaceRegion
 _SHORTEST_PX = 40.0
 #: Lines nearer than this are one, and a segment this near to a known line is that one [px at 640].
 _SAME_PX, _KNOWN_PX = 2.5, 8.0
+#: Half width of the strip in which an edge of paint is fitted, and width within which it is one edge [px at 640]; it is
+#: fitted beyond a segment by this multiple of its length.
+_PAINT_PX, _ACROSS = 6.0, 20.0
 #: A longer line on an edge is taken if its further part has this share of the better one's score.
 _FURTHER_SHARE = 0.5
 #: Score from which a line is said to border the surface.
@@ -101,19 +104,25 @@ def find_candidates(
     best = np.argsort(-rough, kind="stable")[:most]
     best = best[rough[best] > _HOPELESS]
     pieces = trimmed(segments[best], surface, _SHORTEST_PX * picture.scale)
-    chosen = [segments[best], pieces]
+    beyond = np.repeat((FIT_BEYOND, 0.0), (len(best), len(pieces)))
+    fits = fit_segments(np.vstack((segments[best], pieces)), picture, config.line, colors, beyond, contents=painted)
     if painted:
         share = _differing(segments, colors, surface, picture)
         share[best] = 0.0
-        chosen.insert(
-            0, segments[np.argsort(-_lengths(segments) * share, kind="stable")[: np.sum(share > _SHOWS)]][:most]
-        )
-    beyond = np.full(sum(map(len, chosen)), FIT_BEYOND)
-    beyond[len(beyond) - len(pieces) :] = 0.0
-    segments = np.vstack(chosen)
-    fits = fit_segments(segments, picture, config.line, colors, beyond, contents=painted)
-    found = judge_lines([fit for fit in fits if fit is not None], picture, depth, surface, colors, tilt)
-    return _each_edge_once(found, _SAME_PX * picture.scale)
+        order = np.argsort(-_lengths(segments) * share, kind="stable")[: np.sum(share > _SHOWS)]
+        fits += _fit_paint(segments[order][:most], picture, config, colors)
+    lines = [fit for fit in fits if fit is not None]
+    shortest = config.detect.min_length * picture.mask.shape[1]
+    found = judge_lines(lines, picture, depth, surface, colors, tilt, shortest)
+    return _each_edge_once(found, picture.scale)
+
+
+def _fit_paint(
+    segments: np.ndarray, picture: Picture, config: VisionConfig, colors: SurfaceColors
+) -> list[RefinedLine | None]:
+    """Fits of edges of paint across the picture: a stroke is wavy, and a short piece of it leans."""
+    beyond, wide = np.full(len(segments), _ACROSS), _PAINT_PX * picture.scale
+    return fit_segments(segments, picture, config.line, colors, beyond, contents=True, half_width_px=wide)
 
 
 def _end_of_paint(picture: Picture, surface: SurfaceRegion, colors: SurfaceColors) -> np.ndarray:
@@ -131,11 +140,12 @@ def _rough_scores(segments: np.ndarray, picture: Picture, depth: np.ndarray, sur
     return score_borders(pixels, normals_of(pixels), picture, depth, surface, PLACES // 2).score
 
 
-def _each_edge_once(lines: list[Candidate], limit_px: float) -> list[Candidate]:
+def _each_edge_once(lines: list[Candidate], scale: float) -> list[Candidate]:
     """The best line of every edge, best first: a longer one is more exact, unless it is much worse."""
     kept: list[Candidate] = []
     for line in sorted(lines, key=lambda entry: -entry.score):
-        same = next((k for k, other in enumerate(kept) if _same_edge(line, other, limit_px)), None)
+        limit = scale * (_PAINT_PX if line.kind == "paint" else _SAME_PX)
+        same = next((k for k, other in enumerate(kept) if _same_edge(line, other, limit)), None)
         if same is None:
             kept.append(line)
         elif line.kind == kept[same].kind and _adds(line, kept[same]):
@@ -159,8 +169,9 @@ def judge_lines(
     surface: SurfaceRegion,
     colors: SurfaceColors,
     tilt: float | None,
+    shortest_px: float = 0.0,
 ) -> list[Candidate]:
-    """Tell of fitted lines what they are, with score and confidence."""
+    """Tell of fitted lines what they are, with score and confidence; shorter ones are no edges of paint."""
     if not fits:
         return []
     pixels = np.array([denormalise(fit.segment, picture.intrinsics) for fit in fits])
@@ -168,7 +179,7 @@ def judge_lines(
     normals = normals_of(pixels)
     normals *= np.sign(np.vecdot(normals, np.column_stack((np.cos(theta), np.sin(theta)))))[:, None]
     borders = score_borders(pixels, normals, picture, depth, surface)
-    return [_candidate(fit, pixels[k], borders, k, picture, colors, tilt) for k, fit in enumerate(fits)]
+    return [_candidate(fit, pixels[k], borders, k, picture, colors, tilt, shortest_px) for k, fit in enumerate(fits)]
 
 
 def _candidate(
@@ -179,9 +190,11 @@ def _candidate(
     picture: Picture,
     colors: SurfaceColors,
     tilt: float | None,
+    shortest_px: float,
 ) -> Candidate:
     """A fitted line with what its two sides say."""
-    paint_side = 0 if borders.depth[index] > _DEPTH_STEP else _board_beside_paint(fit, colors)
+    may_be_paint = borders.depth[index] <= _DEPTH_STEP and fit.length_px >= shortest_px
+    paint_side = _board_beside_paint(fit, colors) if may_be_paint else 0
     if paint_side:
         kind, side, confidence = "paint", paint_side, _PAINT_CONFIDENCE
         length = min(fit.length_px / (_FULL_LENGTH * picture.mask.shape[1]), 1.0)

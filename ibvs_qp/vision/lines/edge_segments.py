@@ -79,6 +79,7 @@ def fit_segments(
     colors: SurfaceColors,
     beyond: np.ndarray | None = None,
     contents: bool = False,
+    half_width_px: float | None = None,
 ) -> list[RefinedLine | None]:
     """Sub-pixel fits of segments.
 
@@ -89,6 +90,7 @@ def fit_segments(
         colors: Of the surface.
         beyond: Share of its length by which each is fitted beyond its ends, (n,); `FIT_BEYOND` unless given.
         contents: Whether the colours of both sides are wanted.
+        half_width_px: Half width of the strips; 4 px at 640 unless given.
 
     Returns:
         One fit for every segment, None where nothing supports one.
@@ -102,7 +104,7 @@ def fit_segments(
         fits += refine_lines(
             picture,
             queries[start : start + _BATCH],
-            half_width_px=_REFINE_PX * picture.scale,
+            half_width_px=half_width_px or _REFINE_PX * picture.scale,
             config=config,
             colors=colors,
             contents=contents,

@@ -52,7 +52,7 @@ def fit_lines(
         side,
         config.contrast_min,
         config.inlier_px * picture.scale,
-        config.bridge,
+        config.bridge_px * picture.scale,
         config.min_profiles,
         found,
         u,

@@ -14,13 +14,14 @@ from ibvs_qp.vision.lines.refined import RefinedLine
 _STEP_BLEND = 0.2
 #: Share of the new value in its score and confidence.
 _JUDGED_BLEND = 0.5
-#: A line is searched beyond its ends by this share of its length: it grows into view that fast.
-_BEYOND = 0.25
+#: A line is searched beyond its ends by this share of its length or this much, normalised, whichever is more: it grows
+#: into view that fast, and paint over a part of it does not cut it off for good.
+_BEYOND, _AT_LEAST = 0.25, 0.15
 
 
 @dataclass
 class Track:
-    """One line followed over time."""
+    """One line followed over time; its confidence fades while it is not seen, and is whole again when it is."""
 
     track_id: int
     line: RefinedLine
@@ -36,6 +37,7 @@ class Track:
     hits: list[bool] = field(default_factory=lambda: [True])
     confirmed: bool = False
     lost_s: float = 0.0
+    fading: float = 1.0
     rho: float = 0.0
     theta: float = 0.0
     covariance: np.ndarray = field(default_factory=lambda: np.zeros((2, 2)))
@@ -57,7 +59,7 @@ class Track:
     def span(self) -> tuple[float, float]:
         """Range along x or y in which it is searched: somewhat beyond what was seen last, normalised."""
         first, last = self.extent
-        more = _BEYOND * (last - first)
+        more = max(_BEYOND * (last - first), _AT_LEAST)
         return first - more, last + more
 
     def judge(self, score: float, confidence: float, borders: bool) -> None:
@@ -96,7 +98,7 @@ class Track:
             rms_px=self.line.rms_px,
             length_px=self.line.length_px,
             score=self.score,
-            confidence=self.confidence,
+            confidence=self.confidence * self.fading,
             borders_plane=self.borders_plane,
             hint=self.hint,
         )

@@ -167,13 +167,12 @@ class LineTracker:
         track.hits = [*track.hits, line is not None][-config.confirm_window :]
         if line is None:
             track.lost_s += interval_s
-            left = max(0.0, 1.0 - interval_s / max(config.hold_s, 1e-3))
             track.weight = max(0.0, track.weight - interval_s / max(config.hold_s, 1e-3))
-            track.confidence *= left
+            track.fading = max(0.0, 1.0 - track.lost_s / max(config.hold_s, 1e-3))
             track.covariance = track.covariance + _DRIFT
             return
         track.adopt(line)
-        track.lost_s = 0.0
+        track.lost_s, track.fading = 0.0, 1.0
         track.confirmed = track.confirmed or sum(track.hits) >= config.confirm_hits
         if track.confirmed:
             track.weight = min(1.0, track.weight + config.rise)
@@ -197,7 +196,10 @@ class LineTracker:
             twin = next((other for other in kept if self._same(other, track, picture)), None)
             if twin is None:
                 kept.append(track)
-            elif track.hint and not twin.hint:
+                continue
+            if track.kind == twin.kind and track.line.length_px > _LONGER * twin.line.length_px:
+                twin.adopt(track.line)
+            if track.hint and not twin.hint:
                 twin.hint = track.hint
                 if not colors.paint_distinct:
                     twin.become(track)
