@@ -28,6 +28,9 @@ def make_result(
 ) -> PerceptionResult:
     """Result of one picture; only confirmed and certain tracks of positive weight become features."""
     tracks = tuple(track.state() for track in followed)
+    certain = {
+        track.track_id for track in followed if track.confidence >= least_confidence
+    }  # seen or not: weight fades
     lines = tuple(
         LineFeature(
             rho=track.rho,
@@ -42,7 +45,7 @@ def make_result(
             kind=track.kind,
         )
         for track in tracks
-        if track.confirmed and track.weight > 0.0 and track.confidence >= least_confidence
+        if track.confirmed and track.weight > 0.0 and track.track_id in certain
     )
     moving = flow if isinstance(flow, FlowVelocity) else None
     features = FeatureFrame(

@@ -15,6 +15,8 @@ UNSEEN, ON, FARTHER, NEARER = 0, 1, 2, 3
 _SEEN_WITHIN, _ENDED_FROM, _ON_FROM, _ON_TO, _COVERED_FROM = 5, 5, 1, 4, 2
 #: Colours on both sides nearer than this are one; beside the bare surface, what goes on is as near to it [grey levels].
 _CONTRAST, _SAME_COLOR = 16.0, 24.0
+#: Colours this near to the paint's are paint: less than the gate of the labels, for nothing else tells [grey levels].
+_SAME_PAINT = 30.0
 #: Of the places beyond a line at which colour is read, this many must be the surface's for it to go on.
 _MOST = 2
 #: A border that only colour shows counts this much, and what depth shows where colour does not agree.
@@ -40,6 +42,15 @@ def is_alike(red, green, blue, color):
         return True
     away = (light - 1.0) * size
     return offset + away * away < _GREY * _GREY
+
+
+@inner
+def _is_painted(pixel, paint):
+    """Whether a colour is that of the paint; never if that is not known. A wall may be alike in another light."""
+    if len(paint) == 0:
+        return False
+    away = (pixel[0] - paint[0]) ** 2 + (pixel[1] - paint[1]) ** 2 + (pixel[2] - paint[2]) ** 2
+    return away < _SAME_PAINT * _SAME_PAINT
 
 
 @inner
@@ -90,15 +101,19 @@ def _any(states, first, last, wanted):
 
 
 @inner
-def _ends_here(inner_states, outer_states, inner_colors, outer_colors, inside, color, sums):
+def _ends_here(inner_states, outer_states, inner_colors, outer_colors, inside, color, paint, sums):
     """Add what one place says with the surface on the inner side: seen, ended, covered, goes on, changes, own."""
     count = len(outer_states)
-    own = is_alike(inner_colors[0, 0], inner_colors[0, 1], inner_colors[0, 2], color)
+    bare = is_alike(inner_colors[0, 0], inner_colors[0, 1], inner_colors[0, 2], color)
+    own = bare or _is_painted(inner_colors[0], paint)
     like = 0
     for d in range(len(outer_colors)):
+        if inside[d] and _is_painted(outer_colors[d], paint):
+            like += 1
+            continue
         if not inside[d] or not is_alike(outer_colors[d, 0], outer_colors[d, 1], outer_colors[d, 2], color):
             continue
-        if own:  # beside the bare surface the light is known, and what goes on must have its very colour
+        if bare:  # beside the bare surface the light is known, and what goes on must have its very colour
             apart = 0.0
             for c in range(3):
                 apart += (outer_colors[d, c] - inner_colors[0, c]) ** 2
@@ -137,7 +152,7 @@ def _beside(cells, pixels, nx, ny, distance, stride, offset):
 
 @kernel(
     "void(u1[:, :, ::1], f4[:, ::1], u1[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8, f8[::1],"
-    " u1[:, ::1], f8, f8, f8, i8, f8[:, :, ::1])"
+    " f8[::1], u1[:, ::1], f8, f8, f8, i8, f8[:, :, ::1])"
 )
 def border_evidence(
     rgb,
@@ -150,6 +165,7 @@ def border_evidence(
     plane,
     gate,
     color,
+    paint,
     cells,
     distance,
     stride,
@@ -170,6 +186,7 @@ def border_evidence(
         plane: The surface over pixels, 1/Z = p u + q v + r, (3,).
         gate: Share of depth within which a reading is on it.
         color: Its colour, (3,).
+        paint: Colour of the paint on it, (3,), or empty if unknown.
         cells: Its samples, (rows, columns).
         distance: Distance from a line at which these must lie beside it [px].
         stride: Distance of the samples [px].
@@ -212,7 +229,9 @@ def border_evidence(
             count += 1
             for side in range(2):
                 other = 1 - side
-                _ends_here(states[side], states[other], colors[side], colors[other], inside[other], color, sums[side])
+                _ends_here(
+                    states[side], states[other], colors[side], colors[other], inside[other], color, paint, sums[side]
+                )
         for side in range(2):
             sign = 1.0 if side == 0 else -1.0
             evidence[i, side, 3] = _beside(cells, pixels[i], sign * nx, sign * ny, distance, stride, offset)

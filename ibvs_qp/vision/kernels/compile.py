@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import importlib
 import logging
@@ -45,8 +46,9 @@ def _cached(function: Callable[..., Any]) -> Any:
     except RuntimeError:  # neither the package nor the user's cache folder can be written
         return numba.njit(**_OPTIONS)(function)
     for index in _indices(compiled):
-        if index.stat().st_mtime < _newest():
-            index.unlink(missing_ok=True)
+        with contextlib.suppress(FileNotFoundError):  # another process was faster
+            if index.stat().st_mtime < _newest():
+                index.unlink()
     return compiled
 
 

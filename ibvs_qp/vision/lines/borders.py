@@ -52,6 +52,7 @@ def score_borders(
     picture: Picture,
     depth: np.ndarray,
     region: SurfaceRegion,
+    paint: np.ndarray | None,
     places: int = PLACES,
 ) -> Borders:
     """Score lines as ends of the surface.
@@ -62,6 +63,7 @@ def score_borders(
         picture: Colour, mask and camera.
         depth: Depth [m], (H, W).
         region: The surface.
+        paint: Colour of the paint on it, RGB (3,), or None if unknown.
         places: Places looked at along each line.
     """
     grid, ends, normals = region.grid, np.ascontiguousarray(pixels.reshape(-1, 4)), np.ascontiguousarray(normals)
@@ -78,6 +80,7 @@ def score_borders(
         np.array((a / fx, b / fy, c - a * cx / fx - b * cy / fy)),
         depth_gate(region.plane),
         np.ascontiguousarray(region.color, float),
+        np.empty(0) if paint is None else np.ascontiguousarray(paint, float),
         region.cells.view(np.uint8),
         _CELLS_BESIDE * grid.stride,
         float(grid.stride),

@@ -100,7 +100,7 @@ def find_candidates(
     segments = segments[[not any(_covered(segment, line, picture) for line in known) for segment in segments]]
     if len(segments) == 0:
         return []
-    rough, most = _rough_scores(segments, picture, depth, surface), config.detect.candidates
+    rough, most = _rough_scores(segments, picture, depth, surface, colors), config.detect.candidates
     best = np.argsort(-rough, kind="stable")[:most]
     best = best[rough[best] > _HOPELESS]
     pieces = trimmed(segments[best], surface, _SHORTEST_PX * picture.scale)
@@ -134,10 +134,13 @@ def _end_of_paint(picture: Picture, surface: SurfaceRegion, colors: SurfaceColor
     return near[0] & near[1] & near[2]
 
 
-def _rough_scores(segments: np.ndarray, picture: Picture, depth: np.ndarray, surface: SurfaceRegion) -> np.ndarray:
+def _rough_scores(
+    segments: np.ndarray, picture: Picture, depth: np.ndarray, surface: SurfaceRegion, colors: SurfaceColors
+) -> np.ndarray:
     """Scores of segments (n, 4) as ends of the surface before they are fitted, (n,)."""
     pixels = segments.reshape(-1, 2, 2)
-    return score_borders(pixels, normals_of(pixels), picture, depth, surface, PLACES // 2).score
+    paint, places = _paint_of(colors), PLACES // 2
+    return score_borders(pixels, normals_of(pixels), picture, depth, surface, paint, places).score
 
 
 def _each_edge_once(lines: list[Candidate], scale: float) -> list[Candidate]:
@@ -178,7 +181,7 @@ def judge_lines(
     theta = np.array([fit.theta for fit in fits])
     normals = normals_of(pixels)
     normals *= np.sign(np.vecdot(normals, np.column_stack((np.cos(theta), np.sin(theta)))))[:, None]
-    borders = score_borders(pixels, normals, picture, depth, surface)
+    borders = score_borders(pixels, normals, picture, depth, surface, _paint_of(colors))
     return [_candidate(fit, pixels[k], borders, k, picture, colors, tilt, shortest_px) for k, fit in enumerate(fits)]
 
 
@@ -213,6 +216,11 @@ def _candidate(
         score=score,
         confidence=confidence,
     )
+
+
+def _paint_of(colors: SurfaceColors) -> np.ndarray | None:
+    """Colour of the paint where it differs from the board's."""
+    return colors.paint if colors.paint_distinct else None
 
 
 def _board_beside_paint(fit: RefinedLine, colors: SurfaceColors) -> int:
