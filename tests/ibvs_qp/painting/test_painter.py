@@ -395,6 +395,20 @@ def test_where_the_fresh_edge_misleads_the_board_leads(misleads: str) -> None:
     assert world.ends[1][2] == pytest.approx(-world.config.pitch_m, abs=0.004)
 
 
+def test_back_from_the_board_to_the_fresh_edge_the_row_stays() -> None:
+    """With the board's offset as its target the fresh edge led 90 mm up."""
+    world = World(short(rows=2))
+    world.fly(100.0, until="climb")
+    world.fly(10.0, until="paint")
+    world.fly(0.5)
+    for hidden, guide in (({101}, 1), ({1}, 101)):
+        world.hidden = hidden
+        world.fly(0.5)
+        assert world.painter._guide.identity == guide
+    world.fly(1.0)
+    assert world.tip[1] == pytest.approx(-world.config.pitch_m, abs=0.004)
+
+
 def test_a_sloped_row_does_not_lean() -> None:
     world = World(short(rows=2))
     for edge in world.edges:
