@@ -25,7 +25,7 @@ _COLOR_ONLY, _DEPTH_ONLY = 0.75, 0.5
 #: colour's size and this distance [grey levels].
 _DIMMER, _BRIGHTER, _CHROMA, _GREY = 0.68, 1.4, 0.10, 14.0
 #: Least share of the places along a line that nothing hides.
-_LEAST_SHARE = 0.25
+_LEAST_SHARE = 0.15
 #: Columns of the evidence of one side: score, by depth, by colour, share beside the surface.
 EVIDENCE = 4
 

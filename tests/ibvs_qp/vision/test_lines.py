@@ -6,6 +6,9 @@ import cv2
 import numpy as np
 import pytest
 
+from ibvs_qp.config.vehicle import VehicleParams
+from ibvs_qp.measurement import RgbdFrame
+from ibvs_qp.vision import Perception, VisionConfig
 from ibvs_qp.vision.appearance.colors import SurfaceColors
 from ibvs_qp.vision.config import LineConfig
 from ibvs_qp.vision.lines.query import LineQuery
@@ -72,3 +75,24 @@ def test_no_queries_and_lines_outside_the_picture() -> None:
     assert (
         refined([LineQuery(rho=2.0, theta=0.5 * np.pi), LineQuery(rho=0.0, theta=1.57, span=(3.0, 4.0))]) == [None] * 2
     )
+
+
+def test_an_edge_that_the_brush_half_hides_is_as_certain_as_what_is_seen_of_it() -> None:
+    """A bare board's corner beside the brush, flush with the wall: a fifth of the edge has two free sides."""
+    random = np.random.default_rng(5)
+    perception = Perception(VisionConfig(), VehicleParams())
+
+    def corner(number: int) -> RgbdFrame:
+        rgb = np.full((*SIZE, 3), WALL, np.uint8)
+        rgb[:213, :367] = BOARD
+        rgb = np.clip(rgb + random.normal(0.0, 2.0, rgb.shape), 0, 255).astype(np.uint8)
+        depth = (0.65 * (1.0 + 0.003 * random.standard_normal(SIZE))).astype(np.float32)
+        return RgbdFrame(rgb=rgb, depth=depth, intrinsics=INTRINSICS, stamp_ns=1 + 33_000_000 * number)
+
+    level = np.array((1.0, 0.0, 0.0, 0.0))
+    seen = [perception.process(corner(number), attitude=level, rotation=np.zeros(3)) for number in range(12)][-1]
+    upright = [track for track in seen.tracks if track.role == "vertical"]
+    assert len(upright) == 1
+    assert upright[0].length_px > 100.0
+    assert upright[0].confidence > 0.5
+    assert len(seen.features.lines) == 2
