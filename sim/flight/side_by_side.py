@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
+import cv2
 import joblib
 
 from sim.flight.closed_loop import INTERRUPTED, fly
@@ -68,6 +69,7 @@ def fly_laws(
 
 def _fly_one(scene: Scene, options: FlightOptions, progress: Callable[[float, str, float], None]) -> Trace:
     """Fly one law and report its end."""
+    cv2.setNumThreads(1)  # more of them make no flight faster, and the laws share the cores as processes
     trace = pack_pictures(fly(scene, options, progress))
     duration = float(trace.t[-1]) if len(trace.t) else 0.0
     phase = INTERRUPTED if trace.reason == INTERRUPTED else "done"
@@ -104,10 +106,7 @@ def _fly_apart(scene: Scene, jobs: dict[str, FlightOptions], progress: LawProgre
 
 
 def _fly_in_worker(scene: Scene, options: FlightOptions, news: Any, stop: Any) -> Flight:
-    import cv2
-
     live_with_parent()  # `stop` ends the flight
-    cv2.setNumThreads(1)  # the laws share the cores as processes
 
     def report(flown_s: float, phase: str, real_time_factor: float) -> None:
         news.put((options.law, flown_s, phase, real_time_factor))
