@@ -128,9 +128,9 @@ class HeldSamples:
         self._complete(*color, depth[1], self.camera)
 
     def _complete(self, stamp_ns: int, rgb: np.ndarray, depth: np.ndarray, camera: pictures.Camera) -> None:
-        if rgb.shape[:2] != depth.shape:
+        if self._topics.depth_registered and rgb.shape[:2] != depth.shape:
             raise BadMessage("colour and depth differ in size")
-        if depth.shape != camera.shape:  # binning and a region of interest change it as well, and with it the pixels
+        if rgb.shape[:2] != camera.shape:  # binning and a region of interest change it as well, and with it the pixels
             raise BadMessage("size is not that of camera_info")
         self._picture = RgbdFrame(rgb=rgb, depth=depth, intrinsics=camera.intrinsics, stamp_ns=stamp_ns)
         self.pairs += 1

@@ -38,7 +38,10 @@ class Topics:
     wrench: str = setting("/ft_sensor/wrench", "force/torque sensor: geometry_msgs/WrenchStamped")
     color: str = setting("/camera/camera/color/image_raw", "colour: sensor_msgs/Image, 8 bits per channel")
     depth: str = setting(
-        "/camera/camera/aligned_depth_to_color/image_raw", "depth registered to colour: 16UC1 (mm) or 32FC1 (m)"
+        "/camera/camera/aligned_depth_to_color/image_raw", "depth, registered or not: 16UC1 (mm) or 32FC1 (m)"
+    )
+    depth_registered: bool = setting(
+        True, "depth has colour's pixels (False: its own; depth_intrinsics and the like in [camera] place them)"
     )
     camera_info: str = setting("/camera/camera/color/camera_info", "sensor_msgs/CameraInfo of the colour pictures")
     wrench_axes: str = choice("flu", "axes of the force sensor: front-left-up or front-right-down", ("flu", "frd"))

@@ -65,7 +65,7 @@ def write_bag(
                     axes = topics.wrench_axes, topics.wrench_on
                     write("wrench", before, samples.to_wrench(wrench_ns, np.asarray(frame.wrench, float), *axes))
                 if (image := frame.image) is not None:
-                    info = pictures.from_intrinsics(image.intrinsics, image.depth.shape, image.stamp_ns)
+                    info = pictures.from_intrinsics(image.intrinsics, image.rgb.shape, image.stamp_ns)
                     write("camera_info", before, info)
                     write("color", before, pictures.from_rgb(image.rgb, image.stamp_ns))
                     write("depth", before, pictures.from_depth(image.depth, image.stamp_ns))

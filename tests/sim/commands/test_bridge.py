@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 import shutil
@@ -12,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import tomli_w
 from dds_loopback import environment, require_dds
 
 pytest.importorskip("rosbags", reason="needs the extra ros")
@@ -20,8 +22,11 @@ import ibvs_qp.ros.write_bag as write_bag_module
 from ibvs_qp import RgbdFrame, SensorFrame
 from ibvs_qp.ros.messages import typestore
 from ibvs_qp.ros.write_bag import write_bag
+from ibvs_qp.vision.picture.lens import Lens
 from sim.commands.cli import main
 from sim.detection.truth import FAMILIES, render_frame, sample_scene
+from sim.detection.truth.accuracy import line_errors
+from sim.detection.truth.devices import REALSENSE_D435
 
 
 @pytest.fixture(autouse=True)
@@ -133,10 +138,9 @@ def test_a_missing_extra_is_named(
     assert f"the extra {extra}: pip install -c constraints.txt -e '.[{extra}]'" in error and error.count("\n") == 1
 
 
-def bag() -> None:
+def bag(image: RgbdFrame | None = None) -> None:
     truth = render_frame(sample_scene(FAMILIES["near wall"], 1))
-    image = truth.frame
-    image = RgbdFrame(rgb=image.rgb, depth=image.depth, intrinsics=image.intrinsics, stamp_ns=10**9)
+    image = dataclasses.replace(image or truth.frame, stamp_ns=10**9)
     frame = SensorFrame(
         stamp_ns=10**9,
         attitude=np.array([1.0, 0.0, 0.0, 0.0]),
@@ -159,6 +163,27 @@ def test_detect_reads_the_pictures_of_a_bag(capsys: pytest.CaptureFixture[str]) 
     assert frame["color"] == "bag/000000_1000000000" and frame["refused"] is None
     assert sum(guide is not None for guide in frame["guides"].values()) >= 2
     assert [file.name for file in Path("drawn").iterdir()] == ["bag_000000_1000000000_overlay.png"]
+
+
+def test_depth_of_a_camera_beside_is_registered_by_the_settings(capsys: pytest.CaptureFixture[str]) -> None:
+    truth = render_frame(sample_scene(FAMILIES["realsense_d435"], 4))
+    assert truth.raw is not None and truth.raw.depth.shape != truth.raw.rgb.shape[:2]
+    bag(dataclasses.replace(truth.raw, depth=(1e-3 * truth.raw.depth).astype(np.float32)))
+    settings = dataclasses.asdict(REALSENSE_D435.settings) | {"depth_units_per_metre": 1000.0}
+    Path("camera.toml").write_text(tomli_w.dumps({"camera": settings}))
+    Path("topics.toml").write_text("depth_registered = false\n")
+    fx, fy, cx, cy = truth.frame.intrinsics
+    ideal = (np.array([truth.seed]) - (cx, cy)) / (fx, fy)
+    [seed] = Lens(REALSENSE_D435.distortion).pixels(ideal, truth.frame.intrinsics)
+    words = ["detect", "bag", "--camera", "camera.toml", "--seed-pixel", *map(str, seed.tolist()), "--json"]
+    assert main([*words, "--topics", "topics.toml"]) == 0
+    (frame,) = json.loads(capsys.readouterr().out)["frames"]
+    for side, edge in truth.edges.items():
+        line = frame["guides"][side]
+        assert line is not None, side
+        assert line_errors(edge, line["rho"], line["theta"], truth.frame.intrinsics)[0] < 0.5
+    assert main(words) == 2
+    assert "colour and depth differ in size" in capsys.readouterr().err
 
 
 def test_detect_straightens_the_lines_of_the_lens_in_the_bag(
