@@ -51,9 +51,14 @@ def frame_problem(frame: RgbdFrame) -> str | None:
 
 
 class PictureGate:
-    """Checks the pictures of one flight; only a lasting change of size or intrinsics is followed."""
+    """Checks the pictures of one flight; only a lasting change of size or intrinsics is followed.
 
-    def __init__(self) -> None:
+    Args:
+        in_flight: Whether a picture may have `MOST_PIXELS` only.
+    """
+
+    def __init__(self, in_flight: bool = True) -> None:
+        self._in_flight = in_flight
         self.reset()
 
     def reset(self) -> None:
@@ -67,7 +72,7 @@ class PictureGate:
         if problem := frame_problem(frame):
             return problem
         height, width = frame.depth.shape
-        if height * width > MOST_PIXELS:
+        if self._in_flight and height * width > MOST_PIXELS:
             return f"picture of {width} x {height} px is too large: in flight at most {MOST_PIXELS} px"
         camera = (height, width, *frame.intrinsics)
         if self._camera in (None, camera):

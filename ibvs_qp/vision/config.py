@@ -1,25 +1,17 @@
-"""Settings of perception; every length in pixels is for a picture 640 wide and scales with the width."""
+"""Settings of perception; every length in pixels is for a picture 640 wide and scales with the longer side."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from ibvs_qp.config.settings import setting, validate
+from ibvs_qp.config.settings import Checked, setting
 
 #: Width of the picture for which pixel settings are stated [px].
 REFERENCE_WIDTH = 640.0
 
 
-class _Checked:
-    """A settings section that refuses values out of range at construction."""
-
-    def __post_init__(self) -> None:
-        """Validate every field."""
-        validate(self)
-
-
 @dataclass(frozen=True, kw_only=True)
-class PlaneConfig(_Checked):
+class PlaneConfig(Checked):
     """Robust fit of the surface, in inverse depth. Gates are relative to depth, as the noise of an RGB-D camera is."""
 
     grid_columns: int = setting(80, "samples per row of the coarse grid (1/8 of 640)", low=20, high=320)
@@ -57,7 +49,7 @@ class PlaneConfig(_Checked):
 
 
 @dataclass(frozen=True, kw_only=True)
-class MaskConfig(_Checked):
+class MaskConfig(Checked):
     """Parts of the vehicle in its own picture."""
 
     brush_length_m: float = setting(0.05, "length of the brush along the arm", unit="m", low=0.0, high=0.5)
@@ -70,7 +62,7 @@ class MaskConfig(_Checked):
 
 
 @dataclass(frozen=True, kw_only=True)
-class DetectConfig(_Checked):
+class DetectConfig(Checked):
     """Search for lines without a prediction."""
 
     half_range_deg: float = setting(
@@ -83,7 +75,7 @@ class DetectConfig(_Checked):
     band_cells: int = setting(
         4, "half width of the band around the surface's end in which its edges are sought (32 px)", low=1, high=20
     )
-    min_length: float = setting(0.10, "shortest line, share of the picture's width", low=0.01, high=1.0)
+    min_length: float = setting(0.10, "shortest edge of paint, share of the picture's width", low=0.01, high=1.0)
     candidates: int = setting(16, "segments fitted to a fraction of a pixel per detection", low=1, high=100)
     period: int = setting(20, "frames between detections while tracks live", low=1, high=1000)
     lost_period: int = setting(3, "frames between detections while nothing is tracked", low=1, high=1000)
@@ -91,7 +83,7 @@ class DetectConfig(_Checked):
 
 
 @dataclass(frozen=True, kw_only=True)
-class LineConfig(_Checked):
+class LineConfig(Checked):
     """Sub-pixel refinement by profiles across the line, and what lies on its two sides."""
 
     profiles: int = setting(64, "profiles along a line", low=16, high=400)
@@ -114,12 +106,11 @@ class LineConfig(_Checked):
         low=5.0,
         high=200.0,
     )
-    depth_step_sigmas: float = setting(4.0, "a side is farther beyond this many sigmas of its mean", low=1.0, high=20.0)
     rho_max: float = setting(1.5, "lines farther off the axis are refused (L grows without bound)", low=0.2, high=10.0)
 
 
 @dataclass(frozen=True, kw_only=True)
-class TrackConfig(_Checked):
+class TrackConfig(Checked):
     """Life of a track."""
 
     confirm_hits: int = setting(2, "hits needed to accept a new track", low=1, high=20)
@@ -133,12 +124,12 @@ class TrackConfig(_Checked):
     confidence_min: float = setting(
         0.3, "less certain lines are followed, but are no features for control", low=0.0, high=1.0
     )
-    duplicate_px: float = setting(4.0, "two tracks of one kind nearer than this are one", unit="px", low=0.5, high=50.0)
+    duplicate_px: float = setting(4.0, "two tracks nearer than this are one", unit="px", low=0.5, high=50.0)
     capacity: int = setting(12, "most tracks kept", low=1, high=64)
 
 
 @dataclass(frozen=True, kw_only=True)
-class FlowConfig(_Checked):
+class FlowConfig(Checked):
     """Velocity from sparse flow at half resolution."""
 
     points: int = setting(45, "most points followed", low=8, high=500)
@@ -164,7 +155,7 @@ class FlowConfig(_Checked):
 
 
 @dataclass(frozen=True, kw_only=True)
-class VisionConfig(_Checked):
+class VisionConfig(Checked):
     """All settings of perception."""
 
     brush_width_m: float = setting(

@@ -56,7 +56,8 @@ class Perception:
         self._surface = SurfaceTracker(config.plane, self._colors)
         self._tracker, self._flow = LineTracker(config), SparseFlow(config.flow)
         self._layout: PictureLayout | None = None
-        self._exposure, self._gate, self._guides = ExposureSteps(), PictureGate(), GuideKeeper()
+        self._exposure, self._guides = ExposureSteps(), GuideKeeper()
+        self._gate = PictureGate(in_flight=vehicle is not None)
         self.reset()
 
     def reset(self) -> None:
@@ -66,6 +67,7 @@ class Perception:
             part.reset()
         self._grey: np.ndarray | None = None
         self._stamp_ns: int | None = None
+        self._missed_turn = np.zeros(3)  # over pictures that were refused [rad]
         self._since_detection, self._frames = self._config.detect.period, 0
 
     def process(
@@ -94,9 +96,12 @@ class Perception:
             Features, plane, tracks, guides and times.
         """
         try:
-            problem = self._gate.problem(frame)
+            problem, turned = self._gate.problem(frame), finite_vector(rotation, 3)
+            if turned is not None:
+                turned = turned + self._missed_turn
+                self._missed_turn = np.zeros(3) if problem is None else turned
             if problem is None:
-                turned, moved = finite_vector(rotation, 3), finite_vector(velocity, 3)
+                moved = finite_vector(velocity, 3)
                 return self._process(frame, finite_vector(attitude, 4), turned, moved, hints, detect, seed_pixel)
         except Exception as error:  # in flight nothing may raise; the reason is reported instead
             problem = raised("picture not understood", error)
@@ -171,7 +176,7 @@ class Perception:
         )
 
     def _plain(self, frame: RgbdFrame) -> RgbdFrame:
-        """The picture as the kernels read it, at the exposure of the first one."""
+        """The picture as the kernels read it, without steps of the exposure."""
         rgb = np.require(self._exposure.level(frame.rgb, frame.stamp_ns), np.uint8, ("C", "W"))
         depth = np.require(frame.depth, np.float32, ("C", "W"))
         if rgb is frame.rgb and depth is frame.depth:
@@ -183,9 +188,11 @@ class Perception:
         if self._layout is None or not self._layout.fits(frame):
             self._layout = PictureLayout(frame, self._config, self._vehicle)
             self._grey = None
-            self._surface.lose()
-            self._tracker.reset()
-            self._flow.reset()
+            for part in (self._surface, self._tracker):
+                part.lose()
+            for part in (self._flow, self._guides):
+                part.reset()
+            self._colors.forget_light()
         return self._layout
 
     def _motion(

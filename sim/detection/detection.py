@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ibvs_qp.vision.lines.refined import RefinedLine
 from ibvs_qp.vision.surface.estimate import PlaneEstimate
 
 #: The four guides, by the side of the surface on which they lie.
@@ -26,8 +25,8 @@ class DetectedLine:
         confidence: 0..1, share of such lines that are right; 0.8 and more is sure.
         borders_plane: Whether the surface ends there.
         surface_side: +1 if the surface lies on the side the normal (cos, sin) points to, -1 on the other, 0 unknown.
-        line_id: Identity, kept from picture to picture of a followed sequence.
-        fit: The fit that it comes from, or None.
+        line_id: Identity of a track, kept from picture to picture of a followed sequence; lines without a track are
+            numbered after those of their picture.
     """
 
     pixels: np.ndarray
@@ -39,7 +38,6 @@ class DetectedLine:
     borders_plane: bool = False
     surface_side: int = 0
     line_id: int = 0
-    fit: RefinedLine | None = None
 
     @property
     def length_px(self) -> float:

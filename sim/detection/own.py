@@ -5,12 +5,11 @@ from __future__ import annotations
 import dataclasses
 import time
 
-import numpy as np
-
 from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.vision import Perception, VisionConfig
 from ibvs_qp.vision.checks import frame_problem
-from ibvs_qp.vision.lines.candidates import Candidate
+from ibvs_qp.vision.config import REFERENCE_WIDTH
+from ibvs_qp.vision.lines.candidates import SAME_EDGE_PX, Candidate, runs_along
 from ibvs_qp.vision.lines.line_state import TrackState
 from ibvs_qp.vision.perception_result import PerceptionResult
 from ibvs_qp.vision.picture.picture import denormalise
@@ -46,6 +45,9 @@ class OwnMethod:
     def follow(self, frame: RgbdFrame, seed_pixel: tuple[float, float] | None) -> Detection:
         """The same for the next picture of a motion sequence: lines keep their identity, guides do not flicker."""
         found = self._seen(frame, seed_pixel, tracked=self._follows)
+        if found.refused is not None and self._follows:  # it may still be understood alone
+            self.reset()
+            found = self._seen(frame, seed_pixel, tracked=False)
         if found.refused is not None:
             self.reset()
         self._follows = found.refused is None
@@ -61,23 +63,25 @@ class OwnMethod:
         if problem is not None:
             return Detection(refused=problem, time_ms=_since(started))
         found = self._perception.process(frame, seed_pixel=seed_pixel, detect=not tracked)
-        tracks = {track.track_id: _of_track(track, frame) for track in found.tracks}
+        tracks = {track.track_id: _of_track(track, frame) for track in found.tracks if track.seen}
         lines = list(tracks.values())
-        lines += [_of_candidate(entry) for entry in _untracked(found)]
+        lines += [_of_candidate(entry) for entry in _untracked(found, lines, max(frame.rgb.shape) / REFERENCE_WIDTH)]
         return Detection(
             plane=found.plane,
             refused=found.refused,
             candidates=tuple(sorted(_numbered(lines), key=lambda line: -line.score)),
-            guides={side: None if track is None else tracks[track.track_id] for side, track in found.guides.items()},
+            guides={side: track and tracks.get(track.track_id) for side, track in found.guides.items()},
             tracked=tracked,
             time_ms=_since(started),
         )
 
 
-def _untracked(found: PerceptionResult) -> list[Candidate]:
-    """Candidates that started no track in this picture and are none."""
-    fits = [track.segment for track in found.tracks]
-    return [entry for entry in found.candidates if not any(np.array_equal(entry.line.segment, fit) for fit in fits)]
+def _untracked(found: PerceptionResult, tracked: list[DetectedLine], scale: float) -> list[Candidate]:
+    """Candidates on edges that no track follows."""
+    limit = SAME_EDGE_PX * scale
+    return [
+        entry for entry in found.candidates if not any(runs_along(entry.pixels, line.pixels, limit) for line in tracked)
+    ]
 
 
 def _of_track(track: TrackState, frame: RgbdFrame) -> DetectedLine:

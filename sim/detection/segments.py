@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import cv2
 import numpy as np
 
@@ -16,9 +14,7 @@ _APART_PX, _GAP_SHARE = 1.5, 0.5
 _TURN = np.radians(3.0)
 
 
-def find_segments(
-    grey: np.ndarray, scale: float, wanted: Callable[[np.ndarray], np.ndarray] | None = None
-) -> np.ndarray:
+def find_segments(grey: np.ndarray, scale: float) -> np.ndarray:
     """All line segments, longest first.
 
     The detector is OpenCV's LSD (von Gioi et al., IPOL 2012): no threshold of its own needs tuning, and on real
@@ -27,7 +23,6 @@ def find_segments(
     Args:
         grey: Picture, uint8 (H, W).
         scale: Factor for lengths stated for a picture 640 wide.
-        wanted: Tells which of some pieces (n, 4) to keep, bool (n,), before they are joined; None for all.
 
     Returns:
         End points (u1, v1, u2, v2) [px], (n, 4).
@@ -35,8 +30,6 @@ def find_segments(
     found = cv2.createLineSegmentDetector().detect(np.ascontiguousarray(grey))[0]
     pieces = np.zeros((0, 4)) if found is None else np.asarray(found, float).reshape(-1, 4)
     pieces = pieces[_lengths(pieces) >= _PIECE_PX * scale]
-    if wanted is not None:
-        pieces = pieces[wanted(pieces)]
     lines = np.concatenate((pieces, _joined(pieces, scale)))
     lines = lines[_lengths(lines) >= _LISTED_PX * scale]
     return lines[np.argsort(-_lengths(lines), kind="stable")]

@@ -25,7 +25,8 @@ _FULL_LENGTH = 0.25
 
 def every_line(frame: RgbdFrame, config: LineConfig) -> tuple[DetectedLine, ...]:
     """All straight lines of a picture, longest first; needs colour and intrinsics only."""
-    picture = Picture.of(frame.rgb, np.zeros(frame.rgb.shape[:2], np.uint8), frame.intrinsics)
+    rgb = np.require(frame.rgb, np.uint8, ("C", "W"))  # the one type of the kernel
+    picture = Picture.of(rgb, np.zeros(frame.rgb.shape[:2], np.uint8), frame.intrinsics)
     segments = find_segments(cv2.cvtColor(frame.rgb, cv2.COLOR_RGB2GRAY), picture.scale)
     fits = fit_segments(segments, picture, config, SurfaceColors(None, None, config.color_gate))
     lines = []

@@ -109,6 +109,10 @@ class SurfaceColors:
         if count >= _LEAST_PAINT:
             self.paint = self._named if abs(math.log(found)) < _AS_NAMED else np.float32(found) * self._named
 
+    def forget_light(self) -> None:
+        """Forget how the light falls: its cells are those of one picture size."""
+        self.light = None
+
     def levels_at(self, u: np.ndarray, v: np.ndarray) -> np.ndarray | None:
         """Level of light at pixels, for `label`; None where the light is even."""
         return None if self.light is None else self.light.levels_at(u, v)

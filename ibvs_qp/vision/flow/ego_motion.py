@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 
 from ibvs_qp.vision.flow.camera_motion import CameraMotion
+from ibvs_qp.vision.picture.lens import camera_matrix
 from ibvs_qp.vision.picture.mask import Intrinsics
 from ibvs_qp.vision.surface.region import SurfaceRegion
 
@@ -51,13 +52,12 @@ def surface_motion(
     inverse = rays @ region.plane.inverse_depth
     kept = inverse > 1e-3
     points, stop = rays[kept] / inverse[kept, None], stop[kept]
-    camera = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
     if len(points) < _LEAST:
         return None
     solved, turn, shifted, agreeing = cv2.solvePnPRansac(
         points,
         stop,
-        camera,
+        camera_matrix(intrinsics),
         None,  # type: ignore[arg-type]
         rvec=np.zeros((3, 1)),
         tvec=np.zeros((3, 1)),

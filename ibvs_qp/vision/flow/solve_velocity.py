@@ -43,7 +43,7 @@ class FlowVelocity:
 
 
 class FlowSurface(NamedTuple):
-    """What flow asks of the working surface.
+    """The working surface, as far as flow needs it.
 
     Attributes:
         inverse_depth: (a, b, c) of 1/Z = a x + b y + c, (3,).
@@ -79,7 +79,7 @@ def inverse_depths(
     if plane is not None:
         surface = np.ascontiguousarray(plane.inverse_depth, float)
         gate = max(_ON_PLANE_SIGMAS * float(plane.residual_sigma), 0.01)
-    depth = np.ascontiguousarray(depth, np.float32)
+    depth = np.require(depth, np.float32, ("C", "W"))  # the one type of the kernel
     return point_depths(bearings, depth, np.array(intrinsics, float), surface, gate, _CROSS_PX, _READINGS)
 
 

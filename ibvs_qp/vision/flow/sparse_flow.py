@@ -78,12 +78,12 @@ class SparseFlow:
         Returns:
             The velocity, or the reason why there is none.
         """
-        result = self.follow(rgb, excluded, intrinsics, stamp_ns, rotation, camera_rotation, camera_position)
+        result = self._velocity_of(rgb, excluded, intrinsics, stamp_ns, rotation, camera_rotation, camera_position)
         surface = None if plane is None else FlowSurface(plane.inverse_depth, plane.residual_sigma)
-        self.settle(depth, excluded, intrinsics, surface, busy)
+        self._prepare_points(depth, excluded, intrinsics, surface, busy)
         return result
 
-    def follow(
+    def _velocity_of(
         self,
         rgb: np.ndarray,
         excluded: np.ndarray,
@@ -93,11 +93,11 @@ class SparseFlow:
         camera_rotation: np.ndarray,
         camera_position: np.ndarray,
     ) -> FlowVelocity | str:
-        """First half of `update`, which asks for nothing that the rest of vision finds in this picture."""
+        """First half of `update`: the velocity, from the points of the picture before."""
         config, half = self._config, half_resolution(intrinsics)
-        grey = cv2.resize(  # grey first: one channel is shrunk eight times as fast as three
-            cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY), (rgb.shape[1] // 2, rgb.shape[0] // 2), interpolation=cv2.INTER_AREA
-        )
+        rows, columns = rgb.shape[0] // 2, rgb.shape[1] // 2
+        whole = cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)  # grey first: one channel is shrunk eight times as fast as three
+        grey = cv2.resize(whole[: 2 * rows, : 2 * columns], (columns, rows), interpolation=cv2.INTER_AREA)
         interval = (stamp_ns - self._stamp_ns) * 1e-9
         result: FlowVelocity | str = "first picture"
         if self._grey is not None and grey.shape == self._grey.shape:
@@ -120,7 +120,7 @@ class SparseFlow:
         self._grey, self._stamp_ns = grey, stamp_ns
         return result
 
-    def settle(
+    def _prepare_points(
         self,
         depth: np.ndarray,
         excluded: np.ndarray,

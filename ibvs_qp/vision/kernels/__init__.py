@@ -4,6 +4,7 @@ Every kernel is one Python function with the types of its arguments. `prepare` c
 the machine code beside the source, or in the user's cache folder where the package cannot be written.
 """
 
-from ibvs_qp.vision.kernels.compile import inner, kernel, prepare
+from ibvs_qp.vision.kernels.compile import inner, kernel
+from ibvs_qp.vision.kernels.everything import prepare
 
 __all__ = ["inner", "kernel", "prepare"]

@@ -45,7 +45,7 @@ def find_admissible(
         table: Labels of all colours in every level of light, uint8.
         levels: Level of light in cells of the picture, uint8; empty where it is even.
         width: Of the picture [px].
-        demands: Answers of `ibvs_qp.vision.admissible.FITS`, uint8.
+        demands: Answers of `ibvs_qp.vision.lines.admissible.FITS`, uint8.
         side: Distance of the two sides from an edge [px].
         allowed: Filled with whether an edge may lie at a searched place, uint8 (K, n).
     """

@@ -1,11 +1,9 @@
-"""Compilation of the kernels, and the one line about it."""
+"""How a function becomes a kernel, and where its machine code is stored."""
 
 from __future__ import annotations
 
 import contextlib
 import functools
-import importlib
-import logging
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -16,8 +14,8 @@ import numba
 #: all processors give the same bits.
 _OPTIONS = {"nogil": True, "error_model": "numpy", "fastmath": False}
 
-log = logging.getLogger(__name__)
-_kernels: list[tuple[Any, str]] = []
+#: Every kernel that was imported, with its signature.
+KERNELS: list[tuple[Any, str]] = []
 
 
 def kernel(signature: str) -> Callable[[Callable[..., Any]], Any]:
@@ -29,7 +27,7 @@ def kernel(signature: str) -> Callable[[Callable[..., Any]], Any]:
 
     def decorate(function: Callable[..., Any]) -> Any:
         compiled = _cached(function)
-        _kernels.append((compiled, signature))
+        KERNELS.append((compiled, signature))
         return compiled
 
     return decorate
@@ -45,7 +43,7 @@ def _cached(function: Callable[..., Any]) -> Any:
         compiled = numba.njit(cache=True, **_OPTIONS)(function)
     except RuntimeError:  # neither the package nor the user's cache folder can be written
         return numba.njit(**_OPTIONS)(function)
-    for index in _indices(compiled):
+    for index in stored(compiled):
         with contextlib.suppress(FileNotFoundError):  # another process was faster
             if index.stat().st_mtime < _newest():
                 index.unlink()
@@ -58,18 +56,8 @@ def _newest() -> float:
     return max(file.stat().st_mtime for file in Path(__file__).parent.glob("*.py"))
 
 
-def _indices(compiled: Any) -> list[Path]:
+def stored(compiled: Any) -> list[Path]:
     """Files that list the stored machine code of a kernel."""
     folder, function = compiled.stats.cache_path, compiled.py_func
     module = function.__module__.rpartition(".")[2]
     return [] if folder is None else list(Path(folder).glob(f"{module}.{function.__name__}-*.nbi"))
-
-
-def prepare() -> None:
-    """Compile every kernel that is not yet, and say so in one line: the first time it takes up to 25 s."""
-    importlib.import_module("ibvs_qp.vision.kernels.everything")
-    if not all(compiled.signatures or _indices(compiled) for compiled, _ in _kernels):
-        log.warning("vision is compiled, once: up to 25 s")
-    for compiled, signature in _kernels:
-        if not compiled.signatures:
-            compiled.compile(signature)

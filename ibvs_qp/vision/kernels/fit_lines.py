@@ -61,8 +61,8 @@ def fit_lines(
         depth: Depth of every pixel [m], float32 (H W,); empty if it or the surface is unknown.
         table: Labels of all colours in every level of light, uint8; may be empty if no line demands any.
         levels: Level of light in cells of the picture, uint8; empty where it is even.
-        demands: Answers of `ibvs_qp.vision.admissible.FITS`, uint8.
-        queries: The lines, (L, QUERY_COLUMNS) of `line_tables`.
+        demands: Answers of `ibvs_qp.vision.lines.admissible.FITS`, uint8.
+        queries: The lines, (L, 20) of `line_tables`.
         reach: Rows searched on either side of a prediction.
         side: Distance from an edge at which its two sides are looked at [px].
         contrast_min: Least colour step of a line [grey levels].

@@ -29,7 +29,7 @@ def judge_planes(
         seed: Place of the seed among the samples.
         value: 1/Z there [1/m].
         pairs: Places of the other two samples of every plane, (2, planes).
-        judged: Places of the samples that are asked, (m,).
+        judged: Places of the samples that are judged by, (m,).
         gate: Distance within which a sample agrees, share of 1/Z.
         width: Distance from the seed at which a sample's weight is 1/e, normalised.
         span: Least area that the arms of a plane span, normalised; narrower ones are level.

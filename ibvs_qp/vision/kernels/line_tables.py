@@ -11,7 +11,6 @@ from __future__ import annotations
     BEGIN, SPAN, SLOPE, LEVEL, HEIGHT, ROW_STEP, COLUMN_STEP, SEEN_FROM, SEEN_TO, KNOWN, RED, GREEN, BLUE, POLARITY,
     KIND, BEHIND, BOARD, SURFACE_U, SURFACE_V, SURFACE,
 ) = range(20)  # fmt: skip
-QUERY_COLUMNS = 20
 
 #: A fitted line v = FIT_LEVEL + FIT_SLOPE (u - FIT_CENTER), its variances and residual [px]; the profiles that agree,
 #: those of the run that agree or could be seen, and the first and the last of the run; the colour step along +v; and

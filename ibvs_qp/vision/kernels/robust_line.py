@@ -8,11 +8,10 @@ import numpy as np
 
 from ibvs_qp.vision.kernels.compile import inner
 from ibvs_qp.vision.kernels.median import upper_median
+from ibvs_qp.vision.robust import MAD_TO_SIGMA
 
 #: Tukey's constant: 95 % efficiency on normal residuals.
 _TUKEY = 4.685
-#: Standard deviation of a normal distribution over its median absolute deviation.
-_MAD_TO_SIGMA = 1.4826
 #: Smallest residual scale [px]: below this, all residuals are rounding.
 _SCALE_MIN = 0.02
 #: Largest correlation of neighbouring residuals accounted for.
@@ -58,7 +57,7 @@ def robust_line(
         for k in range(size):
             residual[k] = v[k] - (level - slope * center) - slope * ((u[k] - middle) / half)
         if turn == 0:
-            unit = 1.0 / (_TUKEY * max(_MAD_TO_SIGMA * _middle_size(residual, used, weight), _SCALE_MIN))
+            unit = 1.0 / (_TUKEY * max(MAD_TO_SIGMA * _middle_size(residual, used, weight), _SCALE_MIN))
         for k in range(size):
             share = residual[k] * unit
             left = max(1.0 - share * share, 0.0)

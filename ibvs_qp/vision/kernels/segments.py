@@ -49,15 +49,23 @@ def _gradient(small, r, c):
 
 
 @inner
-def _gradients(small, region, stride, least, strength, gradient):
+def _columns_of(cell, cells, stride, factor, columns):
+    """First column of a cell and the one behind its last; the outer cells reach to the border, but for one pixel."""
+    first, end = (cell * stride + factor - 1) // factor, ((cell + 1) * stride + factor - 1) // factor
+    return max(first, 1), columns - 1 if cell == cells - 1 else min(end, columns - 1)
+
+
+@inner
+def _gradients(small, region, stride, factor, least, strength, gradient):
     """Gradients of at least some squared length in the wanted cells."""
     rows, columns, _ = small.shape
     for r in range(1, rows - 1):
-        row = min(r // stride, region.shape[0] - 1)
+        row = min(factor * r // stride, region.shape[0] - 1)
         for cell in range(region.shape[1]):
             if region[row, cell] == 0:
                 continue
-            for c in range(max(cell * stride, 1), min((cell + 1) * stride, columns - 1)):
+            first, end = _columns_of(cell, region.shape[1], stride, factor, columns)
+            for c in range(first, end):
                 size, right, down = _gradient(small, r, c)
                 if size > least:
                     strength[r, c] = size
@@ -85,16 +93,17 @@ def _edge_points(small, mask, factor, region, stride, threshold, points):
     rows, columns, _ = small.shape
     strength = np.zeros((rows, columns), np.int32)
     gradient = np.empty((rows, columns, 2), np.int16)
-    _gradients(small, region, stride, threshold * threshold, strength, gradient)
+    _gradients(small, region, stride, factor, threshold * threshold, strength, gradient)
     levels = np.zeros(_LEVELS, np.int64)
     places = np.empty(rows * columns, np.int32)
     count = 0
     for r in range(1, rows - 1):
-        row = min(r // stride, region.shape[0] - 1)
+        row = min(factor * r // stride, region.shape[0] - 1)
         for cell in range(region.shape[1]):
             if region[row, cell] == 0:
                 continue
-            for c in range(max(cell * stride, 1), min((cell + 1) * stride, columns - 1)):
+            first, end = _columns_of(cell, region.shape[1], stride, factor, columns)
+            for c in range(first, end):
                 if strength[r, c] == 0 or mask[factor * r, factor * c] != 0:
                     continue
                 ridge, dr, dc = _is_ridge(strength, gradient, r, c)
@@ -104,7 +113,7 @@ def _edge_points(small, mask, factor, region, stride, threshold, points):
                     levels[int(math.sqrt(strength[r, c]))] += 1
                     count += 1
     weakest, stronger = _LEVELS - 1, levels[_LEVELS - 1]
-    while weakest > 0 and stronger + levels[weakest - 1] <= _MOST:
+    while weakest > 0 and (stronger == 0 or stronger + levels[weakest - 1] <= _MOST):
         weakest -= 1
         stronger += levels[weakest]
     kept = 0
@@ -112,7 +121,7 @@ def _edge_points(small, mask, factor, region, stride, threshold, points):
         r = places[k] // columns
         c = places[k] - r * columns
         size = math.sqrt(strength[r, c])
-        if size < weakest:
+        if size < weakest or kept == _MOST:
             continue
         _, dr, dc = _is_ridge(strength, gradient, r, c)
         before, behind = math.sqrt(strength[r - dr, c - dc]), math.sqrt(strength[r + dr, c + dc])
@@ -170,7 +179,7 @@ def _peaks(points, order, first, wanted, middle, threshold, least, cosine, sine,
                 if wanted[k] == 0:
                     continue
                 votes[k, int(u * cosine[k] + v * sine[k] + reach + 0.5)] += weight
-    heights, places = np.empty(votes.size // 4, np.int64), np.empty(votes.size // 4, np.int64)
+    heights, places = np.empty(votes.size // 2, np.int64), np.empty(votes.size // 2, np.int64)
     levels, count = np.zeros(_HIGHEST + 1, np.int64), 0
     for k in range(_ANGLES):
         if wanted[k] == 0:
@@ -283,14 +292,14 @@ def find_segments(small, mask, factor, region, stride, threshold, shortest, tilt
     Args:
         small: Picture, at a lower resolution, (h, w, 3).
         mask: Non-zero where the vehicle hides the view, at full resolution, (H, W).
-        factor: Pixels of the mask per pixel of the picture.
+        factor: Pixels at full resolution per pixel of the picture.
         region: Non-zero on the cells in which segments are wanted, (rows, columns).
-        stride: Side of a cell [px].
+        stride: Side of a cell at full resolution [px].
         threshold: Least gradient, over two pixels [grey levels].
         shortest: Least length [px].
         tilt: Angle of gravity in the picture from down [rad]; NaN if it is unknown.
         within: With a tilt, segments this near to level and upright are wanted [deg].
-        segments: Receives u1, v1, u2, v2 [px] and number of points, (n, 5). The brighter side lies to the right of the
+        segments: Receives u1, v1, u2, v2 [px] and number of points, (n, 5). The brighter side lies to the left of the
             way from the first end to the second.
 
     Returns:

@@ -35,14 +35,12 @@ class Borders:
         side: +1 if the surface lies where the given normal points, -1 if on the other side, (n,).
         depth: 0..1, share of the line along which depth says that the surface ends there, (n,).
         color: 0..1, share along which colour says so, (n,).
-        beyond: Share of the surface's samples abreast of the line that lie beyond it, (n,).
         score: 0..1, all of it together with the length, (n,).
     """
 
     side: np.ndarray
     depth: np.ndarray
     color: np.ndarray
-    beyond: np.ndarray
     score: np.ndarray
 
 
@@ -102,6 +100,5 @@ def score_borders(
         side=1 - 2 * best,
         depth=evidence[each, best, 1],
         color=evidence[each, best, 2],
-        beyond=beyond[each, best],
         score=scores[each, best],
     )

@@ -21,8 +21,8 @@ from ibvs_qp.vision.surface.region import SurfaceRegion
 
 #: Shortest piece of a segment that is looked at where the surface ends before the segment does [px at 640].
 _SHORTEST_PX = 40.0
-#: Lines nearer than this are one, and a segment this near to a known line is that one [px at 640].
-_SAME_PX, _KNOWN_PX = 2.5, 8.0
+#: Lines nearer than this are on one edge, and a segment this near to a known line is that one [px at 640].
+SAME_EDGE_PX, _KNOWN_PX = 2.5, 8.0
 #: Half width of the strip in which an edge of paint is fitted, and width within which it is one edge [px at 640]; it is
 #: fitted beyond a segment by this multiple of its length.
 _PAINT_PX, _ACROSS = 6.0, 20.0
@@ -107,10 +107,11 @@ def find_candidates(
     beyond = np.repeat((FIT_BEYOND, 0.0), (len(best), len(pieces)))
     fits = fit_segments(np.vstack((segments[best], pieces)), picture, config.line, colors, beyond, contents=painted)
     if painted:
-        share = _differing(segments, colors, surface, picture)
+        share = _differing(segments, colors, picture)
         share[best] = 0.0
-        order = np.argsort(-_lengths(segments) * share, kind="stable")[: np.sum(share > _SHOWS)]
-        fits += _fit_paint(segments[order][:most], picture, config, colors)
+        order = np.argsort(-_lengths(segments) * share, kind="stable")
+        order = order[share[order] > _SHOWS][:most]
+        fits += _fit_paint(segments[order], picture, config, colors)
     lines = [fit for fit in fits if fit is not None]
     shortest = config.detect.min_length * picture.mask.shape[1]
     found = judge_lines(lines, picture, depth, surface, colors, tilt, shortest)
@@ -147,7 +148,7 @@ def _each_edge_once(lines: list[Candidate], scale: float) -> list[Candidate]:
     """The best line of every edge, best first: a longer one is more exact, unless it is much worse."""
     kept: list[Candidate] = []
     for line in sorted(lines, key=lambda entry: -entry.score):
-        limit = scale * (_PAINT_PX if line.kind == "paint" else _SAME_PX)
+        limit = scale * (_PAINT_PX if line.kind == "paint" else SAME_EDGE_PX)
         same = next((k for k, other in enumerate(kept) if _same_edge(line, other, limit)), None)
         if same is None:
             kept.append(line)
@@ -174,7 +175,7 @@ def judge_lines(
     tilt: float | None,
     shortest_px: float = 0.0,
 ) -> list[Candidate]:
-    """Tell of fitted lines what they are, with score and confidence; shorter ones are no edges of paint."""
+    """What fitted lines are, with score and confidence; shorter ones are no edges of paint."""
     if not fits:
         return []
     pixels = np.array([denormalise(fit.segment, picture.intrinsics) for fit in fits])
@@ -247,7 +248,7 @@ def _lengths(segments: np.ndarray) -> np.ndarray:
     return np.hypot(segments[:, 2] - segments[:, 0], segments[:, 3] - segments[:, 1])
 
 
-def _differing(segments: np.ndarray, colors: SurfaceColors, surface: SurfaceRegion, picture: Picture) -> np.ndarray:
+def _differing(segments: np.ndarray, colors: SurfaceColors, picture: Picture) -> np.ndarray:
     """Share of each segment (n, 4) along which one side shows the board and the other the paint, (n,)."""
     share = np.linspace(0.05, 0.95, 16)[:, None]
     places = segments[:, None, :2] + share * (segments[:, None, 2:] - segments[:, None, :2])
@@ -265,14 +266,14 @@ def _differing(segments: np.ndarray, colors: SurfaceColors, surface: SurfaceRegi
 def _covered(segment: np.ndarray, line: RefinedLine, picture: Picture) -> bool:
     """Whether a segment runs along a known line."""
     pixels = denormalise(line.segment, picture.intrinsics)
-    return _beside(segment.reshape(2, 2), pixels, _KNOWN_PX * picture.scale)
+    return runs_along(segment.reshape(2, 2), pixels, _KNOWN_PX * picture.scale)
 
 
 def _same_edge(one: Candidate, two: Candidate, limit_px: float) -> bool:
-    return _beside(one.pixels, two.pixels, limit_px)
+    return runs_along(one.pixels, two.pixels, limit_px)
 
 
-def _beside(one: np.ndarray, two: np.ndarray, limit_px: float) -> bool:
+def runs_along(one: np.ndarray, two: np.ndarray, limit_px: float) -> bool:
     """Whether two segments (2, 2) [px] run along one edge where they overlap."""
     run = two[1] - two[0]
     length = float(np.hypot(*run))

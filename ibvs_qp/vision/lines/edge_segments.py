@@ -36,7 +36,8 @@ def half_resolution(rgb: np.ndarray) -> tuple[np.ndarray, int]:
     height, width = rgb.shape[:2]
     if max(height, width) < _SMALL * REFERENCE_WIDTH:
         return rgb, 1
-    return cv2.resize(rgb, (width // 2, height // 2), interpolation=cv2.INTER_AREA), 2
+    even = rgb[: height // 2 * 2, : width // 2 * 2]  # the factor must be exact
+    return cv2.resize(even, (width // 2, height // 2), interpolation=cv2.INTER_AREA), 2
 
 
 def edge_segments(
@@ -61,7 +62,7 @@ def edge_segments(
         picture.mask,
         factor,
         np.ascontiguousarray(region).view(np.uint8),
-        max(grid.stride // factor, 1),
+        grid.stride,
         _GRADIENT,
         _SHORTEST_PX * picture.scale / factor,
         math.nan if tilt is None else tilt,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from dataclasses import dataclass
 
@@ -12,6 +13,8 @@ from ibvs_qp.vision.config import LineConfig
 from ibvs_qp.vision.lines.fits import Fits, LineFit, Profiles
 from ibvs_qp.vision.lines.query import LineView
 
+#: Signs of the covariance of (rho, theta) where rho changes its sign.
+_REVERSED = np.array([[1.0, -1.0], [-1.0, 1.0]])
 _NO_SIDES, _NO_PIXELS = np.zeros((2, 0, 3), np.uint8), np.zeros((0, 2))
 
 
@@ -45,6 +48,20 @@ class RefinedLine:
     step: np.ndarray
     sides: np.ndarray
     pixels: np.ndarray
+
+    def aligned(self, theta: float) -> RefinedLine:
+        """The same line with its normal within 90 degrees of an angle [rad]."""
+        if math.cos(self.theta - theta) >= 0.0:
+            return self
+        rho, angle = align_line(self.rho, self.theta, theta)
+        return dataclasses.replace(
+            self,
+            rho=rho,
+            theta=angle,
+            covariance=self.covariance * _REVERSED,
+            step=-self.step,
+            sides=self.sides[::-1],
+        )
 
 
 def finish_lines(

@@ -69,7 +69,9 @@ class Track:
         self.borders_plane = self.borders_plane or borders
 
     def adopt(self, line: RefinedLine) -> None:
-        """Take a fresh fit."""
+        """Take a fresh fit; its normal may point the other way."""
+        if self.step.any():
+            line = line.aligned(self.theta)
         self.line, self.rho, self.theta, self.covariance = line, line.rho, line.theta, line.covariance
         self.step = line.step if not self.step.any() else self.step + _STEP_BLEND * (line.step - self.step)
 

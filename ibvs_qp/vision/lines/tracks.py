@@ -58,6 +58,10 @@ class LineTracker:
         self.tracks: list[Track] = []
         self._next_id = 1
 
+    def lose(self) -> None:
+        """Drop all tracks; identities go on."""
+        self.tracks = []
+
     def advance(
         self,
         picture: Picture,

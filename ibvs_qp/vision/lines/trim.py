@@ -16,7 +16,7 @@ _WHOLE = 0.95
 def trimmed(segments: np.ndarray, surface: SurfaceRegion, shortest_px: float) -> np.ndarray:
     """The pieces beside the surface of those segments that reach beyond it.
 
-    The eye that finds segments joins an edge of the surface and a joint of the wall that prolongs it a pixel or two
+    The search for segments joins an edge of the surface and a joint of the wall that prolongs it a pixel or two
     aside; a fit to both is wrong by a part of that.
 
     Args:

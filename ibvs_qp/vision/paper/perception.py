@@ -28,9 +28,9 @@ TOPMOST_TRACK, FIRST_TRACK = 1, 2
 class PaperPerception:
     """Topmost level line, first upright line, surface and flow velocity of every picture.
 
-    No line is followed from picture to picture and none is expected: hints go unheard, and the two identities belong
-    to whatever is topmost or first. The search for the surface begins at the middle of the last box (the paper), or
-    beside the brush where that place is hidden or nothing was found. Velocity is that of the own sparse flow, since
+    No line is followed from picture to picture and none is expected: hints have no effect, and the two identities
+    belong to whatever is topmost or first. The search for the surface begins at the middle of the last box (the paper),
+    or beside the brush where that place is hidden or nothing was found. Velocity is that of the own sparse flow, since
     the paper only says that it takes one.
 
     Args:
@@ -143,7 +143,7 @@ class PaperPerception:
         return found
 
     def _track(self, track_id: int, chosen: Candidate | None) -> Track | None:
-        """The chosen line as a track of full weight: it is believed as it is, from the first picture on."""
+        """The chosen line as a track of full weight: it counts from the first picture on."""
         self._age[track_id] = 0 if chosen is None else self._age[track_id] + 1
         if chosen is None:
             return None

@@ -92,7 +92,7 @@ class CoarseGrid:
     def windows(self, cells: list[tuple[int, int]], radius: int) -> np.ndarray:
         """Flat places of the windows around cells, those beyond the border moved to it, (n, (2 radius + 1)^2).
 
-        Not to be written: the same cells are asked for again and again.
+        Not to be written: the cells are kept for the next call.
         """
         return self._windows(tuple(cells), radius)
 

@@ -1,4 +1,4 @@
-"""One frame as the line code wants it: colour, mask and camera, with a transposed view for upright lines."""
+"""One frame for the search and fit of lines: colour, mask and camera, with a transposed view for upright lines."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Picture:
         depth: np.ndarray | None = None,
         plane: np.ndarray | None = None,
     ) -> Picture:
-        """Wrap a picture, its scale taken from its width."""
+        """Wrap a picture, its scale taken from its longer side."""
         height, width = mask.shape
         return cls(
             rgb=np.ascontiguousarray(rgb),

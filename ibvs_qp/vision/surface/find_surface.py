@@ -125,17 +125,17 @@ def followed_region(
     config: PlaneConfig,
     plane: PlaneEstimate,
     colors: SurfaceColors,
-    before: SurfaceRegion | None,
+    before: SurfaceRegion,
 ) -> SurfaceRegion:
-    """The samples of a surface whose plane, on this grid, and colour are known; ``before`` is the region so far."""
-    assert colors.board is not None
+    """The samples of a surface whose plane, on this grid, is known; ``before`` is the region so far."""
     coarse = grid.sample(frame.rgb)
     inverse = grid.inverse_depth(frame.depth, config.distance_min_m, config.distance_max_m)
     cells = samples_on(grid, inverse, plane, middle_cell(plane.component))
-    labels = colors.label(coarse, colors.levels_at(*grid.pixels))
-    return _region(
-        grid, coarse, plane, cells, colors.board, colors, labels, inverse, before is not None and before.by_color
-    )
+    if colors.board is None:
+        color, labels = before.color, colors.like(coarse, before.color)
+    else:
+        color, labels = colors.board, colors.label(coarse, colors.levels_at(*grid.pixels))
+    return _region(grid, coarse, plane, cells, color, colors, labels, inverse, before.by_color)
 
 
 def _region(

@@ -22,7 +22,7 @@ class SurfaceTracker:
 
     Args:
         config: Settings of the plane.
-        colors: What board and paint look like; the searches for lines teach it.
+        colors: What board and paint look like; learned at every search for lines.
 
     Attributes:
         plane: In the last picture, None if it is unknown.
@@ -92,9 +92,9 @@ class SurfaceTracker:
         plane = self._whole(self.plane, frame, layout, coarse, down)
         self._colors.learn(coarse, plane.component)
         plane = self._in_its_light(plane, frame, layout, coarse, down)
-        if (region is None or region.plane is not plane) and self._colors.board is not None:
+        assert region is not None  # every plane began with a region
+        if region.plane is not plane:
             region = followed_region(frame, layout.grid, self._config, plane, self._colors, region)
-        assert region is not None
         self.region = region
         return region
 

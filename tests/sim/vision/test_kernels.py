@@ -16,7 +16,7 @@ from sim.bench.mission import mission_shots
 def test_no_picture_waits_for_a_compiler() -> None:
     """An argument of another type (an integer, a picture that must not be written) would compile a kernel in flight."""
     prepare()
-    assert all(len(kernel.signatures) == 1 for kernel, _ in compiling._kernels)
+    assert all(len(kernel.signatures) == 1 for kernel, _ in compiling.KERNELS)
     vehicle = VehicleParams()
     follows, searches = (Perception(VisionConfig(paint_color=(40, 90, 200)), vehicle) for _ in range(2))
     alone = Perception(VisionConfig(), None)
@@ -27,5 +27,5 @@ def test_no_picture_waits_for_a_compiler() -> None:
         searches.reset()
         searches.process(shot.frame, attitude=shot.attitude, detect=True)
         alone.process(shot.frame, seed_pixel=(100.0, 60.0), velocity=np.zeros(3))
-    compiled = {kernel.py_func.__name__: len(kernel.signatures) for kernel, _ in compiling._kernels}
+    compiled = {kernel.py_func.__name__: len(kernel.signatures) for kernel, _ in compiling.KERNELS}
     assert set(compiled.values()) == {1}, compiled
