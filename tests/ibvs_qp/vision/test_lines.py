@@ -101,7 +101,10 @@ def test_an_edge_that_the_brush_half_hides_is_as_certain_as_what_is_seen_of_it()
     assert len(seen.features.lines) == 2
 
 
-@pytest.mark.parametrize("size", [(480, 640), (480, 848), (480, 720), (768, 1024), (1080, 1920), (481, 641), (1536, 2048)])
+SIZES = [(480, 640), (480, 848), (480, 720), (768, 1024), (1080, 1920), (481, 641), (1536, 2048)]
+
+
+@pytest.mark.parametrize("size", SIZES)
 def test_all_four_edges_are_found_in_pictures_of_any_size(size: tuple[int, int]) -> None:
     """The cells of the coarse grid have 8, 11, 9, 13, 24 and 26 pixels, the searched picture has half of them."""
     random, (height, width) = np.random.default_rng(6), size
