@@ -45,7 +45,8 @@ class Perception:
 
     Args:
         config: Settings.
-        vehicle: Geometry of the vehicle in the picture; None for a camera alone, whose surface is named by a seed.
+        vehicle: Geometry of the vehicle in the picture; None for a camera alone, not in
+            flight, whose surface is named by a seed.
     """
 
     def __init__(self, config: VisionConfig, vehicle: VehicleParams | None) -> None:

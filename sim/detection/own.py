@@ -9,7 +9,7 @@ from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.vision import Perception, VisionConfig
 from ibvs_qp.vision.checks import frame_problem
 from ibvs_qp.vision.config import REFERENCE_WIDTH
-from ibvs_qp.vision.lines.candidates import SAME_EDGE_PX, Candidate, runs_along
+from ibvs_qp.vision.lines.candidates import Candidate, on_same_edge
 from ibvs_qp.vision.lines.line_state import TrackState
 from ibvs_qp.vision.perception_result import PerceptionResult
 from ibvs_qp.vision.picture.picture import denormalise
@@ -78,10 +78,8 @@ class OwnMethod:
 
 def _untracked(found: PerceptionResult, tracked: list[DetectedLine], scale: float) -> list[Candidate]:
     """Candidates on edges that no track follows."""
-    limit = SAME_EDGE_PX * scale
-    return [
-        entry for entry in found.candidates if not any(runs_along(entry.pixels, line.pixels, limit) for line in tracked)
-    ]
+    taken = [line.pixels for line in tracked]
+    return [entry for entry in found.candidates if not any(on_same_edge(entry, pixels, scale) for pixels in taken)]
 
 
 def _of_track(track: TrackState, frame: RgbdFrame) -> DetectedLine:

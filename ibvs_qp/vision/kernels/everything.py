@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 
-from ibvs_qp.vision.kernels import (
+from ibvs_qp.vision.kernels import (  # noqa: F401  importing them fills `KERNELS`
     borders,
     colors,
     fit_lines,
@@ -18,11 +18,6 @@ from ibvs_qp.vision.kernels import (
     segments,
 )
 from ibvs_qp.vision.kernels.compile import KERNELS, stored
-
-#: Modules of kernels; importing them fills `KERNELS`.
-MODULES = (
-    borders, colors, fit_lines, flow, flow_points, hypotheses, labels, plane, registration, samples, segments,
-)  # fmt: skip
 
 log = logging.getLogger(__name__)
 

@@ -22,7 +22,7 @@ from ibvs_qp.vision.surface.region import SurfaceRegion
 #: Shortest piece of a segment that is looked at where the surface ends before the segment does [px at 640].
 _SHORTEST_PX = 40.0
 #: Lines nearer than this are on one edge, and a segment this near to a known line is that one [px at 640].
-SAME_EDGE_PX, _KNOWN_PX = 2.5, 8.0
+_SAME_PX, _KNOWN_PX = 2.5, 8.0
 #: Half width of the strip in which an edge of paint is fitted, and width within which it is one edge [px at 640]; it is
 #: fitted beyond a segment by this multiple of its length.
 _PAINT_PX, _ACROSS = 6.0, 20.0
@@ -148,8 +148,7 @@ def _each_edge_once(lines: list[Candidate], scale: float) -> list[Candidate]:
     """The best line of every edge, best first: a longer one is more exact, unless it is much worse."""
     kept: list[Candidate] = []
     for line in sorted(lines, key=lambda entry: -entry.score):
-        limit = scale * (_PAINT_PX if line.kind == "paint" else SAME_EDGE_PX)
-        same = next((k for k, other in enumerate(kept) if _same_edge(line, other, limit)), None)
+        same = next((k for k, other in enumerate(kept) if on_same_edge(line, other.pixels, scale)), None)
         if same is None:
             kept.append(line)
         elif line.kind == kept[same].kind and _adds(line, kept[same]):
@@ -266,14 +265,15 @@ def _differing(segments: np.ndarray, colors: SurfaceColors, picture: Picture) ->
 def _covered(segment: np.ndarray, line: RefinedLine, picture: Picture) -> bool:
     """Whether a segment runs along a known line."""
     pixels = denormalise(line.segment, picture.intrinsics)
-    return runs_along(segment.reshape(2, 2), pixels, _KNOWN_PX * picture.scale)
+    return _beside(segment.reshape(2, 2), pixels, _KNOWN_PX * picture.scale)
 
 
-def _same_edge(one: Candidate, two: Candidate, limit_px: float) -> bool:
-    return runs_along(one.pixels, two.pixels, limit_px)
+def on_same_edge(line: Candidate, segment: np.ndarray, scale: float) -> bool:
+    """Whether a line and a segment (2, 2) [px] are on one edge, in a picture of a scale."""
+    return _beside(line.pixels, segment, scale * (_PAINT_PX if line.kind == "paint" else _SAME_PX))
 
 
-def runs_along(one: np.ndarray, two: np.ndarray, limit_px: float) -> bool:
+def _beside(one: np.ndarray, two: np.ndarray, limit_px: float) -> bool:
     """Whether two segments (2, 2) [px] run along one edge where they overlap."""
     run = two[1] - two[0]
     length = float(np.hypot(*run))

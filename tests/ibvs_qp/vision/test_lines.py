@@ -16,6 +16,7 @@ from ibvs_qp.vision.config import LineConfig
 from ibvs_qp.vision.lines.query import LineQuery
 from ibvs_qp.vision.lines.refine_lines import refine_lines
 from ibvs_qp.vision.lines.track import Track
+from ibvs_qp.vision.lines.tracks import LineTracker
 from ibvs_qp.vision.picture.picture import Picture
 
 FOCAL, SIZE = 600.0, (480, 640)
@@ -145,10 +146,17 @@ def test_a_line_fitted_with_the_other_normal_leaves_a_track_as_it_is() -> None:
     assert track.step.tolist() == pytest.approx(before[2]) and track.covariance.tolist() == before[3]
 
 
-def test_light_is_forgotten_with_the_size_of_the_picture_and_identities_go_on() -> None:
+def test_light_is_forgotten_with_the_size_of_the_picture_and_identities_go_on(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its cells would be read out of bounds; an identity means one line."""
     perception, stamp = Perception(VisionConfig(board_color=BOARD), None), 0
-    seen = []
+    seen, widths = [], []
+
+    def hints(self: LineTracker, hints: object, picture: Picture, *more: object) -> None:
+        """The first search after a change: what the light's cells are then."""
+        light = perception._colors.light
+        widths.append((picture.mask.shape[1], None if light is None else 16 * light.levels.shape[1]))
+
+    monkeypatch.setattr(LineTracker, "hints", hints)
     for half in (False,) * 3 + (True,) * 7 + (False,) * 7:
         stamp += 33_000_000
         frame = shaded(stamp)
@@ -161,10 +169,9 @@ def test_light_is_forgotten_with_the_size_of_the_picture_and_identities_go_on() 
             )
         width = frame.rgb.shape[1]
         seen.append(perception.process(frame, seed_pixel=(0.5 * width, 0.4 * width)))
-        light = None if seen[-1].refused else perception._colors.light
-        assert light is None or light.levels.shape[1] == -(-width // 16)
     of_size = [{track.track_id for track in found.tracks} for found in (seen[2], seen[9], seen[16])]
     assert all(of_size)
+    assert {(640, 640), (320, 320)} <= set(widths) and all(light in (None, width) for width, light in widths)
     assert not of_size[0] & of_size[1] and not (of_size[0] | of_size[1]) & of_size[2]
 
 

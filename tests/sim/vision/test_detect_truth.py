@@ -115,6 +115,10 @@ def test_following_keeps_identities_and_stays_right() -> None:
             middle, angle, ends = line_errors(edge, guide.rho, guide.theta, truth.frame.intrinsics)
             assert middle < 0.5 and angle < 1.0 and ends < 2.0
             assert identities.setdefault(side, guide.line_id) == guide.line_id
+            found = [line_errors(edge, line.rho, line.theta, truth.frame.intrinsics) for line in result.candidates]
+            assert sum(ends < 2.0 for _, _, ends in found) == 1, "an edge is listed once"
+    other = render_frame(sample_scene(FAMILIES["small picture"], 3))
+    assert method.follow(other.frame, other.seed).refused is None, "another camera's picture is understood alone"
     assert len(set(identities.values())) == len(identities)
 
 
