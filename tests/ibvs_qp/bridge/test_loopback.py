@@ -7,11 +7,14 @@ from pathlib import Path
 import dds_loopback
 import pytest
 
+from ibvs_qp.bridge.config import BridgeConfig
+from ibvs_qp.config.safety import SafetySettings
+
 pytest.importorskip("rosbags", reason="needs the extra ros")
 
 pytestmark = pytest.mark.timeout(180)
-#: Tick [Hz], and what may be late [ms].
-RATE, LATE_MS = 250.0, 20.0
+#: Tick [Hz]; oldest inertial data that a command may answer and longest silence of the link [ms].
+RATE, LATE_MS, SILENT_MS = 250.0, 1e3 * SafetySettings().imu_age_s, 1e3 * BridgeConfig().link_timeout_s
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -30,7 +33,7 @@ def test_flies_in_time_through_garbage(tmp_path: Path, domain: int) -> None:
     assert seen["offboard"] and seen["early"] == 0 and seen["failsafe_s"] is None
     assert seen["commands"] >= 0.9 * RATE * 3.0
     assert seen["age_ms"][1] <= LATE_MS  # 99 %: other tests run beside this one
-    assert seen["alive_gap_ms"][2] <= 300.0  # COM_OF_LOSS_T; PX4 needs 2 Hz
+    assert seen["alive_gap_ms"][-1] <= 300.0  # COM_OF_LOSS_T; PX4 needs 2 Hz
     assert seen["moved_m"][0] > 0.05  # it approaches the wall: closed loop
     assert min(flown.garbage.values()) > 1000
     kinds = {reason.split(":")[0] for reason in flown.ignored}
@@ -70,6 +73,8 @@ def test_a_minute_at_full_rate_through_a_hundred_thousand_packets(tmp_path: Path
     seen = flown.seen
     print(seen, flown.garbage, flown.ignored)
     assert seen["commands"] >= 0.99 * RATE * 60.0
-    assert seen["age_ms"][2] <= LATE_MS and seen["gap_ms"][2] <= LATE_MS
+    # Other tests run beside this one: what may be late is one command in a thousand, and never for as long as the link
+    # may be silent. benchmarks/bridge.py shows the oldest command of an otherwise idle computer.
+    assert seen["age_ms"][2] <= LATE_MS and seen["age_ms"][-1] <= SILENT_MS
     assert sum(flown.garbage.values()) == 100_000 and seen["failsafe_s"] is None
     assert abs(seen["moved_m"][1]) < 0.5 and seen["distance_m"] > 0.3  # both rows painted, and away from the wall
