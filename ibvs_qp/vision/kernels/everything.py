@@ -6,6 +6,7 @@ import logging
 
 from ibvs_qp.vision.kernels import (  # noqa: F401  importing them fills `KERNELS`
     borders,
+    brightness,
     colors,
     fit_lines,
     flow,

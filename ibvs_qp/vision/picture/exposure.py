@@ -7,6 +7,8 @@ import math
 import cv2
 import numpy as np
 
+from ibvs_qp.vision.kernels.brightness import brightness_ratio
+
 #: Brightness of two pictures is compared at every so many pixels, below this grey value: saturated ones do not change.
 _COMPARED, _UNSATURATED = 16, 250
 #: A relative change of brightness from picture to picture below this one is no step: motion and noise look like it [-].
@@ -43,17 +45,8 @@ class ExposureSteps:
         if last is None or last.shape != small.shape or not 0.0 < interval <= _LONGEST_GAP:
             self.gain = 1.0
             return rgb
-        ratio = _ratio(last, small)
+        ratio = brightness_ratio(last, small, _UNSATURATED)
         if abs(ratio - 1.0) > _STEP:
             self.gain *= ratio
         self.gain **= math.exp(-interval / _FADE_S)
         return rgb if abs(self.gain - 1.0) <= _STEP else cv2.convertScaleAbs(rgb, alpha=1.0 / self.gain)
-
-
-def _ratio(last: np.ndarray, now: np.ndarray) -> float:
-    """Brightness of a picture over that of the last one: the median, so that what moves does not count."""
-    unsaturated = (last.max(axis=2) < _UNSATURATED) & (now.max(axis=2) < _UNSATURATED)
-    if unsaturated.sum() < 0.05 * unsaturated.size:
-        return 1.0
-    before, after = last[unsaturated].sum(axis=1), now[unsaturated].sum(axis=1)
-    return float(np.median((after + 1.0) / (before + 1.0)))
