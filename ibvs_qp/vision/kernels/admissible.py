@@ -20,7 +20,8 @@ _ANY, _BORDER = 0, 2
 
 @inner
 def find_admissible(
-    query: np.ndarray,
+    view: np.ndarray,
+    kind: int,
     u: np.ndarray,
     base: np.ndarray,
     colors: np.ndarray,
@@ -36,7 +37,8 @@ def find_admissible(
     """Judge by hidden pixels, and by colour and depth on both sides, at which places an edge of a line may lie.
 
     Args:
-        query: The line, a row of `line_tables`.
+        view: The line in its view, a row of `line_tables`.
+        kind: What it demands of its sides.
         u: Columns of the profiles [px], (K,).
         base: Predicted rows in whole pixels, (K,).
         colors: RGB of the strip's pixels, uint8 (K, 3 M).
@@ -49,10 +51,10 @@ def find_admissible(
         side: Distance of the two sides from an edge [px].
         allowed: Filled with whether an edge may lie at a searched place, uint8 (K, n).
     """
-    pixels, kind = hidden.shape[1], int(query[t.KIND])
-    row_step, column_step, lowest = int(query[t.ROW_STEP]), int(query[t.COLUMN_STEP]), int(query[t.HEIGHT]) - 1
-    key = _KIND_STEP * kind + _SIDE_STEP * int(query[t.BEHIND])
-    gate_before, gate_behind = (_OFF_FAR, _OFF_NEAR) if query[t.BEHIND] != 0.0 else (_OFF_NEAR, _OFF_FAR)
+    pixels, row_step, column_step = hidden.shape[1], int(view[t.VIEW_ROW_STEP]), int(view[t.VIEW_COLUMN_STEP])
+    lowest, behind = int(view[t.VIEW_HEIGHT]) - 1, view[t.VIEW_BEHIND] != 0.0
+    key = _KIND_STEP * kind + _SIDE_STEP * int(behind)
+    gate_before, gate_behind = (_OFF_FAR, _OFF_NEAR) if behind else (_OFF_NEAR, _OFF_FAR)
     label, away = np.zeros(pixels, np.int64), np.zeros(pixels)  # of the pixels of a profile
     for k in range(len(u)):
         if kind != _ANY:
@@ -62,11 +64,11 @@ def find_admissible(
                 red, green, blue = colors[k, 3 * i], colors[k, 3 * i + 1], colors[k, 3 * i + 2]
                 label[i] = label_of(table, light, np.int64(red), np.int64(green), np.int64(blue))
         if kind == _BORDER and depth.size:
-            along = u[k] * query[t.SURFACE_U]
+            along = u[k] * view[t.VIEW_U]
             for i in range(pixels):
                 v = base[k] - pixels // 2 + i
                 at = row_step * clamped(v, 0, lowest) + column_step * int(u[k])
-                relative = depth[at] * (along + v * query[t.SURFACE_V] + query[t.SURFACE])
+                relative = depth[at] * (along + v * view[t.VIEW_V] + view[t.VIEW_ONE])
                 away[i] = abs(relative - 1.0) if relative > 0.0 else 0.0  # no reading: not known to be off
         for i in range(allowed.shape[1]):
             j = i + 2 * side

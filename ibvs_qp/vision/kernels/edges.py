@@ -17,7 +17,7 @@ _ENOUGH = 0.5
 
 @inner
 def find_edges(
-    query: np.ndarray,
+    view: np.ndarray,
     u: np.ndarray,
     base: np.ndarray,
     colors: np.ndarray,
@@ -34,7 +34,7 @@ def find_edges(
     """Sub-pixel row of every profile's strongest answer, and whether it may be an edge of the line.
 
     Args:
-        query: The line, a row of `line_tables`.
+        view: The line in its view, a row of `line_tables`.
         u: Columns of the profiles [px], (K,).
         base: Predicted rows in whole pixels, (K,).
         colors: RGB of the strip's pixels, uint8 (K, 3 M).
@@ -65,7 +65,7 @@ def find_edges(
         good[k] = inside and peak > limit and allowed[k, index] != 0
         row[k] = base[k] + place
         found += good[k]
-        expected += visible[k] != 0 and query[t.SEEN_FROM] <= u[k] <= query[t.SEEN_TO]
+        expected += visible[k] != 0 and view[t.VIEW_SEEN_FROM] <= u[k] <= view[t.VIEW_SEEN_TO]
     return found >= _ENOUGH * expected
 
 

@@ -52,20 +52,40 @@ def step_across(
 
 
 @inner
-def copy_sides(
+def copy_contents(
+    view: np.ndarray,
+    fit: np.ndarray,
     colors: np.ndarray,
     u: np.ndarray,
     base: np.ndarray,
-    at_zero: float,
-    slope: float,
+    support: np.ndarray,
     reach: int,
     side: int,
     sides: np.ndarray,
-    line: int,
+    pixels: np.ndarray,
 ) -> None:
-    """Fill `sides` (2, L, K, 3) with the colours before and behind the fitted line v = at_zero + slope u itself."""
+    """Colours on both sides of a fitted line at its supporting profiles, and the places of these.
+
+    Args:
+        view: The line's view, a row of `line_tables`.
+        fit: The fit, a row of `line_tables`.
+        colors: RGB of the strip's pixels, uint8 (K, 3 M).
+        u: Columns of the profiles [px], (K,).
+        base: Predicted rows in whole pixels, (K,).
+        support: Profiles that agree, uint8 (K,).
+        reach: Rows searched on either side of the prediction.
+        side: Distance of the two sides from the edge [px].
+        sides: Its first places are filled with the colours before and behind along the normal, uint8 (2, N, 3).
+        pixels: Its first places are filled with the places on the line [px], (N, 2).
+    """
+    count, upright, behind = 0, int(view[t.VIEW_UPRIGHT]), 1 if view[t.VIEW_SIGN] > 0.0 else 0
     for k in range(len(u)):
-        index = _index_of(at_zero + slope * u[k], base[k], reach, side)
+        if not support[k]:
+            continue
+        v = fit[t.FIT_LEVEL] + fit[t.FIT_SLOPE] * (u[k] - fit[t.FIT_CENTER])
+        pixels[count, upright], pixels[count, 1 - upright] = u[k], v
+        index = _index_of(v, base[k], reach, side)
         for c in range(3):
-            sides[0, line, k, c] = colors[k, 3 * (index - side) + c]
-            sides[1, line, k, c] = colors[k, 3 * (index + side) + c]
+            sides[1 - behind, count, c] = colors[k, 3 * (index - side) + c]
+            sides[behind, count, c] = colors[k, 3 * (index + side) + c]
+        count += 1

@@ -14,7 +14,7 @@ from ibvs_qp.vision.kernels.compile import inner
 def gather(
     rgb: np.ndarray,
     mask: np.ndarray,
-    query: np.ndarray,
+    view: np.ndarray,
     far: int,
     u: np.ndarray,
     predicted: np.ndarray,
@@ -28,7 +28,7 @@ def gather(
     Args:
         rgb: Picture, uint8 (H, W, 3).
         mask: Non-zero where the vehicle hides the view, uint8 (H, W).
-        query: The line, a row of `line_tables`.
+        view: The line in its view, a row of `line_tables`.
         far: Pixels of a profile on either side of its middle, reach + side.
         u: Filled with the columns of the profiles [px], (K,).
         predicted: Filled with the predicted rows [px], (K,).
@@ -37,11 +37,11 @@ def gather(
         hidden: Filled with non-zero where a pixel is hidden or outside the picture, uint8 (K, M).
         visible: Filled with whether the middle of a profile is neither hidden nor outside, uint8 (K,).
     """
-    height, upright = int(query[t.HEIGHT]), query[t.COLUMN_STEP] != 1.0
-    share = 1.0 / (len(u) - 1)
+    height, upright = int(view[t.VIEW_HEIGHT]), view[t.VIEW_UPRIGHT] != 0.0
+    begin, span, share = view[t.VIEW_FIRST] + 0.5, view[t.VIEW_LAST] - view[t.VIEW_FIRST], 1.0 / (len(u) - 1)
     for k in range(len(u)):
-        column = math.floor(query[t.BEGIN] + query[t.SPAN] * (k * share))
-        row = query[t.SLOPE] * column + query[t.LEVEL]
+        column = math.floor(begin + span * (k * share))
+        row = view[t.VIEW_SLOPE] * column + view[t.VIEW_LEVEL]
         middle = clamped(np.rint(row), -2 * far, height + 2 * far)
         u[k], predicted[k], base[k] = column, row, middle
         along, first = int(column), middle - far

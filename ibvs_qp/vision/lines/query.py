@@ -1,4 +1,4 @@
-"""What to look for: a predicted line with what is known of it, and the view in which it is level."""
+"""What to look for: a predicted line with what is known of it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ibvs_qp.vision.picture.picture import Picture, pixel_line
+from ibvs_qp.vision.appearance.colors import SurfaceColors
+from ibvs_qp.vision.lines.admissible import kind_of
+
+_ANYWHERE, _NO_STEP = (-math.inf, math.inf), (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,75 +37,17 @@ class LineQuery:
     kind: str = ""
     surface_side: int = 0
 
-
-@dataclass(frozen=True)
-class LineView:
-    """A predicted line in the (possibly transposed) view in which it is level: p u + q v + r = 0.
-
-    Attributes:
-        query: What is looked for.
-        view: The picture, transposed for upright lines.
-        upright: Whether the view is transposed.
-        sign: +1 if the line's normal points along +v of the view, -1 if along -v.
-        coefficients: (p, q, r) in pixels of the view.
-        columns: Columns asked for; may reach out of the picture.
-        first: First column looked at.
-        last: Last column looked at.
-    """
-
-    query: LineQuery
-    view: Picture
-    upright: bool
-    sign: int
-    coefficients: tuple[float, float, float]
-    columns: tuple[float, float]
-    first: float
-    last: float
-
-    @classmethod
-    def of(cls, picture: Picture, query: LineQuery) -> LineView:
-        """Place a line in its view."""
-        upright = abs(math.cos(query.theta)) > abs(math.sin(query.theta))
-        view = picture.transposed if upright else picture
-        angle = 0.5 * math.pi - query.theta if upright else query.theta
-        sign = 1 if math.sin(angle) > 0.0 else -1
-        columns = (0.0, view.width - 1.0)
-        if query.span is not None:
-            fx, _, cx, _ = view.intrinsics
-            columns = (fx * query.span[0] + cx, fx * query.span[1] + cx)
-        coefficients = pixel_line(query.rho, angle, view.intrinsics)
-        first, last = max(columns[0], 0.0), min(columns[1], view.width - 1.0)
-        return cls(
-            query=query,
-            view=view,
-            upright=upright,
-            sign=sign,
-            coefficients=coefficients,
-            columns=columns,
-            first=first,
-            last=last,
+    def row(self, colors: SurfaceColors) -> tuple[float, ...]:
+        """The query as a row of `ibvs_qp.vision.kernels.line_tables`."""
+        return (
+            self.rho,
+            self.theta,
+            *(self.span or _ANYWHERE),
+            *(self.extent or _ANYWHERE),
+            self.step is not None,
+            *(_NO_STEP if self.step is None else self.step.tolist()),
+            self.polarity,
+            kind_of(self.kind, self.surface_side, colors),
+            self.surface_side,
+            self.kind == "board",
         )
-
-    @property
-    def extent(self) -> tuple[float, float]:
-        """Columns between which it is known to lie; all of the view if nothing is known."""
-        if self.query.extent is None:
-            return 0.0, self.view.width - 1.0
-        fx, _, cx, _ = self.view.intrinsics
-        return fx * self.query.extent[0] + cx, fx * self.query.extent[1] + cx
-
-    @property
-    def slope_level(self) -> tuple[float, float]:
-        """Slope and level of the line v = slope u + level [px]."""
-        p, q, r = self.coefficients
-        return -p / q, -r / q
-
-    @property
-    def surface(self) -> tuple[float, float, float]:
-        """(p, q, r) of the surface over pixels of the view, 1/Z = p u + q v + r; zero if it is unknown."""
-        return self.view.surface
-
-    @property
-    def side(self) -> int:
-        """Side of the surface along +v of the view: +1, -1 or 0 if unknown."""
-        return self.sign * self.query.surface_side

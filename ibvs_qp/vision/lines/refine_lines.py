@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from ibvs_qp.vision.appearance.colors import SurfaceColors
 from ibvs_qp.vision.config import LineConfig
-from ibvs_qp.vision.lines.fit_lines import fit_lines
-from ibvs_qp.vision.lines.query import LineQuery, LineView
-from ibvs_qp.vision.lines.refined import RefinedLine, finish_lines
+from ibvs_qp.vision.kernels import line_tables as t
+from ibvs_qp.vision.kernels.fit_lines import fit_lines
+from ibvs_qp.vision.lines.admissible import FITS
+from ibvs_qp.vision.lines.query import LineQuery
+from ibvs_qp.vision.lines.refined import RefinedLine
 from ibvs_qp.vision.picture.picture import Picture
+
+#: Distance from the edge at which its two sides are looked at [px at 640]: beyond blur, within a 10 mm margin.
+_SIDE_PX = 4.0
+_NO_LABELS, _NO_DEPTH = np.empty(0, np.uint8), np.empty(0, np.float32)
 
 
 def refine_lines(
@@ -32,12 +40,35 @@ def refine_lines(
     Returns:
         For every query its line, or None when nothing there supports it.
     """
-    found: list[RefinedLine | None] = [None] * len(queries)
-    views = [LineView.of(picture, query) for query in queries]
-    used = [k for k, view in enumerate(views) if view.last - view.first >= config.profiles // 8]
-    if not used:
-        return found
-    fitted = fit_lines(picture, [views[k] for k in used], max(2, round(half_width_px)), config, colors, contents)
-    for k, line in zip(used, finish_lines(*fitted, config), strict=True):
-        found[k] = line
-    return found
+    if not queries:
+        return []
+    lines, kept = np.empty((len(queries), t.LINE_COLUMNS)), len(queries) if contents else 0
+    sides, pixels = np.empty((kept, 2, config.profiles, 3), np.uint8), np.empty((kept, config.profiles, 2))
+    plane = (0.0, 0.0, 0.0) if picture.plane is None else picture.plane
+    fit_lines(
+        picture.rgb,
+        picture.mask,
+        _NO_DEPTH if picture.depth is None or picture.plane is None else picture.depth,
+        _NO_LABELS if colors.board is None else colors.table(),
+        _NO_LABELS if colors.levels is None else colors.levels.reshape(-1),
+        FITS,
+        np.array((*picture.intrinsics, *plane)),
+        np.array([query.row(colors) for query in queries], float),
+        max(2, round(half_width_px)),
+        max(2, round(_SIDE_PX * picture.scale)),
+        config.contrast_min,
+        config.inlier_px * picture.scale,
+        config.bridge_px * picture.scale,
+        config.profiles,
+        config.min_profiles,
+        config.bias_px * picture.scale,
+        lines,
+        sides,
+        pixels,
+    )
+    return [
+        None
+        if row[t.ALIVE] == 0.0 or abs(row[t.LINE_RHO]) > config.rho_max
+        else RefinedLine.of(row, sides[k] if contents else None, pixels[k] if contents else None)
+        for k, row in enumerate(lines)
+    ]
