@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 
 from ibvs_qp.vision.kernels import (  # noqa: F401  importing them fills `KERNELS`
+    beside,
     borders,
     brightness,
     colors,

@@ -11,6 +11,7 @@ import numpy as np
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL
 from ibvs_qp.vision.appearance.colors import BOARD, PAINT, SurfaceColors
 from ibvs_qp.vision.config import VisionConfig
+from ibvs_qp.vision.kernels.beside import labels_beside
 from ibvs_qp.vision.lines.borders import PLACES, Borders, score_borders
 from ibvs_qp.vision.lines.confidence import line_confidence
 from ibvs_qp.vision.lines.edge_segments import FIT_BEYOND, edge_segments, fit_segments
@@ -36,8 +37,11 @@ _HOPELESS = 0.05
 _PAINT_CONFIDENCE = 0.9
 #: Share of a line along which a side must show a colour, and along which depth rules out an edge of paint.
 _SHOWS, _DEPTH_STEP = 0.6, 0.5
-#: Distance from a line at which its two sides are read for a first look [px at 640].
-_BESIDE_PX = 4.0
+#: Distance from a line at which its two sides are read for a first look [px at 640], places along it at which they are,
+#: and the share left out at either end.
+_BESIDE_PX, _PLACES, _MARGIN = 4.0, 16, 0.05
+#: Levels of even light.
+_EVEN = np.empty(0, np.uint8)
 #: Samples this far apart are near each other: two cells.
 _NEAR_CELLS = np.ones((5, 5), np.uint8)
 #: Length that earns the full score of an edge of paint, share of the picture's width.
@@ -97,7 +101,9 @@ def find_candidates(
     if painted:
         region = region | _end_of_paint(picture, surface, colors)
     segments = edge_segments(picture, surface.grid, region, tilt, config.detect.half_range_deg)
-    segments = segments[[not any(_covered(segment, line, picture) for line in known) for segment in segments]]
+    lines, near = [denormalise(line.segment, picture.intrinsics) for line in known], _KNOWN_PX * picture.scale
+    new = [not any(_beside(ends, line, near) for line in lines) for ends in segments.reshape(-1, 2, 2)]
+    segments = segments[new]
     if len(segments) == 0:
         return []
     rough, most = _rough_scores(segments, picture, depth, surface, colors), config.detect.candidates
@@ -112,9 +118,9 @@ def find_candidates(
         order = np.argsort(-_lengths(segments) * share, kind="stable")
         order = order[share[order] > _SHOWS][:most]
         fits += _fit_paint(segments[order], picture, config, colors)
-    lines = [fit for fit in fits if fit is not None]
+    fitted = [fit for fit in fits if fit is not None]
     shortest = config.detect.min_length * picture.mask.shape[1]
-    found = judge_lines(lines, picture, depth, surface, colors, tilt, shortest)
+    found = judge_lines(fitted, picture, depth, surface, colors, tilt, shortest)
     return _each_edge_once(found, picture.scale)
 
 
@@ -249,23 +255,13 @@ def _lengths(segments: np.ndarray) -> np.ndarray:
 
 def _differing(segments: np.ndarray, colors: SurfaceColors, picture: Picture) -> np.ndarray:
     """Share of each segment (n, 4) along which one side shows the board and the other the paint, (n,)."""
-    share = np.linspace(0.05, 0.95, 16)[:, None]
-    places = segments[:, None, :2] + share * (segments[:, None, 2:] - segments[:, None, :2])
-    across = _BESIDE_PX * picture.scale * normals_of(segments.reshape(-1, 2, 2))[:, None]
-    height, width = picture.mask.shape
-    labels = []
-    for sign in (-1.0, 1.0):
-        at = np.rint(places + sign * across).astype(np.intp)
-        u, v = np.clip(at[..., 0], 0, width - 1), np.clip(at[..., 1], 0, height - 1)
-        labels.append(colors.label(picture.rgb[v, u], colors.levels_at(u, v)))
-    one, two = labels
+    if colors.board is None:
+        return np.zeros(len(segments))
+    labels = np.empty((len(segments), 2, _PLACES), np.uint8)
+    levels = _EVEN if colors.levels is None else colors.levels.reshape(-1)
+    labels_beside(picture.rgb, segments, _MARGIN, _BESIDE_PX * picture.scale, levels, colors.table(), labels)
+    one, two = labels[:, 0], labels[:, 1]
     return ((one != two) & (one > 0) & (two > 0)).mean(axis=1)
-
-
-def _covered(segment: np.ndarray, line: RefinedLine, picture: Picture) -> bool:
-    """Whether a segment runs along a known line."""
-    pixels = denormalise(line.segment, picture.intrinsics)
-    return _beside(segment.reshape(2, 2), pixels, _KNOWN_PX * picture.scale)
 
 
 def on_same_edge(line: Candidate, segment: np.ndarray, scale: float) -> bool:
@@ -275,10 +271,11 @@ def on_same_edge(line: Candidate, segment: np.ndarray, scale: float) -> bool:
 
 def _beside(one: np.ndarray, two: np.ndarray, limit_px: float) -> bool:
     """Whether two segments (2, 2) [px] run along one edge where they overlap."""
-    run = two[1] - two[0]
-    length = float(np.hypot(*run))
-    normal = np.array([-run[1], run[0]]) / length
-    if np.abs((one - two[0]) @ normal).max() > limit_px:
+    (u, v), (u_end, v_end) = two.tolist()
+    length = math.hypot(u_end - u, v_end - v)
+    du, dv = (u_end - u) / length, (v_end - v) / length
+    ends = [(x - u, y - v) for x, y in one.tolist()]
+    if max(abs(y * du - x * dv) for x, y in ends) > limit_px:
         return False
-    along = np.sort((one - two[0]) @ run / length)
-    return bool(along[1] > 0.0 and along[0] < length)
+    along = [x * du + y * dv for x, y in ends]
+    return max(along) > 0.0 and min(along) < length

@@ -27,8 +27,8 @@ _REFINE_PX = 4.0
 FIT_BEYOND = 0.15
 #: Segments fitted in one batch: those of a batch share the number of profiles.
 _BATCH = 8
-#: Distance at which the change of brightness across a segment is read [px].
-_ACROSS_PX = 2.0
+#: Polarity along the normal of a line from one end of a segment to the other, whose left side is the brighter one.
+_DARKER = -1
 
 
 def half_resolution(rgb: np.ndarray) -> tuple[np.ndarray, int]:
@@ -53,7 +53,7 @@ def edge_segments(
         within_deg: With a tilt, edges this near to level and upright are looked for [deg].
 
     Returns:
-        End points u1, v1, u2, v2 [px], (n, 4).
+        End points u1, v1, u2, v2 [px], the brighter side to the left of the way, (n, 4).
     """
     small, factor = half_resolution(picture.rgb)
     found = np.empty((_MOST, SEGMENT))
@@ -85,7 +85,7 @@ def fit_segments(
     """Sub-pixel fits of segments.
 
     Args:
-        segments: End points (u1, v1, u2, v2) [px], (n, 4).
+        segments: End points (u1, v1, u2, v2) [px], the brighter side to the left of the way, (n, 4).
         picture: Colour and camera.
         config: Settings of the fit.
         colors: Of the surface.
@@ -99,7 +99,7 @@ def fit_segments(
     shares = np.full(len(segments), FIT_BEYOND) if beyond is None else beyond
     fits: list[RefinedLine | None] = []
     lines = _normalised_lines(segments, picture.intrinsics)
-    found = zip(segments.tolist(), *lines, _polarities(segments, lines[1], picture), shares.tolist(), strict=True)
+    found = zip(segments.tolist(), *lines, shares.tolist(), strict=True)
     queries = [_query(*entry, picture) for entry in found]
     for start in range(0, len(queries), _BATCH):
         fits += refine_lines(
@@ -113,13 +113,13 @@ def fit_segments(
     return fits
 
 
-def _query(ends: list[float], rho: float, theta: float, polarity: int, beyond: float, picture: Picture) -> LineQuery:
+def _query(ends: list[float], rho: float, theta: float, beyond: float, picture: Picture) -> LineQuery:
     fx, fy, cx, cy = picture.intrinsics
     u1, v1, u2, v2 = ends
     upright = abs(math.cos(theta)) > abs(math.sin(theta))
     low, high = sorted(((v1 - cy) / fy, (v2 - cy) / fy) if upright else ((u1 - cx) / fx, (u2 - cx) / fx))
     more = beyond * (high - low)
-    return LineQuery(rho=rho, theta=theta, polarity=polarity, span=(low - more, high + more))
+    return LineQuery(rho=rho, theta=theta, polarity=_DARKER, span=(low - more, high + more))
 
 
 def _normalised_lines(segments: np.ndarray, intrinsics: Intrinsics) -> tuple[list[float], list[float]]:
@@ -128,17 +128,3 @@ def _normalised_lines(segments: np.ndarray, intrinsics: Intrinsics) -> tuple[lis
     across, down = y[0] - y[1], x[1] - x[0]
     rho = (across * x[0] + down * y[0]) / np.hypot(across, down)
     return rho.tolist(), np.arctan2(down, across).tolist()
-
-
-def _polarities(segments: np.ndarray, theta: list[float], picture: Picture) -> list[int]:
-    """+1 or -1 where the picture gets brighter or darker along a line's normal."""
-    height, width = picture.mask.shape
-    share = np.linspace(0.1, 0.9, 17)[:, None]
-    places = segments[:, None, :2] + share * (segments[:, None, 2:] - segments[:, None, :2])
-    normals = _ACROSS_PX * picture.scale * np.column_stack((np.cos(theta), np.sin(theta)))[:, None]
-    change = np.zeros(len(segments), int)
-    for sign in (-1, 1):
-        at = np.rint(places + sign * normals).astype(np.intp)
-        u, v = np.clip(at[..., 0], 0, width - 1), np.clip(at[..., 1], 0, height - 1)
-        change += sign * picture.rgb[v, u].sum(axis=(1, 2), dtype=int)
-    return np.where(change >= 0, 1, -1).tolist()

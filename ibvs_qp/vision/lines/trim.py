@@ -5,6 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
+from ibvs_qp.vision.kernels.beside import cells_beside
 from ibvs_qp.vision.surface.region import SurfaceRegion, filled
 
 #: Distance from a segment at which the surface's samples must lie beside it [cells], and places looked at along it.
@@ -28,20 +29,13 @@ def trimmed(segments: np.ndarray, surface: SurfaceRegion, shortest_px: float) ->
         End points, one piece for every segment that is cut at most, (m, 4) [px].
     """
     grid, ends = surface.grid, segments.reshape(-1, 2, 2)
-    region = cv2.morphologyEx(filled(surface.colored), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)) > 0
+    region = cv2.morphologyEx(filled(surface.colored), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
     run = ends[:, 1] - ends[:, 0]
     length = np.hypot(*run.T)
-    share = (np.arange(_PLACES) + 0.5) / _PLACES
-    places = ends[:, :1] + share[:, None] * run[:, None]
-    offset = _CELLS_BESIDE * grid.stride * (np.column_stack((-run[:, 1], run[:, 0])) / length[:, None])[:, None]
-    sides = []
-    for sign in (-1.0, 1.0):
-        cells = np.rint((places + sign * offset - grid.offset) / grid.stride).astype(np.intp)
-        columns, rows = cells[..., 0], cells[..., 1]
-        inside = (rows >= 0) & (rows < grid.shape[0]) & (columns >= 0) & (columns < grid.shape[1])
-        rows, columns = np.clip(rows, 0, grid.shape[0] - 1), np.clip(columns, 0, grid.shape[1] - 1)
-        sides.append(inside & region[rows, columns])
-    beside = np.where((sides[0].sum(axis=1) >= sides[1].sum(axis=1))[:, None], *sides)
+    sides = np.empty((len(segments), 2, _PLACES), np.uint8)
+    cells_beside(region, segments, _CELLS_BESIDE * grid.stride, grid.stride, grid.offset, sides)
+    count = sides.sum(axis=2)
+    beside = np.where((count[:, 0] >= count[:, 1])[:, None], sides[:, 0], sides[:, 1]) > 0
     first, count = _longest_runs(beside)
     kept = (count < _WHOLE * _PLACES) & (count * length >= shortest_px * _PLACES)
     start, end = ((edge / _PLACES)[:, None] * run + ends[:, 0] for edge in (first, first + count))

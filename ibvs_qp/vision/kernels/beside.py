@@ -1,0 +1,73 @@
+"""What lies on both sides of segments, at places along them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ibvs_qp.vision.kernels.compile import inner, kernel
+from ibvs_qp.vision.kernels.labels import label_of, level_at
+
+
+@inner
+def _place(segment: np.ndarray, k: int, places: int, margin: float, distance: float) -> tuple[float, float]:
+    """Place k of those along a segment, beside it by a distance [px]."""
+    run_u, run_v = segment[2] - segment[0], segment[3] - segment[1]
+    share, away = margin + (1.0 - 2.0 * margin) * k / (places - 1), distance / math.hypot(run_u, run_v)
+    return segment[0] + share * run_u - away * run_v, segment[1] + share * run_v + away * run_u
+
+
+@kernel("void(u1[:, :, ::1], f8[:, ::1], f8, f8, u1[::1], u1[::1], u1[:, :, ::1])")
+def labels_beside(
+    rgb: np.ndarray,
+    segments: np.ndarray,
+    margin: float,
+    distance: float,
+    levels: np.ndarray,
+    table: np.ndarray,
+    labels: np.ndarray,
+) -> None:
+    """Labels of the colours before and behind segments.
+
+    Args:
+        rgb: Picture, (H, W, 3).
+        segments: End points u1, v1, u2, v2 [px], (n, 4).
+        margin: Share of a segment left out at either end.
+        distance: From the segment [px].
+        levels: Level of light in cells of the picture; empty where it is even.
+        table: Labels of all colours in every level of light.
+        labels: Receives the labels at K places, the border's beyond the picture, (n, 2, K).
+    """
+    height, width, _ = rgb.shape
+    for i in range(len(segments)):
+        for side in range(2):
+            for k in range(labels.shape[2]):
+                u, v = _place(segments[i], k, labels.shape[2], margin, distance if side == 1 else -distance)
+                column, row = min(max(int(np.rint(u)), 0), width - 1), min(max(int(np.rint(v)), 0), height - 1)
+                color, level = rgb[row, column], np.int64(level_at(levels, width, column, row))
+                labels[i, side, k] = label_of(table, level, np.int64(color[0]), np.int64(color[1]), np.int64(color[2]))
+
+
+@kernel("void(u1[:, ::1], f8[:, ::1], f8, f8, f8, u1[:, :, ::1])")
+def cells_beside(
+    cells: np.ndarray, segments: np.ndarray, distance: float, stride: float, offset: float, found: np.ndarray
+) -> None:
+    """Which cells of a grid lie before and behind segments.
+
+    Args:
+        cells: Non-zero where they are looked for, (rows, columns).
+        segments: End points u1, v1, u2, v2 [px], (n, 4).
+        distance: From the segment [px].
+        stride: Side of a cell [px].
+        offset: Place of the first one [px].
+        found: Receives whether one lies there, at K places, (n, 2, K).
+    """
+    margin = 0.5 / found.shape[2]
+    for i in range(len(segments)):
+        for side in range(2):
+            for k in range(found.shape[2]):
+                u, v = _place(segments[i], k, found.shape[2], margin, distance if side == 1 else -distance)
+                row, column = int(np.rint((v - offset) / stride)), int(np.rint((u - offset) / stride))
+                inside = 0 <= row < cells.shape[0] and 0 <= column < cells.shape[1]
+                found[i, side, k] = inside and cells[row, column] != 0
