@@ -148,31 +148,32 @@ def _wanted_degrees(tilt, within):
 
 
 @inner
-def _by_direction(points, count, first):
-    """Order of the points by the whole degree of their gradient; ``first`` receives where each degree begins."""
-    degrees = np.empty(count, np.int64)
+def _by_direction(points, count, middle, first):
+    """The points about the middle, by the whole degree of their gradient; ``first`` receives where each one begins."""
+    degrees, ordered = np.empty(count, np.int64), np.empty((count, POINT))
     for i in range(count):
         degrees[i] = round(math.degrees(math.atan2(points[i, 3], points[i, 2]))) % _ANGLES
         first[degrees[i] + 1] += 1
     for k in range(_ANGLES):
         first[k + 1] += first[k]
-    order, filled = np.empty(count, np.int64), first[:_ANGLES].copy()
+    filled = first[:_ANGLES].copy()
     for i in range(count):
-        order[filled[degrees[i]]] = i
+        place = ordered[filled[degrees[i]]]
+        place[0], place[1] = points[i, 0] - middle[0], points[i, 1] - middle[1]
+        place[2:] = points[i, 2:]
         filled[degrees[i]] += 1
-    return order
+    return ordered
 
 
 @inner
-def _peaks(points, order, first, wanted, middle, threshold, least, cosine, sine, normals, distances):
+def _peaks(points, first, wanted, middle, threshold, least, cosine, sine, normals, distances):
     """Voted lines, best first: degree of the normal and distance from the middle; returns how many."""
     reach = int(math.hypot(middle[0], middle[1])) + 2
     wide = 2 * reach + 1
     votes = np.zeros((_ANGLES, wide), np.int32)
     for degree in range(_ANGLES):
-        for j in range(first[degree], first[degree + 1]):
-            i = order[j]
-            u, v = points[i, 0] - middle[0], points[i, 1] - middle[1]
+        for i in range(first[degree], first[degree + 1]):
+            u, v = points[i, 0], points[i, 1]
             weight = 2 if points[i, 4] > 2.0 * threshold else 1
             for turn in range(-_VOTES_WITHIN, _VOTES_WITHIN + 1):
                 k = (degree + turn) % _ANGLES
@@ -213,14 +214,13 @@ def _peaks(points, order, first, wanted, middle, threshold, least, cosine, sine,
 
 
 @inner
-def _supporters(points, order, first, used, middle, degree, within, nx, ny, rho, near, held):
+def _supporters(points, first, used, degree, within, nx, ny, rho, near, held):
     """Free points near a line whose gradients agree with its normal; returns how many."""
     agree, count = math.cos(math.radians(_AGREES_WITHIN)), 0
     for turn in range(-within, within + 1):
         k = (degree + turn) % _ANGLES
-        for j in range(first[k], first[k + 1]):
-            i = order[j]
-            away = (points[i, 0] - middle[0]) * nx + (points[i, 1] - middle[1]) * ny - rho
+        for i in range(first[k], first[k + 1]):
+            away = points[i, 0] * nx + points[i, 1] * ny - rho
             if used[i] == 0 and abs(away) <= near and points[i, 2] * nx + points[i, 3] * ny >= agree:
                 held[count] = i
                 count += 1
@@ -228,11 +228,11 @@ def _supporters(points, order, first, used, middle, degree, within, nx, ny, rho,
 
 
 @inner
-def _through(points, held, count, middle, nx, ny, rho):
+def _through(points, held, count, nx, ny, rho):
     """The line through points by least squares; the given one where it would turn too far."""
     u = v = uu = uv = vv = 0.0
     for j in range(count):
-        x, y = points[held[j], 0] - middle[0], points[held[j], 1] - middle[1]
+        x, y = points[held[j], 0], points[held[j], 1]
         u += x
         v += y
         uu += x * x
@@ -257,7 +257,7 @@ def _cut(points, held, count, middle, nx, ny, rho, shortest, used, segments, kep
     bins[:, 0] = 0.0
     half = len(bins) // 2
     for j in range(count):
-        along = (points[held[j], 1] - middle[1]) * nx - (points[held[j], 0] - middle[0]) * ny
+        along = points[held[j], 1] * nx - points[held[j], 0] * ny
         one = bins[int(along + half)]
         one[1] = along if one[0] == 0.0 else min(one[1], along)
         one[2] = along if one[0] == 0.0 else max(one[2], along)
@@ -277,7 +277,7 @@ def _cut(points, held, count, middle, nx, ny, rho, shortest, used, segments, kep
             segments[kept, 4] = size
             kept += 1
             for j in range(count):
-                along = (points[held[j], 1] - middle[1]) * nx - (points[held[j], 0] - middle[0]) * ny
+                along = points[held[j], 1] * nx - points[held[j], 0] * ny
                 if low <= along <= high:
                     used[held[j]] = 1
         if not last:
@@ -312,20 +312,20 @@ def find_segments(small, mask, factor, region, stride, threshold, shortest, tilt
     for k in range(_ANGLES):
         cosine[k], sine[k] = math.cos(math.radians(k)), math.sin(math.radians(k))
     first, least = np.zeros(_ANGLES + 1, np.int64), int(_VOTED * shortest)
-    order, wanted = _by_direction(points, count, first), _wanted_degrees(tilt, within)
+    points, wanted = _by_direction(points, count, middle, first), _wanted_degrees(tilt, within)
     normals, distances = np.empty(_TRIED, np.int64), np.empty(_TRIED, np.int64)
-    tried = _peaks(points, order, first, wanted, middle, threshold, least, cosine, sine, normals, distances)
+    tried = _peaks(points, first, wanted, middle, threshold, least, cosine, sine, normals, distances)
     bins = np.empty((2 * int(math.hypot(middle[0], middle[1])) + 6, 3))
     used, held, kept = np.zeros(count, np.uint8), np.empty(count, np.int64), 0
     for peak in range(tried):
         k, rho = normals[peak], float(distances[peak])
         nx, ny = cosine[k], sine[k]
-        near = _supporters(points, order, first, used, middle, k, _AGREES_WITHIN + 1, nx, ny, rho, _NEAR_FIRST, held)
+        near = _supporters(points, first, used, k, _AGREES_WITHIN + 1, nx, ny, rho, _NEAR_FIRST, held)
         if near < least:
             continue
-        nx, ny, rho = _through(points, held, near, middle, nx, ny, rho)
+        nx, ny, rho = _through(points, held, near, nx, ny, rho)
         wide = _AGREES_WITHIN + _TURN + 1
-        near = _supporters(points, order, first, used, middle, k, wide, nx, ny, rho, _NEAR, held)
+        near = _supporters(points, first, used, k, wide, nx, ny, rho, _NEAR, held)
         if near >= least:
             kept = _cut(points, held, near, middle, nx, ny, rho, shortest, used, segments, kept, bins)
         if kept == len(segments):
