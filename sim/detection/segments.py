@@ -25,7 +25,7 @@ def find_segments(grey: np.ndarray, scale: float) -> np.ndarray:
         scale: Factor for lengths stated for a picture 640 wide.
 
     Returns:
-        End points (u1, v1, u2, v2) [px], (n, 4).
+        End points (u1, v1, u2, v2) [px], the brighter side to the left of the way, (n, 4).
     """
     found = cv2.createLineSegmentDetector().detect(np.ascontiguousarray(grey))[0]
     pieces = np.zeros((0, 4)) if found is None else np.asarray(found, float).reshape(-1, 4)

@@ -1,4 +1,7 @@
-"""What lies on both sides of segments, at places along them."""
+"""What lies on both sides of segments, at places along them.
+
+Side 0 is the left of the way from a segment's first end to its second one, side 1 the right.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,7 @@ from ibvs_qp.vision.kernels.labels import label_of, level_at
 
 @inner
 def _place(segment: np.ndarray, k: int, places: int, margin: float, distance: float) -> tuple[float, float]:
-    """Place k of those along a segment, beside it by a distance [px]."""
+    """Place k of those along a segment, to the right of it by a distance [px]."""
     run_u, run_v = segment[2] - segment[0], segment[3] - segment[1]
     share, away = margin + (1.0 - 2.0 * margin) * k / (places - 1), distance / math.hypot(run_u, run_v)
     return segment[0] + share * run_u - away * run_v, segment[1] + share * run_v + away * run_u
@@ -28,7 +31,7 @@ def labels_beside(
     table: np.ndarray,
     labels: np.ndarray,
 ) -> None:
-    """Labels of the colours before and behind segments.
+    """Labels of the colours on both sides of segments.
 
     Args:
         rgb: Picture, (H, W, 3).
@@ -53,15 +56,15 @@ def labels_beside(
 def cells_beside(
     cells: np.ndarray, segments: np.ndarray, distance: float, stride: float, offset: float, found: np.ndarray
 ) -> None:
-    """Which cells of a grid lie before and behind segments.
+    """Whether marked cells of a grid lie on both sides of segments.
 
     Args:
-        cells: Non-zero where they are looked for, (rows, columns).
+        cells: Non-zero where marked, (rows, columns).
         segments: End points u1, v1, u2, v2 [px], (n, 4).
         distance: From the segment [px].
-        stride: Side of a cell [px].
-        offset: Place of the first one [px].
-        found: Receives whether one lies there, at K places, (n, 2, K).
+        stride: Distance of the grid's samples [px].
+        offset: Place of the first sample [px].
+        found: Receives whether one lies there, at K places, none beyond the grid, (n, 2, K).
     """
     margin = 0.5 / found.shape[2]
     for i in range(len(segments)):

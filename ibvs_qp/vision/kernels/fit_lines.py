@@ -25,7 +25,7 @@ _STEP_SHARE = 0.12
 _FAINT_SHARE = 0.3
 #: No longer gap than this share of the searched length is bridged.
 _BRIDGED_SHARE = 0.3
-#: Share of the profiles that a line must have room for in the picture [px].
+#: A line with less room in the picture [px] than this share of the number of profiles is left out.
 _ROOM_SHARE = 0.125
 #: Colour steps smaller than this have no direction [grey levels].
 _STEP_MIN = 1e-3
@@ -75,7 +75,7 @@ def fit_lines(
         profiles: Most profiles of a line.
         min_profiles: Least profiles that must agree.
         bias: Standard deviation of a line that no number of profiles makes less [px].
-        lines: Filled with the lines, rows of `line_tables`, (L, 20).
+        lines: Filled with the lines, rows of `line_tables`, (L, 20); without a line only `ALIVE` is set.
         sides: Filled with the colours before and behind the lines, uint8 (L, 2, profiles, 3); left alone if empty.
         pixels: Filled with the places of these, (L, profiles, 2) [px]; left alone with the sides.
     """

@@ -10,7 +10,7 @@ from __future__ import annotations
     RHO, THETA, FROM, TO, SEEN_FROM, SEEN_TO, KNOWN, RED, GREEN, BLUE, POLARITY, KIND, SURFACE_SIDE, BOARD,
 ) = range(14)  # fmt: skip
 
-#: The camera: focal lengths and principal point [px], and 1/Z = a x + b y + c of the surface.
+#: The camera: focal lengths and principal point [px], and 1/Z = a x + b y + c of the surface, zero if unknown.
 FX, FY, CX, CY, PLANE_A, PLANE_B, PLANE_C = range(7)
 
 #: The same line v = SLOPE u + LEVEL [px] in the view in which it is level, rows and columns swapped for an upright one:

@@ -27,7 +27,8 @@ _GAP, _GAP_SHARE = 6.0, 0.3
 _DENSE, _VOTED = 0.25, 0.4
 #: Peaks of the vote that are looked at, and the height from which on they are not told apart.
 _TRIED, _HIGHEST = 120, 4095
-#: Columns of a point: column, row, gradient direction, magnitude. Of a segment: ends, points.
+#: Columns of a point: column and row, about the middle of the picture once ordered by direction, then direction and
+#: magnitude of its gradient. Of a segment: ends, points.
 POINT, SEGMENT = 5, 5
 #: Most points: the strongest ones vote.
 _MOST = 2500

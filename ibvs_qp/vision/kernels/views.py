@@ -18,11 +18,11 @@ def place_in_view(query: np.ndarray, camera: np.ndarray, height: int, width: int
     """Fill a row of views.
 
     Args:
-        query: The line.
-        camera: The camera.
+        query: The line, a row of `line_tables`.
+        camera: The camera, a row of `line_tables`.
         height: Of the picture [px].
         width: Of the picture [px].
-        view: Filled.
+        view: Filled, a row of `line_tables`.
     """
     fx, fy, cx, cy = camera[t.FX], camera[t.FY], camera[t.CX], camera[t.CY]
     a, b, c = camera[t.PLANE_A], camera[t.PLANE_B], camera[t.PLANE_C]
@@ -61,14 +61,14 @@ def finish(
     """Fill a row of lines.
 
     Args:
-        view: The view.
-        fit: The fit in it.
+        view: The view, a row of `line_tables`.
+        fit: The fit in it, a row of `line_tables`.
         theta: Predicted angle [rad]: the line's normal is turned to it.
         u: Columns of the profiles [px], (K,).
         visible: Profiles that could be seen, uint8 (K,).
         side: Distance from an edge at which its two sides are looked at [px].
         bias: Standard deviation of the line that no number of profiles makes less [px].
-        line: Filled.
+        line: Filled, a row of `line_tables`.
     """
     fx, fy, cx, cy = view[t.VIEW_FX], view[t.VIEW_FY], view[t.VIEW_CX], view[t.VIEW_CY]
     level, slope, center = fit[t.FIT_LEVEL], fit[t.FIT_SLOPE], fit[t.FIT_CENTER]

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL
-from ibvs_qp.vision.appearance.colors import BOARD, PAINT, SurfaceColors
+from ibvs_qp.vision.appearance.colors import BOARD, NO_LEVELS, PAINT, SurfaceColors
 from ibvs_qp.vision.config import VisionConfig
 from ibvs_qp.vision.kernels.beside import labels_beside
 from ibvs_qp.vision.lines.borders import PLACES, Borders, score_borders
@@ -40,8 +40,6 @@ _SHOWS, _DEPTH_STEP = 0.6, 0.5
 #: Distance from a line at which its two sides are read for a first look [px at 640], places along it at which they are,
 #: and the share left out at either end.
 _BESIDE_PX, _PLACES, _MARGIN = 4.0, 16, 0.05
-#: Levels of even light.
-_EVEN = np.empty(0, np.uint8)
 #: Samples this far apart are near each other: two cells.
 _NEAR_CELLS = np.ones((5, 5), np.uint8)
 #: Length that earns the full score of an edge of paint, share of the picture's width.
@@ -255,10 +253,8 @@ def _lengths(segments: np.ndarray) -> np.ndarray:
 
 def _differing(segments: np.ndarray, colors: SurfaceColors, picture: Picture) -> np.ndarray:
     """Share of each segment (n, 4) along which one side shows the board and the other the paint, (n,)."""
-    if colors.board is None:
-        return np.zeros(len(segments))
     labels = np.empty((len(segments), 2, _PLACES), np.uint8)
-    levels = _EVEN if colors.levels is None else colors.levels.reshape(-1)
+    levels = NO_LEVELS if colors.levels is None else colors.levels.reshape(-1)
     labels_beside(picture.rgb, segments, _MARGIN, _BESIDE_PX * picture.scale, levels, colors.table(), labels)
     one, two = labels[:, 0], labels[:, 1]
     return ((one != two) & (one > 0) & (two > 0)).mean(axis=1)

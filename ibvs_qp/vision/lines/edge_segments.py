@@ -27,7 +27,7 @@ _REFINE_PX = 4.0
 FIT_BEYOND = 0.15
 #: Segments fitted in one batch: those of a batch share the number of profiles.
 _BATCH = 8
-#: Polarity along the normal of a line from one end of a segment to the other, whose left side is the brighter one.
+#: Polarity of a segment along the normal of its line, which points to the right of the way from end to end.
 _DARKER = -1
 
 
@@ -66,7 +66,7 @@ def edge_segments(
         _GRADIENT,
         _SHORTEST_PX * picture.scale / factor,
         math.nan if tilt is None else tilt,
-        within_deg,
+        float(within_deg),
         found,
     )
     ends = found[:count, :4] * factor + 0.5 * (factor - 1)  # pixel centres
@@ -85,7 +85,8 @@ def fit_segments(
     """Sub-pixel fits of segments.
 
     Args:
-        segments: End points (u1, v1, u2, v2) [px], the brighter side to the left of the way, (n, 4).
+        segments: End points (u1, v1, u2, v2) [px], the brighter side to the left of the way, (n, 4); the brighter one
+            by the channel that changes most.
         picture: Colour and camera.
         config: Settings of the fit.
         colors: Of the surface.

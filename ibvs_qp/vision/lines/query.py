@@ -42,8 +42,8 @@ class LineQuery:
         return (
             self.rho,
             self.theta,
-            *(self.span or _ANYWHERE),
-            *(self.extent or _ANYWHERE),
+            *(_ANYWHERE if self.span is None else self.span),
+            *(_ANYWHERE if self.extent is None else self.extent),
             self.step is not None,
             *(_NO_STEP if self.step is None else self.step.tolist()),
             self.polarity,

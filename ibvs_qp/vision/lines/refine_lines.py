@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ibvs_qp.vision.appearance.colors import SurfaceColors
+from ibvs_qp.vision.appearance.colors import NO_LEVELS, SurfaceColors
 from ibvs_qp.vision.config import LineConfig
 from ibvs_qp.vision.kernels import line_tables as t
 from ibvs_qp.vision.kernels.fit_lines import fit_lines
@@ -50,13 +50,13 @@ def refine_lines(
         picture.mask,
         _NO_DEPTH if picture.depth is None or picture.plane is None else picture.depth,
         _NO_LABELS if colors.board is None else colors.table(),
-        _NO_LABELS if colors.levels is None else colors.levels.reshape(-1),
+        NO_LEVELS if colors.levels is None else colors.levels.reshape(-1),
         FITS,
         np.array((*picture.intrinsics, *plane)),
         np.array([query.row(colors) for query in queries], float),
         max(2, round(half_width_px)),
         max(2, round(_SIDE_PX * picture.scale)),
-        config.contrast_min,
+        float(config.contrast_min),
         config.inlier_px * picture.scale,
         config.bridge_px * picture.scale,
         config.profiles,

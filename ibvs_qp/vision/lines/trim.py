@@ -33,9 +33,9 @@ def trimmed(segments: np.ndarray, surface: SurfaceRegion, shortest_px: float) ->
     run = ends[:, 1] - ends[:, 0]
     length = np.hypot(*run.T)
     sides = np.empty((len(segments), 2, _PLACES), np.uint8)
-    cells_beside(region, segments, _CELLS_BESIDE * grid.stride, grid.stride, grid.offset, sides)
-    count = sides.sum(axis=2)
-    beside = np.where((count[:, 0] >= count[:, 1])[:, None], sides[:, 0], sides[:, 1]) > 0
+    cells_beside(region, segments, _CELLS_BESIDE * grid.stride, float(grid.stride), float(grid.offset), sides)
+    marked = sides.sum(axis=2)
+    beside = np.where((marked[:, 0] >= marked[:, 1])[:, None], sides[:, 0], sides[:, 1]) > 0
     first, count = _longest_runs(beside)
     kept = (count < _WHOLE * _PLACES) & (count * length >= shortest_px * _PLACES)
     start, end = ((edge / _PLACES)[:, None] * run + ends[:, 0] for edge in (first, first + count))

@@ -76,5 +76,6 @@ def test_a_minute_at_full_rate_through_a_hundred_thousand_packets(tmp_path: Path
     # Other tests run beside this one: what may be late is one command in a thousand, and never for as long as the link
     # may be silent. benchmarks/bridge.py shows the oldest command of an otherwise idle computer.
     assert seen["age_ms"][2] <= LATE_MS and seen["age_ms"][-1] <= SILENT_MS
+    assert seen["gap_ms"][2] <= LATE_MS and seen["gap_ms"][-1] <= SILENT_MS
     assert sum(flown.garbage.values()) == 100_000 and seen["failsafe_s"] is None
     assert abs(seen["moved_m"][1]) < 0.5 and seen["distance_m"] > 0.3  # both rows painted, and away from the wall
