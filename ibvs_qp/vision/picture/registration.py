@@ -44,7 +44,8 @@ class Registration:
     def depth(self, depth: np.ndarray) -> np.ndarray:
         """Depth in C [m], float32 (H, W), 0 where the depth camera sees nothing or something else."""
         self._nearest.fill(0.0)
-        project_depth(np.ascontiguousarray(depth, np.float32), self._rays, self._shift, self._half, self._nearest)
+        readings = np.require(depth, np.float32, ("C", "W"))  # the one type of the kernel
+        project_depth(readings, self._rays, self._shift, self._half, self._nearest)
         closed = np.empty(self._shape, np.float32)
         close_cracks(self._nearest, closed)
         return closed
