@@ -13,7 +13,7 @@ from ibvs_qp.vision.kernels.colors import board_color, light_of, painted_light
 from ibvs_qp.vision.kernels.labels import BOARD, OTHER, PAINT, UNKNOWN, labels_of, like_colors
 from ibvs_qp.vision.picture.grid import CoarseGrid
 
-__all__ = ["BOARD", "NO_LEVELS", "OTHER", "PAINT", "SurfaceColors"]
+__all__ = ["BOARD", "OTHER", "PAINT", "SurfaceColors"]
 
 #: Share of a new sample in the board's running colour.
 _BLEND = 0.2
@@ -25,8 +25,7 @@ _DISTINCT = 0.8
 _LEAST_BOARD, _LEAST_PAINT = 8, 12
 #: Light on the paint nearer than this to that in which it was named needs no correction [ln]: the gate holds it.
 _AS_NAMED = 0.08
-#: Levels of even light, as kernels take them.
-NO_LEVELS = np.empty(0, np.uint8)
+_NO_LEVELS = np.empty(0, np.uint8)
 
 
 class SurfaceColors:
@@ -119,15 +118,15 @@ class SurfaceColors:
         return None if self.light is None else self.light.levels_at(u, v)
 
     @property
-    def levels(self) -> np.ndarray | None:
-        """Level of light in every cell of the picture, uint8 (rows, columns); None where the light is even."""
-        return None if self.light is None else self.light.levels
+    def levels(self) -> np.ndarray:
+        """Level of light in every cell of the picture, as kernels take them, uint8 (n,); empty where it is even."""
+        return _NO_LEVELS if self.light is None else self.light.levels.reshape(-1)
 
     def label(self, colors: np.ndarray, levels: np.ndarray | None = None) -> np.ndarray:
         """OTHER, BOARD or PAINT for colours uint8 (..., 3) in light of some level; all OTHER for an unknown board."""
         if self.board is None:
             return np.zeros(colors.shape[:-1], np.uint8)
-        lit = NO_LEVELS if levels is None else np.broadcast_to(levels, colors.shape[:-1]).flatten()
+        lit = _NO_LEVELS if levels is None else np.broadcast_to(levels, colors.shape[:-1]).flatten()
         return labels_of(_flat(colors), lit, self.table()).reshape(colors.shape[:-1])
 
     def table(self) -> np.ndarray:

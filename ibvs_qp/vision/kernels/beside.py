@@ -14,11 +14,21 @@ from ibvs_qp.vision.kernels.labels import label_of, level_at
 
 
 @inner
-def _place(segment: np.ndarray, k: int, places: int, margin: float, distance: float) -> tuple[float, float]:
-    """Place k of those along a segment, to the right of it by a distance [px]."""
+def place_along(
+    segment: np.ndarray, k: int, places: int, margin: float, right: float, down: float
+) -> tuple[float, float]:
+    """Place k of those along a segment, without a share of it at either end, moved to the right and down [px]."""
+    share = margin + (1.0 - 2.0 * margin) * k / (places - 1)
+    u = segment[0] + share * (segment[2] - segment[0]) + right
+    return u, segment[1] + share * (segment[3] - segment[1]) + down
+
+
+@inner
+def _aside(segment: np.ndarray, side: int, distance: float) -> tuple[float, float]:
+    """Way to one side of a segment, to the right and down [px]."""
     run_u, run_v = segment[2] - segment[0], segment[3] - segment[1]
-    share, away = margin + (1.0 - 2.0 * margin) * k / (places - 1), distance / math.hypot(run_u, run_v)
-    return segment[0] + share * run_u - away * run_v, segment[1] + share * run_v + away * run_u
+    away = (distance if side == 1 else -distance) / math.hypot(run_u, run_v)
+    return -away * run_v, away * run_u
 
 
 @kernel("void(u1[:, :, ::1], f8[:, ::1], f8, f8, u1[::1], u1[::1], u1[:, :, ::1])")
@@ -45,8 +55,9 @@ def labels_beside(
     height, width, _ = rgb.shape
     for i in range(len(segments)):
         for side in range(2):
+            right, down = _aside(segments[i], side, distance)
             for k in range(labels.shape[2]):
-                u, v = _place(segments[i], k, labels.shape[2], margin, distance if side == 1 else -distance)
+                u, v = place_along(segments[i], k, labels.shape[2], margin, right, down)
                 column, row = min(max(int(np.rint(u)), 0), width - 1), min(max(int(np.rint(v)), 0), height - 1)
                 color, level = rgb[row, column], np.int64(level_at(levels, width, column, row))
                 labels[i, side, k] = label_of(table, level, np.int64(color[0]), np.int64(color[1]), np.int64(color[2]))
@@ -69,8 +80,9 @@ def cells_beside(
     margin = 0.5 / found.shape[2]
     for i in range(len(segments)):
         for side in range(2):
+            right, down = _aside(segments[i], side, distance)
             for k in range(found.shape[2]):
-                u, v = _place(segments[i], k, found.shape[2], margin, distance if side == 1 else -distance)
+                u, v = place_along(segments[i], k, found.shape[2], margin, right, down)
                 row, column = int(np.rint((v - offset) / stride)), int(np.rint((u - offset) / stride))
                 inside = 0 <= row < cells.shape[0] and 0 <= column < cells.shape[1]
                 found[i, side, k] = inside and cells[row, column] != 0

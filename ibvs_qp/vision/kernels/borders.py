@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from ibvs_qp.vision.kernels.beside import place_along
 from ibvs_qp.vision.kernels.compile import inner, kernel
 
 #: What a depth reading says.
@@ -26,6 +27,8 @@ _COLOR_ONLY, _DEPTH_ONLY = 0.75, 0.5
 _DIMMER, _BRIGHTER, _CHROMA, _GREY = 0.68, 1.4, 0.10, 14.0
 #: Least share of the places along a line that nothing hides.
 _LEAST_SHARE = 0.15
+#: Places along a line at which samples are looked for beside it, and share of it left out at either end.
+_PLACES, _MARGIN = 16, 0.05
 #: Columns of the evidence of one side: score, by depth, by colour, share beside the surface.
 EVIDENCE = 4
 
@@ -140,14 +143,12 @@ def _ends_here(inner_states, outer_states, inner_colors, outer_colors, inside, c
 def _beside(cells, pixels, nx, ny, distance, stride, offset):
     """Share of the places along a line beside which the surface's samples lie."""
     count = 0
-    for k in range(16):
-        share = 0.05 + 0.9 * k / 15.0
-        u = pixels[0] + share * (pixels[2] - pixels[0]) + distance * nx
-        v = pixels[1] + share * (pixels[3] - pixels[1]) + distance * ny
+    for k in range(_PLACES):
+        u, v = place_along(pixels, k, _PLACES, _MARGIN, distance * nx, distance * ny)
         row, column = round((v - offset) / stride), round((u - offset) / stride)
         row, column = min(max(row, 0), cells.shape[0] - 1), min(max(column, 0), cells.shape[1] - 1)
         count += cells[row, column] != 0
-    return count / 16.0
+    return count / _PLACES
 
 
 @kernel(

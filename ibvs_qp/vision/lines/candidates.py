@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL
-from ibvs_qp.vision.appearance.colors import BOARD, NO_LEVELS, PAINT, SurfaceColors
+from ibvs_qp.vision.appearance.colors import BOARD, PAINT, SurfaceColors
 from ibvs_qp.vision.config import VisionConfig
 from ibvs_qp.vision.kernels.beside import labels_beside
 from ibvs_qp.vision.lines.borders import PLACES, Borders, score_borders
@@ -254,8 +254,7 @@ def _lengths(segments: np.ndarray) -> np.ndarray:
 def _differing(segments: np.ndarray, colors: SurfaceColors, picture: Picture) -> np.ndarray:
     """Share of each segment (n, 4) along which one side shows the board and the other the paint, (n,)."""
     labels = np.empty((len(segments), 2, _PLACES), np.uint8)
-    levels = NO_LEVELS if colors.levels is None else colors.levels.reshape(-1)
-    labels_beside(picture.rgb, segments, _MARGIN, _BESIDE_PX * picture.scale, levels, colors.table(), labels)
+    labels_beside(picture.rgb, segments, _MARGIN, _BESIDE_PX * picture.scale, colors.levels, colors.table(), labels)
     one, two = labels[:, 0], labels[:, 1]
     return ((one != two) & (one > 0) & (two > 0)).mean(axis=1)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ibvs_qp.vision.appearance.colors import NO_LEVELS, SurfaceColors
+from ibvs_qp.vision.appearance.colors import SurfaceColors
 from ibvs_qp.vision.config import LineConfig
 from ibvs_qp.vision.kernels import line_tables as t
 from ibvs_qp.vision.kernels.fit_lines import fit_lines
@@ -50,7 +50,7 @@ def refine_lines(
         picture.mask,
         _NO_DEPTH if picture.depth is None or picture.plane is None else picture.depth,
         _NO_LABELS if colors.board is None else colors.table(),
-        NO_LEVELS if colors.levels is None else colors.levels.reshape(-1),
+        colors.levels,
         FITS,
         np.array((*picture.intrinsics, *plane)),
         np.array([query.row(colors) for query in queries], float),

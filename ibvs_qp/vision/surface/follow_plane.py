@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ibvs_qp.vision.appearance.colors import NO_LEVELS, SurfaceColors
+from ibvs_qp.vision.appearance.colors import SurfaceColors
 from ibvs_qp.vision.config import PlaneConfig
 from ibvs_qp.vision.kernels.labels import sample_labels
 from ibvs_qp.vision.kernels.samples import sample_means
@@ -78,7 +78,6 @@ class PlaneFollower:
     def _labels(self, rgb: np.ndarray, colors: SurfaceColors) -> np.ndarray:
         """Labels of the samples' colours, uint8 (rows, columns); the board must be known."""
         labels = np.empty(self._grid.shape, np.uint8)
-        levels = NO_LEVELS if colors.levels is None else colors.levels.reshape(-1)
         rgb, places = np.ascontiguousarray(rgb), self._grid.places.reshape(-1, 2)
-        sample_labels(rgb, places, levels, colors.table(), labels.reshape(-1))
+        sample_labels(rgb, places, colors.levels, colors.table(), labels.reshape(-1))
         return labels

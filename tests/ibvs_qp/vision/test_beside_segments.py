@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from ibvs_qp.vision.kernels.beside import cells_beside, labels_beside
-from ibvs_qp.vision.kernels.brightness import brightness_ratio
 from ibvs_qp.vision.kernels.segments import SEGMENT, find_segments
 from sim.detection import segments as every_segment
 
@@ -60,13 +59,3 @@ def test_labels_and_cells_beside_segments() -> None:
     assert found[0].tolist() == [[0] + [1] * 9, [0] * 10]
     assert found[1].tolist() == [[0] * 10, [1] * 9 + [0]]
     assert not found[2].any()
-
-
-def test_brightness_is_compared_on_unsaturated_pixels_only() -> None:
-    before = np.full((20, 30, 3), 100, np.uint8)
-    after = np.full((20, 30, 3), 121, np.uint8)
-    after[:, :20] = 255
-    assert brightness_ratio(before, after, 250) == pytest.approx(364.0 / 301.0)
-    after[:, :29] = 255  # less than a twentieth is left
-    after[1:] = 255
-    assert brightness_ratio(before, after, 250) == 1.0

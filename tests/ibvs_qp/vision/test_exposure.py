@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from ibvs_qp.vision.kernels.brightness import brightness_ratio
 from ibvs_qp.vision.picture.exposure import ExposureSteps
 
 FRAME_NS = 33_000_000
@@ -50,3 +51,13 @@ def test_a_pause_or_another_size_starts_anew() -> None:
     assert steps.level(later, 1 + 20 * FRAME_NS) is later and steps.gain == 1.0
     small = picture(0.8, 2)[::2, ::2]
     assert steps.level(small, 1 + 21 * FRAME_NS) is small and steps.gain == 1.0
+
+
+def test_brightness_is_compared_on_unsaturated_pixels_only() -> None:
+    before = np.full((20, 30, 3), 100, np.uint8)
+    after = np.full((20, 30, 3), 121, np.uint8)
+    after[:, :20] = 255
+    assert brightness_ratio(before, after, 250) == pytest.approx(364.0 / 301.0)
+    after[:, :29] = 255  # less than a twentieth is left
+    after[1:] = 255
+    assert brightness_ratio(before, after, 250) == 1.0

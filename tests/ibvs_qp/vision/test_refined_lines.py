@@ -67,17 +67,13 @@ def test_a_turned_normal_is_the_same_line(upright: bool) -> None:
 
 
 @pytest.mark.parametrize("upright", [False, True])
-def test_covariance_is_the_change_of_the_line_with_its_two_ends(upright: bool) -> None:
-    """Level and slope are independent at the middle of the profiles: the ends of the line there vary by the same."""
+def test_a_line_is_most_certain_at_the_middle_of_its_segment(upright: bool) -> None:
+    """Level and slope are independent there: the variance of the distance, over places along the line, is least."""
     line = fitted(picture(upright=upright), upright=upright)
-    normal = np.array((math.cos(line.theta), math.sin(line.theta)))
-    across = np.array((-normal[1], normal[0]))
-    spread = [line.covariance[0, 0]]
-    for along in np.linspace(-0.5, 0.5, 41):
-        row = np.array((1.0, -along))
-        spread.append(float(row @ line.covariance @ row))
-    best = np.linspace(-0.5, 0.5, 41)[int(np.argmin(spread[1:]))]
-    assert best == pytest.approx(float(line.segment.mean(axis=0) @ across), abs=0.03)
+    middle = line.segment.mean(axis=0) @ (-math.sin(line.theta), math.cos(line.theta))
+    places = np.linspace(-0.5, 0.5, 41)
+    variances = [float((1.0, -along) @ line.covariance @ (1.0, -along)) for along in places]
+    assert places[int(np.argmin(variances))] == pytest.approx(float(middle), abs=0.03)
 
 
 @pytest.mark.parametrize("upright", [False, True])
