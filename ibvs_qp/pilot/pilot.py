@@ -25,7 +25,7 @@ from ibvs_qp.estimation.wall_lines import WallAxes, image_line
 from ibvs_qp.estimation.wall_motion import BIAS, WallMotion
 from ibvs_qp.estimation.wrench_tare import WrenchTare
 from ibvs_qp.frames import down_in_body, plane_in_body, rotation_from_vector, to_camera
-from ibvs_qp.measurement import FeatureFrame, Measurement, Reference, RgbdFrame, SensorFrame
+from ibvs_qp.measurement import HORIZONTAL, FeatureFrame, Measurement, Reference, RgbdFrame, SensorFrame
 from ibvs_qp.model.reporting import fixed_command
 from ibvs_qp.model.setpoints import Setpoints
 from ibvs_qp.painting.command import PainterInput, PaintingCommand
@@ -386,16 +386,18 @@ class Pilot:
         return self._camera.perceive(frame, velocity, hints, self.assurance.is_news, self._rejected)
 
     def _hints(self, stamp_ns: int) -> tuple[LineHint, ...]:
-        """Expected place of the fresh edge: at the brush, ahead of it, by lines and contact of the tick before."""
-        expected, contact = self.painter.expected_fresh_edge(self.motion.lines), self.contact.state
+        """Expected place of the last stroke's edge, ahead of the brush, by lines and contact of the tick before."""
+        expected, contact = self.painter.expected_edge(), self.contact.state
         if expected is None or not contact.known:
             return ()
-        offset, side = expected
         axes = WallAxes.of(contact.normal, down_in_body(self._history.attitude(stamp_ns)))
-        rho, theta, _ = image_line(offset, 0.5 * math.pi, axes, self._tip_from_camera, contact.distance)
+        level = expected.role == HORIZONTAL
+        angle = 0.5 * math.pi if level else 0.0
+        rho, theta, _ = image_line(expected.offset, angle, axes, self._tip_from_camera, contact.distance)
         near, far = HINT_SPAN
-        span = (near, far) if side > 0.0 else (-far, -near)
-        return (LineHint(name="fresh", rho=rho, theta=theta, kind="paint", surface_side=-1, span=span),)
+        tip = 0.0 if level else self._tip_camera[1] / self._tip_camera[2]
+        span = (tip + near, far) if expected.ahead > 0 else (-far, tip - near)
+        return (LineHint(name="fresh", rho=rho, theta=theta, kind="paint", surface_side=expected.side, span=span),)
 
     # -------------------------------------------------------------- estimation
 
