@@ -156,7 +156,7 @@ class Paint:
         from ibvs_qp.recording.layouts import FOLDER as LAYOUTS
         from sim.evaluate.metrics import compute_metrics
         from sim.evaluate.table import figure_table
-        from sim.flight.side_by_side import INTERRUPTED
+        from sim.flight.trace import INTERRUPTED
         from sim.report.rundir import as_json, peak_memory, summary
 
         traces = {law: flight.trace for law, flight in flights.items()}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -41,7 +42,8 @@ def write_log(stream: BinaryIO, traces: dict[str, Trace]) -> None:
             arrays["canvas"] = trace.canvas
             arrays["coverage_percent"] = np.round(100 * trace.coverage_mask).astype(np.uint8)
             arrays["canvas_px_per_m"] = np.array(trace.canvas_px_per_m)
-        arrays["outcome_of_flight"] = np.array([str(trace.completed), trace.reason], dtype=str)
+        arrays["outcome_of_flight"] = np.array([str(trace.claimed), trace.reason], dtype=str)
+        arrays["plan"] = np.array(json.dumps(trace.plan))
         arrays["preset"], arrays["world"] = np.array(trace.preset), np.array(world_name(trace.scene.errors))
         arrays["seed"], arrays["wall_time_s"] = np.array(trace.seed), np.array(trace.wall_time_s)
         content.update({f"{law}/{name}": values for name, values in arrays.items()})
@@ -80,7 +82,7 @@ def load_run(path: str | Path) -> dict[str, Trace]:
 def _trace(law: str, scene: Scene, arrays: dict[str, np.ndarray]) -> Trace:
     """The trace of one law; the arrays that are not its own are taken out."""
     check_arrays(arrays)
-    completed, reason = _texts(arrays.pop("outcome_of_flight"))
+    claimed, reason = _texts(arrays.pop("outcome_of_flight"))
     event_t, event_text = arrays.pop("event_t"), arrays.pop("event_text").reshape(-1, 2)
     coverage = arrays.pop("coverage_percent", None)
     arrays.pop("world", None)  # the scene holds the errors themselves
@@ -93,7 +95,8 @@ def _trace(law: str, scene: Scene, arrays: dict[str, np.ndarray]) -> Trace:
         outcomes=_texts(arrays.pop("outcomes")),
         limits=_texts(arrays.pop("limits")),
         events=[Event(t=float(t), kind=kind, text=text) for t, (kind, text) in zip(event_t, texts, strict=True)],
-        completed=completed == "True",
+        claimed=claimed == "True",
+        plan=_plan(arrays.pop("plan", None)),
         reason=reason,
         preset="".join(_texts(arrays.pop("preset", np.array("")))),
         wall_time_s=float(arrays.pop("wall_time_s")),
@@ -102,6 +105,14 @@ def _trace(law: str, scene: Scene, arrays: dict[str, np.ndarray]) -> Trace:
         coverage_mask=None if coverage is None else coverage.astype(np.float32) / 100,
         arrays=arrays,
     )
+
+
+def _plan(array: np.ndarray | None) -> dict[str, float]:
+    """Durations of the phases of a job without strokes; an older log has none."""
+    plan = json.loads("".join(_texts(array))) if array is not None else {}
+    if plan and not (isinstance(plan, dict) and plan.keys() == {"press", "paint", "descend"}):
+        raise ValueError(f"plan {plan!r} of a flight")
+    return {name: float(value) for name, value in plan.items()}
 
 
 def _texts(array: np.ndarray) -> tuple[str, ...]:

@@ -12,9 +12,8 @@ from ibvs_qp.config.errors import IbvsQpError
 from ibvs_qp.config.settings import dump_toml
 from sim.flight.closed_loop import fly
 from sim.flight.flight_log import save_log
-from sim.flight.side_by_side import INTERRUPTED
 from sim.flight.stop import ignore_stop
-from sim.flight.trace import Trace
+from sim.flight.trace import INTERRUPTED, Trace
 from sim.storage.atomic import write_text
 from sim.sweep.design import Block, Refusal, Run
 from sim.sweep.fingerprint import code_hash, configuration_hash

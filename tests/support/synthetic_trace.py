@@ -153,7 +153,7 @@ def synthetic_trace(
         outcomes=OUTCOMES,
         limits=LIMITS,
         events=[*events, Event(t=TOUCH_S, kind="touch", text="touch at 0.05 m/s")],
-        completed=True,
+        claimed=True,
         reason="rows, climbs and retreat done",
         wall_time_s=end / 8.0,
         canvas=canvas,

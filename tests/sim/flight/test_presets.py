@@ -110,5 +110,5 @@ def test_the_octorotor_paints() -> None:
     scene = short_scene(stroke_m=0.3, rows=1)
     options = FlightOptions(features="geometric", video=False, preset=str(FOLDER / "octorotor_qp.toml"))
     trace = fly(scene, options)
-    assert trace.completed and trace.thrusts.shape[1] == 8
+    assert trace.claimed and trace.thrusts.shape[1] == 8
     assert compute_metrics(trace)["force_rms_straight_n"] <= 0.35
