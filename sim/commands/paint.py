@@ -154,8 +154,8 @@ class Paint:
         from rich.console import Console
 
         from ibvs_qp.recording.layouts import FOLDER as LAYOUTS
+        from sim.evaluate.flight_table import figure_table
         from sim.evaluate.metrics import compute_metrics
-        from sim.evaluate.table import figure_table
         from sim.flight.trace import INTERRUPTED
         from sim.report.rundir import as_json, peak_memory, summary
 

@@ -10,13 +10,12 @@ import numpy as np
 
 from sim.evaluate.paint_plan import PaintPlan, Segment, band_mask, nominal_plan
 from sim.evaluate.path_error import PathError, path_error
-from sim.evaluate.strokes import Stroke, on_board
+from sim.evaluate.strokes import Stroke, contact_share, on_board
 from sim.evaluate.truth import Judgement
-from sim.evaluate.window import CONTACT_N, board_tip, contact_clock, in_phase, tilt_deg, touch_figures
+from sim.evaluate.window import SETTLED_S, board_tip, contact_clock, in_phase, physics_ticks, tilt_deg, touch_figures
 from sim.flight.trace import Trace
+from sim.world.board import BoardGeometry
 
-#: Attitude figures skip the release of the vehicle [s].
-RELEASE_S = 1.0
 #: Paint coverage of a pixel above which it counts as painted.
 PAINTED = 0.5
 
@@ -40,7 +39,7 @@ class Part:
     def rows(self) -> list[Part]:
         """The rows flown."""
         found = []
-        for row in range(1, self.trace.scene.paint.rows + 1):
+        for row in range(1, self.stroke_count + 1):
             ticks = self.path.painting & (self.trace.row == row)
             if ticks.any():
                 found.append(Part(trace=self.trace, path=self.path, judgement=self.judgement, ticks=ticks, row=row))
@@ -66,7 +65,7 @@ class Part:
     @cached_property
     def released(self) -> np.ndarray:
         """Ticks after the release of the vehicle, (N,) bool."""
-        return self.ticks & (self.trace.t >= RELEASE_S)
+        return self.ticks & (self.trace.t >= SETTLED_S)
 
     # ---------------------------------------------------------------- signals
 
@@ -86,21 +85,24 @@ class Part:
         return np.degrees(self.trace.euler[:, 2])
 
     @cached_property
-    def _clock(self) -> tuple[np.ndarray, np.ndarray]:
-        """Time of every physics step [s], and whether it belongs to the part."""
-        clock = contact_clock(self.trace)
-        return clock, self.ticks[np.searchsorted(self.trace.t, clock + 1e-9, side="right") - 1]
+    def _inside(self) -> np.ndarray:
+        """Whether every physics step belongs to the part, (M,) bool."""
+        return self.ticks[physics_ticks(self.trace)]
 
     @cached_property
     def contact(self) -> np.ndarray:
         """Push at the physics steps of the part, (K,) [N]."""
-        return self.trace.contact_1khz[self._clock[1]]
+        return self.trace.contact_1khz[self._inside]
+
+    @cached_property
+    def thrusts(self) -> np.ndarray:
+        """Commanded thrusts after the release, (K, n) [N]."""
+        return self.trace.thrusts[self.trace.t >= SETTLED_S]
 
     @cached_property
     def touch(self) -> dict[str, float]:
         """First touch, time to settle and bounces."""
-        clock, inside = self._clock
-        return touch_figures(self.trace, self.contact, clock[inside])
+        return touch_figures(self.trace, self.contact, contact_clock(self.trace)[self._inside])
 
     # ------------------------------------------------------------------- job
 
@@ -110,15 +112,20 @@ class Part:
         return tuple(each for each in nominal_plan(self.trace.scene).segments if self.row in (0, each.row))
 
     @cached_property
-    def strokes(self) -> list[Stroke]:
-        """Painted strokes of the part."""
-        return [each for number, each in self.judgement.strokes.items() if self.row in (0, number)]
+    def strokes(self) -> dict[int, Stroke]:
+        """Painted strokes of the part by number."""
+        return {number: each for number, each in self.judgement.strokes.items() if self.row in (0, number)}
+
+    @cached_property
+    def stroke_count(self) -> int:
+        """Strokes that the scene asks for."""
+        return BoardGeometry(self.trace.scene).strokes
 
     @property
     def stroke_m(self) -> float:
         """Length of the shortest stroke; 0 if one is missing."""
-        asked = {segment.row for segment in self.segments if segment.kind == "row"}
-        return min((self.judgement.length_m(row) for row in asked), default=0.0)
+        numbers = [self.row] if self.row else range(1, self.stroke_count + 1)
+        return min(self.strokes[number].length_m if number in self.strokes else 0.0 for number in numbers)
 
     @property
     def coverage(self) -> float:
@@ -129,6 +136,11 @@ class Part:
         plan = PaintPlan(segments=self.segments)
         intended = band_mask(trace.scene, plan, trace.coverage_mask.shape[:2], trace.canvas_px_per_m)
         return float(np.mean(trace.coverage_mask[intended] > PAINTED)) if intended.any() else math.nan
+
+    @property
+    def contact_share(self) -> float:
+        """Fraction of the physics steps of painting that are in contact."""
+        return contact_share(self.trace, self.ticks)
 
     @property
     def off_board_share(self) -> float:
@@ -146,8 +158,10 @@ class Part:
     @property
     def reason(self) -> str:
         """Why the flight, or this row of it, ended."""
-        begun = self.trace.t[self._last] - 1e-9 if self.row else math.inf
-        reasons = [event.text for event in self.trace.events if event.kind == "phase" and event.t > begun]
+        if not self.row:
+            return self.trace.reason
+        ended = self.trace.t[self._last] - 1e-9
+        reasons = [event.text for event in self.trace.events if event.kind in self.trace.phases and event.t > ended]
         return reasons[0] if reasons else self.trace.reason
 
     @property
@@ -169,12 +183,6 @@ class Part:
         error = (self.trace.velocity_estimate - self.trace.velocity)[self.ticks]
         known = np.isfinite(error).any(axis=1)
         return math.sqrt(np.mean(np.nansum(error[known] ** 2, axis=1))) if known.any() else math.nan
-
-    @property
-    def touching_share(self) -> float:
-        """Fraction of the physics steps of painting that are in contact."""
-        demanded = self.trace.painting_1khz[self._clock[1]].astype(bool)
-        return float(np.mean(self.contact[demanded] > CONTACT_N)) if demanded.any() else math.nan
 
     @cached_property
     def _last(self) -> int:

@@ -1,7 +1,7 @@
-"""Painted strokes against their nominal lines, in pattern coordinates (u, v) [m].
+"""Painted strokes against their nominal lines, in pattern coordinates (u, v) [m] of `ibvs_qp.painting.pattern`.
 
-u runs along the strokes from the board edge at which stroke 1 begins, v across them from the edge at which the pattern
-begins. Stroke k belongs on the line v = edge margin + (k - 1) pitch, whatever the strokes before it did.
+Stroke k belongs on the line v = `BoardGeometry.stroke_place`, counted from the board's edge, whatever the strokes
+before it did. A stroke's line is the mean of its tip path over pieces along u, of what lies on the board in contact.
 """
 
 from __future__ import annotations
@@ -11,15 +11,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.evaluate.window import CONTACT_N, board_tip, contact_clock, in_phase
+from sim.evaluate.paint_plan import averaged
+from sim.evaluate.window import CONTACT_N, board_tip, in_phase, physics_ticks
 from sim.flight.trace import Trace
 from sim.world.board import BoardGeometry
 from sim.world.scene import Scene
 
 #: Length of the ends of a stroke that do not belong to its straight part [m].
 CORNER_M = 0.10
-#: A painted stroke is averaged over pieces of this length [m], shorter than any bend that the vehicle can paint.
-BIN_M = 0.01
 #: A stroke may leave the band of the stroke before within this distance of its end [m].
 END_M = 0.02
 
@@ -36,29 +35,10 @@ class Stroke:
     nominal_overlap_m: float  # that of the scene
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Line:
-    """Tip line of a stroke, averaged over pieces along u."""
-
-    u: np.ndarray  # (K,) increasing [m]
-    v: np.ndarray  # (K,) [m]
-
-
-def pattern_coordinates(scene: Scene, spots: np.ndarray) -> np.ndarray:
-    """(u, v) of board coordinates (along, up), (N, 2) [m]; rows from the bottom right corner."""
-    return np.column_stack((scene.board.width_m - spots[:, 0], spots[:, 1]))
-
-
-def nominal_lines(scene: Scene) -> np.ndarray:
+def nominal_lines(board: BoardGeometry) -> np.ndarray:
     """Place v, first and last u of every stroke in the order of travel, (strokes, 3) [m]."""
-    board, paint = BoardGeometry(scene), scene.paint
-    first, last = (scene.board.width_m - end for end in reversed(board.row_ends))
-    return np.array(
-        [
-            (board.row_height(row), *((first, last) if row % 2 else (last, first)))
-            for row in range(1, paint.rows + 1)
-        ]
-    )  # fmt: skip
+    ends = board.stroke_ends
+    return np.array([(board.stroke_place(k), *ends[:: 1 if k % 2 else -1]) for k in range(1, board.strokes + 1)])
 
 
 def on_board(scene: Scene, spots: np.ndarray) -> np.ndarray:
@@ -68,22 +48,20 @@ def on_board(scene: Scene, spots: np.ndarray) -> np.ndarray:
 
 def painted_strokes(trace: Trace) -> dict[int, Stroke]:
     """Every stroke that left paint on the board, by number."""
-    spots = board_tip(trace)
-    tip, nominal = pattern_coordinates(trace.scene, spots), nominal_lines(trace.scene)
+    spots, board = board_tip(trace), BoardGeometry(trace.scene)
+    tip, nominal, width = board.to_pattern(spots), nominal_lines(board), trace.scene.paint.brush_width_m
     touching = in_phase(trace, "paint") & (trace.push_true > CONTACT_N) & on_board(trace.scene, spots)
-    width = trace.scene.paint.brush_width_m
     strokes: dict[int, Stroke] = {}
-    before: _Line | None = None
+    before: np.ndarray | None = None
     for number, (place, first, last) in enumerate(nominal, start=1):
         path = tip[touching & (trace.row == number)]
         if not len(path):
             before = None
             continue
-        line = _averaged(path)
-        low, high = min(first, last) + CORNER_M, max(first, last) - CORNER_M
-        straight = (line.u >= low) & (line.u <= high)
-        error = line.v[straight if straight.any() else slice(None)] - place
-        overlap = _overlap(line, before, width, backwards=last < first) if before is not None else np.array([])
+        line = averaged(path)
+        straight = (np.abs(line[:, 0] - first) > CORNER_M) & (np.abs(line[:, 0] - last) > CORNER_M)
+        error = line[straight if straight.any() else slice(None), 1] - place
+        overlap = _overlap(line, before, width, first > last) if before is not None else np.array([])
         strokes[number] = Stroke(
             number=number,
             length_m=float(np.ptp(path[:, 0])),
@@ -96,27 +74,15 @@ def painted_strokes(trace: Trace) -> dict[int, Stroke]:
     return strokes
 
 
-def _averaged(path: np.ndarray) -> _Line:
-    first = path[:, 0].min()
-    piece = ((path[:, 0] - first) / BIN_M).astype(int)
-    count = np.bincount(piece)
-    u, v = (np.bincount(piece, path[:, axis])[count > 0] / count[count > 0] for axis in (0, 1))
-    return _Line(u=u, v=v)
-
-
-def _overlap(line: _Line, before: _Line, width: float, *, backwards: bool) -> np.ndarray:
+def _overlap(line: np.ndarray, before: np.ndarray, width: float, backwards: bool) -> np.ndarray:
     """Overlap of the bands of two strokes at every piece of the second, without its last `END_M` [m]."""
-    end = line.u[0] if backwards else line.u[-1]
-    inner = np.abs(line.u - end) > END_M
-    u, v = line.u[inner], line.v[inner]
-    beyond = np.maximum(0.0, np.maximum(before.u[0] - u, u - before.u[-1]) - 0.5 * width)  # past its round end
-    return width - (v - np.interp(u, before.u, before.v)) - beyond
+    end = line[0, 0] if backwards else line[-1, 0]
+    u, v = line[np.abs(line[:, 0] - end) > END_M].T
+    beyond = np.maximum(0.0, np.maximum(before[0, 0] - u, u - before[-1, 0]) - 0.5 * width)  # past its round end
+    return width - (v - np.interp(u, *before.T)) - beyond
 
 
 def contact_share(trace: Trace, ticks: np.ndarray) -> float:
     """Fraction of the physics steps of painting within some control ticks (N,) bool that are in contact."""
-    if not ticks.any():
-        return math.nan
-    inside = ticks[np.searchsorted(trace.t, contact_clock(trace) + 1e-9, side="right") - 1]
-    contact = trace.contact_1khz[inside & trace.painting_1khz.astype(bool)]
-    return float(np.mean(contact > CONTACT_N)) if len(contact) else math.nan
+    inside = ticks[physics_ticks(trace)] & trace.painting_1khz.astype(bool)
+    return float(np.mean(trace.contact_1khz[inside] > CONTACT_N)) if inside.any() else math.nan

@@ -12,6 +12,7 @@ import numpy as np
 from sim.evaluate.strokes import Stroke, contact_share, painted_strokes
 from sim.evaluate.window import CONTACT_N, board_tip, in_phase
 from sim.flight.trace import CRASH, INTERRUPTED, KILLED, LANDED, TIME_OUT, Trace
+from sim.world.board import BoardGeometry
 from sim.world.worlds import HARSH, world_name
 
 #: A stroke is at its place within this distance of its nominal line [m]: the overlap of two strokes.
@@ -69,6 +70,11 @@ class Judgement:
         """What a stroke lacks; None for a good one."""
         return "; ".join(self._stroke(number)) or None
 
+    @property
+    def _word(self) -> str:
+        """Row or column."""
+        return self.trace.scene.paint.pattern.removesuffix("s")
+
     def _ends(self) -> Iterator[str]:
         """Ends of a flight that complete no job, whatever came before."""
         reason = self.trace.reason
@@ -76,9 +82,10 @@ class Judgement:
             yield reason
 
     def _painted(self) -> Iterator[str]:
-        for number in range(1, self.trace.scene.paint.rows + 1):
+        board = BoardGeometry(self.trace.scene)
+        for number in range(1, board.strokes + 1):
             if missing := self.of_stroke(number):
-                yield f"row {number}: {missing}"
+                yield f"{self._word} {number}: {missing}"
         painting = in_phase(self.trace, "paint", "climb")
         share = contact_share(self.trace, painting)
         if share < self.least_contact:
@@ -92,10 +99,11 @@ class Judgement:
         if abs(stroke.place_error_m) > PLACE_M:
             yield f"{_mm(abs(stroke.place_error_m))} from its place"
         if stroke.overlap_m < -ROUNDING_M:
-            yield f"gap of {_mm(-stroke.overlap_m)} to row {number - 1}"
+            yield f"gap of {_mm(-stroke.overlap_m)} to {self._word} {number - 1}"
         if stroke.most_overlap_m > MOST_OVERLAP * stroke.nominal_overlap_m + ROUNDING_M:
             yield (
-                f"overlaps row {number - 1} by {_mm(stroke.most_overlap_m)}, nominal {_mm(stroke.nominal_overlap_m)}"
+                f"overlaps {self._word} {number - 1} by {_mm(stroke.most_overlap_m)}, "
+                f"nominal {_mm(stroke.nominal_overlap_m)}"
             )
         if abs(stroke.length_m - paint.stroke_m) > LENGTH_M:
             yield f"{stroke.length_m:.3f} m long, {paint.stroke_m:.3f} m asked"

@@ -8,13 +8,14 @@ from pathlib import Path
 
 import polars as pl
 
-from sim.evaluate.table import law_name, markdown
+from sim.evaluate.table import markdown
 from sim.experiments.comparison import compared_cells
 from sim.experiments.criteria_section import criteria_table
 from sim.experiments.parts_section import parts_table
 from sim.experiments.spec import Experiment
 from sim.experiments.variants import VARIANTS
 from sim.experiments.wording import cell, difference, entry, headings, interval, measured, value_of
+from sim.flight.trace import law_name
 from sim.sweep.paired import differences, needed
 from sim.sweep.statistics import cells, parameters, split
 

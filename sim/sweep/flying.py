@@ -10,6 +10,7 @@ from typing import Any
 
 from ibvs_qp.config.errors import IbvsQpError
 from ibvs_qp.config.settings import dump_toml
+from sim.evaluate.truth import Judgement
 from sim.flight.closed_loop import fly
 from sim.flight.flight_log import save_log
 from sim.flight.stop import ignore_stop
@@ -19,6 +20,8 @@ from sim.sweep.design import Block, Refusal, Run
 from sim.sweep.fingerprint import code_hash, configuration_hash
 from sim.sweep.parts import PARAM
 
+#: Beginning of the reason of a flight that the pilot claims and the truth does not complete.
+FALSE_CLAIM = "false claim"
 #: A row of the table: column to value.
 Row = dict[str, Any]
 
@@ -61,6 +64,7 @@ def fly_run(run: Run | Refusal, log: Path | None = None) -> Row:
         "variant": run.variant,
         "seed": run.seed,
         "completed": False,
+        "claimed": False,
         "config_hash": None,
         "code_hash": code_hash(),
         "version": version("ibvs-qp"),
@@ -80,11 +84,20 @@ def fly_run(run: Run | Refusal, log: Path | None = None) -> Row:
         return {**row, "reason": f"error: {type(error).__name__}: {error} ({Path(where.filename).name}:{where.lineno})"}
     if trace.reason == INTERRUPTED:
         raise KeyboardInterrupt
-    row |= {"completed": bool(trace.completed), "reason": trace.reason}
+    row |= outcome(trace)
     if run.keep and log is not None:
         row["log"] = _store(trace, log)
     figures = run.measure(trace)
     return row | {key: None if math.isnan(value) else float(value) for key, value in figures.items()}
+
+
+def outcome(trace: Trace) -> Row:
+    """Whether a flight ended as planned, by the truth and by the pilot, and why it ended; a false claim has failed."""
+    judgement, claimed = Judgement(trace), bool(trace.claimed)
+    completed, reason = judgement.completed, trace.reason
+    if completed != claimed:
+        reason = f"{FALSE_CLAIM}: {judgement.shortfall}" if claimed else f"not claimed: {reason}"
+    return {"completed": completed and claimed, "claimed": claimed, "reason": reason}
 
 
 def _store(trace: Trace, folder: Path) -> str:

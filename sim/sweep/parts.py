@@ -17,7 +17,8 @@ HEAD = {
     "law": pl.String,
     "variant": pl.String,
     "seed": pl.Int64,
-    "completed": pl.Boolean,
+    "completed": pl.Boolean,  # by the truth, and claimed by the pilot
+    "claimed": pl.Boolean,  # by the pilot alone
     "reason": pl.String,
     "config_hash": pl.String,
     "code_hash": pl.String,

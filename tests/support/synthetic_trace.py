@@ -83,7 +83,7 @@ def synthetic_trace(
     lost = np.flatnonzero(painting_1khz)[4000 : 4000 + errors.lost_steps]
     contact[lost] = 0.0
     standoff = np.interp(t, [0, 2, 3, TOUCH_S], [scene.start.distance_m, 0.02, 0.02, 0.0])
-    standoff[t > points[-1][0]] = (t[t > points[-1][0]] - points[-1][0]) * 0.1
+    standoff[t > points[-1][0]] = (t[t > points[-1][0]] - points[-1][0]) * 0.1  # 0.3 m at the end
     tip = np.column_stack((-standoff, board.point(*tip_board.T)))
     half_roll, half_yaw = np.radians(errors.roll_deg) / 2, np.radians(errors.yaw_deg) / 2
     attitude = np.array(  # yaw, then roll
@@ -143,7 +143,7 @@ def synthetic_trace(
     mask.flat[covered[: round(errors.unpainted_share * len(covered))]] = 0.0
     canvas = np.where(mask[..., None] > 0.5, scene.paint.color, scene.board.color).astype(np.uint8)
     changes = np.flatnonzero(np.diff(arrays["phase"])) + 1
-    events = [Event(t=float(t[i]), kind="phase", text=f"{phase_names[i]}: made up") for i in changes]
+    events = [Event(t=float(t[i]), kind=str(phase_names[i]), text=f"{phase_names[i]}: made up") for i in changes]
     return Trace(
         scene=scene,
         seed=seed,
