@@ -13,11 +13,8 @@ from sim.evaluate.path_error import PathError, path_error
 from sim.evaluate.strokes import Stroke, contact_share, on_board
 from sim.evaluate.truth import Judgement
 from sim.evaluate.window import SETTLED_S, board_tip, contact_clock, in_phase, physics_ticks, tilt_deg, touch_figures
-from sim.flight.trace import Trace
+from sim.flight.trace import PAINTED, Trace
 from sim.world.board import BoardGeometry
-
-#: Paint coverage of a pixel above which it counts as painted.
-PAINTED = 0.5
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -18,6 +18,8 @@ LANDED, INTERRUPTED = "landed", "interrupted"
 KILLED = "the process of the flight was killed: its log ends here"
 #: Part of the reason of a flight, or of a strategy, that took too long.
 TIME_OUT = "time-out"
+#: Paint coverage of a pixel above which it counts as painted.
+PAINTED = 0.5
 #: Meaning of every array of a trace (N control ticks, M physics steps, F pictures).
 FIELDS = {
     "t": "(N,) time since start [s]",
@@ -56,6 +58,15 @@ FIELDS = {
     "contact_1khz": "(M,) true normal contact force at every physics step [N]",
     "painting_1khz": "(M,) bool, true while a row or a climb is being painted (phase demands contact)",
 }
+
+
+#: Arrays that figures of merit are computed from; the log level `trace` has no others.
+FIGURE_INPUTS = (
+    *("t", "position", "velocity", "attitude", "euler", "tip", "thrusts", "thrusts_actual", "thrust_min", "thrust_max"),
+    *("true_thrust_min", "true_thrust_max", "true_mass", "push_true", "push_reference", "friction_true"),
+    *("velocity_estimate", "phase", "row", "outcome", "active", "step_us", "vision_ms", "propeller_clearance"),
+    *("contact_1khz", "painting_1khz"),
+)
 
 
 #: Names of the laws in titles, headings and legends, in the order flown.

@@ -11,7 +11,7 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
-from sim.evaluate.flight_table import LINES
+from sim.evaluate.flight_table import LINES, false_claims, shown
 from sim.flight.pictures import pack_picture
 from sim.flight.trace import Trace, law_name
 from sim.report.plain_words import OUTCOMES, limit_words
@@ -53,7 +53,7 @@ def write_report(
     page = Template(_PAGE.read_text(encoding="utf-8")).substitute(
         title="Painting flight: " + " and ".join(map(law_name, laws)) if laws else "No flight",
         lead=lead,
-        warning=interrupted if summary["interrupted"] else "",
+        warning=interrupted if summary["interrupted"] else _false_claims(laws),
         table=_figures_of_merit(laws),
         rows=_rows(laws),
         video=_video(video),
@@ -79,8 +79,13 @@ def _table(headings: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequ
 
 
 def _figures_of_merit(laws: dict[str, dict[str, Any]]) -> str:
-    rows = [(line.words, *(line.show(figures) for figures in laws.values()), line.unit, line.about) for line in LINES]
+    rows = [(line.words, *(shown(line, figures) for figures in laws.values()), line.unit, line.about) for line in LINES]
     return _table(("", *map(law_name, laws), "unit", "meaning"), rows, range(1, len(laws) + 1))
+
+
+def _false_claims(laws: dict[str, dict[str, Any]]) -> str:
+    """Warnings of flights whose claim and truth differ."""
+    return "".join(f'<p class="warning">{escape(line)}.</p>' for line in false_claims(laws))
 
 
 def _rows(laws: dict[str, dict[str, Any]]) -> str:

@@ -15,11 +15,14 @@ from sim.flight.closed_loop import fly
 from sim.flight.flight_log import save_log
 from sim.flight.stop import ignore_stop
 from sim.flight.trace import INTERRUPTED, Trace
+from sim.flight.trace_log import save_trace
 from sim.storage.atomic import write_text
 from sim.sweep.design import Block, Refusal, Run
 from sim.sweep.fingerprint import code_hash, configuration_hash
 from sim.sweep.parts import PARAM
 
+#: Ending of the file of a flight's trace.
+TRACE = ".trace.npz"
 #: Beginning of the reason of a flight that the pilot claims and the truth does not complete.
 FALSE_CLAIM = "false claim"
 #: A row of the table: column to value.
@@ -50,7 +53,7 @@ def fly_run(run: Run | Refusal, log: Path | None = None) -> Row:
 
     Args:
         run: The run.
-        log: Folder of its log, if the run stores one.
+        log: Folder of its log, if the run stores one; its trace goes beside it.
 
     Raises:
         KeyboardInterrupt: On Ctrl-C.
@@ -69,6 +72,7 @@ def fly_run(run: Run | Refusal, log: Path | None = None) -> Row:
         "code_hash": code_hash(),
         "version": version("ibvs-qp"),
         "log": None,
+        "trace": None,
         **{PARAM + key: value for key, value in run.params.items()},
     }
     if isinstance(run, Refusal):
@@ -87,6 +91,9 @@ def fly_run(run: Run | Refusal, log: Path | None = None) -> Row:
     row |= outcome(trace)
     if run.keep and log is not None:
         row["log"] = _store(trace, log)
+    if run.trace and log is not None:
+        save_trace(file := log.parent / f"{log.name}{TRACE}", trace)
+        row["trace"] = f"{file.parent.name}/{file.name}"
     figures = run.measure(trace)
     return row | {key: None if math.isnan(value) else float(value) for key, value in figures.items()}
 

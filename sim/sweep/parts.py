@@ -23,7 +23,8 @@ HEAD = {
     "config_hash": pl.String,
     "code_hash": pl.String,
     "version": pl.String,
-    "log": pl.String,
+    "log": pl.String,  # folder of the whole log
+    "trace": pl.String,  # file of the inputs of the figures (`sim.flight.trace_log`)
 }
 #: Prefix of parameter columns.
 PARAM = "param."

@@ -99,6 +99,17 @@ def test_report_plays_the_video_beside_it(traces, tmp_path):
     assert page.count('poster="data:image/jpeg;base64,') == 1, "a picture before it plays"
 
 
+def test_a_false_claim_is_marked(page, traces, tmp_path):
+    assert 'class="warning"' not in page
+    metrics = {law: compute_metrics(trace) for law, trace in traces.items()}
+    metrics["qp"] |= {"completed": False, "not_completed": "row 5: 54 mm from its place"}
+    folder = RunFolder(tmp_path)
+    write_report(folder.report, traces, summary(FACTS, folder, metrics, False, 12.3, 10**9), {})
+    text = folder.report.read_text(encoding="utf-8")
+    assert '<p class="warning">QP law: claimed as completed, but row 5: 54 mm from its place.</p>' in text
+    assert text.count("yes (FALSE CLAIM)") == 1
+
+
 def test_every_row_of_the_report_has_a_meaning(page):
     assert all(figure.about for figure in FIGURES_OF_MERIT.values() if figure.of is not None)
     assert set(plain_words.OUTCOMES) == set(Outcome)

@@ -39,7 +39,7 @@ def made_up_flight(scene, options, *, config, **_):
     off = sum(math.log(getattr(gains, name) / best) ** 2 for name, best in BEST.items())
     wobble = 1.0 + 0.01 * math.sin(options.seed + len(scene.wind.mean_m_s) * scene.wall.friction)
     figures = {each.name: 0.05 * each.failed * (0.2 + off) * wobble for each in OBJECTIVES}
-    return SimpleNamespace(completed=gains.line_kp < 55.0, reason="", figures=figures)
+    return SimpleNamespace(outcome={"completed": gains.line_kp < 55.0}, reason="", figures=figures)
 
 
 @pytest.fixture
@@ -52,6 +52,7 @@ def flown(monkeypatch, tmp_path):
         return made_up_flight(scene, options, **named)
 
     monkeypatch.setattr(sim.sweep.flying, "fly", fly)
+    monkeypatch.setattr(sim.sweep.flying, "outcome", lambda trace: trace.outcome)
     monkeypatch.setattr(sim.tune.flights, "paint_figures", made_up_figures)
     monkeypatch.setattr("sim.tune.search.require_margin", lambda *_: None)
     monkeypatch.setattr("sim.tune.search.motion_sensitivity", lambda _: {"line": 1.5})
