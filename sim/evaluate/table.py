@@ -53,7 +53,9 @@ def terminal_table(
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, title=title, title_justify="left")
     left = headings[:1] if text is None else text
     for heading in headings:
-        table.add_column(heading, justify="left" if heading in left else "right", no_wrap=heading not in wrap)
+        justify = "left" if heading in left else "right"
+        wraps = heading in wrap
+        table.add_column(heading, justify=justify, no_wrap=not wraps, overflow="fold" if wraps else "ellipsis")
     for row in rows:
         table.add_row(*row)
     return table

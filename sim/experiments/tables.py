@@ -29,8 +29,9 @@ Generated from data by `{command}`; do not edit. {lead} [results.md](results.md)
 them, any other bound to the median of the cell; if not all flights are within the bound, the number within it follows.
 A flight without the metric fails.
 Values are medians over the flights of a cell, with their 95 % bootstrap interval in brackets. *Done* counts the flights
-that ended as planned, by the truth and by the pilot's claim; values come from those flights only. Differences are taken between flights with the same seed
-that both ended as planned, with the exact interval of the median in brackets; **bold** means that the interval excludes
+that ended as planned, by the truth and by the pilot's claim; values come from those flights only. Differences are taken
+between flights with the same seed that both ended as planned, with the exact interval of the median in brackets;
+**bold** means that the interval excludes
 zero. Fewer than {needed} pairs are too few for such an interval.
 
 """

@@ -123,6 +123,7 @@ def fly(*arguments, **named):
     time.sleep(0.1)
     return made_up.made_up_flight(*arguments, **named)
 sim.sweep.flying.fly = fly
+sim.sweep.flying.outcome = lambda trace: trace.outcome
 from sim.commands.cli import main
 main(["sweep", "spec.toml", "--jobs", "1", "--json", "--out", "run"])
 """
