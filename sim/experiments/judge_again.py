@@ -74,7 +74,7 @@ def judged(table: pl.DataFrame, runs: list[Run]) -> pl.DataFrame:
     rows = []
     for row in table.filter(pl.col("completed")).to_dicts():
         names = ("experiment", "law", "variant", "seed")
-        run = by_key[_key(*(row[name] for name in names), parameters(row))]
+        run = by_key[_key(row["experiment"], row["law"], row["variant"], row["seed"], parameters(row))]
         outcome, why = judge(row, run)
         world = world_name(run.plan.scene.errors)
         rows.append({name: row[name] for name in names} | {"world": world, "outcome": outcome, "why": why})
@@ -92,7 +92,9 @@ def section(found: pl.DataFrame) -> str:
         count = Counter(part["outcome"])
         failed = Counter(part.filter(pl.col("outcome") == FAILS).select("why", "variant", "world").rows())
         words = "; ".join(f"{why} ({variant}, {world}: {n})" for (why, variant, world), n in failed.items())
-        rows.append([str(experiment), str(law), str(part.height), *(str(count[o]) for o in (HOLDS, FAILS, OPEN)), words])
+        rows.append(
+            [str(experiment), str(law), str(part.height), *(str(count[o]) for o in (HOLDS, FAILS, OPEN)), words]
+        )
     return markdown(("experiment", "law", "claimed", HOLDS, FAILS, OPEN, "what fails"), rows)
 
 

@@ -95,7 +95,7 @@ def test_the_gains_are_those_that_the_kept_search_chose(law: str) -> None:
 
 def finalist(row: dict[str, Any]) -> Finalist:
     def read(each: dict[str, Any]) -> Score:
-        return Score(tuple(each[objective.column] for objective in OBJECTIVES), each["failed"])
+        return Score(tuple(each[objective.name] for objective in OBJECTIVES), each["failed"])
 
     return Finalist(read(row), {name: read(each) for name, each in row["scenes"].items()}, row["damping"])
 
