@@ -155,7 +155,9 @@ class Compare:
 def _print(conditions: list[dict[str, Any]], cells: list[dict[str, Any]], a: Path, b: Path) -> None:
     from rich.console import Console
 
-    from sim.evaluate.table import LINES, law_name, plain, terminal_table
+    from sim.evaluate.flight_table import LINES
+    from sim.evaluate.table import plain, terminal_table
+    from sim.flight.trace import law_name
     from sim.report.comparison import PAINT_VARIANT
     from sim.report.conditions import ABSENT
 
@@ -174,12 +176,11 @@ def _print(conditions: list[dict[str, Any]], cells: list[dict[str, Any]], a: Pat
         done = " and ".join(f"{count} of {cell['n']}" for count in cell["completed"])
         rows = []
         for line in LINES:
-            if (found := cell["differences"].get(line.key)) is None:
+            if (found := cell["differences"].get(line.name)) is None:
                 continue
             figures = [line.scale * found[key] for key in ("a", "b", "median", "low", "high")]
             a_text, b_text = (f"{figure:.4g}" for figure in figures[:2])
             median, low, high = (f"{figure:+.4g}" for figure in figures[2:])
             interval = f"{low} to {high}" if low != high else ABSENT
-            label = f"{line.label} [{line.unit}]" if line.unit else line.label
-            rows.append((plain(label), a_text, b_text, median, interval))
+            rows.append((plain(line.label), a_text, b_text, median, interval))
         console.print(terminal_table(headings, rows, plain(f"{', '.join(labels)}: completed {done}")))

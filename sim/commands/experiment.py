@@ -52,6 +52,8 @@ class ExperimentCommand:
     """Parallel processes; default: one per core. The results do not depend on it."""
     out: Annotated[Path | None, optional("DIR")] = None
     """Run folder; default: runs/<UTC stamp>. Finished flights in it are not flown again."""
+    traces: Annotated[bool, flag] = False
+    """Keep the inputs of every flight's figures, about 20 kB per second of flight: others can be computed later."""
     plan: Annotated[bool, flag] = False
     """Print the number of flights and their flight time, and stop."""
     json: Annotated[bool, flag] = False
@@ -68,7 +70,7 @@ class ExperimentCommand:
         check_seed(self.seed)
         check_jobs(self.jobs)
         notes = Console(stderr=True, quiet=self.json)
-        choice = Choice(quick=self.quick, seed=self.seed, features=self.features, world=self.world)
+        choice = Choice(quick=self.quick, seed=self.seed, features=self.features, traces=self.traces, world=self.world)
         runs = designs(self.name, choice)
         _print_plan(Console() if self.plan else notes, runs)
         if self.plan:
@@ -126,6 +128,8 @@ class ExperimentCommand:
             print(as_json(content))
         else:
             _print_verdicts(Console(), content)
+            if content["false_claims"]:
+                print(f"False claims: {content['false_claims']} flights were claimed and not completed; they failed.")
             if page is not None:
                 print(f"Results: {page}")
         if result.interrupted:

@@ -154,9 +154,9 @@ class Paint:
         from rich.console import Console
 
         from ibvs_qp.recording.layouts import FOLDER as LAYOUTS
+        from sim.evaluate.flight_table import false_claims, figure_table
         from sim.evaluate.metrics import compute_metrics
-        from sim.evaluate.table import figure_table
-        from sim.flight.side_by_side import INTERRUPTED
+        from sim.flight.trace import INTERRUPTED
         from sim.report.rundir import as_json, peak_memory, summary
 
         traces = {law: flight.trace for law, flight in flights.items()}
@@ -184,6 +184,8 @@ class Paint:
                 print(f"Report: {folder.report}")
             for file in folder.logs():
                 print(f"Log: {file}; layouts for Foxglove and Rerun: {LAYOUTS}")
+        if (false := false_claims(metrics)) and not interrupted:
+            print(f"ibvs-qp: warning: {'; '.join(false)}", file=sys.stderr)
         if interrupted:
             print(f"ibvs-qp: interrupted; the partial run is in {folder.path}", file=sys.stderr)
         return EXIT_INTERRUPTED if interrupted else 0

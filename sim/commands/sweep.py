@@ -136,6 +136,8 @@ class Sweep:
             print(as_json(content))
         elif page is not None:
             print(f"{content['completed']} of {content['flights']} flights ended as planned. Report: {page}")
+            if content["false_claims"]:
+                print(f"{content['false_claims']} more were claimed by the pilot: false claims.")
         if result.interrupted:
             return interrupted(words, folder, f"finished blocks are in {folder}")
         return 0
@@ -168,6 +170,8 @@ class Sweep:
 
 
 def _facts(design: Planned, result: SweepResult) -> dict[str, object]:
+    from sim.sweep.statistics import false_claims
+
     failed = result.table.filter(~result.table["completed"])
     reasons = failed["reason"].value_counts(sort=True, name="n").rows()
     return {
@@ -175,6 +179,7 @@ def _facts(design: Planned, result: SweepResult) -> dict[str, object]:
         "planned": len(design),
         "flights": result.table.height,
         "completed": int(result.table["completed"].sum()),
+        "false_claims": false_claims(result.table),
         "failed": {str(reason): count for reason, count in sorted(reasons, key=lambda row: (-row[1], str(row[0])))},
         "on_disk_before": result.reused,
         "interrupted": result.interrupted,

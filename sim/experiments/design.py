@@ -37,6 +37,7 @@ class Choice:
     quick: bool = False  # a few cells and seeds, for minutes instead of the record
     seed: int = 0  # first seed
     features: str = "rendered"  # "rendered" or "geometric"
+    traces: bool = False  # whether the inputs of every flight's figures are kept
     world: str = EXPERIMENT_WORLD  # errors of vehicle and sensors, where no level names another world
 
 
@@ -86,6 +87,7 @@ def _cell(experiment: Experiment, flights: Flights, level: dict[str, Parameter],
                 ),
                 measure=getattr(measures, f"{flights.measure}_figures"),
                 keep=flights.keep and index == 0,
+                trace=choice.traces,
                 expected_s=AROUND_S + setup.job.expected_s(config.painting),
             )
 

@@ -49,6 +49,7 @@ class Planned:
                 "setups": {law: [to_dict(s.scene), to_dict(s.pilot), repr(s.job)] for law, s in spec.setups.items()},
                 "options": [spec.settings.features, spec.settings.vision],
                 "name": spec.settings.name,
+                "traces": spec.settings.traces,
                 "code": code_hash(),
             }
         )
@@ -90,7 +91,8 @@ class Planned:
         config = pilot_config(setup.scene, options, setup.pilot)
         plan = FlightPlan(scene=setup.scene, config=config, options=options, job=setup.job)
         measure = paint_figures if isinstance(setup.job, PaintJob) else press_row
-        return Run(**facts, plan=plan, measure=measure, expected_s=OVERHEAD_S + setup.job.expected_s(config.painting))
+        expected_s = OVERHEAD_S + setup.job.expected_s(config.painting)
+        return Run(**facts, plan=plan, measure=measure, trace=self.spec.settings.traces, expected_s=expected_s)
 
 
 def _runs(design: Planned, start: int, stop: int) -> Iterator[Run | Refusal]:

@@ -46,6 +46,7 @@ class SweepSettings:
     seeds: int = setting(1, "flights of every point and law: seed, seed + 1, ...", low=1, high=1_000_000)
     samples: int = setting(0, "number of draws of [random]", low=0, high=MOST_FLIGHTS)
     draw: str = choice("random", "method of the draws", ("random", "sobol"))
+    traces: bool = setting(False, "keep the inputs of every flight's figures, 20 kB per second of flight")
     block_runs: int = setting(10, "runs per block: the most that an interrupt loses", low=1, high=100_000)
 
     def __post_init__(self) -> None:

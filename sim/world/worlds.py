@@ -9,6 +9,8 @@ from sim.world.scene import Scene
 
 #: World of `paint` without a scene file, and of experiments and comparisons without `--world`.
 DEFAULT_WORLD, EXPERIMENT_WORLD = "datasheet", "ideal"
+#: World of a neglected vehicle.
+HARSH = "harsh"
 #: Name of errors that no shipped profile has.
 OWN = "own"
 

@@ -87,7 +87,7 @@ def test_second_run_leaves_nothing_stale(flown, capsys):
 
 def test_law_that_does_not_complete_is_still_reported(flown, capsys, monkeypatch):
     def crash(scene, options, progress=None):
-        return dataclasses.replace(fake_fly(scene, options), completed=False, reason="propeller touched the wall")
+        return dataclasses.replace(fake_fly(scene, options), claimed=False, reason="propeller touched the wall")
 
     monkeypatch.setattr(sim.flight.side_by_side, "fly", crash)
     assert main(["paint", "--json", "--no-video"]) == 0
@@ -96,7 +96,7 @@ def test_law_that_does_not_complete_is_still_reported(flown, capsys, monkeypatch
 
 def test_interrupt_writes_the_partial_run(flown, capsys, monkeypatch):
     def cut_short(scene, options, progress=None):
-        return dataclasses.replace(fake_fly(scene, options), completed=False, reason="interrupted")
+        return dataclasses.replace(fake_fly(scene, options), claimed=False, reason="interrupted")
 
     monkeypatch.setattr(sim.flight.side_by_side, "fly", cut_short)
     assert main(["paint", "--json", "--out", "run", "--no-video"]) == 130
