@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from ibvs_qp.config.settings import setting, validate
+from ibvs_qp.config.settings import choice, setting, validate
+from ibvs_qp.painting.pattern import CORNERS, FILL, PATTERNS
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,9 +46,13 @@ class PaintingConfig:
 
     brush_width_m: float = setting(0.08, "diameter of the brush", unit="m", low=0.02, high=0.3)
     edge_margin_m: float = setting(0.05, "brush centre to the guiding or stopping edge", unit="m", low=0.01, high=0.5)
-    rows: int = setting(2, "number of rows", low=1, high=20)
-    stroke_m: float = setting(1.30, "length of a row", unit="m", low=0.1, high=20.0)
-    overlap_m: float = setting(0.008, "overlap of rows", unit="m", low=0.0, high=0.1)
+    pattern: str = choice("rows", "direction of the strokes", PATTERNS)
+    start: str = choice("bottom-right", "corner of the board at which stroke 1 begins", CORNERS)
+    rows: int | str = setting(
+        2, "number of strokes of either pattern, or as many as the board has place for", low=1, high=20, words=(FILL,)
+    )
+    stroke_m: float = setting(1.30, "length of a stroke", unit="m", low=0.1, high=20.0)
+    overlap_m: float = setting(0.008, "overlap of strokes", unit="m", low=0.0, high=0.1)
     speed_m_s: float = setting(0.10, "painting speed", unit="m/s", low=0.01, high=0.5)
     push_n: float = setting(5.0, "push", unit="N", low=0.5, high=40.0)
     climb_speed_m_s: float = setting(0.05, "speed of a climb", unit="m/s", low=0.005, high=0.3)
