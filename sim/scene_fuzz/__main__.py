@@ -11,7 +11,7 @@ from collections import Counter
 
 from sim.flight.options import FlightOptions
 from sim.scene_fuzz.judge import BAD, COMPLETE, OUTCOMES, judge
-from sim.world.worlds import EXPERIMENT_WORLD, world_names
+from sim.world.worlds import DEFAULT_WORLD, world_names
 
 #: Longest time of the strokes of a drawn scene [s]; ten times that of the default one would take a day for 150 draws.
 LONGEST_S = 150.0
@@ -24,7 +24,7 @@ def main() -> int:
     parser.add_argument("--first-seed", type=int, default=0, help="seed of the first; the next ones follow")
     parser.add_argument("--law", choices=("qp", "paper"), default="qp")
     parser.add_argument("--features", choices=("geometric", "rendered"), default="geometric")
-    parser.add_argument("--world", choices=world_names(), default=EXPERIMENT_WORLD)
+    parser.add_argument("--world", choices=world_names(), default=DEFAULT_WORLD)
     parser.add_argument("--longest", type=float, default=LONGEST_S, help="longest time of a scene's strokes [s]")
     given = parser.parse_args()
     options = FlightOptions(law=given.law, features=given.features, video=False, compiled=True)
