@@ -82,16 +82,16 @@ def _overlap(scene: Scene) -> Iterator[str]:
 
 
 def _strokes(board: BoardGeometry) -> Iterator[str]:
-    """The brush's centre stays on the board in every stroke that is at its place."""
+    """Strokes keep the margin at both ends, where edges stop them, and the brush's centre stays on the board."""
     paint, (length, extent) = board.scene.paint, board.extent
     sides = ("board.width_m", "board.height_m")
     along, across = sides if board.pattern.kind == ROWS else sides[::-1]
     reason = "the brush's centre stays on the board in every stroke that is at its place"
     margin: Key = ("paint.edge_margin_m", paint.edge_margin_m, "m")
-    longest, widest = length - paint.edge_margin_m - PLACE_TOLERANCE_M, extent - PLACE_TOLERANCE_M
+    longest, widest = length - 2.0 * paint.edge_margin_m + PLACE_TOLERANCE_M, extent - PLACE_TOLERANCE_M
     if paint.stroke_m > longest + ROUNDING:
-        allowed = f"allowed is at most {max(longest, 0.0):.4g} m"
-        yield _problem("paint.stroke_m", paint.stroke_m, "m", allowed, reason, (along, length, "m"), margin)
+        allowed, words = f"allowed is at most {max(longest, 0.0):.4g} m", "strokes keep the margin at both ends"
+        yield _problem("paint.stroke_m", paint.stroke_m, "m", allowed, words, (along, length, "m"), margin)
     if paint.edge_margin_m > widest + ROUNDING:
         allowed = f"allowed is at most {max(widest, 0.0):.4g} m"
         yield _problem(*margin, allowed, reason, (across, extent, "m"))

@@ -45,13 +45,13 @@ def force(**keys: float) -> Scene:
 BRUSH = {"brush_width_m": 0.25, "rows": 3, "stroke_m": 1.2, "edge_margin_m": 0.12}
 LIMITS = {
     "strokes longer than the board": (
-        paint(stroke_m=1.343),
-        paint(stroke_m=1.342),
+        paint(stroke_m=1.309),
+        paint(stroke_m=1.308),
         ["paint.stroke_m", "board.width_m"],
     ),
     "columns longer than the board": (
-        paint(pattern="columns", stroke_m=0.543),
-        paint(pattern="columns", stroke_m=0.542),
+        paint(pattern="columns", stroke_m=0.509),
+        paint(pattern="columns", stroke_m=0.508),
         ["paint.stroke_m", "board.height_m"],
     ),
     "strokes above the board": (
