@@ -98,7 +98,8 @@ class Paint:
 
         check_mujoco()
         from ibvs_qp.recording import require_extra
-        from sim.flight.options import FlightOptions, pilot_config
+        from sim.flight.options import FlightOptions, pilot_config, sized
+        from sim.flight.preflight import check_job
         from sim.flight.progress import flight_progress
         from sim.flight.side_by_side import fly_laws
         from sim.report.rundir import RunFolder
@@ -128,8 +129,10 @@ class Paint:
             compiled=True,
             view=self.view,
         )
-        pilot_config(scene, options)  # raises on an unusable preset before anything is shown or written
         laws = ("qp", "paper") if self.law == "both" else (self.law,)
+        for law in laws:  # an unusable preset or job is refused before anything is shown or written
+            flown = dataclasses.replace(options, law=law)
+            check_job(sized(scene, flown), pilot_config(scene, flown), self.features)
         notes = Console(stderr=True, quiet=self.json)
         facts = {
             "command": command_line(words),

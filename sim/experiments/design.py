@@ -16,6 +16,7 @@ from sim.faults.fault import Fault
 from sim.faults.rotors import Derate
 from sim.flight.jobs import PaintJob, PressJob
 from sim.flight.options import FlightOptions, pilot_config, unsupervised
+from sim.flight.preflight import check_job
 from sim.sweep.design import FlightPlan, Parameter, Run
 from sim.sweep.setup import Setup, changed
 from sim.world.random_scene import EVALUATION, random_scene
@@ -78,6 +79,7 @@ def _cell(experiment: Experiment, flights: Flights, level: dict[str, Parameter],
                 video=False,
             )
             config = pilot_config(setup.scene, options, setup.pilot)
+            check_job(setup.scene, config, options.features, setup.job)
             yield Run(
                 experiment=experiment.name,
                 variant=variant,
