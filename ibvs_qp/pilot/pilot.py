@@ -35,6 +35,7 @@ from ibvs_qp.pilot.attitude_history import AttitudeHistory
 from ibvs_qp.pilot.camera import CameraInput
 from ibvs_qp.pilot.config import PilotConfig
 from ibvs_qp.pilot.inertial import INERTIAL, InertialData
+from ibvs_qp.pilot.push_report import PushReport
 from ibvs_qp.pilot.status import Event, FlightStatus
 from ibvs_qp.safety.assurance import Assurance
 from ibvs_qp.safety.policy import Fault
@@ -121,6 +122,7 @@ class Pilot:
         self._camera = CameraInput(self.config, self._history, seen_as)
         self.rotor_loss = RotorLoss(vehicle, settings.gains)
         self.assurance = Assurance(vehicle, self.config.safety)
+        self.push_report = PushReport()
         self.painter = painter or Painter(self.config.painting)
         self.observer: Callable[[LawCall], None] | None = None
         law = HybridController if self.config.law == "qp" else PaperController
@@ -146,7 +148,7 @@ class Pilot:
         self._inertial.reset(self._gate.last)
         sensing = (self.self_check, self.tare, self._history, self._camera)
         flying = (self.contact, self.motion, self.rotor_loss, self.assurance, self.painter, self.controller)
-        for part in (*sensing, *flying):
+        for part in (*sensing, *flying, self.push_report):
             part.reset()
         self._first = self._stamp = self._imu_stamp = -1
         self._covariance = self.motion.velocity_variance * np.eye(3)
@@ -183,6 +185,10 @@ class Pilot:
             reason="; ".join(supervisor.reasons) if ended else painter.reason,
             safety=supervisor.state,
             events=tuple(Event(*entry) for entry in painter.log),
+            push_asked_n=self.push_report.asked_n,
+            push_commanded_n=self.push_report.commanded_n,
+            push_flown_n=self.push_report.felt_n,
+            push_reduction=self.push_report.reduction,
         )
 
     @property
@@ -274,6 +280,8 @@ class Pilot:
         begin = time.perf_counter()
         command = self._command(stamp, contact)
         self.controller_time_s = time.perf_counter() - begin
+        if event := self.push_report.update(self.reference, contact, self.setpoints, command, dt):
+            self.painter.log.append(((stamp - self._first) * 1e-9, *event))
         self._commanded = self.assurance.explained(command)
         self.assurance.watch(self._shown(frame, contact, command), self.setpoints)
         return self._commanded
