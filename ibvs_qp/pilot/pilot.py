@@ -258,6 +258,7 @@ class Pilot:
             if frame.features is not None or frame.image is not None:
                 self._rejected.append("picture: the vehicle is turned from the wall")
         features = None if turned else self._perceive(frame)
+        surface_offset = self.contact.surface_offset
         contact = self.contact.update(
             stamp_ns=stamp,
             angular_velocity=rate,
@@ -267,7 +268,11 @@ class Pilot:
             wrench_stamp_ns=wrench_stamp,
             plane=self._camera.plane,
             plane_stamp_ns=self._camera.plane_ns,
+            press=self.reference.contact,  # of the tick before: the strategy needs the contact of this one
         )
+        if self.contact.surface_offset > surface_offset:
+            found = f"{contact.push:.1f} N felt {1e3 * self.contact.surface_offset:.0f} mm before the seen surface"
+            self.painter.log.append((1e-9 * (stamp - self._first), "wall", f"{found}: its distance starts anew there"))
         self._check_axes(frame.wrench, contact, dt)
         axes = WallAxes.of(contact.normal, down)
         self.motion.predict(stamp, axes, force, rate, dt)
@@ -410,7 +415,7 @@ class Pilot:
     def _correct_motion(self, features: FeatureFrame, contact: ContactState) -> None:
         """Correct motion and lines at the time of capture."""
         if features.plane is not None and self.contact.plane_ns == features.stamp_ns:
-            normal, distance = plane_in_body(features.plane, self._tip_from_camera)
+            normal, distance = plane_in_body(self.contact.on_felt_surface(features.plane), self._tip_from_camera)
         elif contact.known:
             normal, distance = contact.normal, contact.distance
         else:
@@ -482,7 +487,7 @@ class Pilot:
             contact_wrench=wrench,
             wrench_stamp_ns=wrench_stamp,
             lines=tuple([self.motion.feature(line, axes, distance, frame.stamp_ns) for line, _ in target.guides]),
-            plane=self._camera.plane,
+            plane=self._camera.plane and self.contact.on_felt_surface(self._camera.plane),
             plane_stamp_ns=self._camera.plane_ns,
             velocity=velocity,
             velocity_covariance=covariance,
