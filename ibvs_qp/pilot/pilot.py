@@ -35,6 +35,7 @@ from ibvs_qp.pilot.attitude_history import AttitudeHistory
 from ibvs_qp.pilot.camera import CameraInput
 from ibvs_qp.pilot.config import PilotConfig
 from ibvs_qp.pilot.inertial import INERTIAL, InertialData
+from ibvs_qp.pilot.push_report import PushReport
 from ibvs_qp.pilot.status import Event, FlightStatus
 from ibvs_qp.safety.assurance import Assurance
 from ibvs_qp.safety.policy import Fault
@@ -121,6 +122,7 @@ class Pilot:
         self._camera = CameraInput(self.config, self._history, seen_as)
         self.rotor_loss = RotorLoss(vehicle, settings.gains)
         self.assurance = Assurance(vehicle, self.config.safety)
+        self.push_report = PushReport()
         self.painter = painter or Painter(self.config.painting)
         self.observer: Callable[[LawCall], None] | None = None
         law = HybridController if self.config.law == "qp" else PaperController
@@ -146,7 +148,7 @@ class Pilot:
         self._inertial.reset(self._gate.last)
         sensing = (self.self_check, self.tare, self._history, self._camera)
         flying = (self.contact, self.motion, self.rotor_loss, self.assurance, self.painter, self.controller)
-        for part in (*sensing, *flying):
+        for part in (*sensing, *flying, self.push_report):
             part.reset()
         self._first = self._stamp = self._imu_stamp = -1
         self._covariance = self.motion.velocity_variance * np.eye(3)
@@ -183,6 +185,10 @@ class Pilot:
             reason="; ".join(supervisor.reasons) if ended else painter.reason,
             safety=supervisor.state,
             events=tuple(Event(*entry) for entry in painter.log),
+            push_asked_n=self.push_report.asked_n,
+            push_commanded_n=self.push_report.commanded_n,
+            push_flown_n=self.push_report.felt_n,
+            push_reduction=self.push_report.reduction,
         )
 
     @property
@@ -252,6 +258,7 @@ class Pilot:
             if frame.features is not None or frame.image is not None:
                 self._rejected.append("picture: the vehicle is turned from the wall")
         features = None if turned else self._perceive(frame)
+        surface_offset = self.contact.surface_offset
         contact = self.contact.update(
             stamp_ns=stamp,
             angular_velocity=rate,
@@ -261,7 +268,11 @@ class Pilot:
             wrench_stamp_ns=wrench_stamp,
             plane=self._camera.plane,
             plane_stamp_ns=self._camera.plane_ns,
+            press=self.reference.contact,  # of the tick before: the strategy needs the contact of this one
         )
+        if self.contact.surface_offset > surface_offset:
+            found = f"{contact.push:.1f} N felt {1e3 * self.contact.surface_offset:.0f} mm before the seen surface"
+            self.painter.log.append((1e-9 * (stamp - self._first), "wall", f"{found}: its distance starts anew there"))
         self._check_axes(frame.wrench, contact, dt)
         axes = WallAxes.of(contact.normal, down)
         self.motion.predict(stamp, axes, force, rate, dt)
@@ -274,6 +285,8 @@ class Pilot:
         begin = time.perf_counter()
         command = self._command(stamp, contact)
         self.controller_time_s = time.perf_counter() - begin
+        if event := self.push_report.update(self.reference, contact, self.setpoints, command, dt):
+            self.painter.log.append(((stamp - self._first) * 1e-9, *event))
         self._commanded = self.assurance.explained(command)
         self.assurance.watch(self._shown(frame, contact, command), self.setpoints)
         return self._commanded
@@ -404,7 +417,7 @@ class Pilot:
     def _correct_motion(self, features: FeatureFrame, contact: ContactState) -> None:
         """Correct motion and lines at the time of capture."""
         if features.plane is not None and self.contact.plane_ns == features.stamp_ns:
-            normal, distance = plane_in_body(features.plane, self._tip_from_camera)
+            normal, distance = plane_in_body(self.contact.on_felt_surface(features.plane), self._tip_from_camera)
         elif contact.known:
             normal, distance = contact.normal, contact.distance
         else:
@@ -476,7 +489,7 @@ class Pilot:
             contact_wrench=wrench,
             wrench_stamp_ns=wrench_stamp,
             lines=tuple([self.motion.feature(line, axes, distance, frame.stamp_ns) for line, _ in target.guides]),
-            plane=self._camera.plane,
+            plane=self._camera.plane and self.contact.on_felt_surface(self._camera.plane),
             plane_stamp_ns=self._camera.plane_ns,
             velocity=velocity,
             velocity_covariance=covariance,

@@ -98,7 +98,7 @@ def _table(
     trace: Trace, tick: int, explanation: Explanation | None, conflict: tuple[LimitValue, ...], config: PilotConfig
 ) -> dict[str, Any]:
     """One tick as JSON: without a program no thrust limits, without a solution no tasks and no active limits."""
-    from sim.evaluate.explanation import rejections, thrust_window
+    from sim.evaluate.explanation import push_reduction, rejections, thrust_window
 
     flown = trace.thrusts[tick].tolist()
     table = {
@@ -108,6 +108,8 @@ def _table(
         "outcome": trace.outcomes[int(trace.outcome[tick])],
         "push_asked": config.painting.push_n,
         "push_reference": float(trace.push_reference[tick]),
+        "push_measured": float(trace.push_measured[tick]),
+        "push_reduced": push_reduction(trace, tick) or None,
         "reach_margin": float(trace.reach_margin[tick]),
         "rejected": [{"t": event.t, "text": event.text} for event in rejections(trace, tick)],
         "thrusts": flown,

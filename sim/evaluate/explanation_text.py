@@ -9,7 +9,7 @@ import numpy as np
 
 from ibvs_qp.config.contact_margin import LEAST_DAMPING_RATIO, least_margin
 from ibvs_qp.pilot import PilotConfig
-from sim.evaluate.explanation import rejections, thrust_window
+from sim.evaluate.explanation import push_reduction, rejections, thrust_window
 from sim.evaluate.table import plain, terminal_table
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ TASK_HEADINGS = ("task", "unit", "target", "achieved", "residual", "weight", "co
 _AXES = ("front", "right", "down", "roll", "pitch", "yaw")
 #: Components of the wrench given up below this are not listed [N, N m].
 _NOTHING = 5e-4
-#: The job's push is listed if the commanded push is lower by more than this [N].
+#: A commanded push that is lower than the job's by more than this is explained [N].
 _REDUCED_N = 1e-3
 #: Rows without a limit at this tick have bounds beyond this, in the row's unit.
 _NO_BOUND = 9e3
@@ -53,15 +53,16 @@ def explanation_tables(
 
 
 def _headline(trace: Trace, tick: int, config: PilotConfig) -> list[str]:
-    """Time, phase, push and outcome; then the rejected inputs."""
+    """Time, phase, push asked, commanded and measured, and outcome; then the rejected inputs."""
     phase, outcome = trace.phases[int(trace.phase[tick])], trace.outcomes[int(trace.outcome[tick])]
     push, reference = float(trace.push_measured[tick]), float(trace.push_reference[tick])
     job, margin = config.painting.push_n, float(trace.reach_margin[tick])
-    lowered = f" (job: {job:.2f} N, lowered by ramp or reach)" if 0.0 < reference < job - _REDUCED_N else ""
+    reason = push_reduction(trace, tick) or "by the ramp after touch"
+    lowered = f" (reduced: {plain(reason)})" if 0.0 < reference < job - _REDUCED_N else ""
     reach = "reach unknown, or no push can be held" if math.isnan(margin) else f"{margin:.2f} N further within reach"
     headline = (
         f"[bold]t = {trace.t[tick]:.3f} s[/], phase {plain(phase)}, lambda {trace.contact_weight[tick]:.2f}\n"
-        f"push {push:.2f} N, commanded {reference:.2f} N{lowered}; {reach}\n"
+        f"push asked {job:.2f} N, commanded {reference:.2f} N, measured {push:.2f} N{lowered}; {reach}\n"
         f"{plain(outcome)} after {int(trace.iterations[tick])} iterations"
     )
     return [headline, *(f"Rejected at {event.t:.3f} s: {plain(event.text)}" for event in rejections(trace, tick))]

@@ -74,7 +74,8 @@ def test_rotors_have_the_names_and_the_window_of_the_tick(
     np.testing.assert_allclose(table["thrust_lower"], np.maximum(before - step, 1.2), atol=1e-4)
     np.testing.assert_allclose(table["thrust_upper"], np.minimum(before + step, 52.56), atol=1e-4)
     assert table["reach_margin"] == pytest.approx(float(trace.reach_margin[tick]))
-    assert table["push_asked"] == trace.scene.paint.push_n
+    assert table["push_asked"] == trace.scene.paint.push_n and table["push_reduced"] is None
+    assert table["push_measured"] == pytest.approx(float(trace.push_measured[tick]))
     config, explanation = explain_tick(trace, tick)
     assert explanation is not None
     vehicle = config.controller.vehicle
@@ -116,9 +117,19 @@ def test_a_lowered_push_is_printed_with_the_jobs(run: tuple[Path, Trace], capsys
     config, explanation = explain_tick(trace, tick)
     assert explanation is not None
     greedy = dataclasses.replace(config, painting=dataclasses.replace(config.painting, push_n=35.0))
-    text = shown(explanation_tables(trace, tick, explanation, greedy), capsys)
-    assert "job: 35.00 N" in text and f"{trace.reach_margin[tick]:.2f} N further" in text
-    assert "job:" not in shown(explanation_tables(trace, tick, explanation, config), capsys)
+    reasons = ["reach 4.9 N of 35.0 N asked: friction 0.80 assumed", "standing still, no longer the last"]
+    events = [Event(t=float(trace.t[tick]) + late, kind="push reduced", text=text) for late, text in enumerate(reasons)]
+    reduced = dataclasses.replace(trace, events=events)
+    text = shown(explanation_tables(reduced, tick, explanation, greedy), capsys)
+    commanded, measured = float(trace.push_reference[tick]), float(trace.push_measured[tick])
+    assert f"push asked 35.00 N, commanded {commanded:.2f} N, measured {measured:.2f} N (reduced: {reasons[0]})" in text
+    assert f"{trace.reach_margin[tick]:.2f} N further" in text
+    restored = Event(t=float(trace.t[tick]), kind="push restored", text="35.0 N of 35.0 N asked")
+    for flown in (trace, dataclasses.replace(trace, events=[*events[:1], restored])):
+        assert "(reduced: by the ramp after touch)" in shown(
+            explanation_tables(flown, tick, explanation, greedy), capsys
+        )
+    assert "reduced" not in shown(explanation_tables(trace, tick, explanation, config), capsys)
 
 
 def turning(trace: Trace, tick: int, rate: float, pitch: float = 0.0, hard: bool = False) -> Trace:
