@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -45,5 +46,5 @@ class ExportC:
         write_library(self.folder, settings.controller, self.float)
         write_recorded(self.folder, settings.controller, press_ticks(settings, RECORDED_TICKS), self.float)
         print(f"Written: {self.folder}")
-        print(f"Build and test it: make -C {self.folder} test")
+        print(f"Build and test it: {shlex.join(['make', '-C', str(self.folder), 'test'])}")
         return 0
