@@ -68,6 +68,9 @@ class Compare:
         return dataclasses.replace(self, run_a=a, run_b=b)._compare(words)
 
     def _compare(self, words: list[str]) -> int:
+        from rich.console import Console
+
+        from sim.flight.working import working
         from sim.report.comparison import compare, read_run
         from sim.report.conditions import differing_presets, differing_runs
         from sim.report.rundir import as_json
@@ -78,7 +81,8 @@ class Compare:
             a, b, folder, stopped = self._fly()
         else:
             a, b = read_run(self.run_a), read_run(self.run_b)
-        cells = [] if stopped else compare(a, b)
+        with working(Console(stderr=True, quiet=self.json), "Comparing ..."):
+            cells = [] if stopped else compare(a, b)
         if self.json:
             content: dict[str, Any] = {
                 "schema": 1,

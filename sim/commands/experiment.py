@@ -84,6 +84,7 @@ class ExperimentCommand:
         from sim.experiments.design import chosen
         from sim.experiments.record import PARTS, write_page, write_summary, write_tables
         from sim.experiments.record import summary as summarise
+        from sim.flight.working import working
         from sim.report.rundir import as_json
         from sim.sweep import run_sweep
         from sim.sweep.progress import sweep_progress
@@ -101,8 +102,9 @@ class ExperimentCommand:
             "wall_time_s": time.perf_counter() - started,
         }
         experiments, table = chosen(self.name), result.table
-        write_tables(folder, self.name, experiments, table)
-        content = summarise(self.name, experiments, table, folder, facts)
+        with working(notes, "Comparing ..."):
+            write_tables(folder, self.name, experiments, table)
+            content = summarise(self.name, experiments, table, folder, facts)
         write_summary(folder, content)  # before the figures: an error there must not lose the record
         page = None
         if table.height and not result.interrupted:
@@ -118,7 +120,7 @@ class ExperimentCommand:
                 f"{facts['version']}."
             )
             lead = ("A quick run with few flights, not the record: " if self.quick else "") + lead
-            with notes.status("Drawing the figures ..."):
+            with working(notes, "Drawing the figures ..."):
                 page = write_page(folder, experiments, table, lead, self._again(), self.name)
         content["wall_time_s"] = time.perf_counter() - started
         write_summary(folder, content)

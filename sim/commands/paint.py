@@ -157,19 +157,22 @@ class Paint:
         from sim.evaluate.metrics import compute_metrics
         from sim.evaluate.table import figure_table
         from sim.flight.side_by_side import INTERRUPTED
+        from sim.flight.working import working
         from sim.report.rundir import as_json, peak_memory, summary
 
         traces = {law: flight.trace for law, flight in flights.items()}
-        metrics = {law: compute_metrics(trace) for law, trace in traces.items()}
+        with working(notes, "Computing the figures of merit ..."):
+            metrics = {law: compute_metrics(trace) for law, trace in traces.items()}
         interrupted = any(trace.reason == INTERRUPTED for trace in traces.values()) or not traces
 
         def current() -> dict:
             elapsed = time.perf_counter() - started
             return summary(facts, folder, metrics, interrupted, elapsed, peak_memory(flights.values()))
 
-        folder.write_record(traces, current())
+        with working(notes, "Writing the log ..."):
+            folder.write_record(traces, current())
         try:
-            with notes.status("Drawing the report ..."):
+            with working(notes, "Drawing the report ..."):
                 folder.write_report(traces, current(), video=not self.no_video)
         except KeyboardInterrupt:
             interrupted = True
