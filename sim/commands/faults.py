@@ -116,7 +116,7 @@ class Faults:
             if self.json:
                 print(as_json(content))
             else:
-                _print_verdicts(Console(), judged)
+                _print_verdicts(Console(), judged, choice.worlds)
                 print(f"Results: {file}")
             if result.interrupted:
                 return interrupted(words, folder, f"finished flights are in {folder}")
@@ -160,7 +160,7 @@ def _print_plan(console: Console, runs: Sequence[Run], workers: int) -> None:
     )
 
 
-def _print_verdicts(console: Console, verdicts: Sequence[Verdict]) -> None:
+def _print_verdicts(console: Console, verdicts: Sequence[Verdict], worlds: Sequence[str]) -> None:
     from sim.evaluate.table import terminal_table
 
     heads = ("fault", "place", "passed", "control fails", "broken")
@@ -171,4 +171,4 @@ def _print_verdicts(console: Console, verdicts: Sequence[Verdict]) -> None:
         passed = f"{flown.passed} of {flown.n}" + ("" if verdict.met else ": NO")
         how = flown.how if flown.n else control.how
         rows.append((verdict.row.name, verdict.place, passed if flown.n else "–", fails, "; ".join(how)))
-    console.print(terminal_table(heads, rows, "Fault matrix", text=heads, wrap=(heads[0], heads[-1])))
+    console.print(terminal_table(heads, rows, f"Fault matrix, world {' and '.join(worlds)}", text=heads))

@@ -102,17 +102,14 @@ class Paint:
         from sim.flight.progress import flight_progress
         from sim.flight.side_by_side import fly_laws
         from sim.report.rundir import RunFolder
-        from sim.world.scene import Scene, load_scene
-        from sim.world.worlds import DEFAULT_WORLD, in_world, world_name
+        from sim.world.worlds import scene_in_world
 
         started = time.perf_counter()
         check_seed(self.seed)
         if self.log == "mcap":
             require_extra()
         chosen, preset = scene_file(self.scene), preset_file(self.preset)
-        scene = load_scene(chosen) if chosen else in_world(Scene(), self.world or DEFAULT_WORLD)
-        if self.world is not None:
-            scene = in_world(scene, self.world)
+        scene, world = scene_in_world(chosen, self.world)
         size = _SIZES[self.image_size] if self.image_size else None
         camera, note = resolve_camera(self.camera)
         if note is not None:
@@ -135,7 +132,7 @@ class Paint:
             "command": command_line(words),
             "seed": self.seed,
             "scene": str(self.scene) if self.scene else "default",
-            "world": self.world or world_name(scene.errors),
+            "world": world,
             "preset": str(self.preset) if self.preset else None,
             "camera": camera,
             "image_size": list(size or (scene.camera.width, scene.camera.height)),
@@ -155,7 +152,7 @@ class Paint:
 
         from ibvs_qp.recording.layouts import FOLDER as LAYOUTS
         from sim.evaluate.metrics import compute_metrics
-        from sim.evaluate.table import figure_table
+        from sim.evaluate.table import figure_table, plain
         from sim.flight.side_by_side import INTERRUPTED
         from sim.flight.working import working
         from sim.report.rundir import as_json, peak_memory, summary
@@ -182,7 +179,9 @@ class Paint:
         if self.json:
             print(as_json(final))
         else:
-            Console().print(figure_table(metrics))
+            table = figure_table(metrics)
+            table.title = plain(f"Scene {facts['scene']}, world {facts['world']}, seed {facts['seed']}")
+            Console().print(table)
             if folder.report.exists():
                 print(f"Report: {folder.report}")
             for file in folder.logs():

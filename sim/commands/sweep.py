@@ -126,7 +126,9 @@ class Sweep:
         page = None
         if result.table.height and not result.interrupted:
             with working(notes, "Drawing the report ..."):
-                page = write_report(result.table, folder, f"Sweep {settings.name}", self.figures)
+                page = write_report(
+                    result.table, folder, f"Sweep {settings.name}, world {design.spec.world}", self.figures
+                )
         content = {
             "schema": 1,
             "command": command_line(words),
@@ -195,7 +197,7 @@ def _print_plan(console: Console, design: Planned) -> None:
     air = f", about {len(design) * first.expected_s / 60.0:.0f} min of flight time" if isinstance(first, Run) else ""
     varied = ", ".join(axis.path for axis in (*design.spec.grid, *design.spec.random)) or "seeds only"
     console.print(
-        f"{settings.name}: {len(design)} flights in {blocks} blocks{air}; varied: {varied}",
+        f"{settings.name}: {len(design)} flights in {blocks} blocks{air}; world {design.spec.world}; varied: {varied}",
         soft_wrap=True,
         highlight=False,
     )

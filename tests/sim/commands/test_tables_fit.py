@@ -95,7 +95,7 @@ def test_compare(printed: list[object], capsys: pytest.CaptureFixture[str], tmp_
     cell = {"experiment": "paint", "law": "qp", "variant": "lexicographic", "params": {"world": "harsh"}, "n": 20}
     cell |= {"completed": [20, 19], "differences": {line.key: figures for line in LINES}}
     conditions = [{"name": "preset.controller.gains.force_kfp", "a": 0.123456789, "b": [0.25, 0.125, 1.0625]}]
-    compare._print(conditions, [cell], tmp_path, tmp_path)
+    compare._print(conditions, [cell], tmp_path, tmp_path, "datasheet")
     assert_whole(printed, 2)
 
 
@@ -112,14 +112,15 @@ def test_paint() -> None:
 def test_experiment(printed: list[object]) -> None:
     verdict = {"experiment": "paint", "figure": "height error, peak", "cell": {"wall": 10000.0, "world": "datasheet"}}
     verdict |= {"variant": "no-reach-check", "least": False, "unit": "rad/s^2", "median": WIDE, "held": 10, "n": 10}
-    experiment._print_verdicts(Console(), {"verdicts": [verdict | {"bound": WIDE, "words": "not certain (3 of 10)"}]})
+    content = {"verdicts": [verdict | {"bound": WIDE, "words": "not certain (3 of 10)"}]}
+    experiment._print_verdicts(Console(), content, {"paint": ["ideal", "datasheet"]})
     assert_whole(printed, 1)
 
 
 def test_faults(printed: list[object]) -> None:
     judged = Made(n=20, passed=19, how=("reaction after 12.345 s", "push 12.345 N of 5 N"))
     verdict = Made(flown=judged, control=judged, row=Made(name="F/T zero"), place="contact")
-    faults._print_verdicts(Console(), [Made(**vars(verdict), met=False, proves_nothing=True)])  # type: ignore[list-item]
+    faults._print_verdicts(Console(), [Made(**vars(verdict), met=False, proves_nothing=True)], ["ideal"])  # type: ignore[list-item]
     assert_whole(printed, 1)
 
 
