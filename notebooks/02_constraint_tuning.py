@@ -56,7 +56,9 @@ def _():
     * a **weight** $w_k$ is the inverse square of an acceptable error. Weights have no effect while all tasks can be
       met together. Otherwise they decide which task deviates;
     * a **hard limit** (thrust, thrust rate) always holds. Its **multiplier** $|\partial J^\star / \partial
-      u_\text{max}|$ is the cost that one more newton would save;
+      u_\text{max}|$ is the derivative of the least cost by the bound, and no more: it falls linearly as the bound
+      yields, to zero where the limit is released. If nothing else changes on the way, the cost falls by half of
+      multiplier times way. `ibvs-qp explain` prints the range and the true fall;
     * a **soft limit** has a slack $s_j$ with the **slack weight** $p_j$: a large $p_j$ is nearly a hard limit, a small
       $p_j$ allows violations.
 
@@ -211,8 +213,8 @@ def _():
     **Reversed priorities: the weight of the push from 0.5 to 5000, at the same 34 N without the check.** The flight
     before has the shipped weight. This one weight decides which task deviates: now the vehicle leans into the wall,
     because leaning converts lift into push. The push error while holding falls from 4.0 to 1.9 N rms, until the
-    supervisor ends the flight at a tilt of 13 degrees. The multipliers rise from about ten to above ten thousand: a
-    newton of thrust saves more cost when the weight of its effect is larger. The analytic law has no such parameter;
+    supervisor ends the flight at a tilt of 13 degrees. The multipliers rise from about ten to above ten thousand: the
+    cost depends more on a bound when the weight of its effect is larger. The analytic law has no such parameter;
     the geometry decides what the clipped thrusts lose.
     """)
     return

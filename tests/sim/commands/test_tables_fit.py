@@ -13,7 +13,7 @@ from rich.table import Table
 
 import ibvs_qp
 from ibvs_qp.command import ActiveLimit, TaskReport
-from ibvs_qp.qp.explain import Explanation, LimitValue
+from ibvs_qp.qp.explain import Explanation, LimitRange, LimitValue
 from sim.bench.loop import STAGES
 from sim.bench.timing import Bench, Row
 from sim.commands import bench, compare, experiment, faults
@@ -77,6 +77,10 @@ def explained(rotors: int) -> Explanation:
         limit_rows=tuple(
             LimitValue(name=name, unit="rad/s^2", lower=WIDE, upper=-8999.9, value=WIDE) for name in names
         ),
+        limit_ranges=tuple(
+            LimitRange(change_low=WIDE, change_high=-WIDE, cost_fall=1.234e-5, until=f"{name} released")
+            for name in names
+        ),
         unallocated_wrench=np.zeros(6),
     )
 
@@ -87,7 +91,7 @@ def test_explain() -> None:
     trace = Made(thrusts=found.thrusts[None], preset="")
     rotors = explanation_text._rotors(trace, 0, config, found, False)  # type: ignore[arg-type]
     limits, conflict = explanation_text._limits(found), explanation_text._conflict(found.limit_rows)
-    assert_whole([explanation_text._tasks(found), *limits, *conflict, rotors], 4)
+    assert_whole([explanation_text._tasks(found), *limits, *conflict, rotors], 5)
 
 
 def test_compare(printed: list[object], capsys: pytest.CaptureFixture[str], tmp_path) -> None:
