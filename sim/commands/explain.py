@@ -129,12 +129,15 @@ def _table(
     table |= {"thrust_lower": lower.tolist(), "thrust_upper": upper.tolist()}
     if explanation is None:
         return table
-    limits = zip(explanation.active_limits, explanation.limit_rows, explanation.limit_cost, strict=True)
+    every = (explanation.active_limits, explanation.limit_rows, explanation.limit_ranges, explanation.limit_cost)
     tasks = zip(explanation.tasks, explanation.cost, strict=True)
     return table | {
         "thrusts": explanation.thrusts.tolist(),
         "tasks": [asdict(task) | {"cost_share": cost} for task, cost in tasks],
-        "active_limits": [asdict(limit) | asdict(row) | {"cost_share": cost} for limit, row, cost in limits],
+        "active_limits": [
+            asdict(limit) | asdict(row) | asdict(span) | {"cost_share": cost}
+            for limit, row, span, cost in zip(*every, strict=True)
+        ],
         "total_cost": explanation.total_cost,
         "slack_cost_share": explanation.slack_cost,
         "unallocated_wrench": explanation.unallocated_wrench.tolist(),

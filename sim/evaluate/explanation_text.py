@@ -87,21 +87,34 @@ def _tasks(explanation: Explanation) -> Any:
 def _limits(explanation: Explanation) -> list[Any]:
     if not explanation.active_limits:
         return ["No limit is active: the thrusts are the weighted least-squares solution."]
-    rows = []
-    for limit, row, cost in zip(explanation.active_limits, explanation.limit_rows, explanation.limit_cost, strict=True):
+    rows, prices = [], []
+    every = (explanation.active_limits, explanation.limit_rows, explanation.limit_cost, explanation.limit_ranges)
+    for limit, row, cost, span in zip(*every, strict=True):
         bound = row.upper if limit.side == "upper" else row.lower
         slack, paid = "", "hard"
         if limit.slack > 0.0:
             slack, paid = f"{limit.slack:.4g}", f"{cost * explanation.total_cost:.3g} ({_percent(cost)})"
-        values = (_number(bound), _number(row.value), slack, limit.unit, _number(limit.price), paid)
-        rows.append((limit.name, limit.side, *values))
-    headings = ("limit", "side", "bound", "value", "slack", "unit", "price per unit", "cost of slack")
-    words = "Price: the multiplier, by which the cost would fall if the bound moved by one unit. "
+        rows.append((limit.name, limit.side, _number(bound), _number(row.value), slack, limit.unit, paid))
+        fall = f"{span.cost_fall:.3g} ({_percent(span.cost_fall / explanation.total_cost)})"
+        changes = f"{span.change_low:+.3g} to {span.change_high:+.3g}"
+        prices.append((limit.name, _number(limit.price), limit.unit, changes, fall, span.until))
+    words = (
+        "Price: the derivative of the cost by the bound, the multiplier. It falls as the bound yields, so the cost "
+        "falls by less than price times change: by the amount stated if the bound yields to the end of the range. Over "
+        "the range the same limits are active; at its end a limit is released or becomes active. "
+    )
     if explanation.slack_cost > 0.0:
         words += f"Slack takes {_percent(explanation.slack_cost)} of the cost of {explanation.total_cost:.3g}. "
     words += "The cost has no unit: weights and slack weights are per squared unit of the row."
+    headings = ("limit", "side", "bound", "value", "slack", "unit", "cost of slack")
     title = "Active limits, highest price first"
-    return [terminal_table(headings, rows, title, text=("limit", "side", "unit")), words]
+    price_headings = ("limit", "price per unit", "unit", "range of changes", "cost falls by", "until")
+    price_text = ("limit", "unit", "until")
+    return [
+        terminal_table(headings, rows, title, text=("limit", "side", "unit")),
+        terminal_table(price_headings, prices, "Derivatives of the cost by these bounds", text=price_text),
+        words,
+    ]
 
 
 def _conflict(conflict: tuple[LimitValue, ...]) -> list[Any]:

@@ -15,7 +15,7 @@ from sim.flight.options import FlightOptions, pilot_config
 from sim.flight.preflight import check_job
 from sim.sweep.design import FlightPlan, Measure, Run
 from sim.world.scene import Scene
-from sim.world.worlds import EXPERIMENT_WORLD, in_world
+from sim.world.worlds import DEFAULT_WORLD, in_world
 
 #: Stroke of the quick job [m].
 QUICK_STROKE_M = 0.4
@@ -67,7 +67,7 @@ def preset_runs(
     seeds: Iterable[int],
     features: str,
     quick: bool,
-    world: str = EXPERIMENT_WORLD,
+    world: str = DEFAULT_WORLD,
 ) -> list[Run]:
     """Paint jobs under a preset file.
 

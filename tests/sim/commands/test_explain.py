@@ -161,14 +161,20 @@ def test_cost_of_slack_has_bound_and_unit(
     assert paid * explanation.total_cost == pytest.approx(0.5 * price * limit.slack**2)
     assert sum(explanation.limit_cost) == pytest.approx(explanation.slack_cost, rel=1e-6)
     text = shown(explanation_tables(trace, tick, explanation, config), capsys)
-    line = next(line for line in text.splitlines() if "tilt_pitch" in line)
+    line, price_line = (line for line in text.splitlines() if line.lstrip().startswith("tilt_pitch "))
     assert f"{row.upper:.4g}" in line and "rad/s^2" in line and f"({paid:.0%})" in line
+    span = explanation.limit_ranges[at]
+    assert (
+        f"{span.cost_fall:.3g}" in price_line and f"{span.change_high:+.3g}" in price_line and span.until in price_line
+    )
+    assert 0.0 < span.cost_fall < limit.price * span.change_high and "derivative of the cost" in text
     assert "Slack takes" in text and "per squared unit" in text
     (tmp_path / "scene.toml").write_text((folder / "scene.toml").read_text())
     save_log(tmp_path / "log.npz", {"qp": turning(trace, tick, 0.0, pitch=0.3)})
     assert main(["explain", str(tmp_path), "--at", f"{trace.t[tick]:.3f}", "--json"]) == 0
     table = json.loads(capsys.readouterr().out)
     (entry,) = [entry for entry in table["active_limits"] if entry["name"] == "tilt_pitch"]
+    assert entry["cost_fall"] == pytest.approx(span.cost_fall, rel=1e-3) and entry["until"] == span.until
     assert entry["cost_share"] == pytest.approx(paid) and entry["upper"] == pytest.approx(row.upper, abs=1e-6)
     assert table["slack_cost_share"] == pytest.approx(explanation.slack_cost) and table["conflict"] == []
 
