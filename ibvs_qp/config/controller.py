@@ -18,7 +18,9 @@ from ibvs_qp.config.angular_rate import AngularRateSettings
 from ibvs_qp.config.brush import BrushSettings
 from ibvs_qp.config.contact import ContactSettings
 from ibvs_qp.config.contact_margin import require_margin
+from ibvs_qp.config.derived import derive
 from ibvs_qp.config.errors import out_of_range
+from ibvs_qp.config.from_vehicle import contact_depth, contact_values, limit_values
 from ibvs_qp.config.gains import Gains
 from ibvs_qp.config.limits import LimitSettings
 from ibvs_qp.config.settings import choice, dump_toml, load_toml, setting, validate
@@ -67,13 +69,15 @@ class ControllerConfig:
     )
 
     def __post_init__(self) -> None:
-        """Validate, also that the vehicle is fully actuated, and the depths at which the push begins."""
+        """Derive what follows from the vehicle, and validate: it is fully actuated, and a push can begin."""
         validate(self)
+        object.__setattr__(self, "contact", derive(self.contact, contact_values(self.vehicle)))
+        object.__setattr__(self, "limits", derive(self.limits, limit_values(self.vehicle, self.limits.view_margin)))
         matrix = control_effectiveness(self.vehicle.geometry)
         if (rank := int(np.linalg.matrix_rank(matrix))) < len(matrix):
             needed = f"they give {rank} of 6 directions of a wrench; 'ibvs-qp vehicle FILE' names the others"
             raise out_of_range("vehicle.geometry", self.vehicle.geometry.count, "rotors", needed)
-        arm = round(self.vehicle.tip_position_m[0] - self.vehicle.camera_position_m[0], 9)
+        arm = round(contact_depth(self.vehicle), 9)
         if self.contact.depth_min_m < arm:
             allowed = f"allowed is at least {arm:g} m, where the camera is when the tip touches"
             raise out_of_range("contact.depth_min_m", self.contact.depth_min_m, "m", allowed)

@@ -18,6 +18,7 @@ from typing import Any, TypeVar
 
 import tomli_w
 
+from ibvs_qp.config.derived import Derived
 from ibvs_qp.config.errors import ConfigError, out_of_range, shown
 from ibvs_qp.config.toml_text import read_toml
 
@@ -30,7 +31,7 @@ def setting(
     """Declare a settings field with its unit and closed allowed range [low, high].
 
     Args:
-        default: Number, boolean, string, or tuple of numbers.
+        default: Number, boolean, string, or tuple of numbers; None for a value that follows from others.
         doc: Meaning, and source of the value unless ``why`` gives it.
         unit: SI unit, empty for a pure number.
         why: Reason for the default.
@@ -69,7 +70,7 @@ class Checked:
 
 
 def require_order(instance: Any, smaller: str, larger: str, reason: str) -> None:
-    """Require that one field lies below another.
+    """Require that one field lies below another; None has no order.
 
     Args:
         instance: The settings.
@@ -81,7 +82,7 @@ def require_order(instance: Any, smaller: str, larger: str, reason: str) -> None
         ConfigError: Naming both fields, their values and their unit.
     """
     low, high = getattr(instance, smaller), getattr(instance, larger)
-    if not low < high:
+    if low is not None and high is not None and not low < high:
         unit = next(field.metadata["unit"] for field in dataclasses.fields(instance) if field.name == larger)
         raise out_of_range(smaller, low, unit, f"must lie below {larger} = {high!r} {unit}: {reason}")
 
@@ -181,11 +182,11 @@ def _convert_tuple(hint: Any, value: Any, place: str) -> tuple[Any, ...]:
 
 
 def to_dict(instance: Any) -> dict[str, Any]:
-    """Convert a settings tree to plain tables without None entries: TOML has no null."""
+    """Convert a settings tree to plain tables, without None (TOML has no null) and without derived values."""
     table: dict[str, Any] = {}
     for field in dataclasses.fields(instance):
         value = getattr(instance, field.name)
-        if value is not None:
+        if value is not None and type(value) is not Derived:
             table[field.name] = _plain(value)
     return table
 

@@ -6,10 +6,15 @@ import dataclasses
 from dataclasses import dataclass
 
 import ibvs_qp
+from ibvs_qp.config import VehicleParams
 from ibvs_qp.config.errors import out_of_range
 from ibvs_qp.pilot import PilotConfig
+from sim.sensors.cameras.protocol import camera_intrinsics
 from sim.world.plant import TICK_NS
 from sim.world.scene import Scene
+
+#: Decimals of a calibration [-]: hundredths of a pixel.
+CALIBRATION_DIGITS = 2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,11 +46,28 @@ def unsupervised(config: PilotConfig) -> PilotConfig:
     return dataclasses.replace(config, safety=dataclasses.replace(config.safety, supervise=False))
 
 
+def flown_scene(scene: Scene, options: FlightOptions) -> Scene:
+    """The scene with the picture size of the options."""
+    if options.image_size is None:
+        return scene
+    width, height = options.image_size
+    return dataclasses.replace(scene, camera=dataclasses.replace(scene.camera, width=width, height=height))
+
+
+def calibrated(vehicle: VehicleParams, scene: Scene, options: FlightOptions) -> VehicleParams:
+    """The vehicle with picture size and intrinsics of the camera that flies, as a calibration gives them."""
+    camera = flown_scene(scene, options).camera
+    fx, fy, cx, cy = (round(entry, CALIBRATION_DIGITS) for entry in camera_intrinsics(camera))
+    return dataclasses.replace(
+        vehicle, camera_size_px=(camera.width, camera.height), camera_intrinsics_px=(fx, fy, cx, cy)
+    )
+
+
 def pilot_config(scene: Scene, options: FlightOptions, config: PilotConfig | None = None) -> PilotConfig:
-    """The pilot's configuration: preset, law, and the scene's paint job; nothing else of the scene.
+    """The pilot's configuration: preset, law, the scene's paint job and the camera's calibration; nothing else.
 
     Args:
-        scene: Only its paint job is read.
+        scene: Only its paint job is read, and size and field of view of its camera.
         options: Law and preset file.
         config: Replaces the preset.
 
@@ -69,7 +91,7 @@ def pilot_config(scene: Scene, options: FlightOptions, config: PilotConfig | Non
         push_n=paint.push_n,
     )
     vision = dataclasses.replace(config.vision, paint_color=paint.color, brush_width_m=paint.brush_width_m)
-    controller = config.controller
+    controller = dataclasses.replace(config.controller, vehicle=calibrated(config.controller.vehicle, scene, options))
     if options.compiled:
         controller = controller.on_backend("compiled")
     return dataclasses.replace(
