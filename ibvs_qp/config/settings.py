@@ -181,20 +181,27 @@ def _convert_tuple(hint: Any, value: Any, place: str) -> tuple[Any, ...]:
     return tuple(_convert(kind, entry, place) for kind, entry in zip(arguments, value, strict=True))
 
 
-def to_dict(instance: Any) -> dict[str, Any]:
-    """Convert a settings tree to plain tables, without None (TOML has no null) and without derived values."""
+def to_dict(instance: Any, *, derived: bool = False) -> dict[str, Any]:
+    """Convert a settings tree to plain tables, without None: TOML has no null.
+
+    Args:
+        instance: The settings.
+        derived: Whether values that follow from others are in the tables too, as if they were stated.
+    """
     table: dict[str, Any] = {}
     for field in dataclasses.fields(instance):
         value = getattr(instance, field.name)
-        if value is not None and type(value) is not Derived:
-            table[field.name] = _plain(value)
+        if value is not None and (derived or type(value) is not Derived):
+            table[field.name] = _plain(value, derived)
     return table
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: Any, derived: bool) -> Any:
     if dataclasses.is_dataclass(value):
-        return to_dict(value)
-    return [_plain(entry) for entry in value] if isinstance(value, tuple) else value
+        return to_dict(value, derived=derived)
+    if isinstance(value, tuple):
+        return [_plain(entry, derived) for entry in value]
+    return float(value) if type(value) is Derived else value
 
 
 def load_toml(kind: type[T], file: str | Path) -> T:
@@ -210,6 +217,6 @@ def load_toml(kind: type[T], file: str | Path) -> T:
         raise ConfigError(f"{file}: {error}") from None
 
 
-def dump_toml(instance: Any) -> str:
-    """Write a settings tree as TOML text; `load_toml` restores an equal tree."""
-    return tomli_w.dumps(to_dict(instance))
+def dump_toml(instance: Any, *, derived: bool = False) -> str:
+    """Write a settings tree as TOML text; `load_toml` restores an equal tree. Arguments as for `to_dict`."""
+    return tomli_w.dumps(to_dict(instance, derived=derived))

@@ -34,6 +34,7 @@ from ibvs_qp.painting.reference import image_reference
 from ibvs_qp.pilot.attitude_history import AttitudeHistory
 from ibvs_qp.pilot.camera import CameraInput
 from ibvs_qp.pilot.config import PilotConfig
+from ibvs_qp.pilot.contact_picture import hint_span
 from ibvs_qp.pilot.inertial import INERTIAL, InertialData
 from ibvs_qp.pilot.status import Event, FlightStatus
 from ibvs_qp.safety.assurance import Assurance
@@ -48,8 +49,6 @@ from ibvs_qp.validation.thrust_limits import ThrustLimits
 from ibvs_qp.vision.lines.line_state import LineHint
 from ibvs_qp.vision.perception_result import PerceptionResult
 
-#: Extent of the fresh edge ahead of the brush, normalised image x from the tip's side to the border.
-HINT_SPAN = (0.10, 0.50)
 #: States in which the strategy flies.
 _FLYING = (SafetyState.NOMINAL, SafetyState.DEGRADED)
 #: Tip to wall before the first plane [m].
@@ -108,6 +107,8 @@ class Pilot:
         self._tip, camera = np.array(vehicle.tip_position_m), np.array(vehicle.camera_position_m)
         self._tip_camera = to_camera(self._tip, camera).tolist()
         self._tip_from_camera = (self._tip - camera).tolist()
+        brush = self.config.vision.brush_width_m
+        self._hint_spans = hint_span(vehicle, brush, -1.0), hint_span(vehicle, brush, 1.0)
         self._gate = SensorGate(self.config.camera.latest_s)
         self._limits = ThrustLimits(vehicle.geometry.count)
         self.self_check = SelfCheck(self.config.safety.self_check)
@@ -393,8 +394,9 @@ class Pilot:
         offset, side = expected
         axes = WallAxes.of(contact.normal, down_in_body(self._history.attitude(stamp_ns)))
         rho, theta, _ = image_line(offset, 0.5 * math.pi, axes, self._tip_from_camera, contact.distance)
-        near, far = HINT_SPAN
-        span = (near, far) if side > 0.0 else (-far, -near)
+        span = self._hint_spans[side > 0.0]
+        if span[0] >= span[1]:
+            return ()
         return (LineHint(name="fresh", rho=rho, theta=theta, kind="paint", surface_side=-1, span=span),)
 
     # -------------------------------------------------------------- estimation

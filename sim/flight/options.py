@@ -46,8 +46,8 @@ def unsupervised(config: PilotConfig) -> PilotConfig:
     return dataclasses.replace(config, safety=dataclasses.replace(config.safety, supervise=False))
 
 
-def flown_scene(scene: Scene, options: FlightOptions) -> Scene:
-    """The scene with the picture size of the options."""
+def sized(scene: Scene, options: FlightOptions) -> Scene:
+    """The scene with the picture size of the options, if they state one."""
     if options.image_size is None:
         return scene
     width, height = options.image_size
@@ -56,7 +56,7 @@ def flown_scene(scene: Scene, options: FlightOptions) -> Scene:
 
 def calibrated(vehicle: VehicleParams, scene: Scene, options: FlightOptions) -> VehicleParams:
     """The vehicle with picture size and intrinsics of the camera that flies, as a calibration gives them."""
-    camera = flown_scene(scene, options).camera
+    camera = sized(scene, options).camera
     fx, fy, cx, cy = (round(entry, CALIBRATION_DIGITS) for entry in camera_intrinsics(camera))
     return dataclasses.replace(
         vehicle, camera_size_px=(camera.width, camera.height), camera_intrinsics_px=(fx, fy, cx, cy)

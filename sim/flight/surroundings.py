@@ -7,7 +7,7 @@ import numpy as np
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.measurement import SensorFrame
 from ibvs_qp.pilot import PilotConfig
-from sim.flight.options import FlightOptions, flown_scene
+from sim.flight.options import FlightOptions, sized
 from sim.flight.viewer import FlightViewer
 from sim.sensors.camera_mount import CameraMount
 from sim.sensors.cameras import CameraStream, Dropouts, open_camera
@@ -32,7 +32,7 @@ class World:
     """Plant, sensors, canvas and camera: everything but the pilot."""
 
     def __init__(self, scene: Scene, options: FlightOptions, config: PilotConfig) -> None:
-        scene = flown_scene(scene, options)
+        scene = sized(scene, options)
         self.scene, self.geometry = scene, BoardGeometry(scene)
         self._rendered = options.features == "rendered"
         self.stream: CameraStream | None = None
