@@ -444,9 +444,9 @@ class Pilot:
 
     def _refer(self, target: PaintingCommand, contact: ContactState) -> Reference:
         """Reference of a command at the measured distance."""
-        _, tip_below, tip_ahead = self._tip_camera
+        tip_right, tip_below, tip_ahead = self._tip_camera
         depth = tip_ahead + (contact.distance if contact.known else ASSUMED_DISTANCE)
-        return image_reference(target, depth, tip_below)
+        return image_reference(target, depth, tip_below, tip_right)
 
     def _measure(
         self,

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
+from pathlib import Path
 
 import ibvs_qp
 from ibvs_qp.config import VehicleParams
 from ibvs_qp.config.errors import out_of_range
 from ibvs_qp.pilot import PilotConfig
 from sim.sensors.cameras.protocol import camera_intrinsics
+from sim.vehicles.configuration import with_vehicle
+from sim.vehicles.vehicle_file import read_vehicle
 from sim.world.plant import TICK_NS
 from sim.world.scene import Scene
 
@@ -34,6 +37,7 @@ class FlightOptions:
     camera: str = "plane"
     image_size: tuple[int, int] | None = None
     preset: str | None = None
+    vehicle: str | None = None
     video: bool = True
     compiled: bool = False
     view: bool = False
@@ -63,19 +67,27 @@ def calibrated(vehicle: VehicleParams, scene: Scene, options: FlightOptions) -> 
     )
 
 
+def _given(options: FlightOptions) -> PilotConfig:
+    """Preset and vehicle of the options; without a preset another vehicle has the law's gains, scaled to it."""
+    if options.vehicle is None:
+        return PilotConfig.from_toml(options.preset) if options.preset else ibvs_qp.preset(options.law)
+    config = PilotConfig.from_toml(options.preset) if options.preset else PilotConfig(law=options.law)
+    return with_vehicle(config, read_vehicle(Path(options.vehicle)).vehicle)
+
+
 def pilot_config(scene: Scene, options: FlightOptions, config: PilotConfig | None = None) -> PilotConfig:
     """The pilot's configuration: preset, law, the scene's paint job and the camera's calibration; nothing else.
 
     Args:
         scene: Only its paint job is read, and size and field of view of its camera.
-        options: Law and preset file.
+        options: Law, preset file and vehicle file.
         config: Replaces the preset.
 
     Raises:
         ConfigError: If the controller expects another period than the one that is simulated.
     """
     if config is None:
-        config = PilotConfig.from_toml(options.preset) if options.preset else ibvs_qp.preset(options.law)
+        config = _given(options)
     if round(config.controller.tick_s * 1e9) != TICK_NS:
         allowed = f"the simulated loop ticks every {TICK_NS * 1e-9:g} s"
         raise out_of_range("controller.tick_s", config.controller.tick_s, "s", allowed)

@@ -8,10 +8,12 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from ibvs_qp.config.derived import Derived
+from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.gain_scaling import gain_factors
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.pilot import PilotConfig
 from ibvs_qp.pilot.contact_picture import hint_span
+from ibvs_qp.pilot.vehicle_check import check_vehicle
 from sim.vehicles.vehicle_file import VehicleFile
 from sim.world.scene import Scene
 
@@ -50,6 +52,25 @@ def with_camera(scene: Scene, found: VehicleFile) -> Scene:
         field = 2.0 * math.degrees(math.atan(0.5 * vehicle.camera_size_px[1] / vehicle.camera_intrinsics_px[1]))
         camera = dataclasses.replace(camera, vertical_fov_deg=field)
     return dataclasses.replace(scene, camera=camera)
+
+
+def require_vehicle(config: PilotConfig, place: str) -> tuple[str, ...]:
+    """Refuse a vehicle that cannot paint the job of a configuration.
+
+    Args:
+        config: Vehicle, camera and paint job.
+        place: Option or file that messages name.
+
+    Returns:
+        Warnings.
+
+    Raises:
+        ConfigError: Naming all problems, in one line.
+    """
+    check = check_vehicle(config, config.painting.push_n)
+    if check.problems:
+        raise ConfigError(f"{place}: {'; '.join(check.problems)}")
+    return check.warnings
 
 
 def derived_settings(config: PilotConfig) -> Iterator[DerivedSetting]:
