@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 from painted_wall import END, GUIDE, NEAR, PaintedWall, Piece, short
 
@@ -14,7 +15,7 @@ PLACE = 3e-3
 def started(right: float, down: float, **changes: object) -> PaintedWall:
     """A job of one stroke that starts that far along u and v from where stroke 1 begins [m]."""
     world = PaintedWall(short(**({"rows": 1} | changes)))
-    world.tip = world.tip + (right, down)
+    world.tip = world.tip + np.array((right, down))
     return world
 
 
@@ -148,7 +149,7 @@ def test_press_waits_for_the_push() -> None:
 
 
 def _off_place(world: PaintedWall) -> None:
-    world.tip = world.tip + (0.0, 0.03)
+    world.tip = world.tip + np.array((0.0, 0.03))
     world.odometer = world.odometer + world.to_wall(0.0, 0.03)
     world.stuck = True
 
