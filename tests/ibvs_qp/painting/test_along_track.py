@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from ibvs_qp.estimation.tracked_line import TrackedLine
+from ibvs_qp.painting import along_track
 from ibvs_qp.painting.along_track import DRIFT_PER_M, EDGE_STD, AlongTrack
 from ibvs_qp.painting.config import PaintingConfig
 from ibvs_qp.painting.pattern_lines import PatternLine
@@ -130,3 +131,12 @@ def test_the_error_of_u_is_as_large_as_the_filter_says() -> None:
     share, rms = np.mean(np.abs(ratios) < 3.0), np.sqrt(np.mean(np.square(ratios)))
     print(f"within three standard deviations {share:.3f}, rms {rms:.2f}")
     assert share >= 0.95 and 0.3 < rms < 1.5
+
+
+def test_rows_of_h_are_the_derivatives_of_the_places_of_both_ends() -> None:
+    base, rows = np.array((0.3, -0.05)), []
+    for state in range(2):
+        step = 1e-6 * np.eye(2)[state]
+        places = [(END_U - u, near - u) for u, near in (base + step, base - step)]
+        rows.append((np.array(places[0]) - np.array(places[1])) / 2e-6)
+    np.testing.assert_allclose(np.transpose(rows), (along_track._END, along_track._NEAR), atol=1e-6)

@@ -246,3 +246,24 @@ def test_without_edges_the_uncertainty_grows_and_never_shrinks() -> None:
         assert cross.deviation > last
         last = cross.deviation
     assert cross.guides == {}
+
+
+def test_the_drift_of_the_odometer_makes_v_uncertain_in_one_direction() -> None:
+    """Its variance in v grows with the square of time, and v and drift are correlated."""
+    cross, seconds = CrossTrack(CONFIG), 20.0
+    cross.start(parallel(1, -MARGIN, 1, "board"))
+    before = cross._p[0, 0]
+    for _ in range(200):
+        cross.predict(0.0, 0.0, 0.1)
+    variance = cross_track.DRIFT_STD**2
+    assert cross._p[0, 4] == pytest.approx(-seconds * variance, rel=0.1)
+    rest = cross_track.ODOMETER_AT_REST * seconds
+    assert cross._p[0, 0] - before == pytest.approx(seconds**2 * variance + rest, rel=0.1)
+    np.testing.assert_allclose(cross._p, cross._p.T, atol=1e-18)
+
+
+def test_a_map_that_begins_has_the_error_of_v() -> None:
+    cross = _after_stroke_one()
+    cross.begin_stroke()
+    np.testing.assert_array_equal(cross._p[3], cross._p[0])
+    assert cross._p[3, 3] == cross._p[0, 0] > 0.0
