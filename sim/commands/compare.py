@@ -163,6 +163,7 @@ def _print(conditions: list[dict[str, Any]], cells: list[dict[str, Any]], a: Pat
     from sim.evaluate.table import LINES, law_name, plain, terminal_table
     from sim.report.comparison import PAINT_VARIANT
     from sim.report.conditions import ABSENT
+    from sim.sweep.statistics import needed, spread
 
     console, names = Console(), ("A", "B")
     print(f"A: {a}\nB: {b}")
@@ -171,7 +172,6 @@ def _print(conditions: list[dict[str, Any]], cells: list[dict[str, Any]], a: Pat
         shown.append((f"{len(conditions) - MOST_CONDITIONS} more, see --json", "", ""))
     if shown:
         console.print(terminal_table(("flown under other conditions", *names), shown, wrap=names))
-    headings = ("figure", *names, "B - A", "95 %")
     for cell in cells:
         variant = [] if cell["variant"] == PAINT_VARIANT else [cell["variant"]]
         params = (f"{name} {value}" for name, value in cell["params"].items())
@@ -185,7 +185,10 @@ def _print(conditions: list[dict[str, Any]], cells: list[dict[str, Any]], a: Pat
             figures = [line.scale * found[key] for key in ("a", "b", "median", "low", "high")]
             a_text, b_text = (f"{figure:.4g}" for figure in figures[:2])
             median, low, high = (f"{figure:+.4g}" for figure in figures[2:])
-            interval = f"{low} to {high}" if low != high else ABSENT
+            interval = spread(low, high, found["pairs"]) if low != high else ABSENT
             label = f"{line.label} [{line.unit}]" if line.unit else line.label
             rows.append((plain(label), a_text, b_text, median, interval))
+        enough = {found["pairs"] >= needed() for found in cell["differences"].values()}
+        spreads = (*(["95 %"] if True in enough else []), *(["min, max"] if False in enough else []))
+        headings = ("figure", *names, "B - A", " or ".join(spreads))
         console.print(terminal_table(headings, rows, plain(f"{', '.join(labels)}: completed {done}")))

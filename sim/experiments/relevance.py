@@ -9,7 +9,8 @@ from pathlib import Path
 
 from ibvs_qp.config.settings import load_toml
 from sim.experiments.spec import Column
-from sim.sweep.paired import needed, sign
+from sim.sweep.paired import sign
+from sim.sweep.statistics import needed
 
 
 @dataclass(frozen=True, kw_only=True)
