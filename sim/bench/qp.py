@@ -23,8 +23,8 @@ WARM_UP = 500
 #: Rivals of qpsolvers; those not installed are skipped.
 RIVALS = ("osqp", "daqp", "quadprog", "proxqp", "piqp", "clarabel")
 #: What a row of each kind times.
-ROW_KINDS = {
-    "step": "the whole tick; its stage solve is what compares with the direct rows",
+TIMED = {
+    "step": "the whole tick, whose stage solve compares with the direct rows",
     "qpsolvers_NAME": "through qpsolvers: assembly of the program with scipy.sparse, then the solver",
     "qpsolvers_assembly": "that assembly alone, for the solvers that take sparse matrices",
     "direct_NAME": "the solver's own call on arrays that are ready",
@@ -61,7 +61,7 @@ def bench_qp(count: int, seed: int, sample: int, progress: Callable[[str], None]
     notes = {
         "ticks": len(ticks),
         "compiler": " ".join(compiler() or ("none",)),
-        "row_kinds": ROW_KINDS,
+        "row_kinds": TIMED,
         "rivals_see_every": sample,
         "iterations": _histogram(iterations),
         "osqp_iterates_share": sum(count > 0 for count in iterations) / len(iterations),

@@ -134,8 +134,9 @@ def test_faults(printed: list[object]) -> None:
 @pytest.mark.parametrize("size", [None, "640x480"])
 def test_bench(printed: list[object], size: str | None) -> None:
     row = Row(name="qpsolvers_proxqp", size=size, times_us=[123456.7] * 1000)
-    bench._show(Bench(rows=[row], stages_us={"solve": 1.0}, ratios={"rival": 1.0}))
+    bench._show(Bench(rows=[row], stages_us={"solve": 1.0}, ratios={"rival": 1.0}, notes={"row_kinds": {"step": "x"}}))
     assert_whole(printed, 1)
+    assert f"in {'us' if size is None else 'ms'}" in shown(printed[0]) and "step: x" in printed
 
 
 def test_bench_loop(printed: list[object]) -> None:
