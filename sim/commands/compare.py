@@ -176,8 +176,8 @@ def _print(conditions: list[dict[str, Any]], cells: list[dict[str, Any]], a: Pat
         variant = [] if cell["variant"] == PAINT_VARIANT else [cell["variant"]]
         params = (f"{name} {value}" for name, value in cell["params"].items())
         labels = [cell["experiment"], law_name(cell["law"]), *variant, *params]
-        labels += [] if "world" in cell["params"] else [f"world {world}"]
         done = " and ".join(f"{count} of {cell['n']}" for count in cell["completed"])
+        where = "" if "world" in cell["params"] else f"; world {world}"
         rows = []
         for line in LINES:
             if (found := cell["differences"].get(line.key)) is None:
@@ -191,4 +191,4 @@ def _print(conditions: list[dict[str, Any]], cells: list[dict[str, Any]], a: Pat
         enough = {found["pairs"] >= needed() for found in cell["differences"].values()}
         spreads = (*(["95 %"] if True in enough else []), *(["min, max"] if False in enough else []))
         headings = ("figure", *names, "B - A", " or ".join(spreads))
-        console.print(terminal_table(headings, rows, plain(f"{', '.join(labels)}: completed {done}")))
+        console.print(terminal_table(headings, rows, plain(f"{', '.join(labels)}: completed {done}{where}")))
