@@ -53,6 +53,11 @@ class AlongTrack:
         """Standard deviation of u [m]."""
         return math.sqrt(max(float(self._p[0, 0]), 0.0))
 
+    @property
+    def begin(self) -> float:
+        """U at which the strokes begin and even ones end [m]: 0, or the margin from the edge beside it."""
+        return max(0.0, float(self._x[1]) + self._config.edge_margin_m) if self._near_known else 0.0
+
     def predict(self, du: float) -> None:
         """The tip has moved by the odometer [m]."""
         self._x[0] += du
@@ -115,8 +120,8 @@ class AlongTrack:
             return None
         near = max(found, key=lambda line: line.place)
         self._x[1] = self.u + near.place
-        self._p[1, :] = self._p[:, 1] = self._p[0, :]
-        self._p[1, 1] += EDGE_STD**2
+        self._p[0, 1] = self._p[1, 0] = self._p[0, 0]
+        self._p[1, 1] = self._p[0, 0] + EDGE_STD**2
         self._near_known = True
         if abs(float(self._x[1]) + margin) < SIGMAS * math.sqrt(float(self._p[1, 1])):  # the job begins at the margin
             self._update(-margin - float(self._x[1]), np.array((0.0, 1.0)), MARGIN_STD**2)

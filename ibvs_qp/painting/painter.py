@@ -105,7 +105,7 @@ class Painter(PhaseMachine):
         if self.phase == "survey":
             return ()
         goal = self._stroke_goal() if self.phase == "paint" else self._stroke_begin()
-        return (self._along.end,) if goal > 0.0 else (self._along.near,)
+        return (self._along.end,) if goal > 0.5 * self.config.stroke_m else (self._along.near,)
 
     def _guides(self) -> tuple[int, ...]:
         """Tracks of the edges along the strokes, best first; at the wall, those that stay in the picture."""
@@ -126,6 +126,9 @@ class Painter(PhaseMachine):
     def _enter(self, inputs: PainterInput, phase: str, reason: str) -> None:
         super()._enter(inputs, phase, reason)
         self._since = math.nan
+        if phase == "survey":
+            way = self.config.stroke_m + self.config.gates.first_stop_m
+            self._way_s = 2.0 * way / self.config.survey_speed_m_s
         if phase == "approach":
             u, v = self._stroke_begin() - self._along.u, self._v_target - self._cross.v
             self._way_s = abs(u) / self.config.survey_speed_m_s + abs(v) / self.config.climb_speed_m_s
@@ -138,6 +141,11 @@ class Painter(PhaseMachine):
             return ", ".join(
                 [name for name, there in missing if not there] or ["the board's edge that guides stroke 1"]
             )
+        if phase == "survey":
+            way = self.config.stroke_m + self.config.gates.first_stop_m
+            self._way_s = 2.0 * way / self.config.survey_speed_m_s
+        if phase == "survey":
+            return f"the edge at the end of stroke 1, {self._along.u:.2f} m flown"
         if phase == "approach":
             u, v = self._stroke_begin() - self._along.u, self._v_target - self._cross.v
             place = max(abs(u), abs(v))
@@ -254,10 +262,12 @@ class Painter(PhaseMachine):
 
     def _paint(self, inputs: PainterInput, dt: float) -> PaintingCommand:
         config, travel = self.config, self.pattern.travel(self.row)
-        late = inputs.time_s - self.entered > config.timeout_s + 2.0 * config.stroke_m / config.speed_m_s
+        allowed = config.timeout_s + 2.0 * config.stroke_m / config.speed_m_s
+        late = inputs.time_s - self.entered > allowed
         if late:
             self._speed = 0.0
-            self._fail(inputs, f"time-out in row {self.row}")
+            left = f"{abs(self._stroke_goal() - self._along.u) * 1e3:.0f} mm are left after {allowed:.0f} s"
+            self._fail(inputs, f"time-out in row {self.row}: {left}")
         self._v_reference = self._slid(self._v_reference, self._v_target, dt)
         remaining = travel * (self._stroke_goal() - self._along.u)
         self._pause_without_contact(inputs)
@@ -317,11 +327,11 @@ class Painter(PhaseMachine):
 
     def _stroke_begin(self) -> float:
         """Where the stroke in progress, or the first one, begins, u [m]."""
-        return 0.0 if self.pattern.travel(max(self.row, 1)) > 0.0 else self.config.stroke_m
+        return self._along.begin if self.pattern.travel(max(self.row, 1)) > 0.0 else self.config.stroke_m
 
     def _stroke_goal(self) -> float:
         """Where the stroke in progress ends, u [m]."""
-        return self.config.stroke_m if self.pattern.travel(self.row) > 0.0 else 0.0
+        return self.config.stroke_m if self.pattern.travel(self.row) > 0.0 else self._along.begin
 
     def _place(self, stroke: int) -> float:
         """Nominal v of a stroke [m]; the last one of a filling job keeps the margin to the board's other edge."""

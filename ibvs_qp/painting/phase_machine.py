@@ -23,7 +23,7 @@ class PhaseMachine:
     """
 
     #: Phases without the common time-out.
-    _UNTIMED = ("paint", "survey", "search", "done")
+    _UNTIMED = ("paint", "search", "done")
 
     def __init__(self, config: PaintingConfig) -> None:
         self.config = config

@@ -10,8 +10,9 @@ import numpy as np
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.controller import HybridController
 from ibvs_qp.qp.exact import ExactSolver
-from ibvs_qp.qp.offline import installed_solvers, solve_offline
+from ibvs_qp.qp.offline import installed_solvers, qpsolvers_problem, solve_offline
 from ibvs_qp.symbolic.compiler import compiler
+from sim.bench.direct import direct_solvers
 from sim.bench.reference_rival import mink_row
 from sim.bench.stages import stage_medians
 from sim.bench.ticks import Tick, by_flight, recorded_ticks
@@ -21,6 +22,14 @@ from sim.bench.timing import Bench, Row
 WARM_UP = 500
 #: Rivals of qpsolvers; those not installed are skipped.
 RIVALS = ("osqp", "daqp", "quadprog", "proxqp", "piqp", "clarabel")
+#: What a row of each kind times.
+TIMED = {
+    "step": "the whole tick, whose stage solve compares with the direct rows",
+    "qpsolvers_NAME": "through qpsolvers: assembly of the program with scipy.sparse, then the solver",
+    "qpsolvers_assembly": "that assembly alone, for the solvers that take sparse matrices",
+    "direct_NAME": "the solver's own call on arrays that are ready",
+    "casadi_daqp": "DAQP through CasADi with its conversions, as in the exact fallback",
+}
 
 
 def bench_qp(count: int, seed: int, sample: int, progress: Callable[[str], None]) -> Bench:
@@ -52,6 +61,7 @@ def bench_qp(count: int, seed: int, sample: int, progress: Callable[[str], None]
     notes = {
         "ticks": len(ticks),
         "compiler": " ".join(compiler() or ("none",)),
+        "row_kinds": TIMED,
         "rivals_see_every": sample,
         "iterations": _histogram(iterations),
         "osqp_iterates_share": sum(count > 0 for count in iterations) / len(iterations),
@@ -85,7 +95,9 @@ def _rivals(
     problem, data = controller.problem, controller.engine.data
     rows = {name: Row(name=f"qpsolvers_{name}") for name in RIVALS if name in installed_solvers()}
     exact_row, exact = Row(name="casadi_daqp"), ExactSolver(problem)
-    differences: dict[str, list[float]] = {name: [] for name in ("step", "step_limited", "step_unlimited", *rows)}
+    assembly_row, direct = Row(name="qpsolvers_assembly"), direct_solvers()
+    direct_rows = {name: Row(name=f"direct_{name}") for name in direct}
+    differences: dict[str, list[float]] = {}
     for index, (measurement, reference) in enumerate(by_flight(controller, ticks)):
         command = controller.step(measurement, reference)
         if index % sample or index < WARM_UP:
@@ -97,6 +109,9 @@ def _rivals(
             answer = row.measure(lambda: solve_offline(problem, data, name))  # noqa: B023 - called at once
             if answer is not None:
                 answers[name] = answer[0][: len(command.thrusts)]
+        assembly_row.measure(lambda: qpsolvers_problem(problem, data))
+        for name, row in direct_rows.items():
+            answers[row.name] = row.measure(direct[name](data))[: len(command.thrusts)]
         if found is None:
             continue
         for name, thrusts in answers.items():
@@ -106,7 +121,7 @@ def _rivals(
         for name, errors in differences.items()
         if errors
     }
-    return [*rows.values(), exact_row], figures
+    return [*rows.values(), assembly_row, *direct_rows.values(), exact_row], figures
 
 
 def _histogram(iterations: list[int]) -> dict[str, int]:

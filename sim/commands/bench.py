@@ -102,10 +102,11 @@ def _show(bench: BenchResult) -> None:
         size = (figure["size"] or "",) if sized else ()
         rows.append((figure["name"], *size, *times, "/".join(map(str, figure["misses"].values()))))
     console = Console()
-    console.print(terminal_table(headings, rows, f"Processor time, one thread [{name}]", text=("measured", "size")))
+    console.print(terminal_table(headings, rows, f"Processor time, one thread, in {name}", text=("measured", "size")))
     stages = ", ".join(f"{stage} {unit * time_us:.2f}" for stage, time_us in bench.stages_us.items())
-    console.print(f"Medians of the stages [{name}]: {stages}")
+    console.print(f"Medians of the stages, in {name}: {stages}")
     for rival, ratio in bench.ratios.items():
         console.print(f"{rival}: {ratio:.1f} x our median")
-    for key, note in bench.notes.items():
-        console.print(f"{key}: {note}")
+    notes = dict(bench.notes)
+    for key, note in (notes.pop("row_kinds", {}) | notes).items():
+        console.print(f"{key}: {note}", markup=False)

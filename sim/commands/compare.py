@@ -165,6 +165,7 @@ def _print(conditions: list[dict[str, Any]], cells: list[dict[str, Any]], a: Pat
     from sim.flight.trace import law_name
     from sim.report.comparison import PAINT_VARIANT
     from sim.report.conditions import ABSENT
+    from sim.sweep.statistics import needed, spread
 
     console, names = Console(), ("A", "B")
     print(f"A: {a}\nB: {b}")
@@ -173,13 +174,12 @@ def _print(conditions: list[dict[str, Any]], cells: list[dict[str, Any]], a: Pat
         shown.append((f"{len(conditions) - MOST_CONDITIONS} more, see --json", "", ""))
     if shown:
         console.print(terminal_table(("flown under other conditions", *names), shown, wrap=names))
-    headings = ("figure", *names, "B - A", "95 %")
     for cell in cells:
         variant = [] if cell["variant"] == PAINT_VARIANT else [cell["variant"]]
         params = (f"{name} {value}" for name, value in cell["params"].items())
         labels = [cell["experiment"], law_name(cell["law"]), *variant, *params]
-        labels += [] if "world" in cell["params"] else [f"world {world}"]
         done = " and ".join(f"{count} of {cell['n']}" for count in cell["completed"])
+        where = "" if "world" in cell["params"] else f"; world {world}"
         rows = []
         for line in LINES:
             if (found := cell["differences"].get(line.name)) is None:
@@ -187,6 +187,9 @@ def _print(conditions: list[dict[str, Any]], cells: list[dict[str, Any]], a: Pat
             figures = [line.scale * found[key] for key in ("a", "b", "median", "low", "high")]
             a_text, b_text = (f"{figure:.4g}" for figure in figures[:2])
             median, low, high = (f"{figure:+.4g}" for figure in figures[2:])
-            interval = f"{low} to {high}" if low != high else ABSENT
+            interval = spread(low, high, found["pairs"]) if low != high else ABSENT
             rows.append((plain(line.label), a_text, b_text, median, interval))
-        console.print(terminal_table(headings, rows, plain(f"{', '.join(labels)}: completed {done}")))
+        enough = {found["pairs"] >= needed() for found in cell["differences"].values()}
+        spreads = (*(["95 %"] if True in enough else []), *(["min, max"] if False in enough else []))
+        headings = ("figure", *names, "B - A", " or ".join(spreads))
+        console.print(terminal_table(headings, rows, plain(f"{', '.join(labels)}: completed {done}{where}")))

@@ -11,8 +11,7 @@ from scipy.stats import binomtest
 from sim.experiments.comparison import compared_cells
 from sim.experiments.relevance import Effect
 from sim.experiments.sections import HEADINGS, Flown, capped, grouped, world_of
-from sim.sweep.paired import needed
-from sim.sweep.statistics import CONFIDENCE
+from sim.sweep.statistics import CONFIDENCE, needed
 
 
 def completion_section(flown: Flown) -> tuple[str, str]:

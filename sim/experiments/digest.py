@@ -18,7 +18,7 @@ from sim.evaluate.table import markdown
 from sim.experiments.comparison import SHIPPED, best_allocator, rivals
 from sim.experiments.spec import Column
 from sim.experiments.wording import rounded
-from sim.sweep.statistics import median_interval, select
+from sim.sweep.statistics import median_interval, select, spread
 
 #: Marks around the table.
 BEGIN, END = "<!-- experiments: generated -->", "<!-- end of experiments -->"
@@ -87,7 +87,7 @@ def _value(rows: pl.DataFrame, line: Line) -> str:
     if not values.size:
         return "".join(failed) or "–"
     middle, low, high = (rounded(value, line.digits) for value in median_interval(values).values())
-    parts = [middle if low == high else f"{middle} ({low} to {high})"]
+    parts = [middle if low == high else f"{middle} ({spread(low, high, values.size)})"]
     for column in line.also:
         more = done[column.metric].drop_nulls().to_numpy()
         if more.size:

@@ -9,8 +9,8 @@ import polars as pl
 from sim.experiments.figures.force_map import OSCILLATES_N, map_cells
 from sim.experiments.relevance import Effect, effect
 from sim.experiments.sections import capped
-from sim.experiments.spec import Experiment
-from sim.experiments.wording import cell, exact, interval, varying
+from sim.experiments.spec import Column, Experiment
+from sim.experiments.wording import cell, exact, rounded, varying
 from sim.flight.trace import law_name
 from sim.sweep.paired import variant_differences
 from sim.sweep.parts import PARAM
@@ -44,7 +44,7 @@ def impedance_section(experiment: Experiment, table: pl.DataFrame) -> str:
         if difference and entry["params"].get("kind") == "hold":
             effects[effect(difference, column)] += 1
         own = select(table, entry["params"], law=entry["law"])
-        medians = (interval(_median(select(own, variant=name)), column) for name in (IMPEDANCE, DIRECT))
+        medians = (_median(select(own, variant=name), column) for name in (IMPEDANCE, DIRECT))
         done = " and ".join(str(entry["flown"] - failed) for failed in entry["failed"]) + f" of {entry['flown']}"
         where = cell(experiment, place) or "all"
         rows.append([law_name(entry["law"]), where, done, *medians, exact(difference, column)])
@@ -55,9 +55,8 @@ def impedance_section(experiment: Experiment, table: pl.DataFrame) -> str:
     return f"{_said(effects)} {stability}{mechanism}\n\n{column.label.capitalize()}:\n\n{capped(heads, rows)}"
 
 
-def _median(rows: pl.DataFrame) -> dict[str, float]:
-    middle = median_interval(completed(rows, _METRIC))["median"]
-    return {"median": middle, "low": middle, "high": middle}
+def _median(rows: pl.DataFrame, column: Column) -> str:
+    return rounded(column.scale * median_interval(completed(rows, _METRIC))["median"], column.digits)
 
 
 def _said(effects: Counter[Effect]) -> str:

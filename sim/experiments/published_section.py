@@ -33,9 +33,10 @@ def published_section(flown: Flown) -> str:
                 continue
             best = best_allocator(parts, columns[0])
             for law, flights in (("QP law", qp), (f"analytic law ({best})", parts[best])):
-                values = [median_interval(completed(flights, column.metric)) for column in columns]
+                values = [completed(flights, column.metric) for column in columns]
                 cells = [
-                    f"{interval(value, column)} {column.unit}" for value, column in zip(values, columns, strict=True)
+                    f"{interval(median_interval(each), column, len(each))} {column.unit}"
+                    for each, column in zip(values, columns, strict=True)
                 ]
                 what = f"simulation, {experiment.name}, world *{world_of(params)}*, {law}"
                 rows.append([what, *cells, f"{flights['completed'].sum()} of {flights.height}"])

@@ -7,7 +7,8 @@ from enum import Enum
 
 from sim.evaluate.figures import figure_of
 from sim.experiments.spec import Column
-from sim.sweep.paired import needed, sign
+from sim.sweep.paired import sign
+from sim.sweep.statistics import needed
 
 
 class Effect(Enum):

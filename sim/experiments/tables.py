@@ -16,8 +16,8 @@ from sim.experiments.spec import Experiment
 from sim.experiments.variants import VARIANTS
 from sim.experiments.wording import cell, difference, entry, headings, interval, measured, value_of
 from sim.flight.trace import law_name
-from sim.sweep.paired import differences, needed
-from sim.sweep.statistics import cells, false_claims, parameters, split
+from sim.sweep.paired import differences
+from sim.sweep.statistics import cells, false_claims, needed, parameters, split
 
 #: Top of the page.
 _HEAD = """# Tables behind the results
@@ -28,10 +28,11 @@ Generated from data by `{command}`; do not edit. {lead} [results.md](results.md)
 *Met*: a bound marked *every* (flags, peaks, bounces) applies to each flight, one marked with a share to that share of
 them, any other bound to the median of the cell; if not all flights are within the bound, the number within it follows.
 A flight without the metric fails.
-Values are medians over the flights of a cell, with their 95 % bootstrap interval in brackets. *Done* counts the flights
-that ended as planned, by the truth and by the pilot's claim; values come from those flights only. Differences are taken
-between flights with the same seed that both ended as planned, with the exact interval of the median in brackets;
-**bold** means that the interval excludes
+Values are medians over the flights of a cell, with their 95 % bootstrap interval in brackets; of fewer than {needed}
+flights with their minimum and maximum, named so. Bars in figures are the same. *Done* counts the flights that ended as
+planned, by the truth and by the pilot's claim; values come from those flights only. Differences are taken between
+flights with the same seed that both ended as planned, with the exact interval of the median in brackets; **bold** means
+that the interval excludes
 zero. Fewer than {needed} pairs are too few for such an interval.
 
 """
@@ -70,7 +71,8 @@ def _table(experiment: Experiment, table: pl.DataFrame) -> str:
     for flown in cells(table, {column.metric for column in columns if column.of_all}):
         row = [entry(flown["params"].get(name, "")) for name in experiment.params]
         row += [flown["variant"], law_name(flown["law"]), f"{flown['completed']} of {flown['n']}"]
-        row += [interval(value_of(flown["metrics"], column, flown["params"]), column) for column in columns]
+        values = ((value_of(flown["metrics"], column, flown["params"]), column) for column in columns)
+        row += [interval(value, column, flown["counts"].get(column.metric, 0)) for value, column in values]
         rows[experiment.is_folded(flown["params"])].append(row)
     text = markdown(heads, rows[False])
     if rows[True]:

@@ -11,8 +11,7 @@ from sim.experiments.completion_section import completion_section
 from sim.experiments.relevance import Effect, threshold
 from sim.experiments.sections import HEADINGS, Flown, capped, grouped, world_of
 from sim.experiments.wording import cell, exact, varying
-from sim.sweep.paired import needed
-from sim.sweep.statistics import CONFIDENCE
+from sim.sweep.statistics import CONFIDENCE, needed
 
 
 def verdict_section(flown: Flown) -> str:

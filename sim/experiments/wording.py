@@ -10,6 +10,7 @@ import polars as pl
 
 from sim.experiments.spec import Column, Experiment
 from sim.sweep.paired import sign
+from sim.sweep.statistics import needed, spread
 
 
 def rounded(value: float, digits: int, plus: bool = False) -> str:
@@ -20,14 +21,14 @@ def rounded(value: float, digits: int, plus: bool = False) -> str:
     return text.lstrip("-") if float(text) == 0.0 else f"{value:+.{digits}f}" if plus else text
 
 
-def interval(value: Mapping[str, float] | None, column: Column) -> str:
-    """Median with its bootstrap interval in the unit of a column."""
-    return _interval(value, column, False, ("median", "low", "high"))
+def interval(value: Mapping[str, float] | None, column: Column, count: int) -> str:
+    """Median of so many flights in the unit of a column, with its bootstrap interval, or minimum and maximum of few."""
+    return _interval(value, column, False, ("median", "low", "high"), count)
 
 
 def exact(value: Mapping[str, float] | None, column: Column) -> str:
     """Median difference with its exact interval in the unit of a column, signed."""
-    return _interval(value, column, True, ("median", "sure_low", "sure_high"))
+    return _interval(value, column, True, ("median", "sure_low", "sure_high"), needed())
 
 
 def difference(found: Mapping[str, float] | None, column: Column) -> str:
@@ -36,11 +37,11 @@ def difference(found: Mapping[str, float] | None, column: Column) -> str:
     return f"**{text}**" if found is not None and column.better and sign(dict(found)) else text
 
 
-def _interval(value: Mapping[str, float] | None, column: Column, plus: bool, names: Sequence[str]) -> str:
+def _interval(value: Mapping[str, float] | None, column: Column, plus: bool, names: Sequence[str], count: int) -> str:
     if value is None or not np.isfinite(value["median"]):
         return "–"
     middle, low, high = (rounded(column.scale * value[name], column.digits, plus) for name in names)
-    return middle if low == high or "–" in (low, high) else f"{middle} ({low} to {high})"
+    return middle if low == high or "–" in (low, high) else f"{middle} ({spread(low, high, count)})"
 
 
 def entry(value: Any) -> str:

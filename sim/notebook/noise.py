@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from pathlib import Path
 from typing import Any
@@ -16,15 +17,16 @@ from sim.experiments.design import Choice
 from sim.experiments.design import designs as experiment_runs
 from sim.flight.closed_loop import fly
 from sim.flight.trace import Trace, law_name
-from sim.notebook.noise_sample import SAMPLE, sample_runs
+from sim.notebook.noise_sample import SAMPLE, WORLD, sample_runs
 from sim.notebook.table import table
 from sim.sweep.design import Run
 from sim.sweep.figures.page import read_table
 from sim.sweep.fingerprint import code_hash, configuration_hash
-from sim.sweep.paired import needed, paired_differences, sign
+from sim.sweep.paired import paired_differences, sign
 from sim.sweep.parts import PARAM
 from sim.sweep.spec import LAWS
-from sim.sweep.statistics import completed, select
+from sim.sweep.statistics import completed, needed, select
+from sim.world.worlds import DEFAULT_WORLD
 
 #: Columns of the two noises.
 VS, FORCE = PARAM + "sigma_vs", PARAM + "sigma_f_n"
@@ -170,7 +172,8 @@ def find_run(row: dict[str, Any]) -> Run:
         LookupError: When no design has such a cell, law and seed.
     """
     designs = [sample_runs(MOST_SEEDS)]
-    designs += [experiment_runs("noise-sweep", Choice(features=features)) for features in ("geometric", "rendered")]
+    choices = itertools.product(("geometric", "rendered"), (DEFAULT_WORLD, WORLD))
+    designs += [experiment_runs("noise-sweep", Choice(features=features, world=world)) for features, world in choices]
     key = (row["law"], row["seed"], row[VS], row[FORCE])
     alike = [
         run

@@ -18,15 +18,17 @@ from sim.sweep.parts import write_table
 
 #: Table that the notebook reads by default.
 SAMPLE = Path(__file__).parents[2] / "notebooks" / "data" / "noise_sweep.parquet"
-#: Flights per cell and law: the fewest pairs that can make a difference significant (`sim.sweep.paired.needed`).
+#: Flights per cell and law: the fewest pairs that can make a difference significant (`sim.sweep.statistics.needed`).
 SEEDS = 6
+#: World of the sample: its two noises are the only errors beyond those of the scene's sensors.
+WORLD = "ideal"
 
 
 def sample_runs(seeds: int = SEEDS) -> list[Run]:
     """All nine cells under both laws, without logs."""
     sweep = experiment("noise-sweep")
     short = dataclasses.replace(sweep.flights[0], seeds=seeds, keep=False, fixed=sweep.quick[0].fixed)
-    return design(dataclasses.replace(sweep, flights=(short,)), Choice(features="geometric"))
+    return design(dataclasses.replace(sweep, flights=(short,)), Choice(features="geometric", world=WORLD))
 
 
 def main() -> int:

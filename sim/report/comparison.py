@@ -80,9 +80,9 @@ def compare(a: pl.DataFrame, b: pl.DataFrame) -> list[dict[str, Any]]:
 
 
 def _difference(rows: pl.DataFrame, name: str) -> dict[str, float] | None:
-    """Medians of run A and B, and of B - A flight by flight with its bootstrap and its exact interval."""
+    """Medians of run A and B, and of B - A flight by flight with both intervals; number of pairs of flights."""
     first, second = (rows[column].cast(pl.Float64).to_numpy() for column in (name, f"{name}.b"))
     if not np.isfinite(second - first).any():
         return None
     medians = {"a": median_interval(first)["median"], "b": median_interval(second)["median"]}
-    return medians | difference(second - first)
+    return medians | difference(second - first) | {"pairs": int(np.isfinite(second - first).sum())}

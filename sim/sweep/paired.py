@@ -33,11 +33,6 @@ def difference(values: np.ndarray) -> dict[str, float]:
     return {**median_interval(values), "sure_low": low, "sure_high": high}
 
 
-def needed() -> int:
-    """Fewest pairs of a significant difference."""
-    return math.ceil(1.0 - math.log2(1.0 - CONFIDENCE))
-
-
 def sign(figure: dict[str, float]) -> int:
     """+1 or -1 for a significantly positive or negative difference, else 0."""
     return int(figure["sure_low"] > 0.0) - int(figure["sure_high"] < 0.0)

@@ -18,8 +18,18 @@ CONFIDENCE, RESAMPLES = 0.95, 999
 _SEED = 20
 
 
+def needed() -> int:
+    """Fewest values of an interval: fewer leave the sign of their median open at this confidence, whatever they are."""
+    return math.ceil(1.0 - math.log2(1.0 - CONFIDENCE))
+
+
+def spread(low: str, high: str, count: int) -> str:
+    """Ends of `median_interval` of so many values as text: those of an interval, or named minimum and maximum."""
+    return f"{low} to {high}" if count >= needed() else f"min {low}, max {high}"
+
+
 def median_interval(values: np.ndarray) -> dict[str, float]:
-    """Median with its percentile bootstrap interval; of a single value, or equal ones, the value itself.
+    """Median with its percentile bootstrap interval; of fewer than `needed` values with their minimum and maximum.
 
     Args:
         values: Figures of the flights of one cell; values that are not finite are dropped.
@@ -32,8 +42,8 @@ def median_interval(values: np.ndarray) -> dict[str, float]:
     if not len(good):
         return {"median": math.nan, "low": math.nan, "high": math.nan}
     middle = float(np.median(good))
-    if len(good) < 2 or np.ptp(good) == 0.0:
-        return {"median": middle, "low": middle, "high": middle}
+    if len(good) < needed() or np.ptp(good) == 0.0:  # a bootstrap interval of two covers half of the medians
+        return {"median": middle, "low": float(good.min()), "high": float(good.max())}
     interval = bootstrap(
         (good,),
         np.median,
@@ -86,7 +96,7 @@ def false_claims(rows: pl.DataFrame) -> int:
 
 
 def cells(table: pl.DataFrame, of_all: Collection[str] = ()) -> list[dict[str, Any]]:
-    """Cells of the contract: law, variant, params, n, completed, false claims, and every figure with its interval.
+    """Cells of the contract: law, variant, params, n, completed, false claims, figures with interval and count.
 
     Only flights that ended as planned have figures: a flight cut short by a crash measures nothing.
 
@@ -98,8 +108,9 @@ def cells(table: pl.DataFrame, of_all: Collection[str] = ()) -> list[dict[str, A
     for key, rows in split(table, ("experiment", "law", "variant")):
         done = rows.filter(pl.col("completed"))
         columns = {name: (rows if name in of_all else done)[name].drop_nulls() for name in names}
-        metrics = {name: median_interval(values.to_numpy()) for name, values in columns.items() if len(values)}
+        counts = {name: len(values) for name, values in columns.items() if len(values)}
+        metrics = {name: median_interval(columns[name].to_numpy()) for name in counts}
         cell = {name: key[name] for name in ("experiment", "law", "variant")} | {"params": parameters(key)}
-        counts = {"n": rows.height, "completed": done.height, "false_claims": false_claims(rows)}
-        result.append(cell | counts | {"metrics": metrics})
+        flown = {"n": rows.height, "completed": done.height, "false_claims": false_claims(rows)}
+        result.append(cell | flown | {"metrics": metrics, "counts": counts})
     return result

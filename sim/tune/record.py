@@ -15,6 +15,7 @@ from sim.flight.trace import law_name
 from sim.report.rundir import write_json
 from sim.storage.atomic import write_text
 from sim.sweep.parts import write_table
+from sim.sweep.statistics import needed, spread
 from sim.tune.choice import front, gain_over
 from sim.tune.figures import draw_front, draw_unseen
 from sim.tune.finalists import SHIPPED, Finalist, best_of, shipped_score
@@ -144,12 +145,13 @@ def _page(outcome: Outcome, summary: dict[str, Any]) -> list[str]:
         "the geometric mean. On unseen seeds, of neither search nor choice:",
         "",
     ]
-    heads = ("scene", "objective", "flights", "shipped", "tuned", "tuned - shipped (95 % interval)", "verdict")
+    change = f"tuned - shipped (95 % interval; min and max of fewer than {needed()} flights)"
+    heads = ("scene", "objective", "flights", "shipped", "tuned", change, "verdict")
     scale, rows = {each.name: each for each in OBJECTIVES}, []
     for each in summary["unseen"]:
         objective = scale[each["objective"]]
         a, b = (objective.scale * each[name] for name in ("shipped", "tuned"))
         median, low, high = (objective.scale * each["difference"][name] for name in ("median", "low", "high"))
-        change = f"{median:+.3g} ({low:+.3g} to {high:+.3g})"
+        change = f"{median:+.3g} ({spread(f'{low:+.3g}', f'{high:+.3g}', each['n'])})"
         rows.append((each["scene"], objective.label, str(each["n"]), f"{a:.3g}", f"{b:.3g}", change, each["verdict"]))
     return [*lines, markdown(heads, rows), f"![Unseen seeds](figures/{law}-unseen.png)"]

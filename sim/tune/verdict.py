@@ -8,7 +8,7 @@ import numpy as np
 import polars as pl
 
 from sim.sweep.parts import PARAM
-from sim.sweep.statistics import median_interval
+from sim.sweep.statistics import median_interval, needed
 from sim.tune.finalists import SHIPPED, TUNED
 from sim.tune.objectives import OBJECTIVES
 
@@ -24,7 +24,7 @@ def differences(table: pl.DataFrame) -> list[dict[str, Any]]:
 
     Returns:
         Per scene ("all" first) and objective: n, medians of both, median of the differences with its interval, and
-        a verdict: "better", "worse", or "same" for an interval with zero inside.
+        a verdict: "better", "worse", "same" for an interval with zero inside, or "too few" flights for an interval.
     """
     both = paired(table)
     by_scene = both.partition_by(PARAM + "scene", maintain_order=True, as_dict=True)
@@ -32,16 +32,17 @@ def differences(table: pl.DataFrame) -> list[dict[str, Any]]:
     for scene, rows in {"all": both, **{str(name): rows for (name,), rows in by_scene.items()}}.items():
         for each in OBJECTIVES:
             before, after = (rows[name].cast(pl.Float64).to_numpy() for name in (each.name, f"{each.name}.{TUNED}"))
-            change = median_interval(after - before)
+            change, count = median_interval(after - before), int(np.isfinite(after - before).sum())
+            verdict = "better" if change["high"] < 0.0 else "worse" if change["low"] > 0.0 else "same"
             result.append(
                 {
                     "scene": scene,
                     "objective": each.name,
-                    "n": int(np.isfinite(after - before).sum()),
+                    "n": count,
                     "shipped": median_interval(before)["median"],
                     "tuned": median_interval(after)["median"],
                     "difference": change,
-                    "verdict": "better" if change["high"] < 0.0 else "worse" if change["low"] > 0.0 else "same",
+                    "verdict": verdict if count >= needed() else "too few",
                 }
             )
     return result

@@ -26,11 +26,15 @@ def test_bench_qp_as_json(capsys: pytest.CaptureFixture[str]) -> None:
         "step",
         "step_interpreted",
         "qpsolvers_osqp",
+        "qpsolvers_assembly",
         "casadi_daqp",
     } <= set(rows)
     assert set(rows["step"]) == {"name", "size", "p50_us", "p90_us", "p99_us", "p999_us", "max_us", "misses"}
     assert set(table["stages_us"]) == {"pack", "evaluate", "solve", "explain"}
     assert table["ratios"]["qpsolvers_osqp"] > 1.0
+    assert rows["qpsolvers_assembly"]["p50_us"] < rows["qpsolvers_osqp"]["p50_us"]
+    kinds = [*table["row_kinds"], "step_interpreted", "mink_12_joints"]
+    assert all(any(name == kind or name.startswith(kind.removesuffix("NAME")) for kind in kinds) for name in rows)
     assert sum(table["outcomes"].values()) == table["ticks"] == 1200
     assert table["osqp_iterates_share"] == 1.0 and "0" not in table["iterations"]
     assert table["difference_to_exact_n"]["max"] < 2e-2

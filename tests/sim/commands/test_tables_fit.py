@@ -94,13 +94,16 @@ def test_explain() -> None:
     assert_whole([explanation_text._tasks(found), *limits, *conflict, rotors], 5)
 
 
-def test_compare(printed: list[object], capsys: pytest.CaptureFixture[str], tmp_path) -> None:
-    figures = {"a": WIDE, "b": WIDE, "median": WIDE, "low": 2.0 * WIDE, "high": WIDE}
+@pytest.mark.parametrize("pairs", [2, 20])
+def test_compare(printed: list[object], capsys: pytest.CaptureFixture[str], tmp_path, pairs: int) -> None:
+    figures = {"a": WIDE, "b": WIDE, "median": WIDE, "low": 2.0 * WIDE, "high": WIDE, "pairs": pairs}
     cell = {"experiment": "paint", "law": "qp", "variant": "lexicographic", "params": {"world": "harsh"}, "n": 20}
     cell |= {"completed": [20, 19], "differences": {line.key: figures for line in LINES}}
     conditions = [{"name": "preset.controller.gains.force_kfp", "a": 0.123456789, "b": [0.25, 0.125, 1.0625]}]
     compare._print(conditions, [cell], tmp_path, tmp_path, "datasheet")
     assert_whole(printed, 2)
+    text = shown(printed[-1], 120)
+    assert ("95 %" in text, "min -" in text, "min, max" in text) == (pairs >= 6, pairs < 6, pairs < 6)
 
 
 def test_vehicle_of_eight_rotors(printed: list[object], capsys: pytest.CaptureFixture[str]) -> None:
@@ -131,8 +134,9 @@ def test_faults(printed: list[object]) -> None:
 @pytest.mark.parametrize("size", [None, "640x480"])
 def test_bench(printed: list[object], size: str | None) -> None:
     row = Row(name="qpsolvers_proxqp", size=size, times_us=[123456.7] * 1000)
-    bench._show(Bench(rows=[row], stages_us={"solve": 1.0}, ratios={"rival": 1.0}))
+    bench._show(Bench(rows=[row], stages_us={"solve": 1.0}, ratios={"rival": 1.0}, notes={"row_kinds": {"step": "x"}}))
     assert_whole(printed, 1)
+    assert f"in {'us' if size is None else 'ms'}" in shown(printed[0]) and "step: x" in printed
 
 
 def test_bench_loop(printed: list[object]) -> None:

@@ -41,7 +41,7 @@ def test_medians_of_flights_that_ended_as_planned_and_how_many_did_not() -> None
         {"variant": "x", "path_rms_m": 8.0},
     ]
     assert digest(table(*rows), [LINE]).splitlines()[2] == (
-        "| error [mm] | 2.00 (1.00 to 9.00); fails in 1 of 4 | fails in 1 of 1 | – | – | 4 | paint |"
+        "| error [mm] | 2.00 (min 1.00, max 9.00); fails in 1 of 4 | fails in 1 of 1 | – | – | 4 | paint |"
     )
 
 

@@ -51,6 +51,7 @@ def test_the_command_names_them_first_and_labels_figures_as_paint_does(
         )
     ]
     assert places == sorted(places)
+    assert "world ideal against harsh" in " ".join(text.split())
     assert "path error, largest [mm]" in text and "path_max_m" not in text
 
 

@@ -16,9 +16,9 @@ from sim.experiments.design import Choice, designs
 from sim.experiments.spec import experiment
 from sim.experiments.verdict import evaluate
 from sim.report.comparison import compare, read_run
-from sim.sweep.paired import exact_interval, needed, paired_differences, sign, variant_differences
+from sim.sweep.paired import exact_interval, paired_differences, sign, variant_differences
 from sim.sweep.parts import frame, write_table
-from sim.sweep.statistics import cells, median_interval
+from sim.sweep.statistics import cells, median_interval, needed, spread
 
 
 def table(values: dict[str, list[float]], name: str = "error", **params: float) -> pl.DataFrame:
@@ -46,6 +46,15 @@ def test_intervals_cover_the_true_median_as_often_as_they_say():
         interval = median_interval(rng.normal(0.0, 1.0, 15))
         inside += interval["low"] <= 0.0 <= interval["high"]
     assert 0.88 <= inside / 120 <= 1.0
+
+
+@pytest.mark.parametrize("count", [2, 5])
+def test_fewer_than_six_values_have_minimum_and_maximum_and_say_so(count: int):
+    values = np.array([3.0, 1.0, 7.0, 2.0, 5.0, 4.0])
+    few, enough = values[:count], median_interval(values)
+    assert median_interval(few) == {"median": np.median(few), "low": few.min(), "high": few.max()}
+    assert spread("1", "7", count) == "min 1, max 7" and spread("1", "7", needed()) == "1 to 7"
+    assert (enough["low"], enough["high"]) != (values.min(), values.max()) and needed() == 6
 
 
 def test_few_values_make_no_interval():
