@@ -42,6 +42,7 @@ from ibvs_qp.safety.policy import Fault
 from ibvs_qp.safety.rotor_loss import RotorLoss
 from ibvs_qp.safety.tick import Tick
 from ibvs_qp.validation.failure import raised
+from ibvs_qp.validation.load_check import LoadCheck
 from ibvs_qp.validation.measurement import answered_stamp
 from ibvs_qp.validation.self_check import SelfCheck
 from ibvs_qp.validation.sensor_frame import SensorGate
@@ -111,7 +112,7 @@ class Pilot:
         self._tip_from_camera = (self._tip - camera).tolist()
         self._gate = SensorGate(self.config.camera.latest_s)
         self._limits = ThrustLimits(vehicle.geometry.count)
-        self.self_check = SelfCheck(self.config.safety.self_check)
+        self.self_check = SelfCheck(self.config.safety.self_check, LoadCheck(vehicle, self.config.safety))
         self._inertial = InertialData(self._tip_from_camera, settings.tick_s)
         turn = vehicle.force_torque_turn_deg
         self._force_axes = rotation_from_vector(np.radians(turn)) if any(turn) else None
@@ -387,6 +388,11 @@ class Pilot:
         if not any(name in missing for name in INERTIAL):
             check.inertial(now["attitude"], now["angular_velocity"], now["specific_force"], dt)
         if "wrench" not in missing:
+            free = contact.known and contact.distance > self.config.estimation.tare_distance_m
+            noted = check.note
+            check.load(wrench, self._inertial.force, free, dt)
+            if check.note != noted:
+                self.painter.log.append((1e-9 * (self._stamp - self._first), "force sensor", check.note))
             check.contact(wrench[:3].tolist(), contact.push_noise, contact.normal, contact.distance, dt)
         self._rejected += [f"self-check: {fault}" for fault in check.faults()]
 
