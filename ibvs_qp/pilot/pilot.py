@@ -274,7 +274,7 @@ class Pilot:
         if self.contact.surface_offset > surface_offset:
             found = f"{contact.push:.1f} N felt {1e3 * self.contact.surface_offset:.0f} mm before the seen surface"
             self.painter.log.append((1e-9 * (stamp - self._first), "wall", f"{found}: its distance starts anew there"))
-        self._check_axes(frame.wrench, contact, dt)
+        self._check_axes(frame, contact, dt)
         axes = WallAxes.of(contact.normal, down)
         self.motion.predict(stamp, axes, force, rate, dt)
         self._history.remember(attitude, rate, dt)
@@ -382,7 +382,7 @@ class Pilot:
         free = not last.in_contact and last.distance > self.config.estimation.tare_distance_m
         return self.tare.update(frame.wrench, frame.wrench_stamp_ns, specific_force, free)
 
-    def _check_axes(self, wrench: np.ndarray, contact: ContactState, dt: float) -> None:
+    def _check_axes(self, frame: SensorFrame, contact: ContactState, dt: float) -> None:
         """Self-check with those raw sensors that the tick has; it names what it found in every command."""
         now, missing, check = self._gate.last, self._gate.replaced, self.self_check
         if not any(name in missing for name in INERTIAL):
@@ -390,10 +390,10 @@ class Pilot:
         if "wrench" not in missing:
             free = contact.known and contact.distance > self.config.estimation.tare_distance_m
             noted = check.note
-            check.load(wrench, self._inertial.force, free, dt)
+            check.load(frame.wrench, frame.wrench_stamp_ns, self._inertial.force, free, dt)
             if check.note != noted:
                 self.painter.log.append((1e-9 * (self._stamp - self._first), "force sensor", check.note))
-            check.contact(wrench[:3].tolist(), contact.push_noise, contact.normal, contact.distance, dt)
+            check.contact(frame.wrench[:3].tolist(), contact.push_noise, contact.normal, contact.distance, dt)
         self._rejected += [f"self-check: {fault}" for fault in check.faults()]
 
     # -------------------------------------------------------------- perception

@@ -23,8 +23,10 @@ from ibvs_qp.config.safety import SafetySettings
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import GRAVITY
 
-#: Averaging time [s]: the first readings of the tare, whose mean noise is 0.03 N at 100 Hz.
-MEAN_TIME = 0.4
+#: Averaging time [s]: within that of the tare, and longer while noise is not small beside the allowed errors.
+MEAN_TIME, LONGEST_TIME = 0.4, 3.0
+#: Standard deviations of a mean that count as its error, and part of the allowed error that is small beside it [-].
+NOISE_SIGMAS, SMALL_NOISE = 3.0, 0.5
 #: At rest the mean specific force has the length of gravity to this error [m/s^2].
 REST_FORCE_ERROR = 1.5
 #: A load is known by its direction if its length is right to this part [-]: tool mass, gain and cross-talk.
@@ -51,20 +53,25 @@ class LoadCheck:
 
     def __init__(self, vehicle: VehicleParams, settings: SafetySettings) -> None:
         self._mass, self._arm = vehicle.tool_mass_kg, _arm(vehicle)
-        self._errors = settings.force_offset_n, settings.moment_offset_n_m
+        self._errors = np.array((settings.force_offset_n, settings.moment_offset_n_m))
         self.reset()
 
     def reset(self) -> None:
         """As before the first reading."""
         self.done, self.note = False, ""
         self.faults: tuple[str, ...] = ()
-        self._time, self._read, self._force = 0.0, np.zeros(6), np.zeros(3)
+        self._begin()
 
-    def add(self, wrench: np.ndarray, force: Sequence[float], free: bool, dt: float) -> None:
+    def _begin(self) -> None:
+        self._time, self._force = 0.0, np.zeros(3)
+        self._samples, self._stamp = list[np.ndarray](), -1
+
+    def add(self, wrench: np.ndarray, stamp_ns: int, force: Sequence[float], free: bool, dt: float) -> None:
         """Add a tick.
 
         Args:
             wrench: Force and moment of the tool, vehicle on tool, in axes of B [N, N m], (6,).
+            stamp_ns: Time of that sample.
             force: Accelerometer in B [m/s^2], (3,).
             free: Whether the tip is known to be away from the wall.
             dt: Time since the last tick [s].
@@ -72,22 +79,28 @@ class LoadCheck:
         if self.done:
             return
         if not free:
-            self._time, self._read, self._force = 0.0, np.zeros(6), np.zeros(3)
+            self._begin()
             return
-        self._time, self._read = self._time + dt, self._read + dt * wrench
-        self._force = self._force + dt * np.asarray(force)
+        self._time, self._force = self._time + dt, self._force + dt * np.asarray(force)
+        if stamp_ns > self._stamp:
+            self._stamp = stamp_ns
+            self._samples.append(wrench)
         if self._time < MEAN_TIME:
             return
-        read, specific = self._read / self._time, self._force / self._time
+        samples, specific = np.array(self._samples), self._force / self._time
+        spread = np.sqrt(samples.var(axis=0).reshape(2, 3).max(axis=1) / len(samples))
+        noise = NOISE_SIGMAS * spread  # of the means of force and moment
+        if self._time < LONGEST_TIME and (noise > SMALL_NOISE * self._errors).any():
+            return
         if abs(math.hypot(*specific) - GRAVITY) <= REST_FORCE_ERROR:
             self.done = True
-            self._compare(read, specific)
-        self._time, self._read, self._force = 0.0, np.zeros(6), np.zeros(3)
+            self._compare(samples.mean(axis=0), specific, np.hypot(self._errors, noise))
+        self._begin()
 
-    def _compare(self, read: np.ndarray, specific: np.ndarray) -> None:
+    def _compare(self, read: np.ndarray, specific: np.ndarray, errors: np.ndarray) -> None:
         weight = self._mass * specific
-        force = _Load(weight, read[:3], self._errors[0])
-        moment = _Load(np.cross(self._arm, weight), read[3:], self._errors[1])
+        force = _Load(weight, read[:3], float(errors[0]))
+        moment = _Load(np.cross(self._arm, weight), read[3:], float(errors[1]))
         known = [load for load in (force, moment) if load.shows_turns and load.has_its_length]
         if any([load.is_turned for load in known]):
             self.faults = (_turn(known),)

@@ -65,10 +65,10 @@ class SelfCheck:
             self._rest.add(down_in_body(attitude), rate, force, dt)
         self._turn.add(attitude, rate, dt)
 
-    def load(self, wrench: np.ndarray, force: Sequence[float], free: bool, dt: float) -> None:
+    def load(self, wrench: np.ndarray, stamp_ns: int, force: Sequence[float], free: bool, dt: float) -> None:
         """Add the raw force sensor of one tick; arguments as of `ibvs_qp.validation.load_check.LoadCheck.add`."""
         if not self.done and self._load is not None:
-            self._load.add(wrench, force, free, dt)
+            self._load.add(wrench, stamp_ns, force, free, dt)
 
     def contact(self, raw: Sequence[float], noise: float, normal: Sequence[float], distance: float, dt: float) -> None:
         """Add the force sensor of one tick.

@@ -26,17 +26,23 @@ def checked(
     vehicle: VehicleParams = VEHICLE,
     acceleration: tuple[float, float, float] = (0.0, 0.0, 0.0),
     free: bool = True,
+    sigma_n: float = 0.3,
+    seconds: float = 0.5,
+    seed: int = 0,
 ) -> LoadCheck:
-    """Half a second of noisy readings of a sensor that is turned by a rotation vector."""
-    check, rng = LoadCheck(vehicle, SETTINGS), np.random.default_rng(0)
+    """Half a second of noisy readings at 100 Hz of a sensor that is turned by a rotation vector."""
+    check, rng = LoadCheck(vehicle, SETTINGS), np.random.default_rng(seed)
     specific = REST + acceleration
     force = vehicle.tool_mass_kg * specific
     moment = np.cross(np.subtract(vehicle.tool_position_m, vehicle.force_torque_position_m), force)
     to_sensor = Rotation.from_rotvec(turn_deg, degrees=True).inv()
     load = np.concatenate((to_sensor.apply(force), to_sensor.apply(moment))) + offset
-    for _ in range(125):
-        noise = np.concatenate((rng.normal(0.0, 0.3, 3), rng.normal(0.0, 0.02, 3)))
-        check.add(load + noise, (specific + rng.normal(0.0, 0.3, 3)).tolist(), free, DT)
+    reading, stamp = load, -1
+    for tick in range(round(seconds / DT)):
+        if tick * DT % 0.01 < DT:
+            stamp = round(1e9 * tick * DT)
+            reading = load + np.concatenate((rng.normal(0.0, sigma_n, 3), rng.normal(0.0, 0.02, 3)))
+        check.add(reading, stamp, (specific + rng.normal(0.0, 0.3, 3)).tolist(), free, DT)
     return check
 
 
@@ -89,6 +95,15 @@ def test_the_moment_shows_a_turn_that_a_large_offset_of_the_force_hides() -> Non
 def test_an_acceleration_moves_the_load_and_is_no_turn() -> None:
     assert checked(acceleration=(1.0, -1.0, 0.3)).faults == ()
     assert checked((90.0, 0.0, 0.0), acceleration=(1.0, -1.0, 0.3)).faults
+
+
+def test_noise_is_averaged_for_longer_and_is_no_turn() -> None:
+    for seed in range(20):
+        short = checked(sigma_n=3.0, seed=seed)
+        assert not short.done and short.faults == ()
+        long = checked(sigma_n=3.0, seconds=3.1, seed=seed)
+        assert long.done and long.faults == () and long.note == ""
+    assert checked((60.0, 0.0, 0.0), sigma_n=3.0, seconds=3.1).faults
 
 
 def test_readings_near_the_wall_are_not_compared() -> None:
