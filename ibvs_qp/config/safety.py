@@ -14,6 +14,23 @@ class SafetySettings:
     supervise: bool = setting(True, "the supervisor acts; without it only the checks of inputs remain")
     self_check: bool = setting(True, "find sensor data in other axes than FRD and NED before the first touch")
 
+    force_offset_n: float = setting(
+        0.85,
+        "largest error of the force that the force sensor reads at rest",
+        unit="N",
+        why="0.35 N of zero offset, and cross-talk of 2 % at three standard deviations; a smaller error finds smaller "
+        "turns of the sensor by the tool's weight",
+        low=0.01,
+        high=20.0,
+    )
+    moment_offset_n_m: float = setting(
+        0.07,
+        "the same of the moment: half again the largest of 60 flights in the harsh world",
+        unit="N m",
+        low=0.001,
+        high=2.0,
+    )
+
     image_age_s: float = setting(0.2, "oldest picture: latency, and two dropped ones", unit="s", low=0.05, high=5.0)
     first_picture_s: float = setting(
         3.0, "first picture and wall plane after the start, where they are expected", unit="s", low=0.1, high=600.0

@@ -43,6 +43,7 @@ from ibvs_qp.safety.policy import Fault
 from ibvs_qp.safety.rotor_loss import RotorLoss
 from ibvs_qp.safety.tick import Tick
 from ibvs_qp.validation.failure import raised
+from ibvs_qp.validation.load_check import LoadCheck
 from ibvs_qp.validation.measurement import answered_stamp
 from ibvs_qp.validation.self_check import SelfCheck
 from ibvs_qp.validation.sensor_frame import SensorGate
@@ -113,7 +114,7 @@ class Pilot:
         self._hint_spans = {way: hint_span(vehicle, brush, *way) for way in ways}
         self._gate = SensorGate(self.config.camera.latest_s)
         self._limits = ThrustLimits(vehicle.geometry.count)
-        self.self_check = SelfCheck(self.config.safety.self_check)
+        self.self_check = SelfCheck(self.config.safety.self_check, LoadCheck(vehicle, self.config.safety))
         self._inertial = InertialData(self._tip_from_camera, settings.tick_s)
         turn = vehicle.force_torque_turn_deg
         self._force_axes = rotation_from_vector(np.radians(turn)) if any(turn) else None
@@ -275,7 +276,7 @@ class Pilot:
         if self.contact.surface_offset > surface_offset:
             found = f"{contact.push:.1f} N felt {1e3 * self.contact.surface_offset:.0f} mm before the seen surface"
             self.painter.log.append((1e-9 * (stamp - self._first), "wall", f"{found}: its distance starts anew there"))
-        self._check_axes(frame.wrench, contact, dt)
+        self._check_axes(frame, contact, dt)
         axes = WallAxes.of(contact.normal, down)
         self.motion.predict(stamp, axes, force, rate, dt)
         self._history.remember(attitude, rate, dt)
@@ -383,13 +384,18 @@ class Pilot:
         free = not last.in_contact and last.distance > self.config.estimation.tare_distance_m
         return self.tare.update(frame.wrench, frame.wrench_stamp_ns, specific_force, free)
 
-    def _check_axes(self, wrench: np.ndarray, contact: ContactState, dt: float) -> None:
+    def _check_axes(self, frame: SensorFrame, contact: ContactState, dt: float) -> None:
         """Self-check with those raw sensors that the tick has; it names what it found in every command."""
         now, missing, check = self._gate.last, self._gate.replaced, self.self_check
         if not any(name in missing for name in INERTIAL):
             check.inertial(now["attitude"], now["angular_velocity"], now["specific_force"], dt)
         if "wrench" not in missing:
-            check.contact(wrench[:3].tolist(), contact.push_noise, contact.normal, contact.distance, dt)
+            free = contact.known and contact.distance > self.config.estimation.tare_distance_m
+            noted = check.note
+            check.load(frame.wrench, frame.wrench_stamp_ns, self._inertial.force, free, dt)
+            if check.note != noted:
+                self.painter.log.append((1e-9 * (self._stamp - self._first), "force sensor", check.note))
+            check.contact(frame.wrench[:3].tolist(), contact.push_noise, contact.normal, contact.distance, dt)
         self._rejected += [f"self-check: {fault}" for fault in check.faults()]
 
     # -------------------------------------------------------------- perception

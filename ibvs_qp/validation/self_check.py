@@ -1,14 +1,18 @@
 """Start-up self-check: sensor data in other axes than front-right-down and north-east-down, found before contact.
 
-Level and at rest many wrong conventions look right. So the check goes on until the first touch: accelerometer at
-rest, attitude against accelerometer and gyro, and the force of the first touch against the wall's normal.
+Level and at rest many wrong conventions look right. So the check goes on until the first touch: accelerometer and load
+of the force sensor at rest, attitude against accelerometer and gyro, and the force of the first touch against the
+wall's normal.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from ibvs_qp.frames import down_in_body
+from ibvs_qp.validation.load_check import LoadCheck
 from ibvs_qp.validation.rest_check import RestCheck
 from ibvs_qp.validation.touch_check import TouchCheck
 from ibvs_qp.validation.turn_check import TurnCheck
@@ -22,15 +26,18 @@ class SelfCheck:
 
     Args:
         enabled: Whether anything is checked.
+        load: Check of the force sensor's load, for raw readings; None for a tared wrench.
     """
 
-    def __init__(self, enabled: bool) -> None:
-        self._enabled = enabled
+    def __init__(self, enabled: bool, load: LoadCheck | None = None) -> None:
+        self._enabled, self._load = enabled, load
         self.reset()
 
     def reset(self) -> None:
         """As before the first tick."""
         self._rest, self._turn, self._touch = RestCheck(), TurnCheck(), TouchCheck()
+        if self._load is not None:
+            self._load.reset()
         self.done = not self._enabled
 
     @property
@@ -40,7 +47,15 @@ class SelfCheck:
 
     def faults(self) -> tuple[str, ...]:
         """What was found, in words; empty without a fault, and after a first touch with the right axes."""
-        return () if self.done else (*self._rest.faults, *self._turn.faults, *self._touch.faults)
+        if self.done:
+            return ()
+        load = () if self._load is None else self._load.faults
+        return (*self._rest.faults, *self._turn.faults, *load, *self._touch.faults)
+
+    @property
+    def note(self) -> str:
+        """What the check of the force sensor's load found that is no fault."""
+        return "" if self._load is None else self._load.note
 
     def inertial(self, attitude: Sequence[float], rate: Sequence[float], force: Sequence[float], dt: float) -> None:
         """Add a tick: quaternion B in I, gyro [rad/s], accelerometer [m/s^2], time since the last tick [s]."""
@@ -49,6 +64,11 @@ class SelfCheck:
         if not self._rest.passed:
             self._rest.add(down_in_body(attitude), rate, force, dt)
         self._turn.add(attitude, rate, dt)
+
+    def load(self, wrench: np.ndarray, stamp_ns: int, force: Sequence[float], free: bool, dt: float) -> None:
+        """Add the raw force sensor of one tick; arguments as of `ibvs_qp.validation.load_check.LoadCheck.add`."""
+        if not self.done and self._load is not None:
+            self._load.add(wrench, stamp_ns, force, free, dt)
 
     def contact(self, raw: Sequence[float], noise: float, normal: Sequence[float], distance: float, dt: float) -> None:
         """Add the force sensor of one tick.

@@ -52,6 +52,12 @@ def test_nothing_is_learnt_while_slow_or_barely_touching_or_free() -> None:
     assert slide(free, 5.0, 4.0, 0.1, 500) == ASSUMED_FRICTION
 
 
+def test_friction_is_learnt_in_a_slide_as_slow_as_its_command() -> None:
+    block = estimator(travel=0.012)
+    assert slide(block, 5.0, 4.0, 0.004, 90) == ASSUMED_FRICTION  # slower than half its command
+    assert slide(block, 5.0, 4.0, 0.012, 500) == pytest.approx(0.8, abs=0.02)
+
+
 def test_a_held_tip_raises_the_belief_until_it_breaks_away() -> None:
     block = estimator()
     assert slide(block, 5.0, 1.5, 0.0, round(PATIENCE / 0.004) - 1) == ASSUMED_FRICTION

@@ -1,4 +1,4 @@
-"""A flight replayed open loop with a hole in all its data: the contact goes on, whatever surface is seen after it."""
+"""A felt push against the distance of another surface: after a hole in the data, open loop, and in a whole approach."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from sim.flight.closed_loop import make_pilot
 from sim.flight.jobs import PaintJob
 from sim.flight.options import FlightOptions, pilot_config
 from sim.flight.surroundings import World
+from sim.world.readout import PLACES
 from sim.world.worlds import in_world
 
 SCENE = in_world(short_job(0.7, rows=1), "datasheet")
@@ -74,3 +75,17 @@ def test_a_contact_survives_a_hole_in_the_data(
     assert pilot.status.safety in ("nominal", "degraded") and pilot.painter.phase == "paint"
     noted = [text for _, kind, text in pilot.painter.log if kind == "wall"]
     assert len(noted) == wall_seen and all(" mm before the seen surface" in text for text in noted)
+
+
+def test_a_board_before_the_seen_wall_is_pressed_softly() -> None:
+    """Vision takes the wall for the board from the start: the tip meets the board before the estimated surface."""
+    pilot, world = make_pilot(SCENE, OPTIONS, CONFIG, PaintJob()), World(SCENE, OPTIONS, CONFIG)
+    largest = 0.0
+    while pilot.painter.phase != "paint" and pilot.assurance.state == "nominal":
+        world.act(pilot.step(behind(world.sense())).thrusts)
+        largest = max(largest, float(world.plant.truth[PLACES["pushes"]].max()))
+    world.close()
+    print(f"largest push {largest:.1f} N, offset {1e3 * pilot.contact.surface_offset:.0f} mm")
+    assert pilot.painter.phase == "paint" and pilot.contact.state.in_contact
+    assert pilot.contact.surface_offset == pytest.approx(GAP_M, abs=5e-3)
+    assert largest < 8.0

@@ -12,6 +12,7 @@ from ibvs_qp.config import SafetySettings
 from ibvs_qp.measurement import SensorFrame
 from ibvs_qp.pilot import Pilot
 from sim.experiments.scenes import near_wall
+from sim.flight.closed_loop import fly
 from sim.flight.options import FlightOptions, pilot_config
 from sim.flight.surroundings import World
 from sim.world.errors import world_errors
@@ -61,9 +62,26 @@ def test_wrong_inertial_axes_are_named_at_once(seen_as: Callable[[SensorFrame], 
     assert len(names) == 1 and names[0].startswith(words) and not pilot.self_check.passed
 
 
-@pytest.mark.parametrize(("order", "sign"), [([0, 1, 2], -1.0), ([1, 0, 2], 1.0), ([2, 1, 0], 1.0), ([1, 2, 0], 1.0)])
-def test_a_force_sensor_in_wrong_axes_is_named_at_the_first_touch(order: list[int], sign: float) -> None:
+AXES = [([0, 1, 2], -1.0), ([1, 0, 2], 1.0), ([2, 1, 0], 1.0), ([1, 2, 0], 1.0)]
+
+
+def zeroed(seen_as: Callable[[SensorFrame], SensorFrame]) -> Callable[[SensorFrame], SensorFrame]:
+    """The same from a sensor whose driver takes its reading at rest for zero."""
+    rest = np.array([0.0, 0.0, -3.43, 0.0, 0.86, 0.0])
+    return lambda frame: seen_as(dataclasses.replace(frame, wrench=frame.wrench - rest))
+
+
+@pytest.mark.parametrize(("order", "sign"), AXES)
+def test_a_force_sensor_in_wrong_axes_is_named_before_the_tare(order: list[int], sign: float) -> None:
     pilot, names = found(2500, of_wrench(order, sign))
+    assert len(names) == 1 and names[0].startswith("self-check: force sensor: turned by ")
+    assert not pilot.tare.ready and not pilot.self_check.passed
+
+
+@pytest.mark.parametrize(("order", "sign"), AXES)
+def test_a_zeroed_force_sensor_in_wrong_axes_is_named_at_the_first_touch(order: list[int], sign: float) -> None:
+    pilot, names = found(2500, zeroed(of_wrench(order, sign)))
+    assert [text for _, kind, text in pilot.painter.log if kind == "force sensor" and "zeroed by its driver" in text]
     assert len(names) == 1 and names[0].startswith("self-check: wrench: the first touch is (")
     assert pilot.contact.state.distance > -0.006, "before it presses with more than 9 N"
     assert not pilot.self_check.passed
@@ -86,3 +104,27 @@ def test_right_axes_pass_in_every_world(world: str, law: str) -> None:
         assert not any(reason.startswith("self-check") for reason in command.rejected)
         assert pilot.self_check.passed == (tick >= 12)
     assert pilot.contact.state.in_contact
+
+
+@pytest.mark.parametrize("law", ["qp", "paper"])
+def test_a_turned_force_sensor_ends_the_job_by_name_before_the_touch(law: str) -> None:
+    scene = near_wall(plant={"force_torque_turn_deg": (90.0, 0.0, 0.0)}, errors=vars(world_errors("datasheet")))
+    trace = fly(scene, dataclasses.replace(OPTIONS, law=law))
+    assert not trace.completed and trace.push_true.max() == 0.0
+    assert trace.reason.startswith("sensor data in other axes: force sensor: turned by ")
+    assert " deg about x against the vehicle's settings" in trace.reason
+
+
+@pytest.mark.parametrize("world", ["datasheet", "harsh"])
+def test_the_load_of_a_right_sensor_is_no_turn_in_20_flights(world: str) -> None:
+    scene = dataclasses.replace(near_wall(), errors=world_errors(world))
+    config = pilot_config(scene, OPTIONS)
+    pilot = Pilot(config)
+    for seed in range(20):
+        pilot.reset()
+        flown = World(scene, dataclasses.replace(OPTIONS, seed=seed), config)
+        while not pilot.tare.ready:
+            command = pilot.step(flown.sense())
+            flown.act(command.thrusts)
+        flown.close()
+        assert not pilot.self_check.faults() and not pilot.self_check.note
