@@ -38,24 +38,22 @@ def terminal_table(
     text: Collection[str] | None = None,
     wrap: Collection[str] = (),
 ) -> Table:
-    """A table for the terminal.
+    """A table for the terminal. It fits the width: text wraps, numbers stay whole, further columns follow below.
 
     Args:
-        headings: Of the columns.
+        headings: Of the columns; those below each other repeat the first.
         rows: Cells of every row.
         title: Above the table.
         text: Headings of left-aligned columns; default: the first. All others are numbers.
-        wrap: Headings of the columns whose cells may take several lines.
+        wrap: Headings of right-aligned columns that are text too.
     """
-    from rich import box
-    from rich.table import Table
+    from sim.evaluate.fitting_table import FittingTable
 
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, title=title, title_justify="left")
+    table = FittingTable(title)
     left = headings[:1] if text is None else text
     for heading in headings:
-        justify = "left" if heading in left else "right"
-        wraps = heading in wrap
-        table.add_column(heading, justify=justify, no_wrap=not wraps, overflow="fold" if wraps else "ellipsis")
+        words = heading in left or heading in wrap
+        table.add_column(heading, justify="left" if heading in left else "right", no_wrap=not words)
     for row in rows:
         table.add_row(*row)
     return table

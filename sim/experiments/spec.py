@@ -136,6 +136,7 @@ class Experiment:
     paths: dict[str, tuple[str, ...]] = field(default_factory=dict)  # dotted paths that take a parameter's value
     named: dict[str, dict[str, dict[str, Value]]] = field(default_factory=dict)  # paths set by a parameter's value
     fixed: dict[str, Value] = field(default_factory=dict)  # values of dotted paths for all flights
+    world: str = ""  # of flights without a level `world`; empty takes that of the command line
     folded: dict[str, Parameter] = field(default_factory=dict)  # cells that the page folds away: a figure shows them
 
     def every_criterion(self) -> list[Criterion]:

@@ -41,6 +41,14 @@ def unsupervised(config: PilotConfig) -> PilotConfig:
     return dataclasses.replace(config, safety=dataclasses.replace(config.safety, supervise=False))
 
 
+def sized(scene: Scene, options: FlightOptions) -> Scene:
+    """The scene with the picture size of the options, if they state one."""
+    if options.image_size is None:
+        return scene
+    width, height = options.image_size
+    return dataclasses.replace(scene, camera=dataclasses.replace(scene.camera, width=width, height=height))
+
+
 def pilot_config(scene: Scene, options: FlightOptions, config: PilotConfig | None = None) -> PilotConfig:
     """The pilot's configuration: preset, law, and the scene's paint job; nothing else of the scene.
 

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.measurement import SensorFrame
 from ibvs_qp.pilot import PilotConfig
-from sim.flight.options import FlightOptions
+from sim.flight.options import FlightOptions, sized
 from sim.flight.viewer import FlightViewer
 from sim.sensors.camera_mount import CameraMount
 from sim.sensors.cameras import CameraStream, Dropouts, open_camera
@@ -34,9 +32,7 @@ class World:
     """Plant, sensors, canvas and camera: everything but the pilot."""
 
     def __init__(self, scene: Scene, options: FlightOptions, config: PilotConfig) -> None:
-        if options.image_size is not None:
-            width, height = options.image_size
-            scene = dataclasses.replace(scene, camera=dataclasses.replace(scene.camera, width=width, height=height))
+        scene = sized(scene, options)
         self.scene, self.geometry = scene, BoardGeometry(scene)
         self._rendered = options.features == "rendered"
         self.stream: CameraStream | None = None
@@ -78,10 +74,10 @@ class World:
         return self.sensors.sample(plant, image=None if image is None else self._mount.picture(image))
 
     def act(self, thrusts: np.ndarray) -> None:
-        """Advance one control tick and paint where the brush presses."""
+        """Advance one control tick and paint where the brush presses the board."""
         plant = self.plant
         plant.step(thrusts)
-        pressing = plant.contact_normal_force > PAINTING_FORCE
+        pressing = plant.on_board and plant.contact_normal_force > PAINTING_FORCE
         if self.viewer is not None:
             self.viewer.show(pressing)
         if pressing:

@@ -147,6 +147,8 @@ def test_interrupt_while_drawing_keeps_the_log(flown, capsys, monkeypatch):
         (["paint", "--preset", "dark_board"], ["--preset dark_board: this is a scene, not a preset"]),
         (["paint", "--scene", "octorotor_qp"], ["--scene octorotor_qp: this is a preset, not a scene"]),
         (["compare"], ["compare", "paint"]),
+        (["paint", "--scene", "long.toml"], ["paint.stroke_m = 1.5 m", "at most 1.308 m", "board.width_m = 1.4 m"]),
+        (["paint", "--scene", "slow.toml", "--law", "paper"], ["imu.rate_hz = 100.0 Hz", "at least 250 Hz"]),
         (["pain"], ["unknown command pain; did you mean paint?"]),
         (["fly"], ["unknown command fly; commands are paint, "]),
         ([], ["paint", "--help"]),
@@ -162,6 +164,8 @@ def test_user_errors_are_one_line(flown, capsys, words, needles):
     (flown / "rings.toml").write_text("[controller.gains]\nforce_ksp = 4000.0\n")
     (flown / "scene.toml").write_text("[wall]\nfriction = 0.3\n")
     (flown / "file").write_text("")
+    (flown / "long.toml").write_text("[paint]\nstroke_m = 1.5\n")
+    (flown / "slow.toml").write_text("[imu]\nrate_hz = 100.0\n")
     before = sorted(flown.rglob("*"))
     assert main(words) == 2
     out, err = capsys.readouterr()
