@@ -381,27 +381,65 @@ _FIGURES = (
     ),
     # -------------------------------------------- of the measures of presses, slides and lost rotors, which compute it
     Figure("touch_peak_n", "push at touch, peak", "Largest push within 3 s after the first touch.", unit="N"),
-    Figure("force_error_rms_n", "push minus job's push, rms", "Push minus the push of the job, from 4 s after the touch or the fault.", unit="N"),
-    Figure("force_std_n", "push, standard deviation", "Spread of the push, from 4 s after the touch or the fault.", unit="N", digits=3),
-    Figure("push_mean_n", "push delivered, mean", "Mean push, from 4 s after the touch or the fault; of a slide from 1 s after its start.", unit="N", better=NEITHER),
-    Figure("delivered_share", "delivered share of the push", "Mean push over the push of the job.", unit="%", scale=100.0, digits=1, better=MORE),
+    Figure(
+        "force_error_rms_n", "push minus job's push, rms",
+        "Push minus the push of the job, from 4 s after the touch or the fault.", unit="N",
+    ),
+    Figure(
+        "force_std_n", "push, standard deviation",
+        "Spread of the push, from 4 s after the touch or the fault.", unit="N", digits=3,
+    ),
+    Figure(
+        "push_mean_n", "push delivered, mean",
+        "Mean push, from 4 s after the touch or the fault; of a slide from 1 s after its start.",
+        unit="N", better=NEITHER,
+    ),
+    Figure(
+        "delivered_share", "delivered share of the push",
+        "Mean push over the push of the job.", unit="%", scale=100.0, digits=1, better=MORE,
+    ),
     Figure("reach_n", "reach", "Largest push that the true limits of the rotors can hold.", unit="N", better=NEITHER),
-    Figure("reach_share", "delivered share of the reach", "Mean push over the lesser of reach and push of the job.", unit="%", scale=100.0, digits=1, better=MORE),
-    Figure("approach_speed_m_s", "speed at touch", "Speed towards the wall just before the first touch.", unit="mm/s", scale=1e3, digits=0, better=NEITHER),
-    Figure("height_error_peak_m", "height error, peak", "Largest distance from the height of the guide since the touch.", unit="mm", scale=1e3, digits=1),
-    Figure("recovery_s", "recovered after", "From the fault until the push stays within 0.5 N and the tip within 5 mm.", unit="s"),
+    Figure(
+        "reach_share", "delivered share of the reach",
+        "Mean push over the lesser of reach and push of the job.", unit="%", scale=100.0, digits=1, better=MORE,
+    ),
+    Figure(
+        "approach_speed_m_s", "speed at touch",
+        "Speed towards the wall just before the first touch.", unit="mm/s", scale=1e3, digits=0, better=NEITHER,
+    ),
+    Figure(
+        "height_error_peak_m", "height error, peak",
+        "Largest distance from the height of the guide since the touch.", unit="mm", scale=1e3, digits=1,
+    ),
+    Figure(
+        "recovery_s", "recovered after",
+        "From the fault until the push stays within 0.5 N and the tip within 5 mm.", unit="s",
+    ),
     Figure("fault_force_peak_n", "push error after the step, peak", "Largest push error from the fault on.", unit="N"),
-    Figure("fault_path_peak_m", "tip after the step, peak", "Largest distance of the tip from its place at the fault.", unit="mm", scale=1e3, digits=1),
+    Figure(
+        "fault_path_peak_m", "tip after the step, peak",
+        "Largest distance of the tip from its place at the fault.", unit="mm", scale=1e3, digits=1,
+    ),
     Figure("speed_m_s", "speed", "Speed of a slide, from 1 s after its start.", unit="m/s", better=NEITHER),
-    Figure("speed_error_share", "speed error", "Speed of a slide against the commanded one, from 1 s after its start.", unit="%", scale=100.0, digits=1),
-    Figure("reduced_said", "reduction reported", "Whether a command reported the reduced push and why.", better=MORE, digits=0),
-    Figure("survived_s", "flight time after the loss", "From the loss of a rotor to the crash, the landing or the planned end.", unit="s", digits=1, better=NEITHER),
+    Figure(
+        "speed_error_share", "speed error",
+        "Speed of a slide against the commanded one, from 1 s after its start.", unit="%", scale=100.0, digits=1,
+    ),
+    Figure(
+        "reduced_said", "reduction reported",
+        "Whether a command reported the reduced push and why.", better=MORE, digits=0,
+    ),
+    Figure(
+        "survived_s", "flight time after the loss",
+        "From the loss of a rotor to the crash, the landing or the planned end.", unit="s", digits=1, better=NEITHER,
+    ),
     Figure("push_spike_n", "push after the loss, peak", "Largest push after the loss of a rotor.", unit="N"),
     Figure("descent_peak_m_s", "descent, fastest", "Fastest descent after the loss of a rotor.", unit="m/s"),
     Figure("detached", "left the wall", "Whether the tip is 10 cm from the board at the end.", better=MORE, digits=0),
     Figure("yaw_rate_peak_deg_s", "yaw rate, peak", "Fastest turn after the loss of a rotor.", unit="deg/s", digits=0),
     Figure(
-        "yaw_turned_deg", "turn since the loss", "Largest turn from the heading at the loss of a rotor, full turns included.", unit="deg", digits=0,
+        "yaw_turned_deg", "turn since the loss",
+        "Largest turn from the heading at the loss of a rotor, full turns included.", unit="deg", digits=0,
         matters=(10.0, "turns after the loss of a rotor reach hundreds of degrees"),
     ),
 )  # fmt: skip
