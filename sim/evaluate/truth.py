@@ -29,6 +29,8 @@ CONTACT, ROUGH_CONTACT = 0.98, 0.90
 DETACHED_M = 0.10
 #: A slide has moved the tip by at least this fraction of speed times duration.
 SLID = 0.5
+#: Lengths are shown in whole millimetres from this one on [m].
+WHOLE_M = 0.01
 #: Phases of a plan may be shorter than planned by this [s]: a few control ticks.
 TICKS_S = 0.02
 
@@ -155,4 +157,6 @@ class Judgement:
 
 
 def _mm(value_m: float) -> str:
-    return f"{1e3 * value_m:.0f} mm" if math.isfinite(value_m) else "unknown"
+    if not math.isfinite(value_m):
+        return "unknown"
+    return f"{1e3 * value_m:.{0 if abs(value_m) >= WHOLE_M else 1}f} mm"

@@ -27,7 +27,7 @@ from sim.world.board import BoardGeometry
 from sim.world.worlds import HARSH, world_name
 
 #: Outcomes of a claimed flight.
-HOLDS, FAILS, OPEN = "holds", "fails", "not decided"
+HOLDS, FAILS, OPEN = "no fault found", "fails", "not decided"
 
 
 def judge(row: dict[str, Any], run: Run) -> tuple[str, str]:
@@ -69,15 +69,14 @@ def _press(figures: dict[str, float], run: Run) -> tuple[str, str]:
 
 
 def judged(table: pl.DataFrame, runs: list[Run]) -> pl.DataFrame:
-    """Experiment, world, law, variant, seed, outcome, and why, of every flight that the table holds as completed."""
+    """Experiment, law, variant, seed, outcome, and why, of every flight that the table holds as completed."""
     by_key = {_key(run.experiment, run.law, run.variant, run.seed, run.params): run for run in runs}
     rows = []
     for row in table.filter(pl.col("completed")).to_dicts():
         names = ("experiment", "law", "variant", "seed")
         run = by_key[_key(row["experiment"], row["law"], row["variant"], row["seed"], parameters(row))]
         outcome, why = judge(row, run)
-        world = world_name(run.plan.scene.errors)
-        rows.append({name: row[name] for name in names} | {"world": world, "outcome": outcome, "why": why})
+        rows.append({name: row[name] for name in names} | {"outcome": outcome, "why": why})
     return pl.DataFrame(rows)
 
 
@@ -90,8 +89,8 @@ def section(found: pl.DataFrame) -> str:
     rows = []
     for (experiment, law), part in found.group_by(["experiment", "law"], maintain_order=True):
         count = Counter(part["outcome"])
-        failed = Counter(part.filter(pl.col("outcome") == FAILS).select("why", "variant", "world").rows())
-        words = "; ".join(f"{why} ({variant}, {world}: {n})" for (why, variant, world), n in failed.items())
+        failed = Counter(part.filter(pl.col("outcome") == FAILS).select("why", "variant").rows())
+        words = "; ".join(f"{why} ({variant}: {n})" for (why, variant), n in failed.items())
         rows.append(
             [str(experiment), str(law), str(part.height), *(str(count[o]) for o in (HOLDS, FAILS, OPEN)), words]
         )

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import polars as pl
+
 from sim.experiments.criteria_section import criteria_section
 from sim.experiments.impedance_section import impedance_section
 from sim.experiments.parts_section import parts_section, rivals_section
@@ -14,6 +16,21 @@ from sim.sweep.statistics import false_claims
 
 #: Experiment whose figure gives the overview.
 _OVERVIEW = "worlds"
+
+
+def _claims(tables: Sequence[pl.DataFrame]) -> str:
+    """How many flights were judged by the truth, and how many of them the pilot claims wrongly."""
+    judged = sum(table["claimed"].count() for table in tables if "claimed" in table.columns)
+    text = ""
+    if judged:
+        claims = sum(map(false_claims, tables))
+        text = f"False claims (claimed by the pilot, not completed by the truth): {claims} of {judged} flights.\n"
+    if older := sum(map(len, tables)) - judged:
+        text += (
+            f"{older} flights are older than the judgement by the truth: they *ended as planned* by the pilot's claim "
+            "([experiments](../experiments.md) has them judged again by their figures).\n"
+        )
+    return text
 
 
 def results_page(sections: Sequence[Section], lead: str, command: str, name: str) -> str:
@@ -31,10 +48,7 @@ def results_page(sections: Sequence[Section], lead: str, command: str, name: str
         "[tables.md](tables.md) has every table and figure, [experiments.md](../experiments.md) describes the "
         "experiments. All flights are simulated.\n"
     )
-    tables = [table for _, table in flown if "claimed" in table.columns]
-    if tables:
-        claims, flights = (sum(map(count, tables)) for count in (false_claims, len))
-        text += f"False claims (claimed by the pilot, not completed by the truth): {claims} of {flights} flights.\n"
+    text += _claims([table for _, table in flown])
     if verdict := verdict_section(flown):
         text += "\n## Verdict\n\n" + verdict
     overview = [figure for section in sections if section.experiment.name == _OVERVIEW

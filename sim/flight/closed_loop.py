@@ -15,7 +15,7 @@ from sim.flight.jobs import Job, PaintJob
 from sim.flight.options import FlightOptions, pilot_config
 from sim.flight.recorder import Recorder
 from sim.flight.surroundings import World
-from sim.flight.trace import CRASH, INTERRUPTED, LANDED, TIME_OUT, Event, Trace
+from sim.flight.trace import CRASH, INTERRUPTED, LANDED, Event, Trace
 from sim.rivals import rival_controller
 from sim.sensors.features import add_sigma_vs
 from sim.world.board import BoardGeometry
@@ -110,7 +110,7 @@ def fly(
                 reason = LANDED
                 break
             if tick * TICK_NS * 1e-9 > limit:
-                reason = f"{TIME_OUT} after {limit:.0f} s of flight"
+                reason = f"time-out after {limit:.0f} s of flight"
                 break
             if progress is not None and tick % PROGRESS_TICKS == 0:
                 flown = tick * TICK_NS * 1e-9

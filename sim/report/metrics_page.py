@@ -58,8 +58,8 @@ _LIST = """
 ## All figures
 
 *Better*: ↓ less, ↑ more. *Matters*: the least difference that counts in comparisons of experiments; a smaller one "does
-not matter", however certain it is. Figures without a definition come from the measures of presses, slides and lost
-rotors in `sim/evaluate/measures`.
+not matter", however certain it is. Figures after `perception_hz` are those of presses, slides and lost rotors
+(`sim/evaluate/measures`).
 
 """
 

@@ -33,7 +33,11 @@ def flown(monkeypatch, tmp_path):
             return trace
         return synthetic_trace(Errors(push_error_n=0.1), scene, options.law, options.seed)
 
+    def outcome(trace):
+        return {"completed": trace.claimed, "claimed": trace.claimed, "reason": trace.reason}
+
     monkeypatch.setattr(sim.sweep.flying, "fly", fly)
+    monkeypatch.setattr(sim.sweep.flying, "outcome", outcome)  # made-up presses do not retreat
     monkeypatch.chdir(tmp_path)
     return flights
 

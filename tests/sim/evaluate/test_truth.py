@@ -63,13 +63,13 @@ def test_a_good_flight_is_completed_in_every_pattern(kind, start):
 def test_the_place_counts_from_the_edge_and_errors_add_up():
     """Every row lies right beside the one before; the third is 9 mm from its place."""
     assert shortfall(three_rows(0.002, 0.003, 0.002)) is None
-    assert shortfall(three_rows(0.003, 0.003, 0.003)) == "row 3: 9 mm from its place"
+    assert shortfall(three_rows(0.003, 0.003, 0.003)) == "row 3: 9.0 mm from its place"
 
 
 def test_a_row_on_the_row_before_is_named():
     """The fifth row of a wall, painted over the fourth: claimed, but not completed."""
     trace = three_rows(0.0, 0.0, -0.054)
-    assert shortfall(trace) == "row 3: 54 mm from its place; overlaps row 2 by 62 mm, nominal 8 mm"
+    assert shortfall(trace) == "row 3: 54 mm from its place; overlaps row 2 by 62 mm, nominal 8.0 mm"
     metrics = compute_metrics(trace)
     assert metrics["claimed"] and not metrics["completed"] and metrics["place_error_m"] == pytest.approx(-0.054)
     assert [row["completed"] for row in metrics["rows"]] == [True, True, False]
@@ -77,9 +77,9 @@ def test_a_row_on_the_row_before_is_named():
 
 
 @pytest.mark.parametrize(("gap_m", "last_m", "missing"), [
-    (0.0079, 0.3, None), (0.009, 0.3, "row 2: gap of 1 mm to row 1"), (0.03, 0.018, None),
+    (0.0079, 0.3, None), (0.009, 0.3, "row 2: gap of 1.0 mm to row 1"), (0.03, 0.018, None),
     (0.03, 0.03, "row 2: gap of 22 mm to row 1"), (-0.0159, 0.1, None),
-    (-0.017, 0.1, "row 2: overlaps row 1 by 25 mm, nominal 8 mm"),
+    (-0.017, 0.1, "row 2: overlaps row 1 by 25 mm, nominal 8.0 mm"),
 ])  # fmt: skip
 def test_bands_touch_everywhere_but_in_the_last_two_centimetres(gap_m, last_m, missing):
     """Row 2 ends at the beginning of row 1, u = 0.05 m on this board."""
@@ -186,7 +186,7 @@ def test_a_press_follows_its_plan():
     assert shortfall(press(hold_s=4.9, slide_s=4.1)) == "slid for 4.0 s, 4.1 s asked"
     stuck = press(hold_s=4.9, slide_s=3.9)
     stuck.arrays["tip"][:, 1] = stuck.tip[0, 1]
-    assert shortfall(stuck) == "slid 0 mm, at least 195 mm needed"
+    assert shortfall(stuck) == "slid 0.0 mm, at least 195 mm needed"
     untouched = press()
     untouched.arrays["push_true"] = np.zeros(len(untouched.t))
     assert shortfall(untouched) == "no touch"

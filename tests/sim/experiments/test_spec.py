@@ -95,7 +95,8 @@ def test_levels_vary_from_the_last_to_the_first_and_laws_share_seeds():
     assert first[20][1] == 0.3
     assert runs[0].plan.scene.wall.friction == 0.1
     holds = design(experiment("force-hold"), Choice())
-    assert holds[0].keep and not holds[1].keep
+    assert holds[0].keep and not holds[1].keep and not holds[0].trace
+    assert all(run.trace for run in design(experiment("friction"), Choice(traces=True)))
 
 
 def test_flights_that_need_pictures_are_left_out_of_geometric_ones():

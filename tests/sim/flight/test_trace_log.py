@@ -10,9 +10,11 @@ from press_trace import press_trace
 from synthetic_trace import Errors, synthetic_trace
 
 from ibvs_qp.config.files import UnreadableFile
+from ibvs_qp.config.settings import dump_toml
 from sim.evaluate.measures import fault_figures, loss_figures, paint_figures, press_row, slide_figures
 from sim.evaluate.metrics import compute_metrics
 from sim.flight.closed_loop import fly
+from sim.flight.flight_log import load_run, save_log
 from sim.flight.options import FlightOptions
 from sim.flight.trace import FIELDS, FIGURE_INPUTS, Trace
 from sim.flight.trace_log import load_trace, save_trace
@@ -121,3 +123,14 @@ def test_the_board_of_a_slope_comes_back(tmp_path):
     scene = Scene(board=BoardScene(slope_deg=2.0))
     again, _ = stored(synthetic_trace(scene=scene), tmp_path)
     assert again.scene == scene and np.allclose(BoardGeometry(again.scene).along, BoardGeometry(scene).along)
+
+
+def test_a_log_from_before_the_truth_loads_with_its_claim(tmp_path):
+    trace = synthetic_trace()
+    save_log(tmp_path / "log.npz", {"qp": trace})
+    with np.load(tmp_path / "log.npz") as log:
+        older = {name: log[name] for name in log.files if name != "qp/plan"}
+    np.savez_compressed(tmp_path / "log.npz", **older)
+    (tmp_path / "scene.toml").write_text(dump_toml(trace.scene))
+    again = load_run(tmp_path)["qp"]
+    assert again.claimed and again.plan == {} and compute_metrics(again)["completed"]

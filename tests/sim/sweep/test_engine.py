@@ -15,8 +15,11 @@ from sim.evaluate.measures import paint_figures, press_figures
 from sim.experiments.scenes import changed, near_wall, short_job
 from sim.flight.jobs import PressJob
 from sim.flight.options import FlightOptions, pilot_config
+from sim.flight.trace_log import load_trace
 from sim.sweep import FlightPlan, Run, run_sweep
 from sim.sweep.fingerprint import configuration_hash
+from sim.sweep.paired import paired_differences
+from sim.sweep.statistics import cells, false_claims
 
 
 def made_up(seed=0, law="qp", friction=0.3, **changes) -> Run:
@@ -42,7 +45,9 @@ def flown(monkeypatch):
             trace = synthetic_trace(Errors(), scene, options.law, options.seed)
             trace.reason = "interrupted"
             return trace
-        return synthetic_trace(Errors(push_error_n=0.01 * options.seed), scene, options.law, options.seed)
+        offsets = (0.0, -0.02) if options.seed == 15 else (0.002, 0.003)
+        errors = Errors(push_error_n=0.01 * options.seed, row_offset_m=offsets)
+        return synthetic_trace(errors, scene, options.law, options.seed)
 
     monkeypatch.setattr(sim.sweep.flying, "fly", fly)
     return seeds
@@ -104,6 +109,23 @@ def test_rows_say_where_they_come_from(flown, tmp_path):
     assert row["config_hash"] == configuration_hash(made_up(5))
     assert row["version"] and row["code_hash"]
     assert (tmp_path / row["log"] / "log.npz").is_file()
+
+
+def test_a_false_claim_is_a_failed_flight_and_is_counted(flown, tmp_path):
+    table = run_sweep([made_up(0), made_up(15)], tmp_path).table
+    assert table["completed"].to_list() == [True, False] and table["claimed"].to_list() == [True, True]
+    assert table["reason"][1] == "false claim: row 2: 20 mm from its place; overlaps row 1 by 28 mm, nominal 8.0 mm"
+    assert [cell["false_claims"] for cell in cells(table)] == [1] and false_claims(table) == 1
+    assert cells(table)[0]["completed"] == 1 and paired_differences(table) == []
+
+
+def test_the_trace_of_every_flight_yields_its_figures_again(flown, tmp_path):
+    table = run_sweep([made_up(seed, trace=True) for seed in range(2)], tmp_path).table
+    for row in table.to_dicts():
+        again = paint_figures(load_trace(tmp_path / row["trace"]))
+        assert again["force_rms_n"] == pytest.approx(row["force_rms_n"], abs=1e-6)
+        assert again["place_error_m"] == pytest.approx(row["place_error_m"], rel=1e-5)
+    assert run_sweep([made_up(0)], tmp_path).table["trace"].to_list() == [None], "another run: it keeps no trace"
 
 
 def real(seed: int) -> Run:
