@@ -90,7 +90,7 @@ def _cell(experiment: Experiment, flights: Flights, level: dict[str, Parameter],
                 measure=getattr(measures, f"{flights.measure}_figures"),
                 keep=flights.keep and index == 0,
                 trace=choice.traces,
-                expected_s=AROUND_S + setup.job.expected_s(config.painting),
+                expected_s=AROUND_S + setup.job.expected_s(setup.scene),
             )
 
 

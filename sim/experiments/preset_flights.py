@@ -44,7 +44,7 @@ def paint_runs(
     """
     pilot = pilot_config(scene, FlightOptions(law=config.law), config)
     check_job(scene, pilot, features)
-    expected_s = overhead_s + PaintJob().expected_s(pilot.painting)
+    expected_s = overhead_s + PaintJob().expected_s(scene)
     return [
         Run(
             plan=FlightPlan(

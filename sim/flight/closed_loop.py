@@ -84,7 +84,7 @@ def fly(
     recorder, schedule = Recorder(scene, options, world, pilot), FaultSchedule(faults, options.seed)
     log = open_mcap(options, world, pilot)
     fly_tick = pilot.step if log is None else log.step
-    limit = BASE_TIME + STROKE_FACTOR * job.expected_s(config.painting)
+    limit = BASE_TIME + STROKE_FACTOR * job.expected_s(scene)
     start, reason, tick = time.perf_counter(), "", 0
     try:
         command = None

@@ -10,9 +10,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from allocation.level_flight import worst_level_reach
+from allocation.wrench_facets import WrenchFacets
 from ibvs_qp.config import SafetySettings
 from ibvs_qp.config.errors import ConfigError, out_of_range
-from ibvs_qp.frames import rotation_from_vector
+from ibvs_qp.frames import GRAVITY, rotation_from_vector
 from ibvs_qp.painting.pattern import FILL_REST_M, ROWS
 from ibvs_qp.pilot import PilotConfig
 from sim.flight.contact_view import STEP_M, ContactView
@@ -27,6 +29,8 @@ from sim.world.trim import START_DISTANCE_M, START_DOWN_M, START_YAW_DEG
 PLACE_TOLERANCE_M = FILL_REST_M
 #: Lengths and times are compared to this [m, s]: rounding of sums of settings.
 ROUNDING = 1e-9
+#: Gusts that a job must stand, in standard deviations: stronger ones blow a twentieth of the time.
+GUST_DEVIATIONS = 2.0
 
 
 def check_job(scene: Scene, config: PilotConfig, features: str = "rendered", job: Job | None = None) -> None:
@@ -47,7 +51,7 @@ def check_job(scene: Scene, config: PilotConfig, features: str = "rendered", job
 
 def job_problems(scene: Scene, config: PilotConfig, features: str = "rendered", job: Job | None = None) -> list[str]:
     """What forbids a flight, one sentence each; arguments as of `check_job`. Empty: it can be flown."""
-    problems = [*_sensors(scene, config)]
+    problems = [*_sensors(scene, config), *_wind(scene, config)]
     if features == "rendered":
         problems += _colours(scene, config)
     if not isinstance(job or PaintJob(), PaintJob):
@@ -156,16 +160,16 @@ def _shows_guides(board: BoardGeometry, config: PilotConfig, brush: float) -> bo
 
 def _envelope(board: BoardGeometry, config: PilotConfig) -> Iterator[str]:
     """The job ends within the supervisor's bounds of time and height."""
-    safety, paint, strokes = config.safety, board.scene.paint, board.strokes
+    safety, paint = config.safety, board.scene.paint
     if not safety.supervise:
         return
-    seconds = (strokes * paint.stroke_m + (strokes - 1) * paint.pitch_m) / paint.speed_m_s
+    seconds = PaintJob().expected_s(board.scene)
     if seconds > safety.mission_s:
         allowed = f"allowed is at least {paint.speed_m_s * seconds / safety.mission_s:.3g} m/s"
         mission = "safety.mission_s", safety.mission_s, "s"
         reason = f"the strokes take {seconds:.0f} s"
         yield _problem("paint.speed_m_s", paint.speed_m_s, "m/s", allowed, reason, mission)
-    corners = [(u, board.stroke_place(stroke)) for u in board.stroke_ends for stroke in (1, strokes)]
+    corners = [(u, board.stroke_place(stroke)) for u in board.stroke_ends for stroke in (1, board.strokes)]
     heights = board.point(*board.from_pattern(np.array(corners)).T)[:, 1]
     change = float(np.ptp(heights))
     if change > safety.height_m:
@@ -216,6 +220,26 @@ def oldest_s(rate_hz: float, delay_s: float, tick_s: float) -> float:
     """Age of a sample at the last tick before the next one arrives [s]; samples are taken and delivered at ticks."""
     delay, period = (math.ceil(value / tick_s - ROUNDING) for value in (delay_s, 1.0 / rate_hz))
     return (delay + period - 1) * tick_s
+
+
+def _wind(scene: Scene, config: PilotConfig) -> Iterator[str]:
+    """The rotors of a level vehicle hold against the mean wind and usual gusts in the least favourable direction."""
+    vehicle, wind = config.controller.vehicle, scene.wind
+    held, _ = worst_level_reach(
+        WrenchFacets(vehicle.geometry), vehicle.mass_kg * GRAVITY, vehicle.thrust_min, vehicle.thrust_max
+    )
+    mean = vehicle.linear_drag_n_s_m * math.hypot(*wind.mean_m_s[:2])
+    gusts = GUST_DEVIATIONS * wind.gust_n_rms
+    if mean + gusts > held:
+        reason = f"{mean:.3g} N of mean wind and gusts of {gusts:.3g} N are held level up to {held:.3g} N"
+        strength = "wind.gust_n_rms", wind.gust_n_rms, "N"
+        if mean > gusts:
+            allowed = (
+                f"allowed is a level speed of at most {max(held - gusts, 0.0) / vehicle.linear_drag_n_s_m:.3g} m/s"
+            )
+            yield _problem("wind.mean_m_s", list(wind.mean_m_s), "m/s", allowed, reason, strength)
+        else:
+            yield _problem(*strength, f"allowed is at most {(held - mean) / GUST_DEVIATIONS:.3g} N", reason)
 
 
 def _colours(scene: Scene, config: PilotConfig) -> Iterator[str]:

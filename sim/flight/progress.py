@@ -9,7 +9,6 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 
 from sim.flight.jobs import PaintJob
-from sim.flight.options import FlightOptions, pilot_config
 from sim.flight.trace import law_name
 from sim.flight.working import lines
 from sim.world.scene import Scene
@@ -38,7 +37,7 @@ def flight_progress(
         TaskProgressColumn(),
         TextColumn("{task.fields[note]}"),
     )
-    total = PaintJob().expected_s(pilot_config(scene, FlightOptions()).painting) + OVERHEAD_S
+    total = PaintJob().expected_s(scene) + OVERHEAD_S
     with Progress(*columns, console=console, disable=console.quiet) as bars:
         tasks = {law: bars.add_task(law_name(law), total=total, note="starting") for law in laws}
 

@@ -93,7 +93,7 @@ class Planned:
             return Refusal(**facts, law=law, seed=seed, reason=str(error))
         plan = FlightPlan(scene=setup.scene, config=config, options=options, job=setup.job)
         measure = paint_figures if isinstance(setup.job, PaintJob) else press_row
-        expected_s = OVERHEAD_S + setup.job.expected_s(config.painting)
+        expected_s = OVERHEAD_S + setup.job.expected_s(setup.scene)
         return Run(**facts, plan=plan, measure=measure, trace=self.spec.settings.traces, expected_s=expected_s)
 
 

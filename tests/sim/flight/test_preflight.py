@@ -6,7 +6,7 @@ import math
 import pytest
 
 from ibvs_qp.config.errors import ConfigError
-from sim.flight.jobs import PressJob
+from sim.flight.jobs import PaintJob, PressJob
 from sim.flight.options import FlightOptions, pilot_config, unsupervised
 from sim.flight.preflight import PLACE_TOLERANCE_M, check_job, job_problems, oldest_s
 from sim.world.scene import (
@@ -18,6 +18,7 @@ from sim.world.scene import (
     Scene,
     StartScene,
     WallScene,
+    WindScene,
 )
 from sim.world.worlds import in_world
 
@@ -115,6 +116,16 @@ LIMITS = {
         Scene(imu=ImuScene(rate_hz=250.0)),
         ["imu.rate_hz = 249.0 Hz", "at least 250 Hz"],
     ),
+    "wind that no level vehicle holds": (
+        Scene(wind=WindScene(mean_m_s=(-12.0, 12.1, 0.0))),
+        Scene(wind=WindScene(mean_m_s=(-11.8, 11.8, 0.0))),
+        ["wind.mean_m_s", "level speed of at most 16.9 m/s"],
+    ),
+    "gusts that no level vehicle holds": (
+        Scene(wind=WindScene(gust_n_rms=7.7)),
+        Scene(wind=WindScene(gust_n_rms=7.5)),
+        ["wind.gust_n_rms", "at most 7.6 N"],
+    ),
     # Both sides of these were flown: the passing one to the end, the other until the supervisor ended the flight.
     "old pictures": (
         camera(latency_s=0.16),
@@ -184,9 +195,10 @@ def test_a_press_needs_no_place_for_strokes_and_no_supervisor_no_young_samples()
 
 
 def test_fill_always_ends_on_the_board():
-    for height in (0.1, 0.33, 0.6, 1.5):
+    for height, strokes in ((0.1, 1), (0.33, 5), (0.6, 8), (1.5, 21)):
         scene = paint(BoardScene(height_m=height), rows="fill")
         assert problems(scene) == []
+        assert PaintJob().expected_s(scene) == pytest.approx((strokes * 1.3 + (strokes - 1) * 0.072) / 0.1)
     assert PLACE_TOLERANCE_M < PaintScene().edge_margin_m
 
 
