@@ -56,7 +56,7 @@ def job_problems(scene: Scene, config: PilotConfig, features: str = "rendered", 
         problems += _colours(scene, config)
     if not isinstance(job or PaintJob(), PaintJob):
         return problems
-    overlap = list(_overlap(scene))
+    overlap = list(_overlap(scene, config))
     if overlap:  # without a distance between strokes none of them has a place
         return problems + overlap
     board = BoardGeometry(scene)
@@ -75,14 +75,18 @@ def _problem(field: str, value: object, unit: str, allowed: str, reason: str, *k
     return str(out_of_range(field, value, unit, f"{allowed}: {reason}" + (f" ({beside})" if keys else "")))
 
 
-def _overlap(scene: Scene) -> Iterator[str]:
-    """Strokes lie farther apart than the tolerance of their places; otherwise one on another counts as both."""
-    paint = scene.paint
-    most = paint.brush_width_m - PLACE_TOLERANCE_M
-    if paint.rows != 1 and paint.overlap_m > most + ROUNDING:
-        allowed, apart = f"allowed is at most {most:.4g} m", f"strokes lie at least {PLACE_TOLERANCE_M:g} m apart"
-        brush = "paint.brush_width_m", paint.brush_width_m, "m"
-        yield _problem("paint.overlap_m", paint.overlap_m, "m", allowed, apart, brush)
+def _overlap(scene: Scene, config: PilotConfig) -> Iterator[str]:
+    """Two strokes at their places touch, and lie farther apart than the tolerance of a place.
+
+    Each place is certain to `PaintingConfig.least_certainty_m`; a stroke on another would count as both.
+    """
+    paint, certain = scene.paint, config.painting.least_certainty_m
+    least, most = 2.0 * certain, paint.brush_width_m - PLACE_TOLERANCE_M
+    if paint.rows != 1 and not least - ROUNDING <= paint.overlap_m <= most + ROUNDING:
+        allowed = f"allowed is [{least:.3g}, {most:.4g}] m" if least <= most else "allowed is no value"
+        reason = f"neighbouring strokes touch, and lie at least {PLACE_TOLERANCE_M:g} m apart"
+        keys = ("paint.brush_width_m", paint.brush_width_m, "m"), ("painting.least_certainty_m", certain, "m")
+        yield _problem("paint.overlap_m", paint.overlap_m, "m", allowed, reason, *keys)
 
 
 def _strokes(board: BoardGeometry) -> Iterator[str]:
