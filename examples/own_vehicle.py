@@ -8,7 +8,6 @@ import numpy as np
 from allocation import Rotor, RotorGeometry
 from allocation.actuation import actuation
 from ibvs_qp import ControllerConfig, HybridController, Measurement, Reference, VehicleParams, preset
-from ibvs_qp.config import ContactSettings
 
 # Hubs on the corners of a box [m], front-right-down; every axis leans sideways by 25 degrees, in turn.
 rotors = []
@@ -31,12 +30,7 @@ VEHICLE = VehicleParams(
     camera_turn_deg=(0.0, 8.0, 0.0),  # rotation vector: 8 degrees nose up
     force_torque_position_m=(0.35, 0.0, 0.05),
 )
-ARM_M = VEHICLE.tip_position_m[0] - VEHICLE.camera_position_m[0]  # the push begins within these distances of the wall
-CONFIG = ControllerConfig(
-    vehicle=VEHICLE,
-    gains=preset("qp").controller.gains,
-    contact=ContactSettings(depth_min_m=ARM_M + 0.03, depth_max_m=ARM_M + 0.13),
-)
+CONFIG = ControllerConfig(vehicle=VEHICLE, gains=preset("qp").controller.gains)
 
 weight, tip = 9.81 * VEHICLE.mass_kg, np.array(VEHICLE.tip_position_m)
 found = actuation(VEHICLE.geometry, weight, tip, VEHICLE.thrust_min, VEHICLE.thrust_max)

@@ -31,8 +31,22 @@ class ContactSettings:
         low=2.0,
         high=60.0,
     )
-    depth_min_m: float = setting(0.53, "camera to wall, lambda = 1 below", unit="m", low=0.1, high=3.0)
-    depth_max_m: float = setting(0.63, "camera to wall, lambda = 0 above", unit="m", low=0.1, high=3.0)
+    depth_min_m: float = setting(
+        None,
+        "camera to wall, lambda = 1 below; from tip and camera if not stated",
+        unit="m",
+        why="3 cm more than in contact",
+        low=0.01,
+        high=5.0,
+    )
+    depth_max_m: float = setting(
+        None,
+        "camera to wall, lambda = 0 above; from tip and camera if not stated",
+        unit="m",
+        why="13 cm more than in contact",
+        low=0.01,
+        high=5.0,
+    )
     ramp_s: float = setting(
         1.0, "lambda and the force reference rise over this time after touch", unit="s", low=0.05, high=10.0
     )

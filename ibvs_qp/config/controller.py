@@ -18,7 +18,10 @@ from ibvs_qp.config.angular_rate import AngularRateSettings
 from ibvs_qp.config.brush import BrushSettings
 from ibvs_qp.config.contact import ContactSettings
 from ibvs_qp.config.contact_margin import require_margin
+from ibvs_qp.config.derived import derive
 from ibvs_qp.config.errors import out_of_range
+from ibvs_qp.config.from_vehicle import contact_depth, contact_values, limit_values
+from ibvs_qp.config.gain_scaling import LAWS, scaled_gains
 from ibvs_qp.config.gains import Gains
 from ibvs_qp.config.limits import LimitSettings
 from ibvs_qp.config.settings import choice, dump_toml, load_toml, setting, validate
@@ -42,6 +45,9 @@ class ControllerConfig:
     limits: LimitSettings = field(default_factory=LimitSettings)
     solver: SolverSettings = field(default_factory=SolverSettings)
     brush: BrushSettings = field(default_factory=BrushSettings)
+    gains_of: str = choice(
+        "qp", "law whose tuned gains, scaled to the vehicle, are those that are not stated; a pilot's own law", LAWS
+    )
     line_profile: str = choice(
         "tip",
         "error of the line rows: at the point where the tip meets the wall, or the paper's, rho at the image centre",
@@ -67,13 +73,16 @@ class ControllerConfig:
     )
 
     def __post_init__(self) -> None:
-        """Validate, also that the vehicle is fully actuated, and the depths at which the push begins."""
+        """Derive what follows from the vehicle, and validate: it is fully actuated, and a push can begin."""
         validate(self)
+        object.__setattr__(self, "gains", derive(self.gains, scaled_gains(self.vehicle, self.gains_of)))
+        object.__setattr__(self, "contact", derive(self.contact, contact_values(self.vehicle)))
+        object.__setattr__(self, "limits", derive(self.limits, limit_values(self.vehicle, self.limits.view_margin)))
         matrix = control_effectiveness(self.vehicle.geometry)
         if (rank := int(np.linalg.matrix_rank(matrix))) < len(matrix):
             needed = f"they give {rank} of 6 directions of a wrench; 'ibvs-qp vehicle FILE' names the others"
             raise out_of_range("vehicle.geometry", self.vehicle.geometry.count, "rotors", needed)
-        arm = round(self.vehicle.tip_position_m[0] - self.vehicle.camera_position_m[0], 9)
+        arm = round(contact_depth(self.vehicle), 9)
         if self.contact.depth_min_m < arm:
             allowed = f"allowed is at least {arm:g} m, where the camera is when the tip touches"
             raise out_of_range("contact.depth_min_m", self.contact.depth_min_m, "m", allowed)
@@ -94,6 +103,6 @@ class ControllerConfig:
         require_margin(config, config.brush, f"{file}: ")
         return config
 
-    def to_toml(self) -> str:
-        """Write the configuration as TOML text."""
-        return dump_toml(self)
+    def to_toml(self, *, derived: bool = False) -> str:
+        """Write the configuration as TOML text; with ``derived`` also what follows from the rest, for a record."""
+        return dump_toml(self, derived=derived)

@@ -3,34 +3,41 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
+from ibvs_qp.config.derived import Derived
 from ibvs_qp.config.settings import setting, validate
+
+
+def _gain(default: float, doc: str, *, unit: str = "", high: float) -> Any:
+    """Setting of a gain; one that is not stated is that of the law, scaled to the vehicle (`scaled_gains`)."""
+    return setting(Derived(default), doc, unit=unit, low=0.0, high=high)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Gains:
     """Feedback gains, the same object for both laws."""
 
-    line_kp: float = setting(42.26, "line error to image acceleration", unit="1/s^2", low=0.0, high=200.0)
-    line_kd: float = setting(9.29, "line error rate", unit="1/s", low=0.0, high=100.0)
-    line_ki: float = setting(1.148, "integral of the line error", unit="1/s^3", low=0.0, high=100.0)
-    theta_kp: float = setting(33.34, "line angle error", unit="1/s^2", low=0.0, high=400.0)
-    theta_kd: float = setting(9.223, "line angle rate", unit="1/s", low=0.0, high=100.0)
-    body_rotation_gain: float = setting(
-        0.4796, "fraction of the body's rotation in line rows while the tip travels", low=0.0, high=1.0
+    line_kp: float = _gain(42.26, "line error to image acceleration", unit="1/s^2", high=200.0)
+    line_kd: float = _gain(9.29, "line error rate", unit="1/s", high=100.0)
+    line_ki: float = _gain(1.148, "integral of the line error", unit="1/s^3", high=100.0)
+    theta_kp: float = _gain(33.34, "line angle error", unit="1/s^2", high=400.0)
+    theta_kd: float = _gain(9.223, "line angle rate", unit="1/s", high=100.0)
+    body_rotation_gain: float = _gain(
+        0.4796, "fraction of the body's rotation in line rows while the tip travels", high=1.0
     )
-    velocity_kp: float = setting(3.215, "velocity error along free directions", unit="1/s", low=0.0, high=50.0)
-    velocity_ki: float = setting(2.804, "integral of that error", unit="1/s^2", low=0.0, high=50.0)
-    attitude_kp: float = setting(53.07, "roll and pitch", unit="1/s^2", low=0.0, high=400.0)
-    attitude_kd: float = setting(18.59, "roll and pitch rate", unit="1/s", low=0.0, high=100.0)
-    yaw_kp: float = setting(92.85, "yaw to the wall normal", unit="1/s^2", low=0.0, high=400.0)
-    yaw_kd: float = setting(21.83, "yaw rate", unit="1/s", low=0.0, high=100.0)
-    standoff_kp: float = setting(2.0, "distance error to approach speed", unit="1/s", low=0.0, high=20.0)
-    standoff_kd: float = setting(5.0, "approach speed error to acceleration", unit="1/s", low=0.0, high=50.0)
-    force_ksp: float = setting(22.93, "impedance stiffness K_sp", unit="N/m", low=0.0, high=5000.0)
-    force_ksd: float = setting(34.42, "impedance damping K_sd", unit="N s/m", low=0.0, high=1000.0)
-    force_kfp: float = setting(0.1852, "force error K_fp, up to contact.full_gain_stiffness_n_m", low=0.0, high=10.0)
-    force_kfi: float = setting(1.31, "integral of the force error K_fi", unit="1/s", low=0.0, high=50.0)
+    velocity_kp: float = _gain(3.215, "velocity error along free directions", unit="1/s", high=50.0)
+    velocity_ki: float = _gain(2.804, "integral of that error", unit="1/s^2", high=50.0)
+    attitude_kp: float = _gain(53.07, "roll and pitch", unit="1/s^2", high=400.0)
+    attitude_kd: float = _gain(18.59, "roll and pitch rate", unit="1/s", high=100.0)
+    yaw_kp: float = _gain(92.85, "yaw to the wall normal", unit="1/s^2", high=400.0)
+    yaw_kd: float = _gain(21.83, "yaw rate", unit="1/s", high=100.0)
+    standoff_kp: float = _gain(2.0, "distance error to approach speed", unit="1/s", high=20.0)
+    standoff_kd: float = _gain(5.0, "approach speed error to acceleration", unit="1/s", high=50.0)
+    force_ksp: float = _gain(22.93, "impedance stiffness K_sp", unit="N/m", high=5000.0)
+    force_ksd: float = _gain(34.42, "impedance damping K_sd", unit="N s/m", high=1000.0)
+    force_kfp: float = _gain(0.1852, "force error K_fp, up to contact.full_gain_stiffness_n_m", high=10.0)
+    force_kfi: float = _gain(1.31, "integral of the force error K_fi", unit="1/s", high=50.0)
 
     def __post_init__(self) -> None:
         """Validate."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from ibvs_qp.config.settings import setting, validate
+from ibvs_qp.config.settings import require_order, setting, validate
 
 
 def _slack_weight(default: float, name: str, unit: str, why: str) -> Any:
@@ -16,6 +16,17 @@ def _slack_weight(default: float, name: str, unit: str, why: str) -> Any:
 def _poles(default: float, name: str, why: str) -> Any:
     """Setting of the pole of a barrier: how fast its bound may be approached."""
     return setting(default, f"poles of {name}", unit="1/s", why=why, low=0.1, high=100.0)
+
+
+def _view_bound(meaning: str, border: str) -> Any:
+    """Setting of one bound of the view barriers; from the camera if not stated."""
+    return setting(
+        None,
+        meaning,
+        why=f"the picture's {border} border and view_margin; from the camera if not stated",
+        low=-10,
+        high=10,
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,10 +48,10 @@ class LimitSettings:
     tilt_slack_weight: float = _slack_weight(4000.0, "the tilt barriers", "s^4/rad^2", "ten times the level rows")
     tilt_rate_1_s: float = _poles(8.0, "the tilt barriers", "half of the motors' 17 1/s; faster ones brake too late")
     yaw_deg: float = setting(
-        10.0,
-        "yaw bound",
+        None,
+        "yaw bound; from propellers and tip if not stated",
         unit="deg",
-        why="half of 19 deg, where a front propeller strikes the wall",
+        why="half of the yaw at which a propeller strikes the wall, 19 deg on the Tarot T960, and at most 10 deg",
         low=0.5,
         high=45.0,
     )
@@ -48,12 +59,17 @@ class LimitSettings:
         1000.0, "the yaw barrier", "s^4/rad^2", "above every row that turns the vehicle; not sensitive"
     )
     yaw_rate_1_s: float = _poles(5.0, "the yaw barrier", "a third of the motors' 17 1/s; 20 1/s brake too late")
-    view_down: float = setting(
-        0.35, "largest |rho| of a level guide", why="the picture ends at 0.384", low=0.01, high=10.0
+    view_margin: float = setting(
+        0.033,
+        "farthest place of a guide inside the picture's border, as a share of the picture's width",
+        why="perception looks 14 of 640 px to each side of a line, and the soft barrier yields by half as much",
+        low=0.0,
+        high=0.4,
     )
-    view_right: float = setting(
-        0.48, "largest |rho| of an upright guide", why="the picture ends at 0.512", low=0.01, high=10.0
-    )
+    view_up: float = _view_bound("least rho of a level guide, its normal down", "upper")
+    view_down: float = _view_bound("largest rho of a level guide, its normal down", "lower")
+    view_left: float = _view_bound("least rho of an upright guide, its normal to the right", "left")
+    view_right: float = _view_bound("largest rho of an upright guide, its normal to the right", "right")
     view_slack_weight: float = _slack_weight(
         4e4, "the line-in-view barriers", "s^4", "400 times the line rows; at a tenth a guide leaves the picture"
     )
@@ -97,5 +113,7 @@ class LimitSettings:
     )
 
     def __post_init__(self) -> None:
-        """Validate."""
+        """Validate; the bounds of the view in their order."""
         validate(self)
+        require_order(self, "view_up", "view_down", "a level guide has its place between them")
+        require_order(self, "view_left", "view_right", "an upright guide has its place between them")

@@ -18,6 +18,7 @@ from typing import Any, TypeVar
 
 import tomli_w
 
+from ibvs_qp.config.derived import Derived
 from ibvs_qp.config.errors import ConfigError, out_of_range, shown
 from ibvs_qp.config.toml_text import read_toml
 
@@ -37,7 +38,7 @@ def setting(
     """Declare a settings field with its unit and closed allowed range [low, high].
 
     Args:
-        default: Number, boolean, string, or tuple of numbers.
+        default: Number, boolean, string, or tuple of numbers; None for a value that follows from others.
         doc: Meaning, and source of the value unless ``why`` gives it.
         unit: SI unit, empty for a pure number.
         why: Reason for the default.
@@ -78,7 +79,7 @@ class Checked:
 
 
 def require_order(instance: Any, smaller: str, larger: str, reason: str) -> None:
-    """Require that one field lies below another.
+    """Require that one field lies below another; None has no order.
 
     Args:
         instance: The settings.
@@ -90,7 +91,7 @@ def require_order(instance: Any, smaller: str, larger: str, reason: str) -> None
         ConfigError: Naming both fields, their values and their unit.
     """
     low, high = getattr(instance, smaller), getattr(instance, larger)
-    if not low < high:
+    if low is not None and high is not None and not low < high:
         unit = next(field.metadata["unit"] for field in dataclasses.fields(instance) if field.name == larger)
         raise out_of_range(smaller, low, unit, f"must lie below {larger} = {high!r} {unit}: {reason}")
 
@@ -192,20 +193,27 @@ def _convert_tuple(hint: Any, value: Any, place: str) -> tuple[Any, ...]:
     return tuple(_convert(kind, entry, place) for kind, entry in zip(arguments, value, strict=True))
 
 
-def to_dict(instance: Any) -> dict[str, Any]:
-    """Convert a settings tree to plain tables without None entries: TOML has no null."""
+def to_dict(instance: Any, *, derived: bool = False) -> dict[str, Any]:
+    """Convert a settings tree to plain tables, without None: TOML has no null.
+
+    Args:
+        instance: The settings.
+        derived: Whether values that follow from others are in the tables too, as if they were stated.
+    """
     table: dict[str, Any] = {}
     for field in dataclasses.fields(instance):
         value = getattr(instance, field.name)
-        if value is not None:
-            table[field.name] = _plain(value)
+        if value is not None and (derived or type(value) is not Derived):
+            table[field.name] = _plain(value, derived)
     return table
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: Any, derived: bool) -> Any:
     if dataclasses.is_dataclass(value):
-        return to_dict(value)
-    return [_plain(entry) for entry in value] if isinstance(value, tuple) else value
+        return to_dict(value, derived=derived)
+    if isinstance(value, tuple):
+        return [_plain(entry, derived) for entry in value]
+    return float(value) if type(value) is Derived else value
 
 
 def load_toml(kind: type[T], file: str | Path) -> T:
@@ -221,6 +229,6 @@ def load_toml(kind: type[T], file: str | Path) -> T:
         raise ConfigError(f"{file}: {error}") from None
 
 
-def dump_toml(instance: Any) -> str:
-    """Write a settings tree as TOML text; `load_toml` restores an equal tree."""
-    return tomli_w.dumps(to_dict(instance))
+def dump_toml(instance: Any, *, derived: bool = False) -> str:
+    """Write a settings tree as TOML text; `load_toml` restores an equal tree. Arguments as for `to_dict`."""
+    return tomli_w.dumps(to_dict(instance, derived=derived))

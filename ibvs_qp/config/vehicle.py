@@ -12,6 +12,8 @@ from ibvs_qp.config.settings import require_order, setting, validate
 
 #: Rounding of the largest moment of inertia against the sum of the others [-]: equal for a flat body.
 INERTIA_TOLERANCE = 1e-9
+#: Shortest focal length [px].
+SHORTEST_PX = 1.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,11 +85,24 @@ class VehicleParams:
         low=-180.0,
         high=180.0,
     )
+    camera_size_px: tuple[int, int] = setting(
+        (640, 480), "width and height of the picture", unit="px", low=32, high=8192
+    )
+    camera_intrinsics_px: tuple[float, float, float, float] = setting(
+        (625.22, 625.22, 319.5, 239.5),
+        "fx, fy, cx, cy of the colour camera, pixel centres at integers; 42 deg upright",
+        unit="px",
+        low=-1e5,
+        high=1e5,
+    )
 
     def __post_init__(self) -> None:
         """Refuse values out of range."""
         validate(self)
         require_order(self, "tool_mass_kg", "mass_kg", "the tool is part of the vehicle")
+        if min(self.camera_intrinsics_px[:2]) < SHORTEST_PX:
+            allowed = f"focal lengths must be at least {SHORTEST_PX:g} px"
+            raise out_of_range("camera_intrinsics_px", self.camera_intrinsics_px, "px", allowed)
         for field in ("thrust_min_n", "thrust_max_n"):
             value = getattr(self, field)
             if isinstance(value, tuple) and len(value) != self.geometry.count:

@@ -9,7 +9,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from ibvs_qp.config import ControllerConfig
-from ibvs_qp.frames import R_BODY_CAMERA, rotation_from_vector
+from ibvs_qp.config.derived import stated
+from ibvs_qp.config.field_of_view import camera_rotation
 from ibvs_qp.measurement import FeatureFrame, LineFeature, Measurement
 from ibvs_qp.validation.geometry import INVERSE_DEPTH_MIN, LINE_BOUND
 
@@ -20,10 +21,14 @@ Plane = tuple[float, float, float, float]
 
 
 def straightened(config: ControllerConfig) -> ControllerConfig:
-    """Configuration of a controller whose measurements have their features in C already, as a pilot's."""
+    """Configuration of a controller whose measurements have their features in C already, as a pilot's.
+
+    The bounds of the view remain those of the turned camera.
+    """
     if not any(config.vehicle.camera_turn_deg):
         return config
-    return dataclasses.replace(config, vehicle=dataclasses.replace(config.vehicle, camera_turn_deg=(0.0, 0.0, 0.0)))
+    vehicle = dataclasses.replace(config.vehicle, camera_turn_deg=(0.0, 0.0, 0.0))
+    return dataclasses.replace(config, vehicle=vehicle, limits=stated(config.limits))
 
 
 class TurnedCamera:
@@ -41,8 +46,7 @@ class TurnedCamera:
     """
 
     def __init__(self, turn_deg: Sequence[float]) -> None:
-        turn = rotation_from_vector(np.radians(turn_deg))
-        self.rotation = R_BODY_CAMERA.T @ turn @ R_BODY_CAMERA
+        self.rotation = camera_rotation(turn_deg)
         self.straight = not any(turn_deg)
 
     def features(self, frame: FeatureFrame, rejected: list[str]) -> FeatureFrame:

@@ -10,7 +10,7 @@ from ibvs_qp.model.rows import LimitRow
 
 
 class YawLimit(Limit):
-    """Yaw away from the wall normal stays within `limits.yaw_deg`: the front propellers strike the wall at 19 deg."""
+    """Yaw away from the wall normal stays within `limits.yaw_deg`: beyond it a propeller strikes the wall."""
 
     bound_settings = ("limits.yaw_deg", "limits.yaw_rate_1_s")
     slack_weight_setting = "limits.yaw_slack_weight"

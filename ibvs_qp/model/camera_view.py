@@ -23,7 +23,7 @@ class CameraView:
         plane: Wall plane (A, B, C) for D = -1.
         depth: Depth of the tip's wall point [m]: where the tip meets the wall when it moves along n.
         tip: Image (x_t, y_t) of that point, normalised.
-        tip_height: y_0 of that point for a level vehicle square to the wall, times depth [m].
+        tip_place: Image of that point for a level vehicle square to the wall, times depth [m], to the right and down.
         twist: Camera twist [v; omega] without motion along the normal, (6,).
         relative_twist: The same minus the commanded travel: zero where the vehicle moves as commanded.
     """
@@ -31,7 +31,7 @@ class CameraView:
     plane: ca.SX
     depth: ca.SX
     tip: tuple[ca.SX, ca.SX]
-    tip_height: float
+    tip_place: tuple[float, float]
     twist: ca.SX
     relative_twist: ca.SX
 
@@ -51,7 +51,7 @@ def camera_view(vehicle: VehicleParams, body: Body, contact: Contact, travel: ca
         plane=ca.if_else(contact.known, normal / depth, ca.DM([0.0, 0.0, 1.0])),
         depth=foot_depth,
         tip=(foot[0] / foot_depth, foot[1] / foot_depth),
-        tip_height=float(tip[1]),
+        tip_place=(float(tip[0]), float(tip[1])),
         twist=ca.vertcat(velocity, rate),
         relative_twist=ca.vertcat(velocity - to_c @ travel, rate),
     )

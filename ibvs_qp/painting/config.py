@@ -159,3 +159,8 @@ class PaintingConfig:
     def pitch_m(self) -> float:
         """Distance between rows [m]."""
         return self.brush_width_m - self.overlap_m
+
+    @property
+    def fresh_edge_m(self) -> float:
+        """From the last stroke's outer edge to the brush centre of the present stroke [m]."""
+        return self.pitch_m - 0.5 * self.brush_width_m

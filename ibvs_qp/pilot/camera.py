@@ -130,7 +130,7 @@ class CameraInput:
         if seen is not None:
             plane = self.plane if seen.plane is None else seen.plane
             motion = seen.velocity if velocity is None else velocity
-            seen = self._shutter.features(seen, self.picture, plane, motion, self._history.rate(image.stamp_ns))
+            seen = self._shutter.features(seen, image, plane, motion, self._history.rate(image.stamp_ns))
         return seen if self._seen_as is None or seen is None else self._seen_as(seen)
 
 

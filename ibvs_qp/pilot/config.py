@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from ibvs_qp.config import ControllerConfig, EstimationConfig, SafetySettings
 from ibvs_qp.config.contact_margin import require_margin
+from ibvs_qp.config.derived import derive
+from ibvs_qp.config.gain_scaling import LAWS
 from ibvs_qp.config.settings import choice, dump_toml, load_toml, setting, validate
 from ibvs_qp.painting.config import PaintingConfig
 from ibvs_qp.vision.config import VisionConfig
@@ -40,11 +43,15 @@ class PilotConfig:
     safety: SafetySettings = field(default_factory=SafetySettings)
     perception: str = choice("own", "vision pipeline: the own one or the paper's", ("own", "paper"))
     paper_vision: PaperConfig = field(default_factory=PaperConfig)
-    law: str = choice("qp", "control law", ("qp", "paper"))
+    law: str = choice("qp", "control law", LAWS)
 
     def __post_init__(self) -> None:
-        """Validate."""
+        """Validate; derive what follows from law and brush."""
         validate(self)
+        if self.controller.gains_of != self.law:
+            object.__setattr__(self, "controller", dataclasses.replace(self.controller, gains_of=self.law))
+        vision = derive(self.vision, {"brush_width_m": self.painting.brush_width_m})
+        object.__setattr__(self, "vision", vision)
 
     @classmethod
     def from_toml(cls, file: str | Path) -> PilotConfig:
@@ -53,6 +60,6 @@ class PilotConfig:
         require_margin(config.controller, config.controller.brush, f"{file}: controller.")
         return config
 
-    def to_toml(self) -> str:
-        """Write the preset as TOML text."""
-        return dump_toml(self)
+    def to_toml(self, *, derived: bool = False) -> str:
+        """Write the preset as TOML text; with ``derived`` also what follows from the rest, for a record."""
+        return dump_toml(self, derived=derived)

@@ -25,7 +25,7 @@ from ibvs_qp.estimation.wall_lines import WallAxes, image_line
 from ibvs_qp.estimation.wall_motion import BIAS, WallMotion
 from ibvs_qp.estimation.wrench_tare import WrenchTare
 from ibvs_qp.frames import down_in_body, plane_in_body, rotation_from_vector, to_camera
-from ibvs_qp.measurement import HORIZONTAL, FeatureFrame, Measurement, Reference, RgbdFrame, SensorFrame
+from ibvs_qp.measurement import HORIZONTAL, VERTICAL, FeatureFrame, Measurement, Reference, RgbdFrame, SensorFrame
 from ibvs_qp.model.reporting import fixed_command
 from ibvs_qp.model.setpoints import Setpoints
 from ibvs_qp.painting.command import PainterInput, PaintingCommand
@@ -34,6 +34,7 @@ from ibvs_qp.painting.reference import image_reference
 from ibvs_qp.pilot.attitude_history import AttitudeHistory
 from ibvs_qp.pilot.camera import CameraInput
 from ibvs_qp.pilot.config import PilotConfig
+from ibvs_qp.pilot.contact_picture import hint_span
 from ibvs_qp.pilot.inertial import INERTIAL, InertialData
 from ibvs_qp.pilot.push_report import PushReport
 from ibvs_qp.pilot.status import Event, FlightStatus
@@ -49,8 +50,6 @@ from ibvs_qp.validation.thrust_limits import ThrustLimits
 from ibvs_qp.vision.lines.line_state import LineHint
 from ibvs_qp.vision.perception_result import PerceptionResult
 
-#: Extent of the fresh edge ahead of the brush, normalised image x from the tip's side to the border.
-HINT_SPAN = (0.10, 0.50)
 #: States in which the strategy flies.
 _FLYING = (SafetyState.NOMINAL, SafetyState.DEGRADED)
 #: Tip to wall before the first plane [m].
@@ -109,6 +108,9 @@ class Pilot:
         self._tip, camera = np.array(vehicle.tip_position_m), np.array(vehicle.camera_position_m)
         self._tip_camera = to_camera(self._tip, camera).tolist()
         self._tip_from_camera = (self._tip - camera).tolist()
+        brush = self.config.vision.brush_width_m
+        ways = [(role, ahead) for role in (HORIZONTAL, VERTICAL) for ahead in (-1, 1)]
+        self._hint_spans = {way: hint_span(vehicle, brush, *way) for way in ways}
         self._gate = SensorGate(self.config.camera.latest_s)
         self._limits = ThrustLimits(vehicle.geometry.count)
         self.self_check = SelfCheck(self.config.safety.self_check)
@@ -407,9 +409,9 @@ class Pilot:
         level = expected.role == HORIZONTAL
         angle = 0.5 * math.pi if level else 0.0
         rho, theta, _ = image_line(expected.offset, angle, axes, self._tip_from_camera, contact.distance)
-        near, far = HINT_SPAN
-        tip = 0.0 if level else self._tip_camera[1] / self._tip_camera[2]
-        span = (tip + near, far) if expected.ahead > 0 else (-far, tip - near)
+        span = self._hint_spans[expected.role, expected.ahead]
+        if span[0] >= span[1]:
+            return ()
         return (LineHint(name="fresh", rho=rho, theta=theta, kind="paint", surface_side=expected.side, span=span),)
 
     # -------------------------------------------------------------- estimation
@@ -457,9 +459,9 @@ class Pilot:
 
     def _refer(self, target: PaintingCommand, contact: ContactState) -> Reference:
         """Reference of a command at the measured distance."""
-        _, tip_below, tip_ahead = self._tip_camera
+        tip_right, tip_below, tip_ahead = self._tip_camera
         depth = tip_ahead + (contact.distance if contact.known else ASSUMED_DISTANCE)
-        return image_reference(target, depth, tip_below)
+        return image_reference(target, depth, tip_below, tip_right)
 
     def _measure(
         self,

@@ -32,7 +32,7 @@ def header(flown: Pilot | Assured | CheckedLaw) -> dict[str, str]:
     """Facts of the metadata record."""
     law: Any = flown if isinstance(flown, CheckedLaw) else flown.controller
     kind = PILOT if isinstance(flown, Pilot) else ASSURED if isinstance(flown, Assured) else CONTROLLER
-    config = dump_toml(flown.config if isinstance(flown, Pilot) else law.config)
+    config = dump_toml(flown.config if isinstance(flown, Pilot) else law.config, derived=True)
     own = next((name for name, shipped in LAWS.items() if type(law) is shipped), "")
     return {
         "format": FORMAT,

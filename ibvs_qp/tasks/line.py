@@ -53,10 +53,11 @@ class LineTask(Task):
     r"""One line of the picture converges to its reference, as seen from the tip's wall point.
 
     .. math:: L S \dot\nu = -(K_p e + K_d \dot e + K_i \textstyle\int e), \qquad
-              e = \rho - (x_t\cos\theta + y_t\sin\theta) - (\rho_{ref} - y_0 \sin\theta_{ref})
+              e = \rho - (x_t\cos\theta + y_t\sin\theta) - (\rho_{ref} - x_0 \cos\theta_{ref} - y_0 \sin\theta_{ref})
 
     with the row :math:`L = L_\rho + (x_t \sin\theta - y_t \cos\theta) L_\theta` and (x_t, y_t) the image of the point
-    where the tip meets the wall: endpoint closed loop. The angle row has no integral and yields to level flight.
+    where the tip meets the wall, (x_0, y_0) that of a level vehicle square to it: endpoint closed loop. The angle row
+    has no integral and yields to level flight.
     """
 
     weight_settings = ("weights.line", "weights.line_angle")
@@ -107,9 +108,10 @@ def line_state(model: Model, index: int) -> LineState:
 
 def _line_state(model: Model, line: Line) -> LineState:
     view, weights = model.view, model.config.weights
-    x_tip, y_tip = view.tip
+    (x_tip, y_tip), (right, below) = view.tip, view.tip_place
     cos, sin = ca.cos(line.theta), ca.sin(line.theta)
-    reference = line.rho_reference - view.tip_height / view.depth * ca.sin(line.theta_reference)
+    nominal = (right * ca.cos(line.theta_reference) + below * ca.sin(line.theta_reference)) / view.depth
+    reference = line.rho_reference - nominal
     error = line.rho - (x_tip * cos + y_tip * sin) - reference
     row_rho, row_theta = symbolic_line_rows(line.rho, line.theta, view.plane)
     row = endpoint_line_row((row_rho, row_theta), line.theta, view.tip)

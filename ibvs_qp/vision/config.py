@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from ibvs_qp.config.derived import Derived
 from ibvs_qp.config.settings import Checked, setting
 
 #: Width of the picture for which pixel settings are stated [px].
@@ -159,7 +160,11 @@ class VisionConfig(Checked):
     """All settings of perception."""
 
     brush_width_m: float = setting(
-        0.08, "diameter of the round brush (design, section 4.4)", unit="m", low=0.005, high=0.5
+        Derived(0.08),
+        "diameter of the round brush (design, section 4.4); a pilot's is that of the paint job unless it is stated",
+        unit="m",
+        low=0.005,
+        high=0.5,
     )
     paint_color: tuple[int, int, int] | None = setting(None, "colour of the paint if known, RGB", low=0, high=255)
     board_color: tuple[int, int, int] | None = setting(

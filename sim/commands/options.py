@@ -78,16 +78,21 @@ def scene_file(file: Path | None, option: str = "--scene") -> Path | None:
     return _shipped_or_given(file, option, "scene")
 
 
-def preset_file(file: Path | None, option: str = "--preset") -> Path | None:
+def preset_file(file: Path | None, option: str = "--preset", *, other_formats: bool = False) -> Path | None:
     """A preset file, or the shipped one of that name; its values are checked on use.
+
+    Args:
+        file: As given.
+        option: Name of the option, for messages.
+        other_formats: Whether the file need not be TOML.
 
     Raises:
         ConfigError: When there is none, or it is a scene.
     """
-    return _shipped_or_given(file, option, "preset")
+    return _shipped_or_given(file, option, "preset", other_formats)
 
 
-def _shipped_or_given(file: Path | None, option: str, kind: str) -> Path | None:
+def _shipped_or_given(file: Path | None, option: str, kind: str, other_formats: bool = False) -> Path | None:
     from ibvs_qp import presets
     from sim import scenes
 
@@ -102,7 +107,7 @@ def _shipped_or_given(file: Path | None, option: str, kind: str) -> Path | None:
     except UnreadableFile as error:
         names = ", ".join(shipped[kind])
         raise ConfigError(f"{error}; give an existing file with {option}, or one of {names}") from None
-    if (other := _kind(file)) not in (kind, None):
+    if not other_formats and (other := _kind(file)) not in (kind, None):
         raise ConfigError(f"{option} {given}: this is a {other}, not a {kind}")
     return file
 

@@ -43,6 +43,8 @@ class Paint:
     world: SceneWorld = None
     preset: Annotated[Path | None, optional("FILE")] = None
     """Preset file (TOML), or a shipped one as octorotor_qp: vehicle, gains, weights, limits; default: the law's."""
+    vehicle: Annotated[Path | None, optional("FILE")] = None
+    """Vehicle that flies instead of the preset's: TOML with [vehicle], PX4 parameters, MJCF or URDF."""
     features: Literal["rendered", "geometric"] = "rendered"
     """Perception: rendered pictures through the vision pipeline, or a sensor model of lines."""
     vision: Literal["own", "paper"] = "own"
@@ -103,6 +105,8 @@ class Paint:
         from sim.flight.progress import flight_progress
         from sim.flight.side_by_side import fly_laws
         from sim.report.rundir import RunFolder
+        from sim.vehicles.configuration import require_vehicle, with_camera
+        from sim.vehicles.vehicle_file import read_vehicle
         from sim.world.worlds import scene_in_world
 
         started = time.perf_counter()
@@ -111,6 +115,9 @@ class Paint:
             require_extra()
         chosen, preset = scene_file(self.scene), preset_file(self.preset)
         scene, world = scene_in_world(chosen, self.world)
+        vehicle = preset_file(self.vehicle, "--vehicle", other_formats=True)
+        if vehicle is not None:
+            scene = with_camera(scene, read_vehicle(vehicle))
         size = _SIZES[self.image_size] if self.image_size else None
         camera, note = resolve_camera(self.camera)
         if note is not None:
@@ -122,10 +129,14 @@ class Paint:
             camera=camera,
             image_size=size,
             preset=str(preset) if preset else None,
+            vehicle=str(vehicle) if vehicle else None,
             video=not self.no_video,
             compiled=True,
             view=self.view,
         )
+        if vehicle is not None:
+            for warning in require_vehicle(pilot_config(scene, options), f"--vehicle {self.vehicle}"):
+                print(f"ibvs-qp: {warning}", file=sys.stderr)
         laws = ("qp", "paper") if self.law == "both" else (self.law,)
         for law in laws:  # an unusable preset or job is refused before anything is shown or written
             flown = dataclasses.replace(options, law=law)

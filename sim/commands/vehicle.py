@@ -14,85 +14,124 @@ from ibvs_qp.config.errors import out_of_range
 from sim.commands.options import flag, optional, preset_file
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from allocation.actuation import Actuation
     from ibvs_qp.config.vehicle import VehicleParams
+    from ibvs_qp.pilot import PilotConfig
+    from ibvs_qp.pilot.vehicle_check import VehicleCheck
+    from sim.vehicles.vehicle_file import VehicleFile
 
+#: Push of a job unless it is stated, and the largest that a scene takes [N].
+DEFAULT_PUSH_N, LARGEST_PUSH_N = 5.0, 40.0
 #: Endings of pictures.
 _PICTURES = (".png", ".pdf", ".svg")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Vehicle:
-    """Check a vehicle: control effectiveness, hover, reach, and what is not fully actuated.
+    """Check a vehicle: control effectiveness, hover, reach, camera in contact; exit code 2 if it cannot paint.
 
     Example: ibvs-qp vehicle octorotor_qp --picture octorotor.png
     """
 
     file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
-    """Preset (TOML) or the name of a shipped one, a TOML file with [vehicle] alone, or PX4 parameters (.params)."""
+    """Preset (TOML) or the name of a shipped one, a TOML file with [vehicle] alone, PX4 parameters, MJCF, or URDF."""
+    push: float = DEFAULT_PUSH_N
+    """Push of the job [N]."""
     px4: Annotated[Path | None, optional("FILE")] = None
     """Write PX4's parameters CA_ROTORn_* to this file."""
+    toml: Annotated[Path | None, optional("FILE")] = None
+    """Write the vehicle as a TOML file with [vehicle], what the file does not state as comments."""
     picture: Annotated[Path | None, optional("FILE")] = None
-    """Draw the vehicle to this PNG, PDF or SVG file."""
+    """Draw the vehicle and its picture in contact to this PNG, PDF or SVG file."""
     json: Annotated[bool, flag] = False
     """Print one JSON line on standard output, and nothing else."""
 
     def run(self, words: list[str]) -> int:
         """Analyse and print."""
-        from allocation.actuation import actuation
         from ibvs_qp.adapters.px4_rotors import to_px4
-        from ibvs_qp.frames import GRAVITY
+        from ibvs_qp.config.errors import ConfigError
+        from ibvs_qp.pilot import PilotConfig
+        from ibvs_qp.pilot.vehicle_check import VehicleCheck, check_vehicle, rotor_problems, vehicle_actuation
         from sim.report.rundir import as_json
+        from sim.vehicles.configuration import with_vehicle
 
         if self.picture is not None and self.picture.suffix not in _PICTURES:
             raise out_of_range("--picture", str(self.picture), "", f"its name ends in {', '.join(_PICTURES)}")
-        vehicle = read_vehicle(self.file)
-        tip, limits = np.array(vehicle.tip_position_m), (vehicle.thrust_min, vehicle.thrust_max)
-        found = actuation(vehicle.geometry, vehicle.mass_kg * GRAVITY, tip, *limits)
+        if not 0.0 < self.push <= LARGEST_PUSH_N:
+            raise out_of_range("--push", self.push, "N", f"allowed is above 0 to {LARGEST_PUSH_N:g} N")
+        given = read_vehicle(self.file)
+        vehicle, found = given.vehicle, vehicle_actuation(given.vehicle)
+        problems = rotor_problems(vehicle, found)
+        config = given.preset or (None if found.missing else with_vehicle(PilotConfig(), vehicle))
+        check = VehicleCheck(problems=tuple(problems), warnings=(), picture=None)
+        if config is not None:
+            check = check_vehicle(config, self.push, found)
         if self.px4 is not None:
             self.px4.write_text(to_px4(vehicle.geometry, vehicle.thrust_max.tolist()), encoding="utf-8")
+        if self.toml is not None:
+            self.toml.write_text(vehicle_toml(given), encoding="utf-8")
         if self.picture is not None:
-            _draw(vehicle, self.picture)
+            _draw(vehicle, config, self.picture)
         if self.json:
-            print(as_json(_summary(vehicle, found)))
+            print(as_json(_summary(given, found, check)))
         else:
-            _show(vehicle, found)
-            for file in filter(None, (self.px4, self.picture)):
+            _show(given, found, config)
+            for file in filter(None, (self.px4, self.toml, self.picture)):
                 print(f"Written: {file}")
+            for warning in check.warnings:
+                print(f"Warning: {warning}.")
+        if check.problems:
+            unstated = f" (not stated, so the Tarot T960's: {', '.join(given.assumed)})" if given.assumed else ""
+            raise ConfigError(f"{self.file}: {'; '.join(check.problems)}{unstated}")
         return 0
 
 
-def read_vehicle(file: Path) -> VehicleParams:
-    """Vehicle of a preset, of a file with [vehicle], or of PX4's parameters, whose rest is that of the Tarot T960."""
-    from ibvs_qp.adapters.px4_rotors import read_px4
-    from ibvs_qp.config.errors import ConfigError
-    from ibvs_qp.config.settings import from_dict
-    from ibvs_qp.config.toml_text import read_toml
-    from ibvs_qp.config.vehicle import VehicleParams
-    from ibvs_qp.pilot import PilotConfig
+def read_vehicle(file: Path) -> VehicleFile:
+    """Vehicle of a file or of a shipped preset."""
+    from sim.vehicles.vehicle_file import read_vehicle as read
 
-    if file.suffix in (".params", ".txt"):
-        return VehicleParams(geometry=read_px4(file).geometry)
-    chosen = preset_file(file, "FILE")
+    chosen = preset_file(file, "FILE", other_formats=True)
     assert chosen is not None
-    table = read_toml(chosen)
-    if set(table) != {"vehicle"} or not isinstance(table["vehicle"], dict):
-        return PilotConfig.from_toml(chosen).controller.vehicle
-    try:
-        return from_dict(VehicleParams, table["vehicle"], "vehicle")
-    except ConfigError as error:
-        raise ConfigError(f"{chosen}: {error}") from None
+    return read(chosen)
 
 
-def _draw(vehicle: VehicleParams, file: Path) -> None:
+def vehicle_toml(given: VehicleFile) -> str:
+    """A file with [vehicle]; lines of what its source did not state are comments that say so."""
+    import tomli_w
+
+    from ibvs_qp.config.settings import to_dict
+
+    table = to_dict(given.vehicle)
+    stated = {name: value for name, value in table.items() if name in given.stated}
+    assumed = {name: value for name, value in table.items() if name not in given.stated and name != "geometry"}
+    lines = [f"# {line}  # of the Tarot T960: {given.kind} does not state it" for line in _toml_lines(assumed)]
+    geometry = stated.pop("geometry", None)
+    rotors = ["", tomli_w.dumps({"vehicle": {"geometry": geometry}})] if geometry else [""]
+    return "\n".join(["[vehicle]", *_toml_lines(stated), *lines, *rotors])
+
+
+def _toml_lines(table: dict[str, Any]) -> list[str]:
+    import tomli_w
+
+    return [" ".join(tomli_w.dumps({name: value}).split()) for name, value in table.items()]
+
+
+def _draw(vehicle: VehicleParams, config: PilotConfig | None, file: Path) -> None:
     from sim.figures.vehicle import vehicle_figure
 
-    vehicle_figure(vehicle).savefig(file)
+    vehicle_figure(vehicle, config).savefig(file)
 
 
-def _summary(vehicle: VehicleParams, found: Actuation) -> dict[str, Any]:
+def _summary(given: VehicleFile, found: Actuation, check: VehicleCheck) -> dict[str, Any]:
+    vehicle = given.vehicle
     return {
         "schema": 1,
+        "kind": given.kind,
+        "assumed": list(given.assumed),
+        "problems": list(check.problems),
+        "warnings": list(check.warnings),
         "rotors": list(vehicle.geometry.names),
         "effectiveness": found.effectiveness.tolist(),
         "singular_values": found.singular_values.tolist(),
@@ -107,29 +146,32 @@ def _summary(vehicle: VehicleParams, found: Actuation) -> dict[str, Any]:
     }
 
 
-def _show(vehicle: VehicleParams, found: Actuation) -> None:
+def _show(given: VehicleFile, found: Actuation, config: PilotConfig | None) -> None:
     from rich.console import Console
 
     from allocation.actuation import DIRECTIONS, SLIDING_FRICTION
     from sim.evaluate.table import plain, terminal_table
 
+    vehicle, mark = given.vehicle, " (assumed)" if "mass_kg" in given.assumed else ""
     console, geometry = Console(), vehicle.geometry
     names, numbers = [plain(name) for name in geometry.names], [str(index) for index in range(geometry.count)]
     ratios = [f"{ratio:+.3f}" for ratio in geometry.spins * geometry.torque_ratios]
     rows = zip(numbers, names, map(_vector, geometry.positions), map(_vector, geometry.axes), ratios, strict=True)
-    title = f"{vehicle.mass_kg:g} kg, {geometry.count} rotors; front, right, down"
+    title = f"{vehicle.mass_kg:.4g} kg{mark}, {geometry.count} rotors; front, right, down"
     console.print(
         terminal_table(("#", "rotor", "position, m", "thrust axis", "KM, m"), rows, title, text=("#", "rotor"))
     )
     limits = [f"{low:.1f} to {high:.1f}" for low, high in zip(vehicle.thrust_min, vehicle.thrust_max, strict=True)]
     hover = [f"{thrust:.1f}" for thrust in found.hover]
     rows = zip(numbers, limits, hover, map(_tilt, found.tilt_without), strict=True)
-    console.print(terminal_table(("#", "thrust, N", "hover, N", "least tilt if lost"), rows))
+    mark = " (assumed)" if "thrust_max_n" in given.assumed else ""
+    console.print(terminal_table(("#", f"thrust, N{mark}", "hover, N", "least tilt if lost"), rows))
     effectiveness = [
         (name, *(f"{entry + 0.0:+.3f}" for entry in row.round(6)))
         for name, row in zip(DIRECTIONS, found.effectiveness, strict=True)
     ]
     console.print(terminal_table(("per newton of #", *numbers), effectiveness, "Control effectiveness B"))
+    _show_origin(console, given, config)
     if found.missing:
         console.print("[bold]Not fully actuated.[/] The rotors cannot give:")
         for direction in found.missing:
@@ -148,6 +190,19 @@ def _show(vehicle: VehicleParams, found: Actuation) -> None:
     binding = " and ".join(f"rotor {index} at its {side} limit" for index, side in found.push.binding)
     console.print(f"Push at the tip: {found.push.push:.1f} N standing ({binding});")
     console.print(f"  {found.sliding_push.push:.1f} N sliding anywhere with a friction of {SLIDING_FRICTION:g}.")
+
+
+def _show_origin(console: Console, given: VehicleFile, config: PilotConfig | None) -> None:
+    """Settings that follow from the vehicle, and what the file does not state."""
+    from sim.evaluate.table import terminal_table
+    from sim.vehicles.configuration import derived_settings
+
+    if config is not None:
+        console.print(terminal_table(("setting", "value", "from"), derived_settings(config), text=("setting", "from")))
+    if given.assumed:
+        console.print(f"Assumed, {given.kind} does not state it: {', '.join(given.assumed)}.")
+    for note in given.notes:
+        console.print(f"Assumed: {note}.")
 
 
 def _vector(values: np.ndarray) -> str:

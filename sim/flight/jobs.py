@@ -9,8 +9,6 @@ from ibvs_qp.config.settings import setting, validate
 from ibvs_qp.painting.config import PaintingConfig
 from ibvs_qp.painting.painter import Painter
 from ibvs_qp.painting.presser import Presser
-from sim.world.board import BoardGeometry
-from sim.world.scene import Scene
 
 
 class Job(Protocol):
@@ -20,8 +18,8 @@ class Job(Protocol):
         """The strategy of one flight."""
         ...
 
-    def expected_s(self, scene: Scene) -> float:
-        """Flying time at the wall to expect [s]."""
+    def expected_s(self, config: PaintingConfig, strokes: int) -> float:
+        """Flying time at the wall to expect for a number of strokes [s]."""
         ...
 
     @property
@@ -38,10 +36,9 @@ class PaintJob:
         """The painter."""
         return Painter(config)
 
-    def expected_s(self, scene: Scene) -> float:
+    def expected_s(self, config: PaintingConfig, strokes: int) -> float:
         """Strokes and climbs at their speed."""
-        paint, strokes = scene.paint, BoardGeometry(scene).strokes
-        return (strokes * paint.stroke_m + (strokes - 1) * paint.pitch_m) / paint.speed_m_s
+        return (strokes * config.stroke_m + (strokes - 1) * config.pitch_m) / config.speed_m_s
 
     @property
     def plan(self) -> dict[str, float]:
@@ -65,7 +62,7 @@ class PressJob:
         """The presser."""
         return Presser(config, self.hold_s, self.slide_s, self.descend_s)
 
-    def expected_s(self, scene: Scene) -> float:
+    def expected_s(self, config: PaintingConfig, strokes: int) -> float:
         """Hold and slide."""
         return self.hold_s + self.slide_s
 

@@ -4,12 +4,20 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
+from pathlib import Path
 
 import ibvs_qp
+from ibvs_qp.config import VehicleParams
 from ibvs_qp.config.errors import out_of_range
 from ibvs_qp.pilot import PilotConfig
+from sim.sensors.cameras.protocol import camera_intrinsics
+from sim.vehicles.configuration import with_vehicle
+from sim.vehicles.vehicle_file import read_vehicle
 from sim.world.plant import TICK_NS
 from sim.world.scene import Scene
+
+#: Decimals of a calibration [-]: hundredths of a pixel.
+CALIBRATION_DIGITS = 2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,6 +37,7 @@ class FlightOptions:
     camera: str = "plane"
     image_size: tuple[int, int] | None = None
     preset: str | None = None
+    vehicle: str | None = None
     video: bool = True
     compiled: bool = False
     view: bool = False
@@ -49,19 +58,36 @@ def sized(scene: Scene, options: FlightOptions) -> Scene:
     return dataclasses.replace(scene, camera=dataclasses.replace(scene.camera, width=width, height=height))
 
 
+def calibrated(vehicle: VehicleParams, scene: Scene, options: FlightOptions) -> VehicleParams:
+    """The vehicle with picture size and intrinsics of the camera that flies, as a calibration gives them."""
+    camera = sized(scene, options).camera
+    fx, fy, cx, cy = (round(entry, CALIBRATION_DIGITS) for entry in camera_intrinsics(camera))
+    return dataclasses.replace(
+        vehicle, camera_size_px=(camera.width, camera.height), camera_intrinsics_px=(fx, fy, cx, cy)
+    )
+
+
+def _given(options: FlightOptions) -> PilotConfig:
+    """Preset and vehicle of the options; without a preset another vehicle has the law's gains, scaled to it."""
+    if options.vehicle is None:
+        return PilotConfig.from_toml(options.preset) if options.preset else ibvs_qp.preset(options.law)
+    config = PilotConfig.from_toml(options.preset) if options.preset else PilotConfig(law=options.law)
+    return with_vehicle(config, read_vehicle(Path(options.vehicle)).vehicle)
+
+
 def pilot_config(scene: Scene, options: FlightOptions, config: PilotConfig | None = None) -> PilotConfig:
-    """The pilot's configuration: preset, law, and the scene's paint job; nothing else of the scene.
+    """The pilot's configuration: preset, law, the scene's paint job and the camera's calibration; nothing else.
 
     Args:
-        scene: Only its paint job is read.
-        options: Law and preset file.
+        scene: Only its paint job is read, and size and field of view of its camera.
+        options: Law, preset file and vehicle file.
         config: Replaces the preset.
 
     Raises:
         ConfigError: If the controller expects another period than the one that is simulated.
     """
     if config is None:
-        config = PilotConfig.from_toml(options.preset) if options.preset else ibvs_qp.preset(options.law)
+        config = _given(options)
     if round(config.controller.tick_s * 1e9) != TICK_NS:
         allowed = f"the simulated loop ticks every {TICK_NS * 1e-9:g} s"
         raise out_of_range("controller.tick_s", config.controller.tick_s, "s", allowed)
@@ -79,7 +105,7 @@ def pilot_config(scene: Scene, options: FlightOptions, config: PilotConfig | Non
         push_n=paint.push_n,
     )
     vision = dataclasses.replace(config.vision, paint_color=paint.color, brush_width_m=paint.brush_width_m)
-    controller = config.controller
+    controller = dataclasses.replace(config.controller, vehicle=calibrated(config.controller.vehicle, scene, options))
     if options.compiled:
         controller = controller.on_backend("compiled")
     return dataclasses.replace(

@@ -167,7 +167,7 @@ def _envelope(board: BoardGeometry, config: PilotConfig) -> Iterator[str]:
     safety, paint = config.safety, board.scene.paint
     if not safety.supervise:
         return
-    seconds = PaintJob().expected_s(board.scene)
+    seconds = PaintJob().expected_s(config.painting, board.strokes)
     if seconds > safety.mission_s:
         allowed = f"allowed is at least {paint.speed_m_s * seconds / safety.mission_s:.3g} m/s"
         mission = "safety.mission_s", safety.mission_s, "s"

@@ -74,7 +74,7 @@ class Recorder:
         self._journal: Journal | None = None
         self._kept = _Kept()
         if options.journal:
-            scene_text, preset = dump_toml(world.scene), pilot.config.to_toml()
+            scene_text, preset = dump_toml(world.scene), pilot.config.to_toml(derived=True)
             points = 0 if self._program is None else len(self._program)
             header = Header(options.law, options.seed, scene_text, preset, widths, points)
             self._journal = Journal(Path(options.journal), header)
@@ -181,7 +181,7 @@ class Recorder:
             canvas_px_per_m=canvas.pixels_per_m,
             coverage_mask=canvas.coverage,
             pictures=self._pictures,
-            preset=pilot.config.to_toml(),
+            preset=pilot.config.to_toml(derived=True),
         )
         trace.draw_later(lambda: canvas.rgb)
         return trace

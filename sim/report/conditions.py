@@ -58,7 +58,7 @@ def differing_runs(a: Path, b: Path) -> list[dict[str, Any]]:
 
 def differing_presets(a: Path, b: Path) -> list[dict[str, Any]]:
     """Differing keys of two presets, defaults filled in."""
-    first, second = (parse_toml(PilotConfig.from_toml(file).to_toml(), file) for file in (a, b))
+    first, second = (parse_toml(PilotConfig.from_toml(file).to_toml(derived=True), file) for file in (a, b))
     return _differences("preset.", first, second)
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ibvs_qp.config.field_of_view import straightened_intrinsics
 from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.vision.checks import frame_problem
 from ibvs_qp.vision.picture.convert import to_color, to_metres
@@ -24,6 +25,8 @@ _LARGEST = 4096
 
 class RgbdCamera:
     """Mono to colour, units to metres, depth to colour, the lens removed; tables are made at the first frame.
+
+    The middle of a turned camera's picture stays in the middle: the principal point moves.
 
     Attributes:
         lens: Lens and mount of the colour camera.
@@ -43,6 +46,7 @@ class RgbdCamera:
         self._settings, self._problem = settings or RgbdCameraSettings(), problem
         self.lens = Lens(self._settings.distortion, mount)
         self._key: tuple[object, ...] = ()
+        self._intrinsics: tuple[float, float, float, float] = (1.0, 1.0, 0.0, 0.0)  # of the straightened picture
         self._rectification: Rectification | None = None
         self._registration: Registration | None = None
         if not self._settings.registered:  # compiled here, not at the first picture in flight
@@ -66,7 +70,8 @@ class RgbdCamera:
             return frame
         self._prepare(frame)
         assert self._rectification is not None
-        return dataclasses.replace(frame, rgb=self._rectification.color(rgb), depth=self._rectification.depth(depth))
+        rgb, depth = self._rectification.color(rgb), self._rectification.depth(depth)
+        return dataclasses.replace(frame, rgb=rgb, depth=depth, intrinsics=self._intrinsics)
 
     def _registered(self, frame: RgbdFrame) -> RgbdFrame:
         if not (_is_depth(frame.depth) and type(frame.rgb) is np.ndarray):
@@ -78,7 +83,8 @@ class RgbdCamera:
         self._prepare(frame)
         assert self._registration is not None
         rgb = frame.rgb if self._rectification is None else self._rectification.color(frame.rgb)
-        return dataclasses.replace(frame, rgb=rgb, depth=self._registration.depth(frame.depth))
+        depth = self._registration.depth(frame.depth)
+        return dataclasses.replace(frame, rgb=rgb, depth=depth, intrinsics=self._intrinsics)
 
     def _prepare(self, frame: RgbdFrame) -> None:
         """Make the tables of a camera of another size or other intrinsics than the last one."""
@@ -86,10 +92,11 @@ class RgbdCamera:
         key = frame.depth.shape, shape, intrinsics
         if key == self._key:
             return
+        self._intrinsics = straightened_intrinsics(intrinsics, shape[::-1], self.lens.rotation)
         if not self.lens.none:
-            self._rectification = Rectification(self.lens, shape, intrinsics)
+            self._rectification = Rectification(self.lens, shape, intrinsics, self._intrinsics)
         if not self._settings.registered:
-            self._registration = self._new_registration(frame.depth.shape, shape, intrinsics)
+            self._registration = self._new_registration(frame.depth.shape, shape, self._intrinsics)
         self._key = key
 
     def _new_registration(

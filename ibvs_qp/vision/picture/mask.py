@@ -42,6 +42,16 @@ def vehicle_mask(
     axis = np.array([1.0, 0.0, 0.0])
     _fill_rod(mask, vehicle, intrinsics, np.array([0.0, tip[1], tip[2]]), tip, vehicle.arm_radius_m)
     _fill_rod(mask, vehicle, intrinsics, tip - config.brush_length_m * axis, tip, 0.5 * brush_width_m)
+    return _grow(mask, config.margin_px * shape[1] / REFERENCE_WIDTH) | propeller_mask(
+        vehicle, config, intrinsics, shape
+    )
+
+
+def propeller_mask(
+    vehicle: VehicleParams, config: MaskConfig, intrinsics: Intrinsics, shape: tuple[int, int]
+) -> np.ndarray:
+    """The part of `vehicle_mask` that its propellers hide."""
+    mask = np.zeros(shape, np.uint8)
     for hub, thrust_axis in zip(vehicle.geometry.positions, vehicle.geometry.axes, strict=True):
         disc = hub + _circle(thrust_axis, vehicle.propeller_radius_m)
         _fill_hull(mask, _project(disc, vehicle, intrinsics))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import cv2
 import numpy as np
 
@@ -21,14 +23,14 @@ class Rectification:
     Args:
         lens: Lens and mount.
         shape: Height and width of the picture [px].
-        intrinsics: (fx, fy, cx, cy) of the real and of the ideal picture [px].
+        intrinsics: (fx, fy, cx, cy) of the real picture [px].
+        ideal: The same of the ideal picture.
     """
 
-    def __init__(self, lens: Lens, shape: tuple[int, int], intrinsics: tuple[float, ...]) -> None:
-        fx, fy, cx, cy = intrinsics
-        matrix, size = camera_matrix(intrinsics), (shape[1], shape[0])
+    def __init__(self, lens: Lens, shape: tuple[int, int], intrinsics: Sequence[float], ideal: Sequence[float]) -> None:
+        fx, fy, cx, cy = ideal
         self._columns, self._rows = cv2.initUndistortRectifyMap(
-            matrix, lens.distortion, lens.rotation, matrix, size, cv2.CV_32FC1
+            camera_matrix(intrinsics), lens.distortion, lens.rotation, camera_matrix(ideal), shape[::-1], cv2.CV_32FC1
         )
         x = (np.arange(shape[1]) - cx) / fx
         y = (np.arange(shape[0])[:, None] - cy) / fy

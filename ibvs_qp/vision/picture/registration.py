@@ -20,7 +20,7 @@ class Registration:
         settings: Depth camera and its pose.
         mount: Rotation from the real colour camera's axes to C, (3, 3).
         shapes: Height and width of the depth picture, and of the colour picture [px].
-        intrinsics: (fx, fy, cx, cy) of the colour picture [px].
+        intrinsics: (fx, fy, cx, cy) of the ideal colour picture [px].
     """
 
     def __init__(

@@ -168,10 +168,11 @@ def test_pairs_in_the_wrong_order_are_refused(kind: type, values: dict[str, floa
 
 def test_a_push_that_could_never_begin_is_refused() -> None:
     """Lambda depends on the distance of the camera, and in contact the arm keeps that: half a metre, or more."""
+    short = ContactSettings(depth_min_m=0.53, depth_max_m=0.63)
     text = refusal(lambda: from_dict(ControllerConfig, {"contact": {"depth_min_m": 0.2, "depth_max_m": 0.4}}))
     assert text.startswith("contact.depth_min_m = 0.2 m is refused: allowed is at least 0.5 m")
     long_arm = VehicleParams(tip_position_m=(0.9, 0.0, 0.0))
-    assert "at least 0.7 m" in refusal(lambda: ControllerConfig(vehicle=long_arm))
+    assert "at least 0.7 m" in refusal(lambda: ControllerConfig(vehicle=long_arm, contact=short))
     ControllerConfig(vehicle=long_arm, contact=ContactSettings(depth_min_m=0.73, depth_max_m=0.83))
 
 

@@ -11,7 +11,7 @@ import pytest
 from controller_scenes import line_references
 from small_vehicle import SmallVehicle
 
-from ibvs_qp.config import ControllerConfig, Gains, LimitSettings, Weights
+from ibvs_qp.config import ControllerConfig, Gains, LimitSettings, VehicleParams, Weights
 from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import HORIZONTAL, LineReference, Reference
 
@@ -110,6 +110,18 @@ def test_a_guide_is_not_steered_out_of_the_picture() -> None:
     with_it, without = (fly(config("view", on), reference, 4.0, lines=1) for on in (True, False))
     assert with_it.rho <= 0.384 and with_it.share("view_horizontal") > 0.5
     assert without.rho > 0.384
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_view_ends_where_the_picture_ends(mirrored: bool) -> None:
+    """A guide that a wide camera still shows is steered to its place; a camera turned up ends nearer to the axis."""
+    angle = -0.5 * math.pi if mirrored else 0.5 * math.pi
+    line = LineReference(rho=-0.6 if mirrored else 0.6, theta=angle, role=HORIZONTAL)
+    reference = Reference(standoff=0.1, lines=(line,))
+    wide = VehicleParams(camera_intrinsics_px=(342.8, 342.8, 319.5, 239.5))  # 70 deg
+    assert fly(config(vehicle=wide), reference, 4.0, lines=1).rho > 0.55
+    shifted = VehicleParams(camera_intrinsics_px=(625.22, 625.22, 319.5, 339.5))  # 100 px less below the axis
+    assert fly(config(vehicle=shifted), reference, 4.0, lines=1).rho < 0.384 - 100.0 / 625.22
 
 
 @pytest.mark.parametrize("wrong", [{"force_kfp": 2.0}, {"force_kfi": 8.0}])

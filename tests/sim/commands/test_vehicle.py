@@ -53,8 +53,9 @@ def test_a_shipped_preset_is_shown_and_drawn(capsys: pytest.CaptureFixture[str])
 
 def test_what_is_not_actuated_is_named(capsys: pytest.CaptureFixture[str]) -> None:
     Path("flat.toml").write_text(FLAT)
-    assert main(["vehicle", "flat.toml"]) == 0
-    text = capsys.readouterr().out
+    assert main(["vehicle", "flat.toml"]) == 2
+    text, err = capsys.readouterr()
+    assert err.count("\n") == 1 and "flat.toml: not fully actuated: the 4 rotors cannot give force front" in err
     assert "Not fully actuated." in text and "  force front\n  force right\n" in text and "[bold]a" in text
 
 
@@ -75,3 +76,57 @@ def test_user_errors_are_one_line(capsys: pytest.CaptureFixture[str], words: lis
     assert main(["vehicle", *words]) == 2
     out, err = capsys.readouterr()
     assert out == "" and err.count("\n") == 1 and needle in err
+
+
+def test_what_a_file_does_not_state_is_marked(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["vehicle", "tarot_t960_qp", "--px4", "t.params"]) == 0
+    capsys.readouterr()
+    assert main(["vehicle", "t.params", "--toml", "t.toml"]) == 0
+    text = " ".join(capsys.readouterr().out.split())
+    assert "6 kg (assumed), 6 rotors" in text
+    assert "Assumed, PX4 parameters does not state it: mass_kg, inertia_kg_m2" in text
+    found = summary(capsys, "t.toml")
+    assert "mass_kg" in found["assumed"] and "geometry" not in found["assumed"]  # type: ignore[operator]
+    assert found["push_n"] == pytest.approx(30.4, abs=0.1)
+
+
+def test_derived_values_are_listed_with_their_source(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("own.toml").write_text("[vehicle]\nmass_kg = 3.0\ntip_position_m = [0.8, 0.0, 0.0]\n")
+    assert main(["vehicle", "own.toml", "--picture", "own.png"]) == 0
+    lines = {" ".join(line.split()) for line in capsys.readouterr().out.splitlines()}
+    assert (
+        "contact.depth_min_m 0.63 m tip and camera" in lines
+        and "gains, impedance x 0.50 mass over the Tarot's" in lines
+    )
+    Path("stated.toml").write_text("[controller.contact]\ndepth_min_m = 0.55\n")
+    assert main(["vehicle", "stated.toml"]) == 0
+    assert "contact.depth_min_m 0.55 m stated" in {" ".join(x.split()) for x in capsys.readouterr().out.splitlines()}
+
+
+@pytest.mark.parametrize(
+    ("own", "push", "needle"),
+    [
+        ("camera_turn_deg = [0.0, -25.0, 0.0]", "5", "brush outside the picture"),
+        ("camera_turn_deg = [0.0, 180.0, 0.0]", "5", "brush outside the picture"),
+        ("camera_turn_deg = [0.0, 25.0, 0.0]", "5", "no guide position in view"),
+        ("camera_position_m = [0.42, 0.24, 0.01]", "5", "lens inside the disc of propeller front_right"),
+        ("tip_position_m = [0.2, 0.0, 0.0]", "5", "tip behind the force/torque sensor"),
+        ("tip_position_m = [0.6, 0.0, 0.0]", "5", "tip behind the propellers"),
+        ("mass_kg = 40.0", "5", "no level hover"),
+        ("", "16", "reach 14.4 N is below the job's push of 16 N"),
+    ],
+)
+def test_what_cannot_paint_is_refused_in_one_line(
+    capsys: pytest.CaptureFixture[str], own: str, push: str, needle: str
+) -> None:
+    Path("own.toml").write_text(f"[vehicle]\n{own}\n")
+    assert main(["vehicle", "own.toml", "--push", push, "--picture", "own.png"]) == 2
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1 and needle in err and Path("own.png").exists()
+
+
+def test_little_reach_and_propellers_in_view_are_warned_of(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("own.toml").write_text("[vehicle]\ncamera_position_m = [0.0, 0.0, 0.08]\n")
+    warnings = summary(capsys, "own.toml", "--push", "12")["warnings"]
+    assert "reach" in warnings[0] and "propellers in view" in warnings[1]  # type: ignore[index]
+    assert summary(capsys, "tarot_t960_qp")["warnings"] == []

@@ -29,15 +29,17 @@ def pixels() -> np.ndarray:
     return np.stack((columns, rows), axis=-1).reshape(-1, 2).astype(float)
 
 
-def matrix() -> np.ndarray:
-    fx, fy, cx, cy = INTRINSICS
+def matrix(intrinsics: tuple[float, ...]) -> np.ndarray:
+    fx, fy, cx, cy = intrinsics
     return np.array(((fx, 0.0, cx), (0.0, fy, cy), (0.0, 0.0, 1.0)))
 
 
-def picture(rotation: np.ndarray, distortion: tuple[float, ...]) -> RgbdFrame:
+def picture(
+    rotation: np.ndarray, distortion: tuple[float, ...], intrinsics: tuple[float, float, float, float] = INTRINSICS
+) -> RgbdFrame:
     """A sloped wall with smooth colours, by a camera with X_C = rotation X."""
     bent = np.array(distortion, float) if distortion else None
-    rays = cv2.undistortPoints(pixels()[:, None], matrix(), bent)[:, 0]
+    rays = cv2.undistortPoints(pixels()[:, None], matrix(intrinsics), bent)[:, 0]
     real = np.column_stack((rays, np.ones(len(rays))))
     straight = real @ rotation.T
     depth = 1.0 / (straight @ (0.3, -0.2, 1.8))  # along the ray in C: 0.3 x - 0.2 y + 1.8 z = 1
@@ -46,7 +48,7 @@ def picture(rotation: np.ndarray, distortion: tuple[float, ...]) -> RgbdFrame:
     return RgbdFrame(
         rgb=np.rint(rgb).astype(np.uint8).reshape(*SIZE, 3),
         depth=depth.astype(np.float32).reshape(SIZE),  # the ray has depth 1 in the real camera
-        intrinsics=INTRINSICS,
+        intrinsics=intrinsics,
         stamp_ns=7,
     )
 
@@ -55,15 +57,24 @@ def picture(rotation: np.ndarray, distortion: tuple[float, ...]) -> RgbdFrame:
 def test_a_rectified_picture_is_that_of_a_straight_camera_without_a_lens(case: str) -> None:
     turn, distortion = CASES[case]
     camera = TurnedCamera(turn)
-    seen, expected = picture(camera.rotation, distortion), picture(np.eye(3), ())
+    seen = picture(camera.rotation, distortion)
     found = RgbdCamera(RgbdCameraSettings(distortion=distortion), camera.rotation).picture(seen)
+    expected = picture(np.eye(3), (), found.intrinsics)
     inside = found.depth > 0.0
     assert inside.mean() > (0.5 if turn[0] == 90.0 else 0.75)
     core = cv2.erode(inside.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
     assert np.abs(found.rgb.astype(float) - expected.rgb)[core].mean() < 1.0
     assert np.abs(seen.rgb.astype(float) - expected.rgb)[core].mean() > 4.0
     assert np.abs(found.depth - expected.depth)[core].max() < 2e-3
-    assert (found.intrinsics, found.stamp_ns) == (INTRINSICS, 7) and found.depth.dtype == np.float32
+    assert (found.intrinsics[:2], found.stamp_ns) == (INTRINSICS[:2], 7) and found.depth.dtype == np.float32
+
+
+@pytest.mark.parametrize("turn_deg", [0.0, 8.0, -20.0])
+def test_a_turned_camera_keeps_its_picture(turn_deg: float) -> None:
+    """Without a new principal point a camera 20 degrees down would lose 100 of 240 rows."""
+    camera = TurnedCamera((0.0, turn_deg, 0.0))
+    found = RgbdCamera(mount=camera.rotation).picture(picture(camera.rotation, ()))
+    assert (found.depth > 0.0).mean() > 0.85
 
 
 def test_nothing_to_rectify_changes_nothing() -> None:

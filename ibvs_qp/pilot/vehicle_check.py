@@ -1,0 +1,155 @@
+"""Whether a vehicle can paint: by its rotors, its reach, and what its camera has in view in contact."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from allocation.actuation import SLIDING_FRICTION, Actuation, actuation
+from ibvs_qp.config.from_vehicle import contact_depth, strike_yaw_deg
+from ibvs_qp.config.vehicle import VehicleParams
+from ibvs_qp.frames import GRAVITY
+from ibvs_qp.pilot.config import PilotConfig
+from ibvs_qp.pilot.contact_picture import ContactPicture, contact_picture
+
+#: Reach over push below which a vehicle is warned of [-]: gusts and friction take a quarter of it.
+GOOD_REACH = 1.3
+#: Distance of the lens from a propeller's disc along its axis within which it counts as in it [m]: a lens, and blades
+#: that bend.
+_DISC_DEPTH_M = 0.03
+#: Least yaw at which a propeller may strike the wall [deg]: twice what a sliding tip turns the vehicle by.
+_LEAST_STRIKE_DEG = 2.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class VehicleCheck:
+    """What was found about a vehicle and a job.
+
+    Attributes:
+        problems: Why it cannot fly the job, one line each; empty if it can.
+        warnings: What makes the job hard.
+        picture: The picture in contact; None for a vehicle whose rotors cannot carry it.
+    """
+
+    problems: tuple[str, ...]
+    warnings: tuple[str, ...]
+    picture: ContactPicture | None
+
+
+def vehicle_problems(config: PilotConfig, push_n: float) -> list[str]:
+    """Why a vehicle cannot paint with a push, one line each; empty if it can.
+
+    Args:
+        config: Vehicle, camera, brush and margins.
+        push_n: Push of the job [N].
+    """
+    return list(check_vehicle(config, push_n).problems)
+
+
+def vehicle_actuation(vehicle: VehicleParams) -> Actuation:
+    """What the rotors of a vehicle can do at its tip."""
+    tip, weight = np.array(vehicle.tip_position_m), vehicle.mass_kg * GRAVITY
+    return actuation(vehicle.geometry, weight, tip, vehicle.thrust_min, vehicle.thrust_max)
+
+
+def rotor_problems(vehicle: VehicleParams, found: Actuation) -> list[str]:
+    """Why rotors cannot carry a vehicle level; `ControllerConfig` refuses one that is not fully actuated."""
+    if found.missing:
+        return [f"not fully actuated: the {vehicle.geometry.count} rotors cannot give {', '.join(found.missing)}"]
+    if not found.hovers:
+        weight, most = vehicle.mass_kg * GRAVITY, float(vehicle.thrust_max.sum())
+        words = "within the thrust limits the rotors do not carry the vehicle without a moment"
+        return [f"no level hover: {words} ({weight:.1f} N of weight, {most:.1f} N of thrust in all)"]
+    return []
+
+
+def check_vehicle(config: PilotConfig, push_n: float, found: Actuation | None = None) -> VehicleCheck:
+    """Problems and warnings of a vehicle; arguments as for `vehicle_problems`.
+
+    Args:
+        config: Vehicle, camera, brush and margins.
+        push_n: Push of the job [N].
+        found: What its rotors can do, if it is known.
+    """
+    vehicle = config.controller.vehicle
+    found = found or vehicle_actuation(vehicle)
+    if problems := rotor_problems(vehicle, found):
+        return VehicleCheck(problems=tuple(problems), warnings=(), picture=None)
+    picture = contact_picture(config)
+    problems = [*_reach(found, push_n), *_lens(vehicle), *_tip(vehicle)]
+    if not problems or contact_depth(vehicle) > 0.0:
+        problems += _view(config, picture)
+    warnings = []
+    assert found.sliding_push is not None
+    reach = found.sliding_push.push
+    if push_n <= reach < GOOD_REACH * push_n:
+        least = GOOD_REACH * push_n
+        warnings.append(
+            f"reach {reach:.1f} N is less than {GOOD_REACH:g} times the push of {push_n:g} N ({least:.1f} N)"
+        )
+    if share := float(picture.propellers.mean()):
+        warnings.append(f"propellers in view: they hide {100.0 * share:.2g} % of the picture")
+    return VehicleCheck(problems=tuple(problems), warnings=tuple(warnings), picture=picture)
+
+
+def _reach(found: Actuation, push_n: float) -> list[str]:
+    assert found.sliding_push is not None
+    reach = found.sliding_push.push
+    if reach >= push_n:
+        return []
+    sliding = f"sliding anywhere with a friction of {SLIDING_FRICTION:g}"
+    return [
+        f"reach {reach:.1f} N is below the job's push of {push_n:g} N: the greatest push of a level vehicle {sliding}"
+    ]
+
+
+def _lens(vehicle: VehicleParams) -> list[str]:
+    """The lens inside a propeller's disc."""
+    camera, radius = np.array(vehicle.camera_position_m), vehicle.propeller_radius_m
+    geometry = vehicle.geometry
+    for rotor, hub, axis in zip(geometry.rotors, geometry.positions, geometry.axes, strict=True):
+        along = float((camera - hub) @ axis)
+        across = float(np.linalg.norm(camera - hub - along * axis))
+        if abs(along) < _DISC_DEPTH_M and across < radius:
+            words = f"{across:.2f} m from the hub, whose radius is {radius:g} m, and {abs(along):.3f} m from its plane"
+            return [f"lens inside the disc of propeller {rotor.name}: vehicle.camera_position_m lies {words}"]
+    return []
+
+
+def _tip(vehicle: VehicleParams) -> list[str]:
+    """The tip lies ahead of sensor, camera and propellers."""
+    tip, found = vehicle.tip_position_m[0], []
+    for name, place in (
+        ("force/torque sensor", vehicle.force_torque_position_m[0]),
+        ("camera", vehicle.camera_position_m[0]),
+    ):
+        if tip <= place:
+            found.append(f"tip behind the {name}: vehicle.tip_position_m has x = {tip:g} m, the {name} {place:g} m")
+    if not found and (strike := strike_yaw_deg(vehicle)) < _LEAST_STRIKE_DEG:
+        least = f"allowed is at least {_LEAST_STRIKE_DEG:g} deg"
+        found.append(
+            f"tip behind the propellers: one strikes the wall at a yaw of {strike:.1f} deg in contact, {least}"
+        )
+    return found
+
+
+def _view(config: PilotConfig, picture: ContactPicture) -> list[str]:
+    """Brush and guides in the picture in contact, and the wall in the range of the depth camera."""
+    plane, painting = config.vision.plane, config.painting
+    if not plane.distance_min_m <= picture.depth <= plane.distance_max_m:
+        allowed = f"allowed is {plane.distance_min_m:g} to {plane.distance_max_m:g} m"
+        return [f"wall out of the depth camera's range: it is {picture.depth:.2f} m away in contact, {allowed}"]
+    column, row = picture.tip
+    height, width = picture.seen.shape
+    if not picture.shows_tip:
+        place = f"in contact the tip is at column {column:.0f}, row {row:.0f} of a picture of {width} x {height} px"
+        return [f"brush outside the picture: {place}"]
+    least, found = config.vision.detect.min_length, []
+    for name, below in (("board's edge", painting.edge_margin_m), ("last row's edge", painting.fresh_edge_m)):
+        left, right = picture.beside(below)
+        if min(left, right) < least:
+            place = f"the {name}, {below:.3g} m below the tip, is at row {picture.row(below):.0f} of {height}"
+            shown = f"{100 * left:.0f} % of the picture's width left and {100 * right:.0f} % right of the brush"
+            found.append(f"no guide position in view: {place}; it shows {shown}, needed are {100 * least:.0f} %")
+    return found[:1]

@@ -1,0 +1,1 @@
+"""Vehicles of others: read from their files, checked, and drawn at random."""

@@ -1,0 +1,226 @@
+"""A vehicle from a robot model: MJCF with thrust actuators at sites, or URDF with rotors as joints."""
+
+# MuJoCo's bindings carry no types.
+# pyright: reportAttributeAccessIssue=false
+from __future__ import annotations
+
+import math
+import re
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from allocation import Rotor, RotorGeometry
+from ibvs_qp.config.errors import ConfigError
+from ibvs_qp.config.files import read_bytes
+from ibvs_qp.config.toml_text import LARGEST_TOML
+from ibvs_qp.config.vehicle import VehicleParams
+from ibvs_qp.frames import R_BODY_CAMERA
+from sim.world.drawn_shape import FLIP
+
+#: Names of places, of sites, bodies or links.
+_TIP = re.compile(r"(^|_)(tip|brush|tool_?tip|end_?effector|tcp)($|_)", re.IGNORECASE)
+_SENSOR = re.compile(r"(^|_)(ft|force_?torque|wrench)(_|$)", re.IGNORECASE)
+_CAMERA = re.compile(r"(^|_)(camera|rgbd|realsense)(_|$)", re.IGNORECASE)
+_ROTOR = re.compile(r"rotor|prop", re.IGNORECASE)
+#: Moment per thrust of rotors without one [m].
+_ASSUMED_RATIO_M = 0.02
+#: A moment per thrust below this is none [m].
+_LEAST_RATIO_M = 1e-6
+#: Greatest moment that a site's force has beside its axis, as a share of the moment [-].
+_BESIDE = 0.01
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModelVehicle:
+    """A vehicle of a robot model; attributes as of `sim.vehicles.vehicle_file.VehicleFile`."""
+
+    vehicle: VehicleParams
+    kind: str
+    stated: frozenset[str]
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Thrust:
+    """One rotor: hub and thrust axis in world axes, signed KM [m] or None, thrust limits [N] or None."""
+
+    name: str
+    hub: np.ndarray
+    axis: np.ndarray
+    ratio: float | None
+    limits: tuple[float, float] | None
+
+
+def read_model(file: Path) -> ModelVehicle:
+    """Read MJCF or URDF: mass, inertia, rotors, and the places named tip, force_torque and camera.
+
+    Axes are front-left-up, those of the first body. In MJCF a rotor is an actuator at a site whose gear is a force
+    along the thrust axis and a moment, as in MuJoCo's own models of quadrotors; in URDF it is a joint whose link has
+    "rotor" or "prop" in its name, its axis that of the thrust, and "ccw" or "cw" in its name or a turn by azimuth.
+
+    Args:
+        file: The model.
+
+    Raises:
+        ConfigError: When it is no such model, or a vehicle is refused.
+    """
+    text = read_bytes(file, LARGEST_TOML).decode("utf-8-sig", errors="replace")
+    try:
+        root = ET.fromstring(text)
+        if root.tag not in ("mujoco", "robot"):
+            raise ConfigError(f"its root is <{root.tag}>; MJCF has <mujoco>, URDF <robot>")
+        urdf = root.tag == "robot"
+        model = mujoco.MjModel.from_xml_string(_kinematic(root)) if urdf else mujoco.MjModel.from_xml_path(str(file))
+        return _vehicle(model, root if urdf else None)
+    except (ET.ParseError, ValueError, ConfigError) as error:
+        words = " ".join(str(error).split())
+        raise ConfigError(f"{file}: {words}") from None
+
+
+def _kinematic(root: ET.Element) -> str:
+    """The URDF without shapes and with all joints fixed: frames and inertias remain."""
+    copy = ET.fromstring(ET.tostring(root))
+    for link in copy.iter("link"):
+        for shape in [*link.findall("visual"), *link.findall("collision")]:
+            link.remove(shape)
+    for joint in copy.findall("joint"):
+        joint.set("type", "fixed")
+    options = ET.SubElement(copy, "mujoco")
+    ET.SubElement(options, "compiler", fusestatic="false", discardvisual="true")
+    return ET.tostring(copy, encoding="unicode")
+
+
+def _vehicle(model: mujoco.MjModel, urdf: ET.Element | None) -> ModelVehicle:
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    base = next((body for body in range(1, model.nbody) if model.body_dofnum[body] == 6), min(1, model.nbody - 1))
+    masses = np.array(model.body_mass)
+    if (base == 0 and urdf is None) or masses.sum() <= 0.0:
+        raise ConfigError("no body with a mass")
+    own = [
+        body for body in range(model.nbody) if urdf is not None or model.body_rootid[body] == model.body_rootid[base]
+    ]
+    mass, centre = masses[own].sum(), masses[own] @ data.xipos[own] / masses[own].sum()
+    to_body = np.diag(FLIP) @ data.xmat[base].reshape(3, 3).T
+    inertia = np.zeros((3, 3))
+    for body in own:
+        axes, arm = data.ximat[body].reshape(3, 3), data.xipos[body] - centre
+        inertia += axes @ np.diag(model.body_inertia[body]) @ axes.T
+        inertia += masses[body] * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    inertia = to_body @ inertia @ to_body.T
+    thrusts = list(_mjcf_rotors(model, data) if urdf is None else _urdf_rotors(model, data, urdf))
+    if not thrusts:
+        needed = (
+            "actuators at sites with a force in their gear"
+            if urdf is None
+            else 'joints to links named "rotor" or "prop"'
+        )
+        raise ConfigError(f"no rotors: {needed} are needed")
+    values: dict[str, Any] = {"mass_kg": float(mass), "inertia_kg_m2": tuple(np.diag(inertia).tolist())}
+    values["inertia_products_kg_m2"] = (float(inertia[0, 1]), float(inertia[0, 2]), float(inertia[1, 2]))
+    geometry, notes = _geometry(thrusts, centre, to_body)
+    values["geometry"] = geometry
+    limits = [thrust.limits for thrust in thrusts if thrust.limits is not None]
+    if len(limits) == len(thrusts):
+        values["thrust_min_n"], values["thrust_max_n"] = (tuple(side) for side in zip(*limits, strict=True))
+    for field, pattern in (("tip_position_m", _TIP), ("force_torque_position_m", _SENSOR)):
+        if (place := _place(model, data, pattern)) is not None:
+            values[field] = tuple((to_body @ (place - centre)).tolist())
+    values |= _camera(model, data, centre, to_body)
+    kind = "MJCF" if urdf is None else "URDF"
+    return ModelVehicle(vehicle=VehicleParams(**values), kind=kind, stated=frozenset(values), notes=notes)
+
+
+def _mjcf_rotors(model: mujoco.MjModel, data: mujoco.MjData) -> Iterable[_Thrust]:
+    for index in range(model.nu):
+        gear = model.actuator_gear[index]
+        force = float(np.linalg.norm(gear[:3]))
+        if model.actuator_trntype[index] != mujoco.mjtTrn.mjTRN_SITE or force == 0.0:
+            continue
+        site = int(model.actuator_trnid[index, 0])
+        axes, axis = data.site_xmat[site].reshape(3, 3), gear[:3] / force
+        ratio = -float(gear[3:] @ axis) / force
+        scale, limits = force * float(model.actuator_gainprm[index, 0]), None
+        if model.actuator_ctrllimited[index]:
+            low, high = (scale * model.actuator_ctrlrange[index]).tolist()
+            limits = max(low, 0.0), high
+        name = model.actuator(index).name or f"rotor_{index}"
+        yield _Thrust(name=name, hub=data.site_xpos[site].copy(), axis=axes @ axis, ratio=ratio, limits=limits)
+
+
+def _urdf_rotors(model: mujoco.MjModel, data: mujoco.MjData, urdf: ET.Element) -> Iterable[_Thrust]:
+    for joint in urdf.findall("joint"):
+        child, axis = joint.find("child"), joint.find("axis")
+        name = "" if child is None else child.get("link", "")
+        if not _ROTOR.search(name) or joint.get("type") not in ("continuous", "revolute"):
+            continue
+        body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
+        if body < 0:
+            continue
+        own = np.array((axis.get("xyz", "1 0 0") if axis is not None else "1 0 0").split(), float)
+        own /= max(float(np.linalg.norm(own)), 1e-12)
+        turn = 1.0 if "ccw" in name.lower() else -1.0 if re.search(r"(^|_)cw(_|$)", name.lower()) else 0.0
+        ratio = turn * _ASSUMED_RATIO_M or None
+        yield _Thrust(
+            name=name, hub=data.xpos[body].copy(), axis=data.xmat[body].reshape(3, 3) @ own, ratio=ratio, limits=None
+        )
+
+
+def _geometry(thrusts: list[_Thrust], centre: np.ndarray, to_body: np.ndarray) -> tuple[RotorGeometry, tuple[str, ...]]:
+    """Rotors in B; those without a moment turn in alternation by azimuth."""
+    hubs = [to_body @ (thrust.hub - centre) for thrust in thrusts]
+    order = sorted(range(len(hubs)), key=lambda index: math.atan2(hubs[index][1], hubs[index][0]))
+    alternate = {index: 1 if place % 2 == 0 else -1 for place, index in enumerate(order)}
+    rotors, open_ones = [], []
+    for index, (thrust, hub) in enumerate(zip(thrusts, hubs, strict=True)):
+        known = thrust.ratio is not None and abs(thrust.ratio) > _LEAST_RATIO_M
+        ratio = thrust.ratio if known and thrust.ratio is not None else alternate[index] * _ASSUMED_RATIO_M
+        if not known:
+            open_ones.append(thrust.name)
+        axis = to_body @ thrust.axis
+        rotors.append(
+            Rotor(
+                name=thrust.name,
+                spin=1 if ratio > 0.0 else -1,
+                position_m=(float(hub[0]), float(hub[1]), float(hub[2])),
+                axis=(float(axis[0]), float(axis[1]), float(axis[2])),
+                torque_ratio_m=abs(ratio),
+            )
+        )
+    words = f"spin of {', '.join(open_ones)}: in turn by azimuth, with {_ASSUMED_RATIO_M:g} m of moment per thrust"
+    return RotorGeometry(rotors=tuple(rotors), torque_ratio_m=_ASSUMED_RATIO_M), (words,) if open_ones else ()
+
+
+def _place(model: mujoco.MjModel, data: mujoco.MjData, pattern: re.Pattern[str]) -> np.ndarray | None:
+    """Place of the first site or body with such a name."""
+    for count, kind, places in ((model.nsite, model.site, data.site_xpos), (model.nbody, model.body, data.xpos)):
+        for index in range(count):
+            if pattern.search(kind(index).name):
+                return places[index].copy()
+    return None
+
+
+def _camera(model: mujoco.MjModel, data: mujoco.MjData, centre: np.ndarray, to_body: np.ndarray) -> dict[str, Any]:
+    """Place, turn and intrinsics of the first camera of MJCF; the place of one in URDF."""
+    if model.ncam == 0:
+        place = _place(model, data, _CAMERA)
+        return {} if place is None else {"camera_position_m": tuple((to_body @ (place - centre)).tolist())}
+    axes = to_body @ data.cam_xmat[0].reshape(3, 3) @ np.diag(FLIP)  # right, down, front in B
+    turn = np.degrees(Rotation.from_matrix(axes @ R_BODY_CAMERA.T).as_rotvec()).round(6) + 0.0
+    (width, height), default = (int(entry) for entry in model.cam_resolution[0]), VehicleParams().camera_size_px
+    if min(width, height) < 32:
+        width, height = default
+    focal = 0.5 * height / math.tan(0.5 * math.radians(float(model.cam_fovy[0])))
+    return {
+        "camera_position_m": tuple((to_body @ (data.cam_xpos[0] - centre)).tolist()),
+        "camera_turn_deg": tuple(turn.tolist()),
+        "camera_size_px": (width, height),
+        "camera_intrinsics_px": (focal, focal, 0.5 * (width - 1), 0.5 * (height - 1)),
+    }
