@@ -96,7 +96,7 @@ def _strokes(board: BoardGeometry) -> Iterator[str]:
     along, across = sides if board.pattern.kind == ROWS else sides[::-1]
     reason = "the brush's centre stays on the board in every stroke that is at its place"
     margin: Key = ("paint.edge_margin_m", paint.edge_margin_m, "m")
-    longest, widest = length - 2.0 * paint.edge_margin_m + PLACE_TOLERANCE_M, extent - PLACE_TOLERANCE_M
+    longest, widest = length - 2.0 * paint.edge_margin_m, extent - PLACE_TOLERANCE_M
     if paint.stroke_m > longest + ROUNDING:
         allowed, words = f"allowed is at most {max(longest, 0.0):.4g} m", "strokes keep the margin at both ends"
         yield _problem("paint.stroke_m", paint.stroke_m, "m", allowed, words, (along, length, "m"), margin)
@@ -128,13 +128,13 @@ def _start(board: BoardGeometry, config: PilotConfig) -> Iterator[str]:
 
 
 def _views(board: BoardGeometry, config: PilotConfig) -> Iterator[str]:
-    """In contact the camera shows the board's edge where stroke 1 begins, and a guide of every later stroke."""
-    paint = board.scene.paint
-    field_of_view = "camera.vertical_fov_deg", board.scene.camera.vertical_fov_deg, "deg"
-    if not _shows_edge(board, config, paint.edge_margin_m):
-        shown = [aside for aside in np.arange(0.0, 1.0, STEP_M).tolist() if _shows_edge(board, config, aside)]
+    """In contact the camera shows the board's edges where stroke 1 begins and ends, and a guide of later strokes."""
+    paint, camera = board.scene.paint, board.scene.camera
+    field_of_view = "camera.vertical_fov_deg", camera.vertical_fov_deg, "deg"
+    if not _shows_edges(board, config, paint.edge_margin_m):
+        shown = [margin for margin in np.arange(0.0, 1.0, STEP_M).tolist() if _shows_edges(board, config, margin)]
         allowed = f"allowed is [{shown[0]:.3g}, {shown[-1]:.3g}] m" if shown else "allowed is no value"
-        reason = "in contact the board's edge beside stroke 1 is in view"
+        reason = "in contact the board's edges beside stroke 1 and at its end are in view"
         yield _problem("paint.edge_margin_m", paint.edge_margin_m, "m", allowed, reason, field_of_view)
     if not _shows_guides(board, config, paint.brush_width_m):
         widths = np.arange(paint.brush_width_m, paint.overlap_m + PLACE_TOLERANCE_M, -STEP_M).tolist()
@@ -144,10 +144,18 @@ def _views(board: BoardGeometry, config: PilotConfig) -> Iterator[str]:
         yield _problem("paint.brush_width_m", paint.brush_width_m, "m", allowed, reason, field_of_view)
 
 
-def _shows_edge(board: BoardGeometry, config: PilotConfig, aside: float) -> bool:
+def _shows_edges(board: BoardGeometry, config: PilotConfig, margin: float) -> bool:
+    """Whether with a margin the guiding edge is in view where stroke 1 begins, and the stopping edge where it ends."""
+    guiding = ContactView(board.pattern, config, board.scene.paint.brush_width_m)
+    stopping = ContactView(board.pattern, config, 0.0)  # it is followed before the brush comes near
+    across = board.extent[1]
+    return _shows_guiding_edge(board, guiding, margin) and stopping.shows_across(margin, -margin, across - margin)
+
+
+def _shows_guiding_edge(board: BoardGeometry, view: ContactView, aside: float) -> bool:
     """Whether the guiding edge of the board is in view, so far from the tip [m], where stroke 1 begins."""
-    begin, brush = board.stroke_ends[0], board.scene.paint.brush_width_m
-    return ContactView(board, config, brush).shows_parallel(-aside, -begin, board.extent[0] - begin)
+    begin = board.stroke_ends[0]
+    return view.shows_parallel(-aside, -begin, board.extent[0] - begin)
 
 
 def _shows_guides(board: BoardGeometry, config: PilotConfig, brush: float) -> bool:
@@ -155,11 +163,11 @@ def _shows_guides(board: BoardGeometry, config: PilotConfig, brush: float) -> bo
 
     ``brush`` is the width of the brush [m].
     """
-    view, paint = ContactView(board, config, brush), board.scene.paint
+    view, paint = ContactView(board.pattern, config, brush), board.scene.paint
     ways = [board.pattern.travel(stroke) for stroke in range(2, min(board.strokes, 3) + 1)]
     reach = [sorted((0.0, way * paint.stroke_m)) for way in ways]
     fresh = all([view.shows_parallel(paint.overlap_m - 0.5 * brush, *ends) for ends in reach])
-    return fresh or _shows_edge(board, config, board.stroke_place(board.strokes))
+    return fresh or _shows_guiding_edge(board, view, board.stroke_place(board.strokes))
 
 
 def _envelope(board: BoardGeometry, config: PilotConfig) -> Iterator[str]:

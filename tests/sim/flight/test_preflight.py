@@ -43,16 +43,16 @@ def force(**keys: float) -> Scene:
     return Scene(force_torque=ForceTorqueScene(**keys))
 
 
-BRUSH = {"brush_width_m": 0.25, "rows": 3, "stroke_m": 1.2, "edge_margin_m": 0.12}
+BRUSH = {"brush_width_m": 0.25, "rows": 3, "stroke_m": 1.2, "edge_margin_m": 0.1}
 LIMITS = {
     "strokes longer than the board": (
-        paint(stroke_m=1.309),
-        paint(stroke_m=1.308),
+        paint(stroke_m=1.301),
+        paint(stroke_m=1.3),
         ["paint.stroke_m", "board.width_m"],
     ),
     "columns longer than the board": (
-        paint(pattern="columns", stroke_m=0.509),
-        paint(pattern="columns", stroke_m=0.508),
+        paint(pattern="columns", stroke_m=0.501),
+        paint(pattern="columns", stroke_m=0.5),
         ["paint.stroke_m", "board.height_m"],
     ),
     "strokes above the board": (
@@ -81,19 +81,19 @@ LIMITS = {
         paint(brush_width_m=0.05, overlap_m=0.06, rows=1),
         ["paint.overlap_m", "paint.brush_width_m = 0.05 m"],
     ),
-    "an edge below the picture": (
-        paint(BIG, edge_margin_m=0.265, stroke_m=1.0),
-        paint(BIG, edge_margin_m=0.262, stroke_m=1.0),
+    "an edge beside the picture": (
+        paint(BIG, edge_margin_m=0.241, stroke_m=1.0),
+        paint(BIG, edge_margin_m=0.238, stroke_m=1.0),
         ["paint.edge_margin_m", "camera.vertical_fov_deg"],
     ),
     "an edge above the picture": (
-        paint(BIG, edge_margin_m=0.105, stroke_m=1.0, start="top-left"),
-        paint(BIG, edge_margin_m=0.102, stroke_m=1.0, start="top-left"),
+        paint(BIG, edge_margin_m=0.097, stroke_m=1.0, start="top-left"),
+        paint(BIG, edge_margin_m=0.094, stroke_m=1.0, start="top-left"),
         ["paint.edge_margin_m"],
     ),
-    "an edge beside the picture": (
-        paint(BIG, edge_margin_m=0.249, stroke_m=1.0, pattern="columns"),
-        paint(BIG, edge_margin_m=0.246, stroke_m=1.0, pattern="columns"),
+    "the end of a column above the picture": (
+        paint(BIG, edge_margin_m=0.097, stroke_m=1.0, pattern="columns"),
+        paint(BIG, edge_margin_m=0.094, stroke_m=1.0, pattern="columns"),
         ["paint.edge_margin_m"],
     ),
     "a brush that hides its guide": (
