@@ -203,7 +203,9 @@ def test_fill_always_ends_on_the_board():
     for height, strokes in ((0.1, 1), (0.33, 5), (0.6, 8), (1.5, 21)):
         scene = paint(BoardScene(height_m=height), rows="fill")
         assert problems(scene) == []
-        assert PaintJob().expected_s(scene) == pytest.approx((strokes * 1.3 + (strokes - 1) * 0.072) / 0.1)
+        assert PaintJob().expected_s(pilot_config(scene, FlightOptions()).painting, strokes) == pytest.approx(
+            (strokes * 1.3 + (strokes - 1) * 0.072) / 0.1
+        )
     assert PLACE_TOLERANCE_M < PaintScene().edge_margin_m
 
 
