@@ -222,7 +222,9 @@ def _age(section: str, rate: float, latency: float, late: float, tick: float, li
     """Refuse samples that get older than a limit, at a rate [Hz], a latency, its worst and a tick [s]."""
     age = oldest_s(rate, late, tick)
     if age > most + ROUNDING:
-        allowed = f"allowed is at most {most - age + latency:.3g} s"
+        ticks = math.floor((most - oldest_s(rate, 0.0, tick)) / tick + ROUNDING)
+        latest = ticks * tick - (late - latency)
+        allowed = f"allowed is at most {latest:.3g} s" if latest >= 0.0 else "allowed is no value"
         keys = (f"{section}.rate_hz", rate, "Hz"), (limit, most, "s")
         reason = f"a sample gets {age:.3g} s old"
         yield _problem(f"{section}.latency_s", latency, "s", allowed, reason, *keys)

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import re
 
 import pytest
 
@@ -207,6 +208,18 @@ def test_fill_always_ends_on_the_board():
             (strokes * 1.3 + (strokes - 1) * 0.072) / 0.1
         )
     assert PLACE_TOLERANCE_M < PaintScene().edge_margin_m
+
+
+@pytest.mark.parametrize(("section", "rate"), [("camera", 30.0), ("camera", 11.0), ("force_torque", 100.0)])
+def test_the_latency_that_a_refusal_allows_is_the_largest_one(section, rate):
+    def scene(latency: float) -> Scene:
+        part = dataclasses.replace(getattr(Scene(), section), rate_hz=rate, latency_s=latency)
+        return dataclasses.replace(Scene(), **{section: part})
+
+    (text,) = problems(scene(0.1 if section == "force_torque" else 0.3))
+    allowed = float(re.search(r"at most ([\d.]+) s", text)[1])  # type: ignore[index]
+    assert problems(scene(allowed)) == []
+    assert len(problems(scene(allowed + 0.0005))) == 1
 
 
 def test_age_of_a_sample_counts_its_period_in_ticks():
