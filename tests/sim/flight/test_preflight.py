@@ -3,6 +3,7 @@
 import dataclasses
 import math
 import re
+from typing import Any
 
 import pytest
 
@@ -32,15 +33,15 @@ def problems(scene: Scene, features: str = "geometric", world: str = "datasheet"
     return job_problems(scene, pilot_config(scene, FlightOptions(features=features)), features)
 
 
-def paint(board: BoardScene | None = None, **keys: object) -> Scene:
+def paint(board: BoardScene | None = None, **keys: Any) -> Scene:
     return Scene(board=board or BoardScene(), paint=PaintScene(**keys))
 
 
-def camera(**keys: float) -> Scene:
+def camera(**keys: Any) -> Scene:
     return Scene(camera=CameraScene(**keys))
 
 
-def force(**keys: float) -> Scene:
+def force(**keys: Any) -> Scene:
     return Scene(force_torque=ForceTorqueScene(**keys))
 
 
