@@ -27,6 +27,9 @@ from sim.world.trim import START_DISTANCE_M, START_DOWN_M, START_YAW_DEG
 
 #: Farthest that a stroke at its place may lie from its nominal place [m].
 PLACE_TOLERANCE_M = FILL_REST_M
+#: Neighbouring strokes come locally up to this much farther apart than nominal [m]: 14 pairs of strokes of 0.6 and 0.8 m
+#: in the world datasheet, from the sensor model of lines.
+LEAST_OVERLAP_M = 0.007
 #: Lengths and times are compared to this [m, s]: rounding of sums of settings.
 ROUNDING = 1e-9
 #: Gusts that a job must stand, in standard deviations: stronger ones blow a twentieth of the time.
@@ -56,7 +59,7 @@ def job_problems(scene: Scene, config: PilotConfig, features: str = "rendered", 
         problems += _colours(scene, config)
     if not isinstance(job or PaintJob(), PaintJob):
         return problems
-    overlap = list(_overlap(scene, config))
+    overlap = list(_overlap(scene))
     if overlap:  # without a distance between strokes none of them has a place
         return problems + overlap
     board = BoardGeometry(scene)
@@ -75,18 +78,17 @@ def _problem(field: str, value: object, unit: str, allowed: str, reason: str, *k
     return str(out_of_range(field, value, unit, f"{allowed}: {reason}" + (f" ({beside})" if keys else "")))
 
 
-def _overlap(scene: Scene, config: PilotConfig) -> Iterator[str]:
-    """Two strokes at their places touch, and lie farther apart than the tolerance of a place.
-
-    Each place is certain to `PaintingConfig.least_certainty_m`; a stroke on another would count as both.
-    """
-    paint, certain = scene.paint, config.painting.least_certainty_m
-    least, most = 2.0 * certain, paint.brush_width_m - PLACE_TOLERANCE_M
-    if paint.rows != 1 and not least - ROUNDING <= paint.overlap_m <= most + ROUNDING:
-        allowed = f"allowed is [{least:.3g}, {most:.4g}] m" if least <= most else "allowed is no value"
+def _overlap(scene: Scene) -> Iterator[str]:
+    """Neighbouring strokes touch, and lie farther apart than the tolerance of a place: else one would count as both."""
+    paint = scene.paint
+    most = paint.brush_width_m - PLACE_TOLERANCE_M
+    if paint.rows != 1 and not LEAST_OVERLAP_M - ROUNDING <= paint.overlap_m <= most + ROUNDING:
+        allowed = (
+            f"allowed is [{LEAST_OVERLAP_M:g}, {most:.4g}] m" if most >= LEAST_OVERLAP_M else "allowed is no value"
+        )
         reason = f"neighbouring strokes touch, and lie at least {PLACE_TOLERANCE_M:g} m apart"
-        keys = ("paint.brush_width_m", paint.brush_width_m, "m"), ("painting.least_certainty_m", certain, "m")
-        yield _problem("paint.overlap_m", paint.overlap_m, "m", allowed, reason, *keys)
+        brush = "paint.brush_width_m", paint.brush_width_m, "m"
+        yield _problem("paint.overlap_m", paint.overlap_m, "m", allowed, reason, brush)
 
 
 def _strokes(board: BoardGeometry) -> Iterator[str]:
