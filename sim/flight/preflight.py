@@ -27,8 +27,8 @@ from sim.world.trim import START_DISTANCE_M, START_DOWN_M, START_YAW_DEG
 
 #: Farthest that a stroke at its place may lie from its nominal place [m].
 PLACE_TOLERANCE_M = FILL_REST_M
-#: Neighbouring strokes come locally up to this much farther apart than nominal [m]: 14 pairs of strokes of 0.6 and 0.8 m
-#: in the world datasheet, from the sensor model of lines.
+#: Neighbouring strokes come locally up to this much farther apart than nominal [m]: 14 pairs of strokes of 0.6 and 0.8
+#: m in the world datasheet, from the sensor model of lines.
 LEAST_OVERLAP_M = 0.007
 #: Lengths and times are compared to this [m, s]: rounding of sums of settings.
 ROUNDING = 1e-9
