@@ -49,9 +49,7 @@ def _corners(axes: Axes, results: Results, sigma: float, drawn: bool) -> None:
     trace = stored_trace(results, rows)
     if trace is not None:
         paint = trace.scene.paint
-        corners = np.cumsum(
-            [leg for _ in range(1, BoardGeometry(trace.scene).strokes) for leg in (paint.stroke_m, paint.pitch_m)]
-        )
+        corners = np.cumsum([paint.stroke_m, paint.pitch_m] * (BoardGeometry(trace.scene).strokes - 1))
         for corner in corners:
             axes.axvline(corner, color="#888888", linewidth=0.7, linestyle=":", label="corners")
     values = 1e3 * completed(rows, "path_rms_m")
