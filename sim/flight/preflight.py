@@ -10,9 +10,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from allocation.level_flight import worst_level_reach
+from allocation.wrench_facets import WrenchFacets
 from ibvs_qp.config import SafetySettings
 from ibvs_qp.config.errors import ConfigError, out_of_range
-from ibvs_qp.frames import rotation_from_vector
+from ibvs_qp.frames import GRAVITY, rotation_from_vector
 from ibvs_qp.painting.pattern import FILL_REST_M, ROWS
 from ibvs_qp.pilot import PilotConfig
 from sim.flight.contact_view import STEP_M, ContactView
@@ -25,8 +27,13 @@ from sim.world.trim import START_DISTANCE_M, START_DOWN_M, START_YAW_DEG
 
 #: Farthest that a stroke at its place may lie from its nominal place [m].
 PLACE_TOLERANCE_M = FILL_REST_M
+#: Neighbouring strokes come locally up to this much farther apart than nominal [m]: 14 pairs of strokes of 0.6 and 0.8
+#: m in the world datasheet, from the sensor model of lines.
+LEAST_OVERLAP_M = 0.007
 #: Lengths and times are compared to this [m, s]: rounding of sums of settings.
 ROUNDING = 1e-9
+#: Gusts that a job must stand, in standard deviations: stronger ones blow a twentieth of the time.
+GUST_DEVIATIONS = 2.0
 
 
 def check_job(scene: Scene, config: PilotConfig, features: str = "rendered", job: Job | None = None) -> None:
@@ -47,7 +54,7 @@ def check_job(scene: Scene, config: PilotConfig, features: str = "rendered", job
 
 def job_problems(scene: Scene, config: PilotConfig, features: str = "rendered", job: Job | None = None) -> list[str]:
     """What forbids a flight, one sentence each; arguments as of `check_job`. Empty: it can be flown."""
-    problems = [*_sensors(scene, config)]
+    problems = [*_sensors(scene, config), *_wind(scene, config)]
     if features == "rendered":
         problems += _colours(scene, config)
     if not isinstance(job or PaintJob(), PaintJob):
@@ -72,13 +79,16 @@ def _problem(field: str, value: object, unit: str, allowed: str, reason: str, *k
 
 
 def _overlap(scene: Scene) -> Iterator[str]:
-    """Strokes lie farther apart than the tolerance of their places; otherwise one on another counts as both."""
+    """Neighbouring strokes touch, and lie farther apart than the tolerance of a place: else one would count as both."""
     paint = scene.paint
     most = paint.brush_width_m - PLACE_TOLERANCE_M
-    if paint.rows != 1 and paint.overlap_m > most + ROUNDING:
-        allowed, apart = f"allowed is at most {most:.4g} m", f"strokes lie at least {PLACE_TOLERANCE_M:g} m apart"
+    if paint.rows != 1 and not LEAST_OVERLAP_M - ROUNDING <= paint.overlap_m <= most + ROUNDING:
+        allowed = (
+            f"allowed is [{LEAST_OVERLAP_M:g}, {most:.4g}] m" if most >= LEAST_OVERLAP_M else "allowed is no value"
+        )
+        reason = f"neighbouring strokes touch, and lie at least {PLACE_TOLERANCE_M:g} m apart"
         brush = "paint.brush_width_m", paint.brush_width_m, "m"
-        yield _problem("paint.overlap_m", paint.overlap_m, "m", allowed, apart, brush)
+        yield _problem("paint.overlap_m", paint.overlap_m, "m", allowed, reason, brush)
 
 
 def _strokes(board: BoardGeometry) -> Iterator[str]:
@@ -88,7 +98,7 @@ def _strokes(board: BoardGeometry) -> Iterator[str]:
     along, across = sides if board.pattern.kind == ROWS else sides[::-1]
     reason = "the brush's centre stays on the board in every stroke that is at its place"
     margin: Key = ("paint.edge_margin_m", paint.edge_margin_m, "m")
-    longest, widest = length - 2.0 * paint.edge_margin_m + PLACE_TOLERANCE_M, extent - PLACE_TOLERANCE_M
+    longest, widest = length - 2.0 * paint.edge_margin_m, extent - PLACE_TOLERANCE_M
     if paint.stroke_m > longest + ROUNDING:
         allowed, words = f"allowed is at most {max(longest, 0.0):.4g} m", "strokes keep the margin at both ends"
         yield _problem("paint.stroke_m", paint.stroke_m, "m", allowed, words, (along, length, "m"), margin)
@@ -120,13 +130,13 @@ def _start(board: BoardGeometry, config: PilotConfig) -> Iterator[str]:
 
 
 def _views(board: BoardGeometry, config: PilotConfig) -> Iterator[str]:
-    """In contact the camera shows the board's edge where stroke 1 begins, and a guide of every later stroke."""
-    paint = board.scene.paint
-    field_of_view = "camera.vertical_fov_deg", board.scene.camera.vertical_fov_deg, "deg"
-    if not _shows_edge(board, config, paint.edge_margin_m):
-        shown = [aside for aside in np.arange(0.0, 1.0, STEP_M).tolist() if _shows_edge(board, config, aside)]
+    """In contact the camera shows the board's edges where stroke 1 begins and ends, and a guide of later strokes."""
+    paint, camera = board.scene.paint, board.scene.camera
+    field_of_view = "camera.vertical_fov_deg", camera.vertical_fov_deg, "deg"
+    if not _shows_edges(board, config, paint.edge_margin_m):
+        shown = [margin for margin in np.arange(0.0, 1.0, STEP_M).tolist() if _shows_edges(board, config, margin)]
         allowed = f"allowed is [{shown[0]:.3g}, {shown[-1]:.3g}] m" if shown else "allowed is no value"
-        reason = "in contact the board's edge beside stroke 1 is in view"
+        reason = "in contact the board's edges beside stroke 1 and at its end are in view"
         yield _problem("paint.edge_margin_m", paint.edge_margin_m, "m", allowed, reason, field_of_view)
     if not _shows_guides(board, config, paint.brush_width_m):
         widths = np.arange(paint.brush_width_m, paint.overlap_m + PLACE_TOLERANCE_M, -STEP_M).tolist()
@@ -136,10 +146,18 @@ def _views(board: BoardGeometry, config: PilotConfig) -> Iterator[str]:
         yield _problem("paint.brush_width_m", paint.brush_width_m, "m", allowed, reason, field_of_view)
 
 
-def _shows_edge(board: BoardGeometry, config: PilotConfig, aside: float) -> bool:
+def _shows_edges(board: BoardGeometry, config: PilotConfig, margin: float) -> bool:
+    """Whether with a margin the guiding edge is in view where stroke 1 begins, and the stopping edge where it ends."""
+    guiding = ContactView(board.pattern, config, board.scene.paint.brush_width_m)
+    stopping = ContactView(board.pattern, config, 0.0)  # it is followed before the brush comes near
+    across = board.extent[1]
+    return _shows_guiding_edge(board, guiding, margin) and stopping.shows_across(margin, -margin, across - margin)
+
+
+def _shows_guiding_edge(board: BoardGeometry, view: ContactView, aside: float) -> bool:
     """Whether the guiding edge of the board is in view, so far from the tip [m], where stroke 1 begins."""
-    begin, brush = board.stroke_ends[0], board.scene.paint.brush_width_m
-    return ContactView(board, config, brush).shows_parallel(-aside, -begin, board.extent[0] - begin)
+    begin = board.stroke_ends[0]
+    return view.shows_parallel(-aside, -begin, board.extent[0] - begin)
 
 
 def _shows_guides(board: BoardGeometry, config: PilotConfig, brush: float) -> bool:
@@ -147,25 +165,25 @@ def _shows_guides(board: BoardGeometry, config: PilotConfig, brush: float) -> bo
 
     ``brush`` is the width of the brush [m].
     """
-    view, paint = ContactView(board, config, brush), board.scene.paint
+    view, paint = ContactView(board.pattern, config, brush), board.scene.paint
     ways = [board.pattern.travel(stroke) for stroke in range(2, min(board.strokes, 3) + 1)]
     reach = [sorted((0.0, way * paint.stroke_m)) for way in ways]
     fresh = all([view.shows_parallel(paint.overlap_m - 0.5 * brush, *ends) for ends in reach])
-    return fresh or _shows_edge(board, config, board.stroke_place(board.strokes))
+    return fresh or _shows_guiding_edge(board, view, board.stroke_place(board.strokes))
 
 
 def _envelope(board: BoardGeometry, config: PilotConfig) -> Iterator[str]:
     """The job ends within the supervisor's bounds of time and height."""
-    safety, paint, strokes = config.safety, board.scene.paint, board.strokes
+    safety, paint = config.safety, board.scene.paint
     if not safety.supervise:
         return
-    seconds = (strokes * paint.stroke_m + (strokes - 1) * paint.pitch_m) / paint.speed_m_s
+    seconds = PaintJob().expected_s(config.painting, board.strokes)
     if seconds > safety.mission_s:
         allowed = f"allowed is at least {paint.speed_m_s * seconds / safety.mission_s:.3g} m/s"
         mission = "safety.mission_s", safety.mission_s, "s"
         reason = f"the strokes take {seconds:.0f} s"
         yield _problem("paint.speed_m_s", paint.speed_m_s, "m/s", allowed, reason, mission)
-    corners = [(u, board.stroke_place(stroke)) for u in board.stroke_ends for stroke in (1, strokes)]
+    corners = [(u, board.stroke_place(stroke)) for u in board.stroke_ends for stroke in (1, board.strokes)]
     heights = board.point(*board.from_pattern(np.array(corners)).T)[:, 1]
     change = float(np.ptp(heights))
     if change > safety.height_m:
@@ -206,7 +224,9 @@ def _age(section: str, rate: float, latency: float, late: float, tick: float, li
     """Refuse samples that get older than a limit, at a rate [Hz], a latency, its worst and a tick [s]."""
     age = oldest_s(rate, late, tick)
     if age > most + ROUNDING:
-        allowed = f"allowed is at most {most - age + latency:.3g} s"
+        ticks = math.floor((most - oldest_s(rate, 0.0, tick)) / tick + ROUNDING)
+        latest = ticks * tick - (late - latency)
+        allowed = f"allowed is at most {latest:.3g} s" if latest >= 0.0 else "allowed is no value"
         keys = (f"{section}.rate_hz", rate, "Hz"), (limit, most, "s")
         reason = f"a sample gets {age:.3g} s old"
         yield _problem(f"{section}.latency_s", latency, "s", allowed, reason, *keys)
@@ -216,6 +236,26 @@ def oldest_s(rate_hz: float, delay_s: float, tick_s: float) -> float:
     """Age of a sample at the last tick before the next one arrives [s]; samples are taken and delivered at ticks."""
     delay, period = (math.ceil(value / tick_s - ROUNDING) for value in (delay_s, 1.0 / rate_hz))
     return (delay + period - 1) * tick_s
+
+
+def _wind(scene: Scene, config: PilotConfig) -> Iterator[str]:
+    """The rotors of a level vehicle hold against the mean wind and usual gusts in the least favourable direction."""
+    vehicle, wind = config.controller.vehicle, scene.wind
+    held, _ = worst_level_reach(
+        WrenchFacets(vehicle.geometry), vehicle.mass_kg * GRAVITY, vehicle.thrust_min, vehicle.thrust_max
+    )
+    mean = vehicle.linear_drag_n_s_m * math.hypot(*wind.mean_m_s[:2])
+    gusts = GUST_DEVIATIONS * wind.gust_n_rms
+    if mean + gusts > held:
+        reason = f"{mean:.3g} N of mean wind and gusts of {gusts:.3g} N are held level up to {held:.3g} N"
+        strength = "wind.gust_n_rms", wind.gust_n_rms, "N"
+        if mean > gusts:
+            allowed = (
+                f"allowed is a level speed of at most {max(held - gusts, 0.0) / vehicle.linear_drag_n_s_m:.3g} m/s"
+            )
+            yield _problem("wind.mean_m_s", list(wind.mean_m_s), "m/s", allowed, reason, strength)
+        else:
+            yield _problem(*strength, f"allowed is at most {(held - mean) / GUST_DEVIATIONS:.3g} N", reason)
 
 
 def _colours(scene: Scene, config: PilotConfig) -> Iterator[str]:

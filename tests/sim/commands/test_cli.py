@@ -147,7 +147,7 @@ def test_interrupt_while_drawing_keeps_the_log(flown, capsys, monkeypatch):
         (["paint", "--preset", "dark_board"], ["--preset dark_board: this is a scene, not a preset"]),
         (["paint", "--scene", "octorotor_qp"], ["--scene octorotor_qp: this is a preset, not a scene"]),
         (["compare"], ["compare", "paint"]),
-        (["paint", "--scene", "long.toml"], ["paint.stroke_m = 1.5 m", "at most 1.308 m", "board.width_m = 1.4 m"]),
+        (["paint", "--scene", "long.toml"], ["paint.stroke_m = 1.5 m", "at most 1.3 m", "board.width_m = 1.4 m"]),
         (["paint", "--scene", "slow.toml", "--law", "paper"], ["imu.rate_hz = 100.0 Hz", "at least 250 Hz"]),
         (["pain"], ["unknown command pain; did you mean paint?"]),
         (["fly"], ["unknown command fly; commands are paint, "]),

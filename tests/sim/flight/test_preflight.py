@@ -2,11 +2,13 @@
 
 import dataclasses
 import math
+import re
+from typing import Any
 
 import pytest
 
 from ibvs_qp.config.errors import ConfigError
-from sim.flight.jobs import PressJob
+from sim.flight.jobs import PaintJob, PressJob
 from sim.flight.options import FlightOptions, pilot_config, unsupervised
 from sim.flight.preflight import PLACE_TOLERANCE_M, check_job, job_problems, oldest_s
 from sim.world.scene import (
@@ -18,6 +20,7 @@ from sim.world.scene import (
     Scene,
     StartScene,
     WallScene,
+    WindScene,
 )
 from sim.world.worlds import in_world
 
@@ -30,28 +33,28 @@ def problems(scene: Scene, features: str = "geometric", world: str = "datasheet"
     return job_problems(scene, pilot_config(scene, FlightOptions(features=features)), features)
 
 
-def paint(board: BoardScene | None = None, **keys: object) -> Scene:
+def paint(board: BoardScene | None = None, **keys: Any) -> Scene:
     return Scene(board=board or BoardScene(), paint=PaintScene(**keys))
 
 
-def camera(**keys: float) -> Scene:
+def camera(**keys: Any) -> Scene:
     return Scene(camera=CameraScene(**keys))
 
 
-def force(**keys: float) -> Scene:
+def force(**keys: Any) -> Scene:
     return Scene(force_torque=ForceTorqueScene(**keys))
 
 
-BRUSH = {"brush_width_m": 0.25, "rows": 3, "stroke_m": 1.2, "edge_margin_m": 0.12}
+BRUSH = {"brush_width_m": 0.25, "rows": 3, "stroke_m": 1.2, "edge_margin_m": 0.1}
 LIMITS = {
     "strokes longer than the board": (
-        paint(stroke_m=1.309),
-        paint(stroke_m=1.308),
+        paint(stroke_m=1.301),
+        paint(stroke_m=1.3),
         ["paint.stroke_m", "board.width_m"],
     ),
     "columns longer than the board": (
-        paint(pattern="columns", stroke_m=0.509),
-        paint(pattern="columns", stroke_m=0.508),
+        paint(pattern="columns", stroke_m=0.501),
+        paint(pattern="columns", stroke_m=0.5),
         ["paint.stroke_m", "board.height_m"],
     ),
     "strokes above the board": (
@@ -70,24 +73,29 @@ LIMITS = {
         ["paint.edge_margin_m", "board.height_m"],
     ),
     "an overlap as wide as the brush": (paint(overlap_m=0.08), paint(overlap_m=0.072), ["paint.overlap_m", "brush"]),
+    "an overlap that leaves gaps": (
+        paint(overlap_m=0.0069),
+        paint(overlap_m=0.007),
+        ["paint.overlap_m", "allowed is [0.007, 0.072] m", "paint.brush_width_m = 0.08 m"],
+    ),
     "a brush thinner than the overlap": (
         paint(brush_width_m=0.05, overlap_m=0.06),
         paint(brush_width_m=0.05, overlap_m=0.06, rows=1),
         ["paint.overlap_m", "paint.brush_width_m = 0.05 m"],
     ),
-    "an edge below the picture": (
-        paint(BIG, edge_margin_m=0.265, stroke_m=1.0),
-        paint(BIG, edge_margin_m=0.262, stroke_m=1.0),
+    "an edge beside the picture": (
+        paint(BIG, edge_margin_m=0.241, stroke_m=1.0),
+        paint(BIG, edge_margin_m=0.238, stroke_m=1.0),
         ["paint.edge_margin_m", "camera.vertical_fov_deg"],
     ),
     "an edge above the picture": (
-        paint(BIG, edge_margin_m=0.105, stroke_m=1.0, start="top-left"),
-        paint(BIG, edge_margin_m=0.102, stroke_m=1.0, start="top-left"),
+        paint(BIG, edge_margin_m=0.097, stroke_m=1.0, start="top-left"),
+        paint(BIG, edge_margin_m=0.094, stroke_m=1.0, start="top-left"),
         ["paint.edge_margin_m"],
     ),
-    "an edge beside the picture": (
-        paint(BIG, edge_margin_m=0.249, stroke_m=1.0, pattern="columns"),
-        paint(BIG, edge_margin_m=0.246, stroke_m=1.0, pattern="columns"),
+    "the end of a column above the picture": (
+        paint(BIG, edge_margin_m=0.097, stroke_m=1.0, pattern="columns"),
+        paint(BIG, edge_margin_m=0.094, stroke_m=1.0, pattern="columns"),
         ["paint.edge_margin_m"],
     ),
     "a brush that hides its guide": (
@@ -114,6 +122,16 @@ LIMITS = {
         Scene(imu=ImuScene(rate_hz=249.0)),
         Scene(imu=ImuScene(rate_hz=250.0)),
         ["imu.rate_hz = 249.0 Hz", "at least 250 Hz"],
+    ),
+    "wind that no level vehicle holds": (
+        Scene(wind=WindScene(mean_m_s=(-12.0, 12.1, 0.0))),
+        Scene(wind=WindScene(mean_m_s=(-11.8, 11.8, 0.0))),
+        ["wind.mean_m_s", "level speed of at most 16.9 m/s"],
+    ),
+    "gusts that no level vehicle holds": (
+        Scene(wind=WindScene(gust_n_rms=7.7)),
+        Scene(wind=WindScene(gust_n_rms=7.5)),
+        ["wind.gust_n_rms", "at most 7.6 N"],
     ),
     # Both sides of these were flown: the passing one to the end, the other until the supervisor ended the flight.
     "old pictures": (
@@ -184,10 +202,25 @@ def test_a_press_needs_no_place_for_strokes_and_no_supervisor_no_young_samples()
 
 
 def test_fill_always_ends_on_the_board():
-    for height in (0.1, 0.33, 0.6, 1.5):
+    for height, strokes in ((0.1, 1), (0.33, 5), (0.6, 8), (1.5, 21)):
         scene = paint(BoardScene(height_m=height), rows="fill")
         assert problems(scene) == []
+        assert PaintJob().expected_s(pilot_config(scene, FlightOptions()).painting, strokes) == pytest.approx(
+            (strokes * 1.3 + (strokes - 1) * 0.072) / 0.1
+        )
     assert PLACE_TOLERANCE_M < PaintScene().edge_margin_m
+
+
+@pytest.mark.parametrize(("section", "rate"), [("camera", 30.0), ("camera", 11.0), ("force_torque", 100.0)])
+def test_the_latency_that_a_refusal_allows_is_the_largest_one(section, rate):
+    def scene(latency: float) -> Scene:
+        part = dataclasses.replace(getattr(Scene(), section), rate_hz=rate, latency_s=latency)
+        return dataclasses.replace(Scene(), **{section: part})
+
+    (text,) = problems(scene(0.1 if section == "force_torque" else 0.3))
+    allowed = float(re.search(r"at most ([\d.]+) s", text)[1])  # type: ignore[index]
+    assert problems(scene(allowed)) == []
+    assert len(problems(scene(allowed + 0.0005))) == 1
 
 
 def test_age_of_a_sample_counts_its_period_in_ticks():
