@@ -56,7 +56,8 @@ class LineTask(Task):
               e = \rho - (x_t\cos\theta + y_t\sin\theta) - (\rho_{ref} - x_0 \cos\theta_{ref} - y_0 \sin\theta_{ref})
 
     with the row :math:`L = L_\rho + (x_t \sin\theta - y_t \cos\theta) L_\theta` and (x_t, y_t) the image of the point
-    where the tip meets the wall, (x_0, y_0) that of a level vehicle square to it: endpoint closed loop. The angle row has no integral and yields to level flight.
+    where the tip meets the wall, (x_0, y_0) that of a level vehicle square to it: endpoint closed loop. The angle row
+    has no integral and yields to level flight.
     """
 
     weight_settings = ("weights.line", "weights.line_angle")

@@ -119,7 +119,7 @@ class Paint:
             scene = in_world(scene, self.world)
         vehicle = preset_file(self.vehicle, "--vehicle", other_formats=True)
         if vehicle is not None:
-            scene = with_camera(scene, read_vehicle(vehicle))
+            scene = with_camera(scene, read_vehicle(vehicle).vehicle)
         size = _SIZES[self.image_size] if self.image_size else None
         camera, note = resolve_camera(self.camera)
         if note is not None:

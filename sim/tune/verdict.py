@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,7 @@ def differences(table: pl.DataFrame) -> list[dict[str, Any]]:
 
     Returns:
         Per scene ("all" first) and objective: n, medians of both, median of the differences with its interval, and
-        a verdict: "better", "worse", or "same" for an interval with zero inside.
+        a verdict: "better", "worse", "same" for an interval with zero inside, or "none" without a pair of figures.
     """
     both = paired(table)
     by_scene = both.partition_by(PARAM + "scene", maintain_order=True, as_dict=True)
@@ -41,7 +42,28 @@ def differences(table: pl.DataFrame) -> list[dict[str, Any]]:
                     "shipped": median_interval(before)["median"],
                     "tuned": median_interval(after)["median"],
                     "difference": change,
-                    "verdict": "better" if change["high"] < 0.0 else "worse" if change["low"] > 0.0 else "same",
+                    "verdict": _verdict(change),
                 }
             )
     return result
+
+
+def _verdict(change: dict[str, float]) -> str:
+    if math.isnan(change["median"]):
+        return "none"
+    return "better" if change["high"] < 0.0 else "worse" if change["low"] > 0.0 else "same"
+
+
+def objection(table: pl.DataFrame) -> str:
+    """Why the tuned preset may not be recommended after the unseen flights, or "".
+
+    It completes less often than the shipped one, or in some scene it has no figure at all.
+    """
+    both = paired(table)
+    before, after = (int(both[name].cast(pl.Boolean).sum() or 0) for name in ("completed", f"completed.{TUNED}"))
+    if after < before:
+        return f"it completes {after} of {len(both)} unseen flights, the preset of the start {before}"
+    for each in differences(table):
+        if math.isnan(each["tuned"]):
+            return f"in the scene {each['scene']} it has no figure for {each['objective']}: no flight completes"
+    return ""
