@@ -49,11 +49,14 @@ def candidates(first: int = 0) -> Iterator[Candidate]:
 
 
 def completes(vehicle: VehicleParams, law: str, seed: int, features: str = "geometric") -> tuple[bool, str]:
-    """Whether a vehicle completes the default job, and why the flight ended."""
+    """Whether a vehicle completes the default job, and how the flight ended."""
     scene = with_camera(in_world(Scene(), _WORLD), vehicle)
     options = FlightOptions(law=law, seed=seed, features=features, video=False, compiled=True)
     trace = fly(scene, options, config=with_vehicle(PilotConfig(law=law), vehicle))
-    return bool(compute_metrics(trace)["completed"]), trace.reason
+    metrics = compute_metrics(trace)
+    path, coverage = 1e3 * metrics["path_rms_straight_m"], 100.0 * metrics["coverage"]
+    words = f"{trace.reason}; coverage {coverage:.1f} %, path {path:.1f} mm rms"
+    return bool(metrics["completed"]), words
 
 
 def main() -> int:
