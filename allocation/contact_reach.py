@@ -99,8 +99,29 @@ def push_reach(
         ValueError: When a lower limit is above its upper limit.
     """
     facets = rotors if isinstance(rotors, WrenchFacets) else WrenchFacets(rotors)
-    slope = facets.normals @ push_direction(tip, friction, travel, normal)
-    return _reach(facets, *facets.rooms(hover_wrench(weight), lower, upper), slope)
+    return ray_reach(facets, hover_wrench(weight), push_direction(tip, friction, travel, normal), lower, upper)
+
+
+def ray_reach(
+    facets: WrenchFacets,
+    wrench: np.ndarray,
+    direction: np.ndarray,
+    lower: np.ndarray | float,
+    upper: np.ndarray | float,
+) -> PushReach:
+    """Greatest push beside any steady wrench of the rotors.
+
+    Args:
+        facets: Of the rotors.
+        wrench: Wrench of the rotors without push [N, N m], (6,).
+        direction: Wrench per newton of push, by `push_direction`, (6,).
+        lower: Smallest thrusts [N], (n,) or one number.
+        upper: Largest thrusts [N], (n,) or one number; equal to lower for a dead rotor.
+
+    Raises:
+        ValueError: When a lower limit is above its upper limit.
+    """
+    return _reach(facets, *facets.rooms(wrench, lower, upper), facets.normals @ direction)
 
 
 def worst_push_reach(

@@ -224,7 +224,7 @@ def _():
 @app.cell
 def _(flight):
     def test_flight_is_completed_and_painted():
-        assert flight.completed, flight.reason
+        assert flight.claimed, flight.reason
         assert flight.coverage_mask.max() > 0.9 and len(flight.pictures) > 20
 
     def test_push_follows_its_reference_while_painting():

@@ -11,7 +11,7 @@ with app.setup:
     from sim.notebook.dashboard import draw_dashboard
     from sim.notebook.knobs import GROUPS, KNOBS, knob_values
     from sim.notebook.picture import picture
-    from sim.notebook.tuning import Start, TuningBench, compare_pair, save_setting, save_text
+    from sim.notebook.tuning import Start, TuningBench, compare_pair, load_setting, load_start, save_setting, save_text
     from sim.notebook.wall_flights import Setting, flights_table, fly_setting
 
     FIGURES = (
@@ -56,7 +56,9 @@ def _():
     * a **weight** $w_k$ is the inverse square of an acceptable error. Weights have no effect while all tasks can be
       met together. Otherwise they decide which task deviates;
     * a **hard limit** (thrust, thrust rate) always holds. Its **multiplier** $|\partial J^\star / \partial
-      u_\text{max}|$ is the cost that one more newton would save;
+      u_\text{max}|$ is the derivative of the least cost by the bound, and no more: it falls linearly as the bound
+      yields, to zero where the limit is released. If nothing else changes on the way, the cost falls by half of
+      multiplier times way. `ibvs-qp explain` prints the range and the true fall;
     * a **soft limit** has a slack $s_j$ with the **slack weight** $p_j$: a large $p_j$ is nearly a hard limit, a small
       $p_j$ allows violations.
 
@@ -74,7 +76,8 @@ def _():
     # Each control reports to this state by itself: steps that arrive during a flight become one flight of the last
     # values. Elements of one mo.ui.dictionary would lose all but one of the controls moved meanwhile.
     start, set_start = mo.state(Start())
-    return set_start, start
+    refusal, set_refusal = mo.state("")  # apart from the start: a preset that is refused resets no control
+    return refusal, set_refusal, set_start, start
 
 
 @app.cell(hide_code=True)
@@ -97,21 +100,26 @@ def _(start):
 
 
 @app.cell(hide_code=True)
-def _(set_start):
+def _(set_refusal, set_start):
+    def _reset(_):
+        set_refusal("")
+        set_start(lambda now: now.again())
+
     wanted = mo.ui.text(value="tarot_t960_qp", label="preset (name or file)", full_width=True)
-    load = mo.ui.button(label="load", on_change=lambda _: set_start(lambda now: now.load(wanted.value)))
-    reset = mo.ui.button(label="reset all", on_change=lambda _: set_start(lambda now: now.again()))
+    load = mo.ui.button(label="load", on_change=lambda _: load_start(wanted.value, set_start, set_refusal))
+    reset = mo.ui.button(label="reset all", on_change=_reset)
     return load, reset, wanted
 
 
 @app.cell(hide_code=True)
-def _(controls, load, reset, share_gains, start, wanted):
+def _(controls, load, refusal, reset, share_gains, start, wanted):
     _groups = {
         title: mo.vstack([controls[knob.path] for knob in knobs], gap=0.3).style({"padding-right": "1.2rem"})
         for title, knobs in GROUPS.items()
     }
     _folded = mo.accordion({title: panel for title, panel in _groups.items() if title != "Task"}, multiple=True)
-    _task = mo.md(f"{load} {reset} {start().text()}\n\n### Task")
+    _note = f"**Not loaded:** {refusal()}" if refusal() else f"begun with {start().name}"
+    _task = mo.md(f"{load} {reset} {_note}\n\n### Task")
     mo.sidebar([wanted, _task, _groups["Task"], _folded, share_gains], width="22rem")
     return
 
@@ -205,8 +213,8 @@ def _():
     **Reversed priorities: the weight of the push from 0.5 to 5000, at the same 34 N without the check.** The flight
     before has the shipped weight. This one weight decides which task deviates: now the vehicle leans into the wall,
     because leaning converts lift into push. The push error while holding falls from 4.0 to 1.9 N rms, until the
-    supervisor ends the flight at a tilt of 13 degrees. The multipliers rise from about ten to above ten thousand: a
-    newton of thrust saves more cost when the weight of its effect is larger. The analytic law has no such parameter;
+    supervisor ends the flight at a tilt of 13 degrees. The multipliers rise from about ten to above ten thousand: the
+    cost depends more on a bound when the weight of its effect is larger. The analytic law has no such parameter;
     the geometry decides what the clipped thrusts lose.
     """)
     return
@@ -314,7 +322,7 @@ def _(at_the_limit, bench, comparison, controls):
         with tempfile.TemporaryDirectory() as folder:
             file = f"{folder}/saved.toml"
             save_setting(at_the_limit.setting, file)
-            again = Start().load(file).setting
+            again = load_setting(file)
             assert again == at_the_limit.setting
             assert (fly_setting(again).thrusts == at_the_limit.now.thrusts).all()
             assert f"ibvs-qp paint --preset {file} --scene {folder}/saved.scene.toml --seed 0" in save_text(again, file)

@@ -239,9 +239,9 @@ def _(again):
 @app.cell(hide_code=True)
 def _(again, figures, flight, same):
     _rows = [
-        (each.label, *(number(value and each.scale * value, ".3f") for value in (flight.value[each.column], flown)))
+        (each.label, *(number(value and each.scale * value, ".3f") for value in (flight.value[each.name], flown)))
         for each in FIGURES[:4]
-        for flown in [figures.get(each.column)]
+        for flown in [figures.get(each.name)]
     ]
     _note = "Same code and settings: the figures are equal to the bit."
     _changed = "Code or settings have changed since the table was made, so the figures may differ."
@@ -273,7 +273,7 @@ def _(rows, sweep):
         vs, force = sweep[VS].to_numpy(), sweep[FORCE].to_numpy()
         rng = np.random.default_rng(0)
         made = 0.01 * vs**0.8 * force**0.1 * np.exp(rng.normal(0.0, 0.01, len(vs)))
-        known = sweep.with_columns(pl.Series(FIGURES[0].column, made), pl.lit(True).alias("completed"))
+        known = sweep.with_columns(pl.Series(FIGURES[0].name, made), pl.lit(True).alias("completed"))
         found = effects(known, "qp", FIGURES[0])
         assert abs(found["vs"] - 0.8) < 0.02 and abs(found["force"] - 0.1) < 0.02
         assert found["vs_part"] > 0.9 and found["rest"] < 0.02

@@ -64,6 +64,13 @@ class ContactSettings:
         1.0, "filtered force noise that halves that gain: a stuck tip amplifies noise", unit="N", low=0.01, high=100.0
     )
     friction_gain: float = setting(0.9, "gain of the friction along the travel in the feed-forward", low=0.0, high=1.0)
+    assumed_friction: float = setting(
+        0.8,
+        "friction coefficient of brush and wall that the reach check assumes until a slide of 1 s has measured it",
+        why="the most of a dry brush: a push that friction stops turns the vehicle about its tip",
+        low=0.02,
+        high=1.2,
+    )
     friction_slew_n_s: float = setting(6.0, "fastest change of that force", unit="N/s", low=0.1, high=100.0)
     stuck_speed_m_s: float = setting(
         0.005, "slower than this in contact counts as stuck", unit="m/s", low=0.0, high=0.1

@@ -31,6 +31,14 @@ class EstimationConfig:
     line_noise: float = setting(
         1e-3, "random walk of line offsets: edges are not perfectly straight", unit="m/sqrt(s)", low=1e-6, high=0.1
     )
+    paint_noise: float = setting(
+        7e-3,
+        "random walk of the offsets of painted edges",
+        unit="m/sqrt(s)",
+        why="the piece in view moves along a path that swings by 3 deg: 5 mm/s that change within a second",
+        low=1e-6,
+        high=0.1,
+    )
     line_std_m: float = setting(
         3e-4, "least deviation of a line offset; the frames may show more", unit="m", low=1e-6, high=0.1
     )

@@ -26,7 +26,14 @@ T = TypeVar("T")
 
 
 def setting(
-    default: Any, doc: str, *, unit: str = "", why: str = "", low: float = -math.inf, high: float = math.inf
+    default: Any,
+    doc: str,
+    *,
+    unit: str = "",
+    why: str = "",
+    low: float = -math.inf,
+    high: float = math.inf,
+    words: tuple[str, ...] = (),
 ) -> Any:
     """Declare a settings field with its unit and closed allowed range [low, high].
 
@@ -37,8 +44,10 @@ def setting(
         why: Reason for the default.
         low: Smallest allowed value, of each entry for tuples.
         high: Largest allowed value.
+        words: Strings that are allowed beside numbers.
     """
-    return dataclasses.field(default=default, metadata={"doc": doc, "unit": unit, "why": why, "low": low, "high": high})
+    limits = {"low": low, "high": high, "words": words}
+    return dataclasses.field(default=default, metadata={"doc": doc, "unit": unit, "why": why, **limits})
 
 
 def choice(default: str, doc: str, options: tuple[str, ...]) -> Any:
@@ -90,12 +99,15 @@ def require_order(instance: Any, smaller: str, larger: str, reason: str) -> None
 def _check_number(name: str, value: Any, default: Any, meta: typing.Mapping[str, Any]) -> None:
     if isinstance(default, (bool, str)) or (value is None and default is None):
         return
-    low, high, unit = meta["low"], meta["high"], meta["unit"]
+    low, high, unit, words = meta["low"], meta["high"], meta["unit"], meta["words"]
+    if isinstance(value, str) and value in words:
+        return
     number = numbers.Integral if isinstance(default, int) else numbers.Real
     for entry in value if isinstance(value, tuple) else (value,):
         right_type = isinstance(entry, number) and not isinstance(entry, bool)
         if not (right_type and _is_finite(entry) and low <= entry <= high):
-            raise out_of_range(name, value, unit, f"allowed is [{low:g}, {high:g}] {unit}".rstrip())
+            allowed = f"allowed is [{low:g}, {high:g}] {unit}".rstrip()
+            raise out_of_range(name, value, unit, " or ".join([allowed, *(repr(word) for word in words)]))
 
 
 def _is_finite(value: Any) -> bool:

@@ -17,14 +17,22 @@ from ibvs_qp.estimation.stamps import sample_interval
 from ibvs_qp.estimation.stiffness import stiffness
 from ibvs_qp.estimation.touch import TouchDetector, touch_threshold
 from ibvs_qp.estimation.wall_distance import Plane, Tick, WallDistance
-from ibvs_qp.symbolic.logic import both, no, where
+from ibvs_qp.symbolic.logic import both, either, no, where
 from ibvs_qp.symbolic.signals import Signals
 from ibvs_qp.symbolic.step_function import StepFunction
 
 #: Without a plane for this long [s], a push means that the tip touches, whatever the drifting distance says.
 BLIND_S = 0.3
+#: A tip that shall press and is felt to push harder than this [N] touches, although the distance says otherwise: planes
+#: since its last start are those of another surface, such as a wall behind the board. Before a contact the tip must
+#: also move slower than this along the normal [m/s], for this long [s]: an approach is faster down to 15 mm from the
+#: wall, so that a false force makes no contact far from it.
+FELT_PUSH, STOPPED_SPEED, STOPPED_S = 2.0, 0.02, 0.1
 #: The push noise is learned beyond this multiple of `contact_distance_m`.
 FREE_DISTANCES = 2.0
+#: A plane, (A, B, C, D); and the least part of its distance at which the tip can touch a surface before it.
+Plane4 = tuple[float, float, float, float]
+LEAST_RATIO = 0.1
 #: Entries of the estimate as results of the function, in the order of `ContactState` behind the normal.
 SCALARS = ContactState._fields[1:]
 #: Those that are true or false, and those that are infinite while no wall is known.
@@ -39,6 +47,7 @@ def contact_state(
     plane: Plane,
     wrench: ca.SX,
     interval: ca.SX,
+    press: ca.SX,
 ) -> dict[str, ca.SX]:
     """The estimate of one tick as expressions, by the names of `ContactState`.
 
@@ -50,19 +59,28 @@ def contact_state(
         plane: Last measured plane.
         wrench: Tared wrench ON the vehicle at the centre of mass, FRD [N, N m], (6,).
         interval: Time since the last force sample [s], 0 without a new one.
+        press: Whether the tip shall press.
     """
     settings, estimation = config.contact, config.contact.estimation
     touch = TouchDetector(signals, config, tick.dt)
     wall = WallDistance(signals, config, tick, history)
     wall.correct(plane, both(touch.in_contact, touch.time - plane.age > estimation.stationary_after_s))
-    free = both(no(touch.in_contact), wall.distance > FREE_DISTANCES * settings.contact_distance_m)
+    stopped_s = signals.state("contact.stopped_s")
+    far = wall.distance > FREE_DISTANCES * settings.contact_distance_m
+    free = both(no(touch.in_contact), far, stopped_s <= 0.0)
     push = PushFilter(signals, settings, wrench, interval, wall.normal, free)
     touch.add_sample(interval > 0.0, push.push, push.push_noise)
-    wall.touch(both(interval > 0.0, touch.pressed, wall.known, wall.since_plane > BLIND_S))
+    beyond = wall.distance > settings.contact_distance_m
+    felt = both(press, wall.anew, beyond, push.push > ca.fmax(FELT_PUSH, settings.touch_sigmas * push.push_noise))
+    stopped = both(felt, no(touch.in_contact), ca.fabs(wall.rate) < STOPPED_SPEED)
+    stopped_s = signals.remember("contact.stopped_s", where(stopped, stopped_s + tick.dt, 0.0))
+    another = both(touch.pressed, either(both(felt, touch.in_contact), stopped_s >= STOPPED_S))
+    blind = both(interval > 0.0, touch.pressed, wall.known, wall.since_plane > BLIND_S)
+    wall.touch(either(blind, another), both(another, no(blind)))
     pressing = where(touch.in_contact, interval, 0.0)
     touched = touch.update(push.push, wall.distance)
     slope = stiffness(signals, settings, push.push, -wall.distance, pressing, touched)
-    wall.store()
+    wall.store(both(touch.in_contact, wall.distance <= settings.contact_distance_m))
     return {
         "normal": wall.normal,
         "known": wall.known,
@@ -83,6 +101,7 @@ def contact_state(
         "contact_weight": touch.ramp * depth_weight(settings, wall.depth),
         "stiffness": slope.value,
         "stiffness_known": slope.known,
+        "surface_offset": wall.offset,
         "plane_accepted": wall.accepted,
     }
 
@@ -99,6 +118,7 @@ class ContactEstimator:
     Attributes:
         state: Result of the last update.
         plane_ns: Capture time of the last accepted plane, -1 before the first.
+        surface_offset: Distance from the felt surface to the seen one [m], 0 while they are one.
 
     Args:
         config: Geometry and `contact` settings.
@@ -116,9 +136,9 @@ class ContactEstimator:
             doubt=signals.input("doubt"),
         )
         plane = Plane(new=signals.input("plane_new"), age=signals.input("plane_age"), values=signals.input("plane", 4))
-        wrench, interval = signals.input("wrench", 6), signals.input("interval")
+        wrench, interval, press = signals.input("wrench", 6), signals.input("interval"), signals.input("press")
         history = MotionHistory(signals, tick.elapsed, tick.rate, tick.acceleration, config.tick_s)
-        for name, value in contact_state(signals, config, tick, history, plane, wrench, interval).items():
+        for name, value in contact_state(signals, config, tick, history, plane, wrench, interval, press).items():
             signals.output(name, value)
         self._step = StepFunction(signals, to_machine_code=config.compiled)
         self._plane = np.array([0.0, 0.0, 1.0, -1.0])
@@ -128,7 +148,7 @@ class ContactEstimator:
         """Return to the state before the first measurement."""
         self._step.reset()
         self._stamp = self._wrench_ns = self._plane_ns = self.plane_ns = -1
-        self._doubt = False
+        self._doubt, self.surface_offset = False, 0.0
         self.state = no_contact(self._config)
 
     @property
@@ -151,6 +171,7 @@ class ContactEstimator:
         wrench_stamp_ns: int,
         plane: Sequence[float] | None,
         plane_stamp_ns: int,
+        press: bool = False,
     ) -> ContactState:
         """Update with the sensors of one tick; wrench and plane count once, when their stamps are new.
 
@@ -163,6 +184,7 @@ class ContactEstimator:
             wrench_stamp_ns: Time at which it was measured.
             plane: (A, B, C, D) of the wall in C, or None.
             plane_stamp_ns: Time at which it was measured.
+            press: Whether the tip shall press.
         """
         elapsed = self._config.tick_s if self._stamp < 0 else max((stamp_ns - self._stamp) * 1e-9, 0.0)
         self._stamp = stamp_ns
@@ -186,14 +208,24 @@ class ContactEstimator:
             *self._plane,
             *contact_wrench.tolist(),
             interval,
+            press,
         )
         self._doubt = False
         self._step.evaluate()
         values = self._step.results.tolist()
         self.state = read_contact(values)
-        if values[-1]:
+        self.surface_offset, accepted = values[-2:]
+        if accepted:
             self.plane_ns = plane_stamp_ns
         return self.state
+
+    def on_felt_surface(self, plane: Plane4) -> Plane4:
+        """A measured plane (A, B, C, D) in C, moved to the surface that the tip touches."""
+        if self.surface_offset == 0.0:
+            return plane
+        a, b, c, d = plane
+        ratio = max(1.0 - self.surface_offset * math.hypot(a, b, c) / abs(d), LEAST_RATIO)
+        return a / ratio, b / ratio, c / ratio, d
 
 
 def no_contact(config: ControllerConfig) -> ContactState:

@@ -84,6 +84,10 @@ class LineTracks:
         self.seen_ns = max(self.seen_ns, stamp)
         track.fresh_weight = min(1.0, track.frames / self._config.frames_to_trust) * line.weight
         track.surface_side, track.kind = measured.surface_side, line.kind or track.kind
+        # A painted edge grows behind the brush and swings ahead of it: its offset says little of the velocity.
+        walk = self._config.paint_noise if track.kind == "paint" else self._config.line_noise
+        self._filter.noise[LINES + track.slot, LINES + track.slot] = walk**2
+        track.seen_angle, track.middle, track.length = measured.angle, measured.middle, measured.length
         self._couple(track)
 
     def _correct_offset(self, track: TrackedLine, measured: MeasuredLine, claimed: float, stamp: int) -> bool:

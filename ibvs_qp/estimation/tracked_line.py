@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 from ibvs_qp.estimation.line_noise import SteadyValue, WhiteNoise
@@ -27,6 +28,8 @@ class TrackedLine:
         rates: Change of the offset per metre of tip motion (right, down).
         noise: Noise of the measured offset [m^2]; tilt: filter of the angle.
         refused: Refused offsets in a row that agree with each other.
+        seen_angle, middle, length: Angle [rad], middle and length [m] of the visible piece in the last frame, as in
+            `ibvs_qp.estimation.wall_lines.MeasuredLine`.
     """
 
     track_id: int
@@ -47,3 +50,11 @@ class TrackedLine:
     noise: WhiteNoise = field(default_factory=WhiteNoise)
     tilt: SteadyValue = field(default_factory=SteadyValue)
     refused: int = 0
+    seen_angle: float = math.nan
+    middle: float = math.nan
+    length: float = 0.0
+
+    @property
+    def seen_offset(self) -> float:
+        """Offset that the last frame shows, moved to now [m]; `offset` is filtered."""
+        return self.offset + self.noise.residual

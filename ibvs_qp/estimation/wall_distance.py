@@ -73,6 +73,8 @@ class WallDistance:
     Attributes:
         normal: Unit vector into the wall, in B, (3,).
         known: Whether a plane was measured since the start.
+        offset: Distance from the felt surface to the seen one [m], 0 while they are one.
+        anew: Whether the distance has started from a plane since the last contact: that plane may be another surface's.
         accepted: Whether this tick's plane was accepted.
         since_plane: Time since the capture of the last accepted plane [s].
         rate_noise: Standard deviation of the rate [m/s].
@@ -84,7 +86,8 @@ class WallDistance:
         self._settings = settings = config.contact.estimation
         self._tip = ca.DM(config.vehicle.tip_position_m)
         self._tip_from_camera = ca.DM(np.subtract(config.vehicle.tip_position_m, config.vehicle.camera_position_m))
-        self.known = signals.state("wall.known")
+        self.known, self.offset = signals.state("wall.known"), signals.state("wall.offset")
+        self.anew = signals.state("wall.anew")
         self.since_plane = signals.state("wall.since_plane", start=NEVER_S) + tick.elapsed
         self._gap = either(signals.state("wall.gap"), tick.elapsed > GAP_S, tick.doubt)
         self._kalman = LateKalman(signals, INITIAL_STD, tick.elapsed)
@@ -118,7 +121,8 @@ class WallDistance:
     def correct(self, plane: Plane, tip_stationary: ca.SX) -> None:
         """Correct with a plane at its capture; those of a camera with mirrored axes are refused for good."""
         signals, kalman = self._signals, self._kalman
-        seen, distance = self._seen(plane.values)
+        seen, raw = self._seen(plane.values)
+        distance = raw - self.offset
         past, past_normal, past_yaw = self._at(plane.age)
         last_age = signals.state("wall.last_age") + self._tick.elapsed
         signals.remember("wall.last_age", where(plane.new, plane.age, last_age))
@@ -128,10 +132,12 @@ class WallDistance:
         trusted, past_normal = self._trusts(both(new, no(first)), seen, past_normal)
         covered = self._history.covers(plane.age)
         kalman.go_to(both(trusted, covered), plane.age)
-        corrected = self._correct_distance(both(trusted, covered), plane.age, distance, past, tip_stationary)
+        corrected, restart = self._correct_distance(both(trusted, covered), plane.age, distance, past, tip_stationary)
         kalman.set_entry(first, DISTANCE, FIRST_DISTANCE_STD)
         kalman.set_entry(both(first, self._gap), SPEED, GAP_SPEED_STD)
-        self._set(first, DISTANCE, distance)
+        anew = either(first, restart)
+        self._set(anew, DISTANCE, raw)
+        self.offset, self.anew = where(anew, 0.0, self.offset), either(self.anew, anew)
         self.accepted = either(first, corrected)
         moved = self.normal + self._settings.normal_gain * (seen - past_normal)
         self.normal = where(first, seen, where(corrected, moved / ca.norm_2(moved), self.normal))
@@ -179,8 +185,10 @@ class WallDistance:
         self.normal = where(reopens, seen, self.normal)
         return either(agrees, reopens), where(reopens, seen, past)
 
-    def _correct_distance(self, new: ca.SX, age: ca.SX, distance: ca.SX, past: ca.SX, tip_stationary: ca.SX) -> ca.SX:
-        """Correct distance and speed; whether the plane is accepted.
+    def _correct_distance(
+        self, new: ca.SX, age: ca.SX, distance: ca.SX, past: ca.SX, tip_stationary: ca.SX
+    ) -> tuple[ca.SX, ca.SX]:
+        """Correct distance and speed; whether the plane is accepted, and whether the distance starts again from it.
 
         A plane beyond the gate counts little, and a jump not at all, until the next ones lie on the same side: then
         the filter is wrong, and starts again.
@@ -219,11 +227,16 @@ class WallDistance:
         interval = ca.fmax(first_age - age, SHORTEST_JUMPS)
         kalman.restart(restart, (FIRST_DISTANCE_STD, JUMP_SPEED_STD, INITIAL_STD[BIAS]))
         self._set(restart, SPEED, (first_distance - distance) / interval - self._lever_speed)
-        self._set(restart, DISTANCE, distance)
-        return accepted
+        return accepted, restart
 
-    def touch(self, happens: ca.SX) -> None:
-        """The tip rests at the wall, whatever the drifting distance says; the accelerometer's bias stays."""
+    def touch(self, happens: ca.SX, another: ca.SX) -> None:
+        """The tip rests at the wall, whatever the drifting distance says; the accelerometer's bias stays.
+
+        Args:
+            happens: Whether it rests there.
+            another: Whether the planes are right, and of another surface: the next ones count from the felt one.
+        """
+        self.offset = self.offset + where(both(happens, another), self._state[DISTANCE], 0.0)
         self._kalman.set_entry(happens, DISTANCE, TOUCH_STD)
         self._kalman.set_entry(happens, SPEED, self._settings.stationary_speed_std_m_s)
         self._set(happens, DISTANCE, ca.SX(0.0))
@@ -234,12 +247,14 @@ class WallDistance:
         entries[index] = where(condition, value, entries[index])
         self._state = ca.vertcat(*entries)
 
-    def store(self) -> None:
-        """Remember the states for the next tick."""
+    def store(self, confirmed: ca.SX) -> None:
+        """Remember the states for the next tick; ``confirmed`` by a contact at the wall."""
+        self._signals.remember("wall.anew", where(confirmed, 0.0, self.anew))
         for name, value in {
             "normal": self.normal,
             "state": self._state,
             "known": self.known,
+            "offset": self.offset,
             "gap": self._gap,
             "since_plane": ca.fmin(self.since_plane, NEVER_S),
         }.items():

@@ -42,12 +42,17 @@ class MeasuredLine:
         angle: Angle of the normal in (right, down) [rad].
         surface_side: As in `LineFeature`, for this normal.
         scale: Metres per unit of rho.
+        middle: Middle of the visible piece along the line, from the foot of the tip's wall point towards the normal
+            turned from right to down by 90 degrees [m]; NaN without end points.
+        length: Length of that piece [m].
     """
 
     offset: float
     angle: float
     surface_side: int
     scale: float
+    middle: float = math.nan
+    length: float = 0.0
 
 
 def wall_line(
@@ -74,12 +79,31 @@ def wall_line(
         return None
     point = add_scaled(tip_from_camera, distance, axes.normal)
     sign = 1.0 if (down if line.role == HORIZONTAL else right) >= 0.0 else -1.0
+    depth = dot(point, axes.normal)
+    ends = _along(line, axes, point, depth, (sign * right / length, sign * down / length))
     return MeasuredLine(
         offset=-sign * dot(h, point) / length,
         angle=math.atan2(sign * down, sign * right),
         surface_side=int(sign) * line.surface_side,
-        scale=dot(point, axes.normal) / length,
+        scale=depth / length,
+        middle=0.5 * sum(ends) if ends else math.nan,
+        length=abs(ends[1] - ends[0]) if ends else 0.0,
     )
+
+
+def _along(line: LineFeature, axes: WallAxes, point: Vector3, depth: float, normal: tuple[float, float]) -> list[float]:
+    """Place of both ends of the visible piece along a line with that normal (right, down) [m]; [] without ends."""
+    if line.segment is None:
+        return []
+    places = []
+    for x, y in line.segment.tolist():
+        towards = axes.normal[0] + x * axes.normal[1] + y * axes.normal[2]
+        if towards < LEAST_IN_PLANE:
+            return []
+        ray = depth / towards
+        away = ray - point[0], ray * x - point[1], ray * y - point[2]
+        places.append(normal[0] * dot(axes.down, away) - normal[1] * dot(axes.right, away))
+    return places
 
 
 def image_line(

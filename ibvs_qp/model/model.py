@@ -146,7 +146,7 @@ class Model:
         unreal = ca.vertcat(vehicle.mass_kg * bias, ca.DM.zeros(3))
         static = ca.vertcat(vehicle.mass_kg * GRAVITY * body.down, gyroscopic) + external - unreal
         self.bias_wrench = static + expected
-        return static, cautious_friction(signals, friction)
+        return static, cautious_friction(signals, friction, config.contact.assumed_friction)
 
     def _rotor_limits(self) -> None:
         """Thrust window of the step, and the last thrusts and where their last change would lead [N], (n,) each."""

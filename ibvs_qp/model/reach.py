@@ -35,7 +35,8 @@ def push_reach(
     The ray :math:`w(f) = f [d; p \times d] - h`, :math:`d = n + \mu t`, meets the facets of the attainable wrench set
     (`allocation.wrench_facets`), exactly for any number of rotors. The reach is the first f at which it leaves. The
     output `least_push` is the last f at which it enters: above zero where only pushing relieves a weak rotor, and
-    `NO_PUSH` where the vehicle can hold no push, not even zero.
+    `NO_PUSH` where the vehicle can hold no push, not even zero. `ibvs_qp.model.setpoints.Setpoints.limiting_rotors`
+    names the rotors at the reach from the outputs `reach_direction` and `static_wrench`.
     """
     facets, count = WrenchFacets(vehicle.geometry), vehicle.geometry.count
     low, high = signals.input("thrust_low", count), signals.input("thrust_high", count)
@@ -43,9 +44,10 @@ def push_reach(
     signals.output("reach_friction", ca.if_else(speed > STANDING_SPEED, friction, 0.0))
     direction = normal + ca.if_else(speed > STANDING_SPEED, friction / ca.fmax(speed, STANDING_SPEED), 0.0) * travel
     lever = ca.cross(ca.DM(vehicle.tip_position_m), direction)
-    slope = ca.DM(facets.normals) @ ca.vertcat(direction, lever)
+    ray = signals.output("reach_direction", ca.vertcat(direction, lever))
+    slope = ca.DM(facets.normals) @ ray
     rising, falling = ca.DM(np.maximum(facets.coefficients, 0.0)), ca.DM(np.minimum(facets.coefficients, 0.0))
-    offset = -(ca.DM(facets.normals) @ static_wrench)
+    offset = -(ca.DM(facets.normals) @ signals.output("static_wrench", static_wrench))
     upper, lower = rising @ high + falling @ low - offset, rising @ low + falling @ high - offset
     along, safe = ca.fabs(slope) > RELATIVE_ZERO, ca.if_else(ca.fabs(slope) > RELATIVE_ZERO, slope, 1.0)
     room = ca.if_else(along, ca.if_else(slope > 0.0, upper, lower) / safe, UNBOUNDED)

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
+from allocation.contact_reach import ray_reach
+from allocation.wrench_facets import WrenchFacets
 from ibvs_qp.estimation.contact import no_contact, read_contact
 from ibvs_qp.estimation.contact_state import ContactState
 from ibvs_qp.frames import camera_twist_matrix
@@ -71,6 +73,7 @@ class Setpoints:
         self.model = model
         self.effectiveness, self.mass_matrix = model.effectiveness, vehicle.mass_matrix
         self.inverse = np.linalg.pinv(self.effectiveness)
+        self._facets: WrenchFacets | None = None
         self.step = TickFunction(model, extra)
         self._sensed = sensed = self.step.sensed
         self._parameters = [(sensed[entry.name], entry) for entry in model.parameters]
@@ -178,6 +181,25 @@ class Setpoints:
     least_push = _number("least_push", 0, "Smallest push that they allow [N]; above the reach when they allow none.")
     reach_friction = _number("reach_friction", 0, "Friction coefficient assumed by the reach; 0 standing still.")
     contact_weight = _number("contact_weight", 0, "Lambda: 0 in free air or out of contact, 1 in contact.")
+
+    @property
+    def friction_measured(self) -> bool:
+        """Whether a slide has measured the friction that the reach assumes."""
+        return bool(self.step.outputs["friction_measured"].item())
+
+    @property
+    def derated(self) -> bool:
+        """Whether the limits of this step are narrower than the vehicle's own."""
+        low, high = self._sensed["thrust_low"], self._sensed["thrust_high"]
+        return bool((low > self.floor).any() or (high < self.ceiling).any())
+
+    def limiting_rotors(self) -> tuple[tuple[str, str, float], ...]:
+        """Rotors at a limit at the reach of this step: name, "lower" or "upper", and that limit [N]."""
+        self._facets = self._facets or WrenchFacets(self.effectiveness)
+        limits = {"lower": self._sensed["thrust_low"], "upper": self._sensed["thrust_high"]}
+        out, names = self.step.outputs, self.config.vehicle.geometry.names
+        reach = ray_reach(self._facets, -out["static_wrench"], out["reach_direction"], *limits.values())
+        return tuple((names[rotor], side, float(limits[side][rotor])) for rotor, side in reach.binding)
 
     @property
     def inertial_push(self) -> float:

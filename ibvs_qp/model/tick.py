@@ -175,7 +175,8 @@ def _contact(signals: Signals, config: ControllerConfig, tick: Tick, history: Mo
     plane = Plane(new=since_plane > 0.0, age=value["plane_age"], values=value["plane"])
     since_wrench = _since_last(gated, "wrench", elapsed, value["wrench_age"], ca.SX(1.0))
     interval = where(since_wrench < NEVER_S / 2, ca.fmin(since_wrench, LONGEST_INTERVAL), FIRST_INTERVAL)
-    estimate = contact_state(gated, config, tick, history, plane, value["contact_wrench"], interval)
+    wrench, press = value["contact_wrench"], value["reference.press"]
+    estimate = contact_state(gated, config, tick, history, plane, wrench, interval, press)
     for name, entry in estimate.items():
         signals.output(f"estimate.{name}", entry)
     contact = {

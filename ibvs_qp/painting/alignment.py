@@ -15,30 +15,40 @@ class Alignment:
     noisy pictures may prevent any standstill, so the tolerances open with time.
 
     Attributes:
-        error: Averaged line error [m].
+        error, speed: Averaged line error [m] and speed [m/s].
     """
 
     def __init__(self, config: PaintingConfig) -> None:
         self._config = config
         self._average: tuple[float, ...] | None = None
         self._since = math.nan
-        self.error = math.inf
+        self.error = self.speed = math.inf
 
     def is_reached(self, inputs: PainterInput, errors: tuple[float, float], began: float, dt: float) -> bool:
         """Whether the errors of guide and start mark [m] and the speed have stayed within their tolerances long enough.
 
         ``began`` is the begin of the alignment and ``dt`` the time since the last tick [s].
         """
-        config = self._config
-        self.error, speed = self._averaged((*errors, *inputs.velocity[:2]), dt)
-        waited = (inputs.time_s - began) / config.align_patience_s
-        opening = min(max(1.0, waited**2), config.align_opening_max)
-        if not (self.error < opening * config.align_error_m and speed < opening * config.align_speed_m_s):
+        config, opening = self._config, self._opening(inputs.time_s - began)
+        self.error, self.speed = self._averaged((*errors, *inputs.velocity[:2]), dt)
+        if not (self.error < opening * config.align_error_m and self.speed < opening * config.align_speed_m_s):
             self._since = math.nan
             return False
         if math.isnan(self._since):
             self._since = inputs.time_s
         return inputs.time_s - self._since >= config.align_time_s
+
+    def state(self, waited: float) -> str:
+        """Error and speed with their limits, in words, after that time [s]."""
+        opening, config = self._opening(waited), self._config
+        error = "no guide in view" if math.isinf(self.error) else f"line error {self.error * 1e3:.1f} mm"
+        limits = opening * config.align_error_m * 1e3, opening * config.align_speed_m_s * 1e3
+        return f"{error}, limit {limits[0]:g} mm; speed {self.speed * 1e3:.0f} mm/s, limit {limits[1]:g} mm/s"
+
+    def _opening(self, waited: float) -> float:
+        """Factor on both tolerances after that time [s]."""
+        config = self._config
+        return min(max(1.0, (waited / config.align_patience_s) ** 2), config.align_opening_max)
 
     def _averaged(self, now: tuple[float, ...], dt: float) -> tuple[float, float]:
         """Largest averaged error [m] and averaged speed [m/s]; infinite without a guide."""

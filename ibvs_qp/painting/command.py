@@ -68,3 +68,20 @@ class PaintingCommand:
     tilt: np.ndarray = field(default_factory=lambda: ZERO)
     travel: np.ndarray = field(default_factory=lambda: ZERO)
     trim: np.ndarray = field(default_factory=lambda: ZERO)
+
+
+@dataclass(frozen=True, slots=True)
+class ExpectedEdge:
+    """A painted edge that should come into view.
+
+    Attributes:
+        role: "horizontal" or "vertical".
+        offset: Signed distance from the tip's wall point along the normal that points down or right [m].
+        side: Side of the bare surface along that normal, +1 or -1.
+        ahead: Where it is in view beside the brush: +1 to the right or downwards, -1 to the left or upwards.
+    """
+
+    role: str
+    offset: float
+    side: int
+    ahead: int

@@ -4,27 +4,30 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from ibvs_qp.config.settings import setting, validate
+from ibvs_qp.config.derived import Derived
+from ibvs_qp.config.settings import choice, setting, validate
+from ibvs_qp.painting.pattern import CORNERS, FILL, PATTERNS
 
 
 @dataclass(frozen=True, kw_only=True)
 class LineGates:
     """Largest distance of a line from its expected offset, by use of the line."""
 
-    start_m: float = setting(0.15, "guide at start and approach", unit="m", low=0.01, high=1.0)
-    row_m: float = setting(
-        0.018, "guide from row to row", unit="m", why="a quarter of the distance between rows", low=0.002, high=0.2
+    start_m: float = setting(
+        0.7, "board edge that guides stroke 1", unit="m", why="a start 0.5 m away, and a margin", low=0.01, high=2.0
     )
-    mark_m: float = setting(0.06, "right board edge as mark of the start", unit="m", low=0.005, high=0.5)
+    mark_m: float = setting(
+        0.03, "board edge beside the beginning: nearer to its place, it marks it", unit="m", low=0.005, high=0.5
+    )
     first_stop_m: float = setting(
-        0.25, "edge that ends row 1", unit="m", why="its length is nominal", low=0.01, high=2.0
+        0.25, "edge that ends stroke 1", unit="m", why="its length is nominal", low=0.01, high=2.0
     )
     stop_m: float = setting(
-        0.06, "edge that ends a later row", unit="m", why="the odometer has passed both ends", low=0.005, high=0.5
+        0.06, "edge that ends a later stroke", unit="m", why="the odometer has passed both ends", low=0.005, high=0.5
     )
     fresh_lean_deg: float = setting(
-        3.0,
-        "angle between the fresh edge and the board's edge",
+        5.0,
+        "angle to the board's edge up to which a painted edge leads",
         unit="deg",
         why="at 6 deg the short end of a bent stroke rolls the vehicle",
         low=0.5,
@@ -45,9 +48,13 @@ class PaintingConfig:
 
     brush_width_m: float = setting(0.08, "diameter of the brush", unit="m", low=0.02, high=0.3)
     edge_margin_m: float = setting(0.05, "brush centre to the guiding or stopping edge", unit="m", low=0.01, high=0.5)
-    rows: int = setting(2, "number of rows", low=1, high=20)
-    stroke_m: float = setting(1.30, "length of a row", unit="m", low=0.1, high=20.0)
-    overlap_m: float = setting(0.008, "overlap of rows", unit="m", low=0.0, high=0.1)
+    pattern: str = choice("rows", "direction of the strokes", PATTERNS)
+    start: str = choice("bottom-right", "corner of the board at which stroke 1 begins", CORNERS)
+    rows: int | str = setting(
+        2, "number of strokes of either pattern, or as many as the board has place for", low=1, high=20, words=(FILL,)
+    )
+    stroke_m: float = setting(1.30, "length of a stroke", unit="m", low=0.1, high=20.0)
+    overlap_m: float = setting(0.008, "overlap of strokes", unit="m", low=0.0, high=0.1)
     speed_m_s: float = setting(0.10, "painting speed", unit="m/s", low=0.01, high=0.5)
     push_n: float = setting(5.0, "push", unit="N", low=0.5, high=40.0)
     climb_speed_m_s: float = setting(0.05, "speed of a climb", unit="m/s", low=0.005, high=0.3)
@@ -66,6 +73,14 @@ class PaintingConfig:
     )
     gates: LineGates = field(default_factory=LineGates)
 
+    guide_reach_m: float = setting(
+        Derived(0.24),
+        "farthest edge that leads along a stroke, from the tip; a pilot's follows from its camera unless it is stated",
+        unit="m",
+        why="at the wall the picture shows 0.27 m below the tip, and the view barrier must not hold the vehicle back",
+        low=0.02,
+        high=2.0,
+    )
     align_error_m: float = setting(0.003, "line error that counts as aligned", unit="m", low=0.0005, high=0.05)
     align_speed_m_s: float = setting(0.005, "speed that counts as still", unit="m/s", low=0.001, high=0.1)
     align_time_s: float = setting(0.3, "aligned this long", unit="s", low=0.0, high=10.0)
@@ -90,12 +105,38 @@ class PaintingConfig:
     stop_timeout_s: float = setting(
         0.8, "longest time of a stop", unit="s", why="stiction may hold the last millimetres", low=0.1, high=10.0
     )
-    overrun_m: float = setting(
-        0.10, "farthest that row 1 runs past its length in search of its end", unit="m", low=0.0, high=1.0
+    start_look_s: float = setting(
+        2.0, "time without a guide before the vehicle steps back for a wider view", unit="s", low=0.0, high=60.0
+    )
+    wide_view_m: float = setting(
+        1.2, "tip to wall where it stops stepping back", unit="m", why="sees 0.5 m around the tip", low=0.1, high=5.0
+    )
+    survey_speed_m_s: float = setting(
+        0.15, "speed of a move along the wall in free flight", unit="m/s", low=0.01, high=1.0
+    )
+    search_standoff_m: float = setting(
+        0.15, "tip to wall while a lost edge is searched", unit="m", why="sees what the brush hides", low=0.02, high=1.0
+    )
+    search_back_m: float = setting(0.15, "way back along the last stroke for that search", unit="m", low=0.0, high=1.0)
+    least_certainty_m: float = setting(
+        0.003,
+        "three standard deviations of a stroke's place that are certain at any overlap",
+        unit="m",
+        why="half of 8 mm is reached without help; no edge is known better than to 1 mm",
+        low=0.0005,
+        high=0.05,
     )
     climb_error_m: float = setting(0.004, "error of the guide that ends a climb", unit="m", low=0.0005, high=0.05)
     climb_time_s: float = setting(0.3, "least time at the end of a climb", unit="s", low=0.0, high=5.0)
     climb_timeout_s: float = setting(1.0, "longest time for that error", unit="s", low=0.0, high=10.0)
+    climb_stuck_m: float = setting(
+        0.008,
+        "error after that time from which the stroke begins; beyond it the brush leaves the wall and touches again",
+        unit="m",
+        why="friction holds the tip; a band that much too far still touches the last one",
+        low=0.0005,
+        high=0.05,
+    )
     fresh_edge_timeout_s: float = setting(
         2.0, "longest search for the fresh edge after a climb", unit="s", low=0.0, high=20.0
     )
@@ -104,7 +145,11 @@ class PaintingConfig:
         0.15, "speed of that descent", unit="m/s", why="slow: nothing measures the height", low=0.01, high=1.0
     )
     timeout_s: float = setting(
-        15.0, "longest start, approach, align, press, climb or retreat", unit="s", low=1.0, high=300.0
+        15.0,
+        "longest start, approach, align, press, climb or retreat, beside the time of its way",
+        unit="s",
+        low=1.0,
+        high=300.0,
     )
 
     def __post_init__(self) -> None:
@@ -115,8 +160,3 @@ class PaintingConfig:
     def pitch_m(self) -> float:
         """Distance between rows [m]."""
         return self.brush_width_m - self.overlap_m
-
-    @property
-    def fresh_edge_m(self) -> float:
-        """Upper edge of the last row below the brush centre of the present row [m]."""
-        return self.pitch_m - 0.5 * self.brush_width_m

@@ -1,7 +1,8 @@
-"""The painting strategy: start, approach, align, press, paint and climb row by row, retreat, done.
+"""The painting strategy: start, survey, approach, align, press, paint and climb stroke by stroke, retreat, done.
 
-Offsets are in metres from the tip's wall point (`TrackedLine`). The guide of a row: `ibvs_qp.painting.guide_line`; the
-end of a stroke: `ibvs_qp.painting.stroke_end`; time-outs and failure: `ibvs_qp.painting.phase_machine`.
+Everything is in pattern coordinates (u along the strokes, v across; `ibvs_qp.painting.pattern`). Where the tip is:
+`cross_track` and `along_track`; lines that lead there: `carrier`; time-outs and failure: `phase_machine`. A "climb" is
+the step from stroke to stroke, in whatever direction.
 """
 
 from __future__ import annotations
@@ -10,183 +11,430 @@ import math
 
 import numpy as np
 
-from ibvs_qp.estimation.wall_motion import TrackedLine
-from ibvs_qp.measurement import VERTICAL
+from ibvs_qp.measurement import HORIZONTAL
 from ibvs_qp.painting.alignment import Alignment
-from ibvs_qp.painting.command import ZERO, PainterInput, PaintingCommand
+from ibvs_qp.painting.along_track import AlongTrack
+from ibvs_qp.painting.carrier import Carrier
+from ibvs_qp.painting.command import ZERO, ExpectedEdge, PainterInput, PaintingCommand
 from ibvs_qp.painting.config import PaintingConfig
-from ibvs_qp.painting.guide_line import GuideLine
-from ibvs_qp.painting.line_choice import CERTAIN_WEIGHT, VISIBLE_WEIGHT, bottom_edge, start_mark
+from ibvs_qp.painting.cross_track import LOOK_S, CrossTrack
+from ibvs_qp.painting.pattern import FILL, FILL_REST_M, Pattern
+from ibvs_qp.painting.pattern_lines import CERTAIN_WEIGHT, PatternLine, pattern_lines
 from ibvs_qp.painting.phase_machine import PhaseMachine
-from ibvs_qp.painting.speed import climb_speed, clipped, ramped, stroke_speed
-from ibvs_qp.painting.stroke_end import STOP_DISTANCE, StrokeEnd, travel_of
+from ibvs_qp.painting.speed import approached, climb_speed, clipped, ramped, stroke_speed
+from ibvs_qp.painting.stroke_end import StrokeEnd
 
 #: Difference from the stand-off and from the retreat distance at which these phases end [m].
 STANDOFF_REACHED, RETREAT_REACHED = 0.01, 0.02
 #: Least push to which the relative error of a press refers [N].
 PRESS_REFERENCE_MIN = 1.0
+#: Distance from the beginning of stroke 1 within which the vehicle approaches the wall while it moves there [m].
+NEAR_BEGINNING_M = 0.06
+#: Least mean speed towards the wall, by which an approach is given its time [m/s].
+APPROACH_SPEED = 0.05
+#: A stroke that ends without an edge is as long as asked if u is known this well [m]; half the tolerance of a length.
+CERTAIN_LENGTH_M = 0.005
 
 
 class Painter(PhaseMachine):
-    """Paints the rows of a job; `step` returns the command of the tick.
+    """Paints the strokes of a job; `step` returns the command of the tick.
 
     Attributes:
-        row: Row in progress from 1, 0 before the first stroke.
+        row: Stroke in progress from 1, 0 before the first one.
     """
 
     _SLIDES = True  # whether a stroke follows the press
     _COMPLETED = "all rows painted, retreated"
 
     def __init__(self, config: PaintingConfig) -> None:
-        self._travel = np.array((-config.speed_m_s, 0.0))
-        self._travel.flags.writeable = False  # one array for all commands
+        self.pattern = Pattern(config.pattern, config.start)
         super().__init__(config)
 
     def reset(self) -> None:
         """As after construction."""
         super().reset()
         self.row = 0
-        self._guide, self._stroke_end = GuideLine(self.config), StrokeEnd(self.config)
-        self._alignment = Alignment(self.config)
-        self._speed = self._climbed = 0.0
+        self._cross, self._along = CrossTrack(self.config), AlongTrack(self.config)
+        self._across_line, self._along_line = Carrier(), Carrier()
+        self._alignment, self._stroke_end = Alignment(self.config), StrokeEnd(self.config)
+        self._lines: list[PatternLine] = []
+        self._odometer: tuple[float, float] | None = None
+        self._looked = -math.inf
+        self._u_reference = self._v_reference = 0.0  # where the tip should be now [m]
+        self._v_target = self.config.edge_margin_m  # where the stroke in progress belongs [m]
+        self._speed = 0.0
         self._since = math.nan  # time of the touch in press, and of the arrival in climb [s]
-        self._anchor = 0.0  # odometer to hold [m]: at first where the tip was before the vehicle turned to the wall
-        self._paused = False
+        self._standoff = math.nan
+        self._waypoints: list[tuple[float, float]] = []
+        self._uncertain = ""  # why the job is not what was asked, although it was flown to its end
+        self._paused = self._follows_end = False
+
+    # -------------------------------------------------------------- navigation
+
+    def step(self, inputs: PainterInput) -> PaintingCommand:
+        """Advance by one tick."""
+        dt = 0.0 if math.isnan(self._last_time) else inputs.time_s - self._last_time
+        self._navigate(inputs, dt)
+        return super().step(inputs)
+
+    def _navigate(self, inputs: PainterInput, dt: float) -> None:
+        """Move both coordinates by the odometer and correct them with the lines in view."""
+        cross, along = self._cross, self._along
+        odometer = float(inputs.odometer[0]), float(inputs.odometer[1])
+        before, self._odometer = self._odometer or odometer, odometer
+        du, dv = self._turned(*self.pattern.to_pattern(odometer[0] - before[0], odometer[1] - before[1]), -cross.turn)
+        cross.predict(du, dv, dt)
+        along.predict(du)
+        self._lines = lines = pattern_lines(inputs.lines.values(), self.pattern, cross.turn)
+        if self.phase == "paint" and inputs.in_contact:
+            cross.lay(along.u)
+        if inputs.time_s - self._looked >= LOOK_S and self.phase != "start":
+            self._looked = inputs.time_s
+            cross.look(lines, along.u, self._view_direction())
+            if along.known and (noticed := along.look(lines)):
+                self.log.append((inputs.time_s, "edge", noticed))
+        if self._across_line.update(lines, self._guides()) and self.phase != "start":
+            line = self._across_line.line
+            assert line is not None
+            text = f"track {line.track.track_id} at {line.track.offset * 1e3:+.1f} mm"
+            self.log.append((inputs.time_s, "guide", text))
+        self._along_line.update(lines, self._upright_tracks())
+
+    def _upright_tracks(self) -> tuple[int, ...]:
+        """Tracks of the edge beside the place to which the tip moves; another one may leave the picture on the way."""
+        if self.phase == "survey":
+            return ()
+        goal = self._stroke_goal() if self.phase == "paint" else self._stroke_begin()
+        return (self._along.end,) if goal > 0.0 else (self._along.near,)
+
+    def _guides(self) -> tuple[int, ...]:
+        """Tracks of the edges along the strokes, best first; at the wall, those that stay in the picture."""
+        cross, reach = self._cross, self.config.guide_reach_m
+        if self.phase not in ("paint", "climb"):
+            return tuple(cross.guides)
+        return tuple([track for track, v in cross.guides.items() if abs(v - self._v_target) < reach])
+
+    def _view_direction(self) -> float:
+        """Direction along u in which the last stroke's edge is in view, not under the brush."""
+        return self.pattern.travel(max(self.row, 1))
+
+    @staticmethod
+    def _turned(u: float, v: float, angle: float) -> tuple[float, float]:
+        c, s = math.cos(angle), math.sin(angle)
+        return c * u - s * v, s * u + c * v
 
     def _enter(self, inputs: PainterInput, phase: str, reason: str) -> None:
         super()._enter(inputs, phase, reason)
         self._since = math.nan
+        if phase == "approach":
+            u, v = self._stroke_begin() - self._along.u, self._v_target - self._cross.v
+            self._way_s = abs(u) / self.config.survey_speed_m_s + abs(v) / self.config.climb_speed_m_s
+            self._way_s += inputs.distance / APPROACH_SPEED
+
+    def _waits_for(self, inputs: PainterInput) -> str:
+        config, phase = self.config, self.phase
+        if phase == "start":
+            missing = [("wall", inputs.wall_known), ("tare of the force sensor", inputs.tared)]
+            return ", ".join(
+                [name for name, there in missing if not there] or ["the board's edge that guides stroke 1"]
+            )
+        if phase == "approach":
+            u, v = self._stroke_begin() - self._along.u, self._v_target - self._cross.v
+            place = max(abs(u), abs(v))
+            if place > NEAR_BEGINNING_M:
+                return f"the beginning, {place * 1e3:.0f} mm away, limit {NEAR_BEGINNING_M * 1e3:.0f} mm"
+            return f"stand-off {inputs.distance:.3f} m, goal {config.standoff_m:g} m within {STANDOFF_REACHED:g} m"
+        if phase == "align":
+            return self._alignment.state(inputs.time_s - self.entered)
+        if phase == "press" and inputs.in_contact:
+            within = config.press_error * max(inputs.push_reference, PRESS_REFERENCE_MIN)
+            return f"push {inputs.push:.2f} N, commanded {inputs.push_reference:.2f} N, limit {within:.2f} N"
+        if phase in ("press", "climb") and not inputs.in_contact:
+            return f"contact, tip {inputs.distance * 1e3:.0f} mm from the wall"
+        if phase == "climb":
+            return f"place {(self._v_target - self._cross.v) * 1e3:+.0f} mm, limit {config.climb_error_m * 1e3:g} mm"
+        return f"distance {inputs.distance:.2f} m, goal {config.retreat_m:g} m"
 
     # ------------------------------------------------------------------ phases
 
     def _start(self, inputs: PainterInput, dt: float) -> PaintingCommand:
+        """Wait for wall, tare and guide; step back for a wider view while no guide is in sight."""
         config = self.config
-        guide = bottom_edge(inputs.lines.values(), config.edge_margin_m, config.gates.start_m)
-        if guide is not None and inputs.wall_known and inputs.tared:
-            if guide.weight > CERTAIN_WEIGHT and guide.deviation < config.gates.start_deviation_m:
-                self._guide.take(guide, config.edge_margin_m)
-                found = f"guide {guide.offset * 1e3:+.0f} mm below the tip, wall known, wrench tared"
-                self._enter(inputs, "approach", found)
-        distance = inputs.distance if inputs.wall_known else config.retreat_m
-        return self._command(inputs, contact=False, standoff=max(distance, config.standoff_m), guided=False)
+        if not inputs.wall_known:
+            return self._command(inputs, contact=False, standoff=config.retreat_m, guided=False)
+        if math.isnan(self._standoff):
+            self._standoff = max(inputs.distance, config.standoff_m)
+        guide = self._starting_guide()
+        if guide is not None and inputs.tared:
+            self._cross.start(guide)
+            self._v_reference = self._cross.v
+            found = f"guide {guide.track.offset * 1e3:+.0f} mm from the tip, wall known, wrench tared"
+            self._begin_job(inputs, found)
+        elif guide is None and inputs.time_s - self.entered > config.start_look_s:
+            widest = max(config.wide_view_m, self._standoff)
+            self._standoff = approached(self._standoff, widest, config.survey_speed_m_s * dt)
+        return self._command(inputs, contact=False, standoff=self._standoff, guided=False)
+
+    def _starting_guide(self) -> PatternLine | None:
+        """The board's edge at which the pattern starts, with the surface on its inner side."""
+        expected, gates = -self.config.edge_margin_m, self.config.gates
+        found = [line for line in self._lines if line.parallel and line.kind != "paint" and line.side >= 0]
+        found = [line for line in found if abs(line.place - expected) < gates.start_m]
+        guide = min(found, key=lambda line: abs(line.place - expected), default=None)
+        if guide is None or guide.weight <= CERTAIN_WEIGHT or guide.track.deviation >= gates.start_deviation_m:
+            return None
+        return guide
+
+    def _begin_job(self, inputs: PainterInput, found: str) -> None:
+        """Where stroke 1 begins: by its end if that is in view, at the margin from the edge beside, or by a survey."""
+        if self._along.find_end(self._lines):
+            self._enter(inputs, "approach", f"{found}, stroke 1 begins by the edge at its end")
+        elif (mark := self._starting_mark()) is not None:
+            self._along.start_at(mark)
+            self._enter(inputs, "approach", f"{found}, stroke 1 begins at the margin")
+        else:
+            self._along.start_here()
+            self._enter(inputs, "survey", f"{found}, stroke 1 begins where the edge at its end says")
+        self._u_reference = self._along.u
+
+    def _starting_mark(self) -> PatternLine | None:
+        """The board's edge beside the beginning of stroke 1, if the tip is at the margin from it."""
+        margin = self.config.edge_margin_m
+        beside = [line for line in self._lines if not line.parallel and line.kind != "paint" and line.side >= 0]
+        mark = min(beside, key=lambda line: abs(line.place + margin), default=None)
+        if mark is None or mark.weight <= CERTAIN_WEIGHT or abs(mark.place + margin) >= self.config.gates.mark_m:
+            return None
+        return mark
+
+    def _survey(self, inputs: PainterInput, dt: float) -> PaintingCommand:
+        """Fly along stroke 1 until the edge at its end is in view."""
+        config = self.config
+        if self._along.find_end(self._lines):
+            self._u_reference = self._along.u
+            self._speed = 0.0
+            beginning = f"stroke 1 begins {-self._along.u * 1e3:+.0f} mm from here"
+            self._enter(inputs, "approach", f"edge at the end of stroke 1 found, {beginning}")
+        elif self._along.u > config.stroke_m + config.gates.first_stop_m:
+            self._speed = 0.0
+            self._uncertain = "no edge at the end of stroke 1"
+            self._enter(inputs, "approach", "no edge at the end of stroke 1: it begins where the vehicle started")
+        else:
+            self._speed = ramped(self._speed, config.survey_speed_m_s, config.acceleration_m_s2 * dt)
+            self._u_reference += self._speed * dt
+        self._climb_to(config.edge_margin_m, dt)
+        return self._command(inputs, contact=False, standoff=self._standoff, along=self._speed, hold=True)
 
     def _approach(self, inputs: PainterInput, dt: float) -> PaintingCommand:
+        """Move to the beginning of the stroke; then to the stand-off."""
         config = self.config
-        self._follow_guide(inputs, config.gates.start_m)
-        if abs(inputs.distance - config.standoff_m) < STANDOFF_REACHED:
+        u_target = self._stroke_begin()
+        u_speed, v_speed = self._move_to(u_target, self._v_target, dt)
+        far = max(abs(u_target - self._along.u), abs(self._v_target - self._cross.v)) > NEAR_BEGINNING_M
+        standoff = self._standoff if far else config.standoff_m
+        if not far and abs(inputs.distance - config.standoff_m) < STANDOFF_REACHED:
             self._enter(inputs, "align", f"stand-off {inputs.distance * 1e3:.0f} mm reached")
-        return self._command(inputs, contact=False, standoff=config.standoff_m, hold=True, mark=True)
+        return self._command(inputs, contact=False, standoff=standoff, along=u_speed, climb=v_speed, hold=True)
 
     def _align(self, inputs: PainterInput, dt: float) -> PaintingCommand:
-        config = self.config
-        self._follow_guide(inputs, config.gates.row_m)
-        line, mark = self._guide.line(inputs), self._start_mark(inputs)
-        high = math.inf if line is None else line.offset - self._guide.target
-        aside = 0.0 if mark is None else mark.offset - config.edge_margin_m
+        self._move_to(self._stroke_begin(), self._v_target, dt)
+        high = math.inf if self._across_line.line is None else self._v_target - self._cross.v
+        aside = self._stroke_begin() - self._along.u
         if self._alignment.is_reached(inputs, (high, aside), self.entered, dt):
-            self._stroke_end.right_margin = mark.offset if mark is not None else None
-            self._anchor = float(inputs.odometer[0])
             self._enter(inputs, "press", f"aligned within {self._alignment.error * 1e3:.1f} mm")
-        return self._command(inputs, contact=False, standoff=config.standoff_m, hold=True, mark=True)
+        return self._command(inputs, contact=False, standoff=self.config.standoff_m, hold=True)
 
     def _press(self, inputs: PainterInput, dt: float) -> PaintingCommand:
         config = self.config
-        self._follow_guide(inputs, config.gates.row_m)
         self._hold_touch_point(inputs)
         if inputs.in_contact and inputs.time_since_touch > config.press_time_s:
             tolerance = config.press_error * max(inputs.push_reference, PRESS_REFERENCE_MIN)
             if abs(inputs.push - inputs.push_reference) < tolerance:
-                self.row = 1
-                self._begin_row(inputs, f"push {inputs.push:.1f} N reached")
-        return self._command(inputs, contact=True, hold=True, mark=True)
+                self._begin_stroke(inputs, max(self.row, 1), f"push {inputs.push:.1f} N reached")
+        return self._command(inputs, contact=True, hold=True)
 
     def _paint(self, inputs: PainterInput, dt: float) -> PaintingCommand:
-        config, travel = self.config, travel_of(self.row)
+        config, travel = self.config, self.pattern.travel(self.row)
         late = inputs.time_s - self.entered > config.timeout_s + 2.0 * config.stroke_m / config.speed_m_s
         if late:
             self._speed = 0.0
             self._fail(inputs, f"time-out in row {self.row}")
-        self._follow_guide(inputs, config.gates.row_m)
-        self._guide.slide(self.row, dt)
-        if self.row == 1:
-            self._guide.tip.look(inputs, dt)
-        remaining, edge = self._stroke_end.remaining(inputs, self.row)
+        self._v_reference = self._slid(self._v_reference, self._v_target, dt)
+        remaining = travel * (self._stroke_goal() - self._along.u)
         self._pause_without_contact(inputs)
         target = 0.0 if self._paused else stroke_speed(config, remaining)
         self._speed = ramped(self._speed, target, config.acceleration_m_s2 * dt)
-        if remaining <= STOP_DISTANCE:
+        ended = self._stroke_end.is_near(remaining)
+        if ended:
             self._speed = 0.0
+        self._lead_to_end(ended, travel * self._speed * dt)
         if not late and self._stroke_end.is_reached(inputs, remaining):
-            self._end_row(inputs, edge)
-        along = travel * self._speed
-        return self._command(inputs, contact=True, along=along, edge=edge, edge_rate=-along * dt)
+            self._end_stroke(inputs)
+        return self._command(inputs, contact=True, along=travel * self._speed, edge=self._follows_end)
 
     def _climb(self, inputs: PainterInput, dt: float) -> PaintingCommand:
-        config, edge = self.config, self._stroke_end.beside_climb(inputs, self.row - 1)
+        config = self.config
         self._pause_without_contact(inputs)
-        left = config.pitch_m - self._climbed
+        self._v_target = self._place(self.row)  # the far edge may come into view
+        left = self._v_target - self._v_reference
         target = 0.0 if self._paused else climb_speed(config, left)
         self._speed = ramped(self._speed, target, config.acceleration_m_s2 * dt)
-        move = min(self._speed * dt, max(left, 0.0))
-        self._climbed += move
-        self._guide.target += move
+        self._v_reference += min(self._speed * dt, max(left, 0.0))
         if left <= 0.0:
-            self._speed = 0.0
-            if self._climb_settled(inputs):
-                edge = None
-        return self._command(inputs, contact=True, climb=self._speed, edge=edge, hold=edge is None)
+            self._speed, self._v_reference = 0.0, self._v_target
+            self._climb_settled(inputs)
+        return self._command(inputs, contact=True, climb=self._speed, hold=True)
+
+    def _search(self, inputs: PainterInput, dt: float) -> PaintingCommand:
+        """Off the wall, along the last stroke and across it, until its edge is recognised."""
+        config = self.config
+        if self._is_certain() and self._across_line.line is not None and inputs.time_s - self.entered > 1.0:
+            self._waypoints = []
+            self._enter(inputs, "approach", f"edge for stroke {self.row} found")
+            return self._command(inputs, contact=False, standoff=config.standoff_m, hold=True)
+        if not self._waypoints:
+            self._fail(inputs, f"stroke {self.row}: the edge of stroke {self.row - 1} was not found")
+        else:
+            u, v = self._waypoints[0]
+            self._move_to(u, v, dt)
+            if abs(self._u_reference - u) + abs(self._v_reference - v) < 1e-9 and self._waited(inputs, 1.0):
+                self._waypoints.pop(0)
+                self._since = math.nan
+        return self._command(inputs, contact=False, standoff=config.search_standoff_m, hold=True)
 
     def _retreat(self, inputs: PainterInput, dt: float) -> PaintingCommand:
         if self._given_up:
             return self._descend(inputs)
         if inputs.distance > self.config.retreat_m - RETREAT_REACHED and not inputs.in_contact:
+            if self._uncertain and not self.failed:
+                self.failed, self.reason = True, self._uncertain
             self._end(inputs, self.reason if self.failed else self._COMPLETED)
         return self._command(inputs, contact=False, standoff=self.config.retreat_m, hold=True)
 
     def _done(self, inputs: PainterInput, dt: float) -> PaintingCommand:
         return self._command(inputs, contact=False, standoff=self.config.retreat_m, guided=False)
 
-    # -------------------------------------------------------------------- rows
+    # ----------------------------------------------------------------- strokes
 
-    def _begin_row(self, inputs: PainterInput, reason: str) -> None:
-        self._speed = 0.0
-        self._stroke_end.begin_row(self.row, inputs)
+    def _stroke_begin(self) -> float:
+        """Where the stroke in progress, or the first one, begins, u [m]."""
+        return 0.0 if self.pattern.travel(max(self.row, 1)) > 0.0 else self.config.stroke_m
+
+    def _stroke_goal(self) -> float:
+        """Where the stroke in progress ends, u [m]."""
+        return self.config.stroke_m if self.pattern.travel(self.row) > 0.0 else 0.0
+
+    def _place(self, stroke: int) -> float:
+        """Nominal v of a stroke [m]; the last one of a filling job keeps the margin to the board's other edge."""
+        config = self.config
+        nominal = config.edge_margin_m + (stroke - 1) * config.pitch_m
+        if config.rows == FILL and not math.isnan(self._cross.far_edge):
+            last = self._cross.far_edge - config.edge_margin_m
+            return last if last < nominal + FILL_REST_M else nominal
+        return nominal
+
+    def _is_last(self) -> bool:
+        config = self.config
+        if config.rows != FILL:
+            return self.row >= int(config.rows)
+        rest = self._cross.far_edge - config.edge_margin_m - self._v_target
+        return not math.isnan(rest) and rest <= FILL_REST_M
+
+    def _begin_stroke(self, inputs: PainterInput, stroke: int, reason: str) -> None:
+        self.row, self._speed, self._follows_end = stroke, 0.0, False
+        self._cross.begin_stroke()
+        self._stroke_end.begin()
+        self._u_reference, self._v_reference = (
+            self._along.u,
+            self._cross.v,
+        )  # friction may hold the tip beside its place
         self._enter(inputs, "paint", f"row {self.row}: {reason}")
 
-    def _end_row(self, inputs: PainterInput, edge: TrackedLine | None) -> None:
-        self._stroke_end.end_row(self.row, inputs)
-        how = "by the odometer" if edge is None else f"at {edge.kind or 'unknown'} edge {edge.offset * 1e3:+.0f} mm"
-        if self.row >= self.config.rows:
-            self._enter(inputs, "retreat", f"row {self.row} ended {how}; all rows done")
+    def _end_stroke(self, inputs: PainterInput) -> None:
+        self._cross.end_stroke()
+        edge = self._along_line.line
+        how = "by the odometer"
+        if edge is not None:
+            how = f"at {edge.kind or 'unknown'} edge {edge.track.offset * 1e3:+.0f} mm"
+        elif self._along.deviation > CERTAIN_LENGTH_M and not self._uncertain:
+            known = f"its length is known to {self._along.deviation * 1e3:.0f} mm"
+            self._uncertain = f"row {self.row} ended by the odometer, {known}"
+        ended = f"row {self.row} ended {how}"
+        if self._is_last():
+            self._enter(inputs, "retreat", f"{ended}; all rows done")
             return
         self.row += 1
-        self._climbed, self._speed = 0.0, 0.0
-        self._anchor = float(inputs.odometer[0])
-        self._enter(inputs, "climb", f"row {self.row - 1} ended {how}")
+        self._speed, self._u_reference = 0.0, self._along.u
+        self._enter(inputs, "climb", ended)
 
-    def _climb_settled(self, inputs: PainterInput) -> bool:
-        """Begin the next row once the fresh edge is found, or was searched for too long; True when it begins."""
+    def _lead_to_end(self, ended: bool, moved: float) -> None:
+        """Once the edge at the end of the stroke is in view, it leads: from where the tip is, at the stroke's speed."""
+        if self._along_line.line is None:
+            self._follows_end = False
+            return
+        if not self._follows_end:
+            self._follows_end, self._u_reference = True, self._along.u
+        self._u_reference += moved
+        goal, travel = self._stroke_goal(), self.pattern.travel(self.row)
+        if ended or travel * (goal - self._u_reference) < 0.0:
+            self._u_reference = goal
+
+    def _climb_settled(self, inputs: PainterInput) -> None:
+        """Begin the stroke at its place once it is known well enough; search for its edge if it stays unknown."""
         config = self.config
+        if not self._waited(inputs, config.climb_time_s):
+            return
+        error, waited = self._v_target - self._cross.v, inputs.time_s - self._since
+        if not self._is_certain():
+            if waited > config.fresh_edge_timeout_s:
+                self._begin_search(inputs)
+            return
+        if abs(error) < (config.climb_error_m if waited < config.climb_timeout_s else config.climb_stuck_m):
+            guide = "no edge in view" if self._across_line.line is None else f"by {self._across_line.line.kind} edge"
+            known = f"known to {self._cross.deviation * 1e3:.1f} mm"
+            self._begin_stroke(inputs, self.row, f"climbed to {self._v_target * 1e3:.0f} mm, {guide}, {known}")
+        elif waited > config.climb_timeout_s:
+            self._begin_search(inputs, f"{error * 1e3:+.0f} mm from its place of {config.climb_stuck_m * 1e3:g} mm")
+
+    def _is_certain(self) -> bool:
+        """Whether three standard deviations of the place fit into half the overlap."""
+        config = self.config
+        return 3.0 * self._cross.deviation < max(0.5 * config.overlap_m, config.least_certainty_m)
+
+    def _begin_search(self, inputs: PainterInput, why: str = "its edge is not in view") -> None:
+        config, begin = self.config, self._stroke_begin()
+        back = begin + self._view_direction() * config.search_back_m
+        pitch, v = config.pitch_m, self._v_target
+        steps = (0.0, -1.0, 1.0, -2.0, 2.0)
+        self._waypoints = [(begin, v)] + [(back, v + step * pitch) for step in steps]
+        self._standoff = config.search_standoff_m
+        self._enter(inputs, "search", f"row {self.row}: {why}")
+
+    # ---------------------------------------------------------------- movement
+
+    def _waited(self, inputs: PainterInput, seconds: float) -> bool:
+        """Whether that much time has passed since this was first called in the phase."""
         self._since = inputs.time_s if math.isnan(self._since) else self._since
-        waited = inputs.time_s - self._since
-        # An old guide near the border of the picture holds the vehicle back (`limits.view`): all lines are displaced.
-        fresh = self._guide.fresh(inputs, self._guide.displacement(inputs))
-        if fresh is not None and fresh.weight <= CERTAIN_WEIGHT:
-            fresh = None
-        found = fresh is not None or waited > config.fresh_edge_timeout_s
-        near = self._guide.error(inputs) < config.climb_error_m or waited > config.climb_timeout_s
-        if not (waited > config.climb_time_s and found and near):
-            return False
-        if fresh is not None:
-            self._guide.take(fresh, fresh.offset)
-        why = "no fresh edge; the old guide stays" if fresh is None else "fresh edge found"
-        self._begin_row(inputs, f"climbed {self._climbed * 1e3:.0f} mm, {why}")
-        return True
+        return inputs.time_s - self._since > seconds
+
+    def _move_to(self, u: float, v: float, dt: float) -> tuple[float, float]:
+        """Move both references towards a place off the wall; returns their speeds [m/s]."""
+        config, last = self.config, (self._u_reference, self._v_reference)
+        self._u_reference = approached(last[0], u, config.survey_speed_m_s * dt)
+        self._climb_to(v, dt)
+        if dt <= 0.0:
+            return 0.0, 0.0
+        return (self._u_reference - last[0]) / dt, (self._v_reference - last[1]) / dt
+
+    def _climb_to(self, v: float, dt: float) -> None:
+        self._v_reference = approached(self._v_reference, v, self.config.climb_speed_m_s * dt)
+
+    def _slid(self, now: float, target: float, dt: float) -> float:
+        return approached(now, target, self.config.guide_slide_m_s * dt)
 
     def _hold_touch_point(self, inputs: PainterInput) -> None:
         """Hold the point of the touch: friction holds the tip there, and another target would command a slide."""
         if inputs.in_contact and math.isnan(self._since):
-            self._since, self._anchor = inputs.time_s, float(inputs.odometer[0])
+            self._since, self._u_reference = inputs.time_s, self._along.u
 
     def _pause_without_contact(self, inputs: PainterInput) -> None:
         if not inputs.in_contact and not self._paused:
@@ -198,31 +446,18 @@ class Painter(PhaseMachine):
 
     # ------------------------------------------------------------------- lines
 
-    def expected_fresh_edge(self, lines: dict[int, TrackedLine]) -> tuple[float, float] | None:
-        """Expected offset [m] of the last row's upper edge while it is not followed, and its side (+1 right, -1 left).
-
-        It is visible only ahead of the brush, on the side of the coming travel.
-        """
-        if self.row < 2 or self.phase not in ("climb", "paint"):
+    def expected_edge(self) -> ExpectedEdge | None:
+        """The last stroke's outer edge where it should come into view; perception looks there."""
+        if self.row < 2 or self.phase not in ("climb", "paint", "search"):
             return None
-        line = lines.get(self._guide.identity)
-        followed = line is not None and line.weight > VISIBLE_WEIGHT and line.kind == "paint"
-        if followed and self.phase == "paint":
-            return None
-        left = self.config.pitch_m - self._climbed if self.phase == "climb" else 0.0
-        return self._guide.fresh_offset - left, travel_of(self.row)
-
-    def _start_mark(self, inputs: PainterInput) -> TrackedLine | None:
-        return start_mark(inputs.lines.values(), self.config.edge_margin_m, self.config.gates.mark_m)
-
-    def _follow_guide(self, inputs: PainterInput, gate: float) -> None:
-        """Follow the guide, or choose another line within a gate [m]."""
-        if self.row < 2:
-            new = self._guide.follow_board(inputs, gate, first_row=self.row == 1)
-        else:
-            new = self._guide.follow_row(inputs, self.row)
-        if new is not None:
-            self.log.append((inputs.time_s, "guide", f"track {new.track_id} at {new.offset * 1e3:+.1f} mm"))
+        pattern, cross = self.pattern, self._cross
+        ahead, across = pattern.along, pattern.across
+        travel = pattern.travel(self.row)
+        last = self._place(self.row - 1) + 0.5 * self.config.brush_width_m
+        place = last - cross.v - cross.tip_error
+        sign = across[1] if pattern.guide_role == HORIZONTAL else across[0]
+        direction = ahead[0] if pattern.guide_role == HORIZONTAL else ahead[1]
+        return ExpectedEdge(role=pattern.guide_role, offset=place * sign, side=int(sign), ahead=int(travel * direction))
 
     # ----------------------------------------------------------------- command
 
@@ -234,33 +469,36 @@ class Painter(PhaseMachine):
         standoff: float = 0.0,
         guided: bool = True,
         hold: bool = False,
-        mark: bool = False,
         along: float = 0.0,
         climb: float = 0.0,
-        edge: TrackedLine | None = None,
-        edge_rate: float = 0.0,
+        edge: bool = False,
     ) -> PaintingCommand:
         """Command of the tick.
 
-        ``hold`` holds the position on the odometer where no upright line is followed, ``mark`` follows the start mark;
-        ``along`` and ``climb`` are speeds along the guide to the right and across it upwards [m/s], ``edge`` ends the
-        row and ``edge_rate`` is the change of its target since the last tick [m].
+        ``along`` and ``climb`` are speeds along u and v [m/s]; ``hold`` holds u at its reference, ``edge`` leads the
+        tip there by the edge at the end of the stroke. Without a line in view, the odometer holds.
         """
-        config, guides, right, slope = self.config, [], 0.0, 0.0
-        line = self._guide.line(inputs) if guided else None
-        if line is not None:
-            guides.append((line, self._guide.target))
-            slope = line.angle - 0.5 * math.pi
-        start = self._start_mark(inputs) if mark else None
-        if start is not None:
-            guides.append((start, config.edge_margin_m))
-        if edge is not None and edge.weight > 0.0:
-            climbs = self.phase == "climb"  # beside the edge at which the row before ended
-            guides.append((edge, self._stroke_end.reference(edge, edge_rate, self.row - climbs, reached=climbs)))
-        if hold and not any([guide.role == VERTICAL for guide, _ in guides]):
-            error = self._anchor - inputs.odometer[0]
-            right = clipped(config.hold_gain * error, -config.hold_speed_m_s, config.hold_speed_m_s)
-        c, s = math.cos(slope), math.sin(slope)
-        velocity = np.array((right + along * c + climb * s, along * s - climb * c))
-        travel = self._travel if contact and self._SLIDES else ZERO
+        config, guides, u, v = self.config, [], along, climb
+        if guided:
+            error = self._v_reference - self._cross.v
+            if (line := self._across_line.line) is not None:
+                guides.append((line.track, self._across_line.offset(error)))
+            else:
+                v += self._held(error)
+        if hold or edge:
+            error = self._u_reference - self._along.u
+            if (line := self._along_line.line) is not None:
+                guides.append((line.track, self._along_line.offset(error)))
+            elif hold:
+                u += self._held(error)
+        u, v = self._turned(u, v, self._cross.turn)
+        travel = ZERO
+        if contact and self._SLIDES:
+            way = config.speed_m_s * self.pattern.travel(max(self.row, 1))
+            travel = np.array(self.pattern.to_wall(way, 0.0))
+        velocity = np.array(self.pattern.to_wall(u, v))
         return PaintingCommand(contact, standoff, velocity, guides, config.push_n, ZERO, travel)
+
+    def _held(self, error: float) -> float:
+        """Speed that holds a place by the odometer [m/s]."""
+        return clipped(self.config.hold_gain * error, -self.config.hold_speed_m_s, self.config.hold_speed_m_s)

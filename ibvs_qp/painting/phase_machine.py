@@ -23,7 +23,7 @@ class PhaseMachine:
     """
 
     #: Phases without the common time-out.
-    _UNTIMED = ("paint", "done")
+    _UNTIMED = ("paint", "survey", "search", "done")
 
     def __init__(self, config: PaintingConfig) -> None:
         self.config = config
@@ -36,12 +36,13 @@ class PhaseMachine:
         self.finished = self.failed = self._given_up = False
         self.reason = ""
         self._last_time = math.nan
+        self._way_s = 0.0  # time of the way in this phase, beside the time-out [s]
 
     def step(self, inputs: PainterInput) -> PaintingCommand:
         """Advance by one tick."""
         dt = 0.0 if math.isnan(self._last_time) else inputs.time_s - self._last_time
         self._last_time = inputs.time_s
-        if inputs.time_s - self.entered > self.config.timeout_s and self.phase not in self._UNTIMED:
+        if inputs.time_s - self.entered > self.config.timeout_s + self._way_s and self.phase not in self._UNTIMED:
             self._time_out(inputs)
         return getattr(self, "_" + self.phase)(inputs, dt)
 
@@ -61,10 +62,16 @@ class PhaseMachine:
 
     def _enter(self, inputs: PainterInput, phase: str, reason: str) -> None:
         self.log.append((inputs.time_s, phase, reason))
-        self.phase, self.entered = phase, inputs.time_s
+        self.phase, self.entered, self._way_s = phase, inputs.time_s, 0.0
+
+    def _waits_for(self, inputs: PainterInput) -> str:
+        """What the phase waits for, with value and limit."""
+        return ""
 
     def _time_out(self, inputs: PainterInput) -> None:
-        reason = f"time-out after {self.config.timeout_s:g} s in {self.phase}"
+        reason = f"time-out after {inputs.time_s - self.entered:.0f} s in {self.phase}"
+        if missing := self._waits_for(inputs):
+            reason += f": {missing}"
         if self.phase == "retreat":
             self._end(inputs, reason, failed=True)
         else:

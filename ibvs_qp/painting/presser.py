@@ -42,25 +42,32 @@ class Presser(Painter):
         if self.phase != "press" or math.isnan(self._touched):
             super()._time_out(inputs)
 
+    def _begin_job(self, inputs: PainterInput, found: str) -> None:
+        """A press begins at the margin from the edge beside it, or where the tip is."""
+        mark = self._starting_mark()
+        if mark is None:
+            self._along.start_here()
+        else:
+            self._along.start_at(mark)
+        self._u_reference = self._along.u
+        self._enter(inputs, "approach", found)
+
     def _press(self, inputs: PainterInput, dt: float) -> PaintingCommand:
-        self._follow_guide(inputs, self.config.gates.row_m)
         self._hold_touch_point(inputs)
         if math.isnan(self._touched) and inputs.in_contact:
             self._touched = inputs.time_s
         if inputs.time_s - self._touched > self._hold_s:
             held = f"held for {self._hold_s:g} s"
             if self._slide_s > 0.0:
-                self.row, self._speed = 1, 0.0
-                self._enter(inputs, "paint", f"{held}, sliding")
+                self._begin_stroke(inputs, 1, f"{held}, sliding")
             else:
                 self._enter(inputs, "retreat", held)
-        return self._command(inputs, contact=True, hold=True, mark=True)
+        return self._command(inputs, contact=True, hold=True)
 
     def _paint(self, inputs: PainterInput, dt: float) -> PaintingCommand:
-        self._follow_guide(inputs, self.config.gates.row_m)
         self._pause_without_contact(inputs)
         target = 0.0 if self._paused else self.config.speed_m_s
         self._speed = ramped(self._speed, target, self.config.acceleration_m_s2 * dt)
         if inputs.time_s - self.entered > self._slide_s:
             self._enter(inputs, "retreat", f"slid for {self._slide_s:g} s")
-        return self._command(inputs, contact=True, along=-self._speed)
+        return self._command(inputs, contact=True, along=self._speed)

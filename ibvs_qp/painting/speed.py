@@ -35,3 +35,8 @@ def ramped(speed: float, target: float, step: float) -> float:
 def clipped(value: float, low: float, high: float) -> float:
     """The value within its bounds; plain comparisons cost a fraction of calls of min and max."""
     return low if value < low else high if value > high else value
+
+
+def approached(now: float, target: float, step: float) -> float:
+    """A value one step nearer to its target."""
+    return now + clipped(target - now, -step, step)

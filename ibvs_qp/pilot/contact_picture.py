@@ -11,6 +11,9 @@ from ibvs_qp.config.field_of_view import camera_rotation, field_of_view, picture
 from ibvs_qp.config.from_vehicle import contact_depth
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import to_camera
+from ibvs_qp.measurement import HORIZONTAL
+from ibvs_qp.painting.config import PaintingConfig
+from ibvs_qp.painting.pattern import Pattern
 from ibvs_qp.pilot.config import PilotConfig
 from ibvs_qp.vision.picture.mask import propeller_mask, vehicle_mask
 
@@ -43,21 +46,24 @@ class ContactPicture:
     seen: np.ndarray
     propellers: np.ndarray
 
-    def row(self, below_m: float) -> float:
-        """Row of a level line on the wall so far below the tip [px]."""
-        return float(self.tip[1]) + self.intrinsics[1] * below_m / self.depth
+    def place(self, offset_m: float, level: bool = True) -> float:
+        """Row of a level line on the wall so far below the tip, or column of an upright one right of it [px]."""
+        axis = 1 if level else 0
+        return float(self.tip[axis]) + self.intrinsics[axis] * offset_m / self.depth
 
-    def beside(self, below_m: float) -> tuple[float, float]:
-        """Length of a level line in view to the left and to the right of the tip, in widths of the picture.
+    def beside(self, offset_m: float, level: bool = True) -> tuple[float, float]:
+        """Length of a line in view on both sides of the tip, in widths of the picture.
 
         Args:
-            below_m: Its distance below the tip [m].
+            offset_m: Its distance below the tip, or to the right of it [m].
+            level: Whether it is level; else upright.
         """
-        height, width = self.seen.shape
-        row, middle = round(self.row(below_m)), min(max(round(float(self.tip[0])), 0), width)
-        if not _ROWS <= row < height - _ROWS:
+        seen, along = (self.seen, 0) if level else (self.seen.T, 1)
+        place, middle = round(self.place(offset_m, level)), min(max(round(float(self.tip[along])), 0), seen.shape[1])
+        if not _ROWS <= place < seen.shape[0] - _ROWS:
             return 0.0, 0.0
-        shown: np.ndarray = np.all(self.seen[row - _ROWS : row + _ROWS + 1], axis=0)
+        shown: np.ndarray = np.all(seen[place - _ROWS : place + _ROWS + 1], axis=0)
+        width = self.seen.shape[1]
         return float(shown[:middle].sum()) / width, float(shown[middle:].sum()) / width
 
 
@@ -91,15 +97,24 @@ def contact_picture(config: PilotConfig) -> ContactPicture:
     )
 
 
-def hint_span(vehicle: VehicleParams, brush_width_m: float, side: float) -> tuple[float, float]:
-    """Where the fresh edge ahead of the brush is looked for, normalised x in C; empty where its ends are out of order.
+def guide_direction(painting: PaintingConfig) -> tuple[bool, float]:
+    """Whether guides are level, and on which side of the tip: +1 below or to the right of it, else -1."""
+    pattern = Pattern(painting.pattern, painting.start)
+    right, down = pattern.across
+    return pattern.guide_role == HORIZONTAL, -(right + down)
+
+
+def hint_span(vehicle: VehicleParams, brush_width_m: float, level: bool, ahead: bool) -> tuple[float, float]:
+    """Where the last stroke's edge ahead of the brush is looked for, normalised, in C; empty with ends out of order.
 
     Args:
         vehicle: Tip and camera.
         brush_width_m: Diameter of the brush [m].
-        side: Positive to the right of the brush, else to the left.
+        level: Whether the edge is level, and the span along x; else it is upright.
+        ahead: Whether the brush moves to the right or down; else to the left or up.
     """
     depth, view = max(contact_depth(vehicle), _LEAST_DEPTH_M), field_of_view(vehicle)
-    tip = float(to_camera(np.array(vehicle.tip_position_m), np.array(vehicle.camera_position_m))[0]) / depth
+    place = to_camera(np.array(vehicle.tip_position_m), np.array(vehicle.camera_position_m))
+    tip, (low, high) = float(place[0 if level else 1]) / depth, view[:2] if level else view[2:]
     beside = 0.5 * brush_width_m / depth + _BESIDE_BRUSH
-    return (tip + beside, view.right - _BORDER) if side > 0.0 else (view.left + _BORDER, tip - beside)
+    return (tip + beside, high - _BORDER) if ahead else (low + _BORDER, tip - beside)

@@ -25,7 +25,7 @@ from ibvs_qp.estimation.wall_lines import WallAxes, image_line
 from ibvs_qp.estimation.wall_motion import BIAS, WallMotion
 from ibvs_qp.estimation.wrench_tare import WrenchTare
 from ibvs_qp.frames import down_in_body, plane_in_body, rotation_from_vector, to_camera
-from ibvs_qp.measurement import FeatureFrame, Measurement, Reference, RgbdFrame, SensorFrame
+from ibvs_qp.measurement import HORIZONTAL, FeatureFrame, Measurement, Reference, RgbdFrame, SensorFrame
 from ibvs_qp.model.reporting import fixed_command
 from ibvs_qp.model.setpoints import Setpoints
 from ibvs_qp.painting.command import PainterInput, PaintingCommand
@@ -36,6 +36,7 @@ from ibvs_qp.pilot.camera import CameraInput
 from ibvs_qp.pilot.config import PilotConfig
 from ibvs_qp.pilot.contact_picture import hint_span
 from ibvs_qp.pilot.inertial import INERTIAL, InertialData
+from ibvs_qp.pilot.push_report import PushReport
 from ibvs_qp.pilot.status import Event, FlightStatus
 from ibvs_qp.safety.assurance import Assurance
 from ibvs_qp.safety.policy import Fault
@@ -108,7 +109,8 @@ class Pilot:
         self._tip_camera = to_camera(self._tip, camera).tolist()
         self._tip_from_camera = (self._tip - camera).tolist()
         brush = self.config.vision.brush_width_m
-        self._hint_spans = hint_span(vehicle, brush, -1.0), hint_span(vehicle, brush, 1.0)
+        ways = [(level, ahead) for level in (False, True) for ahead in (False, True)]
+        self._hint_spans = {way: hint_span(vehicle, brush, *way) for way in ways}
         self._gate = SensorGate(self.config.camera.latest_s)
         self._limits = ThrustLimits(vehicle.geometry.count)
         self.self_check = SelfCheck(self.config.safety.self_check)
@@ -122,6 +124,7 @@ class Pilot:
         self._camera = CameraInput(self.config, self._history, seen_as)
         self.rotor_loss = RotorLoss(vehicle, settings.gains)
         self.assurance = Assurance(vehicle, self.config.safety)
+        self.push_report = PushReport()
         self.painter = painter or Painter(self.config.painting)
         self.observer: Callable[[LawCall], None] | None = None
         law = HybridController if self.config.law == "qp" else PaperController
@@ -147,7 +150,7 @@ class Pilot:
         self._inertial.reset(self._gate.last)
         sensing = (self.self_check, self.tare, self._history, self._camera)
         flying = (self.contact, self.motion, self.rotor_loss, self.assurance, self.painter, self.controller)
-        for part in (*sensing, *flying):
+        for part in (*sensing, *flying, self.push_report):
             part.reset()
         self._first = self._stamp = self._imu_stamp = -1
         self._covariance = self.motion.velocity_variance * np.eye(3)
@@ -184,6 +187,10 @@ class Pilot:
             reason="; ".join(supervisor.reasons) if ended else painter.reason,
             safety=supervisor.state,
             events=tuple(Event(*entry) for entry in painter.log),
+            push_asked_n=self.push_report.asked_n,
+            push_commanded_n=self.push_report.commanded_n,
+            push_flown_n=self.push_report.felt_n,
+            push_reduction=self.push_report.reduction,
         )
 
     @property
@@ -253,6 +260,7 @@ class Pilot:
             if frame.features is not None or frame.image is not None:
                 self._rejected.append("picture: the vehicle is turned from the wall")
         features = None if turned else self._perceive(frame)
+        surface_offset = self.contact.surface_offset
         contact = self.contact.update(
             stamp_ns=stamp,
             angular_velocity=rate,
@@ -262,7 +270,11 @@ class Pilot:
             wrench_stamp_ns=wrench_stamp,
             plane=self._camera.plane,
             plane_stamp_ns=self._camera.plane_ns,
+            press=self.reference.contact,  # of the tick before: the strategy needs the contact of this one
         )
+        if self.contact.surface_offset > surface_offset:
+            found = f"{contact.push:.1f} N felt {1e3 * self.contact.surface_offset:.0f} mm before the seen surface"
+            self.painter.log.append((1e-9 * (stamp - self._first), "wall", f"{found}: its distance starts anew there"))
         self._check_axes(frame.wrench, contact, dt)
         axes = WallAxes.of(contact.normal, down)
         self.motion.predict(stamp, axes, force, rate, dt)
@@ -275,6 +287,8 @@ class Pilot:
         begin = time.perf_counter()
         command = self._command(stamp, contact)
         self.controller_time_s = time.perf_counter() - begin
+        if event := self.push_report.update(self.reference, contact, self.setpoints, command, dt):
+            self.painter.log.append(((stamp - self._first) * 1e-9, *event))
         self._commanded = self.assurance.explained(command)
         self.assurance.watch(self._shown(frame, contact, command), self.setpoints)
         return self._commanded
@@ -387,24 +401,25 @@ class Pilot:
         return self._camera.perceive(frame, velocity, hints, self.assurance.is_news, self._rejected)
 
     def _hints(self, stamp_ns: int) -> tuple[LineHint, ...]:
-        """Expected place of the fresh edge: at the brush, ahead of it, by lines and contact of the tick before."""
-        expected, contact = self.painter.expected_fresh_edge(self.motion.lines), self.contact.state
+        """Expected place of the last stroke's edge, ahead of the brush, by lines and contact of the tick before."""
+        expected, contact = self.painter.expected_edge(), self.contact.state
         if expected is None or not contact.known:
             return ()
-        offset, side = expected
         axes = WallAxes.of(contact.normal, down_in_body(self._history.attitude(stamp_ns)))
-        rho, theta, _ = image_line(offset, 0.5 * math.pi, axes, self._tip_from_camera, contact.distance)
-        span = self._hint_spans[side > 0.0]
+        level = expected.role == HORIZONTAL
+        span = self._hint_spans[level, expected.ahead > 0]
         if span[0] >= span[1]:
             return ()
-        return (LineHint(name="fresh", rho=rho, theta=theta, kind="paint", surface_side=-1, span=span),)
+        angle = 0.5 * math.pi if level else 0.0
+        rho, theta, _ = image_line(expected.offset, angle, axes, self._tip_from_camera, contact.distance)
+        return (LineHint(name="fresh", rho=rho, theta=theta, kind="paint", surface_side=expected.side, span=span),)
 
     # -------------------------------------------------------------- estimation
 
     def _correct_motion(self, features: FeatureFrame, contact: ContactState) -> None:
         """Correct motion and lines at the time of capture."""
         if features.plane is not None and self.contact.plane_ns == features.stamp_ns:
-            normal, distance = plane_in_body(features.plane, self._tip_from_camera)
+            normal, distance = plane_in_body(self.contact.on_felt_surface(features.plane), self._tip_from_camera)
         elif contact.known:
             normal, distance = contact.normal, contact.distance
         else:
@@ -476,7 +491,7 @@ class Pilot:
             contact_wrench=wrench,
             wrench_stamp_ns=wrench_stamp,
             lines=tuple([self.motion.feature(line, axes, distance, frame.stamp_ns) for line, _ in target.guides]),
-            plane=self._camera.plane,
+            plane=self._camera.plane and self.contact.on_felt_surface(self._camera.plane),
             plane_stamp_ns=self._camera.plane_ns,
             velocity=velocity,
             velocity_covariance=covariance,

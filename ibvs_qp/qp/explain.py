@@ -9,6 +9,7 @@ import numpy as np
 
 from ibvs_qp.command import ActiveLimit, TaskReport, TaskReports
 from ibvs_qp.config.errors import ConfigError
+from ibvs_qp.qp.bound_range import bound_ranges
 from ibvs_qp.qp.evaluator import ProgramData, RecordedProgram
 from ibvs_qp.qp.exact import ExactSolver
 from ibvs_qp.qp.infeasible import conflicting_rows
@@ -28,6 +29,23 @@ class LimitValue:
 
 
 @dataclass(frozen=True, kw_only=True)
+class LimitRange:
+    """How far the price of an active limit holds: the changes of its bound over which the same limits are active.
+
+    Attributes:
+        change_low: Most negative change of the bound, in the row's unit; -inf where nothing ends it.
+        change_high: Most positive change.
+        cost_fall: By how much the cost falls as the bound yields to that end; less than the price times the change.
+        until: What happens there: "released", or the name of another limit with "active" or "released".
+    """
+
+    change_low: float
+    change_high: float
+    cost_fall: float
+    until: str
+
+
+@dataclass(frozen=True, kw_only=True)
 class Explanation:
     """Targets, results and costs of a tick.
 
@@ -37,7 +55,8 @@ class Explanation:
         total_cost: Cost of the tick, without unit: weights are per squared unit of their rows.
         slack_cost: Fraction of the cost for slack; with those of the tasks it sums to one.
         active_limits: Active limits by falling multiplier; `limit_cost` are the fractions of the cost for their slack,
-            zero for a hard one, and `limit_rows` their bounds and values, in the same order.
+            zero for a hard one, `limit_rows` their bounds and values, and `limit_ranges` how far their prices hold, in
+            the same order.
         unallocated_wrench: Wrench of the same tick without limits minus the wrench [N, N m], (6,).
     """
 
@@ -49,6 +68,7 @@ class Explanation:
     active_limits: tuple[ActiveLimit, ...]
     limit_cost: tuple[float, ...]
     limit_rows: tuple[LimitValue, ...]
+    limit_ranges: tuple[LimitRange, ...]
     unallocated_wrench: np.ndarray
 
 
@@ -130,6 +150,7 @@ class TickReplay:
             active_limits=tuple(limits),
             limit_cost=tuple(paid),
             limit_rows=self.limit_values([limit.name for limit in limits], thrusts),
+            limit_ranges=self._limit_ranges([limit.name for limit in limits]),
             unallocated_wrench=effectiveness @ (data.free - thrusts) if limits else np.zeros(6),
         )
 
@@ -148,6 +169,22 @@ class TickReplay:
             )
             for row in rows
         )
+
+    def _limit_ranges(self, names: Sequence[str]) -> tuple[LimitRange, ...]:
+        """Ranges by name, at the exact solution: its multipliers of inactive rows are zero."""
+        data, every = self._data, self._problem.row_names
+        exact = self._exact.solve(data.p, data.q, data.a, data.lower, data.upper)
+        assert exact is not None
+        found = bound_ranges(data.hessian(), data.rows(), data.lower, data.upper, *exact)
+        ranges = []
+        for row in map(every.index, names):
+            if (at := found.get(row)) is None:
+                ranges.append(LimitRange(change_low=0.0, change_high=0.0, cost_fall=0.0, until="unknown"))
+                continue
+            event = "active" if exact[1][at.end] == 0.0 else "released"
+            until = event if at.end == row else f"{every[at.end]} {event}"
+            ranges.append(LimitRange(change_low=at.lower, change_high=at.upper, cost_fall=at.fall, until=until))
+        return tuple(ranges)
 
     def _solve(self) -> tuple[np.ndarray, np.ndarray] | None:
         data = self._data

@@ -41,6 +41,7 @@ class Bench:
         """Measure and print."""
         from rich.console import Console
 
+        from sim.flight.working import working
         from sim.report.rundir import as_json
 
         check_seed(self.seed)
@@ -48,8 +49,8 @@ class Bench:
         check_count("--ticks", self.ticks, 1000, 10_000_000)
         check_count("--sample", self.sample, 1, 10_000)
         notes = Console(stderr=True, quiet=self.json)
-        with notes.status("Measuring ...") as status:
-            bench = self._measure(lambda text: status.update(f"Measuring {text} ..."))
+        with working(notes, "Measuring ...") as update:
+            bench = self._measure(lambda text: update(f"Measuring {text} ..."))
         if self.json:
             print(as_json(bench.summary()))
         elif self.what == "loop":

@@ -20,7 +20,7 @@ from sim.commands.options import (
     preset_file,
     usable_cores,
 )
-from sim.world.worlds import EXPERIMENT_WORLD
+from sim.world.worlds import DEFAULT_WORLD
 
 if TYPE_CHECKING:
     import polars as pl
@@ -50,7 +50,7 @@ class Compare:
     """Presets only: first seed."""
     features: Literal["rendered", "geometric"] = "rendered"
     """Presets only: perception."""
-    world: World = EXPERIMENT_WORLD
+    world: World = DEFAULT_WORLD
     quick: Annotated[bool, flag] = False
     """Presets only: fly a short paint job."""
     jobs: Annotated[int | None, optional("N")] = None
@@ -68,8 +68,11 @@ class Compare:
         return dataclasses.replace(self, run_a=a, run_b=b)._compare(words)
 
     def _compare(self, words: list[str]) -> int:
+        from rich.console import Console
+
+        from sim.flight.working import working
         from sim.report.comparison import compare, read_run
-        from sim.report.conditions import differing_presets, differing_runs
+        from sim.report.conditions import differing_presets, differing_runs, run_world
         from sim.report.rundir import as_json
 
         folder, stopped, presets = None, False, self._presets()
@@ -78,7 +81,8 @@ class Compare:
             a, b, folder, stopped = self._fly()
         else:
             a, b = read_run(self.run_a), read_run(self.run_b)
-        cells = [] if stopped else compare(a, b)
+        with working(Console(stderr=True, quiet=self.json), "Comparing ..."):
+            cells = [] if stopped else compare(a, b)
         if self.json:
             content: dict[str, Any] = {
                 "schema": 1,
@@ -93,7 +97,8 @@ class Compare:
             }
             print(as_json(content))
         elif not stopped:
-            _print(conditions, cells, self.run_a, self.run_b)
+            named = [self.world] if presets else [run_world(run) or "unknown" for run in (self.run_a, self.run_b)]
+            _print(conditions, cells, self.run_a, self.run_b, " against ".join(dict.fromkeys(named)))
         if stopped and folder is not None:
             return interrupted(words, folder, f"finished flights are in {folder}")
         return 0
@@ -152,10 +157,12 @@ class Compare:
         return a, b, folder, result.interrupted
 
 
-def _print(conditions: list[dict[str, Any]], cells: list[dict[str, Any]], a: Path, b: Path) -> None:
+def _print(conditions: list[dict[str, Any]], cells: list[dict[str, Any]], a: Path, b: Path, world: str) -> None:
     from rich.console import Console
 
-    from sim.evaluate.table import LINES, law_name, plain, terminal_table
+    from sim.evaluate.flight_table import LINES
+    from sim.evaluate.table import plain, terminal_table
+    from sim.flight.trace import law_name
     from sim.report.comparison import PAINT_VARIANT
     from sim.report.conditions import ABSENT
 
@@ -171,15 +178,15 @@ def _print(conditions: list[dict[str, Any]], cells: list[dict[str, Any]], a: Pat
         variant = [] if cell["variant"] == PAINT_VARIANT else [cell["variant"]]
         params = (f"{name} {value}" for name, value in cell["params"].items())
         labels = [cell["experiment"], law_name(cell["law"]), *variant, *params]
+        labels += [] if "world" in cell["params"] else [f"world {world}"]
         done = " and ".join(f"{count} of {cell['n']}" for count in cell["completed"])
         rows = []
         for line in LINES:
-            if (found := cell["differences"].get(line.key)) is None:
+            if (found := cell["differences"].get(line.name)) is None:
                 continue
             figures = [line.scale * found[key] for key in ("a", "b", "median", "low", "high")]
             a_text, b_text = (f"{figure:.4g}" for figure in figures[:2])
             median, low, high = (f"{figure:+.4g}" for figure in figures[2:])
             interval = f"{low} to {high}" if low != high else ABSENT
-            label = f"{line.label} [{line.unit}]" if line.unit else line.label
-            rows.append((plain(label), a_text, b_text, median, interval))
+            rows.append((plain(line.label), a_text, b_text, median, interval))
         console.print(terminal_table(headings, rows, plain(f"{', '.join(labels)}: completed {done}")))

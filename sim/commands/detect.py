@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -14,8 +15,6 @@ from sim.commands.options import check_seed, flag, optional
 from sim.detection.methods import METHODS
 
 if TYPE_CHECKING:
-    from rich.status import Status
-
     from ibvs_qp.vision.picture.settings import RgbdCameraSettings
     from sim.detection.manifest import FrameEntry
     from sim.detection.run import FrameResult
@@ -83,14 +82,15 @@ class Detect:
         from rich.console import Console
 
         from sim.detection.report import as_json, frame_table, refusals
+        from sim.flight.working import working
 
         check_seed(self.seed)
         cv2.setNumThreads(1)
         self._check()
         folder = None if self.overlay is None else _folder(self.overlay)
         notes = Console(stderr=True, quiet=self.json)
-        with notes.status("Detecting ...") as status:
-            frames = self._files(status, folder) if self.bag is None else self._pictures(self.bag, status, folder)
+        with working(notes, "Detecting ...") as update:
+            frames = self._files(update, folder) if self.bag is None else self._pictures(self.bag, update, folder)
         if self.json:
             print(as_json(frames, self.method))
         else:
@@ -101,7 +101,7 @@ class Detect:
                 print(f"Pictures: {folder}")
         return 0
 
-    def _files(self, status: Status, folder: Path | None) -> list[FrameResult]:
+    def _files(self, update: Callable[[str], None], folder: Path | None) -> list[FrameResult]:
         """Results of one frame or a folder."""
         from sim.detection.overlay import write_overlay
         from sim.detection.run import detect_frames
@@ -112,14 +112,14 @@ class Detect:
             self.method,
             every=self.all,
             track=not self.no_track,
-            started=lambda entry: status.update(f"Detecting in {plain(entry.color)} ..."),
+            started=lambda entry: update(f"Detecting in {plain(entry.color)} ..."),
         )
         if folder is not None:
             for seen in frames:
                 write_overlay(seen, folder)
         return frames
 
-    def _pictures(self, path: Path, status: Status, folder: Path | None) -> list[FrameResult]:
+    def _pictures(self, path: Path, update: Callable[[str], None], folder: Path | None) -> list[FrameResult]:
         """Results of the pictures of a bag."""
         from ibvs_qp.config.settings import load_toml
         from ibvs_qp.ros.bag import Bag
@@ -131,7 +131,7 @@ class Detect:
         bag = Bag(path, None if self.topics is None else load_toml(Topics, self.topics))
 
         def finished(seen: FrameResult) -> None:
-            status.update(f"Detected in {plain(seen.entry.color)} ...")
+            update(f"Detected in {plain(seen.entry.color)} ...")
             if folder is not None:
                 write_overlay(seen, folder)
 

@@ -6,7 +6,7 @@ import dataclasses
 import math
 import shlex
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -23,7 +23,7 @@ from sim.commands.options import (
     usable_cores,
 )
 from sim.experiments import ALL, NAMES
-from sim.world.worlds import EXPERIMENT_WORLD
+from sim.world.worlds import DEFAULT_WORLD
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -45,13 +45,15 @@ class ExperimentCommand:
     """Few cells and seeds: takes minutes, does not replace the record."""
     features: Literal["rendered", "geometric"] = "rendered"
     """Perception: rendered pictures through the vision pipeline, or a sensor model of lines."""
-    world: World = EXPERIMENT_WORLD
+    world: World = DEFAULT_WORLD
     seed: int = 0
     """First seed; the flights of a cell use consecutive seeds."""
     jobs: Annotated[int | None, optional("N")] = None
     """Parallel processes; default: one per core. The results do not depend on it."""
     out: Annotated[Path | None, optional("DIR")] = None
     """Run folder; default: runs/<UTC stamp>. Finished flights in it are not flown again."""
+    traces: Annotated[bool, flag] = False
+    """Keep the inputs of every flight's figures, about 20 kB per second of flight: others can be computed later."""
     plan: Annotated[bool, flag] = False
     """Print the number of flights and their flight time, and stop."""
     json: Annotated[bool, flag] = False
@@ -68,7 +70,7 @@ class ExperimentCommand:
         check_seed(self.seed)
         check_jobs(self.jobs)
         notes = Console(stderr=True, quiet=self.json)
-        choice = Choice(quick=self.quick, seed=self.seed, features=self.features, world=self.world)
+        choice = Choice(quick=self.quick, seed=self.seed, features=self.features, traces=self.traces, world=self.world)
         runs = designs(self.name, choice)
         _print_plan(Console() if self.plan else notes, runs)
         if self.plan:
@@ -81,51 +83,50 @@ class ExperimentCommand:
 
         from rich.console import Console
 
-        from sim.experiments.design import chosen
+        from sim.experiments.design import chosen, worlds_of
         from sim.experiments.record import PARTS, write_page, write_summary, write_tables
         from sim.experiments.record import summary as summarise
+        from sim.flight.working import working
         from sim.report.rundir import as_json
         from sim.sweep import run_sweep
         from sim.sweep.progress import sweep_progress
 
         with sweep_progress(notes, self.name) as progress:
             result = run_sweep(runs, folder / PARTS, workers=self.jobs or usable_cores(), progress=progress)
+        worlds = worlds_of(runs, self.world)
         facts: dict[str, Any] = {
             "command": command_line(words),
             "version": version("ibvs-qp"),
             "quick": self.quick,
             "seed": self.seed,
             "features": self.features,
-            "world": self.world,
+            "world": " and ".join(dict.fromkeys(world for names in worlds.values() for world in names)),
             "interrupted": result.interrupted,
             "wall_time_s": time.perf_counter() - started,
         }
         experiments, table = chosen(self.name), result.table
-        write_tables(folder, self.name, experiments, table)
-        content = summarise(self.name, experiments, table, folder, facts)
+        with working(notes, "Comparing ..."):
+            write_tables(folder, self.name, experiments, table)
+            content = summarise(self.name, experiments, table, folder, facts)
         write_summary(folder, content)  # before the figures: an error there must not lose the record
         page = None
         if table.height and not result.interrupted:
-            features, worlds = (
-                " and ".join(dict.fromkeys(names))
-                for names in (
-                    [run.plan.options.features for run in runs],
-                    [str(run.params.get("world", self.world)) for run in runs],
-                )
-            )
+            features = " and ".join(dict.fromkeys(run.plan.options.features for run in runs))
             lead = (
-                f"{table.height} flights, {features} features, world {worlds}, first seed {self.seed}, "
+                f"{table.height} flights, {features} features, world {facts['world']}, first seed {self.seed}, "
                 f"{facts['version']}."
             )
             lead = ("A quick run with few flights, not the record: " if self.quick else "") + lead
-            with notes.status("Drawing the figures ..."):
+            with working(notes, "Drawing the figures ..."):
                 page = write_page(folder, experiments, table, lead, self._again(), self.name)
         content["wall_time_s"] = time.perf_counter() - started
         write_summary(folder, content)
         if self.json:
             print(as_json(content))
         else:
-            _print_verdicts(Console(), content)
+            _print_verdicts(Console(), content, worlds)
+            if content["false_claims"]:
+                print(f"False claims: {content['false_claims']} flights were claimed and not completed; they failed.")
             if page is not None:
                 print(f"Results: {page}")
         if result.interrupted:
@@ -136,7 +137,7 @@ class ExperimentCommand:
         """The command that repeats an experiment on any computer, with ``{name}`` in place of its name."""
         words = ["ibvs-qp", "experiment", "NAME", *(["--quick"] if self.quick else [])]
         words += ["--features", self.features] if self.features != "rendered" else []
-        words += ["--world", self.world] if self.world != EXPERIMENT_WORLD else []
+        words += ["--world", self.world] if self.world != DEFAULT_WORLD else []
         words += ["--seed", str(self.seed)] if self.seed else []
         return shlex.join(words).replace("NAME", "{name}")
 
@@ -152,7 +153,7 @@ def _print_plan(console: Console, runs: Sequence[Run]) -> None:
         console.print(f"{name}: {len(times)} flights, about {minutes:.0f} min of flight time", highlight=False)
 
 
-def _print_verdicts(console: Console, content: dict[str, Any]) -> None:
+def _print_verdicts(console: Console, content: dict[str, Any], worlds: Mapping[str, Sequence[str]]) -> None:
     from sim.evaluate.table import terminal_table
 
     tables: dict[str, list[tuple[str, ...]]] = {}
@@ -169,6 +170,5 @@ def _print_verdicts(console: Console, content: dict[str, Any]) -> None:
         tables.setdefault(entry["experiment"], []).append(row)
     headings = ("figure", "bound", "median", "flights", "met")
     for name, rows in tables.items():
-        console.print(
-            terminal_table(headings, rows, f"{name}: criteria of the QP law", text=headings, wrap=("figure",))
-        )
+        title = f"{name}: criteria of the QP law, world {' and '.join(worlds[name])}"
+        console.print(terminal_table(headings, rows, title, text=headings))

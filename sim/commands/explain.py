@@ -98,7 +98,7 @@ def _table(
     trace: Trace, tick: int, explanation: Explanation | None, conflict: tuple[LimitValue, ...], config: PilotConfig
 ) -> dict[str, Any]:
     """One tick as JSON: without a program no thrust limits, without a solution no tasks and no active limits."""
-    from sim.evaluate.explanation import rejections, thrust_window
+    from sim.evaluate.explanation import push_reduction, rejections, thrust_window
 
     flown = trace.thrusts[tick].tolist()
     table = {
@@ -108,6 +108,8 @@ def _table(
         "outcome": trace.outcomes[int(trace.outcome[tick])],
         "push_asked": config.painting.push_n,
         "push_reference": float(trace.push_reference[tick]),
+        "push_measured": float(trace.push_measured[tick]),
+        "push_reduced": push_reduction(trace, tick) or None,
         "reach_margin": float(trace.reach_margin[tick]),
         "rejected": [{"t": event.t, "text": event.text} for event in rejections(trace, tick)],
         "thrusts": flown,
@@ -127,12 +129,15 @@ def _table(
     table |= {"thrust_lower": lower.tolist(), "thrust_upper": upper.tolist()}
     if explanation is None:
         return table
-    limits = zip(explanation.active_limits, explanation.limit_rows, explanation.limit_cost, strict=True)
+    every = (explanation.active_limits, explanation.limit_rows, explanation.limit_ranges, explanation.limit_cost)
     tasks = zip(explanation.tasks, explanation.cost, strict=True)
     return table | {
         "thrusts": explanation.thrusts.tolist(),
         "tasks": [asdict(task) | {"cost_share": cost} for task, cost in tasks],
-        "active_limits": [asdict(limit) | asdict(row) | {"cost_share": cost} for limit, row, cost in limits],
+        "active_limits": [
+            asdict(limit) | asdict(row) | asdict(span) | {"cost_share": cost}
+            for limit, row, span, cost in zip(*every, strict=True)
+        ],
         "total_cost": explanation.total_cost,
         "slack_cost_share": explanation.slack_cost,
         "unallocated_wrench": explanation.unallocated_wrench.tolist(),

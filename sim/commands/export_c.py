@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -30,11 +31,14 @@ class ExportC:
 
     def run(self, words: list[str]) -> int:
         """Write the library."""
+        from rich.console import Console
+
         from ibvs_qp.config.errors import ConfigError
         from ibvs_qp.export.library import write_library
         from ibvs_qp.export.recorded import write_recorded
         from ibvs_qp.pilot import PilotConfig
         from sim.bench.ticks import press_ticks
+        from sim.flight.working import working
 
         if self.folder.exists() and (not self.folder.is_dir() or any(self.folder.iterdir())):
             raise ConfigError(f"DIR: {self.folder} exists and is not an empty folder")
@@ -42,8 +46,9 @@ class ExportC:
         settings = PilotConfig() if chosen is None else PilotConfig.from_toml(chosen)
         if settings.law != "qp":
             raise ConfigError(f"law: {settings.law!r}; the library flies the quadratic program, so it must be 'qp'")
-        write_library(self.folder, settings.controller, self.float)
-        write_recorded(self.folder, settings.controller, press_ticks(settings, RECORDED_TICKS), self.float)
+        with working(Console(stderr=True), "Writing the library ..."):
+            write_library(self.folder, settings.controller, self.float)
+            write_recorded(self.folder, settings.controller, press_ticks(settings, RECORDED_TICKS), self.float)
         print(f"Written: {self.folder}")
-        print(f"Build and test it: make -C {self.folder} test")
+        print(f"Build and test it: {shlex.join(['make', '-C', str(self.folder), 'test'])}")
         return 0

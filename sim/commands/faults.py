@@ -72,6 +72,7 @@ class Faults:
         from sim.fault_matrix.design import NAME, Choice, design, job_scene, pilot_of
         from sim.fault_matrix.record import PARTS, summary, write
         from sim.fault_matrix.verdict import verdicts
+        from sim.flight.working import working
         from sim.report.rundir import RunFolder, as_json
         from sim.sweep import run_sweep
         from sim.sweep.progress import sweep_progress
@@ -97,9 +98,8 @@ class Faults:
             folder = opened.path
             with sweep_progress(notes, NAME) as progress:
                 result = run_sweep(runs, folder / PARTS, workers=workers, progress=progress)
-            scenes = {world: job_scene(world) for world in choice.worlds}
             vehicle = pilot_of("supervised").controller.vehicle
-            push_n = next(iter(scenes.values())).paint.push_n
+            push_n = job_scene(choice.worlds[0]).paint.push_n
             judged = verdicts(choice.rows, result.table, push_n, vehicle)
             facts: dict[str, Any] = {
                 "command": command_line(words),
@@ -111,11 +111,12 @@ class Faults:
                 "wall_time_s": time.perf_counter() - started,
             }
             content = summary(judged, folder, facts)
-            file = write(folder, result.table, content, self._page(judged, choice, result.table.height))
+            with working(notes, "Writing the page ..."):
+                file = write(folder, result.table, content, self._page(judged, choice, result.table.height))
             if self.json:
                 print(as_json(content))
             else:
-                _print_verdicts(Console(), judged)
+                _print_verdicts(Console(), judged, choice.worlds)
                 print(f"Results: {file}")
             if result.interrupted:
                 return interrupted(words, folder, f"finished flights are in {folder}")
@@ -159,7 +160,7 @@ def _print_plan(console: Console, runs: Sequence[Run], workers: int) -> None:
     )
 
 
-def _print_verdicts(console: Console, verdicts: Sequence[Verdict]) -> None:
+def _print_verdicts(console: Console, verdicts: Sequence[Verdict], worlds: Sequence[str]) -> None:
     from sim.evaluate.table import terminal_table
 
     heads = ("fault", "place", "passed", "control fails", "broken")
@@ -170,4 +171,4 @@ def _print_verdicts(console: Console, verdicts: Sequence[Verdict]) -> None:
         passed = f"{flown.passed} of {flown.n}" + ("" if verdict.met else ": NO")
         how = flown.how if flown.n else control.how
         rows.append((verdict.row.name, verdict.place, passed if flown.n else "–", fails, "; ".join(how)))
-    console.print(terminal_table(heads, rows, "Fault matrix", text=heads, wrap=(heads[0], heads[-1])))
+    console.print(terminal_table(heads, rows, f"Fault matrix, world {' and '.join(worlds)}", text=heads))

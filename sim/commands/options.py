@@ -16,16 +16,18 @@ from ibvs_qp.config.errors import ConfigError, out_of_range
 from ibvs_qp.config.files import UnreadableFile, open_regular
 from ibvs_qp.config.toml_text import read_toml
 from sim.commands.exit_codes import EXIT_INTERRUPTED
-from sim.world.worlds import DEFAULT_WORLD, EXPERIMENT_WORLD
+from sim.world.worlds import DEFAULT_WORLD
 
 _WORLD = "World: errors of vehicle and sensors, as ideal, datasheet, harsh, or a TOML file; default: "
 #: World of the flights of a command that flies no scene file.
-World = Annotated[str, tyro.conf.arg(metavar="NAME", help=f"{_WORLD}{EXPERIMENT_WORLD}.", help_behavior_hint="")]
-#: World of a flight that may have a scene file; None takes the scene file's errors.
+World = Annotated[str, tyro.conf.arg(metavar="NAME", help=f"{_WORLD}{DEFAULT_WORLD}.", help_behavior_hint="")]
+#: World of a flight that may have a scene file; None takes the errors that the file sets, else the default world.
 SceneWorld = Annotated[
     str | None,
     tyro.conf.arg(
-        metavar="NAME", help=f"{_WORLD}the scene file's errors; without one, {DEFAULT_WORLD}.", help_behavior_hint=""
+        metavar="NAME",
+        help=f"{_WORLD}the scene file's errors, if it has none {DEFAULT_WORLD}.",
+        help_behavior_hint="",
     ),
 ]
 #: Largest seed [-]: that of a sweep; every seed that follows from it fits the 64 bits of a table.

@@ -100,23 +100,21 @@ class Paint:
 
         check_mujoco()
         from ibvs_qp.recording import require_extra
-        from sim.flight.options import FlightOptions, pilot_config
+        from sim.flight.options import FlightOptions, pilot_config, sized
+        from sim.flight.preflight import check_job
         from sim.flight.progress import flight_progress
         from sim.flight.side_by_side import fly_laws
         from sim.report.rundir import RunFolder
         from sim.vehicles.configuration import require_vehicle, with_camera
         from sim.vehicles.vehicle_file import read_vehicle
-        from sim.world.scene import Scene, load_scene
-        from sim.world.worlds import DEFAULT_WORLD, in_world, world_name
+        from sim.world.worlds import scene_in_world
 
         started = time.perf_counter()
         check_seed(self.seed)
         if self.log == "mcap":
             require_extra()
         chosen, preset = scene_file(self.scene), preset_file(self.preset)
-        scene = load_scene(chosen) if chosen else in_world(Scene(), self.world or DEFAULT_WORLD)
-        if self.world is not None:
-            scene = in_world(scene, self.world)
+        scene, world = scene_in_world(chosen, self.world)
         vehicle = preset_file(self.vehicle, "--vehicle", other_formats=True)
         if vehicle is not None:
             scene = with_camera(scene, read_vehicle(vehicle).vehicle)
@@ -136,17 +134,19 @@ class Paint:
             compiled=True,
             view=self.view,
         )
-        config = pilot_config(scene, options)  # raises on an unusable preset before anything is shown or written
         if vehicle is not None:
-            for warning in require_vehicle(config, f"--vehicle {self.vehicle}"):
+            for warning in require_vehicle(pilot_config(scene, options), f"--vehicle {self.vehicle}"):
                 print(f"ibvs-qp: {warning}", file=sys.stderr)
         laws = ("qp", "paper") if self.law == "both" else (self.law,)
+        for law in laws:  # an unusable preset or job is refused before anything is shown or written
+            flown = dataclasses.replace(options, law=law)
+            check_job(sized(scene, flown), pilot_config(scene, flown), self.features)
         notes = Console(stderr=True, quiet=self.json)
         facts = {
             "command": command_line(words),
             "seed": self.seed,
             "scene": str(self.scene) if self.scene else "default",
-            "world": self.world or world_name(scene.errors),
+            "world": world,
             "preset": str(self.preset) if self.preset else None,
             "camera": camera,
             "image_size": list(size or (scene.camera.width, scene.camera.height)),
@@ -165,22 +165,26 @@ class Paint:
         from rich.console import Console
 
         from ibvs_qp.recording.layouts import FOLDER as LAYOUTS
+        from sim.evaluate.flight_table import false_claims, figure_table
         from sim.evaluate.metrics import compute_metrics
-        from sim.evaluate.table import figure_table
-        from sim.flight.side_by_side import INTERRUPTED
+        from sim.evaluate.table import plain
+        from sim.flight.trace import INTERRUPTED
+        from sim.flight.working import working
         from sim.report.rundir import as_json, peak_memory, summary
 
         traces = {law: flight.trace for law, flight in flights.items()}
-        metrics = {law: compute_metrics(trace) for law, trace in traces.items()}
+        with working(notes, "Computing the figures of merit ..."):
+            metrics = {law: compute_metrics(trace) for law, trace in traces.items()}
         interrupted = any(trace.reason == INTERRUPTED for trace in traces.values()) or not traces
 
         def current() -> dict:
             elapsed = time.perf_counter() - started
             return summary(facts, folder, metrics, interrupted, elapsed, peak_memory(flights.values()))
 
-        folder.write_record(traces, current())
+        with working(notes, "Writing the log ..."):
+            folder.write_record(traces, current())
         try:
-            with notes.status("Drawing the report ..."):
+            with working(notes, "Drawing the report ..."):
                 folder.write_report(traces, current(), video=not self.no_video)
         except KeyboardInterrupt:
             interrupted = True
@@ -190,11 +194,15 @@ class Paint:
         if self.json:
             print(as_json(final))
         else:
-            Console().print(figure_table(metrics))
+            table = figure_table(metrics)
+            table.title = plain(f"Scene {facts['scene']}, world {facts['world']}, seed {facts['seed']}")
+            Console().print(table)
             if folder.report.exists():
                 print(f"Report: {folder.report}")
             for file in folder.logs():
                 print(f"Log: {file}; layouts for Foxglove and Rerun: {LAYOUTS}")
+        if (false := false_claims(metrics)) and not interrupted:
+            print(f"ibvs-qp: warning: {'; '.join(false)}", file=sys.stderr)
         if interrupted:
             print(f"ibvs-qp: interrupted; the partial run is in {folder.path}", file=sys.stderr)
         return EXIT_INTERRUPTED if interrupted else 0

@@ -37,8 +37,11 @@ class ReplayCommand:
 
     def run(self, words: list[str]) -> int:
         """Replay and print."""
+        from rich.console import Console
+
         from ibvs_qp.pilot import PilotConfig
         from ibvs_qp.recording import compare_preset, read_log, repair, replay
+        from sim.flight.working import working
         from sim.report.rundir import as_json
 
         flight = read_log(self.log)
@@ -47,7 +50,8 @@ class ReplayCommand:
         if self.repair is not None:
             repair(flight, self.repair)
         try:
-            result = replay(flight) if preset is None else compare_preset(flight, preset)
+            with working(Console(stderr=True, quiet=self.json), "Replaying ..."):
+                result = replay(flight) if preset is None else compare_preset(flight, preset)
         except ConfigError as error:
             raise ConfigError(f"{self.log}: {error}") from None
         if self.json:

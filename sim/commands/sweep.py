@@ -74,13 +74,17 @@ class Sweep:
         return self._fly(words, notes)
 
     def _report(self, path: Path) -> int:
+        from rich.console import Console
+
+        from sim.flight.working import working
         from sim.report.rundir import RunFolder, as_json
         from sim.sweep.figures import write_report
         from sim.sweep.figures.page import read_table
 
         table, folder = read_table(path)
         title = f"Sweep {path.stem if path.is_file() else path.name}"
-        with RunFolder.open(self.out or folder, resume=True) as out:
+        notes = Console(stderr=True, quiet=self.json)
+        with RunFolder.open(self.out or folder, resume=True) as out, working(notes, "Drawing the report ..."):
             page = write_report(table, out.path, title, self.figures)
         print(as_json({"schema": 1, "report": str(page), "flights": table.height}) if self.json else f"Report: {page}")
         return 0
@@ -96,6 +100,7 @@ class Sweep:
             return self._fly_into(folder.path, design, words, started, notes)
 
     def _fly_into(self, folder: Path, design: Planned, words: list[str], started: float, notes: Console) -> int:
+        from sim.flight.working import working
         from sim.report.rundir import as_json, write_json
         from sim.storage.atomic import write_text
         from sim.sweep import run_sweep
@@ -120,8 +125,10 @@ class Sweep:
         write_table(table, result.table)
         page = None
         if result.table.height and not result.interrupted:
-            with notes.status("Drawing the report ..."):
-                page = write_report(result.table, folder, f"Sweep {settings.name}", self.figures)
+            with working(notes, "Drawing the report ..."):
+                page = write_report(
+                    result.table, folder, f"Sweep {settings.name}, world {design.spec.world}", self.figures
+                )
         content = {
             "schema": 1,
             "command": command_line(words),
@@ -136,6 +143,8 @@ class Sweep:
             print(as_json(content))
         elif page is not None:
             print(f"{content['completed']} of {content['flights']} flights ended as planned. Report: {page}")
+            if content["false_claims"]:
+                print(f"{content['false_claims']} more were claimed by the pilot: false claims.")
         if result.interrupted:
             return interrupted(words, folder, f"finished blocks are in {folder}")
         return 0
@@ -159,15 +168,18 @@ class Sweep:
         if not (self.dask or self.scheduler):
             yield None
             return
+        from sim.flight.working import working
         from sim.sweep.cluster import cluster_pool
 
         with contextlib.ExitStack() as stack:
-            with notes.status("Waiting for the cluster ..."):
+            with working(notes, "Waiting for the cluster ..."):
                 pool = stack.enter_context(cluster_pool(self.scheduler, self.jobs or usable_cores()))
             yield pool
 
 
 def _facts(design: Planned, result: SweepResult) -> dict[str, object]:
+    from sim.sweep.statistics import false_claims
+
     failed = result.table.filter(~result.table["completed"])
     reasons = failed["reason"].value_counts(sort=True, name="n").rows()
     return {
@@ -175,6 +187,7 @@ def _facts(design: Planned, result: SweepResult) -> dict[str, object]:
         "planned": len(design),
         "flights": result.table.height,
         "completed": int(result.table["completed"].sum()),
+        "false_claims": false_claims(result.table),
         "failed": {str(reason): count for reason, count in sorted(reasons, key=lambda row: (-row[1], str(row[0])))},
         "on_disk_before": result.reused,
         "interrupted": result.interrupted,
@@ -189,7 +202,7 @@ def _print_plan(console: Console, design: Planned) -> None:
     air = f", about {len(design) * first.expected_s / 60.0:.0f} min of flight time" if isinstance(first, Run) else ""
     varied = ", ".join(axis.path for axis in (*design.spec.grid, *design.spec.random)) or "seeds only"
     console.print(
-        f"{settings.name}: {len(design)} flights in {blocks} blocks{air}; varied: {varied}",
+        f"{settings.name}: {len(design)} flights in {blocks} blocks{air}; world {design.spec.world}; varied: {varied}",
         soft_wrap=True,
         highlight=False,
     )

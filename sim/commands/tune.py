@@ -124,6 +124,7 @@ class Tune:
         )
 
     def _search(self, plan: SearchPlan, folder: Path, words: list[str], notes: Console) -> dict[str, Any]:
+        from sim.flight.working import working
         from sim.sweep.progress import sweep_progress
         from sim.tune.finalists import best_of, fly_finalists, fly_unseen
         from sim.tune.record import Outcome, write
@@ -146,7 +147,8 @@ class Tune:
             searched_by=searched_by,
             again=self._again(),
         )
-        return write(outcome, folder)
+        with working(notes, "Drawing the report ..."):
+            return write(outcome, folder)
 
     def _trials(self, plan: SearchPlan, command: str, notes: Console) -> tuple[Trials, str]:
         """Trials of a search or of a record, and the command of the search."""

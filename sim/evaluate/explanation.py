@@ -13,6 +13,7 @@ from ibvs_qp.config.settings import from_dict
 from ibvs_qp.config.toml_text import parse_toml
 from ibvs_qp.controller import qp_problem
 from ibvs_qp.pilot import PilotConfig
+from ibvs_qp.pilot.push_report import REDUCED, RESTORED
 from ibvs_qp.qp.explain import Explanation, LimitValue, TickReplay
 
 if TYPE_CHECKING:
@@ -77,3 +78,10 @@ def rejections(trace: Trace, tick: int) -> list[Event]:
     """Events of rejected inputs up to this tick; the log holds the first event of each kind."""
     now = float(trace.t[tick]) + _TIME_TOLERANCE_S
     return [event for event in trace.events if event.kind == "rejected" and event.t <= now]
+
+
+def push_reduction(trace: Trace, tick: int) -> str:
+    """Why the push is below the job's up to this tick, by the events of the flight; empty while it is not."""
+    now = float(trace.t[tick]) + _TIME_TOLERANCE_S
+    events = [event for event in trace.events if event.kind in (REDUCED, RESTORED) and event.t <= now]
+    return events[-1].text if events and events[-1].kind == REDUCED else ""

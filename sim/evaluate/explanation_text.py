@@ -9,7 +9,7 @@ import numpy as np
 
 from ibvs_qp.config.contact_margin import LEAST_DAMPING_RATIO, least_margin
 from ibvs_qp.pilot import PilotConfig
-from sim.evaluate.explanation import rejections, thrust_window
+from sim.evaluate.explanation import push_reduction, rejections, thrust_window
 from sim.evaluate.table import plain, terminal_table
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ TASK_HEADINGS = ("task", "unit", "target", "achieved", "residual", "weight", "co
 _AXES = ("front", "right", "down", "roll", "pitch", "yaw")
 #: Components of the wrench given up below this are not listed [N, N m].
 _NOTHING = 5e-4
-#: The job's push is listed if the commanded push is lower by more than this [N].
+#: A commanded push that is lower than the job's by more than this is explained [N].
 _REDUCED_N = 1e-3
 #: Rows without a limit at this tick have bounds beyond this, in the row's unit.
 _NO_BOUND = 9e3
@@ -53,15 +53,16 @@ def explanation_tables(
 
 
 def _headline(trace: Trace, tick: int, config: PilotConfig) -> list[str]:
-    """Time, phase, push and outcome; then the rejected inputs."""
+    """Time, phase, push asked, commanded and measured, and outcome; then the rejected inputs."""
     phase, outcome = trace.phases[int(trace.phase[tick])], trace.outcomes[int(trace.outcome[tick])]
     push, reference = float(trace.push_measured[tick]), float(trace.push_reference[tick])
     job, margin = config.painting.push_n, float(trace.reach_margin[tick])
-    lowered = f" (job: {job:.2f} N, lowered by ramp or reach)" if 0.0 < reference < job - _REDUCED_N else ""
+    reason = push_reduction(trace, tick) or "by the ramp after touch"
+    lowered = f" (reduced: {plain(reason)})" if 0.0 < reference < job - _REDUCED_N else ""
     reach = "reach unknown, or no push can be held" if math.isnan(margin) else f"{margin:.2f} N further within reach"
     headline = (
         f"[bold]t = {trace.t[tick]:.3f} s[/], phase {plain(phase)}, lambda {trace.contact_weight[tick]:.2f}\n"
-        f"push {push:.2f} N, commanded {reference:.2f} N{lowered}; {reach}\n"
+        f"push asked {job:.2f} N, commanded {reference:.2f} N, measured {push:.2f} N{lowered}; {reach}\n"
         f"{plain(outcome)} after {int(trace.iterations[tick])} iterations"
     )
     return [headline, *(f"Rejected at {event.t:.3f} s: {plain(event.text)}" for event in rejections(trace, tick))]
@@ -86,21 +87,34 @@ def _tasks(explanation: Explanation) -> Any:
 def _limits(explanation: Explanation) -> list[Any]:
     if not explanation.active_limits:
         return ["No limit is active: the thrusts are the weighted least-squares solution."]
-    rows = []
-    for limit, row, cost in zip(explanation.active_limits, explanation.limit_rows, explanation.limit_cost, strict=True):
+    rows, prices = [], []
+    every = (explanation.active_limits, explanation.limit_rows, explanation.limit_cost, explanation.limit_ranges)
+    for limit, row, cost, span in zip(*every, strict=True):
         bound = row.upper if limit.side == "upper" else row.lower
         slack, paid = "", "hard"
         if limit.slack > 0.0:
             slack, paid = f"{limit.slack:.4g}", f"{cost * explanation.total_cost:.3g} ({_percent(cost)})"
-        values = (_number(bound), _number(row.value), slack, limit.unit, _number(limit.price), paid)
-        rows.append((limit.name, limit.side, *values))
-    headings = ("limit", "side", "bound", "value", "slack", "unit", "price per unit", "cost of slack")
-    words = "Price: the multiplier, by which the cost would fall if the bound moved by one unit. "
+        rows.append((limit.name, limit.side, _number(bound), _number(row.value), slack, limit.unit, paid))
+        fall = f"{span.cost_fall:.3g} ({_percent(span.cost_fall / explanation.total_cost)})"
+        changes = f"{span.change_low:+.3g} to {span.change_high:+.3g}"
+        prices.append((limit.name, _number(limit.price), limit.unit, changes, fall, span.until))
+    words = (
+        "Price: the derivative of the cost by the bound, the multiplier. It falls as the bound yields, so the cost "
+        "falls by less than price times change: by the amount stated if the bound yields to the end of the range. Over "
+        "the range the same limits are active; at its end a limit is released or becomes active. "
+    )
     if explanation.slack_cost > 0.0:
         words += f"Slack takes {_percent(explanation.slack_cost)} of the cost of {explanation.total_cost:.3g}. "
     words += "The cost has no unit: weights and slack weights are per squared unit of the row."
+    headings = ("limit", "side", "bound", "value", "slack", "unit", "cost of slack")
     title = "Active limits, highest price first"
-    return [terminal_table(headings, rows, title, text=("limit", "side", "unit")), words]
+    price_headings = ("limit", "price per unit", "unit", "range of changes", "cost falls by", "until")
+    price_text = ("limit", "unit", "until")
+    return [
+        terminal_table(headings, rows, title, text=("limit", "side", "unit")),
+        terminal_table(price_headings, prices, "Derivatives of the cost by these bounds", text=price_text),
+        words,
+    ]
 
 
 def _conflict(conflict: tuple[LimitValue, ...]) -> list[Any]:

@@ -1,20 +1,21 @@
 """The nominal polyline of a paint job and its intended band (truth, for metrics and figures only).
 
-Everything is in board coordinates (along, up) [m] of `BoardGeometry`. Row 1 runs parallel to the bottom edge, the
-first climb parallel to the left edge, and row k follows the upper edge of row k - 1 as it was painted.
+Plans are in board coordinates (along, up) [m] of `BoardGeometry` and computed in pattern coordinates (u, v). Stroke 1
+runs parallel to its board edge, the first climb parallel to the edge at which stroke 1 ends, and stroke k follows the
+outer edge of stroke k - 1 as it was painted. Strokes are called rows, whatever their direction.
 """
 
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from sim.world.board import BoardGeometry
 from sim.world.scene import Scene
 
-#: A painted row is averaged over pieces of this length [m], shorter than any bend that the vehicle can paint.
+#: A painted stroke is averaged over pieces of this length [m], shorter than any bend that the vehicle can paint.
 BIN_M = 0.01
 
 
@@ -53,68 +54,63 @@ class PaintPlan:
 
 
 def nominal_plan(scene: Scene) -> PaintPlan:
-    """The polyline of a perfect flight: straight rows, one pitch apart."""
+    """The polyline of a perfect flight: straight strokes at their nominal places."""
     return plan_as_painted(scene, {})
 
 
 def plan_as_painted(scene: Scene, painted: dict[int, np.ndarray]) -> PaintPlan:
-    """The polyline whose row k follows the upper edge of row k - 1 as painted.
+    """The polyline whose stroke k follows the outer edge of stroke k - 1 as painted.
 
-    The tip of row k belongs ``pitch - brush_width / 2`` above that edge, and the edge lies half a brush width above
-    the path of the tip. Even rows end where the row below ends. The start of row 1 has no guide, so a touch further
-    right than planned lengthens row 1.
+    That edge lies half a brush width beyond the path of the tip, so stroke k belongs one pitch beyond that path. Even
+    strokes end where the one before begins. The start of stroke 1 has no guide, so a touch further outside than
+    planned lengthens stroke 1.
 
     Args:
         scene: The scene flown.
-        painted: Tip path of every row painted in contact, (S, 2) each, board coordinates; rows may be missing.
+        painted: Tip path of every stroke painted in contact, (S, 2) each, board coordinates; strokes may be missing.
 
     Returns:
-        The plan; rows without a painted path below them are straight.
+        The plan; strokes without a painted path before them are straight.
     """
-    paint, board = scene.paint, BoardGeometry(scene)
-    left, right = board.row_ends
-    right = max(right, _extreme(painted, 1, right))
+    board = BoardGeometry(scene)
+    paths = {stroke: board.to_pattern(path) for stroke, path in painted.items() if len(path)}
+    begin, end = board.stroke_ends
+    begin = min(begin, _begin(paths, 1, begin))
     segments: list[Segment] = []
-    height = np.array([[left, board.row_height(1)], [right, board.row_height(1)]])
-    for row in range(1, paint.rows + 1):
-        to_left = row % 2 == 1
-        if row > 1:
-            begin = segments[-1].points[-1]
-            if not to_left and row - 1 in painted:
-                right = _extreme(painted, row - 1, right)
-            edge = _upper_edge(painted.get(row - 1), height, paint.brush_width_m)
-            height = edge + np.array([0.0, paint.pitch_m - 0.5 * paint.brush_width_m])
-            target = [begin[0], float(np.interp(begin[0], *height.T))]
-            segments.append(Segment(kind="climb", row=row, points=np.array([begin, target])))
-        segments.append(Segment(kind="row", row=row, points=_row_points(height, left, right, to_left)))
-    return PaintPlan(segments=tuple(segments))
+    line = np.array([[begin, board.stroke_place(1)], [end, board.stroke_place(1)]])
+    for stroke in range(1, board.strokes + 1):
+        if stroke > 1:
+            if stroke % 2 == 0:
+                begin = _begin(paths, stroke - 1, begin)
+            before = averaged(paths[stroke - 1]) if stroke - 1 in paths else line
+            pitch = board.stroke_place(stroke) - board.stroke_place(stroke - 1)
+            line = before + np.array([0.0, pitch])
+            corner = segments[-1].points[-1]
+            climb = np.array([corner, [corner[0], float(np.interp(corner[0], *line.T))]])
+            segments.append(Segment(kind="climb", row=stroke, points=climb))
+        segments.append(Segment(kind="row", row=stroke, points=_points(line, begin, end, stroke % 2 == 0)))
+    return PaintPlan(segments=tuple(replace(each, points=board.from_pattern(each.points)) for each in segments))
 
 
-def _extreme(painted: dict[int, np.ndarray], row: int, default: float) -> float:
-    path = painted.get(row)
-    return default if path is None or not len(path) else float(path[:, 0].max())
+def _begin(paths: dict[int, np.ndarray], stroke: int, default: float) -> float:
+    """Painted point of a stroke nearest to the edge at which stroke 1 begins, u [m]."""
+    return float(paths[stroke][:, 0].min()) if stroke in paths else default
 
 
-def _upper_edge(path: np.ndarray | None, planned: np.ndarray, brush_width_m: float) -> np.ndarray:
-    """Upper edge of a row, (K, 2) with increasing first column: the tip's path averaged over pieces of `BIN_M`."""
-    if path is None or not len(path):
-        path = planned
-        centres, heights = path[:, 0], path[:, 1]
-    else:
-        first = path[:, 0].min()
-        piece = ((path[:, 0] - first) / BIN_M).astype(int)
-        count = np.bincount(piece)
-        used = count > 0
-        centres = np.bincount(piece, path[:, 0])[used] / count[used]
-        heights = np.bincount(piece, path[:, 1])[used] / count[used]
-    return np.column_stack((centres, heights + 0.5 * brush_width_m))
+def averaged(path: np.ndarray) -> np.ndarray:
+    """Line of a tip path (u, v): means over pieces of `BIN_M` along u, (K, 2) with increasing u [m]."""
+    piece = ((path[:, 0] - path[:, 0].min()) / BIN_M).astype(int)
+    count = np.bincount(piece)
+    used = count > 0
+    return np.column_stack([np.bincount(piece, path[:, axis])[used] / count[used] for axis in (0, 1)])
 
 
-def _row_points(height: np.ndarray, left: float, right: float, to_left: bool) -> np.ndarray:
-    inside = height[(height[:, 0] > left) & (height[:, 0] < right), 0]
-    along = np.concatenate(([left], inside, [right]))
-    points = np.column_stack((along, np.interp(along, *height.T)))
-    return points[::-1] if to_left else points
+def _points(line: np.ndarray, begin: float, end: float, backwards: bool) -> np.ndarray:
+    """Points of a stroke between its ends u, in the order of travel, (K, 2) [m]."""
+    inside = line[(line[:, 0] > begin) & (line[:, 0] < end), 0]
+    along = np.concatenate(([begin], inside, [end]))
+    points = np.column_stack((along, np.interp(along, *line.T)))
+    return points[::-1] if backwards else points
 
 
 def distance_to_polyline(points: np.ndarray, polyline: np.ndarray) -> np.ndarray:

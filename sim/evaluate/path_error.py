@@ -9,6 +9,7 @@ import numpy as np
 from sim.evaluate.paint_plan import PaintPlan, distance_to_polyline, plan_as_painted
 from sim.evaluate.window import CONTACT_N, board_tip, in_phase
 from sim.flight.trace import Trace
+from sim.world.board import BoardGeometry
 
 #: Distance from a vertex of the polyline within which a sample belongs to the corner [m].
 CORNER_M = 0.10
@@ -25,7 +26,7 @@ class PathError:
     painting: np.ndarray  # the vehicle paints a row or a climb, (N,) bool
     corner: np.ndarray  # painting within 0.10 m of a vertex, (N,) bool
     distance: np.ndarray  # unsigned distance to the polyline, (N,) [m]
-    height: np.ndarray  # tip above (+) or below (-) its row, in phase ``paint``, (N,) [m]
+    height: np.ndarray  # tip beyond (+) or before (-) its stroke, across it, in phase ``paint``, (N,) [m]
 
     @property
     def travelled(self) -> np.ndarray:
@@ -47,7 +48,8 @@ def path_error(trace: Trace) -> PathError:
     The error is the distance to the nearest point of the current segment or of its neighbours. It contains no time
     lag, and another row is never the nearest segment.
     """
-    tip = board_tip(trace)
+    tip, board = board_tip(trace), BoardGeometry(trace.scene)
+    uv = board.to_pattern(tip)
     plan = plan_as_painted(trace.scene, painted_rows(trace, tip))
     painting = np.zeros(len(tip), bool)
     distance, height = np.full(len(tip), np.nan), np.full(len(tip), np.nan)
@@ -58,8 +60,9 @@ def path_error(trace: Trace) -> PathError:
         distance[ticks] = np.min([distance_to_polyline(tip[ticks], other.points) for other in near], axis=0)
         painting[ticks] = True
         if segment.kind == "row":
-            order = np.argsort(segment.points[:, 0])
-            height[ticks] = tip[ticks, 1] - np.interp(tip[ticks, 0], *segment.points[order].T)
+            line = board.to_pattern(segment.points)
+            line = line[np.argsort(line[:, 0])]
+            height[ticks] = uv[ticks, 1] - np.interp(uv[ticks, 0], *line.T)
     to_vertex = np.min(np.linalg.norm(tip[:, None] - plan.vertices[None], axis=2), axis=1)
     return PathError(
         plan=plan,

@@ -14,6 +14,8 @@ from sim.world.board import BoardGeometry
 PHYSICS_RATE_HZ, CONTACT_N = 1000.0, 0.05
 #: The push has settled when it stays this near to the commanded push [N] for this long [s].
 SETTLE_BAND_N, SETTLE_HOLD_S = 0.5, 0.5
+#: The vehicle finds its hover within this time after release [s].
+SETTLED_S = 1.0
 #: Losses of contact count as bounces, and the push to settle at is read, within this time after first touch [s].
 BOUNCE_WINDOW_S = 3.0
 
@@ -43,6 +45,11 @@ def least(values: np.ndarray) -> float:
     return _of_finite(values, np.min)
 
 
+def percentile(values: np.ndarray, percent: float) -> float:
+    """Percentile; NaN without values."""
+    return float(np.percentile(values, percent)) if len(values) else math.nan
+
+
 def tilt_deg(trace: Trace) -> np.ndarray:
     """Angle between the body's down axis and the world's [deg], (N,); exact near zero, where arccos is not."""
     _, x, y, _ = trace.attitude.T
@@ -60,6 +67,11 @@ def contact_clock(trace: Trace) -> np.ndarray:
     return begin + np.arange(len(trace.contact_1khz)) / PHYSICS_RATE_HZ
 
 
+def physics_ticks(trace: Trace) -> np.ndarray:
+    """Index of the control tick of every physics step, (M,)."""
+    return np.searchsorted(trace.t, contact_clock(trace) + 1e-9, side="right") - 1
+
+
 def in_phase(trace: Trace, *names: str) -> np.ndarray:
     """Control ticks in one of the named phases, (N,) bool."""
     return np.isin(trace.phase, [index for index, name in enumerate(trace.phases) if name in names])
@@ -74,6 +86,11 @@ def phase_window(trace: Trace, phase: str) -> tuple[float, float]:
 def event_time(trace: Trace, kind: str) -> float:
     """Time of the first event of a kind [s]; NaN if there is none."""
     return next((event.t for event in trace.events if event.kind == kind), math.nan)
+
+
+def last_event(trace: Trace, kind: str) -> str | None:
+    """Text of the last event of a kind; None if there is none."""
+    return next((event.text for event in reversed(trace.events) if event.kind == kind), None)
 
 
 def first_run(good: np.ndarray, length: int) -> int | None:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.settings import choice, setting, validate
+from sim.evaluate.figures import figure_of
 from sim.sweep.design import Parameter
 
 #: Statistic that a bound applies to: the median of the cell, or each of its flights (flags, peaks, counts of mishaps).
@@ -23,8 +24,6 @@ class Bound:
     metric: str  # column of the table of flights
     at_most: float = math.nan  # upper bound, in SI
     at_least: float = math.nan  # lower bound, in SI
-    scale: float = 1.0  # factor from SI to `unit`
-    unit: str = ""  # unit shown
     statistic: str = choice(MEDIAN, "statistic that the bound applies to", (MEDIAN, EVERY))
     share: float = setting(
         1.0, "fraction of flights that must be within a bound on every flight, or have a value", low=0.0, high=1.0
@@ -47,6 +46,16 @@ class Bound:
     def bound(self) -> float:
         """The bound, in SI."""
         return self.at_least if self.least else self.at_most
+
+    @property
+    def scale(self) -> float:
+        """Factor from SI to the unit shown."""
+        return figure_of(self.metric).scale
+
+    @property
+    def unit(self) -> str:
+        """Unit shown."""
+        return figure_of(self.metric).unit
 
     @property
     def every(self) -> bool:

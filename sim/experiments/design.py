@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import ibvs_qp
@@ -16,11 +16,12 @@ from sim.faults.fault import Fault
 from sim.faults.rotors import Derate
 from sim.flight.jobs import PaintJob, PressJob
 from sim.flight.options import FlightOptions, pilot_config, unsupervised
+from sim.flight.preflight import check_job
 from sim.sweep.design import FlightPlan, Parameter, Run
 from sim.sweep.setup import Setup, changed
 from sim.world.random_scene import EVALUATION, random_scene
 from sim.world.scene import Scene
-from sim.world.worlds import EXPERIMENT_WORLD, in_world
+from sim.world.worlds import DEFAULT_WORLD, in_world
 
 #: Start, approach, alignment, touch and retreat of a flight that starts near the wall [s]; sizes plan and bar only.
 AROUND_S = 9.0
@@ -37,7 +38,8 @@ class Choice:
     quick: bool = False  # a few cells and seeds, for minutes instead of the record
     seed: int = 0  # first seed
     features: str = "rendered"  # "rendered" or "geometric"
-    world: str = EXPERIMENT_WORLD  # errors of vehicle and sensors, where no level names another world
+    traces: bool = False  # whether the inputs of every flight's figures are kept
+    world: str = DEFAULT_WORLD  # errors of vehicle and sensors, where neither level nor experiment names a world
 
 
 def chosen(name: str) -> list[Experiment]:
@@ -66,7 +68,7 @@ def _cell(experiment: Experiment, flights: Flights, level: dict[str, Parameter],
     variant = str(level.get("variant", "standard"))
     for law in flights.laws or VARIANTS[variant].laws:
         for index in range(flights.seeds):
-            scene = _scene(flights, str(level.get("world", choice.world)), choice.seed + index)
+            scene = _scene(flights, world_of(experiment, level, choice.world), choice.seed + index)
             setup = _setup(experiment, flights, level, law, variant, scene)
             options = FlightOptions(
                 law=law,
@@ -77,6 +79,7 @@ def _cell(experiment: Experiment, flights: Flights, level: dict[str, Parameter],
                 video=False,
             )
             config = pilot_config(setup.scene, options, setup.pilot)
+            check_job(setup.scene, config, options.features, setup.job)
             yield Run(
                 experiment=experiment.name,
                 variant=variant,
@@ -86,8 +89,22 @@ def _cell(experiment: Experiment, flights: Flights, level: dict[str, Parameter],
                 ),
                 measure=getattr(measures, f"{flights.measure}_figures"),
                 keep=flights.keep and index == 0,
+                trace=choice.traces,
                 expected_s=AROUND_S + setup.job.expected_s(config.painting),
             )
+
+
+def world_of(experiment: Experiment, level: Mapping[str, Parameter], given: str) -> str:
+    """World of a cell: that of its level, of the experiment, or the one given on the command line."""
+    return str(level.get("world", experiment.world or given))
+
+
+def worlds_of(runs: Iterable[Run], given: str) -> dict[str, list[str]]:
+    """Worlds of every experiment's runs, in their order; `given` is that of the command line."""
+    found: dict[str, dict[str, None]] = {}
+    for run in runs:
+        found.setdefault(run.experiment, {})[world_of(experiment(run.experiment), run.params, given)] = None
+    return {name: list(worlds) for name, worlds in found.items()}
 
 
 def _scene(flights: Flights, world: str, seed: int) -> Scene:

@@ -6,12 +6,12 @@ from collections import Counter
 
 import polars as pl
 
-from sim.evaluate.table import law_name
 from sim.experiments.figures.force_map import OSCILLATES_N, map_cells
 from sim.experiments.relevance import Effect, effect
 from sim.experiments.sections import capped
 from sim.experiments.spec import Experiment
 from sim.experiments.wording import cell, exact, interval, varying
+from sim.flight.trace import law_name
 from sim.sweep.paired import variant_differences
 from sim.sweep.parts import PARAM
 from sim.sweep.statistics import completed, median_interval, select

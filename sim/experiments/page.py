@@ -10,6 +10,7 @@ from sim.experiments.parts_section import parts_section, rivals_section
 from sim.experiments.published_section import published_section, rates_section
 from sim.experiments.tables import Section
 from sim.experiments.verdict_section import verdict_section
+from sim.sweep.statistics import false_claims
 
 #: Experiment whose figure gives the overview.
 _OVERVIEW = "worlds"
@@ -30,6 +31,10 @@ def results_page(sections: Sequence[Section], lead: str, command: str, name: str
         "[tables.md](tables.md) has every table and figure, [experiments.md](../experiments.md) describes the "
         "experiments. All flights are simulated.\n"
     )
+    tables = [table for _, table in flown if "claimed" in table.columns]
+    if tables:
+        claims, flights = (sum(map(count, tables)) for count in (false_claims, len))
+        text += f"False claims (claimed by the pilot, not completed by the truth): {claims} of {flights} flights.\n"
     if verdict := verdict_section(flown):
         text += "\n## Verdict\n\n" + verdict
     overview = [figure for section in sections if section.experiment.name == _OVERVIEW

@@ -6,13 +6,14 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from sim.evaluate.table import law_name, markdown
+from sim.evaluate.table import markdown
 from sim.experiments.impedance_section import DIRECT
 from sim.experiments.relevance import Effect, effect, threshold
 from sim.experiments.sections import Flown, capped, grouped, world_of
 from sim.experiments.spec import Column, Experiment
 from sim.experiments.variants import REFERENCES, VARIANTS
 from sim.experiments.wording import cell, difference, exact, headings, measured, value_of, varying
+from sim.flight.trace import law_name
 from sim.sweep.paired import variant_differences
 
 

@@ -12,9 +12,10 @@ from sim.evaluate.measures import paint_figures
 from sim.experiments.scenes import near_wall, short_job
 from sim.flight.jobs import PaintJob
 from sim.flight.options import FlightOptions, pilot_config
+from sim.flight.preflight import check_job
 from sim.sweep.design import FlightPlan, Measure, Run
 from sim.world.scene import Scene
-from sim.world.worlds import EXPERIMENT_WORLD, in_world
+from sim.world.worlds import DEFAULT_WORLD, in_world
 
 #: Stroke of the quick job [m].
 QUICK_STROKE_M = 0.4
@@ -42,6 +43,7 @@ def paint_runs(
         cell: ``experiment``, ``variant`` and ``params`` of the runs.
     """
     pilot = pilot_config(scene, FlightOptions(law=config.law), config)
+    check_job(scene, pilot, features)
     expected_s = overhead_s + PaintJob().expected_s(pilot.painting)
     return [
         Run(
@@ -65,7 +67,7 @@ def preset_runs(
     seeds: Iterable[int],
     features: str,
     quick: bool,
-    world: str = EXPERIMENT_WORLD,
+    world: str = DEFAULT_WORLD,
 ) -> list[Run]:
     """Paint jobs under a preset file.
 

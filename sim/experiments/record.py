@@ -20,7 +20,7 @@ from sim.report.rundir import write_json
 from sim.storage.atomic import write_text
 from sim.sweep.paired import paired_differences, variant_differences
 from sim.sweep.parts import write_table
-from sim.sweep.statistics import cells
+from sim.sweep.statistics import cells, false_claims
 
 SCHEMA = 1
 #: Folder of parts and logs, under the folder of the experiment.
@@ -61,6 +61,7 @@ def summary(
         "data_file": str(data_file(folder, name)),
         "run_dir": str(folder),
         **{key: facts[key] for key in _FACTS},
+        "false_claims": false_claims(table),
         "cells": listed,
         "differences": paired_differences(table) if table.height else [],
         "parts": variant_differences(table, REFERENCES) if table.height else [],

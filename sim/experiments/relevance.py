@@ -3,33 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from enum import Enum
-from pathlib import Path
 
-from ibvs_qp.config.settings import load_toml
+from sim.evaluate.figures import figure_of
 from sim.experiments.spec import Column
 from sim.sweep.paired import needed, sign
-
-
-@dataclass(frozen=True, kw_only=True)
-class Threshold:
-    """Least difference that matters."""
-
-    least: float  # in `unit`
-    reason: str  # why
-    unit: str = ""  # unit of the columns
-    metrics: tuple[str, ...] = ()  # columns; empty means all others of the unit
-
-
-@dataclass(frozen=True, kw_only=True)
-class Thresholds:
-    """Content of ``relevance.toml``."""
-
-    thresholds: tuple[Threshold, ...]
-
-
-THRESHOLDS = load_toml(Thresholds, Path(__file__).with_name("relevance.toml")).thresholds
 
 
 class Effect(Enum):
@@ -46,13 +24,9 @@ def threshold(column: Column) -> float:
     """Least difference of a column that matters, in its unit.
 
     Raises:
-        KeyError: When ``relevance.toml`` has none for the column.
+        KeyError: When neither its figure nor its unit has one.
     """
-    own = [each.least for each in THRESHOLDS if column.metric in each.metrics]
-    shared = [each.least for each in THRESHOLDS if each.unit == column.unit and each.unit and not each.metrics]
-    for least in (*own, *shared):
-        return least
-    raise KeyError(f"relevance.toml has no threshold for {column.metric!r} [{column.unit}]")
+    return figure_of(column.metric).least[0]
 
 
 def effect(found: Mapping[str, float], column: Column) -> Effect:
@@ -66,7 +40,7 @@ def effect(found: Mapping[str, float], column: Column) -> Effect:
     least = threshold(column) / column.scale
     if max(abs(found["sure_low"]), abs(found["sure_high"])) < least:
         return Effect.IRRELEVANT
-    side = -column.better * sign(dict(found))
+    side = -(column.better or 0) * sign(dict(found))
     if not side:
         return Effect.OPEN
     if abs(found["median"]) < least:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ibvs_qp.config.settings import choice, load_toml, setting, validate
+from sim.evaluate.figures import figure_of
 from sim.experiments.criteria import Criteria, Criterion
 from sim.sweep.design import Parameter
 
@@ -24,14 +25,30 @@ Value = int | float | bool | str | tuple[float, ...]
 class Column:
     """A metric shown in the tables of an experiment."""
 
-    metric: str  # column of the table of flights
-    label: str  # heading
-    unit: str = ""  # unit shown
-    scale: float = 1.0  # factor from SI to `unit`
-    digits: int = 2  # decimals
-    better: int = -1  # +1 if more is better, -1 if less is better, 0 if neither
+    metric: str  # name of the figure, column of the table of flights
+    label: str = ""  # heading where the measure means something narrower than the figure's words
+    digits: int | None = None  # decimals if not those of the figure
+    better: int | None = None  # direction if not that of the figure
     of_all: bool = False  # whether flights that did not end as planned have the metric too
     where: dict[str, Parameter] = field(default_factory=dict)  # cells with this metric; empty means all
+
+    def __post_init__(self) -> None:
+        """Fill in what the figure says."""
+        figure = figure_of(self.metric)
+        filled = {"label": self.label or figure.words, "digits": figure.digits, "better": figure.better}
+        for name, value in filled.items():
+            if getattr(self, name) in ("", None):
+                object.__setattr__(self, name, value)
+
+    @property
+    def unit(self) -> str:
+        """Unit shown."""
+        return figure_of(self.metric).unit
+
+    @property
+    def scale(self) -> float:
+        """Factor from SI to the unit."""
+        return figure_of(self.metric).scale
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,10 +84,14 @@ class Panel:
 
     metric: str
     label: str  # with unit
-    scale: float = 1.0  # factor from SI to that unit
     top: float = math.inf  # highest value shown
     where: dict[str, Parameter] = field(default_factory=dict)  # rows shown
     xlabel: str = ""  # if it differs from that of the figure
+
+    @property
+    def scale(self) -> float:
+        """Factor from SI to the unit of the label."""
+        return figure_of(self.metric).scale
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,6 +136,7 @@ class Experiment:
     paths: dict[str, tuple[str, ...]] = field(default_factory=dict)  # dotted paths that take a parameter's value
     named: dict[str, dict[str, dict[str, Value]]] = field(default_factory=dict)  # paths set by a parameter's value
     fixed: dict[str, Value] = field(default_factory=dict)  # values of dotted paths for all flights
+    world: str = ""  # of flights without a level `world`; empty takes that of the command line
     folded: dict[str, Parameter] = field(default_factory=dict)  # cells that the page folds away: a figure shows them
 
     def every_criterion(self) -> list[Criterion]:

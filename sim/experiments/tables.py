@@ -8,15 +8,16 @@ from pathlib import Path
 
 import polars as pl
 
-from sim.evaluate.table import law_name, markdown
+from sim.evaluate.table import markdown
 from sim.experiments.comparison import compared_cells
 from sim.experiments.criteria_section import criteria_table
 from sim.experiments.parts_section import parts_table
 from sim.experiments.spec import Experiment
 from sim.experiments.variants import VARIANTS
 from sim.experiments.wording import cell, difference, entry, headings, interval, measured, value_of
+from sim.flight.trace import law_name
 from sim.sweep.paired import differences, needed
-from sim.sweep.statistics import cells, parameters, split
+from sim.sweep.statistics import cells, false_claims, parameters, split
 
 #: Top of the page.
 _HEAD = """# Tables behind the results
@@ -28,8 +29,9 @@ Generated from data by `{command}`; do not edit. {lead} [results.md](results.md)
 them, any other bound to the median of the cell; if not all flights are within the bound, the number within it follows.
 A flight without the metric fails.
 Values are medians over the flights of a cell, with their 95 % bootstrap interval in brackets. *Done* counts the flights
-that ended as planned; values come from those flights only. Differences are taken between flights with the same seed
-that both ended as planned, with the exact interval of the median in brackets; **bold** means that the interval excludes
+that ended as planned, by the truth and by the pilot's claim; values come from those flights only. Differences are taken
+between flights with the same seed that both ended as planned, with the exact interval of the median in brackets;
+**bold** means that the interval excludes
 zero. Fewer than {needed} pairs are too few for such an interval.
 
 """
@@ -104,7 +106,8 @@ def _failures(experiment: Experiment, table: pl.DataFrame) -> str:
     failed = table.filter(~pl.col("completed"))
     if not failed.height:
         return ""
-    lines = ["Flights that did not end as planned:", ""]
+    count = false_claims(table)
+    lines = [f"Flights that did not end as planned, {count} of them claimed by the pilot:", ""]
     for key, rows in split(failed, ("law", "variant", "reason")):
         seeds = ", ".join(map(str, sorted(rows["seed"])))
         where = cell(experiment, parameters(key))

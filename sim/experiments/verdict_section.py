@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
+from sim.evaluate.figures import MATTERS
 from sim.experiments.comparison import Comparison, compared_cells, comparisons
 from sim.experiments.completion_section import completion_section
-from sim.experiments.relevance import THRESHOLDS, Effect, threshold
+from sim.experiments.relevance import Effect, threshold
 from sim.experiments.sections import HEADINGS, Flown, capped, grouped, world_of
 from sim.experiments.wording import cell, exact, varying
 from sim.sweep.paired import needed
@@ -53,9 +54,7 @@ def _headline(best: Sequence[Comparison]) -> str:
 def _method(best: Sequence[Comparison]) -> str:
     """How a comparison is made and what its outcomes mean, with the thresholds of the figures compared."""
     units = {each.column.unit for each in best}
-    least = "; ".join(
-        f"{each.least:g} {each.unit}: {each.reason}" for each in THRESHOLDS if each.unit in units and not each.metrics
-    )
+    least = "; ".join(f"{amount:g} {unit}: {reason}" for unit, (amount, reason) in MATTERS.items() if unit in units)
     enough = sum(each.effect != Effect.FEW for each in best)
     return (
         "A comparison is one figure of merit in one cell: analytic law minus QP law, seed by seed, over the flights "

@@ -6,12 +6,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
-from sim.evaluate.metrics import coverage
 from sim.evaluate.paint_plan import band_mask, nominal_plan
-from sim.evaluate.table import law_name
+from sim.evaluate.part import Part
 from sim.evaluate.window import board_tip
 from sim.figures.style import REFERENCE, law_panels, thin
-from sim.flight.trace import Trace
+from sim.flight.trace import Trace, law_name
 
 #: Width of the axes, height of a title, largest height of a panel [in].
 _WIDTH_IN, _TITLE_IN, _MOST_HEIGHT_IN = 7.4, 0.45, 2.9
@@ -24,7 +23,7 @@ def draw_board(traces: dict[str, Trace]) -> Figure:
     figure, panels = law_panels(traces, height * len(traces))
     for axes, law, trace in panels:
         draw_canvas(axes, trace)
-        axes.set_title(f"{law_name(law)}: {100 * coverage(trace):.1f} % of the intended band covered")
+        axes.set_title(f"{law_name(law)}: {100 * Part.whole(trace).coverage:.1f} % of the intended band covered")
     return figure
 
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from sim.evaluate.table import law_name
 from sim.evaluate.window import CONTACT_N, PHYSICS_RATE_HZ
 from sim.figures.style import FAINT, REFERENCE, law_colour, legend_above, new_figure, note_empty, shade_phases, thin
-from sim.flight.trace import Trace
+from sim.flight.trace import Trace, law_name
 
 #: Time before and after the first touch in the enlarged view [s].
 BEFORE_TOUCH_S, AFTER_TOUCH_S = 0.3, 2.7

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from sim.evaluate.table import law_name
 from sim.figures.style import ZERO, law_colour, legend_above, new_figure, shade_phases, thin
-from sim.flight.trace import Trace
+from sim.flight.trace import Trace, law_name
 
 _VELOCITY = ("forward", "right", "down")
 _ATTITUDE = ("roll", "pitch", "yaw")

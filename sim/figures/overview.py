@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from sim.evaluate.table import law_name
 from sim.figures.board import draw_canvas
 from sim.figures.style import REFERENCE, law_colour, legend_above, new_figure, shade_phases, thin
 from sim.flight.pictures import unpack_picture
-from sim.flight.trace import Trace
+from sim.flight.trace import Trace, law_name
 
 #: The camera view is taken at this fraction of the last row.
 FRACTION_OF_ROW = 0.35

@@ -8,9 +8,8 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from sim.evaluate.paint_plan import nominal_plan
 from sim.evaluate.path_error import CORNER_M, path_error
-from sim.evaluate.table import law_name
 from sim.figures.style import REFERENCE, law_colour, new_figure, thin
-from sim.flight.trace import Trace
+from sim.flight.trace import Trace, law_name
 from sim.world.board import BoardGeometry
 
 

@@ -17,8 +17,7 @@ from matplotlib.patches import Patch
 from matplotlib.transforms import blended_transform_factory
 from numpy.typing import ArrayLike
 
-from sim.evaluate.table import law_name
-from sim.flight.trace import Trace
+from sim.flight.trace import Trace, law_name
 from sim.storage.atomic import replacing
 
 STYLE_FILE = Path(__file__).with_name("ibvs_qp.mplstyle")

@@ -19,7 +19,7 @@ from sim.world.scene import Scene
 from sim.world.true_vehicle import TrueVehicle, true_vehicle
 
 #: Names of the strategy's phases, in the order of a flight.
-PHASES = ("start", "approach", "align", "press", "paint", "climb", "retreat", "done")
+PHASES = ("start", "survey", "approach", "align", "press", "paint", "climb", "search", "retreat", "done")
 OUTCOMES = tuple(str(outcome) for outcome in Outcome)
 #: Ticks per logged propeller clearance, which changes slowly (the plant checks for strikes at every tick).
 CLEARANCE_TICKS = 5

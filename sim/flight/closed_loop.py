@@ -15,7 +15,7 @@ from sim.flight.jobs import Job, PaintJob
 from sim.flight.options import FlightOptions, pilot_config
 from sim.flight.recorder import Recorder
 from sim.flight.surroundings import World
-from sim.flight.trace import CRASH, LANDED, Event, Trace
+from sim.flight.trace import CRASH, INTERRUPTED, LANDED, TIME_OUT, Event, Trace
 from sim.rivals import rival_controller
 from sim.sensors.features import add_sigma_vs
 from sim.world.plant import TICK_NS
@@ -30,8 +30,6 @@ Progress = Callable[[float, str, float], None]
 
 #: Ending of MCAP logs.
 MCAP = ".mcap"
-#: Reason of a flight that Ctrl-C ended.
-INTERRUPTED = "interrupted"
 #: Control ticks between calls of the progress function.
 PROGRESS_TICKS = 125
 #: Time-out of a flight [s]: start and corners, plus the strokes at half speed.
@@ -111,7 +109,7 @@ def fly(
                 reason = LANDED
                 break
             if tick * TICK_NS * 1e-9 > limit:
-                reason = f"time-out after {limit:.0f} s of flight"
+                reason = f"{TIME_OUT} after {limit:.0f} s of flight"
                 break
             if progress is not None and tick % PROGRESS_TICKS == 0:
                 flown = tick * TICK_NS * 1e-9
@@ -125,8 +123,8 @@ def fly(
     trace = recorder.trace()
     trace.wall_time_s = time.perf_counter() - start  # includes the trace
     planned = not reason or (reason == LANDED and pilot.painter.descending)
-    trace.completed = planned and (pilot.painter.finished or bool(reason)) and not pilot.painter.failed
-    trace.reason = reason or pilot.painter.reason
+    trace.claimed = planned and (pilot.painter.finished or bool(reason)) and not pilot.painter.failed
+    trace.reason, trace.plan = reason or pilot.painter.reason, job.plan
     if reason:
         trace.events.append(Event(t=tick * TICK_NS * 1e-9, kind="end", text=reason))
     return trace

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from ibvs_qp.config.files import UnreadableFile
 from sim.flight.log_check import check_arrays
-from sim.flight.trace import Event, Trace
+from sim.flight.trace import PAINTED, Event, Trace
 from sim.flight.unfinished import unfinished_run
 from sim.storage.arrays import read_npz
 from sim.storage.atomic import replacing
@@ -32,20 +33,29 @@ def write_log(stream: BinaryIO, traces: dict[str, Trace]) -> None:
     """Write every array of every law in npz format, named ``<law>/<array>``."""
     content: dict[str, Any] = {}
     for law, trace in traces.items():
-        arrays = dict(trace.arrays)
-        for name in ("phases", "outcomes", "limits"):
-            arrays[name] = np.array(getattr(trace, name), dtype=str)
-        arrays["event_t"] = np.array([event.t for event in trace.events])
-        arrays["event_text"] = np.array([[event.kind, event.text] for event in trace.events], dtype=str)
+        arrays = trace.arrays | facts_of(trace)
         if trace.canvas is not None and trace.coverage_mask is not None:
             arrays["canvas"] = trace.canvas
-            arrays["coverage_percent"] = np.round(100 * trace.coverage_mask).astype(np.uint8)
-            arrays["canvas_px_per_m"] = np.array(trace.canvas_px_per_m)
-        arrays["outcome_of_flight"] = np.array([str(trace.completed), trace.reason], dtype=str)
-        arrays["preset"], arrays["world"] = np.array(trace.preset), np.array(world_name(trace.scene.errors))
-        arrays["seed"], arrays["wall_time_s"] = np.array(trace.seed), np.array(trace.wall_time_s)
         content.update({f"{law}/{name}": values for name, values in arrays.items()})
     np.savez_compressed(stream, **content)
+
+
+def facts_of(trace: Trace) -> dict[str, Any]:
+    """What a log has beside the arrays of a trace and its canvas, as arrays."""
+    facts: dict[str, Any] = {name: np.array(getattr(trace, name), str) for name in ("phases", "outcomes", "limits")}
+    facts["event_t"] = np.array([event.t for event in trace.events])
+    facts["event_text"] = np.array([[event.kind, event.text] for event in trace.events], dtype=str)
+    if trace.coverage_mask is not None:
+        painted = trace.coverage_mask > PAINTED  # rounding must not move a pixel across the bound
+        percent, bound = np.round(100 * trace.coverage_mask), 100 * PAINTED
+        percent = np.where(painted, np.maximum(percent, bound + 1), np.minimum(percent, bound))
+        facts["coverage_percent"] = percent.astype(np.uint8)
+        facts["canvas_px_per_m"] = np.array(trace.canvas_px_per_m)
+    facts["outcome_of_flight"] = np.array([str(trace.claimed), trace.reason], dtype=str)
+    facts["plan"], facts["preset"] = np.array(json.dumps(trace.plan)), np.array(trace.preset)
+    facts["world"] = np.array(world_name(trace.scene.errors))
+    facts["seed"], facts["wall_time_s"] = np.array(trace.seed), np.array(trace.wall_time_s)
+    return facts
 
 
 def load_run(path: str | Path) -> dict[str, Trace]:
@@ -69,7 +79,7 @@ def load_run(path: str | Path) -> dict[str, Trace]:
     for law in dict.fromkeys(name.split("/")[0] for name in arrays):
         own = {name.split("/", 1)[1]: values for name, values in arrays.items() if name.startswith(law + "/")}
         try:
-            traces[law] = _trace(law, scene, own)
+            traces[law] = trace_of(law, scene, own)
         except KeyError as error:
             raise UnreadableFile(file, f"no log of a flight: law {law!r} has no array {error}") from None
         except (TypeError, ValueError, OverflowError) as error:
@@ -77,10 +87,10 @@ def load_run(path: str | Path) -> dict[str, Trace]:
     return traces
 
 
-def _trace(law: str, scene: Scene, arrays: dict[str, np.ndarray]) -> Trace:
+def trace_of(law: str, scene: Scene, arrays: dict[str, np.ndarray]) -> Trace:
     """The trace of one law; the arrays that are not its own are taken out."""
     check_arrays(arrays)
-    completed, reason = _texts(arrays.pop("outcome_of_flight"))
+    claimed, reason = _texts(arrays.pop("outcome_of_flight"))
     event_t, event_text = arrays.pop("event_t"), arrays.pop("event_text").reshape(-1, 2)
     coverage = arrays.pop("coverage_percent", None)
     arrays.pop("world", None)  # the scene holds the errors themselves
@@ -93,7 +103,8 @@ def _trace(law: str, scene: Scene, arrays: dict[str, np.ndarray]) -> Trace:
         outcomes=_texts(arrays.pop("outcomes")),
         limits=_texts(arrays.pop("limits")),
         events=[Event(t=float(t), kind=kind, text=text) for t, (kind, text) in zip(event_t, texts, strict=True)],
-        completed=completed == "True",
+        claimed=claimed == "True",
+        plan=_plan(arrays.pop("plan", None)),
         reason=reason,
         preset="".join(_texts(arrays.pop("preset", np.array("")))),
         wall_time_s=float(arrays.pop("wall_time_s")),
@@ -102,6 +113,14 @@ def _trace(law: str, scene: Scene, arrays: dict[str, np.ndarray]) -> Trace:
         coverage_mask=None if coverage is None else coverage.astype(np.float32) / 100,
         arrays=arrays,
     )
+
+
+def _plan(array: np.ndarray | None) -> dict[str, float]:
+    """Durations of the phases of a job without strokes; an older log has none."""
+    plan = json.loads("".join(_texts(array))) if array is not None else {}
+    if plan and not (isinstance(plan, dict) and plan.keys() == {"press", "paint", "descend"}):
+        raise ValueError(f"plan {plan!r} of a flight")
+    return {name: float(value) for name, value in plan.items()}
 
 
 def _texts(array: np.ndarray) -> tuple[str, ...]:

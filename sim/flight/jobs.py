@@ -22,6 +22,11 @@ class Job(Protocol):
         """Flying time at the wall to expect [s]."""
         ...
 
+    @property
+    def plan(self) -> dict[str, float]:
+        """Least durations of the phases of a job without strokes [s]; empty for a paint job."""
+        ...
+
 
 @dataclass(frozen=True, kw_only=True)
 class PaintJob:
@@ -34,6 +39,11 @@ class PaintJob:
     def expected_s(self, config: PaintingConfig) -> float:
         """Strokes and climbs at their speed."""
         return (config.rows * config.stroke_m + (config.rows - 1) * config.pitch_m) / config.speed_m_s
+
+    @property
+    def plan(self) -> dict[str, float]:
+        """None: the scene has its strokes."""
+        return {}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,3 +65,8 @@ class PressJob:
     def expected_s(self, config: PaintingConfig) -> float:
         """Hold and slide."""
         return self.hold_s + self.slide_s
+
+    @property
+    def plan(self) -> dict[str, float]:
+        """Hold in phase ``press``, slide in phase ``paint``; ``descend`` after a lost rotor."""
+        return {"press": self.hold_s, "paint": self.slide_s, "descend": self.descend_s}

@@ -96,6 +96,8 @@ def pilot_config(scene: Scene, options: FlightOptions, config: PilotConfig | Non
         config.painting,
         brush_width_m=paint.brush_width_m,
         edge_margin_m=paint.edge_margin_m,
+        pattern=paint.pattern,
+        start=paint.start,
         rows=paint.rows,
         stroke_m=paint.stroke_m,
         overlap_m=paint.overlap_m,

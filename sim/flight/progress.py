@@ -1,4 +1,4 @@
-"""Progress of the flights on standard error: one bar per law with phase and real-time factor."""
+"""Progress of the flights on standard error: phase and real-time factor per law, on a terminal with a bar."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 from sim.flight.jobs import PaintJob
 from sim.flight.options import FlightOptions, pilot_config
 from sim.flight.trace import law_name
+from sim.flight.working import lines
 from sim.world.scene import Scene
 
 #: Flying time that does not grow with the job: approach, alignment, press, retreat [s]; only sizes the bar.
@@ -21,11 +22,16 @@ OVERHEAD_S = 25.0
 def flight_progress(
     console: Console, scene: Scene, laws: tuple[str, ...]
 ) -> Iterator[Callable[[str, float, str, float], None]]:
-    """Show a bar per law while the context is open.
+    """Show every law while the context is open.
 
     Yields:
         A function of law, simulated time [s], phase and real-time factor.
     """
+    notes = dict.fromkeys(laws, "starting")
+    if not console.is_terminal:
+        with lines(console, lambda: "; ".join(f"{law_name(law)}: {note}" for law, note in notes.items())):
+            yield lambda law, *now: notes.update({law: _note(*now)})
+        return
     columns = (
         TextColumn("{task.description:<12}"),
         BarColumn(),
@@ -41,7 +47,11 @@ def flight_progress(
             bars.update(
                 tasks[law],
                 completed=total if done else min(t, 0.99 * total),
-                note=f"{t:5.1f} s  {phase:<9} {rtf:4.1f} x real time",
+                note=_note(t, phase, rtf),
             )
 
         yield update
+
+
+def _note(t: float, phase: str, rtf: float) -> str:
+    return f"{t:5.1f} s  {phase:<9} {rtf:4.1f} x real time"

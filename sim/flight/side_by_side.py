@@ -15,11 +15,11 @@ from typing import Any
 import cv2
 import joblib
 
-from sim.flight.closed_loop import INTERRUPTED, fly
+from sim.flight.closed_loop import fly
 from sim.flight.options import FlightOptions
 from sim.flight.pictures import pack_pictures
 from sim.flight.stop import handled_ctrl_c, live_with_parent
-from sim.flight.trace import Trace
+from sim.flight.trace import INTERRUPTED, Trace
 from sim.world.scene import Scene
 
 #: Called with law, simulated time [s], phase and real-time factor.

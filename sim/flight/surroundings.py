@@ -74,10 +74,10 @@ class World:
         return self.sensors.sample(plant, image=None if image is None else self._mount.picture(image))
 
     def act(self, thrusts: np.ndarray) -> None:
-        """Advance one control tick and paint where the brush presses."""
+        """Advance one control tick and paint where the brush presses the board."""
         plant = self.plant
         plant.step(thrusts)
-        pressing = plant.contact_normal_force > PAINTING_FORCE
+        pressing = plant.on_board and plant.contact_normal_force > PAINTING_FORCE
         if self.viewer is not None:
             self.viewer.show(pressing)
         if pressing:

@@ -12,8 +12,14 @@ from sim.world.scene import Scene
 
 #: Beginning of the reason of a flight that ended in a crash.
 CRASH = "crash"
-#: Reason of a flight that ended in a touchdown.
-LANDED = "landed"
+#: Reason of a flight that ended in a touchdown, and of one that Ctrl-C ended.
+LANDED, INTERRUPTED = "landed", "interrupted"
+#: Reason of a flight without an end.
+KILLED = "the process of the flight was killed: its log ends here"
+#: Part of the reason of a flight, or of a strategy, that took too long.
+TIME_OUT = "time-out"
+#: Paint coverage of a pixel above which it counts as painted.
+PAINTED = 0.5
 #: Meaning of every array of a trace (N control ticks, M physics steps, F pictures).
 FIELDS = {
     "t": "(N,) time since start [s]",
@@ -54,6 +60,15 @@ FIELDS = {
 }
 
 
+#: Arrays that figures of merit are computed from; the log level `trace` has no others.
+FIGURE_INPUTS = (
+    *("t", "position", "velocity", "attitude", "euler", "tip", "thrusts", "thrusts_actual", "thrust_min", "thrust_max"),
+    *("true_thrust_min", "true_thrust_max", "true_mass", "push_true", "push_reference", "friction_true"),
+    *("velocity_estimate", "phase", "row", "outcome", "active", "step_us", "vision_ms", "propeller_clearance"),
+    *("contact_1khz", "painting_1khz"),
+)
+
+
 #: Names of the laws in titles, headings and legends, in the order flown.
 LAWS = {"qp": "QP law", "paper": "analytic law"}
 
@@ -84,7 +99,9 @@ class Trace:
     outcomes: tuple[str, ...] = ()  # names of the outcomes
     limits: tuple[str, ...] = ()  # names of the limits, columns of ``active``
     events: list[Event] = field(default_factory=list)  # phase changes and other events in order
-    completed: bool = False  # rows, climbs and retreat done without time-out or crash
+    claimed: bool = False  # whether the pilot ended its job as planned, by what it knows (truth: sim.evaluate.truth)
+    # Least durations [s] of the phases of a job without strokes (`sim.flight.jobs.PressJob`); empty for a paint job.
+    plan: dict[str, float] = field(default_factory=dict)
     reason: str = ""  # why the flight ended, in words
     wall_time_s: float = 0.0  # wall-clock time of the simulation [s]
     # Painted board as the camera would see it, uint8 RGB, with `canvas_px_per_m`; no class attribute, see `draw_later`.

@@ -18,7 +18,7 @@ from sim.flight.assemble import OUTCOMES, PHASES, Flown, LoggedRows, assemble
 from sim.flight.columns import split
 from sim.flight.journal import NOTES, ROWS, Header
 from sim.flight.log_check import check_arrays
-from sim.flight.trace import LAWS, Event, Trace
+from sim.flight.trace import KILLED, LAWS, Event, Trace
 from sim.storage.limits import LARGEST_ARRAYS
 from sim.world.scene import Scene
 
@@ -26,8 +26,6 @@ from sim.world.scene import Scene
 JOURNALS = "partial-"
 #: Errors of content that no journal wrote.
 _DAMAGE = (ArithmeticError, AttributeError, ConfigError, LookupError, RecursionError, TypeError, ValueError)
-#: Reason of a flight without an end.
-KILLED = "the process of the flight was killed: its log ends here"
 
 
 def unfinished_run(path: Path) -> dict[str, Trace]:

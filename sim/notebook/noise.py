@@ -10,11 +10,12 @@ import numpy as np
 import polars as pl
 
 from ibvs_qp.config.errors import ConfigError
-from sim.evaluate.table import Figure, law_name
+from sim.evaluate.figures import FIGURES as FIGURES_BY_NAME
+from sim.evaluate.figures import MORE, Figure
 from sim.experiments.design import Choice
 from sim.experiments.design import designs as experiment_runs
 from sim.flight.closed_loop import fly
-from sim.flight.trace import Trace
+from sim.flight.trace import Trace, law_name
 from sim.notebook.noise_sample import SAMPLE, sample_runs
 from sim.notebook.table import table
 from sim.sweep.design import Run
@@ -35,16 +36,12 @@ MOST_SEEDS = 10
 _VERDICTS = {1: "QP better", 0: "no significant difference", -1: "analytic law better"}
 
 
-FIGURES = (
-    Figure("path_rms_m", "path error, rms", 1e3, "mm"),
-    Figure("force_rms_n", "push error, rms", unit="N"),
-    Figure("path_max_m", "path error, largest", 1e3, "mm"),
-    Figure("tilt_rms_deg", "tilt, rms", unit="deg"),
-    Figure("yaw_rms_deg", "yaw, rms", unit="deg"),
-    Figure("velocity_rms_m_s", "error of the estimated velocity, rms", 1e3, "mm/s"),
-    Figure("coverage", "painted part of the intended band", 1e2, "%", more_is_better=True),
-    Figure("limited_share", "ticks with an active limit", 1e2, "%"),
-    Figure("duration_s", "duration", unit="s"),
+FIGURES = tuple(
+    FIGURES_BY_NAME[name]
+    for name in (
+        *("path_rms_m", "force_rms_n", "path_max_m", "tilt_rms_deg", "yaw_rms_deg", "velocity_rms_m_s", "coverage"),
+        *("limited_share", "duration_s"),
+    )
 )
 
 
@@ -75,9 +72,9 @@ def grid_of(sweep: pl.DataFrame) -> tuple[list[float], list[float]]:
 
 def cell_values(sweep: pl.DataFrame, law: str, vs: float, force: float, figure: Figure) -> np.ndarray:
     """Figure of the completed flights of a cell, in the unit of its label."""
-    if figure.column not in sweep.columns:
+    if figure.name not in sweep.columns:
         return np.array([])
-    return figure.scale * completed(select(sweep, law=law, sigma_vs=vs, sigma_f_n=force), figure.column)
+    return figure.scale * completed(select(sweep, law=law, sigma_vs=vs, sigma_f_n=force), figure.name)
 
 
 def success(sweep: pl.DataFrame) -> pl.DataFrame:
@@ -112,8 +109,8 @@ def effects(sweep: pl.DataFrame, law: str, figure: Figure) -> dict[str, float]:
         scatter of log y that sigma_vs alone, sigma_f alone, and not even both explain: ``vs_part``, ``force_part`` and
         ``rest``. NaN with too few flights.
     """
-    flown = sweep.filter((pl.col("law") == law) & pl.col("completed") & (pl.col(figure.column) > 0.0))
-    logs = flown.select(pl.col(figure.column).log().alias("y"), pl.col(VS).log(), pl.col(FORCE).log())
+    flown = sweep.filter((pl.col("law") == law) & pl.col("completed") & (pl.col(figure.name) > 0.0))
+    logs = flown.select(pl.col(figure.name).log().alias("y"), pl.col(VS).log(), pl.col(FORCE).log())
     y, vs, force = logs.to_numpy().T
     if len(y) <= 3 or min(np.ptp(y), np.ptp(vs), np.ptp(force)) == 0.0:
         return {"flights": len(y), **dict.fromkeys(("vs", "force", "vs_part", "force_part", "rest"), math.nan)}
@@ -148,12 +145,12 @@ def averaged_samples(sweep: pl.DataFrame, law: str) -> tuple[dict[float, float],
 def differences_table(sweep: pl.DataFrame, figure: Figure) -> str:
     """Analytic law minus QP law, seed by seed: median with its exact interval per cell, as markdown."""
     rows = []
-    for cell in paired_differences(sweep.filter(pl.col("completed")), [figure.column]):
-        found = cell["differences"].get(figure.column)
+    for cell in paired_differences(sweep.filter(pl.col("completed")), [figure.name]):
+        found = cell["differences"].get(figure.name)
         if found is None:
             continue
         low, middle, high = (figure.scale * found[name] for name in ("sure_low", "median", "sure_high"))
-        enough, better = math.isfinite(low), -sign(found) if figure.more_is_better else sign(found)
+        enough, better = math.isfinite(low), -sign(found) if figure.better == MORE else sign(found)
         verdict = _VERDICTS[better] if enough else f"significant from {needed()} pairs on"
         sigmas = (f"{cell['params'][name]:g}" for name in ("sigma_vs", "sigma_f_n"))
         rows.append((*sigmas, cell["n"], f"{middle:+.2f}", f"{low:+.2f} to {high:+.2f}" if enough else "–", verdict))

@@ -7,7 +7,7 @@ import polars as pl
 from matplotlib.figure import Figure as Drawing
 from matplotlib.lines import Line2D
 
-from sim.evaluate.table import Figure
+from sim.evaluate.figures import Figure
 from sim.figures import style
 from sim.figures.style import law_colour, law_name, law_patches, legend_below, new_figure
 from sim.notebook.noise import FIGURES, FORCE, LAWS, VS, cell_values, grid_of

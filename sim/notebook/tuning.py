@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import shlex
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -173,27 +174,34 @@ def load_setting(preset: str) -> Setting:
 
 @dataclass(frozen=True, kw_only=True)
 class Start:
-    """Where the controls begin: a preset, and why another one was not loaded."""
+    """The preset with which the controls begin."""
 
     setting: Setting = field(default_factory=Setting)
     name: str = "the shipped preset"
-    refusal: str = ""
     count: int = 0  # so that a reset is a change
 
     def again(self) -> Start:
         """The same, as a new value."""
-        return dataclasses.replace(self, refusal="", count=self.count + 1)
+        return dataclasses.replace(self, count=self.count + 1)
 
-    def load(self, preset: str) -> Start:
-        """Another preset, see `load_setting`; the same with the reason if that is refused."""
-        try:
-            return Start(setting=load_setting(preset), name=f"`{preset}`", count=self.count + 1)
-        except ConfigError as error:
-            return dataclasses.replace(self, refusal=str(error), count=self.count + 1)
 
-    def text(self) -> str:
-        """What the controls began with, as markdown."""
-        return f"**Not loaded:** {self.refusal}" if self.refusal else f"begun with {self.name}"
+def load_start(
+    preset: str, set_start: Callable[[Callable[[Start], Start]], Any], set_refusal: Callable[[str], Any]
+) -> None:
+    """Begin with another preset, see `load_setting`; one that is refused leaves the controls as they are.
+
+    Args:
+        preset: Name or file.
+        set_start: Takes a function of the present start, and sets its result; each call rebuilds the controls.
+        set_refusal: Takes the reason of a refusal; empty for a preset that is loaded.
+    """
+    try:
+        setting = load_setting(preset)
+    except ConfigError as error:
+        set_refusal(str(error))
+        return
+    set_refusal("")
+    set_start(lambda now: Start(setting=setting, name=f"`{preset}`", count=now.count + 1))
 
 
 def _path(name: str | Path) -> Path:

@@ -2,15 +2,29 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 from typing import Any
 
+from ibvs_qp.config.files import UnreadableFile
 from ibvs_qp.config.toml_text import parse_toml, read_toml
 from ibvs_qp.pilot import PilotConfig
 from sim.report.summary_file import FACTS, read_facts
+from sim.storage.json_file import read_json
 
 #: A key that one side lacks.
 ABSENT = "–"
+
+
+def run_world(folder: Path) -> str | None:
+    """World of a run of `paint` or of an experiment, as its record names it; None where it names none."""
+    files = [file] if (file := folder / "summary.json").is_file() else sorted(folder.glob("*.json"))
+    for file in files:
+        with contextlib.suppress(UnreadableFile):
+            content = read_json(file)
+            if isinstance(content, dict) and isinstance(content.get("world"), str):
+                return content["world"]
+    return None
 
 
 def differing_runs(a: Path, b: Path) -> list[dict[str, Any]]:

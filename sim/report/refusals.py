@@ -26,7 +26,7 @@ _IN_FLIGHT = (
 #: Elsewhere messages are the texts of errors: raised, or prepared in a variable of such a name.
 _PREPARED = re.compile(r"advice|allowed|checks|instead|kind|message|most|need|problem|reason|remedy|words|REMEDY|KINDS")
 #: Notebooks, experiments and renderings of the project itself refuse nothing that a user gives.
-_INTERNAL = ("sim/notebook", "sim/report/refusals.py", "sim/rivals/solver.py", "sim/experiments/relevance.py")
+_INTERNAL = ("sim/notebook", "sim/report/refusals.py", "sim/rivals/solver.py")
 #: Calls whose texts document settings.
 _DOCUMENTS = {"setting", "choice", "_weight", "_poles", "_slack_weight", "_vector", "split", "kernel"}
 #: What a logger fills in, and marks of a console.

@@ -11,21 +11,16 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
-from sim.evaluate.table import LINES, law_name
+from sim.evaluate.flight_table import LINES, false_claims, shown
 from sim.flight.pictures import pack_picture
-from sim.flight.trace import Trace
-from sim.report.plain_words import FIGURES, OUTCOMES, limit_words
+from sim.flight.trace import Trace, law_name
+from sim.report.plain_words import OUTCOMES, limit_words
 from sim.storage.atomic import write_text
 from sim.video.film import still
 
 _PAGE = Path(__file__).with_name("report_page.html")
 #: Packages whose versions can change a flight.
 _PACKAGES = ("ibvs-qp", "numpy", "scipy", "casadi", "osqp", "mujoco", "opencv-python-headless", "matplotlib")
-_ROW_KEYS = (
-    "stroke_m", "coverage", "path_rms_straight_m", "path_rms_corner_m", "path_max_m", "force_rms_straight_n",
-    "force_rms_corner_n", "contact_share", "tilt_peak_deg", "yaw_peak_deg",
-)  # fmt: skip
-
 
 #: The picture shown before the video is played, as a fraction of its length [-].
 _POSTER = 0.7
@@ -58,7 +53,7 @@ def write_report(
     page = Template(_PAGE.read_text(encoding="utf-8")).substitute(
         title="Painting flight: " + " and ".join(map(law_name, laws)) if laws else "No flight",
         lead=lead,
-        warning=interrupted if summary["interrupted"] else "",
+        warning=interrupted if summary["interrupted"] else _false_claims(laws),
         table=_figures_of_merit(laws),
         rows=_rows(laws),
         video=_video(video),
@@ -84,16 +79,18 @@ def _table(headings: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequ
 
 
 def _figures_of_merit(laws: dict[str, dict[str, Any]]) -> str:
-    rows = [
-        (line.label, *(line.show(figures) for figures in laws.values()), line.unit, FIGURES.get(line.key, ""))
-        for line in LINES
-    ]
+    rows = [(line.words, *(shown(line, figures) for figures in laws.values()), line.unit, line.about) for line in LINES]
     return _table(("", *map(law_name, laws), "unit", "meaning"), rows, range(1, len(laws) + 1))
 
 
+def _false_claims(laws: dict[str, dict[str, Any]]) -> str:
+    """Warnings of flights whose claim and truth differ."""
+    return "".join(f'<p class="warning">{escape(line)}.</p>' for line in false_claims(laws))
+
+
 def _rows(laws: dict[str, dict[str, Any]]) -> str:
-    lines = [line for key in _ROW_KEYS for line in LINES if line.key == key]
-    headings = [f"{line.label} [{line.unit}]" if line.unit else line.label for line in lines]
+    lines = [line for line in LINES if line.in_rows]
+    headings = [line.label for line in lines]
     rows = [
         (f"{law_name(law)}, row {row['row']}", *(line.show(row) for line in lines))
         for law, figures in laws.items()

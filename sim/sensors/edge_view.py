@@ -112,10 +112,10 @@ def board_view() -> ca.Function:
 
 
 @functools.cache
-def painted_edge_view() -> ca.Function:
-    """Function of (board view, piece, half view) yielding `EDGE_NUMBERS` of a level edge painted on the board.
+def painted_edge_view(upright: bool) -> ca.Function:
+    """Function of (board view, piece, half view) yielding `EDGE_NUMBERS` of an edge painted on the board.
 
-    The piece is (along, up) of its left end, of its right end and of a point on the surface beside it [m], (6).
+    The piece is (along, up) of its two ends and of a point on the surface beside it [m], (6).
     """
     board, piece, half = ca.SX.sym("board", BOARD_VIEW), ca.SX.sym("piece", 6), ca.SX.sym("half", 2)
     corner, along, up = _rows(board, 3)
@@ -124,5 +124,5 @@ def painted_edge_view() -> ca.Function:
         right, high = piece[2 * index], piece[2 * index + 1]
         return [c + right * a + high * u for c, a, u in zip(corner, along, up, strict=True)]
 
-    numbers = ca.vertcat(*_seen_edge((spot(0), spot(1)), spot(2), (half[0], half[1]), False))
+    numbers = ca.vertcat(*_seen_edge((spot(0), spot(1)), spot(2), (half[0], half[1]), upright))
     return ca.Function("painted_edge_view", [board, piece, half], [ca.densify(numbers)])

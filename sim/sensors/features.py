@@ -14,6 +14,7 @@ import numpy as np
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import camera_twist_matrix
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL, FeatureFrame
+from ibvs_qp.painting.pattern import COLUMNS
 from ibvs_qp.symbolic.bound_function import BoundFunction
 from sim.sensors.cameras.arm import vehicle_mask
 from sim.sensors.cameras.exposure import Dropouts
@@ -23,7 +24,6 @@ from sim.sensors.edge_view import (
     BOARD_EDGES,
     BOARD_VIEW,
     EDGE_NUMBERS,
-    PER_METRE,
     PLANE,
     board_view,
     painted_edge_view,
@@ -43,9 +43,9 @@ SIGMA_DISTANCE_M, SIGMA_NORMAL = 0.001, math.radians(0.1)
 SIGMA_VELOCITY_M_S = 0.003
 _VELOCITY_COVARIANCE = SIGMA_VELOCITY_M_S**2 * np.eye(3)
 _VELOCITY_COVARIANCE.flags.writeable = False  # shared by all frames
-#: Track identities: board edges by name, rows from `_FIRST_ROW_TRACK`.
+#: Track identities: board edges by name, outer edges of strokes from `_FIRST_STROKE_TRACK`.
 BOARD_TRACKS = {"bottom": 1, "right": 2, "top": 3, "left": 4}
-_FIRST_ROW_TRACK = 10
+_FIRST_STROKE_TRACK = 10
 _BOARD_LINES = [
     (slice(start, start + EDGE_NUMBERS), VERTICAL if upright else HORIZONTAL, "board", BOARD_TRACKS[name])
     for start, (name, (*_, upright)) in zip(
@@ -54,15 +54,13 @@ _BOARD_LINES = [
 ]
 #: A line without noise: its numbers, role, kind and track.
 _Line = tuple[list[float], str, str, int]
-#: A point this far above a painted edge lies on its upper side [m].
-_ABOVE_M = 0.02
 
 
 class GeometricFeatures:
     """Sensor model of line perception: rate, latency, field of view and noise of a camera, but no pictures.
 
-    Lines: the board's edges (kind "board") and the upper edges of the painted rows where no later row and no brush
-    covers them (kind "paint"; their surface side is the unpainted board).
+    Lines: the board's edges (kind "board") and the outer edges of the painted strokes where no later stroke and no
+    brush covers them (kind "paint"; their surface side is the unpainted board).
 
     Args:
         scene: Board, paint job, camera, and ``features.sigma_vs``.
@@ -110,7 +108,9 @@ class GeometricFeatures:
         self._view_board = BoundFunction(
             board_view(), (self._position, self._quaternion, camera, outline, unit, half), (self._board,)
         )
-        self._view_piece = BoundFunction(painted_edge_view(), (self._board, self._piece, half), (self._edge,))
+        self._view_piece = BoundFunction(
+            painted_edge_view(self._geometry.pattern.kind == COLUMNS), (self._board, self._piece, half), (self._edge,)
+        )
 
     def rests(self, now_ns: int) -> bool:
         """Whether neither a capture nor a delivery is due now, so that `tick` may be skipped."""
@@ -151,7 +151,7 @@ class GeometricFeatures:
         self._view_board()
         board = self._board.tolist()
         found = [(board[at], role, kind, track) for at, role, kind, track in _BOARD_LINES if board[at.start]]
-        found += self._paint_lines(board)
+        found += self._paint_lines()
         if self._defects.moves_lines:
             found = self._as_seen(found, board[PLANE], velocity_body, rate)
         a, b, c = self._plane(*board[PLANE])
@@ -184,34 +184,15 @@ class GeometricFeatures:
         yz = self._geometry.point(along, up)
         return np.concatenate((np.zeros((*yz.shape[:-1], 1)), yz), axis=-1)
 
-    def _paint_lines(self, board: list[float]) -> list[_Line]:
-        low, high = self._edges.heights
-        if low > high:
-            return []
+    def _paint_lines(self) -> list[_Line]:
         lines: list[_Line] = []
-        span = self._in_view(board, low, high)
-        for row, left, low, right, high in self._pieces.seen(*span):
-            self._piece[:] = left, low, right, high, 0.5 * (left + right), 0.5 * (low + high) + _ABOVE_M
+        for stroke, piece in self._pieces.seen():
+            self._piece[:] = piece
             self._view_piece()
             numbers = self._edge.tolist()
             if numbers[0]:
-                lines.append((numbers, HORIZONTAL, "paint", _FIRST_ROW_TRACK + row))
+                lines.append((numbers, self._geometry.pattern.guide_role, "paint", _FIRST_STROKE_TRACK + stroke))
         return lines
-
-    def _in_view(self, board: list[float], low: float, high: float) -> tuple[float, float]:
-        """Range along the board [m] that contains every visible point between two heights."""
-        x, _, z, along_x, _, along_z, up_x, _, up_z = board[: PER_METRE.stop]
-        half, first, last = self._half[0], -math.inf, math.inf
-        for sign in (1.0, -1.0):  # half z +- x >= 0, which is linear along the board and up
-            at, rate, rise = half * z + sign * x, half * along_z + sign * along_x, half * up_z + sign * up_x
-            if rate == 0.0:
-                continue
-            meets = -(at + low * rise) / rate, -(at + high * rise) / rate
-            if rate > 0.0:
-                first = max(first, min(meets))
-            else:
-                last = min(last, max(meets))
-        return first, last
 
     def _plane(self, a: float, b: float, c: float) -> tuple[float, float, float]:
         if not self._noise:

@@ -9,8 +9,11 @@ import numpy as np
 from sim.sensors.edge_view import CORNER, NEAR_M, PER_METRE
 from sim.world.painted_edges import BIN_M, PaintedEdges
 
-#: Row, and (along, up) of the left and of the right end of the least-squares line through the piece [m].
-Piece = tuple[int, float, float, float, float]
+#: A point this far outside a painted edge lies on the unpainted surface [m].
+_OUTSIDE_M = 0.02
+#: Stroke, and board coordinates (along, up) of three points: the ends of the least-squares line through the piece and a
+#: point on the unpainted surface beside it [m], (6,).
+Piece = tuple[int, np.ndarray]
 
 
 class PaintedPieces:
@@ -36,21 +39,21 @@ class PaintedPieces:
         height, width = hidden.shape
         self._last_pixel = np.array((width - 1.0, height - 1.0))
 
-    def seen(self, first_m: float, last_m: float) -> list[Piece]:
-        """The piece of every row of which two points at least are seen.
-
-        Args:
-            first_m: Points farther left along the board than this are not in the picture [m].
-            last_m: Likewise farther right.
-        """
-        rows, points = self._edges.all_exposed(first_m, last_m)
-        along, up = points[:, :1], points[:, 1:]
+    def seen(self) -> list[Piece]:
+        """The piece of every stroke of which two points at least are seen."""
+        strokes, points = self._edges.exposed()
+        if len(strokes) == 0:
+            return []
+        on_board = self._edges.on_board(points)
+        along, up = on_board[:, :1], on_board[:, 1:]
         seen = self._unhidden(self._corner + (along * self._along + up * self._up))
         pieces = []
-        for row, place in _by_row(rows[seen], seen):
+        for stroke, place in _by_stroke(strokes[seen], seen):
             piece = _longest_run(place, points[:, 0])
             if len(piece) > 1:
-                pieces.append((row, *fitted_ends(points[piece])))
+                u0, v0, u1, v1 = fitted_ends(points[piece])
+                beside = 0.5 * (u0 + u1), 0.5 * (v0 + v1) + _OUTSIDE_M
+                pieces.append((stroke, self._edges.on_board(np.array(((u0, v0), (u1, v1), beside))).reshape(-1)))
         return pieces
 
     def _unhidden(self, spots: np.ndarray) -> np.ndarray:
@@ -66,12 +69,12 @@ class PaintedPieces:
 
 
 def fitted_ends(points: np.ndarray) -> tuple[float, float, float, float]:
-    """Least-squares line up(along) through points (n, 2), as (along, up) of its two ends."""
-    along, up = points.T
-    middle, height = _total(along) / len(along), _total(up) / len(up)
-    away = along - middle
-    slope = _total(away * up) / _total(away * away)
-    first, last = along.item(0), along.item(-1)
+    """Least-squares line v(u) through points (n, 2), as (u, v) of its two ends."""
+    u, v = points.T
+    middle, height = _total(u) / len(u), _total(v) / len(v)
+    away = u - middle
+    slope = _total(away * v) / _total(away * away)
+    first, last = u.item(0), u.item(-1)
     return first, height + slope * (first - middle), last, height + slope * (last - middle)
 
 
@@ -80,18 +83,18 @@ def _total(numbers: np.ndarray) -> float:
     return np.add.accumulate(numbers).item(-1)
 
 
-def _by_row(rows: np.ndarray, places: np.ndarray) -> list[tuple[int, np.ndarray]]:
-    """Every row that occurs, in order, and its part of the places."""
-    ends = [*((rows[1:] != rows[:-1]).nonzero()[0] + 1).tolist(), len(rows)] if len(rows) else []
+def _by_stroke(strokes: np.ndarray, places: np.ndarray) -> list[tuple[int, np.ndarray]]:
+    """Every stroke that occurs, in order, and its part of the places."""
+    ends = [*((strokes[1:] != strokes[:-1]).nonzero()[0] + 1).tolist(), len(strokes)] if len(strokes) else []
     starts = [0, *ends[:-1]]
-    return [(int(rows[start]), places[start:end]) for start, end in zip(starts, ends, strict=False)]
+    return [(int(strokes[start]), places[start:end]) for start, end in zip(starts, ends, strict=False)]
 
 
-def _longest_run(seen: np.ndarray, along: np.ndarray) -> np.ndarray:
-    """The longest run of indices whose points follow one another without a gap along the board."""
-    if len(seen) == 0 or along[seen[-1]] - along[seen[0]] < (len(seen) - 0.5) * BIN_M:
+def _longest_run(seen: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """The longest run of indices whose points follow one another without a gap along the stroke."""
+    if len(seen) == 0 or u[seen[-1]] - u[seen[0]] < (len(seen) - 0.5) * BIN_M:
         return seen
-    where = along[seen]
+    where = u[seen]
     breaks = np.flatnonzero(where[1:] - where[:-1] > 1.5 * BIN_M) + 1
     bounds = [0, *breaks.tolist(), len(seen)]
     start, end = max(itertools.pairwise(bounds), key=lambda run: run[1] - run[0])

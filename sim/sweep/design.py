@@ -39,6 +39,7 @@ class Run:
     plan: FlightPlan  # the flight
     measure: Measure  # module-level function from trace to figures
     keep: bool = False  # whether the whole log is stored, for figures of single flights
+    trace: bool = False  # whether the inputs of its figures are stored, to compute others later
     expected_s: float = 20.0  # expected flying time [s]; sizes the plan and the progress bar
 
     @property

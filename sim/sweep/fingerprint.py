@@ -64,8 +64,9 @@ def code_hash() -> str:
 def listed_block(runs: Sequence[Run]) -> Block:
     """A block of explicitly listed runs."""
     rows = [
-        (run.experiment, run.variant, run.params, configuration_hash(run), run.seed, run.measure.__qualname__, run.keep)
+        (run.experiment, run.variant, run.params, configuration_hash(run), run.seed, run.measure.__qualname__, kept)
         for run in runs
+        for kept in ((run.keep, run.trace),)
     ]
     return Block(
         name=digest({"rows": rows, "code": code_hash()}),

@@ -10,16 +10,21 @@ from typing import Any
 
 from ibvs_qp.config.errors import IbvsQpError
 from ibvs_qp.config.settings import dump_toml
+from sim.evaluate.truth import Judgement
 from sim.flight.closed_loop import fly
 from sim.flight.flight_log import save_log
-from sim.flight.side_by_side import INTERRUPTED
 from sim.flight.stop import ignore_stop
-from sim.flight.trace import Trace
+from sim.flight.trace import INTERRUPTED, Trace
+from sim.flight.trace_log import save_trace
 from sim.storage.atomic import write_text
 from sim.sweep.design import Block, Refusal, Run
 from sim.sweep.fingerprint import code_hash, configuration_hash
 from sim.sweep.parts import PARAM
 
+#: Ending of the file of a flight's trace.
+TRACE = ".trace.npz"
+#: Beginning of the reason of a flight that the pilot claims and the truth does not complete.
+FALSE_CLAIM = "false claim"
 #: A row of the table: column to value.
 Row = dict[str, Any]
 
@@ -48,7 +53,7 @@ def fly_run(run: Run | Refusal, log: Path | None = None) -> Row:
 
     Args:
         run: The run.
-        log: Folder of its log, if the run stores one.
+        log: Folder of its log, if the run stores one; its trace goes beside it.
 
     Raises:
         KeyboardInterrupt: On Ctrl-C.
@@ -62,10 +67,12 @@ def fly_run(run: Run | Refusal, log: Path | None = None) -> Row:
         "variant": run.variant,
         "seed": run.seed,
         "completed": False,
+        "claimed": False,
         "config_hash": None,
         "code_hash": code_hash(),
         "version": version("ibvs-qp"),
         "log": None,
+        "trace": None,
         **{PARAM + key: value for key, value in run.params.items()},
     }
     if isinstance(run, Refusal):
@@ -81,11 +88,23 @@ def fly_run(run: Run | Refusal, log: Path | None = None) -> Row:
         return {**row, "reason": f"error: {type(error).__name__}: {error} ({Path(where.filename).name}:{where.lineno})"}
     if trace.reason == INTERRUPTED:
         raise KeyboardInterrupt
-    row |= {"completed": bool(trace.completed), "reason": trace.reason}
+    row |= outcome(trace)
     if run.keep and log is not None:
         row["log"] = _store(trace, log)
+    if run.trace and log is not None:
+        save_trace(file := log.parent / f"{log.name}{TRACE}", trace)
+        row["trace"] = f"{file.parent.name}/{file.name}"
     figures = run.measure(trace)
     return row | {key: None if math.isnan(value) else float(value) for key, value in figures.items()}
+
+
+def outcome(trace: Trace) -> Row:
+    """Whether a flight ended as planned, by the truth and by the pilot, and why it ended; a false claim has failed."""
+    judgement, claimed = Judgement(trace), bool(trace.claimed)
+    completed, reason = judgement.completed, trace.reason
+    if completed != claimed:
+        reason = f"{FALSE_CLAIM}: {judgement.shortfall}" if claimed else f"not claimed: {reason}"
+    return {"completed": completed and claimed, "claimed": claimed, "reason": reason}
 
 
 def _store(trace: Trace, folder: Path) -> str:

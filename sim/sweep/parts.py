@@ -17,12 +17,14 @@ HEAD = {
     "law": pl.String,
     "variant": pl.String,
     "seed": pl.Int64,
-    "completed": pl.Boolean,
+    "completed": pl.Boolean,  # by the truth, and claimed by the pilot
+    "claimed": pl.Boolean,  # by the pilot alone
     "reason": pl.String,
     "config_hash": pl.String,
     "code_hash": pl.String,
     "version": pl.String,
-    "log": pl.String,
+    "log": pl.String,  # folder of the whole log
+    "trace": pl.String,  # file of the inputs of the figures (`sim.flight.trace_log`)
 }
 #: Prefix of parameter columns.
 PARAM = "param."

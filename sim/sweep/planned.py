@@ -12,6 +12,7 @@ from ibvs_qp.config.settings import to_dict
 from sim.evaluate.measures import paint_figures, press_row
 from sim.flight.jobs import PaintJob
 from sim.flight.options import pilot_config
+from sim.flight.preflight import check_job
 from sim.sweep.axes import fractions
 from sim.sweep.design import Block, FlightPlan, Parameter, Refusal, Run
 from sim.sweep.fingerprint import code_hash, digest
@@ -49,6 +50,7 @@ class Planned:
                 "setups": {law: [to_dict(s.scene), to_dict(s.pilot), repr(s.job)] for law, s in spec.setups.items()},
                 "options": [spec.settings.features, spec.settings.vision],
                 "name": spec.settings.name,
+                "traces": spec.settings.traces,
                 "code": code_hash(),
             }
         )
@@ -84,13 +86,15 @@ class Planned:
         facts = {"experiment": self.spec.settings.name, "variant": "standard", "params": params}
         try:
             setup = changed(self.spec.setups[law], params)
+            options = options_of(self.spec.settings, law, seed)
+            config = pilot_config(setup.scene, options, setup.pilot)
+            check_job(setup.scene, config, options.features, setup.job)
         except ConfigError as error:
             return Refusal(**facts, law=law, seed=seed, reason=str(error))
-        options = options_of(self.spec.settings, law, seed)
-        config = pilot_config(setup.scene, options, setup.pilot)
         plan = FlightPlan(scene=setup.scene, config=config, options=options, job=setup.job)
         measure = paint_figures if isinstance(setup.job, PaintJob) else press_row
-        return Run(**facts, plan=plan, measure=measure, expected_s=OVERHEAD_S + setup.job.expected_s(config.painting))
+        expected_s = OVERHEAD_S + setup.job.expected_s(config.painting)
+        return Run(**facts, plan=plan, measure=measure, trace=self.spec.settings.traces, expected_s=expected_s)
 
 
 def _runs(design: Planned, start: int, stop: int) -> Iterator[Run | Refusal]:

@@ -19,7 +19,7 @@ from sim.flight.jobs import PaintJob, PressJob
 from sim.flight.options import FlightOptions, pilot_config
 from sim.sweep.axes import Axis, make_axis
 from sim.sweep.setup import Setup, changed, value_at
-from sim.world.scene import Scene, load_scene
+from sim.world.worlds import scene_in_world
 
 LAWS = ("qp", "paper")
 JOBS = {"paint": PaintJob, "press": PressJob}
@@ -40,12 +40,14 @@ class SweepSettings:
     features: str = choice("geometric", "sensor model of lines, or rendered pictures", ("geometric", "rendered"))
     vision: str = choice("own", "perception of rendered pictures", ("own", "paper"))
     scene: str = setting("", "scene file, beside the spec; empty is the default scene")
+    world: str = setting("", "ideal, datasheet, harsh or a file; empty: the scene file's errors, else datasheet")
     preset_qp: str = setting("", "preset of the QP law, beside the spec; empty is the shipped one")
     preset_paper: str = setting("", "preset of the analytic law")
     seed: int = setting(0, "first seed", low=0, high=2**31 - 1)
     seeds: int = setting(1, "flights of every point and law: seed, seed + 1, ...", low=1, high=1_000_000)
     samples: int = setting(0, "number of draws of [random]", low=0, high=MOST_FLIGHTS)
     draw: str = choice("random", "method of the draws", ("random", "sobol"))
+    traces: bool = setting(False, "keep the inputs of every flight's figures, 20 kB per second of flight")
     block_runs: int = setting(10, "runs per block: the most that an interrupt loses", low=1, high=100_000)
 
     def __post_init__(self) -> None:
@@ -62,6 +64,7 @@ class SweepSpec:
     """A sweep, checked."""
 
     settings: SweepSettings  # keys outside the sections
+    world: str  # name of the world, whose errors the sections may change
     setups: dict[str, Setup]  # start values of every law, [fixed] included
     grid: tuple[Axis, ...]  # axes of the grid; every combination flies
     random: tuple[Axis, ...]  # drawn axes; every draw flies at every point of the grid
@@ -96,7 +99,8 @@ def parse_spec(table: dict[str, Any], folder: Path) -> SweepSpec:
     settings = from_dict(SweepSettings, {key: value for key, value in table.items() if key not in SECTIONS})
     if bool(sections["random"]) != bool(settings.samples):
         raise ConfigError("samples and [random] go together: give both or neither")
-    scene = load_scene(folder / settings.scene) if settings.scene else Scene()
+    world = str(folder / settings.world) if settings.world.endswith(".toml") else settings.world or None
+    scene, world = scene_in_world(folder / settings.scene if settings.scene else None, world)
     for a, b in itertools.combinations(SECTIONS, 2):
         for path in sections[a].keys() & sections[b].keys():
             raise ConfigError(f"{path} is in [{a}] and in [{b}]; leave it in one of them")
@@ -110,7 +114,7 @@ def parse_spec(table: dict[str, Any], folder: Path) -> SweepSpec:
         tuple(make_axis(name, path, given, value_at(first, path)) for path, given in sections[name].items())
         for name in ("grid", "random")
     )
-    spec = SweepSpec(settings=settings, setups=setups, grid=grid, random=random)
+    spec = SweepSpec(settings=settings, world=world, setups=setups, grid=grid, random=random)
     if spec.flights > MOST_FLIGHTS:
         allowed = f"at most {MOST_FLIGHTS} are flown"
         raise out_of_range("samples x grid x laws x seeds", spec.flights, "flights", allowed)

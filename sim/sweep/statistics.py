@@ -80,8 +80,13 @@ def split(table: pl.DataFrame, keys: Sequence[str]) -> list[tuple[dict[str, Any]
     return [(dict(zip(columns, values, strict=True)), rows) for values, rows in groups]
 
 
+def false_claims(rows: pl.DataFrame) -> int:
+    """Number of flights that the pilot claims and the truth does not complete; older tables have no claims."""
+    return rows.filter(pl.col("claimed") & ~pl.col("completed")).height if "claimed" in rows.columns else 0
+
+
 def cells(table: pl.DataFrame, of_all: Collection[str] = ()) -> list[dict[str, Any]]:
-    """Cells of the contract: law, variant, params, n, completed, and every figure with its interval.
+    """Cells of the contract: law, variant, params, n, completed, false claims, and every figure with its interval.
 
     Only flights that ended as planned have figures: a flight cut short by a crash measures nothing.
 
@@ -95,5 +100,6 @@ def cells(table: pl.DataFrame, of_all: Collection[str] = ()) -> list[dict[str, A
         columns = {name: (rows if name in of_all else done)[name].drop_nulls() for name in names}
         metrics = {name: median_interval(values.to_numpy()) for name, values in columns.items() if len(values)}
         cell = {name: key[name] for name in ("experiment", "law", "variant")} | {"params": parameters(key)}
-        result.append(cell | {"n": rows.height, "completed": done.height, "metrics": metrics})
+        counts = {"n": rows.height, "completed": done.height, "false_claims": false_claims(rows)}
+        result.append(cell | counts | {"metrics": metrics})
     return result

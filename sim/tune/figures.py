@@ -72,10 +72,10 @@ def draw_unseen(law: str, table: pl.DataFrame) -> Figure:
     for axes, each in zip(grid, OBJECTIVES, strict=True):
         for scene, marker, shade in zip(names, _MARKERS, (law_colour(law), *_SHADES), strict=False):
             rows = both.filter(pl.col(PARAM + "scene") == scene)
-            before, after = (each.scale * rows[name].to_numpy() for name in (each.column, f"{each.column}.{TUNED}"))
+            before, after = (each.scale * rows[name].to_numpy() for name in (each.name, f"{each.name}.{TUNED}"))
             axes.scatter(before, after, s=16, marker=marker, alpha=0.75, linewidth=0, label=scene,
                          color=shade)  # fmt: skip
-        both_ways = each.scale * both.select(each.column, f"{each.column}.{TUNED}").to_numpy()
+        both_ways = each.scale * both.select(each.name, f"{each.name}.{TUNED}").to_numpy()
         reach = (0.85 * np.nanmin(both_ways), 1.15 * np.nanmax(both_ways))
         axes.plot(reach, reach, **REFERENCE)
         axes.set(xscale="log", yscale="log", xlim=reach, ylim=reach, aspect="equal")

@@ -7,25 +7,35 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from sim.evaluate.table import Figure
+from sim.evaluate.figures import FIGURES
 
 
 @dataclass(frozen=True)
-class Objective(Figure):
+class Objective:
     """A figure to minimise."""
 
-    # value of a flight that does not complete, in the unit of the column: far beyond any completed one
-    failed: float = math.inf
+    name: str
+    failed: float  # value of a flight that does not complete, in SI: far beyond any completed one
     worse: float = 1.1  # greatest ratio to the shipped preset that may replace it; seeds alone change it by a tenth
+
+    @property
+    def label(self) -> str:
+        """Words with unit."""
+        return FIGURES[self.name].label
+
+    @property
+    def scale(self) -> float:
+        """Factor from SI to the unit of the label."""
+        return FIGURES[self.name].scale
 
 
 OBJECTIVES = (
-    Objective("force_rms_n", "push error, rms", unit="N", failed=3.0),
-    Objective("path_rms_m", "path error, rms", 1e3, "mm", failed=0.05),
-    Objective("tilt_peak_deg", "tilt, peak", unit="deg", failed=20.0),
-    Objective("yaw_peak_deg", "yaw, peak", unit="deg", failed=20.0),
+    Objective("force_rms_n", 3.0),
+    Objective("path_rms_m", 0.05),
+    Objective("tilt_peak_deg", 20.0),
+    Objective("yaw_peak_deg", 20.0),
     # It wears motors and costs no accuracy; a quarter more is an eighth of the limit of 500 N/s.
-    Objective("jitter_n_s", "thrust rate, rms", unit="N/s", failed=1000.0, worse=1.25),
+    Objective("jitter_n_s", 1000.0, worse=1.25),
 )
 
 
@@ -50,6 +60,6 @@ def refused() -> Score:
 
 
 def _value(row: Mapping[str, Any], objective: Objective) -> float:
-    value = row.get(objective.column)
+    value = row.get(objective.name)
     good = row["completed"] and value is not None and math.isfinite(value)
     return min(float(value), objective.failed) if good else objective.failed  # type: ignore[arg-type]

@@ -9,8 +9,9 @@ from typing import Any
 
 import polars as pl
 
-from sim.evaluate.table import law_name, markdown
+from sim.evaluate.table import markdown
 from sim.figures.style import save, styled
+from sim.flight.trace import law_name
 from sim.report.rundir import write_json
 from sim.storage.atomic import write_text
 from sim.sweep.parts import write_table
@@ -155,7 +156,7 @@ def _page(outcome: Outcome, summary: dict[str, Any]) -> list[str]:
         "",
     ]
     heads = ("scene", "objective", "flights", "shipped", "tuned", "tuned - shipped (95 % interval)", "verdict")
-    scale, rows = {each.column: each for each in OBJECTIVES}, []
+    scale, rows = {each.name: each for each in OBJECTIVES}, []
     for each in summary["unseen"]:
         objective = scale[each["objective"]]
         a, b = (objective.scale * each[name] for name in ("shipped", "tuned"))

@@ -15,7 +15,7 @@ from sim.tune.space import RANGES
 
 def objective_columns(score: Score) -> dict[str, float]:
     """Values of a score by column."""
-    return dict(zip((each.column for each in OBJECTIVES), score.values, strict=True)) | {"failed": score.failed}
+    return dict(zip((each.name for each in OBJECTIVES), score.values, strict=True)) | {"failed": score.failed}
 
 
 def trial_rows(trials: Trials) -> list[dict[str, float]]:
@@ -54,4 +54,4 @@ def stored_trials(file: Path, plan: SearchPlan) -> tuple[Trials, str]:
 
 def _trial(row: Mapping[str, float]) -> tuple[dict[str, float], Score]:
     gains = {name: float(row[name]) for name in RANGES}
-    return gains, Score(tuple(float(row[each.column]) for each in OBJECTIVES), float(row["failed"]))
+    return gains, Score(tuple(float(row[each.name]) for each in OBJECTIVES), float(row["failed"]))

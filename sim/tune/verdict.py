@@ -32,12 +32,12 @@ def differences(table: pl.DataFrame) -> list[dict[str, Any]]:
     result = []
     for scene, rows in {"all": both, **{str(name): rows for (name,), rows in by_scene.items()}}.items():
         for each in OBJECTIVES:
-            before, after = (rows[name].cast(pl.Float64).to_numpy() for name in (each.column, f"{each.column}.{TUNED}"))
+            before, after = (rows[name].cast(pl.Float64).to_numpy() for name in (each.name, f"{each.name}.{TUNED}"))
             change = median_interval(after - before)
             result.append(
                 {
                     "scene": scene,
-                    "objective": each.column,
+                    "objective": each.name,
                     "n": int(np.isfinite(after - before).sum()),
                     "shipped": median_interval(before)["median"],
                     "tuned": median_interval(after)["median"],

@@ -84,8 +84,8 @@ def derived_settings(config: PilotConfig) -> Iterator[DerivedSetting]:
     yield DerivedSetting(
         "brush range", f"{brush.stiffness_min_n_m:g} to {brush.stiffness_max_n_m:g} N/m", "brush and wall"
     )
-    for side, name in ((-1.0, "left"), (1.0, "right")):
-        low, high = hint_span(vehicle, config.vision.brush_width_m, side)
+    for ahead, name in ((False, "left"), (True, "right")):
+        low, high = hint_span(vehicle, config.vision.brush_width_m, level=True, ahead=ahead)
         words = f"{low:.2f} to {high:.2f}" if low < high else "none"
         yield DerivedSetting(f"fresh edge, {name}", words, "tip, brush and camera")
     yield DerivedSetting("mask of the vehicle", "drawn", "arm, brush and propellers")

@@ -13,6 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ibvs_qp.painting.pattern import ROWS, Pattern, stroke_count, stroke_place
 from sim.world.scene import Scene
 
 
@@ -73,9 +74,61 @@ class BoardGeometry:
         """Nominal height of row 1, 2, ... above the bottom edge [m]."""
         return self.scene.paint.edge_margin_m + (row - 1) * self.scene.paint.pitch_m
 
+    @cached_property
+    def pattern(self) -> Pattern:
+        """Directions of the strokes."""
+        return Pattern(self.scene.paint.pattern, self.scene.paint.start)
+
+    @cached_property
+    def extent(self) -> tuple[float, float]:
+        """Size of the board along and across the strokes [m]."""
+        size = self.scene.board.width_m, self.scene.board.height_m
+        return size if self.pattern.kind == ROWS else (size[1], size[0])
+
+    @property
+    def stroke_ends(self) -> tuple[float, float]:
+        """Beginning and end of stroke 1, u [m]; all strokes lie between them."""
+        end = self.extent[0] - self.scene.paint.edge_margin_m
+        return end - self.scene.paint.stroke_m, end
+
+    @property
+    def strokes(self) -> int:
+        """Number of strokes."""
+        paint = self.scene.paint
+        return stroke_count(paint.rows, self.extent[1], paint.edge_margin_m, paint.pitch_m)
+
+    def stroke_place(self, stroke: int) -> float:
+        """Nominal v of the centre of stroke 1, 2, ... [m]."""
+        paint = self.scene.paint
+        return stroke_place(stroke, paint.rows, self.extent[1], paint.edge_margin_m, paint.pitch_m)
+
+    def to_pattern(self, along_up: np.ndarray) -> np.ndarray:
+        """Pattern coordinates (u, v) of board coordinates (along, up) [m], (..., 2)."""
+        return (np.asarray(along_up, float) - self._start_corner) @ self._pattern_axes
+
+    def from_pattern(self, uv: np.ndarray) -> np.ndarray:
+        """Inverse of `to_pattern`: board coordinates (along, up) [m], (..., 2)."""
+        return np.asarray(uv, float) @ self._pattern_axes.T + self._start_corner
+
+    @cached_property
+    def _start_corner(self) -> np.ndarray:
+        """Corner of the board at which stroke 1 begins, (along, up) [m]."""
+        board, start = self.scene.board, self.pattern.start
+        return np.array(
+            (
+                board.width_m if start.endswith("right") else 0.0,
+                0.0 if start.startswith("bottom") else board.height_m,
+            )
+        )
+
+    @cached_property
+    def _pattern_axes(self) -> np.ndarray:
+        """Columns u and v in (along, up), (2, 2)."""
+        return np.column_stack((self.pattern.along, self.pattern.across)) * np.array([[1.0], [-1.0]])
+
     @property
     def start_tip(self) -> np.ndarray:
         """World position of the tip at the start of a flight without seed variation [m], (3,)."""
-        start, (_, right) = self.scene.start, self.row_ends
-        y, z = self.point(right, self.row_height(1))
+        start = self.scene.start
+        y, z = self.point(*self.from_pattern(np.array((self.stroke_ends[0], self.stroke_place(1)))))
         return np.array([-start.distance_m, y + start.right_m, z + start.down_m])

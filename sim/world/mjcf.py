@@ -19,13 +19,11 @@ import numpy as np
 from ibvs_qp.frames import GRAVITY
 from sim.world.contact import OPTION_XML, pair_xml, set_contact
 from sim.world.drawn_shape import tool_xml, vehicle_xml
+from sim.world.face import TIP_RADIUS_M
 from sim.world.mujoco_frames import FLIP, FLIP_QUATERNION, rotor_quaternion
 from sim.world.rigid_body import RigidBody, bare_body, principal_axes, tool_body
 from sim.world.scene import Scene
 from sim.world.true_vehicle import TrueVehicle, turn_quaternion
-
-#: Radius of the tip's contact sphere [m]; its foremost point is the tip. Small: the contact point stays at the tip.
-TIP_RADIUS_M = 0.005
 
 #: Thickness of the board drawn [m].
 BOARD_THICKNESS_M = 0.004
@@ -39,6 +37,7 @@ class ModelIds:
     """Indices of bodies and sensors in the compiled model."""
 
     vehicle: int  # body of the vehicle without tool
+    face: int  # geom of the contact plane
     accelerometer: slice  # slice of ``sensordata``: specific force at the body origin, front-left-up [m/s^2]
     force: slice  # slice: force of the vehicle on the tool, front-left-up [N]
     torque: slice  # slice: the moment at the force/torque sensor [N m]
@@ -94,7 +93,7 @@ def _surroundings_xml(scene: Scene) -> str:
 def build_xml(scene: Scene, vehicle: TrueVehicle, drawn: bool = True) -> str:
     """MJCF text of the world; contact numbers follow after compilation, see `build_model`.
 
-    The contact plane is infinite: a box would push the tip out sideways near its rim and bound the penetration.
+    The contact plane is infinite; `sim.world.face` moves it to the surface before the tip.
     """
     sites, actuators = _rotors_xml(vehicle)
     tip, sensor = FLIP * vehicle.tip_position_m, FLIP * vehicle.force_torque_position_m
@@ -163,4 +162,5 @@ def build_model(scene: Scene, vehicle: TrueVehicle, drawn: bool = True) -> tuple
         slices[name] = slice(start, start + int(model.sensor_dim[sensor]))
         # Layout: two numbers of MuJoCo's own, the stamps, a ring of samples; after a whole tick the oldest is first.
         remembered.append(int(model.sensor_historyadr[sensor]) + 2 + STEPS_PER_TICK)
-    return model, ModelIds(vehicle=body, **slices, remembered=tuple(remembered))
+    face = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, "face")
+    return model, ModelIds(vehicle=body, face=face, **slices, remembered=tuple(remembered))

@@ -15,6 +15,7 @@ from sim.world.board import BoardGeometry
 from sim.world.clearance import PropellerClearance
 from sim.world.crash import crash_reason, has_landed
 from sim.world.errors import RotorErrors
+from sim.world.face import Face
 from sim.world.mjcf import STEPS_PER_TICK, build_model
 from sim.world.mujoco_frames import FLIP, FLIP_QUATERNION
 from sim.world.random_streams import stream
@@ -31,7 +32,7 @@ TICK_NS = 4_000_000
 
 #: Crash reason after a non-finite command; physics stops from then on.
 NOT_FINITE = "non-finite thrust command"
-_SAFE, _SINK = PLACES["safe"].start, PLACES["velocity"].stop - 1
+_SAFE, _SINK, _TIP = PLACES["safe"].start, PLACES["velocity"].stop - 1, PLACES["tip"]
 
 
 class Plant(PlantReadings):
@@ -68,7 +69,9 @@ class Plant(PlantReadings):
         self.model, self._ids = build_model(scene, self.vehicle, drawn)
         self.data = mujoco.MjData(self.model)
         self._lower, self._upper = self.vehicle.thrust_min, self.vehicle.thrust_max
-        self.clearance = PropellerClearance(BoardGeometry(scene), self.vehicle)
+        board = BoardGeometry(scene)
+        self.clearance = PropellerClearance(board, self.vehicle)
+        self._face = Face(board, self.model.geom_pos[self._ids.face])
         drag = self.vehicle.linear_drag_n_s_m
         self.wind = Wind(scene.wind, drag, TICK_NS * 1e-9, stream(seed, "wind"))
         rotors, count = scene.errors.rotors, self.vehicle.geometry.count
@@ -132,6 +135,7 @@ class Plant(PlantReadings):
             self._air += self.outer_force
         self._drive()
         self._lag[:] = self._lags
+        struck = self._face.follow(self.truth[_TIP].tolist())
         mujoco.mj_step(self.model, self.data, STEPS_PER_TICK)
         self.time_ns += TICK_NS
         self._read()
@@ -139,6 +143,13 @@ class Plant(PlantReadings):
             position, rotation = self.position.tolist(), self.rotation.tolist()
             self.landed = has_landed(position, rotation, self.truth.item(_SINK))
             self.crashed = None if self.landed else crash_reason(position, rotation, self.clearance)
+        if struck and not self.over:
+            self.crashed = struck
+
+    @property
+    def on_board(self) -> bool:
+        """Whether the tip lies inside the board's outline; beside it the wall takes the push."""
+        return self._face.on_board
 
     @property
     def over(self) -> bool:

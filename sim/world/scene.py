@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ibvs_qp.config.settings import Checked, load_toml, setting
+from ibvs_qp.config.settings import Checked, choice, load_toml, setting
+from ibvs_qp.painting.pattern import CORNERS, FILL, PATTERNS
 from sim.world.errors import WorldErrors
 from sim.world.plant_scene import PlantScene
 
@@ -46,21 +47,25 @@ class PaintScene(Checked):
     color: Color = setting((40, 90, 200), "paint colour", low=0, high=255)
     brush_width_m: float = setting(0.08, "diameter of the round brush", unit="m", low=0.02, high=0.3)
     edge_margin_m: float = setting(0.05, "brush centre to the guiding or stopping edge", unit="m", low=0.01, high=0.5)
-    rows: int = setting(2, "number of rows", low=1, high=20)
-    stroke_m: float = setting(1.30, "length of every row", unit="m", low=0.1, high=20.0)
-    overlap_m: float = setting(0.008, "overlap of neighbouring rows", unit="m", low=0.0, high=0.1)
+    pattern: str = choice("rows", "direction of the strokes", PATTERNS)
+    start: str = choice("bottom-right", "corner of the board at which stroke 1 begins", CORNERS)
+    rows: int | str = setting(
+        2, "number of strokes of either pattern, or as many as the board has place for", low=1, high=20, words=(FILL,)
+    )
+    stroke_m: float = setting(1.30, "length of every stroke", unit="m", low=0.1, high=20.0)
+    overlap_m: float = setting(0.008, "overlap of neighbouring strokes", unit="m", low=0.0, high=0.1)
     speed_m_s: float = setting(0.10, "painting speed", unit="m/s", low=0.01, high=0.5)
     push_n: float = setting(5.0, "push force", unit="N", low=0.5, high=40.0)
 
     @property
     def pitch_m(self) -> float:
-        """Distance between rows: brush width minus overlap [m]."""
+        """Distance between strokes: brush width minus overlap [m]."""
         return self.brush_width_m - self.overlap_m
 
 
 @dataclass(frozen=True, kw_only=True)
 class StartScene(Checked):
-    """Start pose as offsets from facing the right end of row 1."""
+    """Start pose as offsets from facing the beginning of stroke 1."""
 
     distance_m: float = setting(0.45, "tip to board", unit="m", low=0.15, high=2.0)
     right_m: float = setting(0.0, "offset to the right", unit="m", low=-0.5, high=0.5)

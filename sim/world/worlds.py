@@ -1,16 +1,38 @@
-"""Worlds by name: a scene with the errors of a profile, and the name of a scene's errors."""
+"""Worlds by name: the scene of a flight with the errors of its world, and the name of a scene's errors."""
 
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 
+from ibvs_qp.config.toml_text import read_toml
 from sim.world.errors import WorldErrors, world_errors, world_names
-from sim.world.scene import Scene
+from sim.world.scene import Scene, load_scene
 
-#: World of `paint` without a scene file, and of experiments and comparisons without `--world`.
-DEFAULT_WORLD, EXPERIMENT_WORLD = "datasheet", "ideal"
-#: Name of errors that no shipped profile has.
-OWN = "own"
+#: World of flights that name none.
+DEFAULT_WORLD = "datasheet"
+#: World of a neglected vehicle.
+HARSH = "harsh"
+#: Name of errors that no shipped profile has; in a scene file they are those of the scene.
+OWN, OF_THE_SCENE = "own", "of the scene"
+
+
+def scene_in_world(file: Path | None, world: str | None = None) -> tuple[Scene, str]:
+    """The scene to fly and the name of its world: the named one, else the file's `errors`, else the default world.
+
+    Args:
+        file: Scene file; None is the default scene.
+        world: Name of a shipped profile, or a TOML file; None where none is named.
+
+    Raises:
+        ConfigError: When the file is refused, or there is no such world.
+    """
+    scene = Scene() if file is None else load_scene(file)
+    if world is None and file is not None and "errors" in read_toml(file):
+        name = world_name(scene.errors)
+        return scene, OF_THE_SCENE if name == OWN else name
+    world = world or DEFAULT_WORLD
+    return in_world(scene, world), world
 
 
 def in_world(scene: Scene, world: str) -> Scene:

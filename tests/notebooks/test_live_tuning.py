@@ -113,10 +113,19 @@ async def drag(address: str, folder: Path) -> None:
         reader.send("load", 1)
         await reader.until_idle()
         assert any("begun with" in text and "octorotor_qp" in text for text in reader.notes)
-        reader.send("preset (name or file)", "tarot_t960_paper")
-        reader.send("load", 1)
+        reader.send("push [N]", 10)
         await reader.until_idle()
-        assert any("Not loaded" in text and "analytic law" in text for text in reader.notes)
+        moved, *_ = re.findall(r"push \[N\]: \S+ → \S+", reader.changes[-1])
+        for preset, reason in (("tarot_t960_paper", "analytic law"), ("octorotor_pq", "does not exist")):
+            seen = len(reader.changes)
+            reader.send("preset (name or file)", preset)
+            reader.send("load", 2)
+            await reader.until_idle()
+            assert "Not loaded" in reader.notes[-1] and reason in reader.notes[-1]
+            assert len(reader.changes) == seen, "a refused preset flies nothing"
+        reader.send("friction [-]", 12)
+        await reader.until_idle()
+        assert moved in reader.changes[-1] and "friction [-]" in reader.changes[-1], "a refused preset resets a control"
         assert not list(folder.iterdir()), "nothing is written before it is asked for"
 
 

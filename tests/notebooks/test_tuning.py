@@ -19,7 +19,7 @@ from sim.notebook.knobs import KNOBS, knob_values, turned
 from sim.notebook.picture import DOTS_PER_INCH, picture
 from sim.notebook.plots import RED
 from sim.notebook.short import SHORT_VARIABLE
-from sim.notebook.tuning import Start, TuningBench, analytic_setting, load_setting, reach_note, save_setting
+from sim.notebook.tuning import Start, TuningBench, analytic_setting, load_setting, load_start, reach_note, save_setting
 from sim.notebook.wall_flights import HOVER_S, Setting, flight_figures, fly_setting
 from sim.world.scene import load_scene
 
@@ -91,12 +91,21 @@ def test_a_preset_is_loaded_or_the_reason_named(tmp_path):
     assert start.again() != start and start.again().setting == start.setting
     setting = turned(Setting(), {"scene.wall.friction": 0.6, "pilot.controller.weights.push": 1.0})
     save_setting(setting, tmp_path / "mine.toml")
-    assert start.load(str(tmp_path / "mine.toml")).setting == setting
-    eight = start.load("octorotor_qp")
-    assert eight.setting.pilot.controller.vehicle.geometry.count == 8 and "octorotor_qp" in eight.text()
+    starts, refusals = [start], [""]
+
+    def load(preset: str) -> None:
+        load_start(preset, lambda change: starts.append(change(starts[-1])), refusals.append)
+
+    load(str(tmp_path / "mine.toml"))
+    assert starts[-1].setting == setting and starts[-1] != start
+    load("octorotor_qp")
+    eight = starts[-1]
+    assert eight.setting.pilot.controller.vehicle.geometry.count == 8 and "octorotor_qp" in eight.name
     for wrong, reason in (("tarot_t960_paper", "analytic law"), ("nothing.toml", "tarot_t960_qp")):
-        refused = eight.load(wrong)
-        assert refused.setting == eight.setting and reason in refused.text()
+        load(wrong)
+        assert starts[-1] is eight and reason in refusals[-1], "a refused preset is no new start: no control is reset"
+    load("octorotor_qp")
+    assert starts[-1] != eight and refusals[-1] == ""
 
 
 def test_the_figure_of_eight_rotors_is_drawn():
@@ -152,6 +161,7 @@ def test_a_preset_that_would_ring_is_not_saved(tmp_path):
 
 @pytest.mark.parametrize("name", ["~no_such_user_here/x.toml", "nul\0.toml"])
 def test_a_name_that_is_no_path_is_refused(name):
-    assert Start().load(name).refusal
+    with pytest.raises(ConfigError):
+        load_setting(name)
     with pytest.raises(ConfigError):
         save_setting(Setting(), name)

@@ -8,15 +8,17 @@ NUMBER = (int, float, type(None))  # non-finite numbers are null
 M_NUMBERS = (
     "duration_s real_time_factor stroke_m path_rms_straight_m path_rms_corner_m path_max_m force_rms_straight_n "
     "force_rms_corner_n force_peak_n contact_share tilt_rms_deg tilt_peak_deg yaw_rms_deg yaw_peak_deg "
-    "height_error_rms_m coverage velocity_rms_m_s propeller_clearance_min_m first_touch_s settle_s bounces"
+    "height_error_rms_m coverage velocity_rms_m_s propeller_clearance_min_m first_touch_s settle_s bounces "
+    "push_asked_n push_commanded_n push_flown_n place_error_m overlap_m off_board_share"
 ).split()
 OUTCOMES = {"solved", "inaccurate_accepted", "capped_accepted", "exact_fallback", "analytic_fallback", "hold"}
 
 
 def check_metrics(metrics: dict[str, Any], row: bool = False) -> None:
     """Assert that M, or a row of it, has every key of the contract with the right type."""
-    assert isinstance(metrics["completed"], bool)
+    assert isinstance(metrics["completed"], bool) and isinstance(metrics["claimed"], bool)
     assert isinstance(metrics["reason"], str)
+    assert all(metrics[name] is None or isinstance(metrics[name], str) for name in ("not_completed", "push_reduced"))
     for name in M_NUMBERS:
         assert isinstance(metrics[name], NUMBER) and not isinstance(metrics[name], bool), name
     assert set(metrics["outcomes"]) <= OUTCOMES

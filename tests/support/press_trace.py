@@ -61,4 +61,4 @@ def press_trace(
         "true_thrust_min": np.full(6, 1.2),
         "true_thrust_max": np.full(6, 52.56),
     }
-    return Trace(scene=scene, seed=0, law="qp", arrays=arrays, phases=PHASES, events=events, completed=True)
+    return Trace(scene=scene, seed=0, law="qp", arrays=arrays, phases=PHASES, events=events, claimed=True)

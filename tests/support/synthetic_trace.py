@@ -22,7 +22,8 @@ TOUCH_S, RAMP_S, PAINT_FROM_S = 4.0, 1.0, 6.0
 class Errors:
     """What is wrong with the flight, and by how much."""
 
-    row_offset_m: tuple[float, ...] = (0.002, 0.003)  # tip above its row
+    row_offset_m: tuple[float, ...] = (0.002, 0.003)  # tip beyond its row, the row before being right
+    longer_m: float = 0.0  # odd rows end too late
     push_error_n: float = 0.2
     roll_deg: float = 0.5
     yaw_deg: float = -1.5
@@ -36,18 +37,20 @@ class Errors:
 
 def _waypoints(scene: Scene, errors: Errors) -> list[tuple[float, str, int, np.ndarray]]:
     """(time at the end, phase, row, board coordinates at the end), rows offset as the errors say."""
-    paint, (left, right) = scene.paint, BoardGeometry(scene).row_ends
-    height = paint.edge_margin_m + errors.row_offset_m[0]
-    points = [(PAINT_FROM_S, "press", 0, np.array([right, height]))]
+    paint, board = scene.paint, BoardGeometry(scene)
+    begin, end = board.stroke_ends
+    across = board.stroke_place(1) + errors.row_offset_m[0]
     time = PAINT_FROM_S
-    for row in range(1, paint.rows + 1):
+    points = [(time, "press", 0, np.array([begin, across]))]
+    for row in range(1, board.strokes + 1):
         if row > 1:
-            height += paint.pitch_m + errors.row_offset_m[row - 1]
-            time += (height - points[-1][3][1]) / paint.speed_m_s
-            points.append((time, "climb", row, np.array([points[-1][3][0], height])))
-        time += paint.stroke_m / paint.speed_m_s
-        points.append((time, "paint", row, np.array([left if row % 2 else right, height])))
-    return points
+            across += board.stroke_place(row) - board.stroke_place(row - 1) + errors.row_offset_m[row - 1]
+            time += (across - points[-1][3][1]) / paint.speed_m_s
+            points.append((time, "climb", row, np.array([points[-1][3][0], across])))
+        stop = end + errors.longer_m if row % 2 else begin
+        time += abs(stop - points[-1][3][0]) / paint.speed_m_s
+        points.append((time, "paint", row, np.array([stop, across])))
+    return [(time, phase, row, board.from_pattern(place)) for time, phase, row, place in points]
 
 
 def synthetic_trace(
@@ -83,7 +86,7 @@ def synthetic_trace(
     lost = np.flatnonzero(painting_1khz)[4000 : 4000 + errors.lost_steps]
     contact[lost] = 0.0
     standoff = np.interp(t, [0, 2, 3, TOUCH_S], [scene.start.distance_m, 0.02, 0.02, 0.0])
-    standoff[t > points[-1][0]] = (t[t > points[-1][0]] - points[-1][0]) * 0.1
+    standoff[t > points[-1][0]] = (t[t > points[-1][0]] - points[-1][0]) * 0.1  # 0.3 m at the end
     tip = np.column_stack((-standoff, board.point(*tip_board.T)))
     half_roll, half_yaw = np.radians(errors.roll_deg) / 2, np.radians(errors.yaw_deg) / 2
     attitude = np.array(  # yaw, then roll
@@ -143,7 +146,7 @@ def synthetic_trace(
     mask.flat[covered[: round(errors.unpainted_share * len(covered))]] = 0.0
     canvas = np.where(mask[..., None] > 0.5, scene.paint.color, scene.board.color).astype(np.uint8)
     changes = np.flatnonzero(np.diff(arrays["phase"])) + 1
-    events = [Event(t=float(t[i]), kind="phase", text=f"{phase_names[i]}: made up") for i in changes]
+    events = [Event(t=float(t[i]), kind=str(phase_names[i]), text=f"{phase_names[i]}: made up") for i in changes]
     return Trace(
         scene=scene,
         seed=seed,
@@ -153,7 +156,7 @@ def synthetic_trace(
         outcomes=OUTCOMES,
         limits=LIMITS,
         events=[*events, Event(t=TOUCH_S, kind="touch", text="touch at 0.05 m/s")],
-        completed=True,
+        claimed=True,
         reason="rows, climbs and retreat done",
         wall_time_s=end / 8.0,
         canvas=canvas,

@@ -51,7 +51,7 @@ def vehicle_layer(
     shape = (scene.camera.height, scene.camera.width)
     picture, mask = np.zeros((*shape, 4), np.uint8), np.zeros(shape, np.uint8)
     inverse_depth, propellers = np.zeros(shape, np.float32), np.zeros(shape, np.uint8)
-    camera, to_camera = np.asarray(vehicle.camera_position_m), _to_camera(vehicle)
+    camera, to_camera = np.asarray(vehicle.camera_position_m), camera_axes(vehicle)
     tip, base = np.asarray(vehicle.tip_position_m), np.asarray(vehicle.force_torque_position_m)
     ferrule = tip - np.array([BRUSH_LENGTH_M, 0.0, 0.0])
     color = np.array(brush_color(scene), float)
@@ -82,7 +82,7 @@ def vehicle_layer(
     )
 
 
-def _to_camera(vehicle: VehicleParams) -> np.ndarray:
+def camera_axes(vehicle: VehicleParams) -> np.ndarray:
     """Rotation from B to the axes of the camera, (3, 3)."""
     turn = rotation_from_vector(np.radians(vehicle.camera_turn_deg))
     return (turn @ R_BODY_CAMERA).T

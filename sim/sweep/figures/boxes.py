@@ -6,7 +6,7 @@ import numpy as np
 import polars as pl
 from matplotlib.figure import Figure as Canvas
 
-from sim.evaluate.table import Figure
+from sim.evaluate.figures import Figure
 from sim.figures import style
 from sim.figures.style import law_patches, new_figure
 from sim.sweep.figures.levels import levels

@@ -10,21 +10,13 @@ import polars as pl
 from scipy.stats import spearmanr
 
 from ibvs_qp.config.errors import ConfigError
-from sim.evaluate.table import LINES, Figure
+from sim.evaluate.figures import Figure, figure_of
 from sim.sweep.parts import PARAM
 from sim.sweep.setup import unit_of
 from sim.sweep.statistics import figure_names
 
 #: Figures of a report by default, in this order, as far as present.
-DEFAULT = (
-    Figure("path_rms_m", "path error, rms", 1e3, "mm"),
-    Figure("force_rms_n", "push error, rms", unit="N"),
-    Figure("tilt_peak_deg", "tilt, peak", unit="deg"),
-    Figure("jitter_n_s", "thrust rate, rms", unit="N/s"),
-)
-#: Figures by column; one that is not among them has the name and the unit of its column.
-KNOWN = {line.key: Figure(line.key, line.label, line.scale, line.unit) for line in LINES}
-KNOWN |= {figure.column: figure for figure in DEFAULT}
+DEFAULT = ("path_rms_m", "force_rms_n", "tilt_peak_deg", "jitter_n_s")
 #: A parameter with more distinct values than MOST_LEVELS is sorted into BINS bins of equal count.
 MOST_LEVELS, BINS = 12, 6
 #: Fewest rows of a rank correlation.
@@ -54,8 +46,8 @@ def chosen_figures(table: pl.DataFrame, columns: tuple[str, ...]) -> list[Figure
     for name in columns:
         if name not in have:
             raise ConfigError(f"no figure {name!r} in the table; it has {', '.join(have) or 'none'}")
-    names = columns or tuple(figure.column for figure in DEFAULT if figure.column in have) or tuple(have[:3])
-    return [KNOWN.get(name, Figure(name, name)) for name in names]
+    names = columns or tuple(name for name in DEFAULT if name in have) or tuple(have[:3])
+    return [figure_of(name) for name in names]
 
 
 def varied(table: pl.DataFrame) -> list[str]:
@@ -90,7 +82,7 @@ def rank_correlation(table: pl.DataFrame, figures: list[Figure], columns: list[s
     NaN with too few rows, or where one of both does not vary.
     """
     result = np.full((len(columns), len(figures) + 1), np.nan)
-    merits = [table[figure.column] for figure in figures] + [table["completed"]]
+    merits = [table[figure.name] for figure in figures] + [table["completed"]]
     for row, column in enumerate(columns):
         if not table[column].dtype.is_numeric():
             continue

@@ -14,7 +14,7 @@ from matplotlib.colors import Normalize, TwoSlopeNorm
 from matplotlib.figure import Figure as Canvas
 from matplotlib.image import AxesImage
 
-from sim.evaluate.table import Figure
+from sim.evaluate.figures import Figure
 from sim.figures.style import law_name, new_figure
 from sim.sweep.figures.levels import Levels, levels, parameter_label, rank_correlation
 

@@ -8,8 +8,10 @@ import polars as pl
 from matplotlib.figure import Figure as Canvas
 
 from ibvs_qp.config.errors import ConfigError
-from sim.evaluate.table import Figure, law_name, markdown
+from sim.evaluate.figures import Figure
+from sim.evaluate.table import markdown
 from sim.figures.style import save, styled
+from sim.flight.trace import law_name
 from sim.storage.atomic import write_text
 from sim.sweep.figures.boxes import draw_boxes
 from sim.sweep.figures.levels import chosen_figures, most_influential, varied
@@ -87,8 +89,8 @@ def _draw_all(table: pl.DataFrame, figures: list[Figure], columns: list[str]) ->
     which = "" if len(mapped) == len(columns) else f", the {len(mapped)} parameters with the largest influence"
     drawn["success"] = (f"Flights that ended as planned{which}", draw_success_maps(table, mapped))
     for figure in figures:
-        drawn[f"boxes-{figure.column}"] = (f"{figure.words.capitalize()}: boxes", draw_boxes(table, figure, boxed))
-        drawn[f"map-{figure.column}"] = (
+        drawn[f"boxes-{figure.name}"] = (f"{figure.words.capitalize()}: boxes", draw_boxes(table, figure, boxed))
+        drawn[f"map-{figure.name}"] = (
             f"{figure.words.capitalize()}: medians{which}", draw_figure_maps(table, figure, mapped)
         )  # fmt: skip
     if len(columns) > 1 and (canvas := draw_dependence(table, figures, columns)) is not None:
@@ -103,7 +105,7 @@ def _summary(table: pl.DataFrame, figures: list[Figure]) -> str:
         rows = table.filter(pl.col("law") == law)
         cells = [law_name(law), str(rows.height), f"{100.0 * float(rows['completed'].mean()):.1f} %"]  # type: ignore[arg-type]
         for figure in figures:
-            values = figure.scale * rows[figure.column].drop_nulls().drop_nans()
+            values = figure.scale * rows[figure.name].drop_nulls().drop_nans()
             low, middle, high = (values.quantile(level, "linear") for level in (0.05, 0.5, 0.95))
             cells.append("–" if middle is None else f"{middle:.3g} ({low:.3g} to {high:.3g})")
         lines.append(cells)

@@ -17,7 +17,7 @@ LEVEL = attitude()
 DOWN = (0.0, 0.0, 1.0)
 
 
-def update(estimator: ContactEstimator, measurement: Measurement) -> ContactState:
+def update(estimator: ContactEstimator, measurement: Measurement, press: bool = False) -> ContactState:
     force = measurement.specific_force
     return estimator.update(
         stamp_ns=measurement.stamp_ns,
@@ -28,6 +28,7 @@ def update(estimator: ContactEstimator, measurement: Measurement) -> ContactStat
         wrench_stamp_ns=measurement.wrench_stamp_ns,
         plane=measurement.plane,
         plane_stamp_ns=measurement.plane_stamp_ns,
+        press=press,
     )
 
 
@@ -113,9 +114,9 @@ class Press:
         """Result of the last tick."""
         return self.estimator.state
 
-    def feel(self, push: float, distance: float, seconds: float, sigma: float = 0.0) -> int:
-        """Number of touches within that time."""
-        touches = 0
+    def feel(self, push: float, distance: float, seconds: float, sigma: float = 0.0, **flight: float) -> int:
+        """Number of touches within that time; ``flight`` may give `press` and the closing `speed` [m/s]."""
+        touches, speed, press = 0, flight.get("speed", 0.0), bool(flight.get("press", False))
         for _ in range(round(seconds / 0.004)):
             stamp = (self.tick + 1) * TICK_NS
             sample = self.tick // 3 * 3
@@ -129,8 +130,8 @@ class Press:
                 plane_stamp_ns=stamp,
             )
             before = self.state.in_contact
-            touches += update(self.estimator, sensors).in_contact and not before
-            self.tick += 1
+            touches += update(self.estimator, sensors, press).in_contact and not before
+            self.tick, distance = self.tick + 1, distance - 0.004 * speed
         return touches
 
 
@@ -142,6 +143,50 @@ def test_touch_needs_force_and_nearness() -> None:
     assert near.feel(0.3, 0.002, 1.0) == 0  # below the least force
     assert near.feel(3.0, 0.0, 0.5) == 1
     assert near.state.in_contact and near.state.push == pytest.approx(3.0, rel=0.01)
+
+
+def test_a_push_that_stops_the_tip_before_the_seen_surface_is_a_touch_of_another_one() -> None:
+    """Vision follows the wall 50 mm behind the board: the tip presses the board and the distance says 47 mm."""
+    press = Press()
+    press.feel(0.0, 0.047, 0.5, press=True)
+    assert press.feel(4.0, 0.047, 0.5, press=True) == 1
+    assert press.state.in_contact and press.state.distance == pytest.approx(0.0, abs=3e-3)
+    assert press.estimator.surface_offset == pytest.approx(0.047, abs=3e-3)
+    a, b, c, d = press.estimator.on_felt_surface(Wall(LEVEL, 0.047).plane)
+    np.testing.assert_allclose((a, b, c, d), Wall(LEVEL, 0.0).plane, atol=0.02)
+    press.feel(4.0, 0.047, 2.0, press=True)
+    assert press.state.in_contact, "the planes of the wall go on"
+    press.feel(4.0, -0.003, 0.5, press=True)  # vision finds the board
+    assert press.state.in_contact and press.estimator.surface_offset == 0.0
+    assert press.state.distance == pytest.approx(-0.003, abs=1e-3)
+
+
+def test_a_distance_that_starts_anew_in_a_contact_does_not_end_it() -> None:
+    press = Press()
+    press.feel(0.0, 0.005, 0.5, press=True)
+    press.feel(5.0, -0.002, 2.0, press=True)
+    assert press.state.in_contact
+    press.estimator.doubt()  # ticks are missing, and the first plane after them is the wall's
+    press.feel(5.0, 0.047, 0.004, press=True)
+    assert press.state.in_contact and press.state.distance == pytest.approx(0.0, abs=1e-3)
+    press.feel(5.0, 0.047, 2.0, press=True)
+    assert press.state.in_contact and press.state.time_since_touch > 3.9
+
+
+def test_a_false_force_makes_no_contact_far_from_the_wall() -> None:
+    """The tip moves, or is not to press, or leaves a wall that it has touched: the force is the sensor's own."""
+    moving = Press()
+    moving.feel(0.0, 0.10, 0.5, press=True)
+    moving.feel(0.0, 0.10, 0.2, press=True, speed=0.04)
+    assert moving.feel(4.0, 0.092, 1.5, press=True, speed=0.04) == 0
+    waiting = Press()
+    waiting.feel(0.0, 0.06, 0.5)
+    assert waiting.feel(4.0, 0.06, 3.0) == 0
+    drifting = Press()
+    drifting.feel(0.0, 0.005, 0.5, press=True)
+    assert drifting.feel(5.0, -0.002, 1.0, press=True) == 1
+    assert drifting.feel(5.0, -0.002, 4.0, press=True, speed=-0.005) == 0
+    assert not drifting.state.in_contact and drifting.estimator.surface_offset == 0.0
 
 
 def test_one_spike_is_no_touch() -> None:

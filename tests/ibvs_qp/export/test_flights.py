@@ -31,7 +31,7 @@ SEEDS = range(10)
 def paint(seed: int, single: bool) -> tuple[bool, str, dict[str, Any]]:
     sim.rivals.RIVALS["c"] = functools.partial(CFlown, single=single)
     trace = fly(in_world(Scene(), "datasheet"), FlightOptions(rival="c", seed=seed, video=False))
-    return trace.completed, trace.reason, compute_metrics(trace)
+    return trace.claimed, trace.reason, compute_metrics(trace)
 
 
 @pytest.mark.parametrize("single", [False, True])

@@ -68,6 +68,12 @@ class World:
         self.drift = 0.0
 
     @property
+    def guide(self) -> int:
+        """Track of the line that leads across the strokes, -1 without one."""
+        guides = [] if self.command is None else self.command.guides
+        return next((line.track_id for line, _ in guides if line.role == HORIZONTAL), -1)
+
+    @property
     def in_contact(self) -> bool:
         return not math.isnan(self.contact_since)
 
@@ -76,6 +82,8 @@ class World:
         for edge in self.edges + self.extra:
             axis = 1 if edge.role == HORIZONTAL else 0
             offset = edge.place - self.tip[axis]
+            if axis:
+                offset = (offset - math.tan(edge.lean) * self.tip[0]) * math.cos(edge.lean)
             inside = -VIEW_UP < offset < VIEW_DOWN if axis else abs(offset) < VIEW_X
             along = self.tip[0]
             inside &= axis == 0 or (along - VIEW_X < edge.span[1] and along + VIEW_X > edge.span[0])
@@ -316,7 +324,7 @@ def test_topmost_and_nearest_decoys_are_not_taken_for_the_bottom_edge() -> None:
     ]
     world = World(short(), extra=decoys, tip=np.array([0.0, -0.03]))  # starts 3 cm high
     world.fly(10.0, until="approach")
-    assert world.painter._guide.identity == 1
+    assert world.guide == 1
     world.fly(100.0)
     assert world.painter.finished and not world.painter.failed
     assert world.ends[0][2] == pytest.approx(0.0, abs=0.004)
@@ -350,7 +358,7 @@ def test_row_two_follows_the_fresh_edge_and_not_its_own_upper_edge() -> None:
         own.place = world.tip[1] - HALF_BRUSH  # grows with the row, topmost in the picture
         world.step()
         if world.painter.phase == "paint":
-            assert world.painter._guide.identity == 101
+            assert world.guide == 101
         if world.painter.finished:
             break
     assert not world.painter.failed
@@ -386,10 +394,10 @@ def test_where_the_fresh_edge_misleads_the_board_leads(misleads: str) -> None:
     if misleads == "lost in the row":
         world.hidden.add(101)
     elif misleads == "leans in the row":
-        assert world.painter._guide.identity == 101  # two degrees are none
+        assert world.guide == 101  # two degrees are none
         fresh.lean, fresh.place = lean, fresh.place - 0.015
     world.fly(1.0)
-    assert world.painter._guide.identity == 1
+    assert world.guide == 1
     world.fly(100.0)
     assert world.painter.finished and not world.painter.failed
     assert world.ends[1][2] == pytest.approx(-world.config.pitch_m, abs=0.004)
@@ -404,7 +412,7 @@ def test_back_from_the_board_to_the_fresh_edge_the_row_stays() -> None:
     for hidden, guide in (({101}, 1), ({1}, 101)):
         world.hidden = hidden
         world.fly(0.5)
-        assert world.painter._guide.identity == guide
+        assert world.guide == guide
     world.fly(1.0)
     assert world.tip[1] == pytest.approx(-world.config.pitch_m, abs=0.004)
 
@@ -417,7 +425,7 @@ def test_a_sloped_row_does_not_lean() -> None:
     next(edge for edge in world.edges if edge.identity == 101).lean = math.radians(8.0)
     world.fly(10.0, until="paint")
     world.fly(1.0)
-    assert world.painter._guide.identity == 101
+    assert world.guide == 101
 
 
 def test_the_edge_of_a_climb_is_found_again_under_another_name() -> None:
@@ -440,7 +448,7 @@ def test_a_guide_that_is_lost_is_found_again_under_another_name() -> None:
     world.fly(2.0)
     world.edges[0].identity = 33
     world.fly(1.0)
-    assert world.painter._guide.identity == 33
+    assert world.guide == 33
     assert any(phase == "guide" for _, phase, _ in world.painter.log)
     world.fly(100.0)
     assert not world.painter.failed

@@ -87,7 +87,7 @@ def test_second_run_leaves_nothing_stale(flown, capsys):
 
 def test_law_that_does_not_complete_is_still_reported(flown, capsys, monkeypatch):
     def crash(scene, options, progress=None):
-        return dataclasses.replace(fake_fly(scene, options), completed=False, reason="propeller touched the wall")
+        return dataclasses.replace(fake_fly(scene, options), claimed=False, reason="propeller touched the wall")
 
     monkeypatch.setattr(sim.flight.side_by_side, "fly", crash)
     assert main(["paint", "--json", "--no-video"]) == 0
@@ -96,7 +96,7 @@ def test_law_that_does_not_complete_is_still_reported(flown, capsys, monkeypatch
 
 def test_interrupt_writes_the_partial_run(flown, capsys, monkeypatch):
     def cut_short(scene, options, progress=None):
-        return dataclasses.replace(fake_fly(scene, options), completed=False, reason="interrupted")
+        return dataclasses.replace(fake_fly(scene, options), claimed=False, reason="interrupted")
 
     monkeypatch.setattr(sim.flight.side_by_side, "fly", cut_short)
     assert main(["paint", "--json", "--out", "run", "--no-video"]) == 130
@@ -147,6 +147,8 @@ def test_interrupt_while_drawing_keeps_the_log(flown, capsys, monkeypatch):
         (["paint", "--preset", "dark_board"], ["--preset dark_board: this is a scene, not a preset"]),
         (["paint", "--scene", "octorotor_qp"], ["--scene octorotor_qp: this is a preset, not a scene"]),
         (["compare"], ["compare", "paint"]),
+        (["paint", "--scene", "long.toml"], ["paint.stroke_m = 1.5 m", "at most 1.308 m", "board.width_m = 1.4 m"]),
+        (["paint", "--scene", "slow.toml", "--law", "paper"], ["imu.rate_hz = 100.0 Hz", "at least 250 Hz"]),
         (["pain"], ["unknown command pain; did you mean paint?"]),
         (["fly"], ["unknown command fly; commands are paint, "]),
         ([], ["paint", "--help"]),
@@ -162,6 +164,8 @@ def test_user_errors_are_one_line(flown, capsys, words, needles):
     (flown / "rings.toml").write_text("[controller.gains]\nforce_ksp = 4000.0\n")
     (flown / "scene.toml").write_text("[wall]\nfriction = 0.3\n")
     (flown / "file").write_text("")
+    (flown / "long.toml").write_text("[paint]\nstroke_m = 1.5\n")
+    (flown / "slow.toml").write_text("[imu]\nrate_hz = 100.0\n")
     before = sorted(flown.rglob("*"))
     assert main(words) == 2
     out, err = capsys.readouterr()

@@ -74,7 +74,8 @@ def test_rotors_have_the_names_and_the_window_of_the_tick(
     np.testing.assert_allclose(table["thrust_lower"], np.maximum(before - step, 1.2), atol=1e-4)
     np.testing.assert_allclose(table["thrust_upper"], np.minimum(before + step, 52.56), atol=1e-4)
     assert table["reach_margin"] == pytest.approx(float(trace.reach_margin[tick]))
-    assert table["push_asked"] == trace.scene.paint.push_n
+    assert table["push_asked"] == trace.scene.paint.push_n and table["push_reduced"] is None
+    assert table["push_measured"] == pytest.approx(float(trace.push_measured[tick]))
     config, explanation = explain_tick(trace, tick)
     assert explanation is not None
     vehicle = config.controller.vehicle
@@ -116,9 +117,19 @@ def test_a_lowered_push_is_printed_with_the_jobs(run: tuple[Path, Trace], capsys
     config, explanation = explain_tick(trace, tick)
     assert explanation is not None
     greedy = dataclasses.replace(config, painting=dataclasses.replace(config.painting, push_n=35.0))
-    text = shown(explanation_tables(trace, tick, explanation, greedy), capsys)
-    assert "job: 35.00 N" in text and f"{trace.reach_margin[tick]:.2f} N further" in text
-    assert "job:" not in shown(explanation_tables(trace, tick, explanation, config), capsys)
+    reasons = ["reach 4.9 N of 35.0 N asked: friction 0.80 assumed", "standing still, no longer the last"]
+    events = [Event(t=float(trace.t[tick]) + late, kind="push reduced", text=text) for late, text in enumerate(reasons)]
+    reduced = dataclasses.replace(trace, events=events)
+    text = shown(explanation_tables(reduced, tick, explanation, greedy), capsys)
+    commanded, measured = float(trace.push_reference[tick]), float(trace.push_measured[tick])
+    assert f"push asked 35.00 N, commanded {commanded:.2f} N, measured {measured:.2f} N (reduced: {reasons[0]})" in text
+    assert f"{trace.reach_margin[tick]:.2f} N further" in text
+    restored = Event(t=float(trace.t[tick]), kind="push restored", text="35.0 N of 35.0 N asked")
+    for flown in (trace, dataclasses.replace(trace, events=[*events[:1], restored])):
+        assert "(reduced: by the ramp after touch)" in shown(
+            explanation_tables(flown, tick, explanation, greedy), capsys
+        )
+    assert "reduced" not in shown(explanation_tables(trace, tick, explanation, config), capsys)
 
 
 def turning(trace: Trace, tick: int, rate: float, pitch: float = 0.0, hard: bool = False) -> Trace:
@@ -150,14 +161,20 @@ def test_cost_of_slack_has_bound_and_unit(
     assert paid * explanation.total_cost == pytest.approx(0.5 * price * limit.slack**2)
     assert sum(explanation.limit_cost) == pytest.approx(explanation.slack_cost, rel=1e-6)
     text = shown(explanation_tables(trace, tick, explanation, config), capsys)
-    line = next(line for line in text.splitlines() if "tilt_pitch" in line)
+    line, price_line = (line for line in text.splitlines() if line.lstrip().startswith("tilt_pitch "))
     assert f"{row.upper:.4g}" in line and "rad/s^2" in line and f"({paid:.0%})" in line
+    span = explanation.limit_ranges[at]
+    assert (
+        f"{span.cost_fall:.3g}" in price_line and f"{span.change_high:+.3g}" in price_line and span.until in price_line
+    )
+    assert 0.0 < span.cost_fall < limit.price * span.change_high and "derivative of the cost" in text
     assert "Slack takes" in text and "per squared unit" in text
     (tmp_path / "scene.toml").write_text((folder / "scene.toml").read_text())
     save_log(tmp_path / "log.npz", {"qp": turning(trace, tick, 0.0, pitch=0.3)})
     assert main(["explain", str(tmp_path), "--at", f"{trace.t[tick]:.3f}", "--json"]) == 0
     table = json.loads(capsys.readouterr().out)
     (entry,) = [entry for entry in table["active_limits"] if entry["name"] == "tilt_pitch"]
+    assert entry["cost_fall"] == pytest.approx(span.cost_fall, rel=1e-3) and entry["until"] == span.until
     assert entry["cost_share"] == pytest.approx(paid) and entry["upper"] == pytest.approx(row.upper, abs=1e-6)
     assert table["slack_cost_share"] == pytest.approx(explanation.slack_cost) and table["conflict"] == []
 

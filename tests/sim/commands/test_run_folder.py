@@ -19,7 +19,7 @@ import sim.flight.side_by_side
 from ibvs_qp.config.errors import IbvsQpError
 from sim.commands.cli import main
 from sim.flight.flight_log import load_run
-from sim.flight.unfinished import KILLED
+from sim.flight.trace import KILLED
 from sim.report.rundir import RunFolder
 from sim.storage.folder import locked_folder
 
@@ -132,7 +132,7 @@ def test_after_kill_9_the_rows_are_there(tmp_path: Path, law: str, capfd: pytest
     assert set(traces) == set(sizes)
     for trace in traces.values():
         assert len(trace.t) > 500 and np.allclose(np.diff(trace.t), 0.004)
-        assert trace.reason == KILLED and not trace.completed and trace.events[-1].text == KILLED
+        assert trace.reason == KILLED and not trace.claimed and trace.events[-1].text == KILLED
         assert np.isfinite(trace.thrusts).all() and trace.scene.paint.rows == 8
     assert main(["explain", str(tmp_path / "run"), "--at", "1", "--json"]) == 0
     assert json.loads(capfd.readouterr().out)["tasks"]

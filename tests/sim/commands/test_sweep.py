@@ -40,7 +40,9 @@ def made_up_flight(scene, options, **_):
     if scene.plant.mass_kg > 6.0 and scene.wall.friction > 0.5:
         raise ZeroDivisionError("too heavy")
     figures = {"path_rms_m": 1e-3 * weight, "force_rms_n": weight * (1.0 if options.law == "qp" else 1.5)}
-    return SimpleNamespace(completed=weight < 2.3, reason="held" if weight < 2.3 else "lost", figures=figures)
+    done, reason = weight < 2.3, "held" if weight < 2.3 else "lost"
+    outcome = {"completed": done, "claimed": done, "reason": reason}
+    return SimpleNamespace(outcome=outcome, reason=reason, figures=figures)
 
 
 def made_up_figures(trace):
@@ -57,6 +59,7 @@ def flown(monkeypatch, tmp_path):
         return made_up_flight(scene, options)
 
     monkeypatch.setattr(sim.sweep.flying, "fly", fly)
+    monkeypatch.setattr(sim.sweep.flying, "outcome", lambda trace: trace.outcome)
     monkeypatch.setattr(sim.sweep.planned, "press_row", made_up_figures)
     monkeypatch.setattr(sim.sweep.figures, "write_report", lambda table, folder, *_: folder / "report.md")
     (tmp_path / "spec.toml").write_text(SPEC)
@@ -99,6 +102,7 @@ def test_ctrl_c_keeps_blocks_and_the_rest_is_flown_later(flown, monkeypatch, cap
         return whole(*arguments, **named)
 
     monkeypatch.setattr(sim.sweep.flying, "fly", fly)
+    monkeypatch.setattr(sim.sweep.flying, "outcome", lambda trace: trace.outcome)
     assert main(["sweep", "spec.toml", "--jobs", "1", "--json", "--out", "run"]) == 130
     out, err = capsys.readouterr()
     assert json.loads(out)["flights"] == 9 and err.count("\n") == 1 and "go on with: ibvs-qp sweep spec.toml" in err
@@ -119,6 +123,7 @@ def fly(*arguments, **named):
     time.sleep(0.1)
     return made_up.made_up_flight(*arguments, **named)
 sim.sweep.flying.fly = fly
+sim.sweep.flying.outcome = lambda trace: trace.outcome
 from sim.commands.cli import main
 main(["sweep", "spec.toml", "--jobs", "1", "--json", "--out", "run"])
 """

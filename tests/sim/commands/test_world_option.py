@@ -16,11 +16,11 @@ import sim.flight.side_by_side
 import sim.sweep.flying
 from ibvs_qp.config.settings import dump_toml
 from sim.commands.cli import main
-from sim.experiments.design import Choice, designs
+from sim.experiments.design import Choice, designs, worlds_of
 from sim.flight.flight_log import load_run
-from sim.world.errors import WorldErrors, world_errors
+from sim.world.errors import GyroErrors, WorldErrors, world_errors
 from sim.world.scene import Scene
-from sim.world.worlds import DEFAULT_WORLD, EXPERIMENT_WORLD, in_world
+from sim.world.worlds import DEFAULT_WORLD, OF_THE_SCENE, in_world, scene_in_world
 
 PRESET = str(Path(ibvs_qp.__file__).parent / "presets" / "tarot_t960_qp.toml")
 PAINT = ["paint", "--law", "qp", "--no-video", "--json", "--out", "run", "--overwrite"]
@@ -63,29 +63,60 @@ def test_a_file_is_a_world_too(flown, capsys):
     assert json.loads(capsys.readouterr().out)["world"] == "mine.toml"
 
 
-def test_a_scene_file_keeps_its_errors_unless_a_world_is_named(flown, capsys):
-    Path("scene.toml").write_text(dump_toml(in_world(Scene(), "datasheet")), encoding="utf-8")
-    for words, world in (([], "datasheet"), (["--world", "ideal"], "ideal")):
+SCENES = {
+    "none": ("[wall]\nfriction = 0.4\n", DEFAULT_WORLD, world_errors(DEFAULT_WORLD)),
+    "empty": ("[errors]\n", "ideal", WorldErrors()),
+    "one": ("[errors.gyro]\nbias_rad_s = 0.004\n", OF_THE_SCENE, WorldErrors(gyro=GyroErrors(bias_rad_s=0.004))),
+    "profile": (dump_toml(in_world(Scene(), "harsh")), "harsh", world_errors("harsh")),
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_errors_of_a_scene_file_hold_where_it_has_any_and_a_named_world_wins(flown, capsys, name):
+    text, world, errors = SCENES[name]
+    Path("scene.toml").write_text(text, encoding="utf-8")
+    assert scene_in_world(Path("scene.toml"))[1] == world
+    for words, expected in (([], (world, errors)), (["--world", "ideal"], ("ideal", WorldErrors()))):
         assert main([*PAINT, "--scene", "scene.toml", *words]) == 0
-        assert flown[-1] == world_errors(world)
-        assert json.loads(capsys.readouterr().out)["world"] == world
-    assert main(PAINT) == 0
-    assert flown[-1] == world_errors(DEFAULT_WORLD)
+        assert (json.loads(capsys.readouterr().out)["world"], flown[-1]) == expected
+
+
+def test_every_command_has_the_same_default_world(flown, capsys):
+    quick = ["--quick", "--features", "geometric", "--jobs", "1", "--json"]
+    for words in (PAINT, ["compare", PRESET, PRESET, "--seeds", "1", *quick], ["experiment", "noise-sweep", *quick]):
+        assert main(words) == 0
+        assert json.loads(capsys.readouterr().out)["world"] == DEFAULT_WORLD
+    assert set(flown) == {world_errors(DEFAULT_WORLD)}
+
+
+def test_the_tables_are_titled_with_the_world(flown, capsys):
+    quick = ["--quick", "--features", "geometric", "--jobs", "1", "--world", "harsh"]
+    paint = [word for word in PAINT if word != "--json"]
+    experiment = ["experiment", "noise-sweep", *quick]
+    for words in ([*paint, "--world", "harsh"], ["compare", PRESET, PRESET, "--seeds", "1", *quick], experiment):
+        assert main(words) == 0
+        assert "world harsh" in capsys.readouterr().out
+    assert main([*paint[:-3], "--out", "other"]) == 0
+    capsys.readouterr()
+    assert main(["compare", "run", "other"]) == 0
+    assert "world harsh against datasheet" in " ".join(capsys.readouterr().out.split())
 
 
 def test_compare_and_experiment_fly_a_world(flown, capsys):
-    flights = ["--quick", "--features", "geometric", "--jobs", "1", "--json", "--world", "datasheet"]
+    flights = ["--quick", "--features", "geometric", "--jobs", "1", "--json", "--world", "harsh"]
     assert main(["compare", PRESET, PRESET, "--seeds", "1", *flights]) == 0
-    assert json.loads(capsys.readouterr().out)["world"] == "datasheet"
+    assert json.loads(capsys.readouterr().out)["world"] == "harsh"
     assert main(["experiment", "noise-sweep", *flights, "--out", "all"]) == 0
-    assert json.loads(capsys.readouterr().out)["world"] == "datasheet"
-    assert "--world datasheet" in Path("all/results.md").read_text(encoding="utf-8")
-    assert set(flown) == {world_errors("datasheet")}
+    assert json.loads(capsys.readouterr().out)["world"] == "harsh"
+    assert "--world harsh" in Path("all/results.md").read_text(encoding="utf-8")
+    assert set(flown) == {world_errors("harsh")}
 
 
-def test_the_default_world_changes_no_experiment():
-    plans = [run.plan for run in designs("approach", Choice(quick=True))]
-    assert {plan.scene.errors for plan in plans} == {world_errors(EXPERIMENT_WORLD)}
+def test_one_error_at_a_time_is_flown_in_the_ideal_world_and_named_so():
+    runs = designs("mismatch", Choice(world="harsh"))
+    (right,) = {run.plan.scene.errors for run in runs if run.params["error"] == "nothing"}
+    assert right == WorldErrors() and worlds_of(runs, "harsh") == {"mismatch": ["ideal"]}
+    assert worlds_of(designs("worlds", Choice()), "ideal") == {"worlds": ["ideal", "datasheet", "harsh"]}
 
 
 @pytest.mark.parametrize("words", [["paint"], ["compare", PRESET, PRESET], ["experiment", "approach", "--quick"]])

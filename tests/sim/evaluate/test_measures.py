@@ -93,7 +93,7 @@ def test_a_spin_after_a_loss_counts_its_full_turns():
 def test_a_paint_job_tells_its_peak_and_its_crash():
     trace = synthetic_trace(Errors(peak_n=7.5))
     assert paint_figures(trace)["push_peak_ratio"] == pytest.approx(1.5) and paint_figures(trace)["crashed"] == 0.0
-    trace.completed, trace.reason = False, "crash: propeller strike"
+    trace.claimed, trace.reason = False, "crash: propeller strike"
     assert paint_figures(trace)["crashed"] == 1.0
 
 

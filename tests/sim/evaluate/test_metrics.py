@@ -133,7 +133,7 @@ def test_partial_flight_has_a_short_stroke_and_no_row_two():
     for name, values in trace.arrays.items():
         if len(values) == len(keep):
             trace.arrays[name] = values[keep]
-    trace.completed, trace.reason = False, "interrupted"
+    trace.claimed, trace.reason = False, "interrupted"
     metrics = compute_metrics(trace)
     assert metrics["stroke_m"] == 0.0
     assert [row["row"] for row in metrics["rows"]] == [1]

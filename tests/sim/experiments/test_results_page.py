@@ -50,13 +50,13 @@ def rows(name: str, law: str, variant: str, errors: Sequence[float | None], metr
 )
 def test_a_difference_is_certain_and_large_or_it_is_no_verdict(median, low, high, pairs, found):
     difference = {"median": median, "sure_low": low, "sure_high": high, "pairs": pairs}
-    assert effect(difference, Column(metric=TILT, label="tilt", unit="deg")) is found
+    assert effect(difference, Column(metric=TILT, label="tilt")) is found
     contrary = {Effect.FIRST: Effect.SECOND, Effect.SECOND: Effect.FIRST}.get(found, found)
-    assert effect(difference, Column(metric=TILT, label="tilt", unit="deg", better=1)) is contrary
+    assert effect(difference, Column(metric=TILT, label="tilt", better=1)) is contrary
 
 
 def test_thresholds_follow_the_unit_of_the_page():
-    path = Column(metric="path_rms_m", label="path", unit="mm", scale=1e3)
+    path = Column(metric="path_rms_m")
     small = {"median": 4e-4, "sure_low": 3e-4, "sure_high": 6e-4, "pairs": 9}
     assert effect(small, path) is Effect.IRRELEVANT
     assert effect({name: 2.0 * value for name, value in small.items()}, path) is Effect.FIRST
@@ -179,7 +179,7 @@ def test_laws_in_place_of_the_qp_are_compared_with_it_and_without_an_analytic_la
     assert "## Verdict" not in page and "analytic" not in page
     assert "of 1 comparisons it is better in 0, the QP in 0; 1 do not matter" in page
     assert "of 1 comparisons it is better in 1, the QP in 0; 0 do not matter" in page
-    assert "| *mpc* | path, straights, rms | paint, world datasheet | -2.00" in page
+    assert "| *mpc* | path error, straights, rms | paint, world datasheet | -2.00" in page
     assert page.index("What weights") < page.index("## Bounds")
 
 

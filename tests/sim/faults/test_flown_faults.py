@@ -20,14 +20,14 @@ def test_a_watched_flight_goes_on_after_the_end_of_the_strategy_and_is_completed
     fault = NoFault(after="retreat", delay_s=0.0, watch_s=4.0)
     trace = fly(short_job(0.2, rows=1), OPTIONS, faults=(fault,))
     figures = fault_figures(trace)
-    assert trace.completed and figures["end_s"] - figures["fault_s"] == pytest.approx(4.0, abs=0.01)
+    assert trace.claimed and figures["end_s"] - figures["fault_s"] == pytest.approx(4.0, abs=0.01)
     assert trace.phases[trace.phase[-1]] == "done"
 
 
 def test_a_slow_touchdown_ends_the_flight_as_landed():
     low = near_wall(board={"bottom_m": 0.5}, start={"down_m": 0.35})
     trace = fly(low, OPTIONS, faults=(ThrustLoss(after="start", delay_s=0.0, share=0.7),))
-    assert trace.reason == "landed" and not trace.completed
+    assert trace.reason == "landed" and not trace.claimed
     assert fault_figures(trace)["landed"] == 1.0 and trace.t[-1] < 2.0
 
 

@@ -26,7 +26,7 @@ OPTIONS = FlightOptions(features="geometric", video=False)
 
 def test_press_job_holds_as_long_as_asked_whatever_the_push_does():
     trace = fly(near_wall(paint={"push_n": 35.0}), OPTIONS, job=PressJob(hold_s=2.0))
-    assert trace.completed, trace.reason
+    assert trace.claimed, trace.reason
     press = trace.t[trace.phase == trace.phases.index("press")]
     touch = trace.t[np.argmax(trace.push_true > 0.05)]
     assert press[-1] - touch == pytest.approx(2.0, abs=0.6)
@@ -83,7 +83,7 @@ def test_a_camera_pitched_by_12_degrees_and_a_force_sensor_on_its_side_hold_the_
     )
     config = dataclasses.replace(config, controller=dataclasses.replace(config.controller, vehicle=vehicle))
     trace = fly(near_wall(), OPTIONS, job=PressJob(hold_s=3.0), config=config)
-    assert trace.completed, trace.reason
+    assert trace.claimed, trace.reason
     held = (trace.phase == trace.phases.index("press")) & (trace.contact_weight == 1.0)
     late = trace.push_true[held][-500:]
     assert np.sqrt(np.mean((late - 5.0) ** 2)) < 0.3

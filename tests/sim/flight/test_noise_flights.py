@@ -31,7 +31,7 @@ def noisy(sigma_vs: float, sigma_f: float, sigma_nm: float = 0.005) -> Scene:
 def test_corners_of_the_noise_sweep(vs: float, force: float, law: str) -> None:
     """Held for the QP law; the analytic law has the same lines and forces and must come home as well."""
     trace = fly(noisy(vs, force), FlightOptions(law=law, video=False))
-    assert trace.completed, trace.reason
+    assert trace.claimed, trace.reason
     figures = paint_figures(trace)
     assert figures["contact_share"] >= 0.995
     if law == "qp":
@@ -43,5 +43,5 @@ def test_corners_of_the_noise_sweep(vs: float, force: float, law: str) -> None:
 def test_moments_as_noisy_as_the_forces() -> None:
     """Moments noisy in the same proportion, 0.15 N m at 3 N, still measure the force across the tool better."""
     trace = fly(noisy(0.02, 3.0, sigma_nm=0.15), FlightOptions(law="qp", video=False))
-    assert trace.completed, trace.reason
+    assert trace.claimed, trace.reason
     assert paint_figures(trace)["path_rms_m"] <= bound("path_rms_m", sigma_vs=0.02)

@@ -95,7 +95,7 @@ def test_the_gains_are_those_that_the_kept_search_chose(law: str) -> None:
 
 def finalist(row: dict[str, Any]) -> Finalist:
     def read(each: dict[str, Any]) -> Score:
-        return Score(tuple(each[objective.column] for objective in OBJECTIVES), each["failed"])
+        return Score(tuple(each[objective.name] for objective in OBJECTIVES), each["failed"])
 
     return Finalist(read(row), {name: read(each) for name, each in row["scenes"].items()}, row["damping"])
 
@@ -110,5 +110,5 @@ def test_the_octorotor_paints() -> None:
     scene = short_scene(stroke_m=0.3, rows=1)
     options = FlightOptions(features="geometric", video=False, preset=str(FOLDER / "octorotor_qp.toml"))
     trace = fly(scene, options)
-    assert trace.completed and trace.thrusts.shape[1] == 8
+    assert trace.claimed and trace.thrusts.shape[1] == 8
     assert compute_metrics(trace)["force_rms_straight_n"] <= 0.35

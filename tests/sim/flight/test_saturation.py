@@ -48,7 +48,7 @@ def test_a_static_push_within_reach_is_delivered(push: float, friction: float) -
     ticks = settled(trace)
     delivered = float(trace.push_true[ticks].mean())
     print(f"{push:g} N at mu {friction:g}: {delivered:.2f} N")
-    assert trace.completed and delivered == pytest.approx(push, rel=0.05)
+    assert trace.claimed and delivered == pytest.approx(push, rel=0.05)
 
 
 @pytest.mark.parametrize("reach_check", [True, False])
@@ -58,7 +58,7 @@ def test_a_push_beyond_reach_is_given_up_and_nothing_else(reach_check: bool) -> 
     delivered, tilt = float(trace.push_true[ticks].mean()), np.degrees(trace.euler[ticks, :2])
     height = float(np.ptp(trace.position[ticks, 2]))
     print(f"35 N: {delivered:.2f} N, height {1e3 * height:.1f} mm, tilt {np.abs(tilt).max():.2f} deg peak")
-    assert trace.completed and delivered >= 0.95 * REACH_N
+    assert trace.claimed and delivered >= 0.95 * REACH_N
     assert height <= 0.05 and np.sqrt((tilt**2).mean()) <= 1.0 and np.abs(tilt).max() <= 2.0
     assert any("reduced" in text and "reach standing still" in text for text in notes(trace)) is reach_check
 
@@ -72,15 +72,15 @@ def test_within_reach_the_laws_push_alike(push: float) -> None:
         error = trace.push_true[ticks] - push
         height = float(np.ptp(trace.position[ticks, 2]))
         print(f"{law} {push:g} N: {error.mean():+.3f} N, {error.std():.3f} N, height {1e3 * height:.1f} mm")
-        assert trace.completed and abs(error.mean()) <= 0.01 * push and error.std() <= 0.2
+        assert trace.claimed and abs(error.mean()) <= 0.01 * push and error.std() <= 0.2
         assert height <= 2e-3 and np.abs(np.degrees(trace.euler[ticks])).max() <= 0.3
 
 
 def test_at_the_reach_clipping_loses_the_wall_and_the_program_does_not() -> None:
     """30 N unchecked, 0.4 N below the reach: noise clips rotors, and what clipping leaves is no level flight."""
     program, clipped = (press(30.0, 0.3, reach_check=False, law=law) for law in ("qp", "paper"))
-    assert program.completed and program.push_true[settled(program)].mean() >= 0.95 * 30.0
-    assert not clipped.completed and "crash" in clipped.reason
+    assert program.claimed and program.push_true[settled(program)].mean() >= 0.95 * 30.0
+    assert not clipped.claimed and "crash" in clipped.reason
 
 
 @pytest.mark.parametrize(
@@ -102,7 +102,7 @@ def test_a_sliding_push_beyond_reach_is_reduced_with_the_reason(
     rms, delivered = float(np.sqrt((yaw**2).mean())), float(trace.push_true[last].mean())
     speed = 250.0 / (len(last) - 1) * float(trace.position[last[0], 1] - trace.position[last[-1], 1])
     print(f"{law} mu {friction:g}: {delivered:.2f} N, yaw {rms:.2f} deg rms, {1e3 * speed:.0f} mm/s at the end")
-    assert trace.completed and 0.9 * limit <= delivered <= limit
+    assert trace.claimed and 0.9 * limit <= delivered <= limit
     assert any("reduced" in text and "friction" in text and "along the travel" in text for text in notes(trace))
     assert rms <= 1.0
     if law == "qp":

@@ -84,7 +84,7 @@ def test_no_phase_and_no_fault_of_a_whole_flight_makes_the_thrusts_jump(law: str
     fault = Derate(after="paint", delay_s=1.5, rotor="front_left", share=0.25)
     options = FlightOptions(law=law, features="geometric", video=False)
     trace = fly(short_scene(0.25, rows=1), options, faults=(fault,))
-    assert [event.kind for event in trace.events].count("fault") == 1 and trace.completed
+    assert [event.kind for event in trace.events].count("fault") == 1 and trace.claimed
     steps = np.abs(np.diff(trace.thrusts, axis=0)).max(axis=1)
     assert steps[1:].max() <= RATE_STEP + 1e-6  # the first command comes from nowhere
     for tick in np.flatnonzero(np.diff(trace.phase)):

@@ -12,8 +12,8 @@ from synthetic_trace import Errors, synthetic_trace
 from ibvs_qp.command import Outcome
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.controller import default_limits, qp_problem
+from sim.evaluate.figures import FIGURES as FIGURES_OF_MERIT
 from sim.evaluate.metrics import compute_metrics
-from sim.evaluate.table import LINES
 from sim.figures import FIGURES, draw_all
 from sim.report import plain_words
 from sim.report.report import write_report
@@ -99,11 +99,22 @@ def test_report_plays_the_video_beside_it(traces, tmp_path):
     assert page.count('poster="data:image/jpeg;base64,') == 1, "a picture before it plays"
 
 
+def test_a_false_claim_is_marked(page, traces, tmp_path):
+    assert 'class="warning"' not in page
+    metrics = {law: compute_metrics(trace) for law, trace in traces.items()}
+    metrics["qp"] |= {"completed": False, "not_completed": "row 5: 54 mm from its place"}
+    folder = RunFolder(tmp_path)
+    write_report(folder.report, traces, summary(FACTS, folder, metrics, False, 12.3, 10**9), {})
+    text = folder.report.read_text(encoding="utf-8")
+    assert '<p class="warning">QP law: claimed as completed, but row 5: 54 mm from its place.</p>' in text
+    assert text.count("yes (FALSE CLAIM)") == 1
+
+
 def test_every_row_of_the_report_has_a_meaning(page):
-    assert set(plain_words.FIGURES) == {line.key for line in LINES}
+    assert all(figure.about for figure in FIGURES_OF_MERIT.values() if figure.of is not None)
     assert set(plain_words.OUTCOMES) == set(Outcome)
     config = ControllerConfig()
     names = [row.name for limit in default_limits(config) for row in limit.rows(qp_problem(config).model)]
     assert all(plain_words.limit_words(name) for name in names)
-    for words in (plain_words.FIGURES["coverage"], plain_words.OUTCOMES["solved"]):
+    for words in (FIGURES_OF_MERIT["coverage"].about, plain_words.OUTCOMES["solved"]):
         assert words in page

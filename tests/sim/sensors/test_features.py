@@ -12,11 +12,12 @@ import pytest
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import R_BODY_CAMERA, rotation_from_quaternion
 from ibvs_qp.measurement import FeatureFrame, LineFeature
+from ibvs_qp.painting.pattern import CORNERS, PATTERNS
 from sim.sensors.features import BOARD_TRACKS, GeometricFeatures, add_sigma_vs
 from sim.world.board import BoardGeometry
 from sim.world.canvas import Canvas
 from sim.world.painted_edges import PaintedEdges
-from sim.world.scene import BoardScene, CameraScene, FeaturesScene, Scene
+from sim.world.scene import BoardScene, CameraScene, FeaturesScene, PaintScene, Scene
 
 VEHICLE = VehicleParams()
 SCENE = Scene()
@@ -144,7 +145,8 @@ def test_painted_edge_follows_the_strokes_not_the_plan() -> None:
 
 def test_a_climb_is_no_part_of_a_row() -> None:
     edges = painted_c(0.7)
-    rows, points = edges.all_exposed()
+    rows, uv = edges.exposed()
+    points = edges.on_board(uv)
     first = points[rows == 1]
     assert first[:, 0].min() > 0.7 + 0.03
     assert np.abs(first[:, 1] - ROW1 - 0.04).max() < 1e-9
@@ -237,27 +239,22 @@ def test_same_seed_same_bits() -> None:
     assert run(1) == run(1) != run(2)
 
 
-@pytest.mark.parametrize("slope", [0.0, 3.0])
-@pytest.mark.parametrize(("along", "up", "roll", "yaw"), [
-    (0.2, ROW2, 0.0, 0.0), (0.7, ROW2, 8.0, -9.0), (1.3, 0.3, -8.0, 9.0),
-])  # fmt: skip
-def test_painted_edges_outside_the_picture_are_left_out_and_no_other(
-    monkeypatch: pytest.MonkeyPatch, slope: float, along: float, up: float, roll: float, yaw: float
-) -> None:
-    scene = dataclasses.replace(SCENE, board=BoardScene(slope_deg=slope))
-    features, pose = (
-        GeometricFeatures(scene, VEHICLE, painted_c(), 0, noise=False),
-        facing(scene, along, up, 0.0, roll, yaw),
-    )
-    seen: list[int] = []
-    pieces = features._pieces
-    unhidden = pieces._unhidden
-    monkeypatch.setattr(pieces, "_unhidden", lambda spots: seen.append(len(spots)) or unhidden(spots))
-    asked_for = features.capture(*pose, STILL, 0)
-    monkeypatch.setattr(features, "_in_view", lambda *_: (-math.inf, math.inf))
-    everything = features.capture(*pose, STILL, 0)
-    assert seen[0] < 0.6 * seen[1]
-    assert [line.track_id for line in asked_for.lines] == [line.track_id for line in everything.lines]
-    for ours, theirs in zip(asked_for.lines, everything.lines, strict=True):
-        assert (ours.rho, ours.theta) == (theirs.rho, theirs.theta)
-        np.testing.assert_array_equal(ours.segment, theirs.segment)
+@pytest.mark.parametrize("kind", PATTERNS)
+@pytest.mark.parametrize("start", CORNERS)
+def test_the_outer_edge_of_a_stroke_is_reported_in_every_pattern(kind: str, start: str) -> None:
+    scene = Scene(board=BoardScene(width_m=1.4, height_m=1.4), paint=PaintScene(pattern=kind, start=start))
+    geometry, edges = BoardGeometry(scene), PaintedEdges(scene)
+    begin, end = geometry.stroke_ends
+    place = geometry.stroke_place(1)
+    path = geometry.from_pattern(np.column_stack((np.linspace(begin, end, 200), np.full(200, place))))
+    for previous, current in itertools.pairwise(path):
+        edges.stroke(previous, current)
+    spot = geometry.from_pattern(np.array((0.7, geometry.stroke_place(2))))
+    pose = facing(scene, *spot, 0.0)
+    lines = by_track(GeometricFeatures(scene, VEHICLE, edges, 0, noise=False).capture(*pose, STILL, 0))
+    line = lines[11]
+    along, up = geometry.from_pattern(np.array((0.8, place + 0.04)))
+    assert offset(line, normalised(on_board(scene, along, up), pose)) == pytest.approx(0.0, abs=1e-6)
+    assert line.role == geometry.pattern.guide_role and line.kind == "paint"
+    along, up = geometry.from_pattern(np.array((0.8, place + 0.08)))
+    assert np.sign(offset(line, normalised(on_board(scene, along, up), pose))) == line.surface_side

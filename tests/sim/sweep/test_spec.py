@@ -143,6 +143,13 @@ def test_values_that_are_refused_together_make_a_row_with_the_reason():
     assert "stiffness_min_n_m = 1000.0 N/m" in run.reason and run.params["scene.wall.friction"] == 0.1
 
 
+def test_a_point_that_cannot_be_flown_makes_a_row_with_the_reason():
+    design = planned("[grid]\nscene.force_torque.latency_s = [0.004, 0.05]")
+    flown, refused = design.run(0), design.run(1)
+    assert isinstance(flown, Run) and isinstance(refused, Refusal)
+    assert "force_torque.latency_s = 0.05 s" in refused.reason and "safety.wrench_age_s = 0.03 s" in refused.reason
+
+
 def test_a_block_is_small_and_the_same_elsewhere():
     design = planned(DRAWN.format(samples=100_000, draw="random"))
     block = design.block(70_000, 70_100)

@@ -40,8 +40,8 @@ def made_up_flight(scene, options, *, config, **_):
     gains = config.controller.gains
     off = sum(math.log(getattr(gains, name) / best) ** 2 for name, best in BEST.items())
     wobble = 1.0 + 0.01 * math.sin(options.seed + len(scene.wind.mean_m_s) * scene.wall.friction)
-    figures = {each.column: 0.05 * each.failed * (0.2 + off) * wobble for each in OBJECTIVES}
-    return SimpleNamespace(completed=gains.line_kp < 55.0, reason="", figures=figures)
+    figures = {each.name: 0.05 * each.failed * (0.2 + off) * wobble for each in OBJECTIVES}
+    return SimpleNamespace(outcome={"completed": gains.line_kp < 55.0}, reason="", figures=figures)
 
 
 @pytest.fixture
@@ -54,6 +54,7 @@ def flown(monkeypatch, tmp_path):
         return made_up_flight(scene, options, **named)
 
     monkeypatch.setattr(sim.sweep.flying, "fly", fly)
+    monkeypatch.setattr(sim.sweep.flying, "outcome", lambda trace: trace.outcome)
     monkeypatch.setattr(sim.tune.flights, "paint_figures", made_up_figures)
     monkeypatch.setattr("sim.tune.search.require_margin", lambda *_: None)
     monkeypatch.setattr("sim.tune.search.motion_sensitivity", lambda _: {"line": 1.5})
@@ -162,7 +163,7 @@ def test_no_scene_of_the_search_is_one_of_the_evaluation():
 
 
 def test_failed_flights_count_with_the_worst():
-    row = {"completed": True, **{each.column: 0.5 * each.failed for each in OBJECTIVES}}
+    row = {"completed": True, **{each.name: 0.5 * each.failed for each in OBJECTIVES}}
     lost = {**row, "completed": False}
     unknown = {**row, "path_rms_m": None}
     assert score([row, lost]).failed == 0.5
@@ -202,7 +203,7 @@ def test_command_writes_preset_trials_figures_and_verdict(flown, capsys):
         .startswith("# Gains found by `ibvs-qp tune --law qp --trials 24 --unseen 4`")
     )
     everywhere = [each for each in content["unseen"] if each["scene"] == "all"]
-    assert [each["objective"] for each in everywhere] == [each.column for each in OBJECTIVES]
+    assert [each["objective"] for each in everywhere] == [each.name for each in OBJECTIVES]
     assert all(each["n"] == 28 and each["verdict"] == "better" for each in everywhere)
     assert all(each["difference"]["high"] < 0.0 for each in everywhere)
     assert {seed // 1000 for seed in flown} == {1, 2, 3}
@@ -350,11 +351,11 @@ def unseen(before: list[bool], after: list[bool]) -> pl.DataFrame:
     """Flights of both presets; one that does not complete has no figures."""
     rows = [
         {"variant": name, "param.scene": "job", "seed": seed, "completed": done}
-        | {each.column: 1.0 if done else None for each in OBJECTIVES}
+        | {each.name: 1.0 if done else None for each in OBJECTIVES}
         for name, flights in (("shipped", before), ("tuned", after))
         for seed, done in enumerate(flights)
     ]
-    return pl.DataFrame(rows, schema_overrides={each.column: pl.Float64 for each in OBJECTIVES})
+    return pl.DataFrame(rows, schema_overrides={each.name: pl.Float64 for each in OBJECTIVES})
 
 
 def test_what_completes_less_often_or_has_no_figure_is_not_recommended():

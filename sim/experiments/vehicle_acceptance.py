@@ -1,4 +1,4 @@
-"""How many of randomly drawn vehicles are accepted and fly: ``python -m sim.vehicles.acceptance --flights 2``."""
+"""How many of randomly drawn vehicles are accepted and fly: ``python -m sim.experiments.vehicle_acceptance``."""
 
 from __future__ import annotations
 

@@ -1,0 +1,156 @@
+r"""Place of the tip along the strokes, from the odometer and the edges of the board across them.
+
+u counts from the beginning of the nominal stroke: the edge to which stroke 1 runs lies at u = stroke + margin. A Kalman
+filter holds u and n, the u of the edge beside the beginning. The place of these edges beside the tip is
+:math:`p = (\text{stroke} + \text{margin}) - u` and :math:`p = n - u`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from ibvs_qp.painting.config import PaintingConfig
+from ibvs_qp.painting.pattern_lines import CERTAIN_WEIGHT, LOST_WEIGHT, MARK_WEIGHT, PatternLine
+
+#: Variance of the odometer per metre of way [m^2/m]: 7 mm after 1 m, as flown in the datasheet world.
+DRIFT_PER_M = 5e-5
+#: Standard deviation of an edge's place in one look, and of an unknown place [m].
+EDGE_STD, UNKNOWN_STD = 2e-3, 0.5
+#: Standard deviation of the margin beside the beginning where the board's edge confirms it [m].
+MARGIN_STD = 1e-3
+#: A length that differs from the job's by more standard deviations than this is believed [-].
+SIGMAS = 3.0
+
+_END, _NEAR = np.array((-1.0, 0.0)), np.array((-1.0, 1.0))
+
+
+class AlongTrack:
+    """u of the tip and its uncertainty.
+
+    Attributes:
+        known: Whether u has an origin: by an edge, or assumed.
+        end_seen: Whether the edge to which stroke 1 runs has been recognised.
+        end, near: Tracks of the two edges at the last look, -1 where not in view.
+    """
+
+    def __init__(self, config: PaintingConfig) -> None:
+        self._config = config
+        self._x, self._p = np.zeros(2), np.diag((UNKNOWN_STD**2, UNKNOWN_STD**2))
+        self.known = self.end_seen = False
+        self._near_known = False
+        self.end = self.near = -1
+
+    @property
+    def u(self) -> float:
+        """Place of the tip [m]."""
+        return float(self._x[0])
+
+    @property
+    def deviation(self) -> float:
+        """Standard deviation of u [m]."""
+        return math.sqrt(max(float(self._p[0, 0]), 0.0))
+
+    def predict(self, du: float) -> None:
+        """The tip has moved by the odometer [m]."""
+        self._x[0] += du
+        self._p[0, 0] += DRIFT_PER_M * abs(du)
+
+    def find_end(self, lines: Sequence[PatternLine]) -> bool:
+        """Take u from the edge to which stroke 1 runs, wherever it is; False where it is not in view."""
+        found = [line for line in _ends(lines) if line.kind == "board" and line.weight > CERTAIN_WEIGHT]
+        if not found:
+            return False
+        edge = min(found, key=lambda line: line.place)
+        self._shift(self._config.stroke_m + self._config.edge_margin_m - edge.place - self.u)
+        self._p[0, :] = self._p[:, 0] = 0.0
+        self._p[0, 0], self._p[1, 1] = EDGE_STD**2, UNKNOWN_STD**2
+        self.known = self.end_seen = True
+        self.end = edge.track.track_id
+        return True
+
+    def start_at(self, mark: PatternLine) -> None:
+        """Take u from the edge beside the beginning: the job begins at the margin from it."""
+        near = -self._config.edge_margin_m
+        self._x[:] = near - mark.place, near
+        self._p[:] = MARGIN_STD**2
+        self._p[0, 0] += EDGE_STD**2
+        self.known = self._near_known = True
+
+    def start_here(self) -> None:
+        """The job begins where the tip is."""
+        self._x[0], self._p[0, 0], self.known = 0.0, MARGIN_STD**2, True
+
+    def look(self, lines: Sequence[PatternLine]) -> str:
+        """Correct with the edges in view, once per look; returns what was noticed, or an empty text."""
+        noticed = ""
+        ends = [line for line in _ends(lines) if line.weight > (LOST_WEIGHT if self.end_seen else CERTAIN_WEIGHT)]
+        end = _nearest(ends, self._config.stroke_m + self._config.edge_margin_m - self.u, self._end_gate)
+        self.end = -1 if end is None else end.track.track_id
+        if end is not None:
+            noticed = self._correct(end, self._config.stroke_m + self._config.edge_margin_m - self.u, _END)
+            self.end_seen = True
+        beside = [line for line in lines if not line.parallel and line.kind != "paint" and line.side >= 0]
+        beside = [line for line in beside if line.weight > (LOST_WEIGHT if self._near_known else MARK_WEIGHT)]
+        near = self._near_edge(beside)
+        self.near = -1 if near is None else near.track.track_id
+        return noticed
+
+    @property
+    def _end_gate(self) -> float:
+        """Largest distance of that edge from its expected place [m]: the length of stroke 1 is nominal."""
+        return self._config.gates.stop_m if self.end_seen else self._config.gates.first_stop_m
+
+    def _near_edge(self, lines: list[PatternLine]) -> PatternLine | None:
+        margin, gates = self._config.edge_margin_m, self._config.gates
+        if self._near_known:
+            near = _nearest(lines, float(self._x[1]) - self.u, gates.stop_m)
+            if near is not None:
+                self._correct(near, float(self._x[1]) - self.u, _NEAR)
+            return near
+        found = [line for line in lines if line.kind == "board" and line.weight > CERTAIN_WEIGHT and line.place < 0.0]
+        if not found:
+            return None
+        near = max(found, key=lambda line: line.place)
+        self._x[1] = self.u + near.place
+        self._p[1, :] = self._p[:, 1] = self._p[0, :]
+        self._p[1, 1] += EDGE_STD**2
+        self._near_known = True
+        if abs(float(self._x[1]) + margin) < SIGMAS * math.sqrt(float(self._p[1, 1])):  # the job begins at the margin
+            self._update(-margin - float(self._x[1]), np.array((0.0, 1.0)), MARGIN_STD**2)
+        return near
+
+    def _correct(self, line: PatternLine, expected: float, row: np.ndarray) -> str:
+        difference = line.place - expected
+        variance = float(row @ self._p @ row) + EDGE_STD**2
+        noticed = ""
+        if abs(difference) > SIGMAS * math.sqrt(variance):
+            # Both edges are seen, so the board is longer or shorter than the job says: the origin of u moves.
+            noticed = f"the board's edge lies {difference * 1e3:+.0f} mm from where the job expects it"
+            if row is _END:
+                self._p += self._config.gates.first_stop_m**2
+            else:
+                self._p[1, 1] += self._config.gates.first_stop_m**2
+        self._update(difference, row, EDGE_STD**2 / max(line.weight, LOST_WEIGHT))
+        return noticed
+
+    def _update(self, difference: float, row: np.ndarray, noise: float) -> None:
+        gain = self._p @ row
+        gain = gain / (float(row @ gain) + noise)
+        self._x += gain * difference
+        self._p -= np.outer(gain, row @ self._p)
+
+    def _shift(self, by: float) -> None:
+        self._x += by
+
+
+def _ends(lines: Sequence[PatternLine]) -> list[PatternLine]:
+    """Edges that may end stroke 1: across the strokes, the surface on the side from which the brush comes."""
+    return [line for line in lines if not line.parallel and line.kind != "paint" and line.side < 0]
+
+
+def _nearest(lines: Sequence[PatternLine], expected: float, gate: float) -> PatternLine | None:
+    near = [line for line in lines if abs(line.place - expected) < gate]
+    return min(near, key=lambda line: abs(line.place - expected), default=None)

@@ -1,0 +1,40 @@
+"""Where a stroke was painted: v of the tip over u, as it was estimated while the stroke was laid."""
+
+from __future__ import annotations
+
+import math
+
+#: Length of a bin [m], and what lies before and behind the nominal stroke [m].
+BIN_M, BEYOND_M = 0.01, 0.3
+#: Share of a window's bins that must be painted for its mean.
+_LEAST_SHARE = 0.5
+
+
+class StrokeMap:
+    """v of the tip in bins of u.
+
+    Args:
+        length_m: Nominal length of the stroke [m].
+    """
+
+    def __init__(self, length_m: float) -> None:
+        bins = math.ceil((length_m + 2.0 * BEYOND_M) / BIN_M)
+        self._sum, self._count = [0.0] * bins, [0] * bins
+
+    def add(self, u: float, v: float) -> None:
+        """The tip paints here."""
+        place = self._bin(u)
+        if 0 <= place < len(self._sum):
+            self._sum[place] += v
+            self._count[place] += 1
+
+    def mean(self, first_u: float, last_u: float) -> float:
+        """Mean v between two places [m]; NaN where the stroke does not cover half of the way."""
+        low, high = sorted((self._bin(first_u), self._bin(last_u)))
+        window = range(max(low, 0), min(high + 1, len(self._sum)))
+        means = [self._sum[k] / self._count[k] for k in window if self._count[k]]
+        return sum(means) / len(means) if len(means) >= _LEAST_SHARE * (high + 1 - low) else math.nan
+
+    @staticmethod
+    def _bin(u: float) -> int:
+        return math.floor((u + BEYOND_M) / BIN_M)

@@ -1,0 +1,232 @@
+"""Checks of a job before its flight: what board, strokes, brush, camera, sensors and colours cannot do together.
+
+Every limit follows from a setting or from geometry; a truth of the plant, such as a wrong mass, is never refused here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from ibvs_qp.config import SafetySettings
+from ibvs_qp.config.errors import ConfigError, out_of_range
+from ibvs_qp.frames import rotation_from_vector
+from ibvs_qp.painting.pattern import FILL_REST_M, ROWS
+from ibvs_qp.pilot import PilotConfig
+from sim.flight.contact_view import STEP_M, ContactView
+from sim.flight.jobs import Job, PaintJob
+from sim.world.board import BoardGeometry
+from sim.world.clearance import PropellerClearance
+from sim.world.crash import GROUND_CLEARANCE_M
+from sim.world.scene import Scene
+from sim.world.trim import START_DISTANCE_M, START_DOWN_M, START_YAW_DEG
+
+#: Farthest that a stroke at its place may lie from its nominal place [m].
+PLACE_TOLERANCE_M = FILL_REST_M
+#: Lengths and times are compared to this [m, s]: rounding of sums of settings.
+ROUNDING = 1e-9
+
+
+def check_job(scene: Scene, config: PilotConfig, features: str = "rendered", job: Job | None = None) -> None:
+    """Refuse a job that cannot be flown, before anything is shown or written.
+
+    Args:
+        scene: Board, paint job, start and sensors.
+        config: The pilot with the scene's paint job, see `sim.flight.options.pilot_config`.
+        features: "rendered" or "geometric"; lines without pictures have no colours.
+        job: Task at the wall; None paints.
+
+    Raises:
+        ConfigError: Naming keys, values, units and the allowed ranges of everything that is wrong, in one line.
+    """
+    if problems := job_problems(scene, config, features, job):
+        raise ConfigError("; ".join(problems))
+
+
+def job_problems(scene: Scene, config: PilotConfig, features: str = "rendered", job: Job | None = None) -> list[str]:
+    """What forbids a flight, one sentence each; arguments as of `check_job`. Empty: it can be flown."""
+    problems = [*_sensors(scene, config)]
+    if features == "rendered":
+        problems += _colours(scene, config)
+    if not isinstance(job or PaintJob(), PaintJob):
+        return problems
+    overlap = list(_overlap(scene))
+    if overlap:  # without a distance between strokes none of them has a place
+        return problems + overlap
+    board = BoardGeometry(scene)
+    off = list(_strokes(board))
+    if off:
+        return problems + off
+    return [*problems, *_start(board, config), *_views(board, config), *_envelope(board, config)]
+
+
+#: Another key with its value and unit.
+Key = tuple[str, float, str]
+
+
+def _problem(field: str, value: object, unit: str, allowed: str, reason: str, *keys: Key) -> str:
+    beside = ", ".join(f"{name} = {number:g} {name_unit}".rstrip() for name, number, name_unit in keys)
+    return str(out_of_range(field, value, unit, f"{allowed}: {reason}" + (f" ({beside})" if keys else "")))
+
+
+def _overlap(scene: Scene) -> Iterator[str]:
+    """Strokes lie farther apart than the tolerance of their places; otherwise one on another counts as both."""
+    paint = scene.paint
+    most = paint.brush_width_m - PLACE_TOLERANCE_M
+    if paint.rows != 1 and paint.overlap_m > most + ROUNDING:
+        allowed, apart = f"allowed is at most {most:.4g} m", f"strokes lie at least {PLACE_TOLERANCE_M:g} m apart"
+        brush = "paint.brush_width_m", paint.brush_width_m, "m"
+        yield _problem("paint.overlap_m", paint.overlap_m, "m", allowed, apart, brush)
+
+
+def _strokes(board: BoardGeometry) -> Iterator[str]:
+    """Strokes keep the margin at both ends, where edges stop them, and the brush's centre stays on the board."""
+    paint, (length, extent) = board.scene.paint, board.extent
+    sides = ("board.width_m", "board.height_m")
+    along, across = sides if board.pattern.kind == ROWS else sides[::-1]
+    reason = "the brush's centre stays on the board in every stroke that is at its place"
+    margin: Key = ("paint.edge_margin_m", paint.edge_margin_m, "m")
+    longest, widest = length - 2.0 * paint.edge_margin_m + PLACE_TOLERANCE_M, extent - PLACE_TOLERANCE_M
+    if paint.stroke_m > longest + ROUNDING:
+        allowed, words = f"allowed is at most {max(longest, 0.0):.4g} m", "strokes keep the margin at both ends"
+        yield _problem("paint.stroke_m", paint.stroke_m, "m", allowed, words, (along, length, "m"), margin)
+    if paint.edge_margin_m > widest + ROUNDING:
+        allowed = f"allowed is at most {max(widest, 0.0):.4g} m"
+        yield _problem(*margin, allowed, reason, (across, extent, "m"))
+    elif board.stroke_place(board.strokes) > widest + ROUNDING:
+        allowed = f"allowed is at most {1 + math.floor((widest - paint.edge_margin_m) / paint.pitch_m + ROUNDING)}"
+        keys = (across, extent, "m"), margin, ("distance of strokes", paint.pitch_m, "m")
+        yield _problem("paint.rows", paint.rows, "", allowed, reason, *keys)
+
+
+def _start(board: BoardGeometry, config: PilotConfig) -> Iterator[str]:
+    """At the start nothing touches ground, board or wall, whatever the seed."""
+    start, vehicle = board.scene.start, config.controller.vehicle
+    sunk = float(board.start_tip[2]) - vehicle.tip_position_m[2] + START_DOWN_M + GROUND_CLEARANCE_M
+    if sunk > 0.0:
+        allowed, reason = f"allowed is at most {start.down_m - sunk:.3g} m", "the vehicle starts above the ground"
+        bottom = "board.bottom_m", board.scene.board.bottom_m, "m"
+        yield _problem("start.down_m", start.down_m, "m", allowed, reason, bottom)
+    clearance, tip = PropellerClearance(board, vehicle), np.add(board.start_tip, (START_DISTANCE_M, 0.0, 0.0))
+    turns = [rotation_from_vector((0.0, 0.0, math.radians(start.yaw_deg + k * START_YAW_DEG))) for k in (-1, 1)]
+    places = [tip - turn @ np.array(vehicle.tip_position_m) for turn in turns]
+    near = -min(clearance.distance(place, turn) for place, turn in zip(places, turns, strict=True))
+    if near >= 0.0:
+        allowed, reason = f"allowed is at least {start.distance_m + near:.3g} m", "no propeller starts at the wall"
+        yaw = "start.yaw_deg", start.yaw_deg, "deg"
+        yield _problem("start.distance_m", start.distance_m, "m", allowed, reason, yaw)
+
+
+def _views(board: BoardGeometry, config: PilotConfig) -> Iterator[str]:
+    """In contact the camera shows the board's edge where stroke 1 begins, and a guide of every later stroke."""
+    paint = board.scene.paint
+    field_of_view = "camera.vertical_fov_deg", board.scene.camera.vertical_fov_deg, "deg"
+    if not _shows_edge(board, config, paint.edge_margin_m):
+        shown = [aside for aside in np.arange(0.0, 1.0, STEP_M).tolist() if _shows_edge(board, config, aside)]
+        allowed = f"allowed is [{shown[0]:.3g}, {shown[-1]:.3g}] m" if shown else "allowed is no value"
+        reason = "in contact the board's edge beside stroke 1 is in view"
+        yield _problem("paint.edge_margin_m", paint.edge_margin_m, "m", allowed, reason, field_of_view)
+    if not _shows_guides(board, config, paint.brush_width_m):
+        widths = np.arange(paint.brush_width_m, paint.overlap_m + PLACE_TOLERANCE_M, -STEP_M).tolist()
+        shown = [width for width in widths if _shows_guides(board, config, width)]
+        allowed = f"allowed is at most {shown[0]:.3g} m" if shown else "allowed is no value"
+        reason = "in contact the edge of the stroke before is in view ahead of the brush"
+        yield _problem("paint.brush_width_m", paint.brush_width_m, "m", allowed, reason, field_of_view)
+
+
+def _shows_edge(board: BoardGeometry, config: PilotConfig, aside: float) -> bool:
+    """Whether the guiding edge of the board is in view, so far from the tip [m], where stroke 1 begins."""
+    begin, brush = board.stroke_ends[0], board.scene.paint.brush_width_m
+    return ContactView(board, config, brush).shows_parallel(-aside, -begin, board.extent[0] - begin)
+
+
+def _shows_guides(board: BoardGeometry, config: PilotConfig, brush: float) -> bool:
+    """Whether ahead of every later stroke the edge of the stroke before is in view, or still the board's.
+
+    ``brush`` is the width of the brush [m].
+    """
+    view, paint = ContactView(board, config, brush), board.scene.paint
+    ways = [board.pattern.travel(stroke) for stroke in range(2, min(board.strokes, 3) + 1)]
+    reach = [sorted((0.0, way * paint.stroke_m)) for way in ways]
+    fresh = all([view.shows_parallel(paint.overlap_m - 0.5 * brush, *ends) for ends in reach])
+    return fresh or _shows_edge(board, config, board.stroke_place(board.strokes))
+
+
+def _envelope(board: BoardGeometry, config: PilotConfig) -> Iterator[str]:
+    """The job ends within the supervisor's bounds of time and height."""
+    safety, paint, strokes = config.safety, board.scene.paint, board.strokes
+    if not safety.supervise:
+        return
+    seconds = (strokes * paint.stroke_m + (strokes - 1) * paint.pitch_m) / paint.speed_m_s
+    if seconds > safety.mission_s:
+        allowed = f"allowed is at least {paint.speed_m_s * seconds / safety.mission_s:.3g} m/s"
+        mission = "safety.mission_s", safety.mission_s, "s"
+        reason = f"the strokes take {seconds:.0f} s"
+        yield _problem("paint.speed_m_s", paint.speed_m_s, "m/s", allowed, reason, mission)
+    corners = [(u, board.stroke_place(stroke)) for u in board.stroke_ends for stroke in (1, strokes)]
+    heights = board.point(*board.from_pattern(np.array(corners)).T)[:, 1]
+    change = float(np.ptp(heights))
+    if change > safety.height_m:
+        key = ("paint.rows", paint.rows, "") if board.pattern.kind == ROWS else ("paint.stroke_m", paint.stroke_m, "m")
+        bound = "safety.height_m", safety.height_m, "m"
+        allowed = f"allowed is a change of height of at most {safety.height_m:g} m"
+        reason = f"the strokes reach over {change:.3g} m"
+        yield _problem(*key, allowed, reason, bound)
+
+
+def _sensors(scene: Scene, config: PilotConfig) -> Iterator[str]:
+    """Samples come at the rate of the contract and are never older than the pilot and its supervisor allow."""
+    camera, force, safety, tick = scene.camera, scene.force_torque, config.safety, config.controller.tick_s
+    if scene.imu.rate_hz * tick < 1.0 - ROUNDING:
+        allowed, reason = f"allowed is at least {1.0 / tick:g} Hz", "attitude and IMU are sampled once a tick"
+        yield _problem("imu.rate_hz", scene.imu.rate_hz, "Hz", allowed, reason, ("controller.tick_s", tick, "s"))
+    # Jitter of delivery is exponential: its mean, and as much again for its standard deviation.
+    late = camera.latency_s + 2.0 * scene.errors.timing.jitter_s + abs(scene.errors.timing.stamp_error_s)
+    old = list(_age("camera", camera.rate_hz, camera.latency_s, late, tick, *_oldest_picture(safety)))
+    if safety.supervise and old:
+        yield from old
+    elif late > config.camera.latest_s:
+        allowed = f"allowed is at most {camera.latency_s - late + config.camera.latest_s:.3g} s"
+        latest = "camera.latest_s", config.camera.latest_s, "s"
+        reason = "a picture that comes later is refused"
+        yield _problem("camera.latency_s", camera.latency_s, "s", allowed, reason, latest)
+    if safety.supervise:
+        delay = force.latency_s
+        yield from _age("force_torque", force.rate_hz, delay, delay, tick, "safety.wrench_age_s", safety.wrench_age_s)
+
+
+def _oldest_picture(safety: SafetySettings) -> tuple[str, float]:
+    ages = {"safety.image_age_s": safety.image_age_s, "safety.plane_age_s": safety.plane_age_s}
+    return min(ages.items(), key=lambda item: item[1])
+
+
+def _age(section: str, rate: float, latency: float, late: float, tick: float, limit: str, most: float) -> Iterator[str]:
+    """Refuse samples that get older than a limit, at a rate [Hz], a latency, its worst and a tick [s]."""
+    age = oldest_s(rate, late, tick)
+    if age > most + ROUNDING:
+        allowed = f"allowed is at most {most - age + latency:.3g} s"
+        keys = (f"{section}.rate_hz", rate, "Hz"), (limit, most, "s")
+        reason = f"a sample gets {age:.3g} s old"
+        yield _problem(f"{section}.latency_s", latency, "s", allowed, reason, *keys)
+
+
+def oldest_s(rate_hz: float, delay_s: float, tick_s: float) -> float:
+    """Age of a sample at the last tick before the next one arrives [s]; samples are taken and delivered at ticks."""
+    delay, period = (math.ceil(value / tick_s - ROUNDING) for value in (delay_s, 1.0 / rate_hz))
+    return (delay + period - 1) * tick_s
+
+
+def _colours(scene: Scene, config: PilotConfig) -> Iterator[str]:
+    """Board, wall and paint are told apart by colour, whatever the gap between board and wall."""
+    gate = config.vision.line.color_gate
+    colors = {"board": scene.board.color, "wall": scene.wall.color, "paint": scene.paint.color}
+    for one, other in (("paint", "board"), ("wall", "board"), ("wall", "paint")):
+        apart = math.dist(colors[one], colors[other])
+        if apart < gate:
+            allowed = (
+                f"allowed is a distance of at least {gate:g} grey levels from {other}.color = {list(colors[other])}"
+            )
+            reason = f"vision separates them by colour, and theirs differ by {apart:.0f} (vision.line.color_gate)"
+            yield _problem(f"{one}.color", list(colors[one]), "", allowed, reason)

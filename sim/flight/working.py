@@ -1,0 +1,74 @@
+"""Signs of work on standard error: a spinner on a terminal; elsewhere, as in a file, lines of text."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+import time
+from collections.abc import Callable, Iterator
+
+from rich.console import Console
+
+#: Time to the first line and between two [s]: together less than 10 s, as one kind of work follows another. The line of
+#: an error in an option or a file comes before the first.
+FIRST_S, PERIOD_S = 3.0, 6.0
+
+
+@contextlib.contextmanager
+def lines(console: Console, state: Callable[[], str]) -> Iterator[None]:
+    """Write the state of some work after `FIRST_S` and every `PERIOD_S` while the context is open, by a thread.
+
+    Args:
+        console: Output, whose descriptor is no terminal; a quiet one gets nothing.
+        state: The present state, in one line.
+    """
+    over = threading.Event()
+    thread = threading.Thread(target=write, args=(console, state, over.wait), name="progress", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
+
+
+def write(
+    console: Console,
+    state: Callable[[], str],
+    over: Callable[[float], bool],
+    clock: Callable[[], float] = time.monotonic,
+) -> None:
+    """Write lines until the work is over.
+
+    Args:
+        console: Output.
+        state: The present state.
+        over: Waits for the end of the work, at most so long [s], and returns whether it came.
+        clock: Monotonic time [s].
+    """
+    started, pause = clock(), FIRST_S
+    while not over(pause):
+        pause = PERIOD_S
+        if not console.quiet:
+            with contextlib.suppress(OSError, ValueError):  # a closed output must not end the work
+                print(f"{state()} ({clock() - started:.0f} s)", file=console.file, flush=True)
+
+
+@contextlib.contextmanager
+def working(console: Console, text: str) -> Iterator[Callable[[str], None]]:
+    """Show what is being done while the context is open.
+
+    Args:
+        console: Standard error.
+        text: What is being done.
+
+    Yields:
+        A function that replaces the text.
+    """
+    if console.is_terminal:
+        with console.status(text) as status:
+            yield status.update
+        return
+    shown = {"text": text}
+    with lines(console, lambda: shown["text"]):
+        yield lambda new: shown.update(text=new)

@@ -1,0 +1,22 @@
+"""``ibvs-qp export-c``: the printed command, with the library itself left out (tests/ibvs_qp/export has it)."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+
+import pytest
+
+from sim.commands.cli import main
+
+
+def test_the_printed_command_is_one_that_a_shell_takes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in ("ibvs_qp.export.library.write_library", "ibvs_qp.export.recorded.write_recorded"):
+        monkeypatch.setattr(name, lambda *_: None)
+    monkeypatch.setattr("sim.bench.ticks.press_ticks", lambda *_: [])
+    folder = tmp_path / "my lib's; controller"
+    assert main(["export-c", str(folder)]) == 0
+    (line,) = (line for line in capsys.readouterr().out.splitlines() if "make" in line)
+    assert shlex.split(line.partition(": ")[2]) == ["make", "-C", str(folder), "test"]

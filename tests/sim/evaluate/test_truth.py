@@ -1,0 +1,211 @@
+"""Completed by the truth: each condition fails alone, is named, and holds at its bound."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from press_trace import press_trace
+from synthetic_trace import Errors, synthetic_trace
+
+from sim.evaluate.flight_table import false_claims
+from sim.evaluate.metrics import compute_metrics
+from sim.evaluate.strokes import painted_strokes
+from sim.evaluate.truth import Judgement
+from sim.flight.trace import INTERRUPTED, KILLED, Event, Trace
+from sim.world.board import BoardGeometry
+from sim.world.scene import BoardScene, PaintScene, Scene, WindScene
+from sim.world.worlds import in_world
+
+THREE_ROWS = Scene(paint=PaintScene(rows=3, stroke_m=0.6))
+PATTERNS = [(kind, f"{high}-{side}") for kind in ("rows", "columns") for high in ("bottom", "top")
+            for side in ("right", "left")]  # fmt: skip
+
+
+def shortfall(trace: Trace) -> str | None:
+    return Judgement(trace).shortfall
+
+
+def three_rows(*offsets: float, **errors: float) -> Trace:
+    return synthetic_trace(Errors(row_offset_m=offsets or (0.0, 0.0, 0.0), **errors), THREE_ROWS)
+
+
+def moved(trace: Trace, ticks: np.ndarray, across_m: float) -> Trace:
+    """The trace with some ticks moved across their stroke."""
+    board = BoardGeometry(trace.scene)
+    spots = board.board_coordinates(trace.tip[ticks, 1:])
+    spots = board.from_pattern(board.to_pattern(spots) + np.array([0.0, across_m]))
+    trace.arrays["tip"] = trace.tip.copy()
+    trace.arrays["tip"][ticks, 1:] = board.point(*spots.T)
+    return trace
+
+
+def along(trace: Trace) -> np.ndarray:
+    """Pattern coordinate u of every tick."""
+    board = BoardGeometry(trace.scene)
+    return board.to_pattern(board.board_coordinates(trace.tip[:, 1:]))[:, 0]
+
+
+@pytest.mark.parametrize(("kind", "start"), PATTERNS)
+def test_a_good_flight_is_completed_in_every_pattern(kind, start):
+    size = {"width_m": 0.7, "height_m": 0.7}
+    scene = Scene(board=BoardScene(**size), paint=PaintScene(pattern=kind, start=start, rows=3, stroke_m=0.6))
+    assert shortfall(synthetic_trace(Errors(row_offset_m=(0.0,) * 3), scene)) is None
+    lost = shortfall(synthetic_trace(Errors(row_offset_m=(0.0, -0.02, 0.0)), scene))
+    assert lost is not None and lost.startswith(f"{kind[:-1]} 2: 20 mm from its place")
+    strokes = painted_strokes(synthetic_trace(Errors(row_offset_m=(0.001, 0.002, 0.003)), scene))
+    assert [strokes[k].place_error_m for k in (1, 2, 3)] == pytest.approx([0.001, 0.003, 0.006], abs=1e-9)
+    assert [strokes[k].overlap_m for k in (2, 3)] == pytest.approx([0.006, 0.005], abs=1e-9)
+
+
+def test_the_place_counts_from_the_edge_and_errors_add_up():
+    """Every row lies right beside the one before; the third is 9 mm from its place."""
+    assert shortfall(three_rows(0.002, 0.003, 0.002)) is None
+    assert shortfall(three_rows(0.003, 0.003, 0.003)) == "row 3: 9 mm from its place"
+
+
+def test_a_row_on_the_row_before_is_named():
+    """The fifth row of a wall, painted over the fourth: claimed, but not completed."""
+    trace = three_rows(0.0, 0.0, -0.054)
+    assert shortfall(trace) == "row 3: 54 mm from its place; overlaps row 2 by 62 mm, nominal 8 mm"
+    metrics = compute_metrics(trace)
+    assert metrics["claimed"] and not metrics["completed"] and metrics["place_error_m"] == pytest.approx(-0.054)
+    assert [row["completed"] for row in metrics["rows"]] == [True, True, False]
+    assert false_claims({"qp": metrics}) == [f"QP law: claimed as completed, but {metrics['not_completed']}"]
+
+
+@pytest.mark.parametrize(("gap_m", "last_m", "missing"), [
+    (0.0079, 0.3, None), (0.009, 0.3, "row 2: gap of 1 mm to row 1"), (0.03, 0.018, None),
+    (0.03, 0.03, "row 2: gap of 22 mm to row 1"), (-0.0159, 0.1, None),
+    (-0.017, 0.1, "row 2: overlaps row 1 by 25 mm, nominal 8 mm"),
+])  # fmt: skip
+def test_bands_touch_everywhere_but_in_the_last_two_centimetres(gap_m, last_m, missing):
+    """Row 2 ends at the beginning of row 1, u = 0.05 m on this board."""
+    trace = synthetic_trace(Errors(row_offset_m=(0.0, 0.0)), Scene(board=BoardScene(width_m=0.7),
+                                                                   paint=PaintScene(stroke_m=0.6)))  # fmt: skip
+    # Within a corner: the straight part, and with it the place error, stays as it is.
+    place = along(trace) - BoardGeometry(trace.scene).stroke_ends[0]
+    inside = place <= last_m if last_m <= 0.1 else (place > 0.2) & (place < 0.25)
+    assert shortfall(moved(trace, (trace.row == 2) & inside, gap_m)) == missing
+
+
+@pytest.mark.parametrize(("longer_m", "good"), [(0.0, True), (0.0095, True), (0.011, False), (-0.011, False)])
+def test_a_stroke_has_its_length(longer_m, good):
+    """Rows 1 and 2 both have another length if row 1 ends elsewhere."""
+    found = shortfall(synthetic_trace(Errors(row_offset_m=(0.0, 0.0), longer_m=longer_m)))
+    assert (found is None) is good
+    assert good or found.startswith(f"row 1: {1.3 + longer_m:.3f} m long, 1.300 m asked; row 2: 1.")
+
+
+def test_what_is_painted_beside_the_board_is_no_stroke():
+    scene = Scene(board=BoardScene(height_m=0.19), paint=PaintScene(rows=3, stroke_m=1.3))
+    trace = synthetic_trace(Errors(row_offset_m=(0.0, 0.0, 0.0)), scene)
+    assert shortfall(trace) == "row 3: not painted"
+    metrics = compute_metrics(trace)
+    assert metrics["off_board_share"] == pytest.approx(1.304 / 4.044, abs=1e-3)  # row 3 and the end of its climb
+    assert metrics["rows"][2]["off_board_share"] == pytest.approx(1.0, abs=0.05)
+
+
+@pytest.mark.parametrize(("share", "scene", "good"), [
+    (0.019, Scene(), True), (0.021, Scene(), False),
+    (0.09, Scene(wind=WindScene(gust_n_rms=1.0)), True), (0.11, Scene(wind=WindScene(gust_n_rms=1.0)), False),
+    (0.09, in_world(Scene(), "harsh"), True), (0.11, in_world(Scene(), "harsh"), False),
+    (0.09, in_world(Scene(), "datasheet"), False),
+])  # fmt: skip
+def test_contact_lasts(share, scene, good):
+    trace = synthetic_trace(Errors(row_offset_m=(0.0, 0.0)), scene)
+    painting = np.flatnonzero(trace.painting_1khz)
+    trace.arrays["contact_1khz"][painting[4000 : 4000 + round(share * len(painting))]] = 0.0
+    found = shortfall(trace)
+    assert (found is None) if good else found.startswith("contact in ")
+
+
+def test_the_vehicle_backs_away():
+    trace = synthetic_trace(Errors(row_offset_m=(0.0, 0.0)))
+    trace.arrays["tip"] = trace.tip.copy()
+    trace.arrays["tip"][-1, 0] = -0.05
+    assert shortfall(trace) == "no retreat: the tip ends 50 mm from the board"
+    trace = synthetic_trace(Errors(row_offset_m=(0.0, 0.0)))
+    trace.phases = tuple("away" if name in ("retreat", "done") else name for name in trace.phases)
+    assert shortfall(trace) == "no retreat"
+
+
+@pytest.mark.parametrize("reason", ["crash: propeller strike", "time-out after 15 s in retreat", INTERRUPTED, KILLED,
+                                    "time-out after 142 s of flight"])  # fmt: skip
+def test_some_ends_complete_no_job(reason):
+    trace = synthetic_trace(Errors(row_offset_m=(0.0, 0.0)))
+    trace.reason = reason
+    assert shortfall(trace) == reason
+
+
+def test_a_job_that_was_done_and_not_claimed_is_marked_too():
+    trace = synthetic_trace(Errors(row_offset_m=(0.0, 0.0)))
+    trace.claimed, trace.reason = False, "no guide"
+    assert false_claims({"paper": compute_metrics(trace)}) == [
+        "analytic law: completed, but not claimed by the pilot (no guide)"
+    ]
+
+
+def test_a_reduced_push_has_a_reason():
+    trace = synthetic_trace(Errors(row_offset_m=(0.0, 0.0), push_error_n=-0.24))
+    assert compute_metrics(trace)["push_reduced"] is None
+    trace = synthetic_trace(Errors(row_offset_m=(0.0, 0.0), push_error_n=-0.26))
+    metrics = compute_metrics(trace)
+    assert metrics["push_reduced"] == "the push was not reached"
+    assert (metrics["push_asked_n"], metrics["push_commanded_n"]) == (5.0, 5.0)
+    assert metrics["push_flown_n"] == pytest.approx(4.74)
+    trace.events += [Event(t=9.0, kind="push reduced", text=text) for text in ("friction not yet learnt", "reach")]
+    assert compute_metrics(trace)["push_reduced"] == "reach"
+
+
+def press(*, hold_s: float = 8.0, slide_s: float = 0.0, retreat: bool = True, **more) -> Trace:
+    """A press of 10 s after the touch, or one that slides in its last 4 s, and its retreat."""
+    trace = press_trace(**more)
+    trace.plan = {"press": hold_s, "paint": slide_s, "descend": 5.0}
+    phase, t = np.where(trace.t < 1.0, 0, 1), trace.t
+    tip = trace.tip.copy()
+    if slide_s > 0.0:
+        phase[t >= 7.0] = 2
+        tip[:, 1] -= 0.1 * np.clip(t - 7.0, 0.0, None)
+    if retreat:
+        phase[t >= 11.0] = 3
+        tip[t >= 11.0, 0] = -0.3
+        for name, rate in (("push_true", 1), ("contact_1khz", 4)):
+            trace.arrays[name] = trace.arrays[name] * np.repeat(t < 11.0, rate)
+    trace.arrays |= {"phase": phase, "tip": tip}
+    return trace
+
+
+def test_a_press_follows_its_plan():
+    assert shortfall(press()) is None
+    assert shortfall(press(hold_s=9.2)) == "held for 9.0 s, 9.2 s asked"
+    assert shortfall(press(retreat=False)) == "no retreat"
+    assert shortfall(press(hold_s=4.9, slide_s=3.9)) is None
+    assert shortfall(press(hold_s=4.9, slide_s=4.1)) == "slid for 4.0 s, 4.1 s asked"
+    stuck = press(hold_s=4.9, slide_s=3.9)
+    stuck.arrays["tip"][:, 1] = stuck.tip[0, 1]
+    assert shortfall(stuck) == "slid 0 mm, at least 195 mm needed"
+    untouched = press()
+    untouched.arrays["push_true"] = np.zeros(len(untouched.t))
+    assert shortfall(untouched) == "no touch"
+
+
+def test_a_press_that_a_fault_ended_lands_or_descends():
+    trace = press(hold_s=20.0, fault_s=6.0)
+    assert shortfall(trace) == "descended for 1.0 s, 5 s asked"
+    trace.plan["descend"] = 0.9
+    assert shortfall(trace) is None
+    trace.plan["descend"], trace.reason = 5.0, "landed"
+    assert shortfall(trace) is None
+    trace.reason = "crash: flipped"
+    assert shortfall(trace) == "crash: flipped; descended for 1.0 s, 5 s asked"
+
+
+def test_a_flight_that_never_began_is_not_completed():
+    trace = synthetic_trace()
+    for name, values in trace.arrays.items():
+        trace.arrays[name] = values if name.startswith("thrust_") else values[:0]
+    assert "row 1: not painted" in str(shortfall(trace)) and not compute_metrics(trace)["completed"]
+    assert math.isnan(compute_metrics(dataclasses.replace(trace))["push_flown_n"])

@@ -1,0 +1,76 @@
+"""Drawn scenes cover every key over its range, and their flights are judged by the truth."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from sim.flight.options import FlightOptions
+from sim.flight.preflight import job_problems
+from sim.scene_fuzz import judge as judging
+from sim.scene_fuzz.draw import FEWEST, MOST, drawn_scene, scene_keys
+from sim.scene_fuzz.judge import BAD, judge
+
+OPTIONS = FlightOptions(features="geometric", video=False, compiled=True)
+#: Draws of the slow test; the command `python -m sim.scene_fuzz` flies others.
+FIRST_SEED, FLIGHTS = 7000, 12
+
+
+def test_draws_repeat_and_move_every_key_to_both_sides_of_its_default():
+    draws = [drawn_scene(seed, "rendered", 1e4) for seed in range(400)]
+    assert draws == [drawn_scene(seed, "rendered", 1e4) for seed in range(400)]
+    moved = [keys for _, keys in draws]
+    assert all(FEWEST <= len(keys) <= MOST for keys in moved)
+    values: dict[str, set] = {path: set() for path in scene_keys("rendered")}
+    for keys in moved:
+        for path, value in keys.items():
+            values[path].add(str(value))
+    assert min(len(found) for found in values.values()) >= 2
+    assert {"'fill'", "fill"} & values["paint.rows"] and {"rows", "columns"} <= values["paint.pattern"]
+    widths = sorted(scene.board.width_m for scene, keys in draws if "board.width_m" in keys)
+    assert widths[0] < 1.0 and widths[-1] > 4.0
+
+
+def test_draws_that_take_too_long_are_drawn_again_and_strokes_fit_the_board():
+    for seed in range(100):
+        scene, moved = drawn_scene(seed, "geometric", 60.0)
+        assert "wall.color" not in moved
+        assert scene.paint.stroke_m / scene.paint.speed_m_s <= 60.0
+        if "paint.stroke_m" not in moved and scene.paint.edge_margin_m <= 0.05:
+            pilot = judging.pilot_config(scene, OPTIONS)
+            assert not any("paint.stroke_m" in text for text in job_problems(scene, pilot, "geometric"))
+
+
+@pytest.mark.parametrize(
+    ("completed", "claimed", "reason", "outcome"),
+    [
+        (True, True, "all rows painted, retreated", "complete"),
+        (False, True, "all rows painted, retreated", "FALSE CLAIM"),
+        (False, False, "time-out after 15 s in align", "honestly failed"),
+        (True, False, "landed", "complete, not claimed"),
+        (False, False, "crash: hit the ground", "CRASH"),
+    ],
+)
+def test_outcome_is_what_the_truth_makes_of_the_claim(monkeypatch, completed, claimed, reason, outcome):
+    monkeypatch.setattr(judging, "fly", lambda scene, options: SimpleNamespace(reason=reason))
+    figures = {"completed": completed, "claimed": claimed, "not_completed": None if completed else "row 1: short"}
+    monkeypatch.setattr(judging, "compute_metrics", lambda trace: figures)
+    judged = judge(0, OPTIONS, "datasheet", 150.0)
+    assert judged.outcome == outcome and (outcome in BAD) == outcome.isupper()
+    assert reason in str(judged)
+
+
+def test_refusals_and_internal_errors_are_told_apart(monkeypatch):
+    def broken(scene, options):
+        raise ZeroDivisionError("pitch")
+
+    monkeypatch.setattr(judging, "fly", broken)
+    outcomes = {judge(seed, OPTIONS, "datasheet", 150.0).outcome for seed in range(40)}
+    assert outcomes == {"refused before flight", "INTERNAL ERROR"}
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("seed", range(FIRST_SEED, FIRST_SEED + FLIGHTS))
+def test_no_drawn_scene_crashes_breaks_or_is_claimed_falsely(seed):
+    judged = judge(seed, OPTIONS, "datasheet", 100.0)
+    assert judged.outcome not in BAD, str(judged)
