@@ -55,7 +55,7 @@ def completes(vehicle: VehicleParams, law: str, seed: int, features: str = "geom
     trace = fly(scene, options, config=with_vehicle(PilotConfig(law=law), vehicle))
     metrics = compute_metrics(trace)
     path, coverage = 1e3 * metrics["path_rms_straight_m"], 100.0 * metrics["coverage"]
-    words = f"{trace.reason}; coverage {coverage:.1f} %, path {path:.1f} mm rms"
+    words = f"{metrics['not_completed'] or trace.reason}; coverage {coverage:.1f} %, path {path:.1f} mm rms"
     return bool(metrics["completed"]), words
 
 
