@@ -104,17 +104,20 @@ def guide_direction(painting: PaintingConfig) -> tuple[bool, float]:
     return pattern.guide_role == HORIZONTAL, -(right + down)
 
 
-def hint_span(vehicle: VehicleParams, brush_width_m: float, level: bool, ahead: bool) -> tuple[float, float]:
-    """Where the last stroke's edge ahead of the brush is looked for, normalised, in C; empty with ends out of order.
+def hint_span(vehicle: VehicleParams, brush_width_m: float, role: str, ahead: int) -> tuple[float, float]:
+    """Where the last stroke's edge beside the brush is looked for, along the edge; empty where its ends are reversed.
 
     Args:
         vehicle: Tip and camera.
         brush_width_m: Diameter of the brush [m].
-        level: Whether the edge is level, and the span along x; else it is upright.
-        ahead: Whether the brush moves to the right or down; else to the left or up.
+        role: Of the edge: "horizontal" or "vertical".
+        ahead: +1 to the right of the brush or below it, -1 to the left or above.
+
+    Returns:
+        Range of the normalised x of a level edge, of the normalised y of an upright one, in C.
     """
     depth, view = max(contact_depth(vehicle), _LEAST_DEPTH_M), field_of_view(vehicle)
-    place = to_camera(np.array(vehicle.tip_position_m), np.array(vehicle.camera_position_m))
-    tip, (low, high) = float(place[0 if level else 1]) / depth, view[:2] if level else view[2:]
+    x, y, _ = to_camera(np.array(vehicle.tip_position_m), np.array(vehicle.camera_position_m)) / depth
+    tip, low, high = (x, view.left, view.right) if role == HORIZONTAL else (y, view.up, view.down)
     beside = 0.5 * brush_width_m / depth + _BESIDE_BRUSH
-    return (tip + beside, high - _BORDER) if ahead else (low + _BORDER, tip - beside)
+    return (float(tip + beside), high - _BORDER) if ahead > 0 else (low + _BORDER, float(tip - beside))

@@ -25,7 +25,7 @@ from ibvs_qp.estimation.wall_lines import WallAxes, image_line
 from ibvs_qp.estimation.wall_motion import BIAS, WallMotion
 from ibvs_qp.estimation.wrench_tare import WrenchTare
 from ibvs_qp.frames import down_in_body, plane_in_body, rotation_from_vector, to_camera
-from ibvs_qp.measurement import HORIZONTAL, FeatureFrame, Measurement, Reference, RgbdFrame, SensorFrame
+from ibvs_qp.measurement import HORIZONTAL, VERTICAL, FeatureFrame, Measurement, Reference, RgbdFrame, SensorFrame
 from ibvs_qp.model.reporting import fixed_command
 from ibvs_qp.model.setpoints import Setpoints
 from ibvs_qp.painting.command import PainterInput, PaintingCommand
@@ -109,7 +109,7 @@ class Pilot:
         self._tip_camera = to_camera(self._tip, camera).tolist()
         self._tip_from_camera = (self._tip - camera).tolist()
         brush = self.config.vision.brush_width_m
-        ways = [(level, ahead) for level in (False, True) for ahead in (False, True)]
+        ways = [(role, ahead) for role in (HORIZONTAL, VERTICAL) for ahead in (-1, 1)]
         self._hint_spans = {way: hint_span(vehicle, brush, *way) for way in ways}
         self._gate = SensorGate(self.config.camera.latest_s)
         self._limits = ThrustLimits(vehicle.geometry.count)
@@ -407,11 +407,11 @@ class Pilot:
             return ()
         axes = WallAxes.of(contact.normal, down_in_body(self._history.attitude(stamp_ns)))
         level = expected.role == HORIZONTAL
-        span = self._hint_spans[level, expected.ahead > 0]
-        if span[0] >= span[1]:
-            return ()
         angle = 0.5 * math.pi if level else 0.0
         rho, theta, _ = image_line(expected.offset, angle, axes, self._tip_from_camera, contact.distance)
+        span = self._hint_spans[expected.role, expected.ahead]
+        if span[0] >= span[1]:
+            return ()
         return (LineHint(name="fresh", rho=rho, theta=theta, kind="paint", surface_side=expected.side, span=span),)
 
     # -------------------------------------------------------------- estimation

@@ -19,6 +19,7 @@ from sim.flight.options import FlightOptions, pilot_config, unsupervised
 from sim.flight.preflight import check_job
 from sim.sweep.design import FlightPlan, Parameter, Run
 from sim.sweep.setup import Setup, changed
+from sim.world.board import BoardGeometry
 from sim.world.random_scene import EVALUATION, random_scene
 from sim.world.scene import Scene
 from sim.world.worlds import DEFAULT_WORLD, in_world
@@ -90,7 +91,7 @@ def _cell(experiment: Experiment, flights: Flights, level: dict[str, Parameter],
                 measure=getattr(measures, f"{flights.measure}_figures"),
                 keep=flights.keep and index == 0,
                 trace=choice.traces,
-                expected_s=AROUND_S + setup.job.expected_s(config.painting),
+                expected_s=AROUND_S + setup.job.expected_s(config.painting, BoardGeometry(setup.scene).strokes),
             )
 
 

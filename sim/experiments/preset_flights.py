@@ -14,6 +14,7 @@ from sim.flight.jobs import PaintJob
 from sim.flight.options import FlightOptions, pilot_config
 from sim.flight.preflight import check_job
 from sim.sweep.design import FlightPlan, Measure, Run
+from sim.world.board import BoardGeometry
 from sim.world.scene import Scene
 from sim.world.worlds import DEFAULT_WORLD, in_world
 
@@ -44,7 +45,7 @@ def paint_runs(
     """
     pilot = pilot_config(scene, FlightOptions(law=config.law), config)
     check_job(scene, pilot, features)
-    expected_s = overhead_s + PaintJob().expected_s(pilot.painting)
+    expected_s = overhead_s + PaintJob().expected_s(pilot.painting, BoardGeometry(scene).strokes)
     return [
         Run(
             plan=FlightPlan(

@@ -20,6 +20,9 @@ SPECS = Path(__file__).with_name("specs")
 #: Value of a dotted path of scene, pilot or job; integers stay integers.
 Value = int | float | bool | str | tuple[float, ...]
 
+#: Of a column: as its figure says.
+OF_FIGURE = 99
+
 
 @dataclass(frozen=True, kw_only=True)
 class Column:
@@ -27,8 +30,8 @@ class Column:
 
     metric: str  # name of the figure, column of the table of flights
     label: str = ""  # heading where the measure means something narrower than the figure's words
-    digits: int | None = None  # decimals if not those of the figure
-    better: int | None = None  # direction if not that of the figure
+    digits: int = OF_FIGURE  # decimals
+    better: int = OF_FIGURE  # direction
     of_all: bool = False  # whether flights that did not end as planned have the metric too
     where: dict[str, Parameter] = field(default_factory=dict)  # cells with this metric; empty means all
 
@@ -37,7 +40,7 @@ class Column:
         figure = figure_of(self.metric)
         filled = {"label": self.label or figure.words, "digits": figure.digits, "better": figure.better}
         for name, value in filled.items():
-            if getattr(self, name) in ("", None):
+            if getattr(self, name) in ("", OF_FIGURE):
                 object.__setattr__(self, name, value)
 
     @property

@@ -9,6 +9,7 @@ from sim.figures.board import draw_canvas
 from sim.figures.style import REFERENCE, law_colour, legend_above, new_figure, shade_phases, thin
 from sim.flight.pictures import unpack_picture
 from sim.flight.trace import Trace, law_name
+from sim.world.board import BoardGeometry
 
 #: The camera view is taken at this fraction of the last row.
 FRACTION_OF_ROW = 0.35
@@ -46,5 +47,5 @@ def _picture(trace: Trace) -> np.ndarray | None:
     painting = [picture for _, picture, phase in trace.pictures if phase.startswith("paint")]
     if not painting:
         return trace.pictures[-1][1] if trace.pictures else None
-    rows = max(trace.scene.paint.rows, 1)
+    rows = BoardGeometry(trace.scene).strokes
     return painting[min(int((rows - 1 + FRACTION_OF_ROW) / rows * len(painting)), len(painting) - 1)]

@@ -18,6 +18,7 @@ from sim.flight.surroundings import World
 from sim.flight.trace import CRASH, INTERRUPTED, LANDED, TIME_OUT, Event, Trace
 from sim.rivals import rival_controller
 from sim.sensors.features import add_sigma_vs
+from sim.world.board import BoardGeometry
 from sim.world.plant import TICK_NS
 from sim.world.random_streams import stream
 from sim.world.scene import Scene
@@ -84,7 +85,7 @@ def fly(
     recorder, schedule = Recorder(scene, options, world, pilot), FaultSchedule(faults, options.seed)
     log = open_mcap(options, world, pilot)
     fly_tick = pilot.step if log is None else log.step
-    limit = BASE_TIME + STROKE_FACTOR * job.expected_s(config.painting)
+    limit = BASE_TIME + STROKE_FACTOR * job.expected_s(config.painting, BoardGeometry(scene).strokes)
     start, reason, tick = time.perf_counter(), "", 0
     try:
         command = None

@@ -18,8 +18,8 @@ class Job(Protocol):
         """The strategy of one flight."""
         ...
 
-    def expected_s(self, config: PaintingConfig) -> float:
-        """Flying time at the wall to expect [s]."""
+    def expected_s(self, config: PaintingConfig, strokes: int) -> float:
+        """Flying time at the wall to expect for a number of strokes [s]."""
         ...
 
     @property
@@ -36,9 +36,9 @@ class PaintJob:
         """The painter."""
         return Painter(config)
 
-    def expected_s(self, config: PaintingConfig) -> float:
+    def expected_s(self, config: PaintingConfig, strokes: int) -> float:
         """Strokes and climbs at their speed."""
-        return (config.rows * config.stroke_m + (config.rows - 1) * config.pitch_m) / config.speed_m_s
+        return (strokes * config.stroke_m + (strokes - 1) * config.pitch_m) / config.speed_m_s
 
     @property
     def plan(self) -> dict[str, float]:
@@ -62,7 +62,7 @@ class PressJob:
         """The presser."""
         return Presser(config, self.hold_s, self.slide_s, self.descend_s)
 
-    def expected_s(self, config: PaintingConfig) -> float:
+    def expected_s(self, config: PaintingConfig, strokes: int) -> float:
         """Hold and slide."""
         return self.hold_s + self.slide_s
 

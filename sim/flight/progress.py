@@ -12,6 +12,7 @@ from sim.flight.jobs import PaintJob
 from sim.flight.options import FlightOptions, pilot_config
 from sim.flight.trace import law_name
 from sim.flight.working import lines
+from sim.world.board import BoardGeometry
 from sim.world.scene import Scene
 
 #: Flying time that does not grow with the job: approach, alignment, press, retreat [s]; only sizes the bar.
@@ -38,7 +39,9 @@ def flight_progress(
         TaskProgressColumn(),
         TextColumn("{task.fields[note]}"),
     )
-    total = PaintJob().expected_s(pilot_config(scene, FlightOptions()).painting) + OVERHEAD_S
+    total = (
+        PaintJob().expected_s(pilot_config(scene, FlightOptions()).painting, BoardGeometry(scene).strokes) + OVERHEAD_S
+    )
     with Progress(*columns, console=console, disable=console.quiet) as bars:
         tasks = {law: bars.add_task(law_name(law), total=total, note="starting") for law in laws}
 

@@ -57,9 +57,14 @@ class WallJob:
         """The strategy of one flight."""
         return _PressAndSlide(config, self.hold_s, self.slide_s)
 
-    def expected_s(self, config: PaintingConfig) -> float:
+    def expected_s(self, config: PaintingConfig, strokes: int) -> float:
         """Hold and slide [s]."""
         return self.hold_s + self.slide_s
+
+    @property
+    def plan(self) -> dict[str, float]:
+        """Least durations of the phases [s]."""
+        return {"press": self.hold_s, "paint": self.slide_s} if self.slide_s > 0.0 else {"press": self.hold_s}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -18,6 +18,7 @@ from sim.sweep.design import Block, FlightPlan, Parameter, Refusal, Run
 from sim.sweep.fingerprint import code_hash, digest
 from sim.sweep.setup import changed
 from sim.sweep.spec import SweepSpec, options_of
+from sim.world.board import BoardGeometry
 
 #: Start, approach, alignment and retreat of a flight [s]; sizes the plan only.
 OVERHEAD_S = 9.0
@@ -93,7 +94,7 @@ class Planned:
             return Refusal(**facts, law=law, seed=seed, reason=str(error))
         plan = FlightPlan(scene=setup.scene, config=config, options=options, job=setup.job)
         measure = paint_figures if isinstance(setup.job, PaintJob) else press_row
-        expected_s = OVERHEAD_S + setup.job.expected_s(config.painting)
+        expected_s = OVERHEAD_S + setup.job.expected_s(config.painting, BoardGeometry(setup.scene).strokes)
         return Run(**facts, plan=plan, measure=measure, trace=self.spec.settings.traces, expected_s=expected_s)
 
 

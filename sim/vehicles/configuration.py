@@ -11,6 +11,7 @@ from ibvs_qp.config.derived import Derived
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.gain_scaling import gain_factors
 from ibvs_qp.config.vehicle import VehicleParams
+from ibvs_qp.measurement import HORIZONTAL, VERTICAL
 from ibvs_qp.pilot import PilotConfig
 from ibvs_qp.pilot.contact_picture import hint_span
 from ibvs_qp.pilot.vehicle_check import check_vehicle
@@ -84,8 +85,9 @@ def derived_settings(config: PilotConfig) -> Iterator[DerivedSetting]:
     yield DerivedSetting(
         "brush range", f"{brush.stiffness_min_n_m:g} to {brush.stiffness_max_n_m:g} N/m", "brush and wall"
     )
-    for ahead, name in ((False, "left"), (True, "right")):
-        low, high = hint_span(vehicle, config.vision.brush_width_m, level=True, ahead=ahead)
+    directions = {"left": (HORIZONTAL, -1), "right": (HORIZONTAL, 1), "above": (VERTICAL, -1), "below": (VERTICAL, 1)}
+    for name, (role, ahead) in directions.items():
+        low, high = hint_span(vehicle, config.vision.brush_width_m, role, ahead)
         words = f"{low:.2f} to {high:.2f}" if low < high else "none"
         yield DerivedSetting(f"fresh edge, {name}", words, "tip, brush and camera")
     yield DerivedSetting("mask of the vehicle", "drawn", "arm, brush and propellers")

@@ -1,5 +1,7 @@
 """A vehicle from a robot model: MJCF with thrust actuators at sites, or URDF with rotors as joints."""
 
+# MuJoCo's bindings carry no types.
+# pyright: reportAttributeAccessIssue=false
 from __future__ import annotations
 
 import math

@@ -80,7 +80,7 @@ def _board(axes: Axes, trace: Trace) -> None:
     axes.imshow(painted_board(trace), extent=(0.0, scene.board.width_m, 0.0, scene.board.height_m))
     draw_canvas(axes, trace)
     paint = scene.paint
-    top = paint.edge_margin_m + (paint.rows - 1) * paint.pitch_m + paint.brush_width_m
+    top = paint.edge_margin_m + (BoardGeometry(scene).strokes - 1) * paint.pitch_m + paint.brush_width_m
     axes.set(ylim=(0.0, min(scene.board.height_m, top)), title="(a) the board afterwards; white: path of the tip")
     axes.set_ylabel("up [m]")
     axes.set_xlabel("along the board [m]", labelpad=1.0)

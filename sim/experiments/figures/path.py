@@ -11,6 +11,7 @@ from sim.experiments.figures.common import Drawn, Results, stored_trace
 from sim.experiments.spec import FigureSpec
 from sim.figures.style import FAINT, law_colour, law_name, legend_below, new_figure, note_empty
 from sim.sweep.statistics import completed, select
+from sim.world.board import BoardGeometry
 
 
 def draw_path_error(spec: FigureSpec, results: Results) -> Drawn:
@@ -48,7 +49,7 @@ def _corners(axes: Axes, results: Results, sigma: float, drawn: bool) -> None:
     trace = stored_trace(results, rows)
     if trace is not None:
         paint = trace.scene.paint
-        corners = np.cumsum([leg for row in range(1, paint.rows) for leg in (paint.stroke_m, paint.pitch_m)])
+        corners = np.cumsum([paint.stroke_m, paint.pitch_m] * (BoardGeometry(trace.scene).strokes - 1))
         for corner in corners:
             axes.axvline(corner, color="#888888", linewidth=0.7, linestyle=":", label="corners")
     values = 1e3 * completed(rows, "path_rms_m")
