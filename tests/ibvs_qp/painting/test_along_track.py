@@ -1,0 +1,142 @@
+"""Place of the tip along the strokes, from the odometer and the board's edges across them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from ibvs_qp.estimation.tracked_line import TrackedLine
+from ibvs_qp.painting import along_track
+from ibvs_qp.painting.along_track import DRIFT_PER_M, EDGE_STD, AlongTrack
+from ibvs_qp.painting.config import PaintingConfig
+from ibvs_qp.painting.pattern_lines import PatternLine
+
+CONFIG = PaintingConfig(stroke_m=1.0)
+MARGIN = CONFIG.edge_margin_m
+END_U = CONFIG.stroke_m + MARGIN
+
+
+def upright(track: int, place: float, side: int, kind: str = "board", weight: float = 1.0) -> PatternLine:
+    """A line across the strokes, beside the tip."""
+    line = TrackedLine(track_id=track, role="vertical", slot=0, angle=0.0, deviation=1e-3, seen_ns=0)
+    line.weight, line.kind = weight, kind
+    return PatternLine(line, False, place, 0.0, side, 1.0, (place, 0.0), 0.4)
+
+
+def at_the_margin() -> AlongTrack:
+    along = AlongTrack(CONFIG)
+    along.start_at(upright(2, -MARGIN, 1))
+    return along
+
+
+def test_the_odometer_moves_u_and_its_variance_grows_with_the_way() -> None:
+    along = at_the_margin()
+    before = along.deviation
+    for _ in range(100):
+        along.predict(0.01)
+    assert along.u == pytest.approx(1.0)
+    assert along.deviation**2 - before**2 == pytest.approx(DRIFT_PER_M)
+    along.predict(-1.0)
+    assert along.u == pytest.approx(0.0) and along.deviation**2 - before**2 == pytest.approx(2.0 * DRIFT_PER_M)
+
+
+def test_the_beginning_is_at_the_margin_from_the_edge_beside_it() -> None:
+    along = AlongTrack(CONFIG)
+    assert not along.known
+    along.start_at(upright(2, -0.07, 1))  # the tip is 2 cm too far
+    assert along.known and along.u == pytest.approx(0.02)
+
+
+def test_the_end_gives_u_wherever_it_is() -> None:
+    along = AlongTrack(CONFIG)
+    assert not along.find_end([upright(2, -0.1, 1), upright(5, 0.1, -1, "paint"), upright(6, 0.1, -1, weight=0.5)])
+    assert along.find_end([upright(4, 0.4, -1), upright(3, 0.2, -1)])
+    assert along.u == pytest.approx(END_U - 0.2) and along.end == 3 and along.deviation == pytest.approx(EDGE_STD)
+
+
+@pytest.mark.parametrize("error", [-0.01, 0.01])
+def test_the_end_corrects_what_the_odometer_has_lost(error: float) -> None:
+    along = at_the_margin()
+    for _ in range(90):
+        along.predict(0.01)
+    for _ in range(20):
+        assert along.look([upright(3, END_U - 0.9 - error, -1)]) == ""
+    assert along.u == pytest.approx(0.9 + error, abs=1e-3) and along.deviation < 1e-3 and along.end_seen
+
+
+@pytest.mark.parametrize("shift", [-0.1, 0.1])
+def test_a_board_of_another_length_moves_the_origin_and_is_noticed(shift: float) -> None:
+    along = at_the_margin()
+    for _ in range(90):
+        along.predict(0.01)
+    noticed = [along.look([upright(3, END_U + shift - 0.9, -1)]) for _ in range(3)]
+    assert noticed == [f"the board's edge lies {shift * 1e3:+.0f} mm from where the job expects it", "", ""]
+    assert along.u == pytest.approx(0.9 - shift, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    "decoy",
+    [
+        upright(7, END_U - 0.9, 1),  # the surface on its other side
+        upright(7, END_U - 0.9, -1, "paint"),
+        upright(7, END_U - 0.9, -1, weight=0.5),
+        upright(7, END_U - 0.9 - 0.3, -1),  # beyond the gate of a first end
+    ],
+)
+def test_another_edge_ends_nothing(decoy: PatternLine) -> None:
+    along = at_the_margin()
+    along.predict(0.9)
+    along.look([decoy])
+    assert along.end == -1 and not along.end_seen and along.u == pytest.approx(0.9)
+
+
+def test_an_end_that_was_recognised_has_a_narrow_gate_and_may_be_dim() -> None:
+    along = at_the_margin()
+    along.predict(0.9)
+    along.look([upright(3, END_U - 0.9, -1)])
+    along.look([upright(3, END_U - 0.9, -1, weight=0.1)])
+    assert along.end == 3
+    along.look([upright(3, END_U - 0.9 + 0.1, -1)])
+    assert along.end == -1 and along.u == pytest.approx(0.9, abs=1e-3)
+
+
+def test_back_at_the_beginning_the_edge_beside_it_corrects() -> None:
+    along = at_the_margin()
+    along.look([upright(2, -MARGIN, 1)])
+    for du in (1.0, -1.0):
+        along.predict(du)
+    for _ in range(20):
+        along.look([upright(2, -MARGIN - 0.008, 1)])
+    assert along.near == 2 and along.u == pytest.approx(0.008, abs=1.5e-3)
+    along.look([])
+    assert along.near == along.end == -1
+
+
+def test_the_error_of_u_is_as_large_as_the_filter_says() -> None:
+    """Thirty flights there and back with edges and an odometer as noisy as the filter assumes."""
+    ratios = []
+    for seed in range(30):
+        rng = np.random.default_rng(seed)
+        place = 0.0
+        along = AlongTrack(CONFIG)
+        along.start_at(upright(2, -MARGIN + EDGE_STD * rng.standard_normal(), 1))
+        for du in [0.01] * 100 + [-0.01] * 100:
+            place += du
+            along.predict(du + math.sqrt(DRIFT_PER_M * abs(du)) * rng.standard_normal())
+            lines = [(3, END_U - place, -1), (2, -MARGIN - place, 1)]
+            along.look([upright(k, p + EDGE_STD * rng.standard_normal(), s) for k, p, s in lines if abs(p) < 0.26])
+            ratios.append((along.u - place) / along.deviation)
+    share, rms = np.mean(np.abs(ratios) < 3.0), np.sqrt(np.mean(np.square(ratios)))
+    print(f"within three standard deviations {share:.3f}, rms {rms:.2f}")
+    assert share >= 0.95 and 0.3 < rms < 1.5
+
+
+def test_rows_of_h_are_the_derivatives_of_the_places_of_both_ends() -> None:
+    base, rows = np.array((0.3, -0.05)), []
+    for state in range(2):
+        step = 1e-6 * np.eye(2)[state]
+        places = [(END_U - u, near - u) for u, near in (base + step, base - step)]
+        rows.append((np.array(places[0]) - np.array(places[1])) / 2e-6)
+    np.testing.assert_allclose(np.transpose(rows), (along_track._END, along_track._NEAR), atol=1e-6)

@@ -1,0 +1,269 @@
+"""Place of the tip across the strokes: the filter against simulated strokes with the noises that it assumes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from ibvs_qp.estimation.tracked_line import TrackedLine
+from ibvs_qp.painting import cross_track
+from ibvs_qp.painting.config import PaintingConfig
+from ibvs_qp.painting.cross_track import LOOK_S, CrossTrack
+from ibvs_qp.painting.pattern_lines import PatternLine
+
+CONFIG = PaintingConfig(stroke_m=0.6)
+MARGIN, HALF, PITCH = CONFIG.edge_margin_m, 0.5 * CONFIG.brush_width_m, CONFIG.pitch_m
+RUNS, WITHIN = 30, 0.95
+
+
+def parallel(track: int, place: float, side: int, kind: str, middle_u: float = 0.0, length: float = 6.0) -> PatternLine:
+    """A line along the strokes, beside the tip."""
+    line = TrackedLine(track_id=track, role="horizontal", slot=0, angle=0.5 * math.pi, deviation=0.0, seen_ns=0)
+    line.weight, line.kind = 1.0, kind
+    return PatternLine(line, True, place, 0.0, side, 1.0, (middle_u, place), length)
+
+
+class Strokes:
+    """A tip that paints strokes beside a board's edge, with an odometer and edges as noisy as the filter assumes."""
+
+    def __init__(self, seed: int) -> None:
+        self.rng = np.random.default_rng(seed)
+        self.cross = CrossTrack(CONFIG)
+        self.u, self.v, self.delta = 0.0, MARGIN, cross_track.TIP_STD * self.rng.standard_normal()
+        self.drift = cross_track.DRIFT_STD * self.rng.standard_normal()
+        self.strokes: list[dict[int, float]] = []
+        board = self.seen(1, 0.0, 1, "board", cross_track.BOARD_STD)
+        self.cross.start(board)
+        self.ratios: list[float] = []
+
+    def seen(self, track: int, v: float, side: int, kind: str, std: float, middle: float = 0.0, length: float = 6.0):
+        """An edge at v as the picture shows it."""
+        place = v - self.v - self.delta + std * self.rng.standard_normal()
+        return parallel(track, place, side, kind, middle, length)
+
+    def move(self, du: float, dv: float, dt: float = LOOK_S) -> None:
+        variance = cross_track.ODOMETER_PER_M * math.hypot(du, dv) + cross_track.ODOMETER_AT_REST * dt
+        measured = dv + self.drift * dt + math.sqrt(variance) * self.rng.standard_normal()
+        self.u, self.v = self.u + du, self.v + dv
+        self.cross.predict(du, measured, dt)
+
+    def lines(self, ahead: float, laying: bool) -> list[PatternLine]:
+        independent = math.sqrt(cross_track.INDEPENDENT_S / LOOK_S)
+        noise = cross_track.EDGE_STD * independent
+        found = []
+        if len(self.strokes) < 3:
+            still = math.sqrt(cross_track.BOARD_INDEPENDENT_S / LOOK_S)
+            found.append(self.seen(1, 0.0, 1, "board", cross_track.BOARD_STD * still))
+        complete = self.strokes[:-1] if laying else self.strokes
+        for stroke, direction, sides in ((complete, ahead, (1,)), (self.strokes if laying else [], -ahead, (1, -1))):
+            if not stroke:
+                continue
+            reach = [u for u in stroke[-1] if 0.05 < direction * (0.01 * u - self.u) < 0.22]
+            if len(reach) < 8:
+                continue
+            middle, v = 0.01 * np.mean(reach) - self.u, np.mean([stroke[-1][u] for u in reach])
+            for side in sides:
+                track = 100 * side + len(complete) + (direction != ahead)
+                found.append(self.seen(track, v + side * HALF, side, "paint", noise, middle, 0.01 * len(reach)))
+        return found
+
+    def paint(self, count: int) -> None:
+        for stroke in range(1, count + 1):
+            ahead = 1.0 if stroke % 2 else -1.0
+            self.cross.begin_stroke()
+            self.strokes.append({})
+            for _ in range(round(CONFIG.stroke_m / 0.01)):
+                self.strokes[-1][round(self.u / 0.01)] = self.v
+                self.cross.lay(self.u)
+                self.move(0.01 * ahead, 0.05 * (MARGIN + (stroke - 1) * PITCH - self.cross.v))
+                self.cross.look(self.lines(ahead, True), self.u, ahead)
+                self.ratios.append(self.error() / self.expected())
+            self.cross.end_stroke()
+            for _ in range(15):
+                self.move(0.0, PITCH / 15)
+                self.cross.look(self.lines(-ahead, False), self.u, -ahead)
+
+    def error(self) -> float:
+        return self.cross.v - self.v
+
+    def expected(self) -> float:
+        return math.sqrt(self.cross._p[0, 0])
+
+
+def test_the_error_of_v_is_as_large_as_the_filter_says() -> None:
+    """Thirty flights of three strokes: the normalised error stays within three in at least 95 % of the looks."""
+    ratios = np.array([_ratios(seed) for seed in range(RUNS)])
+    share = float(np.mean(np.abs(ratios) < 3.0))
+    rms = float(np.sqrt(np.mean(ratios**2)))
+    print(f"within three standard deviations {share:.3f}, rms {rms:.2f}, n = {ratios.size}")
+    assert share >= WITHIN
+    assert 0.3 < rms < 1.5  # and the filter does not claim much less than it has
+
+
+def _ratios(seed: int) -> list[float]:
+    flight = Strokes(seed)
+    flight.paint(3)
+    return flight.ratios
+
+
+@pytest.mark.parametrize("state", range(5))
+def test_rows_of_h_are_the_derivatives_of_the_places_in_the_picture(state: int) -> None:
+    """Places of edges by a geometry of its own, against changes of each state."""
+
+    def places(v: float, tip: float, last: float, own: float, _drift: float) -> np.ndarray:
+        shown = v + tip  # where the picture shows the tip
+        true_last, true_own = 0.05 + last, 0.122 + own  # by their maps, and the errors of these
+        return np.array([0.0 - shown, true_last + HALF - shown, true_own - HALF - shown])
+
+    step = np.zeros(5)
+    step[state] = 1e-6
+    base = np.array((0.11, 0.003, 0.001, -0.002, 1e-4))
+    slopes = (places(*(base + step)) - places(*(base - step))) / 2e-6
+    rows = cross_track._BOARD, cross_track._LAST, cross_track._OWN
+    assert [row[state] for row in rows] == pytest.approx(slopes, abs=1e-6)
+
+
+def _after_stroke_one(delta: float = 0.0) -> CrossTrack:
+    """Stroke 1 is painted by an exact odometer, the tip has climbed."""
+    cross = CrossTrack(CONFIG)
+    cross.start(parallel(1, -MARGIN - delta, 1, "board"))
+    cross.begin_stroke()
+    for k in range(60):
+        cross.lay(0.01 * k)
+        cross.predict(0.01, 0.0, 0.1)
+    cross.end_stroke()
+    cross.predict(0.0, PITCH, 1.5)
+    return cross
+
+
+def _look(cross: CrossTrack, *lines: PatternLine, u: float = 0.3, times: int = 20, ahead: float = -1.0) -> CrossTrack:
+    for _ in range(times):
+        cross.look(lines, u, ahead)
+    return cross
+
+
+def fresh(error: float = 0.0, track: int = 101, side: int = 1, kind: str = "paint", middle: float = -0.14):
+    """The last stroke's outer edge beside a tip that has climbed one pitch and is that far too high [m]."""
+    return parallel(track, HALF - PITCH - error, side, kind, middle, 0.16)
+
+
+def test_the_fresh_edge_corrects_v_where_the_tip_s_place_in_the_picture_is_known(monkeypatch) -> None:
+    monkeypatch.setattr(cross_track, "TIP_STD", 1e-5)
+    cross = _after_stroke_one()
+    before = cross.deviation
+    _look(cross, fresh(0.004), times=60)
+    above_last = cross.v - float(cross._x[2])
+    assert above_last == pytest.approx(MARGIN + PITCH + 0.004, abs=1e-3)  # against the last stroke's map
+    assert cross.deviation < 0.9 * before and list(cross.guides) == [101]
+
+
+def test_a_displaced_fresh_edge_tells_the_tip_s_place_in_the_picture_where_that_is_unknown() -> None:
+    """The board's edge showed v + delta, the odometer knows the climb: an edge that is off says that delta is."""
+    cross = _look(_after_stroke_one(delta=0.004), fresh(0.004), times=60)
+    assert cross.tip_error == pytest.approx(0.004, abs=1e-3)
+    assert cross.v == pytest.approx(MARGIN + PITCH, abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    "decoy",
+    [
+        lambda: fresh(0.030),  # farther than the gate
+        lambda: fresh(side=-1),  # the bare side is the other one
+        lambda: fresh(kind="board"),
+        lambda: fresh(middle=0.14),  # the paint lies on the other side of the tip
+    ],
+)
+def test_another_edge_corrects_nothing(decoy: Callable[[], PatternLine]) -> None:
+    cross = _after_stroke_one()
+    v, deviation = cross.v, cross.deviation
+    _look(cross, decoy())
+    assert cross.v == v and cross.deviation == deviation
+    assert 101 not in cross.guides or decoy().kind == "board"
+
+
+def test_a_place_that_is_seen_twice_is_better_known_than_once() -> None:
+    once, twice = _look(_after_stroke_one(), fresh(), times=1), _look(_after_stroke_one(), fresh(), times=2)
+    assert twice.deviation < once.deviation < _after_stroke_one().deviation
+
+
+def test_own_edges_show_where_the_picture_shows_the_tip() -> None:
+    """The board's edge cannot tell v from delta; the edges of the own paint lie at +- half a brush from the tip."""
+    delta = 0.004
+    cross = CrossTrack(CONFIG)
+    board = parallel(1, -MARGIN - delta, 1, "board")  # the tip is at the margin
+    cross.start(board)
+    _look(cross, board, times=50)
+    assert cross.v == pytest.approx(MARGIN + delta, abs=1e-4) and cross.tip_error == pytest.approx(0.0, abs=1e-4)
+    cross.begin_stroke()
+    for k in range(60):
+        u = 0.01 * k
+        cross.lay(u)
+        cross.predict(0.01, 0.0, 0.1)
+        own = [parallel(100 + side, side * HALF - delta, side, "paint", -0.14, 0.16) for side in (1, -1)]
+        cross.look([board, *(own if u > 0.25 else [])], u, 1.0)
+    assert cross.tip_error == pytest.approx(delta, abs=1e-3)
+    assert cross.v == pytest.approx(MARGIN, abs=1e-3)
+
+
+def test_an_older_stroke_helps_where_the_last_one_is_missing() -> None:
+    cross = _after_stroke_one()
+    cross.begin_stroke()
+    for k in range(60):
+        cross.predict(-0.01, 0.0, 0.1)
+        cross.lay(0.6 - 0.01 * k)
+    cross.end_stroke()
+    cross.predict(0.0, PITCH, 1.5)
+    before = cross._p[0, 0]
+    _look(cross, parallel(101, HALF - 2.0 * PITCH - 0.002, 1, "paint", 0.14, 0.16), ahead=1.0)
+    assert cross._p[0, 0] < before and list(cross.guides) == [101]
+
+
+def test_the_board_s_edge_turns_the_strokes_and_no_more_than_a_board_may() -> None:
+    for lean, expected in ((0.05, math.atan(0.05)), (0.6, cross_track.LARGEST_TURN)):
+        cross = CrossTrack(CONFIG)
+        edge = parallel(1, -MARGIN, 1, "board")
+        edge.lean = lean
+        cross.start(edge)
+        assert cross.turn == pytest.approx(expected)
+
+
+def test_the_far_edge_is_remembered_and_leads_last() -> None:
+    cross = _after_stroke_one()
+    assert math.isnan(cross.far_edge)
+    _look(cross, fresh(), parallel(4, 0.1, -1, "board"))
+    assert cross.far_edge == pytest.approx(MARGIN + PITCH + 0.1, abs=1e-3)
+    assert list(cross.guides) == [101, 4]
+
+
+def test_without_edges_the_uncertainty_grows_and_never_shrinks() -> None:
+    cross, last = _after_stroke_one(), 0.0
+    for _ in range(50):
+        cross.predict(0.0, 0.001, 0.1)
+        cross.look([], 0.0, 1.0)
+        assert cross.deviation > last
+        last = cross.deviation
+    assert cross.guides == {}
+
+
+def test_the_drift_of_the_odometer_makes_v_uncertain_in_one_direction() -> None:
+    """Its variance in v grows with the square of time, and v and drift are correlated."""
+    cross, seconds = CrossTrack(CONFIG), 20.0
+    cross.start(parallel(1, -MARGIN, 1, "board"))
+    before = cross._p[0, 0]
+    for _ in range(200):
+        cross.predict(0.0, 0.0, 0.1)
+    variance = cross_track.DRIFT_STD**2
+    assert cross._p[0, 4] == pytest.approx(-seconds * variance, rel=0.1)
+    rest = cross_track.ODOMETER_AT_REST * seconds
+    assert cross._p[0, 0] - before == pytest.approx(seconds**2 * variance + rest, rel=0.1)
+    np.testing.assert_allclose(cross._p, cross._p.T, atol=1e-18)
+
+
+def test_a_map_that_begins_has_the_error_of_v() -> None:
+    cross = _after_stroke_one()
+    cross.begin_stroke()
+    np.testing.assert_array_equal(cross._p[3], cross._p[0])
+    assert cross._p[3, 3] == cross._p[0, 0] > 0.0

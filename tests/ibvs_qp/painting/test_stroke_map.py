@@ -1,0 +1,44 @@
+"""Where a stroke was painted."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from ibvs_qp.painting.stroke_map import BEYOND_M, BIN_M, StrokeMap
+
+
+def straight_map(first: float = 0.0, last: float = 0.6, slope: float = 0.1, length: float = 0.6) -> StrokeMap:
+    stroke = StrokeMap(length)
+    for u in np.arange(first, last, 0.002):
+        stroke.add(float(u), 0.05 + slope * float(u))
+    return stroke
+
+
+@pytest.mark.parametrize("window", [(0.1, 0.3), (0.3, 0.1), (0.25, 0.55)])
+def test_the_mean_over_a_window_is_v_at_its_middle(window: tuple[float, float]) -> None:
+    assert straight_map().mean(*window) == pytest.approx(0.05 + 0.1 * sum(window) / 2.0, abs=0.1 * BIN_M)
+
+
+def test_a_slow_part_counts_no_more_than_a_fast_one() -> None:
+    stroke = straight_map(slope=0.0)
+    for _ in range(1000):
+        stroke.add(0.205, 0.07)
+    assert stroke.mean(0.1, 0.3) == pytest.approx(0.05 + 0.02 / 21.0, abs=2e-4)
+
+
+def test_a_window_that_is_half_bare_has_no_mean() -> None:
+    stroke = straight_map(0.0, 0.3)
+    assert stroke.mean(0.2, 0.36) == pytest.approx(0.075, abs=1e-3)  # ten of seventeen bins
+    assert math.isnan(stroke.mean(0.2, 0.45)) and math.isnan(stroke.mean(0.4, 0.5))
+    assert math.isnan(StrokeMap(0.6).mean(0.0, 0.1))
+
+
+def test_paint_beside_the_nominal_stroke_is_remembered_and_farther_away_ignored() -> None:
+    stroke = StrokeMap(0.6)
+    for u in (-0.105, 0.705, -BEYOND_M - 0.1, 0.6 + BEYOND_M + 0.1):
+        stroke.add(u, 0.05)
+    assert stroke.mean(-0.105, -0.105) == stroke.mean(0.705, 0.705) == pytest.approx(0.05)
+    assert math.isnan(stroke.mean(-BEYOND_M - 0.1, -BEYOND_M - 0.1))

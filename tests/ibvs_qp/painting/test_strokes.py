@@ -1,0 +1,224 @@
+"""Strokes and the steps between them: ends, edges that are hidden or misleading, lost contact, certainty."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from painted_wall import END, FAR, GUIDE, NEAR, OUTER, PaintedWall, Piece, short
+
+from ibvs_qp.painting.config import PaintingConfig
+
+PLACE = 3e-3
+
+
+def assert_painted(world: PaintedWall, seconds: float = 250.0) -> None:
+    world.fly(seconds)
+    assert world.painter.finished and not world.painter.failed, world.painter.reason
+    assert abs(world.place_errors()).max() < PLACE
+
+
+def certain(config: PaintingConfig) -> float:
+    """Largest standard deviation of a stroke's place with which it may begin [m]."""
+    return max(0.5 * config.overlap_m, config.least_certainty_m) / 3.0
+
+
+# --------------------------------------------------------------------------------------------------- ends of strokes
+
+
+def test_a_hidden_end_never_runs_the_stroke_over_the_margin_and_the_job_is_not_claimed() -> None:
+    """The odometer ends it, and its length is not known to half the tolerance after a metre."""
+    world = PaintedWall(short(rows=2, stroke_m=1.0), hidden={END})
+    world.fly(200.0)
+    assert world.reached[1] < world.config.stroke_m + PLACE
+    assert world.painter.finished and world.painter.failed
+    assert re.fullmatch(r"row 1 ended by the odometer, its length is known to \d mm", world.painter.reason)
+
+
+def test_both_ends_hidden_later_do_not_lengthen_a_stroke() -> None:
+    world = PaintedWall(short(rows=3, stroke_m=1.0))
+    world.fly(60.0, until="paint", stroke=2)
+    world.hidden = {NEAR, END}
+    world.fly(200.0)
+    assert world.painter.finished
+    assert -PLACE < world.reached[0] and world.reached[1] < world.config.stroke_m + PLACE
+
+
+@pytest.mark.parametrize("shift", [-0.03, 0.03])
+def test_strokes_end_at_the_edge_and_not_by_the_odometer(shift: float) -> None:
+    """The board is shorter or longer than the job says: stroke 1 keeps its margin, and what follows its length."""
+    world = PaintedWall(short(rows=2, stroke_m=1.0), length=1.1 + shift)
+    assert_painted(world)
+    assert world.ends[0][1] == pytest.approx(1.0 + shift, abs=PLACE)
+    noticed = [reason for _, event, reason in world.painter.log if event == "edge"]
+    assert noticed and f"{shift * 1e3:+.0f} mm from where the job expects it" in noticed[0]
+
+
+def test_only_an_edge_with_the_surface_on_our_side_ends_a_stroke() -> None:
+    """A joint, paint and the begin of another board stand where the stroke should end; its own edge a little behind."""
+    world = PaintedWall(short(rows=1), length=0.61)
+    end = world.length - world.config.edge_margin_m
+    world.extra = [
+        Piece.upright(60, end - 0.015, 1),
+        Piece.upright(61, end - 0.02, 1, ""),
+        Piece.upright(62, end - 0.01, -1, "paint"),
+    ]
+    assert_painted(world)
+    assert world.ends[0][1] == pytest.approx(end - world.config.edge_margin_m, abs=PLACE)
+
+
+def test_a_board_s_edge_on_the_way_ends_no_stroke() -> None:
+    """The edges of a board that lies behind: in view half a metre before the end of either stroke."""
+    world = PaintedWall(short(rows=2, stroke_m=1.2))
+    world.extra = [Piece.upright(70, 0.6, -1), Piece.upright(71, 0.62, 1)]
+    assert_painted(world)
+    assert [u for _, u, _ in world.ends] == pytest.approx([1.2, 0.0], abs=PLACE)
+
+
+def test_the_far_edge_of_the_board_leads_where_it_is_all_that_is_seen() -> None:
+    world = PaintedWall(short(rows=4, stroke_m=0.6), height=0.36)
+    world.fly(100.0, until="paint", stroke=4)
+    world.hidden = {GUIDE, *range(OUTER, OUTER + 5)}
+    world.fly(1.0)
+    assert world.guide == FAR
+    assert_painted(world)
+
+
+# -------------------------------------------------------------------------------------------------- edges of strokes
+
+
+def test_stroke_two_follows_the_fresh_edge_and_not_its_own() -> None:
+    world = PaintedWall(short(rows=2))
+    world.fly(100.0, until="paint", stroke=2)
+    world.fly(1.0)
+    followed = set()
+    while world.painter.phase == "paint":
+        world.step()
+        followed.add(world.guide)
+    assert OUTER + 2 in world.lines() and OUTER + 2 not in followed and OUTER + 1 in followed
+    assert abs(world.place_errors()[1]) < PLACE
+
+
+@pytest.mark.parametrize("misleads", ["leans", "lost", "displaced"])
+def test_a_fresh_edge_that_misleads_does_not_lead(misleads: str) -> None:
+    world = PaintedWall(short(rows=2, stroke_m=0.8))
+    world.fly(100.0, until="paint", stroke=2)
+    world.hidden = {OUTER + 1}
+    if misleads != "lost":
+        edge = 0.05 + world.config.pitch_m - 0.032
+        rise = 0.05 if misleads == "leans" else 0.0  # 7 deg over the stroke
+        lift = 0.0 if misleads == "leans" else 0.025
+        first, last = (0.0, edge + lift + 2.0 * rise), (0.8, edge + lift)
+        world.extra = [Piece(OUTER + 30, first, last, 1, "paint")]
+    world.fly(1.0)
+    assert world.guide == GUIDE
+    assert_painted(world)
+
+
+def test_a_line_that_is_found_again_under_another_name_leads_on() -> None:
+    world = PaintedWall(short(rows=2))
+    world.fly(60.0, until="paint")
+    world.fly(2.0)
+    world.board[0].identity = 33
+    world.board[2].identity = 34
+    world.fly(1.0)
+    assert world.guide == 33
+    assert any(event == "guide" and "track 33" in reason for _, event, reason in world.painter.log)
+    assert_painted(world)
+    assert world.ends[0][1] == pytest.approx(world.config.stroke_m, abs=PLACE)
+
+
+def slow_climb(**changes: object) -> PaintingConfig:
+    """Climbs that last until the odometer alone is not good enough."""
+    return short(**({"rows": 6, "climb_speed_m_s": 0.005, "timeout_s": 40.0} | changes))
+
+
+def hide_fresh_edge(world: PaintedWall) -> PaintedWall:
+    """From climb 5 on, the board's edge leaves the picture, and nothing else shows where the strokes are."""
+    world.fly(250.0, until="climb", stroke=5)
+    world.hidden = {OUTER + 4, FAR, GUIDE}
+    return world
+
+
+def test_a_hidden_fresh_edge_is_searched_and_the_job_fails_by_name() -> None:
+    world = hide_fresh_edge(PaintedWall(slow_climb()))
+    commands = world.fly(200.0)
+    assert "search" in world.phases() and len(world.begins) == 4
+    assert world.painter.finished and world.painter.failed
+    assert world.painter.reason == "stroke 5: the edge of stroke 4 was not found"
+    assert any(not c.contact and c.standoff == world.config.search_standoff_m for c in commands)
+
+
+def test_a_search_goes_on_once_the_edge_reappears() -> None:
+    world = hide_fresh_edge(PaintedWall(slow_climb()))
+    world.fly(60.0, until="search")
+    world.fly(5.0)
+    assert world.painter.phase == "search"
+    world.hidden = set()
+    assert_painted(world)
+    assert [phase for phase in world.phases() if phase == "search"] == ["search"]
+    assert any(phase == "approach" and "edge for stroke 5 found" in reason for _, phase, reason in world.painter.log)
+    assert len(world.ends) == 6
+
+
+@pytest.mark.parametrize("overlap", [0.0, 0.008])
+def test_no_stroke_begins_while_its_place_is_uncertain(overlap: float) -> None:
+    """The fresh edge comes back ten seconds after the climb: until then the vehicle waits or searches."""
+    config = slow_climb(overlap_m=overlap)
+    world = hide_fresh_edge(PaintedWall(config))
+    while world.painter.phase == "climb":
+        world.step()
+    assert world.painter.phase == "search" and 3.0 * world.painter._cross.deviation > 3.0 * certain(config)
+    world.fly(5.0)
+    world.hidden = set()
+    world.fly(250.0)
+    assert len(world.begins) == 6
+    assert max(deviation for _, deviation in world.begins) < certain(config)
+
+
+def test_a_tip_that_friction_holds_beside_its_place_searches_and_begins_anew() -> None:
+    world = PaintedWall(short(rows=2))
+    world.fly(60.0, until="climb")
+    world.fly(0.5)
+    world.stuck = True
+    world.fly(10.0, until="search")
+    assert world.painter.phase == "search"
+    _, _, reason = world.painter.log[-1]
+    assert re.fullmatch(r"row 2: \+\d+ mm from its place of 8 mm", reason)
+    world.stuck = False
+    assert_painted(world)
+
+
+# ------------------------------------------------------------------------------------------------------ lost contact
+
+
+def test_lost_contact_pauses_the_stroke_and_it_goes_on_afterwards() -> None:
+    world = PaintedWall(short(rows=2))
+    world.fly(60.0, until="paint")
+    world.fly(2.0)
+    world.contact_allowed = False
+    world.fly(2.0)
+    held = world.tip.copy()
+    commands = world.fly(1.0)
+    assert all(command.contact and abs(command.velocity[0]) < 1e-9 for command in commands)
+    assert abs(world.tip - held).max() < 1e-3
+    world.contact_allowed = True
+    world.fly(0.4)
+    assert abs(world.tip[0] - held[0]) < 1e-3  # not before the push is back
+    assert_painted(world)
+    events = [event for _, event, _ in world.painter.log if event.startswith("contact")]
+    assert events == ["contact lost", "contact back"]
+    assert world.ends[0][1] == pytest.approx(world.config.stroke_m, abs=PLACE)
+
+
+def test_contact_that_is_lost_in_a_climb_pauses_it() -> None:
+    world = PaintedWall(short(rows=2))
+    world.fly(60.0, until="climb")
+    world.fly(0.5)
+    world.contact_allowed = False
+    world.fly(1.0)
+    held = world.tip.copy()
+    world.fly(2.0)
+    assert abs(world.tip - held).max() < 1e-3
+    world.contact_allowed = True
+    assert_painted(world)
