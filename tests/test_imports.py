@@ -19,8 +19,8 @@ ORDER = {
         "limits qp vision painting checked_law analytic controller export assured pilot presets recording ros bridge"
     ).split(),
     "sim": (
-        "storage world scenes sensors rivals faults flight video evaluate scene_fuzz figures sweep report detection "
-        "experiments fault_matrix tune notebook bench commands"
+        "storage world scenes vehicles sensors rivals faults flight video evaluate scene_fuzz figures sweep report "
+        "detection experiments fault_matrix tune notebook bench commands"
     ).split(),
 }
 #: Rooms of vision in the order of its stages: data passes forward.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from ibvs_qp.config.derived import Derived
 from ibvs_qp.config.settings import choice, setting, validate
 from ibvs_qp.painting.pattern import CORNERS, FILL, PATTERNS
 
@@ -73,8 +74,8 @@ class PaintingConfig:
     gates: LineGates = field(default_factory=LineGates)
 
     guide_reach_m: float = setting(
-        0.24,
-        "farthest edge that leads along a stroke, from the tip",
+        Derived(0.24),
+        "farthest edge that leads along a stroke, from the tip; a pilot's follows from its camera unless it is stated",
         unit="m",
         why="at the wall the picture shows 0.27 m below the tip, and the view barrier must not hold the vehicle back",
         low=0.02,
@@ -159,8 +160,3 @@ class PaintingConfig:
     def pitch_m(self) -> float:
         """Distance between rows [m]."""
         return self.brush_width_m - self.overlap_m
-
-    @property
-    def fresh_edge_m(self) -> float:
-        """From the last stroke's outer edge to the brush centre of the present stroke [m]."""
-        return self.pitch_m - 0.5 * self.brush_width_m

@@ -6,15 +6,23 @@ import dataclasses
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+
 from ibvs_qp.config import ControllerConfig, EstimationConfig, SafetySettings
 from ibvs_qp.config.contact_margin import require_margin
 from ibvs_qp.config.derived import derive
+from ibvs_qp.config.from_vehicle import contact_depth
 from ibvs_qp.config.gain_scaling import LAWS
 from ibvs_qp.config.settings import choice, dump_toml, load_toml, setting, validate
+from ibvs_qp.frames import to_camera
 from ibvs_qp.painting.config import PaintingConfig
+from ibvs_qp.painting.pattern import Pattern
 from ibvs_qp.vision.config import VisionConfig
 from ibvs_qp.vision.paper.config import PaperConfig
 from ibvs_qp.vision.picture.settings import RgbdCameraSettings
+
+#: Distance of a guide from the view barrier at which the barrier hardly acts [m]; range of the result [m].
+_BARRIER_ROOM_M, _LEAST_REACH_M, _MOST_REACH_M = 0.015, 0.02, 2.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,6 +58,8 @@ class PilotConfig:
         validate(self)
         if self.controller.gains_of != self.law:
             object.__setattr__(self, "controller", dataclasses.replace(self.controller, gains_of=self.law))
+        painting = derive(self.painting, {"guide_reach_m": _guide_reach(self.controller, self.painting)})
+        object.__setattr__(self, "painting", painting)
         vision = derive(self.vision, {"brush_width_m": self.painting.brush_width_m})
         object.__setattr__(self, "vision", vision)
 
@@ -63,3 +73,15 @@ class PilotConfig:
     def to_toml(self, *, derived: bool = False) -> str:
         """Write the preset as TOML text; with ``derived`` also what follows from the rest, for a record."""
         return dump_toml(self, derived=derived)
+
+
+def _guide_reach(controller: ControllerConfig, painting: PaintingConfig) -> float:
+    """Distance on the wall, in contact, from the tip to where the view barrier begins on the side of the guides [m]."""
+    vehicle, limits = controller.vehicle, controller.limits
+    (right, down), depth = Pattern(painting.pattern, painting.start).across, contact_depth(vehicle)
+    x, y, _ = to_camera(np.array(vehicle.tip_position_m), np.array(vehicle.camera_position_m))
+    if down:
+        room = limits.view_down * depth - y if down < 0.0 else y - limits.view_up * depth
+    else:
+        room = limits.view_right * depth - x if right < 0.0 else x - limits.view_left * depth
+    return round(min(max(room - _BARRIER_ROOM_M, _LEAST_REACH_M), _MOST_REACH_M), 6)

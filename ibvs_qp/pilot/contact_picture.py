@@ -12,6 +12,8 @@ from ibvs_qp.config.from_vehicle import contact_depth
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import to_camera
 from ibvs_qp.measurement import HORIZONTAL
+from ibvs_qp.painting.config import PaintingConfig
+from ibvs_qp.painting.pattern import Pattern
 from ibvs_qp.pilot.config import PilotConfig
 from ibvs_qp.vision.picture.mask import propeller_mask, vehicle_mask
 
@@ -44,21 +46,24 @@ class ContactPicture:
     seen: np.ndarray
     propellers: np.ndarray
 
-    def row(self, below_m: float) -> float:
-        """Row of a level line on the wall so far below the tip [px]."""
-        return float(self.tip[1]) + self.intrinsics[1] * below_m / self.depth
+    def place(self, offset_m: float, level: bool = True) -> float:
+        """Row of a level line on the wall so far below the tip, or column of an upright one right of it [px]."""
+        axis = 1 if level else 0
+        return float(self.tip[axis]) + self.intrinsics[axis] * offset_m / self.depth
 
-    def beside(self, below_m: float) -> tuple[float, float]:
-        """Length of a level line in view to the left and to the right of the tip, in widths of the picture.
+    def beside(self, offset_m: float, level: bool = True) -> tuple[float, float]:
+        """Length of a line in view on both sides of the tip, in widths of the picture.
 
         Args:
-            below_m: Its distance below the tip [m].
+            offset_m: Its distance below the tip, or to the right of it [m].
+            level: Whether it is level; else upright.
         """
-        height, width = self.seen.shape
-        row, middle = round(self.row(below_m)), min(max(round(float(self.tip[0])), 0), width)
-        if not _ROWS <= row < height - _ROWS:
+        seen, along = (self.seen, 0) if level else (self.seen.T, 1)
+        place, middle = round(self.place(offset_m, level)), min(max(round(float(self.tip[along])), 0), seen.shape[1])
+        if not _ROWS <= place < seen.shape[0] - _ROWS:
             return 0.0, 0.0
-        shown: np.ndarray = np.all(self.seen[row - _ROWS : row + _ROWS + 1], axis=0)
+        shown: np.ndarray = np.all(seen[place - _ROWS : place + _ROWS + 1], axis=0)
+        width = self.seen.shape[1]
         return float(shown[:middle].sum()) / width, float(shown[middle:].sum()) / width
 
 
@@ -90,6 +95,13 @@ def contact_picture(config: PilotConfig) -> ContactPicture:
         seen=(picture > 0) & ~hidden,
         propellers=propellers & (picture > 0),
     )
+
+
+def guide_direction(painting: PaintingConfig) -> tuple[bool, float]:
+    """Whether guides are level, and on which side of the tip: +1 below or to the right of it, else -1."""
+    pattern = Pattern(painting.pattern, painting.start)
+    right, down = pattern.across
+    return pattern.guide_role == HORIZONTAL, -(right + down)
 
 
 def hint_span(vehicle: VehicleParams, brush_width_m: float, role: str, ahead: int) -> tuple[float, float]:

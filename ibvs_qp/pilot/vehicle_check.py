@@ -11,7 +11,7 @@ from ibvs_qp.config.from_vehicle import contact_depth, strike_yaw_deg
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import GRAVITY
 from ibvs_qp.pilot.config import PilotConfig
-from ibvs_qp.pilot.contact_picture import ContactPicture, contact_picture
+from ibvs_qp.pilot.contact_picture import ContactPicture, contact_picture, guide_direction
 
 #: Reach over push below which a vehicle is warned of [-]: gusts and friction take a quarter of it.
 GOOD_REACH = 1.3
@@ -146,10 +146,15 @@ def _view(config: PilotConfig, picture: ContactPicture) -> list[str]:
         place = f"in contact the tip is at column {column:.0f}, row {row:.0f} of a picture of {width} x {height} px"
         return [f"brush outside the picture: {place}"]
     least, found = config.vision.detect.min_length, []
-    for name, below in (("board's edge", painting.edge_margin_m), ("last row's edge", painting.fresh_edge_m)):
-        left, right = picture.beside(below)
-        if min(left, right) < least:
-            place = f"the {name}, {below:.3g} m below the tip, is at row {picture.row(below):.0f} of {height}"
-            shown = f"{100 * left:.0f} % of the picture's width left and {100 * right:.0f} % right of the brush"
-            found.append(f"no guide position in view: {place}; it shows {shown}, needed are {100 * least:.0f} %")
+    level, sign = guide_direction(painting)
+    edge, last = painting.edge_margin_m, 0.5 * painting.brush_width_m - painting.overlap_m
+    for name, distance in (("board's edge", edge), ("last stroke's edge", last)):
+        shown = picture.beside(sign * distance, level)
+        if min(shown) < least:
+            place, axis = picture.place(sign * distance, level), "row" if level else "column"
+            most = height if level else width
+            words = f"the {name}, {distance:.3g} m beside the tip, is at {axis} {place:.0f} of {most}"
+            parts = " and ".join(f"{100 * share:.0f} %" for share in shown)
+            needed = f"needed are {100 * least:.0f} % of the picture's width on both sides of the brush"
+            found.append(f"no guide position in view: {words}; {parts} are seen, {needed}")
     return found[:1]

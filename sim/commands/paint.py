@@ -117,7 +117,10 @@ class Paint:
         scene, world = scene_in_world(chosen, self.world)
         vehicle = preset_file(self.vehicle, "--vehicle", other_formats=True)
         if vehicle is not None:
-            scene = with_camera(scene, read_vehicle(vehicle))
+            given = read_vehicle(vehicle)
+            scene = with_camera(scene, given.vehicle)
+            for assumption in given.assumptions:
+                print(f"ibvs-qp: {assumption}", file=sys.stderr)
         size = _SIZES[self.image_size] if self.image_size else None
         camera, note = resolve_camera(self.camera)
         if note is not None:

@@ -54,6 +54,8 @@ class Tune:
     """Perception: a sensor model of lines, or rendered pictures (five times slower)."""
     preset: Annotated[Path | None, optional("FILE")] = None
     """Preset to start from; default: the shipped one."""
+    vehicle: Annotated[Path | None, optional("FILE")] = None
+    """Vehicle to tune for: TOML with [vehicle], PX4 parameters, MJCF or URDF; it replaces the preset's."""
     jobs: int = 1
     """Trials of a generation that fly side by side."""
     trials_of: Annotated[Path | None, optional("FILE")] = None
@@ -92,6 +94,7 @@ class Tune:
             check_count(f"--{name}", getattr(self, name), 1, most)  # more seeds would be those of the next scene
         check_jobs(self.jobs)
         preset_file(self.preset)
+        preset_file(self.vehicle, "--vehicle", other_formats=True)
         check_readable("--trials-of", self.trials_of)
         if self.storage and "://" not in self.storage and os.path.lexists(self.storage):
             check_readable("--storage", Path(self.storage), LARGEST_JOURNAL)
@@ -102,8 +105,13 @@ class Tune:
     def _plan(self, folder: Path) -> SearchPlan:
         from ibvs_qp.pilot import PilotConfig
         from sim.tune.search import SearchPlan
+        from sim.vehicles.configuration import require_vehicle, with_vehicle
+        from sim.vehicles.vehicle_file import read_vehicle
 
         start = PilotConfig.from_toml(preset) if (preset := preset_file(self.preset)) else ibvs_qp.preset(self.law)
+        if (file := preset_file(self.vehicle, "--vehicle", other_formats=True)) is not None:
+            start = with_vehicle(start if preset else PilotConfig(law=self.law), read_vehicle(file).vehicle)
+            require_vehicle(start, f"--vehicle {self.vehicle}")
         return SearchPlan(
             shipped=dataclasses.replace(start, law=self.law),
             other=ibvs_qp.preset("paper" if self.law == "qp" else "qp"),
@@ -160,7 +168,7 @@ class Tune:
         """The command that repeats the result on any computer."""
         default = type(self)()
         words = ["ibvs-qp", "tune", "--law", self.law, *([] if self.trials_of else ["--trials", str(self.trials)])]
-        for name in ("seed", "flights", "unseen", "features", "preset", "trials_of", "jobs"):
+        for name in ("seed", "flights", "unseen", "features", "preset", "vehicle", "trials_of", "jobs"):
             if getattr(self, name) != getattr(default, name):
                 words += [f"--{name.replace('_', '-')}", str(getattr(self, name))]
         return shlex.join(words)

@@ -11,7 +11,7 @@ from allocation.rotor import disc_rim
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import rotation_from_vector
 from ibvs_qp.pilot import PilotConfig
-from ibvs_qp.pilot.contact_picture import contact_picture
+from ibvs_qp.pilot.contact_picture import contact_picture, guide_direction
 from sim.figures.style import new_figure, styled
 
 #: Views: title, body axes to the right and upwards with their signs, labels.
@@ -82,11 +82,13 @@ def _draw_picture(axes: Axes, config: PilotConfig) -> None:
     column, row = picture.tip
     radius = 0.5 * painting.brush_width_m / picture.depth
     axes.add_patch(Ellipse((column, row), 2 * fx * radius, 2 * fy * radius, color="#0b6f9e", alpha=0.6, label="brush"))
-    for name, below, colour in (
-        ("board's edge, row 1", painting.edge_margin_m, "#d55e1a"),
-        ("edge of the last row", painting.fresh_edge_m, "#2a7f3f"),
+    level, sign = guide_direction(painting)
+    draw = axes.axhline if level else axes.axvline
+    for name, distance, colour in (
+        ("board's edge, stroke 1", painting.edge_margin_m, "#d55e1a"),
+        ("edge of the last stroke", 0.5 * painting.brush_width_m - painting.overlap_m, "#2a7f3f"),
     ):
-        axes.axhline(picture.row(below), color=colour, label=name)
+        draw(picture.place(sign * distance, level), color=colour, label=name)
     for index, bound in enumerate((limits.view_up, limits.view_down)):
         axes.axhline(fy * bound + cy, color="#777777", linestyle=":", label="view limits" if index == 0 else None)
     for bound in (limits.view_left, limits.view_right):

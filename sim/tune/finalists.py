@@ -38,7 +38,12 @@ class Finalist:
     damping: float  # least damping ratio of the contact
 
     def may_replace(self, shipped: Finalist) -> bool:
-        """Whether it is better than the shipped preset on the mean, and clearly worse in no objective and no scene."""
+        """Whether it is better than the shipped preset on the mean, and clearly worse in no objective and no scene.
+
+        Without a completed flight in a scene it has no figure there, and replaces nothing.
+        """
+        if any(each.failed == 1.0 for each in self.scenes.values()):
+            return False
         near = all(allowed(self.scenes[name], each, SCENE_ROOM) for name, each in shipped.scenes.items())
         return near and allowed(self.score, shipped.score) and gain_over(self.score, shipped.score) < 0.0
 

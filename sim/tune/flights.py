@@ -11,6 +11,7 @@ from sim.evaluate.measures import paint_figures
 from sim.experiments.preset_flights import paint_runs
 from sim.experiments.scenes import NEAR_START_M, changed
 from sim.sweep.design import Run
+from sim.vehicles.configuration import with_camera
 from sim.world.random_scene import TUNING, random_scene
 from sim.world.scene import Scene
 from sim.world.worlds import in_world
@@ -75,7 +76,7 @@ def flights(
         run
         for place, (name, scene) in enumerate(flown.items())
         for run in paint_runs(
-            scene,
+            with_camera(scene, config.controller.vehicle),
             config,
             tuple(seed + SEED_STRIDE * place for seed in seeds),
             features,

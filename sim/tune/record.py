@@ -21,9 +21,9 @@ from sim.tune.figures import draw_front, draw_unseen
 from sim.tune.finalists import SHIPPED, Finalist, best_of, shipped_score
 from sim.tune.objectives import OBJECTIVES, Score
 from sim.tune.search import SearchPlan, Trials
-from sim.tune.space import RANGES, with_gains
+from sim.tune.space import ranges, with_gains
 from sim.tune.stored import objective_columns, trial_rows
-from sim.tune.verdict import differences
+from sim.tune.verdict import differences, objection
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,7 +46,12 @@ class Outcome:
     @property
     def chosen(self) -> int | None:
         """Number of the chosen trial; None leaves the shipped preset in place."""
-        return best_of(self.finalists)
+        return None if self.objection else best_of(self.finalists)
+
+    @property
+    def objection(self) -> str:
+        """Why the best finalist is not recommended after its flights on unseen seeds, or ""."""
+        return "" if self.table is None else objection(self.table)
 
     @property
     def scores(self) -> dict[int, Score]:
@@ -70,6 +75,7 @@ def content(outcome: Outcome, folder: Path) -> dict[str, Any]:
         "finalists": {name: _finalist(each) for name, each in outcome.finalists.items()},
         "chosen": outcome.chosen,
         "gains": None if outcome.chosen is None else outcome.trials[outcome.chosen][0],
+        "objection": outcome.objection or None,
         "unseen": [] if outcome.table is None else differences(outcome.table),
         "preset": str(folder / f"{outcome.law}.toml"),
         "report": str(folder / f"report_{outcome.law}.md"),
@@ -88,12 +94,12 @@ def write(outcome: Outcome, folder: Path) -> dict[str, Any]:
         head = "# The shipped preset: no trial of the search may replace it."
     preset = with_gains(outcome.plan.shipped, gains).to_toml()
     write_text(folder / f"{law}.toml", f"{head}\n{preset}")
-    record = {**summary, "ranges": RANGES, "all_trials": trial_rows(outcome.trials)}
+    record = {**summary, "ranges": ranges(outcome.plan.shipped), "all_trials": trial_rows(outcome.trials)}
     write_json(folder / f"{law}_trials.json", record)
     with styled():
         shipped = shipped_score(outcome.plan, outcome.trials)
         save(draw_front(law, found, shipped, outcome.chosen), folder / "figures" / f"{law}-front.png")
-        if outcome.table is not None:
+        if outcome.table is not None and outcome.chosen is not None:
             write_table(folder / f"{law}_unseen.parquet", outcome.table)
             save(draw_unseen(law, outcome.table), folder / "figures" / f"{law}-unseen.png")
     write_text(folder / f"report_{law}.md", "\n".join(_page(outcome, summary)) + "\n")
@@ -133,6 +139,11 @@ def _page(outcome: Outcome, summary: dict[str, Any]) -> list[str]:
         "",
         *_finalists(outcome.finalists),
     ]
+    if outcome.objection:
+        return [
+            *lines,
+            f"The best finalist is not recommended: {outcome.objection}. The shipped preset stays.",
+        ]
     if outcome.chosen is None:
         return [
             *lines,

@@ -17,7 +17,7 @@ from sim.sweep.flying import fly_run
 from sim.tune.choice import STEEP, contact_damping, cost, less_damped
 from sim.tune.flights import SEARCH_SEED, flights, scenes, seeds
 from sim.tune.objectives import Score, refused, score
-from sim.tune.space import BY_HAND, RANGES, rounded, searched_gains, with_gains
+from sim.tune.space import BY_HAND, RANGES, ranges, rounded, searched_gains, with_gains
 
 if TYPE_CHECKING:
     import optuna
@@ -30,6 +30,8 @@ SPREAD = 0.12
 
 #: Gains and score of trials by number.
 Trials = dict[int, tuple[dict[str, float], Score]]
+#: Range of every searched gain.
+Spans = dict[str, tuple[float, float]]
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -89,7 +91,7 @@ def search(plan: SearchPlan, study: optuna.Study, progress: Callable[[int], None
         while (done := len(finished(study))) < plan.trials:
             progress(done)
             batch = _candidates(plan, study)[: min(plan.jobs, plan.trials - done)]
-            trials = [_ask(study, gains) for gains in batch]
+            trials = [_ask(plan, study, gains) for gains in batch]
             scores = evaluate(batch, plan, parallel)
             shipped = next((each for _, each in finished(study).values()), scores[0])
             for trial, gains, each in zip(trials, batch, scores, strict=True):
@@ -100,11 +102,11 @@ def search(plan: SearchPlan, study: optuna.Study, progress: Callable[[int], None
     progress(len(finished(study)))
 
 
-def _ask(study: optuna.Study, gains: dict[str, float]) -> optuna.Trial:
+def _ask(plan: SearchPlan, study: optuna.Study, gains: dict[str, float]) -> optuna.Trial:
     """A trial of these gains."""
     study.enqueue_trial(gains)
     trial = study.ask()
-    for name, span in RANGES.items():
+    for name, span in ranges(plan.shipped).items():
         trial.suggest_float(name, *span, log=True)
     return trial
 
@@ -129,11 +131,11 @@ def _candidates(plan: SearchPlan, study: optuna.Study) -> list[dict[str, float]]
     if left := waiting(starts):
         return left
     best = min(starts, key=lambda gains: costs[_key(gains)])
-    bounds = np.tile((0.0, 1.0), (len(RANGES), 1))
-    optimizer = cmaes.CMA(mean=_to_unit(best), sigma=SPREAD, bounds=bounds, seed=plan.seed)
+    spans, bounds = ranges(plan.shipped), np.tile((0.0, 1.0), (len(RANGES), 1))
+    optimizer = cmaes.CMA(mean=_to_unit(best, spans), sigma=SPREAD, bounds=bounds, seed=plan.seed)
     while True:
         draws = [optimizer.ask() for _ in range(optimizer.population_size)]
-        generation = [_from_unit(draw) for draw in draws]
+        generation = [_from_unit(draw, spans) for draw in draws]
         if left := waiting(generation):
             return left
         optimizer.tell([(draw, costs[_key(gains)]) for draw, gains in zip(draws, generation, strict=True)])
@@ -145,21 +147,23 @@ def _key(gains: dict[str, float]) -> tuple[float, ...]:
     return tuple(flown[name] for name in RANGES)
 
 
-def _to_unit(gains: dict[str, float]) -> np.ndarray:
+def _to_unit(gains: dict[str, float], spans: Spans) -> np.ndarray:
     """Gains as fractions of their logarithmic ranges."""
-    return np.array([np.log(gains[name] / low) / np.log(high / low) for name, (low, high) in RANGES.items()])
+    return np.array([np.log(gains[name] / low) / np.log(high / low) for name, (low, high) in spans.items()])
 
 
-def _from_unit(fractions: np.ndarray) -> dict[str, float]:
-    spans = zip(RANGES.items(), fractions, strict=True)
-    return {name: min(float(low * (high / low) ** fraction), high) for (name, (low, high)), fraction in spans}
+def _from_unit(fractions: np.ndarray, spans: Spans) -> dict[str, float]:
+    pairs = zip(spans.items(), fractions, strict=True)
+    return {name: min(float(low * (high / low) ** fraction), high) for (name, (low, high)), fraction in pairs}
 
 
 def _starts(plan: SearchPlan) -> list[dict[str, float]]:
     """Gains of the first trials, within the range of the search: the shipped ones, the other law's, those by hand."""
     shipped, other = searched_gains(plan.shipped), searched_gains(plan.other)
     known = [shipped, other, shipped | BY_HAND]
-    return [{name: float(np.clip(gains[name], *span)) for name, span in RANGES.items()} for gains in known]
+    return [
+        {name: float(np.clip(gains[name], *span)) for name, span in ranges(plan.shipped).items()} for gains in known
+    ]
 
 
 def start_gains(plan: SearchPlan) -> dict[str, float]:

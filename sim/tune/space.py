@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
+from ibvs_qp.config.gain_scaling import gain_factors
 from ibvs_qp.pilot import PilotConfig
 
 #: Search range of every gain, both laws alike: [low, high] on a logarithmic scale, about a decade around flying gains.
@@ -37,6 +38,13 @@ BY_HAND = {
 }
 #: Significant digits of a gain, so that the written preset equals the flown one.
 DIGITS = 4
+
+
+def ranges(config: PilotConfig) -> dict[str, tuple[float, float]]:
+    """`RANGES` for a vehicle: a lighter one than the Tarot has a lighter impedance."""
+    mass = min(1.0, gain_factors(config.controller.vehicle)[0])
+    scaled = {name: (mass * low, high) for name, (low, high) in RANGES.items() if name in ("force_ksp", "force_ksd")}
+    return RANGES | scaled
 
 
 def rounded(gains: dict[str, float]) -> dict[str, float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,8 @@ def differences(table: pl.DataFrame) -> list[dict[str, Any]]:
 
     Returns:
         Per scene ("all" first) and objective: n, medians of both, median of the differences with its interval, and
-        a verdict: "better", "worse", "same" for an interval with zero inside, or "too few" flights for an interval.
+        a verdict: "better", "worse", "same" for an interval with zero inside, "too few" flights for an interval, or
+        "none" without a pair of figures.
     """
     both = paired(table)
     by_scene = both.partition_by(PARAM + "scene", maintain_order=True, as_dict=True)
@@ -33,7 +35,6 @@ def differences(table: pl.DataFrame) -> list[dict[str, Any]]:
         for each in OBJECTIVES:
             before, after = (rows[name].cast(pl.Float64).to_numpy() for name in (each.name, f"{each.name}.{TUNED}"))
             change, count = median_interval(after - before), int(np.isfinite(after - before).sum())
-            verdict = "better" if change["high"] < 0.0 else "worse" if change["low"] > 0.0 else "same"
             result.append(
                 {
                     "scene": scene,
@@ -42,7 +43,28 @@ def differences(table: pl.DataFrame) -> list[dict[str, Any]]:
                     "shipped": median_interval(before)["median"],
                     "tuned": median_interval(after)["median"],
                     "difference": change,
-                    "verdict": verdict if count >= needed() else "too few",
+                    "verdict": _verdict(change, count),
                 }
             )
     return result
+
+
+def _verdict(change: dict[str, float], count: int) -> str:
+    if count < needed():
+        return "too few" if count else "none"
+    return "better" if change["high"] < 0.0 else "worse" if change["low"] > 0.0 else "same"
+
+
+def objection(table: pl.DataFrame) -> str:
+    """Why the tuned preset may not be recommended after the unseen flights, or "".
+
+    It completes less often than the shipped one, or in some scene it has no figure at all.
+    """
+    both = paired(table)
+    before, after = (int(both[name].cast(pl.Boolean).sum() or 0) for name in ("completed", f"completed.{TUNED}"))
+    if after < before:
+        return f"it completes {after} of {len(both)} unseen flights, the preset of the start {before}"
+    for each in differences(table):
+        if math.isnan(each["tuned"]):
+            return f"in the scene {each['scene']} it has no figure for {each['objective']}: no flight completes"
+    return ""

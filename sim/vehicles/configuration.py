@@ -15,7 +15,6 @@ from ibvs_qp.measurement import HORIZONTAL, VERTICAL
 from ibvs_qp.pilot import PilotConfig
 from ibvs_qp.pilot.contact_picture import hint_span
 from ibvs_qp.pilot.vehicle_check import check_vehicle
-from sim.vehicles.vehicle_file import VehicleFile
 from sim.world.scene import Scene
 
 #: Origin of settings that follow from the vehicle.
@@ -43,15 +42,16 @@ def with_vehicle(config: PilotConfig, vehicle: VehicleParams) -> PilotConfig:
     return dataclasses.replace(config, controller=dataclasses.replace(config.controller, vehicle=vehicle))
 
 
-def with_camera(scene: Scene, found: VehicleFile) -> Scene:
-    """The scene with the picture size and the field of view of a vehicle's camera, if its file states them."""
-    camera, vehicle = scene.camera, found.vehicle
-    if "camera_size_px" in found.stated:
-        width, height = vehicle.camera_size_px
-        camera = dataclasses.replace(camera, width=width, height=height)
-    if "camera_intrinsics_px" in found.stated:
-        field = 2.0 * math.degrees(math.atan(0.5 * vehicle.camera_size_px[1] / vehicle.camera_intrinsics_px[1]))
-        camera = dataclasses.replace(camera, vertical_fov_deg=field)
+def with_camera(scene: Scene, vehicle: VehicleParams) -> Scene:
+    """The scene with picture size and field of view of a vehicle's camera, unless that is the Tarot T960's.
+
+    The simulated camera has square pixels and its principal point in the middle.
+    """
+    usual, size, focal = VehicleParams(), vehicle.camera_size_px, vehicle.camera_intrinsics_px
+    if (size, focal) == (usual.camera_size_px, usual.camera_intrinsics_px):
+        return scene
+    field = 2.0 * math.degrees(math.atan(0.5 * size[1] / focal[1]))
+    camera = dataclasses.replace(scene.camera, width=size[0], height=size[1], vertical_fov_deg=field)
     return dataclasses.replace(scene, camera=camera)
 
 

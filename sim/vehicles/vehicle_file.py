@@ -44,6 +44,13 @@ class VehicleFile:
         """Fields that the file does not state."""
         return tuple(field.name for field in dataclasses.fields(VehicleParams) if field.name not in self.stated)
 
+    @property
+    def assumptions(self) -> tuple[str, ...]:
+        """What a flight assumes beside the file, in words; a key that TOML leaves out is the Tarot's by definition."""
+        if self.kind == "TOML":
+            return ()
+        return (f"{self.kind} without {', '.join(self.assumed)}: those of the Tarot T960", *self.notes)
+
 
 def read_vehicle(file: Path) -> VehicleFile:
     """Read a vehicle; the type of a file is found by its content.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from ibvs_qp import HybridController, PaperController, Pilot, PilotConfig, SafetySettings
 from ibvs_qp.presets import FOLDER
@@ -14,6 +15,11 @@ from . import internals
 DATA = Path(__file__).parent / "data"
 #: Colour of the paint, RGB, as in the default scene.
 PAINT_COLOR = (40, 90, 200)
+#: Calibration of the recorded pictures.
+SMALL_CAMERA: dict[str, Any] = {
+    "camera_size_px": (424, 240),
+    "camera_intrinsics_px": (312.61, 312.61, 211.5, 119.5),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,9 +49,10 @@ class Case:
     def config(self) -> PilotConfig:
         """The preset with what the case changes; replayed sensors do not answer the thrusts, so nothing supervises."""
         preset = PilotConfig.from_toml(FOLDER / f"{self.preset}.toml")
+        vehicle = dataclasses.replace(preset.controller.vehicle, **(SMALL_CAMERA if self.pictures else {}))
         return dataclasses.replace(
             preset,
-            controller=dataclasses.replace(preset.controller, reach_check=self.reach_check),
+            controller=dataclasses.replace(preset.controller, vehicle=vehicle, reach_check=self.reach_check),
             painting=dataclasses.replace(preset.painting, push_n=self.push_n),
             vision=dataclasses.replace(preset.vision, paint_color=PAINT_COLOR),
             perception=self.perception,

@@ -10,17 +10,32 @@ from ibvs_qp.vision.picture.grid import CoarseGrid
 
 #: Distances of the seeds from the tip's image, in brush radii: just outside the brush, then farther.
 _STEPS = (1.7, 2.6)
+#: Farther ones where all of those are hidden or outside the picture; below the brush, too.
+_FAR_STEPS = (4.0, 6.0, 9.0)
+_ASIDE = ((-1.0, 0.0), (1.0, 0.0), (-1.0, -1.0), (1.0, -1.0))
+_AROUND = (*_ASIDE, (-1.0, 1.0), (1.0, 1.0), (0.0, 1.0), (0.0, -1.0))
 
 
 def seed_cells(grid: CoarseGrid, vehicle: VehicleParams, brush_width_m: float) -> list[tuple[int, int]]:
-    """Cells around the brush's image that the vehicle does not hide: left, right and above."""
+    """Cells around the brush's image that the vehicle does not hide: left, right and above, else anywhere near."""
     x, y, z = to_camera(np.asarray(vehicle.tip_position_m, float), np.asarray(vehicle.camera_position_m, float))
-    radius = 0.5 * brush_width_m / z
+    center, radius = (x / z, y / z), 0.5 * brush_width_m / z
+    near = _free_cells(grid, center, radius, _STEPS, _ASIDE)
+    return near or _free_cells(grid, center, radius, (*_STEPS, *_FAR_STEPS), _AROUND)
+
+
+def _free_cells(
+    grid: CoarseGrid,
+    center: tuple[float, float],
+    radius: float,
+    steps: tuple[float, ...],
+    directions: tuple[tuple[float, float], ...],
+) -> list[tuple[int, int]]:
     rows, columns = grid.shape
     found = []
-    for step in _STEPS:
-        for across, down in ((-step, 0.0), (step, 0.0), (-step, -step), (step, -step)):
-            cell = grid.cell(x / z + across * radius, y / z + down * radius)
+    for step in steps:
+        for across, down in directions:
+            cell = grid.cell(center[0] + step * across * radius, center[1] + step * down * radius)
             if 0 <= cell[0] < rows and 0 <= cell[1] < columns and grid.free[cell]:
                 found.append(cell)
     return found

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import ibvs_qp
 from sim.commands.cli import main
+from sim.flight.options import FlightOptions, pilot_config
+from sim.flight.surroundings import World
+from sim.vehicles.configuration import with_camera
+from sim.vehicles.vehicle_file import read_vehicle
+from sim.world.scene import Scene
 
 FLAT = """[vehicle]
 mass_kg = 2.0
@@ -130,3 +137,24 @@ def test_little_reach_and_propellers_in_view_are_warned_of(capsys: pytest.Captur
     warnings = summary(capsys, "own.toml", "--push", "12")["warnings"]
     assert "reach" in warnings[0] and "propellers in view" in warnings[1]  # type: ignore[index]
     assert summary(capsys, "tarot_t960_qp")["warnings"] == []
+
+
+def test_paint_refuses_the_same_before_it_flies(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("own.toml").write_text("[vehicle]\ncamera_turn_deg = [0.0, -25.0, 0.0]\n")
+    assert main(["paint", "--vehicle", "own.toml", "--no-video", "--out", "run"]) == 2
+    out, err = capsys.readouterr()
+    assert out == "" and err.count("\n") == 1 and "--vehicle own.toml: brush outside the picture" in err
+    assert not Path("run").exists()
+
+
+def test_a_vehicle_of_a_file_flies_with_scaled_gains_and_its_camera() -> None:
+    Path("own.toml").write_text(
+        "[vehicle]\nmass_kg = 3.0\ncamera_size_px = [424, 240]\ncamera_intrinsics_px = [300.0, 300.0, 211.5, 119.5]\n"
+    )
+    scene = with_camera(Scene(), read_vehicle(Path("own.toml")).vehicle)
+    options = FlightOptions(law="paper", vehicle="own.toml")
+    config = pilot_config(scene, options).controller
+    assert config.gains.force_ksp == pytest.approx(0.5 * ibvs_qp.preset("paper").controller.gains.force_ksp)
+    assert config.vehicle.camera_intrinsics_px == pytest.approx((300.0, 300.0, 211.5, 119.5), abs=0.01)
+    world = World(scene, dataclasses.replace(options, features="geometric"), pilot_config(scene, options))
+    assert world.plant.vehicle.mass_kg == 3.0 and world.scene.camera.width == 424

@@ -7,6 +7,7 @@ import math
 from pathlib import Path
 from types import SimpleNamespace
 
+import polars as pl
 import pytest
 
 import ibvs_qp
@@ -20,6 +21,7 @@ from sim.tune.flights import CHOICE_SEED, REPORT_SEED, SEARCH_SEED, WORLD, check
 from sim.tune.objectives import OBJECTIVES, Score, refused, score
 from sim.tune.search import SearchPlan, finished, open_study, search
 from sim.tune.space import BY_HAND, RANGES, searched_gains, with_gains
+from sim.tune.verdict import differences, objection
 from sim.world.errors import world_errors
 from sim.world.random_scene import EVALUATION, TUNING, random_scene
 
@@ -343,3 +345,27 @@ def test_a_storage_of_another_search_is_refused(flown, capsys):
     assert main(["tune", "--trials", "1", "--json", "--out", "run"]) == 0
     assert main(["tune", "--trials", "1", "--json", "--out", "run", "--flights", "2"]) == 2
     assert "another --out" in capsys.readouterr().err
+
+
+def unseen(before: list[bool], after: list[bool]) -> pl.DataFrame:
+    """Flights of both presets; one that does not complete has no figures."""
+    rows = [
+        {"variant": name, "param.scene": "job", "seed": seed, "completed": done}
+        | {each.name: 1.0 if done else None for each in OBJECTIVES}
+        for name, flights in (("shipped", before), ("tuned", after))
+        for seed, done in enumerate(flights)
+    ]
+    return pl.DataFrame(rows, schema_overrides={each.name: pl.Float64 for each in OBJECTIVES})
+
+
+def test_what_completes_less_often_or_has_no_figure_is_not_recommended():
+    assert objection(unseen([True, True, False], [True, True, False])) == ""
+    assert "completes 1 of 3 unseen flights, the preset of the start 2" in objection(
+        unseen([True, True, False], [True, False, False])
+    )
+    nothing = unseen([False, False], [False, False])
+    assert "no figure for force_rms_n" in objection(nothing)
+    assert {each["verdict"] for each in differences(nothing)} == {"none"}
+    lost = Finalist(Score((0.5,) * len(OBJECTIVES), 0.5), {"job": Score((0.1,) * len(OBJECTIVES), 1.0)}, 0.3)
+    start = Finalist(Score((1.0,) * len(OBJECTIVES), 0.5), {"job": Score((1.0,) * len(OBJECTIVES), 1.0)}, 0.3)
+    assert not lost.may_replace(start)

@@ -117,3 +117,4 @@ def test_thrusts_of_px4_are_those_of_the_file(tmp_path: Path) -> None:
     found = read("\n".join(lines), tmp_path)
     assert found.kind == "PX4 parameters" and found.stated == {"geometry", "thrust_max_n"}
     np.testing.assert_allclose(found.vehicle.thrust_max, 30.0 + np.arange(6))
+    assert found.assumptions[0].startswith("PX4 parameters without mass_kg, inertia_kg_m2")
