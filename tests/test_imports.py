@@ -19,7 +19,7 @@ ORDER = {
         "limits qp vision painting checked_law analytic controller export assured pilot presets recording ros bridge"
     ).split(),
     "sim": (
-        "storage world scenes sensors rivals faults flight video evaluate scene_fuzz figures sweep report detection "
+        "storage world vehicles scenes sensors rivals faults flight video evaluate scene_fuzz figures sweep report detection "
         "experiments fault_matrix tune notebook bench commands"
     ).split(),
 }
