@@ -71,7 +71,14 @@ class SafetySettings:
     flip_deg: float = setting(60.0, "tilt that ends the flight", unit="deg", low=20.0, high=180.0)
     rate_rad_s: float = setting(3.0, "largest angular rate", unit="rad/s", low=0.2, high=30.0)
     speed_m_s: float = setting(0.7, "largest speed by the estimate", unit="m/s", low=0.1, high=10.0)
-    height_m: float = setting(1.5, "largest change of height by the odometer", unit="m", low=0.1, high=100.0)
+    height_m: float = setting(
+        2.5,
+        "largest change of height by the odometer",
+        unit="m",
+        why="a wall of 1.7 m and a start half a metre away",
+        low=0.1,
+        high=100.0,
+    )
     mission_s: float = setting(900.0, "longest flight", unit="s", low=1.0, high=1e5)
     envelope_time_s: float = setting(0.1, "beyond any of these for this long is a fault", unit="s", low=0.0, high=5.0)
     wall_gone_m: float = setting(

@@ -17,8 +17,9 @@ from ibvs_qp.painting.pattern_lines import CERTAIN_WEIGHT, LOST_WEIGHT, MARK_WEI
 
 #: Variance of the odometer per metre of way [m^2/m]: 7 mm after 1 m, as flown in the datasheet world.
 DRIFT_PER_M = 5e-5
-#: Standard deviation of an edge's place in one look, and of an unknown place [m].
-EDGE_STD, UNKNOWN_STD = 2e-3, 0.5
+#: Standard deviation of an edge's place in one look, and of an unknown place [m]; of the scale by which a far edge's
+#: place is seen [-]: depth and focal length.
+EDGE_STD, UNKNOWN_STD, SCALE_STD = 2e-3, 0.5, 0.015
 #: Standard deviation of the margin beside the beginning where the board's edge confirms it [m].
 MARGIN_STD = 1e-3
 #: A length that differs from the job's by more standard deviations than this is believed [-].
@@ -41,6 +42,7 @@ class AlongTrack:
         self._x, self._p = np.zeros(2), np.diag((UNKNOWN_STD**2, UNKNOWN_STD**2))
         self.known = self.end_seen = False
         self._near_known = False
+        self._way = self._began = self._began_variance = 0.0
         self.end = self.near = -1
 
     @property
@@ -61,17 +63,31 @@ class AlongTrack:
     def predict(self, du: float) -> None:
         """The tip has moved by the odometer [m]."""
         self._x[0] += du
+        self._way += du
         self._p[0, 0] += DRIFT_PER_M * abs(du)
+
+    def begin_stroke(self) -> None:
+        """A stroke begins here."""
+        self._way, self._began, self._began_variance = 0.0, self.u, float(self._p[0, 0])
+
+    @property
+    def stroke_length(self) -> float:
+        """Length of the stroke so far [m]; corrections on the way belong to its beginning and to the odometer."""
+        corrected = self.u - self._began - self._way
+        share = self._began_variance / (self._began_variance + DRIFT_PER_M * abs(self._way) + EDGE_STD**2)
+        return abs(self.u - self._began - share * corrected)
 
     def find_end(self, lines: Sequence[PatternLine]) -> bool:
         """Take u from the edge to which stroke 1 runs, wherever it is; False where it is not in view."""
+        certain = self._config.gates.start_deviation_m
         found = [line for line in _ends(lines) if line.kind == "board" and line.weight > CERTAIN_WEIGHT]
+        found = [line for line in found if line.track.deviation < certain]
         if not found:
             return False
         edge = min(found, key=lambda line: line.place)
         self._shift(self._config.stroke_m + self._config.edge_margin_m - edge.place - self.u)
         self._p[0, :] = self._p[:, 0] = 0.0
-        self._p[0, 0], self._p[1, 1] = EDGE_STD**2, UNKNOWN_STD**2
+        self._p[0, 0], self._p[1, 1] = EDGE_STD**2 + (SCALE_STD * edge.place) ** 2, UNKNOWN_STD**2
         self.known = self.end_seen = True
         self.end = edge.track.track_id
         return True
@@ -128,8 +144,8 @@ class AlongTrack:
         return near
 
     def _correct(self, line: PatternLine, expected: float, row: np.ndarray) -> str:
-        difference = line.place - expected
-        variance = float(row @ self._p @ row) + EDGE_STD**2
+        difference, seen = line.place - expected, EDGE_STD**2 + line.track.deviation**2
+        variance = float(row @ self._p @ row) + seen
         noticed = ""
         if abs(difference) > SIGMAS * math.sqrt(variance):
             # Both edges are seen, so the board is longer or shorter than the job says: the origin of u moves.
@@ -138,7 +154,7 @@ class AlongTrack:
                 self._p += self._config.gates.first_stop_m**2
             else:
                 self._p[1, 1] += self._config.gates.first_stop_m**2
-        self._update(difference, row, EDGE_STD**2 / max(line.weight, LOST_WEIGHT))
+        self._update(difference, row, seen / max(line.weight, LOST_WEIGHT))
         return noticed
 
     def _update(self, difference: float, row: np.ndarray, noise: float) -> None:

@@ -130,10 +130,10 @@ class PaintingConfig:
     climb_time_s: float = setting(0.3, "least time at the end of a climb", unit="s", low=0.0, high=5.0)
     climb_timeout_s: float = setting(1.0, "longest time for that error", unit="s", low=0.0, high=10.0)
     climb_stuck_m: float = setting(
-        0.008,
+        0.005,
         "error after that time from which the stroke begins; beyond it the brush leaves the wall and touches again",
         unit="m",
-        why="friction holds the tip; a band that much too far still touches the last one",
+        why="friction holds the tip; with the waves of both strokes the band still touches the last one",
         low=0.0005,
         high=0.05,
     )

@@ -13,7 +13,7 @@ import numpy as np
 
 from ibvs_qp.measurement import HORIZONTAL
 from ibvs_qp.painting.alignment import Alignment
-from ibvs_qp.painting.along_track import AlongTrack
+from ibvs_qp.painting.along_track import SIGMAS, AlongTrack
 from ibvs_qp.painting.carrier import Carrier
 from ibvs_qp.painting.command import ZERO, ExpectedEdge, PainterInput, PaintingCommand
 from ibvs_qp.painting.config import PaintingConfig
@@ -34,6 +34,8 @@ NEAR_BEGINNING_M = 0.06
 APPROACH_SPEED = 0.05
 #: A stroke that ends without an edge is as long as asked if u is known this well [m]; half the tolerance of a length.
 CERTAIN_LENGTH_M = 0.005
+#: A stroke is as long as asked within this [m].
+LENGTH_TOLERANCE_M = 0.01
 
 
 class Painter(PhaseMachine):
@@ -210,9 +212,10 @@ class Painter(PhaseMachine):
         margin = self.config.edge_margin_m
         beside = [line for line in self._lines if not line.parallel and line.kind != "paint" and line.side >= 0]
         mark = min(beside, key=lambda line: abs(line.place + margin), default=None)
-        if mark is None or mark.weight <= CERTAIN_WEIGHT or abs(mark.place + margin) >= self.config.gates.mark_m:
+        if mark is None or mark.weight <= CERTAIN_WEIGHT:
             return None
-        return mark
+        gate = self.config.gates.mark_m + SIGMAS * mark.track.deviation
+        return mark if abs(mark.place + margin) < gate else None
 
     def _survey(self, inputs: PainterInput, dt: float) -> PaintingCommand:
         """Fly along stroke 1 until the edge at its end is in view."""
@@ -352,6 +355,7 @@ class Painter(PhaseMachine):
     def _begin_stroke(self, inputs: PainterInput, stroke: int, reason: str) -> None:
         self.row, self._speed, self._follows_end = stroke, 0.0, False
         self._cross.begin_stroke()
+        self._along.begin_stroke()
         self._stroke_end.begin()
         self._u_reference, self._v_reference = (
             self._along.u,
@@ -368,6 +372,9 @@ class Painter(PhaseMachine):
         elif self._along.deviation > CERTAIN_LENGTH_M and not self._uncertain:
             known = f"its length is known to {self._along.deviation * 1e3:.0f} mm"
             self._uncertain = f"row {self.row} ended by the odometer, {known}"
+        length, asked = self._along.stroke_length, self.config.stroke_m
+        if abs(length - asked) > LENGTH_TOLERANCE_M and not self._uncertain:
+            self._uncertain = f"row {self.row} is {length * 1e3:.0f} mm long, {asked * 1e3:.0f} mm were asked"
         ended = f"row {self.row} ended {how}"
         if self._is_last():
             self._enter(inputs, "retreat", f"{ended}; all rows done")

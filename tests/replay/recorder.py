@@ -46,7 +46,7 @@ def fly(name: str, case: Case) -> Recording:
         seed=SEEDS.get(name, 0),
         features="rendered" if case.pictures else "geometric",
         vision=case.perception,
-        image_size=IMAGE_SIZE,
+        image_size=IMAGE_SIZE if case.pictures else None,
         video=False,
     )
     assert pilot_config(scene, options, config) == config, f"{name}: the replayed pilot is configured otherwise"

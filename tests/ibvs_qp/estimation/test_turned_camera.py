@@ -13,7 +13,7 @@ from controller_scenes import line_references
 from small_vehicle import SmallVehicle
 
 from ibvs_qp.analytic import PaperController
-from ibvs_qp.config import ControllerConfig
+from ibvs_qp.config import ControllerConfig, LimitSettings
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.controller import HybridController
 from ibvs_qp.estimation.turned_camera import OUT_OF_VIEW, TurnedCamera
@@ -87,7 +87,12 @@ def test_what_a_straight_camera_cannot_see_is_named() -> None:
 @pytest.mark.parametrize("law", [HybridController, PaperController])
 @pytest.mark.parametrize("turn", [(0.0, 15.0, 0.0), (10.0, -20.0, 15.0)])
 def test_a_controller_flies_a_turned_camera_like_a_straight_one(law: Callable[..., Any], turn: Turn) -> None:
-    straight, real = law(ControllerConfig()), law(ControllerConfig(vehicle=VehicleParams(camera_turn_deg=turn)))
+    limits = LimitSettings(view_barrier=False)  # a turned camera has another field of view
+    settings = [
+        ControllerConfig(limits=limits, vehicle=vehicle)
+        for vehicle in (VehicleParams(), VehicleParams(camera_turn_deg=turn))
+    ]
+    straight, real = (law(config) for config in settings)
     camera, vehicle = TurnedCamera(turn), SmallVehicle(ControllerConfig(), distance=0.3)
     camera.rotation = camera.rotation.T  # from the straight camera to the real one
     reference = Reference(standoff=0.2, lines=line_references(2))

@@ -9,7 +9,7 @@ import pytest
 
 from ibvs_qp.estimation.tracked_line import TrackedLine
 from ibvs_qp.painting import along_track
-from ibvs_qp.painting.along_track import DRIFT_PER_M, EDGE_STD, AlongTrack
+from ibvs_qp.painting.along_track import DRIFT_PER_M, EDGE_STD, SCALE_STD, AlongTrack
 from ibvs_qp.painting.config import PaintingConfig
 from ibvs_qp.painting.pattern_lines import PatternLine
 
@@ -53,7 +53,8 @@ def test_the_end_gives_u_wherever_it_is() -> None:
     along = AlongTrack(CONFIG)
     assert not along.find_end([upright(2, -0.1, 1), upright(5, 0.1, -1, "paint"), upright(6, 0.1, -1, weight=0.5)])
     assert along.find_end([upright(4, 0.4, -1), upright(3, 0.2, -1)])
-    assert along.u == pytest.approx(END_U - 0.2) and along.end == 3 and along.deviation == pytest.approx(EDGE_STD)
+    assert along.u == pytest.approx(END_U - 0.2) and along.end == 3
+    assert along.deviation == pytest.approx(math.hypot(EDGE_STD, 0.2 * SCALE_STD))
 
 
 @pytest.mark.parametrize("error", [-0.01, 0.01])

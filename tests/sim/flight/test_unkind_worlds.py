@@ -78,8 +78,9 @@ def test_the_analytic_law_completes_in_every_world(world: str) -> None:
 
 
 @pytest.mark.parametrize("down_m", [-0.005, 0.005])
-def test_a_tip_that_is_not_where_it_should_be_keeps_the_second_row_at_its_place(down_m: float) -> None:
+def test_a_tip_that_is_not_where_it_should_be_is_learnt_from_the_paint_in_the_first_row(down_m: float) -> None:
     front, right, down = ibvs_qp.preset("qp").controller.vehicle.tip_position_m  # believed
     metrics = compute_metrics(flown(WorldErrors(), plant=PlantScene(tip_position_m=(front, right, down + down_m))))
     rows = [row["path_rms_straight_m"] for row in metrics["rows"]]
-    assert metrics["completed"] and rows[0] > 4e-3 and rows[1] < 2e-3
+    assert metrics["completed"], metrics["not_completed"]
+    assert rows[0] < 4e-3 and rows[1] < 2.5e-3  # 5 mm and more where nothing is learnt
