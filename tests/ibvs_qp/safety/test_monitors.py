@@ -59,7 +59,7 @@ STOPPED = BEGIN * TICK_NS
         (Fault.TILT, 0.11, lambda n: {"down": (math.sin(0.23), 0.0, math.cos(0.23))}),
         (Fault.RATE, 0.11, lambda n: {"rate": (0.0, 2.5, 2.5)}),
         (Fault.SPEED, 0.11, lambda n: {"speed": 0.8}),
-        (Fault.HEIGHT, 0.11, lambda n: {"height": -1.6}),
+        (Fault.HEIGHT, 0.11, lambda n: {"height": -2.6}),
         (Fault.WALL_GONE, 0.11, lambda n: {"contact": CONTACT._replace(in_contact=False, distance=0.05, push=0.0)}),
         (Fault.SOLVER, 0.0, lambda n: {"outcome": Outcome.ANALYTIC_FALLBACK}),
     ],

@@ -109,8 +109,8 @@ LIMITS = {
         ["paint.speed_m_s", "safety.mission_s"],
     ),
     "columns higher than the supervisor's bound": (
-        paint(BoardScene(height_m=2.0), pattern="columns", stroke_m=1.52),
-        paint(BoardScene(height_m=2.0), pattern="columns", stroke_m=1.49),
+        paint(BoardScene(height_m=3.0), pattern="columns", stroke_m=2.52),
+        paint(BoardScene(height_m=3.0), pattern="columns", stroke_m=2.49),
         ["paint.stroke_m", "safety.height_m"],
     ),
     "a start at the ground": (
