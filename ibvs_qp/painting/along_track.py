@@ -152,6 +152,7 @@ class AlongTrack:
             noticed = f"the board's edge lies {difference * 1e3:+.0f} mm from where the job expects it"
             if row is _END:
                 self._p += self._config.gates.first_stop_m**2
+                self._began_variance += self._config.gates.first_stop_m**2
             else:
                 self._p[1, 1] += self._config.gates.first_stop_m**2
         self._update(difference, row, seen / max(line.weight, LOST_WEIGHT))

@@ -17,7 +17,12 @@ class LineGates:
         0.7, "board edge that guides stroke 1", unit="m", why="a start 0.5 m away, and a margin", low=0.01, high=2.0
     )
     mark_m: float = setting(
-        0.03, "board edge beside the beginning: nearer to its place, it marks it", unit="m", low=0.005, high=0.5
+        0.045,
+        "board edge beside the beginning: nearer to its place, it marks it",
+        unit="m",
+        why="a start placed by hand within 2 cm, turned by 3 deg at 0.45 m",
+        low=0.005,
+        high=0.5,
     )
     first_stop_m: float = setting(
         0.25, "edge that ends stroke 1", unit="m", why="its length is nominal", low=0.01, high=2.0

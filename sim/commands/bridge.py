@@ -82,7 +82,7 @@ class BridgeCommand:
         flight = PilotConfig.from_toml(file)
         if self.vehicle is None:
             return flight
-        controller = dataclasses.replace(flight.controller, vehicle=read_vehicle(self.vehicle))
+        controller = dataclasses.replace(flight.controller, vehicle=read_vehicle(self.vehicle).vehicle)
         return dataclasses.replace(flight, controller=controller)
 
 

@@ -50,8 +50,8 @@ def test_the_vehicle_steps_back_until_the_guide_is_in_view(across: float) -> Non
 
 
 def test_a_mark_that_is_in_view_but_not_at_the_margin_begins_no_stroke() -> None:
-    """4 cm beside the margin: an edge in view is no mark; where the job begins follows from its end."""
-    world = started(0.04, 0.0, stroke_m=1.0)
+    """6 cm beside the margin: an edge in view is no mark; where the job begins follows from its end."""
+    world = started(0.06, 0.0, stroke_m=1.0)
     assert NEAR in world.lines()
     assert_painted(world)
     assert "survey" in world.phases()
