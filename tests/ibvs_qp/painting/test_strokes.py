@@ -185,7 +185,7 @@ def test_a_tip_that_friction_holds_beside_its_place_searches_and_begins_anew() -
     world.fly(10.0, until="search")
     assert world.painter.phase == "search"
     _, _, reason = world.painter.log[-1]
-    assert re.fullmatch(r"row 2: \+\d+ mm from its place of 8 mm", reason)
+    assert re.fullmatch(r"row 2: \+\d+ mm from its place of 5 mm", reason)
     world.stuck = False
     assert_painted(world)
 
