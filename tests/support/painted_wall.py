@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
+import pytest
 
 from ibvs_qp.estimation.tracked_line import TrackedLine
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL
@@ -351,3 +352,25 @@ def clip(
         (first[0] + low * step[0], first[1] + low * step[1]),
         (first[0] + high * step[0], first[1] + high * step[1]),
     )
+
+
+#: Largest error of a stroke's place and end [m].
+PLACE = 3e-3
+
+
+def started(right: float, down: float, **changes: object) -> PaintedWall:
+    """A job of one stroke that starts that far along u and v from where stroke 1 begins [m]."""
+    world = PaintedWall(short(**({"rows": 1} | changes)))
+    world.tip = world.tip + np.array((right, down))
+    return world
+
+
+def assert_started_well(world: PaintedWall) -> None:
+    """A job of one stroke is finished, begins and ends where it should, and lies at its place."""
+    world.fly(150.0)
+    assert world.painter.finished and not world.painter.failed, world.painter.reason
+    path = world.paint[0]
+    painted = path.u[~(path.v != path.v)]
+    assert abs(world.place_errors()[0]) < PLACE
+    assert painted[0] == pytest.approx(0.0, abs=0.012)
+    assert world.ends[0][1] == pytest.approx(world.config.stroke_m, abs=PLACE)

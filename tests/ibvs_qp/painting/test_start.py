@@ -7,27 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from painted_wall import END, GUIDE, NEAR, PaintedWall, Piece, short
-
-PLACE = 3e-3
-
-
-def started(right: float, down: float, **changes: object) -> PaintedWall:
-    """A job of one stroke that starts that far along u and v from where stroke 1 begins [m]."""
-    world = PaintedWall(short(**({"rows": 1} | changes)))
-    world.tip = world.tip + np.array((right, down))
-    return world
-
-
-def assert_painted(world: PaintedWall) -> None:
-    world.fly(150.0)
-    assert world.painter.finished and not world.painter.failed, world.painter.reason
-    path = world.paint[0]
-    painted = path.u[~(path.v != path.v)]
-    assert abs(world.place_errors()[0]) < PLACE
-    assert painted[0] == pytest.approx(0.0, abs=0.012)
-    assert world.ends[0][1] == pytest.approx(world.config.stroke_m, abs=PLACE)
-
+from painted_wall import END, GUIDE, NEAR, PLACE, PaintedWall, Piece, assert_started_well, short, started
 
 # ------------------------------------------------------------------------------------------------------ from where
 
@@ -35,7 +15,7 @@ def assert_painted(world: PaintedWall) -> None:
 @pytest.mark.parametrize("across", [-0.5, 0.5])
 @pytest.mark.parametrize(("kind", "start"), [("rows", "bottom-right"), ("columns", "top-left")])
 def test_stroke_one_begins_at_its_place_from_beside_it(kind: str, start: str, across: float) -> None:
-    assert_painted(started(0.0, across, pattern=kind, start=start, stroke_m=1.0))
+    assert_started_well(started(0.0, across, pattern=kind, start=start, stroke_m=1.0))
 
 
 @pytest.mark.parametrize("across", [-0.5, 0.5])
@@ -46,14 +26,14 @@ def test_the_vehicle_steps_back_until_the_guide_is_in_view(across: float) -> Non
     assert world.distance == pytest.approx(0.3, abs=1e-6)  # it looks first
     world.fly(15.0, until="approach")
     assert world.painter.phase == "approach" and 0.5 < world.distance < world.config.wide_view_m + 0.01
-    assert_painted(world)
+    assert_started_well(world)
 
 
 def test_a_mark_that_is_in_view_but_not_at_the_margin_begins_no_stroke() -> None:
     """6 cm beside the margin: an edge in view is no mark; where the job begins follows from its end."""
     world = started(0.06, 0.0, stroke_m=1.0)
     assert NEAR in world.lines()
-    assert_painted(world)
+    assert_started_well(world)
     assert "survey" in world.phases()
 
 
@@ -79,7 +59,7 @@ def test_decoys_are_not_taken_for_the_guide() -> None:
     world.fly(10.0, until="approach")
     world.step()
     assert world.guide == GUIDE
-    assert_painted(world)
+    assert_started_well(world)
 
 
 # ------------------------------------------------------------------------------------------------- waits, time-outs

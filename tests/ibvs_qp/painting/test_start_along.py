@@ -4,28 +4,8 @@ from __future__ import annotations
 
 import re
 
-import numpy as np
 import pytest
-from painted_wall import PaintedWall, short
-
-PLACE = 3e-3
-
-
-def started(right: float, down: float, **changes: object) -> PaintedWall:
-    """A job of one stroke that starts that far along u and v from where stroke 1 begins [m]."""
-    world = PaintedWall(short(**({"rows": 1} | changes)))
-    world.tip = world.tip + np.array((right, down))
-    return world
-
-
-def assert_painted(world: PaintedWall) -> None:
-    world.fly(150.0)
-    assert world.painter.finished and not world.painter.failed, world.painter.reason
-    path = world.paint[0]
-    painted = path.u[~(path.v != path.v)]
-    assert abs(world.place_errors()[0]) < PLACE
-    assert painted[0] == pytest.approx(0.0, abs=0.012)
-    assert world.ends[0][1] == pytest.approx(world.config.stroke_m, abs=PLACE)
+from painted_wall import assert_started_well, started
 
 
 @pytest.mark.parametrize(
@@ -34,7 +14,7 @@ def assert_painted(world: PaintedWall) -> None:
 )
 @pytest.mark.parametrize(("kind", "start"), [("rows", "bottom-right"), ("columns", "top-left")])
 def test_stroke_one_begins_at_its_place_from_anywhere(kind: str, start: str, along: float, across: float) -> None:
-    assert_painted(started(along, across, pattern=kind, start=start, stroke_m=1.0))
+    assert_started_well(started(along, across, pattern=kind, start=start, stroke_m=1.0))
 
 
 def test_without_a_mark_at_the_start_a_survey_finds_the_end() -> None:
@@ -46,7 +26,7 @@ def test_without_a_mark_at_the_start_a_survey_finds_the_end() -> None:
     )
     _, _, reason = world.painter.log[-1]
     assert re.search(r"stroke 1 begins -[67]\d\d mm from here", reason)
-    assert_painted(world)
+    assert_started_well(world)
 
 
 def test_an_approach_that_cannot_move_names_the_way_that_is_left() -> None:
