@@ -47,7 +47,7 @@ def line_of(pixels: np.ndarray, picture: RgbdFrame, side: int, track_id: int) ->
 
 
 def main() -> None:
-    """Two seconds of flight on the own detector: the pilot finds the guide and approaches."""
+    """Two seconds of flight on the own detector: the pilot finds the guide and flies along it, to the board's end."""
     pilot = Pilot(preset("qp"))
     vehicle, camera = Vehicle(pilot.config.controller.vehicle), DrawnCamera(BOARD_M)
     for tick in range(1, 501):

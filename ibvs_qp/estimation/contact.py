@@ -64,7 +64,8 @@ def contact_state(
     settings, estimation = config.contact, config.contact.estimation
     touch = TouchDetector(signals, config, tick.dt)
     wall = WallDistance(signals, config, tick, history)
-    wall.correct(plane, both(touch.in_contact, touch.time - plane.age > estimation.stationary_after_s))
+    standing_s = touch.time - plane.age + 0.5 * config.tick_s  # times are whole ticks: rounding must not decide
+    wall.correct(plane, both(touch.in_contact, standing_s > estimation.stationary_after_s))
     stopped_s = signals.state("contact.stopped_s")
     far = wall.distance > FREE_DISTANCES * settings.contact_distance_m
     free = both(no(touch.in_contact), far, stopped_s <= 0.0)

@@ -87,7 +87,7 @@ def test_a_simulator_is_wired_up_in_few_lines() -> None:
 
 def test_other_simulator_paints_two_rows_at_the_push_asked_for() -> None:
     text = printed("other_simulator")
-    assert "failed: False all rows painted" in text and "fresh edge found" in text
+    assert "failed: False all rows painted" in text and "by paint edge" in text
     middle, highest = map(float, re.findall(r"push ([\d.]+) N, at most ([\d.]+) N", text)[0])
     assert middle == pytest.approx(5.0, abs=0.1) and highest < 6.0
 
@@ -95,14 +95,14 @@ def test_other_simulator_paints_two_rows_at_the_push_asked_for() -> None:
 @pytest.mark.slow  # a flight with pictures
 def test_pilot_flies_a_job_by_drawn_pictures_of_a_plain_board_flush_with_its_wall() -> None:
     text = printed("pilot")
-    assert "done, failed: False" in text and "fresh edge found" in text and "refused" not in text
+    assert "done, failed: False" in text and "by paint edge" in text and "refused" not in text
     begin, end = (float(re.findall(rf" ([\d.]+) s  {event}  row 1", text)[0]) for event in ("paint", "climb"))
     assert end - begin < 7.0  # 0.4 m at 0.1 m/s: the lines give the velocity where the flow has no points
 
 
 def test_own_perception_finds_the_edge_below_the_brush() -> None:
     found = re.findall(r"(\w+) +edge ([\d.]+) mm", printed("own_perception"))
-    assert len(found) == 5 and found[-1][0] in ("approach", "align")
+    assert len(found) == 5 and found[-1][0] == "survey"
     assert [float(offset) for _, offset in found] == pytest.approx([50.0] * 5, abs=2.0)
 
 

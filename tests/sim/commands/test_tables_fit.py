@@ -20,7 +20,8 @@ from sim.commands import bench, compare, experiment, faults
 from sim.commands.cli import main
 from sim.detection.report import frame_table
 from sim.evaluate import explanation_text
-from sim.evaluate.table import LINES, figure_table, terminal_table
+from sim.evaluate.flight_table import LINES, figure_table
+from sim.evaluate.table import terminal_table
 
 WIDTH = 80
 #: A figure with more digits than any real one.
@@ -98,7 +99,7 @@ def test_explain() -> None:
 def test_compare(printed: list[object], capsys: pytest.CaptureFixture[str], tmp_path, pairs: int) -> None:
     figures = {"a": WIDE, "b": WIDE, "median": WIDE, "low": 2.0 * WIDE, "high": WIDE, "pairs": pairs}
     cell = {"experiment": "paint", "law": "qp", "variant": "lexicographic", "params": {"world": "harsh"}, "n": 20}
-    cell |= {"completed": [20, 19], "differences": {line.key: figures for line in LINES}}
+    cell |= {"completed": [20, 19], "differences": {line.name: figures for line in LINES}}
     conditions = [{"name": "preset.controller.gains.force_kfp", "a": 0.123456789, "b": [0.25, 0.125, 1.0625]}]
     compare._print(conditions, [cell], tmp_path, tmp_path, "datasheet")
     assert_whole(printed, 2)
@@ -112,7 +113,8 @@ def test_vehicle_of_eight_rotors(printed: list[object], capsys: pytest.CaptureFi
 
 
 def test_paint() -> None:
-    flight = {line.key: REASON if line.key == "reason" else WIDE for line in LINES}
+    flight: dict[str, object] = {line.name: REASON if line.name == "reason" else WIDE for line in LINES}
+    flight |= {"claimed": True, "completed": False}
     assert_whole([figure_table({"qp": flight, "paper": flight})], 1)
 
 

@@ -98,12 +98,14 @@ def test_right_axes_pass_in_every_world(world: str, law: str) -> None:
     options = dataclasses.replace(OPTIONS, law=law, seed=1)
     config = pilot_config(scene, options)
     pilot, flown = Pilot(config), World(scene, options, config)
-    for tick in range(4500):
+    for tick in range(7000):  # a survey of stroke 1 comes first where its begin is not in view
         command = pilot.step(flown.sense())
         flown.act(command.thrusts)
         assert not any(reason.startswith("self-check") for reason in command.rejected)
         assert pilot.self_check.passed == (tick >= 12)
-    assert pilot.contact.state.in_contact
+        if pilot.contact.state.time_since_touch > 1.0:
+            return
+    raise AssertionError("no contact")
 
 
 @pytest.mark.parametrize("law", ["qp", "paper"])
