@@ -1,6 +1,7 @@
 """``python -m sim.scene_fuzz --draws 150 --first-seed 1000``: fly drawn scenes and count their outcomes.
 
-Prints every draw that is not complete, then figure, goal and n; exits 1 when a scene had an outcome that none may have.
+``--scenes FOLDER`` flies the scenes of a folder instead, and none of them may fail. Prints every scene that is not
+complete, then figure, goal and n; exits 1 when a scene had an outcome that none may have.
 """
 
 from __future__ import annotations
@@ -8,9 +9,10 @@ from __future__ import annotations
 import argparse
 import sys
 from collections import Counter
+from pathlib import Path
 
 from sim.flight.options import FlightOptions
-from sim.scene_fuzz.judge import BAD, COMPLETE, OUTCOMES, judge
+from sim.scene_fuzz.judge import BAD, COMPLETE, FAILED, OUTCOMES, judge_draw, judge_file
 from sim.world.worlds import DEFAULT_WORLD, world_names
 
 #: Longest time of the strokes of a drawn scene [s]; ten times that of the default one would take a day for 150 draws.
@@ -22,23 +24,34 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m sim.scene_fuzz", description=__doc__)
     parser.add_argument("--draws", type=int, default=150, help="number of scenes")
     parser.add_argument("--first-seed", type=int, default=0, help="seed of the first; the next ones follow")
+    parser.add_argument(
+        "--scenes", type=Path, help="folder of scenes (TOML) to fly instead of draws, each with --seeds"
+    )
+    parser.add_argument("--seeds", type=int, nargs="+", default=[0], help="seeds of the scenes of a folder")
     parser.add_argument("--law", choices=("qp", "paper"), default="qp")
     parser.add_argument("--features", choices=("geometric", "rendered"), default="geometric")
     parser.add_argument("--world", choices=world_names(), default=DEFAULT_WORLD)
     parser.add_argument("--longest", type=float, default=LONGEST_S, help="longest time of a scene's strokes [s]")
     given = parser.parse_args()
     options = FlightOptions(law=given.law, features=given.features, video=False, compiled=True)
+    if given.scenes is not None:
+        files = sorted(given.scenes.glob("*.toml"))
+        judged = (judge_file(file, options, given.world, seed) for file in files for seed in given.seeds)
+        bad, source = (*BAD, FAILED), str(given.scenes)
+    else:
+        seeds = range(given.first_seed, given.first_seed + given.draws)
+        judged = (judge_draw(seed, options, given.world, given.longest) for seed in seeds)
+        bad, source = BAD, f"draws from seed {given.first_seed}"
     counts: Counter[str] = Counter()
-    for seed in range(given.first_seed, given.first_seed + given.draws):
-        judged = judge(seed, options, given.world, given.longest)
-        counts[judged.outcome] += 1
-        if judged.outcome != COMPLETE:
-            print(judged, flush=True)
-    flown = f"n = {given.draws} scenes, {given.law}, {given.features}, {given.world}, from seed {given.first_seed}"
+    for each in judged:
+        counts[each.outcome] += 1
+        if each.outcome != COMPLETE:
+            print(each, flush=True)
+    flown = f"n = {counts.total()} flights, {given.law}, {given.features}, {given.world}, {source}"
     print(f"\n{'figure':<24} {'count':>5}  goal   {flown}")
     for outcome in OUTCOMES:
-        print(f"{outcome:<24} {counts[outcome]:>5}  {'0' if outcome in BAD else '-':<6}")
-    return int(any(counts[outcome] for outcome in BAD))
+        print(f"{outcome:<24} {counts[outcome]:>5}  {'0' if outcome in bad else '-':<6}")
+    return int(not counts or any(counts[outcome] for outcome in bad))
 
 
 if __name__ == "__main__":

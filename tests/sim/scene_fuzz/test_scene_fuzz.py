@@ -8,7 +8,7 @@ from sim.flight.options import FlightOptions
 from sim.flight.preflight import job_problems
 from sim.scene_fuzz import judge as judging
 from sim.scene_fuzz.draw import FEWEST, MOST, drawn_scene, scene_keys
-from sim.scene_fuzz.judge import BAD, judge
+from sim.scene_fuzz.judge import BAD, judge_draw, judge_file
 
 OPTIONS = FlightOptions(features="geometric", video=False, compiled=True)
 #: Draws of the slow test; the command `python -m sim.scene_fuzz` flies others.
@@ -54,7 +54,7 @@ def test_outcome_is_what_the_truth_makes_of_the_claim(monkeypatch, completed, cl
     monkeypatch.setattr(judging, "fly", lambda scene, options: SimpleNamespace(reason=reason))
     figures = {"completed": completed, "claimed": claimed, "not_completed": None if completed else "row 1: short"}
     monkeypatch.setattr(judging, "compute_metrics", lambda trace: figures)
-    judged = judge(0, OPTIONS, "datasheet", 150.0)
+    judged = judge_draw(0, OPTIONS, "datasheet", 150.0)
     assert judged.outcome == outcome and (outcome in BAD) == outcome.isupper()
     assert reason in str(judged)
 
@@ -64,13 +64,19 @@ def test_refusals_and_internal_errors_are_told_apart(monkeypatch):
         raise ZeroDivisionError("pitch")
 
     monkeypatch.setattr(judging, "fly", broken)
-    outcomes = {judge(seed, OPTIONS, "datasheet", 150.0).outcome for seed in range(40)}
+    outcomes = {judge_draw(seed, OPTIONS, "datasheet", 150.0).outcome for seed in range(40)}
     assert outcomes == {"refused before flight", "INTERNAL ERROR"}
+
+
+def test_a_scene_of_a_file_is_refused_by_name(tmp_path):
+    (tmp_path / "thin.toml").write_text("[paint]\noverlap_m = 0.08\n")
+    judged = judge_file(tmp_path / "thin.toml", OPTIONS, "datasheet", 3)
+    assert judged.outcome == "refused before flight" and str(judged).startswith("thin 3: refused before flight: ")
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("seed", range(FIRST_SEED, FIRST_SEED + FLIGHTS))
 def test_no_drawn_scene_crashes_breaks_or_is_claimed_falsely(seed):
-    judged = judge(seed, OPTIONS, "datasheet", 100.0)
+    judged = judge_draw(seed, OPTIONS, "datasheet", 100.0)
     assert judged.outcome not in BAD, str(judged)
