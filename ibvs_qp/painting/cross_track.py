@@ -71,6 +71,7 @@ class CrossTrack:
         guides: Tracks that were recognised at the last look with their v [m], best first.
         maps: Where the strokes were laid, oldest first.
         far_edge: v of the board's other edge where it has been in view [m], NaN before.
+        laid_deviation: Mean of `deviation` over the stroke that is or was laid last [m].
     """
 
     def __init__(self, config: PaintingConfig) -> None:
@@ -81,6 +82,7 @@ class CrossTrack:
         self.turn, self.far_edge = 0.0, math.nan
         self.guides: dict[int, float] = {}
         self._laying = False
+        self.laid_deviation, self._laid = 0.0, 0
 
     @property
     def v(self) -> float:
@@ -133,11 +135,14 @@ class CrossTrack:
         """The tip begins to paint a stroke; what it paints is remembered."""
         self.maps.append(StrokeMap(self._config.stroke_m))
         self._laying = True
+        self.laid_deviation, self._laid = 0.0, 0
         self._clone(_V, _OWN_MAP)
 
     def lay(self, u: float) -> None:
         """The brush presses here."""
         self.maps[-1].add(u, self.v)
+        self._laid += 1
+        self.laid_deviation += (self.deviation - self.laid_deviation) / self._laid
 
     def end_stroke(self) -> None:
         """The stroke ends; what comes into view first of the next one is its end."""

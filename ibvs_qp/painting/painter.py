@@ -13,7 +13,7 @@ from ibvs_qp.painting.alignment import Alignment
 from ibvs_qp.painting.along_track import SIGMAS
 from ibvs_qp.painting.command import PainterInput, PaintingCommand
 from ibvs_qp.painting.navigation import Navigation
-from ibvs_qp.painting.pattern import FILL, FILL_REST_M
+from ibvs_qp.painting.pattern import FILL, FILL_REST_M, PLACE_TOLERANCE_M
 from ibvs_qp.painting.pattern_lines import CERTAIN_WEIGHT, PatternLine
 from ibvs_qp.painting.speed import approached, climb_speed, ramped, stroke_speed
 from ibvs_qp.painting.stroke_end import StrokeEnd
@@ -272,15 +272,8 @@ class Painter(Navigation):
     def _end_stroke(self, inputs: PainterInput) -> None:
         self._cross.end_stroke()
         edge = self._along_line.line
-        how = "by the odometer"
-        if edge is not None:
-            how = f"at {edge.kind or 'unknown'} edge {edge.track.offset * 1e3:+.0f} mm"
-        elif self._along.deviation > CERTAIN_LENGTH_M and not self._uncertain:
-            known = f"its length is known to {self._along.deviation * 1e3:.0f} mm"
-            self._uncertain = f"row {self.row} ended by the odometer, {known}"
-        length, asked = self._along.stroke_length, self.config.stroke_m
-        if abs(length - asked) > LENGTH_TOLERANCE_M and not self._uncertain:
-            self._uncertain = f"row {self.row} is {length * 1e3:.0f} mm long, {asked * 1e3:.0f} mm were asked"
+        how = "by the odometer" if edge is None else f"at {edge.kind or 'unknown'} edge {edge.track.offset * 1e3:+.0f} mm"
+        self._uncertain = self._uncertain or self._doubt()
         ended = f"row {self.row} ended {how}"
         if self._is_last():
             self._enter(inputs, "retreat", f"{ended}; all rows done")
@@ -288,6 +281,22 @@ class Painter(Navigation):
         self.row += 1
         self._speed, self._u_reference = 0.0, self._along.u
         self._enter(inputs, "climb", ended)
+
+    def _doubt(self) -> str:
+        """What forbids to claim the stroke that has ended: length and place as estimated, and how well they are known."""
+        length, asked = self._along.stroke_length, self.config.stroke_m
+        if self._along_line.line is None and self._along.deviation > CERTAIN_LENGTH_M:
+            known = self._along.deviation
+            return f"row {self.row} ended by the odometer, its length is known to {known * 1e3:.0f} mm"
+        if abs(length - asked) > LENGTH_TOLERANCE_M:
+            return f"row {self.row} is {length * 1e3:.0f} mm long, {asked * 1e3:.0f} mm were asked"
+        spread = SIGMAS * self._cross.laid_deviation
+        if spread > PLACE_TOLERANCE_M:
+            return f"row {self.row}: its place is known to {spread * 1e3:.0f} mm of {PLACE_TOLERANCE_M * 1e3:g} mm"
+        aside = self._cross.maps[-1].mean(self._along.begin, asked) - self._v_target
+        if abs(aside) > PLACE_TOLERANCE_M:
+            return f"row {self.row} lies {aside * 1e3:+.0f} mm from its place, limit {PLACE_TOLERANCE_M * 1e3:g} mm"
+        return ""
 
     def _lead_to_end(self, ended: bool, moved: float) -> None:
         """Once the edge at the end of the stroke is in view, it leads: from where the tip is, at the stroke's speed."""

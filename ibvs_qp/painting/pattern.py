@@ -18,8 +18,10 @@ PATTERNS = (ROWS, COLUMNS)
 CORNERS = ("bottom-right", "bottom-left", "top-right", "top-left")
 #: As many strokes as the board has place for.
 FILL = "fill"
-#: A rest of the board that is narrower than this gets no stroke of its own [m]: the tolerance of a stroke's place.
-FILL_REST_M = 0.008
+#: Farthest that a stroke at its place may lie from its nominal place, in the mean over its straight part [m].
+PLACE_TOLERANCE_M = 0.008
+#: A rest of the board that is narrower than this gets no stroke of its own [m].
+FILL_REST_M = PLACE_TOLERANCE_M
 
 Axis = tuple[float, float]
 _LEFT, _RIGHT, _UP, _DOWN = (-1.0, 0.0), (1.0, 0.0), (0.0, -1.0), (0.0, 1.0)

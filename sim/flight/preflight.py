@@ -15,7 +15,7 @@ from allocation.wrench_facets import WrenchFacets
 from ibvs_qp.config import SafetySettings
 from ibvs_qp.config.errors import ConfigError, out_of_range
 from ibvs_qp.frames import GRAVITY, rotation_from_vector
-from ibvs_qp.painting.pattern import FILL_REST_M, ROWS
+from ibvs_qp.painting.pattern import PLACE_TOLERANCE_M, ROWS
 from ibvs_qp.pilot import PilotConfig
 from sim.flight.contact_view import STEP_M, ContactView
 from sim.flight.jobs import Job, PaintJob
@@ -25,8 +25,6 @@ from sim.world.crash import GROUND_CLEARANCE_M
 from sim.world.scene import Scene
 from sim.world.trim import START_DISTANCE_M, START_DOWN_M, START_YAW_DEG
 
-#: Farthest that a stroke at its place may lie from its nominal place [m].
-PLACE_TOLERANCE_M = FILL_REST_M
 #: Neighbouring strokes come locally up to this much farther apart than nominal [m]: 14 pairs of strokes of 0.6 and 0.8
 #: m in the world datasheet, from the sensor model of lines.
 LEAST_OVERLAP_M = 0.007

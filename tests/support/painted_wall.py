@@ -98,6 +98,7 @@ class PaintedWall:
         hidden: Identities of lines that the picture does not show.
         ends_seen: Whether the picture tells where the pieces end.
         noise: Standard deviation of an offset in one look [m], renewed every `LOOK` ticks.
+        stuck_across: Whether nothing moves a tip that paints across its stroke but the wave.
     """
 
     config: PaintingConfig
@@ -118,6 +119,7 @@ class PaintedWall:
     tared_after: float = 0.5
     blind_wall: bool = False
     stuck: bool = False
+    stuck_across: bool = False
     push: float = 5.0
 
     def __post_init__(self) -> None:
@@ -283,7 +285,9 @@ class PaintedWall:
             velocity += GUIDE_GAIN * (line.offset - target) * np.array((math.cos(line.angle), math.sin(line.angle)))
         self.velocity = np.zeros(2) if self.stuck else np.clip(velocity, -TIP_SPEED_MAX, TIP_SPEED_MAX)
         before = self.tip
-        self.tip = self.tip + TICK * np.array(self.to_board(*self.velocity))
+        along, across = self.to_board(*self.velocity)
+        held = self.stuck_across and self.painter.phase == "paint"
+        self.tip = self.tip + TICK * np.array((along, 0.0 if held else across))
         if self.painter.phase == "paint":
             wave = self.wave(self.painter.row, float(self.tip[0]))
             self.tip[1] += wave - self._wave

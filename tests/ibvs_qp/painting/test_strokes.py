@@ -223,3 +223,22 @@ def test_contact_that_is_lost_in_a_climb_pauses_it() -> None:
     assert abs(world.tip - held).max() < 1e-3
     world.contact_allowed = True
     assert_painted(world)
+
+
+# ---------------------------------------------------------------------------------------------- claim of a stroke
+
+
+def test_a_long_stroke_without_any_edge_on_its_way_is_not_claimed() -> None:
+    """Stroke 2 begins at its place; then only the odometer leads, whose drift displaces it."""
+    world = PaintedWall(short(rows=2, stroke_m=2.0))
+    world.fly(120.0, until="paint", stroke=2)
+    world.hidden.update({GUIDE, FAR, *range(OUTER, OUTER + 3), 201})
+    world.fly(120.0)
+    assert world.painter.failed and world.painter.finished
+    assert "row 2: its place is known to" in world.painter.reason and world.painter.reason.endswith("mm of 8 mm")
+
+
+def test_a_stroke_that_was_pushed_beside_its_place_is_not_claimed() -> None:
+    world = PaintedWall(short(rows=1), wave=lambda _stroke, _u: 0.012, stuck_across=True)
+    world.fly(60.0)
+    assert world.painter.failed and "row 1 lies +12 mm from its place, limit 8 mm" in world.painter.reason
