@@ -272,7 +272,9 @@ class Painter(Navigation):
     def _end_stroke(self, inputs: PainterInput) -> None:
         self._cross.end_stroke()
         edge = self._along_line.line
-        how = "by the odometer" if edge is None else f"at {edge.kind or 'unknown'} edge {edge.track.offset * 1e3:+.0f} mm"
+        how = (
+            "by the odometer" if edge is None else f"at {edge.kind or 'unknown'} edge {edge.track.offset * 1e3:+.0f} mm"
+        )
         self._uncertain = self._uncertain or self._doubt()
         ended = f"row {self.row} ended {how}"
         if self._is_last():

@@ -75,7 +75,7 @@ class Vehicle:
         if self.picture is not None:
             _draw(vehicle, config, self.picture)
         if self.json:
-            print(as_json(_summary(given, found, check)))
+            print(as_json(_summary(given, found, config, check)))
         else:
             _show(given, found, config)
             for file in filter(None, (self.px4, self.toml, self.picture)):
@@ -124,7 +124,7 @@ def _draw(vehicle: VehicleParams, config: PilotConfig | None, file: Path) -> Non
     vehicle_figure(vehicle, config).savefig(file)
 
 
-def _summary(given: VehicleFile, found: Actuation, check: VehicleCheck) -> dict[str, Any]:
+def _summary(given: VehicleFile, found: Actuation, config: PilotConfig | None, check: VehicleCheck) -> dict[str, Any]:
     vehicle = given.vehicle
     return {
         "schema": 1,
@@ -132,6 +132,7 @@ def _summary(given: VehicleFile, found: Actuation, check: VehicleCheck) -> dict[
         "assumed": list(given.assumed),
         "problems": list(check.problems),
         "warnings": list(check.warnings),
+        "force_sensor": None if config is None else _force_sensor(config),
         "rotors": list(vehicle.geometry.names),
         "effectiveness": found.effectiveness.tolist(),
         "singular_values": found.singular_values.tolist(),
@@ -172,6 +173,8 @@ def _show(given: VehicleFile, found: Actuation, config: PilotConfig | None) -> N
     ]
     console.print(terminal_table(("per newton of #", *numbers), effectiveness, "Control effectiveness B"))
     _show_origin(console, given, config)
+    if config is not None:
+        console.print(_sentence(_force_sensor(config)), highlight=False)
     if found.missing:
         console.print("[bold]Not fully actuated.[/] The rotors cannot give:")
         for direction in found.missing:
@@ -203,6 +206,17 @@ def _show_origin(console: Console, given: VehicleFile, config: PilotConfig | Non
         console.print(f"Assumed, {given.kind} does not state it: {', '.join(given.assumed)}.")
     for note in given.notes:
         console.print(f"Assumed: {note}.")
+
+
+def _force_sensor(config: PilotConfig) -> str:
+    """Turns of the force sensor that the start-up check finds, and those that it cannot."""
+    from ibvs_qp.validation.load_check import checkable_turns
+
+    return checkable_turns(config.controller.vehicle, config.safety)
+
+
+def _sentence(text: str) -> str:
+    return f"{text[0].upper()}{text[1:]}."
 
 
 def _vector(values: np.ndarray) -> str:

@@ -25,9 +25,9 @@ from sim.world.crash import GROUND_CLEARANCE_M
 from sim.world.scene import Scene
 from sim.world.trim import START_DISTANCE_M, START_DOWN_M, START_YAW_DEG
 
-#: Neighbouring strokes come locally up to this much farther apart than nominal [m]: 14 pairs of strokes of 0.6 and 0.8
-#: m in the world datasheet, from the sensor model of lines.
-LEAST_OVERLAP_M = 0.007
+#: Neighbouring strokes come locally up to 7 mm farther apart than nominal (14 pairs of strokes of 0.6 and 0.8 m in the
+#: world datasheet, from the sensor model of lines); this much overlap leaves a little of it [m].
+LEAST_OVERLAP_M = 0.008
 #: Lengths and times are compared to this [m, s]: rounding of sums of settings.
 ROUNDING = 1e-9
 #: Gusts that a job must stand, in standard deviations: stronger ones blow a twentieth of the time.

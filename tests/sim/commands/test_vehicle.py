@@ -52,6 +52,7 @@ def test_a_shipped_preset_is_shown_and_drawn(capsys: pytest.CaptureFixture[str])
         "Control effectiveness B",
         "Fully actuated; condition",
         "Push at the tip:",
+        "Force sensor: turns from ",
         "o.png",
     ):
         assert words in text

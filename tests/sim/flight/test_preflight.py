@@ -74,9 +74,9 @@ LIMITS = {
     ),
     "an overlap as wide as the brush": (paint(overlap_m=0.08), paint(overlap_m=0.072), ["paint.overlap_m", "brush"]),
     "an overlap that leaves gaps": (
-        paint(overlap_m=0.0069),
-        paint(overlap_m=0.007),
-        ["paint.overlap_m", "allowed is [0.007, 0.072] m", "paint.brush_width_m = 0.08 m"],
+        paint(overlap_m=0.0079),
+        paint(overlap_m=0.008),
+        ["paint.overlap_m", "allowed is [0.008, 0.072] m", "paint.brush_width_m = 0.08 m"],
     ),
     "a brush thinner than the overlap": (
         paint(brush_width_m=0.05, overlap_m=0.06),
