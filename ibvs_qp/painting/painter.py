@@ -285,7 +285,7 @@ class Painter(Navigation):
         self._enter(inputs, "climb", ended)
 
     def _doubt(self) -> str:
-        """What forbids to claim the stroke that has ended: length and place as estimated, and how well they are known."""
+        """Why the stroke that has ended is not claimed: its length or place as estimated, or too little known."""
         length, asked = self._along.stroke_length, self.config.stroke_m
         if self._along_line.line is None and self._along.deviation > CERTAIN_LENGTH_M:
             known = self._along.deviation

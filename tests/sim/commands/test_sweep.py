@@ -7,7 +7,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -114,13 +113,15 @@ def test_ctrl_c_keeps_blocks_and_the_rest_is_flown_later(flown, monkeypatch, cap
 
 
 _KILLED = """
-import sys, time
+import os, signal, sys
+from pathlib import Path
 sys.path.insert(0, {tests!r})
 import sim.sweep.figures, sim.sweep.flying, sim.sweep.planned, test_sweep as made_up
 sim.sweep.planned.press_row = made_up.made_up_figures
 sim.sweep.figures.write_report = lambda *_: None
 def fly(*arguments, **named):
-    time.sleep(0.1)
+    if len(list(Path("run/parts").glob("part-*.parquet"))) >= 3:
+        os.kill(os.getpid(), signal.SIGKILL)
     return made_up.made_up_flight(*arguments, **named)
 sim.sweep.flying.fly = fly
 sim.sweep.flying.outcome = lambda trace: trace.outcome
@@ -132,13 +133,9 @@ main(["sweep", "spec.toml", "--jobs", "1", "--json", "--out", "run"])
 def test_killed_half_way_and_resumed_gives_the_same_table(flown):
     program = [sys.executable, "-c", _KILLED.format(tests=str(Path(__file__).parent))]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-    process = subprocess.Popen(program, env=environment)
-    parts = Path("run/parts")
-    while len(list(parts.glob("part-*.parquet"))) < 3 and process.poll() is None:
-        time.sleep(0.02)
-    process.send_signal(signal.SIGKILL)
-    assert process.wait() == -signal.SIGKILL and not Path("run/made_up.parquet").exists()
-    left = len(list(parts.glob("part-*.parquet")))
+    process = subprocess.run(program, env=environment, check=False)
+    assert process.returncode == -signal.SIGKILL and not Path("run/made_up.parquet").exists()
+    left = len(list(Path("run/parts").glob("part-*.parquet")))
     assert 3 <= left < 8
     assert main(["sweep", "spec.toml", "--jobs", "1", "--json", "--out", "run"]) == 0
     assert len(flown) == RUNS - 3 * left
