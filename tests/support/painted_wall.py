@@ -268,7 +268,7 @@ class PaintedWall:
             tared=self.time > self.tared_after,
         )
         before, stroke = self.painter.phase, self.painter.row
-        command = self.command = self.painter.step(inputs)
+        command = self.command = self.painter.fly(inputs)
         if before == "paint" and self.painter.phase != "paint":
             self.ends.append((stroke, *self.tip.tolist()))
         if before != "paint" and self.painter.phase == "paint":
