@@ -53,7 +53,7 @@ class PaintingCommand:
         contact: Press the wall (True) or keep the stand-off.
         standoff: Tip to wall while not in contact [m].
         velocity: Velocity along the wall (right, down) [m/s], (2,).
-        guides: Lines to follow, each with its target offset [m]; in their directions the velocity is not followed.
+        guides: Lines to follow, each with its target offset [m]; where one leads, the velocity is its feed-forward.
         push: Push [N].
         tilt: Roll and pitch [rad], (2,).
         trim: Roll and pitch of a vehicle with a limited rotor, flown like level [rad], (2,).
