@@ -14,7 +14,7 @@ from ibvs_qp.painting.command import ExpectedEdge, PainterInput, PaintingCommand
 from ibvs_qp.painting.config import PaintingConfig
 from ibvs_qp.validation.failure import raised, type_name
 from ibvs_qp.validation.fields import PAINTING_COMMAND
-from ibvs_qp.validation.numbers import number
+from ibvs_qp.validation.numbers import number, vector
 
 #: Names of the phases, in the order of a flight. Paint lies where the phase is ``paint`` or ``climb``.
 PHASES = ("start", "survey", "approach", "align", "press", "paint", "climb", "search", "retreat", "done")
@@ -189,12 +189,19 @@ def require_strategy(strategy: object) -> Strategy:
         ConfigError: When it is none, or was constructed without its base class.
     """
     if not isinstance(strategy, Strategy):
-        raise ConfigError(f"strategy: {type_name(strategy)} is no subclass of ibvs_qp.Strategy")
+        raise ConfigError(f"strategy: {type_name(strategy)} is no instance of ibvs_qp.Strategy")
     for name, kind in (("config", PaintingConfig), ("log", list), ("finished", bool)):
         if not isinstance(getattr(strategy, name, None), kind):
             call = "__init__ with super().__init__(config)" if name == "config" else "reset with super().reset()"
             raise ConfigError(f"strategy: {type_name(strategy)} has no {name}; begin its {call}")
+    if type(strategy.legs) not in (list, tuple) or not all([_is_leg(leg) for leg in strategy.legs]):
+        raise ConfigError(f"strategy: {type_name(strategy)}.legs is no list of finite pairs (right, down) [m]")
     return strategy
+
+
+def _is_leg(leg: object) -> bool:
+    entries = vector(leg, 2)
+    return entries is not None and all(map(math.isfinite, entries))
 
 
 def _checked(command: object, inputs: PainterInput) -> tuple[PaintingCommand | None, str]:

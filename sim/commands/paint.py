@@ -101,7 +101,6 @@ class Paint:
         from sim.sensors.cameras import resolve_camera
 
         check_mujoco()
-        from ibvs_qp.painting.strategy import require_strategy
         from ibvs_qp.recording import require_extra
         from sim.flight.jobs import OwnJob
         from sim.flight.options import FlightOptions, pilot_config, sized
@@ -151,7 +150,7 @@ class Paint:
             config = pilot_config(scene, flown)
             check_job(sized(scene, flown), config, self.features, job)
             if job is not None:
-                require_strategy(job.strategy(config.painting))
+                job.strategy(config.painting)
         notes = Console(stderr=True, quiet=self.json)
         facts = {
             "command": command_line(words),

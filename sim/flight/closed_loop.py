@@ -82,6 +82,7 @@ def fly(
     """
     config, job = pilot_config(scene, options, config), job or PaintJob()
     pilot, world = make_pilot(scene, options, config, job), World(scene, options, config)
+    legs = tuple((float(right), float(down)) for right, down in pilot.painter.legs)
     recorder, schedule = Recorder(scene, options, world, pilot), FaultSchedule(faults, options.seed)
     log = open_mcap(options, world, pilot)
     fly_tick = pilot.step if log is None else log.step
@@ -127,7 +128,7 @@ def fly(
     trace.claimed = planned and (pilot.painter.finished or bool(reason)) and not pilot.painter.failed
     trace.reason, trace.plan = reason or pilot.painter.reason, job.plan
     if isinstance(job, OwnJob):
-        trace.legs = tuple((float(right), float(down)) for right, down in pilot.painter.legs)
+        trace.legs = legs
     if reason:
         trace.events.append(Event(t=tick * TICK_NS * 1e-9, kind="end", text=reason))
     return trace

@@ -10,7 +10,7 @@ from ibvs_qp.config.settings import setting, validate
 from ibvs_qp.painting.config import PaintingConfig
 from ibvs_qp.painting.painter import Painter
 from ibvs_qp.painting.presser import Presser
-from ibvs_qp.painting.strategy import Strategy
+from ibvs_qp.painting.strategy import Strategy, require_strategy
 from sim.flight.own_class import built
 
 
@@ -87,7 +87,7 @@ class OwnJob:
         Raises:
             ConfigError: When it cannot be loaded or constructed.
         """
-        return built(self.name, Strategy, "--strategy", config)  # type: ignore[type-abstract]
+        return require_strategy(built(self.name, Strategy, "--strategy", config))  # type: ignore[type-abstract]
 
     def expected_s(self, config: PaintingConfig, strokes: int) -> float:
         """Its legs at painting speed; those of the paint job where it has none."""
