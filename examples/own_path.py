@@ -39,8 +39,8 @@ class OwnPath(Strategy):
         if self.phase == "start" and inputs.wall_known and inputs.tared and 1 in lines:
             self.enter(inputs, "approach", "lower edge in view")
         elif self.phase == "approach" and abs(inputs.distance - job.standoff_m) < 0.01:
-            if np.abs(error).max() < job.align_error_m and np.hypot(*inputs.velocity) < job.align_speed_m_s:
-                self.enter(inputs, "press", f"{1e3 * np.hypot(*error):.1f} mm from the beginning")
+            if np.abs(error).max() < job.align_error_m and np.linalg.norm(inputs.velocity) < job.align_speed_m_s:
+                self.enter(inputs, "press", f"{1e3 * np.linalg.norm(error):.1f} mm from the beginning")
         elif reached and self.row == 2:
             return self.leave(inputs, "L painted")
         elif reached or (self.phase == "press" and inputs.time_since_touch > job.press_time_s):

@@ -273,7 +273,8 @@ class PaintedWall:
             self.ends.append((stroke, *self.tip.tolist()))
         if before != "paint" and self.painter.phase == "paint":
             self.paint.append(Paint(self.config.stroke_m))
-            self.begins.append((self.painter.row, self.painter._cross.deviation))
+            if isinstance(self.painter, Painter):
+                self.begins.append((self.painter.row, self.painter._cross.deviation))
         self._move(command)
         return command
 
