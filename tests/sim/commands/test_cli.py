@@ -203,7 +203,7 @@ def test_unwritable_folder(flown, capsys, monkeypatch):
 
 
 def test_config_error_during_the_flight_is_a_user_error(flown, capsys, monkeypatch):
-    def refuse(*_):
+    def refuse(*_, **__):
         raise ConfigError("preset x.toml: unknown key 'gain'")
 
     monkeypatch.setattr(sim.flight.side_by_side, "fly", refuse)
@@ -212,7 +212,7 @@ def test_config_error_during_the_flight_is_a_user_error(flown, capsys, monkeypat
 
 
 def test_internal_error_keeps_its_traceback(flown, capsys, monkeypatch):
-    def fail(*_):
+    def fail(*_, **__):
         raise ZeroDivisionError("seven")
 
     monkeypatch.setattr(sim.flight.side_by_side, "fly", fail)
