@@ -28,6 +28,8 @@ if TYPE_CHECKING:
         RgbdFrame,
         SensorFrame,
     )
+    from ibvs_qp.painting.command import PainterInput, PaintingCommand
+    from ibvs_qp.painting.strategy import Strategy
     from ibvs_qp.pilot import FlightStatus, Pilot, PilotConfig
     from ibvs_qp.presets import preset
 
@@ -46,6 +48,8 @@ __all__ = [
     "LineReference",
     "Measurement",
     "Outcome",
+    "PainterInput",
+    "PaintingCommand",
     "PaperController",
     "Pilot",
     "PilotConfig",
@@ -55,6 +59,7 @@ __all__ = [
     "SafetySettings",
     "SafetyState",
     "SensorFrame",
+    "Strategy",
     "TaskReport",
     "VehicleParams",
     "__version__",
@@ -71,6 +76,8 @@ _HOMES = {
     "ibvs_qp.config.safety": ("SafetySettings",),
     "ibvs_qp.controller": ("HybridController",),
     "ibvs_qp.config.errors": ("ConfigError", "IbvsQpError"),
+    "ibvs_qp.painting.command": ("PainterInput", "PaintingCommand"),
+    "ibvs_qp.painting.strategy": ("Strategy",),
     "ibvs_qp.pilot": ("FlightStatus", "Pilot", "PilotConfig"),
     "ibvs_qp.config.vehicle": ("VehicleParams",),
     "ibvs_qp.presets": ("preset",),

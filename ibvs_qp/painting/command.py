@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -33,7 +33,7 @@ class PainterInput:
     """
 
     time_s: float
-    lines: dict[int, TrackedLine]
+    lines: Mapping[int, TrackedLine]
     odometer: Sequence[float]
     velocity: Sequence[float]
     distance: float
@@ -53,7 +53,7 @@ class PaintingCommand:
         contact: Press the wall (True) or keep the stand-off.
         standoff: Tip to wall while not in contact [m].
         velocity: Velocity along the wall (right, down) [m/s], (2,).
-        guides: Lines to follow, each with its target offset [m].
+        guides: Lines to follow, each with its target offset [m]; where one leads, the velocity is its feed-forward.
         push: Push [N].
         tilt: Roll and pitch [rad], (2,).
         trim: Roll and pitch of a vehicle with a limited rotor, flown like level [rad], (2,).
@@ -61,10 +61,10 @@ class PaintingCommand:
     """
 
     contact: bool
-    standoff: float
-    velocity: np.ndarray
-    guides: list[tuple[TrackedLine, float]]
-    push: float
+    standoff: float = 0.0
+    velocity: np.ndarray = field(default_factory=lambda: ZERO)
+    guides: list[tuple[TrackedLine, float]] = field(default_factory=list)
+    push: float = 0.0
     tilt: np.ndarray = field(default_factory=lambda: ZERO)
     travel: np.ndarray = field(default_factory=lambda: ZERO)
     trim: np.ndarray = field(default_factory=lambda: ZERO)

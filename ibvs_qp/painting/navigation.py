@@ -23,11 +23,7 @@ from ibvs_qp.painting.speed import approached, clipped
 
 
 class Navigation(PhaseMachine):
-    """Both coordinates of the tip by odometer and lines, and their references; a subclass is the phases.
-
-    Attributes:
-        row: Stroke in progress from 1, 0 before the first one.
-    """
+    """Both coordinates of the tip by odometer and lines, and their references; a subclass is the phases."""
 
     _SLIDES = True  # whether a stroke follows the press
 
@@ -38,7 +34,6 @@ class Navigation(PhaseMachine):
     def reset(self) -> None:
         """As after construction."""
         super().reset()
-        self.row = 0
         self._cross, self._along = CrossTrack(self.config), AlongTrack(self.config)
         self._across_line, self._along_line = Carrier(), Carrier()
         self._lines: list[PatternLine] = []

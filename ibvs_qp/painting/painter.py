@@ -16,10 +16,11 @@ from ibvs_qp.painting.navigation import Navigation
 from ibvs_qp.painting.pattern import FILL, FILL_REST_M, PLACE_TOLERANCE_M
 from ibvs_qp.painting.pattern_lines import CERTAIN_WEIGHT, PatternLine
 from ibvs_qp.painting.speed import approached, climb_speed, ramped, stroke_speed
+from ibvs_qp.painting.strategy import RETREAT_REACHED
 from ibvs_qp.painting.stroke_end import StrokeEnd
 
-#: Difference from the stand-off and from the retreat distance at which these phases end [m].
-STANDOFF_REACHED, RETREAT_REACHED = 0.01, 0.02
+#: Difference from the stand-off at which the approach ends [m].
+STANDOFF_REACHED = 0.01
 #: Least push to which the relative error of a press refers [N].
 PRESS_REFERENCE_MIN = 1.0
 #: Distance from the beginning of stroke 1 within which the vehicle approaches the wall while it moves there [m].
@@ -238,16 +239,11 @@ class Painter(Navigation):
         return self._command(inputs, contact=False, standoff=config.search_standoff_m, hold=True)
 
     def _retreat(self, inputs: PainterInput, dt: float) -> PaintingCommand:
-        if self._given_up:
-            return self._descend(inputs)
         if inputs.distance > self.config.retreat_m - RETREAT_REACHED and not inputs.in_contact:
             if self._uncertain and not self.failed:
                 self.failed, self.reason = True, self._uncertain
             self._end(inputs, self.reason if self.failed else self._COMPLETED)
         return self._command(inputs, contact=False, standoff=self.config.retreat_m, hold=True)
-
-    def _done(self, inputs: PainterInput, dt: float) -> PaintingCommand:
-        return self._command(inputs, contact=False, standoff=self.config.retreat_m, guided=False)
 
     # ----------------------------------------------------------------- strokes
 

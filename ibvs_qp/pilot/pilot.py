@@ -10,6 +10,7 @@ import dataclasses
 import math
 import time
 from collections.abc import Callable
+from types import MappingProxyType
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -31,6 +32,7 @@ from ibvs_qp.model.setpoints import Setpoints
 from ibvs_qp.painting.command import PainterInput, PaintingCommand
 from ibvs_qp.painting.painter import Painter
 from ibvs_qp.painting.reference import image_reference
+from ibvs_qp.painting.strategy import Strategy, require_strategy
 from ibvs_qp.pilot.attitude_history import AttitudeHistory
 from ibvs_qp.pilot.camera import CameraInput
 from ibvs_qp.pilot.config import PilotConfig
@@ -92,7 +94,7 @@ class Pilot:
 
     Args:
         config: Configuration of the flight.
-        painter: Strategy to follow; None paints.
+        painter: Strategy to follow; None paints the job of `PilotConfig.painting`.
         seen_as: Applied to the features of every picture, for studies of perception errors.
         controller: Control law, for studies of other laws; None builds the configured one.
     """
@@ -100,7 +102,7 @@ class Pilot:
     def __init__(
         self,
         config: PilotConfig | None = None,
-        painter: Painter | None = None,
+        painter: Strategy | None = None,
         seen_as: Callable[[FeatureFrame], FeatureFrame] | None = None,
         controller: Controller | None = None,
     ) -> None:
@@ -126,7 +128,7 @@ class Pilot:
         self.rotor_loss = RotorLoss(vehicle, settings.gains)
         self.assurance = Assurance(vehicle, self.config.safety)
         self.push_report = PushReport()
-        self.painter = painter or Painter(self.config.painting)
+        self.painter: Strategy = require_strategy(Painter(self.config.painting) if painter is None else painter)
         self.observer: Callable[[LawCall], None] | None = None
         law = HybridController if self.config.law == "qp" else PaperController
         self.controller: Controller = controller or law(straightened(settings))
@@ -440,11 +442,11 @@ class Pilot:
     # ------------------------------------------------- strategy and controller
 
     def _strategy(self, frame: SensorFrame, contact: ContactState, dt: float) -> PaintingCommand:
-        """Command of the painter, tilted after a lost rotor."""
+        """Command of the strategy, tilted after a lost rotor."""
         motion = self.motion
         inputs = PainterInput(
             time_s=(frame.stamp_ns - self._first) * 1e-9,
-            lines=motion.lines,
+            lines=MappingProxyType(motion.lines),  # a strategy of the user's must not lose lines of the filter
             odometer=motion.state[4:6],
             velocity=motion.state[:2],
             distance=contact.distance,
@@ -452,14 +454,16 @@ class Pilot:
             in_contact=contact.in_contact,
             time_since_touch=contact.time_since_touch,
             push=contact.push,
-            push_reference=self.setpoints.push_reference,  # of the tick before: the controller runs after the painter
+            push_reference=self.setpoints.push_reference,  # of the tick before: the controller runs after the strategy
             tared=self.tare.ready,
         )
         if self.rotor_loss.update(self.assurance.limits(self.thrust_limits)):
             self.painter.abandon(inputs, "no level hover is left")
         elif self.assurance.state not in _FLYING and not self.painter.descending:
             self.painter.stop(inputs, "; ".join(self.assurance.supervisor.reasons))
-        target = self.painter.step(inputs)
+        target = self.painter.fly(inputs)
+        if self.painter.fault:
+            self._rejected.append(self.painter.fault)
         attitude = self.rotor_loss.target(contact, self._inertial.attitude, motion.state[0], dt)
         return dataclasses.replace(target, **attitude) if attitude else target
 

@@ -189,6 +189,9 @@ REFERENCE = FieldTable(
     _vector("trim", 2, 0.6, "rad"),
 )
 
+#: Targets of a strategy (`ibvs_qp.painting.command.PaintingCommand`).
+PAINTING_COMMAND = FieldTable(Field("push", 0, 0.0, 1e3, "N"), *REFERENCE.rows[1:])
+
 
 def measurement_table(rotors: int) -> FieldTable:
     """Table for a `Measurement` of a vehicle with that many rotors."""

@@ -53,6 +53,8 @@ class Paint:
     """Picture size; default: the scene's."""
     camera: Literal["plane", "gl", "auto"] = "plane"
     """Camera back end: plane needs no GL library; gl and auto draw with OpenGL if it works, else with plane."""
+    strategy: Annotated[str | None, optional("MODULE:CLASS")] = None
+    """Strategy of your own, a subclass of ibvs_qp.Strategy: module:Class or file.py:Class; default: paint the scene."""
     law: Literal["qp", "paper", "both"] = "both"
     """Law to fly."""
     seed: int = 0
@@ -100,6 +102,7 @@ class Paint:
 
         check_mujoco()
         from ibvs_qp.recording import require_extra
+        from sim.flight.jobs import OwnJob
         from sim.flight.options import FlightOptions, pilot_config, sized
         from sim.flight.preflight import check_job
         from sim.flight.progress import flight_progress
@@ -141,9 +144,13 @@ class Paint:
             for warning in require_vehicle(pilot_config(scene, options), f"--vehicle {self.vehicle}"):
                 print(f"ibvs-qp: {warning}", file=sys.stderr)
         laws = ("qp", "paper") if self.law == "both" else (self.law,)
-        for law in laws:  # an unusable preset or job is refused before anything is shown or written
+        job = OwnJob(name=self.strategy) if self.strategy is not None else None
+        for law in laws:  # an unusable preset, job or strategy is refused before anything is shown or written
             flown = dataclasses.replace(options, law=law)
-            check_job(sized(scene, flown), pilot_config(scene, flown), self.features)
+            config = pilot_config(scene, flown)
+            check_job(sized(scene, flown), config, self.features, job)
+            if job is not None:
+                job.strategy(config.painting)
         notes = Console(stderr=True, quiet=self.json)
         facts = {
             "command": command_line(words),
@@ -155,11 +162,11 @@ class Paint:
             "image_size": list(size or (scene.camera.width, scene.camera.height)),
             "features": self.features,
             "vision": self.vision,
-        }
+        } | ({} if self.strategy is None else {"strategy": self.strategy})
         with RunFolder.open(self.out, overwrite=self.overwrite) as folder:
             options = dataclasses.replace(options, journal=str(folder.journal), mcap=self.log == "mcap")
             with flight_progress(notes, scene, laws) as progress:
-                flights = fly_laws(scene, options, laws, progress, workers=1 if self.view else None)
+                flights = fly_laws(scene, options, laws, progress, workers=1 if self.view else None, task=job)
             return self._report(folder, flights, facts, started, notes)
 
     def _report(

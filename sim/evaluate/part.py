@@ -105,7 +105,9 @@ class Part:
 
     @cached_property
     def segments(self) -> tuple[Segment, ...]:
-        """Nominal rows and climbs of the part."""
+        """Nominal rows and climbs of the part; none of a strategy of the user's."""
+        if self.trace.legs is not None:
+            return ()
         return tuple(each for each in nominal_plan(self.trace.scene).segments if self.row in (0, each.row))
 
     @cached_property
@@ -115,14 +117,15 @@ class Part:
 
     @cached_property
     def stroke_count(self) -> int:
-        """Strokes that the scene asks for."""
-        return BoardGeometry(self.trace.scene).strokes
+        """Strokes that the scene asks for; 0 for a strategy of the user's, which has legs."""
+        return BoardGeometry(self.trace.scene).strokes if self.trace.legs is None else 0
 
     @property
     def stroke_m(self) -> float:
         """Length of the shortest stroke; 0 if one is missing."""
         numbers = [self.row] if self.row else range(1, self.stroke_count + 1)
-        return min(self.strokes[number].length_m if number in self.strokes else 0.0 for number in numbers)
+        lengths = [self.strokes[number].length_m if number in self.strokes else 0.0 for number in numbers]
+        return min(lengths, default=math.nan)
 
     @property
     def coverage(self) -> float:

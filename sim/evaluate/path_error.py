@@ -53,6 +53,8 @@ def path_error(trace: Trace) -> PathError:
     plan = plan_as_painted(trace.scene, painted_rows(trace, tip))
     painting = np.zeros(len(tip), bool)
     distance, height = np.full(len(tip), np.nan), np.full(len(tip), np.nan)
+    if trace.legs is not None:  # its path is not the scene's
+        painting, plan = in_phase(trace, *PAINTING_PHASES), PaintPlan(segments=())
     for segment in plan.segments:
         phases = [phase for phase, kind in PAINTING_PHASES.items() if kind == segment.kind]
         ticks = np.flatnonzero(in_phase(trace, *phases) & (trace.row == segment.row))
@@ -63,7 +65,8 @@ def path_error(trace: Trace) -> PathError:
             line = board.to_pattern(segment.points)
             line = line[np.argsort(line[:, 0])]
             height[ticks] = uv[ticks, 1] - np.interp(uv[ticks, 0], *line.T)
-    to_vertex = np.min(np.linalg.norm(tip[:, None] - plan.vertices[None], axis=2), axis=1)
+    vertices = plan.vertices if plan.segments else np.full((1, 2), np.inf)
+    to_vertex = np.min(np.linalg.norm(tip[:, None] - vertices[None], axis=2), axis=1)
     return PathError(
         plan=plan,
         tip=tip,

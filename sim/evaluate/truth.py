@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -47,13 +47,17 @@ class Judgement:
 
     @cached_property
     def strokes(self) -> dict[int, Stroke]:
-        """Painted strokes by number."""
-        return painted_strokes(self.trace)
+        """Painted strokes of the scene by number."""
+        return painted_strokes(self.trace) if self.trace.legs is None else {}
 
     @cached_property
     def shortfall(self) -> str | None:
         """What the job lacks, named by stroke or phase; None for a completed one."""
-        found = [*self._ends(), *(self._pressed() if self.trace.plan else self._painted()), *self._retreat()]
+        if self.trace.legs is not None:
+            job = self._legs(self.trace.legs)
+        else:
+            job = self._pressed() if self.trace.plan else self._painted()
+        found = [*self._ends(), *job, *self._retreat()]
         return "; ".join(found) or None
 
     @property
@@ -88,10 +92,37 @@ class Judgement:
         for number in range(1, board.strokes + 1):
             if missing := self.of_stroke(number):
                 yield f"{self._word} {number}: {missing}"
-        painting = in_phase(self.trace, "paint", "climb")
-        share = contact_share(self.trace, painting)
+        yield from self._contact()
+
+    def _contact(self) -> Iterator[str]:
+        share = contact_share(self.trace, in_phase(self.trace, "paint", "climb"))
         if share < self.least_contact:
             yield f"contact in {100.0 * share:.1f} % of painting, {100.0 * self.least_contact:g} % needed"
+
+    def _legs(self, legs: Sequence[tuple[float, float]]) -> Iterator[str]:
+        """Legs of a strategy of the user's by the way of the tip in contact; without legs only its claim can tell."""
+        if not legs and not self.trace.claimed:
+            yield self.trace.reason
+        for number, (right, down) in enumerate(legs, start=1):
+            if missing := self._leg(number, np.array((right, -down))):
+                yield f"leg {number}: {missing}"
+        yield from self._contact()
+
+    def _leg(self, number: int, asked: np.ndarray) -> str:
+        """What a leg lacks; its way is asked in board coordinates (along, up) [m]."""
+        touching = in_phase(self.trace, "paint") & (self.trace.row == number) & (self.trace.push_true > CONTACT_N)
+        spots = board_tip(self.trace)[touching]
+        if not len(spots):
+            return "not painted"
+        way, length = spots - spots[0], float(np.hypot(*asked))
+        along = asked / max(length, ROUNDING_M)
+        flown, aside = way @ along, way @ np.array((-along[1], along[0]))
+        if abs(flown[-1] - length) > LENGTH_M:
+            return f"{flown[-1]:.3f} m long, {length:.3f} m asked"
+        if abs(aside[-1]) > LENGTH_M:
+            return f"it ends {_mm(abs(aside[-1]))} beside its line"
+        stray = float(np.abs(aside - aside.mean()).max())
+        return f"{_mm(stray)} from its mean line" if stray > PLACE_M else ""
 
     def _stroke(self, number: int) -> Iterator[str]:
         stroke, paint = self.strokes.get(number), self.trace.scene.paint

@@ -23,7 +23,8 @@ def draw_board(traces: dict[str, Trace]) -> Figure:
     figure, panels = law_panels(traces, height * len(traces))
     for axes, law, trace in panels:
         draw_canvas(axes, trace)
-        axes.set_title(f"{law_name(law)}: {100 * Part.whole(trace).coverage:.1f} % of the intended band covered")
+        covered = f": {100 * Part.whole(trace).coverage:.1f} % of the intended band covered"
+        axes.set_title(law_name(law) + (covered if trace.legs is None else ""))
     return figure
 
 
@@ -33,6 +34,7 @@ def draw_canvas(axes: Axes, trace: Trace) -> None:
     extent = (0.0, scene.board.width_m, 0.0, scene.board.height_m)
     if trace.canvas is not None:
         axes.imshow(trace.canvas, extent=extent, interpolation="bilinear", zorder=0)
+    if trace.canvas is not None and trace.legs is None:
         shape = trace.canvas.shape[:2]
         band = band_mask(scene, nominal_plan(scene), shape, trace.canvas_px_per_m)
         axes.contour(band[::-1], levels=[0.5], extent=extent, colors=[REFERENCE["color"]],

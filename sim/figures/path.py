@@ -31,8 +31,9 @@ def _draw_space(figure, traces: dict[str, Trace]) -> None:
     corners = board.point(np.array([0.0, width, width, 0.0]), np.array([0.0, 0.0, height, height]))
     face = [(y, 0.0, -z) for y, z in corners]
     axes.add_collection3d(Poly3DCollection([face], facecolor="#f4f2ea", edgecolor="#a9a492", linewidth=0.8))
-    nominal = board.point(*nominal_plan(scene).polyline.T)
-    axes.plot(nominal[:, 0], 0 * nominal[:, 0], -nominal[:, 1], **REFERENCE, label="nominal polyline", zorder=5)
+    if all(trace.legs is None for trace in traces.values()):  # a strategy of the user's has a path of its own
+        nominal = board.point(*nominal_plan(scene).polyline.T)
+        axes.plot(nominal[:, 0], 0 * nominal[:, 0], -nominal[:, 1], **REFERENCE, label="nominal polyline", zorder=5)
     for law, trace in traces.items():
         (tip,) = thin(trace.tip)
         colour, name = law_colour(law), law_name(law)
@@ -57,7 +58,7 @@ def _draw_error(axes, traces: dict[str, Trace]) -> None:
     largest = 1.0
     for law, trace in traces.items():
         path = path_error(trace)
-        if not path.painting.any():
+        if not path.painting.any() or trace.legs is not None:
             continue
         travelled, error = path.travelled, 1e3 * path.distance[path.painting]
         largest = max(largest, float(error.max()))

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ibvs_qp.command import Outcome
+from ibvs_qp.painting.strategy import PHASES
 from ibvs_qp.pilot import PilotConfig
 from sim.flight.flight_truth import euler_angles, in_body, rotations
 from sim.sensors.cameras.protocol import camera_intrinsics
@@ -18,8 +19,6 @@ from sim.world.readout import PLACES
 from sim.world.scene import Scene
 from sim.world.true_vehicle import TrueVehicle, true_vehicle
 
-#: Names of the strategy's phases, in the order of a flight.
-PHASES = ("start", "survey", "approach", "align", "press", "paint", "climb", "search", "retreat", "done")
 OUTCOMES = tuple(str(outcome) for outcome in Outcome)
 #: Ticks per logged propeller clearance, which changes slowly (the plant checks for strikes at every tick).
 CLEARANCE_TICKS = 5

@@ -11,7 +11,7 @@ from ibvs_qp.estimation.turned_camera import straightened
 from ibvs_qp.pilot import Pilot, PilotConfig
 from sim.faults.fault import Fault
 from sim.faults.schedule import FaultSchedule
-from sim.flight.jobs import Job, PaintJob
+from sim.flight.jobs import Job, OwnJob, PaintJob
 from sim.flight.options import FlightOptions, pilot_config
 from sim.flight.recorder import Recorder
 from sim.flight.surroundings import World
@@ -82,6 +82,7 @@ def fly(
     """
     config, job = pilot_config(scene, options, config), job or PaintJob()
     pilot, world = make_pilot(scene, options, config, job), World(scene, options, config)
+    legs = tuple((float(right), float(down)) for right, down in pilot.painter.legs)
     recorder, schedule = Recorder(scene, options, world, pilot), FaultSchedule(faults, options.seed)
     log = open_mcap(options, world, pilot)
     fly_tick = pilot.step if log is None else log.step
@@ -126,6 +127,8 @@ def fly(
     planned = not reason or (reason == LANDED and pilot.painter.descending)
     trace.claimed = planned and (pilot.painter.finished or bool(reason)) and not pilot.painter.failed
     trace.reason, trace.plan = reason or pilot.painter.reason, job.plan
+    if isinstance(job, OwnJob):
+        trace.legs = legs
     if reason:
         trace.events.append(Event(t=tick * TICK_NS * 1e-9, kind="end", text=reason))
     return trace

@@ -53,6 +53,7 @@ def facts_of(trace: Trace) -> dict[str, Any]:
         facts["canvas_px_per_m"] = np.array(trace.canvas_px_per_m)
     facts["outcome_of_flight"] = np.array([str(trace.claimed), trace.reason], dtype=str)
     facts["plan"], facts["preset"] = np.array(json.dumps(trace.plan)), np.array(trace.preset)
+    facts["legs"] = np.array(json.dumps(trace.legs))
     facts["world"] = np.array(world_name(trace.scene.errors))
     facts["seed"], facts["wall_time_s"] = np.array(trace.seed), np.array(trace.wall_time_s)
     return facts
@@ -105,6 +106,7 @@ def trace_of(law: str, scene: Scene, arrays: dict[str, np.ndarray]) -> Trace:
         events=[Event(t=float(t), kind=kind, text=text) for t, (kind, text) in zip(event_t, texts, strict=True)],
         claimed=claimed == "True",
         plan=_plan(arrays.pop("plan", None)),
+        legs=_legs(arrays.pop("legs", None)),
         reason=reason,
         preset="".join(_texts(arrays.pop("preset", np.array("")))),
         wall_time_s=float(arrays.pop("wall_time_s")),
@@ -121,6 +123,12 @@ def _plan(array: np.ndarray | None) -> dict[str, float]:
     if plan and not (isinstance(plan, dict) and plan.keys() == {"press", "paint", "descend"}):
         raise ValueError(f"plan {plan!r} of a flight")
     return {name: float(value) for name, value in plan.items()}
+
+
+def _legs(array: np.ndarray | None) -> tuple[tuple[float, float], ...] | None:
+    """Legs of a strategy of the user's; an older log has none."""
+    legs = json.loads("".join(_texts(array))) if array is not None else None
+    return None if legs is None else tuple((float(right), float(down)) for right, down in legs)
 
 
 def _texts(array: np.ndarray) -> tuple[str, ...]:

@@ -1,7 +1,8 @@
-"""Task of a flight at the wall: paint, or press and slide."""
+"""Task of a flight at the wall: paint, press and slide, or a strategy of the user's."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -9,12 +10,14 @@ from ibvs_qp.config.settings import setting, validate
 from ibvs_qp.painting.config import PaintingConfig
 from ibvs_qp.painting.painter import Painter
 from ibvs_qp.painting.presser import Presser
+from ibvs_qp.painting.strategy import Strategy, require_strategy
+from sim.flight.own_class import built
 
 
 class Job(Protocol):
     """Creates the pilot's strategy; frozen, so that it can be pickled and compared by its repr."""
 
-    def strategy(self, config: PaintingConfig) -> Painter:
+    def strategy(self, config: PaintingConfig) -> Strategy:
         """The strategy of one flight."""
         ...
 
@@ -70,3 +73,28 @@ class PressJob:
     def plan(self) -> dict[str, float]:
         """Hold in phase ``press``, slide in phase ``paint``; ``descend`` after a lost rotor."""
         return {"press": self.hold_s, "paint": self.slide_s, "descend": self.descend_s}
+
+
+@dataclass(frozen=True, kw_only=True)
+class OwnJob:
+    """Fly a strategy of the user's: ``module:Class`` or ``file.py:Class``."""
+
+    name: str
+
+    def strategy(self, config: PaintingConfig) -> Strategy:
+        """A new one.
+
+        Raises:
+            ConfigError: When it cannot be loaded or constructed.
+        """
+        return require_strategy(built(self.name, Strategy, "--strategy", config))  # type: ignore[type-abstract]
+
+    def expected_s(self, config: PaintingConfig, strokes: int) -> float:
+        """Its legs at painting speed; those of the paint job where it has none."""
+        legs = sum(math.hypot(*leg) for leg in self.strategy(config).legs)
+        return legs / config.speed_m_s if legs > 0.0 else PaintJob().expected_s(config, strokes)
+
+    @property
+    def plan(self) -> dict[str, float]:
+        """None: its legs are judged."""
+        return {}

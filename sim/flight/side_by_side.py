@@ -16,6 +16,7 @@ import cv2
 import joblib
 
 from sim.flight.closed_loop import fly
+from sim.flight.jobs import Job
 from sim.flight.options import FlightOptions
 from sim.flight.pictures import pack_pictures
 from sim.flight.stop import handled_ctrl_c, live_with_parent
@@ -41,7 +42,12 @@ def own_peak_memory() -> int:
 
 
 def fly_laws(
-    scene: Scene, options: FlightOptions, laws: Iterable[str], progress: LawProgress, workers: int | None = None
+    scene: Scene,
+    options: FlightOptions,
+    laws: Iterable[str],
+    progress: LawProgress,
+    workers: int | None = None,
+    task: Job | None = None,
 ) -> dict[str, Flight]:
     """Fly the same scene and seed under every law.
 
@@ -51,33 +57,38 @@ def fly_laws(
         laws: Laws to fly.
         progress: Called with the progress of every law.
         workers: Processes at a time; None takes one per law if there are cores for all, else one.
+        task: Task at the wall; None paints.
 
     Returns:
         One flight per law; after Ctrl-C the partial ones, without those that never began.
     """
     jobs = {law: dataclasses.replace(options, law=law) for law in laws}
     if (workers or joblib.cpu_count()) >= len(jobs) > 1:
-        return _fly_apart(scene, jobs, progress)
+        return _fly_apart(scene, jobs, progress, task)
     flights: dict[str, Flight] = {}
     for law, job in jobs.items():
-        trace = _fly_one(scene, job, functools.partial(progress, law))
+        trace = _fly_one(scene, job, functools.partial(progress, law), task)
         flights[law] = Flight(trace=trace)
         if trace.reason == INTERRUPTED:
             break
     return flights
 
 
-def _fly_one(scene: Scene, options: FlightOptions, progress: Callable[[float, str, float], None]) -> Trace:
+def _fly_one(
+    scene: Scene, options: FlightOptions, progress: Callable[[float, str, float], None], task: Job | None
+) -> Trace:
     """Fly one law and report its end."""
     cv2.setNumThreads(1)  # more of them make no flight faster, and the laws share the cores as processes
-    trace = pack_pictures(fly(scene, options, progress))
+    trace = pack_pictures(fly(scene, options, progress, job=task))
     duration = float(trace.t[-1]) if len(trace.t) else 0.0
     phase = INTERRUPTED if trace.reason == INTERRUPTED else "done"
     progress(duration, phase, duration / trace.wall_time_s if trace.wall_time_s > 0 else 0.0)
     return trace
 
 
-def _fly_apart(scene: Scene, jobs: dict[str, FlightOptions], progress: LawProgress) -> dict[str, Flight]:
+def _fly_apart(
+    scene: Scene, jobs: dict[str, FlightOptions], progress: LawProgress, task: Job | None
+) -> dict[str, Flight]:
     """One process per law. The first Ctrl-C ends the flights and returns the partial traces; the second one raises.
 
     Raises:
@@ -87,7 +98,7 @@ def _fly_apart(scene: Scene, jobs: dict[str, FlightOptions], progress: LawProgre
     from joblib.externals.loky.process_executor import BrokenProcessPool
 
     with _Link(progress) as link:
-        calls = [joblib.delayed(_fly_in_worker)(scene, job, link.news, link.stop) for job in jobs.values()]
+        calls = [joblib.delayed(_fly_in_worker)(scene, job, task, link.news, link.stop) for job in jobs.values()]
         try:
             with (
                 joblib.parallel_config(backend="loky", inner_max_num_threads=1),
@@ -105,7 +116,7 @@ def _fly_apart(scene: Scene, jobs: dict[str, FlightOptions], progress: LawProgre
             get_reusable_executor().shutdown(wait=False, kill_workers=True)
 
 
-def _fly_in_worker(scene: Scene, options: FlightOptions, news: Any, stop: Any) -> Flight:
+def _fly_in_worker(scene: Scene, options: FlightOptions, task: Job | None, news: Any, stop: Any) -> Flight:
     live_with_parent()  # `stop` ends the flight
 
     def report(flown_s: float, phase: str, real_time_factor: float) -> None:
@@ -113,7 +124,7 @@ def _fly_in_worker(scene: Scene, options: FlightOptions, news: Any, stop: Any) -
         if stop.is_set() and phase not in ("done", INTERRUPTED):
             raise KeyboardInterrupt
 
-    return Flight(trace=_fly_one(scene, options, report), process_memory_bytes=own_peak_memory())
+    return Flight(trace=_fly_one(scene, options, report, task), process_memory_bytes=own_peak_memory())
 
 
 class _Link:

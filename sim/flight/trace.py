@@ -102,6 +102,8 @@ class Trace:
     claimed: bool = False  # whether the pilot ended its job as planned, by what it knows (truth: sim.evaluate.truth)
     # Least durations [s] of the phases of a job without strokes (`sim.flight.jobs.PressJob`); empty for a paint job.
     plan: dict[str, float] = field(default_factory=dict)
+    # Way (right, down) along the board in every leg of a strategy of the user's [m]; None for a shipped one.
+    legs: tuple[tuple[float, float], ...] | None = None
     reason: str = ""  # why the flight ended, in words
     wall_time_s: float = 0.0  # wall-clock time of the simulation [s]
     # Painted board as the camera would see it, uint8 RGB, with `canvas_px_per_m`; no class attribute, see `draw_later`.

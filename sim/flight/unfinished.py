@@ -13,8 +13,9 @@ from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.files import UnreadableFile, read_bytes
 from ibvs_qp.config.settings import from_dict
 from ibvs_qp.config.toml_text import parse_toml
+from ibvs_qp.painting.strategy import PHASES
 from ibvs_qp.pilot import PilotConfig
-from sim.flight.assemble import OUTCOMES, PHASES, Flown, LoggedRows, assemble
+from sim.flight.assemble import OUTCOMES, Flown, LoggedRows, assemble
 from sim.flight.columns import split
 from sim.flight.journal import NOTES, ROWS, Header
 from sim.flight.log_check import check_arrays

@@ -92,6 +92,11 @@ def test_other_simulator_paints_two_rows_at_the_push_asked_for() -> None:
     assert middle == pytest.approx(5.0, abs=0.1) and highest < 6.0
 
 
+def test_own_path_is_a_strategy_in_sixty_lines() -> None:
+    assert printed("own_path") == "", "`ibvs-qp paint --strategy` flies it"
+    assert len((ROOT / "examples" / "own_path.py").read_text(encoding="utf-8").splitlines()) <= 60
+
+
 @pytest.mark.slow  # a flight with pictures
 def test_pilot_flies_a_job_by_drawn_pictures_of_a_plain_board_flush_with_its_wall() -> None:
     text = printed("pilot")

@@ -7,7 +7,7 @@ import dataclasses
 from synthetic_trace import Errors, synthetic_trace
 
 
-def fake_fly(scene, options, progress=None):
+def fake_fly(scene, options, progress=None, job=None):
     """A made-up flight, with short strokes so that its video is quick to write."""
     if progress:
         progress(1.0, "approach", 8.0)

@@ -270,12 +270,13 @@ class PaintedWall:
             tared=self.time > self.tared_after,
         )
         before, stroke = self.painter.phase, self.painter.row
-        command = self.command = self.painter.step(inputs)
+        command = self.command = self.painter.fly(inputs)
         if before == "paint" and self.painter.phase != "paint":
             self.ends.append((stroke, *self.tip.tolist()))
         if before != "paint" and self.painter.phase == "paint":
             self.paint.append(Paint(self.config.stroke_m))
-            self.begins.append((self.painter.row, self.painter._cross.deviation))
+            if isinstance(self.painter, Painter):
+                self.begins.append((self.painter.row, self.painter._cross.deviation))
         self._move(command)
         return command
 

@@ -86,7 +86,7 @@ def test_second_run_leaves_nothing_stale(flown, capsys):
 
 
 def test_law_that_does_not_complete_is_still_reported(flown, capsys, monkeypatch):
-    def crash(scene, options, progress=None):
+    def crash(scene, options, progress=None, job=None):
         return dataclasses.replace(fake_fly(scene, options), claimed=False, reason="propeller touched the wall")
 
     monkeypatch.setattr(sim.flight.side_by_side, "fly", crash)
@@ -95,7 +95,7 @@ def test_law_that_does_not_complete_is_still_reported(flown, capsys, monkeypatch
 
 
 def test_interrupt_writes_the_partial_run(flown, capsys, monkeypatch):
-    def cut_short(scene, options, progress=None):
+    def cut_short(scene, options, progress=None, job=None):
         return dataclasses.replace(fake_fly(scene, options), claimed=False, reason="interrupted")
 
     monkeypatch.setattr(sim.flight.side_by_side, "fly", cut_short)
@@ -203,7 +203,7 @@ def test_unwritable_folder(flown, capsys, monkeypatch):
 
 
 def test_config_error_during_the_flight_is_a_user_error(flown, capsys, monkeypatch):
-    def refuse(*_):
+    def refuse(*_, **__):
         raise ConfigError("preset x.toml: unknown key 'gain'")
 
     monkeypatch.setattr(sim.flight.side_by_side, "fly", refuse)
@@ -212,7 +212,7 @@ def test_config_error_during_the_flight_is_a_user_error(flown, capsys, monkeypat
 
 
 def test_internal_error_keeps_its_traceback(flown, capsys, monkeypatch):
-    def fail(*_):
+    def fail(*_, **__):
         raise ZeroDivisionError("seven")
 
     monkeypatch.setattr(sim.flight.side_by_side, "fly", fail)

@@ -48,6 +48,35 @@ def along(trace: Trace) -> np.ndarray:
     return board.to_pattern(board.board_coordinates(trace.tip[:, 1:]))[:, 0]
 
 
+def test_legs_of_an_own_strategy_are_compared_with_the_way_of_the_tip():
+    legs = ((-0.6, 0.0), (0.6, 0.0), (-0.6, 0.0))
+    trace = three_rows()
+    trace.legs = legs
+    metrics = compute_metrics(trace)
+    assert shortfall(trace) is None and not false_claims({"qp": metrics})
+    assert metrics["rows"] == [] and math.isnan(metrics["coverage"]) and math.isnan(metrics["stroke_m"])
+    trace.legs = ((-0.6, 0.0), (0.62, 0.0), (-0.6, 0.0))
+    assert shortfall(trace) == "leg 2: 0.600 m long, 0.620 m asked"
+    trace.legs = (*legs, (0.0, -0.2))
+    assert shortfall(trace) == "leg 4: not painted"
+    trace.legs = ((-0.6, 0.0), (0.6, 0.02), (-0.6, 0.0))
+    assert shortfall(trace) == "leg 2: it ends 20 mm beside its line"
+    trace.legs = legs
+    u = along(trace)
+    middle = (trace.row == 2) & (np.abs(u - np.median(u[trace.row == 2])) < 0.05)
+    assert str(shortfall(moved(trace, middle, 0.02))).startswith("leg 2: 1")
+
+
+def test_without_legs_an_own_strategy_is_completed_as_it_says_unless_it_crashes_or_stays():
+    trace = three_rows()
+    trace.legs, trace.claimed, trace.reason = (), False, "no edge in view"
+    assert shortfall(trace) == "no edge in view"
+    trace.claimed = True
+    assert shortfall(trace) is None
+    trace.phases = tuple("away" if name in ("retreat", "done") else name for name in trace.phases)
+    assert shortfall(trace) == "no retreat"
+
+
 @pytest.mark.parametrize(("kind", "start"), PATTERNS)
 def test_a_good_flight_is_completed_in_every_pattern(kind, start):
     size = {"width_m": 0.7, "height_m": 0.7}
