@@ -12,8 +12,8 @@ import subprocess
 import tempfile
 import time
 
-#: Time that compilers may take in one process [s], all runs together: a tick and its solver need 4 s.
-PATIENCE_S = 10.0
+#: Time that compilers may take in one process [s], all runs together: a tick and its solver need 4 s on an idle core.
+PATIENCE_S = 30.0
 
 log = logging.getLogger(__name__)
 _spent_s = 0.0
