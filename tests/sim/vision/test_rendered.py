@@ -67,6 +67,25 @@ def test_a_job_that_begins_at_a_corner_starts_with_the_board_and_not_with_the_wa
         assert found is not None and abs(found[1]) * world.focal < 1.0, name
 
 
+def test_an_edge_that_leaves_the_picture_fades_at_its_place_and_does_not_jump_to_the_next_one() -> None:
+    """The tip rises from 0.256 to 0.276 m above the board's edge, 10 mm below paint: the picture ends at 0.272 m."""
+    paint = PaintScene(rows=4, stroke_m=0.4)
+    world = World(Scene(board=BoardScene(width_m=0.5, height_m=0.488), paint=paint), 0)
+    left, right = world.geometry.row_ends
+    for row in (1, 2, 3):
+        stroke_row(world, row, left, right)
+    heights = np.linspace(0.256, 0.276, 40)
+    first, second, _ = board_edge(world, "bottom")
+    errors = []
+    for seen, position, attitude, _ in perceive(
+        world, np.full(len(heights), 0.25), heights, np.zeros(len(heights)), 0, sway=0.3
+    ):
+        rho, _ = world.line(first, second, position, attitude)
+        level = [line for line in seen.features.lines if line.role == "horizontal" and line.kind == "board"]
+        errors += [(abs(line.rho) - abs(rho)) * world.focal for line in level if abs(abs(line.rho) - abs(rho)) < 0.1]
+    assert len(errors) > 15 and max(np.abs(errors)) < 1.0, errors
+
+
 @pytest.mark.parametrize(("name", "board"), SCENES)
 def test_row_1_in_contact(name: str, board: dict) -> None:
     world = World(scene_of(name, **board), 2)
