@@ -144,10 +144,13 @@ class AlongTrack:
         return near
 
     def _correct(self, line: PatternLine, expected: float, row: np.ndarray) -> str:
-        difference, seen = line.place - expected, EDGE_STD**2 + line.track.deviation**2
+        difference = line.place - expected
+        seen = EDGE_STD**2 + line.track.deviation**2 + (SCALE_STD * line.place) ** 2
         variance = float(row @ self._p @ row) + seen
         noticed = ""
         if abs(difference) > SIGMAS * math.sqrt(variance):
+            if line.weight <= CERTAIN_WEIGHT:
+                return ""  # it leaves the picture or has just come, and its fit may be wrong
             # Both edges are seen, so the board is longer or shorter than the job says: the origin of u moves.
             noticed = f"the board's edge lies {difference * 1e3:+.0f} mm from where the job expects it"
             if row is _END:

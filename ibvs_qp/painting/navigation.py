@@ -81,7 +81,7 @@ class Navigation(PhaseMachine):
     def _guides(self) -> tuple[int, ...]:
         """Tracks of the edges along the strokes, best first; at the wall, those that stay in the picture."""
         cross, reach = self._cross, self.config.guide_reach_m
-        if self.phase not in ("paint", "climb"):
+        if self.phase not in ("press", "paint", "climb"):
             return tuple(cross.guides)
         return tuple([track for track, v in cross.guides.items() if abs(v - self._v_target) < reach])
 

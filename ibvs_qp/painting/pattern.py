@@ -24,7 +24,6 @@ PLACE_TOLERANCE_M = 0.008
 FILL_REST_M = PLACE_TOLERANCE_M
 
 Axis = tuple[float, float]
-_LEFT, _RIGHT, _UP, _DOWN = (-1.0, 0.0), (1.0, 0.0), (0.0, -1.0), (0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -42,17 +41,22 @@ class Pattern:
     @cached_property
     def along(self) -> Axis:
         """Unit vector of u: the travel of stroke 1, (right, down)."""
-        return self._inwards[0] if self.kind == ROWS else self._inwards[1]
+        return self._axes[0] if self.kind == ROWS else self._axes[1]
 
     @cached_property
     def across(self) -> Axis:
         """Unit vector of v: from stroke to stroke, (right, down)."""
-        return self._inwards[1] if self.kind == ROWS else self._inwards[0]
+        return self._axes[1] if self.kind == ROWS else self._axes[0]
 
     @property
     def guide_role(self) -> str:
         """Role of the lines parallel to the strokes."""
         return HORIZONTAL if self.kind == ROWS else VERTICAL
+
+    @property
+    def inwards(self) -> tuple[int, int]:
+        """Where the board lies from its start corner, (right, down), +1 or -1 each."""
+        return -1 if self.start.endswith("right") else 1, -1 if self.start.startswith("bottom") else 1
 
     def travel(self, stroke: int) -> float:
         """Direction of a stroke along u: +1 for odd ones, -1 for even ones."""
@@ -69,9 +73,10 @@ class Pattern:
         return along[0] * u + across[0] * v, along[1] * u + across[1] * v
 
     @property
-    def _inwards(self) -> tuple[Axis, Axis]:
+    def _axes(self) -> tuple[Axis, Axis]:
         """From the start corner into the board: sideways, and up or down."""
-        return _LEFT if self.start.endswith("right") else _RIGHT, _UP if self.start.startswith("bottom") else _DOWN
+        right, down = self.inwards
+        return (float(right), 0.0), (0.0, float(down))
 
 
 def stroke_count(rows: int | str, extent_m: float, edge_margin_m: float, pitch_m: float) -> int:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ibvs_qp.measurement import RgbdFrame
+from ibvs_qp.painting.pattern import Pattern
 from ibvs_qp.pilot.config import PilotConfig
 from ibvs_qp.validation.failure import raised
 
@@ -59,14 +60,15 @@ class PerceptionLoader:
             self.problem = raised("perception", error)
 
     def _construct(self) -> Perception | PaperPerception:
-        vehicle = self._config.controller.vehicle
+        vehicle, painting = self._config.controller.vehicle, self._config.painting
+        inwards = Pattern(painting.pattern, painting.start).inwards
         if self._config.perception == "paper":
             from ibvs_qp.vision.paper import PaperPerception
 
-            return PaperPerception(self._config.paper_vision, self._config.vision, vehicle)
+            return PaperPerception(self._config.paper_vision, self._config.vision, vehicle, inwards)
         from ibvs_qp.vision.perception import Perception
 
-        return Perception(self._config.vision, vehicle)
+        return Perception(self._config.vision, vehicle, inwards)
 
 
 def _stand_in() -> RgbdFrame:

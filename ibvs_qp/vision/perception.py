@@ -28,6 +28,7 @@ from ibvs_qp.vision.perception_result import PerceptionResult
 from ibvs_qp.vision.picture.exposure import ExposureSteps
 from ibvs_qp.vision.picture.picture import Picture
 from ibvs_qp.vision.surface.layout import PictureLayout
+from ibvs_qp.vision.surface.seeds import UP_LEFT
 from ibvs_qp.vision.surface.surface_tracker import SurfaceTracker
 
 #: Pictures after a start in which lines are searched often: colours are learned in the first one.
@@ -47,11 +48,12 @@ class Perception:
         config: Settings.
         vehicle: Geometry of the vehicle in the picture; None for a camera alone, not in
             flight, whose surface is named by a seed.
+        inwards: Where the surface lies from the tip at the beginning of a job, (right, down): +1 or -1 each.
     """
 
-    def __init__(self, config: VisionConfig, vehicle: VehicleParams | None) -> None:
+    def __init__(self, config: VisionConfig, vehicle: VehicleParams | None, inwards: tuple[int, int] = UP_LEFT) -> None:
         prepare()
-        self._config, self._vehicle = config, vehicle
+        self._config, self._vehicle, self._inwards = config, vehicle, inwards
         self._camera_position = np.zeros(3) if vehicle is None else np.asarray(vehicle.camera_position_m, float)
         self._colors = SurfaceColors(config.board_color, config.paint_color, config.line.color_gate)
         self._surface = SurfaceTracker(config.plane, self._colors)
@@ -187,7 +189,7 @@ class Perception:
     def _laid_out(self, frame: RgbdFrame) -> PictureLayout:
         """Masks and grid of the picture; for another size or camera new ones, and nothing is followed into it."""
         if self._layout is None or not self._layout.fits(frame):
-            self._layout = PictureLayout(frame, self._config, self._vehicle)
+            self._layout = PictureLayout(frame, self._config, self._vehicle, self._inwards)
             self._grey = None
             for part in (self._surface, self._tracker):
                 part.lose()

@@ -68,7 +68,7 @@ class _Rivals:
     def _make_paper(self, shot: Shot, seed: _Seed) -> None:
         layout = PictureLayout(shot.frame, self._config, self._vehicle)
         self._paper = PaperPipeline(mask=layout.mask if seed is None else None)
-        (row, column), grid = layout.seeds[0], layout.grid
+        (row, column), grid = layout.ladder[0].cells[0], layout.grid
         self._seed = (float(grid.offset + grid.stride * column), float(grid.offset + grid.stride * row))
 
     def _track(self, rows: dict[str, Row], shot: Shot, seed: _Seed, number: int) -> dict[str, float]:

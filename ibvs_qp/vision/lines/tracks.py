@@ -24,6 +24,10 @@ _DRIFT = np.diag([2e-3**2, 2e-3**2])
 _EXPECTED_CONFIDENCE = 0.8
 #: A detected line this many times as long as the track that follows its edge replaces its line.
 _LONGER = 1.2
+#: A line this near to the picture's border shows its outer side no more [px at 640]: the 4 px at which its sides are
+#: looked at, and the error of a prediction. A fit there takes the inner shoulder of the edge, 3 px aside, or the next
+#: edge inwards.
+_BORDER_PX = 7.0
 #: Squared cosine of the angle below which two lines cannot be one.
 _PARALLEL = 0.9
 
@@ -43,6 +47,19 @@ def _track_of(identity: int, candidate: Candidate, hint: str = "") -> Track:
     )
     track.adopt(candidate.line)
     return track
+
+
+def _leaves(track: Track, picture: Picture) -> bool:
+    """Whether all that was seen of a line lies along the picture's border, or beyond it."""
+    (first, last), (cos, sin) = track.extent, (math.cos(track.theta), math.sin(track.theta))
+    height, width = picture.mask.shape
+    if abs(sin) >= abs(cos):
+        places, size = [(x, (track.rho - x * cos) / sin) for x in (first, last)], height
+    else:
+        places, size = [((track.rho - y * sin) / cos, y) for y in (first, last)], width
+    axis, least = (1 if abs(sin) >= abs(cos) else 0), _BORDER_PX * picture.scale
+    across = denormalise(np.array(places), picture.intrinsics)[:, axis]
+    return bool((across < least).all() or (across > size - 1 - least).all())
 
 
 class LineTracker:
@@ -122,6 +139,8 @@ class LineTracker:
             if not candidate.kind or candidate.score < self._config.detect.min_score:
                 continue
             fresh = _track_of(0, candidate)
+            if _leaves(fresh, picture):
+                continue
             same = next((track for track in self.tracks if self._same(track, fresh, picture)), None)
             if same is None:
                 self._start(candidate)
@@ -160,7 +179,10 @@ class LineTracker:
         config = self._config.line
         width = strip_px * picture.scale
         found = refine_lines(picture, queries, half_width_px=width, config=config, colors=colors)
-        return [line if line is not None and self._healthy(line, picture) else None for line in found]
+        return [
+            line if line is not None and self._healthy(line, picture) and not _leaves(track, picture) else None
+            for track, line in zip(self.tracks, found, strict=True)
+        ]
 
     def _healthy(self, line: RefinedLine, picture: Picture) -> bool:
         track = self._config.track

@@ -20,6 +20,7 @@ from ibvs_qp.vision.paper.pipeline import PaperPipeline
 from ibvs_qp.vision.paper.result import PaperDetection
 from ibvs_qp.vision.perception_result import PerceptionResult
 from ibvs_qp.vision.surface.layout import PictureLayout
+from ibvs_qp.vision.surface.seeds import UP_LEFT, facing
 
 #: Identities of the two lines: the paper knows no others, whichever edge is topmost or first at the moment.
 TOPMOST_TRACK, FIRST_TRACK = 1, 2
@@ -39,8 +40,10 @@ class PaperPerception:
         vehicle: Geometry.
     """
 
-    def __init__(self, config: PaperConfig, vision: VisionConfig, vehicle: VehicleParams) -> None:
-        self._config, self._vision, self._vehicle = config, vision, vehicle
+    def __init__(
+        self, config: PaperConfig, vision: VisionConfig, vehicle: VehicleParams, inwards: tuple[int, int] = UP_LEFT
+    ) -> None:
+        self._config, self._vision, self._vehicle, self._inwards = config, vision, vehicle, inwards
         self._camera_position = np.asarray(vehicle.camera_position_m, float)
         self._flow, self._gate = SparseFlow(vision.flow), PictureGate()
         self._layout: PictureLayout | None = None
@@ -89,7 +92,7 @@ class PaperPerception:
         seed_pixel: tuple[float, float] | None,
     ) -> PerceptionResult:
         if self._layout is None or not self._layout.fits(frame):
-            self._layout = PictureLayout(frame, self._vision, self._vehicle)
+            self._layout = PictureLayout(frame, self._vision, self._vehicle, self._inwards)
             self._pipeline = PaperPipeline(self._config, self._layout.mask)
             self._center = None
             self._flow.reset()
@@ -135,7 +138,7 @@ class PaperPerception:
         seeds = [] if self._center is None else [self._center]
         seeds += [
             (float(grid.offset + grid.stride * column), float(grid.offset + grid.stride * row))
-            for row, column in self._layout.seeds
+            for row, column in facing(grid, frame.depth, self._layout.ladder, self._vision.plane)
         ]
         seeds = seeds if seed_pixel is None else [seed_pixel]
         found = self._pipeline.detect(frame, *seeds)

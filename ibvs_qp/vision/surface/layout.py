@@ -10,7 +10,7 @@ from ibvs_qp.vision.config import VisionConfig
 from ibvs_qp.vision.picture.grid import CoarseGrid
 from ibvs_qp.vision.picture.mask import brush_zone, vehicle_mask
 from ibvs_qp.vision.surface.follow_plane import PlaneFollower
-from ibvs_qp.vision.surface.seeds import seed_cells
+from ibvs_qp.vision.surface.seeds import UP_LEFT, Seeds, seeds_ahead
 
 
 class PictureLayout:
@@ -22,10 +22,16 @@ class PictureLayout:
         grid: Coarse grid.
         beside_brush: Flat places of the grid's samples around the brush, where fresh paint lies.
         follower: Follows the surface on a still coarser one.
-        seeds: Cells beside the brush.
+        ladder: Cells beside the place where the tip meets a surface, by its depth.
     """
 
-    def __init__(self, frame: RgbdFrame, config: VisionConfig, vehicle: VehicleParams | None) -> None:
+    def __init__(
+        self,
+        frame: RgbdFrame,
+        config: VisionConfig,
+        vehicle: VehicleParams | None,
+        inwards: tuple[int, int] = UP_LEFT,
+    ) -> None:
         """Draw the masks and lay the grid for pictures like this one."""
         shape = (frame.rgb.shape[0], frame.rgb.shape[1])
         self._key = (shape, tuple(frame.intrinsics))
@@ -37,7 +43,9 @@ class PictureLayout:
         self.grid = CoarseGrid(shape, frame.intrinsics, self.mask, config.plane.grid_columns)
         self.beside_brush = np.flatnonzero(self.grid.free & (self.grid.sample(zone) > 0))
         self.follower = PlaneFollower(config.plane, shape, frame.intrinsics, self.mask)
-        self.seeds = [] if vehicle is None else seed_cells(self.grid, vehicle, config.brush_width_m)
+        self.ladder: list[Seeds] = []
+        if vehicle is not None:
+            self.ladder = seeds_ahead(self.grid, vehicle, config.brush_width_m, inwards)
 
     def fits(self, frame: RgbdFrame) -> bool:
         """Whether a picture has this size and camera."""

@@ -1,27 +1,67 @@
-"""Where the working surface surely is: beside the brush, at the height of the tip; and how far it is there."""
+"""Where the working surface surely is: beside the place where the tip will meet it; and how far it is there.
+
+The tip meets a surface straight ahead of it. In the picture that place moves with the distance: at the depth Z of the
+surface it lies at (x, y) / Z, where (x, y) is the tip from the camera.
+"""
 
 from __future__ import annotations
+
+import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import to_camera
+from ibvs_qp.vision.config import PlaneConfig
 from ibvs_qp.vision.picture.grid import CoarseGrid
 
 #: Distances of the seeds from the tip's image, in brush radii: just outside the brush, then farther.
 _STEPS = (1.7, 2.6)
-#: Farther ones where all of those are hidden or outside the picture; below the brush, too.
+#: Farther ones where all of those are hidden or outside the picture; on the other side of the tip, too.
 _FAR_STEPS = (4.0, 6.0, 9.0)
-_ASIDE = ((-1.0, 0.0), (1.0, 0.0), (-1.0, -1.0), (1.0, -1.0))
-_AROUND = (*_ASIDE, (-1.0, 1.0), (1.0, 1.0), (0.0, 1.0), (0.0, -1.0))
+#: Where the surface lies from the tip at the beginning of a job, (right, down), unless it is stated.
+UP_LEFT = (-1, -1)
+#: Depths for which seeds are laid, as multiples of the one before, the nearest and the farthest one [m].
+_RATIO, _NEAREST_M, _FARTHEST_M = 1.15, 0.05, 2.6
 
 
-def seed_cells(grid: CoarseGrid, vehicle: VehicleParams, brush_width_m: float) -> list[tuple[int, int]]:
-    """Cells around the brush's image that the vehicle does not hide: left, right and above, else anywhere near."""
+@dataclass(frozen=True, slots=True)
+class Seeds:
+    """Cells beside the place where the tip meets a surface, which lies at one depth [m]."""
+
+    depth: float
+    cells: list[tuple[int, int]]
+
+
+def seeds_ahead(
+    grid: CoarseGrid, vehicle: VehicleParams, brush_width_m: float, inwards: tuple[int, int] = UP_LEFT
+) -> list[Seeds]:
+    """Seeds for a surface in contact, then for farther ones; the vehicle hides none of them.
+
+    Args:
+        grid: Where samples lie.
+        vehicle: Tip and camera.
+        brush_width_m: Diameter of the brush, the distance of seeds [m].
+        inwards: Where the surface lies from the tip at the beginning of a job, (right, down): +1 or -1 each.
+    """
     x, y, z = to_camera(np.asarray(vehicle.tip_position_m, float), np.asarray(vehicle.camera_position_m, float))
-    center, radius = (x / z, y / z), 0.5 * brush_width_m / z
-    near = _free_cells(grid, center, radius, _STEPS, _ASIDE)
-    return near or _free_cells(grid, center, radius, (*_STEPS, *_FAR_STEPS), _AROUND)
+    nearest = max(z, _NEAREST_M)
+    count = 1 + max(math.ceil(math.log(_FARTHEST_M / nearest, _RATIO)), 0)
+    rungs = [nearest * _RATIO**k for k in range(count)]
+    radius = 0.5 * brush_width_m
+    return [Seeds(z, _beside(grid, (x / z, y / z), radius / z, inwards)) for z in rungs]
+
+
+def _beside(
+    grid: CoarseGrid, center: tuple[float, float], radius: float, inwards: tuple[int, int]
+) -> list[tuple[int, int]]:
+    """Cells beside a place and inwards of it, else anywhere near; first those that surely are on the surface."""
+    right, down = inwards
+    aside = ((right, 0), (-right, 0), (right, down), (-right, down))
+    around = (*aside, (right, -down), (-right, -down), (0, -down), (0, down))
+    near = _free_cells(grid, center, radius, _STEPS, aside)
+    return near or _free_cells(grid, center, radius, (*_STEPS, *_FAR_STEPS), around)
 
 
 def _free_cells(
@@ -29,7 +69,7 @@ def _free_cells(
     center: tuple[float, float],
     radius: float,
     steps: tuple[float, ...],
-    directions: tuple[tuple[float, float], ...],
+    directions: tuple[tuple[int, int], ...],
 ) -> list[tuple[int, int]]:
     rows, columns = grid.shape
     found = []
@@ -39,6 +79,27 @@ def _free_cells(
             if 0 <= cell[0] < rows and 0 <= cell[1] < columns and grid.free[cell]:
                 found.append(cell)
     return found
+
+
+def facing(grid: CoarseGrid, depth: np.ndarray, ladder: list[Seeds], config: PlaneConfig) -> list[tuple[int, int]]:
+    """The seeds at which a picture has the depth for which they were laid; without any, those of a contact.
+
+    Args:
+        grid: Where samples lie.
+        depth: Depth [m], (H, W).
+        ladder: From `seeds_ahead`.
+        config: Range of the depth, and the window of a seed.
+    """
+    if not ladder:
+        return []
+    inverse, gate = grid.inverse_depth(depth, config.distance_min_m, config.distance_max_m), math.sqrt(_RATIO)
+    found = {}  # no cell twice, in order
+    for seeds in ladder:
+        values = seed_values(grid, inverse, seeds.cells, config.seed_radius)
+        for cell, value in zip(seeds.cells, values, strict=True):
+            if 1.0 / gate < value * seeds.depth < gate:
+                found[cell] = None
+    return list(found) or ladder[0].cells
 
 
 def seed_values(grid: CoarseGrid, inverse: np.ndarray, seeds: list[tuple[int, int]], radius: int) -> list[float]:

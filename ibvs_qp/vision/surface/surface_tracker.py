@@ -15,6 +15,7 @@ from ibvs_qp.vision.surface.find_surface import find_surface, followed_region
 from ibvs_qp.vision.surface.layout import PictureLayout
 from ibvs_qp.vision.surface.plane import PlaneEstimate, PlaneFitter
 from ibvs_qp.vision.surface.region import SurfaceRegion
+from ibvs_qp.vision.surface.seeds import facing
 
 
 class SurfaceTracker:
@@ -70,7 +71,7 @@ class SurfaceTracker:
                 self.plane = followed
                 return None
         self.plane = None
-        seeds = layout.seeds
+        seeds = facing(layout.grid, frame.depth, layout.ladder, self._config)
         if seed_pixel is not None:
             u, v = seed_pixel
             height, width = frame.depth.shape

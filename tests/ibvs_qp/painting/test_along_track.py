@@ -103,6 +103,18 @@ def test_an_end_that_was_recognised_has_a_narrow_gate_and_may_be_dim() -> None:
     assert along.end == -1 and along.u == pytest.approx(0.9, abs=1e-3)
 
 
+@pytest.mark.parametrize(("weight", "error"), [(0.5, 0.02), (1.0, 0.01)])
+def test_an_edge_that_leaves_the_picture_does_not_move_the_beginning(weight: float, error: float) -> None:
+    """Fading, or seen far aside, where the scale of the picture counts."""
+    along = at_the_margin()
+    along.look([upright(2, -MARGIN, 1)])
+    along.predict(0.22)
+    along.look([upright(2, -MARGIN - 0.22 + error, 1, weight=weight)])
+    along.predict(-0.22)
+    along.look([upright(2, -MARGIN, 1)])
+    assert along.u == pytest.approx(0.0, abs=2e-3) and along._x[1] == pytest.approx(-MARGIN, abs=2e-3)
+
+
 def test_back_at_the_beginning_the_edge_beside_it_corrects() -> None:
     along = at_the_margin()
     along.look([upright(2, -MARGIN, 1)])

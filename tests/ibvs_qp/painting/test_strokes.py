@@ -190,6 +190,20 @@ def test_a_tip_that_friction_holds_beside_its_place_searches_and_begins_anew() -
     assert_painted(world)
 
 
+def test_while_the_tip_presses_no_edge_is_followed_that_the_view_at_the_wall_loses() -> None:
+    """Back from a search for row 4 the board's edge is still in view, 0.27 m away; its barrier would hold the tip."""
+    world = PaintedWall(short(rows=4))
+    world.fly(200.0, until="climb", stroke=4)
+    world.fly(0.5)
+    world.stuck = True
+    world.fly(10.0, until="search")
+    world.stuck, world.hidden = False, {OUTER + 3, OUTER + 2, OUTER + 1, FAR}
+    world.fly(20.0, until="press")
+    commands = world.fly(20.0, until="paint")
+    level = [offset for c in commands for line, offset in c.guides if line.role == world.painter.pattern.guide_role]
+    assert world.painter.phase == "paint" and max(map(abs, level), default=0.0) < world.config.guide_reach_m
+
+
 # ------------------------------------------------------------------------------------------------------ lost contact
 
 

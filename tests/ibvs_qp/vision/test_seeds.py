@@ -1,19 +1,25 @@
-"""Places where the surface is looked for: beside the brush, and elsewhere where nothing beside it is in view."""
+"""Places where the surface is looked for: beside where the tip will meet it, and elsewhere where that is hidden."""
 
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from ibvs_qp.config import VehicleParams
+from ibvs_qp.vision.config import PlaneConfig
 from ibvs_qp.vision.picture.grid import CoarseGrid
-from ibvs_qp.vision.surface.seeds import seed_cells
+from ibvs_qp.vision.surface.seeds import facing, seeds_ahead
 
 SHAPE, INTRINSICS, BRUSH_M = (480, 640), (625.2, 625.2, 319.5, 239.5), 0.08
 
 
-def test_seeds_lie_beside_the_brush() -> None:
-    grid = CoarseGrid(SHAPE, INTRINSICS, np.zeros(SHAPE, np.uint8), 80)
-    cells = seed_cells(grid, VehicleParams(), BRUSH_M)
+def grid_of(mask: np.ndarray | None = None) -> CoarseGrid:
+    return CoarseGrid(SHAPE, INTRINSICS, np.zeros(SHAPE, np.uint8) if mask is None else mask, 80)
+
+
+def test_seeds_of_a_contact_lie_beside_the_brush() -> None:
+    grid = grid_of()
+    cells = seeds_ahead(grid, VehicleParams(), BRUSH_M)[0].cells
     rows = [row for row, _ in cells]
     assert len(cells) == 8 and max(rows) == grid.cell_at(320, 140)[0]
 
@@ -21,6 +27,28 @@ def test_seeds_lie_beside_the_brush() -> None:
 def test_with_everything_beside_the_brush_hidden_the_surface_is_looked_for_below() -> None:
     mask = np.zeros(SHAPE, np.uint8)
     mask[:250] = 255  # propellers and a brush at the upper border
-    grid = CoarseGrid(SHAPE, INTRINSICS, mask, 80)
-    cells = seed_cells(grid, VehicleParams(), BRUSH_M)
+    grid = grid_of(mask)
+    cells = seeds_ahead(grid, VehicleParams(), BRUSH_M)[0].cells
     assert cells and all(grid.free[cell] for cell in cells)
+
+
+@pytest.mark.parametrize("depth", [0.5, 0.8, 1.0, 1.5])
+def test_seeds_follow_the_place_where_the_tip_will_meet_the_surface(depth: float) -> None:
+    grid = grid_of()
+    ladder = seeds_ahead(grid, VehicleParams(), BRUSH_M)
+    cells = facing(grid, np.full(SHAPE, depth, np.float32), ladder, PlaneConfig())
+    row, column = grid.cell(-1.7 * 0.5 * BRUSH_M / depth, -0.08 / depth)  # the tip is 0.08 m above the camera
+    assert cells and abs(cells[0][0] - row) <= 1 and abs(cells[0][1] - column) <= 1
+
+
+def test_the_first_seed_lies_inwards_of_the_corner_at_which_the_job_begins() -> None:
+    grid, tip = grid_of(), round(INTRINSICS[2])
+    for right in (-1, 1):
+        column = seeds_ahead(grid, VehicleParams(), BRUSH_M, (right, 1))[0].cells[0][1]
+        assert (column - grid.cell_at(tip, 0)[1]) * right > 0
+
+
+def test_without_depth_at_any_distance_those_of_a_contact_remain() -> None:
+    grid = grid_of()
+    ladder = seeds_ahead(grid, VehicleParams(), BRUSH_M)
+    assert facing(grid, np.zeros(SHAPE, np.float32), ladder, PlaneConfig()) == ladder[0].cells

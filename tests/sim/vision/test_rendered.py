@@ -23,7 +23,9 @@ from rendered_scenes import (
     stroke_row,
 )
 
+from ibvs_qp.painting.pattern import COLUMNS, CORNERS, Pattern
 from ibvs_qp.vision import LineHint, Perception, VisionConfig
+from sim.world.scene import BoardScene, PaintScene, Scene
 
 SCENES = [
     ("default", {}),
@@ -42,6 +44,46 @@ def test_approach(name: str, board: dict) -> None:
     flight = Flight(world, {"bottom": board_edge(world, "bottom")})
     flight.run(np.full(FRAMES, right - 0.1), world.geometry.row_height(1), np.linspace(0.5, 0.2, FRAMES), 1)
     flight.check(normal_deg=0.6)
+
+
+@pytest.mark.parametrize("gap_m", [0.05, 0.012])
+@pytest.mark.parametrize("start", CORNERS)
+def test_a_job_that_begins_at_a_corner_starts_with_the_board_and_not_with_the_wall(start: str, gap_m: float) -> None:
+    paint = PaintScene(rows=4, stroke_m=0.4, pattern=COLUMNS, start=start)
+    world = World(Scene(board=BoardScene(width_m=0.488, height_m=0.5, gap_m=gap_m), paint=paint), 0)
+    geometry, attitude = world.geometry, quaternion(0.0, 0.0, 0.0)
+    along, up = geometry.from_pattern(np.array((geometry.stroke_ends[0], geometry.stroke_place(1))))
+    position = world.body_position(along, up, 0.45, attitude)
+    perception = Perception(VisionConfig(paint_color=paint.color), VEHICLE, Pattern(COLUMNS, start).inwards)
+    seen = [
+        perception.process(world.camera.capture(position, attitude, k * INTERVAL_NS), attitude=attitude)
+        for k in range(SETTLE)
+    ][-1]
+    assert seen.plane is not None
+    assert seen.plane.distance_m == pytest.approx(world.plane(position, attitude)[1], abs=0.006)
+    for name in start.split("-") if gap_m > 0.02 else ():  # where the arm leaves little of an edge, depth must tell it
+        first, second, kind = board_edge(world, name)
+        found = nearest(seen, world.line(first, second, position, attitude), kind)
+        assert found is not None and abs(found[1]) * world.focal < 1.0, name
+
+
+def test_an_edge_that_leaves_the_picture_fades_at_its_place_and_does_not_jump_to_the_next_one() -> None:
+    """The tip rises from 0.256 to 0.276 m above the board's edge, 10 mm below paint: the picture ends at 0.272 m."""
+    paint = PaintScene(rows=4, stroke_m=0.4)
+    world = World(Scene(board=BoardScene(width_m=0.5, height_m=0.488), paint=paint), 0)
+    left, right = world.geometry.row_ends
+    for row in (1, 2, 3):
+        stroke_row(world, row, left, right)
+    heights = np.linspace(0.256, 0.276, 40)
+    first, second, _ = board_edge(world, "bottom")
+    errors = []
+    for seen, position, attitude, _ in perceive(
+        world, np.full(len(heights), 0.25), heights, np.zeros(len(heights)), 0, sway=0.3
+    ):
+        rho, _ = world.line(first, second, position, attitude)
+        level = [line for line in seen.features.lines if line.role == "horizontal" and line.kind == "board"]
+        errors += [(abs(line.rho) - abs(rho)) * world.focal for line in level if abs(abs(line.rho) - abs(rho)) < 0.1]
+    assert len(errors) > 15 and max(np.abs(errors)) < 1.0, errors
 
 
 @pytest.mark.parametrize(("name", "board"), SCENES)
