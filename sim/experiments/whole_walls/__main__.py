@@ -27,7 +27,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m sim.experiments.whole_walls", description=__doc__)
     parser.add_argument("sets", nargs="*", default=SETS, help=f"of {', '.join(SETS)}; default: all")
     parser.add_argument("--laws", nargs="+", choices=("qp", "paper"), default=("qp", "paper"))
-    parser.add_argument("--part", type=int, default=1, help="fly this part, from 1; 0 flies none and prints the figures")
+    parser.add_argument("--part", type=int, default=1, help="part to fly, from 1; 0 only prints the figures")
     parser.add_argument("--of", type=int, default=1, help="number of parts, of about the same flight time")
     parser.add_argument("--seed", type=int, default=0, help="of the designs: other walls, other faults")
     parser.add_argument("--jobs", type=int, default=1, help="processes side by side")

@@ -20,6 +20,8 @@ from sim.world.worlds import HARSH
 COMPLETE_GOAL = {"datasheet": 1.0, HARSH: 0.9, "rendered": 1.0}
 #: Least coverage of a flight, and largest place error of the last strokes as a multiple of that of an early one [-].
 COVERAGE_GOAL, PLACE_GOAL = 0.98, 2.0
+#: Sets with these two goals.
+_COVERED = ("datasheet", "rendered")
 #: Most false claims, and least share of the complete flights that are claimed.
 FALSE_GOAL, CLAIMED_GOAL = 0, 0.98
 
@@ -46,9 +48,9 @@ class Line:
     @property
     def cells(self) -> tuple[str, ...]:
         """Figure, value, goal, n, and whether the goal is met."""
-        scale, unit = (100.0, " %") if self.percent else (1.0, "")
+        scale, unit, digits = (100.0, " %", ".1f") if self.percent else (1.0, "", ".3g")
         goal = "–" if self.goal is None else f"{'>=' if self.at_least else '<='} {scale * self.goal:g}{unit}"
-        value = "–" if math.isnan(self.value) else f"{scale * self.value:.3g}{unit}"
+        value = "–" if math.isnan(self.value) else f"{scale * self.value:{digits}}{unit}"
         met = "–" if self.goal is None or not self.n else "yes" if self.met else "NO"
         return self.figure, value, goal, f"{self.n} of {self.planned}", met
 
@@ -59,7 +61,7 @@ def lines(table: pl.DataFrame, runs: Sequence[Run]) -> list[Line]:
     for name, law in dict.fromkeys((run.experiment, run.law) for run in runs):
         planned = [run for run in runs if (run.experiment, run.law) == (name, law)]
         rows = table.filter((pl.col("experiment") == name) & (pl.col("law") == law))
-        found += _of_set(f"{name}, {law}", COMPLETE_GOAL.get(name), rows, planned)
+        found += _of_set(name, law, rows, planned)
     done, claimed = _done(table), table["claimed"]
     complete = int(done.sum())
     return [
@@ -83,17 +85,16 @@ def lines(table: pl.DataFrame, runs: Sequence[Run]) -> list[Line]:
     ]
 
 
-def _of_set(words: str, goal: float | None, rows: pl.DataFrame, planned: Sequence[Run]) -> Iterator[Line]:
-    total, done = len(planned), _done(rows)
+def _of_set(name: str, law: str, rows: pl.DataFrame, planned: Sequence[Run]) -> Iterator[Line]:
+    words, goal, total, done = f"{name}, {law}", COMPLETE_GOAL.get(name), len(planned), _done(rows)
     share = _share(done.sum(), rows.height)
     yield Line(figure=f"{words}: complete", value=share, goal=goal, n=rows.height, planned=total, percent=True)
-    if goal is None:
+    if name not in _COVERED:
         return
     covered = _column(rows, "coverage").fill_nan(0.0).fill_null(0.0)
     least = float(covered.min()) if rows.height else math.nan  # type: ignore[arg-type]
-    bound = COVERAGE_GOAL if goal == 1.0 else None
     yield Line(
-        figure=f"{words}: coverage, least", value=least, goal=bound, n=rows.height, planned=total, percent=True
+        figure=f"{words}: coverage, least", value=least, goal=COVERAGE_GOAL, n=rows.height, planned=total, percent=True
     )
     many = pl.col(f"{PARAM}strokes") > EARLY_STROKE
     later = rows.filter(many) if rows.height else rows
@@ -101,7 +102,7 @@ def _of_set(words: str, goal: float | None, rows: pl.DataFrame, planned: Sequenc
     yield Line(
         figure=f"{words}: place error of the last stroke over that of stroke {EARLY_STROKE}, medians",
         value=places[1] / places[0] if places[0] else math.nan,
-        goal=PLACE_GOAL if goal == 1.0 else None,
+        goal=PLACE_GOAL,
         at_least=False,
         n=later.height,
         planned=sum(run.params["strokes"] > EARLY_STROKE for run in planned),  # type: ignore[operator]
@@ -111,10 +112,13 @@ def _of_set(words: str, goal: float | None, rows: pl.DataFrame, planned: Sequenc
 def failures(table: pl.DataFrame, folder: Path) -> Iterator[str]:
     """Every flight that is not complete and claimed, in one line each: where, what the pilot says, what is true."""
     for row, done in zip(table.iter_rows(named=True), _done(table), strict=True):
-        if done and row["claimed"]:
+        covered = row.get("coverage") or 0.0
+        gaps = done and row["experiment"] in _COVERED and covered < COVERAGE_GOAL
+        if done and row["claimed"] and not gaps:
             continue
         job = " ".join(f"{name.removeprefix(PARAM)}={row[name]}" for name in row if name.startswith(PARAM))
         words = f"{row['experiment']}, {row['variant']}, {row['law']}, seed {row['seed']} ({job}): {row['reason']}"
+        words += f"; covers {100.0 * covered:.1f} %" if gaps else ""
         if not row["claimed"] and not done and row["trace"]:
             words += f"; by the truth: {Judgement(load_trace(folder / row['trace'])).shortfall}"
         yield words

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from sim.evaluate.measures import paint_figures
 from sim.evaluate.truth import Judgement
 from sim.experiments.whole_walls.scenes import walls
+from sim.experiments.whole_walls.vision_faults import faulty_jobs
 from sim.faults.fault import Fault
 from sim.flight.jobs import PaintJob
 from sim.flight.options import FlightOptions, pilot_config
@@ -26,19 +27,20 @@ SCENES, RENDERED_SCENES, RENDERED_STROKES = 20, 6, 10
 _AROUND_S = 9.0
 
 #: Sets of flights.
-SETS = ("datasheet", HARSH, "rendered")
+SETS = ("datasheet", HARSH, "rendered", "faults", "faults rendered")
 
 
 def runs_of(sets: Sequence[str], laws: Sequence[str], seed: int = 0) -> list[Run]:
     """Flights of some sets, the shortest first."""
-    return sorted((run for name in sets for run in wall_runs(name, laws, seed)), key=lambda run: run.expected_s)
+    runs = (run for name in sets for run in (fault_runs if "faults" in name else wall_runs)(name, laws, seed))
+    return sorted(runs, key=lambda run: run.expected_s)
 
 
 def wall_runs(name: str, laws: Sequence[str], seed: int = 0) -> list[Run]:
     """Flights of a set over whole walls: every scene under each law, with one seed.
 
     Args:
-        name: "datasheet", "harsh", or "rendered".
+        name: "datasheet", "harsh" or "rendered".
         laws: The laws.
         seed: Of the design.
     """
@@ -50,6 +52,16 @@ def wall_runs(name: str, laws: Sequence[str], seed: int = 0) -> list[Run]:
     return [
         paint_run(name, "standard", in_world(scene, world), law, seed + number, features)
         for number, scene in enumerate(scenes)
+        for law in laws
+    ]
+
+
+def fault_runs(name: str, laws: Sequence[str], seed: int = 0) -> list[Run]:
+    """Flights of a set with faults in vision, in the default world; arguments as of `wall_runs`."""
+    features = "rendered" if "rendered" in name else "geometric"
+    return [
+        paint_run(name, row, in_world(scene, DEFAULT_WORLD), law, number, features, faults)
+        for row, number, scene, faults in faulty_jobs(seed, features)
         for law in laws
     ]
 

@@ -20,9 +20,7 @@ CLUTTER = (0, 4, 10)
 WIDTH_M, HEIGHT_M = (1.4, 3.0), (0.6, 1.7)
 
 
-def walls(
-    seed: int, count: int, strokes: Sequence[int] = STROKES, patterns: Sequence[str] = PATTERNS
-) -> list[Scene]:
+def walls(seed: int, count: int, strokes: Sequence[int] = STROKES, patterns: Sequence[str] = PATTERNS) -> list[Scene]:
     """Scenes with a Latin hypercube over the board's size, and every level of the other factors equally often.
 
     The factors: number of strokes with pattern, corner of stroke 1, colours (those of the shipped scenes), clutter;
