@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -53,7 +54,7 @@ class PictureCovered(SensorFault):
 
         return covered
 
-    def hidden(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    def hidden(self, x: Any, y: Any) -> np.ndarray:
         """How much of what lies at (x, y) is covered, 0..1."""
         radius = np.hypot((x - self.right) / self.half_width, (y - self.down) / self.half_height)
         return np.clip((1.0 - radius) / _RIM + _HALF, 0.0, 1.0)

@@ -76,7 +76,7 @@ def lines(table: pl.DataFrame, runs: Sequence[Run]) -> list[Line]:
         ),
         Line(
             figure="claimed, of the complete flights",
-            value=_share((claimed & done).sum(), complete),
+            value=_share(int((claimed & done).sum()), complete),
             goal=CLAIMED_GOAL,
             n=complete,
             planned=len(runs),
@@ -87,7 +87,7 @@ def lines(table: pl.DataFrame, runs: Sequence[Run]) -> list[Line]:
 
 def _of_set(name: str, law: str, rows: pl.DataFrame, planned: Sequence[Run]) -> Iterator[Line]:
     words, goal, total, done = f"{name}, {law}", COMPLETE_GOAL.get(name), len(planned), _done(rows)
-    share = _share(done.sum(), rows.height)
+    share = _share(int(done.sum()), rows.height)
     yield Line(figure=f"{words}: complete", value=share, goal=goal, n=rows.height, planned=total, percent=True)
     if name not in _COVERED:
         return
