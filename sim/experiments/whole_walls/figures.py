@@ -117,11 +117,11 @@ def failures(table: pl.DataFrame, folder: Path) -> Iterator[str]:
         if done and row["claimed"] and not gaps:
             continue
         job = " ".join(f"{name.removeprefix(PARAM)}={row[name]}" for name in row if name.startswith(PARAM))
-        words = f"{row['experiment']}, {row['variant']}, {row['law']}, seed {row['seed']} ({job}): {row['reason']}"
-        words += f"; covers {100.0 * covered:.1f} %" if gaps else ""
+        found = f"{row['experiment']}, {row['variant']}, {row['law']}, seed {row['seed']} ({job}): {row['reason']}"
+        found += f"; covers {100.0 * covered:.1f} %" if gaps else ""
         if not row["claimed"] and not done and row["trace"]:
-            words += f"; by the truth: {Judgement(load_trace(folder / row['trace'])).shortfall}"
-        yield words
+            found += f"; by the truth: {Judgement(load_trace(folder / row['trace'])).shortfall}"
+        yield found
 
 
 def _column(rows: pl.DataFrame, name: str) -> pl.Series:
