@@ -255,3 +255,14 @@ def test_a_touch_beside_the_beginning_is_taken_back_but_not_for_ever() -> None:
         assert begun == taken_back and world.painter.finished, world.painter.reason
         assert sways > 1 or not world.painter.failed
         assert world.phases().count("paint") == 1
+
+
+def test_the_own_edge_leads_where_no_other_one_is_in_view() -> None:
+    world = PaintedWall(short(rows=2, stroke_m=1.0))
+    world.fly(60.0, until="paint", stroke=2)
+    world.hidden = {GUIDE, OUTER + 1, FAR}
+    world.fly(5.0)
+    assert world.painter.phase == "paint" and world.guide == OUTER + 2
+    world.wave = lambda _stroke, u: 0.01 if u < 0.5 else 0.0  # as a jolt that the odometer measures
+    world.fly(5.0)
+    assert abs(world.tip[1] - world.config.edge_margin_m - world.config.pitch_m) < 0.5 * PLACE
