@@ -71,7 +71,6 @@ class CrossTrack:
         guides: Tracks that were recognised at the last look with their v [m], best first.
         maps: Where the strokes were laid, oldest first.
         far_edge: v of the board's other edge where it has been in view [m], NaN before.
-        laid_deviation: Mean of `deviation` over the stroke that is or was laid last [m].
     """
 
     def __init__(self, config: PaintingConfig) -> None:
@@ -82,7 +81,6 @@ class CrossTrack:
         self.turn, self.far_edge = 0.0, math.nan
         self.guides: dict[int, float] = {}
         self._laying = False
-        self.laid_deviation, self._laid = 0.0, 0
 
     @property
     def v(self) -> float:
@@ -135,14 +133,11 @@ class CrossTrack:
         """The tip begins to paint a stroke; what it paints is remembered."""
         self.maps.append(StrokeMap(self._config.stroke_m))
         self._laying = True
-        self.laid_deviation, self._laid = 0.0, 0
         self._clone(_V, _OWN_MAP)
 
     def lay(self, u: float) -> None:
         """The brush presses here."""
         self.maps[-1].add(u, self.v)
-        self._laid += 1
-        self.laid_deviation += (self.deviation - self.laid_deviation) / self._laid
 
     def end_stroke(self) -> None:
         """The stroke ends; what comes into view first of the next one is its end."""
@@ -168,10 +163,10 @@ class CrossTrack:
         if (line := self._board_edge(parallel)) is not None:
             guides.append(line)
             self._follow_turn(line, LOOK_S / TURN_TIME_S)
-        if self._laying:
-            self._own_edges(parallel, u, ahead)
+        own = self._own_edges(parallel, u, ahead) if self._laying else []
         if (line := self._opposite_edge(parallel)) is not None:
             guides.append(line)
+        guides += own
         self.guides = {line.track.track_id: self.v + self.tip_error + line.place for line in guides}
 
     def _board_edge(self, lines: list[PatternLine]) -> PatternLine | None:
@@ -190,13 +185,17 @@ class CrossTrack:
             row, error, deviation = _BOARD, 0.0, older
         return None
 
-    def _own_edges(self, lines: list[PatternLine], u: float, ahead: float) -> None:
-        """Both edges of the stroke that is being laid, behind the brush: they show where the tip is in the picture."""
+    def _own_edges(self, lines: list[PatternLine], u: float, ahead: float) -> list[PatternLine]:
+        """Both edges of the stroke that is being laid, behind the brush: they show where the tip is in the picture.
+
+        They lead the tip, too, where no other edge is in view: velocity alone holds it half as well against friction.
+        """
         paint = [line for line in lines if line.kind == "paint"]
-        error = float(self._x[_OWN_MAP])
+        error, seen = float(self._x[_OWN_MAP]), []
         for side in (1, -1):
             found = [line for line in paint if line.side == side]
-            self._painted_edge(found, self.maps[-1], (u, -ahead), side * self._half, (_OWN, error, 0.0))
+            seen.append(self._painted_edge(found, self.maps[-1], (u, -ahead), side * self._half, (_OWN, error, 0.0)))
+        return [line for line in seen if line is not None]
 
     def _painted_edge(
         self,

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from ibvs_qp.measurement import HORIZONTAL
-from ibvs_qp.painting.along_track import AlongTrack
+from ibvs_qp.painting.along_track import SIGMAS, AlongTrack
 from ibvs_qp.painting.carrier import Carrier
 from ibvs_qp.painting.command import ZERO, ExpectedEdge, PainterInput, PaintingCommand
 from ibvs_qp.painting.config import PaintingConfig
@@ -115,8 +115,12 @@ class Navigation(PhaseMachine):
 
     def _is_certain(self) -> bool:
         """Whether three standard deviations of the place fit into half the overlap."""
-        config = self.config
-        return 3.0 * self._cross.deviation < max(0.5 * config.overlap_m, config.least_certainty_m)
+        return SIGMAS * self._cross.deviation < self._certain_m
+
+    @property
+    def _certain_m(self) -> float:
+        """Half the overlap, or what is certain at any overlap [m]; a stroke that errs by twice as much leaves a gap."""
+        return max(0.5 * self.config.overlap_m, self.config.least_certainty_m)
 
     # ---------------------------------------------------------------- movement
 

@@ -25,6 +25,9 @@ STANDOFF_REACHED = 0.01
 PRESS_REFERENCE_MIN = 1.0
 #: Distance from the beginning of stroke 1 within which the vehicle approaches the wall while it moves there [m].
 NEAR_BEGINNING_M = 0.06
+#: A touch this far from the beginning of its stroke is taken back [m], at most so often [-]: the vehicle sways by 10 mm
+#: in hover, and a stroke may be wrong by 10 mm, its end and the estimate included.
+TOUCH_ASIDE_M, MOST_TOUCHES = 0.006, 2
 #: Least mean speed towards the wall, by which an approach is given its time [m/s].
 APPROACH_SPEED = 0.05
 #: A stroke that ends without an edge is as long as asked if u is known this well [m]; half the tolerance of a length.
@@ -47,6 +50,8 @@ class Painter(Navigation):
         self._standoff = math.nan
         self._waypoints: list[tuple[float, float]] = []
         self._uncertain = ""  # why the job is not what was asked, although it was flown to its end
+        self._touches = 0  # that were taken back, before the stroke in progress
+        self._worst = 0.0  # largest standard deviation of the place of the stroke in progress [m]
         self._paused = self._follows_end = False
 
     def _enter(self, inputs: PainterInput, phase: str, reason: str) -> None:
@@ -183,7 +188,11 @@ class Painter(Navigation):
         self._hold_touch_point(inputs)
         if inputs.in_contact and inputs.time_since_touch > config.press_time_s:
             tolerance = config.press_error * max(inputs.push_reference, PRESS_REFERENCE_MIN)
-            if abs(inputs.push - inputs.push_reference) < tolerance:
+            aside = self._stroke_begin() - self._along.u
+            if abs(aside) > TOUCH_ASIDE_M and self._touches < MOST_TOUCHES:
+                self._touches += 1
+                self._enter(inputs, "approach", f"touched {aside * 1e3:+.0f} mm from the beginning")
+            elif abs(inputs.push - inputs.push_reference) < tolerance:
                 self._begin_stroke(inputs, max(self.row, 1), f"push {inputs.push:.1f} N reached")
         return self._command(inputs, contact=True, hold=True)
 
@@ -195,6 +204,7 @@ class Painter(Navigation):
             self._speed = 0.0
             left = f"{abs(self._stroke_goal() - self._along.u) * 1e3:.0f} mm are left after {allowed:.0f} s"
             self._fail(inputs, f"time-out in row {self.row}: {left}")
+        self._worst = max(self._worst, self._cross.deviation)
         self._v_reference = self._slid(self._v_reference, self._v_target, dt)
         remaining = travel * (self._stroke_goal() - self._along.u)
         self._pause_without_contact(inputs)
@@ -255,7 +265,7 @@ class Painter(Navigation):
         return not math.isnan(rest) and rest <= FILL_REST_M
 
     def _begin_stroke(self, inputs: PainterInput, stroke: int, reason: str) -> None:
-        self.row, self._speed, self._follows_end = stroke, 0.0, False
+        self.row, self._speed, self._follows_end, self._worst, self._touches = stroke, 0.0, False, 0.0, 0
         self._cross.begin_stroke()
         self._along.begin_stroke()
         self._stroke_end.begin()
@@ -288,9 +298,8 @@ class Painter(Navigation):
             return f"row {self.row} ended by the odometer, its length is known to {known * 1e3:.0f} mm"
         if abs(length - asked) > LENGTH_TOLERANCE_M:
             return f"row {self.row} is {length * 1e3:.0f} mm long, {asked * 1e3:.0f} mm were asked"
-        spread = SIGMAS * self._cross.laid_deviation
-        if spread > PLACE_TOLERANCE_M:
-            return f"row {self.row}: its place is known to {spread * 1e3:.0f} mm of {PLACE_TOLERANCE_M * 1e3:g} mm"
+        if SIGMAS * self._worst > 2.0 * self._certain_m:
+            return f"row {self.row} lost its edge, its place is known to {self._worst * 1e3:.1f} mm"
         aside = self._cross.maps[-1].mean(self._along.begin, asked) - self._v_target
         if abs(aside) > PLACE_TOLERANCE_M:
             return f"row {self.row} lies {aside * 1e3:+.0f} mm from its place, limit {PLACE_TOLERANCE_M * 1e3:g} mm"

@@ -14,6 +14,7 @@ import numpy as np
 from ibvs_qp.config.settings import Checked, setting
 from ibvs_qp.measurement import SensorFrame
 from ibvs_qp.pilot import Pilot
+from sim.world.canvas import Canvas
 from sim.world.plant import Plant
 
 #: What the pilot gets instead of a sensor frame; None: this tick of the pilot does not take place.
@@ -24,6 +25,7 @@ class Surroundings(Protocol):
     """The part of the world that faults change."""
 
     plant: Plant
+    canvas: Canvas
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -50,15 +50,21 @@ class PlaneLost(FeatureFault):
 
 @dataclass(frozen=True, kw_only=True)
 class LinesLost(FeatureFault):
-    """No lines, or each one only now and then."""
+    """No lines, or each one only now and then, or none of a kind."""
 
     share: float = setting(1.0, "fraction of the lines that is lost, drawn for every line and picture", low=0, high=1)
+    kind_of_line: str = choice("", "only board edges or edges of paint; empty: of all kinds", ("", "board", "paint"))
 
     def spoilt(self, features: FeatureFrame, rng: np.random.Generator) -> FeatureFrame:
         """Without those lines."""
         lost = rng.random(len(features.lines)) < self.share
         return dataclasses.replace(
-            features, lines=tuple(line for line, gone in zip(features.lines, lost, strict=True) if not gone)
+            features,
+            lines=tuple(
+                line
+                for line, gone in zip(features.lines, lost, strict=True)
+                if not gone or self.kind_of_line not in ("", line.kind)
+            ),
         )
 
 

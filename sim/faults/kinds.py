@@ -9,19 +9,20 @@ from sim.faults.fault import Fault, NoFault
 from sim.faults.features import DepthFlipped, FeatureNan, LinesLost, PlaneLost, WrongLines
 from sim.faults.force_torque import ForceTorqueBias, ForceTorqueLost, ForceTorqueNan, ForceTorqueStuck, ForceTorqueZero
 from sim.faults.imu import AccelerometerBias, AttitudeStep, GyroBias, ImuLate, ImuNan, ImuStuck
+from sim.faults.picture import PictureCovered
 from sim.faults.rotors import Derate, RotorStuck, ThrustLoss
 from sim.faults.solver import SolverInfeasible, SolverSilent
-from sim.faults.wall import BoardMoved, OtherWall
+from sim.faults.wall import BoardMoved, EdgeBroken, OtherWall
 
 KINDS: dict[str, type[Fault]] = {
     kind.__name__: kind
     for kind in (
         NoFault,
         CameraLost, CameraLatency, CameraJitter, CameraReordered, CameraFrozen,
-        PlaneLost, LinesLost, WrongLines, DepthFlipped, FeatureNan,
+        PlaneLost, LinesLost, WrongLines, DepthFlipped, FeatureNan, PictureCovered,
         ForceTorqueLost, ForceTorqueStuck, ForceTorqueNan, ForceTorqueZero, ForceTorqueBias,
         ImuStuck, ImuLate, ImuNan, GyroBias, AttitudeStep, AccelerometerBias,
-        Derate, RotorStuck, ThrustLoss, WindStep, SidePush, OtherWall, BoardMoved,
+        Derate, RotorStuck, ThrustLoss, WindStep, SidePush, OtherWall, BoardMoved, EdgeBroken,
         ClockLeap, LoopStall, SlowLoop, TicksSkipped, SolverInfeasible, SolverSilent,
     )
 }  # fmt: skip

@@ -1,4 +1,4 @@
-"""Changes of the wall and of the contact."""
+"""Changes of wall, contact and paint."""
 
 from __future__ import annotations
 
@@ -9,7 +9,11 @@ import numpy as np
 from ibvs_qp.config.settings import setting
 from ibvs_qp.pilot import Pilot
 from sim.faults.fault import Fault, Surroundings
+from sim.world.board import BoardGeometry
 from sim.world.contact import contact_stiffness, set_contact
+
+#: Multiples of it, without their whole part, are spread evenly and without order.
+_GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,4 +55,29 @@ class BoardMoved(Fault):
     def strike(self, world: Surroundings, pilot: Pilot) -> str:
         """Move it."""
         world.plant.displace(np.array([-self.away_m, 0.0, 0.0]))
+        return self.words
+
+
+@dataclass(frozen=True, kw_only=True)
+class EdgeBroken(Fault):
+    """Paint has run over the outer edge of the strokes along a part of their length; lines are not found there.
+
+    Strokes that are painted later have a whole edge.
+    """
+
+    length_m: float = setting(0.3, "length of the part", unit="m", low=0.01, high=20.0)
+    at: float = setting(0.5, "its middle, as a fraction of the way along stroke 1", low=0.0, high=1.0)
+    farthest_m: float = setting(0.015, "farthest that paint has run", unit="m", low=0.0, high=0.1)
+
+    def strike(self, world: Surroundings, pilot: Pilot) -> str:
+        """Let paint run over the edges that are there."""
+        edges, radius = world.canvas.edges, 0.5 * world.canvas.scene.paint.brush_width_m
+        first, last = BoardGeometry(world.canvas.scene).stroke_ends
+        low, high = first + self.at * (last - first) + self.length_m * np.array((-0.5, 0.5))
+        _, points = edges.exposed()
+        broken = points[(points[:, 0] >= low) & (points[:, 0] <= high)]
+        for number, (u, v) in enumerate(broken):
+            run_m = self.farthest_m * (number * _GOLDEN % 1.0)
+            world.canvas.stroke(None, edges.on_board(np.array((u, v - radius + run_m))))
+        edges.open[:, (edges.middles >= low) & (edges.middles <= high)] = False
         return self.words

@@ -14,7 +14,7 @@ from ibvs_qp.frames import rotate, rotate_back, rotation_rows
 #: Least visible depth [m].
 NEAR_M = 0.05
 #: Shortest visible piece that counts as a line, normalised (31 px at 640x480).
-_SHORTEST = 0.05
+SHORTEST = 0.05
 #: A smaller change of depth or offset along an edge counts as none [m].
 _PARALLEL = 1e-12
 #: Numbers of a projected edge: visible or not, ends of its visible part (x1, y1, x2, y2), rho, theta, and the side of
@@ -57,7 +57,7 @@ def _seen_edge(ends: tuple[_Numbers, _Numbers], surface: _Numbers, half_view: _N
         seen = ca.logic_and(seen, ca.logic_or(ca.fabs(rate) >= _PARALLEL, value >= 0.0))
     near, far = z0 + low * dz, z0 + high * dz
     x1, y1, x2, y2 = (x0 + low * dx) / near, (y0 + low * dy) / near, (x0 + high * dx) / far, (y0 + high * dy) / far
-    long = (x2 - x1) * (x2 - x1) + (y2 - y1) * (y2 - y1) >= _SHORTEST * _SHORTEST
+    long = (x2 - x1) * (x2 - x1) + (y2 - y1) * (y2 - y1) >= SHORTEST * SHORTEST
     seen = ca.logic_and(seen, ca.logic_and(low < high, long))
     theta = ca.atan2(x1 - x2, y2 - y1)
     rho = x1 * ca.cos(theta) + y1 * ca.sin(theta)

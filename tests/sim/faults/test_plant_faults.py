@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,12 +16,14 @@ from sim.faults.air import SidePush, WindStep
 from sim.faults.rotors import Derate, RotorStuck, ThrustLoss
 from sim.faults.schedule import FaultSchedule
 from sim.faults.solver import SolverInfeasible, SolverSilent
-from sim.faults.wall import BoardMoved, OtherWall
+from sim.faults.wall import BoardMoved, EdgeBroken, OtherWall
 from sim.flight.closed_loop import fly, make_pilot
 from sim.flight.jobs import PressJob
 from sim.flight.options import FlightOptions, pilot_config
 from sim.flight.surroundings import World
 from sim.flight.trace import LANDED
+from sim.world.canvas import Canvas
+from sim.world.painted_edges import BIN_M
 from sim.world.plant import Plant
 from sim.world.scene import Scene
 
@@ -175,3 +178,19 @@ def test_a_failing_solver_gives_the_analytic_law_as_long_as_the_fault_lasts(kind
     found = [str(command.outcome) for command in commands]
     assert set(found[10 : back - 1]) == {"analytic_fallback"}
     assert set(found[:10]) == {"solved"} and set(found[back:]) <= {"solved", "exact_fallback"}
+
+
+def test_paint_runs_over_the_edges_that_are_there_along_a_part_of_them():
+    canvas = Canvas(Scene(), seed=0)
+    geometry, paint = canvas.geometry, canvas.scene.paint
+    first, last = geometry.stroke_ends
+    path = [geometry.from_pattern(np.array((u, paint.edge_margin_m))) for u in np.arange(first, last, 0.01)]
+    for before, after in itertools.pairwise(path):
+        canvas.stroke(before, after)
+    whole, painted = len(canvas.edges.exposed()[0]), canvas.coverage.sum()
+    EdgeBroken(length_m=0.3).strike(SimpleNamespace(canvas=canvas), None)
+    strokes, points = canvas.edges.exposed()
+    assert (whole - len(strokes)) * BIN_M == pytest.approx(0.3, abs=2 * BIN_M)
+    assert np.abs(points[:, 0] - 0.5 * (first + last)).min() >= 0.15 - BIN_M
+    added = (canvas.coverage.sum() - painted) / canvas.pixels_per_m**2
+    assert 0.3 * 0.001 < added < 0.4 * EdgeBroken().farthest_m

@@ -16,6 +16,7 @@ from sim.faults.clock import ClockLeap, LoopStall, SlowLoop, TicksSkipped
 from sim.faults.features import DepthFlipped, FeatureNan, LinesLost, PlaneLost, WrongLines
 from sim.faults.force_torque import ForceTorqueBias, ForceTorqueLost, ForceTorqueNan, ForceTorqueStuck, ForceTorqueZero
 from sim.faults.imu import AccelerometerBias, AttitudeStep, GyroBias, ImuNan, ImuStuck
+from sim.faults.picture import PictureCovered
 
 #: A tick and an F/T sample [ns]; every eighth tick brings a picture that is 60 ms old.
 TICK, SAMPLE, PICTURE_TICKS, AGE = 4_000_000, 10_000_000, 8, 60_000_000
@@ -186,3 +187,47 @@ def test_ticks_do_not_take_place():
     assert skipped == pytest.approx(0.2, abs=0.03)
     taken = [index for index, (_, got) in enumerate(through(SlowLoop(rate_hz=50.0))) if got is not None]
     assert set(np.diff(taken)) == {5}
+
+
+def line_from(*segment, kind="paint"):
+    return LineFeature(
+        rho=0.0, theta=0.5 * math.pi, covariance=np.eye(2), role=HORIZONTAL, segment=np.array(segment), kind=kind
+    )
+
+
+def spoilt(fault, *lines):
+    """The lines that are left of some in one frame."""
+    frame = FeatureFrame(lines=lines, plane=None, stamp_ns=0)
+    return fault.filter(np.random.default_rng(0))(dataclasses.replace(next(frames(1)), features=frame)).features.lines
+
+
+def test_lines_of_one_kind_are_lost():
+    board, paint = line_from((0, 0), (1, 0), kind="board"), line_from((0, 0), (1, 0))
+    assert spoilt(LinesLost(kind_of_line="paint"), board, paint) == (board,)
+    assert spoilt(LinesLost(kind_of_line="board"), board, paint) == (paint,)
+
+
+def test_a_cover_cuts_lines_to_their_longest_clear_piece():
+    cover = PictureCovered(right=0.1, half_width=0.1, half_height=0.05)
+    (cut,) = spoilt(cover, line_from((-0.3, 0.0), (0.3, 0.0)))
+    assert cut.segment == pytest.approx(np.array([[-0.3, 0.0], [0.0, 0.0]]), abs=0.005)
+    beside = line_from((-0.3, 0.1), (0.3, 0.1))
+    assert spoilt(cover, beside) == (beside,)
+    assert spoilt(cover, line_from((0.03, 0.0), (0.21, 0.0))) == ()
+
+
+def test_a_cover_hides_colour_and_depth_of_its_part_of_the_picture():
+    picture = RgbdFrame(
+        rgb=np.full((60, 80, 3), 100, np.uint8),
+        depth=np.ones((60, 80), np.float32),
+        intrinsics=(80.0, 80.0, 39.5, 29.5),
+        stamp_ns=0,
+    )
+    cover = PictureCovered(right=0.25, half_width=0.1, half_height=0.2)
+    frame = dataclasses.replace(next(frames(1)), features=None, image=picture)
+    got = cover.filter(np.random.default_rng(0))(frame).image
+    assert got.rgb.dtype == np.uint8 and got.depth.dtype == np.float32
+    assert (got.rgb[30, 60] == 255).all() and got.depth[30, 60] == 0.0
+    assert (got.rgb[:, :45] == 100).all() and got.depth[:, :45].all()
+    assert 0.0 < np.mean(got.depth == 0.0) == pytest.approx(math.pi * 8 * 16 / (60 * 80), rel=0.1)
+    assert (picture.rgb == 100).all()
