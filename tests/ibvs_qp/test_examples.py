@@ -191,4 +191,4 @@ def test_the_bag_shows_the_board() -> None:
     assert text.startswith("250 frames, messages ignored: {}")
     distance, edges = re.findall(r"tip ([\d.]+) m from the board, (\d) of its edges seen", text)[0]
     assert float(distance) == pytest.approx(0.4, abs=0.002) and edges == "2"
-    assert "approach: guide" in text and "'solved': 2" in text
+    assert "survey: guide" in text and "'solved': 2" in text
