@@ -139,6 +139,11 @@ class CrossTrack:
         """The brush presses here."""
         self.maps[-1].add(u, self.v)
 
+    def last_stroke(self, first_u: float, last_u: float) -> float:
+        """Mean v between two places of the stroke before the one that is laid [m]; NaN where it is not known."""
+        before = self._painted
+        return before[-1].mean(first_u, last_u) + float(self._x[_LAST_MAP]) if before else math.nan
+
     def end_stroke(self) -> None:
         """The stroke ends; what comes into view first of the next one is its end."""
         self._laying = False

@@ -34,6 +34,10 @@ APPROACH_SPEED = 0.05
 CERTAIN_LENGTH_M = 0.005
 #: A stroke is as long as asked within this [m].
 LENGTH_TOLERANCE_M = 0.01
+#: Last part of a stroke, whose overlap does not count [m].
+CORNER_M = 0.02
+#: Way ahead from which a stroke takes its target [m]: the tip follows a target that moves within half a second.
+REACTION_M = 0.05
 
 
 class Painter(Navigation):
@@ -52,6 +56,7 @@ class Painter(Navigation):
         self._uncertain = ""  # why the job is not what was asked, although it was flown to its end
         self._touches = 0  # that were taken back, before the stroke in progress
         self._worst = 0.0  # largest standard deviation of the place of the stroke in progress [m]
+        self._overlap = math.inf  # least overlap of the stroke in progress with the one before, as estimated [m]
         self._paused = self._follows_end = False
 
     def _enter(self, inputs: PainterInput, phase: str, reason: str) -> None:
@@ -204,9 +209,11 @@ class Painter(Navigation):
             self._speed = 0.0
             left = f"{abs(self._stroke_goal() - self._along.u) * 1e3:.0f} mm are left after {allowed:.0f} s"
             self._fail(inputs, f"time-out in row {self.row}: {left}")
-        self._worst = max(self._worst, self._cross.deviation)
-        self._v_reference = self._slid(self._v_reference, self._v_target, dt)
         remaining = travel * (self._stroke_goal() - self._along.u)
+        self._worst = max(self._worst, self._cross.deviation)
+        if remaining > CORNER_M:
+            self._overlap = min(self._overlap, self._reach_of_last(0.0) - self._cross.v)
+        self._v_reference = self._slid(self._v_reference, self._touching_target(), dt)
         self._pause_without_contact(inputs)
         target = 0.0 if self._paused else stroke_speed(config, remaining)
         self._speed = ramped(self._speed, target, config.acceleration_m_s2 * dt)
@@ -266,6 +273,7 @@ class Painter(Navigation):
 
     def _begin_stroke(self, inputs: PainterInput, stroke: int, reason: str) -> None:
         self.row, self._speed, self._follows_end, self._worst, self._touches = stroke, 0.0, False, 0.0, 0
+        self._overlap = math.inf
         self._cross.begin_stroke()
         self._along.begin_stroke()
         self._stroke_end.begin()
@@ -300,10 +308,23 @@ class Painter(Navigation):
             return f"row {self.row} is {length * 1e3:.0f} mm long, {asked * 1e3:.0f} mm were asked"
         if SIGMAS * self._worst > 2.0 * self._certain_m:
             return f"row {self.row} lost its edge, its place is known to {self._worst * 1e3:.1f} mm"
+        if self._overlap < 0.0:
+            return f"row {self.row} leaves a gap of {-self._overlap * 1e3:.1f} mm to the row before"
         aside = self._cross.maps[-1].mean(self._along.begin, asked) - self._v_target
         if abs(aside) > PLACE_TOLERANCE_M:
             return f"row {self.row} lies {aside * 1e3:+.0f} mm from its place, limit {PLACE_TOLERANCE_M * 1e3:g} mm"
         return ""
+
+    def _reach_of_last(self, ahead: float) -> float:
+        """Largest v at which the brush still touches the stroke before, so far ahead [m]; infinite where unknown."""
+        here = self._along.u + ahead * self.pattern.travel(self.row)
+        half = 0.5 * self.config.brush_width_m
+        last = self._cross.last_stroke(here - half, here + half)
+        return math.inf if math.isnan(last) else last + self.config.brush_width_m
+
+    def _touching_target(self) -> float:
+        """V of the stroke here: its place, or half the overlap inside the stroke before where that one falls short."""
+        return min(self._v_target, self._reach_of_last(REACTION_M) - 0.5 * self.config.overlap_m)
 
     def _lead_to_end(self, ended: bool, moved: float) -> None:
         """Once the edge at the end of the stroke is in view, it leads: from where the tip is, at the stroke's speed."""

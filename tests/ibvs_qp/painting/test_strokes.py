@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 
 import numpy as np
@@ -247,6 +248,35 @@ def test_a_stroke_that_was_pushed_beside_its_place_is_not_claimed() -> None:
     world = PaintedWall(short(rows=1), wave=lambda _stroke, _u: 0.012, stuck_across=True)
     world.fly(60.0)
     assert world.painter.failed and "row 1 lies +12 mm from its place, limit 8 mm" in world.painter.reason
+
+
+def test_a_stroke_bends_where_the_one_before_falls_short_and_leaves_no_gap() -> None:
+    """Stroke 1 swings to 12 mm below its place over half a metre: more than the overlap of 8 mm."""
+
+    def swing(stroke: int, u: float) -> float:
+        return -0.012 * max(math.sin(math.pi * (u - 0.5) / 0.5), 0.0) if stroke == 1 and 0.5 < u < 1.0 else 0.0
+
+    world = PaintedWall(short(rows=3, stroke_m=1.5), wave=swing, stuck_across=True)
+    world.fly(60.0, until="climb", stroke=2)
+    world.stuck_across = False
+    world.fly(200.0)
+    first, second, third = (paint.v for paint in world.paint)
+    covered = ~np.isnan(first) & ~np.isnan(second) & (world.paint[0].u > 0.02)
+    assert np.nanmin(first) < 0.04, "it does swing"
+    assert (first + world.config.brush_width_m - second)[covered].min() > 0.0
+    covered = ~np.isnan(third) & ~np.isnan(second) & (world.paint[0].u < 1.48)
+    assert (second + world.config.brush_width_m - third)[covered].min() > 0.0
+    assert world.painter.finished and not world.painter.failed, world.painter.reason
+
+
+def test_a_gap_to_the_stroke_before_is_not_claimed() -> None:
+    """Nothing moves the tip back to stroke 1, which swung away from it."""
+    world = PaintedWall(short(rows=2, stroke_m=1.5), stuck_across=True)
+    world.wave = lambda stroke, u: -0.012 if stroke == 1 and 0.5 < u < 1.0 else 0.0
+    world.fly(300.0)
+    assert world.painter.failed and re.fullmatch(
+        r"row 2 leaves a gap of \d\.\d mm to the row before", world.painter.reason
+    )
 
 
 def test_a_stroke_that_lost_its_edge_for_long_is_painted_but_not_claimed() -> None:
