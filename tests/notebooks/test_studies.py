@@ -10,6 +10,7 @@ import pytest
 
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.controller import HybridController
+from sim.evaluate.figures import MORE
 from sim.notebook.internals import record_program
 from sim.notebook.noise import (
     FIGURES,
@@ -72,7 +73,7 @@ def test_a_difference_is_significant_from_six_pairs_on():
     words = differences_table(made_table(1.0, 0.0, seeds=6), FIGURES[0])
     # where a flight failed, five pairs are left
     assert words.count("QP better") == 6 and words.count("significant from 6 pairs on") == 3
-    shares = dataclasses.replace(FIGURES[0], more_is_better=True)
+    shares = dataclasses.replace(FIGURES[0], better=MORE)
     assert differences_table(made_table(1.0, 0.0, seeds=6), shares).count("analytic law better") == 6
 
 
