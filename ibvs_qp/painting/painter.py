@@ -25,8 +25,8 @@ STANDOFF_REACHED = 0.01
 PRESS_REFERENCE_MIN = 1.0
 #: Distance from the beginning of stroke 1 within which the vehicle approaches the wall while it moves there [m].
 NEAR_BEGINNING_M = 0.06
-#: A touch this far from the beginning of its stroke is taken back [m], at most so often [-]: the vehicle sways by 10 mm
-#: in hover, and a stroke may be wrong by 10 mm, its end and the estimate included.
+#: A touch this far from the beginning of its stroke is taken back [m], at most so often [-], while an edge beside it is in
+#: view: the vehicle sways by 10 mm in hover, and a stroke may be wrong by 10 mm, its end and the estimate included.
 TOUCH_ASIDE_M, MOST_TOUCHES = 0.006, 2
 #: Least mean speed towards the wall, by which an approach is given its time [m/s].
 APPROACH_SPEED = 0.05
@@ -194,7 +194,8 @@ class Painter(Navigation):
         if inputs.in_contact and inputs.time_since_touch > config.press_time_s:
             tolerance = config.press_error * max(inputs.push_reference, PRESS_REFERENCE_MIN)
             aside = self._stroke_begin() - self._along.u
-            if abs(aside) > TOUCH_ASIDE_M and self._touches < MOST_TOUCHES:
+            found_again = self._along_line.line is not None and self._touches < MOST_TOUCHES
+            if abs(aside) > TOUCH_ASIDE_M and found_again:
                 self._touches += 1
                 self._enter(inputs, "approach", f"touched {aside * 1e3:+.0f} mm from the beginning")
             elif abs(inputs.push - inputs.push_reference) < tolerance:

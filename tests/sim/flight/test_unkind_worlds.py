@@ -19,10 +19,11 @@ from sim.world.scene import Scene
 
 
 def flown(errors: WorldErrors, law: str = "qp", seed: int = 0, stroke_m: float = 0.5, **scene: Any) -> Trace:
-    """A paint job on geometric features in a world."""
+    """A paint job on geometric features in a world, on a board as wide as its strokes and margins."""
     paint = dataclasses.replace(Scene().paint, stroke_m=stroke_m)
+    board = dataclasses.replace(Scene().board, width_m=stroke_m + 2.0 * paint.edge_margin_m)
     options = FlightOptions(law=law, seed=seed, features="geometric", video=False, compiled=True)
-    return fly(Scene(paint=paint, errors=errors, **scene), options)
+    return fly(Scene(board=board, paint=paint, errors=errors, **scene), options)
 
 
 def one_error(section: str, **values: float) -> WorldErrors:
