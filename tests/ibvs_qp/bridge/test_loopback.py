@@ -34,7 +34,7 @@ def test_flies_in_time_through_garbage(tmp_path: Path, domain: int) -> None:
     assert seen["commands"] >= 0.9 * RATE * 3.0
     assert seen["age_ms"][1] <= LATE_MS  # 99 %: other tests run beside this one
     assert seen["alive_gap_ms"][-1] <= 300.0  # COM_OF_LOSS_T; PX4 needs 2 Hz
-    assert seen["moved_m"][0] > 0.05  # it approaches the wall: closed loop
+    assert abs(seen["moved_m"][1]) > 0.05  # it flies along the board to its end: closed loop
     assert min(flown.garbage.values()) > 1000
     kinds = {reason.split(":")[0] for reason in flown.ignored}
     assert kinds == {"imu", "attitude", "wrench", "color", "depth", "camera_info", "mode"}

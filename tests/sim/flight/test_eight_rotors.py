@@ -37,9 +37,10 @@ def test_paints_in_the_closed_loop(law: str) -> None:
     assert trace.thrusts.shape[1] == 8
     assert metrics["force_rms_straight_n"] <= 0.35 and metrics["contact_share"] >= 0.99
     assert metrics["path_rms_straight_m"] <= 0.005 and metrics["tilt_peak_deg"] <= 3.0
-    # Two rotors are redundant: what they add to no wrench must not wander off over the flight.
-    idle = null_space(control_effectiveness(OCTOROTOR))
-    assert np.abs(trace.thrusts @ idle).max() <= 2.1
+    # Two rotors are redundant: what they add to no wrench comes from the first movement and must not wander off later.
+    idle = trace.thrusts @ null_space(control_effectiveness(OCTOROTOR))
+    assert np.abs(idle).max() <= 2.5
+    assert np.ptp(idle[trace.phase >= trace.phases.index("press")], axis=0).max() <= 0.5
     if law == "qp":
         # Smoothness alone holds two redundant thrust directions: on limited ticks OSQP may stop at its cap there.
         assert metrics["outcomes"]["solved"] >= 0.995 * len(trace.t)
