@@ -25,8 +25,8 @@ STANDOFF_REACHED = 0.01
 PRESS_REFERENCE_MIN = 1.0
 #: Distance from the beginning of stroke 1 within which the vehicle approaches the wall while it moves there [m].
 NEAR_BEGINNING_M = 0.06
-#: A touch this far from the beginning of its stroke is taken back [m], at most so often [-], while an edge beside it is in
-#: view: the vehicle sways by 10 mm in hover, and a stroke may be wrong by 10 mm, its end and the estimate included.
+#: A touch this far from the beginning of its stroke is taken back [m], at most so often [-], while an edge beside it is
+#: in view: the vehicle sways by 10 mm in hover, and a stroke may be wrong by 10 mm, its end and the estimate included.
 TOUCH_ASIDE_M, MOST_TOUCHES = 0.006, 2
 #: Least mean speed towards the wall, by which an approach is given its time [m/s].
 APPROACH_SPEED = 0.05

@@ -44,10 +44,10 @@ A job without strokes (a press) is completed if it touched, held for its time, s
 {slid:.0f} % of the way, and left the wall, without a crash; after a fault that ended the press, if it landed or
 descended for its time.
 
-A strategy of the user's (`paint --strategy`) is completed if the tip moved by every leg that it states (`Strategy.legs`),
-in contact in phase `paint`: both components within {length:.0f} cm, nowhere more than {place:.0f} mm from the mean line
-of the leg; and contact, retreat and end as of a paint job. Without legs its claim replaces them. Figures against the
-scene's strokes are empty.
+A strategy of the user's (`paint --strategy`) is completed if the tip moved by every leg that it states
+(`Strategy.legs`), in contact in phase `paint`: both components within {length:.0f} cm, nowhere more than {place:.0f} mm
+from the mean line of the leg; and contact, retreat and end as of a paint job. Without legs its claim replaces them.
+Figures against the scene's strokes are empty.
 
 `push_reduced` names the reason if less than {reduced:.0f} % of the asked push was flown.
 The job may still be completed.
