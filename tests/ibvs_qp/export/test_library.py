@@ -31,7 +31,7 @@ CONFIG = ControllerConfig()
 #: Largest difference on solved ticks [N], in double and in float.
 DOUBLE_N, FLOAT_N = 1e-6, 0.03
 #: The same after a tick that OSQP did not solve, in double, and in float with a lost rotor and otherwise [N]: the
-#: analytic law flew that tick and the next ones, the integrals differ from there on, and recorded inputs correct nothing.
+#: analytic law flew that tick and the next ones, integrals differ from there on, and recorded inputs correct nothing.
 AFTER_OTHER_N, LOST_FLOAT_N, AFTER_OTHER_FLOAT_N = 5e-3, 0.2, 1.0
 #: Outcome of a program that was solved on OSQP's active set.
 REFINED = 5
