@@ -66,7 +66,8 @@ def read_line(line: Any) -> LineFeature | None:
     if not issubclass(type(line), LineFeature):
         return None
     values = _values(line)
-    if type(line) is not LineFeature or tuple(map(type, values)) != _PLAIN or values[-1].dtype != FLOAT:
+    plain = type(line) is LineFeature and tuple(map(type, values)) == _PLAIN and values[-1].dtype == FLOAT
+    if not plain or not _is_plain_segment(line.segment):
         line = _converted(line)
         if line is None:
             return None
@@ -84,8 +85,13 @@ def read_line(line: Any) -> LineFeature | None:
         and 0.0 <= a <= VARIANCE_BOUND
         and 0.0 <= d <= VARIANCE_BOUND
         and abs(b) + abs(c) <= VARIANCE_BOUND
+        and (line.segment is None or all([abs(entry) <= LINE_BOUND for entry in line.segment.ravel().tolist()]))
     )
     return line if good else None
+
+
+def _is_plain_segment(segment: Any) -> bool:
+    return segment is None or (type(segment) is np.ndarray and segment.shape == (2, 2) and segment.dtype == FLOAT)
 
 
 def _converted(line: LineFeature) -> LineFeature | None:
@@ -101,6 +107,8 @@ def _converted(line: LineFeature) -> LineFeature | None:
         "track_id": whole(line.track_id, -TRACK_BOUND, TRACK_BOUND),
         "surface_side": whole(line.surface_side, -1, 1),
     }
+    if line.segment is not None:
+        values["segment"] = matrix(line.segment, 2)
     return None if any([value is None for value in values.values()]) else LineFeature(**values)
 
 

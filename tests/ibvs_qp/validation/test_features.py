@@ -51,6 +51,7 @@ BAD_LINES: list[dict[str, Any]] = [
     ],
     *[{"covariance": value} for value in (None, -np.eye(2), np.full((2, 2), math.nan), [[1, 0], [0]], np.eye(3))],
     *[{"covariance": np.array(value)} for value in ([[-1.0, 0], [0, 1]], [[1.0, 0], [0, -1]], [[1, math.nan], [0, 1]])],
+    *[{"segment": value} for value in (1e300, "ends", np.zeros(4), np.full((2, 2), math.nan), [[0, 0], [0, math.inf]])],
     *[{"track_id": []}, {"role": "oblique"}, {"role": ["horizontal"]}, {"surface_side": 3}, {"kind": None}],
 ]
 
@@ -60,6 +61,13 @@ def test_a_bad_line_is_dropped_alone(bad: dict[str, Any]) -> None:
     found, rejected = checked(replace(GOOD, lines=(replace(LINE, **bad), LINE)))
     assert found.lines == (LINE,) and found.plane == GOOD.plane and found.velocity is not None
     assert rejected == ["features.lines: 1 malformed, not finite or of unknown role"]
+
+
+def test_ends_of_a_line_given_as_a_list_are_kept() -> None:
+    ends = [[-0.1, 0.2], [0.1, 0.2]]
+    found, rejected = checked(replace(GOOD, lines=(replace(LINE, segment=ends, rho=0),)))
+    assert rejected == [] and found.lines[0].segment is not None
+    assert found.lines[0].segment.tolist() == ends
 
 
 def test_lines_without_an_identity_get_one_by_role_and_order() -> None:
