@@ -4,9 +4,10 @@
 # pyright: reportAttributeAccessIssue=false
 from __future__ import annotations
 
+import copy
 import math
 import re
-import xml.etree.ElementTree as ET
+import xml.etree.ElementTree as ET  # nosec B405
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -73,7 +74,7 @@ def read_model(file: Path) -> ModelVehicle:
     """
     text = read_bytes(file, LARGEST_TOML).decode("utf-8-sig", errors="replace")
     try:
-        root = ET.fromstring(text)
+        root = ET.fromstring(text)  # nosec B314: expat limits what entities expand to, and the file's size is limited
         if root.tag not in ("mujoco", "robot"):
             raise ConfigError(f"its root is <{root.tag}>; MJCF has <mujoco>, URDF <robot>")
         urdf = root.tag == "robot"
@@ -86,15 +87,15 @@ def read_model(file: Path) -> ModelVehicle:
 
 def _kinematic(root: ET.Element) -> str:
     """The URDF without shapes and with all joints fixed: frames and inertias remain."""
-    copy = ET.fromstring(ET.tostring(root))
-    for link in copy.iter("link"):
+    model = copy.deepcopy(root)
+    for link in model.iter("link"):
         for shape in [*link.findall("visual"), *link.findall("collision")]:
             link.remove(shape)
-    for joint in copy.findall("joint"):
+    for joint in model.findall("joint"):
         joint.set("type", "fixed")
-    options = ET.SubElement(copy, "mujoco")
+    options = ET.SubElement(model, "mujoco")
     ET.SubElement(options, "compiler", fusestatic="false", discardvisual="true")
-    return ET.tostring(copy, encoding="unicode")
+    return ET.tostring(model, encoding="unicode")
 
 
 def _vehicle(model: mujoco.MjModel, urdf: ET.Element | None) -> ModelVehicle:
