@@ -20,7 +20,7 @@ class OwnPath(Strategy):
         super().reset()
         margin, width = self.config.edge_margin_m, self.config.stroke_m + 2.0 * self.config.edge_margin_m
         self.goals = np.array([(width - margin, -margin), (margin, -margin), (margin, -margin - COLUMN_M)])
-        self.legs = [(leg[0], leg[1]) for leg in np.diff(self.goals, axis=0)]  # by which the simulator judges
+        self.legs = [(leg[0], leg[1]) for leg in np.diff(self.goals, axis=0)]  # vectors, for the simulator's truth
         self.edges = ((0, "vertical", -1, width), (0, "vertical", 1, 0.0), (1, "horizontal", -1, 0.0))
         self.corner = np.full(2, np.nan)  # the board's lower left corner by the odometer
 

@@ -78,9 +78,6 @@ class Painter(Navigation):
                 [name for name, there in missing if not there] or ["the board's edge that guides stroke 1"]
             )
         if phase == "survey":
-            way = self.config.stroke_m + self.config.gates.first_stop_m
-            self._way_s = 2.0 * way / self.config.survey_speed_m_s
-        if phase == "survey":
             return f"the edge at the end of stroke 1, {self._along.u:.2f} m flown"
         if phase == "approach":
             u, v = self._stroke_begin() - self._along.u, self._v_target - self._cross.v
@@ -278,18 +275,16 @@ class Painter(Navigation):
         self._cross.begin_stroke()
         self._along.begin_stroke()
         self._stroke_end.begin()
-        self._u_reference, self._v_reference = (
-            self._along.u,
-            self._cross.v,
-        )  # friction may hold the tip beside its place
+        # Friction may hold the tip beside its place.
+        self._u_reference, self._v_reference = self._along.u, self._cross.v
         self._enter(inputs, "paint", f"row {self.row}: {reason}")
 
     def _end_stroke(self, inputs: PainterInput) -> None:
         self._cross.end_stroke()
         edge = self._along_line.line
-        how = (
-            "by the odometer" if edge is None else f"at {edge.kind or 'unknown'} edge {edge.track.offset * 1e3:+.0f} mm"
-        )
+        how = "by the odometer"
+        if edge is not None:
+            how = f"at {edge.kind or 'unknown'} edge {edge.track.offset * 1e3:+.0f} mm"
         self._uncertain = self._uncertain or self._doubt()
         ended = f"row {self.row} ended {how}"
         if self._is_last():

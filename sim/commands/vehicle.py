@@ -174,7 +174,8 @@ def _show(given: VehicleFile, found: Actuation, config: PilotConfig | None) -> N
     console.print(terminal_table(("per newton of #", *numbers), effectiveness, "Control effectiveness B"))
     _show_origin(console, given, config)
     if config is not None:
-        console.print(_sentence(_force_sensor(config)), highlight=False)
+        text = _force_sensor(config)
+        console.print(f"{text[0].upper()}{text[1:]}.", highlight=False)
     if found.missing:
         console.print("[bold]Not fully actuated.[/] The rotors cannot give:")
         for direction in found.missing:
@@ -213,10 +214,6 @@ def _force_sensor(config: PilotConfig) -> str:
     from ibvs_qp.validation.load_check import checkable_turns
 
     return checkable_turns(config.controller.vehicle, config.safety)
-
-
-def _sentence(text: str) -> str:
-    return f"{text[0].upper()}{text[1:]}."
 
 
 def _vector(values: np.ndarray) -> str:

@@ -109,7 +109,7 @@ class Judgement:
         yield from self._contact()
 
     def _leg(self, number: int, asked: np.ndarray) -> str:
-        """What a leg lacks; its way is asked in board coordinates (along, up) [m]."""
+        """Shortfall of a leg; ``asked`` is its vector on the board (along, up) [m]."""
         touching = in_phase(self.trace, "paint") & (self.trace.row == number) & (self.trace.push_true > CONTACT_N)
         spots = board_tip(self.trace)[touching]
         if not len(spots):

@@ -1,4 +1,4 @@
-"""Where the working surface surely is: beside the place where the tip will meet it; and how far it is there.
+"""Cells of the picture that show the working surface, beside the place where the tip will meet it; their depth.
 
 The tip meets a surface straight ahead of it. In the picture that place moves with the distance: at the depth Z of the
 surface it lies at (x, y) / Z, where (x, y) is the tip from the camera.
@@ -56,7 +56,7 @@ def seeds_ahead(
 def _beside(
     grid: CoarseGrid, center: tuple[float, float], radius: float, inwards: tuple[int, int]
 ) -> list[tuple[int, int]]:
-    """Cells beside a place and inwards of it, else anywhere near; first those that surely are on the surface."""
+    """Cells beside a place and inwards of it, else anywhere near; those nearest to the tip first."""
     right, down = inwards
     aside = ((right, 0), (-right, 0), (right, down), (-right, down))
     around = (*aside, (right, -down), (-right, -down), (0, -down), (0, down))

@@ -1,1 +1,1 @@
-"""Whole walls of 5 to 20 strokes, and flights with faults in vision: flown in parts, judged by the truth."""
+"""Whole walls of 5 to 20 strokes, and flights with faults in vision: flown in parts, with goals by the true state."""

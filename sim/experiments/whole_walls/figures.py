@@ -16,7 +16,7 @@ from sim.sweep.design import Run
 from sim.sweep.parts import PARAM
 from sim.world.worlds import HARSH
 
-#: Least share of complete flights, by set; a set that is not listed has no goal of its own.
+#: Least share of complete flights by set; the sets with faults have no such goal.
 COMPLETE_GOAL = {"datasheet": 1.0, HARSH: 0.9, "rendered": 1.0}
 #: Least coverage of a flight, and largest place error of the last strokes as a multiple of that of an early one [-].
 COVERAGE_GOAL, PLACE_GOAL = 0.98, 2.0
