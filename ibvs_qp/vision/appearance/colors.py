@@ -98,7 +98,13 @@ class SurfaceColors:
         return found is not None
 
     def learn_paint(self, grid: CoarseGrid, colors: np.ndarray, places: np.ndarray) -> None:
-        """See how bright the paint is, among colours uint8 (rows, columns, 3) at flat places beside the brush, (n,)."""
+        """Learn how bright the paint is.
+
+        Args:
+            grid: Where the samples lie.
+            colors: Colours of the samples, uint8 (rows, columns, 3).
+            places: Flat places on the surface beside the brush, (n,); a wall behind it may have the paint's colour.
+        """
         if self.board is None or self._named is None:
             return
         samples = _taken(colors, places)

@@ -16,17 +16,24 @@ LEAST = 40
 _WHITE = np.float32(255.0)
 
 
-def on_surface(grid: CoarseGrid, depth: np.ndarray, plane: np.ndarray, gate: float) -> np.ndarray:
-    """Flat places of some samples of the grid that lie on a surface by depth alone, whatever their colour, (n,).
+def on_surface(
+    grid: CoarseGrid, depth: np.ndarray, plane: np.ndarray, gate: float, places: np.ndarray | None = None
+) -> np.ndarray:
+    """Flat places of samples of the grid that lie on a surface by depth alone, whatever their colour, (n,).
 
     Args:
         grid: Coarse grid of the picture.
         depth: Depth [m], (H, W).
         plane: (a, b, c) of 1/Z = a x + b y + c [1/m], (3,).
         gate: Distance from the surface within which a sample is on it, share of depth.
+        places: Flat places of the samples, (m,); None for some all over the picture.
     """
-    places, pixels, design = grid.some(JUDGED)
-    z = depth.reshape(-1).take(pixels)
+    if places is None:
+        places, pixels, design = grid.some(JUDGED)
+        z = depth.reshape(-1).take(pixels)
+    else:
+        u, v = (axis.take(places) for axis in grid.pixels)
+        z, design = depth[v, u], grid.design.take(places, axis=0)
     return places[np.abs(z * (design @ plane) - 1.0) < gate]  # false for NaN and for no reading
 
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Protocol
 
 import numpy as np
 
-from ibvs_qp.vision.appearance.colors import OTHER
+from ibvs_qp.vision.appearance.colors import BOARD, OTHER
 from ibvs_qp.vision.config import PlaneConfig
 from ibvs_qp.vision.picture.grid import CoarseGrid
 from ibvs_qp.vision.surface.estimate import PlaneEstimate
@@ -67,29 +68,48 @@ class PlaneFitter:
         """
         values = seed_values(grid, inverse, seeds, self._config.seed_radius)
         order = sorted((index for index, value in enumerate(values) if value > 0), key=lambda index: -values[index])
-        if prefer is not None and len(order) > 1:
-            order = self._first_of_flush(order, values, seeds, prefer)
         reason = "no valid depth around the seed"
-        for index in order:
-            for wanted in (None,) if prefer is None else (prefer[index], None):
-                start = self._hypothesis(grid, inverse, seeds[index], values[index], down, wanted)
-                if start is None:
-                    reason = "no plane through the seed stands upright and faces the camera"
-                    continue
-                result = self._refine(grid, inverse, start, seeds[index], down, wanted)
-                if isinstance(result, PlaneEstimate):
-                    return result
-                reason = result
+        for index, wanted in self._attempts(order, values, seeds, prefer):
+            start = self._hypothesis(grid, inverse, seeds[index], values[index], down, wanted)
+            if start is None:
+                reason = "no plane through the seed stands upright and faces the camera"
+                continue
+            result = self._refine(grid, inverse, start, seeds[index], down, wanted)
+            if isinstance(result, PlaneEstimate):
+                return result
+            reason = result
         return reason
 
+    def _attempts(
+        self, order: list[int], values: list[float], seeds: list[tuple[int, int]], prefer: LabelsOfSeeds | None
+    ) -> Iterator[tuple[int, np.ndarray | None]]:
+        """Seeds to try with labels of their colour or without, the likeliest first.
+
+        A seed on an edge may have a colour that nearly nothing else has. Without colour its plane would tilt through
+        the surface and a wall behind it, so seeds at the same depth with a colour of their own come before it.
+        """
+        if prefer is None or not order:
+            yield from ((index, None) for index in order)
+            return
+        flush = [index for index in order if values[index] > (1.0 - self._config.coarse_gate) * values[order[0]]]
+        if len(order) > 1:
+            order = self._first_of_flush(order, flush, seeds, prefer)
+            flush = [index for index in order if index in flush]
+        for index in flush:
+            if int(np.count_nonzero(prefer[index] == BOARD)) >= self._config.min_samples:
+                yield index, prefer[index]
+        for index in order:
+            yield index, prefer[index]
+            yield index, None
+
+    @staticmethod
     def _first_of_flush(
-        self, order: list[int], values: list[float], seeds: list[tuple[int, int]], prefer: LabelsOfSeeds
+        order: list[int], flush: list[int], seeds: list[tuple[int, int]], prefer: LabelsOfSeeds
     ) -> list[int]:
         """The order of seeds, with the first listed one in front where the nearest one differs from it by colour only.
 
         A board that is flush with its wall cannot be told from it by depth.
         """
-        flush = [index for index in order if values[index] > (1.0 - self._config.coarse_gate) * values[order[0]]]
         first = min(flush)
         if first == order[0]:
             return order
