@@ -59,6 +59,10 @@ class PaintingConfig:
         2, "number of strokes of either pattern, or as many as the board has place for", low=1, high=20, words=(FILL,)
     )
     stroke_m: float = setting(1.30, "length of a stroke", unit="m", low=0.1, high=20.0)
+    begins_at_margin: bool = setting(
+        True,
+        "stroke 1 begins at the margin from the edge beside it; false: only the edge at its end shows where it begins",
+    )
     overlap_m: float = setting(0.008, "overlap of strokes", unit="m", low=0.0, high=0.1)
     speed_m_s: float = setting(0.10, "painting speed", unit="m/s", low=0.01, high=0.5)
     push_n: float = setting(5.0, "push", unit="N", low=0.5, high=40.0)

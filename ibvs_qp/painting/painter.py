@@ -140,6 +140,8 @@ class Painter(Navigation):
 
     def _starting_mark(self) -> PatternLine | None:
         """The board's edge beside the beginning of stroke 1, if the tip is at the margin from it."""
+        if not self.config.begins_at_margin:
+            return None
         margin = self.config.edge_margin_m
         beside = [line for line in self._lines if not line.parallel and line.kind != "paint" and line.side >= 0]
         mark = min(beside, key=lambda line: abs(line.place + margin), default=None)

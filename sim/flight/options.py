@@ -13,11 +13,14 @@ from ibvs_qp.pilot import PilotConfig
 from sim.sensors.cameras.protocol import camera_intrinsics
 from sim.vehicles.configuration import with_vehicle
 from sim.vehicles.vehicle_file import read_vehicle
+from sim.world.board import BoardGeometry
 from sim.world.plant import TICK_NS
 from sim.world.scene import Scene
 
 #: Decimals of a calibration [-]: hundredths of a pixel.
 CALIBRATION_DIGITS = 2
+#: Board beyond the margin up to which stroke 1 begins at the margin [m]: half the tolerance of its length.
+SLACK_M = 5e-3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,7 +82,7 @@ def pilot_config(scene: Scene, options: FlightOptions, config: PilotConfig | Non
     """The pilot's configuration: preset, law, the scene's paint job and the camera's calibration; nothing else.
 
     Args:
-        scene: Only its paint job is read, and size and field of view of its camera.
+        scene: Only its paint job is read, with the size of its board, and size and field of view of its camera.
         options: Law, preset file and vehicle file.
         config: Replaces the preset.
 
@@ -100,6 +103,7 @@ def pilot_config(scene: Scene, options: FlightOptions, config: PilotConfig | Non
         start=paint.start,
         rows=paint.rows,
         stroke_m=paint.stroke_m,
+        begins_at_margin=BoardGeometry(scene).slack_m < SLACK_M,
         overlap_m=paint.overlap_m,
         speed_m_s=paint.speed_m_s,
         push_n=paint.push_n,

@@ -92,6 +92,11 @@ class BoardGeometry:
         return end - self.scene.paint.stroke_m, end
 
     @property
+    def slack_m(self) -> float:
+        """Board that remains beside the beginning of stroke 1, beyond the margin [m]."""
+        return self.stroke_ends[0] - self.scene.paint.edge_margin_m
+
+    @property
     def strokes(self) -> int:
         """Number of strokes."""
         paint = self.scene.paint

@@ -129,6 +129,19 @@ def test_a_filling_job_ends_at_the_margin_of_the_far_edge(kind: str, start: str,
     assert -PLACE < rest < 8e-3 + PLACE  # a narrower rest gets no stroke of its own
 
 
+@pytest.mark.parametrize("at_margin", [True, False])
+def test_a_board_longer_than_its_strokes_is_surveyed_unless_they_begin_at_the_margin(at_margin: bool) -> None:
+    slack, config = 0.03, short(rows=2, stroke_m=1.0, begins_at_margin=at_margin)
+    length = config.stroke_m + 2.0 * config.edge_margin_m + slack
+    world = PaintedWall(config, length=length, tip=np.array((slack, 0.05)))
+    world.fly(120.0)
+    assert world.painter.finished and world.painter.failed == at_margin  # 3 cm too long are not claimed
+    assert ("survey" in world.phases()) == (not at_margin)
+    begin, end = world.reached
+    assert end == pytest.approx(config.stroke_m + slack, abs=PLACE)
+    assert begin == pytest.approx(0.0 if at_margin else slack, abs=PLACE)
+
+
 def test_the_far_edge_in_view_changes_nothing_in_a_job_with_a_number_of_strokes() -> None:
     world = PaintedWall(short(rows=4, stroke_m=0.4), height=0.5)
     paint(world)

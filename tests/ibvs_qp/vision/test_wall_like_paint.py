@@ -37,8 +37,8 @@ def picture(right: int, index: int) -> RgbdFrame:
 @pytest.mark.parametrize("right", range(362, 380, 3))
 def test_the_board_and_its_edges_are_found_before_anything_is_painted(right: int) -> None:
     perception = Perception(VisionConfig(paint_color=PAINT), VehicleParams())
-    for index in range(6):
-        result = perception.process(picture(right, index), attitude=LEVEL, rotation=np.zeros(3))
+    results = [perception.process(picture(right, index), attitude=LEVEL, rotation=np.zeros(3)) for index in range(6)]
+    result = results[-1]
     assert result.plane is not None and abs(result.plane.distance_m - DISTANCE_M) < 0.01
     [bottom] = [line for line in result.features.lines if line.role == "horizontal"]
     assert abs(abs(bottom.rho) - (BOTTOM - INTRINSICS[3]) / INTRINSICS[1]) * INTRINSICS[1] < 2.0

@@ -227,3 +227,9 @@ def test_age_of_a_sample_counts_its_period_in_ticks():
     # Samples at 0, 12, 20, 32, 40 ms; the first is delivered at 4 and in use until 12 ms.
     assert oldest_s(100.0, 0.004, 0.004) == pytest.approx(0.012)
     assert oldest_s(30.0, 0.060, 0.004) == pytest.approx(0.092)
+
+
+@pytest.mark.parametrize(("stroke_m", "at_margin"), [(1.3, True), (1.296, True), (1.28, False)])
+def test_strokes_shorter_than_the_board_begin_by_the_edge_at_their_end(stroke_m, at_margin):
+    config = pilot_config(paint(stroke_m=stroke_m), FlightOptions())
+    assert config.painting.begins_at_margin == at_margin
