@@ -56,7 +56,7 @@ class Painter(Navigation):
         self._uncertain = ""  # why the job is not what was asked, although it was flown to its end
         self._touches = 0  # that were taken back, before the stroke in progress
         self._worst = 0.0  # largest standard deviation of the place of the stroke in progress [m]
-        self._overlap = math.inf  # least overlap of the stroke in progress with the one before, as estimated [m]
+        self._overlap = math.inf  # least overlap of the stroke in progress with the one before, less its deviation [m]
         self._paused = self._follows_end = False
 
     def _enter(self, inputs: PainterInput, phase: str, reason: str) -> None:
@@ -212,7 +212,7 @@ class Painter(Navigation):
         remaining = travel * (self._stroke_goal() - self._along.u)
         self._worst = max(self._worst, self._cross.deviation)
         if remaining > CORNER_M:
-            self._overlap = min(self._overlap, self._reach_of_last(0.0) - self._cross.v)
+            self._overlap = min(self._overlap, self._reach_of_last(0.0) - self._cross.v - self._cross.deviation)
         self._v_reference = self._slid(self._v_reference, self._touching_target(), dt)
         self._pause_without_contact(inputs)
         target = 0.0 if self._paused else stroke_speed(config, remaining)
@@ -307,7 +307,7 @@ class Painter(Navigation):
         if SIGMAS * self._worst > 2.0 * self._certain_m:
             return f"row {self.row} lost its edge, its place is known to {self._worst * 1e3:.1f} mm"
         if self._overlap < 0.0:
-            return f"row {self.row} leaves a gap of {-self._overlap * 1e3:.1f} mm to the row before"
+            return f"row {self.row} may leave a gap of {-self._overlap * 1e3:.1f} mm to the row before"
         aside = self._cross.maps[-1].mean(self._along.begin, asked) - self._v_target
         if abs(aside) > PLACE_TOLERANCE_M:
             return f"row {self.row} lies {aside * 1e3:+.0f} mm from its place, limit {PLACE_TOLERANCE_M * 1e3:g} mm"
