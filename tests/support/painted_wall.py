@@ -20,7 +20,7 @@ from ibvs_qp.painting.config import PaintingConfig
 from ibvs_qp.painting.painter import Painter
 from ibvs_qp.painting.pattern import Pattern, stroke_place
 
-TICK = 0.02
+TICK = 0.04
 #: What the camera shows around the tip at the wall [m]; it grows with the camera's distance, and its axis lies below.
 VIEW_SIDE, VIEW_UP, VIEW_DOWN = 0.26, 0.11, 0.27
 CAMERA_TO_TIP = 0.5
@@ -97,7 +97,7 @@ class PaintedWall:
         drift: Velocity by which the odometer is wrong, (right, down) [m/s].
         hidden: Identities of lines that the picture does not show.
         ends_seen: Whether the picture tells where the pieces end.
-        noise: Standard deviation of an offset in one look [m], renewed every `LOOK` ticks.
+        noise: Standard deviation of an offset in one look [m], renewed every 0.12 s.
         stuck_across: Whether nothing moves a tip that paints across its stroke but the wave.
     """
 
@@ -254,7 +254,7 @@ class PaintedWall:
         """One tick."""
         self.time += TICK
         touching = self.time - self.contact_since if self.in_contact else 0.0
-        if self.noise and round(self.time / TICK) % 5 == 0:
+        if self.noise and round(self.time / TICK) % 3 == 0:
             self._noise = {k: self.noise * self._rng.standard_normal() for k in (1, 2, 3, 4, *range(101, 125), 201)}
         inputs = PainterInput(
             time_s=self.time,

@@ -56,7 +56,10 @@ def test_a_slide_follows_the_edge_at_its_speed_for_its_time(kind: str, start: st
     assert times(world)["retreat"] - times(world)["paint"] == pytest.approx(SLIDE, abs=2 * TICK)
     u, v = world.tip - begin
     ramp = 0.5 * world.config.speed_m_s / world.config.acceleration_m_s2
-    assert u == pytest.approx(world.config.speed_m_s * (SLIDE - ramp), abs=5e-3) and abs(v) < 1e-3
+    assert (
+        u == pytest.approx(world.config.speed_m_s * (SLIDE - ramp), abs=2 * TICK * world.config.speed_m_s)
+        and abs(v) < 1e-3
+    )
     assert all(command.contact for command in commands[:-1])
     world.fly(30.0)
     assert world.painter.finished and not world.painter.failed
