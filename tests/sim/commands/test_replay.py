@@ -57,11 +57,13 @@ def test_the_log_has_pictures_poses_and_the_truth_apart(tmp_path: Path) -> None:
     np.testing.assert_allclose([row.tip_m[0] for _, row in states], trace.tip[:, 0], atol=1e-12)
     assert [row.phase for _, row in control] == [trace.phases[index] for index in trace.phase]
     # Estimate and truth of the pose lie in one frame at the wall; the estimate drifts along it by a few millimetres.
-    estimates, truths = ([pose for stamp, pose in found[topic] if stamp > 5_000_000_000] for topic in POSES)
-    for estimated, real in zip(estimates, truths, strict=False):
-        for axis, bound in (("x", 0.01), ("y", 0.05), ("z", 0.05)):
-            off = getattr(estimated.pose.position, axis) - getattr(real.pose.position, axis)
-            assert abs(off) < bound, (axis, off)
+    # Along the normal it stays at the wall for 0.3 s when the tip leaves, until the planes contradict it.
+    (stamps, estimates), (true_stamps, truths) = (zip(*found[topic], strict=True) for topic in POSES)
+    settled = np.array(stamps) > 5_000_000_000
+    for axis, bound in (("x", 0.025), ("y", 0.05), ("z", 0.05)):
+        estimated, real = ([getattr(pose.pose.position, axis) for pose in poses] for poses in (estimates, truths))
+        off = np.array(estimated) - np.interp(stamps, true_stamps, real)
+        assert np.abs(off[settled]).max() < bound, axis
 
 
 def test_another_preset_is_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

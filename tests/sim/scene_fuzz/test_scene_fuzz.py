@@ -12,7 +12,7 @@ from sim.scene_fuzz.judge import BAD, judge_draw, judge_file
 
 OPTIONS = FlightOptions(features="geometric", video=False, compiled=True)
 #: Draws of the slow test; the command `python -m sim.scene_fuzz` flies others.
-FIRST_SEED, FLIGHTS = 7000, 12
+FIRST_SEED, FLIGHTS = 7000, 6
 
 
 def test_draws_repeat_and_move_every_key_to_both_sides_of_its_default():
