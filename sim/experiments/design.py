@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
+import functools
 import itertools
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import ibvs_qp
+from ibvs_qp.pilot import PilotConfig
 from sim.evaluate import measures
 from sim.experiments import ALL, NAMES
 from sim.experiments.spec import Experiment, Flights, Value, experiment
@@ -68,31 +71,50 @@ def _cell(experiment: Experiment, flights: Flights, level: dict[str, Parameter],
     """Flights of one cell under every law, with the same seeds."""
     variant = str(level.get("variant", "standard"))
     for law in flights.laws or VARIANTS[variant].laws:
+        options = FlightOptions(
+            law=law,
+            rival=VARIANTS[variant].rival,
+            features=flights.features or choice.features,
+            vision=VARIANTS[variant].vision,
+            video=False,
+        )
+        prepared = functools.partial(_prepared, experiment, flights, level, options, variant, choice.world)
+        shared = None if flights.scene == "random" else prepared(choice.seed)
         for index in range(flights.seeds):
-            scene = _scene(flights, world_of(experiment, level, choice.world), choice.seed + index)
-            setup = _setup(experiment, flights, level, law, variant, scene)
-            options = FlightOptions(
-                law=law,
-                rival=VARIANTS[variant].rival,
-                seed=choice.seed + index,
-                features=flights.features or choice.features,
-                vision=VARIANTS[variant].vision,
-                video=False,
-            )
-            config = pilot_config(setup.scene, options, setup.pilot)
-            check_job(setup.scene, config, options.features, setup.job)
+            setup, config = shared or prepared(choice.seed + index)
             yield Run(
                 experiment=experiment.name,
                 variant=variant,
                 params={name: level[name] for name in experiment.params},
                 plan=FlightPlan(
-                    scene=setup.scene, config=config, options=options, job=setup.job, faults=_faults(flights, level)
+                    scene=setup.scene,
+                    config=config,
+                    options=dataclasses.replace(options, seed=choice.seed + index),
+                    job=setup.job,
+                    faults=_faults(flights, level),
                 ),
                 measure=getattr(measures, f"{flights.measure}_figures"),
                 keep=flights.keep and index == 0,
                 trace=choice.traces,
                 expected_s=AROUND_S + setup.job.expected_s(config.painting, BoardGeometry(setup.scene).strokes),
             )
+
+
+def _prepared(
+    experiment: Experiment,
+    flights: Flights,
+    level: Mapping[str, Parameter],
+    options: FlightOptions,
+    variant: str,
+    world: str,
+    seed: int,
+) -> tuple[Setup, PilotConfig]:
+    """Scene, job and pilot of the flights with a seed, checked; the seed matters in random scenes only."""
+    scene = _scene(flights, world_of(experiment, level, world), seed)
+    setup = _setup(experiment, flights, level, options.law, variant, scene)
+    config = pilot_config(setup.scene, options, setup.pilot)
+    check_job(setup.scene, config, options.features, setup.job)
+    return setup, config
 
 
 def world_of(experiment: Experiment, level: Mapping[str, Parameter], given: str) -> str:
