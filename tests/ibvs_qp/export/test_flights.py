@@ -24,7 +24,8 @@ pytestmark = [pytest.mark.slow, needs_compiler]
 
 RECORD = Path(__file__).parents[3] / "docs" / "experiments" / "all.parquet"
 FIGURES = ("path_rms_straight_m", "force_rms_straight_n", "tilt_rms_deg")
-SEEDS = range(4)
+#: Flights with doubles, which give Python's thrusts, and with floats.
+SEEDS = {False: 2, True: 4}
 
 
 def paint(seed: int, single: bool) -> tuple[bool, str, dict[str, Any]]:
@@ -42,7 +43,7 @@ def test_the_main_job_flies_with_the_library_as_the_record_says(single: bool) ->
         & (pl.col("param.world") == "datasheet")
     )
     assert len(record) == 10
-    flights = joblib.Parallel(n_jobs=2)(joblib.delayed(paint)(seed, single) for seed in SEEDS)
+    flights = joblib.Parallel(n_jobs=2)(joblib.delayed(paint)(seed, single) for seed in range(SEEDS[single]))
     for completed, reason, figures in flights:
         assert completed, reason
         outcomes = figures["outcomes"]
