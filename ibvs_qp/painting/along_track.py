@@ -89,6 +89,7 @@ class AlongTrack:
         self._p[0, :] = self._p[:, 0] = 0.0
         self._p[0, 0], self._p[1, 1] = EDGE_STD**2 + (SCALE_STD * edge.place) ** 2, UNKNOWN_STD**2
         self.known = self.end_seen = True
+        self._near_known = False  # its place may be the margin's now
         self.end = edge.track.track_id
         return True
 
@@ -139,7 +140,8 @@ class AlongTrack:
         self._p[0, 1] = self._p[1, 0] = self._p[0, 0]
         self._p[1, 1] = self._p[0, 0] + EDGE_STD**2
         self._near_known = True
-        if abs(float(self._x[1]) + margin) < SIGMAS * math.sqrt(float(self._p[1, 1])):  # the job begins at the margin
+        likely = abs(float(self._x[1]) + margin) < SIGMAS * math.sqrt(float(self._p[1, 1]))
+        if self._config.begins_at_margin and likely:
             self._update(-margin - float(self._x[1]), np.array((0.0, 1.0)), MARGIN_STD**2)
         return near
 

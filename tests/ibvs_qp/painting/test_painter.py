@@ -129,6 +129,14 @@ def test_a_filling_job_ends_at_the_margin_of_the_far_edge(kind: str, start: str,
     assert -PLACE < rest < 8e-3 + PLACE  # a narrower rest gets no stroke of its own
 
 
+@pytest.mark.parametrize("drift", [1e-3, -1e-3])
+def test_a_job_begun_beside_its_beginning_begins_at_the_margin(drift: float) -> None:
+    world = paint(PaintedWall(short(rows=2, stroke_m=1.2), tip=np.array((0.2, 0.05)), drift=(drift, 0.0)))
+    begin, end = world.reached
+    assert begin == pytest.approx(0.0, abs=PLACE) and end == pytest.approx(1.2, abs=PLACE)
+    assert world.painter._along.deviation < 2e-3  # the job says where the edge beside the beginning lies
+
+
 @pytest.mark.parametrize("at_margin", [True, False])
 def test_a_board_longer_than_its_strokes_is_surveyed_unless_they_begin_at_the_margin(at_margin: bool) -> None:
     slack, config = 0.03, short(rows=2, stroke_m=1.0, begins_at_margin=at_margin)
