@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ibvs_qp.measurement import RgbdFrame
-from ibvs_qp.vision.appearance.colors import BOARD, OTHER, PAINT, SurfaceColors
+from ibvs_qp.vision.appearance.colors import BOARD, OTHER, SurfaceColors
 from ibvs_qp.vision.config import PlaneConfig
 from ibvs_qp.vision.picture.grid import CoarseGrid
 from ibvs_qp.vision.surface.evenly_lit import evenly_lit
@@ -167,13 +167,11 @@ def _labels(
 ) -> np.ndarray:
     """Labels of the samples, uint8 (rows, columns): by the board's colour, before it is known by that of the seed.
 
-    Before it is known nothing is taken for paint: a wall of the paint's colour would bend the plane to its own depth.
     A seed may lie on something printed: then what is apart from it is something else.
     """
     if colors.board is not None:
         return colors.label(coarse, colors.levels_at(*grid.pixels))
     labels = colors.like_around(grid, coarse, seed, radius)
-    labels[labels == PAINT] = OTHER
     if bare:
         return labels
     board = labels == BOARD
