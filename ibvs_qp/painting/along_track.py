@@ -89,7 +89,7 @@ class AlongTrack:
         self._p[0, :] = self._p[:, 0] = 0.0
         self._p[0, 0], self._p[1, 1] = EDGE_STD**2 + (SCALE_STD * edge.place) ** 2, UNKNOWN_STD**2
         self.known = self.end_seen = True
-        self._near_known = False  # its place may be the margin's now
+        self._near_known = False  # the next look compares it with the margin
         self.end = edge.track.track_id
         return True
 

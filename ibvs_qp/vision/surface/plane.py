@@ -95,11 +95,14 @@ class PlaneFitter:
         if len(order) > 1:
             order = self._first_of_flush(order, flush, seeds, prefer)
             flush = [index for index in order if index in flush]
+        tried = set()
         for index in flush:
             if int(np.count_nonzero(prefer[index] == BOARD)) >= self._config.min_samples:
+                tried.add(index)
                 yield index, prefer[index]
         for index in order:
-            yield index, prefer[index]
+            if index not in tried:
+                yield index, prefer[index]
             yield index, None
 
     @staticmethod

@@ -127,14 +127,14 @@ class SurfaceTracker:
     ) -> PlaneEstimate:
         """Learn how light falls on the surface; where it is uneven, all of the surface instead of its well-lit part."""
         grid, shape = layout.grid, (frame.rgb.shape[0], frame.rgb.shape[1])
-        depth, gate = plane.inverse_depth, self._config.fine_gate_high
-        near = on_surface(grid, frame.depth, depth, gate)
+        inverse, gate = plane.inverse_depth, self._config.fine_gate_high
+        near = on_surface(grid, frame.depth, inverse, gate)
         uneven = False
         if not self._colors.surely_even(coarse, near):
             places = grid.design[:, :2].take(near, axis=0)
             samples = coarse.reshape(-1, 3).take(near, axis=0)
             uneven = self._colors.learn_light(samples, places, shape, frame.intrinsics)
-        self._colors.learn_paint(grid, coarse, on_surface(grid, frame.depth, depth, gate, layout.beside_brush))
+        self._colors.learn_paint(grid, coarse, on_surface(grid, frame.depth, inverse, gate, layout.beside_brush))
         refit = self._refit(plane, frame, layout, coarse, down) if uneven else plane
         return refit if isinstance(refit, PlaneEstimate) else plane
 

@@ -15,7 +15,7 @@ from sim.flight.closed_loop import fly
 from sim.flight.options import FlightOptions
 from sim.world.scene import PaintScene, Scene, WallScene, load_scene
 
-#: Seeds of the record.
+#: Of the ten seeds of the record.
 SEEDS = range(5)
 
 
