@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import itertools
+import multiprocessing
+from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
 
@@ -15,10 +17,14 @@ from ibvs_qp.vision.picture.settings import RgbdCameraSettings
 from sim.bench.mission import mission_shots
 
 
-def test_no_picture_waits_for_a_compiler() -> None:
-    """An argument of another type (an integer, a picture that must not be written) would compile a kernel in flight."""
+def _signatures() -> dict[str, int]:
+    return {kernel.py_func.__name__: len(kernel.signatures) for kernel, _ in compiling.KERNELS}
+
+
+def _signatures_around_pictures() -> tuple[dict[str, int], dict[str, int]]:
+    """Signatures compiled for each kernel before the first picture, and after twenty of every use."""
     prepare()
-    assert all(len(kernel.signatures) == 1 for kernel, _ in compiling.KERNELS)
+    before = _signatures()
     vehicle = VehicleParams()
     follows, searches = (Perception(VisionConfig(paint_color=(40, 90, 200)), vehicle) for _ in range(2))
     alone = Perception(VisionConfig(), None)
@@ -32,5 +38,14 @@ def test_no_picture_waits_for_a_compiler() -> None:
         searches.reset()
         searches.process(shot.frame, attitude=shot.attitude, detect=True)
         alone.process(shot.frame, seed_pixel=(100.0, 60.0), velocity=np.zeros(3))
-    compiled = {kernel.py_func.__name__: len(kernel.signatures) for kernel, _ in compiling.KERNELS}
-    assert set(compiled.values()) == {1}, compiled
+    return before, _signatures()
+
+
+def test_no_picture_waits_for_a_compiler() -> None:
+    """An argument of another type (an integer, a picture that must not be written) would compile a kernel in flight.
+
+    In a process of its own: other tests call kernels with arguments that no flight has.
+    """
+    with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as process:
+        before, after = process.submit(_signatures_around_pictures).result()
+    assert set(before.values()) == set(after.values()) == {1}, (before, after)
