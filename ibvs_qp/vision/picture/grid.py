@@ -57,7 +57,8 @@ class CoarseGrid:
 
     def inverse_depth(self, depth: np.ndarray, nearest: float, farthest: float) -> np.ndarray:
         """1/Z at the samples [1/m], 0 where the depth is absent, not finite or out of range, (rows, columns)."""
-        depth, inverse = np.ascontiguousarray(depth, np.float32), np.empty(self.shape)
+        depth = np.require(depth, np.float32, ("C", "W"))  # the one type of the kernel
+        inverse = np.empty(self.shape)
         sample_depths(depth, self.places.reshape(-1, 2), float(nearest), float(farthest), inverse.reshape(-1))
         return inverse
 

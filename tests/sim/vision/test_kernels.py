@@ -12,6 +12,7 @@ from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.vision import Perception, VisionConfig
 from ibvs_qp.vision.kernels import compile as compiling
 from ibvs_qp.vision.kernels import prepare
+from ibvs_qp.vision.paper import PaperConfig, PaperPerception
 from ibvs_qp.vision.picture.camera import RgbdCamera
 from ibvs_qp.vision.picture.settings import RgbdCameraSettings
 from sim.bench.mission import mission_shots
@@ -28,6 +29,7 @@ def _signatures_around_pictures() -> tuple[dict[str, int], dict[str, int]]:
     vehicle = VehicleParams()
     follows, searches = (Perception(VisionConfig(paint_color=(40, 90, 200)), vehicle) for _ in range(2))
     alone = Perception(VisionConfig(), None)
+    published = PaperPerception(PaperConfig(), VisionConfig(), vehicle)
     beside = RgbdCameraSettings(depth_intrinsics=(320.0, 320.0, 211.5, 119.5), depth_translation_m=(0.05, 0.0, 0.0))
     apart = RgbdCamera(beside)
     for number, shot in enumerate(itertools.islice(mission_shots((424, 240), 20, 3, vehicle), 20)):
@@ -35,6 +37,7 @@ def _signatures_around_pictures() -> tuple[dict[str, int], dict[str, int]]:
             array.setflags(write=number % 2 == 0)
         apart.picture(shot.frame)
         follows.process(shot.frame, attitude=shot.attitude, rotation=shot.rotation, velocity=shot.velocity)
+        published.process(shot.frame, rotation=shot.rotation)
         searches.reset()
         searches.process(shot.frame, attitude=shot.attitude, detect=True)
         alone.process(shot.frame, seed_pixel=(100.0, 60.0), velocity=np.zeros(3))
