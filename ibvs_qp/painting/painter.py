@@ -38,6 +38,10 @@ LENGTH_TOLERANCE_M = 0.01
 CORNER_M = 0.02
 #: Way ahead from which a stroke takes its target [m]: the tip follows a target that moves within half a second.
 REACTION_M = 0.05
+#: Overlap at which a stroke aims where the one before falls short, as a share of the nominal one [-].
+LEAST_OVERLAP = 0.75
+#: Piece of the stroke before by which the overlap is claimed [m]: a dip between two samples of its map leaves no gap.
+PIECE_M = 0.01
 
 
 class Painter(Navigation):
@@ -212,7 +216,8 @@ class Painter(Navigation):
         remaining = travel * (self._stroke_goal() - self._along.u)
         self._worst = max(self._worst, self._cross.deviation)
         if remaining > CORNER_M:
-            self._overlap = min(self._overlap, self._reach_of_last(0.0) - self._cross.v - self._cross.deviation)
+            reach = self._reach_of_last(0.0, PIECE_M)
+            self._overlap = min(self._overlap, reach - self._cross.v - self._cross.deviation)
         self._v_reference = self._slid(self._v_reference, self._touching_target(), dt)
         self._pause_without_contact(inputs)
         target = 0.0 if self._paused else stroke_speed(config, remaining)
@@ -313,16 +318,21 @@ class Painter(Navigation):
             return f"row {self.row} lies {aside * 1e3:+.0f} mm from its place, limit {PLACE_TOLERANCE_M * 1e3:g} mm"
         return ""
 
-    def _reach_of_last(self, ahead: float) -> float:
-        """Largest v at which the brush still touches the stroke before, so far ahead [m]; infinite where unknown."""
+    def _reach_of_last(self, ahead: float, length: float) -> float:
+        """Largest v at which the brush still touches the stroke before [m]; infinite where unknown.
+
+        Args:
+            ahead: Way ahead of the tip [m].
+            length: Length of the piece of the stroke before that is averaged [m].
+        """
         here = self._along.u + ahead * self.pattern.travel(self.row)
-        half = 0.5 * self.config.brush_width_m
-        last = self._cross.last_stroke(here - half, here + half)
+        last = self._cross.last_stroke(here - 0.5 * length, here + 0.5 * length)
         return math.inf if math.isnan(last) else last + self.config.brush_width_m
 
     def _touching_target(self) -> float:
-        """V of the stroke here: its place, or half the overlap inside the stroke before where that one falls short."""
-        return min(self._v_target, self._reach_of_last(REACTION_M) - 0.5 * self.config.overlap_m)
+        """V of the stroke here: its place, or well inside the stroke before where that one falls short."""
+        inside = LEAST_OVERLAP * self.config.overlap_m
+        return min(self._v_target, self._reach_of_last(REACTION_M, 0.5 * self.config.brush_width_m) - inside)
 
     def _lead_to_end(self, ended: bool, moved: float) -> None:
         """Once the edge at the end of the stroke is in view, it leads: from where the tip is, at the stroke's speed."""
