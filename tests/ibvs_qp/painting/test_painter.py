@@ -23,9 +23,9 @@ def paint(world: PaintedWall) -> PaintedWall:
     return world
 
 
-def assert_at_their_places(world: PaintedWall, *, after: int = 0) -> None:
-    """Every stroke after that one has the place and the length that the job asks for."""
-    assert np.abs(world.place_errors()[after:]).max() < PLACE, world.place_errors()
+def assert_at_their_places(world: PaintedWall, *, after: int = 0, until: int | None = None) -> None:
+    """Every stroke after that one and until that one has the place, and all the length, that the job asks for."""
+    assert np.abs(world.place_errors()[after:until]).max() < PLACE, world.place_errors()
     for stroke, u, _ in world.ends:
         assert u == pytest.approx(world.config.stroke_m if stroke % 2 else 0.0, abs=PLACE)
 
@@ -123,10 +123,11 @@ def test_a_filling_job_ends_at_the_margin_of_the_far_edge(kind: str, start: str,
     config = short(rows="fill", stroke_m=0.4, pattern=kind, start=start)
     world = paint(PaintedWall(config, height=height))
     assert len(world.ends) == stroke_count("fill", height, config.edge_margin_m, config.pitch_m)
-    assert_at_their_places(world)
-    last = world.paint[-1].straight(config.stroke_m).mean()
+    assert_at_their_places(world, until=-1)
+    before, last = (world.paint[k].straight(config.stroke_m).mean() for k in (-2, -1))
     rest = height - config.edge_margin_m - last
     assert -PLACE < rest < 8e-3 + PLACE  # a narrower rest gets no stroke of its own
+    assert rest < PLACE or last - before == pytest.approx(config.brush_width_m - 0.75 * config.overlap_m, abs=1e-3)
 
 
 @pytest.mark.parametrize("drift", [1e-3, -1e-3])
