@@ -269,10 +269,11 @@ def test_a_stroke_bends_where_the_one_before_falls_short_and_leaves_no_gap() -> 
     assert world.painter.finished and not world.painter.failed, world.painter.reason
 
 
-def test_a_gap_to_the_stroke_before_is_not_claimed() -> None:
-    """Nothing moves the tip back to stroke 1, which swung away from it."""
+@pytest.mark.parametrize("length", [0.5, 0.03])
+def test_a_gap_to_the_stroke_before_is_not_claimed(length: float) -> None:
+    """Nothing moves the tip back to stroke 1, which swung away from it, be it for less than a brush's width."""
     world = PaintedWall(short(rows=2, stroke_m=1.5), stuck_across=True)
-    world.wave = lambda stroke, u: -0.012 if stroke == 1 and 0.5 < u < 1.0 else 0.0
+    world.wave = lambda stroke, u: -0.012 if stroke == 1 and 0.5 < u < 0.5 + length else 0.0
     world.fly(300.0)
     assert world.painter.failed and re.fullmatch(
         r"row 2 may leave a gap of \d\.\d mm to the row before", world.painter.reason
