@@ -136,7 +136,13 @@ class FlowConfig(Checked):
     points: int = setting(45, "most points followed", low=8, high=500)
     redetect: int = setting(10, "frames between searches for points", low=1, high=1000)
     points_low: int = setting(25, "fewer live points start a search at once", low=4, high=500)
-    quality: float = setting(0.01, "corner strength as a share of the best", low=1e-4, high=0.5)
+    quality: float = setting(
+        1e-3,
+        "weakest corner as a share of the strongest; what noise alone makes carries no information",
+        why="a screw on a plain board is 1000 times as strong as the board's texture",
+        low=1e-4,
+        high=0.5,
+    )
     spacing_px: float = setting(8.0, "least distance of points, half resolution", unit="px", low=2.0, high=50.0)
     window_px: int = setting(15, "Lucas-Kanade window, half resolution (odd)", unit="px", low=5, high=41)
     grey_sigma: float = setting(

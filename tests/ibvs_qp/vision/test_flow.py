@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
+import pytest
 
 from ibvs_qp.frames import R_BODY_CAMERA
 from ibvs_qp.vision.config import FlowConfig
@@ -15,6 +16,7 @@ from ibvs_qp.vision.flow.solve_velocity import (
     inverse_depths,
     solve_velocity,
 )
+from ibvs_qp.vision.flow.sparse_flow import SparseFlow
 
 FOCAL, INTERVAL, CONFIG = 150.0, 0.033, FlowConfig()
 INTRINSICS = (FOCAL, FOCAL, 79.5, 59.5)
@@ -86,3 +88,36 @@ def test_expected_points_are_where_they_are_found() -> None:
     np.testing.assert_allclose(
         expected_points(still, inverse, velocity, INTERVAL, INTRINSICS), end * FOCAL + INTRINSICS[2:], atol=1e-4
     )
+
+
+@pytest.mark.parametrize("texture", [3.0, 0.0])
+def test_a_screw_on_a_plain_board_hides_its_texture_from_no_search(texture: float) -> None:
+    """The screw is 1000 times as strong as the texture; without texture, it alone tells no velocity."""
+    rng, focal, speed, depth_m = np.random.default_rng(7), 320.0, 0.1, 0.5
+    board = cv2.GaussianBlur(rng.standard_normal((480, 900)), (0, 0), 6.0)
+    board = 200.0 + texture * board / board.std()
+    cv2.circle(board, (400, 240), 7, 40.0, -1)
+    flow, found = SparseFlow(CONFIG), []
+    for number in range(20):
+        shift = np.array([[1.0, 0.0, -number * INTERVAL * speed / depth_m * focal], [0.0, 1.0, 0.0]])
+        grey = cv2.warpAffine(board, shift, (640, 480), flags=cv2.INTER_CUBIC) + rng.normal(0.0, 2.0, (480, 640))
+        rgb = np.repeat(np.clip(np.rint(grey), 0, 255).astype(np.uint8)[:, :, None], 3, axis=2)
+        result = flow.update(
+            rgb,
+            np.full((480, 640), depth_m, np.float32),
+            np.zeros((240, 320), np.uint8),
+            (focal, focal, 319.5, 239.5),
+            round((1 + number) * INTERVAL * 1e9),
+            np.zeros(3),
+            np.eye(3),
+            None,
+            np.zeros(3),
+        )
+        found.append(result)
+    velocities = [R_BODY_CAMERA.T @ each.velocity for each in found[1:] if isinstance(each, FlowVelocity)]
+    if texture == 0.0:
+        deviations = [np.sqrt(each.covariance[1, 1]) for each in found if isinstance(each, FlowVelocity)]
+        assert not deviations or min(deviations) > 0.02
+        return
+    assert len(velocities) == 19
+    np.testing.assert_allclose(np.mean(velocities, axis=0)[:2], (speed, 0.0), atol=0.005)
