@@ -40,10 +40,12 @@ class Alignment:
 
     def state(self, waited: float) -> str:
         """Error and speed with their limits, in words, after that time [s]."""
+        if math.isinf(self.error):
+            return "no guide in view"
         opening, config = self._opening(waited), self._config
-        error = "no guide in view" if math.isinf(self.error) else f"line error {self.error * 1e3:.1f} mm"
         limits = opening * config.align_error_m * 1e3, opening * config.align_speed_m_s * 1e3
-        return f"{error}, limit {limits[0]:g} mm; speed {self.speed * 1e3:.0f} mm/s, limit {limits[1]:g} mm/s"
+        error, speed = self.error * 1e3, self.speed * 1e3
+        return f"line error {error:.1f} mm, limit {limits[0]:g} mm; speed {speed:.0f} mm/s, limit {limits[1]:g} mm/s"
 
     def _opening(self, waited: float) -> float:
         """Factor on both tolerances after that time [s]."""
