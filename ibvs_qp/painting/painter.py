@@ -18,6 +18,7 @@ from ibvs_qp.painting.pattern_lines import CERTAIN_WEIGHT, PatternLine
 from ibvs_qp.painting.speed import approached, climb_speed, ramped, stroke_speed
 from ibvs_qp.painting.strategy import RETREAT_REACHED
 from ibvs_qp.painting.stroke_end import StrokeEnd
+from ibvs_qp.painting.stroke_map import BIN_M
 
 #: Difference from the stand-off at which the approach ends [m].
 STANDOFF_REACHED = 0.01
@@ -38,10 +39,8 @@ LENGTH_TOLERANCE_M = 0.01
 CORNER_M = 0.02
 #: Way ahead from which a stroke takes its target [m]: the tip follows a target that moves within half a second.
 REACTION_M = 0.05
-#: Overlap at which a stroke aims where the one before falls short, as a share of the nominal one [-].
+#: Target overlap where the stroke before falls short, as a share of the nominal overlap [-].
 LEAST_OVERLAP = 0.75
-#: Piece of the stroke before by which the overlap is claimed [m]: a dip between two samples of its map leaves no gap.
-PIECE_M = 0.01
 
 
 class Painter(Navigation):
@@ -216,7 +215,7 @@ class Painter(Navigation):
         remaining = travel * (self._stroke_goal() - self._along.u)
         self._worst = max(self._worst, self._cross.deviation)
         if remaining > CORNER_M:
-            reach = self._reach_of_last(0.0, PIECE_M)
+            reach = self._reach_of_last(0.0, BIN_M)
             self._overlap = min(self._overlap, reach - self._cross.v - self._cross.deviation)
         self._v_reference = self._slid(self._v_reference, self._touching_target(), dt)
         self._pause_without_contact(inputs)

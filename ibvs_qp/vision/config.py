@@ -138,7 +138,7 @@ class FlowConfig(Checked):
     points_low: int = setting(25, "fewer live points start a search at once", low=4, high=500)
     quality: float = setting(
         1e-3,
-        "weakest corner as a share of the strongest; what noise alone makes carries no information",
+        "strength of the weakest corner that is followed, as a share of the strongest; corners of noise get no weight",
         why="a screw on a plain board is 1000 times as strong as the board's texture",
         low=1e-4,
         high=0.5,

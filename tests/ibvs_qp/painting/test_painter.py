@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from painted_wall import END, END_PART, FAR, GUIDE, NEAR, PaintedWall, short
 
+from ibvs_qp.painting.painter import LEAST_OVERLAP
 from ibvs_qp.painting.pattern import CORNERS, PATTERNS, stroke_count
 
 ALL_PATTERNS = list(itertools.product(PATTERNS, CORNERS))
@@ -127,7 +128,9 @@ def test_a_filling_job_ends_at_the_margin_of_the_far_edge(kind: str, start: str,
     before, last = (world.paint[k].straight(config.stroke_m).mean() for k in (-2, -1))
     rest = height - config.edge_margin_m - last
     assert -PLACE < rest < 8e-3 + PLACE  # a narrower rest gets no stroke of its own
-    assert rest < PLACE or last - before == pytest.approx(config.brush_width_m - 0.75 * config.overlap_m, abs=1e-3)
+    assert rest < PLACE or last - before == pytest.approx(
+        config.brush_width_m - LEAST_OVERLAP * config.overlap_m, abs=1e-3
+    )
 
 
 @pytest.mark.parametrize("drift", [1e-3, -1e-3])

@@ -90,13 +90,13 @@ def test_expected_points_are_where_they_are_found() -> None:
     )
 
 
-@pytest.mark.parametrize("texture", [3.0, 0.0])
-def test_a_screw_on_a_plain_board_hides_its_texture_from_no_search(texture: float) -> None:
-    """The screw is 1000 times as strong as the texture; without texture, it alone tells no velocity."""
+@pytest.mark.parametrize(("texture", "screw"), [(3.0, 40.0), (0.0, 170.0)])
+def test_weak_texture_is_followed_beside_a_strong_corner(texture: float, screw: float) -> None:
+    """A dark screw is a corner 1000 times as strong as the texture; corners of noise give no sure velocity."""
     rng, focal, speed, depth_m = np.random.default_rng(7), 320.0, 0.1, 0.5
     board = cv2.GaussianBlur(rng.standard_normal((480, 900)), (0, 0), 6.0)
     board = 200.0 + texture * board / board.std()
-    cv2.circle(board, (400, 240), 7, 40.0, -1)
+    cv2.circle(board, (400, 240), 7, screw, -1)
     flow, found = SparseFlow(CONFIG), []
     for number in range(20):
         shift = np.array([[1.0, 0.0, -number * INTERVAL * speed / depth_m * focal], [0.0, 1.0, 0.0]])
@@ -117,7 +117,7 @@ def test_a_screw_on_a_plain_board_hides_its_texture_from_no_search(texture: floa
     velocities = [R_BODY_CAMERA.T @ each.velocity for each in found[1:] if isinstance(each, FlowVelocity)]
     if texture == 0.0:
         deviations = [np.sqrt(each.covariance[1, 1]) for each in found if isinstance(each, FlowVelocity)]
-        assert not deviations or min(deviations) > 0.02
+        assert deviations and min(deviations) > 0.1
         return
     assert len(velocities) == 19
     np.testing.assert_allclose(np.mean(velocities, axis=0)[:2], (speed, 0.0), atol=0.005)

@@ -47,7 +47,7 @@ def _signatures_around_pictures() -> tuple[dict[str, int], dict[str, int]]:
 def test_no_picture_waits_for_a_compiler() -> None:
     """An argument of another type (an integer, a picture that must not be written) would compile a kernel in flight.
 
-    In a process of its own: other tests call kernels with arguments that no flight has.
+    In a process of its own: signatures that other tests compiled do not count.
     """
     with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as process:
         before, after = process.submit(_signatures_around_pictures).result()
