@@ -76,9 +76,11 @@ def test_motors_slower_than_believed_cost_little_with_the_estimated_angular_rate
 @pytest.mark.parametrize("world", ["datasheet", pytest.param("harsh", marks=pytest.mark.slow)])
 def test_the_analytic_law_is_at_its_place_in_every_world(world: str) -> None:
     metrics = compute_metrics(flown(world_errors(world), "paper"))
-    assert metrics["claimed"] == metrics["completed"] and abs(metrics["place_error_m"]) <= PLACE_M
-    # In harsh a sway of 3 mm rms leaves a gap of less than 0.1 mm, which is not claimed.
-    assert metrics["completed"] or world == "harsh", metrics["not_completed"]
+    assert abs(metrics["place_error_m"]) <= PLACE_M
+    if world == "harsh":  # a sway of 3 mm rms leaves an overlap or a gap of less than it is known to: not claimed
+        assert metrics["completed"] or not metrics["claimed"]
+    else:
+        assert metrics["completed"] and metrics["claimed"], metrics["not_completed"]
     assert metrics["force_rms_straight_n"] < 0.8  # 1.46 N in harsh with K_fp in full while K_sd is off
 
 
