@@ -1,20 +1,22 @@
 r"""Place of the tip across the strokes, from the odometer and every edge in view.
 
-A Kalman filter with five states: v of the true tip; :math:`\delta`, by which the picture shows the tip at a larger v
-than it has (camera mount, arm, attitude); m and o, by which the last stroke and the one being laid have a larger v than
-their maps say; and the odometer's drift, which the edges show and which goes on where they are out of view. A line at
-v = L then appears at the place :math:`p = L - v - \delta` beside the tip:
+A Kalman filter with these states: v of the true tip; :math:`\delta`, by which the picture shows the tip at a larger v
+than it has (camera mount, arm, attitude); the odometer's drift; the direction of the strokes against the odometer's
+axes; :math:`\beta`, by which an edge ahead seems to lie at a larger v than the same edge behind; and, at `NODES` places
+along each, by which the last stroke and the one being laid have a larger v than their maps say. A line at v = L then
+appears at the place :math:`p = L - v - \delta` beside the tip:
 
-======================================  ==========================  ===================
-line                                    L                           row of H
-======================================  ==========================  ===================
-board edge at which the pattern starts  0                           (-1, -1, 0, 0, 0)
-outer edge of the last stroke           map + w/2 + m               (-1, -1, 1, 0, 0)
-outer edge of an older stroke           map + w/2                   (-1, -1, 0, 0, 0)
-own edges behind the brush, w wide      map + o +-w/2               (-1, -1, 0, 1, 0)
-======================================  ==========================  ===================
+======================================  =====================================
+line                                    L
+======================================  =====================================
+board edge at which the pattern starts  0
+outer edge of the last stroke           map + its error + w/2 + :math:`\beta`
+outer edge of an older stroke           map + w/2 + :math:`\beta`
+own edges behind the brush, w wide      map + its error +-w/2
+======================================  =====================================
 
-A map gets the error that v has when it is laid, so o follows that error over the way to the edge in view.
+A map gets the error that v has when it is laid, so a node takes the error of v until the tip has passed it. Drift and
+direction are steady: they keep a long chain of strokes straight, each of which follows the edge of the one before.
 
 A painted edge has the waves of the stroke that left it. Their map is subtracted, and the odometer smooths what is left,
 so that a stroke does not copy them.
@@ -38,36 +40,38 @@ LOOK_S = 0.1
 #: Standard deviation of an edge in one look [m], and time between looks that count as independent [s]: a board is
 #: straight, and its edge has the noise of a fit; a painted edge has the swings of the path that left it.
 BOARD_STD, BOARD_INDEPENDENT_S = 1e-3, 0.3
-EDGE_STD, INDEPENDENT_S = 1.5e-3, 0.5
-#: Odometer: variance of v per metre of way and per second at one place [m^2/m], [m^2/s], as flown in the datasheet
-#: world; standard deviation of its drift [m/s], and variance of the drift per second [m^2/s^3].
-ODOMETER_PER_M, ODOMETER_AT_REST = 4e-6, 1e-7
-DRIFT_STD, DRIFT_WANDER = 5e-4, 1e-9
-#: The same of a map's error along its stroke: between two edges seen, v drifts [m^2/m].
-MAP_PER_M = 0.5 * ODOMETER_PER_M
+EDGE_STD, INDEPENDENT_S = 1e-3, 0.5
+#: Standard deviation of that difference between ahead and behind, by lens and roll of the camera, for each stroke [m].
+AHEAD_STD = 6e-4
+#: Odometer: variance of v per second [m^2/s], as flown in the datasheet world over 1 to 15 s; standard deviation of its
+#: drift [m/s], and variance of the drift per second [m^2/s^3].
+ODOMETER_PER_S = 1e-6
+DRIFT_STD, DRIFT_WANDER = 1e-3, 1e-9
+#: Standard deviation of the strokes' direction where the board's edge shows it, by the roll of the camera's mount
+#: [rad]; its variance per second [rad^2/s].
+TURN_STD, TURN_WANDER = 8e-3, 1e-8
 #: Variance of the tip's place in the picture per second: the attitude wanders by 0.1 deg within minutes [m^2/s].
 TIP_WANDER = 1e-9
 #: Part of the paint ahead of and behind the brush that a picture without end points shows, from the tip [m].
 WINDOW_M = (0.06, 0.22)
-#: Shortest piece of a painted edge that is looked at [m].
-SHORTEST_M = 0.03
+#: Shortest piece of a painted edge that is looked at [m]; below the brush, a picture shows 25 mm.
+SHORTEST_M = 0.015
 #: An edge farther from its expected place than this many standard deviations plus a floor [m] is another one.
 GATE_SIGMAS, GATE_FLOOR_M = 4.0, 4e-3
 #: Time constant of the direction of the strokes, from the board's edge [s]; largest slope of a board [rad].
 TURN_TIME_S, LARGEST_TURN = 2.0, math.radians(15.0)
+#: Places along a stroke at which the error of its map is a state [-].
+NODES = 24
 
-#: From the tip to the middle of its own edges in view [m].
-BEHIND_M = 0.14
-_V, _TIP, _LAST_MAP, _OWN_MAP, _DRIFT = range(5)
-_BOARD, _LAST, _OWN = np.array([(-1.0, -1.0, 0.0, 0.0, 0.0), (-1.0, -1.0, 1.0, 0.0, 0.0), (-1.0, -1.0, 0.0, 1.0, 0.0)])
-_AGAINST_LAST = np.array((1.0, 0.0, -1.0, 0.0, 0.0))
+_V, _TIP, _DRIFT, _TURN, _AHEAD = range(5)
+_LAST, _OWN = slice(5, 5 + NODES), slice(5 + NODES, 5 + 2 * NODES)
+_STATES = _OWN.stop
 
 
 class CrossTrack:
     """v of the tip, its uncertainty, and the lines by which it is known.
 
     Attributes:
-        turn: Direction of the strokes against the nominal axis u, from u to v [rad].
         guides: Tracks that were recognised at the last look with their v [m], best first.
         maps: Where the strokes were laid, oldest first.
         far_edge: v of the board's other edge where it has been in view [m], NaN before.
@@ -75,12 +79,14 @@ class CrossTrack:
 
     def __init__(self, config: PaintingConfig) -> None:
         self._config, self._half = config, 0.5 * config.brush_width_m
-        self._x, self._p = np.zeros(5), np.zeros((5, 5))
+        self._spacing = config.stroke_m / (NODES - 1)
+        self._x, self._p = np.zeros(_STATES), np.zeros((_STATES, _STATES))
         self.maps: list[StrokeMap] = []
-        self._deviations: list[float] = []  # of every map but the last [m]
-        self.turn, self.far_edge = 0.0, math.nan
+        self._variances: list[np.ndarray] = []  # of every map but the last, at its nodes [m^2]
+        self.far_edge = math.nan
         self.guides: dict[int, float] = {}
         self._laying = False
+        self._u = 0.0
 
     @property
     def v(self) -> float:
@@ -93,73 +99,104 @@ class CrossTrack:
         return float(self._x[_TIP])
 
     @property
+    def turn(self) -> float:
+        """Direction of the strokes against the nominal axis u, from u to v [rad]."""
+        return float(self._x[_TURN])
+
+    @property
     def deviation(self) -> float:
-        """Standard deviation of v against the last stroke, or against the board's edge before there is one [m]."""
-        row = _AGAINST_LAST if self._painted else _BOARD
-        return math.sqrt(max(float(row @ self._p @ row), 0.0))
+        """Standard deviation of v against the last stroke here, or against the board's edge before there is one [m]."""
+        p = self._p
+        if self._painted:
+            shares = self._shares(self._u)
+            last = float(shares @ p[_LAST, _LAST] @ shares) - 2.0 * float(shares @ p[_LAST, _V])
+        else:
+            last = float(p[_TIP, _TIP] + 2.0 * p[_V, _TIP])
+        return math.sqrt(max(float(p[_V, _V]) + last, 0.0))
 
     @property
     def _painted(self) -> list[StrokeMap]:
-        """Maps of the strokes that are complete, oldest first; the state m belongs to the last of them."""
+        """Maps of the strokes that are complete, oldest first; the last nodes belong to the last of them."""
         return self.maps[:-1] if self._laying else self.maps
 
     def start(self, edge: PatternLine) -> None:
         """Begin at a distance from the board's edge; what the picture shows is v plus the tip's error."""
-        self._x[:] = -edge.place, 0.0, 0.0, 0.0, 0.0
+        self._x[:] = 0.0
+        self._x[_V] = -edge.place
         seen, tip = edge.track.deviation**2 + BOARD_STD**2, TIP_STD**2
         self._p[:] = 0.0
         self._p[:2, :2] = (seen + tip, -tip), (-tip, tip)
-        self._p[_DRIFT, _DRIFT] = DRIFT_STD**2
+        self._p[_DRIFT, _DRIFT], self._p[_TURN, _TURN] = DRIFT_STD**2, TURN_STD**2
         self.guides = {edge.track.track_id: 0.0}
         self._follow_turn(edge, 1.0)
 
     def predict(self, du: float, dv: float, dt: float) -> None:
-        """The tip has moved by the odometer [m] within dt [s]."""
+        """The tip has moved by the odometer, in the axes of the strokes [m], within dt [s]."""
         x, p = self._x, self._p
         x[_V] += dv - x[_DRIFT] * dt
-        p[_V] -= dt * p[_DRIFT]
-        p[:, _V] -= dt * p[:, _DRIFT]
-        p[_V, _V] += ODOMETER_PER_M * math.hypot(du, dv) + ODOMETER_AT_REST * dt
+        p[_V] -= dt * p[_DRIFT] + du * p[_TURN]
+        p[:, _V] = p[_V]
+        p[_V, _V] += ODOMETER_PER_S * dt - dt * p[_V, _DRIFT] - du * p[_V, _TURN]
         p[_DRIFT, _DRIFT] += DRIFT_WANDER * dt
+        p[_TURN, _TURN] += TURN_WANDER * dt
         p[_TIP, _TIP] += TIP_WANDER * dt
-        if self._laying and du != 0.0:
-            p[_LAST_MAP, _LAST_MAP] += MAP_PER_M * abs(du)
-            share = min(abs(du) / BEHIND_M, 1.0)
-            x[_OWN_MAP] *= 1.0 - share
-            p[_OWN_MAP] += share * (p[_V] - p[_OWN_MAP])
-            p[:, _OWN_MAP] += share * (p[:, _V] - p[:, _OWN_MAP])
 
     def begin_stroke(self) -> None:
         """The tip begins to paint a stroke; what it paints is remembered."""
         self.maps.append(StrokeMap(self._config.stroke_m))
         self._laying = True
-        self._clone(_V, _OWN_MAP)
+        self._take_error(np.ones(NODES, bool))
 
     def lay(self, u: float) -> None:
         """The brush presses here."""
+        self._u = u
         self.maps[-1].add(u, self.v)
 
     def last_stroke(self, first_u: float, last_u: float) -> float:
         """Mean v between two places of the stroke before the one that is laid [m]; NaN where it is not known."""
         before = self._painted
-        return before[-1].mean(first_u, last_u) + float(self._x[_LAST_MAP]) if before else math.nan
+        if not before:
+            return math.nan
+        return before[-1].mean(first_u, last_u) + float(self._shares(0.5 * (first_u + last_u)) @ self._x[_LAST])
+
+    def stroke_place(self, first_u: float, last_u: float) -> tuple[float, float]:
+        """Mean v of the stroke that is laid between two places, and its standard deviation [m]."""
+        shares = self._shares(np.linspace(first_u, last_u, NODES)).mean(axis=0)
+        place = self.maps[-1].mean(first_u, last_u) + float(shares @ self._x[_OWN])
+        return place, math.sqrt(max(float(shares @ self._p[_OWN, _OWN] @ shares), 0.0))
+
+    def least_overlap(self, first_u: float, last_u: float) -> float:
+        """Least overlap of the stroke that is laid with the last one, less its standard deviation [m].
+
+        Infinite where no place between the two belongs to both strokes.
+        """
+        if len(self.maps) < 2:
+            return math.inf
+        (u, last), (_, own), p = self.maps[-2].places(), self.maps[-1].places(), self._p
+        shares = self._shares(u)
+        overlap = last - own + shares @ (self._x[_LAST] - self._x[_OWN]) + 2.0 * self._half
+        covariance = p[_LAST, _LAST] - p[_LAST, _OWN] - p[_OWN, _LAST] + p[_OWN, _OWN]
+        overlap -= np.sqrt(np.maximum(np.sum(shares @ covariance * shares, axis=1), 0.0))
+        low, high = sorted((first_u, last_u))
+        within = overlap[(low <= u) & (u <= high) & np.isfinite(overlap)]
+        return float(within.min(initial=math.inf))
 
     def end_stroke(self) -> None:
         """The stroke ends; what comes into view first of the next one is its end."""
         self._laying = False
         if len(self.maps) > 1:
-            self._deviations.append(math.sqrt(max(float(self._p[_LAST_MAP, _LAST_MAP]), 0.0)))
-        self._clone(_OWN_MAP, _LAST_MAP)
-
-    def _clone(self, source: int, target: int) -> None:
-        """The error of one state becomes that of another: of v that of the map which it is laid by, and so on."""
-        self._x[target] = self._x[source] if source != _V else 0.0
-        self._p[target, :] = self._p[source, :]
-        self._p[:, target] = self._p[:, source]
-        self._p[target, target] = self._p[source, source]
+            self._variances.append(np.diag(self._p)[_LAST].copy())
+        self._x[_LAST] = self._x[_OWN]
+        self._p[_LAST] = self._p[_OWN]
+        self._p[:, _LAST] = self._p[:, _OWN]
+        self._x[_AHEAD], self._p[_AHEAD], self._p[:, _AHEAD] = 0.0, 0.0, 0.0
+        self._p[_AHEAD, _AHEAD] = AHEAD_STD**2
 
     def look(self, lines: Sequence[PatternLine], u: float, ahead: float) -> None:
         """Correct with every edge in view, once per `LOOK_S`; ``ahead`` is the direction of travel along u, +-1."""
+        self._u = u
+        if self._laying:
+            self._take_error(ahead * (self._spacing * np.arange(NODES) - u) > 0.0)
         parallel = [line for line in lines if line.parallel and line.weight > LOST_WEIGHT]
         guides = []
         straight = math.radians(self._config.gates.fresh_lean_deg)
@@ -167,27 +204,41 @@ class CrossTrack:
             guides.append(line)
         if (line := self._board_edge(parallel)) is not None:
             guides.append(line)
-            self._follow_turn(line, LOOK_S / TURN_TIME_S)
+            if not self.maps:
+                self._follow_turn(line, LOOK_S / TURN_TIME_S)
         own = self._own_edges(parallel, u, ahead) if self._laying else []
         if (line := self._opposite_edge(parallel)) is not None:
             guides.append(line)
         guides += own
         self.guides = {line.track.track_id: self.v + self.tip_error + line.place for line in guides}
 
+    def _take_error(self, nodes: np.ndarray) -> None:
+        """The places of the stroke that are still to be laid get the error of v."""
+        at = _OWN.start + np.flatnonzero(nodes)
+        self._x[at] = 0.0
+        self._p[at] = self._p[_V]
+        self._p[:, at] = self._p[:, _V, np.newaxis]
+
+    def _shares(self, u: float | np.ndarray) -> np.ndarray:
+        """Shares of the nodes in the error of a map at places along it, by linear interpolation; (NODES,) each."""
+        place = np.clip(np.asarray(u) / self._spacing, 0.0, NODES - 1.0)
+        return np.maximum(1.0 - np.abs(place[..., np.newaxis] - np.arange(NODES)), 0.0)
+
     def _board_edge(self, lines: list[PatternLine]) -> PatternLine | None:
         found = [line for line in lines if line.kind != "paint" and line.side >= 0]
-        noise = BOARD_STD**2 * BOARD_INDEPENDENT_S / LOOK_S, 0.0
-        return self._correct([(line, line.place, 0.0) for line in found], _BOARD, noise, self._config.gates.start_m)
+        noise = BOARD_STD**2 * BOARD_INDEPENDENT_S / LOOK_S
+        row = _row_of_h()
+        return self._correct([(line, line.place, row, 0.0, 0.0) for line in found], noise, self._config.gates.start_m)
 
     def _last_edge(self, lines: list[PatternLine], u: float, ahead: float) -> PatternLine | None:
         """Outer edge of the last stroke, or of an older one where the last one is missing."""
         found = [line for line in lines if line.kind != "board" and line.side >= 0]
-        row, error, deviation = _LAST, float(self._x[_LAST_MAP]), 0.0
-        for stroke, older in zip(reversed(self._painted), (*reversed(self._deviations), 0.0), strict=False):
-            line = self._painted_edge(found, stroke, (u, ahead), self._half, (row, error, deviation**2))
+        nodes: slice | None = _LAST
+        for stroke, older in zip(reversed(self._painted), (None, *reversed(self._variances)), strict=False):
+            line = self._painted_edge(found, stroke, (u, ahead), self._half + float(self._x[_AHEAD]), nodes, older)
             if line is not None:
                 return line
-            row, error, deviation = _BOARD, 0.0, older
+            nodes = None
         return None
 
     def _own_edges(self, lines: list[PatternLine], u: float, ahead: float) -> list[PatternLine]:
@@ -196,10 +247,10 @@ class CrossTrack:
         They lead the tip, too, where no other edge is in view: velocity alone holds it half as well against friction.
         """
         paint = [line for line in lines if line.kind == "paint"]
-        error, seen = float(self._x[_OWN_MAP]), []
+        seen = []
         for side in (1, -1):
             found = [line for line in paint if line.side == side]
-            seen.append(self._painted_edge(found, self.maps[-1], (u, -ahead), side * self._half, (_OWN, error, 0.0)))
+            seen.append(self._painted_edge(found, self.maps[-1], (u, -ahead), side * self._half, _OWN))
         return [line for line in seen if line is not None]
 
     def _painted_edge(
@@ -208,7 +259,8 @@ class CrossTrack:
         stroke: StrokeMap,
         place: tuple[float, float],
         half: float,
-        model: tuple[np.ndarray, float, float],
+        nodes: slice | None,
+        variances: np.ndarray | None = None,
     ) -> PatternLine | None:
         """Correct with an edge of a stroke.
 
@@ -216,17 +268,25 @@ class CrossTrack:
             lines: Those that may be this edge.
             stroke: Map of the stroke.
             place: u of the tip [m], and the direction along u in which the edge is seen.
-            half: From the middle of the stroke to the edge [m].
-            model: Row of H, error of the map [m], variance of the map [m^2].
+            half: From the middle of the stroke to the edge, as it seems [m].
+            nodes: States that are the map's error, or None.
+            variances: Of the map at its nodes, where they are no states [m^2].
         """
-        (u, ahead), (row, error, variance) = place, model
+        u, ahead = place
         expected = []
         for line in lines:
             near, far, seen = self._piece(line, ahead)
             if (near + far) * ahead > 0.0 and far - near > SHORTEST_M:
-                expected.append((line, seen, stroke.mean(u + near, u + far) + half + error))
-        noise = EDGE_STD**2 * INDEPENDENT_S / LOOK_S, variance
-        return self._correct(expected, row, noise, 0.5 * self._config.pitch_m)
+                row, shares, variance = _row_of_h(), self._shares(u + 0.5 * (near + far)), 0.0
+                row[_AHEAD] = 0.0 if nodes is _OWN else 1.0
+                level = stroke.mean(u + near, u + far) + half
+                if nodes is not None:
+                    row[nodes] = shares
+                    level += float(shares @ self._x[nodes])
+                if variances is not None:
+                    variance = float(shares @ variances)
+                expected.append((line, seen, row, level, variance))
+        return self._correct(expected, EDGE_STD**2 * INDEPENDENT_S / LOOK_S, 0.5 * self._config.pitch_m)
 
     @staticmethod
     def _piece(line: PatternLine, ahead: float) -> tuple[float, float, float]:
@@ -238,33 +298,31 @@ class CrossTrack:
         return u - 0.5 * line.length, u + 0.5 * line.length, v
 
     def _correct(
-        self, seen: list[tuple[PatternLine, float, float]], row: np.ndarray, noise: tuple[float, float], gate: float
+        self, seen: list[tuple[PatternLine, float, np.ndarray, float, float]], noise: float, gate: float
     ) -> PatternLine | None:
         """Correct with the line nearest to its expected place, within a gate [m]; None without one.
 
         Args:
-            seen: Lines, v of each from the tip, and v of the edge that it may be [m]; NaN where that is unknown.
-            row: Row of H.
-            noise: Variance of one look, and of the edge's place on the board [m^2].
+            seen: Lines, v of each from the tip [m], and of the edge that it may be: row of H, v [m], NaN where that is
+                unknown, and variance of its place on the board [m^2].
+            noise: Variance of one look [m^2].
             gate: Largest distance from the expected place [m].
         """
-        best, least, apparent = None, math.inf, self.v + self.tip_error
-        for line, place, level in seen:
-            difference = place - (level - apparent)
-            if abs(difference) < abs(least):
-                best, least = line, difference
-        if best is None:
+        apparent = self.v + self.tip_error
+        seen = [edge for edge in seen if not math.isnan(edge[3])]
+        if not seen:
             return None
-        look, extra = noise
-        variance = (look + best.track.deviation**2) / best.weight + extra
+        line, place, row, level, extra = min(seen, key=lambda edge: abs(edge[1] - edge[3] + apparent))
+        difference = place - (level - apparent)
         gain = self._p @ row
-        expected_variance = float(row @ gain) + EDGE_STD**2 + extra
-        if abs(least) > min(GATE_SIGMAS * math.sqrt(expected_variance) + GATE_FLOOR_M, gate):
+        expected = float(row @ gain)
+        limit = GATE_SIGMAS * math.sqrt(expected + EDGE_STD**2 + extra) + GATE_FLOOR_M
+        if abs(difference) > min(limit, gate):
             return None
-        gain = gain / (float(row @ gain) + variance)
-        self._x += gain * least
+        gain = gain / (expected + (noise + line.track.deviation**2) / line.weight + extra)
+        self._x += gain * difference
         self._p -= np.outer(gain, row @ self._p)
-        return best
+        return line
 
     def _opposite_edge(self, lines: list[PatternLine]) -> PatternLine | None:
         """The board's edge beyond the last stroke, by kind and side; its place is remembered."""
@@ -277,4 +335,11 @@ class CrossTrack:
 
     def _follow_turn(self, edge: PatternLine, share: float) -> None:
         turn = self.turn + share * math.atan(edge.lean)
-        self.turn = min(max(turn, -LARGEST_TURN), LARGEST_TURN)
+        self._x[_TURN] = min(max(turn, -LARGEST_TURN), LARGEST_TURN)
+
+
+def _row_of_h() -> np.ndarray:
+    """Of the place beside the tip of an edge whose v is known, (_STATES,)."""
+    row = np.zeros(_STATES)
+    row[_V] = row[_TIP] = -1.0
+    return row

@@ -18,7 +18,6 @@ from ibvs_qp.painting.pattern_lines import CERTAIN_WEIGHT, PatternLine
 from ibvs_qp.painting.speed import approached, climb_speed, ramped, stroke_speed
 from ibvs_qp.painting.strategy import RETREAT_REACHED
 from ibvs_qp.painting.stroke_end import StrokeEnd
-from ibvs_qp.painting.stroke_map import BIN_M
 
 #: Difference from the stand-off at which the approach ends [m].
 STANDOFF_REACHED = 0.01
@@ -37,6 +36,8 @@ CERTAIN_LENGTH_M = 0.005
 LENGTH_TOLERANCE_M = 0.01
 #: Last part of a stroke, whose overlap does not count [m].
 CORNER_M = 0.02
+#: A stroke is at its place if that holds at so many standard deviations [-].
+PLACE_SIGMAS = 2.0
 #: Way ahead from which a stroke takes its target [m]: the tip follows a target that moves within half a second.
 REACTION_M = 0.05
 #: Target overlap where the stroke before falls short, as a share of the nominal overlap [-].
@@ -59,7 +60,6 @@ class Painter(Navigation):
         self._uncertain = ""  # why the job is not what was asked, although it was flown to its end
         self._touches = 0  # that were taken back, before the stroke in progress
         self._worst = 0.0  # largest standard deviation of the place of the stroke in progress [m]
-        self._overlap = math.inf  # least overlap of the stroke in progress with the one before, less its deviation [m]
         self._paused = self._follows_end = False
 
     def _enter(self, inputs: PainterInput, phase: str, reason: str) -> None:
@@ -214,9 +214,6 @@ class Painter(Navigation):
             self._fail(inputs, f"time-out in row {self.row}: {left}")
         remaining = travel * (self._stroke_goal() - self._along.u)
         self._worst = max(self._worst, self._cross.deviation)
-        if remaining > CORNER_M:
-            reach = self._reach_of_last(0.0, BIN_M)
-            self._overlap = min(self._overlap, reach - self._cross.v - self._cross.deviation)
         self._v_reference = self._slid(self._v_reference, self._touching_target(), dt)
         self._pause_without_contact(inputs)
         target = 0.0 if self._paused else stroke_speed(config, remaining)
@@ -277,7 +274,6 @@ class Painter(Navigation):
 
     def _begin_stroke(self, inputs: PainterInput, stroke: int, reason: str) -> None:
         self.row, self._speed, self._follows_end, self._worst, self._touches = stroke, 0.0, False, 0.0, 0
-        self._overlap = math.inf
         self._cross.begin_stroke()
         self._along.begin_stroke()
         self._stroke_end.begin()
@@ -286,12 +282,12 @@ class Painter(Navigation):
         self._enter(inputs, "paint", f"row {self.row}: {reason}")
 
     def _end_stroke(self, inputs: PainterInput) -> None:
+        self._uncertain = self._uncertain or self._doubt()
         self._cross.end_stroke()
         edge = self._along_line.line
         how = "by the odometer"
         if edge is not None:
             how = f"at {edge.kind or 'unknown'} edge {edge.track.offset * 1e3:+.0f} mm"
-        self._uncertain = self._uncertain or self._doubt()
         ended = f"row {self.row} ended {how}"
         if self._is_last():
             self._enter(inputs, "retreat", f"{ended}; all rows done")
@@ -302,7 +298,7 @@ class Painter(Navigation):
 
     def _doubt(self) -> str:
         """Why the stroke that has ended is not claimed: its length or place as estimated, or too little known."""
-        length, asked = self._along.stroke_length, self.config.stroke_m
+        length, asked, goal = self._along.stroke_length, self.config.stroke_m, self._stroke_goal()
         if self._along_line.line is None and self._along.deviation > CERTAIN_LENGTH_M:
             known = self._along.deviation
             return f"row {self.row} ended by the odometer, its length is known to {known * 1e3:.0f} mm"
@@ -310,11 +306,16 @@ class Painter(Navigation):
             return f"row {self.row} is {length * 1e3:.0f} mm long, {asked * 1e3:.0f} mm were asked"
         if SIGMAS * self._worst > 2.0 * self._certain_m:
             return f"row {self.row} lost its edge, its place is known to {self._worst * 1e3:.1f} mm"
-        if self._overlap < 0.0:
-            return f"row {self.row} may leave a gap of {-self._overlap * 1e3:.1f} mm to the row before"
-        aside = self._cross.maps[-1].mean(self._along.begin, asked) - self._v_target
-        if abs(aside) > PLACE_TOLERANCE_M:
-            return f"row {self.row} lies {aside * 1e3:+.0f} mm from its place, limit {PLACE_TOLERANCE_M * 1e3:g} mm"
+        overlap = self._cross.least_overlap(self._stroke_begin(), goal - CORNER_M * self.pattern.travel(self.row))
+        if overlap < 0.0:
+            return f"row {self.row} may leave a gap of {-overlap * 1e3:.1f} mm to the row before"
+        place, known = self._cross.stroke_place(self._stroke_begin(), goal)
+        aside = place - self._v_target
+        if abs(aside) + PLACE_SIGMAS * known > PLACE_TOLERANCE_M:
+            return (
+                f"row {self.row} lies {aside * 1e3:+.0f} mm from its place, known to {known * 1e3:.1f} mm, "
+                f"limit {PLACE_TOLERANCE_M * 1e3:g} mm"
+            )
         return ""
 
     def _reach_of_last(self, ahead: float, length: float) -> float:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 #: Length of a bin [m], and what lies before and behind the nominal stroke [m].
 BIN_M, BEYOND_M = 0.01, 0.3
 #: Share of a window's bins that must be painted for its mean.
@@ -34,6 +36,12 @@ class StrokeMap:
         window = range(max(low, 0), min(high + 1, len(self._sum)))
         means = [self._sum[k] / self._count[k] for k in window if self._count[k]]
         return sum(means) / len(means) if len(means) >= _LEAST_SHARE * (high + 1 - low) else math.nan
+
+    def places(self) -> tuple[np.ndarray, np.ndarray]:
+        """Middle of every bin along u and its mean v [m], (bins,) each; NaN where nothing is painted."""
+        count = np.array(self._count, float)
+        u = BIN_M * (np.arange(count.size) + 0.5) - BEYOND_M
+        return u, np.divide(self._sum, count, out=np.full(count.size, math.nan), where=count > 0.0)
 
     @staticmethod
     def _bin(u: float) -> int:
