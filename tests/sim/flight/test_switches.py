@@ -75,7 +75,8 @@ def test_no_switch_makes_the_thrusts_jump(steps: dict[str, float], switch: str, 
 
 
 #: Largest thrust step within 0.2 s of entering a phase [N]; starting to move and letting go may use the whole rate.
-PHASES = {"approach": RATE_STEP, "align": 0.6, "press": 1.5, "paint": 0.6, "retreat": RATE_STEP, "done": 0.4}
+#: Noise alone makes steps of up to 0.4 N in hover.
+PHASES = {"approach": RATE_STEP, "align": 0.6, "press": 1.5, "paint": 0.6, "retreat": RATE_STEP, "done": 0.5}
 
 
 @pytest.mark.parametrize("law", ["qp", "paper"])
