@@ -129,7 +129,7 @@ class PaintingConfig:
     search_back_m: float = setting(0.15, "way back along the last stroke for that search", unit="m", low=0.0, high=1.0)
     least_certainty_m: float = setting(
         0.004,
-        "three standard deviations of a stroke's place that are certain at any overlap",
+        "three standard deviations up to which a place counts as certain at any overlap",
         unit="m",
         why="half of the default overlap; no edge is known better than to 1 mm",
         low=0.0005,

@@ -3,8 +3,8 @@ r"""Place of the tip across the strokes, from the odometer and every edge in vie
 A Kalman filter with these states: v of the true tip; :math:`\delta`, by which the picture shows the tip at a larger v
 than it has (camera mount, arm, attitude); the odometer's drift; the direction of the strokes against the odometer's
 axes; :math:`\beta`, by which an edge ahead seems to lie at a larger v than the same edge behind; and, at `NODES` places
-along each, by which the last stroke and the one being laid have a larger v than their maps say. A line at v = L then
-appears at the place :math:`p = L - v - \delta` beside the tip:
+along the last stroke and the one being laid, the amount by which each lies at a larger v than its map says. A line at
+v = L then appears at the place :math:`p = L - v - \delta` beside the tip:
 
 ======================================  =====================================
 line                                    L
@@ -16,7 +16,7 @@ own edges behind the brush, w wide      map + its error +-w/2
 ======================================  =====================================
 
 A map gets the error that v has when it is laid, so a node takes the error of v until the tip has passed it. Drift and
-direction are steady: they keep a long chain of strokes straight, each of which follows the edge of the one before.
+direction change slowly: they keep a long chain of strokes straight, each of which follows the edge of the one before.
 
 A painted edge has the waves of the stroke that left it. Their map is subtracted, and the odometer smooths what is left,
 so that a stroke does not copy them.
@@ -41,15 +41,15 @@ LOOK_S = 0.1
 #: straight, and its edge has the noise of a fit; a painted edge has the swings of the path that left it.
 BOARD_STD, BOARD_INDEPENDENT_S = 1e-3, 0.3
 EDGE_STD, INDEPENDENT_S = 1e-3, 0.5
-#: Standard deviation of that difference between ahead and behind, by lens and roll of the camera, for each stroke [m].
+#: Standard deviation of beta for each stroke, by lens and roll of the camera [m].
 AHEAD_STD = 6e-4
-#: Odometer: variance of v per second [m^2/s], as flown in the datasheet world over 1 to 15 s; standard deviation of its
-#: drift [m/s], and variance of the drift per second [m^2/s^3].
-ODOMETER_PER_S = 1e-6
+#: Odometer: variance of v per metre of way and per second at one place [m^2/m], [m^2/s], as flown in the datasheet
+#: world over 1 to 15 s; standard deviation of its drift [m/s], and variance of the drift per second [m^2/s^3].
+ODOMETER_PER_M, ODOMETER_AT_REST = 8e-6, 2e-7
 DRIFT_STD, DRIFT_WANDER = 1e-3, 1e-9
 #: Standard deviation of the strokes' direction where the board's edge shows it, by the roll of the camera's mount
 #: [rad]; its variance per second [rad^2/s].
-TURN_STD, TURN_WANDER = 8e-3, 1e-8
+TURN_STD, TURN_WANDER = 8e-3, 1e-9
 #: Variance of the tip's place in the picture per second: the attitude wanders by 0.1 deg within minutes [m^2/s].
 TIP_WANDER = 1e-9
 #: Part of the paint ahead of and behind the brush that a picture without end points shows, from the tip [m].
@@ -84,8 +84,10 @@ class CrossTrack:
         self.maps: list[StrokeMap] = []
         self._variances: list[np.ndarray] = []  # of every map but the last, at its nodes [m^2]
         self.far_edge = math.nan
+        self._roll = 0.0  # of the picture against the odometer's axes, by the board's edge [rad]
         self.guides: dict[int, float] = {}
         self._laying = False
+        self._open = np.zeros(NODES, bool)  # nodes of the stroke that is laid which the tip has not passed
         self._u = 0.0
 
     @property
@@ -100,8 +102,13 @@ class CrossTrack:
 
     @property
     def turn(self) -> float:
-        """Direction of the strokes against the nominal axis u, from u to v [rad]."""
+        """Direction of the strokes against the odometer's axis u, from u to v [rad]."""
         return float(self._x[_TURN])
+
+    @property
+    def picture_turn(self) -> float:
+        """Direction of the strokes in the picture, which the camera's mount rolls [rad]."""
+        return self.turn + self._roll
 
     @property
     def deviation(self) -> float:
@@ -129,6 +136,7 @@ class CrossTrack:
         self._p[_DRIFT, _DRIFT], self._p[_TURN, _TURN] = DRIFT_STD**2, TURN_STD**2
         self.guides = {edge.track.track_id: 0.0}
         self._follow_turn(edge, 1.0)
+        self._x[_TURN], self._roll = self._roll, 0.0
 
     def predict(self, du: float, dv: float, dt: float) -> None:
         """The tip has moved by the odometer, in the axes of the strokes [m], within dt [s]."""
@@ -136,7 +144,8 @@ class CrossTrack:
         x[_V] += dv - x[_DRIFT] * dt
         p[_V] -= dt * p[_DRIFT] + du * p[_TURN]
         p[:, _V] = p[_V]
-        p[_V, _V] += ODOMETER_PER_S * dt - dt * p[_V, _DRIFT] - du * p[_V, _TURN]
+        p[_V, _V] -= dt * p[_V, _DRIFT] + du * p[_V, _TURN]
+        p[_V, _V] += ODOMETER_PER_M * math.hypot(du, dv) + ODOMETER_AT_REST * dt
         p[_DRIFT, _DRIFT] += DRIFT_WANDER * dt
         p[_TURN, _TURN] += TURN_WANDER * dt
         p[_TIP, _TIP] += TIP_WANDER * dt
@@ -145,7 +154,8 @@ class CrossTrack:
         """The tip begins to paint a stroke; what it paints is remembered."""
         self.maps.append(StrokeMap(self._config.stroke_m))
         self._laying = True
-        self._take_error(np.ones(NODES, bool))
+        self._open[:] = True
+        self._take_error()
 
     def lay(self, u: float) -> None:
         """The brush presses here."""
@@ -182,7 +192,7 @@ class CrossTrack:
         return float(within.min(initial=math.inf))
 
     def end_stroke(self) -> None:
-        """The stroke ends; what comes into view first of the next one is its end."""
+        """The stroke ends: the error of its map becomes that of the last stroke, and beta begins anew."""
         self._laying = False
         if len(self.maps) > 1:
             self._variances.append(np.diag(self._p)[_LAST].copy())
@@ -196,7 +206,8 @@ class CrossTrack:
         """Correct with every edge in view, once per `LOOK_S`; ``ahead`` is the direction of travel along u, +-1."""
         self._u = u
         if self._laying:
-            self._take_error(ahead * (self._spacing * np.arange(NODES) - u) > 0.0)
+            self._open &= ahead * (self._spacing * np.arange(NODES) - u) > 0.0
+            self._take_error()
         parallel = [line for line in lines if line.parallel and line.weight > LOST_WEIGHT]
         guides = []
         straight = math.radians(self._config.gates.fresh_lean_deg)
@@ -204,17 +215,16 @@ class CrossTrack:
             guides.append(line)
         if (line := self._board_edge(parallel)) is not None:
             guides.append(line)
-            if not self.maps:
-                self._follow_turn(line, LOOK_S / TURN_TIME_S)
+            self._follow_turn(line, LOOK_S / TURN_TIME_S)
         own = self._own_edges(parallel, u, ahead) if self._laying else []
         if (line := self._opposite_edge(parallel)) is not None:
             guides.append(line)
         guides += own
         self.guides = {line.track.track_id: self.v + self.tip_error + line.place for line in guides}
 
-    def _take_error(self, nodes: np.ndarray) -> None:
+    def _take_error(self) -> None:
         """The places of the stroke that are still to be laid get the error of v."""
-        at = _OWN.start + np.flatnonzero(nodes)
+        at = _OWN.start + np.flatnonzero(self._open)
         self._x[at] = 0.0
         self._p[at] = self._p[_V]
         self._p[:, at] = self._p[:, _V, np.newaxis]
@@ -277,8 +287,8 @@ class CrossTrack:
         for line in lines:
             near, far, seen = self._piece(line, ahead)
             if (near + far) * ahead > 0.0 and far - near > SHORTEST_M:
-                row, shares, variance = _row_of_h(), self._shares(u + 0.5 * (near + far)), 0.0
-                row[_AHEAD] = 0.0 if nodes is _OWN else 1.0
+                middle, row, variance = 0.5 * (near + far), _row_of_h(), 0.0
+                row[_TURN], row[_AHEAD], shares = middle, float(nodes is not _OWN), self._shares(u + middle)
                 level = stroke.mean(u + near, u + far) + half
                 if nodes is not None:
                     row[nodes] = shares
@@ -334,12 +344,12 @@ class CrossTrack:
         return edge
 
     def _follow_turn(self, edge: PatternLine, share: float) -> None:
-        turn = self.turn + share * math.atan(edge.lean)
-        self._x[_TURN] = min(max(turn, -LARGEST_TURN), LARGEST_TURN)
+        turn = self.picture_turn + share * math.atan(edge.lean)
+        self._roll = min(max(turn, -LARGEST_TURN), LARGEST_TURN) - self.turn
 
 
 def _row_of_h() -> np.ndarray:
-    """Of the place beside the tip of an edge whose v is known, (_STATES,)."""
+    """Row of H for the place of an edge at known v, (_STATES,)."""
     row = np.zeros(_STATES)
     row[_V] = row[_TIP] = -1.0
     return row

@@ -56,7 +56,7 @@ class Navigation(PhaseMachine):
         du, dv = self._turned(*self.pattern.to_pattern(odometer[0] - before[0], odometer[1] - before[1]), -cross.turn)
         cross.predict(du, dv, dt)
         along.predict(du)
-        self._lines = lines = pattern_lines(inputs.lines.values(), self.pattern, cross.turn)
+        self._lines = lines = pattern_lines(inputs.lines.values(), self.pattern, cross.picture_turn)
         if self.phase == "paint" and inputs.in_contact:
             cross.lay(along.u)
         if inputs.time_s - self._looked >= LOOK_S and self.phase != "start":
@@ -114,7 +114,7 @@ class Navigation(PhaseMachine):
         return nominal
 
     def _is_certain(self) -> bool:
-        """Whether three standard deviations of the place fit into half the overlap."""
+        """Whether three standard deviations of the place fit into half the overlap, or into `least_certainty_m`."""
         return SIGMAS * self._cross.deviation < self._certain_m
 
     @property

@@ -311,7 +311,7 @@ class Painter(Navigation):
             return f"row {self.row} may leave a gap of {-overlap * 1e3:.1f} mm to the row before"
         place, known = self._cross.stroke_place(self._stroke_begin(), goal)
         aside = place - self._v_target
-        if abs(aside) + PLACE_SIGMAS * known > PLACE_TOLERANCE_M:
+        if not abs(aside) + PLACE_SIGMAS * known <= PLACE_TOLERANCE_M:  # nor where it is not known
             return (
                 f"row {self.row} lies {aside * 1e3:+.0f} mm from its place, known to {known * 1e3:.1f} mm, "
                 f"limit {PLACE_TOLERANCE_M * 1e3:g} mm"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -46,8 +47,9 @@ class Strokes:
         return parallel(track, place, side, kind, middle, length)
 
     def move(self, du: float, dv: float, dt: float = LOOK_S) -> None:
-        noise = math.sqrt(cross_track.ODOMETER_PER_S * dt) * self.rng.standard_normal()
-        measured = dv + self.drift * dt + (self.turn - self.cross.turn) * du + noise
+        variance = cross_track.ODOMETER_PER_M * math.hypot(du, dv) + cross_track.ODOMETER_AT_REST * dt
+        measured = dv + self.drift * dt + (self.turn - self.cross.turn) * du
+        measured += math.sqrt(variance) * self.rng.standard_normal()
         self.u, self.v = self.u + du, self.v + dv
         self.cross.predict(du, measured, dt)
 
@@ -115,7 +117,7 @@ def _ratios(seed: int) -> list[float]:
 
 
 def test_a_chain_of_strokes_stays_straight() -> None:
-    """Twelve strokes: v at both ends of a stroke is wrong by as much, so the strokes turn no further."""
+    """The error of v is equal at both ends of stroke twelve: strokes do not turn."""
     turned = []
     for seed in range(6):
         flight = Strokes(seed)
@@ -127,7 +129,7 @@ def test_a_chain_of_strokes_stays_straight() -> None:
 
 @pytest.mark.parametrize("own", [False, True])
 def test_rows_of_h_are_the_derivatives_of_the_places_in_the_picture(own: bool, monkeypatch) -> None:
-    """Expected places of every edge, against changes of each state."""
+    """Expected less seen places of every edge, against changes of each state; the direction turns what is seen."""
     cross, seen = _after_stroke_one(), []
     lines = [fresh(), parallel(1, -MARGIN - PITCH, 1, "board")]
     if own:
@@ -138,18 +140,19 @@ def test_rows_of_h_are_the_derivatives_of_the_places_in_the_picture(own: bool, m
 
     def expected(state: int, by: float) -> list[float]:
         seen.clear()
+        turned = by if state == cross_track._TURN else 0.0
         cross._x[state] += by
-        cross.look(lines, 0.3, -1.0)
+        cross.look([replace(line, middle=(u, v - turned * u)) for line in lines for u, v in (line.middle,)], 0.3, -1.0)
         cross._x[state] -= by
-        return [level - float(x[0] + x[1]) for x, _, level in seen]
+        return [level - float(x[0] + x[1]) - place for x, place, _, level in seen]
 
     def note(edges: list, _noise: float, _gate: float) -> None:
-        seen.extend((cross._x.copy(), edge[2], edge[3]) for edge in edges)
+        seen.extend((cross._x.copy(), *edge[1:4]) for edge in edges)
 
     monkeypatch.setattr(cross, "_correct", note)
-    monkeypatch.setattr(cross, "_take_error", lambda nodes: None)
+    monkeypatch.setattr(cross, "_take_error", lambda: None)
     expected(0, 0.0)
-    rows = np.array([row for _, row, _ in seen])
+    rows = np.array([row for _, _, row, _ in seen])
     assert len(rows) >= 2 + own
     slopes = [(np.array(expected(k, 1e-4)) - expected(k, -1e-4)) / 2e-4 for k in range(cross_track._STATES)]
     np.testing.assert_allclose(rows, np.transpose(slopes), atol=1e-9)
@@ -258,7 +261,36 @@ def test_the_board_s_edge_turns_the_strokes_and_no_more_than_a_board_may() -> No
         edge = parallel(1, -MARGIN, 1, "board")
         edge.lean = lean
         cross.start(edge)
-        assert cross.turn == pytest.approx(expected)
+        assert cross.turn == cross.picture_turn == pytest.approx(expected)
+
+
+def test_the_direction_that_the_odometer_showed_outlasts_the_board_s_edge_in_the_picture() -> None:
+    """The mount rolls the picture by 6 mrad: 1 m beside the edge shows the direction in the odometer's axes."""
+    cross, roll = CrossTrack(CONFIG), 6e-3
+    edge = parallel(1, -MARGIN, 1, "board")
+    edge.lean = roll
+    cross.start(edge)
+    for k in range(200):
+        du = 0.01 if k < 100 else -0.01
+        cross.predict(du, -cross.turn * du, 0.1)  # the odometer moves along the strokes exactly
+        edge.lean = roll - math.tan(cross.picture_turn)
+        _look(cross, edge, u=0.01 * min(k, 200 - k), times=1, ahead=1.0)
+    assert abs(cross.turn) < 1.5e-3
+    assert cross.picture_turn == pytest.approx(roll, abs=1e-3)
+
+
+def test_a_step_back_forgets_nothing_that_was_learnt_of_the_stroke_that_is_laid() -> None:
+    cross = _after_stroke_one()
+    cross.begin_stroke()
+    for k in range(40):
+        cross.lay(0.6 - 0.01 * k)
+        cross.predict(-0.01, 0.0, 0.1)
+        _look(cross, fresh(0.003, middle=-0.14), u=0.6 - 0.01 * k, times=1)
+    laid = slice(cross_track._OWN.start + 10, cross_track._OWN.stop)  # 0.26 to 0.6 m
+    learnt = cross._x[laid].copy()
+    cross.look([], 0.4, -1.0)
+    np.testing.assert_array_equal(cross._x[laid], learnt)
+    assert np.all(learnt != 0.0)
 
 
 def test_the_far_edge_is_remembered_and_leads_last() -> None:
@@ -288,7 +320,7 @@ def test_the_drift_of_the_odometer_makes_v_uncertain_in_one_direction() -> None:
         cross.predict(0.0, 0.0, 0.1)
     variance = cross_track.DRIFT_STD**2
     assert cross._p[0, cross_track._DRIFT] == pytest.approx(-seconds * variance, rel=0.1)
-    rest = cross_track.ODOMETER_PER_S * seconds
+    rest = cross_track.ODOMETER_AT_REST * seconds
     assert cross._p[0, 0] - before == pytest.approx(seconds**2 * variance + rest, rel=0.1)
     np.testing.assert_allclose(cross._p, cross._p.T, atol=1e-18)
 
