@@ -218,6 +218,13 @@ def test_another_edge_corrects_nothing(decoy: Callable[[], PatternLine]) -> None
     assert 101 not in cross.guides or decoy().kind == "board"
 
 
+@pytest.mark.parametrize(("length", "counts"), [(0.025, True), (0.01, False)])
+def test_the_short_piece_below_the_brush_counts(length: float, counts: bool) -> None:
+    cross = _after_stroke_one()
+    _look(cross, parallel(101, HALF - PITCH, 1, "paint", -0.055, length), times=1)
+    assert (list(cross.guides) == [101]) is counts
+
+
 def test_a_place_that_is_seen_twice_is_better_known_than_once() -> None:
     once, twice = _look(_after_stroke_one(), fresh(), times=1), _look(_after_stroke_one(), fresh(), times=2)
     assert twice.deviation < once.deviation < _after_stroke_one().deviation

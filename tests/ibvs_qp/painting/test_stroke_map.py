@@ -36,6 +36,13 @@ def test_a_window_that_is_half_bare_has_no_mean() -> None:
     assert math.isnan(StrokeMap(0.6).mean(0.0, 0.1))
 
 
+def test_the_places_are_those_of_the_bins_and_nan_where_nothing_is_painted() -> None:
+    u, v = straight_map(0.0, 0.3).places()
+    painted = (u > 0.0) & (u < 0.3)
+    np.testing.assert_allclose(v[painted], 0.05 + 0.1 * u[painted], atol=0.1 * BIN_M)
+    assert np.isnan(v[~painted]).all()
+
+
 def test_paint_beside_the_nominal_stroke_is_remembered_and_farther_away_ignored() -> None:
     stroke = StrokeMap(0.6)
     for u in (-0.105, 0.705, -BEYOND_M - 0.1, 0.6 + BEYOND_M + 0.1):

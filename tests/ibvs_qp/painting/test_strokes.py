@@ -256,6 +256,15 @@ def test_a_stroke_that_was_pushed_beside_its_place_is_not_claimed() -> None:
     )
 
 
+@pytest.mark.parametrize(("aside", "known"), [(0.0, 0.0045), (0.005, 0.002), (math.nan, 0.001)])
+def test_a_place_that_is_not_known_within_the_limit_is_not_claimed(aside: float, known: float, monkeypatch) -> None:
+    world = PaintedWall(short(rows=1))
+    place = world.config.edge_margin_m + aside
+    monkeypatch.setattr(world.painter._cross, "stroke_place", lambda first, last: (place, known))
+    world.fly(60.0)
+    assert world.painter.finished and world.painter.failed and "mm from its place, known to" in world.painter.reason
+
+
 def test_a_stroke_bends_where_the_one_before_falls_short_and_leaves_no_gap() -> None:
     """Stroke 1 swings to 12 mm below its place over half a metre: more than the overlap of 8 mm."""
 
