@@ -87,8 +87,9 @@ class CrossTrack:
         self._roll = 0.0  # of the picture against the odometer's axes, by the board's edge [rad]
         self.guides: dict[int, float] = {}
         self._laying = False
+        self._again = StrokeMap(config.stroke_m)  # where the stroke in progress was painted again
         self._open = np.zeros(NODES, bool)  # nodes of the stroke that is laid which the tip has not passed
-        self._u = 0.0
+        self._u, self._forward = 0.0, 1.0  # of the tip [m]; direction in which the stroke in progress is laid
 
     @property
     def v(self) -> float:
@@ -153,6 +154,7 @@ class CrossTrack:
     def begin_stroke(self) -> None:
         """The tip begins to paint a stroke; what it paints is remembered."""
         self.maps.append(StrokeMap(self._config.stroke_m))
+        self._again = StrokeMap(self._config.stroke_m)
         self._laying = True
         self._open[:] = True
         self._take_error()
@@ -161,6 +163,15 @@ class CrossTrack:
         """The brush presses here."""
         self._u = u
         self.maps[-1].add(u, self.v)
+
+    def lay_again(self, u: float) -> None:
+        """The brush presses here, where the stroke in progress lies already; v one standard deviation farther out.
+
+        The map of the stroke stays: it is that of the outer edge, which paint farther in does not move.
+        """
+        self._u, p, shares = u, self._p, self._shares(u)
+        variance = p[_V, _V] + float(shares @ p[_OWN, _OWN] @ shares) - 2.0 * float(shares @ p[_OWN, _V])
+        self._again.add(u, self.v - float(shares @ self._x[_OWN]) + math.sqrt(max(float(variance), 0.0)))
 
     def last_stroke(self, first_u: float, last_u: float) -> float:
         """Mean v between two places of the stroke before the one that is laid [m]; NaN where it is not known."""
@@ -175,21 +186,26 @@ class CrossTrack:
         place = self.maps[-1].mean(first_u, last_u) + float(shares @ self._x[_OWN])
         return place, math.sqrt(max(float(shares @ self._p[_OWN, _OWN] @ shares), 0.0))
 
-    def least_overlap(self, first_u: float, last_u: float) -> float:
-        """Least overlap of the stroke that is laid with the last one, less its standard deviation [m].
+    def overlap(self, first_u: float, last_u: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Overlap of the stroke in progress with the last one, as painted, where both lie between two places.
 
-        Infinite where no place between the two belongs to both strokes.
+        Args:
+            first_u: One place along the strokes [m].
+            last_u: The other one [m].
+
+        Returns:
+            u, overlap, and its standard deviation [m], (n,) each; empty before the second stroke.
         """
         if len(self.maps) < 2:
-            return math.inf
+            return np.empty(0), np.empty(0), np.empty(0)
         (u, last), (_, own), p = self.maps[-2].places(), self.maps[-1].places(), self._p
-        shares = self._shares(u)
-        overlap = last - own + shares @ (self._x[_LAST] - self._x[_OWN]) + 2.0 * self._half
-        covariance = p[_LAST, _LAST] - p[_LAST, _OWN] - p[_OWN, _LAST] + p[_OWN, _OWN]
-        overlap -= np.sqrt(np.maximum(np.sum(shares @ covariance * shares, axis=1), 0.0))
         low, high = sorted((first_u, last_u))
-        within = overlap[(low <= u) & (u <= high) & np.isfinite(overlap)]
-        return float(within.min(initial=math.inf))
+        within = (low <= u) & (u <= high) & np.isfinite(last - own)
+        shares = self._shares(u[within])
+        inner = np.fmin(own, self._again.places()[1])
+        overlap = (last - inner)[within] + shares @ (self._x[_LAST] - self._x[_OWN]) + 2.0 * self._half
+        covariance = p[_LAST, _LAST] - p[_LAST, _OWN] - p[_OWN, _LAST] + p[_OWN, _OWN]
+        return u[within], overlap, np.sqrt(np.maximum(np.sum(shares @ covariance * shares, axis=1), 0.0))
 
     def end_stroke(self) -> None:
         """The stroke ends: the error of its map becomes that of the last stroke, and beta begins anew."""
@@ -202,21 +218,30 @@ class CrossTrack:
         self._x[_AHEAD], self._p[_AHEAD], self._p[:, _AHEAD] = 0.0, 0.0, 0.0
         self._p[_AHEAD, _AHEAD] = AHEAD_STD**2
 
-    def look(self, lines: Sequence[PatternLine], u: float, ahead: float) -> None:
-        """Correct with every edge in view, once per `LOOK_S`; ``ahead`` is the direction of travel along u, +-1."""
+    def look(self, lines: Sequence[PatternLine], u: float, ahead: float, again: bool = False) -> None:
+        """Correct with every edge in view, once per `LOOK_S`.
+
+        Args:
+            lines: Lines in view.
+            u: Of the tip [m].
+            ahead: Direction of travel along u, +-1.
+            again: Whether the tip is on the paint of the stroke in progress, which hides the last one's edge.
+        """
         self._u = u
+        self._forward = self._forward if again else ahead
         if self._laying:
             self._open &= ahead * (self._spacing * np.arange(NODES) - u) > 0.0
             self._take_error()
         parallel = [line for line in lines if line.parallel and line.weight > LOST_WEIGHT]
         guides = []
         straight = math.radians(self._config.gates.fresh_lean_deg)
-        if (line := self._last_edge(parallel, u, ahead)) is not None and abs(line.lean) < straight:
+        line = None if again else self._last_edge(parallel, u, ahead)
+        if line is not None and abs(line.lean) < straight:
             guides.append(line)
         if (line := self._board_edge(parallel)) is not None:
             guides.append(line)
             self._follow_turn(line, LOOK_S / TURN_TIME_S)
-        own = self._own_edges(parallel, u, ahead) if self._laying else []
+        own = self._own_edges(parallel, u, 0.0 if again else ahead) if self._laying else []
         if (line := self._opposite_edge(parallel)) is not None:
             guides.append(line)
         guides += own
@@ -245,7 +270,7 @@ class CrossTrack:
         found = [line for line in lines if line.kind != "board" and line.side >= 0]
         nodes: slice | None = _LAST
         for stroke, older in zip(reversed(self._painted), (None, *reversed(self._variances)), strict=False):
-            line = self._painted_edge(found, stroke, (u, ahead), self._half + float(self._x[_AHEAD]), nodes, older)
+            line = self._painted_edge(found, stroke, (u, ahead), self._half, nodes, older)
             if line is not None:
                 return line
             nodes = None
@@ -254,7 +279,8 @@ class CrossTrack:
     def _own_edges(self, lines: list[PatternLine], u: float, ahead: float) -> list[PatternLine]:
         """Both edges of the stroke that is being laid, behind the brush: they show where the tip is in the picture.
 
-        They lead the tip, too, where no other edge is in view: velocity alone holds it half as well against friction.
+        On its own paint, on either side: ``ahead`` is then 0. They lead the tip, too, where no other edge is in view:
+        velocity alone holds it half as well against friction.
         """
         paint = [line for line in lines if line.kind == "paint"]
         seen = []
@@ -277,8 +303,8 @@ class CrossTrack:
         Args:
             lines: Those that may be this edge.
             stroke: Map of the stroke.
-            place: u of the tip [m], and the direction along u in which the edge is seen.
-            half: From the middle of the stroke to the edge, as it seems [m].
+            place: u of the tip [m], and the direction along u in which the edge is seen, 0 for either.
+            half: From the middle of the stroke to the edge [m].
             nodes: States that are the map's error, or None.
             variances: Of the map at its nodes, where they are no states [m^2].
         """
@@ -286,10 +312,10 @@ class CrossTrack:
         expected = []
         for line in lines:
             near, far, seen = self._piece(line, ahead)
-            if (near + far) * ahead > 0.0 and far - near > SHORTEST_M:
+            if ((near + far) * ahead > 0.0 or ahead == 0.0) and far - near > SHORTEST_M:
                 middle, row, variance = 0.5 * (near + far), _row_of_h(), 0.0
-                row[_TURN], row[_AHEAD], shares = middle, float(nodes is not _OWN), self._shares(u + middle)
-                level = stroke.mean(u + near, u + far) + half
+                row[_TURN], row[_AHEAD], shares = middle, float(middle * self._forward > 0.0), self._shares(u + middle)
+                level = stroke.mean(u + near, u + far) + half + row[_AHEAD] * float(self._x[_AHEAD])
                 if nodes is not None:
                     row[nodes] = shares
                     level += float(shares @ self._x[nodes])

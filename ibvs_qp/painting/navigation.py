@@ -57,11 +57,14 @@ class Navigation(PhaseMachine):
         cross.predict(du, dv, dt)
         along.predict(du)
         self._lines = lines = pattern_lines(inputs.lines.values(), self.pattern, cross.picture_turn)
+        again = self.phase == "retouch"
         if self.phase == "paint" and inputs.in_contact:
             cross.lay(along.u)
+        if again and inputs.in_contact:
+            cross.lay_again(along.u)
         if inputs.time_s - self._looked >= LOOK_S and self.phase != "start":
             self._looked = inputs.time_s
-            cross.look(lines, along.u, self._view_direction())
+            cross.look(lines, along.u, self._view_direction(), again)
             if along.known and (noticed := along.look(lines)):
                 self.log.append((inputs.time_s, "edge", noticed))
         if self._across_line.update(lines, self._guides()) and self.phase != "start":
@@ -75,18 +78,18 @@ class Navigation(PhaseMachine):
         """Tracks of the edge beside the place to which the tip moves; another one may leave the picture on the way."""
         if self.phase == "survey":
             return ()
-        goal = self._stroke_goal() if self.phase == "paint" else self._stroke_begin()
+        goal = self._stroke_goal() if self.phase in ("paint", "retouch") else self._stroke_begin()
         return (self._along.end,) if goal > 0.5 * self.config.stroke_m else (self._along.near,)
 
     def _guides(self) -> tuple[int, ...]:
         """Tracks of the edges along the strokes, best first; at the wall, those that stay in the picture."""
         cross, reach = self._cross, self.config.guide_reach_m
-        if self.phase not in ("press", "paint", "climb"):
+        if self.phase not in ("press", "paint", "retouch", "climb"):
             return tuple(cross.guides)
         return tuple([track for track, v in cross.guides.items() if abs(v - self._v_target) < reach])
 
     def _view_direction(self) -> float:
-        """Direction along u in which the last stroke's edge is in view, not under the brush."""
+        """Direction of travel along u: the last stroke's edge is in view there, not under the brush."""
         return self.pattern.travel(max(self.row, 1))
 
     @staticmethod
@@ -189,7 +192,7 @@ class Navigation(PhaseMachine):
         u, v = self._turned(u, v, self._cross.turn)
         travel = ZERO
         if contact and self._SLIDES:
-            way = config.speed_m_s * self.pattern.travel(max(self.row, 1))
+            way = config.speed_m_s * self._view_direction()
             travel = np.array(self.pattern.to_wall(way, 0.0))
         velocity = np.array(self.pattern.to_wall(u, v))
         return PaintingCommand(contact, standoff, velocity, guides, config.push_n, ZERO, travel)

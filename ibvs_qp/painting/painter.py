@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ibvs_qp.painting.alignment import Alignment
 from ibvs_qp.painting.along_track import SIGMAS
 from ibvs_qp.painting.command import PainterInput, PaintingCommand
@@ -42,6 +44,9 @@ PLACE_SIGMAS = 2.0
 REACTION_M = 0.05
 #: Target overlap where the stroke before falls short, as a share of the nominal overlap [-].
 LEAST_OVERLAP = 0.75
+#: A stroke is painted again, at most so often [-], where its overlap may be negative at so many standard deviations
+#: [-], from so far before that place [m], with this overlap as a share of the nominal one [-].
+MOST_RETOUCHES, RETOUCH_SIGMAS, RETOUCH_BEFORE_M, RETOUCH_OVERLAP = 2, 2.0, 0.1, 1.25
 
 
 class Painter(Navigation):
@@ -60,11 +65,17 @@ class Painter(Navigation):
         self._uncertain = ""  # why the job is not what was asked, although it was flown to its end
         self._touches = 0  # that were taken back, before the stroke in progress
         self._worst = 0.0  # largest standard deviation of the place of the stroke in progress [m]
+        self._retouches, self._back_to = 0, math.nan  # of the stroke in progress; u to which the tip goes back [m]
         self._paused = self._follows_end = False
 
     def _enter(self, inputs: PainterInput, phase: str, reason: str) -> None:
         super()._enter(inputs, phase, reason)
         self._since = math.nan
+        if phase != "retouch":
+            self._back_to = math.nan
+        if phase in ("paint", "retouch"):
+            way = self.config.stroke_m if math.isnan(self._back_to) else 2.0 * abs(self._back_to - self._along.u)
+            self._way_s = 2.0 * way / self.config.speed_m_s
         if phase == "survey":
             way = self.config.stroke_m + self.config.gates.first_stop_m
             self._way_s = 2.0 * way / self.config.survey_speed_m_s
@@ -205,26 +216,55 @@ class Painter(Navigation):
         return self._command(inputs, contact=True, hold=True)
 
     def _paint(self, inputs: PainterInput, dt: float) -> PaintingCommand:
-        config, travel = self.config, self.pattern.travel(self.row)
-        allowed = config.timeout_s + 2.0 * config.stroke_m / config.speed_m_s
-        late = inputs.time_s - self.entered > allowed
-        if late:
-            self._speed = 0.0
-            left = f"{abs(self._stroke_goal() - self._along.u) * 1e3:.0f} mm are left after {allowed:.0f} s"
-            self._fail(inputs, f"time-out in row {self.row}: {left}")
-        remaining = travel * (self._stroke_goal() - self._along.u)
+        goal = self._stroke_goal()
+        late = self._is_late(inputs, f"row {self.row}", goal)
         self._worst = max(self._worst, self._cross.deviation)
-        self._v_reference = self._slid(self._v_reference, self._touching_target(), dt)
+        if self._is_run(inputs, goal, self._touching_target(LEAST_OVERLAP), dt) and not late:
+            self._end_stroke(inputs)
+        return self._stroke_command(inputs)
+
+    def _retouch(self, inputs: PainterInput, dt: float) -> PaintingCommand:
+        """Back along the stroke to where it may leave a gap, then again to its end; farther in both times."""
+        back = not math.isnan(self._back_to)
+        goal = self._back_to if back else self._stroke_goal()
+        late = self._is_late(inputs, f"the retouch of row {self.row}", goal)
+        if self._is_run(inputs, goal, self._touching_target(RETOUCH_OVERLAP), dt) and not late:
+            if back:
+                self._back_to, self._speed, self._follows_end = math.nan, 0.0, False
+                self._stroke_end.begin()
+            else:
+                self._end_stroke(inputs)
+        return self._stroke_command(inputs)
+
+    def _is_late(self, inputs: PainterInput, name: str, goal: float) -> bool:
+        """Whether this phase takes longer than its way allows; the job has then failed."""
+        allowed = self.config.timeout_s + self._way_s
+        if inputs.time_s - self.entered <= allowed:
+            return False
+        self._speed = 0.0
+        self._fail(
+            inputs, f"time-out in {name}: {abs(goal - self._along.u) * 1e3:.0f} mm are left after {allowed:.0f} s"
+        )
+        return True
+
+    def _is_run(self, inputs: PainterInput, goal: float, v: float, dt: float) -> bool:
+        """Run on towards a place along the stroke, at a place across it; whether the tip is there."""
+        config, travel = self.config, self._view_direction()
+        remaining = travel * (goal - self._along.u)
+        self._v_reference = self._slid(self._v_reference, v, dt)
         self._pause_without_contact(inputs)
         target = 0.0 if self._paused else stroke_speed(config, remaining)
         self._speed = ramped(self._speed, target, config.acceleration_m_s2 * dt)
         ended = self._stroke_end.is_near(remaining)
         if ended:
             self._speed = 0.0
-        self._lead_to_end(ended, travel * self._speed * dt)
-        if not late and self._stroke_end.is_reached(inputs, remaining):
-            self._end_stroke(inputs)
-        return self._command(inputs, contact=True, along=travel * self._speed, edge=self._follows_end)
+        if math.isnan(self._back_to):
+            self._lead_to_end(ended, travel * self._speed * dt)
+        return self._stroke_end.is_reached(inputs, remaining)
+
+    def _stroke_command(self, inputs: PainterInput) -> PaintingCommand:
+        along = self._view_direction() * self._speed
+        return self._command(inputs, contact=True, along=along, edge=self._follows_end)
 
     def _climb(self, inputs: PainterInput, dt: float) -> PaintingCommand:
         config = self.config
@@ -265,6 +305,9 @@ class Painter(Navigation):
 
     # ----------------------------------------------------------------- strokes
 
+    def _view_direction(self) -> float:
+        return super()._view_direction() * (1.0 if math.isnan(self._back_to) else -1.0)
+
     def _is_last(self) -> bool:
         config = self.config
         if config.rows != FILL:
@@ -274,6 +317,7 @@ class Painter(Navigation):
 
     def _begin_stroke(self, inputs: PainterInput, stroke: int, reason: str) -> None:
         self.row, self._speed, self._follows_end, self._worst, self._touches = stroke, 0.0, False, 0.0, 0
+        self._retouches = 0
         self._cross.begin_stroke()
         self._along.begin_stroke()
         self._stroke_end.begin()
@@ -282,6 +326,8 @@ class Painter(Navigation):
         self._enter(inputs, "paint", f"row {self.row}: {reason}")
 
     def _end_stroke(self, inputs: PainterInput) -> None:
+        if self._begin_retouch(inputs):
+            return
         self._uncertain = self._uncertain or self._doubt()
         self._cross.end_stroke()
         edge = self._along_line.line
@@ -296,6 +342,28 @@ class Painter(Navigation):
         self._speed, self._u_reference = 0.0, self._along.u
         self._enter(inputs, "climb", ended)
 
+    def _overlap(self, sigmas: float) -> tuple[np.ndarray, np.ndarray]:
+        """Places along the stroke that has ended where it lies beside the last one, and its least overlap there [m]."""
+        last = self._stroke_goal() - CORNER_M * self.pattern.travel(self.row)
+        u, overlap, known = self._cross.overlap(self._stroke_begin(), last)
+        return u, overlap - sigmas * known
+
+    def _begin_retouch(self, inputs: PainterInput) -> bool:
+        """Go back to where the stroke may leave a gap to the last one; False where it does not."""
+        u, overlap = self._overlap(RETOUCH_SIGMAS)
+        gaps = u[overlap < 0.0]
+        if not gaps.size or self._retouches >= MOST_RETOUCHES or self.config.overlap_m <= 0.0:
+            return False
+        travel, begin = self.pattern.travel(self.row), self._stroke_begin()
+        first = float(gaps.min() if travel > 0.0 else gaps.max())
+        self._retouches += 1
+        self._back_to = begin + travel * max(travel * (first - begin) - RETOUCH_BEFORE_M, 0.0)
+        self._speed, self._follows_end = 0.0, False
+        self._stroke_end.begin()
+        short, way = -float(overlap.min()), abs(self._along.u - self._back_to)
+        self._enter(inputs, "retouch", f"row {self.row} may leave a gap of {short * 1e3:.1f} mm, back by {way:.2f} m")
+        return True
+
     def _doubt(self) -> str:
         """Why the stroke that has ended is not claimed: its length or place as estimated, or too little known."""
         length, asked, goal = self._along.stroke_length, self.config.stroke_m, self._stroke_goal()
@@ -306,7 +374,7 @@ class Painter(Navigation):
             return f"row {self.row} is {length * 1e3:.0f} mm long, {asked * 1e3:.0f} mm were asked"
         if SIGMAS * self._worst > 2.0 * self._certain_m:
             return f"row {self.row} lost its edge, its place is known to {self._worst * 1e3:.1f} mm"
-        overlap = self._cross.least_overlap(self._stroke_begin(), goal - CORNER_M * self.pattern.travel(self.row))
+        overlap = self._overlap(1.0)[1].min(initial=math.inf)
         if overlap < 0.0:
             return f"row {self.row} may leave a gap of {-overlap * 1e3:.1f} mm to the row before"
         place, known = self._cross.stroke_place(self._stroke_begin(), goal)
@@ -325,13 +393,13 @@ class Painter(Navigation):
             ahead: Way ahead of the tip [m].
             length: Length of the piece of the stroke before that is averaged [m].
         """
-        here = self._along.u + ahead * self.pattern.travel(self.row)
+        here = self._along.u + ahead * self._view_direction()
         last = self._cross.last_stroke(here - 0.5 * length, here + 0.5 * length)
         return math.inf if math.isnan(last) else last + self.config.brush_width_m
 
-    def _touching_target(self) -> float:
-        """V of the stroke here: its place, or well inside the stroke before where that one falls short."""
-        inside = LEAST_OVERLAP * self.config.overlap_m
+    def _touching_target(self, share: float) -> float:
+        """V of the stroke here: its place, or this share of the overlap inside the last stroke where that is less."""
+        inside = share * self.config.overlap_m
         return min(self._v_target, self._reach_of_last(REACTION_M, 0.5 * self.config.brush_width_m) - inside)
 
     def _lead_to_end(self, ended: bool, moved: float) -> None:

@@ -12,7 +12,7 @@ class PhaseMachine(Strategy):
     """Runs one method per phase: `_start`, ..., `_retreat`, `_done`, each from (inputs, dt) to a command."""
 
     #: Phases without the common time-out.
-    _UNTIMED = ("paint", "search", "done")
+    _UNTIMED = ("paint", "retouch", "search", "done")
 
     def reset(self) -> None:
         """As after construction."""

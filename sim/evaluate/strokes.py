@@ -1,7 +1,8 @@
 """Painted strokes against their nominal lines, in pattern coordinates (u, v) [m] of `ibvs_qp.painting.pattern`.
 
 Stroke k belongs on the line v = `BoardGeometry.stroke_place`, counted from the board's edge, whatever the strokes
-before it did. A stroke's line is the mean of its tip path over pieces along u, of what lies on the board in contact.
+before it did. A stroke's line is the mean of its tip path over pieces along u, of what lies on the board in contact;
+its band is that of this line and of the line along which it was painted again.
 """
 
 from __future__ import annotations
@@ -50,18 +51,20 @@ def painted_strokes(trace: Trace) -> dict[int, Stroke]:
     """Every stroke that left paint on the board, by number."""
     spots, board = board_tip(trace), BoardGeometry(trace.scene)
     tip, nominal, width = board.to_pattern(spots), nominal_lines(board), trace.scene.paint.brush_width_m
-    touching = in_phase(trace, "paint") & (trace.push_true > CONTACT_N) & on_board(trace.scene, spots)
+    touching = (trace.push_true > CONTACT_N) & on_board(trace.scene, spots)
+    painting, again = touching & in_phase(trace, "paint"), touching & in_phase(trace, "retouch")
     strokes: dict[int, Stroke] = {}
     before: np.ndarray | None = None
     for number, (place, first, last) in enumerate(nominal, start=1):
-        path = tip[touching & (trace.row == number)]
+        path = tip[painting & (trace.row == number)]
         if not len(path):
             before = None
             continue
         line = averaged(path)
+        inner, outer = _band(line, tip[again & (trace.row == number)])
         straight = (np.abs(line[:, 0] - first) > CORNER_M) & (np.abs(line[:, 0] - last) > CORNER_M)
         error = line[straight if straight.any() else slice(None), 1] - place
-        overlap = _overlap(line, before, width, first > last) if before is not None else np.array([])
+        overlap = _overlap(inner, before, width, first > last) if before is not None else np.array([])
         strokes[number] = Stroke(
             number=number,
             length_m=float(np.ptp(path[:, 0])),
@@ -70,8 +73,17 @@ def painted_strokes(trace: Trace) -> dict[int, Stroke]:
             most_overlap_m=float(overlap.max()) if len(overlap) else math.nan,
             nominal_overlap_m=width - (place - nominal[number - 2, 0]) if number > 1 else math.nan,
         )
-        before = line
+        before = outer
     return strokes
+
+
+def _band(line: np.ndarray, again: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Lines of the brush at the inner and the outer side of a stroke's band, of its line and the path painted again."""
+    if not len(again):
+        return line, line
+    (u, v), second = line.T, averaged(again)
+    other = np.interp(u, *second.T, left=math.nan, right=math.nan)
+    return np.column_stack((u, np.fmin(v, other))), np.column_stack((u, np.fmax(v, other)))
 
 
 def _overlap(line: np.ndarray, before: np.ndarray, width: float, backwards: bool) -> np.ndarray:

@@ -95,7 +95,7 @@ class Judgement:
         yield from self._contact()
 
     def _contact(self) -> Iterator[str]:
-        share = contact_share(self.trace, in_phase(self.trace, "paint", "climb"))
+        share = contact_share(self.trace, in_phase(self.trace, "paint", "retouch", "climb"))
         if share < self.least_contact:
             yield f"contact in {100.0 * share:.1f} % of painting, {100.0 * self.least_contact:g} % needed"
 

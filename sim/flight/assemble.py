@@ -29,7 +29,7 @@ INTEGERS = ("phase", "row", "outcome", "iterations")
 #: Inputs of the controller's step that are logged, beside those of every line.
 CONTACT_INPUTS = tuple(f"contact.{name}" for name in ("known", "distance", "push", "ramp"))
 INPUTS = (*CONTACT_INPUTS, "contact_weight", "velocity_known", "velocity")
-_PRESSED = [PHASES.index(phase) for phase in ("paint", "climb")]
+_PRESSED = [PHASES.index(phase) for phase in ("paint", "retouch", "climb")]
 
 
 @dataclass(frozen=True, kw_only=True)

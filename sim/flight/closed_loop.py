@@ -34,7 +34,7 @@ MCAP = ".mcap"
 #: Control ticks between calls of the progress function.
 PROGRESS_TICKS = 125
 #: Time-out of a flight [s]: start and corners, plus the strokes at half speed.
-BASE_TIME, STROKE_FACTOR = 90.0, 2.0
+BASE_TIME, STROKE_FACTOR = 90.0, 6.0
 
 
 def make_pilot(scene: Scene, options: FlightOptions, config: PilotConfig, job: Job) -> Pilot:

@@ -19,6 +19,7 @@ from ibvs_qp.painting.command import PainterInput, PaintingCommand
 from ibvs_qp.painting.config import PaintingConfig
 from ibvs_qp.painting.painter import Painter
 from ibvs_qp.painting.pattern import Pattern, stroke_place
+from ibvs_qp.painting.strategy import PHASES
 
 TICK = 0.04
 #: What the camera shows around the tip at the wall [m]; it grows with the camera's distance, and its axis lies below.
@@ -65,7 +66,8 @@ class Paint:
 
     def __init__(self, stroke_m: float) -> None:
         self.begin = -0.3
-        self.v = np.full(round((stroke_m + 0.6) / BIN), math.nan)
+        self.v = np.full(round((stroke_m + 0.6) / BIN), math.nan)  # of the outermost path
+        self.inner = self.v.copy()  # of the innermost one
         self.bare = np.zeros(self.v.size, bool)
         self.u = self.begin + BIN * (np.arange(self.v.size) + 0.5)
 
@@ -74,6 +76,11 @@ class Paint:
 
     def add(self, u: float, v: float) -> None:
         self.v[self.bin(u)], self.bare[self.bin(u)] = v, True
+        self.inner[self.bin(u)] = v
+
+    def add_again(self, u: float, v: float) -> None:
+        at = self.bin(u)
+        self.v[at], self.inner[at], self.bare[at] = np.fmax(self.v[at], v), np.fmin(self.inner[at], v), True
 
     def cover(self, u: float, half: float) -> None:
         """A later stroke's brush stands here and covers the outer edge."""
@@ -98,7 +105,7 @@ class PaintedWall:
         hidden: Identities of lines that the picture does not show.
         ends_seen: Whether the picture tells where the pieces end.
         noise: Standard deviation of an offset in one look [m], renewed every 0.12 s.
-        stuck_across: Whether nothing moves a tip that paints across its stroke but the wave.
+        stuck_across: Whether nothing moves a tip that paints, once or again, across its stroke but the wave.
     """
 
     config: PaintingConfig
@@ -287,7 +294,7 @@ class PaintedWall:
         self.velocity = np.zeros(2) if self.stuck else np.clip(velocity, -TIP_SPEED_MAX, TIP_SPEED_MAX)
         before = self.tip
         along, across = self.to_board(*self.velocity)
-        held = self.stuck_across and self.painter.phase == "paint"
+        held = self.stuck_across and self.painter.phase in ("paint", "retouch")
         self.tip = self.tip + TICK * np.array((along, 0.0 if held else across))
         if self.painter.phase == "paint":
             wave = self.wave(self.painter.row, float(self.tip[0]))
@@ -307,8 +314,8 @@ class PaintedWall:
     def _leave_paint(self) -> None:
         u, v = self.tip.tolist()
         self.reached = [min(self.reached[0], u), max(self.reached[1], u)]
-        if self.painter.phase == "paint":
-            self.paint[-1].add(u, v)
+        if self.painter.phase in ("paint", "retouch"):
+            (self.paint[-1].add if self.painter.phase == "paint" else self.paint[-1].add_again)(u, v)
             if len(self.paint) > 1:
                 self.paint[-2].cover(u, 0.5 * self.config.brush_width_m)
 
@@ -326,8 +333,7 @@ class PaintedWall:
 
     def phases(self) -> list[str]:
         """The phases that were entered."""
-        names = {"start", "survey", "approach", "align", "press", "paint", "climb", "search", "retreat", "done"}
-        return [phase for _, phase, _ in self.painter.log if phase in names]
+        return [phase for _, phase, _ in self.painter.log if phase in PHASES]
 
     def place_errors(self) -> np.ndarray:
         """Mean of v over the straight part of every stroke minus its nominal place [m]."""

@@ -340,17 +340,65 @@ def test_a_map_that_begins_has_the_error_of_v() -> None:
     assert cross._p[own, own] == cross._p[0, 0] > 0.0
 
 
-def test_the_least_overlap_is_that_of_the_maps_and_their_errors_less_its_deviation() -> None:
+def _least(cross: CrossTrack, first_u: float, last_u: float) -> float:
+    _, overlap, known = cross.overlap(first_u, last_u)
+    return float((overlap - known).min())
+
+
+def test_the_overlap_is_that_of_the_maps_and_their_errors() -> None:
     cross = _after_stroke_one()
-    assert cross.least_overlap(0.0, 0.6) == math.inf
+    assert cross.overlap(0.0, 0.6)[0].size == 0
     cross.begin_stroke()
     for k in range(60):
         cross.lay(0.6 - 0.01 * k)
         cross.predict(-0.01, 0.002 if k == 30 else 0.0, 0.1)
         cross.look([], 0.6 - 0.01 * k, -1.0)
     nominal, step = 2.0 * HALF - PITCH, 0.002
-    late = nominal - step - cross.least_overlap(0.0, 0.25)
-    assert cross.least_overlap(0.35, 0.6) > cross.least_overlap(0.0, 0.25)
-    assert late == pytest.approx(cross.deviation, rel=0.1)  # the tip is at the end, where least is known
+    u, overlap, known = cross.overlap(0.0, 0.25)
+    assert u.min() > 0.0 and u.max() < 0.25 and overlap == pytest.approx(nominal - step, abs=1e-4)
+    assert _least(cross, 0.35, 0.6) > _least(cross, 0.0, 0.25)
+    assert known.max() == pytest.approx(cross.deviation, rel=0.1)  # the tip is at the end, where least is known
     place, known = cross.stroke_place(0.0, 0.25)
     assert place == pytest.approx(MARGIN + PITCH + step, abs=1e-4) and known > 0.0
+
+
+def test_paint_laid_again_farther_in_adds_to_the_overlap_and_not_to_the_map() -> None:
+    cross = _after_stroke_one()
+    cross.begin_stroke()
+    for k in range(60):
+        cross.lay(0.6 - 0.01 * k)
+        cross.predict(-0.01, 0.0, 0.1)
+    before, map_before = cross.overlap(0.0, 0.6), cross.maps[-1].places()[1]
+    cross.predict(0.0, -0.004, 0.1)
+    for k in range(30):
+        cross.lay_again(0.01 * k)
+        cross.predict(0.01, 0.0, 0.1)
+    u, overlap, _ = cross.overlap(0.0, 0.6)
+    np.testing.assert_array_equal(cross.maps[-1].places()[1], map_before)
+    again = u < 0.29
+    assert np.all((overlap - before[1])[~again] == 0.0)
+    gained = (overlap - before[1])[again]
+    assert np.all((0.0 < gained) & (gained < 0.004)), "less the deviation of v"
+    cross.end_stroke()
+    cross.begin_stroke()
+    cross.lay(0.3)
+    assert cross.overlap(0.2, 0.4)[1] == pytest.approx(2.0 * HALF + 0.004, abs=1e-6), "outward: the map's own line"
+
+
+@pytest.mark.parametrize("middle", [-0.14, 0.14])
+def test_on_its_own_paint_the_tip_goes_by_the_edge_on_either_side(middle: float) -> None:
+    """Ahead of the way out (-u) it seems to lie 1 mm farther out, by beta, and that is no error of v."""
+    cross = _after_stroke_one()
+    cross.begin_stroke()
+    for k in range(60):
+        cross.lay(0.6 - 0.01 * k)
+        cross.look([], 0.6 - 0.01 * k, -1.0)
+    cross._x[cross_track._AHEAD] = beta = 1e-3
+    seems = beta if middle < 0.0 else 0.0
+    own, v = parallel(102, HALF + seems, 1, "paint", middle, 0.16), cross.v
+    cross.look([own], 0.3, 1.0, again=True)
+    assert cross.v == pytest.approx(v, abs=1e-9) and list(cross.guides) == [102]
+    cross.look([parallel(102, HALF + seems - 2e-3, 1, "paint", middle, 0.16)], 0.3, 1.0, again=True)
+    assert cross.tip_error > 5e-4, "the edge seems nearer than the map says: the picture shows the tip farther out"
+    cross.look([fresh(track=103)], 0.3, 1.0, again=True)
+    assert 103 not in cross.guides, "the last stroke's edge lies under the paint"

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from painted_wall import END, FAR, GUIDE, NEAR, OUTER, PaintedWall, Piece, short
 
+from ibvs_qp.painting import painter
 from ibvs_qp.painting.config import PaintingConfig
 
 PLACE = 3e-3
@@ -293,6 +294,53 @@ def test_a_gap_to_the_stroke_before_is_not_claimed(length: float) -> None:
     assert world.painter.failed and re.fullmatch(
         r"row 2 may leave a gap of \d\.\d mm to the row before", world.painter.reason
     )
+
+
+@pytest.mark.parametrize("pattern", ["rows", "columns"])
+@pytest.mark.parametrize("stroke", [2, 3])
+def test_a_gap_is_painted_again_and_the_job_is_claimed(pattern: str, stroke: int) -> None:
+    """A gust carries the tip 12 mm away from the last stroke for 0.3 m, and nothing holds it there."""
+    config = short(rows=4, stroke_m=1.5, pattern=pattern)
+    world = PaintedWall(config, wave=lambda row, u: 0.012 if row == stroke and 0.5 < u < 0.8 else 0.0)
+    world.fly(90.0, until="paint", stroke=stroke)
+    world.stuck_across = True
+    world.fly(60.0, until="retouch")
+    begun = float(world.tip[0])
+    assert world.painter.row == stroke and world.painter.phase == "retouch"
+    world.stuck_across, reached = False, [math.inf, -math.inf]
+    while world.painter.phase == "retouch":
+        world.step()
+        reached = [min(reached[0], world.tip[0]), max(reached[1], world.tip[0])]
+    back = 0.5 - painter.RETOUCH_BEFORE_M if stroke == 3 else 0.8 + painter.RETOUCH_BEFORE_M
+    near, far = sorted((back, begun))
+    assert reached == pytest.approx([near, far], abs=0.02), "from before the gap to the end of the stroke"
+    world.fly(200.0)
+    assert world.painter.finished and not world.painter.failed, world.painter.reason
+    assert world.phases().count("retouch") == 1
+    last, mended = world.paint[stroke - 2].v, world.paint[stroke - 1]
+    seam = (mended.u > 0.02) & (mended.u < 1.48)
+    assert (last + config.brush_width_m - mended.inner)[seam].min() > 0.0
+    assert (last + config.brush_width_m - mended.inner)[seam].max() < 3.0 * config.overlap_m
+    assert abs(np.delete(world.place_errors(), stroke - 1)).max() < PLACE
+
+
+def test_a_stroke_is_painted_again_twice_at_most_and_never_without_overlap() -> None:
+    for overlap, retouches in ((0.008, painter.MOST_RETOUCHES), (0.0, 0)):
+        world = PaintedWall(short(rows=2, stroke_m=1.0, overlap_m=overlap), stuck_across=True)
+        world.wave = lambda stroke, u: -0.02 if stroke == 1 and 0.3 < u < 0.6 else 0.0
+        world.fly(200.0)
+        assert world.phases().count("retouch") == retouches
+        assert world.painter.failed and "may leave a gap" in world.painter.reason
+
+
+def test_a_retouch_that_gets_nowhere_ends_the_job_with_what_is_left() -> None:
+    world = PaintedWall(short(rows=2, stroke_m=1.0), stuck_across=True)
+    world.wave = lambda stroke, u: -0.012 if stroke == 1 and 0.3 < u < 0.6 else 0.0
+    world.fly(100.0, until="retouch")
+    world.stuck = True
+    world.fly(200.0)
+    assert world.painter.failed
+    assert re.fullmatch(r"time-out in the retouch of row 2: \d+ mm are left after \d+ s", world.painter.reason)
 
 
 def test_a_stroke_that_lost_its_edge_for_long_is_painted_but_not_claimed() -> None:
