@@ -27,7 +27,7 @@ REFERENCE = {"color": "#333333", "linestyle": (0, (4, 2)), "linewidth": 0.9}
 ZERO = {"color": "#333333", "linewidth": 0.6}
 FAINT, GREY = "#b9c4cc", "#777777"
 #: Tints of the phases with contact.
-PHASE_TINTS = {"press": "#f1ead9", "paint": "#e3eef5", "climb": "#cfe3d3"}
+PHASE_TINTS = {"press": "#f1ead9", "paint": "#e3eef5", "retouch": "#f3dfe4", "climb": "#cfe3d3"}
 #: Width of one letter of a phase's label as a fraction of a page-wide axis; shorter phases get no label.
 LETTER_FRACTION = 0.0125
 #: Largest number of points per curve; more would only enlarge the file.

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 from matplotlib.patches import Patch, Rectangle
 
+from sim.evaluate.window import in_phase
 from sim.experiments.figures.common import Drawn, Results, stored_trace
 from sim.experiments.figures.snapshots import draw_snapshots, painted_board
 from sim.experiments.spec import FigureSpec
@@ -29,7 +30,12 @@ OBLIQUE = (1.2, -0.3)
 LONG_M = 1.5
 #: Free space above the curves for their legend, as a fraction of their range.
 HEADROOM = 0.2
-_WORDS = {"press": "touch and press", "paint": "painting a row", "climb": "climb to the next row"}
+_WORDS = {
+    "press": "touch and press",
+    "paint": "painting a row",
+    "retouch": "painting it again",
+    "climb": "climb to the next row",
+}
 
 
 def draw_demonstrations(spec: FigureSpec, results: Results) -> Drawn:
@@ -69,7 +75,7 @@ def draw_demonstration(trace: Trace) -> Figure:
         axes.set_ylim(low - below * (high - low), high + HEADROOM * (high - low))
         axes.legend(loc="upper center", ncols=3, borderaxespad=0.2, handlelength=1.4, columnspacing=1.0, fontsize=7)
     attitude.set_xlabel("time [s]")
-    flown = [name for name in PHASE_TINTS if name in trace.phases]
+    flown = [name for name in PHASE_TINTS if in_phase(trace, name).any()]
     tints = [Patch(facecolor=PHASE_TINTS[name], edgecolor="#bbbbbb", linewidth=0.4) for name in flown]
     figure.legend(tints, [_WORDS[name] for name in flown], loc="outside lower center", ncols=len(flown))
     return figure

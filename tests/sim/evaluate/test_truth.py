@@ -120,6 +120,37 @@ def test_bands_touch_everywhere_but_in_the_last_two_centimetres(gap_m, last_m, m
     assert shortfall(moved(trace, (trace.row == 2) & inside, gap_m)) == missing
 
 
+def retouched(trace: Trace, row: int, reach_u: tuple[float, float], across_m: float) -> Trace:
+    """The trace with a part of a row painted again, that far outside its place, in the last second of the press."""
+    board, ticks = BoardGeometry(trace.scene), (trace.t > 5.0) & (trace.t < 6.0)
+    count = int(ticks.sum())
+    path = np.column_stack((np.linspace(*reach_u, count), np.full(count, board.stroke_place(row) + across_m)))
+    trace.phases = (*trace.phases, "retouch")
+    for name in ("phase", "row", "tip"):
+        trace.arrays[name] = trace.arrays[name].copy()
+    trace.arrays["phase"][ticks], trace.arrays["row"][ticks] = len(trace.phases) - 1, row
+    trace.arrays["tip"][ticks, 1:] = board.point(*board.from_pattern(path).T)
+    return trace
+
+
+def test_the_band_of_a_stroke_is_that_of_both_passes():
+    def with_gap(row: int) -> Trace:
+        trace, board = three_rows(), BoardGeometry(THREE_ROWS)
+        inside = np.abs(along(trace) - board.stroke_ends[0] - 0.225) < 0.025
+        return moved(trace, (trace.row == row) & inside, 0.009)
+
+    begin = BoardGeometry(THREE_ROWS).stroke_ends[0]
+    assert shortfall(with_gap(2)) == "row 2: gap of 1.0 mm to row 1"
+    assert shortfall(retouched(with_gap(2), 2, (begin + 0.15, begin + 0.3), -0.004)) is None
+    assert shortfall(retouched(with_gap(2), 2, (begin + 0.22, begin + 0.3), -0.004)) == "row 2: gap of 1.0 mm to row 1"
+    assert shortfall(retouched(with_gap(2), 3, (begin + 0.15, begin + 0.3), -0.004)) == "row 2: gap of 1.0 mm to row 1"
+    too_far = "row 2: overlaps row 1 by 25 mm, nominal 8.0 mm"
+    assert shortfall(retouched(three_rows(), 2, (begin + 0.15, begin + 0.3), -0.017)) == too_far
+    # Row 3 overlaps the outer side of both passes of row 2: at most 24 mm.
+    outside = retouched(three_rows(0.0, 0.0, -0.007), 2, (begin + 0.15, begin + 0.3), 0.01)
+    assert shortfall(outside) == "row 3: overlaps row 2 by 25 mm, nominal 8.0 mm"
+
+
 @pytest.mark.parametrize(("longer_m", "good"), [(0.0, True), (0.0095, True), (0.011, False), (-0.011, False)])
 def test_a_stroke_has_its_length(longer_m, good):
     """Rows 1 and 2 both have another length if row 1 ends elsewhere."""
