@@ -64,7 +64,6 @@ class Painter(Navigation):
         self._waypoints: list[tuple[float, float]] = []
         self._uncertain = ""  # why the job is not what was asked, although it was flown to its end
         self._touches = 0  # that were taken back, before the stroke in progress
-        self._worst = 0.0  # largest standard deviation of the place of the stroke in progress [m]
         self._retouches, self._back_to = 0, math.nan  # of the stroke in progress; u to which the tip goes back [m]
         self._paused = self._follows_end = False
 
@@ -218,7 +217,6 @@ class Painter(Navigation):
     def _paint(self, inputs: PainterInput, dt: float) -> PaintingCommand:
         goal = self._stroke_goal()
         late = self._is_late(inputs, f"row {self.row}", goal)
-        self._worst = max(self._worst, self._cross.deviation)
         if self._is_run(inputs, goal, self._touching_target(LEAST_OVERLAP), dt) and not late:
             self._end_stroke(inputs)
         return self._stroke_command(inputs)
@@ -316,7 +314,7 @@ class Painter(Navigation):
         return not math.isnan(rest) and rest <= FILL_REST_M
 
     def _begin_stroke(self, inputs: PainterInput, stroke: int, reason: str) -> None:
-        self.row, self._speed, self._follows_end, self._worst, self._touches = stroke, 0.0, False, 0.0, 0
+        self.row, self._speed, self._follows_end, self._touches = stroke, 0.0, False, 0
         self._retouches = 0
         self._cross.begin_stroke()
         self._along.begin_stroke()
@@ -372,8 +370,6 @@ class Painter(Navigation):
             return f"row {self.row} ended by the odometer, its length is known to {known * 1e3:.0f} mm"
         if abs(length - asked) > LENGTH_TOLERANCE_M:
             return f"row {self.row} is {length * 1e3:.0f} mm long, {asked * 1e3:.0f} mm were asked"
-        if SIGMAS * self._worst > 2.0 * self._certain_m:
-            return f"row {self.row} lost its edge, its place is known to {self._worst * 1e3:.1f} mm"
         overlap = self._overlap(1.0)[1].min(initial=math.inf)
         if overlap < 0.0:
             return f"row {self.row} may leave a gap of {-overlap * 1e3:.1f} mm to the row before"
