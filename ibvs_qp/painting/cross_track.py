@@ -87,7 +87,7 @@ class CrossTrack:
         self._roll = 0.0  # of the picture against the odometer's axes, by the board's edge [rad]
         self.guides: dict[int, float] = {}
         self._laying = False
-        self._again = StrokeMap(config.stroke_m)  # where the stroke in progress was painted again
+        self._again: list[StrokeMap] = []  # where the stroke in progress was painted again, each way for itself
         self._open = np.zeros(NODES, bool)  # nodes of the stroke that is laid which the tip has not passed
         self._u, self._forward = 0.0, 1.0  # of the tip [m]; direction in which the stroke in progress is laid
 
@@ -154,7 +154,7 @@ class CrossTrack:
     def begin_stroke(self) -> None:
         """The tip begins to paint a stroke; what it paints is remembered."""
         self.maps.append(StrokeMap(self._config.stroke_m))
-        self._again = StrokeMap(self._config.stroke_m)
+        self._again = []
         self._laying = True
         self._open[:] = True
         self._take_error()
@@ -164,6 +164,10 @@ class CrossTrack:
         self._u = u
         self.maps[-1].add(u, self.v)
 
+    def begin_again(self) -> None:
+        """The tip turns round and paints the stroke in progress again."""
+        self._again.append(StrokeMap(self._config.stroke_m))
+
     def lay_again(self, u: float) -> None:
         """The brush presses here, where the stroke in progress lies already; v one standard deviation farther out.
 
@@ -171,7 +175,7 @@ class CrossTrack:
         """
         self._u, p, shares = u, self._p, self._shares(u)
         variance = p[_V, _V] + float(shares @ p[_OWN, _OWN] @ shares) - 2.0 * float(shares @ p[_OWN, _V])
-        self._again.add(u, self.v - float(shares @ self._x[_OWN]) + math.sqrt(max(float(variance), 0.0)))
+        self._again[-1].add(u, self.v - float(shares @ self._x[_OWN]) + math.sqrt(max(float(variance), 0.0)))
 
     def last_stroke(self, first_u: float, last_u: float) -> float:
         """Mean v between two places of the stroke before the one that is laid [m]; NaN where it is not known."""
@@ -179,6 +183,11 @@ class CrossTrack:
         if not before:
             return math.nan
         return before[-1].mean(first_u, last_u) + float(self._shares(0.5 * (first_u + last_u)) @ self._x[_LAST])
+
+    def own_stroke(self, first_u: float, last_u: float) -> float:
+        """Mean v between two places of the stroke in progress as it was first laid [m]; NaN where it was not."""
+        shares = self._shares(0.5 * (first_u + last_u))
+        return self.maps[-1].mean(first_u, last_u) + float(shares @ self._x[_OWN])
 
     def stroke_place(self, first_u: float, last_u: float) -> tuple[float, float]:
         """Mean v of the stroke that is laid between two places, and its standard deviation [m]."""
@@ -202,7 +211,7 @@ class CrossTrack:
         low, high = sorted((first_u, last_u))
         within = (low <= u) & (u <= high) & np.isfinite(last - own)
         shares = self._shares(u[within])
-        inner = np.fmin(own, self._again.places()[1])
+        inner = np.fmin.reduce([own, *(again.places()[1] for again in self._again)])
         overlap = (last - inner)[within] + shares @ (self._x[_LAST] - self._x[_OWN]) + 2.0 * self._half
         covariance = p[_LAST, _LAST] - p[_LAST, _OWN] - p[_OWN, _LAST] + p[_OWN, _OWN]
         return u[within], overlap, np.sqrt(np.maximum(np.sum(shares @ covariance * shares, axis=1), 0.0))
@@ -279,12 +288,12 @@ class CrossTrack:
     def _own_edges(self, lines: list[PatternLine], u: float, ahead: float) -> list[PatternLine]:
         """Both edges of the stroke that is being laid, behind the brush: they show where the tip is in the picture.
 
-        On its own paint, on either side: ``ahead`` is then 0. They lead the tip, too, where no other edge is in view:
-        velocity alone holds it half as well against friction.
+        On its own paint the outer one, on either side: ``ahead`` is then 0, and the inner one is that of the brush.
+        They lead the tip, too, where no other edge is in view: velocity alone holds it half as well against friction.
         """
         paint = [line for line in lines if line.kind == "paint"]
         seen = []
-        for side in (1, -1):
+        for side in (1, -1) if ahead else (1,):
             found = [line for line in paint if line.side == side]
             seen.append(self._painted_edge(found, self.maps[-1], (u, -ahead), side * self._half, _OWN))
         return [line for line in seen if line is not None]
@@ -314,7 +323,8 @@ class CrossTrack:
             near, far, seen = self._piece(line, ahead)
             if ((near + far) * ahead > 0.0 or ahead == 0.0) and far - near > SHORTEST_M:
                 middle, row, variance = 0.5 * (near + far), _row_of_h(), 0.0
-                row[_TURN], row[_AHEAD], shares = middle, float(middle * self._forward > 0.0), self._shares(u + middle)
+                row[_TURN], shares = middle, self._shares(u + middle)
+                row[_AHEAD] = float(nodes is not _OWN) if ahead else self._share_ahead(near, far)
                 level = stroke.mean(u + near, u + far) + half + row[_AHEAD] * float(self._x[_AHEAD])
                 if nodes is not None:
                     row[nodes] = shares
@@ -324,12 +334,17 @@ class CrossTrack:
                 expected.append((line, seen, row, level, variance))
         return self._correct(expected, EDGE_STD**2 * INDEPENDENT_S / LOOK_S, 0.5 * self._config.pitch_m)
 
+    def _share_ahead(self, near: float, far: float) -> float:
+        """Share of a piece that lies ahead on the way on which the stroke was laid."""
+        ahead = far if self._forward > 0.0 else -near
+        return min(max(ahead / (far - near), 0.0), 1.0)
+
     @staticmethod
     def _piece(line: PatternLine, ahead: float) -> tuple[float, float, float]:
         """Begin and end of the visible piece along u, and v of its middle, from the tip [m]."""
         u, v = line.middle
         if math.isnan(u):
-            near, far = sorted(ahead * end for end in WINDOW_M)
+            near, far = sorted(ahead * end for end in WINDOW_M) if ahead else (-WINDOW_M[1], WINDOW_M[1])
             return near, far, line.place + 0.5 * line.lean * (near + far)
         return u - 0.5 * line.length, u + 0.5 * line.length, v
 

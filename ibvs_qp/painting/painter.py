@@ -1,4 +1,4 @@
-"""The painting strategy: start, survey, approach, align, press, paint and climb stroke by stroke, retreat, done.
+"""The painting strategy: start, survey, approach, align, press; paint, retouch and climb stroke by stroke; retreat.
 
 Everything is in pattern coordinates (u along the strokes, v across; `ibvs_qp.painting.pattern`). Where the tip is and
 what leads it: `navigation`; time-outs and failure: `phase_machine`. A "climb" is the step from stroke to stroke, in
@@ -65,6 +65,7 @@ class Painter(Navigation):
         self._uncertain = ""  # why the job is not what was asked, although it was flown to its end
         self._touches = 0  # that were taken back, before the stroke in progress
         self._retouches, self._back_to = 0, math.nan  # of the stroke in progress; u to which the tip goes back [m]
+        self._longest = 0.0  # length of the stroke in progress, each pass included [m]
         self._paused = self._follows_end = False
 
     def _enter(self, inputs: PainterInput, phase: str, reason: str) -> None:
@@ -216,8 +217,9 @@ class Painter(Navigation):
 
     def _paint(self, inputs: PainterInput, dt: float) -> PaintingCommand:
         goal = self._stroke_goal()
-        late = self._is_late(inputs, f"row {self.row}", goal)
-        if self._is_run(inputs, goal, self._touching_target(LEAST_OVERLAP), dt) and not late:
+        if self._is_late(inputs, f"row {self.row}", goal):
+            return self._stroke_command(inputs)
+        if self._is_run(inputs, goal, self._touching_target(LEAST_OVERLAP), dt):
             self._end_stroke(inputs)
         return self._stroke_command(inputs)
 
@@ -225,21 +227,30 @@ class Painter(Navigation):
         """Back along the stroke to where it may leave a gap, then again to its end; farther in both times."""
         back = not math.isnan(self._back_to)
         goal = self._back_to if back else self._stroke_goal()
-        late = self._is_late(inputs, f"the retouch of row {self.row}", goal)
-        if self._is_run(inputs, goal, self._touching_target(RETOUCH_OVERLAP), dt) and not late:
+        if self._is_late(inputs, f"the retouch of row {self.row}", goal):
+            return self._stroke_command(inputs)
+        first = self._cross.own_stroke(*self._beside(REACTION_M, 0.5 * self.config.brush_width_m))
+        target = self._touching_target(RETOUCH_OVERLAP)
+        if self._is_run(inputs, goal, target if math.isnan(first) else min(target, first), dt):
             if back:
-                self._back_to, self._speed, self._follows_end = math.nan, 0.0, False
-                self._stroke_end.begin()
+                self._back_to = math.nan
+                self._turn_round()
             else:
                 self._end_stroke(inputs)
         return self._stroke_command(inputs)
+
+    def _turn_round(self) -> None:
+        """The stroke in progress is painted again, one way or the other."""
+        self._speed, self._follows_end = 0.0, False
+        self._stroke_end.begin()
+        self._cross.begin_again()
 
     def _is_late(self, inputs: PainterInput, name: str, goal: float) -> bool:
         """Whether this phase takes longer than its way allows; the job has then failed."""
         allowed = self.config.timeout_s + self._way_s
         if inputs.time_s - self.entered <= allowed:
             return False
-        self._speed = 0.0
+        self._speed, self._follows_end, self._u_reference = 0.0, False, self._along.u
         self._fail(
             inputs, f"time-out in {name}: {abs(goal - self._along.u) * 1e3:.0f} mm are left after {allowed:.0f} s"
         )
@@ -315,7 +326,7 @@ class Painter(Navigation):
 
     def _begin_stroke(self, inputs: PainterInput, stroke: int, reason: str) -> None:
         self.row, self._speed, self._follows_end, self._touches = stroke, 0.0, False, 0
-        self._retouches = 0
+        self._retouches, self._longest = 0, 0.0
         self._cross.begin_stroke()
         self._along.begin_stroke()
         self._stroke_end.begin()
@@ -324,6 +335,7 @@ class Painter(Navigation):
         self._enter(inputs, "paint", f"row {self.row}: {reason}")
 
     def _end_stroke(self, inputs: PainterInput) -> None:
+        self._longest = max(self._longest, self._along.stroke_length)
         if self._begin_retouch(inputs):
             return
         self._uncertain = self._uncertain or self._doubt()
@@ -340,39 +352,41 @@ class Painter(Navigation):
         self._speed, self._u_reference = 0.0, self._along.u
         self._enter(inputs, "climb", ended)
 
-    def _overlap(self, sigmas: float) -> tuple[np.ndarray, np.ndarray]:
-        """Places along the stroke that has ended where it lies beside the last one, and its least overlap there [m]."""
+    def _overlap(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Overlap of the stroke that has ended with the last one, as of `CrossTrack.overlap`."""
         last = self._stroke_goal() - CORNER_M * self.pattern.travel(self.row)
-        u, overlap, known = self._cross.overlap(self._stroke_begin(), last)
-        return u, overlap - sigmas * known
+        return self._cross.overlap(self._stroke_begin(), last)
 
     def _begin_retouch(self, inputs: PainterInput) -> bool:
-        """Go back to where the stroke may leave a gap to the last one; False where it does not."""
-        u, overlap = self._overlap(RETOUCH_SIGMAS)
-        gaps = u[overlap < 0.0]
-        if not gaps.size or self._retouches >= MOST_RETOUCHES or self.config.overlap_m <= 0.0:
+        """Go back to where the stroke may leave a gap to the last one; False where it does not, or cannot be mended."""
+        u, overlap, known = self._overlap()
+        least = overlap - RETOUCH_SIGMAS * known
+        enough = RETOUCH_OVERLAP * self.config.overlap_m > RETOUCH_SIGMAS * known
+        gaps = u[(least < 0.0) & enough & (SIGMAS * known <= 2.0 * self._certain_m)]
+        if not gaps.size or self._retouches >= MOST_RETOUCHES:
             return False
         travel, begin = self.pattern.travel(self.row), self._stroke_begin()
         first = float(gaps.min() if travel > 0.0 else gaps.max())
         self._retouches += 1
         self._back_to = begin + travel * max(travel * (first - begin) - RETOUCH_BEFORE_M, 0.0)
-        self._speed, self._follows_end = 0.0, False
-        self._stroke_end.begin()
-        short, way = -float(overlap.min()), abs(self._along.u - self._back_to)
+        self._turn_round()
+        short, way = -float(least.min()), abs(self._along.u - self._back_to)
         self._enter(inputs, "retouch", f"row {self.row} may leave a gap of {short * 1e3:.1f} mm, back by {way:.2f} m")
         return True
 
     def _doubt(self) -> str:
         """Why the stroke that has ended is not claimed: its length or place as estimated, or too little known."""
-        length, asked, goal = self._along.stroke_length, self.config.stroke_m, self._stroke_goal()
+        length, asked, goal = self._longest, self.config.stroke_m, self._stroke_goal()
         if self._along_line.line is None and self._along.deviation > CERTAIN_LENGTH_M:
             known = self._along.deviation
             return f"row {self.row} ended by the odometer, its length is known to {known * 1e3:.0f} mm"
         if abs(length - asked) > LENGTH_TOLERANCE_M:
             return f"row {self.row} is {length * 1e3:.0f} mm long, {asked * 1e3:.0f} mm were asked"
-        overlap = self._overlap(1.0)[1].min(initial=math.inf)
-        if overlap < 0.0:
-            return f"row {self.row} may leave a gap of {-overlap * 1e3:.1f} mm to the row before"
+        _, overlap, known = self._overlap()
+        if SIGMAS * (worst := known.max(initial=0.0)) > 2.0 * self._certain_m:
+            return f"row {self.row} lost its edge, its overlap is known to {worst * 1e3:.1f} mm"
+        if (least := (overlap - known).min(initial=math.inf)) < 0.0:
+            return f"row {self.row} may leave a gap of {-least * 1e3:.1f} mm to the row before"
         place, known = self._cross.stroke_place(self._stroke_begin(), goal)
         aside = place - self._v_target
         if not abs(aside) + PLACE_SIGMAS * known <= PLACE_TOLERANCE_M:  # nor where it is not known
@@ -389,13 +403,18 @@ class Painter(Navigation):
             ahead: Way ahead of the tip [m].
             length: Length of the piece of the stroke before that is averaged [m].
         """
-        here = self._along.u + ahead * self._view_direction()
-        last = self._cross.last_stroke(here - 0.5 * length, here + 0.5 * length)
+        last = self._cross.last_stroke(*self._beside(ahead, length))
         return math.inf if math.isnan(last) else last + self.config.brush_width_m
+
+    def _beside(self, ahead: float, length: float) -> tuple[float, float]:
+        """First and last u of a piece of a stroke, its middle that far ahead of the tip [m]."""
+        here = self._along.u + ahead * self._view_direction()
+        return here - 0.5 * length, here + 0.5 * length
 
     def _touching_target(self, share: float) -> float:
         """V of the stroke here: its place, or this share of the overlap inside the last stroke where that is less."""
-        inside = share * self.config.overlap_m
+        nominal = self.config.brush_width_m - (self._v_target - self._place(self.row - 1))
+        inside = share * min(self.config.overlap_m, nominal)  # the last stroke of a filling job may overlap less
         return min(self._v_target, self._reach_of_last(REACTION_M, 0.5 * self.config.brush_width_m) - inside)
 
     def _lead_to_end(self, ended: bool, moved: float) -> None:

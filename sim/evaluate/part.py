@@ -19,7 +19,7 @@ from sim.world.board import BoardGeometry
 
 @dataclass(frozen=True, kw_only=True)
 class Part:
-    """A whole flight, or the ticks that painted one row with the climb that leads to it."""
+    """A whole flight, or the ticks that painted one row, once or again, with the climb that leads to it."""
 
     trace: Trace
     path: PathError
@@ -37,7 +37,7 @@ class Part:
         """The rows flown."""
         found = []
         for row in range(1, self.stroke_count + 1):
-            ticks = self.path.painting & (self.trace.row == row)
+            ticks = (self.path.painting | in_phase(self.trace, "retouch")) & (self.trace.row == row)
             if ticks.any():
                 found.append(Part(trace=self.trace, path=self.path, judgement=self.judgement, ticks=ticks, row=row))
         return found
@@ -46,7 +46,7 @@ class Part:
 
     @cached_property
     def painting(self) -> np.ndarray:
-        """Ticks that paint a row or a climb, (N,) bool."""
+        """Ticks that paint a row for the first time, or a climb, (N,) bool."""
         return self.ticks & self.path.painting
 
     @cached_property
@@ -144,8 +144,8 @@ class Part:
 
     @property
     def off_board_share(self) -> float:
-        """Fraction of the painting time with the tip beyond an edge of the board."""
-        spots = board_tip(self.trace)[self.painting]
+        """Fraction of the painting time, retouches included, with the tip beyond an edge of the board."""
+        spots = board_tip(self.trace)[self.painting | (self.ticks & in_phase(self.trace, "retouch"))]
         return float(np.mean(~on_board(self.trace.scene, spots))) if len(spots) else math.nan
 
     @property

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.evaluate.paint_plan import averaged
+from sim.evaluate.paint_plan import BIN_M, averaged
 from sim.evaluate.window import CONTACT_N, board_tip, in_phase, physics_ticks
 from sim.flight.trace import Trace
 from sim.world.board import BoardGeometry
@@ -61,13 +61,14 @@ def painted_strokes(trace: Trace) -> dict[int, Stroke]:
             before = None
             continue
         line = averaged(path)
-        inner, outer = _band(line, tip[again & (trace.row == number)])
+        second = tip[again & (trace.row == number)]
+        inner, outer = _band(line, second)
         straight = (np.abs(line[:, 0] - first) > CORNER_M) & (np.abs(line[:, 0] - last) > CORNER_M)
         error = line[straight if straight.any() else slice(None), 1] - place
         overlap = _overlap(inner, before, width, first > last) if before is not None else np.array([])
         strokes[number] = Stroke(
             number=number,
-            length_m=float(np.ptp(path[:, 0])),
+            length_m=float(np.ptp(np.concatenate((path[:, 0], second[:, 0])))),
             place_error_m=float(np.mean(error)),
             overlap_m=float(overlap.min()) if len(overlap) else math.nan,
             most_overlap_m=float(overlap.max()) if len(overlap) else math.nan,
@@ -79,11 +80,13 @@ def painted_strokes(trace: Trace) -> dict[int, Stroke]:
 
 def _band(line: np.ndarray, again: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Lines of the brush at the inner and the outer side of a stroke's band, of its line and the path painted again."""
-    if not len(again):
-        return line, line
-    (u, v), second = line.T, averaged(again)
-    other = np.interp(u, *second.T, left=math.nan, right=math.nan)
-    return np.column_stack((u, np.fmin(v, other))), np.column_stack((u, np.fmax(v, other)))
+    low = high = line[:, 1]
+    piece, second = (((u[:, 0] - line[0, 0] + 0.5 * BIN_M) // BIN_M).astype(int) for u in (line, again))
+    starts = np.flatnonzero(np.diff(second, prepend=second[:1] - 1)) if len(second) else []
+    for visit in np.split(np.arange(len(second)), starts)[1:]:  # each pass over a piece for itself
+        v, here = float(np.mean(again[visit, 1])), piece == second[visit[0]]
+        low, high = np.where(here, np.minimum(low, v), low), np.where(here, np.maximum(high, v), high)
+    return np.column_stack((line[:, 0], low)), np.column_stack((line[:, 0], high))
 
 
 def _overlap(line: np.ndarray, before: np.ndarray, width: float, backwards: bool) -> np.ndarray:

@@ -33,8 +33,8 @@ Progress = Callable[[float, str, float], None]
 MCAP = ".mcap"
 #: Control ticks between calls of the progress function.
 PROGRESS_TICKS = 125
-#: Time-out of a flight [s]: start and corners, plus the strokes at half speed.
-BASE_TIME, STROKE_FACTOR = 90.0, 6.0
+#: Time-out of a flight [s]: start and corners, plus the strokes, each painted again twice, both ways, and slowly.
+BASE_TIME, STROKE_FACTOR = 90.0, 8.0
 
 
 def make_pilot(scene: Scene, options: FlightOptions, config: PilotConfig, job: Job) -> Pilot:

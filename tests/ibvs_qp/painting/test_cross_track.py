@@ -370,19 +370,22 @@ def test_paint_laid_again_farther_in_adds_to_the_overlap_and_not_to_the_map() ->
         cross.predict(-0.01, 0.0, 0.1)
     before, map_before = cross.overlap(0.0, 0.6), cross.maps[-1].places()[1]
     cross.predict(0.0, -0.004, 0.1)
-    for k in range(30):
-        cross.lay_again(0.01 * k)
-        cross.predict(0.01, 0.0, 0.1)
+    for way in (range(30), reversed(range(30))):  # the way back lies where the first pass does: it takes nothing away
+        cross.begin_again()
+        for k in way:
+            cross.lay_again(0.01 * k)
+        cross.predict(0.0, 0.004, 0.1)
     u, overlap, _ = cross.overlap(0.0, 0.6)
     np.testing.assert_array_equal(cross.maps[-1].places()[1], map_before)
     again = u < 0.29
     assert np.all((overlap - before[1])[~again] == 0.0)
     gained = (overlap - before[1])[again]
     assert np.all((0.0 < gained) & (gained < 0.004)), "less the deviation of v"
+    assert cross.own_stroke(0.1, 0.2) == pytest.approx(MARGIN + PITCH, abs=1e-4)
     cross.end_stroke()
     cross.begin_stroke()
     cross.lay(0.3)
-    assert cross.overlap(0.2, 0.4)[1] == pytest.approx(2.0 * HALF + 0.004, abs=1e-6), "outward: the map's own line"
+    assert cross.overlap(0.2, 0.4)[1] == pytest.approx(2.0 * HALF - 0.004, abs=1e-6), "the first pass is the map"
 
 
 @pytest.mark.parametrize("middle", [-0.14, 0.14])
@@ -400,5 +403,18 @@ def test_on_its_own_paint_the_tip_goes_by_the_edge_on_either_side(middle: float)
     assert cross.v == pytest.approx(v, abs=1e-9) and list(cross.guides) == [102]
     cross.look([parallel(102, HALF + seems - 2e-3, 1, "paint", middle, 0.16)], 0.3, 1.0, again=True)
     assert cross.tip_error > 5e-4, "the edge seems nearer than the map says: the picture shows the tip farther out"
-    cross.look([fresh(track=103)], 0.3, 1.0, again=True)
-    assert 103 not in cross.guides, "the last stroke's edge lies under the paint"
+    inner = parallel(104, -HALF - 4e-3, -1, "paint", middle, 0.16)
+    cross.look([fresh(track=103), inner], 0.3, 1.0, again=True)
+    assert not cross.guides, "the last stroke's edge lies under the paint, and the inner one is that of the brush"
+
+
+@pytest.mark.parametrize(
+    ("near", "far", "share"), [(-0.2, 0.2, 0.5), (-0.2, -0.1, 1.0), (0.1, 0.2, 0.0), (-0.3, 0.1, 0.75)]
+)
+def test_beta_counts_by_the_part_of_the_own_edge_that_lies_ahead_on_the_way_out(near, far, share) -> None:
+    cross = _after_stroke_one()
+    cross.begin_stroke()
+    cross.look([], 0.3, -1.0)
+    assert cross._share_ahead(near, far) == pytest.approx(share)
+    cross.look([], 0.3, 1.0)
+    assert cross._share_ahead(near, far) == pytest.approx(1.0 - share)

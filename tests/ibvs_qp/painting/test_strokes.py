@@ -89,7 +89,7 @@ def test_the_far_edge_of_the_board_leads_where_it_is_all_that_is_seen() -> None:
     config = world.config
     assert len(world.ends) == 4
     assert world.ends[-1][2] == pytest.approx(config.edge_margin_m + 3.0 * config.pitch_m, abs=PLACE)
-    assert not world.painter.failed, world.painter.reason  # 0.6 m by the odometer are known within the overlap
+    assert "row 4 lost its edge" in world.painter.reason  # where that edge lies is known by the tip's place alone
 
 
 # -------------------------------------------------------------------------------------------------- edges of strokes
@@ -324,6 +324,19 @@ def test_a_gap_is_painted_again_and_the_job_is_claimed(pattern: str, stroke: int
     assert abs(np.delete(world.place_errors(), stroke - 1)).max() < PLACE
 
 
+def test_a_retouch_leaves_the_outer_edge_where_it_is() -> None:
+    """After the gap the first pass lies 6 mm inside its place; the second pass must not paint beyond it."""
+    swing = {True: 0.012, False: -0.006}
+    world = PaintedWall(short(rows=2, stroke_m=1.5), stuck_across=True)
+    world.wave = lambda row, u: swing[u > 0.9] if row == 2 and u < 1.2 else 0.0
+    world.fly(100.0, until="retouch")
+    first = world.paint[1].v.copy()
+    world.stuck_across = False
+    world.fly(60.0, until="retreat")
+    inside = (world.paint[1].u > 0.1) & (world.paint[1].u < 0.8)
+    assert "retouch" in world.phases() and np.abs(world.paint[1].v - first)[inside].max() < 1e-3
+
+
 def test_a_stroke_is_painted_again_twice_at_most_and_never_without_overlap() -> None:
     for overlap, retouches in ((0.008, painter.MOST_RETOUCHES), (0.0, 0)):
         world = PaintedWall(short(rows=2, stroke_m=1.0, overlap_m=overlap), stuck_across=True)
@@ -350,7 +363,19 @@ def test_a_stroke_that_lost_its_edge_for_long_is_painted_but_not_claimed() -> No
     world.hidden = {GUIDE, OUTER + 1, OUTER + 2, FAR}
     world.fly(200.0)
     assert len(world.ends) == 2 and world.painter.finished and world.painter.failed
-    assert re.fullmatch(r"row 2 may leave a gap of \d+\.\d mm to the row before", world.painter.reason)
+    assert re.fullmatch(r"row 2 lost its edge, its overlap is known to \d+\.\d mm", world.painter.reason)
+
+
+@pytest.mark.parametrize("drift", [1.0e-3, 1.5e-3])
+def test_a_gap_that_the_odometer_hides_is_not_claimed(drift: float) -> None:
+    """Nothing shows where stroke 2 is, and the odometer drifts by one to two of its standard deviations."""
+    world = PaintedWall(short(rows=2, stroke_m=0.8))
+    world.fly(60.0, until="paint", stroke=2)
+    world.hidden = {GUIDE, OUTER + 1, OUTER + 2, FAR}
+    world.drift = world.to_wall(0.0, -drift)
+    world.fly(200.0)
+    assert world.painter.finished and world.painter.failed, world.painter.reason
+    assert "retouch" not in world.phases(), "it would know its place no better"
 
 
 def test_a_touch_beside_the_beginning_is_taken_back_but_not_for_ever() -> None:

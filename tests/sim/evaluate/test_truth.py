@@ -120,11 +120,25 @@ def test_bands_touch_everywhere_but_in_the_last_two_centimetres(gap_m, last_m, m
     assert shortfall(moved(trace, (trace.row == 2) & inside, gap_m)) == missing
 
 
-def retouched(trace: Trace, row: int, reach_u: tuple[float, float], across_m: float) -> Trace:
-    """The trace with a part of a row painted again, that far outside its place, in the last second of the press."""
+def retouched(trace: Trace, row: int, reach_u: tuple[float, float], *across_m: float) -> Trace:
+    """The trace with a part of a row painted again, that far outside its place, in the last second of the press.
+
+    Two numbers are the way out and back.
+    """
     board, ticks = BoardGeometry(trace.scene), (trace.t > 5.0) & (trace.t < 6.0)
     count = int(ticks.sum())
-    path = np.column_stack((np.linspace(*reach_u, count), np.full(count, board.stroke_place(row) + across_m)))
+    parts = np.array_split(np.linspace(0.0, 1.0, count), len(across_m))
+    path = np.concatenate(
+        [
+            np.column_stack(
+                (
+                    np.linspace(*(reach_u if way == 0 else reach_u[::-1]), len(part)),
+                    np.full(len(part), board.stroke_place(row) + across),
+                )
+            )
+            for way, (part, across) in enumerate(zip(parts, across_m, strict=True))
+        ]
+    )
     trace.phases = (*trace.phases, "retouch")
     for name in ("phase", "row", "tip"):
         trace.arrays[name] = trace.arrays[name].copy()
@@ -146,6 +160,14 @@ def test_the_band_of_a_stroke_is_that_of_both_passes():
     assert shortfall(retouched(with_gap(2), 3, (begin + 0.15, begin + 0.3), -0.004)) == "row 2: gap of 1.0 mm to row 1"
     too_far = "row 2: overlaps row 1 by 25 mm, nominal 8.0 mm"
     assert shortfall(retouched(three_rows(), 2, (begin + 0.15, begin + 0.3), -0.017)) == too_far
+    both_ways = retouched(with_gap(2), 2, (begin + 0.15, begin + 0.3), 0.009, -0.0005)
+    assert shortfall(both_ways) is None, "one way back closes it, however the other one lies"
+    hole = retouched(with_gap(2), 2, (begin + 0.15, begin + 0.3), -0.004)
+    lifted = (hole.t > 5.0) & (hole.t < 6.0) & (np.abs(along(hole) - begin - 0.225) < 0.03)
+    hole.arrays["push_true"] = np.where(lifted, 0.0, hole.push_true)
+    assert shortfall(hole) == "row 2: gap of 1.0 mm to row 1", "it did not touch there"
+    long = retouched(three_rows(), 2, (begin - 0.012, begin + 0.3), 0.0)
+    assert shortfall(long) == "row 2: 0.612 m long, 0.600 m asked"
     # Row 3 overlaps the outer side of both passes of row 2: at most 24 mm.
     outside = retouched(three_rows(0.0, 0.0, -0.007), 2, (begin + 0.15, begin + 0.3), 0.01)
     assert shortfall(outside) == "row 3: overlaps row 2 by 25 mm, nominal 8.0 mm"
