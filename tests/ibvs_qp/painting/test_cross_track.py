@@ -404,7 +404,7 @@ def test_on_its_own_paint_the_tip_goes_by_the_edge_on_either_side(middle: float)
     cross.look([parallel(102, HALF + seems - 2e-3, 1, "paint", middle, 0.16)], 0.3, 1.0, again=True)
     assert cross.tip_error > 5e-4, "the edge seems nearer than the map says: the picture shows the tip farther out"
     inner = parallel(104, -HALF - 4e-3, -1, "paint", middle, 0.16)
-    cross.look([fresh(track=103), inner], 0.3, 1.0, again=True)
+    cross.look([fresh(track=103, middle=0.14), inner], 0.3, 1.0, again=True)
     assert not cross.guides, "the last stroke's edge lies under the paint, and the inner one is that of the brush"
 
 

@@ -10,6 +10,7 @@ import pytest
 from painted_wall import END, FAR, GUIDE, NEAR, OUTER, PaintedWall, Piece, short
 
 from ibvs_qp.painting import painter
+from ibvs_qp.painting.along_track import AlongTrack
 from ibvs_qp.painting.config import PaintingConfig
 
 PLACE = 3e-3
@@ -324,6 +325,30 @@ def test_a_gap_is_painted_again_and_the_job_is_claimed(pattern: str, stroke: int
     assert abs(np.delete(world.place_errors(), stroke - 1)).max() < PLACE
 
 
+def test_a_first_pass_that_was_too_long_is_not_forgiven(monkeypatch) -> None:
+    world = PaintedWall(short(rows=2, stroke_m=1.0), wave=lambda row, u: 0.012 if row == 2 and 0.4 < u < 0.6 else 0.0)
+    world.fly(60.0, until="paint", stroke=2)
+    world.stuck_across = True
+    monkeypatch.setattr(AlongTrack, "stroke_length", 1.012)
+    world.fly(60.0, until="retouch")
+    world.stuck_across = False
+    monkeypatch.setattr(AlongTrack, "stroke_length", 1.0)
+    world.fly(60.0)
+    assert world.painter.failed and world.painter.reason == "row 2 is 1012 mm long, 1000 mm were asked"
+
+
+def test_the_last_stroke_of_a_filling_job_overlaps_by_its_own_nominal_overlap() -> None:
+    """The board ends 5 mm farther out than the third stroke's nominal place asks for: its nominal overlap is 3 mm."""
+    margin, pitch, width = 0.05, 0.072, 0.08
+    world = PaintedWall(short(rows="fill"), height=2.0 * margin + 2.0 * pitch + 0.005)
+    world.fly(100.0, until="paint", stroke=3)
+    world.fly(2.0)
+    pilot = world.painter
+    assert pilot._v_target == pytest.approx(margin + 2.0 * pitch + 0.005, abs=1e-3)
+    reach = pilot._reach_of_last(painter.REACTION_M, 0.5 * width)
+    assert reach - pilot._touching_target(1.5) == pytest.approx(1.5 * 0.003, abs=1e-3)
+
+
 def test_a_retouch_leaves_the_outer_edge_where_it_is() -> None:
     """After the gap the first pass lies 6 mm inside its place; the second pass must not paint beyond it."""
     swing = {True: 0.012, False: -0.006}
@@ -351,8 +376,10 @@ def test_a_retouch_that_gets_nowhere_ends_the_job_with_what_is_left() -> None:
     world.wave = lambda stroke, u: -0.012 if stroke == 1 and 0.3 < u < 0.6 else 0.0
     world.fly(100.0, until="retouch")
     world.stuck = True
-    world.fly(200.0)
-    assert world.painter.failed
+    world.fly(200.0, until="retreat")
+    world.stuck, stopped = False, float(world.tip[0])
+    world.fly(20.0)
+    assert world.painter.failed and world.tip[0] == pytest.approx(stopped, abs=PLACE), "it leaves where it stands"
     assert re.fullmatch(r"time-out in the retouch of row 2: \d+ mm are left after \d+ s", world.painter.reason)
 
 
