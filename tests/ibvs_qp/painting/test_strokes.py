@@ -375,6 +375,7 @@ def test_a_retouch_that_gets_nowhere_ends_the_job_with_what_is_left() -> None:
     world = PaintedWall(short(rows=2, stroke_m=1.0), stuck_across=True)
     world.wave = lambda stroke, u: -0.012 if stroke == 1 and 0.3 < u < 0.6 else 0.0
     world.fly(100.0, until="retouch")
+    world.fly(2.0)
     world.stuck = True
     world.fly(200.0, until="retreat")
     world.stuck, stopped = False, float(world.tip[0])
