@@ -114,13 +114,16 @@ class CrossTrack:
     @property
     def deviation(self) -> float:
         """Standard deviation of v against the last stroke here, or against the board's edge before there is one [m]."""
-        p = self._p
         if self._painted:
-            shares = self._shares(self._u)
-            last = float(shares @ p[_LAST, _LAST] @ shares) - 2.0 * float(shares @ p[_LAST, _V])
-        else:
-            last = float(p[_TIP, _TIP] + 2.0 * p[_V, _TIP])
-        return math.sqrt(max(float(p[_V, _V]) + last, 0.0))
+            return self._deviation_from(_LAST)
+        p = self._p
+        return math.sqrt(max(float(p[_V, _V] + p[_TIP, _TIP] + 2.0 * p[_V, _TIP]), 0.0))
+
+    def _deviation_from(self, nodes: slice) -> float:
+        """Standard deviation of v against the map of a stroke here [m]."""
+        p, shares = self._p, self._shares(self._u)
+        stroke = float(shares @ p[nodes, nodes] @ shares) - 2.0 * float(shares @ p[nodes, _V])
+        return math.sqrt(max(float(p[_V, _V]) + stroke, 0.0))
 
     @property
     def _painted(self) -> list[StrokeMap]:
@@ -173,9 +176,9 @@ class CrossTrack:
 
         The map of the stroke stays: it is that of the outer edge, which paint farther in does not move.
         """
-        self._u, p, shares = u, self._p, self._shares(u)
-        variance = p[_V, _V] + float(shares @ p[_OWN, _OWN] @ shares) - 2.0 * float(shares @ p[_OWN, _V])
-        self._again[-1].add(u, self.v - float(shares @ self._x[_OWN]) + math.sqrt(max(float(variance), 0.0)))
+        self._u = u
+        error = float(self._shares(u) @ self._x[_OWN])
+        self._again[-1].add(u, self.v - error + self._deviation_from(_OWN))
 
     def last_stroke(self, first_u: float, last_u: float) -> float:
         """Mean v between two places of the stroke before the one that is laid [m]; NaN where it is not known."""
@@ -184,13 +187,11 @@ class CrossTrack:
             return math.nan
         return before[-1].mean(first_u, last_u) + float(self._shares(0.5 * (first_u + last_u)) @ self._x[_LAST])
 
-    def own_stroke(self, first_u: float, last_u: float) -> float:
-        """Mean v between two places of the stroke in progress as it was first laid [m]; NaN where it was not."""
-        shares = self._shares(0.5 * (first_u + last_u))
-        return self.maps[-1].mean(first_u, last_u) + float(shares @ self._x[_OWN])
-
     def stroke_place(self, first_u: float, last_u: float) -> tuple[float, float]:
-        """Mean v of the stroke that is laid between two places, and its standard deviation [m]."""
+        """Mean v of the stroke in progress between two places, as first laid, and its standard deviation [m].
+
+        NaN where it was not laid.
+        """
         shares = self._shares(np.linspace(first_u, last_u, NODES)).mean(axis=0)
         place = self.maps[-1].mean(first_u, last_u) + float(shares @ self._x[_OWN])
         return place, math.sqrt(max(float(shares @ self._p[_OWN, _OWN] @ shares), 0.0))
@@ -335,7 +336,7 @@ class CrossTrack:
         return self._correct(expected, EDGE_STD**2 * INDEPENDENT_S / LOOK_S, 0.5 * self._config.pitch_m)
 
     def _share_ahead(self, near: float, far: float) -> float:
-        """Share of a piece that lies ahead on the way on which the stroke was laid."""
+        """Fraction of a visible piece that lies ahead of the tip, in the direction in which the stroke was laid [-]."""
         ahead = far if self._forward > 0.0 else -near
         return min(max(ahead / (far - near), 0.0), 1.0)
 

@@ -44,8 +44,8 @@ PLACE_SIGMAS = 2.0
 REACTION_M = 0.05
 #: Target overlap where the stroke before falls short, as a share of the nominal overlap [-].
 LEAST_OVERLAP = 0.75
-#: A stroke is painted again, at most so often [-], where its overlap may be negative at so many standard deviations
-#: [-], from so far before that place [m], with this overlap as a share of the nominal one [-].
+#: Retouches of one stroke [-]; standard deviations by which its overlap must be positive [-]; length that is painted
+#: again before the gap [m]; target overlap of a retouch over the nominal overlap [-].
 MOST_RETOUCHES, RETOUCH_SIGMAS, RETOUCH_BEFORE_M, RETOUCH_OVERLAP = 2, 2.0, 0.1, 1.25
 
 
@@ -217,9 +217,9 @@ class Painter(Navigation):
 
     def _paint(self, inputs: PainterInput, dt: float) -> PaintingCommand:
         goal = self._stroke_goal()
-        if self._is_late(inputs, f"row {self.row}", goal):
+        if self._fails_by_time(inputs, f"row {self.row}", goal):
             return self._stroke_command(inputs)
-        if self._is_run(inputs, goal, self._touching_target(LEAST_OVERLAP), dt):
+        if self._run_towards(inputs, goal, self._touching_target(LEAST_OVERLAP), dt):
             self._end_stroke(inputs)
         return self._stroke_command(inputs)
 
@@ -227,11 +227,11 @@ class Painter(Navigation):
         """Back along the stroke to where it may leave a gap, then again to its end; farther in both times."""
         back = not math.isnan(self._back_to)
         goal = self._back_to if back else self._stroke_goal()
-        if self._is_late(inputs, f"the retouch of row {self.row}", goal):
+        if self._fails_by_time(inputs, f"the retouch of row {self.row}", goal):
             return self._stroke_command(inputs)
-        first = self._cross.own_stroke(*self._beside(REACTION_M, 0.5 * self.config.brush_width_m))
+        first, _ = self._cross.stroke_place(*self._beside(REACTION_M, 0.5 * self.config.brush_width_m))
         target = self._touching_target(RETOUCH_OVERLAP)
-        if self._is_run(inputs, goal, target if math.isnan(first) else min(target, first), dt):
+        if self._run_towards(inputs, goal, target if math.isnan(first) else min(target, first), dt):
             if back:
                 self._back_to = math.nan
                 self._turn_round()
@@ -245,7 +245,7 @@ class Painter(Navigation):
         self._stroke_end.begin()
         self._cross.begin_again()
 
-    def _is_late(self, inputs: PainterInput, name: str, goal: float) -> bool:
+    def _fails_by_time(self, inputs: PainterInput, name: str, goal: float) -> bool:
         """Whether this phase takes longer than its way allows; the job has then failed."""
         allowed = self.config.timeout_s + self._way_s
         if inputs.time_s - self.entered <= allowed:
@@ -256,7 +256,7 @@ class Painter(Navigation):
         )
         return True
 
-    def _is_run(self, inputs: PainterInput, goal: float, v: float, dt: float) -> bool:
+    def _run_towards(self, inputs: PainterInput, goal: float, v: float, dt: float) -> bool:
         """Run on towards a place along the stroke, at a place across it; whether the tip is there."""
         config, travel = self.config, self._view_direction()
         remaining = travel * (goal - self._along.u)
@@ -412,7 +412,7 @@ class Painter(Navigation):
         return here - 0.5 * length, here + 0.5 * length
 
     def _touching_target(self, share: float) -> float:
-        """V of the stroke here: its place, or this share of the overlap inside the last stroke where that is less."""
+        """Target v [m]: the stroke's place, or less where its overlap would be below this share of the nominal one."""
         nominal = self.config.brush_width_m - (self._v_target - self._place(self.row - 1))
         inside = share * min(self.config.overlap_m, nominal)  # the last stroke of a filling job may overlap less
         return min(self._v_target, self._reach_of_last(REACTION_M, 0.5 * self.config.brush_width_m) - inside)

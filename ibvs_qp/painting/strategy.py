@@ -16,7 +16,7 @@ from ibvs_qp.validation.failure import raised, type_name
 from ibvs_qp.validation.fields import PAINTING_COMMAND
 from ibvs_qp.validation.numbers import number, vector
 
-#: Names of the phases, in the order of a flight but for the last, which is new: the journals of flights hold numbers.
+#: Names of the phases in the order of a flight; ``retouch`` stands last because journals of flights store indices.
 #: Paint lies where the phase is ``paint``, ``climb`` or ``retouch``.
 PHASES = ("start", "survey", "approach", "align", "press", "paint", "climb", "search", "retreat", "done", "retouch")
 #: A vehicle has left the wall this far before the retreat distance [m].

@@ -381,7 +381,7 @@ def test_paint_laid_again_farther_in_adds_to_the_overlap_and_not_to_the_map() ->
     assert np.all((overlap - before[1])[~again] == 0.0)
     gained = (overlap - before[1])[again]
     assert np.all((0.0 < gained) & (gained < 0.004)), "less the deviation of v"
-    assert cross.own_stroke(0.1, 0.2) == pytest.approx(MARGIN + PITCH, abs=1e-4)
+    assert cross.stroke_place(0.1, 0.2)[0] == pytest.approx(MARGIN + PITCH, abs=1e-4)
     cross.end_stroke()
     cross.begin_stroke()
     cross.lay(0.3)
