@@ -145,14 +145,19 @@ class Navigation(PhaseMachine):
     # ------------------------------------------------------------------- lines
 
     def expected_edge(self) -> ExpectedEdge | None:
-        """The last stroke's outer edge where it should come into view; perception looks there."""
-        if self.row < 2 or self.phase not in ("climb", "paint", "search"):
+        """The painted edge to look for: the last stroke's outer one, ahead; behind the brush, stroke 1's own outer one.
+
+        A paint whose colour nobody named is found where it is expected only, and no other edge than the brush's own
+        shows where the tip is in the picture.
+        """
+        first = self.row == 1 and self.phase == "paint"
+        if not first and (self.row < 2 or self.phase not in ("climb", "paint", "search")):
             return None
         pattern, cross = self.pattern, self._cross
         ahead, across = pattern.along, pattern.across
-        travel = pattern.travel(self.row)
-        last = self._place(self.row - 1) + 0.5 * self.config.brush_width_m
-        place = last - cross.v - cross.tip_error
+        travel = -pattern.travel(1) if first else pattern.travel(self.row)
+        outer = 0.5 * self.config.brush_width_m + (0.0 if first else self._place(self.row - 1) - cross.v)
+        place = outer - cross.tip_error
         sign = across[1] if pattern.guide_role == HORIZONTAL else across[0]
         direction = ahead[0] if pattern.guide_role == HORIZONTAL else ahead[1]
         return ExpectedEdge(role=pattern.guide_role, offset=place * sign, side=int(sign), ahead=int(travel * direction))

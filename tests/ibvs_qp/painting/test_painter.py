@@ -215,18 +215,19 @@ def test_reset_starts_over_to_the_bit() -> None:
 
 
 @pytest.mark.parametrize(("kind", "start"), [("rows", "bottom-right"), ("rows", "top-left"), ("columns", "top-right")])
-def test_the_expected_edge_is_the_last_stroke_s_outer_one(kind: str, start: str) -> None:
+def test_the_expected_edge_is_the_outer_one_of_the_last_stroke_or_of_stroke_one_itself(kind: str, start: str) -> None:
     """Offset, bare side and direction along the strokes of that edge beside the brush."""
     world = PaintedWall(short(rows=3, stroke_m=0.4, pattern=kind, start=start))
     assert world.painter.expected_edge() is None
-    world.fly(120.0, until="paint", stroke=2)
-    world.fly(1.0)
-    expected, seen = world.painter.expected_edge(), world.lines()[101]
-    assert expected is not None
-    assert expected.role == seen.role and expected.side == seen.surface_side
-    assert expected.offset == pytest.approx(seen.offset, abs=1e-3)
-    towards = world.pattern.to_wall(-1.0, 0.0)  # stroke 2 returns
-    assert expected.ahead == (towards[0] if kind == "rows" else towards[1])
+    for stroke in (1, 2):  # both towards -u: own edge of stroke 1 lies behind the brush, and stroke 2 returns
+        world.fly(120.0, until="paint", stroke=stroke)
+        world.fly(2.5)
+        expected, seen = world.painter.expected_edge(), world.lines()[101]
+        assert expected is not None
+        assert expected.role == seen.role and expected.side == seen.surface_side
+        assert expected.offset == pytest.approx(seen.offset, abs=1e-3)
+        right, down = world.pattern.to_wall(-1.0, 0.0)
+        assert expected.ahead == (right if kind == "rows" else down)
 
 
 def test_the_guide_of_stroke_one_is_the_edge_at_which_the_pattern_starts() -> None:
