@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
@@ -39,12 +41,13 @@ def _draw_space(figure, traces: dict[str, Trace]) -> None:
         colour, name = law_colour(law), law_name(law)
         axes.plot(tip[:, 1], tip[:, 0], -tip[:, 2], color=colour, linewidth=0.9, label=name, zorder=6)
         axes.scatter(*tip[0, [1]], tip[0, 0], -tip[0, 2], color=colour, s=12, depthshade=False)
-    depth = max(float(np.max(-trace.tip[:, 0])) for trace in traces.values())
-    axes.set_box_aspect((width, max(depth, 0.3), height), zoom=1.3)
+    depth = max(0.3, *(float(np.max(-trace.tip[:, 0])) for trace in traces.values()))
+    zoom = min(1.3, 0.6 * math.hypot(width, depth, height) / height)  # a tall board fits above the errors
+    axes.set_box_aspect((width, depth, height), zoom=zoom)
     axes.set_xlabel("right [m]", labelpad=6)
     axes.set_ylabel("into the wall [m]", labelpad=2)
     axes.set_zlabel("up [m]", labelpad=2)
-    axes.set_yticks(np.round(np.linspace(-max(depth, 0.3), 0.0, 3), 1))
+    axes.set_yticks(np.round(np.linspace(-depth, 0.0, 3), 1))
     axes.view_init(elev=20, azim=-62)
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
