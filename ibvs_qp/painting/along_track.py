@@ -42,7 +42,7 @@ class AlongTrack:
         self._x, self._p = np.zeros(2), np.diag((UNKNOWN_STD**2, UNKNOWN_STD**2))
         self.known = self.end_seen = False
         self._near_known = False
-        self._way = self._began = self._began_variance = 0.0
+        self._way = self._way_variance = self._began = self._began_variance = 0.0
         self.end = self.near = -1
 
     @property
@@ -65,17 +65,25 @@ class AlongTrack:
         self._x[0] += du
         self._way += du
         self._p[0, 0] += DRIFT_PER_M * abs(du)
+        self._way_variance += DRIFT_PER_M * abs(du)
 
     def begin_stroke(self) -> None:
         """A stroke begins here."""
-        self._way, self._began, self._began_variance = 0.0, self.u, float(self._p[0, 0])
+        self._way, self._way_variance = 0.0, 0.0
+        self._began, self._began_variance = self.u, float(self._p[0, 0])
 
     @property
     def stroke_length(self) -> float:
         """Length of the stroke so far [m]; corrections on the way belong to its beginning and to the odometer."""
         corrected = self.u - self._began - self._way
-        share = self._began_variance / (self._began_variance + DRIFT_PER_M * abs(self._way) + EDGE_STD**2)
+        share = self._began_variance / (self._began_variance + self._way_variance + EDGE_STD**2)
         return abs(self.u - self._began - share * corrected)
+
+    @property
+    def length_deviation(self) -> float:
+        """Standard deviation of that length [m]."""
+        ends = self._began_variance + float(self._p[0, 0])
+        return math.sqrt(ends * self._way_variance / (ends + self._way_variance)) if ends > 0.0 else 0.0
 
     def find_end(self, lines: Sequence[PatternLine]) -> bool:
         """Take u from the edge to which stroke 1 runs, wherever it is; False where it is not in view."""
@@ -109,32 +117,32 @@ class AlongTrack:
         """Correct with the edges in view, once per look; returns what was noticed, or an empty text."""
         noticed = ""
         ends = [line for line in _ends(lines) if line.weight > (LOST_WEIGHT if self.end_seen else CERTAIN_WEIGHT)]
-        end = _nearest(ends, self._config.stroke_m + self._config.edge_margin_m - self.u, self._end_gate)
+        end = self._edge(ends, self._config.stroke_m + self._config.edge_margin_m - self.u, self._end_gate)
         self.end = -1 if end is None else end.track.track_id
         if end is not None:
             noticed = self._correct(end, self._config.stroke_m + self._config.edge_margin_m - self.u, _END)
             self.end_seen = True
         beside = [line for line in lines if not line.parallel and line.kind != "paint" and line.side >= 0]
         beside = [line for line in beside if line.weight > (LOST_WEIGHT if self._near_known else MARK_WEIGHT)]
-        near = self._near_edge(beside)
+        near, erred = self._near_edge(beside)
         self.near = -1 if near is None else near.track.track_id
-        return noticed
+        return noticed or erred
 
     @property
     def _end_gate(self) -> float:
         """Largest distance of that edge from its expected place [m]: the length of stroke 1 is nominal."""
         return self._config.gates.stop_m if self.end_seen else self._config.gates.first_stop_m
 
-    def _near_edge(self, lines: list[PatternLine]) -> PatternLine | None:
-        margin, gates = self._config.edge_margin_m, self._config.gates
+    def _near_edge(self, lines: list[PatternLine]) -> tuple[PatternLine | None, str]:
+        """Correct with the edge beside the beginning; returns it and what was noticed."""
+        margin = self._config.edge_margin_m
         if self._near_known:
-            near = _nearest(lines, float(self._x[1]) - self.u, gates.stop_m)
-            if near is not None:
-                self._correct(near, float(self._x[1]) - self.u, _NEAR)
-            return near
+            expected = float(self._x[1]) - self.u
+            near = self._edge(lines, expected, self._config.gates.stop_m)
+            return near, "" if near is None else self._correct(near, expected, _NEAR)
         found = [line for line in lines if line.kind == "board" and line.weight > CERTAIN_WEIGHT and line.place < 0.0]
         if not found:
-            return None
+            return None, ""
         near = max(found, key=lambda line: line.place)
         self._x[1] = self.u + near.place
         self._p[0, 1] = self._p[1, 0] = self._p[0, 0]
@@ -143,7 +151,18 @@ class AlongTrack:
         likely = abs(float(self._x[1]) + margin) < SIGMAS * math.sqrt(float(self._p[1, 1]))
         if self._config.begins_at_margin and likely:
             self._update(-margin - float(self._x[1]), np.array((0.0, 1.0)), MARGIN_STD**2)
-        return near
+        return near, ""
+
+    def _edge(self, lines: list[PatternLine], expected: float, gate: float) -> PatternLine | None:
+        """Edge beside its expected place; else a certain edge of the board farther off, for it is the odometer that errs.
+
+        No stroke runs over an edge in view: a fault of the velocity for seconds moves u by more than the margin.
+        """
+        near = _nearest(lines, expected, gate)
+        if near is not None:
+            return near
+        board = [line for line in lines if line.kind == "board" and line.weight > CERTAIN_WEIGHT]
+        return _nearest(board, expected, self._config.gates.first_stop_m)
 
     def _correct(self, line: PatternLine, expected: float, row: np.ndarray) -> str:
         difference = line.place - expected
@@ -153,13 +172,16 @@ class AlongTrack:
         if abs(difference) > SIGMAS * math.sqrt(variance):
             if line.weight <= CERTAIN_WEIGHT:
                 return ""  # it leaves the picture or has just come, and its fit may be wrong
-            # Both edges are seen, so the board is longer or shorter than the job says: the origin of u moves.
-            noticed = f"the board's edge lies {difference * 1e3:+.0f} mm from where the job expects it"
-            if row is _END:
-                self._p += self._config.gates.first_stop_m**2
-                self._began_variance += self._config.gates.first_stop_m**2
+            unknown = self._config.gates.first_stop_m**2
+            if row is _END and not self.end_seen:
+                # Both edges are seen, so the board is longer or shorter than the job says: the origin of u moves.
+                self._p += unknown
+                self._began_variance += unknown
+                noticed = f"the board's edge lies {difference * 1e3:+.0f} mm from where the job expects it"
             else:
-                self._p[1, 1] += self._config.gates.first_stop_m**2
+                self._p[0, 0] += unknown
+                self._way_variance += unknown
+                noticed = f"the odometer has erred by {-difference * 1e3:+.0f} mm"
         self._update(difference, row, seen / max(line.weight, LOST_WEIGHT))
         return noticed
 

@@ -75,6 +75,8 @@ class CrossTrack:
         guides: Tracks that were recognised at the last look with their v [m], best first.
         maps: Where the strokes were laid, oldest first.
         far_edge: v of the board's other edge where it has been in view [m], NaN before.
+        longest_unled: Longest way of the stroke in progress on which neither the last stroke's edge nor the board's was
+            recognised [m].
     """
 
     def __init__(self, config: PaintingConfig) -> None:
@@ -90,6 +92,7 @@ class CrossTrack:
         self._again: list[StrokeMap] = []  # where the stroke in progress was painted again, each way for itself
         self._open = np.zeros(NODES, bool)  # nodes of the stroke that is laid which the tip has not passed
         self._u, self._forward = 0.0, 1.0  # of the tip [m]; direction in which the stroke in progress is laid
+        self._unled = self.longest_unled = 0.0
 
     @property
     def v(self) -> float:
@@ -158,12 +161,15 @@ class CrossTrack:
         """The tip begins to paint a stroke; what it paints is remembered."""
         self.maps.append(StrokeMap(self._config.stroke_m))
         self._again = []
+        self._unled = self.longest_unled = 0.0
         self._laying = True
         self._open[:] = True
         self._take_error()
 
     def lay(self, u: float) -> None:
         """The brush presses here."""
+        self._unled += abs(u - self._u)
+        self.longest_unled = max(self.longest_unled, self._unled)
         self._u = u
         self.maps[-1].add(u, self.v)
 
@@ -251,6 +257,7 @@ class CrossTrack:
         if (line := self._board_edge(parallel)) is not None:
             guides.append(line)
             self._follow_turn(line, LOOK_S / TURN_TIME_S)
+        self._unled = 0.0 if guides else self._unled
         own = self._own_edges(parallel, u, 0.0 if again else ahead) if self._laying else []
         if (line := self._opposite_edge(parallel)) is not None:
             guides.append(line)

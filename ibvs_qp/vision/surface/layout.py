@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 
 from ibvs_qp.config.vehicle import VehicleParams
@@ -18,7 +19,7 @@ class PictureLayout:
 
     Attributes:
         mask: Vehicle's mask, uint8 (H, W).
-        excluded: Where no flow points may lie, at half resolution, uint8.
+        excluded: Where no flow points may lie, at half resolution, uint8: half a window around the vehicle, too.
         grid: Coarse grid.
         beside_brush: Flat places of the grid's samples around the brush, where fresh paint lies.
         follower: Follows the surface on a still coarser one.
@@ -39,7 +40,9 @@ class PictureLayout:
         if vehicle is not None:
             self.mask = vehicle_mask(vehicle, config.brush_width_m, config.mask, frame.intrinsics, shape)
             zone = brush_zone(vehicle, config.brush_width_m, config.mask, frame.intrinsics, shape)
-        self.excluded = np.ascontiguousarray((self.mask | zone)[: shape[0] // 2 * 2 : 2, : shape[1] // 2 * 2 : 2])
+        hidden = np.ascontiguousarray((self.mask | zone)[: shape[0] // 2 * 2 : 2, : shape[1] // 2 * 2 : 2])
+        # The arm stands still in the picture: no window of a followed point may show its edge.
+        self.excluded = cv2.dilate(hidden, np.ones((config.flow.window_px, config.flow.window_px), np.uint8))
         self.grid = CoarseGrid(shape, frame.intrinsics, self.mask, config.plane.grid_columns)
         self.beside_brush = np.flatnonzero(self.grid.free & (self.grid.sample(zone) > 0))
         self.follower = PlaneFollower(config.plane, shape, frame.intrinsics, self.mask)

@@ -99,8 +99,30 @@ def test_an_end_that_was_recognised_has_a_narrow_gate_and_may_be_dim() -> None:
     along.look([upright(3, END_U - 0.9, -1)])
     along.look([upright(3, END_U - 0.9, -1, weight=0.1)])
     assert along.end == 3
-    along.look([upright(3, END_U - 0.9 + 0.1, -1)])
+    along.look([upright(3, END_U - 0.9 + 0.1, -1, kind="")])
+    along.look([upright(3, END_U - 0.9 + 0.1, -1, weight=0.5)])
+    along.look([upright(3, END_U - 0.9 + 0.3, -1)])
     assert along.end == -1 and along.u == pytest.approx(0.9, abs=1e-3)
+
+
+@pytest.mark.parametrize("error", [-0.08, 0.08])
+@pytest.mark.parametrize("back", [False, True])
+def test_a_certain_edge_of_the_board_shows_that_the_odometer_has_erred(error: float, back: bool) -> None:
+    """Farther from its expected place than its gate: a fault of the velocity for seconds moves u, not the board."""
+    along = at_the_margin()
+    along.begin_stroke()
+    along.predict(0.9)
+    along.look([upright(3, END_U - 0.9, -1)])
+    if back:
+        along.begin_stroke()
+    along.predict(-0.9 if back else 0.0)
+    true = (0.0 if back else 0.9) + error
+    noticed = [along.look([upright(2, -MARGIN - true, 1) if back else upright(3, END_U - true, -1)]) for _ in range(9)]
+    assert noticed[0] == f"the odometer has erred by {error * 1e3:+.0f} mm" and not any(noticed[1:])
+    assert along.u == pytest.approx(true, abs=1e-3) and along.stroke_length == pytest.approx(
+        0.9 + (-error if back else error), abs=5e-3
+    )
+    assert along._x[1] == pytest.approx(-MARGIN, abs=1e-3) and (along.near == 2) == back
 
 
 @pytest.mark.parametrize(("weight", "error"), [(0.5, 0.02), (1.0, 0.01)])

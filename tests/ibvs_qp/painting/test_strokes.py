@@ -334,7 +334,7 @@ def test_a_first_pass_that_was_too_long_is_not_forgiven(monkeypatch) -> None:
     world.stuck_across = False
     monkeypatch.setattr(AlongTrack, "stroke_length", 1.0)
     world.fly(60.0)
-    assert world.painter.failed and world.painter.reason == "row 2 is 1012 mm long, 1000 mm were asked"
+    assert world.painter.failed and world.painter.reason == "row 2 is 1012 mm long, known to 1.4 mm, 1000 mm were asked"
 
 
 def test_the_last_stroke_of_a_filling_job_overlaps_by_its_own_nominal_overlap() -> None:
@@ -392,6 +392,20 @@ def test_a_stroke_that_lost_its_edge_for_long_is_painted_but_not_claimed() -> No
     world.fly(200.0)
     assert len(world.ends) == 2 and world.painter.finished and world.painter.failed
     assert re.fullmatch(r"row 2 lost its edge, its overlap is known to \d+\.\d mm", world.painter.reason)
+
+
+@pytest.mark.parametrize(("hidden_s", "claimed"), [(2.5, True), (5.5, False)])
+def test_a_stroke_without_an_edge_for_half_a_metre_is_not_claimed(hidden_s: float, claimed: bool) -> None:
+    """It has its edge before and after: the odometer alone has led it in between, and no model knows its direction."""
+    world = PaintedWall(short(rows=2, stroke_m=1.2))
+    world.fly(60.0, until="paint", stroke=2)
+    world.fly(3.0)
+    world.hidden = {GUIDE, OUTER + 1, FAR}
+    world.fly(hidden_s)
+    world.hidden = set()
+    world.fly(200.0)
+    assert world.painter.finished and world.painter.failed != claimed, world.painter.reason
+    assert claimed or re.fullmatch(r"row 2 had no edge to follow for 0\.\d+ m", world.painter.reason)
 
 
 @pytest.mark.parametrize("drift", [1.0e-3, 1.5e-3])

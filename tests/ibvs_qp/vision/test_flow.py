@@ -6,8 +6,10 @@ import cv2
 import numpy as np
 import pytest
 
+from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import R_BODY_CAMERA
-from ibvs_qp.vision.config import FlowConfig
+from ibvs_qp.measurement import RgbdFrame
+from ibvs_qp.vision.config import FlowConfig, MaskConfig, VisionConfig
 from ibvs_qp.vision.flow.solve_velocity import (
     FlowSurface,
     FlowVelocity,
@@ -17,6 +19,8 @@ from ibvs_qp.vision.flow.solve_velocity import (
     solve_velocity,
 )
 from ibvs_qp.vision.flow.sparse_flow import SparseFlow
+from ibvs_qp.vision.picture.mask import vehicle_mask
+from ibvs_qp.vision.surface.layout import PictureLayout
 
 FOCAL, INTERVAL, CONFIG = 150.0, 0.033, FlowConfig()
 INTRINSICS = (FOCAL, FOCAL, 79.5, 59.5)
@@ -121,3 +125,30 @@ def test_weak_texture_is_followed_beside_a_strong_corner(texture: float, screw: 
         return
     assert len(velocities) == 19
     np.testing.assert_allclose(np.mean(velocities, axis=0)[:2], (speed, 0.0), atol=0.005)
+
+
+def test_the_edge_of_the_arm_is_not_taken_for_a_wall_that_stands_still() -> None:
+    """A faint board that moves by 8 px a picture behind a black arm, which stands still in every one."""
+    shape, focal, distance, step = (480, 640), 600.0, 0.45, 8
+    vehicle, config = VehicleParams(), VisionConfig()
+    intrinsics = (focal, focal, 319.5, 239.5)
+    rng = np.random.default_rng(2)
+    wall = cv2.GaussianBlur(rng.normal(170.0, 18.0, (480, 1200)), (0, 0), 3.0)
+    wall[60:] = cv2.GaussianBlur(rng.normal(90.0, 1.0, (420, 1200)), (0, 0), 3.0)  # paint, up to a level edge
+    arm = vehicle_mask(vehicle, config.brush_width_m, MaskConfig(margin_px=0.0), intrinsics, shape) > 0
+    depth = np.full(shape, distance, np.float32)
+    flow, velocities = SparseFlow(config.flow), []
+    for picture in range(12):
+        grey = wall[:, picture * step : picture * step + shape[1]] + rng.normal(0.0, 2.0, shape)
+        grey[arm] = 20.0
+        rgb = np.repeat(grey.clip(0, 255).astype(np.uint8)[:, :, None], 3, axis=2)
+        frame = RgbdFrame(rgb=rgb, depth=depth, intrinsics=intrinsics, stamp_ns=picture * 33_000_000)
+        excluded = PictureLayout(frame, config, vehicle).excluded
+        camera = np.array(vehicle.camera_position_m)
+        found = flow.update(
+            rgb, depth, excluded, intrinsics, frame.stamp_ns, np.zeros(3), np.eye(3), None, camera
+        )  # fmt: skip
+        if picture:
+            assert isinstance(found, FlowVelocity)
+            velocities.append((R_BODY_CAMERA.T @ found.velocity)[0])
+    np.testing.assert_allclose(velocities, step * distance / focal / 0.033, atol=0.005)
