@@ -154,9 +154,10 @@ class AlongTrack:
         return near, ""
 
     def _edge(self, lines: list[PatternLine], expected: float, gate: float) -> PatternLine | None:
-        """Edge beside its expected place; else a certain edge of the board farther off, for it is the odometer that errs.
+        """Edge beside its expected place; else a certain edge of the board farther off.
 
-        No stroke runs over an edge in view: a fault of the velocity for seconds moves u by more than the margin.
+        It is the odometer that errs, and no stroke runs over an edge in view: a fault of the velocity for seconds moves u
+        by more than the margin.
         """
         near = _nearest(lines, expected, gate)
         if near is not None:
