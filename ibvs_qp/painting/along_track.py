@@ -156,8 +156,8 @@ class AlongTrack:
     def _edge(self, lines: list[PatternLine], expected: float, gate: float) -> PatternLine | None:
         """Edge beside its expected place; else a certain edge of the board farther off.
 
-        It is the odometer that errs, and no stroke runs over an edge in view: a fault of the velocity for seconds moves u
-        by more than the margin.
+        It is the odometer that errs, and no stroke runs over an edge in view: a fault of the velocity for seconds moves
+        u by more than the margin.
         """
         near = _nearest(lines, expected, gate)
         if near is not None:

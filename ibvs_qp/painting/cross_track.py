@@ -46,6 +46,9 @@ AHEAD_STD = 6e-4
 #: Odometer: variance of v per metre of way and per second at one place [m^2/m], [m^2/s], as flown in the datasheet
 #: world over 1 to 15 s; standard deviation of its drift [m/s], and variance of the drift per second [m^2/s^3].
 ODOMETER_PER_M, ODOMETER_AT_REST = 8e-6, 2e-7
+#: The same per metre of a stroke without an edge, where nothing shows how the wander of the attitude turns its axes:
+#: 1.7e-5 in the datasheet world and 3e-5 in the harsh one, flown over 0.5 m; way after which it holds [m].
+UNLED_PER_M, UNLED_AFTER_M = 2.5e-5, 0.02
 DRIFT_STD, DRIFT_WANDER = 1e-3, 1e-9
 #: Standard deviation of the strokes' direction where the board's edge shows it, by the roll of the camera's mount
 #: [rad]; its variance per second [rad^2/s].
@@ -75,8 +78,8 @@ class CrossTrack:
         guides: Tracks that were recognised at the last look with their v [m], best first.
         maps: Where the strokes were laid, oldest first.
         far_edge: v of the board's other edge where it has been in view [m], NaN before.
-        longest_unled: Longest way of the stroke in progress on which neither the last stroke's edge nor the board's was
-            recognised [m].
+        unled: Way of the stroke in progress since the last stroke's edge or the board's was recognised [m].
+        longest_unled: The longest such way of the stroke [m].
     """
 
     def __init__(self, config: PaintingConfig) -> None:
@@ -92,7 +95,7 @@ class CrossTrack:
         self._again: list[StrokeMap] = []  # where the stroke in progress was painted again, each way for itself
         self._open = np.zeros(NODES, bool)  # nodes of the stroke that is laid which the tip has not passed
         self._u, self._forward = 0.0, 1.0  # of the tip [m]; direction in which the stroke in progress is laid
-        self._unled = self.longest_unled = 0.0
+        self.unled = self.longest_unled = 0.0
 
     @property
     def v(self) -> float:
@@ -152,7 +155,8 @@ class CrossTrack:
         p[_V] -= dt * p[_DRIFT] + du * p[_TURN]
         p[:, _V] = p[_V]
         p[_V, _V] -= dt * p[_V, _DRIFT] + du * p[_V, _TURN]
-        p[_V, _V] += ODOMETER_PER_M * math.hypot(du, dv) + ODOMETER_AT_REST * dt
+        per_m = UNLED_PER_M if self.unled > UNLED_AFTER_M else ODOMETER_PER_M
+        p[_V, _V] += per_m * math.hypot(du, dv) + ODOMETER_AT_REST * dt
         p[_DRIFT, _DRIFT] += DRIFT_WANDER * dt
         p[_TURN, _TURN] += TURN_WANDER * dt
         p[_TIP, _TIP] += TIP_WANDER * dt
@@ -161,15 +165,15 @@ class CrossTrack:
         """The tip begins to paint a stroke; what it paints is remembered."""
         self.maps.append(StrokeMap(self._config.stroke_m))
         self._again = []
-        self._unled = self.longest_unled = 0.0
+        self.unled = self.longest_unled = 0.0
         self._laying = True
         self._open[:] = True
         self._take_error()
 
     def lay(self, u: float) -> None:
         """The brush presses here."""
-        self._unled += abs(u - self._u)
-        self.longest_unled = max(self.longest_unled, self._unled)
+        self.unled += abs(u - self._u)
+        self.longest_unled = max(self.longest_unled, self.unled)
         self._u = u
         self.maps[-1].add(u, self.v)
 
@@ -225,7 +229,7 @@ class CrossTrack:
 
     def end_stroke(self) -> None:
         """The stroke ends: the error of its map becomes that of the last stroke, and beta begins anew."""
-        self._laying = False
+        self._laying, self.unled = False, 0.0
         if len(self.maps) > 1:
             self._variances.append(np.diag(self._p)[_LAST].copy())
         self._x[_LAST] = self._x[_OWN]
@@ -251,17 +255,17 @@ class CrossTrack:
         parallel = [line for line in lines if line.parallel and line.weight > LOST_WEIGHT]
         guides = []
         straight = math.radians(self._config.gates.fresh_lean_deg)
-        line = None if again else self._last_edge(parallel, u, ahead)
-        if line is not None and abs(line.lean) < straight:
-            guides.append(line)
+        last = None if again else self._last_edge(parallel, u, ahead)
+        if last is not None and abs(last.lean) < straight:
+            guides.append(last)
         if (line := self._board_edge(parallel)) is not None:
             guides.append(line)
             self._follow_turn(line, LOOK_S / TURN_TIME_S)
-        self._unled = 0.0 if guides else self._unled
-        own = self._own_edges(parallel, u, 0.0 if again else ahead) if self._laying else []
-        if (line := self._opposite_edge(parallel)) is not None:
-            guides.append(line)
-        guides += own
+        if (opposite := self._opposite_edge(parallel)) is not None:
+            guides.append(opposite)
+        self.unled = 0.0 if last is not None or guides else self.unled
+        if self._laying:
+            guides += self._own_edges(parallel, u, 0.0 if again else ahead)
         self.guides = {line.track.track_id: self.v + self.tip_error + line.place for line in guides}
 
     def _take_error(self) -> None:

@@ -39,6 +39,8 @@ LENGTH_TOLERANCE_M = 0.01
 #: Longest way without an edge of a stroke that is claimed [m]: the odometer, whose direction wanders with the attitude,
 #: errs by 3 mm on it in the datasheet world, and by 4 mm in the harsh one.
 MOST_UNLED_M = 0.4
+#: Way without an edge after which a stroke runs farther out until one shows, and how much [m]: half the usual overlap.
+ASIDE_AFTER_M, ASIDE_M = 0.1, 0.004
 #: Last part of a stroke, whose overlap does not count [m].
 CORNER_M = 0.02
 #: A stroke is at its place if that holds at so many standard deviations [-].
@@ -222,7 +224,9 @@ class Painter(Navigation):
         goal = self._stroke_goal()
         if self._fails_by_time(inputs, f"row {self.row}", goal):
             return self._stroke_command(inputs)
-        if self._run_towards(inputs, goal, self._touching_target(LEAST_OVERLAP), dt):
+        # Where the tip errs inwards the arm hides the edge that would correct it: a little farther out it shows again.
+        aside = ASIDE_M if self.row > 1 and self._cross.unled > ASIDE_AFTER_M else 0.0
+        if self._run_towards(inputs, goal, self._touching_target(LEAST_OVERLAP) + aside, dt):
             self._end_stroke(inputs)
         return self._stroke_command(inputs)
 

@@ -167,6 +167,7 @@ def _after_stroke_one(delta: float = 0.0) -> CrossTrack:
     cross.begin_stroke()
     for k in range(60):
         cross.lay(0.01 * k)
+        cross.unled = 0.0  # as with the board's edge in view
         cross.predict(0.01, 0.0, 0.1)
     cross.end_stroke()
     cross.predict(0.0, PITCH, 1.5)
@@ -367,6 +368,7 @@ def test_paint_laid_again_farther_in_adds_to_the_overlap_and_not_to_the_map() ->
     cross.begin_stroke()
     for k in range(60):
         cross.lay(0.6 - 0.01 * k)
+        cross.unled = 0.0  # as with the last stroke's edge in view
         cross.predict(-0.01, 0.0, 0.1)
     before, map_before = cross.overlap(0.0, 0.6), cross.maps[-1].places()[1]
     cross.predict(0.0, -0.004, 0.1)

@@ -408,6 +408,23 @@ def test_a_stroke_without_an_edge_for_half_a_metre_is_not_claimed(hidden_s: floa
     assert claimed or re.fullmatch(r"row 2 had no edge to follow for 0\.\d+ m", world.painter.reason)
 
 
+def test_an_edge_that_hides_behind_the_arm_where_the_tip_errs_inwards_is_found_again() -> None:
+    """Columns upwards: 32 mm beside the tip it shows, 31 mm beside it the arm covers it, and the odometer drifts."""
+    world = PaintedWall(short(rows=2, stroke_m=1.5))
+    world.fly(60.0, until="paint", stroke=2)
+    world.fly(2.0)
+    world.drift = world.to_wall(0.0, 2.0e-3)
+    place, lowest = world.config.edge_margin_m + world.config.pitch_m, math.inf
+    while world.painter.phase == "paint":
+        world.hidden = {GUIDE, FAR} | ({OUTER + 1} if world.tip[1] < place - 1e-3 else set())
+        world.step()
+        lowest = min(lowest, world.tip[1] - place)
+    world.hidden = set()
+    world.fly(100.0)
+    assert lowest > -0.004, "it runs 13 mm inwards without a look"
+    assert world.painter.finished and not world.painter.failed, world.painter.reason
+
+
 @pytest.mark.parametrize("drift", [1.0e-3, 1.5e-3])
 def test_a_gap_that_the_odometer_hides_is_not_claimed(drift: float) -> None:
     """Nothing shows where stroke 2 is, and the odometer drifts by one to two of its standard deviations."""
@@ -449,4 +466,7 @@ def test_the_own_edge_leads_where_no_other_one_is_in_view() -> None:
     assert world.painter.phase == "paint" and world.guide == OUTER + 2
     world.wave = lambda _stroke, u: 0.01 if u < 0.5 else 0.0  # as a jolt that the odometer measures
     world.fly(5.0)
-    assert abs(world.tip[1] - world.config.edge_margin_m - world.config.pitch_m) < 0.5 * PLACE
+    place = (
+        world.config.edge_margin_m + world.config.pitch_m + painter.ASIDE_M
+    )  # where an edge behind the arm would show
+    assert abs(world.tip[1] - place) < 0.5 * PLACE
