@@ -22,7 +22,7 @@ DRIFT_PER_M = 5e-5
 EDGE_STD, UNKNOWN_STD, SCALE_STD = 2e-3, 0.5, 0.015
 #: Standard deviation of the margin beside the beginning where the board's edge confirms it [m].
 MARGIN_STD = 1e-3
-#: A length that differs from the job's by more standard deviations than this is believed [-].
+#: An edge farther from its expected place than this shows another length of the board, or an error of the odometer [-].
 SIGMAS = 3.0
 
 _END, _NEAR = np.array((-1.0, 0.0)), np.array((-1.0, 1.0))
@@ -35,13 +35,15 @@ class AlongTrack:
         known: Whether u has an origin: by an edge, or assumed.
         end_seen: Whether the edge to which stroke 1 runs has been recognised.
         end, near: Tracks of the two edges at the last look, -1 where not in view.
+        slip: Largest error of the odometer in the stroke in progress that an edge has shown at once [m].
     """
 
     def __init__(self, config: PaintingConfig) -> None:
         self._config = config
         self._x, self._p = np.zeros(2), np.diag((UNKNOWN_STD**2, UNKNOWN_STD**2))
         self.known = self.end_seen = False
-        self._near_known = False
+        self._near_known = self._length_unsure = False
+        self.slip = 0.0
         self._way = self._way_variance = self._began = self._began_variance = 0.0
         self.end = self.near = -1
 
@@ -69,7 +71,7 @@ class AlongTrack:
 
     def begin_stroke(self) -> None:
         """A stroke begins here."""
-        self._way, self._way_variance = 0.0, 0.0
+        self._way = self._way_variance = self.slip = 0.0
         self._began, self._began_variance = self.u, float(self._p[0, 0])
 
     @property
@@ -87,9 +89,7 @@ class AlongTrack:
 
     def find_end(self, lines: Sequence[PatternLine]) -> bool:
         """Take u from the edge to which stroke 1 runs, wherever it is; False where it is not in view."""
-        certain = self._config.gates.start_deviation_m
-        found = [line for line in _ends(lines) if line.kind == "board" and line.weight > CERTAIN_WEIGHT]
-        found = [line for line in found if line.track.deviation < certain]
+        found = self._certain(_ends(lines))
         if not found:
             return False
         edge = min(found, key=lambda line: line.place)
@@ -162,8 +162,13 @@ class AlongTrack:
         near = _nearest(lines, expected, gate)
         if near is not None:
             return near
+        return _nearest(self._certain(lines), expected, self._config.gates.first_stop_m)
+
+    def _certain(self, lines: list[PatternLine]) -> list[PatternLine]:
+        """Edges of the board that are seen well."""
+        limit = self._config.gates.start_deviation_m
         board = [line for line in lines if line.kind == "board" and line.weight > CERTAIN_WEIGHT]
-        return _nearest(board, expected, self._config.gates.first_stop_m)
+        return [line for line in board if line.track.deviation < limit]
 
     def _correct(self, line: PatternLine, expected: float, row: np.ndarray) -> str:
         difference = line.place - expected
@@ -178,11 +183,17 @@ class AlongTrack:
                 # Both edges are seen, so the board is longer or shorter than the job says: the origin of u moves.
                 self._p += unknown
                 self._began_variance += unknown
+                self._length_unsure = True
                 noticed = f"the board's edge lies {difference * 1e3:+.0f} mm from where the job expects it"
+            elif row is _NEAR and self._length_unsure:
+                self._p[1, 1] += unknown  # it was the odometer then, and the board is as long as the job says
             else:
                 self._p[0, 0] += unknown
                 self._way_variance += unknown
-                noticed = f"the odometer has erred by {-difference * 1e3:+.0f} mm"
+                self.slip = max(self.slip, abs(difference))
+                noticed = f"the tip is {-difference * 1e3:+.0f} mm from where the odometer has it"
+        if row is _NEAR and self.end == -1:
+            self._length_unsure = False
         self._update(difference, row, seen / max(line.weight, LOST_WEIGHT))
         return noticed
 

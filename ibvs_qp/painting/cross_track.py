@@ -48,7 +48,7 @@ AHEAD_STD = 6e-4
 ODOMETER_PER_M, ODOMETER_AT_REST = 8e-6, 2e-7
 #: The same per metre of a stroke without an edge, where nothing shows how the wander of the attitude turns its axes:
 #: 1.7e-5 in the datasheet world and 3e-5 in the harsh one, flown over 0.5 m; way after which it holds [m].
-UNLED_PER_M, UNLED_AFTER_M = 2.5e-5, 0.02
+UNLED_PER_M, UNLED_AFTER_M = 2.5e-5, 0.06
 DRIFT_STD, DRIFT_WANDER = 1e-3, 1e-9
 #: Standard deviation of the strokes' direction where the board's edge shows it, by the roll of the camera's mount
 #: [rad]; its variance per second [rad^2/s].
@@ -95,7 +95,7 @@ class CrossTrack:
         self._again: list[StrokeMap] = []  # where the stroke in progress was painted again, each way for itself
         self._open = np.zeros(NODES, bool)  # nodes of the stroke that is laid which the tip has not passed
         self._u, self._forward = 0.0, 1.0  # of the tip [m]; direction in which the stroke in progress is laid
-        self.unled = self.longest_unled = 0.0
+        self._way = self.unled = self.longest_unled = 0.0
 
     @property
     def v(self) -> float:
@@ -155,8 +155,9 @@ class CrossTrack:
         p[_V] -= dt * p[_DRIFT] + du * p[_TURN]
         p[:, _V] = p[_V]
         p[_V, _V] -= dt * p[_V, _DRIFT] + du * p[_V, _TURN]
-        per_m = UNLED_PER_M if self.unled > UNLED_AFTER_M else ODOMETER_PER_M
-        p[_V, _V] += per_m * math.hypot(du, dv) + ODOMETER_AT_REST * dt
+        way, per_m = math.hypot(du, dv), UNLED_PER_M if self.unled > UNLED_AFTER_M else ODOMETER_PER_M
+        self._way += way
+        p[_V, _V] += per_m * way + ODOMETER_AT_REST * dt
         p[_DRIFT, _DRIFT] += DRIFT_WANDER * dt
         p[_TURN, _TURN] += TURN_WANDER * dt
         p[_TIP, _TIP] += TIP_WANDER * dt
@@ -165,20 +166,21 @@ class CrossTrack:
         """The tip begins to paint a stroke; what it paints is remembered."""
         self.maps.append(StrokeMap(self._config.stroke_m))
         self._again = []
-        self.unled = self.longest_unled = 0.0
+        self._way = self.unled = self.longest_unled = 0.0
         self._laying = True
         self._open[:] = True
         self._take_error()
 
     def lay(self, u: float) -> None:
         """The brush presses here."""
-        self.unled += abs(u - self._u)
+        self.unled, self._way = self.unled + self._way, 0.0
         self.longest_unled = max(self.longest_unled, self.unled)
         self._u = u
         self.maps[-1].add(u, self.v)
 
     def begin_again(self) -> None:
-        """The tip turns round and paints the stroke in progress again."""
+        """The tip turns round and paints the stroke in progress again, led by its own edge."""
+        self.unled = 0.0
         self._again.append(StrokeMap(self._config.stroke_m))
 
     def lay_again(self, u: float) -> None:
@@ -261,9 +263,9 @@ class CrossTrack:
         if (line := self._board_edge(parallel)) is not None:
             guides.append(line)
             self._follow_turn(line, LOOK_S / TURN_TIME_S)
+        self.unled = 0.0 if last is not None or guides else self.unled
         if (opposite := self._opposite_edge(parallel)) is not None:
             guides.append(opposite)
-        self.unled = 0.0 if last is not None or guides else self.unled
         if self._laying:
             guides += self._own_edges(parallel, u, 0.0 if again else ahead)
         self.guides = {line.track.track_id: self.v + self.tip_error + line.place for line in guides}

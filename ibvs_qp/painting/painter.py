@@ -225,7 +225,7 @@ class Painter(Navigation):
         if self._fails_by_time(inputs, f"row {self.row}", goal):
             return self._stroke_command(inputs)
         # Where the tip errs inwards the arm hides the edge that would correct it: a little farther out it shows again.
-        aside = ASIDE_M if self.row > 1 and self._cross.unled > ASIDE_AFTER_M else 0.0
+        aside = min(ASIDE_M, 0.5 * self._nominal_overlap()) if self._cross.unled > ASIDE_AFTER_M else 0.0
         if self._run_towards(inputs, goal, self._touching_target(LEAST_OVERLAP) + aside, dt):
             self._end_stroke(inputs)
         return self._stroke_command(inputs)
@@ -370,7 +370,7 @@ class Painter(Navigation):
         least = overlap - RETOUCH_SIGMAS * known
         enough = RETOUCH_OVERLAP * self.config.overlap_m > RETOUCH_SIGMAS * known
         gaps = u[(least < 0.0) & enough & (SIGMAS * known <= 2.0 * self._certain_m)]
-        if not gaps.size or self._retouches >= MOST_RETOUCHES:
+        if not gaps.size or self._retouches >= MOST_RETOUCHES or self._cross.longest_unled > MOST_UNLED_M:
             return False
         travel, begin = self.pattern.travel(self.row), self._stroke_begin()
         first = float(gaps.min() if travel > 0.0 else gaps.max())
@@ -392,6 +392,8 @@ class Painter(Navigation):
                 f"row {self.row} is {length * 1e3:.0f} mm long, known to {known * 1e3:.1f} mm, "
                 f"{asked * 1e3:.0f} mm were asked"
             )
+        if (slip := self._along.slip) > self.config.gates.stop_m:
+            return f"row {self.row} met an edge {slip * 1e3:.0f} mm from where the odometer expected it"
         _, overlap, known = self._overlap()
         if SIGMAS * (worst := known.max(initial=0.0)) > 2.0 * self._certain_m:
             return f"row {self.row} lost its edge, its overlap is known to {worst * 1e3:.1f} mm"
@@ -423,10 +425,18 @@ class Painter(Navigation):
         here = self._along.u + ahead * self._view_direction()
         return here - 0.5 * length, here + 0.5 * length
 
+    def _nominal_overlap(self) -> float:
+        """Overlap of the stroke with the one before at their places [m]; 0 for the first one.
+
+        The last stroke of a filling job may have less than the job's.
+        """
+        if self.row < 2:
+            return 0.0
+        return min(self.config.overlap_m, self.config.brush_width_m - (self._v_target - self._place(self.row - 1)))
+
     def _touching_target(self, share: float) -> float:
         """Target v [m]: the stroke's place, or less where its overlap would be below this share of the nominal one."""
-        nominal = self.config.brush_width_m - (self._v_target - self._place(self.row - 1))
-        inside = share * min(self.config.overlap_m, nominal)  # the last stroke of a filling job may overlap less
+        inside = share * self._nominal_overlap()
         return min(self._v_target, self._reach_of_last(REACTION_M, 0.5 * self.config.brush_width_m) - inside)
 
     def _lead_to_end(self, ended: bool, moved: float) -> None:

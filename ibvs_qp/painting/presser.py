@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 
-from ibvs_qp.painting.command import PainterInput, PaintingCommand
+from ibvs_qp.painting.command import ExpectedEdge, PainterInput, PaintingCommand
 from ibvs_qp.painting.config import PaintingConfig
 from ibvs_qp.painting.painter import Painter
 from ibvs_qp.painting.speed import ramped
@@ -33,6 +33,10 @@ class Presser(Painter):
         """As after construction."""
         super().reset()
         self._touched = math.nan
+
+    def expected_edge(self) -> ExpectedEdge | None:
+        """None: a slide has one path and paints no stroke beside it."""
+        return None
 
     def abandon(self, inputs: PainterInput, reason: str) -> None:
         """Leave the wall for good; a press that studies this case ends as planned, so it is no failure."""

@@ -409,7 +409,7 @@ class Pilot:
         return self._camera.perceive(frame, velocity, hints, self.assurance.is_news, self._rejected)
 
     def _hints(self, stamp_ns: int) -> tuple[LineHint, ...]:
-        """Expected place of the last stroke's edge, ahead of the brush, by lines and contact of the tick before."""
+        """Expected place of a painted edge beside the brush, by lines and contact of the tick before."""
         expected, contact = self.painter.expected_edge(), self.contact.state
         if expected is None or not contact.known:
             return ()

@@ -118,11 +118,38 @@ def test_a_certain_edge_of_the_board_shows_that_the_odometer_has_erred(error: fl
     along.predict(-0.9 if back else 0.0)
     true = (0.0 if back else 0.9) + error
     noticed = [along.look([upright(2, -MARGIN - true, 1) if back else upright(3, END_U - true, -1)]) for _ in range(9)]
-    assert noticed[0] == f"the odometer has erred by {error * 1e3:+.0f} mm" and not any(noticed[1:])
+    assert noticed[0] == f"the tip is {error * 1e3:+.0f} mm from where the odometer has it" and not any(noticed[1:])
     assert along.u == pytest.approx(true, abs=1e-3) and along.stroke_length == pytest.approx(
         0.9 + (-error if back else error), abs=5e-3
     )
     assert along._x[1] == pytest.approx(-MARGIN, abs=1e-3) and (along.near == 2) == back
+    assert along.slip == pytest.approx(abs(error))
+    along.begin_stroke()
+    assert along.slip == 0.0
+
+
+@pytest.mark.parametrize("slip", [0.05, 0.1])
+def test_an_error_of_the_odometer_before_the_first_sight_of_the_end_leaves_no_contradiction(slip: float) -> None:
+    """It looks like a board of another length, until the edge beside the beginning comes back: n was wrong, not u."""
+    along = at_the_margin()
+    along.begin_stroke()
+    along.predict(0.9)
+    assert along.look([upright(3, END_U - 0.9 - slip, -1)]).startswith("the board's edge lies")
+    along.begin_stroke()
+    along.predict(-0.9)
+    noticed = [along.look([upright(2, -MARGIN - slip, 1)]) for _ in range(9)]
+    assert not any(noticed) and along.u == pytest.approx(slip, abs=2e-3) and along.slip == 0.0
+    assert along._x[1] == pytest.approx(-MARGIN, abs=2e-3) and along.begin == pytest.approx(0.0, abs=2e-3)
+
+
+def test_a_far_edge_that_is_seen_badly_moves_nothing() -> None:
+    along = at_the_margin()
+    along.predict(0.9)
+    along.look([upright(3, END_U - 0.9, -1)])
+    far = upright(3, END_U - 0.8, -1)
+    far.track.deviation = 2.0 * CONFIG.gates.start_deviation_m
+    along.look([far])
+    assert along.end == -1 and along.u == pytest.approx(0.9, abs=1e-3)
 
 
 @pytest.mark.parametrize(("weight", "error"), [(0.5, 0.02), (1.0, 0.01)])

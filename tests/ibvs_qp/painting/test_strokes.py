@@ -80,6 +80,17 @@ def test_a_board_s_edge_on_the_way_ends_no_stroke() -> None:
     assert [u for _, u, _ in world.ends] == pytest.approx([1.2, 0.0], abs=PLACE)
 
 
+@pytest.mark.parametrize("decoy", [0.1, 0.2])
+def test_a_decoy_beside_the_beginning_may_end_a_stroke_but_not_as_a_success(decoy: float) -> None:
+    """An edge like the board's, 15 or 25 cm before it, that only the second stroke passes."""
+    world = PaintedWall(short(rows=2, stroke_m=1.0))
+    world.fly(60.0, until="paint", stroke=2)
+    world.extra = [Piece.upright(70, decoy, 1)]
+    world.fly(200.0)
+    assert world.painter.finished and world.painter.failed
+    assert re.match(r"row 2 met an edge \d+ mm from where the odometer expected it", world.painter.reason)
+
+
 def test_the_far_edge_of_the_board_leads_where_it_is_all_that_is_seen() -> None:
     world = PaintedWall(short(rows=4, stroke_m=0.6), height=0.36)
     world.fly(100.0, until="paint", stroke=4)
@@ -89,7 +100,8 @@ def test_the_far_edge_of_the_board_leads_where_it_is_all_that_is_seen() -> None:
     world.fly(100.0)
     config = world.config
     assert len(world.ends) == 4
-    assert world.ends[-1][2] == pytest.approx(config.edge_margin_m + 3.0 * config.pitch_m, abs=PLACE)
+    place = config.edge_margin_m + 3.0 * config.pitch_m + painter.ASIDE_M  # it corrects nothing, so it ends no search
+    assert world.ends[-1][2] == pytest.approx(place, abs=PLACE)
     assert "row 4 lost its edge" in world.painter.reason  # where that edge lies is known by the tip's place alone
 
 
@@ -415,7 +427,7 @@ def test_an_edge_that_hides_behind_the_arm_where_the_tip_errs_inwards_is_found_a
     world.fly(2.0)
     world.drift = world.to_wall(0.0, 2.0e-3)
     place, lowest = world.config.edge_margin_m + world.config.pitch_m, math.inf
-    while world.painter.phase == "paint":
+    while world.painter.phase == "paint" and world.time < 100.0:
         world.hidden = {GUIDE, FAR} | ({OUTER + 1} if world.tip[1] < place - 1e-3 else set())
         world.step()
         lowest = min(lowest, world.tip[1] - place)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from sim.evaluate.measures import paint_figures
+from sim.evaluate.truth import Judgement
 from sim.experiments.scenes import short_job
 from sim.experiments.spec import experiment
 from sim.flight.closed_loop import fly
@@ -31,12 +32,12 @@ def noisy(sigma_vs: float, sigma_f: float, sigma_nm: float = 0.005) -> Scene:
 def test_corners_of_the_noise_sweep(vs: float, force: float, law: str) -> None:
     """Held for the QP law; the analytic law has the same lines and forces and must come home as well.
 
-    At the largest noises it knows the places of its rows to 2 mm only, which it does not claim.
+    At the largest noise of vision it knows the places of its rows to 2 mm only, which it need not claim.
     """
     trace = fly(noisy(vs, force), FlightOptions(law=law, video=False))
     assert trace.phases[int(trace.phase[-1])] == "done"
-    if (vs, force, law) != (0.12, 3.0, "paper"):
-        assert trace.claimed, trace.reason
+    assert trace.claimed or vs > 0.1, trace.reason
+    assert Judgement(trace).completed or not trace.claimed
     figures = paint_figures(trace)
     assert figures["contact_share"] >= 0.995
     if law == "qp":
