@@ -420,3 +420,22 @@ def test_beta_counts_by_the_part_of_the_own_edge_that_lies_ahead_on_the_way_out(
     assert cross._share_ahead(near, far) == pytest.approx(share)
     cross.look([], 0.3, 1.0)
     assert cross._share_ahead(near, far) == pytest.approx(1.0 - share)
+
+
+@pytest.mark.parametrize(("line", "led"), [("fresh", True), ("board", True), ("far", False)])
+def test_the_way_without_an_edge_ends_at_one_that_corrects(line: str, led: bool) -> None:
+    """The board's far edge leads the tip, but where it lies is known by the tip's place alone."""
+    seen = {
+        "fresh": fresh(),
+        "board": parallel(1, -MARGIN - PITCH, 1, "board"),
+        "far": parallel(3, 0.3, -1, "board"),
+    }[line]
+    cross = _after_stroke_one()
+    cross.begin_stroke()
+    for k in range(40):
+        cross.lay(0.6 - 0.01 * k)
+        cross.predict(-0.01, 0.0, 0.1)
+        if k >= 20:
+            cross.look([seen], 0.6 - 0.01 * k, -1.0)
+    assert cross.unled == pytest.approx(0.0 if led else 0.39)
+    assert cross.longest_unled == pytest.approx(0.2 if led else 0.39)

@@ -52,7 +52,9 @@ def test_a_slide_follows_the_edge_at_its_speed_for_its_time(kind: str, start: st
     world = press(SLIDE, pattern=kind, start=start)
     world.fly(60.0, until="paint")
     begin = world.tip.copy()
-    commands = world.fly(10.0, until="retreat")
+    world.fly(1.0)
+    assert world.painter.expected_edge() is None, "a groove beside a slide is no paint"
+    commands = world.fly(9.0, until="retreat")
     assert times(world)["retreat"] - times(world)["paint"] == pytest.approx(SLIDE, abs=2 * TICK)
     u, v = world.tip - begin
     ramp = 0.5 * world.config.speed_m_s / world.config.acceleration_m_s2
