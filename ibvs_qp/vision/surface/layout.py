@@ -40,9 +40,10 @@ class PictureLayout:
         if vehicle is not None:
             self.mask = vehicle_mask(vehicle, config.brush_width_m, config.mask, frame.intrinsics, shape)
             zone = brush_zone(vehicle, config.brush_width_m, config.mask, frame.intrinsics, shape)
-        hidden = np.ascontiguousarray((self.mask | zone)[: shape[0] // 2 * 2 : 2, : shape[1] // 2 * 2 : 2])
+        hidden = np.asarray(self.mask | zone, np.uint8)[: shape[0] // 2 * 2 : 2, : shape[1] // 2 * 2 : 2]
         # The arm stands still in the picture: no window of a followed point may show its edge.
-        self.excluded = cv2.dilate(hidden, np.ones((config.flow.window_px, config.flow.window_px), np.uint8))
+        window = cv2.getStructuringElement(cv2.MORPH_RECT, (config.flow.window_px, config.flow.window_px))
+        self.excluded = np.asarray(cv2.dilate(hidden, window), np.uint8)
         self.grid = CoarseGrid(shape, frame.intrinsics, self.mask, config.plane.grid_columns)
         self.beside_brush = np.flatnonzero(self.grid.free & (self.grid.sample(zone) > 0))
         self.follower = PlaneFollower(config.plane, shape, frame.intrinsics, self.mask)
