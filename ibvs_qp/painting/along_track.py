@@ -117,10 +117,11 @@ class AlongTrack:
         """Correct with the edges in view, once per look; returns what was noticed, or an empty text."""
         noticed = ""
         ends = [line for line in _ends(lines) if line.weight > (LOST_WEIGHT if self.end_seen else CERTAIN_WEIGHT)]
-        end = self._edge(ends, self._config.stroke_m + self._config.edge_margin_m - self.u, self._end_gate)
+        expected = self._config.stroke_m + self._config.edge_margin_m - self.u
+        end = self._edge(ends, expected, self._end_gate)
         self.end = -1 if end is None else end.track.track_id
         if end is not None:
-            noticed = self._correct(end, self._config.stroke_m + self._config.edge_margin_m - self.u, _END)
+            noticed = self._correct(end, expected, _END)
             self.end_seen = True
         beside = [line for line in lines if not line.parallel and line.kind != "paint" and line.side >= 0]
         beside = [line for line in beside if line.weight > (LOST_WEIGHT if self._near_known else MARK_WEIGHT)]

@@ -47,7 +47,8 @@ AHEAD_STD = 6e-4
 #: world over 1 to 15 s; standard deviation of its drift [m/s], and variance of the drift per second [m^2/s^3].
 ODOMETER_PER_M, ODOMETER_AT_REST = 8e-6, 2e-7
 #: The same per metre of a stroke without an edge, where nothing shows how the wander of the attitude turns its axes:
-#: 1.7e-5 in the datasheet world and 3e-5 in the harsh one, flown over 0.5 m; way after which it holds [m].
+#: 1.7e-5 in the datasheet world and 2.5e-5 in the harsh one (a flight each, over 0.5 m, less the mean drift); way after
+#: which it holds [m].
 UNLED_PER_M, UNLED_AFTER_M = 2.5e-5, 0.06
 DRIFT_STD, DRIFT_WANDER = 1e-3, 1e-9
 #: Standard deviation of the strokes' direction where the board's edge shows it, by the roll of the camera's mount

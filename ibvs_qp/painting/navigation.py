@@ -145,10 +145,10 @@ class Navigation(PhaseMachine):
     # ------------------------------------------------------------------- lines
 
     def expected_edge(self) -> ExpectedEdge | None:
-        """The painted edge to look for: the last stroke's outer one, ahead; behind the brush, stroke 1's own outer one.
+        """The painted edge to look for: the last stroke's outer one, ahead; for stroke 1 its own, behind the brush.
 
-        A paint whose colour nobody named is found where it is expected only, and no other edge than the brush's own
-        shows where the tip is in the picture.
+        Without `vision.paint_color`, perception finds edges of paint only where they are expected, and only an edge of
+        the stroke being laid shows where the picture has the tip.
         """
         first = self.row == 1 and self.phase == "paint"
         if not first and (self.row < 2 or self.phase not in ("climb", "paint", "search")):

@@ -80,9 +80,9 @@ def test_a_board_s_edge_on_the_way_ends_no_stroke() -> None:
     assert [u for _, u, _ in world.ends] == pytest.approx([1.2, 0.0], abs=PLACE)
 
 
-@pytest.mark.parametrize("decoy", [0.1, 0.2])
+@pytest.mark.parametrize("decoy", [0.1, 0.18])
 def test_a_decoy_beside_the_beginning_may_end_a_stroke_but_not_as_a_success(decoy: float) -> None:
-    """An edge like the board's, 15 or 25 cm before it, that only the second stroke passes."""
+    """An edge like the board's, 15 or 23 cm before it, that only the second stroke passes."""
     world = PaintedWall(short(rows=2, stroke_m=1.0))
     world.fly(60.0, until="paint", stroke=2)
     world.extra = [Piece.upright(70, decoy, 1)]
@@ -420,6 +420,26 @@ def test_a_stroke_without_an_edge_for_half_a_metre_is_not_claimed(hidden_s: floa
     assert claimed or re.fullmatch(r"row 2 had no edge to follow for 0\.\d+ m", world.painter.reason)
 
 
+def test_a_stroke_that_lost_its_edge_for_long_is_not_painted_again() -> None:
+    """It cannot be claimed, and a retouch without an edge runs blind."""
+    world = PaintedWall(short(rows=2, stroke_m=0.6))
+    world.fly(60.0, until="paint", stroke=2)
+    world.fly(1.0)
+    world.hidden, world.drift = {GUIDE, OUTER + 1, OUTER + 2, FAR}, world.to_wall(0.0, 0.8e-3)
+    world.fly(200.0)
+    assert world.painter.finished and world.painter.failed and "retouch" not in world.phases()
+
+
+@pytest.mark.parametrize("overlap_m", [0.008, 0.004, 0.0])
+def test_the_search_aside_takes_at_most_half_the_overlap(overlap_m: float) -> None:
+    world = PaintedWall(short(rows=2, stroke_m=1.0, overlap_m=overlap_m))
+    world.fly(60.0, until="paint", stroke=2)
+    world.hidden = {GUIDE, OUTER + 1, FAR}
+    world.fly(5.0)
+    aside = world.tip[1] - world.config.edge_margin_m - world.config.pitch_m
+    assert aside == pytest.approx(0.5 * overlap_m, abs=1e-3)
+
+
 def test_an_edge_that_hides_behind_the_arm_where_the_tip_errs_inwards_is_found_again() -> None:
     """Columns upwards: 32 mm beside the tip it shows, 31 mm beside it the arm covers it, and the odometer drifts."""
     world = PaintedWall(short(rows=2, stroke_m=1.5))
@@ -478,7 +498,6 @@ def test_the_own_edge_leads_where_no_other_one_is_in_view() -> None:
     assert world.painter.phase == "paint" and world.guide == OUTER + 2
     world.wave = lambda _stroke, u: 0.01 if u < 0.5 else 0.0  # as a jolt that the odometer measures
     world.fly(5.0)
-    place = (
-        world.config.edge_margin_m + world.config.pitch_m + painter.ASIDE_M
-    )  # where an edge behind the arm would show
+    # Where an edge behind the arm would show.
+    place = world.config.edge_margin_m + world.config.pitch_m + painter.ASIDE_M
     assert abs(world.tip[1] - place) < 0.5 * PLACE
