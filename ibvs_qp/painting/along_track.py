@@ -75,11 +75,16 @@ class AlongTrack:
         self._began, self._began_variance = self.u, float(self._p[0, 0])
 
     @property
+    def moved(self) -> float:
+        """From the beginning of the stroke to the tip, along u [m]."""
+        return self.u - self._began
+
+    @property
     def stroke_length(self) -> float:
         """Length of the stroke so far [m]; corrections on the way belong to its beginning and to the odometer."""
-        corrected = self.u - self._began - self._way
+        corrected = self.moved - self._way
         share = self._began_variance / (self._began_variance + self._way_variance + EDGE_STD**2)
-        return abs(self.u - self._began - share * corrected)
+        return abs(self.moved - share * corrected)
 
     @property
     def length_deviation(self) -> float:

@@ -50,8 +50,9 @@ REACTION_M = 0.05
 #: Target overlap where the stroke before falls short, as a share of the nominal overlap [-].
 LEAST_OVERLAP = 0.75
 #: Retouches of one stroke [-]; standard deviations by which its overlap must be positive [-]; length that is painted
-#: again before the gap [m]; target overlap of a retouch over the nominal overlap [-].
-MOST_RETOUCHES, RETOUCH_SIGMAS, RETOUCH_BEFORE_M, RETOUCH_OVERLAP = 2, 2.0, 0.1, 1.25
+#: again before the gap [m]; target overlap of a retouch over the nominal overlap [-]; the tip turns this far from the
+#: beginning of the stroke [m]: friction lets it slide on by millimetres.
+MOST_RETOUCHES, RETOUCH_SIGMAS, RETOUCH_BEFORE_M, RETOUCH_OVERLAP, TURN_BEFORE_M = 2, 2.0, 0.1, 1.25, 0.005
 
 
 class Painter(Navigation):
@@ -71,6 +72,7 @@ class Painter(Navigation):
         self._touches = 0  # that were taken back, before the stroke in progress
         self._retouches, self._back_to = 0, math.nan  # of the stroke in progress; u to which the tip goes back [m]
         self._longest = 0.0  # length of the stroke in progress, each pass included [m]
+        self._behind = 0.0  # part of it before its beginning, by a retouch [m]
         self._paused = self._follows_end = False
 
     def _enter(self, inputs: PainterInput, phase: str, reason: str) -> None:
@@ -233,7 +235,8 @@ class Painter(Navigation):
     def _retouch(self, inputs: PainterInput, dt: float) -> PaintingCommand:
         """Back along the stroke to where it may leave a gap, then again to its end; farther in both times."""
         back = not math.isnan(self._back_to)
-        goal = self._back_to if back else self._stroke_goal()
+        goal = self._run_goal()
+        self._behind = max(self._behind, -self.pattern.travel(self.row) * self._along.moved)
         if self._fails_by_time(inputs, f"the retouch of row {self.row}", goal):
             return self._stroke_command(inputs)
         first, _ = self._cross.stroke_place(*self._beside(REACTION_M, 0.5 * self.config.brush_width_m))
@@ -274,8 +277,7 @@ class Painter(Navigation):
         ended = self._stroke_end.is_near(remaining)
         if ended:
             self._speed = 0.0
-        if math.isnan(self._back_to):
-            self._lead_to_end(ended, travel * self._speed * dt)
+        self._lead_to_end(ended, travel * self._speed * dt)
         return self._stroke_end.is_reached(inputs, remaining)
 
     def _stroke_command(self, inputs: PainterInput) -> PaintingCommand:
@@ -321,6 +323,9 @@ class Painter(Navigation):
 
     # ----------------------------------------------------------------- strokes
 
+    def _run_goal(self) -> float:
+        return super()._run_goal() if math.isnan(self._back_to) else self._back_to
+
     def _view_direction(self) -> float:
         return super()._view_direction() * (1.0 if math.isnan(self._back_to) else -1.0)
 
@@ -333,7 +338,7 @@ class Painter(Navigation):
 
     def _begin_stroke(self, inputs: PainterInput, stroke: int, reason: str) -> None:
         self.row, self._speed, self._follows_end, self._touches = stroke, 0.0, False, 0
-        self._retouches, self._longest = 0, 0.0
+        self._retouches, self._longest, self._behind = 0, 0.0, 0.0
         self._cross.begin_stroke()
         self._along.begin_stroke()
         self._stroke_end.begin()
@@ -342,7 +347,7 @@ class Painter(Navigation):
         self._enter(inputs, "paint", f"row {self.row}: {reason}")
 
     def _end_stroke(self, inputs: PainterInput) -> None:
-        self._longest = max(self._longest, self._along.stroke_length)
+        self._longest = max(self._longest, self._along.stroke_length + self._behind)
         if self._begin_retouch(inputs):
             return
         self._uncertain = self._uncertain or self._doubt()
@@ -375,7 +380,7 @@ class Painter(Navigation):
         travel, begin = self.pattern.travel(self.row), self._stroke_begin()
         first = float(gaps.min() if travel > 0.0 else gaps.max())
         self._retouches += 1
-        self._back_to = begin + travel * max(travel * (first - begin) - RETOUCH_BEFORE_M, 0.0)
+        self._back_to = begin + travel * max(travel * (first - begin) - RETOUCH_BEFORE_M, TURN_BEFORE_M)
         self._turn_round()
         short, way = -float(least.min()), abs(self._along.u - self._back_to)
         self._enter(inputs, "retouch", f"row {self.row} may leave a gap of {short * 1e3:.1f} mm, back by {way:.2f} m")
@@ -440,14 +445,14 @@ class Painter(Navigation):
         return min(self._v_target, self._reach_of_last(REACTION_M, 0.5 * self.config.brush_width_m) - inside)
 
     def _lead_to_end(self, ended: bool, moved: float) -> None:
-        """Once the edge at the end of the stroke is in view, it leads: from where the tip is, at the stroke's speed."""
+        """Once the edge at the end of the run is in view, it leads: from where the tip is, at the stroke's speed."""
         if self._along_line.line is None:
             self._follows_end = False
             return
         if not self._follows_end:
             self._follows_end, self._u_reference = True, self._along.u
         self._u_reference += moved
-        goal, travel = self._stroke_goal(), self.pattern.travel(self.row)
+        goal, travel = self._run_goal(), self._view_direction()
         if ended or travel * (goal - self._u_reference) < 0.0:
             self._u_reference = goal
 

@@ -349,6 +349,42 @@ def test_a_first_pass_that_was_too_long_is_not_forgiven(monkeypatch) -> None:
     assert world.painter.failed and world.painter.reason == "row 2 is 1012 mm long, known to 1.4 mm, 1000 mm were asked"
 
 
+@pytest.mark.parametrize("stroke", [2, 3])
+@pytest.mark.parametrize(("slide", "claimed"), [(0.003, True), (0.016, False)])
+def test_a_slide_before_the_beginning_by_a_retouch_is_length(stroke: int, slide: float, claimed: bool) -> None:
+    """The gap is at the beginning; where the tip turns there, friction lets it slide on before it stops."""
+    world = PaintedWall(short(rows=stroke, stroke_m=1.0))
+    world.wave = lambda row, u: 0.012 if row == stroke and abs(u - (0.9 if row == 2 else 0.1)) < 0.1 else 0.0
+    world.fly(90.0, until="paint", stroke=stroke)
+    world.stuck_across = True
+    world.fly(60.0, until="retouch")
+    world.stuck_across, begin = False, 0.0 if stroke == 3 else 1.0
+    while abs(world.tip[0] - begin) > painter.TURN_BEFORE_M + 0.002:
+        world.step()
+    beyond = np.array(world.to_wall((begin - 0.5) * 2.0 * (painter.TURN_BEFORE_M + slide), 0.0))
+    world.tip = world.tip + world.to_board(*beyond)
+    world.odometer = world.odometer + beyond
+    world.fly(100.0)
+    reason = rf"row {stroke} is 101\d mm long, known to \d.\d mm, 1000 mm were asked"
+    assert claimed != world.painter.failed
+    assert claimed or re.fullmatch(reason, world.painter.reason), world.painter.reason
+
+
+def test_the_edge_leads_the_way_back_to_the_beginning() -> None:
+    """An odometer that errs by 2 % must not turn 20 mm before or behind the beginning."""
+    world = PaintedWall(short(rows=2, stroke_m=1.0), drift=(0.002, 0.0))
+    world.wave = lambda row, u: 0.012 if row == 2 and u > 0.8 else 0.0
+    world.fly(90.0, until="paint", stroke=2)
+    world.stuck_across = True
+    world.fly(60.0, until="retouch")
+    world.stuck_across, ahead, led = False, -math.inf, False
+    while not math.isnan(world.painter._back_to):
+        command = world.step()
+        led |= any(line.track_id == END for line, _ in command.guides)
+        ahead = max(ahead, float(world.tip[0]))
+    assert led and ahead == pytest.approx(1.0 - painter.TURN_BEFORE_M, abs=0.004)
+
+
 def test_the_last_stroke_of_a_filling_job_overlaps_by_its_own_nominal_overlap() -> None:
     """The board ends 5 mm farther out than the third stroke's nominal place asks for: its nominal overlap is 3 mm."""
     margin, pitch, width = 0.05, 0.072, 0.08
