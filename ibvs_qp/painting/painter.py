@@ -47,8 +47,9 @@ CORNER_M = 0.02
 PLACE_SIGMAS = 2.0
 #: Way ahead from which a stroke takes its target [m]: the tip follows a target that moves within half a second.
 REACTION_M = 0.05
-#: Target overlap where the stroke before falls short, as a share of the nominal overlap [-].
-LEAST_OVERLAP = 0.75
+#: Target overlap where the stroke before falls short, and the most of a stroke that is claimed, over the nominal
+#: overlap [-].
+LEAST_OVERLAP, MOST_OVERLAP = 0.75, 3.0
 #: Retouches of one stroke [-]; standard deviations by which its overlap must be positive [-]; length that is painted
 #: again before the gap [m]; target overlap of a retouch over the nominal overlap [-]; the tip turns this far from the
 #: beginning of the stroke [m]: friction lets it slide on by millimetres.
@@ -406,6 +407,9 @@ class Painter(Navigation):
             return f"row {self.row} had no edge to follow for {unled:.2f} m"
         if (least := (overlap - known).min(initial=math.inf)) < 0.0:
             return f"row {self.row} may leave a gap of {-least * 1e3:.1f} mm to the row before"
+        nominal = self.config.brush_width_m - (self._v_target - self._place(self.row - 1))
+        if (most := (overlap + known).max(initial=0.0)) > MOST_OVERLAP * nominal:
+            return f"row {self.row} may overlap the row before by {most * 1e3:.1f} mm, nominal {nominal * 1e3:.1f} mm"
         place, known = self._cross.stroke_place(self._stroke_begin(), goal)
         aside = place - self._v_target
         if not abs(aside) + PLACE_SIGMAS * known <= PLACE_TOLERANCE_M:  # nor where it is not known

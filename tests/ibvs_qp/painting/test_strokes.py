@@ -309,6 +309,19 @@ def test_a_gap_to_the_stroke_before_is_not_claimed(length: float) -> None:
     )
 
 
+@pytest.mark.parametrize(("swing", "claimed"), [(0.012, True), (0.02, False)])
+def test_a_stroke_that_overlaps_too_much_is_not_claimed(swing: float, claimed: bool) -> None:
+    """Of 8 mm nominal overlap 24 mm is the most that counts as at its place."""
+    world = PaintedWall(short(rows=2, stroke_m=1.5))
+    world.fly(90.0, until="paint", stroke=2)
+    world.stuck_across = True
+    world.wave = lambda stroke, u: -swing if stroke == 2 and 0.5 < u < 0.7 else 0.0
+    world.fly(200.0)
+    reason = r"row 2 may overlap the row before by 2[7-9]\.\d mm, nominal 8\.0 mm"
+    assert claimed != world.painter.failed
+    assert claimed or re.fullmatch(reason, world.painter.reason), world.painter.reason
+
+
 @pytest.mark.parametrize("pattern", ["rows", "columns"])
 @pytest.mark.parametrize("stroke", [2, 3])
 def test_a_gap_is_painted_again_and_the_job_is_claimed(pattern: str, stroke: int) -> None:
