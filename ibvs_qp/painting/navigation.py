@@ -78,7 +78,7 @@ class Navigation(PhaseMachine):
         """Tracks of the edge beside the place to which the tip moves; another one may leave the picture on the way."""
         if self.phase == "survey":
             return ()
-        goal = self._run_goal() if self.phase in ("paint", "retouch") else self._stroke_begin()
+        goal = self._stroke_goal() if self.phase in ("paint", "retouch") else self._stroke_begin()
         return (self._along.end,) if goal > 0.5 * self.config.stroke_m else (self._along.near,)
 
     def _guides(self) -> tuple[int, ...]:
@@ -106,10 +106,6 @@ class Navigation(PhaseMachine):
     def _stroke_goal(self) -> float:
         """Where the stroke in progress ends, u [m]."""
         return self.config.stroke_m if self.pattern.travel(self.row) > 0.0 else self._along.begin
-
-    def _run_goal(self) -> float:
-        """Where the tip runs along the stroke in progress, u [m]."""
-        return self._stroke_goal()
 
     def _place(self, stroke: int) -> float:
         """Nominal v of a stroke [m]; the last one of a filling job keeps the margin to the board's other edge."""

@@ -52,8 +52,8 @@ REACTION_M = 0.05
 LEAST_OVERLAP, MOST_OVERLAP = 0.75, 3.0
 #: Retouches of one stroke [-]; standard deviations by which its overlap must be positive [-]; length that is painted
 #: again before the gap [m]; target overlap of a retouch over the nominal overlap [-]; the tip turns this far from the
-#: beginning of the stroke [m]: friction lets it slide on by millimetres.
-MOST_RETOUCHES, RETOUCH_SIGMAS, RETOUCH_BEFORE_M, RETOUCH_OVERLAP, TURN_BEFORE_M = 2, 2.0, 0.1, 1.25, 0.005
+#: beginning of the stroke [m]: friction lets it slide on, by 11 mm in the datasheet world.
+MOST_RETOUCHES, RETOUCH_SIGMAS, RETOUCH_BEFORE_M, RETOUCH_OVERLAP, TURN_BEFORE_M = 2, 2.0, 0.1, 1.25, 0.02
 
 
 class Painter(Navigation):
@@ -236,7 +236,7 @@ class Painter(Navigation):
     def _retouch(self, inputs: PainterInput, dt: float) -> PaintingCommand:
         """Back along the stroke to where it may leave a gap, then again to its end; farther in both times."""
         back = not math.isnan(self._back_to)
-        goal = self._run_goal()
+        goal = self._back_to if back else self._stroke_goal()
         self._behind = max(self._behind, -self.pattern.travel(self.row) * self._along.moved)
         if self._fails_by_time(inputs, f"the retouch of row {self.row}", goal):
             return self._stroke_command(inputs)
@@ -278,7 +278,8 @@ class Painter(Navigation):
         ended = self._stroke_end.is_near(remaining)
         if ended:
             self._speed = 0.0
-        self._lead_to_end(ended, travel * self._speed * dt)
+        if math.isnan(self._back_to):
+            self._lead_to_end(ended, travel * self._speed * dt)
         return self._stroke_end.is_reached(inputs, remaining)
 
     def _stroke_command(self, inputs: PainterInput) -> PaintingCommand:
@@ -323,9 +324,6 @@ class Painter(Navigation):
         return self._command(inputs, contact=False, standoff=self.config.retreat_m, hold=True)
 
     # ----------------------------------------------------------------- strokes
-
-    def _run_goal(self) -> float:
-        return super()._run_goal() if math.isnan(self._back_to) else self._back_to
 
     def _view_direction(self) -> float:
         return super()._view_direction() * (1.0 if math.isnan(self._back_to) else -1.0)
@@ -449,14 +447,14 @@ class Painter(Navigation):
         return min(self._v_target, self._reach_of_last(REACTION_M, 0.5 * self.config.brush_width_m) - inside)
 
     def _lead_to_end(self, ended: bool, moved: float) -> None:
-        """Once the edge at the end of the run is in view, it leads: from where the tip is, at the stroke's speed."""
+        """Once the edge at the end of the stroke is in view, it leads: from where the tip is, at the stroke's speed."""
         if self._along_line.line is None:
             self._follows_end = False
             return
         if not self._follows_end:
             self._follows_end, self._u_reference = True, self._along.u
         self._u_reference += moved
-        goal, travel = self._run_goal(), self._view_direction()
+        goal, travel = self._stroke_goal(), self.pattern.travel(self.row)
         if ended or travel * (goal - self._u_reference) < 0.0:
             self._u_reference = goal
 

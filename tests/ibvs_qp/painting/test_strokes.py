@@ -383,21 +383,6 @@ def test_a_slide_before_the_beginning_by_a_retouch_is_length(stroke: int, slide:
     assert claimed or re.fullmatch(reason, world.painter.reason), world.painter.reason
 
 
-def test_the_edge_leads_the_way_back_to_the_beginning() -> None:
-    """An odometer that errs by 2 % must not turn 20 mm before or behind the beginning."""
-    world = PaintedWall(short(rows=2, stroke_m=1.0), drift=(0.002, 0.0))
-    world.wave = lambda row, u: 0.012 if row == 2 and u > 0.8 else 0.0
-    world.fly(90.0, until="paint", stroke=2)
-    world.stuck_across = True
-    world.fly(60.0, until="retouch")
-    world.stuck_across, ahead, led = False, -math.inf, False
-    while not math.isnan(world.painter._back_to):
-        command = world.step()
-        led |= any(line.track_id == END for line, _ in command.guides)
-        ahead = max(ahead, float(world.tip[0]))
-    assert led and ahead == pytest.approx(1.0 - painter.TURN_BEFORE_M, abs=0.004)
-
-
 def test_the_last_stroke_of_a_filling_job_overlaps_by_its_own_nominal_overlap() -> None:
     """The board ends 5 mm farther out than the third stroke's nominal place asks for: its nominal overlap is 3 mm."""
     margin, pitch, width = 0.05, 0.072, 0.08
