@@ -32,6 +32,8 @@ LEAST_OVERLAP_M = 0.008
 ROUNDING = 1e-9
 #: Gusts that a job must stand, in standard deviations: stronger ones blow a twentieth of the time.
 GUST_DEVIATIONS = 2.0
+#: Acceleration to the side that is left against wind [m/s^2], as much as the approach brakes with.
+CONTROL_RESERVE_M_S2 = 0.5
 
 
 def check_job(scene: Scene, config: PilotConfig, features: str = "rendered", job: Job | None = None) -> None:
@@ -237,11 +239,14 @@ def oldest_s(rate_hz: float, delay_s: float, tick_s: float) -> float:
 
 
 def _wind(scene: Scene, config: PilotConfig) -> Iterator[str]:
-    """The rotors of a level vehicle hold against the mean wind and usual gusts in the least favourable direction."""
+    """The rotors of a level vehicle hold against the mean wind and usual gusts in the least favourable direction.
+
+    Wind along the vertical adds to the weight or takes from it; both leave less to the side.
+    """
     vehicle, wind = config.controller.vehicle, scene.wind
-    held, _ = worst_level_reach(
-        WrenchFacets(vehicle.geometry), vehicle.mass_kg * GRAVITY, vehicle.thrust_min, vehicle.thrust_max
-    )
+    carried = vehicle.mass_kg * GRAVITY + vehicle.linear_drag_n_s_m * wind.mean_m_s[2]
+    held, _ = worst_level_reach(WrenchFacets(vehicle.geometry), carried, vehicle.thrust_min, vehicle.thrust_max)
+    held -= vehicle.mass_kg * CONTROL_RESERVE_M_S2
     mean = vehicle.linear_drag_n_s_m * math.hypot(*wind.mean_m_s[:2])
     gusts = GUST_DEVIATIONS * wind.gust_n_rms
     if mean + gusts > held:

@@ -124,14 +124,14 @@ LIMITS = {
         ["imu.rate_hz = 249.0 Hz", "at least 250 Hz"],
     ),
     "wind that no level vehicle holds": (
-        Scene(wind=WindScene(mean_m_s=(-12.0, 12.1, 0.0))),
-        Scene(wind=WindScene(mean_m_s=(-11.8, 11.8, 0.0))),
-        ["wind.mean_m_s", "level speed of at most 16.9 m/s"],
+        Scene(wind=WindScene(mean_m_s=(-9.6, 9.6, 0.0))),
+        Scene(wind=WindScene(mean_m_s=(-9.5, 9.5, 0.0))),
+        ["wind.mean_m_s", "level speed of at most 13.5 m/s"],
     ),
     "gusts that no level vehicle holds": (
-        Scene(wind=WindScene(gust_n_rms=7.7)),
-        Scene(wind=WindScene(gust_n_rms=7.5)),
-        ["wind.gust_n_rms", "at most 7.6 N"],
+        Scene(wind=WindScene(gust_n_rms=6.2)),
+        Scene(wind=WindScene(gust_n_rms=6.0)),
+        ["wind.gust_n_rms", "at most 6.1 N"],
     ),
     # Both sides of these were flown: the passing one to the end, the other until the supervisor ended the flight.
     "old pictures": (
