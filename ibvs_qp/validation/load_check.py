@@ -33,6 +33,9 @@ REST_FORCE_ERROR = 1.5
 LENGTH_PART = 0.25
 #: An error of readings may hide this part of a load [-]; a load that is lighter shows no turn below 30 deg.
 LARGEST_PART = 0.5
+#: Turn that a sensor in place may show by attitude, gain and cross-talk [deg]: 4 deg in the datasheet world with a
+#: heavy tool, whose zero offset hides less; and turn from which it counts.
+SHOWN_IN_PLACE_DEG, LEAST_TURN_DEG = 4.0, 6.0
 #: A turn is about an axis of the sensor if that is this part of it [-]: within 18 deg.
 ONE_AXIS = 0.95
 _AXES = dict(zip("xyz", np.eye(3), strict=True))
@@ -142,9 +145,10 @@ class _Load(NamedTuple):
 
     @property
     def is_turned(self) -> bool:
-        """Whether it points farther away than its error moves it."""
+        """Whether it points farther away than its error moves it, and than that of a sensor in place."""
         cosine = float(self.expected @ self.read) / (self.size * self.length)
-        return cosine < math.sqrt(1.0 - (self.error / self.size) ** 2)
+        in_place = max(math.asin(self.error / self.size), math.radians(LEAST_TURN_DEG))
+        return cosine < math.cos(in_place)
 
 
 def _arm(vehicle: VehicleParams) -> np.ndarray:
@@ -176,8 +180,8 @@ def smallest_turns_deg(vehicle: VehicleParams, settings: SafetySettings) -> dict
     r"""Smallest turn of the force sensor about x, y and z that is found at rest for sure, in level flight [deg].
 
     A turn by :math:`\varphi` about the unit axis e moves a load L by :math:`2 |e \times L| \sin(\varphi/2)`. It is
-    found for sure when that is twice the error of a reading, of which the zero offset may hide one half. Infinite where
-    neither weight nor moment shows the turn.
+    found for sure when that is twice the error of a reading, of which the zero offset may hide one half, and the turn
+    counts beside what a sensor in place shows. Infinite where neither weight nor moment shows the turn.
     """
     weight = vehicle.tool_mass_kg * np.array([0.0, 0.0, -GRAVITY])
     found = dict.fromkeys(_AXES, math.inf)
@@ -185,7 +189,8 @@ def smallest_turns_deg(vehicle: VehicleParams, settings: SafetySettings) -> dict
         for name, axis in _AXES.items() if error <= LARGEST_PART * np.linalg.norm(load) else ():
             moved = float(np.linalg.norm(np.cross(axis, load)))
             if moved > error:
-                found[name] = min(found[name], 2.0 * math.degrees(math.asin(error / moved)))
+                turn = max(2.0 * math.degrees(math.asin(error / moved)), LEAST_TURN_DEG + SHOWN_IN_PLACE_DEG)
+                found[name] = min(found[name], turn)
     return found
 
 
