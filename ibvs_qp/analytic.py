@@ -8,8 +8,9 @@ from allocation.least_squares import allocate_least_squares
 from allocation.sequential_desaturation import allocate_sequential
 from ibvs_qp.checked_law import CheckedLaw
 from ibvs_qp.command import Command, Outcome
-from ibvs_qp.config import ControllerConfig, Gains
+from ibvs_qp.config import ControllerConfig
 from ibvs_qp.measurement import Measurement, Reference
+from ibvs_qp.model.interaction_matrix import endpoint_line_row
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.reporting import clip, clipped_command, reach_note
 from ibvs_qp.model.setpoints import LineSetpoint, Setpoints
@@ -25,7 +26,7 @@ def analytic_wrench(setpoints: Setpoints) -> np.ndarray:
     .. math::
         \tau = (I-\Lambda)\,\tau_{vs} + \Lambda \tau_f, \quad
         \tau_{vs} = M [L^\dagger \ddot s + (I - L^\dagger L) a_p], \quad
-        \ddot s = -(K_p e + K_d \dot e + K_i \textstyle\int e), \quad
+        \ddot s = -(K_p e + K_d (\dot e + T L \dot\nu_{now}) + K_i \textstyle\int e), \quad
         \Lambda = \mathrm{blockdiag}(\lambda n n^T, 0)
 
     with the acceleration a_p of the secondary tasks and the push n F as tau_f.
@@ -35,7 +36,7 @@ def analytic_wrench(setpoints: Setpoints) -> np.ndarray:
     """
     acceleration = _secondary_acceleration(setpoints)
     if lines := setpoints.lines:
-        matrix, image_acceleration = _stacked_lines(lines, setpoints.config.gains)
+        matrix, image_acceleration = _stacked_lines(lines, setpoints.config)
         inverse = _pseudo_inverse(matrix)
         acceleration = inverse.dot(image_acceleration) + acceleration - inverse.dot(matrix.dot(acceleration))
     wrench = setpoints.mass_matrix @ acceleration
@@ -57,19 +58,20 @@ def _secondary_acceleration(setpoints: Setpoints) -> np.ndarray:
     return np.array([n * standoff + r * right + d * down for n, r, d in axes] + setpoints.angular.tolist())
 
 
-def _stacked_lines(lines: list[LineSetpoint], gains: Gains) -> tuple[np.ndarray, np.ndarray]:
-    """L and the commanded image acceleration: rho of every line and ONE angle, of the line nearest the image centre.
+def _stacked_lines(lines: list[LineSetpoint], config: ControllerConfig) -> tuple[np.ndarray, np.ndarray]:
+    """L and the commanded image acceleration: every line and ONE angle, of the line nearest the image centre.
 
     Stacking the angle rows of a horizontal and a vertical line as printed makes their difference command pitch through
     a lever of rho: measured, a vertical edge entering the picture pitched the vehicle by 14 degrees.
     """
-    level = min(lines, key=lambda line: abs(line.rho))
-    commands = [
-        -(gains.line_kp * line.rho_error + gains.line_kd * line.rho_rate + gains.line_ki * line.integral)
-        for line in lines
-    ]
-    commands.append(-(gains.theta_kp * level.angle_error + gains.theta_kd * level.angle_rate))
-    return np.array([*(line.matrix[0] for line in lines), level.matrix[1]]), np.array(commands)
+    at_tip = config.analytic_line_point == "tip"
+    rows = [endpoint_line_row(line.matrix, line.theta, line.tip) if at_tip else line.matrix[0] for line in lines]
+    commands = [line.analytic_command for line in lines]
+    if config.analytic_angle_row:
+        level = min(lines, key=lambda line: abs(line.rho))
+        rows.append(level.matrix[1])
+        commands.append(level.angle_command)
+    return np.array(rows), np.array(commands)
 
 
 def _pseudo_inverse(matrix: np.ndarray) -> np.ndarray:

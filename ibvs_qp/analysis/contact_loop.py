@@ -4,15 +4,16 @@ With x the penetration of the undeformed tip (e_s = -x), f the push and F the ro
 
 .. math::
     m \ddot x + c \dot x = F - f, \quad f = k x + b \dot x, \quad
-    F(s) = \frac{e^{-s T_h}}{\tau s + 1} F_c(s),
+    F(s) = \frac{e^{-s T_h}}{(\tau s + 1)(\tau_u s + 1)} F_c(s),
 
 .. math::
     F_c = -\Big(K + \frac{K_{fi}}{s}\Big) \frac{e^{-s T_f}}{s/\omega_f + 1} f
-          - \Big(K_{sp} + K_{sd} s \Big(W + \frac{\tau s}{\tau_a s + 1}\Big)\Big)\, e^{-s T_h} x - \hat g,
+          - \Big(K_{sp} + K_{sd} s \Big(W + \frac{T s}{\tau_a s + 1}\Big)\Big)\, e^{-s T_h} x - \hat g,
     \quad K = K_{fp} \min(1, k_s / k), \quad
     \hat g = \frac{1}{s/\omega_g + 1} (m \ddot x + e^{-s T_f} f - F).
 
-The impedance damps the rate one motor lag ahead. The rate itself passes through
+The impedance damps the rate the lead T ahead, and the push row filters its command with tau_u. The rate itself passes
+through
 :math:`W = 1 - \frac{\kappa}{s + \kappa} e^{-s T_c}`: with every frame, T_c late, the estimator corrects the speed of a
 tip in contact towards zero (`estimation/wall_distance.py`). The observer of gusts (`model/external_wrench.py`) closes
 a loop only through the age of the measured force.
@@ -24,9 +25,10 @@ mass, so the force needs no moment and m is the whole mass; the reference and th
 are constant. The closed loop's poles are the zeros of
 
 .. math::
-    \Delta(s) = m s^2 + (b + c) s + k + \frac{e^{-s T_h}}{\tau s + 1} \Big[\Big(K + \frac{K_{fi}}{s}\Big)
+    \Delta(s) = m s^2 + (b + c) s + k + \frac{e^{-s T_h}}{(\tau s + 1)(\tau_u s + 1)}
+    \Big[\Big(K + \frac{K_{fi}}{s}\Big)
     \frac{e^{-s T_f}(k + b s)}{s/\omega_f + 1}
-    + \Big(K_{sp} + K_{sd} s \Big(W + \frac{\tau s}{\tau_a s + 1}\Big)\Big)\, e^{-s T_h}
+    + \Big(K_{sp} + K_{sd} s \Big(W + \frac{T s}{\tau_a s + 1}\Big)\Big)\, e^{-s T_h}
     + \frac{(e^{-s T_f} - 1)(k + b s) - c s}{s/\omega_g + 1}\Big].
 
 Pade approximants of the delays give a polynomial whose roots start Newton's method on the exact function. Force
@@ -68,7 +70,9 @@ class ContactLoop:
 
     Attributes:
         mass: Of the vehicle, m [kg].
-        lag: Mean motor lag [s]; the impedance predicts the rate this far ahead.
+        lag: Mean motor lag [s].
+        lead: The impedance predicts the rate this far ahead, T [s].
+        command_filter: Time constant of the push row's filter, tau_u [s].
         drag: Of the vehicle, c [N s/m].
         stiffness: Of wall and brush together, k [N/m].
         damping: Of wall and brush together, b [N s/m].
@@ -88,6 +92,8 @@ class ContactLoop:
 
     mass: float
     lag: float
+    lead: float
+    command_filter: float
     drag: float
     stiffness: float
     damping: float
@@ -114,7 +120,7 @@ class ContactLoop:
         s = Polynomial([0.0, 1.0])
         force_top, force_bottom = _pade(self.force_delay)
         rate_top, rate_bottom = _pade(self.rate_delay)
-        motor, filtered = self.lag * s + 1.0, self.filter_lag * s + 1.0
+        motor, filtered = (self.lag * s + 1.0) * (self.command_filter * s + 1.0), self.filter_lag * s + 1.0
         free = self.mass * s**2 + (self.damping + self.drag) * s + self.stiffness
         force = (self.proportional * s + self.integral) * (self.damping * s + self.stiffness)
         smooth, gust = self.acceleration_filter * s + 1.0, s / self.gust_bandwidth + 1.0
@@ -123,7 +129,7 @@ class ContactLoop:
             (s + self.washout) * late_bottom - self.washout * late_top,
             (s + self.washout) * late_bottom,
         )
-        impedance = self.damper * s * (high_passed * smooth + bottom * self.lag * s) + self.spring * smooth * bottom
+        impedance = self.damper * s * (high_passed * smooth + bottom * self.lead * s) + self.spring * smooth * bottom
         unseen = (force_top - force_bottom) * (self.stiffness + self.damping * s) - self.drag * s * force_bottom
         total = free * s * motor * filtered * force_bottom
         total = (total + force * force_top) * rate_bottom * smooth * gust
@@ -144,12 +150,12 @@ class ContactLoop:
         force = (self.proportional + self.integral / s) * cmath.exp(-s * self.force_delay)
         force *= (self.stiffness + self.damping * s) / (self.filter_lag * s + 1.0)
         ahead = 1.0 - self.washout * cmath.exp(-s * FRAME_AGE) / (s + self.washout)
-        ahead += self.lag * s / (self.acceleration_filter * s + 1.0)
+        ahead += self.lead * s / (self.acceleration_filter * s + 1.0)
         motion = (self.spring + self.damper * s * ahead) * cmath.exp(-s * self.rate_delay)
         unseen = (cmath.exp(-s * self.force_delay) - 1.0) * (self.stiffness + self.damping * s) - self.drag * s
         gust = self.observer * unseen / (s / self.gust_bandwidth + 1.0)
         free = self.mass * s * s + (self.damping + self.drag) * s + self.stiffness
-        return free + (force + motion + gust) / (self.lag * s + 1.0)
+        return free + (force + motion + gust) / ((self.lag * s + 1.0) * (self.command_filter * s + 1.0))
 
     def _refine(self, start: complex) -> complex | None:
         """Newton's method from an approximate pole; None when it leads elsewhere or nowhere."""

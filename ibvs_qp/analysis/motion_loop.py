@@ -3,15 +3,15 @@ r"""Robustness of one axis of a rotation, or of one line, in free flight: the pe
 A double integrator behind the motors' lag and the sampling, :math:`P(s) = e^{-s T_h} / (s^2 (\tau s + 1))`, under
 
 .. math::
-    a = -(K_p + K_i / s)\, x - K_d (\hat v + T \hat a), \qquad
+    a = F(s) [-(K_p + K_i / s)\, x - K_d (\hat v + T \hat a)], \qquad
     \hat a = \frac{a}{\tau s + 1}, \qquad \hat v = \frac{\omega_g s\, x + \hat a}{s + \omega_g},
 
-the rate estimate of `ibvs_qp.model.angular_rate` with the gyro's bandwidth omega_g and the lead T. Broken at the
-command,
+the rate estimate of `ibvs_qp.model.angular_rate` with the gyro's bandwidth omega_g, the lead T and the filter of the
+row, :math:`F(s) = (1 - k_u) / (1 - k_u e^{-s \Delta t})` with :math:`k_u = e^{-\Delta t / T_u}`. Broken at the command,
 
 .. math::
-    L(s) = P(s) \frac{K_p + K_i/s + K_d\, \omega_g s / (s + \omega_g)}
-                     {1 + K_d (T + 1/(s + \omega_g)) / (\tau s + 1)}, \qquad
+    L(s) = P(s) F(s) \frac{K_p + K_i/s + K_d\, \omega_g s / (s + \omega_g)}
+                     {1 + F(s) K_d (T + 1/(s + \omega_g)) / (\tau s + 1)}, \qquad
     M_s = \max_\omega |1 + L(j\omega)|^{-1}.
 
 The loop bears any factor on its gain up to M_s / (M_s - 1), and a phase of 2 arcsin(1 / (2 M_s)). T_h is the time
@@ -39,6 +39,8 @@ class MotionLoop:
         delay: From a sample to the middle of its command's hold [s].
         lead: The rate is predicted this far ahead [s].
         bandwidth_hz: Of the measured rate in its estimate [Hz]; infinite without a model of the motors.
+        filter_s: Time constant of the row's filter, T_u [s]; tick_s: time between commands [s].
+        lag_ratio: Lag of the real motors over the modelled one [-].
     """
 
     kp: float
@@ -48,6 +50,9 @@ class MotionLoop:
     ki: float = 0.0
     lead: float = 0.0
     bandwidth_hz: float = math.inf
+    filter_s: float = 0.0
+    tick_s: float = 0.004
+    lag_ratio: float = 1.0
 
     def sensitivity(self, frequencies: np.ndarray) -> np.ndarray:
         """1 / (1 + L) at frequencies [rad/s]; same shape."""
@@ -58,8 +63,10 @@ class MotionLoop:
             corner = 2.0 * math.pi * self.bandwidth_hz
             measured = self.kd * corner * s / (s + corner)
             modelled = self.kd * (self.lead + 1.0 / (s + corner)) / lagged
-        plant = np.exp(-self.delay * s) / (s**2 * lagged)
-        return 1.0 / (1.0 + plant * (self.kp + self.ki / s + measured) / (1.0 + modelled))
+        kept = math.exp(-self.tick_s / self.filter_s) if self.filter_s else 0.0
+        filtered = (1.0 - kept) / (1.0 - kept * np.exp(-self.tick_s * s))
+        plant = filtered * np.exp(-self.delay * s) / (s**2 * (self.lag_ratio * self.lag * s + 1.0))
+        return 1.0 / (1.0 + plant * (self.kp + self.ki / s + measured) / (1.0 + filtered * modelled))
 
     @property
     def sensitivity_peak(self) -> float:

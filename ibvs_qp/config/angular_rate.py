@@ -1,4 +1,4 @@
-"""Settings of the angular rate that damps roll, pitch and yaw."""
+"""Settings of the estimates of attitude and angular velocity that steer roll, pitch and yaw."""
 
 from __future__ import annotations
 
@@ -9,11 +9,18 @@ from ibvs_qp.config.settings import setting, validate
 
 @dataclass(frozen=True, kw_only=True)
 class AngularRateSettings:
-    """Estimate of the angular velocity, and the lead against the motors' lag (docs/how_it_works/model.md)."""
+    """Estimates of attitude and angular velocity, and the lead against the motors' lag (docs/how_it_works/model.md)."""
 
     gyro_bandwidth_hz: float = setting(
         12.5,
         "the gyro counts below, the motors' model above; 1000 takes the gyro as it is",
+        unit="Hz",
+        low=0.5,
+        high=1000.0,
+    )
+    attitude_bandwidth_hz: float = setting(
+        1000.0,
+        "roll and pitch of the attitude estimate count below, the angular velocity above; 1000 takes them as they are",
         unit="Hz",
         low=0.5,
         high=1000.0,

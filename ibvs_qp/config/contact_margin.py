@@ -62,6 +62,8 @@ def contact_loop(
     return ContactLoop(
         mass=vehicle.mass_kg,
         lag=vehicle.motor_lag_s,
+        lead=gains.push_lead_s,
+        command_filter=gains.push_filter_s,
         drag=vehicle.linear_drag_n_s_m,
         stiffness=stiffness,
         damping=damping,

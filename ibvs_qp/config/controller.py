@@ -53,6 +53,16 @@ class ControllerConfig:
         "error of the line rows: at the point where the tip meets the wall, or the paper's, rho at the image centre",
         ("tip", "paper"),
     )
+    analytic_line_point: str = choice(
+        "centre",
+        "error of the analytic law's line rows: rho at the image centre, as printed, or at the point where the tip "
+        "meets the wall",
+        ("centre", "tip"),
+    )
+    analytic_angle_row: bool = setting(
+        True,
+        "angle row of the analytic law (False: level flight alone fixes roll; theta_kp = 0 still takes roll from it)",
+    )
     line_slots: int = setting(3, "lines the fixed program has room for; each costs 500 instructions", low=1, high=16)
     tick_s: float = setting(
         0.004, "control period; a longer tick than 0.02 s is taken for a pause", unit="s", low=0.0005, high=LONGEST_TICK

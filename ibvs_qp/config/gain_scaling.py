@@ -45,7 +45,8 @@ def scaled_gains(vehicle: VehicleParams, law: str = "qp") -> dict[str, float]:
 
     All but the impedance act on accelerations, so that mass and inertia are accounted for. The impedance is a force:
     for the same :math:`\ddot e + (K_{sd}/m)\dot e + (K_{sp}/m) e` it grows with the mass. Motors that lag longer by a
-    factor slow every loop by it: in units of the lag, poles and damping remain. Faster motors change nothing.
+    factor slow every loop by it: in units of the lag, poles and damping remain. Faster motors change no gain. Leads and
+    filters are against the lag, and follow it.
 
     Args:
         vehicle: Mass and lag of the motors.
@@ -58,5 +59,7 @@ def scaled_gains(vehicle: VehicleParams, law: str = "qp") -> dict[str, float]:
         gain = _PAPER.get(field.name, tuned) if law == "paper" else tuned
         unit = field.metadata["unit"]
         factor = pace ** _PER_SECOND.get(unit, 0) * (mass if unit.startswith("N") else 1.0)
+        if unit == "s":
+            factor = vehicle.motor_lag_s / _TUNED_FOR.motor_lag_s
         scaled[field.name] = min(max(factor * gain, field.metadata["low"]), field.metadata["high"])
     return scaled

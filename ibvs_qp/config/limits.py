@@ -106,6 +106,7 @@ class LimitSettings:
     tilt_barrier: bool = setting(True, "zero-tilt barriers on roll and pitch")
     yaw_barrier: bool = setting(True, "yaw barrier")
     view_barrier: bool = setting(True, "line-in-view barriers")
+    view_rotation: bool = setting(True, "line-in-view barriers turn the vehicle too, not only move it")
     push_barrier: bool = setting(True, "push-force ceiling")
     approach_barrier: bool = setting(True, "approach-speed barrier")
     hard_barriers: bool = setting(

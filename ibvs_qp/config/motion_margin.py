@@ -13,16 +13,21 @@ LARGEST_SENSITIVITY = 2.25
 TICKS_LATE = 1.5
 
 
-def motion_sensitivity(config: ControllerConfig) -> dict[str, float]:
+def motion_sensitivity(config: ControllerConfig, lag_ratio: float = 1.0) -> dict[str, float]:
     """Sensitivity peaks of the loops "attitude", "yaw" and "line"; see `ibvs_qp.analysis.motion_loop`.
 
-    The rate of a line comes from the accelerometer and the camera, without a lead.
+    The rate of a line comes from the accelerometer and the camera; its lead from the motors' model.
+
+    Args:
+        config: Gains, leads, filters, tick and motors.
+        lag_ratio: Lag of the real motors over the configured one [-].
     """
     gains, rate, vehicle = config.gains, config.angular_rate, config.vehicle
+    gyro = rate.gyro_bandwidth_hz
     loops = {
-        "attitude": (gains.attitude_kp, gains.attitude_kd, 0.0, rate.lead_s, rate.gyro_bandwidth_hz),
-        "yaw": (gains.yaw_kp, gains.yaw_kd, 0.0, rate.lead_s, rate.gyro_bandwidth_hz),
-        "line": (gains.line_kp, gains.line_kd, gains.line_ki, 0.0, math.inf),
+        "attitude": (gains.attitude_kp, gains.attitude_kd, 0.0, rate.lead_s, gains.attitude_filter_s, gyro),
+        "yaw": (gains.yaw_kp, gains.yaw_kd, 0.0, rate.lead_s, gains.yaw_filter_s, gyro),
+        "line": (gains.line_kp, gains.line_kd, gains.line_ki, gains.line_lead_s, gains.line_filter_s, math.inf),
     }
     return {
         name: MotionLoop(
@@ -32,7 +37,10 @@ def motion_sensitivity(config: ControllerConfig) -> dict[str, float]:
             lag=vehicle.motor_lag_s,
             delay=TICKS_LATE * config.tick_s,
             lead=lead,
+            filter_s=filter_s,
+            tick_s=config.tick_s,
+            lag_ratio=lag_ratio,
             bandwidth_hz=bandwidth,
         ).sensitivity_peak
-        for name, (kp, kd, ki, lead, bandwidth) in loops.items()
+        for name, (kp, kd, ki, lead, filter_s, bandwidth) in loops.items()
     }

@@ -13,23 +13,22 @@ def analytic_terms(model: Model) -> list[ca.SX]:
     """Rows of the stacked lines in body axes, their commanded image accelerations, and the secondary acceleration.
 
     Returns:
-        Rows one after the other, (6 (slots + 1),): rho of every line, then the angle of the line nearest the image
+        Rows one after the other, (6 (slots + 1),): the row of every line, then the angle of the line nearest the image
         centre; rows of absent lines are zero. Commands, (slots + 1,). Acceleration for their null space, (6,).
     """
-    twist, gains = model.camera_twist, model.gains
+    twist = model.camera_twist
     rows, commands = [], []
     level_row, level_command, nearest = ca.SX.zeros(1, 6), ca.SX(0.0), ca.SX(ca.inf)
     for line in model.lines:
         state = line_state(model, line.index)
-        row, angle_row = state.row_rho @ twist, state.row_theta @ twist
-        command = -(gains.line_kp * state.rho_error + gains.line_kd * state.rho_rate + gains.line_ki * state.integral)
-        rows.append(where(line.present, row, ca.SX.zeros(1, 6)))
-        commands.append(where(line.present, command, 0.0))
+        rows.append(where(line.present, state.analytic_row, ca.SX.zeros(1, 6)))
+        commands.append(where(line.present, state.analytic_command, 0.0))
+        if not model.config.analytic_angle_row:
+            continue
         nearer = both(line.present, ca.fabs(line.rho) < nearest)
         nearest = where(nearer, ca.fabs(line.rho), nearest)
-        level_row = where(nearer, angle_row, level_row)
-        angle = -(gains.theta_kp * state.angle_error + gains.theta_kd * state.angle_rate)
-        level_command = where(nearer, angle, level_command)
+        level_row = where(nearer, state.row_theta @ twist, level_row)
+        level_command = where(nearer, state.angle_command, level_command)
     rows, commands = [*rows, level_row], [*commands, level_command]
     out, wall = model.signals.outputs, model.wall
     standoff = (1.0 - model.contact_weight) * out["standoff_command"] / model.config.vehicle.mass_kg

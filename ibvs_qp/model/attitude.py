@@ -6,7 +6,9 @@ from dataclasses import dataclass
 
 import casadi as ca
 
+from ibvs_qp.estimation.roll_pitch import filtered_roll_pitch
 from ibvs_qp.model.inputs import Body, Contact, Target, clamp
+from ibvs_qp.symbolic.signals import Signals
 
 #: Least sine between wall normal and gravity; it keeps the axes of a floor finite.
 LEAST_CROSS = 1e-6
@@ -55,8 +57,19 @@ class Attitude:
     trimmed: ca.SX
 
 
-def attitude(body: Body, contact: Contact, target: Target, rate_ahead: ca.SX) -> Attitude:
-    """Angles and rates of a step; ``rate_ahead`` is the angular velocity after the lead [rad/s], (3,)."""
+def attitude(
+    signals: Signals, body: Body, contact: Contact, target: Target, rate_ahead: ca.SX, bandwidth_hz: float
+) -> Attitude:
+    """Angles and rates of a step.
+
+    Args:
+        signals: Registry of the filter of roll and pitch.
+        body: Attitude and angular velocity.
+        contact: Normal of the wall.
+        target: Roll and pitch to fly.
+        rate_ahead: Angular velocity after the lead [rad/s], (3,).
+        bandwidth_hz: Of the attitude estimate in roll and pitch [Hz] (`filtered_roll_pitch`).
+    """
     roll = ca.atan2(body.down[1], body.down[2])
     pitch = ca.asin(clamp(-body.down[0], -1.0, 1.0))
     yaw = ca.if_else(contact.known, -ca.atan2(contact.normal[1], contact.normal[0]), 0.0)
@@ -70,12 +83,14 @@ def attitude(body: Body, contact: Contact, target: Target, rate_ahead: ca.SX) ->
         angles = p + ca.tan(pitch) * (q * ca.sin(roll) + r * ca.cos(roll)), q * ca.cos(roll) - r * ca.sin(roll)
         return ca.if_else(tilted, ca.vertcat(*angles), rate[:2])
 
+    rates = swept(body.rate)
+    filtered = filtered_roll_pitch(signals, ca.vertcat(roll, pitch), rates, bandwidth_hz, body.dt)
     return Attitude(
         roll=roll,
         pitch=pitch,
         yaw=yaw,
-        tilt_error=ca.vertcat(roll, pitch) - target_angles,
-        tilt_rate=swept(body.rate),
+        tilt_error=filtered - target_angles,
+        tilt_rate=rates,
         tilt_rate_ahead=swept(rate_ahead),
         tilted=tilted,
         trimmed=ca.norm_2(trim) > 0.0,

@@ -10,13 +10,13 @@ from ibvs_qp.model.inputs import Body, Contact, clamp
 from ibvs_qp.model.motor_thrust import MotorThrust
 from ibvs_qp.symbolic.signals import Signals
 
-#: Bandwidth of the force observer in free flight, and in contact in the wall's plane [rad/s]; along the normal it is
-#: `contact.gust_bandwidth_rad_s`. In the plane a faster one mistakes changing friction for an external force: at
-#: 4 rad/s the climb to row 4 lasts 1 s longer, and its fresh edge is lost.
+#: Bandwidth of the force observer in free flight, and in contact in the wall's plane in calm air [rad/s]; in gusts it
+#: is `contact.plane_bandwidth_rad_s` there, and along the normal `contact.gust_bandwidth_rad_s`. In calm air a faster
+#: one mistakes changing friction for an external force: at 4 rad/s the climb to row 4 lasts 1 s longer.
 FORCE_BANDWIDTH_FREE, FORCE_BANDWIDTH_WALL = 4.0, 1.5
 #: Noise of the filtered push at which the bandwidth along the normal halves [N]: the observer passes it on as force.
 QUIET_PUSH = 0.15
-#: In calm air the observer along the normal only passes on sensor noise. Its bandwidth halves where the force not yet
+#: In calm air a fast observer only passes on sensor noise. Its bandwidth halves where the force not yet
 #: learnt is this strong [N rms], low-passed at its own bandwidth and averaged over this time [s].
 CALM_AIR, CALM_TIME = 0.1, 0.5
 #: Power of the unlearnt force up to this many times that of the accelerometer's noise is no gust: a power averaged
@@ -93,23 +93,35 @@ def _force(
     size = ca.dot(normal, felt)
     along = size * normal
     vibration = config.vehicle.mass_kg * contact.acceleration_noise
-    windy = _gust_weight(signals, bandwidth, body.dt, touching * size, vibration)
+    windy = _gust_weight(signals, "gust", bandwidth, body.dt, touching * size, vibration)
     pressing = bandwidth * windy / (1.0 + (contact.push_noise / QUIET_PUSH) ** 2)
-    learnt = filter_gain(pressing, body.dt) * along + filter_gain(FORCE_BANDWIDTH_WALL, body.dt) * (felt - along)
+    across, fastest = felt - along, config.contact.plane_bandwidth_rad_s
+    windy = _gust_weight(signals, "plane", fastest, body.dt, touching * across, vibration)
+    plane = FORCE_BANDWIDTH_WALL + (fastest - FORCE_BANDWIDTH_WALL) * windy
+    learnt = filter_gain(pressing, body.dt) * along + filter_gain(plane, body.dt) * across
     average = ca.if_else(time < START_TIME, body.dt / ca.fmax(time, 1e-9), 0.0)
     step = ca.if_else(touching, learnt, ca.fmax(filter_gain(FORCE_BANDWIDTH_FREE, body.dt), average) * free)
     new = clamp(old + step, -FORCE_BOUND, FORCE_BOUND)
     return signals.remember("external_force", ca.if_else(ca.logic_and(active, body.specific_force_known), new, old))
 
 
-def _gust_weight(signals: Signals, bandwidth: float, dt: ca.SX, unlearnt: ca.SX, vibration: ca.SX) -> ca.SX:
-    """Weight of the observer along the normal: 0 in calm air to 1 in gusts, by the power of the unlearnt force.
+def _gust_weight(signals: Signals, name: str, bandwidth: float, dt: ca.SX, unlearnt: ca.SX, vibration: ca.SX) -> ca.SX:
+    """Weight of the observer: 0 in calm air to 1 in gusts, by the power of the unlearnt force per direction.
 
-    ``vibration`` is the deviation of one sample of that force by the accelerometer's noise [N]: no gust.
+    Args:
+        signals: Registry.
+        name: Of the states: "gust" along the normal, "plane" in the wall's plane.
+        bandwidth: Of the observer in gusts [rad/s].
+        dt: Time since the last step [s].
+        unlearnt: Force along the normal [N], or in the plane, in B [N], (3,).
+        vibration: Deviation of one sample of it by the accelerometer's noise [N]: no gust.
     """
-    smooth, power, gain = signals.state("gust_unlearnt"), signals.state("gust_power"), filter_gain(bandwidth, dt)
-    smooth = signals.remember("gust_unlearnt", smooth + gain * (unlearnt - smooth))
-    power = signals.remember("gust_power", power + filter_gain(1.0 / CALM_TIME, dt) * (smooth**2 - power))
+    directions = 1 if unlearnt.numel() == 1 else 2
+    smooth, power = signals.state(f"{name}_unlearnt", unlearnt.numel()), signals.state(f"{name}_power")
+    gain = filter_gain(bandwidth, dt)
+    smooth = signals.remember(f"{name}_unlearnt", smooth + gain * (unlearnt - smooth))
+    squared = ca.sumsqr(smooth) / directions
+    power = signals.remember(f"{name}_power", power + filter_gain(1.0 / CALM_TIME, dt) * (squared - power))
     noise = vibration**2 * gain / (2.0 - gain)
     gust = ca.fmax(power - NOISE_POWERS * noise, 0.0)
     return gust / (gust + CALM_AIR**2 + noise)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import casadi as ca
 
+from ibvs_qp.config import ContactSettings
 from ibvs_qp.model.inputs import Body, Contact, clamp
 from ibvs_qp.symbolic.signals import Signals
 
@@ -13,8 +14,6 @@ ASSUMED_FRICTION, FRICTION_RANGE = 0.3, (0.02, 1.2)
 AVERAGING_TIME = 0.5
 #: Push above which the ratio is meaningful [N]; sliding speed likewise [m/s], or this part of a slower command.
 LEAST_PUSH, LEAST_SPEED, SLOW_RATIO = 1.5, 0.02, 0.5
-#: After a tip has not followed the commanded travel for this long [s], the estimate rises at this rate [1/s].
-PATIENCE, RISE = 0.4, 0.3
 
 #: A slide of this length has measured the friction [s]: 0.08 m at the acceleration of a stroke; what is left of the
 #: first value is then 14 %, so that a reach at friction 0.8 is 5 % too large at most.
@@ -29,20 +28,20 @@ def cautious_friction(signals: Signals, friction: ca.SX, assumed: float) -> ca.S
 
 def estimated_friction(
     signals: Signals,
+    settings: ContactSettings,
     body: Body,
     contact: Contact,
     tip: ca.SX,
     travel: ca.SX,
     sliding_command: float,
-    stuck_speed: float,
 ) -> tuple[ca.SX, ca.SX]:
     r"""Friction coefficient before and after this tick.
 
     While sliding :math:`\mu` follows :math:`-F_t / f`; while the tip is stuck against a commanded travel it rises. Tip
     velocity and travel are in B [m/s], (3,): a vehicle that turns about a stuck tip moves, its tip does not.
-    ``sliding_command`` is the commanded speed above which the tip shall slide, ``stuck_speed`` the largest speed of a
-    stuck tip [m/s].
+    ``sliding_command`` is the commanded speed above which the tip shall slide [m/s].
     """
+    stuck_speed = settings.stuck_speed_m_s
     before, stuck = signals.state("friction", start=ASSUMED_FRICTION), signals.state("friction_stuck")
     speed = ca.norm_2(travel)
     direction = travel / ca.fmax(speed, 1e-9)
@@ -52,8 +51,8 @@ def estimated_friction(
     still = ca.logic_and(speed > sliding_command, along < stuck_speed)
     waited = ca.if_else(still, stuck + body.dt, 0.0)
     signals.remember("friction_stuck", ca.if_else(watching, waited, stuck))
-    raised = ca.fmin(before + RISE * body.dt, FRICTION_RANGE[1])
-    value = ca.if_else(ca.logic_and(watching, waited > PATIENCE), raised, before)
+    raised = ca.fmin(before + settings.friction_rise_1_s * body.dt, FRICTION_RANGE[1])
+    value = ca.if_else(ca.logic_and(watching, waited > settings.friction_patience_s), raised, before)
     least = ca.fmin(LEAST_SPEED, ca.fmax(SLOW_RATIO * speed, stuck_speed))
     ratio = clamp(-ca.dot(direction, body.wrench[:3]) / ca.fmax(contact.push, LEAST_PUSH), *FRICTION_RANGE)
     slides = ca.logic_and(speed > sliding_command, along >= least)

@@ -177,7 +177,9 @@ def _names(kind: type, but: str = "") -> tuple[str, ...]:
 #: Scalar inputs of contact, reference and every line.
 CONTACT, TARGET, LINE = _names(Contact, "normal"), _names(Target), _names(Line, "index")
 #: Outputs of every line, "line_0.error" and so on (`ibvs_qp.tasks.line.LineState`).
-LINE_OUTPUTS = "error rate integral rho_error rho_rate angle_error angle_rate weight".split()
+LINE_OUTPUTS = (
+    "error rate integral rho_error rho_rate analytic_command angle_error angle_rate angle_command weight".split()
+)
 
 
 def gravity_direction(attitude: ca.SX) -> ca.SX:

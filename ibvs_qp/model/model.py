@@ -31,6 +31,8 @@ T = TypeVar("T")
 
 #: Force or moment given up in the last step above which integrals stop [N, N m].
 WINDUP_WRENCH = 0.5
+#: A row filter of less than this is none [s]: it keeps the exponent finite.
+LEAST_FILTER = 1e-5
 
 
 class Model:
@@ -46,6 +48,7 @@ class Model:
         gains: The feedback gains, symbols under the names of `ibvs_qp.config.Gains`.
         thrust: u [N], (n,).
         acceleration: nu_dot in B [m/s^2, rad/s^2], (6,).
+        acceleration_now: nu_dot of the lagged thrusts; acceleration_commanded: of the last command, (6,).
         wrench: M nu_dot, the net wrench without contact [N, N m], (6,).
         body, contact, target, lines: Inputs (`ibvs_qp.model.inputs`).
         wall: Axes of the wall in B.
@@ -83,7 +86,8 @@ class Model:
         self.body = dataclasses.replace(body, rate=rate)
         self.rate_ahead = rate + config.angular_rate.lead_s * angular_acceleration
         self.wall = wall_axes(self.body, self.contact)
-        self.attitude = attitude(self.body, self.contact, self.target, self.rate_ahead)
+        bandwidth = config.angular_rate.attitude_bandwidth_hz
+        self.attitude = attitude(signals, self.body, self.contact, self.target, self.rate_ahead, bandwidth)
         target = self.target
         velocity = ca.vertcat(target.velocity_right, target.velocity_down)
         self.travel = self.wall.in_body(target.velocity_right, target.velocity_down)
@@ -97,6 +101,9 @@ class Model:
         self.acceleration_per_thrust = ca.DM(inverse_mass @ self.effectiveness)
         self.free_acceleration = ca.sparsify(inverse_mass) @ self.bias_wrench
         self._rotor_limits()
+        flying = self._motors.ready  # before the first command the thrusts are unknown
+        self.acceleration_now = ca.if_else(flying, self.acceleration_of(self._motors.thrusts), 0.0)
+        self.acceleration_commanded = self.acceleration_of(self.last_thrust)
         planned = self.wall.in_body(target.travel_right, target.travel_down)
         ahead = ca.if_else(ca.norm_2(self.travel) > STANDING_SPEED, self.travel, planned)
         self.reach = push_reach(signals, vehicle, self.wall.normal, ahead, friction, static_wrench)
@@ -115,8 +122,7 @@ class Model:
         signals, config, vehicle = self.signals, self.config, self.config.vehicle
         body, contact = self.body, self.contact
         tip = body.velocity_of(vehicle.tip_position_m)
-        stuck_speed = config.contact.stuck_speed_m_s
-        before, friction = estimated_friction(signals, body, contact, tip, self.travel, SLIDING_COMMAND, stuck_speed)
+        before, friction = estimated_friction(signals, config.contact, body, contact, tip, self.travel, SLIDING_COMMAND)
         signals.output("friction", friction)
         expected, felt_moment = ca.SX.zeros(6), ca.SX.zeros(3)
         if config.contact_feedforward:
@@ -174,6 +180,30 @@ class Model:
             "contact_weight": self.contact_weight,
         }.items():
             self.output(name, value)
+
+    def acceleration_of(self, thrusts: ca.SX) -> ca.SX:
+        r"""Acceleration :math:`\dot\nu = M^{-1}(B u + h)` of given thrusts [m/s^2, rad/s^2], (6,)."""
+        return self.acceleration_per_thrust @ thrusts + self.free_acceleration
+
+    def at(self, row: ca.SX, acceleration: ca.SX) -> ca.SX:
+        """Value of a row, linear in `acceleration`, at another acceleration."""
+        # The Jacobian shares the row's nodes; ca.substitute would copy its graph.
+        return ca.jacobian(row, self.acceleration) @ acceleration
+
+    def filtered(self, target: ca.SX, row: ca.SX, time_s: ca.SX) -> ca.SX:
+        r"""Target of a row behind a filter that starts at the last achieved command.
+
+        .. math:: t + k_u (J \dot\nu_{commanded} - t), \qquad k_u = e^{-\Delta t / T}
+
+        The command is the one within the limits, so that a filter never winds up.
+
+        Args:
+            target: t, in the unit of the row.
+            row: :math:`J \dot\nu`.
+            time_s: T [s]; 0 is no filter.
+        """
+        share = ca.exp(-self.config.tick_s / ca.fmax(time_s, LEAST_FILTER))
+        return target + share * (self.at(row, self.acceleration_commanded) - target)
 
     @property
     def normal(self) -> ca.SX:

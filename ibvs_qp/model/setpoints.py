@@ -47,8 +47,10 @@ class LineSetpoint:
     integral: float
     rho_error: float
     rho_rate: float
+    analytic_command: float
     angle_error: float
     angle_rate: float
+    angle_command: float
     weight: float
 
 

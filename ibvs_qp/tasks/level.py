@@ -34,4 +34,5 @@ class LevelTask(Task):
         gains, (soft, _) = model.gains, pivot_stiffness(model.config, model.gains)
         level = [1.0 - line.vertical for line in model.lines]
         stiffness = ca.vertcat(gains.attitude_kp, pivot_limited(model, gains.attitude_kp, soft, level))
-        return -stiffness * model.attitude.tilt_error - gains.attitude_kd * model.attitude.tilt_rate_ahead
+        target = -stiffness * model.attitude.tilt_error - gains.attitude_kd * model.attitude.tilt_rate_ahead
+        return model.filtered(target, model.acceleration[3:5], gains.attitude_filter_s)

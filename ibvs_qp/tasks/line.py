@@ -31,7 +31,9 @@ class LineState:
         error: :math:`\rho - (x_t\cos\theta + y_t\sin\theta)` minus its reference, bounded; rate: its rate [1/s].
         integral: Of the error [s].
         rho_error: rho minus its reference, bounded (paper); rho_rate: its rate [1/s].
-        angle_error: theta minus its reference [rad]; angle_rate: its rate [rad/s].
+        analytic_row: Row of the analytic law on the body's acceleration, (1, 6); analytic_command: image acceleration
+            for it [1/s^2].
+        angle_error: theta minus its reference [rad]; angle_rate: its rate [rad/s]; angle_command: [rad/s^2].
         image_rate: Rate of rho in the picture, whatever its reference does [1/s].
         weight: Of the rows, 0 to 1: presence, confidence and variance of the line.
     """
@@ -43,8 +45,11 @@ class LineState:
     integral: ca.SX
     rho_error: ca.SX
     rho_rate: ca.SX
+    analytic_row: ca.SX
+    analytic_command: ca.SX
     angle_error: ca.SX
     angle_rate: ca.SX
+    angle_command: ca.SX
     image_rate: ca.SX
     weight: ca.SX
 
@@ -52,12 +57,12 @@ class LineState:
 class LineTask(Task):
     r"""One line of the picture converges to its reference, as seen from the tip's wall point.
 
-    .. math:: L S \dot\nu = -(K_p e + K_d \dot e + K_i \textstyle\int e), \qquad
+    .. math:: L S \dot\nu = -(K_p e + K_d (\dot e + T L S \dot\nu_{now}) + K_i \textstyle\int e), \qquad
               e = \rho - (x_t\cos\theta + y_t\sin\theta) - (\rho_{ref} - x_0 \cos\theta_{ref} - y_0 \sin\theta_{ref})
 
     with the row :math:`L = L_\rho + (x_t \sin\theta - y_t \cos\theta) L_\theta` and (x_t, y_t) the image of the point
-    where the tip meets the wall, (x_0, y_0) that of a level vehicle square to it: endpoint closed loop. The angle row
-    has no integral and yields to level flight.
+    where the tip meets the wall, (x_0, y_0) that of a level vehicle square to it: endpoint closed loop. T is the lead
+    against the motors' lag; `Model.filtered` follows. The angle row has no integral and yields to level flight.
     """
 
     weight_settings = ("weights.line", "weights.line_angle")
@@ -80,7 +85,7 @@ class LineTask(Task):
                 name=f"{self.name}_angle",
                 unit="rad/s^2",
                 expression=line.row_theta @ acceleration,
-                target=self.angle_target(model),
+                target=line.angle_command,
                 weight=weights.line_angle * line.weight,
             ),
         ]
@@ -92,13 +97,23 @@ class LineTask(Task):
 
     def target(self, model: Model) -> ca.SX:
         """Image acceleration of the error [1/s^2]."""
-        gains, line = model.gains, line_state(model, self.index)
-        return -(gains.line_kp * line.error + gains.line_kd * line.rate + gains.line_ki * line.integral)
+        line, row = line_state(model, self.index), self.error_row(model) @ model.camera_acceleration
+        return image_command(model, row, line.error, line.rate, line.integral)
 
-    def angle_target(self, model: Model) -> ca.SX:
-        """Image acceleration of the angle [rad/s^2]."""
-        gains, line = model.gains, line_state(model, self.index)
-        return -(gains.theta_kp * line.angle_error + gains.theta_kd * line.angle_rate)
+
+def _along_wall(model: Model) -> ca.SX:
+    """Acceleration without the part of a push, which the wall takes, (6,)."""
+    linear = model.acceleration[:3]
+    pushed = model.contact_weight * ca.dot(model.normal, linear) * model.normal
+    return ca.vertcat(linear - pushed, model.acceleration[3:])
+
+
+def image_command(model: Model, row: ca.SX, error: ca.SX, rate: ca.SX, integral: ca.SX) -> ca.SX:
+    """Image acceleration by the law of a line [1/s^2]; ``row`` is the acceleration that the thrusts give it."""
+    gains = model.gains
+    ahead = rate + gains.line_lead_s * model.at(row, model.acceleration_now)
+    command = -(gains.line_kp * error + gains.line_kd * ahead + gains.line_ki * integral)
+    return model.filtered(command, row, gains.line_filter_s)
 
 
 def line_state(model: Model, index: int) -> LineState:
@@ -117,16 +132,25 @@ def _line_state(model: Model, line: Line) -> LineState:
     row = endpoint_line_row((row_rho, row_theta), line.theta, view.tip)
     moving, filtered = model.body.velocity_known, _differentiated(model, line, error, row @ view.relative_twist)
     bounded = clamp(error, -ERROR_BOUND, ERROR_BOUND)
+    integral = _integral(model, line, bounded)
+    rho_error = clamp(line.rho - line.rho_reference, -ERROR_BOUND, ERROR_BOUND)
+    rho_rate = ca.if_else(moving, row_rho @ view.relative_twist, filtered)
+    analytic_row = (row if model.config.analytic_line_point == "tip" else row_rho) @ model.camera_twist
+    followed = (bounded, filtered) if model.config.analytic_line_point == "tip" else (rho_error, rho_rate)
+    angle_error, angle_rate = line.theta - line.theta_reference, ca.if_else(moving, row_theta @ view.twist, 0.0)
     state = LineState(
         row_rho=row_rho,
         row_theta=row_theta,
         error=bounded,
         rate=filtered,
-        integral=_integral(model, line, bounded),
-        rho_error=clamp(line.rho - line.rho_reference, -ERROR_BOUND, ERROR_BOUND),
-        rho_rate=ca.if_else(moving, row_rho @ view.relative_twist, filtered),
-        angle_error=line.theta - line.theta_reference,
-        angle_rate=ca.if_else(moving, row_theta @ view.twist, 0.0),
+        integral=integral,
+        rho_error=rho_error,
+        rho_rate=rho_rate,
+        analytic_row=analytic_row,
+        analytic_command=image_command(model, analytic_row @ _along_wall(model), *followed, integral),
+        angle_error=angle_error,
+        angle_rate=angle_rate,
+        angle_command=-(model.gains.theta_kp * angle_error + model.gains.theta_kd * angle_rate),
         image_rate=ca.if_else(moving, row_rho @ view.twist, filtered),
         weight=line.present * line.confidence / (1.0 + ca.fmax(line.variance, 0.0) / weights.line_sigma**2),
     )

@@ -8,7 +8,7 @@ import casadi as ca
 
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.rows import TaskRow
-from ibvs_qp.tasks.line import LineTask, line_state
+from ibvs_qp.tasks.line import LineTask, image_command, line_state
 
 #: Farther from the image centre than any line that validation accepts [normalised].
 FAR = 1e3
@@ -29,8 +29,8 @@ class PaperLineTask(LineTask):
 
     def target(self, model: Model) -> ca.SX:
         """Image acceleration of rho [1/s^2]."""
-        gains, line = model.gains, line_state(model, self.index)
-        return -(gains.line_kp * line.rho_error + gains.line_kd * line.rho_rate + gains.line_ki * line.integral)
+        line, row = line_state(model, self.index), self.error_row(model) @ model.camera_acceleration
+        return image_command(model, row, line.rho_error, line.rho_rate, line.integral)
 
     def rows(self, model: Model) -> list[TaskRow]:
         """Two rows: rho [1/s^2] and angle [rad/s^2]."""

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ibvs_qp.config import VehicleParams
 from ibvs_qp.model.feedforward import moment_lag
-from ibvs_qp.model.inputs import LEAST_GAIN, Contact, clamp
+from ibvs_qp.model.inputs import LEAST_GAIN, clamp
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.rows import TaskRow
 from ibvs_qp.tasks.task import Task
@@ -18,10 +17,12 @@ FORCE_INTEGRAL_BOUND = 8.0
 class PushTask(Task):
     r"""Net force along n equals the force law in contact [N], weight lambda.
 
-    .. math:: F = F_{ref} + K_{sp} e_s + K_{sd} \dot e_s + K_{fp} (F_{ref} - f) + K_{fi} \int (F_{ref} - f)
+    .. math::
+        F = F_{ref} + K_{sp} e_s + K_{sd} (\dot e_s + T \ddot e_s) + K_{fp} (F_{ref} - f) + K_{fi} \int (F_{ref} - f)
 
     F_ref is the push reference within reach times the ramp after touch, f the measured push, e_s the distance of the
-    tip to the wall. (Paper, equation 14, with the sign of the force feedback corrected.)
+    tip to the wall, T the lead against the motors' lag; `Model.filtered` follows. (Paper, equation 14, with the sign of
+    the force feedback corrected.)
     """
 
     weight_settings = ("weights.push",)
@@ -47,7 +48,8 @@ class PushTask(Task):
         softness = ca.fmin(1.0, model.config.contact.full_gain_stiffness_n_m / contact.stiffness)
         proportional = softness * _quiet(model) * gains.force_kfp
         feedback = proportional * error + gains.force_kfi * self._integral(model, reference)
-        return reference + feedback + self._impedance(model)
+        target = reference + feedback + self._impedance(model)
+        return model.filtered(target, model.force_along_normal, gains.push_filter_s)
 
     def _integral(self, model: Model, reference: ca.SX) -> ca.SX:
         """Integral of the force error [N s]: zero out of contact; while thrusts are limited it only falls.
@@ -75,7 +77,7 @@ class PushTask(Task):
         if not config.impedance:
             return ca.SX(0.0)
         gains = model.gains
-        damping = _quiet(model) * gains.force_ksd * predicted_rate(config.vehicle, contact)
+        damping = _quiet(model) * gains.force_ksd * predicted_rate(model)
         force = gains.force_ksp * contact.distance + damping
         return ca.if_else(contact.known, force, 0.0)
 
@@ -89,9 +91,9 @@ def _quiet(model: Model) -> ca.SX:
     return 1.0 / (1.0 + (model.contact.rate_noise / model.config.contact.rate_quiet_m_s) ** 4)
 
 
-def predicted_rate(vehicle: VehicleParams, contact: Contact) -> ca.SX:
-    r"""Rate of the distance one mean motor lag ahead, :math:`\dot e_s + \tau \ddot e_s` [m/s].
+def predicted_rate(model: Model) -> ca.SX:
+    r"""Rate of the distance after the lead, :math:`\dot e_s + T \ddot e_s` [m/s].
 
     A touch on a stiff wall lasts 80 ms. Damping that comes one motor lag late arrives when the tip already leaves.
     """
-    return contact.rate + vehicle.motor_lag_s * contact.acceleration
+    return model.contact.rate + model.gains.push_lead_s * model.contact.acceleration

@@ -93,7 +93,7 @@ def _approach(model: Model) -> Approach:
     settings = model.config.contact
     retreat = ca.fmax(settings.retreat_speed_m_s, model.target.standoff / settings.retreat_time_s)
     speed = ca.fmin(ca.fmax(gains.standoff_kp * error, -retreat), allowed)
-    speed_error = speed + predicted_rate(model.config.vehicle, contact)
+    speed_error = speed + predicted_rate(model)
     search = model.output("search_force", _search(model, speed_error))
     return Approach(allowed=model.output("approach_speed", allowed), speed_error=speed_error, search=search)
 

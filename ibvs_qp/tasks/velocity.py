@@ -18,7 +18,11 @@ VELOCITY_INTEGRAL_BOUND = 0.8
 
 
 class VelocityTask(Task):
-    r"""Acceleration :math:`K_p e + K_i \int e` of the velocity error e along right and down of the wall plane."""
+    r"""Acceleration :math:`K_p e + K_i \int e` of the velocity error e along right and down of the wall plane.
+
+    The proportional part takes e less T times the acceleration of the lagged thrusts, T the lead against the motors'
+    lag; `Model.filtered` follows.
+    """
 
     weight_settings = ("weights.velocity",)
 
@@ -54,7 +58,7 @@ def stationary_sideways_weight(weights: Weights) -> float:
 
 
 def velocity_command(model: Model) -> ca.SX:
-    """Accelerations right and down [m/s^2], (2,); zero while no velocity is known."""
+    """Accelerations right and down [m/s^2], (2,); before the filter zero while no velocity is known."""
     return model.once(("velocity",), lambda: model.output("velocity_command", ca.vertcat(*_commands(model))))
 
 
@@ -69,5 +73,9 @@ def _commands(model: Model) -> list[ca.SX]:
         moved = clamp(free[axis] * (old + body.dt * error), -bound, bound)
         integral = ca.if_else(ca.logic_and(body.velocity_known, model.integrate_in_plane), moved, old)
         model.signals.remember(f"velocity_integral_{axis}", integral)
-        commands.append(ca.if_else(body.velocity_known, gains.velocity_kp * error + gains.velocity_ki * integral, 0.0))
+        row = ca.dot(direction, model.acceleration[:3])
+        ahead = error - gains.velocity_lead_s * model.at(row, model.acceleration_now)
+        command = gains.velocity_kp * ahead + gains.velocity_ki * integral
+        command = ca.if_else(body.velocity_known, command, 0.0)
+        commands.append(model.filtered(command, row, gains.velocity_filter_s))
     return commands

@@ -44,4 +44,5 @@ class YawTask(Task):
         facing = -stiffness * model.attitude.yaw + damping
         turned = ca.fabs(model.attitude.yaw) > LARGEST_TURN  # behind the seam at 180 degrees it would drive the spin
         bounded = clamp(ca.if_else(turned, damping, facing), -LOST_ACCELERATION, LOST_ACCELERATION)
-        return ca.if_else(model.attitude.tilted, bounded, facing)
+        target = ca.if_else(model.attitude.tilted, bounded, facing)
+        return model.filtered(target, model.acceleration[5], gains.yaw_filter_s)

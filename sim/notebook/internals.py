@@ -136,7 +136,7 @@ def _selected_thrusts(controller: HybridController) -> np.ndarray:
     drops the motion along it.
     """
     setpoints = controller.setpoints
-    gains, vehicle, contact = setpoints.config.gains, setpoints.config.vehicle, setpoints.contact_weight
+    vehicle, contact = setpoints.config.vehicle, setpoints.contact_weight
     mass = vehicle.mass_matrix
     along = (contact * setpoints.push_command + (1.0 - contact) * setpoints.standoff_command) / vehicle.mass_kg
     right, down = setpoints.velocity_command
@@ -148,11 +148,7 @@ def _selected_thrusts(controller: HybridController) -> np.ndarray:
     if setpoints.lines:
         level = min(setpoints.lines, key=lambda line: abs(line.rho))
         matrix = np.vstack([*(line.matrix[0] for line in setpoints.lines), level.matrix[1]]) @ selection
-        target = [
-            -(gains.line_kp * line.rho_error + gains.line_kd * line.rho_rate + gains.line_ki * line.integral)
-            for line in setpoints.lines
-        ]
-        target.append(-(gains.theta_kp * level.angle_error + gains.theta_kd * level.angle_rate))
+        target = [*(line.analytic_command for line in setpoints.lines), level.angle_command]
         inverse = np.linalg.pinv(matrix, rcond=RANK_TOLERANCE)
         acceleration = acceleration + inverse @ (np.array(target) - matrix @ acceleration)
     return setpoints.inverse @ (mass @ acceleration - setpoints.bias_wrench)

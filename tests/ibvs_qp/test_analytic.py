@@ -18,7 +18,7 @@ from ibvs_qp.config import ControllerConfig
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.frames import camera_twist_matrix
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL, Reference
-from ibvs_qp.model.interaction_matrix import line_interaction_matrix
+from ibvs_qp.model.interaction_matrix import endpoint_line_row, line_interaction_matrix
 from ibvs_qp.model.setpoints import Setpoints
 
 CONFIG = ControllerConfig()
@@ -224,3 +224,25 @@ def test_reset_repeats_to_the_bit_and_modes_are_named() -> None:
     assert controller.step(measured(1), Reference(contact=True)).mode == "approach"
     broken = controller.step(replace(measured(2), stamp_ns=TICK_NS), Reference())
     assert broken.mode == "hold" and broken.outcome is Outcome.HOLD
+
+
+@pytest.mark.parametrize("point", ["centre", "tip"])
+@pytest.mark.parametrize("angle", [True, False])
+def test_the_switches_of_the_line_rows(point: str, angle: bool) -> None:
+    """Unlimited thrusts give every followed error the image acceleration of the law; roll follows level flight."""
+    config = replace(CONFIG, analytic_line_point=point, analytic_angle_row=angle)
+    setpoints = analytic_setpoints(config)
+    setpoints.update(*random_tick(np.random.default_rng(4), 2))
+    setpoints.step.inputs["contact_weight"][0] = 0.0
+    evaluate_law(setpoints)
+    acceleration = analytic_wrench(setpoints) / MASSES
+    for line in setpoints.lines:
+        row = endpoint_line_row(line.matrix, line.theta, line.tip) if point == "tip" else line.matrix[0]
+        error, rate = (line.error, line.rate) if point == "tip" else (line.rho_error, line.rho_rate)
+        gains = config.gains
+        wanted = -(gains.line_kp * error + gains.line_kd * rate + gains.line_ki * line.integral)
+        assert line.analytic_command == pytest.approx(wanted, abs=1e-12)
+        assert row @ acceleration == pytest.approx(wanted, abs=1e-9)
+    level = min(setpoints.lines, key=lambda line: abs(line.rho))
+    follows = level.matrix[1] @ acceleration == pytest.approx(level.angle_command, abs=1e-9)
+    assert follows == angle

@@ -44,7 +44,16 @@ def test_slower_motors_slow_every_loop_alike() -> None:
     assert slow.force_ksd == pytest.approx(0.5 * 0.5 * tuned.force_ksd)
     assert slow.force_kfp == tuned.force_kfp
     fast = VehicleParams(motor_lag_up_s=0.02, motor_lag_down_s=0.03)
-    assert ControllerConfig(vehicle=fast).gains == tuned
+    quick = ControllerConfig(vehicle=fast).gains
+    assert quick == dataclasses.replace(tuned, push_lead_s=Derived(0.025))
+
+
+def test_leads_and_filters_follow_the_motors_lag() -> None:
+    slow, tuned = ControllerConfig(vehicle=LIGHT).gains, Gains()
+    leads = [field.name for field in dataclasses.fields(Gains) if field.metadata["unit"] == "s"]
+    assert len(leads) == 8
+    for name in leads:
+        assert getattr(slow, name) == pytest.approx(2.0 * getattr(tuned, name))
 
 
 @pytest.mark.parametrize("law", ["qp", "paper"])

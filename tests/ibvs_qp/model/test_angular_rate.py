@@ -89,20 +89,25 @@ def test_a_bandwidth_out_of_range_is_refused() -> None:
 
 
 @pytest.mark.parametrize("omega", [9.0, 20.0])
-def test_the_sensitivity_is_that_of_the_flown_loop(omega: float) -> None:
-    """Response of pitch to a sinusoidal moment through the block, the lead and the motors, against the formula."""
+@pytest.mark.parametrize(("filter_s", "lag_ratio"), [(0.0, 1.0), (0.012, 1.0), (0.012, 1.3), (0.006, 0.75)])
+def test_the_sensitivity_is_that_of_the_flown_loop(omega: float, filter_s: float, lag_ratio: float) -> None:
+    """Response of pitch to a sinusoidal moment through the block, lead, filter and motors, against the formula."""
     kp, kd, lead = 80.0, 22.0, 0.03
-    loop = MotionLoop(kp=kp, kd=kd, lag=LAG, delay=0.5 * TICK, lead=lead, bandwidth_hz=12.5)
-    block, angle, rate, actual, record = estimator(), 0.0, 0.0, 0.0, []
+    loop = MotionLoop(
+        kp=kp, kd=kd, lag=LAG, delay=0.5 * TICK, lead=lead, bandwidth_hz=12.5, filter_s=filter_s, lag_ratio=lag_ratio
+    )
+    block, angle, rate, actual, record, commanded = estimator(), 0.0, 0.0, 0.0, [], 0.0
+    share = math.exp(-TICK / filter_s) if filter_s else 0.0
     thrusts = HOVER
     for tick in range(2500):
         value = block(thrust_last=thrusts, commanded=float(tick > 0), angular_velocity=[0.0, rate, 0.0])
-        wanted = -kp * angle - kd * (value[1] + lead * value[4])
+        wanted = share * commanded - (1.0 - share) * (kp * angle + kd * (value[1] + lead * value[4]))
+        commanded = wanted
         thrusts = HOVER + np.linalg.solve(MATRIX, [0.0, 0.0, 0.0, 0.0, PITCH_INERTIA * wanted, 0.0])
         disturbed = wanted + 0.1 * math.sin(omega * tick * TICK)  # at the command, where the loop is broken
         for _ in range(8):
             step = TICK / 8
-            actual += (1.0 - math.exp(-step / LAG)) * (disturbed - actual)
+            actual += (1.0 - math.exp(-step / (lag_ratio * LAG))) * (disturbed - actual)
             angle, rate = angle + step * rate, rate + step * actual
         record.append(disturbed)
     last = np.array(record[1000:])

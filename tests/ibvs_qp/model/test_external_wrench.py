@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from symbolic_block import Block
@@ -21,14 +23,17 @@ TICK, WEIGHT, STILL = 0.004, VEHICLE.mass_kg * 9.81, np.array([0.0, 0.0, -9.81])
 GUST_BANDWIDTH = ControllerConfig().contact.gust_bandwidth_rad_s
 
 
-def observer(adapt_in_contact: bool = True) -> Block:
+def observer(adapt_in_contact: bool = True, plane_bandwidth: float | None = None) -> Block:
     """The observer on its own; the moment fed forward is the measured contact moment."""
+    config = ControllerConfig(contact_feedforward=adapt_in_contact)
+    if plane_bandwidth is not None:
+        config = replace(config, contact=replace(config.contact, plane_bandwidth_rad_s=plane_bandwidth))
 
     def build(signals):
         body, contact = Body.of(signals), Contact.of(signals)
         return external_wrench(
             signals,
-            ControllerConfig(contact_feedforward=adapt_in_contact),
+            config,
             MATRIX,
             body,
             body.wrench[3:],
@@ -197,3 +202,28 @@ def test_without_feedforward_contact_moments_are_not_learnt() -> None:
     for _ in range(1000):
         block(thrust_last=thrusts, commanded=1.0, specific_force=STILL)
     np.testing.assert_array_equal(wrench(block), 0.0)
+
+
+def gust_in_the_plane(plane_bandwidth: float, gust: float, noise: float = 0.0) -> np.ndarray:
+    """Force that the observer gives downwards at the wall, in a gust down of period 2 s [N], (n,)."""
+    block, rng, found = observer(plane_bandwidth=plane_bandwidth), np.random.default_rng(2), []
+    block.contact(touching=1.0, acceleration_noise=noise)
+    hovering = np.linalg.solve(MATRIX, -np.array([0, 0, WEIGHT, 0, 0, 0]))
+    for tick in range(2500):
+        force = gust * np.sin(np.pi * tick * TICK)
+        felt = STILL + [0.0, 0.0, force / VEHICLE.mass_kg] + noise * rng.standard_normal(3)
+        without_lag(block, hovering, specific_force=felt)
+        found.append(wrench(block)[2] - force)
+    return np.array(found)[500:]
+
+
+def test_in_the_plane_a_gust_is_learnt_faster_than_calm_air() -> None:
+    """A first-order observer of bandwidth w leaves the part W / sqrt(w^2 + W^2) of a gust at W = pi rad/s."""
+    left = {most: float(np.sqrt(np.mean(gust_in_the_plane(most, 2.0) ** 2))) for most in (1.5, 10.0)}
+    assert left[1.5] == pytest.approx(np.sqrt(2.0) * np.pi / np.hypot(1.5, np.pi), rel=0.02)
+    assert left[10.0] < 1.25 * np.sqrt(2.0) * np.pi / np.hypot(10.0, np.pi)
+
+
+def test_in_the_plane_noise_of_the_accelerometer_is_no_gust() -> None:
+    slow, fast = (float(np.std(gust_in_the_plane(most, 0.0, noise=0.42))) for most in (1.5, 10.0))
+    assert fast < 1.3 * slow

@@ -6,11 +6,14 @@ import numpy as np
 import pytest
 from symbolic_block import Block
 
-from ibvs_qp.model.friction import ASSUMED_FRICTION, FRICTION_RANGE, PATIENCE, RISE, estimated_friction
+from ibvs_qp.config import ControllerConfig
+from ibvs_qp.model.friction import ASSUMED_FRICTION, FRICTION_RANGE, estimated_friction
 from ibvs_qp.model.inputs import Body, Contact
 
 #: Place of the tip, ahead of the centre of mass and above it [m].
 TIP = (0.6, 0.0, -0.1)
+SETTINGS = ControllerConfig().contact
+PATIENCE, RISE = SETTINGS.friction_patience_s, SETTINGS.friction_rise_1_s
 
 
 def estimator(travel: float = 0.1) -> Block:
@@ -19,7 +22,7 @@ def estimator(travel: float = 0.1) -> Block:
     def build(signals):
         body, touch = Body.of(signals), Contact.of(signals)
         tip = body.velocity_of(TIP)
-        return estimated_friction(signals, body, touch, tip, signals.input("travel", 3), 0.01, 0.005)[1]
+        return estimated_friction(signals, SETTINGS, body, touch, tip, signals.input("travel", 3), 0.01)[1]
 
     block = Block(build)
     block.contact(touching=1.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -309,3 +310,19 @@ def test_barriers_can_be_left_out() -> None:
     bare = HybridController(ControllerConfig(barriers=False))
     assert len(bare.problem.row_names) == 6
     assert len(bare.problem.variable_names) == 6
+
+
+@pytest.mark.parametrize("turns", [True, False])
+def test_a_view_barrier_that_only_moves_the_vehicle_has_no_rotation(turns: bool) -> None:
+    limits = dataclasses.replace(ControllerConfig().limits, view_rotation=turns)
+    controller = HybridController(ControllerConfig(limits=limits))
+    pack(controller, *random_tick(np.random.default_rng(3), 2), share=1.0)
+    names = [row.name for row in controller.problem.limit_rows]
+    matrix = dense(controller)[2]
+    per_thrust = np.linalg.inv(controller.config.vehicle.mass_matrix) @ control_effectiveness(
+        controller.config.vehicle.geometry
+    )
+    for role in (HORIZONTAL, VERTICAL):
+        row = matrix[names.index(f"view_{role}"), :6] @ np.linalg.inv(per_thrust)
+        assert (np.abs(row[3:]).max() > 1e-6) == turns
+        assert np.abs(row[:3]).max() > 0.1
