@@ -32,7 +32,7 @@ LEAST_OVERLAP_M = 0.008
 ROUNDING = 1e-9
 #: Gusts that a job must stand, in standard deviations: stronger ones blow a twentieth of the time.
 GUST_DEVIATIONS = 2.0
-#: Acceleration to the side that is left against wind [m/s^2], as much as the approach brakes with.
+#: Acceleration to the side that is left against wind [m/s^2]; assumed: a drawn scene with less struck the wall.
 CONTROL_RESERVE_M_S2 = 0.5
 
 
