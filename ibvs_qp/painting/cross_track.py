@@ -2,14 +2,15 @@ r"""Place of the tip across the strokes, from the odometer and every edge in vie
 
 A Kalman filter with these states: v of the true tip; :math:`\delta`, by which the picture shows the tip at a larger v
 than it has (camera mount, arm, attitude); the odometer's drift; the direction of the strokes against the odometer's
-axes; :math:`\beta`, by which an edge ahead seems to lie at a larger v than the same edge behind; and, at `NODES` places
-along the last stroke and the one being laid, the amount by which each lies at a larger v than its map says. A line at
-v = L then appears at the place :math:`p = L - v - \delta` beside the tip:
+axes; :math:`\beta`, by which an edge ahead seems to lie at a larger v than the same edge behind; v of the board's far
+edge; and, at `NODES` places along the last stroke and the one being laid, the amount by which each lies at a larger v
+than its map says. A line at v = L then appears at the place :math:`p = L - v - \delta` beside the tip:
 
 ======================================  =====================================
 line                                    L
 ======================================  =====================================
 board edge at which the pattern starts  0
+board edge beyond the last stroke       v of the far edge
 outer edge of the last stroke           map + its error + w/2 + :math:`\beta`
 outer edge of an older stroke           map + w/2 + :math:`\beta`
 own edges behind the brush, w wide      map + its error +-w/2
@@ -54,6 +55,9 @@ DRIFT_STD, DRIFT_WANDER = 1e-3, 1e-9
 #: Standard deviation of the strokes' direction where the board's edge shows it, by the roll of the camera's mount
 #: [rad]; its variance per second [rad^2/s].
 TURN_STD, TURN_WANDER = 8e-3, 1e-9
+#: Variance of the far edge per metre of way across the strokes: its distance from the tip shrinks, and the wall
+#: distance that scales it is known to 1 %, 0.7 mm of a usual pitch [m^2/m].
+FAR_PER_M = 7e-6
 #: Variance of the tip's place in the picture per second: the attitude wanders by 0.1 deg within minutes [m^2/s].
 TIP_WANDER = 1e-9
 #: Part of the paint ahead of and behind the brush that a picture without end points shows, from the tip [m].
@@ -67,8 +71,8 @@ TURN_TIME_S, LARGEST_TURN = 2.0, math.radians(15.0)
 #: Places along a stroke at which the error of its map is a state [-].
 NODES = 24
 
-_V, _TIP, _DRIFT, _TURN, _AHEAD = range(5)
-_LAST, _OWN = slice(5, 5 + NODES), slice(5 + NODES, 5 + 2 * NODES)
+_V, _TIP, _DRIFT, _TURN, _AHEAD, _FAR = range(6)
+_LAST, _OWN = slice(6, 6 + NODES), slice(6 + NODES, 6 + 2 * NODES)
 _STATES = _OWN.stop
 
 
@@ -78,8 +82,7 @@ class CrossTrack:
     Attributes:
         guides: Tracks that were recognised at the last look with their v [m], best first.
         maps: Where the strokes were laid, oldest first.
-        far_edge: v of the board's other edge where it has been in view [m], NaN before.
-        unled: Way of the stroke in progress since the last stroke's edge or the board's was recognised [m].
+        unled: Way of the stroke in progress since the last stroke's edge or one of the board's was recognised [m].
         longest_unled: The longest such way of the stroke [m].
     """
 
@@ -89,7 +92,7 @@ class CrossTrack:
         self._x, self._p = np.zeros(_STATES), np.zeros((_STATES, _STATES))
         self.maps: list[StrokeMap] = []
         self._variances: list[np.ndarray] = []  # of every map but the last, at its nodes [m^2]
-        self.far_edge = math.nan
+        self._far_known = False
         self._roll = 0.0  # of the picture against the odometer's axes, by the board's edge [rad]
         self.guides: dict[int, float] = {}
         self._laying = False
@@ -107,6 +110,11 @@ class CrossTrack:
     def tip_error(self) -> float:
         """By which the picture shows the tip at a larger v [m]."""
         return float(self._x[_TIP])
+
+    @property
+    def far_edge(self) -> float:
+        """Place v of the board's edge beyond the last stroke where it has been in view [m], NaN before."""
+        return float(self._x[_FAR]) if self._far_known else math.nan
 
     @property
     def turn(self) -> float:
@@ -139,7 +147,7 @@ class CrossTrack:
 
     def start(self, edge: PatternLine) -> None:
         """Begin at a distance from the board's edge; what the picture shows is v plus the tip's error."""
-        self._x[:] = 0.0
+        self._x[:], self._far_known = 0.0, False
         self._x[_V] = -edge.place
         seen, tip = edge.track.deviation**2 + BOARD_STD**2, TIP_STD**2
         self._p[:] = 0.0
@@ -162,6 +170,7 @@ class CrossTrack:
         p[_DRIFT, _DRIFT] += DRIFT_WANDER * dt
         p[_TURN, _TURN] += TURN_WANDER * dt
         p[_TIP, _TIP] += TIP_WANDER * dt
+        p[_FAR, _FAR] += FAR_PER_M * abs(dv)
 
     def begin_stroke(self) -> None:
         """The tip begins to paint a stroke; what it paints is remembered."""
@@ -264,8 +273,9 @@ class CrossTrack:
         if (line := self._board_edge(parallel)) is not None:
             guides.append(line)
             self._follow_turn(line, LOOK_S / TURN_TIME_S)
-        self.unled = 0.0 if last is not None or guides else self.unled
-        if (opposite := self._opposite_edge(parallel)) is not None:
+        opposite, known = self._opposite_edge(parallel)
+        self.unled = 0.0 if last is not None or guides or known else self.unled
+        if opposite is not None:
             guides.append(opposite)
         if self._laying:
             guides += self._own_edges(parallel, u, 0.0 if again else ahead)
@@ -390,14 +400,27 @@ class CrossTrack:
         self._p -= np.outer(gain, row @ self._p)
         return line
 
-    def _opposite_edge(self, lines: list[PatternLine]) -> PatternLine | None:
-        """The board's edge beyond the last stroke, by kind and side; its place is remembered."""
+    def _opposite_edge(self, lines: list[PatternLine]) -> tuple[PatternLine | None, bool]:
+        """Correct with the board's edge beyond the last stroke, by kind and side; and whether its place was known.
+
+        An edge elsewhere than expected is another one: its place is known from now on, as well as that of the tip.
+        """
         found = [line for line in lines if line.kind == "board" and line.side < 0 and line.place > 0.0]
         if not found:
-            return None
+            return None, False
+        if self._far_known:
+            row, noise = _row_of_h(), BOARD_STD**2 * BOARD_INDEPENDENT_S / LOOK_S
+            row[_FAR] = 1.0
+            expected = [(line, line.place, row, self.far_edge, 0.0) for line in found]
+            if (line := self._correct(expected, noise, self._config.gates.start_m)) is not None:
+                return line, True
         edge = min(found, key=lambda line: line.place)
-        self.far_edge = self.v + self.tip_error + edge.place
-        return edge
+        x, p, row = self._x, self._p, _row_of_h()
+        x[_FAR], self._far_known = self.v + self.tip_error + edge.place, True
+        p[_FAR] = -row @ p
+        p[:, _FAR] = p[_FAR]
+        p[_FAR, _FAR] = float(row @ p @ row) + BOARD_STD**2 + edge.track.deviation**2
+        return edge, False
 
     def _follow_turn(self, edge: PatternLine, share: float) -> None:
         turn = self.picture_turn + share * math.atan(edge.lean)
