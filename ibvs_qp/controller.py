@@ -37,6 +37,7 @@ from ibvs_qp.tasks import (
     HeightTask,
     LevelTask,
     LineTask,
+    MarginTask,
     PaperLineTask,
     PushTask,
     SmoothnessTask,
@@ -53,7 +54,8 @@ def default_tasks(config: ControllerConfig) -> list[Task]:
     lines: list[Task] = [(PaperLineTask if paper else LineTask)(index) for index in range(config.line_slots)]
     along: list[Task] = [PushTask(), StandoffTask()]
     height: list[Task] = [] if paper else [HeightTask()]
-    return [*lines, *along, LevelTask(), YawTask(), VelocityTask(), *height, EffortTask(), SmoothnessTask()]
+    thrusts: list[Task] = [MarginTask(), EffortTask(), SmoothnessTask()]
+    return [*lines, *along, LevelTask(), YawTask(), VelocityTask(), *height, *thrusts]
 
 
 def default_limits(config: ControllerConfig) -> list[Limit]:

@@ -16,6 +16,9 @@ row, :math:`F(s) = (1 - k_u) / (1 - k_u e^{-s \Delta t})` with :math:`k_u = e^{-
 
 The loop bears any factor on its gain up to M_s / (M_s - 1), and a phase of 2 arcsin(1 / (2 M_s)). T_h is the time
 from a sample to the middle of the hold of its command.
+
+The formula is finite for an unstable loop, too. The same loop in discrete time, with a command that acts one tick after
+its sample, has its poles inside the unit circle if it is stable.
 """
 
 from __future__ import annotations
@@ -70,5 +73,33 @@ class MotionLoop:
 
     @property
     def sensitivity_peak(self) -> float:
-        """M_s: largest amplification of a disturbance; 1 / M_s is the distance of L from -1."""
+        """M_s: largest amplification of a disturbance; 1 / M_s is the distance of L from -1. Infinite if unstable."""
+        if self.spectral_radius >= 1.0:
+            return math.inf
         return float(np.abs(self.sensitivity(FREQUENCIES)).max())
+
+    @property
+    def spectral_radius(self) -> float:
+        """Largest magnitude of a pole per tick; the loop is stable below 1."""
+        from scipy.linalg import expm  # heavy, and no flight needs it
+
+        dt, slow = self.tick_s, self.lag_ratio * self.lag
+        rates = np.zeros((4, 4))  # of position, rate, acceleration and the command that acts
+        rates[0, 1] = rates[1, 2] = 1.0
+        rates[2, 2:] = -1.0 / slow, 1.0 / slow
+        plant = expm(rates * dt)[:3]
+        modelled = 1.0 - math.exp(-dt / self.lag)
+        fresh = 1.0 if math.isinf(self.bandwidth_hz) else 1.0 - math.exp(-2.0 * math.pi * self.bandwidth_hz * dt)
+        kept = math.exp(-dt / self.filter_s) if self.filter_s else 0.0
+        # States: position, rate, acceleration, last command, modelled acceleration, estimated rate, integral.
+        rate = np.array([0.0, fresh, 0.0, 0.0, (1.0 - fresh) * dt, 1.0 - fresh, 0.0])
+        feedback = -self.kd * (rate + self.lead * np.eye(7)[4])
+        feedback[[0, 6]] -= self.kp, self.ki
+        command = (1.0 - kept) * feedback + kept * np.eye(7)[3]
+        step = np.zeros((7, 7))
+        step[:3, :4] = plant
+        step[3], step[5] = command, rate
+        step[4] = modelled * command + (1.0 - modelled) * np.eye(7)[4]
+        step[6, [0, 6]] = dt, 1.0
+        states = 7 if self.ki else 6  # without its gain the integral is no part of the loop
+        return float(np.abs(np.linalg.eigvals(step[:states, :states])).max())

@@ -19,14 +19,14 @@ class AngularRateSettings:
         high=1000.0,
     )
     attitude_bandwidth_hz: float = setting(
-        1000.0,
+        12.0,
         "roll and pitch of the attitude estimate count below, the angular velocity above; 1000 takes them as they are",
         unit="Hz",
         low=0.5,
         high=1000.0,
     )
     lead_s: float = setting(
-        0.03, "damping acts on the rate this far ahead: half of the motors' lag", unit="s", low=0.0, high=0.1
+        0.04, "damping acts on the rate this far ahead: two thirds of the motors' lag", unit="s", low=0.0, high=0.1
     )
 
     def __post_init__(self) -> None:

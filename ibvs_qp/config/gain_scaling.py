@@ -19,16 +19,8 @@ _PAPER = {
     "theta_kp": 7.65,
     "theta_kd": 13.59,
     "body_rotation_gain": 0.3843,
-    "velocity_kp": 1.825,
-    "velocity_ki": 0.3977,
-    "attitude_kp": 35.89,
-    "attitude_kd": 26.87,
-    "yaw_kp": 94.81,
-    "yaw_kd": 23.03,
-    "force_ksp": 115.1,
-    "force_ksd": 57.4,
-    "force_kfp": 0.2153,
-    "force_kfi": 1.424,
+    "line_lead_s": 0.0,
+    "line_filter_s": 0.0,
 }
 #: Seconds in the denominator of a unit: what a gain of that unit takes from slower motors.
 _PER_SECOND = {"1/s": 1, "1/s^2": 2, "1/s^3": 3, "N s/m": 1, "N/m": 2}

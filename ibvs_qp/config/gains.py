@@ -14,14 +14,14 @@ def _gain(default: float, doc: str, *, unit: str = "", high: float) -> Any:
     return setting(Derived(default), doc, unit=unit, low=0.0, high=high)
 
 
-def _lead(of: str, default: float = 0.0) -> Any:
+def _lead(of: str, default: float) -> Any:
     """Setting of a lead against the motors' lag; 0 is none."""
     return _gain(default, f"lead of the {of}: this far ahead by the modelled acceleration", unit="s", high=0.5)
 
 
-def _filter(rows: str) -> Any:
+def _filter(rows: str, default: float) -> Any:
     """Setting of a row filter; 0 is none."""
-    return _gain(0.0, f"filter of the {rows} towards the last achieved command", unit="s", high=0.5)
+    return _gain(default, f"filter of the {rows} towards the last achieved command", unit="s", high=0.5)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,34 +31,34 @@ class Gains:
     Leads and filters are those of rows with the rotors in them (`ibvs_qp.model.model.Model.filtered`).
     """
 
-    line_kp: float = _gain(42.26, "line error to image acceleration", unit="1/s^2", high=1000.0)
-    line_kd: float = _gain(9.29, "line error rate", unit="1/s", high=100.0)
+    line_kp: float = _gain(200.0, "line error to image acceleration", unit="1/s^2", high=1000.0)
+    line_kd: float = _gain(34.0, "line error rate", unit="1/s", high=100.0)
     line_ki: float = _gain(1.148, "integral of the line error", unit="1/s^3", high=100.0)
-    line_lead_s: float = _lead("line error rate")
-    line_filter_s: float = _filter("line rows")
+    line_lead_s: float = _lead("line error rate", 0.045)
+    line_filter_s: float = _filter("line rows", 0.0078)
     theta_kp: float = _gain(33.34, "line angle error", unit="1/s^2", high=400.0)
     theta_kd: float = _gain(9.223, "line angle rate", unit="1/s", high=100.0)
     body_rotation_gain: float = _gain(
         0.4796, "fraction of the body's rotation in line rows while the tip travels", high=1.0
     )
-    velocity_kp: float = _gain(3.215, "velocity error along free directions", unit="1/s", high=50.0)
+    velocity_kp: float = _gain(5.0, "velocity error along free directions", unit="1/s", high=50.0)
     velocity_ki: float = _gain(2.804, "integral of that error", unit="1/s^2", high=50.0)
-    velocity_lead_s: float = _lead("velocity error")
-    velocity_filter_s: float = _filter("velocity rows")
-    attitude_kp: float = _gain(53.07, "roll and pitch", unit="1/s^2", high=400.0)
-    attitude_kd: float = _gain(18.59, "roll and pitch rate", unit="1/s", high=100.0)
-    attitude_filter_s: float = _filter("level rows")
-    yaw_kp: float = _gain(92.85, "yaw to the wall normal", unit="1/s^2", high=400.0)
-    yaw_kd: float = _gain(21.83, "yaw rate", unit="1/s", high=100.0)
-    yaw_filter_s: float = _filter("yaw row")
+    velocity_lead_s: float = _lead("velocity error", 0.055)
+    velocity_filter_s: float = _filter("velocity rows", 0.0112)
+    attitude_kp: float = _gain(300.0, "roll and pitch", unit="1/s^2", high=400.0)
+    attitude_kd: float = _gain(50.0, "roll and pitch rate", unit="1/s", high=100.0)
+    attitude_filter_s: float = _filter("level rows", 0.0058)
+    yaw_kp: float = _gain(150.0, "yaw to the wall normal", unit="1/s^2", high=400.0)
+    yaw_kd: float = _gain(32.0, "yaw rate", unit="1/s", high=100.0)
+    yaw_filter_s: float = _filter("yaw row", 0.0058)
     standoff_kp: float = _gain(2.0, "distance error to approach speed", unit="1/s", high=20.0)
     standoff_kd: float = _gain(5.0, "approach speed error to acceleration", unit="1/s", high=50.0)
-    force_ksp: float = _gain(22.93, "impedance stiffness K_sp", unit="N/m", high=5000.0)
-    force_ksd: float = _gain(34.42, "impedance damping K_sd", unit="N s/m", high=1000.0)
-    force_kfp: float = _gain(0.1852, "force error K_fp, up to contact.full_gain_stiffness_n_m", high=10.0)
-    force_kfi: float = _gain(1.31, "integral of the force error K_fi", unit="1/s", high=50.0)
+    force_ksp: float = _gain(115.1, "impedance stiffness K_sp", unit="N/m", high=5000.0)
+    force_ksd: float = _gain(57.4, "impedance damping K_sd", unit="N s/m", high=1000.0)
+    force_kfp: float = _gain(0.2153, "force error K_fp, up to contact.full_gain_stiffness_n_m", high=10.0)
+    force_kfi: float = _gain(1.424, "integral of the force error K_fi", unit="1/s", high=50.0)
     push_lead_s: float = _lead("rate of the distance, in impedance and approach", 0.0575)
-    push_filter_s: float = _filter("push row")
+    push_filter_s: float = _filter("push row", 0.0)
 
     def __post_init__(self) -> None:
         """Validate."""

@@ -46,7 +46,11 @@ class LimitSettings:
         high=45.0,
     )
     tilt_slack_weight: float = _slack_weight(4000.0, "the tilt barriers", "s^4/rad^2", "ten times the level rows")
-    tilt_rate_1_s: float = _poles(8.0, "the tilt barriers", "half of the motors' 17 1/s; faster ones brake too late")
+    tilt_rate_1_s: float = _poles(
+        12.0,
+        "the tilt barriers",
+        "below the level loop's 17 1/s, whose braking they must not limit; there they brake late",
+    )
     yaw_deg: float = setting(
         None,
         "yaw bound; from propellers and tip if not stated",
@@ -71,9 +75,11 @@ class LimitSettings:
     view_left: float = _view_bound("least rho of an upright guide, its normal to the right", "left")
     view_right: float = _view_bound("largest rho of an upright guide, its normal to the right", "right")
     view_slack_weight: float = _slack_weight(
-        4e4, "the line-in-view barriers", "s^4", "400 times the line rows; at a tenth a guide leaves the picture"
+        4e4, "the line-in-view barriers", "s^4", "400 times the line rows; at a thirtieth a guide leaves the picture"
     )
-    view_rate_1_s: float = _poles(2.0, "the line-in-view barriers", "below the line loop's 5 1/s; not sensitive")
+    view_rate_1_s: float = _poles(
+        10.0, "the line-in-view barriers", "those of the line loop: slower ones hold back its corrections"
+    )
     push_ceiling_ratio: float = setting(
         1.5,
         "push ceiling over the push reference",
@@ -106,7 +112,9 @@ class LimitSettings:
     tilt_barrier: bool = setting(True, "zero-tilt barriers on roll and pitch")
     yaw_barrier: bool = setting(True, "yaw barrier")
     view_barrier: bool = setting(True, "line-in-view barriers")
-    view_rotation: bool = setting(True, "line-in-view barriers turn the vehicle too, not only move it")
+    view_rotation: bool = setting(
+        False, "line-in-view barriers turn the vehicle too, not only move it: a pitched vehicle moves its tip"
+    )
     push_barrier: bool = setting(True, "push-force ceiling")
     approach_barrier: bool = setting(True, "approach-speed barrier")
     hard_barriers: bool = setting(

@@ -42,6 +42,9 @@ class Weights:
     height: float = _weight(
         1.6e3, "height row", "s^4/m^2", "0.025 m/s^2 = 0.15 N: an unreachable push must not lift the vehicle"
     )
+    margin: float = _weight(
+        0.01, "redundant thrusts, of more than six rotors", "1/N^2", "10 N: above effort, below every task"
+    )
     effort: float = setting(
         1e-3,
         "thrust away from the last one",

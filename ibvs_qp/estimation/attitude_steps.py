@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-#: Difference between an attitude and the one predicted by the gyro that is a step [rad]: 1 degree. The noise of an
-#: attitude is a tenth of it.
-STEP = math.radians(1.0)
-#: A sum of changes of the quaternion's entries below this is no step, at any rate: half a degree at most.
-NO_STEP = 4e-3
+#: Least difference between an attitude and the one predicted by the gyro that is a step [rad], and least one in root
+#: mean squares of that difference [-]: noise that counts as steps makes the attitude a random walk, 20 deg in 30 s at
+#: 0.3 deg a sample.
+STEP, STEP_SIGMAS = math.radians(1.0), 6.0
+#: Averaging time of that mean square [s].
+NOISE_TIME = 1.0
 #: Rate at which an absorbed step is given back [rad/s]: half a degree per second, slow against the filters that learn
 #: the direction of gravity.
 RETURN_RATE = math.radians(0.5)
@@ -35,6 +36,7 @@ class AttitudeSteps:
         """As before the first attitude."""
         self.offset = IDENTITY
         self._last: Quaternion | None = None
+        self._power = 0.0  # mean square of the difference of a sample from its prediction [rad^2]
 
     def update(self, attitude: Sequence[float], rate: Sequence[float], dt: float) -> list[float] | None:
         """The continuous attitude (w, x, y, z), or None while it is the measured one.
@@ -46,18 +48,15 @@ class AttitudeSteps:
         """
         w, x, y, z = attitude
         measured = (w, x, y, z)
-        last, self._last = self._last or measured, measured
-        if (
-            self.offset is IDENTITY
-            and abs(w - last[0]) + abs(x - last[1]) + abs(y - last[2]) + abs(z - last[3]) < NO_STEP
-        ):
-            return None
+        last = self._last or measured
         half = 0.5 * dt
         predicted = _product(last, (1.0, half * rate[0], half * rate[1], half * rate[2]))
         if self.offset is not IDENTITY:
             self._give_back(dt)
         given = measured if self.offset is IDENTITY else _product(measured, self.offset)
-        if abs(sum(map(float.__mul__, predicted, given))) < _cosine_of_half(STEP, predicted, given):
+        step, gate = _angle(predicted, given), max(STEP, STEP_SIGMAS * math.sqrt(self._power))
+        self._power += min(dt / NOISE_TIME, 1.0) * (min(step, gate) ** 2 - self._power)
+        if step > gate:
             self.offset = _unit(_product(_inverse(measured), predicted))
             given = _unit(predicted)
         self._last = given
@@ -76,8 +75,10 @@ class AttitudeSteps:
         self.offset = (math.cos(0.5 * left), vector[0] * scale, vector[1] * scale, vector[2] * scale)
 
 
-def _cosine_of_half(angle: float, first: Quaternion, second: Quaternion) -> float:
-    return math.cos(0.5 * angle) * math.hypot(*first) * math.hypot(*second)
+def _angle(first: Quaternion, second: Quaternion) -> float:
+    """Angle between two attitudes [rad]."""
+    w, *vector = _product(_inverse(first), second)
+    return 2.0 * math.atan2(math.hypot(*vector), abs(w))
 
 
 def _product(first: Quaternion, second: Quaternion) -> Quaternion:

@@ -16,6 +16,8 @@ RESIDUAL_BANDWIDTH = 30.0
 PUSH_BANDWIDTH = 10.0
 #: Bandwidth of the force learnt away from the wall: wind, wrong thrusts, accelerometer bias [rad/s].
 FREE_BANDWIDTH = 1.0
+#: The spread of the wind is an average over this time, of forces that change faster than over this time [s].
+WIND_TIME, STEADY_TIME = 5.0, 10.0
 #: The rotors' errors are learnt at this bandwidth [rad/s], evenly in the first seconds, and only while no rotor misses
 #: more than this [N].
 LEARNING_BANDWIDTH, FIRST_SECONDS, LEARNT_UP_TO = 0.3, 1.0, 3.0
@@ -35,16 +37,31 @@ def inertial_push(
 
     .. math:: f = n \cdot (B_F \hat u - m f_{spec}),
 
-    low-passed, minus its mean while the tip is away from the wall. A change of the wind since then is part of it.
+    low-passed, minus its mean while the tip is away from the wall. A change of the wind since then is part of it: the
+    output "wind_spread" is the standard deviation of the same figure along the wall, where the contact is measured [N].
     """
     outside = config.vehicle.mass_kg * body.specific_force - ca.DM(effectiveness[:3]) @ motors.thrusts
     old, mean = signals.state("inertial_push"), signals.state("inertial_push_free")
     ready = ca.logic_and(motors.ready, body.specific_force_known)
+    signals.output("wind_spread", _wind_spread(signals, outside - body.wrench[:3], contact.normal, ready, body.dt))
     away = ca.logic_and(ca.logic_not(contact.touching), contact.distance > AWAY * config.contact.contact_distance_m)
     new = ca.if_else(ready, old + _gain(PUSH_BANDWIDTH, body.dt) * (-ca.dot(contact.normal, outside) - old), old)
     learnt = ca.if_else(ca.logic_and(ready, away), mean + _gain(FREE_BANDWIDTH, body.dt) * (new - mean), mean)
     signals.remember("inertial_push_free", learnt)
     return signals.output("inertial_push", signals.remember("inertial_push", new) - learnt)
+
+
+def _wind_spread(signals: Signals, force: ca.SX, normal: ca.SX, ready: ca.SX, dt: ca.SX) -> ca.SX:
+    """Standard deviation of an unexplained force along the wall, per direction [N]."""
+    smooth, steady, power = signals.state("wind", 3), signals.state("wind_steady", 3), signals.state("wind_power")
+    along = force - normal * ca.dot(normal, force)
+
+    def followed(name: str, old: ca.SX, target: ca.SX, time: float) -> ca.SX:
+        return signals.remember(name, ca.if_else(ready, old + _gain(1.0 / time, dt) * (target - old), old))
+
+    smooth = followed("wind", smooth, along, 1.0 / PUSH_BANDWIDTH)
+    steady = followed("wind_steady", steady, smooth, STEADY_TIME)
+    return ca.sqrt(followed("wind_power", power, 0.5 * ca.sumsqr(smooth - steady), WIND_TIME))
 
 
 def carried_weight(

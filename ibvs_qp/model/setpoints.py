@@ -209,6 +209,11 @@ class Setpoints:
         return self.step.outputs["inertial_push"].item()
 
     @property
+    def wind_spread(self) -> float:
+        """Standard deviation of the unexplained force along the wall [N]."""
+        return self.step.outputs["wind_spread"].item()
+
+    @property
     def carried_weight(self) -> float:
         """Weight that something else than the rotors carries [N]."""
         return self.step.outputs["carried_weight"].item()

@@ -24,7 +24,7 @@ def pivot_stiffness(config: ControllerConfig, gains: Any = None) -> tuple[Any, A
 
     .. math:: K_p < K_d \Big(\frac{J}{m L^2 T} + K_v\Big),
 
-    84 in pitch and 116 in yaw for the shipped vehicle and gains of the program.
+    316 in pitch and 228 in yaw for the shipped vehicle and gains of the program.
 
     Args:
         config: Vehicle and delay of the feed-forward.

@@ -11,7 +11,7 @@ from ibvs_qp.pilot.config import PilotConfig
 #: Folder of the shipped presets, and their files by name.
 FOLDER = Path(__file__).parent
 FILES = {file.stem: file for file in sorted(FOLDER.glob("*.toml"))}
-#: Preset of each law; both were tuned by the same search (docs/tuning.md).
+#: Preset of each law; where their gains come from: docs/tuning.md.
 _OF_LAW = {"qp": "tarot_t960_qp", "paper": "tarot_t960_paper"}
 
 

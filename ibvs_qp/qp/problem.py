@@ -101,7 +101,9 @@ class QpProblem:
         weights = ca.vertcat(*(row.weight for row in self.task_rows))
         targets = ca.vertcat(*(row.target for row in self.task_rows))
         achieved = AffineRows(model, ca.vertcat(*(row.expression for row in self.task_rows)))
-        hessian, gradient = achieved.least_squares(weights, targets)
+        # OSQP may take a program that is not convex for solved: the root of a negative weight is NaN, which no solver
+        # accepts, and `program_faults` names the row.
+        hessian, gradient = achieved.least_squares(ca.if_else(weights >= 0.0, weights, ca.sqrt(weights)), targets)
         slack_weights = [float(self.limit_rows[place].slack_weight or 0.0) for place in soft]
         p = ca.triu(ca.diagcat(hessian, ca.SX(ca.diag(ca.DM(slack_weights)))) if m else hessian)
         q = ca.vertcat(gradient, ca.DM.zeros(m))

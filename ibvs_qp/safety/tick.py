@@ -22,6 +22,11 @@ class Response(Protocol):
         ...
 
     @property
+    def wind_spread(self) -> float:
+        """Standard deviation of the unexplained force along the wall [N]."""
+        ...
+
+    @property
     def carried_weight(self) -> float:
         """Weight that something else than the rotors carries [N]."""
         ...

@@ -4,6 +4,7 @@ from ibvs_qp.tasks.effort import EffortTask, SmoothnessTask
 from ibvs_qp.tasks.height import HeightTask
 from ibvs_qp.tasks.level import LevelTask
 from ibvs_qp.tasks.line import LineTask
+from ibvs_qp.tasks.margin import MarginTask
 from ibvs_qp.tasks.paper_line import PaperLineTask
 from ibvs_qp.tasks.push import PushTask
 from ibvs_qp.tasks.standoff import StandoffTask
@@ -16,6 +17,7 @@ __all__ = [
     "HeightTask",
     "LevelTask",
     "LineTask",
+    "MarginTask",
     "PaperLineTask",
     "PushTask",
     "SmoothnessTask",

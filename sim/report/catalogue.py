@@ -105,7 +105,7 @@ def catalogue(config: ControllerConfig | None = None) -> str:
 
 
 def _weighed(task: Task, rows: Sequence[TaskRow], config: ControllerConfig) -> list[list[str]]:
-    lines: dict[str, list[TaskRow]] = {}
+    lines: dict[str, list[TaskRow]] = {} if rows else {place: [] for place in task.weight_settings}
     for row, place in zip(rows, settings_of_rows(task, rows), strict=True):
         lines.setdefault(place, []).append(row)
     found = []
@@ -146,6 +146,8 @@ def _merge(first: str, second: str) -> str:
 
 
 def _rows(rows: Sequence[TaskRow] | Sequence[LimitRow]) -> str:
+    if not rows:
+        return "none with six rotors"
     names = ", ".join(f"`{row.name}`" for row in rows)
     return f"{names} [{_superscript(rows[0].unit)}]"
 

@@ -7,7 +7,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from controller_scenes import CEILING, FLOOR, TICK_NS, Wall, attitude, line_references, measured, random_tick
+from controller_scenes import (
+    CEILING,
+    FLOOR,
+    TICK_NS,
+    Wall,
+    attitude,
+    line_references,
+    measured,
+    random_tick,
+    without_rotors,
+)
 from law_only import evaluate_law
 from small_vehicle import SmallVehicle
 
@@ -22,12 +32,14 @@ from ibvs_qp.model.interaction_matrix import endpoint_line_row, line_interaction
 from ibvs_qp.model.setpoints import Setpoints
 
 CONFIG = ControllerConfig()
+#: For the law written out by hand.
+PLAIN = without_rotors(CONFIG)
 MASS = CONFIG.vehicle.mass_kg
 MASSES = np.array([MASS] * 3 + list(CONFIG.vehicle.inertia_kg_m2))
 
 
-def terms_of(seed: int, lines: int, share: float) -> Setpoints:
-    setpoints = analytic_setpoints(CONFIG)
+def terms_of(seed: int, lines: int, share: float, config: ControllerConfig = CONFIG) -> Setpoints:
+    setpoints = analytic_setpoints(config)
     setpoints.update(*random_tick(np.random.default_rng(seed), lines))
     setpoints.step.inputs["contact_weight"][0] = share
     evaluate_law(setpoints)
@@ -36,7 +48,7 @@ def terms_of(seed: int, lines: int, share: float) -> Setpoints:
 
 def stacked(setpoints: Setpoints) -> tuple[np.ndarray, np.ndarray]:
     """L in body axes and K_p e + K_d de + K_i int e: a rho row per line and one angle row."""
-    gains, rows, feedback = CONFIG.gains, [], []
+    gains, rows, feedback = PLAIN.gains, [], []
     twist = camera_twist_matrix(np.array(CONFIG.vehicle.camera_position_m))
     for line in setpoints.lines:
         rows.append(line_interaction_matrix(line.rho, line.theta, setpoints.plane)[0] @ twist)
@@ -51,7 +63,7 @@ def stacked(setpoints: Setpoints) -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize("share", [0.0, 0.4, 1.0])
 def test_the_wrench_is_the_law_by_hand(lines: int, share: float) -> None:
     for seed in range(15):
-        setpoints = terms_of(seed, lines, share)
+        setpoints = terms_of(seed, lines, share, PLAIN)
         normal = setpoints.normal
         null = np.concatenate(
             (
@@ -90,13 +102,13 @@ def test_one_angle_row_only() -> None:
         wall.line(0.05, 0.5 * math.pi + 0.02, HORIZONTAL),
         wall.line(-0.12, -0.02, VERTICAL),
     )
-    setpoints = analytic_setpoints(CONFIG)
+    setpoints = analytic_setpoints(PLAIN)
     setpoints.update(measured(0, plane=wall.plane, lines=seen), Reference(lines=line_references(2), contact=True))
     assert len(setpoints.lines) == 2
     matrix, feedback = stacked(setpoints)
     assert matrix.shape == (3, 6)
     both = np.vstack((matrix, setpoints.lines[1].matrix[1]))
-    gains = CONFIG.gains
+    gains = PLAIN.gains
     doubled = np.append(feedback, gains.theta_kp * setpoints.lines[1].angle_error + gains.theta_kd * 0.0)
     printed = -np.linalg.pinv(both) @ doubled
     assert abs(analytic_wrench(setpoints)[4] / MASSES[4]) < 0.1 * abs(printed[4])
@@ -230,7 +242,7 @@ def test_reset_repeats_to_the_bit_and_modes_are_named() -> None:
 @pytest.mark.parametrize("angle", [True, False])
 def test_the_switches_of_the_line_rows(point: str, angle: bool) -> None:
     """Unlimited thrusts give every followed error the image acceleration of the law; roll follows level flight."""
-    config = replace(CONFIG, analytic_line_point=point, analytic_angle_row=angle)
+    config = replace(PLAIN, analytic_line_point=point, analytic_angle_row=angle)
     setpoints = analytic_setpoints(config)
     setpoints.update(*random_tick(np.random.default_rng(4), 2))
     setpoints.step.inputs["contact_weight"][0] = 0.0

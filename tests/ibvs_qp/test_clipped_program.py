@@ -52,5 +52,5 @@ def test_clipping_gives_up_lift_and_level_where_the_program_gives_up_push() -> N
         assert any(limit.name.startswith("thrust_") for limit in command.active_limits)
         assert np.abs(command.unallocated_wrench).max() > 1.0
         lost[name] = np.abs(command.wrench - before)
-    assert lost["within"][2] < 0.5 and lost["within"][4] < 0.05
-    assert lost["clipped"][2] > 4.5 and lost["clipped"][4] > 0.5
+    assert lost["within"][2] < 0.5 and lost["within"][4] < 0.15  # the level rows answer the push that falls
+    assert lost["clipped"][2] > 3.5 and lost["clipped"][4] > 0.5

@@ -93,11 +93,15 @@ def test_a_wrong_file_is_named_and_the_sample_stands_in(tmp_path):
 
 @pytest.fixture(scope="module")
 def programs():
-    """Programs of a vehicle in front of a wall at random states, some beyond its thrust."""
+    """Programs of a vehicle in front of a wall at random states, some beyond its thrust.
+
+    Every one is the first of a flight: from one random state to the next, the rate of the thrusts limits nearly all.
+    """
     from controller_scenes import random_tick
 
     controller, rng, found = HybridController(), np.random.default_rng(1), []
     for tick in range(60):
+        controller.reset()
         controller.step(*random_tick(rng, 2, tick))
         found.append(record_program(controller))
     return found

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -10,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.controller import HybridController
+from ibvs_qp.estimation.roll_pitch import UNFILTERED_HZ
 from ibvs_qp.frames import R_BODY_CAMERA, cross
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL, LineFeature, LineReference, Measurement, Reference
 
@@ -19,6 +21,20 @@ FLOOR, CEILING = 1.2, 52.56
 #: Where the line fit is certain: tests of geometry want no weights in between.
 CERTAIN = np.zeros((2, 2))
 DEFAULT = ControllerConfig()  # once: it validates a hundred settings
+
+
+def without_rotors(config: ControllerConfig = DEFAULT) -> ControllerConfig:
+    """The configuration without leads, row filters and attitude filter: rows are the printed formulas.
+
+    The lead of the push stays, which those formulas have. `test_rotor_rows` proves the rest.
+    """
+    names = [gain.name for gain in dataclasses.fields(config.gains)]
+    off = {name: 0.0 for name in names if name.endswith(("_lead_s", "_filter_s")) and name != "push_lead_s"}
+    return dataclasses.replace(
+        config,
+        gains=dataclasses.replace(config.gains, **off),
+        angular_rate=dataclasses.replace(config.angular_rate, attitude_bandwidth_hz=UNFILTERED_HZ),
+    )
 
 
 def attitude(roll: float = 0.0, pitch: float = 0.0, yaw: float = 0.0) -> np.ndarray:

@@ -24,6 +24,7 @@ class StubResponse:
 
     inertial_push: float = 5.0
     carried_weight: float = 0.0
+    wind_spread: float = 0.0
     missing_noise: float = 0.1
     missing_thrust: np.ndarray = field(default_factory=lambda: np.zeros(6))
     motor_thrusts: np.ndarray = field(default_factory=lambda: np.full(6, 11.3))

@@ -12,6 +12,8 @@ NEAR_WALL = 0.06
 #: Push by inertial data, over the reference, that the sensor must measure, and its least value [-, N].
 UNFELT_OVER_REFERENCE, LEAST_UNFELT = 1.6, 4.0
 
+#: Standard deviations of the wind that the push by inertial data must exceed the measured one by [-].
+WIND_SIGMAS = 6.0
 #: A push may follow its reference down for this long [s]: the tip leaves the wall after a touch ramp's time.
 RELEASE_S = 0.5
 
@@ -21,7 +23,7 @@ class PushMonitor:
 
     The sensor may be dead, or measure zero, before the touch or in contact; controller and observers then press until
     the rotors saturate, 30 N for 5 N. Thrust against acceleration measures the push without it. A gust changes that
-    figure too, so the sensor must disagree widely.
+    figure too, so the sensor must disagree widely, and by more than the gusts along the wall explain.
     """
 
     def __init__(self, settings: SafetySettings) -> None:
@@ -44,6 +46,7 @@ class PushMonitor:
             tick.faults[Fault.PUSH_HIGH] = f"{push:.1f} N, bound {bound:.1f} N"
         least = min(max(UNFELT_OVER_REFERENCE * reference, LEAST_UNFELT), settings.unfelt_push_n)
         unfelt = inertial > least and push < settings.unfelt_ratio * inertial and contact.distance < NEAR_WALL
+        unfelt = unfelt and inertial - push > WIND_SIGMAS * response.wind_spread
         if self._unfelt.update(unfelt, time_s):
             tick.faults[Fault.PUSH_UNFELT] = f"{inertial:.1f} N, measured {push:.1f} N"
 

@@ -12,9 +12,12 @@ from ibvs_qp.config import SafetySettings
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.safety.monitors.persistence import Persistence
 
-#: The thrusts that faulty rotors miss must explain all but this fraction of the missing thrust; a push on the body or
-#: a gust spreads over the rotors.
+#: The thrusts that faulty rotors miss must explain all but this fraction of the missing thrust; a push on the body
+#: spreads over the rotors.
 UNEXPLAINED = 0.5
+#: They must leave less than this share of what a force through the centre of mass leaves: wind has no moment of its
+#: own, and a rotor that misses thrust has half of its signature in moments.
+LESS_THAN_WIND = 0.5
 #: Most rotors at once that are told apart.
 MOST_ROTORS = 2
 #: A rotor that was found is followed down to this missing thrust [N] and this many standard deviations.
@@ -47,7 +50,10 @@ class RotorMonitor:
         self._settings, self._names = settings, vehicle.geometry.names
         self._box = vehicle.thrust_min, vehicle.thrust_max
         # Column i: what a newton missing at rotor i looks like; with more than six rotors it spreads over others.
-        self._signatures = np.linalg.pinv(effectiveness) @ effectiveness
+        inverse = np.linalg.pinv(effectiveness)
+        self._signatures = inverse @ effectiveness
+        # What no force through the centre of mass explains.
+        self._not_wind = np.eye(len(inverse)) - inverse[:, :3] @ np.linalg.pinv(inverse[:, :3])
         self._lift = Persistence(settings.missing_lift_time_s)
         self._upwards = (-effectiveness[2]).tolist()
         self.reset()
@@ -113,12 +119,16 @@ class RotorMonitor:
 
     def _explain(self, missing: np.ndarray, most: int) -> Sequence[int]:
         """Fewest rotors, ``most`` at most, whose missing thrusts explain what is missing; none if they do not."""
-        total, rest, chosen = float(missing @ missing), missing, list[int]()
+        rest, chosen = missing, list[int]()
+        most_left = UNEXPLAINED**2 * float(missing @ missing)
+        if not self._found:
+            left = self._not_wind @ missing
+            most_left = min(most_left, LESS_THAN_WIND**2 * float(left @ left))
         while len(chosen) < most:
             chosen.append(int(np.argmax(np.abs(rest))))
             columns = self._signatures[:, chosen]
             rest = missing - columns @ np.linalg.lstsq(columns, missing, rcond=None)[0]
-            if float(rest @ rest) < UNEXPLAINED**2 * total:
+            if float(rest @ rest) < most_left:
                 return chosen
         return ()
 
@@ -129,7 +139,8 @@ class RotorMonitor:
 
     def _limit(self, rotor: int, actual: float, loss: float, stuck: bool = True) -> None:
         """A faulty rotor counts as stuck at its thrust: one that gives too little may not give less either."""
-        lower, upper = self.limits or (self._box[0].copy(), self._box[1].copy())
+        # Copies: a log still reads the limits of the ticks before.
+        lower, upper = (limit.copy() for limit in self.limits or self._box)
         actual = min(max(actual, 0.0), float(self._box[1][rotor]))
         if stuck:
             lower[rotor] = max(actual - MARGIN, 0.0)

@@ -45,7 +45,12 @@ def test_slower_motors_slow_every_loop_alike() -> None:
     assert slow.force_kfp == tuned.force_kfp
     fast = VehicleParams(motor_lag_up_s=0.02, motor_lag_down_s=0.03)
     quick = ControllerConfig(vehicle=fast).gains
-    assert quick == dataclasses.replace(tuned, push_lead_s=Derived(0.025))
+    seconds = [field.name for field in dataclasses.fields(Gains) if field.metadata["unit"] == "s"]
+    followed = {
+        name: Derived(getattr(tuned, name) * fast.motor_lag_s / VehicleParams().motor_lag_s) for name in seconds
+    }
+    for name, gain in vars(dataclasses.replace(tuned, **followed)).items():
+        assert getattr(quick, name) == pytest.approx(gain)
 
 
 def test_leads_and_filters_follow_the_motors_lag() -> None:

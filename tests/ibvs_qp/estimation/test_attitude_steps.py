@@ -31,6 +31,16 @@ def test_motion_and_noise_pass_unchanged() -> None:
         assert steps.update(noisy, (2.0, 0.0, 0.0), TICK) is None
 
 
+def test_noise_of_any_size_is_no_random_walk() -> None:
+    """0.3 deg a sample and axis, whatever the gate: what is given out stays where the vehicle is."""
+    steps, rng, errors = AttitudeSteps(), np.random.default_rng(1), []
+    for _ in range(7500):
+        noisy = quaternion(*rng.normal(0.0, 0.3, 3))
+        errors.append(angle_deg(steps.update(noisy, REST, TICK) or noisy, [1.0, 0.0, 0.0, 0.0]))
+    assert max(errors) < 4.0  # the first second, while its size is learnt
+    assert np.mean(errors[1000:]) < 0.6
+
+
 @pytest.mark.parametrize("step", [(2.0, 0.0, 0.0), (0.0, 3.0, 0.0), (0.0, 0.0, -30.0), (1.5, -2.0, 10.0)])
 def test_a_step_is_absorbed_and_given_back_at_its_rate(step: tuple[float, float, float]) -> None:
     steps, before, after = AttitudeSteps(), quaternion(1.0, 2.0, 3.0), quaternion(*np.add((1.0, 2.0, 3.0), step))

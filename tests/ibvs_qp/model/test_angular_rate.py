@@ -116,6 +116,22 @@ def test_the_sensitivity_is_that_of_the_flown_loop(omega: float, filter_s: float
     assert measured == pytest.approx(float(abs(loop.sensitivity(np.array([omega]))[0])), rel=0.05)
 
 
+def test_the_peak_of_an_unstable_loop_is_infinite() -> None:
+    """By Routh a double integrator behind the lag is unstable for kd < lag kp; delay comes on top."""
+    gains = {"kp": 200.0, "lag": LAG, "delay": 1.5 * TICK}
+    stable, unstable = MotionLoop(kd=30.0, **gains), MotionLoop(kd=0.9 * 200.0 * LAG, **gains)
+    assert stable.spectral_radius < 1.0 < stable.sensitivity_peak < 4.0
+    assert unstable.spectral_radius > 1.0 and math.isinf(unstable.sensitivity_peak)
+    assert np.abs(unstable.sensitivity(np.geomspace(0.3, 300.0, 600))).max() < 100.0
+
+
+def test_the_qp_bears_motors_of_another_lag() -> None:
+    config = ibvs_qp.preset("qp").controller
+    assert max(motion_sensitivity(config).values()) <= 2.0
+    for ratio in (0.75, 1.3):
+        assert max(motion_sensitivity(config, ratio).values()) <= 2.3
+
+
 @pytest.mark.parametrize("law", ["qp", "paper"])
 def test_the_shipped_gains_keep_their_distance_from_instability(law: str) -> None:
     config = ibvs_qp.preset(law).controller

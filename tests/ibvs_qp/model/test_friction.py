@@ -13,7 +13,10 @@ from ibvs_qp.model.inputs import Body, Contact
 #: Place of the tip, ahead of the centre of mass and above it [m].
 TIP = (0.6, 0.0, -0.1)
 SETTINGS = ControllerConfig().contact
-PATIENCE, RISE = SETTINGS.friction_patience_s, SETTINGS.friction_rise_1_s
+RISE = SETTINGS.friction_rise_1_s
+TICK_S = 0.004
+#: Most ticks that a tip may stand without counting as stuck.
+PATIENT_TICKS = round(SETTINGS.friction_patience_s / TICK_S) - 1
 
 
 def estimator(travel: float = 0.1) -> Block:
@@ -57,14 +60,16 @@ def test_nothing_is_learnt_while_slow_or_barely_touching_or_free() -> None:
 
 def test_friction_is_learnt_in_a_slide_as_slow_as_its_command() -> None:
     block = estimator(travel=0.012)
-    assert slide(block, 5.0, 4.0, 0.004, 90) == ASSUMED_FRICTION  # slower than half its command
+    assert slide(block, 5.0, 4.0, 0.004, PATIENT_TICKS) == ASSUMED_FRICTION  # slower than half its command
     assert slide(block, 5.0, 4.0, 0.012, 500) == pytest.approx(0.8, abs=0.02)
 
 
 def test_a_held_tip_raises_the_belief_until_it_breaks_away() -> None:
     block = estimator()
-    assert slide(block, 5.0, 1.5, 0.0, round(PATIENCE / 0.004) - 1) == ASSUMED_FRICTION
-    assert slide(block, 5.0, 1.5, 0.0, 250) == pytest.approx(ASSUMED_FRICTION + RISE, abs=0.01)
+    assert slide(block, 5.0, 1.5, 0.0, PATIENT_TICKS) == ASSUMED_FRICTION
+    halfway = 0.5 * (FRICTION_RANGE[1] - ASSUMED_FRICTION)
+    ticks = round(halfway / RISE / TICK_S)
+    assert slide(block, 5.0, 1.5, 0.0, ticks) == pytest.approx(ASSUMED_FRICTION + halfway, abs=0.01)
     assert slide(block, 5.0, 1.5, 0.0, 2500) == FRICTION_RANGE[1]
 
 
@@ -73,7 +78,7 @@ def test_a_vehicle_that_turns_about_a_held_tip_learns_nothing_from_its_growing_f
     block, speed = estimator(), 0.05
     turn = (0.0, 0.0, -speed / TIP[0])
     block.contact(push=5.0)
-    for force in np.linspace(0.0, 1.5, 90):  # shorter than the patience
+    for force in np.linspace(0.0, 1.5, PATIENT_TICKS):
         block(contact_wrench=(-5.0, -force, 0.0, 0.0, 0.0, 0.0), velocity=(0.0, speed, 0.0), angular_velocity=turn)
     assert float(block.step.outputs["value"][0]) == ASSUMED_FRICTION
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from controller_scenes import without_rotors
 from scipy.spatial.transform import Rotation
 from small_vehicle import SmallVehicle
 
@@ -20,7 +21,9 @@ from ibvs_qp.safety.hover import hold_thrusts
 
 PRODUCTS = (0.03, -0.05, 0.02)
 DIAGONAL, FULL = (
-    ControllerConfig(vehicle=VehicleParams(inertia_products_kg_m2=products)) for products in ((0.0, 0.0, 0.0), PRODUCTS)
+    # A row filter would start at the turn that the last thrusts give, and that one does depend on the inertia.
+    without_rotors(ControllerConfig(vehicle=VehicleParams(inertia_products_kg_m2=products)))
+    for products in ((0.0, 0.0, 0.0), PRODUCTS)
 )
 
 

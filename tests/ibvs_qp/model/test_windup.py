@@ -137,14 +137,14 @@ def test_a_push_out_of_reach_leaves_no_debt(law: type) -> None:
     np.testing.assert_array_equal(loop.held, held)
     if law is HybridController:  # the analytic law, clipped, has left the line by 0.1 m and bounces off
         after = loop.fly(SATURATED, PRESS)
-        assert after[:, 0].min() > 2.5 and abs(after[-100:, 0].mean() - 5.0) < 0.2
+        assert after[:, 0].min() > 2.5 and abs(after[-25:, 0].mean() - 5.0) < 0.2
 
 
 @pytest.mark.parametrize("law", LAWS)
 def test_the_lag_of_a_ramp_fills_no_integral(law: type) -> None:
     """A push of 25 N overshoots little, although motors and filter are late."""
     loop = Loop(law(), distance=0.005)
-    push = loop.fly(PRESSED, replace(PRESS, push_force=25.0))[:, 0]
+    push = loop.fly(PRESSED + SETTLE, replace(PRESS, push_force=25.0))[:, 0]
     assert push.max() < 1.09 * 25.0 and abs(push[-100:].mean() - 25.0) < 0.3
 
 

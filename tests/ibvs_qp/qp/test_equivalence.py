@@ -44,6 +44,8 @@ def closed_form(controller: HybridController, share: float, last: np.ndarray) ->
     matrix = control_effectiveness(vehicle.geometry)
     inertia = np.array([vehicle.mass_kg] * 3 + list(vehicle.inertia_kg_m2))
     per_thrust, drift = matrix / inertia[:, None], setpoints.bias_wrench / inertia
+    before = per_thrust @ last + drift  # where the filter of the line rows starts
+    kept = math.exp(-config.tick_s / gains.line_filter_s)
     rows: list[tuple[np.ndarray, float, float]] = []  # row on the acceleration, wish, weight
     selection = np.eye(6)
     selection[:3, :3] -= np.outer(setpoints.normal, setpoints.normal)
@@ -51,10 +53,11 @@ def closed_form(controller: HybridController, share: float, last: np.ndarray) ->
     twist = camera_twist_matrix(np.array(vehicle.camera_position_m))
     for line in setpoints.lines:
         image = line_interaction_matrix(line.rho, line.theta, setpoints.plane)
-        at_tip = endpoint_line_row(image, line.theta, line.tip)
+        at_tip = endpoint_line_row(image, line.theta, line.tip) @ twist @ selection
         wanted = -(gains.line_kp * line.error + gains.line_kd * line.rate + gains.line_ki * line.integral)
+        wanted += kept * (at_tip @ before - wanted)
         turn = -(gains.theta_kp * line.angle_error + gains.theta_kd * line.angle_rate)
-        rows.append((at_tip @ twist @ selection, wanted, weights.line * line.weight))
+        rows.append((at_tip, wanted, weights.line * line.weight))
         rows.append((image[1] @ twist @ selection, turn, weights.line_angle * line.weight))
     along = np.concatenate((vehicle.mass_kg * setpoints.normal, np.zeros(3)))
     rows.append((along, setpoints.push_command, weights.push * share))
@@ -91,7 +94,7 @@ def test_without_limits_the_program_is_the_closed_form_law(
 def test_with_limits_that_do_not_bind_as_well() -> None:
     controller = HybridController()
     compared = 0
-    for seed in range(60):
+    for seed in range(100):
         controller.reset()
         rng = np.random.default_rng(seed)
         share = float(rng.uniform())

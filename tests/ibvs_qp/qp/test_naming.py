@@ -81,7 +81,7 @@ def test_a_task_that_turns_numbers_into_none_is_named() -> None:
 
 
 def test_a_weight_below_zero_is_named() -> None:
-    """The program has no least cost then; a solver is not even asked."""
+    """The program has no least cost then, which OSQP does not always find out."""
     controller = HybridController(AT_ONCE, tasks=[LiftTask()])
     for tick in range(3):
         command = step(controller, tick, lift=(10.0, -5e3))

@@ -111,6 +111,14 @@ def test_a_push_must_be_measured_by_the_force_sensor(inertial: float, measured: 
     assert (Fault.PUSH_UNFELT in found) is finds
 
 
+@pytest.mark.parametrize(("wind", "finds"), [(1.0, True), (2.0, False)])
+def test_what_the_wind_along_the_wall_explains_is_no_failed_sensor(wind: float, finds: bool) -> None:
+    found = first_found(
+        lambda number: {"contact": CONTACT._replace(push=1.0)}, StubResponse(inertial_push=10.0, wind_spread=wind)
+    )
+    assert (Fault.PUSH_UNFELT in found) is finds
+
+
 def test_far_from_the_wall_wind_is_no_push() -> None:
     found = first_found(
         lambda number: {"contact": CONTACT._replace(push=0.0, distance=0.3, in_contact=False), "press": False},

@@ -60,6 +60,15 @@ def test_a_push_on_the_body_is_no_rotor_fault(force: tuple[float, float, float])
     assert text == "" and watch.limits is None
 
 
+@pytest.mark.parametrize("size", [8.0, 16.0])
+def test_wind_from_no_side_is_a_rotor_fault(size: float) -> None:
+    """Along the tilt of two opposite rotors they explain a force as well as it does itself."""
+    for angle in np.arange(0.0, 360.0, 5.0):
+        force = size * np.cos(np.radians(angle)), size * np.sin(np.radians(angle)), 0.2 * size
+        text, watch = watched(-np.linalg.pinv(MATRIX) @ np.array([*force, 0.0, 0.0, 0.03 * size]))
+        assert text == "" and watch.limits is None, angle
+
+
 def test_a_short_peak_is_no_fault() -> None:
     watch, missing = monitor(), np.array([10.0, 0, 0, 0, 0, 0])
     for number in range(100):

@@ -133,14 +133,19 @@ def test_a_lowered_push_is_printed_with_the_jobs(run: tuple[Path, Trace], capsys
 
 
 def turning(trace: Trace, tick: int, rate: float, pitch: float = 0.0, hard: bool = False) -> Trace:
-    """The flight with a pitch rate [rad/s] and angle [rad] of its own in a tick, barriers hard or soft."""
+    """The flight with a pitch rate [rad/s] and angle [rad] of its own in a tick, barriers hard or soft.
+
+    The attitude filter begins in this tick: it takes the angle as it is, not a share of the step to it.
+    """
     config = flown_config(trace)
     limits = dataclasses.replace(config.controller.limits, hard_barriers=hard)
     config = dataclasses.replace(config, controller=dataclasses.replace(config.controller, limits=limits))
     program = trace.arrays["program"].copy()
-    place = places(qp_problem(config.controller).model.signals.inputs)
+    signals = qp_problem(config.controller).model.signals
+    place = places(signals.inputs | signals.states)
     program[tick, place["attitude"]] = (np.cos(pitch / 2.0), 0.0, np.sin(pitch / 2.0), 0.0)
     program[tick, place["angular_velocity"]] = (0.0, rate, 0.0)
+    program[tick, place["roll_pitch_begun"]] = 0.0
     return dataclasses.replace(trace, arrays=trace.arrays | {"program": program}, preset=dump_toml(config))
 
 
@@ -155,7 +160,7 @@ def test_cost_of_slack_has_bound_and_unit(
     at = by_name["tilt_pitch"]
     limit, row, paid = explanation.active_limits[at], explanation.limit_rows[at], explanation.limit_cost[at]
     assert limit.side == "upper" and limit.slack > 0.01 and row.name == limit.name and row.unit == "rad/s^2"
-    bound = 64.0 * (np.deg2rad(1.0) - 0.3)  # p^2 (phi_max - phi) - 2 p rate, with p = 8 1/s
+    bound = 144.0 * (np.deg2rad(1.0) - 0.3)  # p^2 (phi_max - phi) - 2 p rate, with p = 12 1/s
     assert row.upper == pytest.approx(bound, abs=0.5) and row.value - row.upper == pytest.approx(limit.slack)
     price = config.controller.limits.tilt_slack_weight
     assert paid * explanation.total_cost == pytest.approx(0.5 * price * limit.slack**2)

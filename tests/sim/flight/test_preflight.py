@@ -11,6 +11,7 @@ from ibvs_qp.config.errors import ConfigError
 from sim.flight.jobs import PaintJob, PressJob
 from sim.flight.options import FlightOptions, pilot_config, unsupervised
 from sim.flight.preflight import PLACE_TOLERANCE_M, check_job, job_problems, oldest_s
+from sim.world.plant_scene import PlantScene
 from sim.world.scene import (
     BoardScene,
     CameraScene,
@@ -132,6 +133,11 @@ LIMITS = {
         Scene(wind=WindScene(gust_n_rms=6.2)),
         Scene(wind=WindScene(gust_n_rms=6.0)),
         ["wind.gust_n_rms", "at most 6.1 N"],
+    ),
+    "motors that lag much longer than the vehicle's": (
+        Scene(plant=PlantScene(motor_lag_up_s=0.12, motor_lag_down_s=0.12)),
+        Scene(plant=PlantScene(motor_lag_up_s=0.11, motor_lag_down_s=0.11)),
+        ["plant.motor_lag_up_s = 0.12 s", "at most 0.115 s"],
     ),
     # Both sides of these were flown: the passing one to the end, the other until the supervisor ended the flight.
     "old pictures": (

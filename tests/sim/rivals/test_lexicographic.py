@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from controller_scenes import random_tick
+from controller_scenes import FLOOR, random_tick
 from scipy.optimize import lsq_linear
 
 from ibvs_qp.config import ControllerConfig
@@ -16,18 +16,29 @@ from sim.rivals.priorities import LEVELS, row_levels
 
 #: Barriers off: the levels then compete within the thrust window alone.
 FREE = dataclasses.replace(ControllerConfig(), barriers=False)
+#: Thrusts that limit only some draws, and thrusts that limit many [N].
+WIDE, NARROW = (FLOOR, 52.0), (9.0, 12.0)
+#: Draws whose two ticks stay within `WIDE`: the row filters carry the thrusts of a limited first tick into the second.
+UNLIMITED = (0, 1, 2, 4)
+#: Draws whose second tick reaches a bound of `NARROW`.
+LIMITED = (1, 2, 3, 4)
 
 
 def stepped(law: type[HybridController], seed: int, low: float, high: float) -> tuple[HybridController, np.ndarray]:
-    """A controller after two ticks near a wall; the window of the second is [low, high] around the last thrusts."""
-    rng, controller = np.random.default_rng(seed), law(FREE)
+    """A controller after two ticks near a wall, and their thrusts, (2, 6); the second has the window [low, high]."""
+    rng, controller, thrusts = np.random.default_rng(seed), law(FREE), []
     for tick in range(2):
         measurement, reference = random_tick(rng, 2, tick)
         controller.setpoints._rate_step = 1e3
         if tick:
             measurement = dataclasses.replace(measurement, thrust_min=np.full(6, low), thrust_max=np.full(6, high))
-        command = controller.step(measurement, reference)
-    return controller, command.thrusts
+        thrusts.append(controller.step(measurement, reference).thrusts)
+    return controller, np.array(thrusts)
+
+
+def reached(thrusts: np.ndarray, low: float, high: float) -> bool:
+    """Whether any thrust is at a bound."""
+    return bool(((thrusts < low + 1e-3) | (thrusts > high - 1e-3)).any())
 
 
 def rows(controller: HybridController) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -36,19 +47,20 @@ def rows(controller: HybridController) -> tuple[np.ndarray, np.ndarray, np.ndarr
     return flat.reshape(6, -1).T, targets, weights
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", UNLIMITED)
 def test_without_an_active_limit_both_laws_agree_up_to_smoothness(seed):
     """Six rows fix six thrusts; effort, smoothness and lines that disagree with level flight move both a little."""
-    _, weighted = stepped(HybridController, seed, 1.2, 52.0)
-    _, strict = stepped(LexicographicController, seed, 1.2, 52.0)
+    _, weighted = stepped(HybridController, seed, *WIDE)
+    _, strict = stepped(LexicographicController, seed, *WIDE)
+    assert not reached(weighted, *WIDE) and not reached(strict, *WIDE)
     assert np.abs(weighted - strict).max() < 0.2  # N, of steps of 7 N
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", LIMITED)
 def test_where_a_limit_is_active_the_first_level_is_as_good_as_alone(seed):
-    controller, thrusts = stepped(LexicographicController, seed, 9.0, 12.0)
+    controller, (_, thrusts) = stepped(LexicographicController, seed, *NARROW)
     data = controller.engine.data
-    assert ((thrusts < 9.0 + 1e-3) | (thrusts > 12.0 - 1e-3)).any()
+    assert reached(thrusts, *NARROW)
     matrix, targets, weights = rows(controller)
     first = row_levels([row.name for row in controller.problem.task_rows])[0]
     scale = np.sqrt(weights[first])[:, None]
@@ -57,11 +69,11 @@ def test_where_a_limit_is_active_the_first_level_is_as_good_as_alone(seed):
     assert float(weights[first] @ residual**2) <= 2.0 * alone.cost + 1e-3
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", LIMITED)
 def test_a_lower_level_takes_what_the_upper_ones_leave(seed):
     """Weighted, the push row pulls at roll and pitch; in strict priorities it does not."""
-    strict, at = stepped(LexicographicController, seed, 9.0, 12.0)
-    _, mixed = stepped(HybridController, seed, 9.0, 12.0)
+    strict, (_, at) = stepped(LexicographicController, seed, *NARROW)
+    _, (_, mixed) = stepped(HybridController, seed, *NARROW)
     matrix, targets, weights = rows(strict)
     first = row_levels([row.name for row in strict.problem.task_rows])[0]
     cost = [float(weights[first] @ (matrix[first] @ thrusts - targets[first]) ** 2) for thrusts in (at, mixed)]

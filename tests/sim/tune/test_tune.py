@@ -31,17 +31,19 @@ pytest.importorskip("optuna", reason="tuning needs the extra tune")
 START = 17
 #: Trials of two whole generations.
 GENERATIONS = 27
-#: Where the made-up flights are best.
-BEST = {"line_kp": 15.0, "force_kfi": 1.0, "attitude_kp": 45.0}
+#: Where the made-up flights are best: softer than the shipped gains, within the ranges.
+BEST = {"line_kp": 90.0, "force_kfi": 0.7, "attitude_kp": 100.0}
+#: Flights with less `line_kp` fail: those by hand, neither law's.
+SLACK = 70.0
 
 
 def made_up_flight(scene, options, *, config, **_):
-    """Every objective grows with the distance from `BEST`, a little with the seed; a very stiff line loop fails."""
+    """Every objective grows with the distance from `BEST`, a little with the seed; a slack line loop fails."""
     gains = config.controller.gains
     off = sum(math.log(getattr(gains, name) / best) ** 2 for name, best in BEST.items())
     wobble = 1.0 + 0.01 * math.sin(options.seed + len(scene.wind.mean_m_s) * scene.wall.friction)
     figures = {each.name: 0.05 * each.failed * (0.2 + off) * wobble for each in OBJECTIVES}
-    return SimpleNamespace(outcome={"completed": gains.line_kp < 55.0}, reason="", figures=figures)
+    return SimpleNamespace(outcome={"completed": gains.line_kp > SLACK}, reason="", figures=figures)
 
 
 @pytest.fixture
