@@ -24,8 +24,8 @@ def bare() -> ControllerConfig:
     return ControllerConfig(gains=Gains(line_ki=0.0, velocity_ki=0.0, force_kfi=0.0))
 
 
-#: ``agreed`` [N]: recorded inputs correct nothing, so that integrals stay apart; the force observer follows them, in the
-#: wall's plane at up to 10 rad/s (at 1.5 rad/s the analytic pilot agrees to 6 N).
+#: ``agreed`` [N]: recorded inputs correct nothing, so that integrals stay apart; the force observer follows them, in
+#: the wall's plane at up to 10 rad/s (at 1.5 rad/s the analytic pilot agrees to 6 N).
 CONTROLLERS = {
     "qp": Subject(HybridController, "rotor_loss", 700, agreed=6.0),
     "qp, bare": Subject(lambda: HybridController(bare()), "rotor_loss", 700, agreed=2.0, bare=True),
