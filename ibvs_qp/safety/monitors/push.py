@@ -14,6 +14,8 @@ UNFELT_OVER_REFERENCE, LEAST_UNFELT = 1.6, 4.0
 
 #: Standard deviations of the wind that the push by inertial data must exceed the measured one by [-].
 WIND_SIGMAS = 6.0
+#: The wind excuses no larger difference [N]: with a dead sensor friction counts as wind, and the push reached 22 N.
+MOST_WIND = 10.0
 #: A push may follow its reference down for this long [s]: the tip leaves the wall after a touch ramp's time.
 RELEASE_S = 0.5
 
@@ -46,7 +48,7 @@ class PushMonitor:
             tick.faults[Fault.PUSH_HIGH] = f"{push:.1f} N, bound {bound:.1f} N"
         least = min(max(UNFELT_OVER_REFERENCE * reference, LEAST_UNFELT), settings.unfelt_push_n)
         unfelt = inertial > least and push < settings.unfelt_ratio * inertial and contact.distance < NEAR_WALL
-        unfelt = unfelt and inertial - push > WIND_SIGMAS * response.wind_spread
+        unfelt = unfelt and inertial - push > min(WIND_SIGMAS * response.wind_spread, MOST_WIND)
         if self._unfelt.update(unfelt, time_s):
             tick.faults[Fault.PUSH_UNFELT] = f"{inertial:.1f} N, measured {push:.1f} N"
 

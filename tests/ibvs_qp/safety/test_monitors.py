@@ -119,6 +119,13 @@ def test_what_the_wind_along_the_wall_explains_is_no_failed_sensor(wind: float, 
     assert (Fault.PUSH_UNFELT in found) is finds
 
 
+def test_no_wind_excuses_a_dead_sensor_for_long() -> None:
+    found = first_found(
+        lambda number: {"contact": CONTACT._replace(push=0.0)}, StubResponse(inertial_push=10.5, wind_spread=5.0)
+    )
+    assert Fault.PUSH_UNFELT in found
+
+
 def test_far_from_the_wall_wind_is_no_push() -> None:
     found = first_found(
         lambda number: {"contact": CONTACT._replace(push=0.0, distance=0.3, in_contact=False), "press": False},
