@@ -11,9 +11,10 @@ from ibvs_qp.tasks.task import Task
 
 #: Entries of a wrench: as many rotors have no redundant thrusts.
 WRENCH_SIZE = 6
-#: Time in which the redundant thrusts go to their place [s]: slow against the wrench, whose margin they widen.
+#: Time in which the redundant thrusts go to their place [s]: five times the motors' lag.
 SETTLING_TIME = 0.3
-#: A rotor counts as this far from a limit at least [N]; one that is held between its limits then hardly moves.
+#: Least distance of a thrust from a limit in the cost [N], a quarter of the width of a stuck rotor's limits: the cost
+#: stays finite, and that rotor hardly moves.
 LEAST_DISTANCE = 0.25
 
 

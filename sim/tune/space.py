@@ -26,8 +26,8 @@ RANGES = {
     "force_kfp": (0.05, 1.0),
     "force_kfi": (0.4, 5.0),
 }
-#: Gains of roll, pitch, yaw and lines near the bound of their loops (`ibvs_qp.config.motion_margin`): a start of both
-#: laws.
+#: Gains of roll, pitch, yaw and lines that were near the bound of their loops without leads and filters: a softer start
+#: of both laws.
 BY_HAND = {
     "line_kp": 60.0,
     "line_kd": 20.0,

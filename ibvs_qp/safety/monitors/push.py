@@ -12,7 +12,8 @@ NEAR_WALL = 0.06
 #: Push by inertial data, over the reference, that the sensor must measure, and its least value [-, N].
 UNFELT_OVER_REFERENCE, LEAST_UNFELT = 1.6, 4.0
 
-#: Standard deviations of the wind that the push by inertial data must exceed the measured one by [-].
+#: The push by inertial data exceeds the measured one by so many standard deviations of the wind [-]: 4.5 left alarms in
+#: 2 of 16 flights in gusts of 2 and 3 N rms.
 WIND_SIGMAS = 6.0
 #: The wind excuses no larger difference [N]: with a dead sensor friction counts as wind, and the push reached 22 N.
 MOST_WIND = 10.0
@@ -48,8 +49,8 @@ class PushMonitor:
             tick.faults[Fault.PUSH_HIGH] = f"{push:.1f} N, bound {bound:.1f} N"
         least = min(max(UNFELT_OVER_REFERENCE * reference, LEAST_UNFELT), settings.unfelt_push_n)
         unfelt = inertial > least and push < settings.unfelt_ratio * inertial and contact.distance < NEAR_WALL
-        unfelt = unfelt and inertial - push > min(WIND_SIGMAS * response.wind_spread, MOST_WIND)
-        if self._unfelt.update(unfelt, time_s):
+        windy = inertial - push <= min(WIND_SIGMAS * response.wind_spread, MOST_WIND)
+        if self._unfelt.update(unfelt and not windy, time_s):
             tick.faults[Fault.PUSH_UNFELT] = f"{inertial:.1f} N, measured {push:.1f} N"
 
     def _recent(self, reference: float, time_s: float) -> float:

@@ -15,8 +15,8 @@ from ibvs_qp.safety.monitors.persistence import Persistence
 #: The thrusts that faulty rotors miss must explain all but this fraction of the missing thrust; a push on the body
 #: spreads over the rotors.
 UNEXPLAINED = 0.5
-#: They must leave less than this share of what a force through the centre of mass leaves: wind has no moment of its
-#: own, and a rotor that misses thrust has half of its signature in moments.
+#: Residual of the fit by faulty rotors over that of the fit by a force through the centre of mass, at most [-]: wind
+#: has next to no moment. Equal losses of two opposite rotors fit a force as well; the missing lift finds them.
 LESS_THAN_WIND = 0.5
 #: Most rotors at once that are told apart.
 MOST_ROTORS = 2

@@ -135,7 +135,7 @@ def test_a_lowered_push_is_printed_with_the_jobs(run: tuple[Path, Trace], capsys
 def turning(trace: Trace, tick: int, rate: float, pitch: float = 0.0, hard: bool = False) -> Trace:
     """The flight with a pitch rate [rad/s] and angle [rad] of its own in a tick, barriers hard or soft.
 
-    The attitude filter begins in this tick: it takes the angle as it is, not a share of the step to it.
+    The attitude filter begins in this tick and returns the measured angle; later ticks move it by a share of the step.
     """
     config = flown_config(trace)
     limits = dataclasses.replace(config.controller.limits, hard_barriers=hard)
