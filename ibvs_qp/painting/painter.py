@@ -41,7 +41,7 @@ LENGTH_TOLERANCE_M = 0.01
 MOST_UNLED_M = 0.4
 #: Way without an edge after which a stroke runs farther out until one shows, and how much [m]: half the usual overlap.
 ASIDE_AFTER_M, ASIDE_M = 0.1, 0.004
-#: Most of the painting of a stroke without contact [-], below this push [N].
+#: Most of the time of painting without contact [-], below this push [N].
 MOST_LOST, LOST_N = 0.02, 0.3
 #: Last part of a stroke, whose overlap does not count [m].
 CORNER_M = 0.02
@@ -50,6 +50,9 @@ PLACE_SIGMAS = 2.0
 #: Last part of a stroke, over which the edge at its end leads [m]: a gust of 2 N rms moves the tip by 15 mm beyond an
 #: end where velocity alone holds it. Over more, stiff line rows and the friction of 10 N at 0.7 shake the vehicle.
 LEAD_M = 0.05
+#: Least speed of the reference towards the end while its edge leads [m/s]: an overshoot of 15 mm is taken back within
+#: the time of a stop.
+END_SPEED = 0.02
 #: Way ahead from which a stroke takes its target [m]: the tip follows a target that moves within half a second.
 REACTION_M = 0.05
 #: Target overlap where the stroke before falls short, and the most of a stroke that is claimed, over the nominal
@@ -79,7 +82,8 @@ class Painter(Navigation):
         self._retouches, self._back_to = 0, math.nan  # of the stroke in progress; u to which the tip goes back [m]
         self._longest = 0.0  # length of the stroke in progress, each pass included [m]
         self._behind = 0.0  # part of it before its beginning, by a retouch [m]
-        self._painted_s = self._lost_s = 0.0  # time of the stroke in progress, and of it without contact [s]
+        self._painted_s = self._lost_s = 0.0  # time of painting, and of it without contact [s]
+        self._lost_m, self._left = 0.0, math.nan  # way of the stroke without contact; least way left in this pass [m]
         self._paused = self._follows_end = False
 
     def _enter(self, inputs: PainterInput, phase: str, reason: str) -> None:
@@ -258,7 +262,7 @@ class Painter(Navigation):
 
     def _turn_round(self) -> None:
         """The stroke in progress is painted again, one way or the other."""
-        self._speed, self._follows_end = 0.0, False
+        self._speed, self._follows_end, self._left = 0.0, False, math.nan
         self._stroke_end.begin()
         self._cross.begin_again()
 
@@ -279,14 +283,22 @@ class Painter(Navigation):
         remaining = travel * (goal - self._along.u)
         self._v_reference = self._slid(self._v_reference, v, dt)
         self._pause_without_contact(inputs)
-        self._painted_s += dt
-        self._lost_s += 0.0 if inputs.push > LOST_N else dt
+        self._count_contact(inputs.push, remaining, dt)
         target = 0.0 if self._paused else stroke_speed(config, remaining)
         self._speed = ramped(self._speed, target, config.acceleration_m_s2 * dt)
         if self._stroke_end.is_near(remaining):
             self._speed = 0.0
-        self._lead_to_end(remaining, travel * self._speed * dt)
+        self._lead_to_end(remaining, self._speed, dt)
         return self._stroke_end.is_reached(inputs, remaining)
+
+    def _count_contact(self, push: float, remaining: float, dt: float) -> None:
+        """Count the time of painting, and time and way without contact; waiting for the contact is no way."""
+        left = remaining if math.isnan(self._left) else min(self._left, remaining)
+        self._painted_s += dt
+        if push <= LOST_N:
+            self._lost_s += dt
+            self._lost_m += 0.0 if math.isnan(self._left) else self._left - left
+        self._left = left
 
     def _stroke_command(self, inputs: PainterInput) -> PaintingCommand:
         along = self._view_direction() * self._speed
@@ -344,7 +356,7 @@ class Painter(Navigation):
     def _begin_stroke(self, inputs: PainterInput, stroke: int, reason: str) -> None:
         self.row, self._speed, self._follows_end, self._touches = stroke, 0.0, False, 0
         self._retouches, self._longest, self._behind = 0, 0.0, 0.0
-        self._painted_s = self._lost_s = 0.0
+        self._lost_m, self._left = 0.0, math.nan
         self._cross.begin_stroke()
         self._along.begin_stroke()
         self._stroke_end.begin()
@@ -405,8 +417,10 @@ class Painter(Navigation):
             )
         if (slip := self._along.slip) > self.config.gates.stop_m:
             return f"row {self.row} met an edge {slip * 1e3:.0f} mm from where the odometer expected it"
-        if self._lost_s > MOST_LOST * self._painted_s:
-            return f"row {self.row} was painted without contact for {self._lost_s:.1f} s of {self._painted_s:.1f} s"
+        if self._lost_m > 0.5 * self.config.brush_width_m:  # the brush covers less from both sides
+            return f"row {self.row} was without contact over {self._lost_m * 1e3:.0f} mm"
+        if self._is_last() and self._lost_s > MOST_LOST * self._painted_s:
+            return f"the strokes were without contact for {self._lost_s:.1f} s of {self._painted_s:.1f} s"
         _, overlap, known = self._overlap()
         if SIGMAS * (worst := known.max(initial=0.0)) > 2.0 * self._certain_m:
             return f"row {self.row} lost its edge, its overlap is known to {worst * 1e3:.1f} mm"
@@ -455,15 +469,17 @@ class Painter(Navigation):
         inside = share * self._nominal_overlap()
         return min(self._v_target, self._reach_of_last(REACTION_M, 0.5 * self.config.brush_width_m) - inside)
 
-    def _lead_to_end(self, remaining: float, moved: float) -> None:
-        """Over its last centimetres the edge at the end of the stroke leads: from where the tip is, at its speed."""
+    def _lead_to_end(self, remaining: float, speed: float, dt: float) -> None:
+        """Over its last centimetres the edge at the end of the stroke leads: from where the tip is, at its speed.
+
+        An overshoot is taken back, and the last millimetres are made up for.
+        """
         if self._along_line.line is None or remaining > LEAD_M or not math.isnan(self._back_to):
             self._follows_end = False
             return
         if not self._follows_end:
             self._follows_end, self._u_reference = True, self._along.u
-        goal, travel = self._stroke_goal(), self.pattern.travel(self.row)
-        self._u_reference += min(abs(moved), max(travel * (goal - self._u_reference), 0.0)) * travel
+        self._u_reference = approached(self._u_reference, self._stroke_goal(), max(speed, END_SPEED) * dt)
 
     def _climb_settled(self, inputs: PainterInput) -> None:
         """Begin the stroke at its place once it is known well enough; search for its edge if it stays unknown."""
