@@ -79,7 +79,14 @@ class SafetySettings:
         low=0.1,
         high=100.0,
     )
-    mission_s: float = setting(900.0, "longest flight", unit="s", low=1.0, high=1e5)
+    mission_s: float = setting(
+        1800.0,
+        "longest flight",
+        unit="s",
+        why="20 rows of 2.9 m, and twice as long where gusts have most strokes painted again",
+        low=1.0,
+        high=1e5,
+    )
     envelope_time_s: float = setting(0.1, "beyond any of these for this long is a fault", unit="s", low=0.0, high=5.0)
     wall_gone_m: float = setting(
         0.04, "distance of the wall from a tip that was in contact", unit="m", low=0.01, high=1.0

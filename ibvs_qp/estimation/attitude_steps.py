@@ -9,8 +9,9 @@ from collections.abc import Sequence
 #: mean squares of that difference [-]: noise that counts as steps makes the attitude a random walk, 20 deg in 30 s at
 #: 0.3 deg a sample.
 STEP, STEP_SIGMAS = math.radians(1.0), 6.0
-#: Averaging time of that mean square [s], and its largest root [rad]: 0.4 deg a sample and axis, or a spell of steps.
-NOISE_TIME, MOST_NOISE = 1.0, math.radians(1.0)
+#: Averaging time of that mean square [s], the most of it that one sample counts for [s], late as it may be, and its
+#: largest root [rad]: 0.3 deg a sample and axis, or a spell of steps.
+NOISE_TIME, LONGEST_SAMPLE, MOST_NOISE = 1.0, 0.01, math.radians(0.8)
 #: Rate at which an absorbed step is given back [rad/s]: half a degree per second, slow against the filters that learn
 #: the direction of gravity.
 RETURN_RATE = math.radians(0.5)
@@ -55,7 +56,7 @@ class AttitudeSteps:
             self._give_back(dt)
         given = measured if self.offset is IDENTITY else _product(measured, self.offset)
         step, gate = _angle(predicted, given), max(STEP, STEP_SIGMAS * math.sqrt(self._power))
-        self._power += min(dt / NOISE_TIME, 1.0) * (min(step, gate, MOST_NOISE) ** 2 - self._power)
+        self._power += min(dt, LONGEST_SAMPLE) / NOISE_TIME * (min(step, gate, MOST_NOISE) ** 2 - self._power)
         if step > gate:
             self.offset = _unit(_product(_inverse(measured), predicted))
             given = _unit(predicted)

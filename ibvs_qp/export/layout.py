@@ -12,6 +12,7 @@ from ibvs_qp.frames import GRAVITY
 from ibvs_qp.model.setpoints import ANY_STEP
 from ibvs_qp.model.tick import LINE
 from ibvs_qp.qp.problem import QpProblem
+from ibvs_qp.safety.hover import hover_gains
 from ibvs_qp.symbolic.literals import real
 from ibvs_qp.symbolic.signals import places
 from ibvs_qp.validation import clock, geometry
@@ -51,10 +52,13 @@ def times() -> dict[str, int]:
 def constants(config: ControllerConfig) -> dict[str, float]:
     """Numbers by name."""
     vehicle = config.vehicle
+    hover_kp, hover_kd = hover_gains(config)
     return {
         "TICK_S": config.tick_s,
         "MASS_KG": vehicle.mass_kg,
         "GRAVITY": GRAVITY,
+        "HOVER_KP": hover_kp,
+        "HOVER_KD": hover_kd,
         "RATE_STEP": vehicle.thrust_rate_n_s * config.tick_s,
         "ANY_STEP": ANY_STEP,
         "RANK_TOLERANCE": RANK_TOLERANCE,

@@ -80,11 +80,15 @@ class AlongTrack:
         return self.u - self._began
 
     @property
-    def stroke_length(self) -> float:
-        """Length of the stroke so far [m]; corrections on the way belong to its beginning and to the odometer."""
-        corrected = self.moved - self._way
+    def began(self) -> float:
+        """Where the stroke began, u [m]; corrections on the way belong to its beginning and to the odometer."""
         share = self._began_variance / (self._began_variance + self._way_variance + EDGE_STD**2)
-        return abs(self.moved - share * corrected)
+        return self._began + share * (self.moved - self._way)
+
+    @property
+    def stroke_length(self) -> float:
+        """Length of the stroke so far [m]."""
+        return abs(self.u - self.began)
 
     @property
     def length_deviation(self) -> float:

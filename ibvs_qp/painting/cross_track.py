@@ -2,9 +2,10 @@ r"""Place of the tip across the strokes, from the odometer and every edge in vie
 
 A Kalman filter with these states: v of the true tip; :math:`\delta`, by which the picture shows the tip at a larger v
 than it has (camera mount, arm, attitude); the odometer's drift; the direction of the strokes against the odometer's
-axes; :math:`\beta`, by which an edge ahead seems to lie at a larger v than the same edge behind; v of the board's far
-edge; and, at `NODES` places along the last stroke and the one being laid, the amount by which each lies at a larger v
-than its map says. A line at v = L then appears at the place :math:`p = L - v - \delta` beside the tip:
+axes, and how these wander with the attitude; :math:`\beta`, by which an edge ahead seems to lie at a larger v than the
+same edge behind; v of the board's far edge; and, at `NODES` places along the last stroke and the one being laid, the
+amount by which each lies at a larger v than its map says. A line at v = L then appears at the place
+:math:`p = L - v - \delta` beside the tip:
 
 ======================================  =====================================
 line                                    L
@@ -55,6 +56,9 @@ DRIFT_STD, DRIFT_WANDER = 1e-3, 1e-9
 #: Standard deviation of the strokes' direction where the board's edge shows it, by the roll of the camera's mount
 #: [rad]; its variance per second [rad^2/s].
 TURN_STD, TURN_WANDER = 8e-3, 1e-9
+#: Wander of the odometer's axes with the attitude: standard deviation [rad] and correlation time [s], as flown in 1 s
+#: pieces of ten flights; 0.25 deg in the datasheet world, 0.6 deg in the harsh one.
+WANDER_STD, WANDER_TIME_S = math.radians(0.4), 8.0
 #: Variance of the far edge per metre of way across the strokes: its distance from the tip shrinks, and the wall
 #: distance that scales it is known to 1 %, 0.7 mm of a usual pitch [m^2/m].
 FAR_PER_M = 7e-6
@@ -71,8 +75,8 @@ TURN_TIME_S, LARGEST_TURN = 2.0, math.radians(15.0)
 #: Places along a stroke at which the error of its map is a state [-].
 NODES = 24
 
-_V, _TIP, _DRIFT, _TURN, _AHEAD, _FAR = range(6)
-_LAST, _OWN = slice(6, 6 + NODES), slice(6 + NODES, 6 + 2 * NODES)
+_V, _TIP, _DRIFT, _TURN, _WANDER, _AHEAD, _FAR = range(7)
+_LAST, _OWN = slice(7, 7 + NODES), slice(7 + NODES, 7 + 2 * NODES)
 _STATES = _OWN.stop
 
 
@@ -119,12 +123,12 @@ class CrossTrack:
     @property
     def turn(self) -> float:
         """Direction of the strokes against the odometer's axis u, from u to v [rad]."""
-        return float(self._x[_TURN])
+        return float(self._x[_TURN] + self._x[_WANDER])
 
     @property
     def picture_turn(self) -> float:
         """Direction of the strokes in the picture, which the camera's mount rolls [rad]."""
-        return self.turn + self._roll
+        return float(self._x[_TURN]) + self._roll
 
     @property
     def deviation(self) -> float:
@@ -153,6 +157,7 @@ class CrossTrack:
         self._p[:] = 0.0
         self._p[:2, :2] = (seen + tip, -tip), (-tip, tip)
         self._p[_DRIFT, _DRIFT], self._p[_TURN, _TURN] = DRIFT_STD**2, TURN_STD**2
+        self._p[_WANDER, _WANDER] = WANDER_STD**2
         self.guides = {edge.track.track_id: 0.0}
         self._follow_turn(edge, 1.0)
         self._x[_TURN], self._roll = self._roll, 0.0
@@ -160,10 +165,15 @@ class CrossTrack:
     def predict(self, du: float, dv: float, dt: float) -> None:
         """The tip has moved by the odometer, in the axes of the strokes [m], within dt [s]."""
         x, p = self._x, self._p
+        kept = math.exp(-dt / WANDER_TIME_S)
         x[_V] += dv - x[_DRIFT] * dt
-        p[_V] -= dt * p[_DRIFT] + du * p[_TURN]
+        p[_V] -= dt * p[_DRIFT] + du * (p[_TURN] + p[_WANDER])
         p[:, _V] = p[_V]
-        p[_V, _V] -= dt * p[_V, _DRIFT] + du * p[_V, _TURN]
+        p[_V, _V] -= dt * p[_V, _DRIFT] + du * (p[_V, _TURN] + p[_V, _WANDER])
+        x[_WANDER] *= kept
+        p[_WANDER] *= kept
+        p[:, _WANDER] *= kept
+        p[_WANDER, _WANDER] += (1.0 - kept**2) * WANDER_STD**2
         way, per_m = math.hypot(du, dv), UNLED_PER_M if self.unled > UNLED_AFTER_M else ODOMETER_PER_M
         self._way += way
         p[_V, _V] += per_m * way + ODOMETER_AT_REST * dt
@@ -424,7 +434,7 @@ class CrossTrack:
 
     def _follow_turn(self, edge: PatternLine, share: float) -> None:
         turn = self.picture_turn + share * math.atan(edge.lean)
-        self._roll = min(max(turn, -LARGEST_TURN), LARGEST_TURN) - self.turn
+        self._roll = min(max(turn, -LARGEST_TURN), LARGEST_TURN) - float(self._x[_TURN])
 
 
 def _row_of_h() -> np.ndarray:

@@ -21,6 +21,12 @@ from ibvs_qp.painting.pattern_lines import PatternLine, pattern_lines
 from ibvs_qp.painting.phase_machine import PhaseMachine
 from ibvs_qp.painting.speed import approached, clipped
 
+#: The end of a stroke moves by at most this much so that its length is right [m]: less than half a length's tolerance,
+#: and the margin beyond the end is ten times as wide.
+MOST_END_SHIFT_M = 0.004
+#: A stroke that begins farther from its place shows that the board is not as long as the job says [m].
+MOST_BEGIN_ERROR_M = 0.015
+
 
 class Navigation(PhaseMachine):
     """Both coordinates of the tip by odometer and lines, and their references; a subclass is the phases."""
@@ -82,9 +88,12 @@ class Navigation(PhaseMachine):
         return (self._along.end,) if goal > 0.5 * self.config.stroke_m else (self._along.near,)
 
     def _guides(self) -> tuple[int, ...]:
-        """Tracks of the edges along the strokes, best first; at the wall, those that stay in the picture."""
+        """Tracks of the edges along the strokes, best first; on the way to the wall and there, those that stay in view.
+
+        Another one would hold the vehicle back: the view barrier keeps it in the picture.
+        """
         cross, reach = self._cross, self.config.guide_reach_m
-        if self.phase not in ("press", "paint", "retouch", "climb"):
+        if self.phase not in ("approach", "align", "press", "paint", "retouch", "climb"):
             return tuple(cross.guides)
         return tuple([track for track, v in cross.guides.items() if abs(v - self._v_target) < reach])
 
@@ -104,8 +113,12 @@ class Navigation(PhaseMachine):
         return self._along.begin if self.pattern.travel(max(self.row, 1)) > 0.0 else self.config.stroke_m
 
     def _stroke_goal(self) -> float:
-        """Where the stroke in progress ends, u [m]."""
-        return self.config.stroke_m if self.pattern.travel(self.row) > 0.0 else self._along.begin
+        """Where the stroke in progress ends, u [m]: half the error of its beginning is made up for there."""
+        goal = self.config.stroke_m if self.pattern.travel(self.row) > 0.0 else self._along.begin
+        error = self._along.began - self._stroke_begin()
+        if abs(error) > MOST_BEGIN_ERROR_M:
+            return goal
+        return goal + clipped(0.5 * error, -MOST_END_SHIFT_M, MOST_END_SHIFT_M)
 
     def _place(self, stroke: int) -> float:
         """Nominal v of a stroke [m]; the last one of a filling job keeps the margin to the board's other edge."""

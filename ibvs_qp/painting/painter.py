@@ -39,8 +39,11 @@ LENGTH_TOLERANCE_M = 0.01
 #: Longest way without an edge of a stroke that is claimed [m]: the odometer, whose direction wanders with the attitude,
 #: errs by 3 mm on it in the datasheet world, and by 4 mm in the harsh one.
 MOST_UNLED_M = 0.4
-#: Way without an edge after which a stroke runs farther out until one shows, and how much [m]: half the usual overlap.
-ASIDE_AFTER_M, ASIDE_M = 0.1, 0.004
+#: Way without an edge after which a stroke runs farther out until one shows [m], how steeply [-], and how far, over the
+#: nominal overlap [-]: steeper than the odometer errs, 1.4 deg in the harsh world.
+UNLED_BEFORE_M, ASIDE_SLOPE, MOST_ASIDE = 0.05, 0.06, 0.75
+#: Way outwards of a step from stroke to stroke and of an alignment while no edge is in view [m].
+ASIDE_M = 0.004
 #: Most of the time of painting without contact [-], below this push [N].
 MOST_LOST, LOST_N = 0.02, 0.3
 #: Last part of a stroke, whose overlap does not count [m].
@@ -212,8 +215,9 @@ class Painter(Navigation):
         return self._command(inputs, contact=False, standoff=standoff, along=u_speed, climb=v_speed, hold=True)
 
     def _align(self, inputs: PainterInput, dt: float) -> PaintingCommand:
-        self._move_to(self._stroke_begin(), self._v_target, dt)
-        high = math.inf if self._across_line.line is None else self._v_target - self._cross.v
+        unled = self._across_line.line is None
+        self._move_to(self._stroke_begin(), self._v_target + (self._aside() if unled else 0.0), dt)
+        high = math.inf if unled and not self._is_certain() else self._v_target - self._cross.v
         aside = self._stroke_begin() - self._along.u
         if self._alignment.is_reached(inputs, (high, aside), self.entered, dt):
             self._enter(inputs, "press", f"aligned within {self._alignment.error * 1e3:.1f} mm")
@@ -237,8 +241,7 @@ class Painter(Navigation):
         goal = self._stroke_goal()
         if self._fails_by_time(inputs, f"row {self.row}", goal):
             return self._stroke_command(inputs)
-        # Where the tip errs inwards the arm hides the edge that would correct it: a little farther out it shows again.
-        aside = min(ASIDE_M, 0.5 * self._nominal_overlap()) if self._cross.unled > ASIDE_AFTER_M else 0.0
+        aside = self._aside(ASIDE_SLOPE * (self._cross.unled - UNLED_BEFORE_M))
         if self._run_towards(inputs, goal, self._touching_target(LEAST_OVERLAP) + aside, dt):
             self._end_stroke(inputs)
         return self._stroke_command(inputs)
@@ -308,12 +311,15 @@ class Painter(Navigation):
         config = self.config
         self._pause_without_contact(inputs)
         self._v_target = self._place(self.row)  # the far edge may come into view
-        left = self._v_target - self._v_reference
+        place = self._v_target + (self._aside() if self._across_line.line is None else 0.0)
+        left = place - self._v_reference
         target = 0.0 if self._paused else climb_speed(config, left)
         self._speed = ramped(self._speed, target, config.acceleration_m_s2 * dt)
         self._v_reference += min(self._speed * dt, max(left, 0.0))
+        if self._along_line.line is not None:
+            self._u_reference = approached(self._u_reference, self._stroke_begin(), END_SPEED * dt)
         if left <= 0.0:
-            self._speed, self._v_reference = 0.0, self._v_target
+            self._speed, self._v_reference = 0.0, place
             self._climb_settled(inputs)
         return self._command(inputs, contact=True, climb=self._speed, hold=True)
 
@@ -463,6 +469,10 @@ class Painter(Navigation):
         if self.row < 2:
             return 0.0
         return min(self.config.overlap_m, self.config.brush_width_m - (self._v_target - self._place(self.row - 1)))
+
+    def _aside(self, way: float = ASIDE_M) -> float:
+        """Way outwards [m]: the arm hides an edge from a tip that errs inwards; the strokes still overlap."""
+        return max(min(way, MOST_ASIDE * self._nominal_overlap()), 0.0)
 
     def _touching_target(self, share: float) -> float:
         """Target v [m]: the stroke's place, or less where its overlap would be below this share of the nominal one."""

@@ -86,8 +86,8 @@ GROUPS: dict[str, tuple[Knob, ...]] = {
         )
     ),
     "Gains": (
-        Knob("line, k_p [1/s²]", _GAINS + "line_kp", 1.0, 100.0),
-        Knob("line, k_d [1/s]", _GAINS + "line_kd", 0.5, 30.0),
+        Knob("line, k_p [1/s²]", _GAINS + "line_kp", 5.0, 500.0),
+        Knob("line, k_d [1/s]", _GAINS + "line_kd", 1.0, 100.0),
         Knob("line, k_i [1/s³]", _GAINS + "line_ki", 0.0, 10.0, 0.2),
         Knob("force, K_fp [-]", _GAINS + "force_kfp", 0.0, 3.0, 0.05),
         Knob("force, K_fi [1/s]", _GAINS + "force_kfi", 0.0, 5.0, 0.1),

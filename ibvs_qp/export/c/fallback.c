@@ -18,10 +18,9 @@ void ibvs_hold_thrusts(const ibvs_controller *c, ibvs_real thrusts[IBVS_ROTORS])
     const ibvs_real w = quaternion[0], x = quaternion[1], y = quaternion[2], z = quaternion[3];
     const ibvs_real down[3] = {2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)};
     const ibvs_real roll = r_atan2(down[1], down[2]), pitch = -r_asin(r_fmax(-1, r_fmin(1, down[0])));
-    const ibvs_gains *gains = &c->gains_in_force;
-    const ibvs_real angular[3] = {-gains->attitude_kp * roll - gains->attitude_kd * rate[0],
-                                  -gains->attitude_kp * pitch - gains->attitude_kd * rate[1],
-                                  -gains->yaw_kd * rate[2]};
+    const ibvs_real angular[3] = {-IBVS_HOVER_KP * roll - IBVS_HOVER_KD * rate[0],
+                                  -IBVS_HOVER_KP * pitch - IBVS_HOVER_KD * rate[1],
+                                  -IBVS_HOVER_KD * rate[2]};
     for (uint32_t i = 0; i < 3; ++i) {
       wrench[i] = -weight * down[i];
       wrench[3 + i] = 0;

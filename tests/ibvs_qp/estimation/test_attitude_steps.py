@@ -41,6 +41,16 @@ def test_noise_of_any_size_is_no_random_walk() -> None:
     assert np.mean(errors[1000:]) < 0.6
 
 
+def test_a_late_sample_lets_no_step_through() -> None:
+    """Half a second without an attitude while the gyro's last value misses a turn of 3 deg; a step of 2 deg later."""
+    steps = AttitudeSteps()
+    assert steps.update(quaternion(0.0, 0.0, 0.0), REST, TICK) is None
+    before = steps.update(quaternion(3.0, 0.0, 0.0), REST, 0.5)
+    assert before is not None
+    given = steps.update(quaternion(3.0, 2.0, 0.0), REST, TICK)
+    assert given is not None and angle_deg(given, before) < 0.01
+
+
 @pytest.mark.parametrize("step", [(2.0, 0.0, 0.0), (0.0, 3.0, 0.0), (0.0, 0.0, -30.0), (1.5, -2.0, 10.0)])
 def test_a_step_is_absorbed_and_given_back_at_its_rate(step: tuple[float, float, float]) -> None:
     steps, before, after = AttitudeSteps(), quaternion(1.0, 2.0, 3.0), quaternion(*np.add((1.0, 2.0, 3.0), step))

@@ -160,17 +160,19 @@ def test_rows_of_h_are_the_derivatives_of_the_places_in_the_picture(own: bool, m
 
 def _after_stroke_one(delta: float = 0.0) -> CrossTrack:
     """Stroke 1 is painted by an odometer without drift, the tip has climbed."""
-    cross = CrossTrack(CONFIG)
-    cross.start(parallel(1, -MARGIN - delta, 1, "board"))
-    for steady in (cross_track._DRIFT, cross_track._TURN):
-        cross._p[steady, steady] = 0.0
-    cross.begin_stroke()
-    for k in range(60):
-        cross.lay(0.01 * k)
-        cross.unled = 0.0  # as with the board's edge in view
-        cross.predict(0.01, 0.0, 0.1)
-    cross.end_stroke()
-    cross.predict(0.0, PITCH, 1.5)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(cross_track, "WANDER_STD", 0.0)
+        cross = CrossTrack(CONFIG)
+        cross.start(parallel(1, -MARGIN - delta, 1, "board"))
+        for steady in (cross_track._DRIFT, cross_track._TURN):
+            cross._p[steady, steady] = 0.0
+        cross.begin_stroke()
+        for k in range(60):
+            cross.lay(0.01 * k)
+            cross.unled = 0.0  # as with the board's edge in view
+            cross.predict(0.01, 0.0, 0.1)
+        cross.end_stroke()
+        cross.predict(0.0, PITCH, 1.5)
     return cross
 
 
@@ -340,6 +342,28 @@ def test_without_edges_the_uncertainty_grows_and_never_shrinks() -> None:
         assert cross.deviation > last
         last = cross.deviation
     assert cross.guides == {}
+
+
+def test_the_wander_of_the_odometer_s_axes_is_followed_and_fades() -> None:
+    """They turn by 1 deg after stroke 1: its edge shows a third of that within 4 s, 2.5 standard deviations."""
+    cross, wander = _after_stroke_one(), math.radians(1.0)
+    cross.begin_stroke()
+
+    def move() -> None:
+        turned = wander - cross.turn  # the odometer in the axes of the strokes, as the filter has them
+        cross.predict(-0.01 * math.cos(turned), -0.01 * math.sin(turned), 0.1)
+
+    for k in range(40):
+        cross.lay(0.6 - 0.01 * k)
+        move()
+        _look(cross, fresh(), u=0.6 - 0.01 * (k + 1), times=1)
+    assert 0.25 * wander < cross.turn < wander
+    before, learnt = cross.v, cross.turn
+    for _ in range(20):
+        move()
+    assert abs(cross.v - before) < 0.8 * 0.2 * wander
+    cross.predict(0.0, 0.0, 30.0)
+    assert abs(cross.turn) < 0.5 * learnt
 
 
 def test_the_drift_of_the_odometer_makes_v_uncertain_in_one_direction() -> None:

@@ -211,7 +211,7 @@ def test_a_tip_that_friction_holds_beside_its_place_searches_and_begins_anew() -
     assert_painted(world)
 
 
-def test_while_the_tip_presses_no_edge_is_followed_that_the_view_at_the_wall_loses() -> None:
+def test_on_the_way_to_the_wall_and_there_no_edge_is_followed_that_the_view_at_the_wall_loses() -> None:
     """Back from a search for row 4 the board's edge is still in view, 0.27 m away; its barrier would hold the tip."""
     world = PaintedWall(short(rows=4))
     world.fly(200.0, until="climb", stroke=4)
@@ -219,8 +219,8 @@ def test_while_the_tip_presses_no_edge_is_followed_that_the_view_at_the_wall_los
     world.stuck = True
     world.fly(10.0, until="search")
     world.stuck, world.hidden = False, {OUTER + 3, OUTER + 2, OUTER + 1, FAR}
-    world.fly(20.0, until="press")
-    commands = world.fly(20.0, until="paint")
+    world.fly(20.0, until="approach")
+    commands = world.fly(40.0, until="paint")
     level = [offset for c in commands for line, offset in c.guides if line.role == world.painter.pattern.guide_role]
     assert world.painter.phase == "paint" and max(map(abs, level), default=0.0) < world.config.guide_reach_m
 
@@ -246,6 +246,36 @@ def test_lost_contact_pauses_the_stroke_and_it_goes_on_afterwards() -> None:
     assert events == ["contact lost", "contact back"]
     assert re.fullmatch(r"the strokes were without contact for 3\.\d s of \d+\.\d s", world.painter.reason)
     assert world.ends[0][1] == pytest.approx(world.config.stroke_m, abs=PLACE)
+
+
+@pytest.mark.parametrize("shift", [0.008, -0.008])
+def test_a_stroke_that_begins_beside_its_beginning_ends_where_its_length_is_right(shift: float) -> None:
+    """The step to stroke 2 takes the tip back; friction that holds it beside costs half of the error in length."""
+    world = PaintedWall(short(rows=2, stroke_m=1.0))
+    world.fly(60.0, until="climb")
+    world.fly(0.5)
+    for _ in range(200):
+        if world.painter.phase == "paint":
+            break
+        if world.painter.phase == "climb" and world.painter._v_target - world.tip[1] < 0.01:
+            moved = world.config.stroke_m + shift - world.tip[0]
+            world.tip[0] += moved
+            world.odometer += world.to_wall(moved, 0.0)
+        world.step()
+    began = world.tip[0]
+    assert began == pytest.approx(1.0 + shift, abs=2e-3)
+    world.fly(60.0, until="retreat")
+    assert world.ends[1][1] == pytest.approx(0.5 * shift, abs=2e-3)
+    assert not world.painter._uncertain
+
+
+def test_a_step_takes_the_tip_back_to_where_strokes_begin() -> None:
+    world = PaintedWall(short(rows=2, stroke_m=1.0))
+    world.fly(60.0, until="climb")
+    world.tip[0] += 0.01
+    world.odometer += world.to_wall(0.01, 0.0)
+    world.fly(60.0, until="paint")
+    assert world.tip[0] == pytest.approx(1.0, abs=2e-3)
 
 
 @pytest.mark.parametrize(("gap_m", "claimed"), [(0.02, True), (0.05, False)])
@@ -496,13 +526,13 @@ def test_a_stroke_that_lost_its_edge_for_long_is_not_painted_again() -> None:
 
 
 @pytest.mark.parametrize("overlap_m", [0.008, 0.004, 0.0])
-def test_the_search_aside_takes_at_most_half_the_overlap(overlap_m: float) -> None:
+def test_the_search_aside_takes_a_part_of_the_overlap(overlap_m: float) -> None:
     world = PaintedWall(short(rows=2, stroke_m=1.0, overlap_m=overlap_m))
     world.fly(60.0, until="paint", stroke=2)
     world.hidden = {GUIDE, OUTER + 1, FAR}
     world.fly(5.0)
     aside = world.tip[1] - world.config.edge_margin_m - world.config.pitch_m
-    assert aside == pytest.approx(0.5 * overlap_m, abs=1e-3)
+    assert aside == pytest.approx(painter.MOST_ASIDE * overlap_m, abs=1e-3)
 
 
 def test_an_edge_that_hides_behind_the_arm_where_the_tip_errs_inwards_is_found_again() -> None:
@@ -564,5 +594,5 @@ def test_the_own_edge_leads_where_no_other_one_is_in_view() -> None:
     world.wave = lambda _stroke, u: 0.01 if u < 0.5 else 0.0  # as a jolt that the odometer measures
     world.fly(5.0)
     # Where an edge behind the arm would show.
-    place = world.config.edge_margin_m + world.config.pitch_m + painter.ASIDE_M
+    place = world.config.edge_margin_m + world.config.pitch_m + painter.MOST_ASIDE * world.config.overlap_m
     assert abs(world.tip[1] - place) < 0.5 * PLACE

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from controller_scenes import CEILING, FLOOR, attitude, measured
 
 from allocation.effectiveness import control_effectiveness
+from ibvs_qp.analysis.motion_loop import MotionLoop
 from ibvs_qp.config import ControllerConfig
-from ibvs_qp.safety.hover import hold_thrusts
+from ibvs_qp.config.motion_margin import TICKS_LATE
+from ibvs_qp.safety.hover import hold_thrusts, hover_gains
 
 CONFIG = ControllerConfig()
 MATRIX = control_effectiveness(CONFIG.vehicle.geometry)
@@ -36,3 +40,14 @@ def test_a_turn_alone_is_opposed(axis: int) -> None:
 def test_thrusts_stay_within_their_limits() -> None:
     thrusts = hold_thrusts(CONFIG, measured(0, attitude=attitude(2.0), angular_velocity=np.full(3, 30.0)))
     assert (thrusts >= FLOOR).all() and (thrusts <= CEILING).all()
+
+
+@pytest.mark.parametrize(("lag_ratio", "bound"), [(0.75, 2.0), (1.0, 2.0), (1.6, 2.5)])
+@pytest.mark.parametrize("lag_s", [0.01, 0.0575, 0.3])
+def test_the_loop_of_the_hover_is_robust_without_leads_and_filters(
+    lag_ratio: float, bound: float, lag_s: float
+) -> None:
+    vehicle = dataclasses.replace(CONFIG.vehicle, motor_lag_up_s=lag_s, motor_lag_down_s=lag_s)
+    kp, kd = hover_gains(dataclasses.replace(CONFIG, vehicle=vehicle))
+    loop = MotionLoop(kp=kp, kd=kd, lag=lag_s, delay=TICKS_LATE * CONFIG.tick_s, lag_ratio=lag_ratio)
+    assert loop.sensitivity_peak < bound
