@@ -70,8 +70,9 @@ WINDOW_M = (0.06, 0.22)
 SHORTEST_M = 0.015
 #: An edge farther from its expected place than this many standard deviations plus a floor [m] is another one.
 GATE_SIGMAS, GATE_FLOOR_M = 4.0, 4e-3
-#: Share of one look in the mean square by which the last stroke's edge differs from its expected place [-]: two seconds.
-MISFIT_SHARE = 0.05
+#: Distance of the last stroke's edge from its expected place: share of one look in its mean square [-], 10 s, and its
+#: usual root [m], as flown in the datasheet world; 1 to 2 mm in the harsh one.
+MISFIT_SHARE, MISFIT = 0.01, 6e-4
 #: Time constant of the direction of the strokes, from the board's edge [s]; largest slope of a board [rad].
 TURN_TIME_S, LARGEST_TURN = 2.0, math.radians(15.0)
 #: Places along a stroke at which the error of its map is a state [-].
@@ -106,7 +107,7 @@ class CrossTrack:
         self._open = np.zeros(NODES, bool)  # nodes of the stroke that is laid which the tip has not passed
         self._u, self._forward = 0.0, 1.0  # of the tip [m]; direction in which the stroke in progress is laid
         self._way = self.unled = self.longest_unled = 0.0
-        self._difference, self._misfit = 0.0, 0.0  # of the last line from its expected place [m]; mean square [m^2]
+        self._difference, self._misfit = 0.0, MISFIT**2  # from the expected place [m]; its mean square [m^2]
 
     @property
     def v(self) -> float:
@@ -229,7 +230,8 @@ class CrossTrack:
         """
         shares = self._shares(np.linspace(first_u, last_u, NODES)).mean(axis=0)
         place = self.maps[-1].mean(first_u, last_u) + float(shares @ self._x[_OWN])
-        return place, math.sqrt(max(float(shares @ self._p[_OWN, _OWN] @ shares), 0.0))
+        rougher = max(math.sqrt(self._misfit) / EDGE_STD, 1.0)  # than the noise of the filter
+        return place, rougher * math.sqrt(max(float(shares @ self._p[_OWN, _OWN] @ shares), 0.0))
 
     def overlap(self, first_u: float, last_u: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Overlap of the stroke in progress with the last one, as painted, where both lie between two places.
