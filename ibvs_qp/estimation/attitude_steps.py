@@ -9,8 +9,8 @@ from collections.abc import Sequence
 #: mean squares of that difference [-]: noise that counts as steps makes the attitude a random walk, 20 deg in 30 s at
 #: 0.3 deg a sample.
 STEP, STEP_SIGMAS = math.radians(1.0), 6.0
-#: Averaging time of that mean square [s], the most of it that one sample counts for [s], late as it may be, and its
-#: largest root [rad]: 0.3 deg a sample and axis, or a spell of steps.
+#: Averaging time of that mean square at 100 Hz and more [s], time for which one sample counts at most, late as it may
+#: be [s], and its largest root [rad]: 0.3 deg a sample and axis, or a spell of steps.
 NOISE_TIME, LONGEST_SAMPLE, MOST_NOISE = 1.0, 0.01, math.radians(0.8)
 #: Rate at which an absorbed step is given back [rad/s]: half a degree per second, slow against the filters that learn
 #: the direction of gravity.

@@ -36,6 +36,7 @@ class AlongTrack:
         end_seen: Whether the edge to which stroke 1 runs has been recognised.
         end, near: Tracks of the two edges at the last look, -1 where not in view.
         slip: Largest error of the odometer in the stroke in progress that an edge has shown at once [m].
+        step: Last move by the odometer [m].
     """
 
     def __init__(self, config: PaintingConfig) -> None:
@@ -43,7 +44,7 @@ class AlongTrack:
         self._x, self._p = np.zeros(2), np.diag((UNKNOWN_STD**2, UNKNOWN_STD**2))
         self.known = self.end_seen = False
         self._near_known = self._length_unsure = False
-        self.slip = 0.0
+        self.slip = self.step = 0.0
         self._way = self._way_variance = self._began = self._began_variance = 0.0
         self.end = self.near = -1
 
@@ -64,6 +65,7 @@ class AlongTrack:
 
     def predict(self, du: float) -> None:
         """The tip has moved by the odometer [m]."""
+        self.step = du
         self._x[0] += du
         self._way += du
         self._p[0, 0] += DRIFT_PER_M * abs(du)

@@ -70,9 +70,9 @@ WINDOW_M = (0.06, 0.22)
 SHORTEST_M = 0.015
 #: An edge farther from its expected place than this many standard deviations plus a floor [m] is another one.
 GATE_SIGMAS, GATE_FLOOR_M = 4.0, 4e-3
-#: Distance of the last stroke's edge from its expected place: share of one look in its mean square [-], 10 s, and its
-#: usual root [m], as flown in the datasheet world; 1 to 2 mm in the harsh one.
-MISFIT_SHARE, MISFIT = 0.01, 6e-4
+#: Distance of the last stroke's edge from its expected place, root mean square: 0.6 mm in the datasheet world, 1 to
+#: 2 mm in the harsh one [m]; looks for which the last stroke counts in the mean of the next one [-].
+MISFIT, MISFIT_LOOKS = 6e-4, 20
 #: Time constant of the direction of the strokes, from the board's edge [s]; largest slope of a board [rad].
 TURN_TIME_S, LARGEST_TURN = 2.0, math.radians(15.0)
 #: Places along a stroke at which the error of its map is a state [-].
@@ -107,7 +107,8 @@ class CrossTrack:
         self._open = np.zeros(NODES, bool)  # nodes of the stroke that is laid which the tip has not passed
         self._u, self._forward = 0.0, 1.0  # of the tip [m]; direction in which the stroke in progress is laid
         self._way = self.unled = self.longest_unled = 0.0
-        self._difference, self._misfit = 0.0, MISFIT**2  # from the expected place [m]; its mean square [m^2]
+        self._difference = 0.0  # of the last line from its expected place [m]
+        self._misfits = MISFIT_LOOKS * [MISFIT**2]  # squares of that of the last stroke's edge [m^2]
 
     @property
     def v(self) -> float:
@@ -141,6 +142,11 @@ class CrossTrack:
             return self._deviation_from(_LAST)
         p = self._p
         return math.sqrt(max(float(p[_V, _V] + p[_TIP, _TIP] + 2.0 * p[_V, _TIP]), 0.0))
+
+    @property
+    def _misfit(self) -> float:
+        """Mean square by which the last stroke's edge differed from its expected place in this stroke [m^2]."""
+        return sum(self._misfits) / len(self._misfits)
 
     def _deviation_from(self, nodes: slice) -> float:
         """Standard deviation of v against the map of a stroke here [m]."""
@@ -191,6 +197,7 @@ class CrossTrack:
         self.maps.append(StrokeMap(self._config.stroke_m))
         self._again = []
         self._way = self.unled = self.longest_unled = 0.0
+        self._misfits = MISFIT_LOOKS * [self._misfit]
         self._laying = True
         self._open[:] = True
         self._take_error()
@@ -286,8 +293,8 @@ class CrossTrack:
         guides = []
         straight = math.radians(self._config.gates.fresh_lean_deg)
         last = None if again else self._last_edge(parallel, u, ahead)
-        if last is not None and self._laying:
-            self._misfit += MISFIT_SHARE * (self._difference**2 - self._misfit)
+        if last is not None and self._laying and self.unled < UNLED_AFTER_M:
+            self._misfits.append(self._difference**2)
         if last is not None and abs(last.lean) < straight:
             guides.append(last)
         if (line := self._board_edge(parallel)) is not None:

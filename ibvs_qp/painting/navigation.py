@@ -21,8 +21,7 @@ from ibvs_qp.painting.pattern_lines import PatternLine, pattern_lines
 from ibvs_qp.painting.phase_machine import PhaseMachine
 from ibvs_qp.painting.speed import approached, clipped
 
-#: The end of a stroke moves by at most this much so that its length is right [m]: less than half a length's tolerance,
-#: and the margin beyond the end is ten times as wide.
+#: The end of a stroke moves by at most this much so that its length is right [m]: less than half a length's tolerance.
 MOST_END_SHIFT_M = 0.004
 #: A stroke that begins farther from its place shows that the board is not as long as the job says [m].
 MOST_BEGIN_ERROR_M = 0.015

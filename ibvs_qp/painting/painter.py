@@ -37,13 +37,13 @@ CERTAIN_LENGTH_M = 0.005
 #: A stroke is as long as asked within this [m].
 LENGTH_TOLERANCE_M = 0.01
 #: Longest way without an edge of a stroke that is claimed [m]: the odometer, whose direction wanders with the attitude,
-#: errs by 3 mm on it in the datasheet world, and by 4 mm in the harsh one.
+#: errs by 3 mm on it in the datasheet world, and by up to 10 mm in the harsh one.
 MOST_UNLED_M = 0.4
 #: Way without an edge after which a stroke runs farther out until one shows [m], how steeply [-], and how far, over the
 #: nominal overlap [-]: steeper than the odometer errs, 1.4 deg in the harsh world.
 UNLED_BEFORE_M, ASIDE_SLOPE, MOST_ASIDE = 0.05, 0.06, 0.75
 #: Way outwards of a step from stroke to stroke and of an alignment while no edge is in view [m].
-ASIDE_M = 0.004
+ASIDE_M = 0.002
 #: Most of the time of painting without contact [-], below this push [N].
 MOST_LOST, LOST_N = 0.02, 0.3
 #: Last part of a stroke, whose overlap does not count [m].
@@ -53,8 +53,8 @@ PLACE_SIGMAS = 2.0
 #: Last part of a stroke, over which the edge at its end leads [m]: a gust of 2 N rms moves the tip by 15 mm beyond an
 #: end where velocity alone holds it. Over more, stiff line rows and the friction of 10 N at 0.7 shake the vehicle.
 LEAD_M = 0.05
-#: Least speed of the reference towards the end while its edge leads [m/s]: an overshoot of 15 mm is taken back within
-#: the time of a stop.
+#: Least speed of the reference towards the end while its edge leads, and towards a beginning [m/s]: 16 mm within the
+#: time of a stop.
 END_SPEED = 0.02
 #: Way ahead from which a stroke takes its target [m]: the tip follows a target that moves within half a second.
 REACTION_M = 0.05
@@ -86,7 +86,7 @@ class Painter(Navigation):
         self._longest = 0.0  # length of the stroke in progress, each pass included [m]
         self._behind = 0.0  # part of it before its beginning, by a retouch [m]
         self._painted_s = self._lost_s = 0.0  # time of painting, and of it without contact [s]
-        self._lost_m, self._left = 0.0, math.nan  # way of the stroke without contact; least way left in this pass [m]
+        self._lost_m = self._lost_at_ends_m = 0.0  # way of the stroke without contact, and of it near its ends [m]
         self._paused = self._follows_end = False
 
     def _enter(self, inputs: PainterInput, phase: str, reason: str) -> None:
@@ -241,8 +241,10 @@ class Painter(Navigation):
         goal = self._stroke_goal()
         if self._fails_by_time(inputs, f"row {self.row}", goal):
             return self._stroke_command(inputs)
-        aside = self._aside(ASIDE_SLOPE * (self._cross.unled - UNLED_BEFORE_M))
-        if self._run_towards(inputs, goal, self._touching_target(LEAST_OVERLAP) + aside, dt):
+        target = self._touching_target(LEAST_OVERLAP)
+        if aside := self._aside(ASIDE_SLOPE * (self._cross.unled - UNLED_BEFORE_M)):
+            target = min(target + aside, max(target, self._touching_target(1.0 - MOST_ASIDE, aside)))
+        if self._run_towards(inputs, goal, target, dt):
             self._end_stroke(inputs)
         return self._stroke_command(inputs)
 
@@ -265,7 +267,7 @@ class Painter(Navigation):
 
     def _turn_round(self) -> None:
         """The stroke in progress is painted again, one way or the other."""
-        self._speed, self._follows_end, self._left = 0.0, False, math.nan
+        self._speed, self._follows_end = 0.0, False
         self._stroke_end.begin()
         self._cross.begin_again()
 
@@ -292,16 +294,19 @@ class Painter(Navigation):
         if self._stroke_end.is_near(remaining):
             self._speed = 0.0
         self._lead_to_end(remaining, self._speed, dt)
-        return self._stroke_end.is_reached(inputs, remaining)
+        return self._stroke_end.is_reached(inputs, remaining) and not self._paused
 
     def _count_contact(self, push: float, remaining: float, dt: float) -> None:
-        """Count the time of painting, and time and way without contact; waiting for the contact is no way."""
-        left = remaining if math.isnan(self._left) else min(self._left, remaining)
+        """Count the time of painting, and time and way without contact; a retouch has paint below it."""
         self._painted_s += dt
-        if push <= LOST_N:
-            self._lost_s += dt
-            self._lost_m += 0.0 if math.isnan(self._left) else self._left - left
-        self._left = left
+        if push > LOST_N:
+            return
+        self._lost_s += dt
+        if self.phase == "paint":
+            advance, half = self._view_direction() * self._along.step, 0.5 * self.config.brush_width_m
+            self._lost_m = max(self._lost_m + advance, 0.0)
+            if not half < remaining < self.config.stroke_m - half:
+                self._lost_at_ends_m = max(self._lost_at_ends_m + advance, 0.0)
 
     def _stroke_command(self, inputs: PainterInput) -> PaintingCommand:
         along = self._view_direction() * self._speed
@@ -316,10 +321,10 @@ class Painter(Navigation):
         target = 0.0 if self._paused else climb_speed(config, left)
         self._speed = ramped(self._speed, target, config.acceleration_m_s2 * dt)
         self._v_reference += min(self._speed * dt, max(left, 0.0))
-        if self._along_line.line is not None:
+        if self._along_line.line is not None and not self._paused:
             self._u_reference = approached(self._u_reference, self._stroke_begin(), END_SPEED * dt)
         if left <= 0.0:
-            self._speed, self._v_reference = 0.0, place
+            self._speed, self._v_reference = 0.0, self._slid(self._v_reference, place, dt)
             self._climb_settled(inputs)
         return self._command(inputs, contact=True, climb=self._speed, hold=True)
 
@@ -362,7 +367,7 @@ class Painter(Navigation):
     def _begin_stroke(self, inputs: PainterInput, stroke: int, reason: str) -> None:
         self.row, self._speed, self._follows_end, self._touches = stroke, 0.0, False, 0
         self._retouches, self._longest, self._behind = 0, 0.0, 0.0
-        self._lost_m, self._left = 0.0, math.nan
+        self._lost_m = self._lost_at_ends_m = 0.0
         self._cross.begin_stroke()
         self._along.begin_stroke()
         self._stroke_end.begin()
@@ -423,7 +428,8 @@ class Painter(Navigation):
             )
         if (slip := self._along.slip) > self.config.gates.stop_m:
             return f"row {self.row} met an edge {slip * 1e3:.0f} mm from where the odometer expected it"
-        if self._lost_m > 0.5 * self.config.brush_width_m:  # the brush covers less from both sides
+        # The brush covers half its width from both sides; beyond an end there is no other side.
+        if self._lost_m > 0.5 * self.config.brush_width_m or self._lost_at_ends_m > LENGTH_TOLERANCE_M:
             return f"row {self.row} was without contact over {self._lost_m * 1e3:.0f} mm"
         if self._is_last() and self._lost_s > MOST_LOST * self._painted_s:
             return f"the strokes were without contact for {self._lost_s:.1f} s of {self._painted_s:.1f} s"
@@ -471,13 +477,13 @@ class Painter(Navigation):
         return min(self.config.overlap_m, self.config.brush_width_m - (self._v_target - self._place(self.row - 1)))
 
     def _aside(self, way: float = ASIDE_M) -> float:
-        """Way outwards [m]: the arm hides an edge from a tip that errs inwards; the strokes still overlap."""
+        """Way outwards at which an edge shows that the arm hides from a tip that errs inwards [m]."""
         return max(min(way, MOST_ASIDE * self._nominal_overlap()), 0.0)
 
-    def _touching_target(self, share: float) -> float:
+    def _touching_target(self, share: float, aside: float = 0.0) -> float:
         """Target v [m]: the stroke's place, or less where its overlap would be below this share of the nominal one."""
         inside = share * self._nominal_overlap()
-        return min(self._v_target, self._reach_of_last(REACTION_M, 0.5 * self.config.brush_width_m) - inside)
+        return min(self._v_target + aside, self._reach_of_last(REACTION_M, 0.5 * self.config.brush_width_m) - inside)
 
     def _lead_to_end(self, remaining: float, speed: float, dt: float) -> None:
         """Over its last centimetres the edge at the end of the stroke leads: from where the tip is, at its speed.
@@ -489,7 +495,8 @@ class Painter(Navigation):
             return
         if not self._follows_end:
             self._follows_end, self._u_reference = True, self._along.u
-        self._u_reference = approached(self._u_reference, self._stroke_goal(), max(speed, END_SPEED) * dt)
+        if not self._paused:
+            self._u_reference = approached(self._u_reference, self._stroke_goal(), max(speed, END_SPEED) * dt)
 
     def _climb_settled(self, inputs: PainterInput) -> None:
         """Begin the stroke at its place once it is known well enough; search for its edge if it stays unknown."""

@@ -37,5 +37,5 @@ class StrokeEnd:
             self._stop_time = inputs.time_s
         waited = inputs.time_s - self._stop_time
         still = math.hypot(*inputs.velocity[:2]) < STOP_SPEED_RATIO * config.align_speed_m_s
-        near = remaining < config.stop_error_m
+        near = abs(remaining) < config.stop_error_m
         return (waited > config.stop_time_s and still and near) or waited > config.stop_timeout_s

@@ -270,8 +270,10 @@ def _wind(scene: Scene, config: PilotConfig) -> Iterator[str]:
 
 def _motors(scene: Scene, config: PilotConfig) -> Iterator[str]:
     """Motors of the plant that lag much longer than those of the vehicle."""
-    plant, expected = scene.plant, config.controller.vehicle.motor_lag_s
-    up, down = (expected if lag is None else lag for lag in (plant.motor_lag_up_s, plant.motor_lag_down_s))
+    plant, vehicle = scene.plant, config.controller.vehicle
+    expected = vehicle.motor_lag_s
+    up = vehicle.motor_lag_up_s if plant.motor_lag_up_s is None else plant.motor_lag_up_s
+    down = vehicle.motor_lag_down_s if plant.motor_lag_down_s is None else plant.motor_lag_down_s
     if up + down > 2.0 * LARGEST_LAG_RATIO * expected:
         allowed = f"allowed is at most {LARGEST_LAG_RATIO * expected:g} s on average"
         reason = f"estimators, observers and leads count on the vehicle's {expected:g} s"

@@ -344,6 +344,21 @@ def test_without_edges_the_uncertainty_grows_and_never_shrinks() -> None:
     assert cross.guides == {}
 
 
+def test_an_overlap_is_as_uncertain_as_the_last_edge_wanders_from_its_expected_place() -> None:
+    overlap, place = [], []
+    for jolt in (0.0, 3e-3):
+        cross = _after_stroke_one()
+        cross.begin_stroke()
+        for k in range(40):
+            cross.lay(0.6 - 0.01 * k)
+            cross.predict(-0.01, 0.0, 0.1)
+            _look(cross, fresh(jolt if k % 2 else -jolt), u=0.6 - 0.01 * (k + 1), times=1)
+        overlap.append(cross.overlap(0.25, 0.6)[2].mean())
+        place.append(cross.stroke_place(0.25, 0.6)[1])
+    assert 2e-3 < math.sqrt(overlap[1] ** 2 - overlap[0] ** 2) < 3.2e-3
+    assert place[1] > 2.0 * place[0]
+
+
 def test_the_wander_of_the_odometer_s_axes_is_followed_and_fades() -> None:
     """They turn by 1 deg after stroke 1: its edge shows a third of that within 4 s, 2.5 standard deviations."""
     cross, wander = _after_stroke_one(), math.radians(1.0)

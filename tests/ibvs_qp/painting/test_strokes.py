@@ -293,6 +293,63 @@ def test_a_stroke_with_a_gap_that_the_push_shows_is_not_claimed(gap_m: float, cl
     assert claimed or re.fullmatch(r"row 2 was without contact over \d+ mm", world.painter.reason)
 
 
+@pytest.mark.parametrize("before_m", [0.032, 0.01])
+def test_contact_lost_before_the_end_of_a_stroke_is_waited_for(before_m: float) -> None:
+    """The edge at the end leads there, but not a tip in the air."""
+    world = PaintedWall(short(rows=6, stroke_m=1.0))
+    world.fly(60.0, until="paint", stroke=2)
+    while world.tip[0] > before_m:
+        world.step()
+    world.contact_allowed = False
+    world.fly(3.0)
+    assert world.painter.phase == "paint" and world.painter.row == 2
+    world.contact_allowed = True
+    world.fly(300.0)
+    assert world.painter.finished
+    assert world.painter.failed or np.nanmin(np.where(np.isnan(world.paint[1].v), 9.0, world.paint[1].u)) < 0.01
+
+
+@pytest.mark.parametrize("place", ["first", "last"])
+def test_the_ends_of_a_stroke_have_no_paint_of_another_side(place: str) -> None:
+    world = PaintedWall(short(rows=6, stroke_m=1.0))
+    world.fly(60.0, until="paint", stroke=2)
+    while place == "last" and world.tip[0] > 0.025:
+        world.step()
+    before, world.push = world.tip[0], 0.0
+    while abs(world.tip[0] - before) < 0.02:
+        world.step()
+    world.push = 5.0
+    world.fly(300.0)
+    assert world.painter.failed and world.painter.reason.startswith("row 2 was without contact over ")
+
+
+def test_way_without_contact_counts_although_an_edge_corrects_u() -> None:
+    """The odometer slips by 50 mm before the contact is lost; that way is the tip's, not that of its estimate."""
+    world = PaintedWall(short(rows=6, stroke_m=1.0))
+    world.fly(60.0, until="paint", stroke=2)
+    world.fly(3.0)
+    world.odometer += world.to_wall(-0.05, 0.0)
+    before, world.push = world.tip[0], 0.0
+    while abs(world.tip[0] - before) < 0.07:
+        world.step()
+    world.push = 5.0
+    world.fly(300.0)
+    assert world.painter.failed
+
+
+def test_a_stroke_does_not_end_beyond_its_end() -> None:
+    """An overshoot that stands still for a moment."""
+    world = PaintedWall(short(rows=2, stroke_m=1.0))
+    world.fly(60.0, until="paint")
+    while world.tip[0] < world.config.stroke_m - STOP_DISTANCE:
+        world.step()
+    world.tip[0] += 0.01
+    world.odometer += world.to_wall(0.01, 0.0)
+    world.stuck = True
+    world.fly(0.3)
+    assert world.painter.phase == "paint"
+
+
 @pytest.mark.parametrize("shift", [0.012, -0.012, -0.002])
 def test_a_tip_that_is_moved_at_the_end_of_a_stroke_returns_to_it(shift: float) -> None:
     """A gust moves it over the end, or stiction holds it short of it; velocity alone would leave it there."""

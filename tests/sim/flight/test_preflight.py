@@ -136,7 +136,7 @@ LIMITS = {
     ),
     "motors that lag much longer than the vehicle's": (
         Scene(plant=PlantScene(motor_lag_up_s=0.12, motor_lag_down_s=0.12)),
-        Scene(plant=PlantScene(motor_lag_up_s=0.11, motor_lag_down_s=0.11)),
+        Scene(plant=PlantScene(motor_lag_up_s=0.045, motor_lag_down_s=0.18)),
         ["plant.motor_lag_up_s = 0.12 s", "at most 0.115 s"],
     ),
     # Both sides of these were flown: the passing one to the end, the other until the supervisor ended the flight.
