@@ -78,7 +78,7 @@ class WallMotion:
         self.state: list[float] = self._filter.state.tolist()
         self.velocity_age_s, self.refused_s = math.inf, 0.0
         self._refused_stamp = -1
-        self._stamp = self._frame_stamp = self._velocity_stamp = -1
+        self._stamp = self._frame_stamp = self._velocity_stamp = self._gap_end = -1
 
     @property
     def lines(self) -> dict[int, TrackedLine]:
@@ -111,6 +111,7 @@ class WallMotion:
         """Integrate accelerometer [m/s^2] and gyro [rad/s] over dt [s]; the tip moves with the body's rotation, too."""
         if 0 <= self._stamp < stamp_ns - GAP_NS:
             self.doubt()
+            self._gap_end = stamp_ns
         acceleration, swing = add_scaled(specific_force, GRAVITY, axes.gravity), cross(omega, self._tip)
         state = self.state.copy()
         velocity_right, velocity_down, bias_right, bias_down, *_ = state
@@ -130,10 +131,15 @@ class WallMotion:
         self.velocity_age_s = (stamp_ns - self._velocity_stamp) * 1e-9 if self._velocity_stamp >= 0 else math.inf
 
     def correct(self, frame: FeatureFrame, axes: WallAxes, distance: float) -> None:
-        """Correct with the features of a newer frame; axes and distance of the tip [m] are those at capture."""
+        """Correct with the features of a newer frame; axes and distance of the tip [m] are those at capture.
+
+        A frame from a time without ticks corrects nothing: the state at its capture is not known.
+        """
         if frame.stamp_ns <= self._frame_stamp:
             return
         self._frame_stamp = frame.stamp_ns
+        if frame.stamp_ns < self._gap_end:
+            return
         self._correct_velocity(frame, axes)
         for line in frame.lines:
             measured = wall_line(line, axes, self._tip_from_camera, distance)

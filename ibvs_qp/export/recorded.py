@@ -13,8 +13,9 @@ from ibvs_qp.export.binding import Structures
 from ibvs_qp.measurement import Measurement, Reference
 from ibvs_qp.symbolic.literals import real, reals
 
-#: Largest difference from the thrusts of Python [N], in double and in single precision.
-TOLERANCE, SINGLE_TOLERANCE_N = 1e-6, 0.03
+#: Largest difference from the thrusts of Python [N], in double and in single precision: row filters carry the rounding
+#: of a tick on to the next ones.
+TOLERANCE, SINGLE_TOLERANCE_N = 5e-6, 0.03
 
 
 def write_recorded(

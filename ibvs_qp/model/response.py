@@ -12,6 +12,8 @@ from ibvs_qp.symbolic.signals import Signals
 
 #: Bandwidth of the residual wrench [rad/s]: it has half of a step after 23 ms.
 RESIDUAL_BANDWIDTH = 30.0
+#: One sample of the moment stands for this many ticks at most [-]: after a hole of 0.9 s, 1 N m of it counted as 27.
+MOST_TICKS = 10.0
 #: Bandwidth of the push by inertial data [rad/s]: of a vibration of 1 m/s^2 at 250 Hz, 1 N rms remains.
 PUSH_BANDWIDTH = 10.0
 #: Bandwidth of the force learnt away from the wall: wind, wrong thrusts, accelerometer bias [rad/s].
@@ -109,7 +111,8 @@ def missing_thrust(
     momentum = ca.sparsify(vehicle.inertia) @ body.gyro
     known = rotors[3:] + felt_moment - ca.cross(body.gyro, momentum)
     path, started = signals.state("residual_momentum", 3), signals.state("residual_started")
-    ready = ca.logic_and(ca.logic_and(motors.ready, body.dt > 0.0), body.specific_force_known)
+    in_time = ca.logic_and(body.dt > 0.0, body.dt < MOST_TICKS * config.tick_s)
+    ready = ca.logic_and(ca.logic_and(motors.ready, in_time), body.specific_force_known)
     begun = ca.if_else(started, path, momentum - old_moment / RESIDUAL_BANDWIDTH)
     moved = begun + body.dt * (known + old_moment)
     moment = ca.if_else(ready, RESIDUAL_BANDWIDTH * (momentum - moved), old_moment)

@@ -71,6 +71,11 @@ class AlongTrack:
         self._p[0, 0] += DRIFT_PER_M * abs(du)
         self._way_variance += DRIFT_PER_M * abs(du)
 
+    def doubt(self, jump: float) -> None:
+        """The odometer may be wrong by its last move [m]."""
+        self._p[0, 0] += jump**2
+        self._way_variance += jump**2
+
     def begin_stroke(self) -> None:
         """A stroke begins here."""
         self._way = self._way_variance = self.slip = 0.0

@@ -70,9 +70,9 @@ WINDOW_M = (0.06, 0.22)
 SHORTEST_M = 0.015
 #: An edge farther from its expected place than this many standard deviations plus a floor [m] is another one.
 GATE_SIGMAS, GATE_FLOOR_M = 4.0, 4e-3
-#: Distance of the last stroke's edge from its expected place, root mean square: 0.6 mm in the datasheet world, 1 to
-#: 2 mm in the harsh one [m]; looks for which the last stroke counts in the mean of the next one [-].
-MISFIT, MISFIT_LOOKS = 6e-4, 20
+#: Distance of the last stroke's edge from its expected place, in the mean of two looks: 0.4 mm in the datasheet world,
+#: 1 mm in the harsh one [m]; looks for which the last stroke counts in the mean of the next one [-].
+MISFIT, MISFIT_LOOKS = 4e-4, 20
 #: Time constant of the direction of the strokes, from the board's edge [s]; largest slope of a board [rad].
 TURN_TIME_S, LARGEST_TURN = 2.0, math.radians(15.0)
 #: Places along a stroke at which the error of its map is a state [-].
@@ -108,7 +108,8 @@ class CrossTrack:
         self._u, self._forward = 0.0, 1.0  # of the tip [m]; direction in which the stroke in progress is laid
         self._way = self.unled = self.longest_unled = 0.0
         self._difference = 0.0  # of the last line from its expected place [m]
-        self._misfits = MISFIT_LOOKS * [MISFIT**2]  # squares of that of the last stroke's edge [m^2]
+        self._before = math.nan  # that of the last stroke's edge at the last look
+        self._misfits = MISFIT_LOOKS * [MISFIT**2]  # products of those of two looks [m^2]
 
     @property
     def v(self) -> float:
@@ -144,9 +145,13 @@ class CrossTrack:
         return math.sqrt(max(float(p[_V, _V] + p[_TIP, _TIP] + 2.0 * p[_V, _TIP]), 0.0))
 
     @property
-    def _misfit(self) -> float:
-        """Mean square by which the last stroke's edge differed from its expected place in this stroke [m^2]."""
-        return sum(self._misfits) / len(self._misfits)
+    def misfit(self) -> float:
+        """By which the last stroke's edge differed from its expected place in this stroke, in the mean [m].
+
+        Gusts and late pictures move the tip faster than the filter follows. From products of the differences in two
+        looks: noise that changes from look to look does not count.
+        """
+        return math.sqrt(max(sum(self._misfits) / len(self._misfits), 0.0))
 
     def _deviation_from(self, nodes: slice) -> float:
         """Standard deviation of v against the map of a stroke here [m]."""
@@ -192,12 +197,16 @@ class CrossTrack:
         p[_TIP, _TIP] += TIP_WANDER * dt
         p[_FAR, _FAR] += FAR_PER_M * abs(dv)
 
+    def doubt(self, jump: float) -> None:
+        """The odometer may be wrong by its last move [m]."""
+        self._p[_V, _V] += jump**2
+
     def begin_stroke(self) -> None:
         """The tip begins to paint a stroke; what it paints is remembered."""
         self.maps.append(StrokeMap(self._config.stroke_m))
         self._again = []
         self._way = self.unled = self.longest_unled = 0.0
-        self._misfits = MISFIT_LOOKS * [self._misfit]
+        self._misfits = MISFIT_LOOKS * [self.misfit**2]
         self._laying = True
         self._open[:] = True
         self._take_error()
@@ -237,7 +246,7 @@ class CrossTrack:
         """
         shares = self._shares(np.linspace(first_u, last_u, NODES)).mean(axis=0)
         place = self.maps[-1].mean(first_u, last_u) + float(shares @ self._x[_OWN])
-        rougher = max(math.sqrt(self._misfit) / EDGE_STD, 1.0)  # than the noise of the filter
+        rougher = max(self.misfit / (0.5 * EDGE_STD), 1.0)  # than the filter allows for
         return place, rougher * math.sqrt(max(float(shares @ self._p[_OWN, _OWN] @ shares), 0.0))
 
     def overlap(self, first_u: float, last_u: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -248,9 +257,7 @@ class CrossTrack:
             last_u: The other one [m].
 
         Returns:
-            u, overlap, and its standard deviation [m], (n,) each; empty before the second stroke. The deviation has a
-            part by which the last stroke's edge differed from its expected place: gusts and late pictures move the
-            tip faster than the filter follows, by 0.6 mm in the datasheet world and 1 to 2 mm in the harsh one.
+            u, overlap, and its standard deviation [m], (n,) each; empty before the second stroke.
         """
         if len(self.maps) < 2:
             return np.empty(0), np.empty(0), np.empty(0)
@@ -261,8 +268,7 @@ class CrossTrack:
         inner = np.fmin.reduce([own, *(again.places()[1] for again in self._again)])
         overlap = (last - inner)[within] + shares @ (self._x[_LAST] - self._x[_OWN]) + 2.0 * self._half
         covariance = p[_LAST, _LAST] - p[_LAST, _OWN] - p[_OWN, _LAST] + p[_OWN, _OWN]
-        variance = np.maximum(np.sum(shares @ covariance * shares, axis=1), 0.0)
-        return u[within], overlap, np.sqrt(variance + self._misfit)
+        return u[within], overlap, np.sqrt(np.maximum(np.sum(shares @ covariance * shares, axis=1), 0.0))
 
     def end_stroke(self) -> None:
         """The stroke ends: the error of its map becomes that of the last stroke, and beta begins anew."""
@@ -294,7 +300,11 @@ class CrossTrack:
         straight = math.radians(self._config.gates.fresh_lean_deg)
         last = None if again else self._last_edge(parallel, u, ahead)
         if last is not None and self._laying and self.unled < UNLED_AFTER_M:
-            self._misfits.append(self._difference**2)
+            if not math.isnan(self._before):
+                self._misfits.append(self._difference * self._before)
+            self._before = self._difference
+        else:
+            self._before = math.nan
         if last is not None and abs(last.lean) < straight:
             guides.append(last)
         if (line := self._board_edge(parallel)) is not None:

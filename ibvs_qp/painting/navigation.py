@@ -25,6 +25,8 @@ from ibvs_qp.painting.speed import approached, clipped
 MOST_END_SHIFT_M = 0.004
 #: A stroke that begins farther from its place shows that the board is not as long as the job says [m].
 MOST_BEGIN_ERROR_M = 0.015
+#: An odometer that moves by more at once was corrected after a hole in the data, by the velocity at its end [m/s, m].
+MOST_SPEED_M_S, JUMP_M = 1.0, 0.005
 
 
 class Navigation(PhaseMachine):
@@ -61,6 +63,9 @@ class Navigation(PhaseMachine):
         du, dv = self._turned(*self.pattern.to_pattern(odometer[0] - before[0], odometer[1] - before[1]), -cross.turn)
         cross.predict(du, dv, dt)
         along.predict(du)
+        if math.hypot(du, dv) > MOST_SPEED_M_S * dt + JUMP_M:
+            cross.doubt(dv)
+            along.doubt(du)
         self._lines = lines = pattern_lines(inputs.lines.values(), self.pattern, cross.picture_turn)
         again = self.phase == "retouch"
         if self.phase == "paint" and inputs.in_contact:

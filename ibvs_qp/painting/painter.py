@@ -401,7 +401,7 @@ class Painter(Navigation):
     def _begin_retouch(self, inputs: PainterInput) -> bool:
         """Go back to where the stroke may leave a gap to the last one; False where it does not, or cannot be mended."""
         u, overlap, known = self._overlap()
-        least = overlap - RETOUCH_SIGMAS * known
+        least = overlap - RETOUCH_SIGMAS * np.hypot(known, self._cross.misfit)
         enough = RETOUCH_OVERLAP * self.config.overlap_m > RETOUCH_SIGMAS * known
         gaps = u[(least < 0.0) & enough & (SIGMAS * known <= 2.0 * self._certain_m)]
         if not gaps.size or self._retouches >= MOST_RETOUCHES or self._cross.longest_unled > MOST_UNLED_M:
@@ -438,7 +438,7 @@ class Painter(Navigation):
             return f"row {self.row} lost its edge, its overlap is known to {worst * 1e3:.1f} mm"
         if (unled := self._cross.longest_unled) > MOST_UNLED_M:
             return f"row {self.row} had no edge to follow for {unled:.2f} m"
-        if (least := (overlap - known).min(initial=math.inf)) < 0.0:
+        if (least := (overlap - np.hypot(known, self._cross.misfit)).min(initial=math.inf)) < 0.0:
             return f"row {self.row} may leave a gap of {-least * 1e3:.1f} mm to the row before"
         nominal = self.config.brush_width_m - (self._v_target - self._place(self.row - 1))
         if (most := (overlap + known).max(initial=0.0)) > MOST_OVERLAP * nominal:

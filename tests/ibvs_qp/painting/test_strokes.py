@@ -337,6 +337,18 @@ def test_way_without_contact_counts_although_an_edge_corrects_u() -> None:
     assert world.painter.failed
 
 
+@pytest.mark.parametrize("jump", [(0.0, -0.03), (0.08, 0.0)])
+def test_a_jump_of_the_odometer_is_doubted(jump: tuple[float, float]) -> None:
+    """After a hole in the data the velocity at its end moves the odometer; the edges show where the tip is."""
+    world = PaintedWall(short(rows=1, stroke_m=1.0))
+    world.fly(60.0, until="paint")
+    world.fly(2.0)
+    world.odometer += world.to_wall(*jump)
+    world.fly(3.0)
+    assert abs(world.painter._cross.v - world.tip[1]) < PLACE
+    assert_painted(world)
+
+
 def test_a_stroke_does_not_end_beyond_its_end() -> None:
     """An overshoot that stands still for a moment."""
     world = PaintedWall(short(rows=2, stroke_m=1.0))
