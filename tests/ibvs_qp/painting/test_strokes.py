@@ -337,7 +337,7 @@ def test_way_without_contact_counts_although_an_edge_corrects_u() -> None:
     assert world.painter.failed
 
 
-@pytest.mark.parametrize("jump", [(0.0, -0.03), (0.08, 0.0)])
+@pytest.mark.parametrize("jump", [(0.0, -0.048), (0.08, 0.0)])
 def test_a_jump_of_the_odometer_is_doubted(jump: tuple[float, float]) -> None:
     """After a hole in the data the velocity at its end moves the odometer; the edges show where the tip is."""
     world = PaintedWall(short(rows=1, stroke_m=1.0))
