@@ -13,8 +13,8 @@ from ibvs_qp.tasks.task import Task
 WRENCH_SIZE = 6
 #: Time in which the redundant thrusts go to their place [s]: five times the motors' lag.
 SETTLING_TIME = 0.3
-#: Least distance of a thrust from a limit in the cost [N], a quarter of the width of a stuck rotor's limits: the cost
-#: stays finite, and that rotor hardly moves.
+#: Least distance of a thrust from a limit in the cost [N], a quarter of the width of a stuck rotor's limits: it keeps
+#: the cost finite.
 LEAST_DISTANCE = 0.25
 
 

@@ -280,7 +280,7 @@ def test_a_step_takes_the_tip_back_to_where_strokes_begin() -> None:
 
 @pytest.mark.parametrize(("gap_m", "claimed"), [(0.02, True), (0.05, False)])
 def test_a_stroke_with_a_gap_that_the_push_shows_is_not_claimed(gap_m: float, claimed: bool) -> None:
-    """A long job hides it in the share of its time; the brush covers half its width from both sides."""
+    """The gap is 1.3 % of the way at most. The brush paints half its width beyond the contact on both sides."""
     world = PaintedWall(short(rows=4, stroke_m=1.0))
     world.fly(60.0, until="paint", stroke=2)
     world.fly(3.0)
