@@ -8,6 +8,7 @@ from allocation.least_squares import DEFAULT_ROW_WEIGHTS, allocate_least_squares
 from allocation.level_flight import level_polygon, worst_level_reach
 from allocation.pseudo_inverse import allocate_pseudo_inverse
 from allocation.sequential_desaturation import FULLY_ACTUATED_ORDER, allocate_px4, allocate_sequential
+from allocation.tilted_reach import tilted_push_reach, worst_tilted_push_reach
 from allocation.wrench_facets import WrenchFacets
 
 __all__ = [
@@ -28,6 +29,8 @@ __all__ = [
     "level_polygon",
     "push_direction",
     "push_reach",
+    "tilted_push_reach",
     "worst_level_reach",
     "worst_push_reach",
+    "worst_tilted_push_reach",
 ]

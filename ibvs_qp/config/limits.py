@@ -45,6 +45,14 @@ class LimitSettings:
         low=0.05,
         high=45.0,
     )
+    trim_deg: float = setting(
+        0.0,
+        "roll and pitch that a push beyond the level reach may take",
+        unit="deg",
+        why="a permission of the mission: 2 deg add 2 N standing and 1.7 N sliding at a friction of 0.8",
+        low=0.0,
+        high=10.0,
+    )
     tilt_slack_weight: float = _slack_weight(4000.0, "the tilt barriers", "s^4/rad^2", "ten times the level rows")
     tilt_rate_1_s: float = _poles(
         12.0,

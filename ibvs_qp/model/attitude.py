@@ -58,7 +58,13 @@ class Attitude:
 
 
 def attitude(
-    signals: Signals, body: Body, contact: Contact, target: Target, rate_ahead: ca.SX, bandwidth_hz: float
+    signals: Signals,
+    body: Body,
+    contact: Contact,
+    target: Target,
+    rate_ahead: ca.SX,
+    bandwidth_hz: float,
+    trim_tilt: ca.SX,
 ) -> Attitude:
     """Angles and rates of a step.
 
@@ -69,12 +75,13 @@ def attitude(
         target: Roll and pitch to fly.
         rate_ahead: Angular velocity after the lead [rad/s], (3,).
         bandwidth_hz: Of the attitude estimate in roll and pitch [Hz] (`filtered_roll_pitch`).
+        trim_tilt: Roll and pitch that a push beyond the level reach takes [rad], (2,) (`ibvs_qp.model.trim_tilt`).
     """
     roll = ca.atan2(body.down[1], body.down[2])
     pitch = ca.asin(clamp(-body.down[0], -1.0, 1.0))
     yaw = ca.if_else(contact.known, -ca.atan2(contact.normal[1], contact.normal[0]), 0.0)
     tilt, trim = ca.vertcat(target.roll, target.pitch), ca.vertcat(target.trim_roll, target.trim_pitch)
-    tilted, target_angles = ca.norm_2(tilt) > 0.0, tilt + trim
+    tilted, target_angles = ca.norm_2(tilt) > 0.0, tilt + trim + trim_tilt
 
     # Near level the body rates are the angle rates; a tilted vehicle that turns about the vertical has body rates
     # in roll and pitch without changing either angle.

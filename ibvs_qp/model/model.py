@@ -21,10 +21,11 @@ from ibvs_qp.model.feedforward import SLIDING_COMMAND, contact_feedforward
 from ibvs_qp.model.friction import cautious_friction, estimated_friction
 from ibvs_qp.model.inputs import Body, Contact, Line, Target, gain_inputs
 from ibvs_qp.model.motor_thrust import motor_thrust
-from ibvs_qp.model.reach import STANDING_SPEED, push_reach, push_reference
+from ibvs_qp.model.reach import STANDING_SPEED, push_planes, push_reach, push_reference
 from ibvs_qp.model.response import carried_weight, inertial_push, missing_thrust
 from ibvs_qp.model.rows import Parameter
 from ibvs_qp.model.thrust_window import thrust_window
+from ibvs_qp.model.trim_tilt import TrimTilt
 from ibvs_qp.symbolic.signals import Signals
 
 T = TypeVar("T")
@@ -87,8 +88,8 @@ class Model:
         self.rate_ahead = rate + config.angular_rate.lead_s * angular_acceleration
         self.wall = wall_axes(self.body, self.contact)
         bandwidth = config.angular_rate.attitude_bandwidth_hz
-        self.attitude = attitude(signals, self.body, self.contact, self.target, self.rate_ahead, bandwidth)
-        target = self.target
+        target, trim = self.target, TrimTilt(signals, config)
+        self.attitude = attitude(signals, self.body, self.contact, target, self.rate_ahead, bandwidth, trim.angles)
         velocity = ca.vertcat(target.velocity_right, target.velocity_down)
         self.travel = self.wall.in_body(target.velocity_right, target.velocity_down)
         self.tip_stationary = ca.logic_and(self.contact.touching, ca.norm_2(velocity) <= SLIDING_COMMAND)
@@ -106,7 +107,9 @@ class Model:
         self.acceleration_commanded = self.acceleration_of(self.last_thrust)
         planned = self.wall.in_body(target.travel_right, target.travel_down)
         ahead = ca.if_else(ca.norm_2(self.travel) > STANDING_SPEED, self.travel, planned)
-        self.reach = push_reach(signals, vehicle, self.wall.normal, ahead, friction, static_wrench)
+        planes = push_planes(signals, vehicle, self.wall.normal, ahead, friction, static_wrench)
+        self.reach = push_reach(signals, planes)
+        trim.update(planes, self.body, self.contact, target)
         self.push_reference = push_reference(signals, config, self.body, self.contact, target, self.reach)
         self._name_outputs()
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import casadi as ca
 import numpy as np
 
@@ -22,21 +24,36 @@ REACH_FRACTION = 0.97
 FALL, RISE = 60.0, 10.0
 
 
-def push_reach(
+@dataclass(frozen=True, kw_only=True)
+class PushPlanes:
+    r"""Planes of the attainable wrench set, along the push.
+
+    A push f is attainable when :math:`lower \le slope\, f \le upper` for every pair of planes.
+
+    Attributes:
+        normals: Facet normals, (k, 6).
+        slope: Of each pair along the push [-], (k,).
+        lower, upper: Distances of both planes from the wrench without push [N], (k,) each.
+    """
+
+    normals: ca.DM
+    slope: ca.SX
+    lower: ca.SX
+    upper: ca.SX
+
+
+def push_planes(
     signals: Signals,
     vehicle: VehicleParams,
     normal: ca.SX,
     travel: ca.SX,
     friction: ca.SX,
     static_wrench: ca.SX,
-) -> ca.SX:
-    r"""Largest push that the limits in force can hold, level, against friction along the commanded travel [N].
+) -> PushPlanes:
+    r"""Planes that bound the push within the limits in force, against friction along the commanded travel.
 
     The ray :math:`w(f) = f [d; p \times d] - h`, :math:`d = n + \mu t`, meets the facets of the attainable wrench set
-    (`allocation.wrench_facets`), exactly for any number of rotors. The reach is the first f at which it leaves. The
-    output `least_push` is the last f at which it enters: above zero where only pushing relieves a weak rotor, and
-    `NO_PUSH` where the vehicle can hold no push, not even zero. `ibvs_qp.model.setpoints.Setpoints.limiting_rotors`
-    names the rotors at the reach from the outputs `reach_direction` and `static_wrench`.
+    (`allocation.wrench_facets`), exactly for any number of rotors.
     """
     facets, count = WrenchFacets(vehicle.geometry), vehicle.geometry.count
     low, high = signals.input("thrust_low", count), signals.input("thrust_high", count)
@@ -45,17 +62,38 @@ def push_reach(
     direction = normal + ca.if_else(speed > STANDING_SPEED, friction / ca.fmax(speed, STANDING_SPEED), 0.0) * travel
     lever = ca.cross(ca.DM(vehicle.tip_position_m), direction)
     ray = signals.output("reach_direction", ca.vertcat(direction, lever))
-    slope = ca.DM(facets.normals) @ ray
     rising, falling = ca.DM(np.maximum(facets.coefficients, 0.0)), ca.DM(np.minimum(facets.coefficients, 0.0))
     offset = -(ca.DM(facets.normals) @ signals.output("static_wrench", static_wrench))
-    upper, lower = rising @ high + falling @ low - offset, rising @ low + falling @ high - offset
+    return PushPlanes(
+        normals=ca.DM(facets.normals),
+        slope=ca.DM(facets.normals) @ ray,
+        lower=rising @ low + falling @ high - offset,
+        upper=rising @ high + falling @ low - offset,
+    )
+
+
+def push_range(planes: PushPlanes) -> tuple[ca.SX, ca.SX]:
+    """Least and largest push between the planes [N]; the least is `NO_PUSH` where there is none."""
+    slope, lower, upper = planes.slope, planes.lower, planes.upper
     along, safe = ca.fabs(slope) > RELATIVE_ZERO, ca.if_else(ca.fabs(slope) > RELATIVE_ZERO, slope, 1.0)
     room = ca.if_else(along, ca.if_else(slope > 0.0, upper, lower) / safe, UNBOUNDED)
     outside = ca.logic_or(lower > ON_PLANE, upper < -ON_PLANE)  # of a pair of planes that the push does not move in
     entry = ca.if_else(along, ca.if_else(slope > 0.0, lower, upper) / safe, ca.if_else(outside, NO_PUSH, 0.0))
     leave, enter = ca.mmin(room), ca.fmax(ca.mmax(entry), 0.0)
     reach = ca.fmax(leave, 0.0)
-    signals.output("least_push", ca.if_else(leave >= enter - ON_PLANE, ca.fmin(enter, reach), NO_PUSH))
+    return ca.if_else(leave >= enter - ON_PLANE, ca.fmin(enter, reach), NO_PUSH), reach
+
+
+def push_reach(signals: Signals, planes: PushPlanes) -> ca.SX:
+    """Largest push that the limits in force can hold at this attitude [N].
+
+    The reach is the first f at which the ray leaves the attainable set. The output `least_push` is the last f at which
+    it enters: above zero where only pushing relieves a weak rotor, and `NO_PUSH` where the vehicle can hold no push,
+    not even zero. `ibvs_qp.model.setpoints.Setpoints.limiting_rotors` names the rotors at the reach from the outputs
+    `reach_direction` and `static_wrench`.
+    """
+    least, reach = push_range(planes)
+    signals.output("least_push", least)
     return signals.output("reach", reach)
 
 

@@ -2,7 +2,7 @@ r"""Place of the tip across the strokes, from the odometer and every edge in vie
 
 A Kalman filter with these states: v of the true tip; :math:`\delta`, by which the picture shows the tip at a larger v
 than it has (camera mount, arm, attitude); the odometer's drift; the direction of the strokes against the odometer's
-axes, and how these wander with the attitude; :math:`\beta`, by which an edge ahead seems to lie at a larger v than the
+axes, and how these and the picture wander with the attitude; :math:`\beta`, by which an edge ahead seems to lie at a larger v than the
 same edge behind; v of the board's far edge; and, at `NODES` places along the last stroke and the one being laid, the
 amount by which each lies at a larger v than its map says. A line at v = L then appears at the place
 :math:`p = L - v - \delta` beside the tip:
@@ -56,7 +56,7 @@ DRIFT_STD, DRIFT_WANDER = 1e-3, 1e-9
 #: Standard deviation of the strokes' direction where the board's edge shows it, by the roll of the camera's mount
 #: [rad]; its variance per second [rad^2/s].
 TURN_STD, TURN_WANDER = 8e-3, 1e-9
-#: Wander of the odometer's axes with the attitude: standard deviation [rad] and correlation time [s], as flown in 1 s
+#: Wander of the axes of odometer and picture with the attitude: standard deviation [rad] and correlation time [s], as flown in 1 s
 #: pieces of ten flights; 0.25 deg in the datasheet world, 0.6 deg in the harsh one.
 WANDER_STD, WANDER_TIME_S = math.radians(0.4), 8.0
 #: Variance of the far edge per metre of way across the strokes: its distance from the tip shrinks, and the wall
@@ -103,13 +103,15 @@ class CrossTrack:
         self._roll = 0.0  # of the picture against the odometer's axes, by the board's edge [rad]
         self.guides: dict[int, float] = {}
         self._laying = False
-        self._again: list[StrokeMap] = []  # where the stroke in progress was painted again, each way for itself
+        #: Where the stroke in progress was painted again, each way for itself: as estimated, and on the safe side.
+        self._again: list[tuple[StrokeMap, StrokeMap]] = []
         self._open = np.zeros(NODES, bool)  # nodes of the stroke that is laid which the tip has not passed
         self._u, self._forward = 0.0, 1.0  # of the tip [m]; direction in which the stroke in progress is laid
         self._way = self.unled = self.longest_unled = 0.0
         self._difference = 0.0  # of the last line from its expected place [m]
         self._before = math.nan  # that of the last stroke's edge at the last look
         self._misfits = MISFIT_LOOKS * [MISFIT**2]  # products of those of two looks [m^2]
+        self._stroke_misfits: list[float] = []  # misfit of every stroke that is complete [m]
 
     @property
     def v(self) -> float:
@@ -134,7 +136,7 @@ class CrossTrack:
     @property
     def picture_turn(self) -> float:
         """Direction of the strokes in the picture, which the camera's mount rolls [rad]."""
-        return float(self._x[_TURN]) + self._roll
+        return self.turn + self._roll
 
     @property
     def deviation(self) -> float:
@@ -221,16 +223,14 @@ class CrossTrack:
     def begin_again(self) -> None:
         """The tip turns round and paints the stroke in progress again, led by its own edge."""
         self.unled = 0.0
-        self._again.append(StrokeMap(self._config.stroke_m))
+        self._again.append((StrokeMap(self._config.stroke_m), StrokeMap(self._config.stroke_m)))
 
     def lay_again(self, u: float) -> None:
-        """The brush presses here, where the stroke in progress lies already; v one standard deviation farther out.
-
-        The map of the stroke stays: it is that of the outer edge, which paint farther in does not move.
-        """
+        """The brush presses here, where the stroke in progress lies already."""
         self._u = u
-        error = float(self._shares(u) @ self._x[_OWN])
-        self._again[-1].add(u, self.v - error + self._deviation_from(_OWN))
+        v, (found, farthest_out) = self.v - float(self._shares(u) @ self._x[_OWN]), self._again[-1]
+        found.add(u, v)
+        farthest_out.add(u, v + self._deviation_from(_OWN))
 
     def last_stroke(self, first_u: float, last_u: float) -> float:
         """Mean v between two places of the stroke before the one that is laid [m]; NaN where it is not known."""
@@ -246,7 +246,9 @@ class CrossTrack:
         """
         shares = self._shares(np.linspace(first_u, last_u, NODES)).mean(axis=0)
         place = self.maps[-1].mean(first_u, last_u) + float(shares @ self._x[_OWN])
-        rougher = max(self.misfit / (0.5 * EDGE_STD), 1.0)  # than the filter allows for
+        # The error of a place is the sum of those of all strokes before it.
+        misfit = math.sqrt(float(np.mean(np.square([*self._stroke_misfits, self.misfit]))))
+        rougher = max(misfit / EDGE_STD, 1.0)  # than the filter allows for
         return place, rougher * math.sqrt(max(float(shares @ self._p[_OWN, _OWN] @ shares), 0.0))
 
     def overlap(self, first_u: float, last_u: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -265,14 +267,21 @@ class CrossTrack:
         low, high = sorted((first_u, last_u))
         within = (low <= u) & (u <= high) & np.isfinite(last - own)
         shares = self._shares(u[within])
-        inner = np.fmin.reduce([own, *(again.places()[1] for again in self._again)])
+        inner = np.fmin.reduce([own, *(farthest_out.places()[1] for _, farthest_out in self._again)])
         overlap = (last - inner)[within] + shares @ (self._x[_LAST] - self._x[_OWN]) + 2.0 * self._half
         covariance = p[_LAST, _LAST] - p[_LAST, _OWN] - p[_OWN, _LAST] + p[_OWN, _OWN]
         return u[within], overlap, np.sqrt(np.maximum(np.sum(shares @ covariance * shares, axis=1), 0.0))
 
     def end_stroke(self) -> None:
-        """The stroke ends: the error of its map becomes that of the last stroke, and beta begins anew."""
+        """The stroke ends: the error of its map becomes that of the last stroke, and beta begins anew.
+
+        Its map is from now on that of its outer edge, which a gust may have moved where it was painted again.
+        """
         self._laying, self.unled = False, 0.0
+        for found, _ in self._again:
+            self.maps[-1] = self.maps[-1].widened(found)
+        self._again = []
+        self._stroke_misfits.append(self.misfit)
         if len(self.maps) > 1:
             self._variances.append(np.diag(self._p)[_LAST].copy())
         self._x[_LAST] = self._x[_OWN]
@@ -385,7 +394,7 @@ class CrossTrack:
             near, far, seen = self._piece(line, ahead)
             if ((near + far) * ahead > 0.0 or ahead == 0.0) and far - near > SHORTEST_M:
                 middle, row, variance = 0.5 * (near + far), _row_of_h(), 0.0
-                row[_TURN], shares = middle, self._shares(u + middle)
+                row[_TURN], row[_WANDER], shares = middle, middle, self._shares(u + middle)
                 row[_AHEAD] = float(nodes is not _OWN) if ahead else self._share_ahead(near, far)
                 level = stroke.mean(u + near, u + far) + half + row[_AHEAD] * float(self._x[_AHEAD])
                 if nodes is not None:
@@ -462,7 +471,7 @@ class CrossTrack:
 
     def _follow_turn(self, edge: PatternLine, share: float) -> None:
         turn = self.picture_turn + share * math.atan(edge.lean)
-        self._roll = min(max(turn, -LARGEST_TURN), LARGEST_TURN) - float(self._x[_TURN])
+        self._roll = min(max(turn, -LARGEST_TURN), LARGEST_TURN) - self.turn
 
 
 def _row_of_h() -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 
 import numpy as np
@@ -42,6 +43,15 @@ class StrokeMap:
         count = np.array(self._count, float)
         u = BIN_M * (np.arange(count.size) + 0.5) - BEYOND_M
         return u, np.divide(self._sum, count, out=np.full(count.size, math.nan), where=count > 0.0)
+
+    def widened(self, again: StrokeMap) -> StrokeMap:
+        """Outermost line of this stroke and of one painted over it: v is the larger one where both lie."""
+        wide = copy.deepcopy(self)
+        for place, (total, count) in enumerate(zip(again._sum, again._count, strict=True)):
+            own = self._count[place]
+            if count and own and total * own > self._sum[place] * count:
+                wide._sum[place], wide._count[place] = total, count
+        return wide
 
     @staticmethod
     def _bin(u: float) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import numpy as np
 from ibvs_qp.config import ControllerConfig, EstimationConfig, SafetySettings
 from ibvs_qp.config.contact_margin import require_margin
 from ibvs_qp.config.derived import derive
+from ibvs_qp.config.errors import out_of_range
 from ibvs_qp.config.from_vehicle import contact_depth
 from ibvs_qp.config.gain_scaling import LAWS
 from ibvs_qp.config.settings import choice, dump_toml, load_toml, setting, validate
@@ -58,10 +60,19 @@ class PilotConfig:
         validate(self)
         if self.controller.gains_of != self.law:
             object.__setattr__(self, "controller", dataclasses.replace(self.controller, gains_of=self.law))
+        self._require_room_for_trim()
         painting = derive(self.painting, {"guide_reach_m": _guide_reach(self.controller, self.painting)})
         object.__setattr__(self, "painting", painting)
         vision = derive(self.vision, {"brush_width_m": self.painting.brush_width_m})
         object.__setattr__(self, "vision", vision)
+
+    def _require_room_for_trim(self) -> None:
+        """A deliberate tilt in both axes, and the barrier about it, stay below the tilt that the supervisor bounds."""
+        limits, most = self.controller.limits, self.safety.tilt_deg
+        if math.sqrt(2.0) * (limits.trim_deg + limits.tilt_deg) > most and limits.trim_deg > 0.0:
+            room = most / math.sqrt(2.0) - limits.tilt_deg
+            allowed = f"allowed is 0 to {max(room, 0.0):.3g} deg beside tilt_deg, for safety.tilt_deg = {most:g} deg"
+            raise out_of_range("controller.limits.trim_deg", limits.trim_deg, "deg", allowed)
 
     @classmethod
     def from_toml(cls, file: str | Path) -> PilotConfig:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from allocation.actuation import SLIDING_FRICTION, Actuation, actuation
+from allocation.tilted_reach import tilted_push_reach, worst_tilted_push_reach
+from allocation.wrench_facets import WrenchFacets
 from ibvs_qp.config.from_vehicle import contact_depth, strike_yaw_deg
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import GRAVITY
@@ -77,12 +80,12 @@ def check_vehicle(config: PilotConfig, push_n: float, found: Actuation | None = 
     if problems := rotor_problems(vehicle, found):
         return VehicleCheck(problems=tuple(problems), warnings=(), picture=None)
     picture = contact_picture(config)
-    problems = [*_reach(found, push_n), *_lens(vehicle), *_tip(vehicle)]
+    trim_deg = config.controller.limits.trim_deg
+    reach = sliding_reach(vehicle, found, trim_deg)
+    problems = [*_reach(reach, trim_deg, push_n), *_lens(vehicle), *_tip(vehicle)]
     if not problems or contact_depth(vehicle) > 0.0:
         problems += _view(config, picture)
     warnings = []
-    assert found.sliding_push is not None
-    reach = found.sliding_push.push
     if push_n <= reach < GOOD_REACH * push_n:
         least = GOOD_REACH * push_n
         warnings.append(
@@ -93,15 +96,35 @@ def check_vehicle(config: PilotConfig, push_n: float, found: Actuation | None = 
     return VehicleCheck(problems=tuple(problems), warnings=tuple(warnings), picture=picture)
 
 
-def _reach(found: Actuation, push_n: float) -> list[str]:
-    assert found.sliding_push is not None
-    reach = found.sliding_push.push
+def sliding_reach(vehicle: VehicleParams, found: Actuation, tilt_deg: float) -> float:
+    """Greatest push sliding anywhere with a friction of `SLIDING_FRICTION`, within a roll and a pitch [N].
+
+    Args:
+        vehicle: The vehicle, fully actuated.
+        found: What its rotors can do.
+        tilt_deg: Largest roll and pitch [deg]; 0 for a level one.
+    """
+    if tilt_deg == 0.0:
+        assert found.sliding_push is not None
+        return found.sliding_push.push
+    facets = WrenchFacets(vehicle.geometry)
+    limits = vehicle.mass_kg * GRAVITY, np.array(vehicle.tip_position_m), vehicle.thrust_min, vehicle.thrust_max
+    return worst_tilted_push_reach(facets, *limits, tilt=math.radians(tilt_deg), friction=SLIDING_FRICTION)
+
+
+def standing_reach(vehicle: VehicleParams, tilt_deg: float) -> float:
+    """Greatest push of a tip at rest, within a roll and a pitch [N]; arguments as of `sliding_reach`."""
+    facets = WrenchFacets(vehicle.geometry)
+    limits = vehicle.mass_kg * GRAVITY, np.array(vehicle.tip_position_m), vehicle.thrust_min, vehicle.thrust_max
+    return tilted_push_reach(facets, *limits, tilt=math.radians(tilt_deg))[0]
+
+
+def _reach(reach: float, trim_deg: float, push_n: float) -> list[str]:
     if reach >= push_n:
         return []
     sliding = f"sliding anywhere with a friction of {SLIDING_FRICTION:g}"
-    return [
-        f"reach {reach:.1f} N is below the job's push of {push_n:g} N: the greatest push of a level vehicle {sliding}"
-    ]
+    vehicle = f"a vehicle trimmed by up to {trim_deg:g} deg" if trim_deg else "a level vehicle"
+    return [f"reach {reach:.1f} N is below the job's push of {push_n:g} N: the greatest push of {vehicle} {sliding}"]
 
 
 def _lens(vehicle: VehicleParams) -> list[str]:

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 #: Push of a job unless it is stated, and the largest that a scene takes [N].
 DEFAULT_PUSH_N, LARGEST_PUSH_N = 5.0, 40.0
+#: Tilts whose reach is shown [deg].
+SHOWN_TILTS_DEG = (0.0, 2.0, 5.0)
 #: Endings of pictures.
 _PICTURES = (".png", ".pdf", ".svg")
 
@@ -143,6 +145,7 @@ def _summary(given: VehicleFile, found: Actuation, config: PilotConfig | None, c
         "level_reach_n": found.level_reach,
         "push_n": None if found.push is None else found.push.push,
         "sliding_push_n": None if found.sliding_push is None else found.sliding_push.push,
+        "tilted_reach": _tilted_reach(vehicle, found),
         "tilt_without_deg": found.tilt_without.tolist(),
     }
 
@@ -194,6 +197,27 @@ def _show(given: VehicleFile, found: Actuation, config: PilotConfig | None) -> N
     binding = " and ".join(f"rotor {index} at its {side} limit" for index, side in found.push.binding)
     console.print(f"Push at the tip: {found.push.push:.1f} N standing ({binding});")
     console.print(f"  {found.sliding_push.push:.1f} N sliding anywhere with a friction of {SLIDING_FRICTION:g}.")
+    rows = [
+        [f"{entry['tilt_deg']:g}", f"{entry['push_n']:.1f}", f"{entry['sliding_push_n']:.1f}"]
+        for entry in _tilted_reach(vehicle, found)
+    ]
+    console.print(terminal_table(("limits.trim_deg", "push standing, N", "push sliding, N"), rows, "Reach by tilt"))
+
+
+def _tilted_reach(vehicle: VehicleParams, found: Actuation) -> list[dict[str, float]]:
+    """Reach where roll and pitch may trim by some angles; empty for a vehicle without a level hover."""
+    from ibvs_qp.pilot.vehicle_check import sliding_reach, standing_reach
+
+    if found.sliding_push is None or not found.hovers:
+        return []
+    return [
+        {
+            "tilt_deg": tilt,
+            "push_n": standing_reach(vehicle, tilt),
+            "sliding_push_n": sliding_reach(vehicle, found, tilt),
+        }
+        for tilt in SHOWN_TILTS_DEG
+    ]
 
 
 def _show_origin(console: Console, given: VehicleFile, config: PilotConfig | None) -> None:

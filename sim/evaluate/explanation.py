@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import functools
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import casadi as ca
 import numpy as np
 
 from ibvs_qp.command import Outcome
+from ibvs_qp.config import ControllerConfig
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.settings import from_dict
 from ibvs_qp.config.toml_text import parse_toml
@@ -15,6 +18,7 @@ from ibvs_qp.controller import qp_problem
 from ibvs_qp.pilot import PilotConfig
 from ibvs_qp.pilot.push_report import REDUCED, RESTORED
 from ibvs_qp.qp.explain import Explanation, LimitValue, TickReplay
+from ibvs_qp.symbolic.signals import stack
 
 if TYPE_CHECKING:
     from sim.flight.trace import Event, Trace
@@ -67,6 +71,38 @@ def explain_conflict(trace: Trace, tick: int) -> tuple[LimitValue, ...]:
     """A smallest set of hard limits that contradict each other, with their values at the flown thrusts; or ()."""
     replay, _ = _replay(trace, tick, flown_config(trace))
     return replay.limit_values(replay.conflict, trace.thrusts[tick])
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrimTilt:
+    """Deliberate tilt of a tick (`ibvs_qp.model.trim_tilt`).
+
+    Attributes:
+        roll_deg, pitch_deg: That is flown to [deg].
+        reach_n: Greatest push at the attitude of the tick [N].
+        level_reach_n: The same in level flight [N].
+    """
+
+    roll_deg: float
+    pitch_deg: float
+    reach_n: float
+    level_reach_n: float
+
+
+@functools.lru_cache(maxsize=2)
+def _trim_function(config: ControllerConfig) -> ca.Function:
+    signals = _program(config).model.signals
+    point = ca.vertcat(stack(signals.inputs), stack(signals.states))
+    return ca.Function("trim", [point], [signals.outputs[name] for name in ("trim_tilt", "reach", "level_reach")])
+
+
+def trim_tilt(trace: Trace, tick: int, config: PilotConfig) -> TrimTilt | None:
+    """Deliberate tilt of a recorded tick; None where the mission does not permit one."""
+    if config.controller.limits.trim_deg == 0.0:
+        return None
+    angles, reach, level = _trim_function(config.controller)(trace.arrays["program"][tick].astype(float))
+    roll, pitch = np.degrees(np.array(angles).ravel())
+    return TrimTilt(roll_deg=roll, pitch_deg=pitch, reach_n=float(reach), level_reach_n=float(level))
 
 
 def has_no_program(trace: Trace, tick: int) -> bool:

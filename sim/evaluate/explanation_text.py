@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ibvs_qp.command import Outcome
 from ibvs_qp.config.contact_margin import LEAST_DAMPING_RATIO, least_margin
 from ibvs_qp.pilot import PilotConfig
-from sim.evaluate.explanation import push_reduction, rejections, thrust_window
+from sim.evaluate.explanation import push_reduction, rejections, thrust_window, trim_tilt
 from sim.evaluate.table import plain, terminal_table
 
 if TYPE_CHECKING:
@@ -27,6 +28,8 @@ _NOTHING = 5e-4
 _REDUCED_N = 1e-3
 #: Rows without a limit at this tick have bounds beyond this, in the row's unit.
 _NO_BOUND = 9e3
+#: Angles of a trim below this are not shown [deg].
+_NO_TRIM_DEG = 0.05
 #: Violations of a limit below this are rounding, in the row's unit.
 _ROUNDING = 1e-6
 
@@ -65,7 +68,24 @@ def _headline(trace: Trace, tick: int, config: PilotConfig) -> list[str]:
         f"push asked {job:.2f} N, commanded {reference:.2f} N, measured {push:.2f} N{lowered}; {reach}\n"
         f"{plain(outcome)} after {int(trace.iterations[tick])} iterations"
     )
-    return [headline, *(f"Rejected at {event.t:.3f} s: {plain(event.text)}" for event in rejections(trace, tick))]
+    return [
+        headline,
+        *_trim(trace, tick, config),
+        *(f"Rejected at {event.t:.3f} s: {plain(event.text)}" for event in rejections(trace, tick)),
+    ]
+
+
+def _trim(trace: Trace, tick: int, config: PilotConfig) -> list[str]:
+    """Deliberate tilt and the push that it buys."""
+    trim, outcome = trim_tilt(trace, tick, config), trace.outcomes[int(trace.outcome[tick])]
+    if trim is None or outcome == Outcome.HOLD or max(abs(trim.roll_deg), abs(trim.pitch_deg)) < _NO_TRIM_DEG:
+        return []
+    gain = trim.reach_n - trim.level_reach_n
+    return [
+        f"Trim: {trim.roll_deg:+.1f} deg of roll and {trim.pitch_deg:+.1f} deg of pitch, at most "
+        f"{config.controller.limits.trim_deg:g} deg each, buy {gain:.1f} N of reach: {trim.reach_n:.1f} N at this "
+        f"attitude, {trim.level_reach_n:.1f} N level"
+    ]
 
 
 def task_rows(explanation: Explanation) -> list[tuple[str, ...]]:

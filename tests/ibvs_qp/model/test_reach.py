@@ -22,6 +22,7 @@ from ibvs_qp.config import ControllerConfig
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import Measurement, Reference
+from ibvs_qp.model.reach import push_planes
 from ibvs_qp.model.reach import push_reach as live_push_reach
 from ibvs_qp.symbolic.signals import Signals
 
@@ -38,7 +39,8 @@ def live(layout: str) -> ca.Function:
     signals, count = Signals(), LAYOUTS[layout].count
     normal, travel = ca.SX.sym("normal", 3), ca.SX.sym("travel", 3)
     friction, static = ca.SX.sym("friction"), ca.SX.sym("static", 6)
-    live_push_reach(signals, VehicleParams(geometry=LAYOUTS[layout]), normal, travel, friction, static)
+    vehicle = VehicleParams(geometry=LAYOUTS[layout])
+    live_push_reach(signals, push_planes(signals, vehicle, normal, travel, friction, static))
     low, high = signals.input("thrust_low", count), signals.input("thrust_high", count)
     return ca.Function(
         "live", [low, high, normal, travel, friction, static], [signals.outputs["least_push"], signals.outputs["reach"]]

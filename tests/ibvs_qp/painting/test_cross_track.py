@@ -37,6 +37,7 @@ class Strokes:
         self.u, self.v, self.delta = 0.0, MARGIN, cross_track.TIP_STD * self.rng.standard_normal()
         self.drift = cross_track.DRIFT_STD * self.rng.standard_normal()
         self.turn = cross_track.TURN_STD * self.rng.standard_normal()
+        self.wander = cross_track.WANDER_STD * self.rng.standard_normal()  # of odometer and picture
         self.strokes: list[dict[int, float]] = []
         board = self.seen(1, 0.0, 1, "board", cross_track.BOARD_STD)
         self.cross.start(board)
@@ -44,12 +45,17 @@ class Strokes:
 
     def seen(self, track: int, v: float, side: int, kind: str, std: float, middle: float = 0.0, length: float = 6.0):
         """An edge at v as the picture shows it."""
-        place = v - self.v - self.delta + std * self.rng.standard_normal()
-        return parallel(track, place, side, kind, middle, length)
+        place, turned = v - self.v - self.delta + std * self.rng.standard_normal(), self.wander - self.cross.picture_turn
+        line = parallel(track, place, side, kind, middle, length)
+        line.middle, line.lean = (middle, place + turned * middle), turned
+        return line
 
     def move(self, du: float, dv: float, dt: float = LOOK_S) -> None:
         variance = cross_track.ODOMETER_PER_M * math.hypot(du, dv) + cross_track.ODOMETER_AT_REST * dt
-        measured = dv + self.drift * dt + (self.turn - self.cross.turn) * du
+        kept = math.exp(-dt / cross_track.WANDER_TIME_S)
+        self.wander *= kept
+        self.wander += math.sqrt(1.0 - kept**2) * cross_track.WANDER_STD * self.rng.standard_normal()
+        measured = dv + self.drift * dt + (self.turn + self.wander - self.cross.turn) * du
         measured += math.sqrt(variance) * self.rng.standard_normal()
         self.u, self.v = self.u + du, self.v + dv
         self.cross.predict(du, measured, dt)
@@ -118,13 +124,16 @@ def _ratios(seed: int) -> list[float]:
 
 
 def test_a_chain_of_strokes_stays_straight(monkeypatch) -> None:
-    """The error of v changes little along stroke ten; by 1.5 mrad without the direction as a state."""
+    """The error of v changes little along stroke ten, although odometer and picture turn by 7 mrad rms.
+
+    By 2.6 mrad where only the odometer turns.
+    """
     monkeypatch.setattr(sys.modules[__name__], "CONFIG", PaintingConfig(stroke_m=2.0))
-    last = [np.split(np.array(Strokes(seed).paint(10)), 10)[-1] for seed in range(4)]
+    last = [np.split(np.array(Strokes(seed).paint(10)), 10)[-1] for seed in range(12)]
     turned = [np.polyfit(0.01 * np.arange(errors.size), errors, 1)[0] for errors in last]
     rms = float(np.sqrt(np.mean(np.square(turned))))
     print(f"turned by {1e3 * rms:.2f} mrad rms, n = {len(turned)}")
-    assert rms < 1e-3
+    assert rms < 2.3e-3
 
 
 @pytest.mark.parametrize("own", [False, True])
@@ -140,7 +149,7 @@ def test_rows_of_h_are_the_derivatives_of_the_places_in_the_picture(own: bool, m
 
     def expected(state: int, by: float) -> list[float]:
         seen.clear()
-        turned = by if state == cross_track._TURN else 0.0
+        turned = by if state in (cross_track._TURN, cross_track._WANDER) else 0.0
         cross._x[state] += by
         cross.look([replace(line, middle=(u, v - turned * u)) for line in lines for u, v in (line.middle,)], 0.3, -1.0)
         cross._x[state] -= by
@@ -357,7 +366,7 @@ def test_a_place_is_as_uncertain_as_the_last_edge_wanders_from_where_it_is_expec
         misfits.append(cross.misfit)
         place.append(cross.stroke_place(0.25, 0.6)[1])
     assert max(misfits[:2]) < 0.5e-3 and 1e-3 < misfits[2] < 3e-3
-    assert place[0] == pytest.approx(place[1]) and place[2] > 2.0 * place[0]
+    assert place[0] == pytest.approx(place[1]) and place[2] > 1.3 * place[0]
 
 
 def test_the_wander_of_the_odometer_s_axes_is_followed_and_fades() -> None:

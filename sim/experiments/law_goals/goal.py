@@ -1,0 +1,94 @@
+"""One goal: a bound of a figure's median, or of the median ratio to the flights of before with the same seeds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import polars as pl
+
+from ibvs_qp.config.errors import ConfigError
+from sim.evaluate.figures import figure_of
+from sim.sweep.paired import exact_interval
+from sim.sweep.parts import PARAM
+
+
+@dataclass(frozen=True, kw_only=True)
+class Goal:
+    """A line of ``goals.toml``; exactly one bound is stated."""
+
+    kind: str  # of the flights
+    world: str
+    figure: str  # of the registry
+    ratio_at_most: float | None = None
+    at_most: float | None = None  # in SI
+    at_least: float | None = None
+
+    def __post_init__(self) -> None:
+        """One bound."""
+        if sum(bound is not None for bound in (self.ratio_at_most, self.at_most, self.at_least)) != 1:
+            raise ConfigError(f"goal of {self.figure}, {self.kind}: state one of ratio_at_most, at_most, at_least")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """What the flights say of a goal: medians in SI, NaN without data; the ratio with its exact interval."""
+
+    goal: Goal
+    before: float
+    now: float
+    ratio: float
+    interval: tuple[float, float]
+    n: int
+
+    @property
+    def met(self) -> bool:
+        """Whether the goal is met."""
+        goal = self.goal
+        if goal.ratio_at_most is not None:
+            return self.ratio <= goal.ratio_at_most
+        return self.now <= goal.at_most if goal.at_most is not None else self.now >= (goal.at_least or 0.0)
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """Flights and figure, before, now, ratio with its interval, goal, n, and whether it is met."""
+        goal, figure = self.goal, figure_of(self.goal.figure)
+        name = f"{goal.kind}, {goal.world}: {figure.words}{', ' if figure.unit else ''}{figure.unit}"
+        low, high = self.interval
+        ratio = "–" if np.isnan(self.ratio) else f"{self.ratio:.2f} ({low:.2f} to {high:.2f})"
+        bounds = {"ratio <=": goal.ratio_at_most, "<=": goal.at_most, ">=": goal.at_least}
+        words, value = next((words, value) for words, value in bounds.items() if value is not None)
+        bound = f"{words} {value * (1.0 if words.startswith('ratio') else figure.scale):g}"
+        numbers = ["–" if np.isnan(value) else f"{value * figure.scale:.3g}" for value in (self.before, self.now)]
+        return name, *numbers, ratio, bound, str(self.n), "yes" if self.met else "NO"
+
+
+def outcome(goal: Goal, flown: pl.DataFrame, before: pl.DataFrame) -> Outcome:
+    """Compare flights of a goal with those of before, seed by seed.
+
+    Args:
+        goal: The goal.
+        flown: Table of today's flights.
+        before: Flights of before, columns kind, world, seed and figures.
+    """
+    old = before.filter((pl.col("kind") == goal.kind) & (pl.col("world") == goal.world))
+    old = old.select("seed", pl.col(goal.figure).cast(float).alias("before"))
+    if not {goal.figure, f"{PARAM}kind"} <= set(flown.columns):
+        flown = pl.DataFrame(schema={f"{PARAM}kind": str, f"{PARAM}world": str, "seed": int, goal.figure: float})
+    mine = flown.filter((pl.col(f"{PARAM}kind") == goal.kind) & (pl.col(f"{PARAM}world") == goal.world))
+    now = mine.select("seed", pl.col(goal.figure).alias("now"))
+    both = now.join(old, on="seed")
+    ratios = (both["now"] / both["before"]).to_numpy()
+    return Outcome(
+        goal=goal,
+        before=_median(old["before"]),
+        now=_median(now["now"]),
+        ratio=float(np.nanmedian(ratios)) if len(ratios) else float("nan"),
+        interval=exact_interval(ratios) if len(ratios) else (float("nan"), float("nan")),
+        n=now.height,
+    )
+
+
+def _median(values: pl.Series) -> float:
+    found = values.drop_nulls().to_numpy()
+    return float(np.median(found)) if len(found) else float("nan")

@@ -1,0 +1,114 @@
+"""Deliberate tilt where a thrust limit would bound the push: least tilt, permission, and what it does in flight."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import casadi as ca
+import numpy as np
+import pytest
+from reach_oracle import RIGHT, TIP, WEIGHT
+from rotor_layouts import OCTOROTOR
+from scipy.optimize import minimize
+from symbolic_block import Block
+
+from allocation import TAROT_T960, WrenchFacets, push_direction, tilted_push_reach
+from ibvs_qp.config import ControllerConfig, LimitSettings
+from ibvs_qp.config.errors import ConfigError
+from ibvs_qp.config.vehicle import VehicleParams
+from ibvs_qp.model.inputs import Body, Contact, Target
+from ibvs_qp.model.model import Model
+from ibvs_qp.model.reach import REACH_FRACTION, push_planes, push_reach
+from ibvs_qp.model.trim_tilt import TrimTilt
+from ibvs_qp.pilot import PilotConfig
+
+LAYOUTS = {"six": TAROT_T960, "eight": OCTOROTOR}
+LIMIT_DEG = 2.0
+
+
+def config(layout: str, trim_deg: float = LIMIT_DEG) -> ControllerConfig:
+    vehicle = VehicleParams(geometry=LAYOUTS[layout])
+    return ControllerConfig(vehicle=vehicle, limits=LimitSettings(trim_deg=trim_deg))
+
+
+def settled(layout: str, push: float, friction: float, *, touching: float = 1.0, ticks: int = 2000) -> np.ndarray:
+    """Roll and pitch [rad], reach at level [N] after some seconds of a push while the tip slides to the left."""
+    made = config(layout)
+
+    def build(signals):
+        body, contact, target = Body.of(signals), Contact.of(signals), Target.of(signals)
+        trim = TrimTilt(signals, made)
+        static = ca.vertcat(WEIGHT * body.down, ca.DM.zeros(3))
+        travel = ca.DM(-0.05 * RIGHT)
+        planes = push_planes(signals, made.vehicle, contact.normal, travel, ca.SX(friction), static)
+        push_reach(signals, planes)
+        trim.update(planes, body, contact, target)
+        return ca.vertcat(signals.outputs["trim_tilt"], signals.outputs["level_reach"])
+
+    block, count = Block(build), LAYOUTS[layout].count
+    block.contact(touching=touching)
+    target = {"reference.push": push, "reference.press": 1.0}
+    found = np.zeros(3)
+    for _ in range(ticks):
+        found = block(thrust_low=np.full(count, 1.2), thrust_high=np.full(count, 52.56), **target)
+    return found
+
+
+def least_tilt(layout: str, push: float, friction: float) -> np.ndarray:
+    """The same angles by a general optimiser [rad], (2,)."""
+    facets = WrenchFacets(LAYOUTS[layout])
+    level = push / REACH_FRACTION * push_direction(TIP, friction, -RIGHT) - np.r_[0.0, 0.0, WEIGHT, 0.0, 0.0, 0.0]
+    low, high = facets.rooms(level, 1.2, 52.56)
+    rows = WEIGHT * np.column_stack((-facets.normals[:, 1], facets.normals[:, 0]))
+    inside = [
+        {"type": "ineq", "fun": lambda angles: high - rows @ angles},
+        {"type": "ineq", "fun": lambda angles: rows @ angles - low},
+    ]
+    return minimize(lambda angles: 1e3 * angles @ angles, np.zeros(2), constraints=inside, options={"ftol": 1e-12}).x
+
+
+@pytest.mark.parametrize(("layout", "push", "friction"), [("six", 9.5, 0.8), ("six", 17.0, 0.3), ("six", 6.0, 0.8)])
+def test_it_is_the_least_tilt_that_allows_the_push(layout: str, push: float, friction: float) -> None:
+    expected = least_tilt(layout, push, friction)
+    assert np.abs(expected).max() < math.radians(LIMIT_DEG)
+    np.testing.assert_allclose(settled(layout, push, friction)[:2], expected, atol=math.radians(0.02))
+
+
+def test_eight_rotors_have_more_planes() -> None:
+    facets, limits = WrenchFacets(OCTOROTOR), (WEIGHT, TIP, 1.2, 52.56)
+    sideways = {"friction": 0.8, "travel": -RIGHT}
+    level = tilted_push_reach(facets, *limits, tilt=0.0, **sideways)[0]
+    most = tilted_push_reach(facets, *limits, tilt=math.radians(LIMIT_DEG), **sideways)[0]
+    push = REACH_FRACTION * (0.5 * level + 0.5 * most)
+    np.testing.assert_allclose(settled("eight", push, 0.8)[:2], least_tilt("eight", push, 0.8), atol=math.radians(0.03))
+
+
+def test_a_push_beyond_reach_takes_the_permission_and_no_more() -> None:
+    angles = settled("six", 40.0, 0.8)[:2]
+    assert np.abs(angles).max() == pytest.approx(math.radians(LIMIT_DEG), rel=1e-3)
+    assert np.abs(angles).max() <= math.radians(LIMIT_DEG) * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize(("push", "touching"), [(5.0, 1.0), (40.0, 0.0)])
+def test_the_vehicle_is_level_within_reach_and_off_the_wall(push: float, touching: float) -> None:
+    np.testing.assert_allclose(settled("six", push, 0.8, touching=touching)[:2], 0.0, atol=1e-12)
+
+
+def test_the_reach_of_level_flight_is_known_at_any_attitude() -> None:
+    level, _ = tilted_push_reach(
+        WrenchFacets(TAROT_T960), WEIGHT, TIP, 1.2, 52.56, tilt=0.0, friction=0.8, travel=-RIGHT
+    )
+    assert settled("six", 5.0, 0.8, ticks=1)[2] == pytest.approx(level, abs=1e-6)
+
+
+def test_without_permission_the_program_is_that_of_before() -> None:
+    names = Model(ControllerConfig()).signals
+    assert not [name for name in (*names.states, *names.outputs) if name.startswith(("trim_tilt", "level_reach"))]
+
+
+def test_the_supervisor_acts_beyond_the_trim() -> None:
+    controller = ControllerConfig(limits=LimitSettings(trim_deg=8.0))
+    with pytest.raises(ConfigError, match=r"limits.trim_deg = 8.0 deg is refused: allowed is 0 to 7.49 deg"):
+        PilotConfig(controller=controller)
+    PilotConfig(controller=dataclasses.replace(controller, limits=LimitSettings(trim_deg=7.0)))

@@ -1,0 +1,69 @@
+"""Goals of the law: each one names flights and a figure that exist, and is judged seed by seed."""
+
+from __future__ import annotations
+
+import math
+
+import polars as pl
+import pytest
+
+from ibvs_qp.config.errors import ConfigError
+from ibvs_qp.config.settings import load_toml
+from sim.evaluate.figures import figure_of
+from sim.experiments.design import Choice, design
+from sim.experiments.law_goals.__main__ import HERE, Goals
+from sim.experiments.law_goals.goal import Goal, outcome
+from sim.experiments.spec import Experiment
+
+BEFORE = pl.read_csv(HERE / "before.csv")
+GOALS = load_toml(Goals, HERE / "goals.toml").goals
+
+
+@pytest.fixture(scope="module")
+def seeds() -> dict[tuple[str, str], set[int]]:
+    """Seeds of every kind of flights."""
+    found: dict[tuple[str, str], set[int]] = {}
+    for run in design(load_toml(Experiment, HERE / "flights.toml"), Choice(features="geometric")):
+        assert run.law == "qp"
+        found.setdefault((str(run.params["kind"]), str(run.params["world"])), set()).add(run.seed)
+    return found
+
+
+@pytest.mark.parametrize("goal", GOALS, ids=lambda goal: f"{goal.kind}-{goal.world}-{goal.figure}")
+def test_every_goal_has_flights_and_those_of_before(goal: Goal, seeds) -> None:
+    assert len(seeds[goal.kind, goal.world]) == 10
+    assert figure_of(goal.figure).words
+    old = BEFORE.filter((pl.col("kind") == goal.kind) & (pl.col("world") == goal.world))
+    if goal.ratio_at_most is not None:
+        assert set(old["seed"]) == seeds[goal.kind, goal.world]
+        assert old[goal.figure].null_count() == 0
+
+
+def flown(factor: float) -> pl.DataFrame:
+    """Flights with this multiple of the path error of before."""
+    old = BEFORE.filter((pl.col("kind") == "paint") & (pl.col("world") == "harsh"))
+    return old.select(
+        pl.col("kind").alias("param.kind"),
+        pl.col("world").alias("param.world"),
+        "seed",
+        pl.col("path_rms_straight_m") * factor,
+    )
+
+
+def test_a_ratio_is_that_of_flights_with_the_same_seed() -> None:
+    goal = Goal(kind="paint", world="harsh", figure="path_rms_straight_m", ratio_at_most=0.8)
+    for factor, met in ((0.7, True), (0.9, False)):
+        found = outcome(goal, flown(factor).sample(fraction=1.0, shuffle=True, seed=1), BEFORE)
+        assert found.ratio == pytest.approx(factor) and found.interval == pytest.approx((factor, factor))
+        assert found.n == 10 and found.met is met and found.cells[-1] == ("yes" if met else "NO")
+
+
+def test_without_flights_no_goal_is_met() -> None:
+    for goal in GOALS:
+        found = outcome(goal, pl.DataFrame(), BEFORE)
+        assert found.n == 0 and math.isnan(found.now) and not found.met and "–" in found.cells
+
+
+def test_a_goal_states_one_bound() -> None:
+    with pytest.raises(ConfigError, match="state one of"):
+        Goal(kind="paint", world="harsh", figure="path_rms_m", at_most=1.0, ratio_at_most=1.0)
