@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.optimize import linprog
 
 from allocation.contact_reach import hover_wrench, push_direction
 from allocation.wrench_facets import WrenchFacets
@@ -45,6 +44,8 @@ def tilted_push_reach(
     Returns:
         Push [N], NaN when none is possible; and the roll and pitch that it takes [rad], (2,).
     """
+    from scipy.optimize import linprog  # a second of import that flights do not need
+
     low, high = facets.rooms(hover_wrench(weight), lower, upper)
     direction = push_direction(tip, friction, travel)
     rows = np.column_stack((facets.normals @ direction, -weight * facets.normals[:, 1], weight * facets.normals[:, 0]))

@@ -15,7 +15,12 @@ from ibvs_qp.symbolic.signals import Signals
 #: one mistakes changing friction for an external force: at 4 rad/s the climb to row 4 lasts 1 s longer.
 FORCE_BANDWIDTH_FREE, FORCE_BANDWIDTH_WALL = 4.0, 1.5
 #: Noise of the filtered push at which the bandwidth along the normal halves [N]: the observer passes it on as force.
-QUIET_PUSH = 0.15
+QUIET_PUSH = 0.3
+#: Gusts along the normal by the force whose changes are faster than one bandwidth and slower than the other [rad/s];
+#: the weight is one half at this deviation [N].
+SLOW_CHANGE, FAST_CHANGE, CALM_CHANGE = 0.5, 4.0, 0.3
+#: Both squares have the noise of the fast filter, and scatter together [-].
+CHANGE_NOISE = 2.0
 #: In calm air a fast observer only passes on sensor noise. Its bandwidth halves where the force not yet
 #: learnt is this strong [N rms], low-passed at its own bandwidth and averaged over this time [s].
 CALM_AIR, CALM_TIME = 0.1, 0.5
@@ -93,10 +98,10 @@ def _force(
     size = ca.dot(normal, felt)
     along = size * normal
     vibration = config.vehicle.mass_kg * contact.acceleration_noise
-    windy = _gust_weight(signals, "gust", bandwidth, body.dt, touching * size, vibration)
+    windy = _change_weight(signals, body.dt, size, ca.dot(normal, old), touching, vibration)
     pressing = bandwidth * windy / (1.0 + (contact.push_noise / QUIET_PUSH) ** 2)
     across, fastest = felt - along, config.contact.plane_bandwidth_rad_s
-    windy = _gust_weight(signals, "plane", fastest, body.dt, touching * across, vibration)
+    windy = _unlearnt_weight(signals, fastest, body.dt, touching * across, vibration)
     plane = FORCE_BANDWIDTH_WALL + (fastest - FORCE_BANDWIDTH_WALL) * windy
     learnt = filter_gain(pressing, body.dt) * along + filter_gain(plane, body.dt) * across
     average = ca.if_else(time < START_TIME, body.dt / ca.fmax(time, 1e-9), 0.0)
@@ -105,26 +110,57 @@ def _force(
     return signals.remember("external_force", ca.if_else(ca.logic_and(active, body.specific_force_known), new, old))
 
 
-def _gust_weight(signals: Signals, name: str, bandwidth: float, dt: ca.SX, unlearnt: ca.SX, vibration: ca.SX) -> ca.SX:
-    """Weight of the observer: 0 in calm air to 1 in gusts, by the power of the unlearnt force per direction.
+def _change_weight(
+    signals: Signals, dt: ca.SX, unlearnt: ca.SX, learnt: ca.SX, touching: ca.SX, vibration: ca.SX
+) -> ca.SX:
+    """Weight of the observer along the normal: 0 in calm air to 1 in gusts, by the power of the force's changes.
+
+    Those of the whole force, learnt and unlearnt, and the unlearnt part: in a gust a fast observer leaves less of it
+    than the accelerometer's noise, and a weight by that part alone closes as the bandwidth opens.
 
     Args:
         signals: Registry.
-        name: Of the states: "gust" along the normal, "plane" in the wall's plane.
+        dt: Time since the last step [s].
+        unlearnt: External force along the normal beyond the learnt one, one sample [N].
+        learnt: Force that the observer gives [N].
+        touching: 1 in contact or just before it; it begins anew there.
+        vibration: Deviation of one sample by the accelerometer's noise [N]: no gust.
+    """
+    force = learnt + unlearnt
+    begun, fast, slow = (signals.state(f"gust_{name}") for name in ("begun", "fast", "slow"))
+    gain = filter_gain(FAST_CHANGE, dt)
+    fast = signals.remember("gust_fast", ca.if_else(begun, fast + gain * (force - fast), force))
+    slow = signals.remember("gust_slow", ca.if_else(begun, slow + filter_gain(SLOW_CHANGE, dt) * (fast - slow), force))
+    signals.remember("gust_begun", touching)
+    left = signals.state("gust_unlearnt")
+    left = signals.remember("gust_unlearnt", ca.if_else(begun, left + gain * (unlearnt - left), 0.0))
+    squared = touching * ((fast - slow) ** 2 + left**2)
+    return _windy(signals, "gust", dt, squared, CHANGE_NOISE * vibration**2 * gain / (2.0 - gain), CALM_CHANGE)
+
+
+def _unlearnt_weight(signals: Signals, bandwidth: float, dt: ca.SX, unlearnt: ca.SX, vibration: ca.SX) -> ca.SX:
+    """Weight of the observer in the wall's plane: 0 in calm air to 1 in gusts, by the power of the unlearnt force.
+
+    Not by the changes of the whole force, which in the plane are those of friction as well.
+
+    Args:
+        signals: Registry.
         bandwidth: Of the observer in gusts [rad/s].
         dt: Time since the last step [s].
-        unlearnt: Force along the normal [N], or in the plane, in B [N], (3,).
-        vibration: Deviation of one sample of it by the accelerometer's noise [N]: no gust.
+        unlearnt: Force in the plane, in B [N], (3,).
+        vibration: Deviation of one sample of a component by the accelerometer's noise [N]: no gust.
     """
-    directions = 1 if unlearnt.numel() == 1 else 2
-    smooth, power = signals.state(f"{name}_unlearnt", unlearnt.numel()), signals.state(f"{name}_power")
-    gain = filter_gain(bandwidth, dt)
-    smooth = signals.remember(f"{name}_unlearnt", smooth + gain * (unlearnt - smooth))
-    squared = ca.sumsqr(smooth) / directions
+    smooth, gain = signals.state("plane_unlearnt", 3), filter_gain(bandwidth, dt)
+    smooth = signals.remember("plane_unlearnt", smooth + gain * (unlearnt - smooth))
+    return _windy(signals, "plane", dt, ca.sumsqr(smooth) / 2.0, vibration**2 * gain / (2.0 - gain), CALM_AIR)
+
+
+def _windy(signals: Signals, name: str, dt: ca.SX, squared: ca.SX, noise: ca.SX, calm: float) -> ca.SX:
+    """Weight by the mean of a squared force [N^2] beyond noise [N^2]; one half at ``calm`` [N] without noise."""
+    power = signals.state(f"{name}_power")
     power = signals.remember(f"{name}_power", power + filter_gain(1.0 / CALM_TIME, dt) * (squared - power))
-    noise = vibration**2 * gain / (2.0 - gain)
     gust = ca.fmax(power - NOISE_POWERS * noise, 0.0)
-    return gust / (gust + CALM_AIR**2 + noise)
+    return gust / (gust + calm**2 + noise)
 
 
 def filter_gain(bandwidth: ca.SX | float, dt: ca.SX) -> ca.SX:

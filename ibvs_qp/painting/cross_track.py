@@ -2,9 +2,9 @@ r"""Place of the tip across the strokes, from the odometer and every edge in vie
 
 A Kalman filter with these states: v of the true tip; :math:`\delta`, by which the picture shows the tip at a larger v
 than it has (camera mount, arm, attitude); the odometer's drift; the direction of the strokes against the odometer's
-axes, and how these and the picture wander with the attitude; :math:`\beta`, by which an edge ahead seems to lie at a larger v than the
-same edge behind; v of the board's far edge; and, at `NODES` places along the last stroke and the one being laid, the
-amount by which each lies at a larger v than its map says. A line at v = L then appears at the place
+axes, and how these and the picture wander with the attitude; :math:`\beta`, by which an edge ahead seems to lie at a
+larger v than the same edge behind; v of the board's far edge; and, at `NODES` places along the last stroke and the one
+being laid, the amount by which each lies at a larger v than its map says. A line at v = L then appears at the place
 :math:`p = L - v - \delta` beside the tip:
 
 ======================================  =====================================
@@ -32,7 +32,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ibvs_qp.painting.config import PaintingConfig
-from ibvs_qp.painting.pattern_lines import LOST_WEIGHT, PatternLine
+from ibvs_qp.painting.pattern_lines import LOST_WEIGHT, VISIBLE_WEIGHT, PatternLine
 from ibvs_qp.painting.stroke_map import StrokeMap
 
 #: Standard deviation of the tip's place in the picture, by mount and arm [m].
@@ -43,8 +43,8 @@ LOOK_S = 0.1
 #: straight, and its edge has the noise of a fit; a painted edge has the swings of the path that left it.
 BOARD_STD, BOARD_INDEPENDENT_S = 1e-3, 0.3
 EDGE_STD, INDEPENDENT_S = 1e-3, 0.5
-#: Standard deviation of beta for each stroke, by lens and roll of the camera [m].
-AHEAD_STD = 6e-4
+#: Standard deviation of beta for each stroke, by the lens [m].
+AHEAD_STD = 4e-4
 #: Odometer: variance of v per metre of way and per second at one place [m^2/m], [m^2/s], as flown in the datasheet
 #: world over 1 to 15 s; standard deviation of its drift [m/s], and variance of the drift per second [m^2/s^3].
 ODOMETER_PER_M, ODOMETER_AT_REST = 8e-6, 2e-7
@@ -56,9 +56,12 @@ DRIFT_STD, DRIFT_WANDER = 1e-3, 1e-9
 #: Standard deviation of the strokes' direction where the board's edge shows it, by the roll of the camera's mount
 #: [rad]; its variance per second [rad^2/s].
 TURN_STD, TURN_WANDER = 8e-3, 1e-9
-#: Wander of the axes of odometer and picture with the attitude: standard deviation [rad] and correlation time [s], as flown in 1 s
-#: pieces of ten flights; 0.25 deg in the datasheet world, 0.6 deg in the harsh one.
-WANDER_STD, WANDER_TIME_S = math.radians(0.4), 8.0
+#: Wander of the axes of odometer and picture with the attitude: standard deviation [rad] and correlation time [s], as
+#: flown in 1 s pieces of ten flights: 0.25 deg in the datasheet world, and 0.4 deg per axis in the harsh one.
+WANDER_STD, WANDER_TIME_S = math.radians(0.3), 8.0
+#: Standard deviation of the direction of a board's edge across the strokes, by its fit and by boards that are not
+#: square [rad]; time between looks that count as independent [s].
+SQUARE_STD, SQUARE_INDEPENDENT_S = math.radians(0.4), 2.0
 #: Variance of the far edge per metre of way across the strokes: its distance from the tip shrinks, and the wall
 #: distance that scales it is known to 1 %, 0.7 mm of a usual pitch [m^2/m].
 FAR_PER_M = 7e-6
@@ -304,6 +307,7 @@ class CrossTrack:
         if self._laying:
             self._open &= ahead * (self._spacing * np.arange(NODES) - u) > 0.0
             self._take_error()
+        self._correct_turn(lines)
         parallel = [line for line in lines if line.parallel and line.weight > LOST_WEIGHT]
         guides = []
         straight = math.radians(self._config.gates.fresh_lean_deg)
@@ -326,6 +330,18 @@ class CrossTrack:
         if self._laying:
             guides += self._own_edges(parallel, u, 0.0 if again else ahead)
         self.guides = {line.track.track_id: self.v + self.tip_error + line.place for line in guides}
+
+    def _correct_turn(self, lines: Sequence[PatternLine]) -> None:
+        """Correct the direction with the longest edge of the board across the strokes: it turns with the picture."""
+        edges = [line for line in lines if not line.parallel and line.kind == "board" and line.weight > VISIBLE_WEIGHT]
+        if not edges:
+            return
+        line, row = max(edges, key=lambda edge: edge.length), np.zeros(_STATES)
+        row[_TURN] = row[_WANDER] = 1.0
+        gain = self._p @ row
+        gain = gain / (float(row @ gain) + SQUARE_STD**2 * SQUARE_INDEPENDENT_S / LOOK_S)
+        self._x -= gain * math.atan(line.lean)
+        self._p -= np.outer(gain, row @ self._p)
 
     def _take_error(self) -> None:
         """The places of the stroke that are still to be laid get the error of v."""

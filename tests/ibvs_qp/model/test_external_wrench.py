@@ -11,7 +11,7 @@ from symbolic_block import Block
 from allocation import control_effectiveness
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.config.vehicle import VehicleParams
-from ibvs_qp.model.external_wrench import FORCE_BOUND, MOMENT_BOUND, external_wrench
+from ibvs_qp.model.external_wrench import FORCE_BOUND, MOMENT_BOUND, QUIET_PUSH, external_wrench
 from ibvs_qp.model.inputs import Body, Contact
 from ibvs_qp.model.motor_thrust import motor_thrust
 
@@ -99,7 +99,7 @@ def test_a_gust_onto_the_wall_is_told_from_what_the_wall_returns() -> None:
 
 
 def test_a_noisy_force_sensor_slows_the_observer_in_contact() -> None:
-    """Its noise would become push: with 1 N of filtered noise a gust is learnt ten times slower, not faster."""
+    """Its noise would become push: with 1 N of filtered noise the bandwidth is a twelfth."""
     found = []
     for noise in (0.0, 1.0):
         block = hover(np.zeros(6), seconds=1.0)
@@ -107,11 +107,14 @@ def test_a_noisy_force_sensor_slows_the_observer_in_contact() -> None:
         gust = np.array([2.0, 0, 0, 0, 0, 0])
         thrusts = np.linalg.solve(MATRIX, -np.array([0, 0, WEIGHT, 0, 0, 0]))
         for _ in range(25):
-            block.step.states["gust_power"][:] = 1.0  # amid gusts
+            block.step.states["gust_power"][:] = 100.0  # amid gusts
             without_lag(block, thrusts, specific_force=STILL + gust[:3] / VEHICLE.mass_kg)
         found.append(float(wrench(block)[0]))
     assert found[0] == pytest.approx(2.0 * (1.0 - np.exp(-0.1 * GUST_BANDWIDTH)), rel=0.02)
-    assert found[1] < 0.1 * found[0]
+    assert found[1] == pytest.approx(
+        2.0 * (1.0 - np.exp(-0.1 * GUST_BANDWIDTH / (1.0 + 1.0 / QUIET_PUSH**2))), rel=0.05
+    )
+    assert found[1] < 0.25 * found[0]
 
 
 def test_in_calm_air_sensor_noise_is_not_handed_on_and_a_gust_wakes_the_observer() -> None:
@@ -147,7 +150,7 @@ def test_vibration_is_no_gust() -> None:
             found.append(float(wrench(block)[0]))
         return float(np.std(found[500:]))
 
-    assert passed_on(0.5) < 0.15 < 0.3 < passed_on(0.0)
+    assert passed_on(0.5) < 0.27 < 0.5 < passed_on(0.0)
 
 
 def test_acceleration_is_not_taken_for_a_load() -> None:

@@ -45,7 +45,8 @@ class Strokes:
 
     def seen(self, track: int, v: float, side: int, kind: str, std: float, middle: float = 0.0, length: float = 6.0):
         """An edge at v as the picture shows it."""
-        place, turned = v - self.v - self.delta + std * self.rng.standard_normal(), self.wander - self.cross.picture_turn
+        turned = self.wander - self.cross.picture_turn
+        place = v - self.v - self.delta + std * self.rng.standard_normal()
         line = parallel(track, place, side, kind, middle, length)
         line.middle, line.lean = (middle, place + turned * middle), turned
         return line
@@ -296,6 +297,21 @@ def test_the_direction_that_the_odometer_showed_outlasts_the_board_s_edge_in_the
         _look(cross, edge, u=0.01 * min(k, 200 - k), times=1, ahead=1.0)
     assert abs(cross.turn) < 1.5e-3
     assert cross.picture_turn == pytest.approx(roll, abs=1e-3)
+
+
+@pytest.mark.parametrize("turned", [-0.01, 0.01])
+def test_a_board_s_edge_across_the_strokes_shows_the_turn_of_the_picture(turned: float) -> None:
+    """A picture that is turned from u to v by an angle shows an edge along v turned from v to -u by it."""
+    cross = _after_stroke_one()
+    cross._p[cross_track._WANDER, cross_track._WANDER] = cross_track.WANDER_STD**2
+    before = cross._p[cross_track._WANDER, cross_track._WANDER]
+    for _ in range(100):
+        across = parallel(7, 0.2, 1, "board")
+        across.parallel, across.lean = False, -math.tan(turned - cross.picture_turn)
+        ends_of_paint = replace(across, lean=0.3, track=replace(across.track, kind="paint"))
+        cross.look([across, ends_of_paint], 0.3, 1.0)
+    assert cross.picture_turn == pytest.approx(turned, abs=0.6 * abs(turned))
+    assert cross._p[cross_track._WANDER, cross_track._WANDER] < 0.5 * before
 
 
 def test_a_step_back_forgets_nothing_that_was_learnt_of_the_stroke_that_is_laid() -> None:

@@ -73,7 +73,7 @@ FAST_OF_TWENTY = (("rows", "bottom-right", TIP_ERROR), ("rows", "top-left", -TIP
     ],
 )
 def test_twenty_strokes_end_at_their_places(kind: str, start: str, delta: float) -> None:
-    world = paint(PaintedWall(short(rows=20, stroke_m=0.4, pattern=kind, start=start), delta=delta))
+    world = paint(PaintedWall(short(rows=20, stroke_m=0.8, pattern=kind, start=start), delta=delta))
     assert len(world.ends) == 20
     assert_at_their_places(world, after=1)
 

@@ -126,3 +126,18 @@ def test_a_tip_that_moves_until_its_line_is_at_the_target_has_lost_its_error(slo
         right, down = world.pattern.to_wall(*((0.0, error) if piece.identity == 1 else (error, 0.0)))
         (moved,) = seen(piece, tip=world.to_board(right, down), slope=slope)
         assert moved.track.offset == pytest.approx(target, abs=1e-9)
+
+
+@given(patterns, angles)
+def test_a_turn_of_the_picture_leans_edges_along_and_across_the_strokes_opposite_ways(
+    pattern: Pattern, turn: float
+) -> None:
+    """From u to v: an edge along u goes to v, one along v to -u."""
+    c, s = math.cos(turn), math.sin(turn)
+    along, across = np.array((c, s)), np.array((-s, c))
+    lines = [
+        line_through(np.array(pattern.to_wall(*(0.1 * end))), np.array(pattern.to_wall(*(-0.1 * end))), np.ones(2))
+        for end in (along, across)
+    ]
+    seen = {line.parallel: line.lean for line in pattern_lines(lines, pattern, 0.0)}
+    assert seen == {True: pytest.approx(math.tan(turn)), False: pytest.approx(-math.tan(turn))}
