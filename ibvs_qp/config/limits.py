@@ -49,7 +49,7 @@ class LimitSettings:
         0.0,
         "roll and pitch that a push beyond the level reach may take",
         unit="deg",
-        why="a permission of the mission: 2 deg add 2 N standing and 1.7 N sliding at a friction of 0.8",
+        why="a permission of the mission: 2 deg add 1.0 N standing and 2.0 N sliding sideways at a friction of 0.8",
         low=0.0,
         high=10.0,
     )

@@ -16,10 +16,10 @@ from ibvs_qp.symbolic.signals import Signals
 FORCE_BANDWIDTH_FREE, FORCE_BANDWIDTH_WALL = 4.0, 1.5
 #: Noise of the filtered push at which the bandwidth along the normal halves [N]: the observer passes it on as force.
 QUIET_PUSH = 0.3
-#: Gusts along the normal by the force whose changes are faster than one bandwidth and slower than the other [rad/s];
-#: the weight is one half at this deviation [N].
+#: Band of the changes of the force along the normal that count as a gust [rad/s], and the deviation at which the weight
+#: is one half [N]: found in gusts of 2 N rms and in calm air (2 seeds each of the worlds datasheet and harsh).
 SLOW_CHANGE, FAST_CHANGE, CALM_CHANGE = 0.5, 4.0, 0.3
-#: Both squares have the noise of the fast filter, and scatter together [-].
+#: Noise variance of the sum of two squares of filtered forces, in variances of one [-].
 CHANGE_NOISE = 2.0
 #: In calm air a fast observer only passes on sensor noise. Its bandwidth halves where the force not yet
 #: learnt is this strong [N rms], low-passed at its own bandwidth and averaged over this time [s].
@@ -98,7 +98,8 @@ def _force(
     size = ca.dot(normal, felt)
     along = size * normal
     vibration = config.vehicle.mass_kg * contact.acceleration_noise
-    windy = _change_weight(signals, body.dt, size, ca.dot(normal, old), touching, vibration)
+    felt_touch = ca.logic_and(touching, ca.logic_and(awake, body.specific_force_known))
+    windy = _change_weight(signals, body.dt, size, ca.dot(normal, old), felt_touch, vibration)
     pressing = bandwidth * windy / (1.0 + (contact.push_noise / QUIET_PUSH) ** 2)
     across, fastest = felt - along, config.contact.plane_bandwidth_rad_s
     windy = _unlearnt_weight(signals, fastest, body.dt, touching * across, vibration)
@@ -123,14 +124,15 @@ def _change_weight(
         dt: Time since the last step [s].
         unlearnt: External force along the normal beyond the learnt one, one sample [N].
         learnt: Force that the observer gives [N].
-        touching: 1 in contact or just before it; it begins anew there.
+        touching: 1 in contact or just before it, with an accelerometer and known thrusts; it begins anew there.
         vibration: Deviation of one sample by the accelerometer's noise [N]: no gust.
     """
     force = learnt + unlearnt
     begun, fast, slow = (signals.state(f"gust_{name}") for name in ("begun", "fast", "slow"))
     gain = filter_gain(FAST_CHANGE, dt)
-    fast = signals.remember("gust_fast", ca.if_else(begun, fast + gain * (force - fast), force))
-    slow = signals.remember("gust_slow", ca.if_else(begun, slow + filter_gain(SLOW_CHANGE, dt) * (fast - slow), force))
+    # Both begin at the learnt force: a single sample holds the vibration.
+    fast = signals.remember("gust_fast", ca.if_else(begun, fast + gain * (force - fast), learnt))
+    slow = signals.remember("gust_slow", ca.if_else(begun, slow + filter_gain(SLOW_CHANGE, dt) * (fast - slow), learnt))
     signals.remember("gust_begun", touching)
     left = signals.state("gust_unlearnt")
     left = signals.remember("gust_unlearnt", ca.if_else(begun, left + gain * (unlearnt - left), 0.0))

@@ -31,12 +31,14 @@ class PushPlanes:
     A push f is attainable when :math:`lower \le slope\, f \le upper` for every pair of planes.
 
     Attributes:
-        normals: Facet normals, (k, 6).
+        normals: Facet normals, scaled to a largest share of one of a rotor's thrust, (k, 6).
+        direction: Force of the rotors per newton of push, n + friction along the travel, in B, (3,).
         slope: Of each pair along the push [-], (k,).
         lower, upper: Distances of both planes from the wrench without push [N], (k,) each.
     """
 
     normals: ca.DM
+    direction: ca.SX
     slope: ca.SX
     lower: ca.SX
     upper: ca.SX
@@ -54,6 +56,14 @@ def push_planes(
 
     The ray :math:`w(f) = f [d; p \times d] - h`, :math:`d = n + \mu t`, meets the facets of the attainable wrench set
     (`allocation.wrench_facets`), exactly for any number of rotors.
+
+    Args:
+        signals: Registry of the thrust limits.
+        vehicle: Rotors and tip.
+        normal: Into the wall, in B, (3,).
+        travel: Commanded velocity along the wall, in B [m/s], (3,).
+        friction: Coulomb coefficient [-].
+        static_wrench: Wrench on the vehicle without rotors and push [N, N m], (6,).
     """
     facets, count = WrenchFacets(vehicle.geometry), vehicle.geometry.count
     low, high = signals.input("thrust_low", count), signals.input("thrust_high", count)
@@ -66,6 +76,7 @@ def push_planes(
     offset = -(ca.DM(facets.normals) @ signals.output("static_wrench", static_wrench))
     return PushPlanes(
         normals=ca.DM(facets.normals),
+        direction=direction,
         slope=ca.DM(facets.normals) @ ray,
         lower=rising @ low + falling @ high - offset,
         upper=rising @ high + falling @ low - offset,

@@ -43,7 +43,7 @@ LOOK_S = 0.1
 #: straight, and its edge has the noise of a fit; a painted edge has the swings of the path that left it.
 BOARD_STD, BOARD_INDEPENDENT_S = 1e-3, 0.3
 EDGE_STD, INDEPENDENT_S = 1e-3, 0.5
-#: Standard deviation of beta for each stroke, by the lens [m].
+#: Standard deviation of beta for each stroke, by the lens [m]; assumed, the roll of the picture is a state.
 AHEAD_STD = 4e-4
 #: Odometer: variance of v per metre of way and per second at one place [m^2/m], [m^2/s], as flown in the datasheet
 #: world over 1 to 15 s; standard deviation of its drift [m/s], and variance of the drift per second [m^2/s^3].
@@ -57,11 +57,13 @@ DRIFT_STD, DRIFT_WANDER = 1e-3, 1e-9
 #: [rad]; its variance per second [rad^2/s].
 TURN_STD, TURN_WANDER = 8e-3, 1e-9
 #: Wander of the axes of odometer and picture with the attitude: standard deviation [rad] and correlation time [s], as
-#: flown in 1 s pieces of ten flights: 0.25 deg in the datasheet world, and 0.4 deg per axis in the harsh one.
+#: flown in 1 s pieces of ten flights: 0.25 deg in the datasheet world, and 0.4 deg per axis by design in the harsh one;
+#: the value is between both.
 WANDER_STD, WANDER_TIME_S = math.radians(0.3), 8.0
 #: Standard deviation of the direction of a board's edge across the strokes, by its fit and by boards that are not
-#: square [rad]; time between looks that count as independent [s].
-SQUARE_STD, SQUARE_INDEPENDENT_S = math.radians(0.4), 2.0
+#: square [rad]; time between looks that count as independent [s]; shortest piece that shows a direction [m]. With twice
+#: of the first two, columns in the harsh world did not become certain.
+SQUARE_STD, SQUARE_INDEPENDENT_S, SQUARE_LENGTH_M = math.radians(0.4), 2.0, 0.08
 #: Variance of the far edge per metre of way across the strokes: its distance from the tip shrinks, and the wall
 #: distance that scales it is known to 1 %, 0.7 mm of a usual pitch [m^2/m].
 FAR_PER_M = 7e-6
@@ -209,7 +211,6 @@ class CrossTrack:
     def begin_stroke(self) -> None:
         """The tip begins to paint a stroke; what it paints is remembered."""
         self.maps.append(StrokeMap(self._config.stroke_m))
-        self._again = []
         self._way = self.unled = self.longest_unled = 0.0
         self._misfits = MISFIT_LOOKS * [self.misfit**2]
         self._laying = True
@@ -251,7 +252,7 @@ class CrossTrack:
         place = self.maps[-1].mean(first_u, last_u) + float(shares @ self._x[_OWN])
         # The error of a place is the sum of those of all strokes before it.
         misfit = math.sqrt(float(np.mean(np.square([*self._stroke_misfits, self.misfit]))))
-        rougher = max(misfit / EDGE_STD, 1.0)  # than the filter allows for
+        rougher = max(misfit / EDGE_STD, 1.0)  # the filter's own noise of an edge is one EDGE_STD
         return place, rougher * math.sqrt(max(float(shares @ self._p[_OWN, _OWN] @ shares), 0.0))
 
     def overlap(self, first_u: float, last_u: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -284,8 +285,8 @@ class CrossTrack:
         for found, _ in self._again:
             self.maps[-1] = self.maps[-1].widened(found)
         self._again = []
-        self._stroke_misfits.append(self.misfit)
-        if len(self.maps) > 1:
+        if len(self.maps) > 1:  # the first stroke has no last edge
+            self._stroke_misfits.append(self.misfit)
             self._variances.append(np.diag(self._p)[_LAST].copy())
         self._x[_LAST] = self._x[_OWN]
         self._p[_LAST] = self._p[_OWN]
@@ -307,7 +308,6 @@ class CrossTrack:
         if self._laying:
             self._open &= ahead * (self._spacing * np.arange(NODES) - u) > 0.0
             self._take_error()
-        self._correct_turn(lines)
         parallel = [line for line in lines if line.parallel and line.weight > LOST_WEIGHT]
         guides = []
         straight = math.radians(self._config.gates.fresh_lean_deg)
@@ -323,6 +323,8 @@ class CrossTrack:
         if (line := self._board_edge(parallel)) is not None:
             guides.append(line)
             self._follow_turn(line, LOOK_S / TURN_TIME_S)
+        else:
+            self._correct_turn(lines)
         opposite, known = self._opposite_edge(parallel)
         self.unled = 0.0 if last is not None or guides or known else self.unled
         if opposite is not None:
@@ -332,15 +334,22 @@ class CrossTrack:
         self.guides = {line.track.track_id: self.v + self.tip_error + line.place for line in guides}
 
     def _correct_turn(self, lines: Sequence[PatternLine]) -> None:
-        """Correct the direction with the longest edge of the board across the strokes: it turns with the picture."""
+        """Correct the direction with the longest edge of the board across the strokes: it turns with the picture.
+
+        Not while the edge along the strokes is in view, which shows that direction whether the board is square or not.
+        """
         edges = [line for line in lines if not line.parallel and line.kind == "board" and line.weight > VISIBLE_WEIGHT]
-        if not edges:
+        line = max(edges, key=lambda edge: edge.length, default=None)
+        if line is None or line.length < SQUARE_LENGTH_M:
             return
-        line, row = max(edges, key=lambda edge: edge.length), np.zeros(_STATES)
+        row, turned = np.zeros(_STATES), -math.atan(line.lean)
         row[_TURN] = row[_WANDER] = 1.0
         gain = self._p @ row
-        gain = gain / (float(row @ gain) + SQUARE_STD**2 * SQUARE_INDEPENDENT_S / LOOK_S)
-        self._x -= gain * math.atan(line.lean)
+        expected = float(row @ gain)
+        if abs(turned) > GATE_SIGMAS * math.sqrt(expected + SQUARE_STD**2):
+            return
+        gain = gain / (expected + SQUARE_STD**2 * SQUARE_INDEPENDENT_S / LOOK_S / line.weight)
+        self._x += gain * turned
         self._p -= np.outer(gain, row @ self._p)
 
     def _take_error(self) -> None:

@@ -67,11 +67,11 @@ class PilotConfig:
         object.__setattr__(self, "vision", vision)
 
     def _require_room_for_trim(self) -> None:
-        """A deliberate tilt in both axes, and the barrier about it, stay below the tilt that the supervisor bounds."""
+        """The deliberate tilt plus the tilt barrier, in roll and pitch together, stay below the supervisor's bound."""
         limits, most = self.controller.limits, self.safety.tilt_deg
         if math.sqrt(2.0) * (limits.trim_deg + limits.tilt_deg) > most and limits.trim_deg > 0.0:
-            room = most / math.sqrt(2.0) - limits.tilt_deg
-            allowed = f"allowed is 0 to {max(room, 0.0):.3g} deg beside tilt_deg, for safety.tilt_deg = {most:g} deg"
+            room = math.floor(100.0 * max(most / math.sqrt(2.0) - limits.tilt_deg, 0.0)) / 100.0
+            allowed = f"allowed is 0 to {room:g} deg beside tilt_deg, for safety.tilt_deg = {most:g} deg"
             raise out_of_range("controller.limits.trim_deg", limits.trim_deg, "deg", allowed)
 
     @classmethod

@@ -107,16 +107,18 @@ def sliding_reach(vehicle: VehicleParams, found: Actuation, tilt_deg: float) -> 
     if tilt_deg == 0.0:
         assert found.sliding_push is not None
         return found.sliding_push.push
-    facets = WrenchFacets(vehicle.geometry)
-    limits = vehicle.mass_kg * GRAVITY, np.array(vehicle.tip_position_m), vehicle.thrust_min, vehicle.thrust_max
-    return worst_tilted_push_reach(facets, *limits, tilt=math.radians(tilt_deg), friction=SLIDING_FRICTION)
+    return worst_tilted_push_reach(*_rotors(vehicle), tilt=math.radians(tilt_deg), friction=SLIDING_FRICTION)
 
 
 def standing_reach(vehicle: VehicleParams, tilt_deg: float) -> float:
     """Greatest push of a tip at rest, within a roll and a pitch [N]; arguments as of `sliding_reach`."""
-    facets = WrenchFacets(vehicle.geometry)
-    limits = vehicle.mass_kg * GRAVITY, np.array(vehicle.tip_position_m), vehicle.thrust_min, vehicle.thrust_max
-    return tilted_push_reach(facets, *limits, tilt=math.radians(tilt_deg))[0]
+    return tilted_push_reach(*_rotors(vehicle), tilt=math.radians(tilt_deg))[0]
+
+
+def _rotors(vehicle: VehicleParams) -> tuple[WrenchFacets, float, np.ndarray, np.ndarray, np.ndarray]:
+    """Facets, weight [N], tip [m], least and largest thrusts [N]."""
+    tip, weight = np.array(vehicle.tip_position_m), vehicle.mass_kg * GRAVITY
+    return WrenchFacets(vehicle.geometry), weight, tip, vehicle.thrust_min, vehicle.thrust_max
 
 
 def _reach(reach: float, trim_deg: float, push_n: float) -> list[str]:

@@ -198,13 +198,13 @@ def _show(given: VehicleFile, found: Actuation, config: PilotConfig | None) -> N
     console.print(f"Push at the tip: {found.push.push:.1f} N standing ({binding});")
     console.print(f"  {found.sliding_push.push:.1f} N sliding anywhere with a friction of {SLIDING_FRICTION:g}.")
     rows = [
-        [f"{entry['tilt_deg']:g}", f"{entry['push_n']:.1f}", f"{entry['sliding_push_n']:.1f}"]
+        [f"{entry['tilt_deg']:g}", *("–" if push is None else f"{push:.1f}" for push in list(entry.values())[1:])]
         for entry in _tilted_reach(vehicle, found)
     ]
     console.print(terminal_table(("limits.trim_deg", "push standing, N", "push sliding, N"), rows, "Reach by tilt"))
 
 
-def _tilted_reach(vehicle: VehicleParams, found: Actuation) -> list[dict[str, float]]:
+def _tilted_reach(vehicle: VehicleParams, found: Actuation) -> list[dict[str, float | None]]:
     """Reach where roll and pitch may trim by some angles; empty for a vehicle without a level hover."""
     from ibvs_qp.pilot.vehicle_check import sliding_reach, standing_reach
 
@@ -213,11 +213,15 @@ def _tilted_reach(vehicle: VehicleParams, found: Actuation) -> list[dict[str, fl
     return [
         {
             "tilt_deg": tilt,
-            "push_n": standing_reach(vehicle, tilt),
-            "sliding_push_n": sliding_reach(vehicle, found, tilt),
+            "push_n": _finite(standing_reach(vehicle, tilt)),
+            "sliding_push_n": _finite(sliding_reach(vehicle, found, tilt)),
         }
         for tilt in SHOWN_TILTS_DEG
     ]
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
 
 
 def _show_origin(console: Console, given: VehicleFile, config: PilotConfig | None) -> None:

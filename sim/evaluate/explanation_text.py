@@ -77,8 +77,9 @@ def _headline(trace: Trace, tick: int, config: PilotConfig) -> list[str]:
 
 def _trim(trace: Trace, tick: int, config: PilotConfig) -> list[str]:
     """Deliberate tilt and the push that it buys."""
-    trim, outcome = trim_tilt(trace, tick, config), trace.outcomes[int(trace.outcome[tick])]
-    if trim is None or outcome == Outcome.HOLD or max(abs(trim.roll_deg), abs(trim.pitch_deg)) < _NO_TRIM_DEG:
+    held = trace.outcomes[int(trace.outcome[tick])] == Outcome.HOLD
+    trim = None if held else trim_tilt(trace, tick, config)
+    if trim is None or max(abs(trim.roll_deg), abs(trim.pitch_deg)) < _NO_TRIM_DEG:
         return []
     gain = trim.reach_n - trim.level_reach_n
     return [

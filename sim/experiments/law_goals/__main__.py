@@ -1,4 +1,4 @@
-"""``python -m sim.experiments.law_goals --jobs 2``: fly what lacks, print every goal with figure and n.
+"""``python -m sim.experiments.law_goals --jobs 2``: fly what is missing, print every goal with figure and n.
 
 ``before.csv`` holds the figures of the QP of revision 1262c78, whose rows lack the rotors, same scenes, same seeds.
 Exits 1 when a goal is missed. ``--part 0`` only prints.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from dataclasses import dataclass
+from collections import Counter
 from pathlib import Path
 
 import polars as pl
@@ -17,7 +17,7 @@ from rich.console import Console
 from ibvs_qp.config.settings import load_toml
 from sim.evaluate.table import terminal_table
 from sim.experiments.design import Choice, design
-from sim.experiments.law_goals.goal import Goal, outcome
+from sim.experiments.law_goals.goal import Goals, outcome
 from sim.experiments.spec import Experiment
 from sim.sweep import run_sweep
 from sim.sweep.fingerprint import listed_block
@@ -26,13 +26,6 @@ from sim.sweep.progress import sweep_progress
 from sim.sweep.tables import read_tables
 
 HERE = Path(__file__).parent
-
-
-@dataclass(frozen=True, kw_only=True)
-class Goals:
-    """Content of ``goals.toml``."""
-
-    goals: tuple[Goal, ...]
 
 
 def main() -> int:
@@ -56,7 +49,8 @@ def main() -> int:
     table = read_tables(file for file in files if file.exists())
     before = pl.read_csv(HERE / "before.csv")
     goals = load_toml(Goals, HERE / "goals.toml").goals
-    found = [outcome(goal, table, before) for goal in goals]
+    planned = Counter((run.params["kind"], run.params["world"]) for run in runs)
+    found = [outcome(goal, table, before, planned[goal.kind, goal.world]) for goal in goals]
     headings = ("figure", "before", "now", "ratio, paired", "goal", "n", "met")
     console.print(terminal_table(headings, [each.cells for each in found], text=("figure", "goal")))
     return 130 if result.interrupted else int(not all(each.met for each in found))

@@ -31,8 +31,25 @@ class Goal:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Goals:
+    """Content of ``goals.toml``."""
+
+    goals: tuple[Goal, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """What the flights say of a goal: medians in SI, NaN without data; the ratio with its exact interval."""
+    """What the flights say of a goal: medians in SI, NaN without data; the ratio with its exact interval.
+
+    Attributes:
+        goal: The goal.
+        before: Median of before.
+        now: Median of the flights that completed.
+        ratio: Median ratio of pairs with the same seed.
+        interval: Of that median.
+        n: Flights with the figure, pairs for a ratio.
+        planned: Flights of the design.
+    """
 
     goal: Goal
     before: float
@@ -40,14 +57,20 @@ class Outcome:
     ratio: float
     interval: tuple[float, float]
     n: int
+    planned: int
 
     @property
     def met(self) -> bool:
-        """Whether the goal is met."""
+        """Whether every flight of the design completed, and the goal is met."""
         goal = self.goal
+        if self.n < self.planned:
+            return False
         if goal.ratio_at_most is not None:
             return self.ratio <= goal.ratio_at_most
-        return self.now <= goal.at_most if goal.at_most is not None else self.now >= (goal.at_least or 0.0)
+        if goal.at_most is not None:
+            return self.now <= goal.at_most
+        assert goal.at_least is not None
+        return self.now >= goal.at_least
 
     @property
     def cells(self) -> tuple[str, ...]:
@@ -60,32 +83,37 @@ class Outcome:
         words, value = next((words, value) for words, value in bounds.items() if value is not None)
         bound = f"{words} {value * (1.0 if words.startswith('ratio') else figure.scale):g}"
         numbers = ["–" if np.isnan(value) else f"{value * figure.scale:.3g}" for value in (self.before, self.now)]
-        return name, *numbers, ratio, bound, str(self.n), "yes" if self.met else "NO"
+        return name, *numbers, ratio, bound, f"{self.n} of {self.planned}", "yes" if self.met else "NO"
 
 
-def outcome(goal: Goal, flown: pl.DataFrame, before: pl.DataFrame) -> Outcome:
-    """Compare flights of a goal with those of before, seed by seed.
+def outcome(goal: Goal, flown: pl.DataFrame, before: pl.DataFrame, planned: int) -> Outcome:
+    """Compare the flights of a goal that completed with those of before, seed by seed.
 
     Args:
         goal: The goal.
         flown: Table of today's flights.
         before: Flights of before, columns kind, world, seed and figures.
+        planned: Flights of the design.
     """
     old = before.filter((pl.col("kind") == goal.kind) & (pl.col("world") == goal.world))
     old = old.select("seed", pl.col(goal.figure).cast(float).alias("before"))
     if not {goal.figure, f"{PARAM}kind"} <= set(flown.columns):
-        flown = pl.DataFrame(schema={f"{PARAM}kind": str, f"{PARAM}world": str, "seed": int, goal.figure: float})
+        columns = {f"{PARAM}kind": str, f"{PARAM}world": str, "seed": int, "completed": bool, goal.figure: float}
+        flown = pl.DataFrame(schema=columns)
     mine = flown.filter((pl.col(f"{PARAM}kind") == goal.kind) & (pl.col(f"{PARAM}world") == goal.world))
-    now = mine.select("seed", pl.col(goal.figure).alias("now"))
+    now = mine.filter(pl.col("completed")).select("seed", pl.col(goal.figure).cast(float).alias("now"))
+    now = now.filter(pl.col("now").is_finite())
     both = now.join(old, on="seed")
     ratios = (both["now"] / both["before"]).to_numpy()
+    ratios = ratios[np.isfinite(ratios)]
     return Outcome(
         goal=goal,
         before=_median(old["before"]),
         now=_median(now["now"]),
-        ratio=float(np.nanmedian(ratios)) if len(ratios) else float("nan"),
+        ratio=float(np.median(ratios)) if len(ratios) else float("nan"),
         interval=exact_interval(ratios) if len(ratios) else (float("nan"), float("nan")),
-        n=now.height,
+        n=len(ratios) if goal.ratio_at_most is not None else now.height,
+        planned=planned,
     )
 
 

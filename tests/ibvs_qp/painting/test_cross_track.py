@@ -125,7 +125,7 @@ def _ratios(seed: int) -> list[float]:
 
 
 def test_a_chain_of_strokes_stays_straight(monkeypatch) -> None:
-    """The error of v changes little along stroke ten, although odometer and picture turn by 7 mrad rms.
+    """The error of v changes little along stroke ten, although odometer and picture turn by 5 mrad rms.
 
     By 2.6 mrad where only the odometer turns.
     """

@@ -11,8 +11,8 @@ from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.settings import load_toml
 from sim.evaluate.figures import figure_of
 from sim.experiments.design import Choice, design
-from sim.experiments.law_goals.__main__ import HERE, Goals
-from sim.experiments.law_goals.goal import Goal, outcome
+from sim.experiments.law_goals.__main__ import HERE
+from sim.experiments.law_goals.goal import Goal, Goals, outcome
 from sim.experiments.spec import Experiment
 
 BEFORE = pl.read_csv(HERE / "before.csv")
@@ -46,6 +46,7 @@ def flown(factor: float) -> pl.DataFrame:
         pl.col("kind").alias("param.kind"),
         pl.col("world").alias("param.world"),
         "seed",
+        pl.lit(True).alias("completed"),
         pl.col("path_rms_straight_m") * factor,
     )
 
@@ -53,14 +54,24 @@ def flown(factor: float) -> pl.DataFrame:
 def test_a_ratio_is_that_of_flights_with_the_same_seed() -> None:
     goal = Goal(kind="paint", world="harsh", figure="path_rms_straight_m", ratio_at_most=0.8)
     for factor, met in ((0.7, True), (0.9, False)):
-        found = outcome(goal, flown(factor).sample(fraction=1.0, shuffle=True, seed=1), BEFORE)
+        found = outcome(goal, flown(factor).sample(fraction=1.0, shuffle=True, seed=1), BEFORE, 10)
         assert found.ratio == pytest.approx(factor) and found.interval == pytest.approx((factor, factor))
         assert found.n == 10 and found.met is met and found.cells[-1] == ("yes" if met else "NO")
 
 
+def test_a_flight_that_is_missing_or_failed_meets_nothing() -> None:
+    goal = Goal(kind="paint", world="harsh", figure="path_rms_straight_m", ratio_at_most=0.8)
+    good = flown(0.7)
+    failed = good.with_columns(pl.when(pl.col("seed") == 3).then(False).otherwise(True).alias("completed"))
+    empty = good.with_columns(pl.when(pl.col("seed") > 0).then(pl.col(goal.figure)).alias(goal.figure))
+    for flights in (good.head(1), failed, empty):
+        found = outcome(goal, flights, BEFORE, 10)
+        assert not found.met and found.n < 10 and found.ratio == pytest.approx(0.7)
+
+
 def test_without_flights_no_goal_is_met() -> None:
     for goal in GOALS:
-        found = outcome(goal, pl.DataFrame(), BEFORE)
+        found = outcome(goal, pl.DataFrame(), BEFORE, 10)
         assert found.n == 0 and math.isnan(found.now) and not found.met and "–" in found.cells
 
 
