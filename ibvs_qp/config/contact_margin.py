@@ -12,7 +12,7 @@ import numpy as np
 
 from ibvs_qp.analysis.contact_loop import ContactLoop
 from ibvs_qp.config.brush import BrushSettings
-from ibvs_qp.config.contact import ContactSettings
+from ibvs_qp.config.contact import LEAST_QUIET, ContactSettings
 from ibvs_qp.config.errors import out_of_range
 from ibvs_qp.config.gains import Gains
 from ibvs_qp.config.vehicle import VehicleParams
@@ -54,7 +54,12 @@ class _PressingConfig(Protocol):
 
 
 def contact_loop(
-    config: _PressingConfig, stiffness: float, damping: float, force_delay_s: float, quiet: float = 1.0
+    config: _PressingConfig,
+    stiffness: float,
+    damping: float,
+    force_delay_s: float,
+    quiet: float = 1.0,
+    gusts: bool = True,
 ) -> ContactLoop:
     """The linear contact loop of a controller against a wall; arguments as in `contact_mode_damping`."""
     gains, vehicle, estimation, hold = config.gains, config.vehicle, config.contact.estimation, 0.5 * config.tick_s
@@ -72,8 +77,8 @@ def contact_loop(
         filter_lag=1.0 / (2.0 * math.pi * config.contact.force_filter_hz),
         spring=spring,
         damper=quiet * damper,
-        observer=1.0 if config.contact_feedforward else 0.0,  # without feed-forward it rests at the wall
-        gust_bandwidth=config.contact.gust_bandwidth_rad_s,
+        observer=float(gusts and config.contact_feedforward),  # without feed-forward it rests at the wall
+        gust_bandwidth=max(quiet, LEAST_QUIET) * config.contact.gust_bandwidth_rad_s,
         force_delay=force_delay_s + hold,
         rate_delay=2.0 * hold,
         acceleration_filter=estimation.acceleration_filter_s,
@@ -101,7 +106,12 @@ class LoopMargin:
 
 
 def contact_mode_damping(
-    config: _PressingConfig, stiffness: float, damping: float, force_delay_s: float, quiet: float = 1.0
+    config: _PressingConfig,
+    stiffness: float,
+    damping: float,
+    force_delay_s: float,
+    quiet: float = 1.0,
+    gusts: bool = True,
 ) -> LoopMargin:
     """Least damping ratio of the contact under a controller; `ContactLoop` derives the loop.
 
@@ -110,9 +120,10 @@ def contact_mode_damping(
         stiffness: Of wall and brush together [N/m].
         damping: Of wall and brush together [N s/m].
         force_delay_s: Mean age of the force sample in use: latency plus half a sample period [s].
-        quiet: Weight of K_sd and K_fp, which vibration reduces (docs/how_it_works/estimation.md) [-].
+        quiet: Weight of K_sd, K_fp and gust observer, which vibration reduces (docs/how_it_works/estimation.md) [-].
+        gusts: Whether the gust observer learns; it rests in calm air.
     """
-    loop = contact_loop(config, stiffness, damping, force_delay_s, quiet)
+    loop = contact_loop(config, stiffness, damping, force_delay_s, quiet, gusts)
     ratio, frequency = 1.0, 0.0
     for pole in loop.poles():
         oscillates = abs(pole.imag) > REAL_POLE * abs(pole)
@@ -129,13 +140,17 @@ def contact_mode_damping(
 
 
 def least_margin(config: _PressingConfig, brush: BrushSettings | None = None) -> LoopMargin:
-    """Least damped contact over the stiffness range of a brush."""
+    """Least damped contact over the stiffness range of a brush, in gusts and in calm air."""
     brush = brush or BrushSettings()
     low, high = brush.stiffness_min_n_m, brush.stiffness_max_n_m
     samples = {float(entry) for entry in np.geomspace(low, high, STIFFNESS_SAMPLES)}
     corner = config.contact.full_gain_stiffness_n_m  # the gain begins to fall: possibly the least damped point
     samples |= {corner} if low < corner < high else set()
-    margins = (contact_mode_damping(config, k, brush.damping_n_s_m, brush.force_delay_s) for k in sorted(samples))
+    margins = (
+        contact_mode_damping(config, k, brush.damping_n_s_m, brush.force_delay_s, gusts=gusts)
+        for k in sorted(samples)
+        for gusts in (True, False)
+    )
     return min(margins, key=lambda margin: margin.least_damping_ratio)
 
 

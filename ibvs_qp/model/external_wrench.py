@@ -5,7 +5,8 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
-from ibvs_qp.config import ControllerConfig, VehicleParams
+from ibvs_qp.config import ContactSettings, ControllerConfig, VehicleParams
+from ibvs_qp.config.contact import LEAST_QUIET
 from ibvs_qp.model.inputs import Body, Contact, clamp
 from ibvs_qp.model.motor_thrust import MotorThrust
 from ibvs_qp.symbolic.signals import Signals
@@ -100,7 +101,8 @@ def _force(
     vibration = config.vehicle.mass_kg * contact.acceleration_noise
     felt_touch = ca.logic_and(touching, ca.logic_and(awake, body.specific_force_known))
     windy = _change_weight(signals, body.dt, size, ca.dot(normal, old), felt_touch, vibration)
-    pressing = bandwidth * windy / (1.0 + (contact.push_noise / QUIET_PUSH) ** 2)
+    steady = ca.fmax(quiet_rate(contact, config.contact), LEAST_QUIET)
+    pressing = bandwidth * windy * steady / (1.0 + (contact.push_noise / QUIET_PUSH) ** 2)
     across, fastest = felt - along, config.contact.plane_bandwidth_rad_s
     windy = _unlearnt_weight(signals, fastest, body.dt, touching * across, vibration)
     plane = FORCE_BANDWIDTH_WALL + (fastest - FORCE_BANDWIDTH_WALL) * windy
@@ -163,6 +165,15 @@ def _windy(signals: Signals, name: str, dt: ca.SX, squared: ca.SX, noise: ca.SX,
     power = signals.remember(f"{name}_power", power + filter_gain(1.0 / CALM_TIME, dt) * (squared - power))
     gust = ca.fmax(power - NOISE_POWERS * noise, 0.0)
     return gust / (gust + calm**2 + noise)
+
+
+def quiet_rate(contact: Contact, settings: ContactSettings) -> ca.SX:
+    """Weight of K_sd, K_fp and the observer along the normal by the noise of the rate [-], 1/2 at `rate_quiet_m_s`.
+
+    A rate that is mostly noise would be pushed into the wall. The proportional gain and the observer need the damping:
+    without K_sd they make the contact oscillate.
+    """
+    return 1.0 / (1.0 + (contact.rate_noise / settings.rate_quiet_m_s) ** 4)
 
 
 def filter_gain(bandwidth: ca.SX | float, dt: ca.SX) -> ca.SX:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import casadi as ca
 
+from ibvs_qp.model.external_wrench import quiet_rate
 from ibvs_qp.model.feedforward import moment_lag
 from ibvs_qp.model.inputs import LEAST_GAIN, clamp
 from ibvs_qp.model.model import Model
@@ -46,7 +47,7 @@ class PushTask(Task):
         error = reference - contact.push
         # On stiff walls the loop gain rises with the stiffness; the proportional gain falls with it.
         softness = ca.fmin(1.0, model.config.contact.full_gain_stiffness_n_m / contact.stiffness)
-        proportional = softness * _quiet(model) * gains.force_kfp
+        proportional = softness * quiet_rate(contact, model.config.contact) * gains.force_kfp
         feedback = proportional * error + gains.force_kfi * self._integral(model, reference)
         target = reference + feedback + self._impedance(model)
         return model.filtered(target, model.force_along_normal, gains.push_filter_s)
@@ -77,18 +78,9 @@ class PushTask(Task):
         if not config.impedance:
             return ca.SX(0.0)
         gains = model.gains
-        damping = _quiet(model) * gains.force_ksd * predicted_rate(model)
+        damping = quiet_rate(contact, config.contact) * gains.force_ksd * predicted_rate(model)
         force = gains.force_ksp * contact.distance + damping
         return ca.if_else(contact.known, force, 0.0)
-
-
-def _quiet(model: Model) -> ca.SX:
-    """Weight of K_sd and K_fp [-], 1/2 at `rate_quiet_m_s`.
-
-    A rate that is mostly noise would be pushed into the wall. The proportional gain needs the damping: without K_sd
-    it makes the contact oscillate.
-    """
-    return 1.0 / (1.0 + (model.contact.rate_noise / model.config.contact.rate_quiet_m_s) ** 4)
 
 
 def predicted_rate(model: Model) -> ca.SX:

@@ -109,7 +109,7 @@ def test_compare(printed: list[object], capsys: pytest.CaptureFixture[str], tmp_
 
 def test_vehicle_of_eight_rotors(printed: list[object], capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["vehicle", "octorotor_qp"]) == 0
-    assert_whole(printed, 4)
+    assert_whole(printed, 5)
 
 
 def test_paint() -> None:
