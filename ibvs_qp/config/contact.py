@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from ibvs_qp.config.contact_estimation import ContactEstimationSettings
 from ibvs_qp.config.settings import require_order, setting, validate
 
-#: Least weight of the gust observer by the noise of the rate [-]: 2 rad/s leave the contact damped without K_sd.
-LEAST_QUIET = 0.07
+#: Least weight of the gust observer by the noise of the rate [-]: 17 rad/s leave a damping of 0.1 without K_sd.
+LEAST_QUIET = 0.56
 
 
 @dataclass(frozen=True, kw_only=True)
