@@ -120,7 +120,7 @@ def contact_mode_damping(
         stiffness: Of wall and brush together [N/m].
         damping: Of wall and brush together [N s/m].
         force_delay_s: Mean age of the force sample in use: latency plus half a sample period [s].
-        quiet: Weight of K_sd, K_fp and gust observer, which vibration reduces (docs/how_it_works/estimation.md) [-].
+        quiet: Weight of K_sd and K_fp, which vibration reduces, and of the gust observer down to `LEAST_QUIET` [-].
         gusts: Whether the gust observer learns; it rests in calm air.
     """
     loop = contact_loop(config, stiffness, damping, force_delay_s, quiet, gusts)

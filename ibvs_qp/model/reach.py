@@ -31,7 +31,7 @@ class PushPlanes:
     A push f is attainable when :math:`lower \le slope\, f \le upper` for every pair of planes.
 
     Attributes:
-        normals: Facet normals, scaled to a largest share of one of a rotor's thrust, (k, 6).
+        normals: Facet normals, (k, 6); the largest of their products with the rotors' wrenches is 1.
         direction: Force of the rotors per newton of push, n + friction along the travel, in B, (3,).
         slope: Of each pair along the push [-], (k,).
         lower, upper: Distances of both planes from the wrench without push [N], (k,) each.

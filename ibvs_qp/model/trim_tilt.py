@@ -20,7 +20,7 @@ TRIM_TIME_S = 0.5
 
 
 class TrimTilt:
-    r"""Least roll and pitch at which the thrust limits allow the push that is asked.
+    r"""Least roll and pitch at which the thrust limits allow the commanded push.
 
     In level axes the rotors must make the force :math:`F = f d - m g e_z` and the moment :math:`f p \times d` of the
     push f along :math:`d = n + \mu t`. In a body tilted by :math:`\theta = (\varphi, \vartheta)` they change by
@@ -50,7 +50,7 @@ class TrimTilt:
             planes: Planes of the push at the attitude of this tick.
             body: Attitude.
             contact: Off the wall the vehicle returns to level.
-            target: Push that is asked; with a tilt of its own, by a limited rotor, there is none for the push.
+            target: Commanded push. While it commands a tilt itself, because of a limited rotor, the trim is zero.
         """
         signals, limit, vehicle = self._signals, self._limit, self._config.vehicle
         if not limit:

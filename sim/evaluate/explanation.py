@@ -74,7 +74,7 @@ def explain_conflict(trace: Trace, tick: int) -> tuple[LimitValue, ...]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class TrimTilt:
+class TrimReport:
     """Deliberate tilt of a tick (`ibvs_qp.model.trim_tilt`).
 
     Attributes:
@@ -96,13 +96,13 @@ def _trim_function(config: ControllerConfig) -> ca.Function:
     return ca.Function("trim", [point], [signals.outputs[name] for name in ("trim_tilt", "reach", "level_reach")])
 
 
-def trim_tilt(trace: Trace, tick: int, config: PilotConfig) -> TrimTilt | None:
+def trim_tilt(trace: Trace, tick: int, config: PilotConfig) -> TrimReport | None:
     """Deliberate tilt of a recorded tick; None where the mission does not permit one."""
     if config.controller.limits.trim_deg == 0.0:
         return None
     angles, reach, level = _trim_function(config.controller)(trace.arrays["program"][tick].astype(float))
     roll, pitch = np.degrees(np.array(angles).ravel())
-    return TrimTilt(roll_deg=roll, pitch_deg=pitch, reach_n=float(reach), level_reach_n=float(level))
+    return TrimReport(roll_deg=roll, pitch_deg=pitch, reach_n=float(reach), level_reach_n=float(level))
 
 
 def has_no_program(trace: Trace, tick: int) -> bool:

@@ -49,3 +49,15 @@ def test_paint_beside_the_nominal_stroke_is_remembered_and_farther_away_ignored(
         stroke.add(u, 0.05)
     assert stroke.mean(-0.105, -0.105) == stroke.mean(0.705, 0.705) == pytest.approx(0.05)
     assert math.isnan(stroke.mean(-BEYOND_M - 0.1, -BEYOND_M - 0.1))
+
+
+def test_a_widened_map_is_the_outermost_of_both_where_both_lie() -> None:
+    first, again = StrokeMap(0.3), StrokeMap(0.3)
+    for u, v in ((0.105, 0.05), (0.115, 0.05), (0.125, 0.05)):
+        first.add(u, v)
+    for u, v in ((0.105, 0.052), (0.115, 0.047), (0.205, 0.06)):
+        again.add(u, v)
+    wide = first.widened(again)
+    assert [wide.mean(u, u) for u in (0.105, 0.115, 0.125)] == pytest.approx([0.052, 0.05, 0.05])
+    assert math.isnan(wide.mean(0.205, 0.205))
+    assert first.mean(0.105, 0.105) == pytest.approx(0.05)

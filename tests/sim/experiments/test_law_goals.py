@@ -1,4 +1,4 @@
-"""Goals of the law: each one names flights and a figure that exist, and is judged seed by seed."""
+"""Goals of the law: their flights and figures exist, and the comparison pairs flights by seed."""
 
 from __future__ import annotations
 
