@@ -33,6 +33,7 @@ CONFIG = ControllerConfig()
 DOUBLE_N, FLOAT_N, REDUNDANT_N = 5e-6, 0.1, 1e-3
 #: The same after a tick that OSQP did not solve, in double, and in float with a lost rotor and otherwise [N]: the
 #: analytic law flew that tick and the next ones, integrals differ from there on, and recorded inputs correct nothing.
+#: With a rotor lost rounding grows in the integrals on solved ticks too: 0.07 N at the loss, 0.13 N after two seconds.
 AFTER_OTHER_N, LOST_FLOAT_N, AFTER_OTHER_FLOAT_N = 5e-3, 0.2, 2.0
 #: Outcome of a program that was solved on OSQP's active set.
 REFINED = 5
@@ -85,7 +86,7 @@ def test_seven_flights_give_the_thrusts_of_python(case: str) -> None:
 def test_six_flights_in_single_precision_give_the_thrusts_of_python(case: str) -> None:
     """In "heavy_noise" single precision does not solve one tick, the first with lines in view."""
     found, sound = differences(case, single=True)
-    assert sound > 100 and found[:sound].max() <= FLOAT_N
+    assert sound > 100 and found[:sound].max() <= (LOST_FLOAT_N if case == "rotor_loss" else FLOAT_N)
     assert sound == len(found) or found.max() <= (LOST_FLOAT_N if case == "rotor_loss" else AFTER_OTHER_FLOAT_N)
 
 
