@@ -55,7 +55,8 @@ class Plan:
     """What happens, in seconds since Offboard mode began; NaN for never."""
 
     domain: int
-    duration_s: float
+    duration_s: float  # at most
+    away_m: float = math.inf  # ends the run: distance of the tip after the first contact
     loss_timeout_s: float = 0.3  # COM_OF_LOSS_T
     wait_s: float = 40.0  # longest wait for proof of life
     silent_at_s: float = math.nan  # the inertial data stop
@@ -161,7 +162,7 @@ class StandIn:
         self._alive = part.reader("/fmu/in/offboard_control_mode", "px4_msgs/msg/OffboardControlMode")
         self._first: float | None = None  # begin, and begin of Offboard mode [s]
         self.began: float | None = None
-        self._ticks, self.left = 0, False
+        self._ticks, self.left, self._touched = 0, False, False
 
     def tick(self, now_ns: int) -> bool:
         now_s, stamp = now_ns * 1e-9, time.time_ns()
@@ -176,7 +177,8 @@ class StandIn:
         self._ticks += 1
         if self.began is None:
             return now_s - self._first < self.plan.wait_s
-        return since < self.plan.duration_s
+        self._touched |= self.vehicle.distance < 0.0
+        return since < self.plan.duration_s and not (self._touched and self.vehicle.distance > self.plan.away_m)
 
     def _receive(self, now_s: float) -> None:
         for data in self._alive.take():
