@@ -33,15 +33,16 @@ MOST_TRIALS = 100_000
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Tune:
-    """Tune the gains of a law for push, path, tilt, yaw and thrust rate together; needs the extra tune.
+    """Tune a law for push, path, place, tilt, yaw, speed, reach and thrust rate together; needs the extra tune.
 
-    Trials fly three random scenes in the datasheet world, the best of them also four harder ones.
+    A trial flies five jobs in the datasheet world: calm, gusts, a sloping edge, and slides that stick and saturate. The
+    best trials also fly four harder ones.
 
     Example: ibvs-qp tune --law qp --trials 200 --out runs/tune
     """
 
-    law: Literal["qp", "paper"] = "qp"
-    """Law to tune."""
+    law: Literal["qp", "paper", "mpc"] = "qp"
+    """Law to tune; mpc is the predictive rival, of which the weights are searched."""
     trials: int = 200
     """Finished trials at which the search stops; trials found in --out count."""
     seed: int = 0
@@ -49,7 +50,7 @@ class Tune:
     flights: int = 1
     """Seeds per scene in every trial."""
     unseen: int = 6
-    """Seeds that compare shipped and tuned gains, seven scenes each; the best trials first fly half as many."""
+    """Seeds that compare shipped and tuned values, nine flights each; the best trials first fly half as many."""
     features: Literal["geometric", "rendered"] = "geometric"
     """Perception: a sensor model of lines, or rendered pictures (five times slower)."""
     preset: Annotated[Path | None, optional("FILE")] = None
@@ -105,16 +106,19 @@ class Tune:
     def _plan(self, folder: Path) -> SearchPlan:
         from ibvs_qp.pilot import PilotConfig
         from sim.tune.search import SearchPlan
+        from sim.tune.space import RIVAL
         from sim.vehicles.configuration import require_vehicle, with_vehicle
         from sim.vehicles.vehicle_file import read_vehicle
 
-        start = PilotConfig.from_toml(preset) if (preset := preset_file(self.preset)) else ibvs_qp.preset(self.law)
+        law = "qp" if self.law == RIVAL else self.law
+        start = PilotConfig.from_toml(preset) if (preset := preset_file(self.preset)) else ibvs_qp.preset(law)
         if (file := preset_file(self.vehicle, "--vehicle", other_formats=True)) is not None:
-            start = with_vehicle(start if preset else PilotConfig(law=self.law), read_vehicle(file).vehicle)
+            start = with_vehicle(start if preset else PilotConfig(law=law), read_vehicle(file).vehicle)
             require_vehicle(start, f"--vehicle {self.vehicle}")
         return SearchPlan(
-            shipped=dataclasses.replace(start, law=self.law),
-            other=ibvs_qp.preset("paper" if self.law == "qp" else "qp"),
+            law=self.law,
+            shipped=dataclasses.replace(start, law=law),
+            other=ibvs_qp.preset("paper" if law == "qp" else "qp"),
             trials=self.trials,
             seed=self.seed,
             flights=self.flights,

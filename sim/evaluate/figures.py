@@ -426,6 +426,11 @@ _FIGURES = (
         "Speed of a slide against the commanded one, from 1 s after its start.", unit="%", scale=100.0, digits=1,
     ),
     Figure(
+        "stuck_share", "time stuck",
+        "Time of a slide, from 1 s after its start, at less than a fifth of the commanded speed.",
+        unit="%", scale=100.0, digits=1,
+    ),
+    Figure(
         "reduced_said", "reduction reported",
         "Whether a command reported the reduced push and why.", better=MORE, digits=0,
     ),

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 from ibvs_qp.pilot import PilotConfig
 from sim.evaluate.measures import paint_figures
 from sim.experiments.scenes import near_wall, short_job
-from sim.flight.jobs import PaintJob
+from sim.flight.jobs import Job, PaintJob
 from sim.flight.options import FlightOptions, pilot_config
 from sim.flight.preflight import check_job
 from sim.sweep.design import FlightPlan, Measure, Run
@@ -30,9 +30,11 @@ def paint_runs(
     *,
     measure: Measure = paint_figures,
     overhead_s: float = 0.0,
+    job: Job | None = None,
+    options: Mapping[str, Any] | None = None,
     **cell: Any,
 ) -> list[Run]:
-    """Paint jobs of one scene under a preset and its law.
+    """Paint jobs, or others, of one scene under a preset and its law.
 
     Args:
         scene: The scene.
@@ -41,17 +43,21 @@ def paint_runs(
         features: "rendered" or "geometric".
         measure: Figures of a flight.
         overhead_s: Start, approaches and retreats beside the strokes [s]; sizes the progress bar only.
+        job: Job at the wall; default: paint.
+        options: Further `FlightOptions`.
         cell: ``experiment``, ``variant`` and ``params`` of the runs.
     """
     pilot = pilot_config(scene, FlightOptions(law=config.law), config)
     check_job(scene, pilot, features)
-    expected_s = overhead_s + PaintJob().expected_s(pilot.painting, BoardGeometry(scene).strokes)
+    job = job or PaintJob()
+    expected_s = overhead_s + job.expected_s(pilot.painting, BoardGeometry(scene).strokes)
     return [
         Run(
             plan=FlightPlan(
                 scene=scene,
                 config=pilot,
-                options=FlightOptions(law=config.law, seed=seed, features=features, video=False),
+                options=FlightOptions(law=config.law, seed=seed, features=features, video=False, **(options or {})),
+                job=job,
             ),
             measure=measure,
             expected_s=expected_s,

@@ -42,7 +42,8 @@ def make_pilot(scene: Scene, options: FlightOptions, config: PilotConfig, job: J
     sigma, noise = scene.features.sigma_vs, stream(options.seed, "sigma_vs")
     rendered = options.features == "rendered"  # the sensor model of lines adds the same noise itself
     seen_as = (lambda frame: add_sigma_vs(frame, sigma, noise)) if rendered and sigma > 0.0 else None
-    controller = rival_controller(options.rival, straightened(config.controller)) if options.rival else None
+    law = straightened(config.controller)
+    controller = rival_controller(options.rival, law, options.rival_settings) if options.rival else None
     pilot = Pilot(config, job.strategy(config.painting), seen_as, controller)
     if rendered:
         pilot.prepare()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import ibvs_qp
 from ibvs_qp.config import VehicleParams
@@ -17,6 +18,9 @@ from sim.world.board import BoardGeometry
 from sim.world.plant import TICK_NS
 from sim.world.scene import Scene
 
+if TYPE_CHECKING:
+    from sim.rivals.horizon import MpcSettings
+
 #: Decimals of a calibration [-]: hundredths of a pixel.
 CALIBRATION_DIGITS = 2
 #: Board beyond the margin up to which stroke 1 begins at the margin [m]: half the tolerance of its length.
@@ -28,12 +32,14 @@ class FlightOptions:
     """How to fly a scene; the defaults are the main job.
 
     With `compiled` the controller runs as C code where there is a compiler: the same flight to the bit, faster. A
-    `rival` is a control law of `sim.rivals`, flown on the law's preset instead of the law itself. With a `journal` the
-    rows of the log are written to that folder while the flight goes on, with `mcap` an MCAP log, too.
+    `rival` is a control law of `sim.rivals`, flown on the law's preset instead of the law itself, the predictive one
+    with `rival_settings` if there are any. With a `journal` the rows of the log are written to that folder while the
+    flight goes on, with `mcap` an MCAP log, too.
     """
 
     law: str = "qp"
     rival: str = ""
+    rival_settings: MpcSettings | None = None
     seed: int = 0
     features: str = "rendered"
     vision: str = "own"

@@ -5,11 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-import numpy as np
-
 from ibvs_qp.config.contact_margin import least_margin
 from ibvs_qp.pilot import PilotConfig
-from sim.tune.objectives import OBJECTIVES, Score
+from sim.tune.objectives import Score, ratios
 
 #: The bounds of the objectives are this much wider in a single scene [-]: fewer flights, more luck.
 SCENE_ROOM = 1.15
@@ -17,7 +15,7 @@ SCENE_ROOM = 1.15
 LEAST_DAMPING = 0.9
 #: Damping ratio as which an undamped contact counts [-]; it keeps the cost finite.
 HARDLY_DAMPED = 1e-3
-#: Slope of the cost beyond the bound of an objective: one of five objectives must not buy room for the others [-].
+#: Slope of the cost beyond the bound of an objective: one of nine objectives must not buy room for the others [-].
 STEEP = 2.0
 #: Presets of a search that fly again, on other seeds and harder scenes, before the choice: the best of many trials is
 #: partly luck, and no trial flew the harder scenes.
@@ -26,9 +24,8 @@ FINALISTS = 8
 
 def gain_over(score: Score, shipped: Score) -> float:
     """Mean logarithm of the ratios to the shipped preset: -0.1 is 10 % less error on the (geometric) mean."""
-    return sum(math.log(value / base) for value, base in zip(score.values, shipped.values, strict=True)) / len(
-        OBJECTIVES
-    )
+    found = ratios(score, shipped)
+    return sum(math.log(ratio) for _, ratio in found) / len(found)
 
 
 def cost(score: Score, shipped: Score) -> float:
@@ -50,8 +47,7 @@ def allowed(score: Score, shipped: Score, room: float = 1.0) -> bool:
 
 def _beyond(score: Score, shipped: Score) -> list[float]:
     """Logarithm of each objective over its bound."""
-    pairs = zip(OBJECTIVES, score.values, shipped.values, strict=True)
-    return [math.log(value / (objective.worse * base)) for objective, value, base in pairs]
+    return [math.log(ratio / objective.worse) for objective, ratio in ratios(score, shipped)]
 
 
 def contact_damping(config: PilotConfig) -> float:
@@ -77,9 +73,10 @@ def ranked(scores: Mapping[int, Score], shipped: Score) -> list[int]:
 
 def front(scores: Mapping[int, Score]) -> list[int]:
     """Pareto front: trials with all flights completed and no other trial better or equal in every objective."""
-    able = {number: np.array(each.values) for number, each in scores.items() if not each.failed}
-    return [
-        number
-        for number, mine in able.items()
-        if not any((other <= mine).all() and (other < mine).any() for other in able.values())
-    ]
+    able = {number: each for number, each in scores.items() if not each.failed}
+
+    def beats(other: Score, mine: Score) -> bool:
+        against = [ratio for _, ratio in ratios(other, mine)]
+        return max(against) <= 1.0 and min(against) < 1.0
+
+    return [number for number, mine in able.items() if not any(beats(other, mine) for other in able.values())]

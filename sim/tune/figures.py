@@ -20,14 +20,21 @@ from sim.tune.verdict import paired
 _AXES_TO = 2.0
 #: Logarithmic axes with a smaller ratio of their ends have linear ticks: no two of 1, 2, 5, 10 lie on them.
 _NARROW = 3.0
-_MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<")
-_SHADES = ("#222222", "#8a8a8a", "#c0a000", "#7a5195", "#5a8f3c", "#2f8f8b", "#c06080")
+_MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", "*")
+_SHADES = ("#222222", "#8a8a8a", "#c0a000", "#7a5195", "#5a8f3c", "#2f8f8b", "#c06080", "#3d5a80")
+#: Objectives that are drawn, with their places: those that no flight has at 0.
+DRAWN = {
+    place: each
+    for place, each in enumerate(OBJECTIVES)
+    if each.name in ("force_rms_n", "path_rms_m", "tilt_peak_deg", "yaw_peak_deg", "jitter_n_s")
+}
 
 
 def draw_front(law: str, scores: dict[int, Score], shipped: Score, chosen: int | None) -> Figure:
     """Every pair of objectives: trials, Pareto front, the shipped and the chosen preset."""
     able = {number: each for number, each in scores.items() if not each.failed}
-    best, last = front(scores), len(OBJECTIVES) - 1
+    best, drawn = front(scores), list(DRAWN)
+    last = len(drawn) - 1
     figure = new_figure(7.0)
     grid = figure.subplots(last, last, sharex="col", sharey="row", squeeze=False)
     for i, j in itertools.product(range(last), range(1, last + 1)):
@@ -35,20 +42,23 @@ def draw_front(law: str, scores: dict[int, Score], shipped: Score, chosen: int |
         if i >= j:
             axes.remove()
             continue
-        x, y = OBJECTIVES[i], OBJECTIVES[j]
+        across, up = drawn[i], drawn[j]
+        x, y = OBJECTIVES[across], OBJECTIVES[up]
         for numbers, colour, size, label in (
             ([number for number in able if number not in best], FAINT, 9, "trial"),
             (best, law_colour(law), 14, "on the front of all objectives"),
         ):
             points = np.array([able[number].values for number in numbers]).reshape(-1, len(OBJECTIVES))
-            axes.scatter(x.scale * points[:, i], y.scale * points[:, j], s=size, color=colour, label=label, linewidth=0)
+            axes.scatter(
+                x.scale * points[:, across], y.scale * points[:, up], s=size, color=colour, label=label, linewidth=0
+            )
         start = shipped.values
-        axes.scatter(x.scale * start[i], y.scale * start[j], s=60, marker="x", color="#222222", label="shipped")
+        axes.scatter(x.scale * start[across], y.scale * start[up], s=60, marker="x", color="#222222", label="shipped")
         if chosen is not None:
             end = scores[chosen].values
-            axes.scatter(x.scale * end[i], y.scale * end[j], s=70, marker="o", facecolor="none", edgecolor="#222222",
-                         linewidth=1.3, label="chosen")  # fmt: skip
-        for axis, objective, place in ((axes.set_xlim, x, i), (axes.set_ylim, y, j)):
+            axes.scatter(x.scale * end[across], y.scale * end[up], s=70, marker="o", facecolor="none",
+                         edgecolor="#222222", linewidth=1.3, label="chosen")  # fmt: skip
+        for axis, objective, place in ((axes.set_xlim, x, across), (axes.set_ylim, y, up)):
             seen = [each.values[place] for each in [*able.values(), shipped]]
             axis(0.9 * objective.scale * min(seen), objective.scale * min(1.05 * max(seen), _AXES_TO * start[place]))
         if j == last:
@@ -68,14 +78,16 @@ def draw_unseen(law: str, table: pl.DataFrame) -> Figure:
     names = both[PARAM + "scene"].unique(maintain_order=True).to_list()
     assert len(names) <= len(_MARKERS)
     figure = new_figure(2.5)
-    grid = figure.subplots(1, len(OBJECTIVES))
-    for axes, each in zip(grid, OBJECTIVES, strict=True):
+    grid = figure.subplots(1, len(DRAWN))
+    for axes, each in zip(grid, DRAWN.values(), strict=True):
         for scene, marker, shade in zip(names, _MARKERS, (law_colour(law), *_SHADES), strict=False):
             rows = both.filter(pl.col(PARAM + "scene") == scene)
-            before, after = (each.scale * rows[name].to_numpy() for name in (each.name, f"{each.name}.{TUNED}"))
+            before, after = (
+                each.scale * rows[name].cast(pl.Float64).to_numpy() for name in (each.name, f"{each.name}.{TUNED}")
+            )
             axes.scatter(before, after, s=16, marker=marker, alpha=0.75, linewidth=0, label=scene,
                          color=shade)  # fmt: skip
-        both_ways = each.scale * both.select(each.name, f"{each.name}.{TUNED}").to_numpy()
+        both_ways = each.scale * both.select(each.name, f"{each.name}.{TUNED}").cast(pl.Float64).to_numpy()
         reach = (0.85 * np.nanmin(both_ways), 1.15 * np.nanmax(both_ways))
         axes.plot(reach, reach, **REFERENCE)
         axes.set(xscale="log", yscale="log", xlim=reach, ylim=reach, aspect="equal")

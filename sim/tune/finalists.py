@@ -20,10 +20,10 @@ from sim.tune.choice import (
     gain_over,
     ranked,
 )
-from sim.tune.flights import CHOICE_SEED, REPORT_SEED, checks, flights, scenes, seeds
+from sim.tune.flights import CHOICE_SEED, REPORT_SEED, checks, flights, seeds, training
 from sim.tune.objectives import Score, score
 from sim.tune.search import SearchPlan, Trials, start_gains
-from sim.tune.space import with_gains
+from sim.tune.space import Values
 
 #: Names of the shipped and of the chosen preset in tables.
 SHIPPED, TUNED = "shipped", "tuned"
@@ -67,12 +67,12 @@ def fly_finalists(
         KeyboardInterrupt: On Ctrl-C; finished flights stay on disk.
     """
     dampings = {SHIPPED: contact_damping(plan.shipped)}
-    presets: dict[str, dict[str, float]] = {SHIPPED: {}}
+    presets: dict[str, Values] = {SHIPPED: {}}
     for number in ranked({number: each for number, (_, each) in trials.items()}, shipped_score(plan, trials)):
         if len(presets) > FINALISTS:
             break
         gains = trials[number][0]
-        damping = contact_damping(with_gains(plan.shipped, gains))
+        damping = contact_damping(plan.subject.having(gains).config)
         if damping >= LEAST_DAMPING * dampings[SHIPPED]:
             presets[str(number)], dampings[str(number)] = gains, damping
     if len(presets) == 1:
@@ -100,15 +100,13 @@ def shipped_score(plan: SearchPlan, trials: Trials) -> Score:
     return next((each for found, each in trials.values() if found == gains), trials[min(trials)][1])
 
 
-def fly_unseen(
-    plan: SearchPlan, gains: dict[str, float], count: int, parts: Path, progress: SweepProgress
-) -> pl.DataFrame:
+def fly_unseen(plan: SearchPlan, gains: Values, count: int, parts: Path, progress: SweepProgress) -> pl.DataFrame:
     """Flights of the shipped and of the chosen preset on the seeds of the report."""
     return fly_presets(plan, {SHIPPED: {}, TUNED: gains}, seeds(REPORT_SEED, plan.seed, count), parts, progress)
 
 
 def fly_presets(
-    plan: SearchPlan, presets: Mapping[str, dict[str, float]], on_seeds: range, parts: Path, progress: SweepProgress
+    plan: SearchPlan, presets: Mapping[str, Values], on_seeds: range, parts: Path, progress: SweepProgress
 ) -> pl.DataFrame:
     """Fly presets over all scenes, those of the search and the checks.
 
@@ -122,9 +120,9 @@ def fly_presets(
     Raises:
         KeyboardInterrupt: On Ctrl-C; finished flights stay on disk.
     """
-    flown, runs = scenes() | checks(), []
+    flown, runs = training() | checks(), []
     for name, gains in presets.items():
-        runs += flights(flown, with_gains(plan.shipped, gains), name, on_seeds, plan.features)
+        runs += flights(flown, plan.subject.having(gains), name, on_seeds, plan.features)
     result = run_sweep(runs, parts, workers=plan.jobs, progress=progress)
     if result.interrupted:
         raise KeyboardInterrupt

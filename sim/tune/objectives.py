@@ -1,4 +1,4 @@
-"""Objectives of the search: push, path, tilt, yaw and thrust rate, each a mean over the flights of a trial."""
+"""Objectives of the search: figures of painting and of slides, each a mean over the flights of a trial."""
 
 from __future__ import annotations
 
@@ -7,16 +7,22 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from sim.evaluate.figures import FIGURES
+from sim.evaluate.figures import FIGURES, MORE
+from sim.sweep.parts import PARAM
+
+#: Tasks of the flights, as parameter `TASK` of their rows.
+PAINT, SLIDE = "paint", "slide"
+TASK = "task"
 
 
 @dataclass(frozen=True)
 class Objective:
-    """A figure to minimise."""
+    """A figure to improve."""
 
     name: str
-    failed: float  # value of a flight that does not complete, in SI: far beyond any completed one
+    failed: float  # value of a flight that does not complete, in SI: far worse than that of any completed one
     worse: float = 1.1  # greatest ratio to the shipped preset that may replace it; seeds alone change it by a tenth
+    tasks: tuple[str, ...] = (PAINT, SLIDE)  # tasks whose flights have it
 
     @property
     def label(self) -> str:
@@ -28,14 +34,27 @@ class Objective:
         """Factor from SI to the unit of the label."""
         return FIGURES[self.name].scale
 
+    def ratio(self, value: float, base: float) -> float:
+        """Ratio of a value to that of the shipped preset, above 1 for a worse one.
+
+        Both are raised by the least difference that matters: a share of 0 is no infinite gain over one of 0.1 %.
+        """
+        least = FIGURES[self.name].least[0] / self.scale
+        ratio = (value + least) / (base + least)
+        return 1.0 / ratio if FIGURES[self.name].better == MORE else ratio
+
 
 OBJECTIVES = (
     Objective("force_rms_n", 3.0),
     Objective("path_rms_m", 0.05),
+    Objective("place_error_m", 0.05, worse=1.25, tasks=(PAINT,)),  # two strokes a flight: it changes more by luck
     Objective("tilt_peak_deg", 20.0),
     Objective("yaw_peak_deg", 20.0),
+    Objective("speed_error_share", 1.0, worse=1.25, tasks=(SLIDE,)),
+    Objective("stuck_share", 1.0, worse=1.25, tasks=(SLIDE,)),
+    Objective("delivered_share", 0.1, worse=1.02, tasks=(SLIDE,)),
     # It wears motors and costs no accuracy; a quarter more is an eighth of the limit of 500 N/s.
-    Objective("jitter_n_s", 1000.0, worse=1.25),
+    Objective("jitter_n_s", 1000.0, worse=1.25, tasks=(PAINT,)),
 )
 
 
@@ -43,15 +62,14 @@ OBJECTIVES = (
 class Score:
     """Quality of a preset."""
 
-    values: tuple[float, ...]  # mean of every objective
+    values: tuple[float, ...]  # mean of every objective; NaN for one that no flight has
     failed: float  # fraction of flights that did not complete; 1 for a preset with an oscillating contact
 
 
 def score(rows: Iterable[Mapping[str, Any]]) -> Score:
     """Means over flights; a failed flight, or one without the figure, counts with the objective's `failed`."""
     rows = list(rows)
-    values = tuple(sum(_value(row, each) for row in rows) / len(rows) for each in OBJECTIVES)
-    return Score(values, sum(not row["completed"] for row in rows) / len(rows))
+    return Score(tuple(_mean(rows, each) for each in OBJECTIVES), sum(not row["completed"] for row in rows) / len(rows))
 
 
 def refused() -> Score:
@@ -59,7 +77,20 @@ def refused() -> Score:
     return Score(tuple(each.failed for each in OBJECTIVES), 1.0)
 
 
+def ratios(score: Score, shipped: Score) -> list[tuple[Objective, float]]:
+    """Ratios of the objectives that both have, above 1 for worse."""
+    pairs = zip(OBJECTIVES, score.values, shipped.values, strict=True)
+    return [(each, each.ratio(value, base)) for each, value, base in pairs if math.isfinite(value + base)]
+
+
+def _mean(rows: list[Mapping[str, Any]], objective: Objective) -> float:
+    values = [_value(row, objective) for row in rows if row[PARAM + TASK] in objective.tasks]
+    return sum(values) / len(values) if values else math.nan
+
+
 def _value(row: Mapping[str, Any], objective: Objective) -> float:
     value = row.get(objective.name)
-    good = row["completed"] and value is not None and math.isfinite(value)
-    return min(float(value), objective.failed) if good else objective.failed  # type: ignore[arg-type]
+    if not row["completed"] or value is None or not math.isfinite(value):
+        return objective.failed
+    worst = max if FIGURES[objective.name].better == MORE else min
+    return worst(abs(float(value)), objective.failed)

@@ -21,7 +21,6 @@ from sim.tune.figures import draw_front, draw_unseen
 from sim.tune.finalists import SHIPPED, Finalist, best_of, shipped_score
 from sim.tune.objectives import OBJECTIVES, Score
 from sim.tune.search import SearchPlan, Trials
-from sim.tune.space import ranges, with_gains
 from sim.tune.stored import objective_columns, trial_rows
 from sim.tune.verdict import differences, objection
 
@@ -41,7 +40,7 @@ class Outcome:
     @property
     def law(self) -> str:
         """Tuned law."""
-        return self.plan.shipped.law
+        return self.plan.law
 
     @property
     def chosen(self) -> int | None:
@@ -92,9 +91,9 @@ def write(outcome: Outcome, folder: Path) -> dict[str, Any]:
     )
     if outcome.chosen is None:
         head = "# The shipped preset: no trial of the search may replace it."
-    preset = with_gains(outcome.plan.shipped, gains).to_toml()
+    preset = outcome.plan.subject.having(gains).to_toml()
     write_text(folder / f"{law}.toml", f"{head}\n{preset}")
-    record = {**summary, "ranges": ranges(outcome.plan.shipped), "all_trials": trial_rows(outcome.trials)}
+    record = {**summary, "ranges": outcome.plan.subject.spans, "all_trials": trial_rows(outcome.trials)}
     write_json(folder / f"{law}_trials.json", record)
     with styled():
         shipped = shipped_score(outcome.plan, outcome.trials)

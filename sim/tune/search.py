@@ -9,15 +9,13 @@ from typing import TYPE_CHECKING, Any
 import joblib
 import numpy as np
 
-from ibvs_qp.config.contact_margin import require_margin
 from ibvs_qp.config.errors import ConfigError
-from ibvs_qp.config.motion_margin import LARGEST_SENSITIVITY, motion_sensitivity
 from ibvs_qp.pilot import PilotConfig
 from sim.sweep.flying import fly_run
 from sim.tune.choice import STEEP, contact_damping, cost, less_damped
-from sim.tune.flights import SEARCH_SEED, flights, scenes, seeds
+from sim.tune.flights import SEARCH_SEED, flights, seeds, training
 from sim.tune.objectives import Score, refused, score
-from sim.tune.space import BY_HAND, RANGES, ranges, rounded, searched_gains, with_gains
+from sim.tune.space import BY_HAND, RIVAL, Spans, Subject, Values, from_unit, rounded, to_unit
 
 if TYPE_CHECKING:
     import optuna
@@ -28,16 +26,15 @@ VALUES, FAILED = "values", "failed"
 #: at the best of the first trials.
 SPREAD = 0.12
 
-#: Gains and score of trials by number.
-Trials = dict[int, tuple[dict[str, float], Score]]
-#: Range of every searched gain.
-Spans = dict[str, tuple[float, float]]
+#: Values and score of trials by number.
+Trials = dict[int, tuple[Values, Score]]
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class SearchPlan:
     """A search."""
 
+    law: str  # "qp", "paper", or "mpc": the predictive rival on the preset of the QP
     shipped: PilotConfig  # the start preset; trial 0 flies its gains
     other: PilotConfig  # the preset of the other law; trial 1 flies its gains, trial 2 those set by hand
     trials: int  # number of finished trials at the end
@@ -46,6 +43,11 @@ class SearchPlan:
     features: str  # "geometric" or "rendered"
     jobs: int  # trials of a generation side by side
     storage: str  # journal file, or the address of a database
+
+    @property
+    def subject(self) -> Subject:
+        """What trial 0 flies."""
+        return Subject(self.shipped, rival=self.law == RIVAL)
 
 
 def open_study(plan: SearchPlan) -> optuna.Study:
@@ -63,14 +65,14 @@ def open_study(plan: SearchPlan) -> optuna.Study:
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     try:
         study = optuna.create_study(
-            study_name=f"{plan.shipped.law}-{plan.seed}",
+            study_name=f"{plan.law}-{plan.seed}",
             storage=plan.storage if "://" in plan.storage else JournalStorage(JournalFileBackend(plan.storage)),
             load_if_exists=True,
         )
     except Exception as error:  # files, URLs, drivers and databases each fail in their own way
         reason = str(error).split("\n")[0]
         raise ConfigError(f"cannot open {plan.storage}: {reason}; give a file or a database with --storage") from None
-    identity = {"law": plan.shipped.law, "seed": plan.seed, "flights": plan.flights, "features": plan.features}
+    identity = {"law": plan.law, "seed": plan.seed, "flights": plan.flights, "features": plan.features}
     stored = {name: study.user_attrs.get(name, value) for name, value in identity.items()}
     if stored != identity:
         other = ", ".join(f"{name} {value}" for name, value in stored.items())
@@ -97,7 +99,7 @@ def search(plan: SearchPlan, study: optuna.Study, progress: Callable[[int], None
             for trial, gains, each in zip(trials, batch, scores, strict=True):
                 trial.set_user_attr(VALUES, each.values)
                 trial.set_user_attr(FAILED, each.failed)
-                ringing = less_damped(contact_damping(with_gains(plan.shipped, rounded(gains))), firm)
+                ringing = less_damped(contact_damping(plan.subject.having(rounded(gains)).config), firm)
                 study.tell(trial, cost(each, shipped) + STEEP * ringing)
     progress(len(finished(study)))
 
@@ -106,8 +108,8 @@ def _ask(plan: SearchPlan, study: optuna.Study, gains: dict[str, float]) -> optu
     """A trial of these gains."""
     study.enqueue_trial(gains)
     trial = study.ask()
-    for name, span in ranges(plan.shipped).items():
-        trial.suggest_float(name, *span, log=True)
+    for name, (low, high) in plan.subject.spans.items():
+        trial.suggest_float(name, low, high, log=low > 0.0)
     return trial
 
 
@@ -131,39 +133,37 @@ def _candidates(plan: SearchPlan, study: optuna.Study) -> list[dict[str, float]]
     if left := waiting(starts):
         return left
     best = min(starts, key=lambda gains: costs[_key(gains)])
-    spans, bounds = ranges(plan.shipped), np.tile((0.0, 1.0), (len(RANGES), 1))
-    optimizer = cmaes.CMA(mean=_to_unit(best, spans), sigma=SPREAD, bounds=bounds, seed=plan.seed)
+    spans = plan.subject.spans
+    start, bounds = (
+        np.array([to_unit(best[name], *span) for name, span in spans.items()]),
+        np.tile((0.0, 1.0), (len(spans), 1)),
+    )
+    optimizer = cmaes.CMA(mean=start, sigma=SPREAD, bounds=bounds, seed=plan.seed)
     while True:
         draws = [optimizer.ask() for _ in range(optimizer.population_size)]
-        generation = [_from_unit(draw, spans) for draw in draws]
+        generation = [_values(draw, spans) for draw in draws]
         if left := waiting(generation):
             return left
         optimizer.tell([(draw, costs[_key(gains)]) for draw, gains in zip(draws, generation, strict=True)])
 
 
-def _key(gains: dict[str, float]) -> tuple[float, ...]:
-    """Gains as flown, in the order of the ranges."""
-    flown = rounded(gains)
-    return tuple(flown[name] for name in RANGES)
+def _key(values: Values) -> tuple[float, ...]:
+    """Values as flown, in alphabetical order."""
+    return tuple(value for _, value in sorted(rounded(values).items()))
 
 
-def _to_unit(gains: dict[str, float], spans: Spans) -> np.ndarray:
-    """Gains as fractions of their logarithmic ranges."""
-    return np.array([np.log(gains[name] / low) / np.log(high / low) for name, (low, high) in spans.items()])
+def _values(places: np.ndarray, spans: Spans) -> Values:
+    pairs = zip(spans.items(), places, strict=True)
+    return {name: from_unit(float(place), *span) for (name, span), place in pairs}
 
 
-def _from_unit(fractions: np.ndarray, spans: Spans) -> dict[str, float]:
-    pairs = zip(spans.items(), fractions, strict=True)
-    return {name: min(float(low * (high / low) ** fraction), high) for (name, (low, high)), fraction in pairs}
-
-
-def _starts(plan: SearchPlan) -> list[dict[str, float]]:
-    """Gains of the first trials, within the range of the search: the shipped ones, the other law's, those by hand."""
-    shipped, other = searched_gains(plan.shipped), searched_gains(plan.other)
-    known = [shipped, other, shipped | BY_HAND]
-    return [
-        {name: float(np.clip(gains[name], *span)) for name, span in ranges(plan.shipped).items()} for gains in known
-    ]
+def _starts(plan: SearchPlan) -> list[Values]:
+    """Values of the first trials, within the ranges: the shipped ones, the other law's gains, those by hand."""
+    shipped = plan.subject.values
+    known = [shipped]
+    if plan.law != RIVAL:
+        known += [Subject(plan.other).values, shipped | BY_HAND]
+    return [{name: float(np.clip(each[name], *span)) for name, span in plan.subject.spans.items()} for each in known]
 
 
 def start_gains(plan: SearchPlan) -> dict[str, float]:
@@ -171,19 +171,17 @@ def start_gains(plan: SearchPlan) -> dict[str, float]:
     return rounded(_starts(plan)[0])
 
 
-def evaluate(gains: Sequence[dict[str, float]], plan: SearchPlan, parallel: joblib.Parallel) -> list[Score]:
-    """Fly sets of gains over all scenes; gains with an oscillating contact, or a loop close to it, are refused."""
-    scores, runs = [refused()] * len(gains), {}
-    for place, each in enumerate(gains):
-        config = with_gains(plan.shipped, rounded(each))
-        try:
-            require_margin(config.controller, config.controller.brush)
-        except ConfigError:
-            continue
-        if max(motion_sensitivity(config.controller).values()) > LARGEST_SENSITIVITY:
-            continue
-        on_seeds = seeds(SEARCH_SEED, plan.seed, plan.flights)
-        runs[place] = flights(scenes(), config, "trial", on_seeds, plan.features)
+def evaluate(candidates: Sequence[Values], plan: SearchPlan, parallel: joblib.Parallel) -> list[Score]:
+    """Fly candidates over all scenes; one with an oscillating contact, or a loop close to it, is refused.
+
+    The start flies in any case: the others are compared with it.
+    """
+    scores, runs, start = [refused()] * len(candidates), {}, start_gains(plan)
+    for place, each in enumerate(candidates):
+        subject = plan.subject.having(rounded(each))
+        if subject.is_robust() or rounded(each) == start:
+            on_seeds = seeds(SEARCH_SEED, plan.seed, plan.flights)
+            runs[place] = flights(training(), subject, "trial", on_seeds, plan.features)
     rows: Any = iter(parallel(joblib.delayed(fly_run)(run) for each in runs.values() for run in each))
     for place, each in runs.items():
         scores[place] = score([next(rows) for _ in each])

@@ -1,30 +1,60 @@
-"""Search space: the gains that both laws have in common, each over a logarithmic range."""
+"""Search space of a law: the gains that both laws have in common, or the weights of the predictive rival."""
 
 from __future__ import annotations
 
 import dataclasses
+import math
+from dataclasses import dataclass, field
 
+from ibvs_qp.config.contact_margin import require_margin
+from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.gain_scaling import gain_factors
+from ibvs_qp.config.motion_margin import LAG_RATIOS, LARGEST_SENSITIVITY, LARGEST_WITH_OTHER_LAG, motion_sensitivity
+from ibvs_qp.config.settings import dump_toml
 from ibvs_qp.pilot import PilotConfig
+from sim.rivals.horizon import MpcSettings
 
-#: Search range of every gain, both laws alike: [low, high] on a logarithmic scale, about a decade around flying gains.
-RANGES = {
+#: The predictive rival, as a law that is searched.
+RIVAL = "mpc"
+#: Search range of every gain, both laws alike: [low, high], logarithmic, linear from 0. About a decade around flying
+#: gains. Leads and filters go from next to nothing to twice the lag of the motors, or to a third of it.
+GAIN_RANGES = {
     "line_kp": (4.0, 400.0),
     "line_kd": (3.0, 60.0),
     "line_ki": (0.5, 15.0),
-    "theta_kp": (4.0, 60.0),
-    "theta_kd": (3.0, 16.0),
+    "line_lead_s": (0.0, 0.115),
+    "line_filter_s": (0.0, 0.02),
+    "theta_kp": (0.0, 60.0),
+    "theta_kd": (0.0, 16.0),
     "body_rotation_gain": (0.1, 1.0),
     "velocity_kp": (1.0, 8.0),
     "velocity_ki": (0.3, 6.0),
+    "velocity_lead_s": (0.0, 0.115),
+    "velocity_filter_s": (0.0, 0.02),
     "attitude_kp": (15.0, 400.0),
     "attitude_kd": (6.0, 80.0),
+    "attitude_filter_s": (0.0, 0.02),
     "yaw_kp": (8.0, 300.0),
     "yaw_kd": (4.0, 60.0),
+    "yaw_filter_s": (0.0, 0.02),
     "force_ksp": (10.0, 300.0),
     "force_ksd": (30.0, 250.0),
     "force_kfp": (0.05, 1.0),
     "force_kfi": (0.4, 5.0),
+}
+#: The same of the rival's weights: a decade to both sides of the first ones, which were set by hand.
+WEIGHT_RANGES = {
+    "line": (4e3, 4e5),
+    "line_rate": (65.0, 6.5e3),
+    "height": (1.0, 40.0),
+    "velocity": (40.0, 4e3),
+    "normal": (0.01, 1.0),
+    "tilt": (5e3, 5e5),
+    "tilt_rate": (50.0, 5e3),
+    "yaw": (2.5e3, 2.5e5),
+    "yaw_rate": (50.0, 5e3),
+    "terminal": (1.0, 30.0),
+    "thrust_change": (0.4, 40.0),
 }
 #: Gains of roll, pitch, yaw and lines that were near the bound of their loops without leads and filters: a softer start
 #: of both laws.
@@ -36,28 +66,74 @@ BY_HAND = {
     "yaw_kp": 60.0,
     "yaw_kd": 18.0,
 }
-#: Significant digits of a gain, so that the written preset equals the flown one.
+#: Significant digits of a value, so that the written preset equals the flown one.
 DIGITS = 4
 
-
-def ranges(config: PilotConfig) -> dict[str, tuple[float, float]]:
-    """`RANGES` for a vehicle: a lighter one than the Tarot has a lighter impedance."""
-    mass = min(1.0, gain_factors(config.controller.vehicle)[0])
-    scaled = {name: (mass * low, high) for name, (low, high) in RANGES.items() if name in ("force_ksp", "force_ksd")}
-    return RANGES | scaled
+#: Values by name.
+Values = dict[str, float]
+#: Range of every searched value.
+Spans = dict[str, tuple[float, float]]
 
 
-def rounded(gains: dict[str, float]) -> dict[str, float]:
-    """Gains with the digits of a preset."""
-    return {name: float(f"{value:.{DIGITS}g}") for name, value in gains.items()}
+@dataclass(frozen=True)
+class Subject:
+    """What a trial flies: a preset, or the predictive rival on it."""
+
+    config: PilotConfig
+    rival: bool = False
+    weights: MpcSettings = field(default_factory=MpcSettings)  # of the rival
+
+    @property
+    def values(self) -> Values:
+        """The present values of what is searched."""
+        source = self.weights if self.rival else self.config.controller.gains
+        return {name: getattr(source, name) for name in self.spans}
+
+    @property
+    def spans(self) -> Spans:
+        """Ranges for the vehicle: a lighter one than the Tarot has a lighter impedance."""
+        if self.rival:
+            return WEIGHT_RANGES
+        mass = min(1.0, gain_factors(self.config.controller.vehicle)[0])
+        impedance = {name: GAIN_RANGES[name] for name in ("force_ksp", "force_ksd")}
+        return GAIN_RANGES | {name: (mass * low, mass * high) for name, (low, high) in impedance.items()}
+
+    def having(self, values: Values) -> Subject:
+        """The same with other values."""
+        if self.rival:
+            return dataclasses.replace(self, weights=dataclasses.replace(self.weights, **values))
+        gains = dataclasses.replace(self.config.controller.gains, **values)
+        controller = dataclasses.replace(self.config.controller, gains=gains)
+        return dataclasses.replace(self, config=dataclasses.replace(self.config, controller=controller))
+
+    def is_robust(self) -> bool:
+        """Whether contact and motion bear another stiffness and another lag; the rival's rows are those of the QP."""
+        if self.rival:
+            return True
+        controller = self.config.controller
+        try:
+            require_margin(controller, controller.brush)
+        except ConfigError:
+            return False
+        if max(motion_sensitivity(controller).values()) > LARGEST_SENSITIVITY:
+            return False
+        return all(max(motion_sensitivity(controller, each).values()) <= LARGEST_WITH_OTHER_LAG for each in LAG_RATIOS)
+
+    def to_toml(self) -> str:
+        """The preset, or the rival's settings."""
+        return dump_toml(self.weights) if self.rival else self.config.to_toml()
 
 
-def with_gains(config: PilotConfig, gains: dict[str, float]) -> PilotConfig:
-    """The pilot with other gains."""
-    controller = dataclasses.replace(config.controller, gains=dataclasses.replace(config.controller.gains, **gains))
-    return dataclasses.replace(config, controller=controller)
+def rounded(values: Values) -> Values:
+    """Values with the digits of a preset."""
+    return {name: float(f"{value:.{DIGITS}g}") for name, value in values.items()}
 
 
-def searched_gains(config: PilotConfig) -> dict[str, float]:
-    """The present values of the searched gains."""
-    return {name: getattr(config.controller.gains, name) for name in RANGES}
+def to_unit(value: float, low: float, high: float) -> float:
+    """Place of a value in its range, logarithmic, or linear from 0 [-]."""
+    return math.log(value / low) / math.log(high / low) if low > 0.0 else value / high
+
+
+def from_unit(place: float, low: float, high: float) -> float:
+    """Value at a place in a range."""
+    return min(low * (high / low) ** place if low > 0.0 else high * place, high)

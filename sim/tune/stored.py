@@ -10,7 +10,7 @@ from ibvs_qp.config.errors import ConfigError
 from sim.storage.json_file import read_json
 from sim.tune.objectives import OBJECTIVES, Score
 from sim.tune.search import SearchPlan, Trials, start_gains
-from sim.tune.space import RANGES
+from sim.tune.space import Spans, Values
 
 
 def objective_columns(score: Score) -> dict[str, float]:
@@ -35,13 +35,15 @@ def stored_trials(file: Path, plan: SearchPlan) -> tuple[Trials, str]:
     """
     record: dict[str, Any] = read_json(file)
     try:
-        trials = {row.get("number", place): _trial(row) for place, row in enumerate(record["all_trials"])}
+        trials = {
+            row.get("number", place): _trial(row, plan.subject.spans) for place, row in enumerate(record["all_trials"])
+        }
     except (AttributeError, KeyError, TypeError, ValueError, OverflowError) as error:
         reason = f"{type(error).__name__}: {error}"
         raise ConfigError(
             f"{file} is no record of a search ({reason}); give a LAW_trials.json with --trials-of"
         ) from None
-    required = {"law": plan.shipped.law, "seed": plan.seed, "features": plan.features}
+    required = {"law": plan.law, "seed": plan.seed, "features": plan.features}
     recorded = {name: record.get(name) for name in required}
     if recorded != required:
         other = ", ".join(f"{name} {value}" for name, value in recorded.items())
@@ -52,6 +54,6 @@ def stored_trials(file: Path, plan: SearchPlan) -> tuple[Trials, str]:
     return trials, record.get("searched_by") or record.get("command", "")
 
 
-def _trial(row: Mapping[str, float]) -> tuple[dict[str, float], Score]:
-    gains = {name: float(row[name]) for name in RANGES}
-    return gains, Score(tuple(float(row[each.name]) for each in OBJECTIVES), float(row["failed"]))
+def _trial(row: Mapping[str, float], spans: Spans) -> tuple[Values, Score]:
+    values = {name: float(row[name]) for name in spans}
+    return values, Score(tuple(float(row[each.name]) for each in OBJECTIVES), float(row["failed"]))

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 import polars as pl
 
+from sim.evaluate.figures import FIGURES, MORE
 from sim.sweep.parts import PARAM
 from sim.sweep.statistics import median_interval, needed
 from sim.tune.finalists import SHIPPED, TUNED
-from sim.tune.objectives import OBJECTIVES
+from sim.tune.objectives import OBJECTIVES, TASK
 
 
 def paired(table: pl.DataFrame) -> pl.DataFrame:
@@ -24,15 +25,18 @@ def differences(table: pl.DataFrame) -> list[dict[str, Any]]:
     """Tuned minus shipped, flight by flight, over all scenes and for each.
 
     Returns:
-        Per scene ("all" first) and objective: n, medians of both, median of the differences with its interval, and
-        a verdict: "better", "worse", "same" for an interval with zero inside, "too few" flights for an interval, or
-        "none" without a pair of figures.
+        Per scene ("all" first) and objective of its task: n, medians of both, median of the differences with its
+        interval, and a verdict: "better", "worse", "same" for an interval with zero inside, "too few" flights for an
+        interval, or "none" without a pair of figures.
     """
     both = paired(table)
     by_scene = both.partition_by(PARAM + "scene", maintain_order=True, as_dict=True)
     result = []
-    for scene, rows in {"all": both, **{str(name): rows for (name,), rows in by_scene.items()}}.items():
+    for scene, part in {"all": both, **{str(name): rows for (name,), rows in by_scene.items()}}.items():
         for each in OBJECTIVES:
+            rows = part.filter(pl.col(PARAM + TASK).is_in(each.tasks))
+            if rows.is_empty():
+                continue
             before, after = (rows[name].cast(pl.Float64).to_numpy() for name in (each.name, f"{each.name}.{TUNED}"))
             change, count = median_interval(after - before), int(np.isfinite(after - before).sum())
             result.append(
@@ -43,16 +47,17 @@ def differences(table: pl.DataFrame) -> list[dict[str, Any]]:
                     "shipped": median_interval(before)["median"],
                     "tuned": median_interval(after)["median"],
                     "difference": change,
-                    "verdict": _verdict(change, count),
+                    "verdict": _verdict(change, count, FIGURES[each.name].better),
                 }
             )
     return result
 
 
-def _verdict(change: dict[str, float], count: int) -> str:
+def _verdict(change: dict[str, float], count: int, better: int) -> str:
     if count < needed():
         return "too few" if count else "none"
-    return "better" if change["high"] < 0.0 else "worse" if change["low"] > 0.0 else "same"
+    less, more = change["high"] < 0.0, change["low"] > 0.0
+    return "better" if (more if better == MORE else less) else "worse" if less or more else "same"
 
 
 def objection(table: pl.DataFrame) -> str:

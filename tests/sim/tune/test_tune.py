@@ -17,10 +17,10 @@ from ibvs_qp.pilot import PilotConfig
 from sim.commands.cli import main
 from sim.tune.choice import STEEP, allowed, contact_damping, cost, front, gain_over, less_damped, ranked
 from sim.tune.finalists import Finalist, best_of, fly_finalists
-from sim.tune.flights import CHOICE_SEED, REPORT_SEED, SEARCH_SEED, WORLD, checks, flights, scenes, seeds
-from sim.tune.objectives import OBJECTIVES, Score, refused, score
+from sim.tune.flights import CHOICE_SEED, REPORT_SEED, SEARCH_SEED, WORLD, checks, flights, seeds, training
+from sim.tune.objectives import OBJECTIVES, PAINT, SLIDE, Score, refused, score
 from sim.tune.search import SearchPlan, finished, open_study, search
-from sim.tune.space import BY_HAND, RANGES, searched_gains, with_gains
+from sim.tune.space import BY_HAND, GAIN_RANGES, Subject, from_unit, to_unit
 from sim.tune.verdict import differences, objection
 from sim.world.errors import world_errors
 from sim.world.random_scene import EVALUATION, TUNING, random_scene
@@ -28,9 +28,9 @@ from sim.world.random_scene import EVALUATION, TUNING, random_scene
 pytest.importorskip("optuna", reason="tuning needs the extra tune")
 
 #: Trials of a search that reach into its second generation.
-START = 17
+START = 18
 #: Trials of two whole generations.
-GENERATIONS = 27
+GENERATIONS = 29
 #: Where the made-up flights are best: softer than the shipped gains, within the ranges.
 BEST = {"line_kp": 90.0, "force_kfi": 0.7, "attitude_kp": 100.0}
 #: Flights with less `line_kp` fail: those by hand, neither law's.
@@ -43,6 +43,7 @@ def made_up_flight(scene, options, *, config, **_):
     off = sum(math.log(getattr(gains, name) / best) ** 2 for name, best in BEST.items())
     wobble = 1.0 + 0.01 * math.sin(options.seed + len(scene.wind.mean_m_s) * scene.wall.friction)
     figures = {each.name: 0.05 * each.failed * (0.2 + off) * wobble for each in OBJECTIVES}
+    figures["delivered_share"] = 1.0 / (1.2 + off) / wobble
     return SimpleNamespace(outcome={"completed": gains.line_kp > SLACK}, reason="", figures=figures)
 
 
@@ -57,9 +58,10 @@ def flown(monkeypatch, tmp_path):
 
     monkeypatch.setattr(sim.sweep.flying, "fly", fly)
     monkeypatch.setattr(sim.sweep.flying, "outcome", lambda trace: trace.outcome)
-    monkeypatch.setattr(sim.tune.flights, "paint_figures", made_up_figures)
-    monkeypatch.setattr("sim.tune.search.require_margin", lambda *_: None)
-    monkeypatch.setattr("sim.tune.search.motion_sensitivity", lambda _: {"line": 1.5})
+    for name in ("paint_figures", "slide_figures"):
+        monkeypatch.setattr(sim.tune.flights, name, made_up_figures)
+    monkeypatch.setattr("sim.tune.space.require_margin", lambda *_: None)
+    monkeypatch.setattr("sim.tune.space.motion_sensitivity", lambda *_: {"line": 1.5})
     monkeypatch.chdir(tmp_path)
     return count
 
@@ -71,7 +73,12 @@ def made_up_figures(trace):
 def plan(trials: int, storage: str, **changes) -> SearchPlan:
     settings = {"seed": 0, "flights": 1, "features": "geometric", "jobs": 1} | changes
     return SearchPlan(
-        shipped=ibvs_qp.preset("qp"), other=ibvs_qp.preset("paper"), trials=trials, storage=storage, **settings
+        law="qp",
+        shipped=ibvs_qp.preset("qp"),
+        other=ibvs_qp.preset("paper"),
+        trials=trials,
+        storage=storage,
+        **settings,
     )
 
 
@@ -85,13 +92,13 @@ def searched(trials: int, storage: str, **changes):
 def test_the_search_begins_at_the_shipped_gains_and_betters_them(flown):
     trials = searched(80, "a.log")
     gains, shipped = trials[0]
-    assert gains == searched_gains(ibvs_qp.preset("qp")) and len(trials) == 80
-    assert trials[1][0] == searched_gains(ibvs_qp.preset("paper"))
+    assert gains == Subject(ibvs_qp.preset("qp")).values and len(trials) == 80
+    assert trials[1][0] == Subject(ibvs_qp.preset("paper")).values
     assert trials[2][0] == gains | BY_HAND
     best = ranked({number: each for number, (_, each) in trials.items()}, shipped)
     assert best and gain_over(trials[best[0]][1], shipped) < -0.3
     for gains, _ in trials.values():
-        assert all(0.999 * low <= gains[name] <= 1.001 * high for name, (low, high) in RANGES.items())
+        assert all(0.999 * low <= gains[name] <= 1.001 * high for name, (low, high) in GAIN_RANGES.items())
 
 
 def test_the_same_seed_is_the_same_search_and_a_resumed_one_too(flown):
@@ -100,7 +107,7 @@ def test_the_same_seed_is_the_same_search_and_a_resumed_one_too(flown):
     searched(START + 1, "c.log")
     before = len(flown)
     assert searched(START + 4, "c.log") == once
-    assert len(flown) - before == 3 * len(scenes())
+    assert len(flown) - before == 3 * len(training())
     assert searched(4, "d.log", seed=1)[3] != once[3]
 
 
@@ -130,66 +137,100 @@ def test_a_preset_whose_contact_would_ring_is_not_flown(flown, monkeypatch):
     def ringing(*_):
         raise ConfigError("rings")
 
-    monkeypatch.setattr("sim.tune.search.require_margin", ringing)
-    trials = searched(2, "a.log")
-    assert not flown and all(each == refused() for _, each in trials.values())
+    monkeypatch.setattr("sim.tune.space.require_margin", ringing)
+    assert searched(2, "a.log")[1][1] == refused()
+    assert len(flown) == len(training()), "the start flies: the others are compared with it"
 
 
 def test_a_preset_close_to_instability_is_not_flown(flown, monkeypatch):
-    monkeypatch.setattr("sim.tune.search.motion_sensitivity", lambda _: {"attitude": 1.5, "line": 2.3})
-    trials = searched(2, "a.log")
-    assert not flown and all(each == refused() for _, each in trials.values())
+    monkeypatch.setattr("sim.tune.space.motion_sensitivity", lambda *_: {"attitude": 1.5, "line": 2.1})
+    assert searched(2, "a.log")[1][1] == refused()
+    assert len(flown) == len(training())
+
+
+def test_a_preset_that_bears_no_other_lag_is_not_flown(flown, monkeypatch):
+    monkeypatch.setattr("sim.tune.space.motion_sensitivity", lambda _, lag=1.0: {"line": 2.4 if lag > 1.0 else 1.9})
+    assert searched(2, "a.log")[1][1] == refused()
 
 
 def test_search_choice_and_report_fly_seeds_of_their_own():
-    config, flown = with_gains(ibvs_qp.preset("paper"), {"line_kp": 11.0}), scenes() | checks()
+    subject, flown = Subject(ibvs_qp.preset("paper")).having({"line_kp": 11.0}), training() | checks()
     spans = [
-        {run.seed for run in flights(flown, config, "tuned", seeds(first, seed, 10), "geometric")}
+        {run.seed for run in flights(flown, subject, "tuned", seeds(first, seed, 10), "geometric")}
         for first in (SEARCH_SEED, CHOICE_SEED, REPORT_SEED)
         for seed in (0, 1)
     ]
     assert {len(span) for span in spans} == {10 * len(flown)}, "every scene has seeds of its own"
     assert sum(map(len, spans)) == len(set().union(*spans))
-    runs = flights(flown, config, "tuned", (5,), "geometric")
+    runs = flights(flown, subject, "tuned", (5,), "geometric")
     assert {run.law for run in runs} == {"paper"} and {run.plan.config.controller.gains.line_kp for run in runs} == {
         11.0
     }
-    assert len({run.params["scene"] for run in runs}) == len({run.plan.scene for run in runs}) == 7
+    assert len({run.params["scene"] for run in runs}) == len({run.plan.scene for run in runs}) == 9
+    tasks = {run.params["scene"]: run.params["task"] for run in runs}
+    assert {scene for scene, task in tasks.items() if task == SLIDE} == {"sticking slide", "saturated slide"}
+    assert [run.params["scene"] for run in runs if not run.plan.config.controller.reach_check] == ["saturated slide"]
+
+
+def test_the_rival_flies_its_weights_on_the_preset_of_the_qp():
+    subject = Subject(ibvs_qp.preset("qp"), rival=True).having({"line": 1234.0})
+    options = flights(training(), subject, "tuned", (5,), "geometric")[0].plan.options
+    assert (options.law, options.rival, options.rival_settings) == ("qp", "mpc", subject.weights)
+    assert subject.values["line"] == 1234.0 and "line = 1234.0" in subject.to_toml()
+
+
+@pytest.mark.parametrize("span", [(0.0, 0.115), (4.0, 400.0)])
+def test_places_in_a_range_go_from_its_lower_end_to_its_upper_one(span):
+    assert from_unit(0.0, *span) == span[0] and from_unit(1.0, *span) == pytest.approx(span[1])
+    assert from_unit(to_unit(0.3 * span[1], *span), *span) == pytest.approx(0.3 * span[1])
 
 
 def test_no_scene_of_the_search_is_one_of_the_evaluation():
-    textures = {scene.board.texture_seed % 2 for scene in (scenes() | checks()).values()}
+    textures = {each.scene.board.texture_seed % 2 for each in (training() | checks()).values()}
     assert textures == {random_scene(0, TUNING).board.texture_seed % 2}
     assert textures != {random_scene(0, EVALUATION).board.texture_seed % 2}
-    assert all(scene.errors == world_errors(WORLD) for scene in scenes().values())
+    assert all(each.scene.errors == world_errors(WORLD) for each in training().values())
 
 
 def test_failed_flights_count_with_the_worst():
-    row = {"completed": True, **{each.name: 0.5 * each.failed for each in OBJECTIVES}}
+    row = {"completed": True, "param.task": PAINT, **{each.name: 0.5 * each.failed for each in OBJECTIVES}}
     lost = {**row, "completed": False}
     unknown = {**row, "path_rms_m": None}
     assert score([row, lost]).failed == 0.5
-    assert score([row, lost]).values == pytest.approx([0.75 * each.failed for each in OBJECTIVES])
+    painted = [each for each in OBJECTIVES if PAINT in each.tasks]
+    found = [value for value in score([row, lost]).values if math.isfinite(value)]
+    assert found == pytest.approx([0.75 * each.failed for each in painted])
     assert score([unknown]).values[1] == OBJECTIVES[1].failed
+    slide = {**row, "param.task": SLIDE, "delivered_share": 0.9}
+    delivered = [each.name for each in OBJECTIVES].index("delivered_share")
+    assert score([slide, {**slide, "completed": False}]).values[delivered] == pytest.approx(0.5 * (0.9 + 0.1))
 
 
 def test_the_rule_of_choice():
-    shipped = Score((1.0, 1.0, 1.0, 1.0, 1.0), 0.0)
+
+    def made(force: float, path: float, tilt: float, thrust_rate: float, failed: float = 0.0) -> Score:
+        """Values far beyond the least difference that matters; a slide's objectives are missing."""
+        values = {"force_rms_n": force, "path_rms_m": path, "tilt_peak_deg": tilt, "jitter_n_s": thrust_rate}
+        return Score(tuple(1e9 * values.get(each.name, math.nan) for each in OBJECTIVES), failed)
+
+    shipped = made(1.0, 1.0, 1.0, 1.0)
     scores = {
         0: shipped,
-        1: Score((0.5, 0.5, 0.5, 1.2, 0.5), 0.0),  # clearly worse in one
-        2: Score((0.9, 0.9, 0.9, 0.9, 1.2), 0.0),  # rotors may be a quarter busier
-        3: Score((0.8, 0.9, 0.9, 0.9, 1.0), 0.0),
-        4: Score((0.1, 0.1, 0.1, 0.1, 0.1), 0.1),  # fails flights
-        5: Score((1.0, 1.0, 1.0, 1.0, 1.01), 0.0),
+        1: made(0.5, 0.5, 1.2, 0.5),  # clearly worse in one
+        2: made(0.9, 0.9, 0.9, 1.2),  # rotors may be a quarter busier
+        3: made(0.8, 0.9, 0.9, 1.0),
+        4: made(0.1, 0.1, 0.1, 0.1, failed=0.1),
+        5: made(1.0, 1.0, 1.0, 1.01),
     }
     assert ranked(scores, shipped) == [3, 2]
     assert not allowed(scores[1], shipped) and not allowed(scores[4], shipped)
     assert front(scores) == [1, 3]
-    assert gain_over(Score((math.e,) * 5, 0.0), shipped) == pytest.approx(1.0)
+    assert gain_over(made(*[math.e] * 4), shipped) == pytest.approx(1.0)
     assert less_damped(0.3, 0.3) == 0.0 and less_damped(0.135, 0.3) == pytest.approx(math.log(2.0))
     assert cost(scores[2], shipped) == gain_over(scores[2], shipped)
     assert cost(scores[1], shipped) == pytest.approx(gain_over(scores[1], shipped) + STEEP * math.log(1.2 / 1.1))
+    stuck = next(each for each in OBJECTIVES if each.name == "stuck_share")
+    assert stuck.ratio(0.0, 0.005) == pytest.approx(0.5), "half a per cent is the least difference that matters"
 
 
 def test_command_writes_preset_trials_figures_and_verdict(flown, capsys):
@@ -198,7 +239,7 @@ def test_command_writes_preset_trials_figures_and_verdict(flown, capsys):
     content = json.loads(capsys.readouterr().out)
     assert (content["schema"], content["law"], content["trials"]) == (1, "qp", 24)
     preset = PilotConfig.from_toml(content["preset"]) if content["chosen"] else None
-    assert preset is not None and searched_gains(preset) == content["gains"]
+    assert preset is not None and Subject(preset).values == content["gains"]
     assert (
         Path(content["preset"])
         .read_text()
@@ -206,8 +247,8 @@ def test_command_writes_preset_trials_figures_and_verdict(flown, capsys):
     )
     everywhere = [each for each in content["unseen"] if each["scene"] == "all"]
     assert [each["objective"] for each in everywhere] == [each.name for each in OBJECTIVES]
-    assert all(each["n"] == 28 and each["verdict"] == "better" for each in everywhere)
-    assert all(each["difference"]["high"] < 0.0 for each in everywhere)
+    counts = {each.name: 4 * (7 * (PAINT in each.tasks) + 2 * (SLIDE in each.tasks)) for each in OBJECTIVES}
+    assert all(each["n"] == counts[each["objective"]] and each["verdict"] == "better" for each in everywhere)
     assert {seed // 1000 for seed in flown} == {1, 2, 3}
     for name in ("qp-front.png", "qp-unseen.png"):
         assert Path("run/figures", name).stat().st_size > 10_000
@@ -285,8 +326,11 @@ def test_a_trial_that_rings_more_is_no_finalist(flown, monkeypatch, tmp_path):
 
 def test_a_finalist_clearly_worse_in_one_scene_may_not_replace_the_shipped():
     def finalist(**scenes: float) -> Finalist:
-        by_scene = {name: Score((value,) * len(OBJECTIVES), 0.0) for name, value in scenes.items()}
-        return Finalist(Score((sum(scenes.values()) / len(scenes),) * len(OBJECTIVES), 0.0), by_scene, 0.3)
+        by_scene = {name: made(value) for name, value in scenes.items()}
+        return Finalist(made(sum(scenes.values()) / len(scenes)), by_scene, 0.3)
+
+    def made(value: float) -> Score:
+        return Score(tuple(1.0 if each.name == "delivered_share" else value for each in OBJECTIVES), 0.0)
 
     shipped = finalist(job=1.0, sticking=1.0, gusts=1.0)
     assert finalist(job=0.7, sticking=1.2, gusts=0.7).may_replace(shipped)
@@ -352,7 +396,7 @@ def test_a_storage_of_another_search_is_refused(flown, capsys):
 def unseen(before: list[bool], after: list[bool]) -> pl.DataFrame:
     """Flights of both presets; one that does not complete has no figures."""
     rows = [
-        {"variant": name, "param.scene": "job", "seed": seed, "completed": done}
+        {"variant": name, "param.scene": "job", "param.task": PAINT, "seed": seed, "completed": done}
         | {each.name: 1.0 if done else None for each in OBJECTIVES}
         for name, flights in (("shipped", before), ("tuned", after))
         for seed, done in enumerate(flights)
