@@ -75,12 +75,12 @@ class ContactSettings:
         high=1.2,
     )
     friction_patience_s: float = setting(
-        0.2, "a tip that has not followed its travel for this long is stuck", unit="s", low=0.01, high=10.0
+        0.15, "a tip that has not followed its travel for this long is stuck", unit="s", low=0.01, high=10.0
     )
     friction_rise_1_s: float = setting(
         1.2, "rise of the estimated friction coefficient while the tip is stuck", unit="1/s", low=0.0, high=10.0
     )
-    friction_slew_n_s: float = setting(6.0, "fastest change of that force", unit="N/s", low=0.1, high=100.0)
+    friction_slew_n_s: float = setting(10.0, "fastest change of that force", unit="N/s", low=0.1, high=100.0)
     stuck_speed_m_s: float = setting(
         0.005, "slower than this in contact counts as stuck", unit="m/s", low=0.0, high=0.1
     )

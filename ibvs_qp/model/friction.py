@@ -49,10 +49,13 @@ def estimated_friction(
     along = ca.fmin(ca.dot(direction, body.velocity), ca.dot(direction, tip))
     watching = ca.logic_and(ca.logic_and(contact.touching, body.velocity_known), speed > 0.0)
     still = ca.logic_and(speed > sliding_command, along < stuck_speed)
-    waited = ca.if_else(still, stuck + body.dt, 0.0)
+    # A noisy sample of the velocity does not begin the wait anew.
+    patience = settings.friction_patience_s
+    waited = ca.if_else(still, ca.fmin(stuck + body.dt, 2.0 * patience), ca.fmax(stuck - 2.0 * body.dt, 0.0))
     signals.remember("friction_stuck", ca.if_else(watching, waited, stuck))
     raised = ca.fmin(before + settings.friction_rise_1_s * body.dt, FRICTION_RANGE[1])
-    value = ca.if_else(ca.logic_and(watching, waited > settings.friction_patience_s), raised, before)
+    sticks = ca.logic_and(watching, ca.logic_and(still, waited > patience))
+    value = ca.if_else(sticks, raised, before)
     least = ca.fmin(LEAST_SPEED, ca.fmax(SLOW_RATIO * speed, stuck_speed))
     ratio = clamp(-ca.dot(direction, body.wrench[:3]) / ca.fmax(contact.push, LEAST_PUSH), *FRICTION_RANGE)
     slides = ca.logic_and(speed > sliding_command, along >= least)

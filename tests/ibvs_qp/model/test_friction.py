@@ -87,3 +87,20 @@ def test_friction_stays_plausible() -> None:
     block = estimator()
     assert slide(block, 2.0, 50.0, 0.1, 3000) == pytest.approx(FRICTION_RANGE[1])
     assert slide(block, 2.0, -50.0, 0.1, 3000) == pytest.approx(FRICTION_RANGE[0])
+
+
+def test_a_noisy_velocity_delays_the_rise_but_does_not_begin_the_wait_anew() -> None:
+    """A tip that stands, with a velocity of 9 mm/s in one sample of ten: above the bound of a stuck one."""
+    block, ticks = estimator(), round(1.0 / TICK_S)
+    for tick in range(ticks):
+        slide(block, 5.0, 1.5, 0.009 if tick % 10 == 9 else 0.0, 1)
+    clean = estimator()
+    assert slide(block, 5.0, 1.5, 0.0, 1) - ASSUMED_FRICTION > 0.7 * (
+        slide(clean, 5.0, 1.5, 0.0, ticks) - ASSUMED_FRICTION
+    )
+
+
+def test_a_tip_that_has_broken_away_raises_nothing() -> None:
+    block = estimator()
+    held = slide(block, 5.0, 1.5, 0.0, 4 * PATIENT_TICKS)
+    assert slide(block, 5.0, 1.5, 0.015, PATIENT_TICKS) == held  # too slow to be measured, too fast to be stuck
