@@ -7,8 +7,8 @@ import math
 from ibvs_qp.analysis.motion_loop import MotionLoop
 from ibvs_qp.config.controller import ControllerConfig
 
-#: Gains with a larger sensitivity peak are not searched: 2.0 bears twice the gain and 29 degrees of phase. The same with
-#: motors of another lag than the configured one, and the ratios of that lag: 2.3 bears 1.8 times the gain.
+#: Gains with a larger sensitivity peak are not searched: 2.0 bears twice the gain and 29 degrees of phase. The same
+#: with motors of another lag than the configured one, and the ratios of that lag: 2.3 bears 1.8 times the gain.
 LARGEST_SENSITIVITY, LARGEST_WITH_OTHER_LAG, LAG_RATIOS = 2.0, 2.3, (0.75, 1.3)
 #: Ticks from a sample to the middle of its command's hold: half a tick, and a tick that a sample may be old.
 TICKS_LATE = 1.5

@@ -15,9 +15,10 @@ from ibvs_qp.symbolic.signals import Signals
 
 #: Price of the tilt over that of a force beyond a plane [N^2/rad^2]: 2 deg cost as much as 0.1 N.
 TILT_PRICE = 10.0
-#: Fraction of the reach that the push may use before the vehicle tilts [-]: rotors whose thrusts differ by some percent
-#: from the model's and a level loop at work keep off their limits. At 0.97, which a level push may use, slides of 10 N at
-#: friction 0.8 in the datasheet world had a rotor at its limit for half of the time, and 0.7 N of push error (0.3 N).
+#: Fraction of the reach that the push may use before the vehicle tilts [-]: rotors whose thrusts differ by some
+#: percent from the model's and a level loop at work keep off their limits. At 0.97, which a level push may use, slides
+#: of 10 N at friction 0.8 in the datasheet world had a rotor at its limit for half of the time, and 0.7 N of push error
+#: instead of 0.3 N.
 TRIM_FRACTION = 0.85
 #: Time constant of the angles [s]: slower than the level loop, whose slow pole is at 7 1/s.
 TRIM_TIME_S = 0.5

@@ -538,6 +538,20 @@ def test_a_retouch_leaves_the_outer_edge_where_it_is() -> None:
     assert "retouch" in world.phases() and np.abs(world.paint[1].v - first)[inside].max() < 1e-3
 
 
+def test_a_retouch_keeps_off_the_outer_edge() -> None:
+    """An edge that the tip paints anew moves with it and shows no error of its place."""
+    world = PaintedWall(short(rows=2, stroke_m=1.5), stuck_across=True)
+    world.wave = lambda row, u: 0.012 if row == 2 and 0.5 < u < 0.6 else 0.0
+    world.fly(100.0, until="retouch")
+    world.stuck_across = False
+    world.fly(3.0)
+    inside = []
+    while world.painter.phase == "retouch":
+        world.step()
+        inside.append(world.painter._v_target - world.painter._cross.v)
+    assert np.mean(inside) > 0.004 and np.median(inside) > 0.004
+
+
 def test_a_stroke_is_painted_again_twice_at_most_and_never_without_overlap() -> None:
     for overlap, retouches in ((0.008, painter.MOST_RETOUCHES), (0.0, 0)):
         world = PaintedWall(short(rows=2, stroke_m=1.0, overlap_m=overlap), stuck_across=True)
