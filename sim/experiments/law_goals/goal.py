@@ -1,4 +1,4 @@
-"""One goal: a bound of a figure's median, or of the median ratio to the flights of before with the same seeds."""
+"""One goal: a bound of a figure over flights, or of the median ratio to the flights of before with the same seeds."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 import polars as pl
 
 from ibvs_qp.config.errors import ConfigError
+from ibvs_qp.config.settings import choice, validate
 from sim.evaluate.figures import figure_of
 from sim.sweep.paired import exact_interval
 from sim.sweep.parts import PARAM
@@ -23,9 +24,15 @@ class Goal:
     ratio_at_most: float | None = None
     at_most: float | None = None  # in SI
     at_least: float | None = None
+    over: str = choice(
+        "completed",
+        "median of the flights that completed, mean of all, or the largest value of all",
+        ("completed", "all", "worst"),
+    )
 
     def __post_init__(self) -> None:
         """One bound."""
+        validate(self)
         if sum(bound is not None for bound in (self.ratio_at_most, self.at_most, self.at_least)) != 1:
             raise ConfigError(f"goal of {self.figure}, {self.kind}: state one of ratio_at_most, at_most, at_least")
 
@@ -39,12 +46,12 @@ class Goals:
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """What the flights say of a goal: medians in SI, NaN without data; the ratio with its exact interval.
+    """What the flights say of a goal, in SI, NaN without data; the ratio with its exact interval.
 
     Attributes:
         goal: The goal.
         before: Median of before.
-        now: Median of the flights that completed.
+        now: Median of the flights that completed, or what the goal says.
         ratio: Median ratio of pairs with the same seed.
         interval: Of that median.
         n: Flights with the figure, pairs for a ratio.
@@ -87,7 +94,7 @@ class Outcome:
 
 
 def outcome(goal: Goal, flown: pl.DataFrame, before: pl.DataFrame, planned: int) -> Outcome:
-    """Compare the flights of a goal that completed with those of before, seed by seed.
+    """Compare the flights of a goal with those of before, seed by seed.
 
     Args:
         goal: The goal.
@@ -96,12 +103,14 @@ def outcome(goal: Goal, flown: pl.DataFrame, before: pl.DataFrame, planned: int)
         planned: Flights of the design.
     """
     old = before.filter((pl.col("kind") == goal.kind) & (pl.col("world") == goal.world))
-    old = old.select("seed", pl.col(goal.figure).cast(float).alias("before"))
+    column = pl.col(goal.figure).cast(float) if goal.figure in old.columns else pl.lit(None, float)
+    old = old.select("seed", column.alias("before"))
     if not {goal.figure, f"{PARAM}kind"} <= set(flown.columns):
         columns = {f"{PARAM}kind": str, f"{PARAM}world": str, "seed": int, "completed": bool, goal.figure: float}
         flown = pl.DataFrame(schema=columns)
     mine = flown.filter((pl.col(f"{PARAM}kind") == goal.kind) & (pl.col(f"{PARAM}world") == goal.world))
-    now = mine.filter(pl.col("completed")).select("seed", pl.col(goal.figure).cast(float).alias("now"))
+    counted = mine.filter(pl.col("completed")) if goal.over == "completed" else mine
+    now = counted.select("seed", pl.col(goal.figure).cast(float).alias("now"))
     now = now.filter(pl.col("now").is_finite())
     both = now.join(old, on="seed")
     ratios = (both["now"] / both["before"]).to_numpy()
@@ -109,7 +118,7 @@ def outcome(goal: Goal, flown: pl.DataFrame, before: pl.DataFrame, planned: int)
     return Outcome(
         goal=goal,
         before=_median(old["before"]),
-        now=_median(now["now"]),
+        now=_SUMMARY[goal.over](now["now"]),
         ratio=float(np.median(ratios)) if len(ratios) else float("nan"),
         interval=exact_interval(ratios) if len(ratios) else (float("nan"), float("nan")),
         n=len(ratios) if goal.ratio_at_most is not None else now.height,
@@ -120,3 +129,15 @@ def outcome(goal: Goal, flown: pl.DataFrame, before: pl.DataFrame, planned: int)
 def _median(values: pl.Series) -> float:
     found = values.drop_nulls().to_numpy()
     return float(np.median(found)) if len(found) else float("nan")
+
+
+def _mean(values: pl.Series) -> float:
+    return float(values.to_numpy().mean()) if len(values) else float("nan")
+
+
+def _largest(values: pl.Series) -> float:
+    return float(values.to_numpy().max()) if len(values) else float("nan")
+
+
+#: Figure of the flights by `Goal.over`.
+_SUMMARY = {"completed": _median, "all": _mean, "worst": _largest}

@@ -31,7 +31,7 @@ def seeds() -> dict[tuple[str, str], set[int]]:
 
 @pytest.mark.parametrize("goal", GOALS, ids=lambda goal: f"{goal.kind}-{goal.world}-{goal.figure}")
 def test_every_goal_has_flights_and_those_of_before(goal: Goal, seeds) -> None:
-    assert len(seeds[goal.kind, goal.world]) == 10
+    assert len(seeds[goal.kind, goal.world]) == (30 if "gusts of" in goal.kind else 10)
     assert figure_of(goal.figure).words
     old = BEFORE.filter((pl.col("kind") == goal.kind) & (pl.col("world") == goal.world))
     if goal.ratio_at_most is not None:
@@ -73,6 +73,21 @@ def test_without_flights_no_goal_is_met() -> None:
     for goal in GOALS:
         found = outcome(goal, pl.DataFrame(), BEFORE, 10)
         assert found.n == 0 and math.isnan(found.now) and not found.met and "–" in found.cells
+
+
+@pytest.mark.parametrize(("bound", "met"), [(0.9, True), (0.95, False)])
+def test_a_share_is_that_of_all_flights(bound: float, met: bool) -> None:
+    goal = Goal(kind="paint", world="harsh", figure="completed", over="all", at_least=bound)
+    flights = flown(0.7).with_columns((pl.col("seed") != 3).alias("completed"))
+    found = outcome(goal, flights, BEFORE, 10)
+    assert found.now == pytest.approx(0.9) and found.n == 10 and found.met is met
+
+
+def test_the_worst_flight_counts_completed_or_not() -> None:
+    goal = Goal(kind="paint", world="harsh", figure="path_rms_straight_m", over="worst", at_most=0.001)
+    flights = flown(0.7).with_columns(pl.lit(False).alias("completed"))
+    found = outcome(goal, flights, BEFORE, 10)
+    assert found.now == flights[goal.figure].max() and found.n == 10 and not found.met
 
 
 def test_a_goal_states_one_bound() -> None:

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
 from sim.evaluate.metrics import compute_metrics
+from sim.experiments.law_goals.__main__ import HERE
 from sim.flight.closed_loop import fly
 from sim.flight.options import FlightOptions
 from sim.world.scene import Scene
 from sim.world.worlds import in_world
 
-WORLD = str(Path(__file__).parent / "twice_harsh.toml")
+WORLD = str(HERE / "twice_harsh.toml")
 
 
 @pytest.mark.slow
