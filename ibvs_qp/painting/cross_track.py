@@ -255,26 +255,30 @@ class CrossTrack:
         rougher = max(misfit / EDGE_STD, 1.0)  # the filter's own noise of an edge is one EDGE_STD
         return place, rougher * math.sqrt(max(float(shares @ self._p[_OWN, _OWN] @ shares), 0.0))
 
-    def overlap(self, first_u: float, last_u: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def overlap(self, first_u: float, last_u: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Overlap of the stroke in progress with the last one, as painted, where both lie between two places.
+
+        What was painted again adds to it as far as that is certain, and in full to the largest overlap.
 
         Args:
             first_u: One place along the strokes [m].
             last_u: The other one [m].
 
         Returns:
-            u, overlap, and its standard deviation [m], (n,) each; empty before the second stroke.
+            u, overlap, its standard deviation, and the largest overlap [m], (n,) each; empty before the second stroke.
         """
         if len(self.maps) < 2:
-            return np.empty(0), np.empty(0), np.empty(0)
+            return np.empty(0), np.empty(0), np.empty(0), np.empty(0)
         (u, last), (_, own), p = self.maps[-2].places(), self.maps[-1].places(), self._p
         low, high = sorted((first_u, last_u))
         within = (low <= u) & (u <= high) & np.isfinite(last - own)
         shares = self._shares(u[within])
         inner = np.fmin.reduce([own, *(farthest_out.places()[1] for _, farthest_out in self._again)])
-        overlap = (last - inner)[within] + shares @ (self._x[_LAST] - self._x[_OWN]) + 2.0 * self._half
+        innermost = np.fmin.reduce([own, *(found.places()[1] for found, _ in self._again)])
+        offset = shares @ (self._x[_LAST] - self._x[_OWN]) + 2.0 * self._half
+        overlap, largest = (last - inner)[within] + offset, (last - innermost)[within] + offset
         covariance = p[_LAST, _LAST] - p[_LAST, _OWN] - p[_OWN, _LAST] + p[_OWN, _OWN]
-        return u[within], overlap, np.sqrt(np.maximum(np.sum(shares @ covariance * shares, axis=1), 0.0))
+        return u[within], overlap, np.sqrt(np.maximum(np.sum(shares @ covariance * shares, axis=1), 0.0)), largest
 
     def end_stroke(self) -> None:
         """The stroke ends: the error of its map becomes that of the last stroke, and beta begins anew.

@@ -48,8 +48,8 @@ ASIDE_M = 0.002
 MOST_LOST, LOST_N = 0.02, 0.3
 #: Last part of a stroke, whose overlap does not count [m].
 CORNER_M = 0.02
-#: A stroke is at its place if that holds at so many standard deviations [-].
-PLACE_SIGMAS = 2.0
+#: A stroke is at its place, and touches the one before, if that holds at so many standard deviations [-].
+PLACE_SIGMAS, OVERLAP_SIGMAS = 2.0, 1.5
 #: Last part of a stroke, over which the edge at its end leads [m]: a gust of 2 N rms moves the tip by 15 mm beyond an
 #: end where velocity alone holds it. Over more, stiff line rows and the friction of 10 N at 0.7 shake the vehicle.
 LEAD_M = 0.05
@@ -68,7 +68,7 @@ MOST_RETOUCHES, RETOUCH_SIGMAS, RETOUCH_BEFORE_M, TURN_BEFORE_M = 2, 2.0, 0.1, 0
 #: Target overlap of a retouch over the nominal overlap [-]. The tip keeps off the outer edge that the stroke has left:
 #: an edge that it paints anew moves with it and shows no error. At 1.25 retouches in the harsh world drifted outwards
 #: by up to 16 mm, and every following stroke with them; at 2 the overlap exceeded `MOST_OVERLAP` times the nominal one.
-RETOUCH_OVERLAP = 1.6
+RETOUCH_OVERLAP = 1.5
 
 
 class Painter(Navigation):
@@ -397,14 +397,14 @@ class Painter(Navigation):
         self._speed, self._u_reference = 0.0, self._along.u
         self._enter(inputs, "climb", ended)
 
-    def _overlap(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _overlap(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Overlap of the stroke that has ended with the last one, as of `CrossTrack.overlap`."""
         last = self._stroke_goal() - CORNER_M * self.pattern.travel(self.row)
         return self._cross.overlap(self._stroke_begin(), last)
 
     def _begin_retouch(self, inputs: PainterInput) -> bool:
         """Go back to where the stroke may leave a gap to the last one; False where it does not, or cannot be mended."""
-        u, overlap, known = self._overlap()
+        u, overlap, known, _ = self._overlap()
         least = overlap - RETOUCH_SIGMAS * np.hypot(known, self._cross.misfit)
         enough = RETOUCH_OVERLAP * self.config.overlap_m > RETOUCH_SIGMAS * known
         gaps = u[(least < 0.0) & enough & (SIGMAS * known <= 2.0 * self._certain_m)]
@@ -437,16 +437,16 @@ class Painter(Navigation):
             return f"row {self.row} was without contact over {self._lost_m * 1e3:.0f} mm"
         if self._is_last() and self._lost_s > MOST_LOST * self._painted_s:
             return f"the strokes were without contact for {self._lost_s:.1f} s of {self._painted_s:.1f} s"
-        _, overlap, known = self._overlap()
+        _, overlap, known, largest = self._overlap()
         if SIGMAS * (worst := known.max(initial=0.0)) > 2.0 * self._certain_m:
             return f"row {self.row} lost its edge, its overlap is known to {worst * 1e3:.1f} mm"
         if (unled := self._cross.longest_unled) > MOST_UNLED_M:
             return f"row {self.row} had no edge to follow for {unled:.2f} m"
-        deviation = np.hypot(known, self._cross.misfit)
+        deviation = OVERLAP_SIGMAS * np.hypot(known, self._cross.misfit)
         if (least := (overlap - deviation).min(initial=math.inf)) < 0.0:
             return f"row {self.row} may leave a gap of {-least * 1e3:.1f} mm to the row before"
         nominal = self.config.brush_width_m - (self._v_target - self._place(self.row - 1))
-        if (most := (overlap + deviation).max(initial=0.0)) > MOST_OVERLAP * nominal:
+        if (most := (largest + deviation).max(initial=0.0)) > MOST_OVERLAP * nominal:
             return f"row {self.row} may overlap the row before by {most * 1e3:.1f} mm, nominal {nominal * 1e3:.1f} mm"
         place, known = self._cross.stroke_place(self._stroke_begin(), goal)
         aside = place - self._v_target

@@ -430,7 +430,7 @@ def test_a_map_that_begins_has_the_error_of_v() -> None:
 
 
 def _least(cross: CrossTrack, first_u: float, last_u: float) -> float:
-    _, overlap, known = cross.overlap(first_u, last_u)
+    _, overlap, known, _ = cross.overlap(first_u, last_u)
     return float((overlap - known).min())
 
 
@@ -443,7 +443,7 @@ def test_the_overlap_is_that_of_the_maps_and_their_errors() -> None:
         cross.predict(-0.01, 0.002 if k == 30 else 0.0, 0.1)
         cross.look([], 0.6 - 0.01 * k, -1.0)
     nominal, step = 2.0 * HALF - PITCH, 0.002
-    u, overlap, known = cross.overlap(0.0, 0.25)
+    u, overlap, known, _ = cross.overlap(0.0, 0.25)
     assert u.min() > 0.0 and u.max() < 0.25 and overlap == pytest.approx(nominal - step, abs=1e-4)
     assert _least(cross, 0.35, 0.6) > _least(cross, 0.0, 0.25)
     assert known.max() == pytest.approx(cross.deviation, rel=0.1)  # the tip is at the end, where least is known
@@ -465,12 +465,13 @@ def test_paint_laid_again_farther_in_adds_to_the_overlap_and_not_to_the_map() ->
         for k in way:
             cross.lay_again(0.01 * k)
         cross.predict(0.0, 0.004, 0.1)
-    u, overlap, _ = cross.overlap(0.0, 0.6)
+    u, overlap, _, largest = cross.overlap(0.0, 0.6)
     np.testing.assert_array_equal(cross.maps[-1].places()[1], map_before)
     again = u < 0.29
     assert np.all((overlap - before[1])[~again] == 0.0)
     gained = (overlap - before[1])[again]
     assert np.all((0.0 < gained) & (gained < 0.004)), "less the deviation of v"
+    np.testing.assert_allclose((largest - before[3])[again], 0.004, atol=1e-6)
     assert cross.stroke_place(0.1, 0.2)[0] == pytest.approx(MARGIN + PITCH, abs=1e-4)
     cross.end_stroke()
     cross.begin_stroke()
