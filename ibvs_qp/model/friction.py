@@ -49,10 +49,11 @@ def estimated_friction(
     along = ca.fmin(ca.dot(direction, body.velocity), ca.dot(direction, tip))
     watching = ca.logic_and(ca.logic_and(contact.touching, body.velocity_known), speed > 0.0)
     still = ca.logic_and(speed > sliding_command, along < stuck_speed)
-    # A noisy sample of the velocity does not begin the wait anew.
+    # A noisy sample of the velocity does not begin the wait anew, a commanded stop does.
     patience = settings.friction_patience_s
     waited = ca.if_else(still, ca.fmin(stuck + body.dt, 2.0 * patience), ca.fmax(stuck - 2.0 * body.dt, 0.0))
-    signals.remember("friction_stuck", ca.if_else(watching, waited, stuck))
+    slide = ca.if_else(watching, waited, stuck)
+    signals.remember("friction_stuck", ca.if_else(speed > sliding_command, slide, 0.0))
     raised = ca.fmin(before + settings.friction_rise_1_s * body.dt, FRICTION_RANGE[1])
     sticks = ca.logic_and(watching, ca.logic_and(still, waited > patience))
     value = ca.if_else(sticks, raised, before)

@@ -83,7 +83,11 @@ class Tune:
             except KeyboardInterrupt:
                 parts, trials = f"flights are in {folder / 'parts'}", f"finished trials are in {plan.storage}"
                 return interrupted(words, folder, parts if self.trials_of else trials)
-        print(as_json(summary) if self.json else f"Report: {summary['report']}\nPreset: {summary['preset']}")
+        print(
+            as_json(summary)
+            if self.json
+            else f"Report: {summary['report']}\n{'Weights' if self.law == 'mpc' else 'Preset'}: {summary['preset']}"
+        )
         return 0
 
     def _check(self) -> None:

@@ -48,8 +48,8 @@ def paint_runs(
         cell: ``experiment``, ``variant`` and ``params`` of the runs.
     """
     pilot = pilot_config(scene, FlightOptions(law=config.law), config)
-    check_job(scene, pilot, features)
     job = job or PaintJob()
+    check_job(scene, pilot, features, job)
     expected_s = overhead_s + job.expected_s(pilot.painting, BoardGeometry(scene).strokes)
     return [
         Run(

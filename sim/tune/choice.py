@@ -5,9 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+import numpy as np
+
 from ibvs_qp.config.contact_margin import least_margin
 from ibvs_qp.pilot import PilotConfig
-from sim.tune.objectives import Score, ratios
+from sim.evaluate.figures import FIGURES
+from sim.tune.objectives import OBJECTIVES, Score, ratios
 
 #: The bounds of the objectives are this much wider in a single scene [-]: fewer flights, more luck.
 SCENE_ROOM = 1.15
@@ -73,10 +76,11 @@ def ranked(scores: Mapping[int, Score], shipped: Score) -> list[int]:
 
 def front(scores: Mapping[int, Score]) -> list[int]:
     """Pareto front: trials with all flights completed and no other trial better or equal in every objective."""
-    able = {number: each for number, each in scores.items() if not each.failed}
-
-    def beats(other: Score, mine: Score) -> bool:
-        against = [ratio for _, ratio in ratios(other, mine)]
-        return max(against) <= 1.0 and min(against) < 1.0
-
-    return [number for number, mine in able.items() if not any(beats(other, mine) for other in able.values())]
+    able = [number for number, each in scores.items() if not each.failed]
+    sign = [-FIGURES[each.name].better for each in OBJECTIVES]  # less is better in every column
+    values = np.nan_to_num([scores[number].values for number in able]).reshape(-1, len(sign)) * sign
+    return [
+        number
+        for number, mine in zip(able, values, strict=True)
+        if not ((values <= mine).all(axis=1) & (values < mine).any(axis=1)).any()
+    ]

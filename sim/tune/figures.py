@@ -22,7 +22,7 @@ _AXES_TO = 2.0
 _NARROW = 3.0
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", "*")
 _SHADES = ("#222222", "#8a8a8a", "#c0a000", "#7a5195", "#5a8f3c", "#2f8f8b", "#c06080", "#3d5a80")
-#: Objectives that are drawn, with their places: those that no flight has at 0.
+#: Objectives that are drawn, with their places: those of painting that no flight has at 0.
 DRAWN = {
     place: each
     for place, each in enumerate(OBJECTIVES)
@@ -31,7 +31,7 @@ DRAWN = {
 
 
 def draw_front(law: str, scores: dict[int, Score], shipped: Score, chosen: int | None) -> Figure:
-    """Every pair of objectives: trials, Pareto front, the shipped and the chosen preset."""
+    """Every pair of the drawn objectives: trials, Pareto front, the shipped and the chosen preset."""
     able = {number: each for number, each in scores.items() if not each.failed}
     best, drawn = front(scores), list(DRAWN)
     last = len(drawn) - 1

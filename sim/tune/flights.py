@@ -5,16 +5,21 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
+from allocation import push_reach
+from ibvs_qp.config.vehicle import VehicleParams
+from ibvs_qp.frames import GRAVITY
 from ibvs_qp.pilot import PilotConfig
 from sim.evaluate.measures import paint_figures, slide_figures
 from sim.experiments.preset_flights import paint_runs
 from sim.experiments.scenes import NEAR_START_M, changed
 from sim.flight.jobs import Job, PaintJob, PressJob
 from sim.sweep.design import Run
-from sim.tune.objectives import PAINT, SLIDE, TASK
+from sim.tune.objectives import PAINT, SATURATED, SLIDE, TASK
 from sim.tune.space import RIVAL, Subject
 from sim.vehicles.configuration import with_camera
 from sim.world.random_scene import TUNING, random_scene
@@ -31,12 +36,14 @@ SEARCH_SEED, CHOICE_SEED, REPORT_SEED = 1000, 2000, 3000
 SEED_STRIDE = 100
 #: Force of the gusts, rms [N], and of the strong ones; slope of the sloping edge [deg].
 GUST_N, STRONG_GUST_N, SLOPE_DEG = 2.0, 3.0, 5.0
-#: Slide at the reach: friction, and push [N] of which the rotors can hold 84 %.
-STICKING, STICKING_PUSH_N = 0.8, 10.0
-#: Slide beyond the reach, which the law has to find by itself: friction, and push [N]; 15.8 N can be held.
-SLIPPERY, SATURATING_PUSH_N = 0.3, 20.0
+#: Slide with the push reduced to the reach, and slide with the reach check off: friction of each, and push over what
+#: the rotors can hold [-]. For the Tarot 10 N and 16 N; 20 N, at 1.27, three of four slides go less than half way.
+STICKING, STICKING_PUSH = 0.8, 1.15
+SLIPPERY, SATURATING_PUSH = 0.3, 1.03
 #: Hold and slide [s].
 SLIDING = PressJob(hold_s=2.0, slide_s=4.0)
+#: Direction of the slide in B.
+LEFT = np.array([0.0, -1.0, 0.0])
 #: Starts, approaches and retreats beside the strokes [s]; sizes the progress bar only.
 _OVERHEAD_S = 9.0
 
@@ -47,37 +54,53 @@ class Training:
 
     Attributes:
         scene: The scene.
-        job: The job.
-        reach_check: Whether the push is reduced to what the rotors can hold.
+        task: Task, which decides on job and objectives. A saturated slide has no reach check.
+        push: Push over what the rotors can hold at the scene's friction [-]; 0 for the scene's push.
     """
 
     scene: Scene
-    job: Job = field(default_factory=PaintJob)
-    reach_check: bool = True
+    task: str = PAINT
+    push: float = 0.0
 
     @property
-    def task(self) -> str:
-        """Task, which decides on the objectives."""
-        return PAINT if isinstance(self.job, PaintJob) else SLIDE
+    def job(self) -> Job:
+        """The job."""
+        return PaintJob() if self.task == PAINT else SLIDING
 
     def config(self, config: PilotConfig) -> PilotConfig:
         """A preset for this job."""
-        controller = dataclasses.replace(config.controller, reach_check=self.reach_check)
-        return dataclasses.replace(config, controller=controller)
+        if self.task != SATURATED:
+            return config
+        return dataclasses.replace(config, controller=dataclasses.replace(config.controller, reach_check=False))
+
+    def scene_for(self, vehicle: VehicleParams) -> Scene:
+        """The scene with the vehicle's camera and push."""
+        scene = with_camera(self.scene, vehicle)
+        if not self.push:
+            return scene
+        reach = push_reach(
+            vehicle.geometry,
+            vehicle.mass_kg * GRAVITY,
+            np.array(vehicle.tip_position_m),
+            np.array(vehicle.thrust_min),
+            np.array(vehicle.thrust_max),
+            friction=scene.wall.friction,
+            travel=LEFT,
+        ).push
+        return changed(scene, paint={"push_n": round(self.push * reach, 1)})
 
 
 @functools.cache
 def training() -> dict[str, Training]:
     """Flights of a trial, on scenes of the tuning family: calm, gusts, a sloping edge, and two slides."""
-    calm, gusts, slope, sticking, saturated = (_short(number) for number in range(5))
+    calm, gusts, slope = (_short(number) for number in range(3))
+    sticking, saturated = _near(3), _near(4)
     return {
         "calm": _flight(calm),
         "gusts": _flight(gusts, wind={"gust_n_rms": GUST_N}),
         "slope": _flight(slope, board={"slope_deg": SLOPE_DEG}),
-        "sticking slide": _flight(sticking, SLIDING, wall={"friction": STICKING}, paint={"push_n": STICKING_PUSH_N}),
-        "saturated slide": _flight(
-            saturated, SLIDING, False, wall={"friction": SLIPPERY}, paint={"push_n": SATURATING_PUSH_N}
-        ),
+        "sticking slide": _flight(sticking, SLIDE, STICKING_PUSH, wall={"friction": STICKING}),
+        "saturated slide": _flight(saturated, SATURATED, SATURATING_PUSH, wall={"friction": SLIPPERY}),
     }
 
 
@@ -93,14 +116,20 @@ def checks() -> dict[str, Training]:
     }
 
 
-def _flight(scene: Scene, job: Job | None = None, reach_check: bool = True, **changes: Any) -> Training:
-    return Training(in_world(changed(scene, **changes), WORLD), job or PaintJob(), reach_check)
+def _flight(scene: Scene, task: str = PAINT, push: float = 0.0, **changes: Any) -> Training:
+    return Training(in_world(changed(scene, **changes), WORLD), task, push)
 
 
 def _short(number: int) -> Scene:
-    """A scene of the tuning family that starts near the wall and has short rows."""
-    scene = random_scene(number, TUNING)
-    return changed(scene, paint={"stroke_m": STROKE_M}, start={"distance_m": NEAR_START_M})
+    """A scene with short rows, on a board that ends with them."""
+    scene = _near(number)
+    width = STROKE_M + 2.0 * scene.paint.edge_margin_m
+    return changed(scene, paint={"stroke_m": STROKE_M}, board={"width_m": width})
+
+
+def _near(number: int) -> Scene:
+    """A scene of the tuning family that starts near the wall."""
+    return changed(random_scene(number, TUNING), start={"distance_m": NEAR_START_M})
 
 
 def flights(
@@ -120,7 +149,7 @@ def flights(
         run
         for place, (name, each) in enumerate(flown.items())
         for run in paint_runs(
-            with_camera(each.scene, subject.config.controller.vehicle),
+            each.scene_for(subject.config.controller.vehicle),
             each.config(subject.config),
             tuple(seed + SEED_STRIDE * place for seed in seeds),
             features,

@@ -86,11 +86,10 @@ def write(outcome: Outcome, folder: Path) -> dict[str, Any]:
     """Write all files; returns the JSON."""
     law, found, summary = outcome.law, outcome.scores, content(outcome, folder)
     gains = {} if outcome.chosen is None else outcome.trials[outcome.chosen][0]
-    head = (
-        f"# Gains found by `{outcome.again}`: trial {outcome.chosen} of {len(found)}; all other values are as shipped."
-    )
+    what = "Weights of the predictive rival" if outcome.plan.subject.rival else "Gains"
+    head = f"# {what} found by `{outcome.again}`: trial {outcome.chosen} of {len(found)}; other values are as shipped."
     if outcome.chosen is None:
-        head = "# The shipped preset: no trial of the search may replace it."
+        head = "# As shipped: no trial of the search may replace it."
     preset = outcome.plan.subject.having(gains).to_toml()
     write_text(folder / f"{law}.toml", f"{head}\n{preset}")
     record = {**summary, "ranges": outcome.plan.subject.spans, "all_trials": trial_rows(outcome.trials)}
@@ -151,7 +150,7 @@ def _page(outcome: Outcome, summary: dict[str, Any]) -> list[str]:
         ]
     percent = 100.0 * (1.0 - math.exp(gain_over(outcome.scores[outcome.chosen], shipped)))
     lines += [
-        f"Chosen: trial {outcome.chosen}; on the flights of the search its objectives are {percent:.0f} % smaller on "
+        f"Chosen: trial {outcome.chosen}; on the flights of the search its objectives are {percent:.0f} % better on "
         "the geometric mean. On unseen seeds, of neither search nor choice:",
         "",
     ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -14,16 +15,16 @@ from ibvs_qp.pilot import PilotConfig
 from sim.sweep.flying import fly_run
 from sim.tune.choice import STEEP, contact_damping, cost, less_damped
 from sim.tune.flights import SEARCH_SEED, flights, seeds, training
-from sim.tune.objectives import Score, refused, score
+from sim.tune.objectives import OBJECTIVES, Score, refused, score
 from sim.tune.space import BY_HAND, RIVAL, Spans, Subject, Values, from_unit, rounded, to_unit
 
 if TYPE_CHECKING:
     import optuna
 
-#: Attributes of a trial: its objectives, and its fraction of failed flights.
-VALUES, FAILED = "values", "failed"
-#: First deviation of CMA-ES, of the logarithmic range of a gain [-]: a factor of 1.3 for a range of a decade. It starts
-#: at the best of the first trials.
+#: Attributes of a trial: its objectives, its fraction of failed flights, and what its margins add to its cost.
+VALUES, FAILED, MARGINS = "values", "failed", "margins"
+#: First deviation of CMA-ES, of the range of a value [-]: a factor of 1.3 for a logarithmic range of a decade. It
+#: starts at the best of the first trials.
 SPREAD = 0.12
 
 #: Values and score of trials by number.
@@ -36,7 +37,7 @@ class SearchPlan:
 
     law: str  # "qp", "paper", or "mpc": the predictive rival on the preset of the QP
     shipped: PilotConfig  # the start preset; trial 0 flies its gains
-    other: PilotConfig  # the preset of the other law; trial 1 flies its gains, trial 2 those set by hand
+    other: PilotConfig  # the preset of the other law; trial 1 has its gains, trial 2 those set by hand
     trials: int  # number of finished trials at the end
     seed: int  # of sampler and flights
     flights: int  # seeds per scene and trial
@@ -48,6 +49,12 @@ class SearchPlan:
     def subject(self) -> Subject:
         """What trial 0 flies."""
         return Subject(self.shipped, rival=self.law == RIVAL)
+
+    @property
+    def digest(self) -> str:
+        """Hash of what gives a trial its score: ranges, objectives, training flights and start."""
+        parts = (self.subject.spans, OBJECTIVES, training(), start_gains(self))
+        return hashlib.sha256(repr(parts).encode()).hexdigest()[:12]
 
 
 def open_study(plan: SearchPlan) -> optuna.Study:
@@ -73,7 +80,9 @@ def open_study(plan: SearchPlan) -> optuna.Study:
         reason = str(error).split("\n")[0]
         raise ConfigError(f"cannot open {plan.storage}: {reason}; give a file or a database with --storage") from None
     identity = {"law": plan.law, "seed": plan.seed, "flights": plan.flights, "features": plan.features}
-    stored = {name: study.user_attrs.get(name, value) for name, value in identity.items()}
+    identity["search"] = plan.digest
+    begun = bool(study.get_trials(deepcopy=False))
+    stored = {name: study.user_attrs.get(name, None if begun else value) for name, value in identity.items()}
     if stored != identity:
         other = ", ".join(f"{name} {value}" for name, value in stored.items())
         raise ConfigError(f"{plan.storage} has a search with {other}; give another --out, or the same options")
@@ -95,12 +104,13 @@ def search(plan: SearchPlan, study: optuna.Study, progress: Callable[[int], None
             batch = _candidates(plan, study)[: min(plan.jobs, plan.trials - done)]
             trials = [_ask(plan, study, gains) for gains in batch]
             scores = evaluate(batch, plan, parallel)
-            shipped = next((each for _, each in finished(study).values()), scores[0])
             for trial, gains, each in zip(trials, batch, scores, strict=True):
+                subject = plan.subject.having(rounded(gains))
+                margins = less_damped(contact_damping(subject.config), firm) + subject.fragility()
                 trial.set_user_attr(VALUES, each.values)
                 trial.set_user_attr(FAILED, each.failed)
-                ringing = less_damped(contact_damping(plan.subject.having(rounded(gains)).config), firm)
-                study.tell(trial, cost(each, shipped) + STEEP * ringing)
+                trial.set_user_attr(MARGINS, margins)
+                study.tell(trial, cost(each, _start_score(plan, study) or each) + STEEP * margins)
     progress(len(finished(study)))
 
 
@@ -122,7 +132,7 @@ def _candidates(plan: SearchPlan, study: optuna.Study) -> list[dict[str, float]]
     import cmaes
     from optuna.trial import TrialState
 
-    costs = {_key(trial.params): float(trial.values[0]) for trial in _complete(study)}
+    costs = _costs(plan, study)
     flying = {_key(trial.params) for trial in study.get_trials(deepcopy=False, states=(TrialState.RUNNING,))}
 
     def waiting(generation: list[dict[str, float]]) -> list[dict[str, float]]:
@@ -145,6 +155,25 @@ def _candidates(plan: SearchPlan, study: optuna.Study) -> list[dict[str, float]]
         if left := waiting(generation):
             return left
         optimizer.tell([(draw, costs[_key(gains)]) for draw, gains in zip(draws, generation, strict=True)])
+
+
+def _costs(plan: SearchPlan, study: optuna.Study) -> dict[tuple[float, ...], float]:
+    """Cost of every finished trial by its values: against the start, once that has flown."""
+    base = _start_score(plan, study)
+    return {
+        _key(trial.params): (cost(_score(trial), base) if base else 0.0) + STEEP * trial.user_attrs[MARGINS]
+        for trial in _complete(study)
+    }
+
+
+def _start_score(plan: SearchPlan, study: optuna.Study) -> Score | None:
+    """Score of the start; None until it has flown."""
+    start = _key(start_gains(plan))
+    return next((_score(trial) for trial in _complete(study) if _key(trial.params) == start), None)
+
+
+def _score(trial: optuna.trial.FrozenTrial) -> Score:
+    return Score(tuple(trial.user_attrs[VALUES]), trial.user_attrs[FAILED])
 
 
 def _key(values: Values) -> tuple[float, ...]:
@@ -172,14 +201,14 @@ def start_gains(plan: SearchPlan) -> dict[str, float]:
 
 
 def evaluate(candidates: Sequence[Values], plan: SearchPlan, parallel: joblib.Parallel) -> list[Score]:
-    """Fly candidates over all scenes; one with an oscillating contact, or a loop close to it, is refused.
+    """Fly candidates over all jobs; one with an oscillating contact, or a loop close to it, is refused.
 
     The start flies in any case: the others are compared with it.
     """
     scores, runs, start = [refused()] * len(candidates), {}, start_gains(plan)
     for place, each in enumerate(candidates):
         subject = plan.subject.having(rounded(each))
-        if subject.is_robust() or rounded(each) == start:
+        if not subject.fragility() or rounded(each) == start:
             on_seeds = seeds(SEARCH_SEED, plan.seed, plan.flights)
             runs[place] = flights(training(), subject, "trial", on_seeds, plan.features)
     rows: Any = iter(parallel(joblib.delayed(fly_run)(run) for each in runs.values() for run in each))
@@ -190,10 +219,7 @@ def evaluate(candidates: Sequence[Values], plan: SearchPlan, parallel: joblib.Pa
 
 def finished(study: optuna.Study) -> Trials:
     """Gains and score of every finished trial, by number."""
-    return {
-        trial.number: (rounded(trial.params), Score(tuple(trial.user_attrs[VALUES]), trial.user_attrs[FAILED]))
-        for trial in _complete(study)
-    }
+    return {trial.number: (rounded(trial.params), _score(trial)) for trial in _complete(study)}
 
 
 def _complete(study: optuna.Study) -> list[optuna.trial.FrozenTrial]:

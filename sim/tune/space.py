@@ -17,7 +17,7 @@ from sim.rivals.horizon import MpcSettings
 #: The predictive rival, as a law that is searched.
 RIVAL = "mpc"
 #: Search range of every gain, both laws alike: [low, high], logarithmic, linear from 0. About a decade around flying
-#: gains. Leads and filters go from next to nothing to twice the lag of the motors, or to a third of it.
+#: gains. Leads go from none to twice the lag of the Tarot's motors, filters to a third of it.
 GAIN_RANGES = {
     "line_kp": (4.0, 400.0),
     "line_kd": (3.0, 60.0),
@@ -42,7 +42,7 @@ GAIN_RANGES = {
     "force_kfp": (0.05, 1.0),
     "force_kfi": (0.4, 5.0),
 }
-#: The same of the rival's weights: a decade to both sides of the first ones, which were set by hand.
+#: The same of the rival's weights: up to a decade to both sides of the first ones, which were set by hand.
 WEIGHT_RANGES = {
     "line": (4e3, 4e5),
     "line_rate": (65.0, 6.5e3),
@@ -66,6 +66,8 @@ BY_HAND = {
     "yaw_kp": 60.0,
     "yaw_kd": 18.0,
 }
+#: Fragility of an unstable loop [-]: a sensitivity peak of 15.
+UNSTABLE = 2.0
 #: Significant digits of a value, so that the written preset equals the flown one.
 DIGITS = 4
 
@@ -106,18 +108,22 @@ class Subject:
         controller = dataclasses.replace(self.config.controller, gains=gains)
         return dataclasses.replace(self, config=dataclasses.replace(self.config, controller=controller))
 
-    def is_robust(self) -> bool:
-        """Whether contact and motion bear another stiffness and another lag; the rival's rows are those of the QP."""
+    def fragility(self) -> float:
+        """Logarithm by which sensitivity peaks exceed their bounds, with the nominal lag and others; 0 if none does.
+
+        A contact that rings with another stiffness counts as an unstable loop. Neither margin describes a horizon, so
+        the rival has none.
+        """
         if self.rival:
-            return True
+            return 0.0
         controller = self.config.controller
         try:
             require_margin(controller, controller.brush)
         except ConfigError:
-            return False
-        if max(motion_sensitivity(controller).values()) > LARGEST_SENSITIVITY:
-            return False
-        return all(max(motion_sensitivity(controller, each).values()) <= LARGEST_WITH_OTHER_LAG for each in LAG_RATIOS)
+            return UNSTABLE
+        peaks = [(max(motion_sensitivity(controller).values()), LARGEST_SENSITIVITY)]
+        peaks += [(max(motion_sensitivity(controller, each).values()), LARGEST_WITH_OTHER_LAG) for each in LAG_RATIOS]
+        return min(max(max(math.log(peak / bound) for peak, bound in peaks), 0.0), UNSTABLE)
 
     def to_toml(self) -> str:
         """The preset, or the rival's settings."""

@@ -34,6 +34,8 @@ def stored_trials(file: Path, plan: SearchPlan) -> tuple[Trials, str]:
         ConfigError: When the file is no such record, or of another search.
     """
     record: dict[str, Any] = read_json(file)
+    if isinstance(record, dict) and "ranges" in record:
+        _require_same(file, record, plan)
     try:
         trials = {
             row.get("number", place): _trial(row, plan.subject.spans) for place, row in enumerate(record["all_trials"])
@@ -43,15 +45,21 @@ def stored_trials(file: Path, plan: SearchPlan) -> tuple[Trials, str]:
         raise ConfigError(
             f"{file} is no record of a search ({reason}); give a LAW_trials.json with --trials-of"
         ) from None
+    start = start_gains(plan)
+    if not any(gains == start for gains, _ in trials.values()):
+        raise ConfigError(f"{file} has no trial of the preset to compare with; give its start with --preset")
+    return trials, record.get("searched_by") or record.get("command", "")
+
+
+def _require_same(file: Path, record: Mapping[str, Any], plan: SearchPlan) -> None:
+    """Refuse the record of another search."""
     required = {"law": plan.law, "seed": plan.seed, "features": plan.features}
     recorded = {name: record.get(name) for name in required}
     if recorded != required:
         other = ", ".join(f"{name} {value}" for name, value in recorded.items())
         raise ConfigError(f"{file} has a search with {other}; give the same options")
-    start = start_gains(plan)
-    if not any(gains == start for gains, _ in trials.values()):
-        raise ConfigError(f"{file} has no trial of the preset to compare with; give its start with --preset")
-    return trials, record.get("searched_by") or record.get("command", "")
+    if record["ranges"] != {name: list(span) for name, span in plan.subject.spans.items()}:
+        raise ConfigError(f"{file} has a search over other values or ranges; it can be chosen from where it was made")
 
 
 def _trial(row: Mapping[str, float], spans: Spans) -> tuple[Values, Score]:

@@ -37,7 +37,7 @@ def differences(table: pl.DataFrame) -> list[dict[str, Any]]:
             rows = part.filter(pl.col(PARAM + TASK).is_in(each.tasks))
             if rows.is_empty():
                 continue
-            before, after = (rows[name].cast(pl.Float64).to_numpy() for name in (each.name, f"{each.name}.{TUNED}"))
+            before, after = (_sizes(rows, name) for name in (each.name, f"{each.name}.{TUNED}"))
             change, count = median_interval(after - before), int(np.isfinite(after - before).sum())
             result.append(
                 {
@@ -51,6 +51,13 @@ def differences(table: pl.DataFrame) -> list[dict[str, Any]]:
                 }
             )
     return result
+
+
+def _sizes(rows: pl.DataFrame, name: str) -> np.ndarray:
+    """Size of a figure in every row; NaN where it is missing."""
+    if name not in rows.columns:
+        return np.full(rows.height, math.nan)
+    return np.abs(rows[name].cast(pl.Float64).fill_null(math.nan).to_numpy())
 
 
 def _verdict(change: dict[str, float], count: int, better: int) -> str:

@@ -1,7 +1,7 @@
 """Errors of a real vehicle and its sensors, beyond the noise of the scene's sensors; all zero is the ideal world.
 
 Every number is a size. What a flight gets is drawn from its seed: a bias has this length and a random direction, a
-calibration error is normal with this standard deviation. Three profiles (`sim/world/profiles`) fill the sections.
+calibration error is normal with this standard deviation. Four profiles (`sim/world/profiles`) fill the sections.
 """
 
 from __future__ import annotations

@@ -94,8 +94,8 @@ def shifted(value: Any, shift_ns: int) -> Any:
 
 
 def worded(rejected: tuple[str, ...]) -> list[str]:
-    """Rejections without their numbers, which follow estimates."""
-    return [re.sub(r"\d+(\.\d+)?", "", text) for text in rejected]
+    """Rejections without their values, which follow estimates; names keep their digits."""
+    return [re.sub(r"(?<!\w)\d+(\.\d+)?", "", text) for text in rejected]
 
 
 class Violation(AssertionError):

@@ -24,10 +24,10 @@ class Goal:
     ratio_at_most: float | None = None
     at_most: float | None = None  # in SI
     at_least: float | None = None
-    over: str = choice(
-        "completed",
-        "median of the flights that completed, mean of all, or the largest value of all",
-        ("completed", "all", "worst"),
+    of: str = choice(
+        "median",
+        "median of the flights that completed, or mean or largest value of all",
+        ("median", "mean", "largest"),
     )
 
     def __post_init__(self) -> None:
@@ -35,6 +35,10 @@ class Goal:
         validate(self)
         if sum(bound is not None for bound in (self.ratio_at_most, self.at_most, self.at_least)) != 1:
             raise ConfigError(f"goal of {self.figure}, {self.kind}: state one of ratio_at_most, at_most, at_least")
+        if self.of != "median" and self.ratio_at_most is not None:
+            raise ConfigError(f"goal of {self.figure}, {self.kind}: a ratio is that of the median")
+        if self.of == "largest" and self.at_least is not None:
+            raise ConfigError(f"goal of {self.figure}, {self.kind}: the largest value has an upper bound")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,7 +72,7 @@ class Outcome:
 
     @property
     def met(self) -> bool:
-        """Whether every flight of the design completed, and the goal is met."""
+        """Whether every flight of the design has the figure, for a median is complete, and the goal is met."""
         goal = self.goal
         if self.n < self.planned:
             return False
@@ -103,13 +107,13 @@ def outcome(goal: Goal, flown: pl.DataFrame, before: pl.DataFrame, planned: int)
         planned: Flights of the design.
     """
     old = before.filter((pl.col("kind") == goal.kind) & (pl.col("world") == goal.world))
-    column = pl.col(goal.figure).cast(float) if goal.figure in old.columns else pl.lit(None, float)
+    column = pl.col(goal.figure).cast(float) if goal.figure in old.columns else pl.lit(None, pl.Float64)
     old = old.select("seed", column.alias("before"))
     if not {goal.figure, f"{PARAM}kind"} <= set(flown.columns):
         columns = {f"{PARAM}kind": str, f"{PARAM}world": str, "seed": int, "completed": bool, goal.figure: float}
         flown = pl.DataFrame(schema=columns)
     mine = flown.filter((pl.col(f"{PARAM}kind") == goal.kind) & (pl.col(f"{PARAM}world") == goal.world))
-    counted = mine.filter(pl.col("completed")) if goal.over == "completed" else mine
+    counted = mine.filter(pl.col("completed")) if goal.of == "median" else mine
     now = counted.select("seed", pl.col(goal.figure).cast(float).alias("now"))
     now = now.filter(pl.col("now").is_finite())
     both = now.join(old, on="seed")
@@ -118,7 +122,7 @@ def outcome(goal: Goal, flown: pl.DataFrame, before: pl.DataFrame, planned: int)
     return Outcome(
         goal=goal,
         before=_median(old["before"]),
-        now=_SUMMARY[goal.over](now["now"]),
+        now=_SUMMARY[goal.of](now["now"]),
         ratio=float(np.median(ratios)) if len(ratios) else float("nan"),
         interval=exact_interval(ratios) if len(ratios) else (float("nan"), float("nan")),
         n=len(ratios) if goal.ratio_at_most is not None else now.height,
@@ -139,5 +143,5 @@ def _largest(values: pl.Series) -> float:
     return float(values.to_numpy().max()) if len(values) else float("nan")
 
 
-#: Figure of the flights by `Goal.over`.
-_SUMMARY = {"completed": _median, "all": _mean, "worst": _largest}
+#: Figure of the flights by `Goal.of`.
+_SUMMARY = {"median": _median, "mean": _mean, "largest": _largest}

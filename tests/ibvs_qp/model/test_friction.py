@@ -100,6 +100,16 @@ def test_a_noisy_velocity_delays_the_rise_but_does_not_begin_the_wait_anew() -> 
     )
 
 
+@pytest.mark.parametrize("commanded", [0.0, 0.005])
+def test_a_commanded_stop_begins_the_wait_anew(commanded: float) -> None:
+    block = estimator()
+    held = slide(block, 5.0, 1.5, 0.0, 2 * PATIENT_TICKS)
+    block.step.inputs["travel"][:] = 0.0, commanded, 0.0
+    assert slide(block, 5.0, 0.0, 0.0, 1) == held
+    block.step.inputs["travel"][:] = 0.0, -0.1, 0.0
+    assert slide(block, 5.0, -1.5, 0.0, PATIENT_TICKS) == held
+
+
 def test_a_tip_that_has_broken_away_raises_nothing() -> None:
     block = estimator()
     held = slide(block, 5.0, 1.5, 0.0, 4 * PATIENT_TICKS)

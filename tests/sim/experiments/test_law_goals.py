@@ -77,14 +77,14 @@ def test_without_flights_no_goal_is_met() -> None:
 
 @pytest.mark.parametrize(("bound", "met"), [(0.9, True), (0.95, False)])
 def test_a_share_is_that_of_all_flights(bound: float, met: bool) -> None:
-    goal = Goal(kind="paint", world="harsh", figure="completed", over="all", at_least=bound)
+    goal = Goal(kind="paint", world="harsh", figure="completed", of="mean", at_least=bound)
     flights = flown(0.7).with_columns((pl.col("seed") != 3).alias("completed"))
     found = outcome(goal, flights, BEFORE, 10)
     assert found.now == pytest.approx(0.9) and found.n == 10 and found.met is met
 
 
 def test_the_worst_flight_counts_completed_or_not() -> None:
-    goal = Goal(kind="paint", world="harsh", figure="path_rms_straight_m", over="worst", at_most=0.001)
+    goal = Goal(kind="paint", world="harsh", figure="path_rms_straight_m", of="largest", at_most=0.001)
     flights = flown(0.7).with_columns(pl.lit(False).alias("completed"))
     found = outcome(goal, flights, BEFORE, 10)
     assert found.now == flights[goal.figure].max() and found.n == 10 and not found.met
@@ -93,3 +93,7 @@ def test_the_worst_flight_counts_completed_or_not() -> None:
 def test_a_goal_states_one_bound() -> None:
     with pytest.raises(ConfigError, match="state one of"):
         Goal(kind="paint", world="harsh", figure="path_rms_m", at_most=1.0, ratio_at_most=1.0)
+    with pytest.raises(ConfigError, match="that of the median"):
+        Goal(kind="paint", world="harsh", figure="path_rms_m", of="mean", ratio_at_most=1.0)
+    with pytest.raises(ConfigError, match="upper bound"):
+        Goal(kind="paint", world="harsh", figure="path_rms_m", of="largest", at_least=1.0)

@@ -5,13 +5,12 @@ from __future__ import annotations
 import pytest
 
 from sim.evaluate.metrics import compute_metrics
-from sim.experiments.law_goals.__main__ import HERE
 from sim.flight.closed_loop import fly
 from sim.flight.options import FlightOptions
 from sim.world.scene import Scene
 from sim.world.worlds import in_world
 
-WORLD = str(HERE / "twice_harsh.toml")
+WORLD = "twice_harsh"
 
 
 @pytest.mark.slow

@@ -18,7 +18,7 @@ from sim.commands.cli import main
 from sim.tune.choice import STEEP, allowed, contact_damping, cost, front, gain_over, less_damped, ranked
 from sim.tune.finalists import Finalist, best_of, fly_finalists
 from sim.tune.flights import CHOICE_SEED, REPORT_SEED, SEARCH_SEED, WORLD, checks, flights, seeds, training
-from sim.tune.objectives import OBJECTIVES, PAINT, SLIDE, Score, refused, score
+from sim.tune.objectives import OBJECTIVES, PAINT, SATURATED, SLIDE, Score, refused, score
 from sim.tune.search import SearchPlan, finished, open_study, search
 from sim.tune.space import BY_HAND, GAIN_RANGES, Subject, from_unit, to_unit
 from sim.tune.verdict import differences, objection
@@ -168,7 +168,8 @@ def test_search_choice_and_report_fly_seeds_of_their_own():
     }
     assert len({run.params["scene"] for run in runs}) == len({run.plan.scene for run in runs}) == 9
     tasks = {run.params["scene"]: run.params["task"] for run in runs}
-    assert {scene for scene, task in tasks.items() if task == SLIDE} == {"sticking slide", "saturated slide"}
+    assert {scene for scene, task in tasks.items() if task == SLIDE} == {"sticking slide"}
+    assert tasks["saturated slide"] == SATURATED
     assert [run.params["scene"] for run in runs if not run.plan.config.controller.reach_check] == ["saturated slide"]
 
 
@@ -247,7 +248,8 @@ def test_command_writes_preset_trials_figures_and_verdict(flown, capsys):
     )
     everywhere = [each for each in content["unseen"] if each["scene"] == "all"]
     assert [each["objective"] for each in everywhere] == [each.name for each in OBJECTIVES]
-    counts = {each.name: 4 * (7 * (PAINT in each.tasks) + 2 * (SLIDE in each.tasks)) for each in OBJECTIVES}
+    flights_of = {PAINT: 7, SLIDE: 1, SATURATED: 1}
+    counts = {each.name: 4 * sum(flights_of[task] for task in each.tasks) for each in OBJECTIVES}
     assert all(each["n"] == counts[each["objective"]] and each["verdict"] == "better" for each in everywhere)
     assert {seed // 1000 for seed in flown} == {1, 2, 3}
     for name in ("qp-front.png", "qp-unseen.png"):

@@ -83,7 +83,7 @@ def test_errors_come_one_at_a_time():
 
 
 def test_worlds_have_names(tmp_path):
-    assert world_names() == ["datasheet", "harsh", "ideal"] and DEFAULT_WORLD in world_names()
+    assert world_names() == ["datasheet", "harsh", "ideal", "twice_harsh"] and DEFAULT_WORLD in world_names()
     assert {name: world_name(in_world(Scene(), name).errors) for name in world_names()} == {
         name: name for name in world_names()
     }
