@@ -47,7 +47,7 @@ class LimitSettings:
     )
     trim_deg: float = setting(
         0.0,
-        "roll and pitch that a push beyond the level reach may take",
+        "roll and pitch that a push above 85 % of the level reach may take",
         unit="deg",
         why="a permission of the mission: 2 deg add 1.0 N standing and 2.0 N sliding sideways at a friction of 0.8",
         low=0.0,
