@@ -49,7 +49,7 @@ MOST_LOST, LOST_N = 0.02, 0.3
 #: Last part of a stroke, whose overlap does not count [m].
 CORNER_M = 0.02
 #: A stroke is at its place, and touches the one before, if that holds at so many standard deviations [-].
-PLACE_SIGMAS, OVERLAP_SIGMAS = 2.0, 1.5
+PLACE_SIGMAS, GAP_SIGMAS = 2.0, 1.5
 #: Last part of a stroke, over which the edge at its end leads [m]: a gust of 2 N rms moves the tip by 15 mm beyond an
 #: end where velocity alone holds it. Over more, stiff line rows and the friction of 10 N at 0.7 shake the vehicle.
 LEAD_M = 0.05
@@ -442,8 +442,8 @@ class Painter(Navigation):
             return f"row {self.row} lost its edge, its overlap is known to {worst * 1e3:.1f} mm"
         if (unled := self._cross.longest_unled) > MOST_UNLED_M:
             return f"row {self.row} had no edge to follow for {unled:.2f} m"
-        deviation = OVERLAP_SIGMAS * np.hypot(known, self._cross.misfit)
-        if (least := (overlap - deviation).min(initial=math.inf)) < 0.0:
+        deviation = np.hypot(known, self._cross.misfit)
+        if (least := (overlap - GAP_SIGMAS * deviation).min(initial=math.inf)) < 0.0:
             return f"row {self.row} may leave a gap of {-least * 1e3:.1f} mm to the row before"
         nominal = self.config.brush_width_m - (self._v_target - self._place(self.row - 1))
         if (most := (largest + deviation).max(initial=0.0)) > MOST_OVERLAP * nominal:
