@@ -442,11 +442,11 @@ class Painter(Navigation):
             return f"row {self.row} lost its edge, its overlap is known to {worst * 1e3:.1f} mm"
         if (unled := self._cross.longest_unled) > MOST_UNLED_M:
             return f"row {self.row} had no edge to follow for {unled:.2f} m"
-        deviation = np.hypot(known, self._cross.misfit)
-        if (least := (overlap - GAP_SIGMAS * deviation).min(initial=math.inf)) < 0.0:
+        least = (overlap - GAP_SIGMAS * np.hypot(known, self._cross.misfit)).min(initial=math.inf)
+        if least < 0.0:
             return f"row {self.row} may leave a gap of {-least * 1e3:.1f} mm to the row before"
         nominal = self.config.brush_width_m - (self._v_target - self._place(self.row - 1))
-        if (most := (largest + deviation).max(initial=0.0)) > MOST_OVERLAP * nominal:
+        if (most := largest.max(initial=0.0)) > MOST_OVERLAP * nominal:
             return f"row {self.row} may overlap the row before by {most * 1e3:.1f} mm, nominal {nominal * 1e3:.1f} mm"
         place, known = self._cross.stroke_place(self._stroke_begin(), goal)
         aside = place - self._v_target
