@@ -75,7 +75,7 @@ def attitude(
         target: Roll and pitch to fly.
         rate_ahead: Angular velocity after the lead [rad/s], (3,).
         bandwidth_hz: Of the attitude estimate in roll and pitch [Hz] (`filtered_roll_pitch`).
-        trim_tilt: Roll and pitch that a push beyond the level reach takes [rad], (2,) (`ibvs_qp.model.trim_tilt`).
+        trim_tilt: Roll and pitch taken by a push above 85 % of the level reach [rad], (2,) (`ibvs_qp.model.trim_tilt`).
     """
     roll = ca.atan2(body.down[1], body.down[2])
     pitch = ca.asin(clamp(-body.down[0], -1.0, 1.0))

@@ -83,11 +83,8 @@ class Tune:
             except KeyboardInterrupt:
                 parts, trials = f"flights are in {folder / 'parts'}", f"finished trials are in {plan.storage}"
                 return interrupted(words, folder, parts if self.trials_of else trials)
-        print(
-            as_json(summary)
-            if self.json
-            else f"Report: {summary['report']}\n{'Weights' if self.law == 'mpc' else 'Preset'}: {summary['preset']}"
-        )
+        found = "Weights" if self.law == "mpc" else "Preset"
+        print(as_json(summary) if self.json else f"Report: {summary['report']}\n{found}: {summary['preset']}")
         return 0
 
     def _check(self) -> None:

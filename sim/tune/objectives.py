@@ -37,8 +37,8 @@ class Objective:
     def ratio(self, value: float, base: float) -> float:
         """Ratio of a value to that of the shipped preset, above 1 for a worse one.
 
-        Both are raised by the least difference that matters: a share of 0 is no infinite gain over one of 0.1 %. Only
-        the size of a figure counts.
+        The least difference that matters is added to both, so that the ratio stays finite where a figure is 0. The sign
+        of a figure does not count.
         """
         value, base = abs(value), abs(base)
         least = FIGURES[self.name].least[0] / self.scale

@@ -98,7 +98,7 @@ class Subject:
             return WEIGHT_RANGES
         mass = min(1.0, gain_factors(self.config.controller.vehicle)[0])
         impedance = {name: GAIN_RANGES[name] for name in ("force_ksp", "force_ksd")}
-        return GAIN_RANGES | {name: (mass * low, mass * high) for name, (low, high) in impedance.items()}
+        return GAIN_RANGES | {name: (mass * low, high) for name, (low, high) in impedance.items()}
 
     def having(self, values: Values) -> Subject:
         """The same with other values."""
