@@ -126,6 +126,22 @@ def test_no_wind_excuses_a_dead_sensor_for_long() -> None:
     assert Fault.PUSH_UNFELT in found
 
 
+@pytest.mark.parametrize(("inertial", "finds"), [(16.0, False), (18.5, True)])
+def test_a_sensor_that_follows_its_reference_is_not_dead(inertial: float, finds: bool) -> None:
+    """In gusts of 3 N rms along the normal: 14.8 N by inertial data, 4 N measured, 5 N asked."""
+    found = first_found(
+        lambda number: {"contact": CONTACT._replace(push=3.0)}, StubResponse(inertial_push=inertial, wind_spread=2.0)
+    )
+    assert (Fault.PUSH_UNFELT in found) is finds
+
+
+def test_a_sensor_that_dies_no_longer_follows() -> None:
+    found = first_found(
+        lambda number: {"contact": CONTACT._replace(push=0.0)}, StubResponse(inertial_push=12.0, wind_spread=5.0)
+    )
+    assert 0.2 < found[Fault.PUSH_UNFELT] < 0.4
+
+
 def test_far_from_the_wall_wind_is_no_push() -> None:
     found = first_found(
         lambda number: {"contact": CONTACT._replace(push=0.0, distance=0.3, in_contact=False), "press": False},
