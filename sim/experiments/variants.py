@@ -13,8 +13,6 @@ from ibvs_qp.config.settings import from_dict
 from ibvs_qp.config.toml_text import read_toml
 from ibvs_qp.pilot import PilotConfig
 
-#: Force gains of direct control: those tuned for the laws before a filter learnt the disturbance.
-DIRECT_GAINS = {"force_kfp": 0.2153, "force_kfi": 1.424}
 #: The gyro in full, and no lead.
 GYRO_ITSELF = AngularRateSettings(gyro_bandwidth_hz=1000.0, lead_s=0.0)
 
@@ -51,8 +49,7 @@ REFERENCES = {name: variant.against for name, variant in VARIANTS.items()}
 
 
 def with_force_gain(config: PilotConfig, factor: float) -> PilotConfig:
-    """The pilot with stiffer force feedback: K_fp and K_fi of direct control, times a factor less one, on top."""
+    """The pilot with the force gains K_fp and K_fi multiplied."""
     gains = config.controller.gains
-    more = {name: getattr(gains, name) + (factor - 1.0) * gain for name, gain in DIRECT_GAINS.items()}
-    gains = dataclasses.replace(gains, **more)
+    gains = dataclasses.replace(gains, force_kfp=factor * gains.force_kfp, force_kfi=factor * gains.force_kfi)
     return dataclasses.replace(config, controller=dataclasses.replace(config.controller, gains=gains))

@@ -39,7 +39,7 @@ def predicted_damping(law: str, variant: str, gain: float, stiffness: float, del
     Args:
         law: Law at its shipped gains.
         variant: Key of `VARIANTS`.
-        gain: Factor of `with_force_gain`.
+        gain: Factor on K_fp and K_fi.
         stiffness: Stiffness of the wall [N/m].
         delay_s: Latency of the force/torque sensor [s]; half a sample period is added.
     """
