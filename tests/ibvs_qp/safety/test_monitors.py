@@ -103,7 +103,9 @@ def test_mission_time_ends_the_flight() -> None:
     assert assurance.state in (SafetyState.RETREAT, SafetyState.HOVER)
 
 
-@pytest.mark.parametrize(("inertial", "measured", "finds"), [(9.0, 0.0, True), (9.0, 5.0, False), (7.0, 0.0, False)])
+@pytest.mark.parametrize(
+    ("inertial", "measured", "finds"), [(9.0, 0.0, True), (9.0, 5.0, False), (7.0, 0.0, False), (30.0, 10.0, False)]
+)
 def test_a_push_must_be_measured_by_the_force_sensor(inertial: float, measured: float, finds: bool) -> None:
     found = first_found(
         lambda number: {"contact": CONTACT._replace(push=measured)}, StubResponse(inertial_push=inertial)
