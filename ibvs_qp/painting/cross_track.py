@@ -286,8 +286,7 @@ class CrossTrack:
         Its map is from now on that of its outer edge, which a gust may have moved where it was painted again.
         """
         self._laying, self.unled = False, 0.0
-        for found, _ in self._again:
-            self.maps[-1] = self.maps[-1].widened(found)
+        self.maps[-1] = self._outermost()
         self._again = []
         if len(self.maps) > 1:  # the first stroke has no last edge
             self._stroke_misfits.append(self.misfit)
@@ -388,15 +387,23 @@ class CrossTrack:
     def _own_edges(self, lines: list[PatternLine], u: float, ahead: float) -> list[PatternLine]:
         """Both edges of the stroke that is being laid, behind the brush: they show where the tip is in the picture.
 
-        On its own paint the outer one, on either side: ``ahead`` is then 0, and the inner one is that of the brush.
+        On its own paint the outer one, on either side, as every pass over it left it: ``ahead`` is then 0, and the
+        inner one is that of the brush.
         They lead the tip, too, where no other edge is in view: velocity alone holds it half as well against friction.
         """
-        paint = [line for line in lines if line.kind == "paint"]
+        paint, stroke = [line for line in lines if line.kind == "paint"], self._outermost()
         seen = []
         for side in (1, -1) if ahead else (1,):
             found = [line for line in paint if line.side == side]
-            seen.append(self._painted_edge(found, self.maps[-1], (u, -ahead), side * self._half, _OWN))
+            seen.append(self._painted_edge(found, stroke, (u, -ahead), side * self._half, _OWN))
         return [line for line in seen if line is not None]
+
+    def _outermost(self) -> StrokeMap:
+        """Map of the stroke in progress, where it was painted again that of its outermost line."""
+        stroke = self.maps[-1]
+        for found, _ in self._again:
+            stroke = stroke.widened(found)
+        return stroke
 
     def _painted_edge(
         self,
