@@ -23,7 +23,7 @@ from sim.flight.jobs import Job, PaintJob
 from sim.world.board import BoardGeometry
 from sim.world.clearance import PropellerClearance
 from sim.world.crash import GROUND_CLEARANCE_M
-from sim.world.scene import Scene
+from sim.world.scene import ImuScene, Scene
 from sim.world.trim import START_DISTANCE_M, START_DOWN_M, START_YAW_DEG
 
 #: Neighbouring strokes come locally up to 7 mm farther apart than nominal (14 pairs of strokes of 0.6 and 0.8 m in the
@@ -39,6 +39,9 @@ CONTROL_RESERVE_M_S2 = 0.5
 #: Mean lag of the plant's motors over the vehicle's, at most [-]: the QP completes at 1.9 (2 seeds of the world
 #: datasheet), a monitor ends 1 of 2 flights at 2.3, and it crashes at 2.6.
 LARGEST_LAG_RATIO = 2.0
+#: Noise of the IMU per sample, at most: accelerometer [m/s^2], gyro [rad/s], attitude [deg]. Jobs complete at 0.95,
+#: 0.095 and 0.4 under both laws (2 seeds each in the world datasheet), and fail at 1.9, 0.19 and 0.8.
+MOST_ACCEL_NOISE, MOST_GYRO_NOISE, MOST_ATTITUDE_NOISE_DEG = 1.2, 0.12, 0.5
 #: Time of a job in gusts over that of its strokes alone [-]: most of them are painted again in the harsh world.
 AGAIN = 2.0
 
@@ -207,6 +210,7 @@ def _sensors(scene: Scene, config: PilotConfig) -> Iterator[str]:
     if scene.imu.rate_hz * tick < 1.0 - ROUNDING:
         allowed, reason = f"allowed is at least {1.0 / tick:g} Hz", "attitude and IMU are sampled once a tick"
         yield _problem("imu.rate_hz", scene.imu.rate_hz, "Hz", allowed, reason, ("controller.tick_s", tick, "s"))
+    yield from _noise(scene.imu)
     # Jitter of delivery is exponential: its mean, and as much again for its standard deviation.
     late = camera.latency_s + 2.0 * scene.errors.timing.jitter_s + abs(scene.errors.timing.stamp_error_s)
     old = list(_age("camera", camera.rate_hz, camera.latency_s, late, tick, *_oldest_picture(safety)))
@@ -220,6 +224,19 @@ def _sensors(scene: Scene, config: PilotConfig) -> Iterator[str]:
     if safety.supervise:
         delay = force.latency_s
         yield from _age("force_torque", force.rate_hz, delay, delay, tick, "safety.wrench_age_s", safety.wrench_age_s)
+
+
+def _noise(imu: ImuScene) -> Iterator[str]:
+    """Odometer and attitude bear the noise of the IMU."""
+    root, rate = math.sqrt(imu.rate_hz), ("imu.rate_hz", imu.rate_hz, "Hz")
+    for field, value, unit, most in (
+        ("imu.accel_density", imu.accel_density, "m/s^2/sqrt(Hz)", MOST_ACCEL_NOISE / root),
+        ("imu.gyro_density", imu.gyro_density, "rad/s/sqrt(Hz)", MOST_GYRO_NOISE / root),
+        ("imu.attitude_noise_deg", imu.attitude_noise_deg, "deg", MOST_ATTITUDE_NOISE_DEG),
+    ):
+        if value > most + ROUNDING:
+            reason = "stronger noise disturbs odometer and attitude"
+            yield _problem(field, value, unit, f"allowed is at most {most:.3g} {unit}", reason, rate)
 
 
 def _oldest_picture(safety: SafetySettings) -> tuple[str, float]:

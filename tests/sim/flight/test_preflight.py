@@ -124,6 +124,21 @@ LIMITS = {
         Scene(imu=ImuScene(rate_hz=250.0)),
         ["imu.rate_hz = 249.0 Hz", "at least 250 Hz"],
     ),
+    "accelerometer noise": (
+        Scene(imu=ImuScene(accel_density=0.077)),
+        Scene(imu=ImuScene(accel_density=0.075)),
+        ["imu.accel_density = 0.077 m/s^2/sqrt(Hz)", "at most 0.0759", "imu.rate_hz = 250 Hz"],
+    ),
+    "gyro noise": (
+        Scene(imu=ImuScene(gyro_density=0.0077)),
+        Scene(imu=ImuScene(gyro_density=0.0075)),
+        ["imu.gyro_density = 0.0077 rad/s/sqrt(Hz)", "at most 0.00759"],
+    ),
+    "attitude noise": (
+        Scene(imu=ImuScene(attitude_noise_deg=0.51)),
+        Scene(imu=ImuScene(attitude_noise_deg=0.5)),
+        ["imu.attitude_noise_deg = 0.51 deg", "at most 0.5 deg"],
+    ),
     "wind that no level vehicle holds": (
         Scene(wind=WindScene(mean_m_s=(-9.6, 9.6, 0.0))),
         Scene(wind=WindScene(mean_m_s=(-9.5, 9.5, 0.0))),
