@@ -54,14 +54,15 @@ class ControllerConfig:
         ("tip", "paper"),
     )
     analytic_line_point: str = choice(
-        "centre",
-        "error of the analytic law's line rows: rho at the image centre, as printed, or at the point where the tip "
-        "meets the wall",
-        ("centre", "tip"),
+        "tip",
+        "error of the analytic law's line rows: at the point where the tip meets the wall, or rho at the image centre, "
+        "as printed",
+        ("tip", "centre"),
     )
     analytic_angle_row: bool = setting(
-        True,
-        "angle row of the analytic law (False: level flight alone fixes roll; theta_kp = 0 still takes roll from it)",
+        False,
+        "angle row of the analytic law, as printed; False: level flight alone fixes roll, whose peak is a third of that "
+        "with the row (theta_kp = 0 still takes roll from it)",
     )
     line_slots: int = setting(3, "lines the fixed program has room for; each costs 500 instructions", low=1, high=16)
     tick_s: float = setting(

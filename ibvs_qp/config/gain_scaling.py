@@ -11,16 +11,11 @@ from ibvs_qp.config.vehicle import VehicleParams
 LAWS = ("qp", "paper")
 #: Vehicle that both laws were tuned for.
 _TUNED_FOR = VehicleParams()
-#: Gains of the analytic law, as in its preset; those of the program are the defaults of `Gains`.
+#: Gains of the analytic law that differ, as in its preset; those of the program are the defaults of `Gains`.
 _PAPER = {
-    "line_kp": 73.02,
-    "line_kd": 23.42,
-    "line_ki": 1.852,
     "theta_kp": 7.65,
     "theta_kd": 13.59,
     "body_rotation_gain": 0.3843,
-    "line_lead_s": 0.0,
-    "line_filter_s": 0.0,
 }
 #: Seconds in the denominator of a unit: what a gain of that unit takes from slower motors.
 _PER_SECOND = {"1/s": 1, "1/s^2": 2, "1/s^3": 3, "N s/m": 1, "N/m": 2}

@@ -23,6 +23,7 @@ class Variant:
 
     words: str  # what differs, for tables
     switches: dict[str, bool | str] = field(default_factory=dict)  # fields of ControllerConfig
+    gains: dict[str, float] = field(default_factory=dict)  # gains that differ
     gains_of: str = ""  # law whose shipped gains it flies; empty for its own
     gyro_rate: bool = False  # whether rotation is damped on the gyro itself
     rival: str = ""  # control law of sim.rivals that flies instead of the law, as in FlightOptions
@@ -33,8 +34,9 @@ class Variant:
     def apply(self, config: PilotConfig) -> PilotConfig:
         """The configuration with the switches set."""
         changes: dict[str, Any] = dict(self.switches)
-        if self.gains_of:
-            changes["gains"] = ibvs_qp.preset(self.gains_of).controller.gains
+        if self.gains_of or self.gains:
+            gains = ibvs_qp.preset(self.gains_of).controller.gains if self.gains_of else config.controller.gains
+            changes["gains"] = dataclasses.replace(gains, **self.gains)
         if self.gyro_rate:
             changes["angular_rate"] = GYRO_ITSELF
         return dataclasses.replace(config, controller=dataclasses.replace(config.controller, **changes))

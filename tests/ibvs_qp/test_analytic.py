@@ -32,8 +32,9 @@ from ibvs_qp.model.interaction_matrix import endpoint_line_row, line_interaction
 from ibvs_qp.model.setpoints import Setpoints
 
 CONFIG = ControllerConfig()
-#: For the law written out by hand.
+#: For the law written out by hand, and with the rows of its lines as printed.
 PLAIN = without_rotors(CONFIG)
+PRINTED = replace(PLAIN, analytic_line_point="centre", analytic_angle_row=True)
 MASS = CONFIG.vehicle.mass_kg
 MASSES = np.array([MASS] * 3 + list(CONFIG.vehicle.inertia_kg_m2))
 
@@ -63,7 +64,7 @@ def stacked(setpoints: Setpoints) -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize("share", [0.0, 0.4, 1.0])
 def test_the_wrench_is_the_law_by_hand(lines: int, share: float) -> None:
     for seed in range(15):
-        setpoints = terms_of(seed, lines, share, PLAIN)
+        setpoints = terms_of(seed, lines, share, PRINTED)
         normal = setpoints.normal
         null = np.concatenate(
             (
@@ -102,7 +103,7 @@ def test_one_angle_row_only() -> None:
         wall.line(0.05, 0.5 * math.pi + 0.02, HORIZONTAL),
         wall.line(-0.12, -0.02, VERTICAL),
     )
-    setpoints = analytic_setpoints(PLAIN)
+    setpoints = analytic_setpoints(PRINTED)
     setpoints.update(measured(0, plane=wall.plane, lines=seen), Reference(lines=line_references(2), contact=True))
     assert len(setpoints.lines) == 2
     matrix, feedback = stacked(setpoints)
