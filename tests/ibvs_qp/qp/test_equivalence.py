@@ -116,7 +116,8 @@ def test_in_the_paper_profile_the_program_converges_to_the_paper_law(lines: int)
     errors = []
     for weight in (1e2, 1e3, 1e4, 1e6):
         weights = Weights(line=weight, effort=1e-9, smoothness=0.0, line_sigma=1.0, **wishes)
-        config = ControllerConfig(weights=weights, line_profile="paper", barriers=False)
+        printed = ControllerConfig(analytic_line_point="centre", analytic_angle_row=True)
+        config = replace(printed, weights=weights, line_profile="paper", barriers=False)
         controller, worst = HybridController(config), 0.0
         for seed in range(5):
             controller.reset()
