@@ -61,8 +61,8 @@ class ControllerConfig:
     )
     analytic_angle_row: bool = setting(
         False,
-        "angle row of the analytic law, as printed; False: level flight alone fixes roll, whose peak is a third of that "
-        "with the row (theta_kp = 0 still takes roll from it)",
+        "angle row of the analytic law, as printed; False: level flight alone fixes roll, its peak falls to a third "
+        "(theta_kp = 0 still takes roll from it)",
     )
     line_slots: int = setting(3, "lines the fixed program has room for; each costs 500 instructions", low=1, high=16)
     tick_s: float = setting(

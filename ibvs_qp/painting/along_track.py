@@ -47,6 +47,8 @@ class AlongTrack:
         self.slip = self.step = 0.0
         self._way = self._way_variance = self._began = self._began_variance = 0.0
         self.end = self.near = -1
+        self._pass_way = self._pass_variance = 0.0
+        self._trail: list[tuple[float, float]] = []  # way by the odometer and u at every look of the pass [m]
 
     @property
     def u(self) -> float:
@@ -68,6 +70,7 @@ class AlongTrack:
         self.step = du
         self._x[0] += du
         self._way += du
+        self._pass_way += du
         self._p[0, 0] += DRIFT_PER_M * abs(du)
         self._way_variance += DRIFT_PER_M * abs(du)
 
@@ -80,6 +83,27 @@ class AlongTrack:
         """A stroke begins here."""
         self._way = self._way_variance = self.slip = 0.0
         self._began, self._began_variance = self.u, float(self._p[0, 0])
+        self.begin_pass()
+
+    def begin_pass(self) -> None:
+        """A way along the stroke begins here: the stroke, or a retouch one way or the other."""
+        self._pass_way, self._pass_variance = 0.0, float(self._p[0, 0])
+        self._trail = [(0.0, self.u)]
+
+    def smoothed(self) -> tuple[np.ndarray, np.ndarray]:
+        r"""Places of the pass as they were estimated on the way, and as every later correction shows them.
+
+        A correction c belongs to what came before it as the variance grew by the odometer,
+
+        .. math:: u_k + \sum_{j > k} \frac{P_0 + q s_k}{P_0 + q s_j} c_j.
+
+        Returns:
+            u before and after [m], (looks,) each.
+        """
+        way, u = np.array(self._trail).T
+        variance = self._pass_variance + DRIFT_PER_M * np.abs(way) + MARGIN_STD**2
+        weighed = (np.diff(u, prepend=u[0]) - np.diff(way, prepend=way[0])) / variance
+        return u, u + variance * (np.cumsum(weighed[::-1])[::-1] - weighed)
 
     @property
     def moved(self) -> float:
@@ -143,6 +167,7 @@ class AlongTrack:
         beside = [line for line in beside if line.weight > (LOST_WEIGHT if self._near_known else MARK_WEIGHT)]
         near, erred = self._near_edge(beside)
         self.near = -1 if near is None else near.track.track_id
+        self._trail.append((self._pass_way, self.u))
         return noticed or erred
 
     @property

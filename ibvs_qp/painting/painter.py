@@ -49,7 +49,7 @@ MOST_LOST, LOST_N = 0.02, 0.3
 #: Last part of a stroke, whose overlap does not count [m].
 CORNER_M = 0.02
 #: A stroke is at its place, and touches the one before, if that holds at so many standard deviations [-].
-PLACE_SIGMAS, GAP_SIGMAS = 2.0, 1.5
+PLACE_SIGMAS, GAP_SIGMAS = 2.0, 2.0
 #: Last part of a stroke, over which the edge at its end leads [m]: a gust of 2 N rms moves the tip by 15 mm beyond an
 #: end where velocity alone holds it. Over more, stiff line rows and the friction of 10 N at 0.7 shake the vehicle.
 LEAD_M = 0.05
@@ -64,11 +64,14 @@ LEAST_OVERLAP, MOST_OVERLAP = 0.75, 3.0
 #: Retouches of one stroke [-]; standard deviations by which its overlap must be positive [-]; length that is painted
 #: again before the gap [m]; the tip turns this far from the beginning of the stroke [m]: friction lets it slide on, by
 #: 11 mm in the datasheet world.
-MOST_RETOUCHES, RETOUCH_SIGMAS, RETOUCH_BEFORE_M, TURN_BEFORE_M = 2, 2.0, 0.1, 0.02
+MOST_RETOUCHES, RETOUCH_SIGMAS, RETOUCH_BEFORE_M, TURN_BEFORE_M = 2, 2.5, 0.1, 0.02
 #: Target overlap of a retouch over the nominal overlap [-]. The tip keeps off the outer edge that the stroke has left:
 #: an edge that it paints anew moves with it and shows no error. At 1.25 retouches in the harsh world drifted outwards
 #: by up to 16 mm, and every following stroke with them; at 2 the overlap exceeded `MOST_OVERLAP` times the nominal one.
 RETOUCH_OVERLAP = 1.5
+#: Most by which the target overlap of a stroke, and of its retouch, exceeds the planned one, over the job's [-]: waves
+#: of both strokes add to it. A retouch that followed a deep first pass, 17 mm, ended at 24 to 26 mm.
+EXCESS, RETOUCH_EXCESS = 1.0, 0.75
 
 
 class Painter(Navigation):
@@ -260,10 +263,12 @@ class Painter(Navigation):
         if self._fails_by_time(inputs, f"the retouch of row {self.row}", goal):
             return self._stroke_command(inputs)
         first, _ = self._cross.stroke_place(*self._beside(REACTION_M, 0.5 * self.config.brush_width_m))
-        target = self._touching_target(RETOUCH_OVERLAP)
-        if self._run_towards(inputs, goal, target if math.isnan(first) else min(target, first), dt):
+        farthest = math.inf if math.isnan(first) else first
+        target = self._touching_target(RETOUCH_OVERLAP, farthest=farthest, excess=RETOUCH_EXCESS)
+        if self._run_towards(inputs, goal, target, dt):
             if back:
                 self._back_to = math.nan
+                self._cross.end_pass(*self._along.smoothed())
                 self._turn_round()
             else:
                 self._end_stroke(inputs)
@@ -274,6 +279,7 @@ class Painter(Navigation):
         self._speed, self._follows_end = 0.0, False
         self._stroke_end.begin()
         self._cross.begin_again()
+        self._along.begin_pass()
 
     def _fails_by_time(self, inputs: PainterInput, name: str, goal: float) -> bool:
         """Whether this phase takes longer than its way allows; the job has then failed."""
@@ -381,6 +387,7 @@ class Painter(Navigation):
 
     def _end_stroke(self, inputs: PainterInput) -> None:
         self._longest = max(self._longest, self._along.stroke_length + self._behind)
+        self._cross.end_pass(*self._along.smoothed())
         if self._begin_retouch(inputs):
             return
         self._uncertain = self._uncertain or self._doubt()
@@ -445,7 +452,7 @@ class Painter(Navigation):
         least = (overlap - GAP_SIGMAS * np.hypot(known, self._cross.misfit)).min(initial=math.inf)
         if least < 0.0:
             return f"row {self.row} may leave a gap of {-least * 1e3:.1f} mm to the row before"
-        nominal = self.config.brush_width_m - (self._v_target - self._place(self.row - 1))
+        nominal = self._planned_overlap()
         if (most := largest.max(initial=0.0)) > MOST_OVERLAP * nominal:
             return f"row {self.row} may overlap the row before by {most * 1e3:.1f} mm, nominal {nominal * 1e3:.1f} mm"
         place, known = self._cross.stroke_place(self._stroke_begin(), goal)
@@ -477,18 +484,28 @@ class Painter(Navigation):
 
         The last stroke of a filling job may have less than the job's.
         """
-        if self.row < 2:
-            return 0.0
-        return min(self.config.overlap_m, self.config.brush_width_m - (self._v_target - self._place(self.row - 1)))
+        return 0.0 if self.row < 2 else min(self.config.overlap_m, self._planned_overlap())
+
+    def _planned_overlap(self) -> float:
+        """Overlap of the stroke with the one before at their places [m]: the last one of a filling job has more."""
+        return self.config.brush_width_m - (self._v_target - self._place(self.row - 1))
 
     def _aside(self, way: float = ASIDE_M) -> float:
         """Way outwards at which an edge shows that the arm hides from a tip that errs inwards [m]."""
         return max(min(way, MOST_ASIDE * self._nominal_overlap()), 0.0)
 
-    def _touching_target(self, share: float, aside: float = 0.0) -> float:
-        """Target v [m]: the stroke's place, or less where its overlap would be below this share of the nominal one."""
-        inside = share * self._nominal_overlap()
-        return min(self._v_target + aside, self._reach_of_last(REACTION_M, 0.5 * self.config.brush_width_m) - inside)
+    def _touching_target(
+        self, share: float, aside: float = 0.0, farthest: float = math.inf, excess: float = EXCESS
+    ) -> float:
+        """Target v [m]: the stroke's place, or beside it where the stroke before lies off its own.
+
+        The overlap is at least a share of the job's, and exceeds the planned one by at most another.
+        """
+        reach = self._reach_of_last(REACTION_M, 0.5 * self.config.brush_width_m)
+        if math.isinf(reach):
+            return min(self._v_target + aside, farthest)
+        deepest = reach - self._planned_overlap() - excess * self.config.overlap_m
+        return max(min(self._v_target + aside, farthest, reach - share * self._nominal_overlap()), deepest)
 
     def _lead_to_end(self, remaining: float, speed: float, dt: float) -> None:
         """Over its last centimetres the edge at the end of the stroke leads: from where the tip is, at its speed.

@@ -13,6 +13,27 @@ BIN_M, BEYOND_M = 0.01, 0.3
 _LEAST_SHARE = 0.5
 
 
+def band_edge(u: np.ndarray, v: np.ndarray, radius: float, side: int) -> np.ndarray:
+    r"""Edge of the band that a round brush leaves along a line, less its radius.
+
+    .. math:: \pm \max_j \left( \pm v_j + \sqrt{r^2 - (u_k - u_j)^2} \right) \mp r
+
+    A narrow dip of the line is filled by the brush on both sides of it.
+
+    Args:
+        u: Places along the line [m], (n,).
+        v: Places across it [m], (n,).
+        radius: Of the brush r [m].
+        side: +1 for the edge at larger v, -1 for the other one.
+
+    Returns:
+        v [m], (n,).
+    """
+    ahead = np.square(u[:, np.newaxis] - u)
+    reach = np.where(ahead < radius**2, np.sqrt(np.maximum(radius**2 - ahead, 0.0)) - radius, -math.inf)
+    return side * (side * v + reach).max(axis=1, initial=-math.inf)
+
+
 class StrokeMap:
     """v of the tip in bins of u.
 
@@ -43,6 +64,24 @@ class StrokeMap:
         count = np.array(self._count, float)
         u = BIN_M * (np.arange(count.size) + 0.5) - BEYOND_M
         return u, np.divide(self._sum, count, out=np.full(count.size, math.nan), where=count > 0.0)
+
+    def moved(self, before: np.ndarray, after: np.ndarray) -> StrokeMap:
+        """The same stroke where its places along u turn out to be others.
+
+        Args:
+            before: Places as they were when the stroke was laid [m], (n,).
+            after: Where they are [m], (n,).
+        """
+        order = np.argsort(before)
+        u, v = self.places()
+        painted = np.isfinite(v)
+        laid, stroke = u[painted] + np.interp(u[painted], before[order], (after - before)[order]), copy.copy(self)
+        if laid.size:
+            along = np.argsort(laid)
+            near = np.abs(u[:, np.newaxis] - laid).min(axis=1) <= BIN_M
+            stroke._count = near.astype(int).tolist()
+            stroke._sum = np.where(near, np.interp(u, laid[along], v[painted][along]), 0.0).tolist()
+        return stroke
 
     def widened(self, again: StrokeMap) -> StrokeMap:
         """Outermost line of this stroke and of one painted over it: v is the larger one where both lie."""

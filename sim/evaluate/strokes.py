@@ -2,7 +2,7 @@
 
 Stroke k belongs on the line v = `BoardGeometry.stroke_place`, counted from the board's edge, whatever the strokes
 before it did. A stroke's line is the mean of its tip path over pieces along u, of what lies on the board in contact;
-its band is that of this line and of the line along which it was painted again.
+its band is what a round brush covers along this line and the line along which it was painted again.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ibvs_qp.painting.stroke_map import band_edge
 from sim.evaluate.paint_plan import BIN_M, averaged
 from sim.evaluate.window import CONTACT_N, board_tip, in_phase, physics_ticks
 from sim.flight.trace import Trace
@@ -91,10 +92,12 @@ def _band(line: np.ndarray, again: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _overlap(line: np.ndarray, before: np.ndarray, width: float, backwards: bool) -> np.ndarray:
     """Overlap of the bands of two strokes at every piece of the second, without its last `END_M` [m]."""
-    end = line[0, 0] if backwards else line[-1, 0]
-    u, v = line[np.abs(line[:, 0] - end) > END_M].T
-    beyond = np.maximum(0.0, np.maximum(before[0, 0] - u, u - before[-1, 0]) - 0.5 * width)  # past its round end
-    return width - (v - np.interp(u, *before.T)) - beyond
+    radius, end = 0.5 * width, line[0, 0] if backwards else line[-1, 0]
+    inner, outer = band_edge(line[:, 0], line[:, 1], radius, -1), band_edge(before[:, 0], before[:, 1], radius, 1)
+    counts = np.abs(line[:, 0] - end) > END_M
+    u, v = line[counts, 0], inner[counts]
+    beyond = np.maximum(0.0, np.maximum(before[0, 0] - u, u - before[-1, 0]) - radius)  # past its round end
+    return width - (v - np.interp(u, before[:, 0], outer)) - beyond
 
 
 def contact_share(trace: Trace, ticks: np.ndarray) -> float:

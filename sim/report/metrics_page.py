@@ -33,10 +33,10 @@ a line on standard error, and it counts as failed in every experiment and sweep.
 A paint job is completed if
 
 - every row is *at its place*: its **place error**, the mean over its straight part (without {corner:.0f} cm at both
-  ends) of (true tip line − nominal line) when it was first painted, is at most {place:.0f} mm, and its band, with what
-  was painted again (phase `retouch`), touches or overlaps that of the row before everywhere but in the last
-  {end:.0f} cm, by at most {most:g} times the nominal overlap. Nominal lines count from the board's edge, whatever the
-  rows before did, so errors add up;
+  ends) of (true tip line − nominal line) when it was first painted, is at most {place:.0f} mm, and its band (what
+  the round brush covers, with what was painted again, phase `retouch`) touches or overlaps that of the row
+  before everywhere but in the last {end:.0f} cm, by at most {most:g} times the nominal overlap. Nominal lines count
+  from the board's edge, whatever the rows before did, so errors add up;
 - every row has its length within {length:.0f} cm. Only what is painted on the board counts;
 - the brush touches in {contact:.0f} % of the painting time, {rough:.0f} % with gusts or in the harsh world;
 - the tip ends at least {away:.0f} cm from the board, without a crash and without a time-out.

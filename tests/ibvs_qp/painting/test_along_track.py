@@ -67,6 +67,28 @@ def test_the_end_corrects_what_the_odometer_has_lost(error: float) -> None:
     assert along.u == pytest.approx(0.9 + error, abs=1e-3) and along.deviation < 1e-3 and along.end_seen
 
 
+def test_what_an_edge_shows_at_the_end_belongs_to_the_way_before() -> None:
+    along, error = at_the_margin(), 0.02
+    along.begin_stroke()
+    for _ in range(90):
+        along.predict(0.01)
+        along.look([])
+    for _ in range(20):
+        along.look([upright(3, END_U - 0.9 - error, -1)])
+    for _ in range(10):
+        along.predict(0.01)
+        along.look([upright(3, END_U - along.u, -1)])
+    before, after = along.smoothed()
+    known = along.u - 1.0
+    assert known == pytest.approx(error, abs=1e-3)
+    assert after[0] - before[0] == pytest.approx(0.0, abs=3e-3), "the edge beside the beginning was in view"
+    assert after[45] - before[45] == pytest.approx(0.55 * known, rel=0.05), "half, and a part of the beginning's"
+    assert after[89] - before[89] == pytest.approx(known, rel=0.05)
+    assert after[-1] == before[-1] == along.u
+    along.begin_pass()
+    np.testing.assert_array_equal(along.smoothed(), [[along.u], [along.u]])
+
+
 @pytest.mark.parametrize("shift", [-0.1, 0.1])
 def test_a_board_of_another_length_moves_the_origin_and_is_noticed(shift: float) -> None:
     along = at_the_margin()

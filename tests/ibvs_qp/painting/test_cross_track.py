@@ -480,6 +480,39 @@ def test_paint_laid_again_farther_in_adds_to_the_overlap_and_not_to_the_map() ->
 
 
 @pytest.mark.parametrize("middle", [-0.14, 0.14])
+def test_on_its_own_paint_the_edge_is_where_the_last_pass_left_it(middle: float) -> None:
+    cross, outwards = _after_stroke_one(), 0.004
+    cross.begin_stroke()
+    for k in range(60):
+        cross.lay(0.6 - 0.01 * k)
+    cross.predict(0.0, outwards, 0.1)
+    cross.begin_again()
+    for k in range(60):
+        cross.lay_again(0.01 * k)
+    cross.predict(0.0, -outwards, 0.1)
+    cross.begin_again()
+    v = cross.v
+    cross.look([parallel(102, HALF + outwards, 1, "paint", middle, 0.16)], 0.3, 1.0, again=True)
+    assert cross.v == pytest.approx(v, abs=1e-6) and list(cross.guides) == [102]
+
+
+def test_a_stroke_that_ends_elsewhere_than_the_odometer_says_moves_its_waves() -> None:
+    """A dip of stroke 2 towards stroke 1 lies 2 cm nearer to its end than it seemed."""
+    cross = _after_stroke_one()
+    cross.begin_stroke()
+    for k in range(60):
+        u, dip = 0.595 - 0.01 * k, 0.006 if 25 <= k < 31 else 0.0
+        cross.predict(-0.01, -dip, 0.1)
+        cross.lay(u)
+        cross.predict(0.0, dip, 0.1)
+    u, overlap, *_ = cross.overlap(0.0, 0.6)
+    assert u[overlap > overlap.min() + 0.005].mean() == pytest.approx(0.32, abs=0.006)
+    cross.end_pass(np.array([0.6, 0.0]), np.array([0.58, -0.02]))
+    u, overlap, *_ = cross.overlap(0.0, 0.6)
+    assert u[overlap > overlap.min() + 0.005].mean() == pytest.approx(0.30, abs=0.006)
+
+
+@pytest.mark.parametrize("middle", [-0.14, 0.14])
 def test_on_its_own_paint_the_tip_goes_by_the_edge_on_either_side(middle: float) -> None:
     """Ahead of the way out (-u) it seems to lie 1 mm farther out, by beta, and that is no error of v."""
     cross = _after_stroke_one()

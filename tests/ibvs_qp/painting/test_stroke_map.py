@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from ibvs_qp.painting.stroke_map import BEYOND_M, BIN_M, StrokeMap
+from ibvs_qp.painting.stroke_map import BEYOND_M, BIN_M, StrokeMap, band_edge
 
 
 def straight_map(first: float = 0.0, last: float = 0.6, slope: float = 0.1, length: float = 0.6) -> StrokeMap:
@@ -61,3 +61,31 @@ def test_a_widened_map_is_the_outermost_of_both_where_both_lie() -> None:
     assert [wide.mean(u, u) for u in (0.105, 0.115, 0.125)] == pytest.approx([0.052, 0.05, 0.05])
     assert math.isnan(wide.mean(0.205, 0.205))
     assert first.mean(0.105, 0.105) == pytest.approx(0.05)
+
+
+def test_a_moved_map_has_its_waves_and_holes_elsewhere() -> None:
+    stroke = StrokeMap(0.6)
+    for u in np.arange(0.0, 0.6, 0.002):
+        if not 0.4 <= u < 0.45:
+            stroke.add(float(u), 0.05 - (0.01 if 0.2 <= u < 0.3 else 0.0))
+    before = np.array([0.6, 0.3, 0.0])
+    moved = stroke.moved(before, before + 0.1 * before)
+    u, v = moved.places()
+    wave = u[v < 0.045]
+    assert wave.min() == pytest.approx(0.22, abs=0.006) and wave.max() == pytest.approx(0.33, abs=0.006)
+    assert np.isnan(v[(u > 0.455) & (u < 0.475)]).all() and np.isfinite(v[(u > 0.01) & (u < 0.43)]).all()
+    assert np.nanmax(u[np.isfinite(v)]) == pytest.approx(0.6 + 0.055, abs=0.01)
+    assert stroke.mean(0.25, 0.25) == pytest.approx(0.04)
+    assert not np.isfinite(StrokeMap(0.6).moved(before, before).places()[1]).any()
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_round_brush_fills_a_dip_from_both_sides_and_widens_no_line(side: int) -> None:
+    u, radius = np.arange(0.0, 0.3, 0.005), 0.04
+    slope = 0.1 * u
+    edge = band_edge(u, slope, radius, side)
+    assert side * (edge - slope)[8:-8] == pytest.approx(radius * (math.sqrt(1.01) - 1.0), abs=2e-5)
+    dip = np.where(np.abs(u - 0.15) < 0.021, -side * 0.02, 0.0)
+    filled = radius - math.sqrt(radius**2 - 0.025**2)
+    assert (side * band_edge(u, dip, radius, side)).min() == pytest.approx(-filled, abs=1e-9)
+    assert (side * band_edge(u, -dip, radius, side)).max() == pytest.approx(0.02)

@@ -428,7 +428,21 @@ def test_a_stroke_bends_where_the_one_before_falls_short_and_leaves_no_gap() -> 
     assert world.painter.finished and not world.painter.failed, world.painter.reason
 
 
-@pytest.mark.parametrize("length", [0.5, 0.03])
+def test_a_stroke_bends_out_where_the_one_before_lies_far_out() -> None:
+    """A wave of 12 mm outwards would leave 20 mm of overlap, and one of this stroke inwards more than is claimed."""
+    world = PaintedWall(short(rows=2, stroke_m=1.5), stuck_across=True)
+    world.wave = lambda stroke, u: 0.012 * max(math.sin(math.pi * (u - 0.4) / 0.7), 0.0) if stroke == 1 else 0.0
+    world.fly(60.0, until="climb", stroke=2)
+    world.stuck_across = False
+    world.fly(200.0)
+    first, second = (paint.v for paint in world.paint)
+    overlap = first + world.config.brush_width_m - second
+    assert np.nanmax(first) > 0.06, "it does swing"
+    assert 0.0 < np.nanmin(overlap) and np.nanmax(overlap) < 2.0 * world.config.overlap_m + 0.002
+    assert world.painter.finished and not world.painter.failed, world.painter.reason
+
+
+@pytest.mark.parametrize("length", [0.5, 0.06])
 def test_a_gap_to_the_stroke_before_is_not_claimed(length: float) -> None:
     """Nothing moves the tip back to stroke 1, which swung away from it, be it for less than a brush's width."""
     world = PaintedWall(short(rows=2, stroke_m=1.5), stuck_across=True)
@@ -467,7 +481,8 @@ def test_a_gap_is_painted_again_and_the_job_is_claimed(pattern: str, stroke: int
     while world.painter.phase == "retouch":
         world.step()
         reached = [min(reached[0], world.tip[0]), max(reached[1], world.tip[0])]
-    back = 0.5 - painter.RETOUCH_BEFORE_M if stroke == 3 else 0.8 + painter.RETOUCH_BEFORE_M
+    inside = 0.02  # the round brush covers the gap's ends
+    back = 0.5 + inside - painter.RETOUCH_BEFORE_M if stroke == 3 else 0.8 - inside + painter.RETOUCH_BEFORE_M
     near, far = sorted((back, begun))
     assert reached == pytest.approx([near, far], abs=0.02), "from before the gap to the end of the stroke"
     world.fly(200.0)

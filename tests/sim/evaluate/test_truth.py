@@ -107,11 +107,11 @@ def test_a_row_on_the_row_before_is_named():
 
 @pytest.mark.parametrize(("gap_m", "last_m", "missing"), [
     (0.0079, 0.3, None), (0.009, 0.3, "row 2: gap of 1.0 mm to row 1"), (0.03, 0.018, None),
-    (0.03, 0.03, "row 2: gap of 22 mm to row 1"), (-0.0159, 0.1, None),
+    (0.03, 0.06, "row 2: gap of 22 mm to row 1"), (0.03, 0.04, None), (-0.0159, 0.1, None),
     (-0.017, 0.1, "row 2: overlaps row 1 by 25 mm, nominal 8.0 mm"),
 ])  # fmt: skip
 def test_bands_touch_everywhere_but_in_the_last_two_centimetres(gap_m, last_m, missing):
-    """Row 2 ends at the beginning of row 1, u = 0.05 m on this board."""
+    """Row 2 ends at the beginning of row 1, u = 0.05 m on this board; a round brush reaches over 2 cm of a gap."""
     trace = synthetic_trace(Errors(row_offset_m=(0.0, 0.0)), Scene(board=BoardScene(width_m=0.7),
                                                                    paint=PaintScene(stroke_m=0.6)))  # fmt: skip
     # Within a corner: the straight part, and with it the place error, stays as it is.
@@ -150,13 +150,13 @@ def retouched(trace: Trace, row: int, reach_u: tuple[float, float], *across_m: f
 def test_the_band_of_a_stroke_is_that_of_both_passes():
     def with_gap(row: int) -> Trace:
         trace, board = three_rows(), BoardGeometry(THREE_ROWS)
-        inside = np.abs(along(trace) - board.stroke_ends[0] - 0.225) < 0.025
+        inside = np.abs(along(trace) - board.stroke_ends[0] - 0.225) < 0.06
         return moved(trace, (trace.row == row) & inside, 0.009)
 
     begin = BoardGeometry(THREE_ROWS).stroke_ends[0]
     assert shortfall(with_gap(2)) == "row 2: gap of 1.0 mm to row 1"
     assert shortfall(retouched(with_gap(2), 2, (begin + 0.15, begin + 0.3), -0.004)) is None
-    assert shortfall(retouched(with_gap(2), 2, (begin + 0.22, begin + 0.3), -0.004)) == "row 2: gap of 1.0 mm to row 1"
+    assert shortfall(retouched(with_gap(2), 2, (begin + 0.24, begin + 0.3), -0.004)) == "row 2: gap of 1.0 mm to row 1"
     assert shortfall(retouched(with_gap(2), 3, (begin + 0.15, begin + 0.3), -0.004)) == "row 2: gap of 1.0 mm to row 1"
     too_far = "row 2: overlaps row 1 by 25 mm, nominal 8.0 mm"
     assert shortfall(retouched(three_rows(), 2, (begin + 0.15, begin + 0.3), -0.017)) == too_far
