@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -163,7 +163,8 @@ def paper_profile(weight: float) -> ControllerConfig:
     mass = ControllerConfig().vehicle.mass_kg
     tasks = {"level": 1.0, "yaw": 1.0, "velocity": 1.0, "push": 1.0 / mass**2}
     weights = Weights(line=weight, effort=1e-9, smoothness=0.0, line_sigma=1.0, **tasks)
-    return ControllerConfig(weights=weights, line_profile="paper", barriers=False)
+    printed = ControllerConfig(analytic_line_point="centre", analytic_angle_row=True)
+    return replace(printed, weights=weights, line_profile="paper", barriers=False)
 
 
 def exact_solver() -> Callable[[Program], tuple[np.ndarray, np.ndarray]]:

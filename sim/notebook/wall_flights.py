@@ -17,6 +17,7 @@ from ibvs_qp.pilot import PilotConfig
 from sim.evaluate.path_error import CONTACT_N
 from sim.evaluate.window import board_tip, mean, peak, phase_window, rms, tilt_deg
 from sim.experiments.scenes import near_wall
+from sim.experiments.variants import VARIANTS
 from sim.flight.closed_loop import fly, make_pilot
 from sim.flight.options import FlightOptions, pilot_config
 from sim.flight.surroundings import World
@@ -64,7 +65,7 @@ def fly_setting(setting: Setting, hold_s: float | None = None, slide_s: float | 
 
 @dataclass(frozen=True, kw_only=True)
 class WallTask:
-    """A flight of notebook 03."""
+    """A flight of notebook 03: the analytic law has its line rows as printed, with gains for them."""
 
     push_n: float = 5.0  # push reference [N]
     slope_deg: float = 0.0  # rotation of the board in its own plane [deg]
@@ -77,8 +78,14 @@ class WallTask:
     def setting(self, law: str) -> Setting:
         """Preset of a law with these switches, and the scene."""
         preset = ibvs_qp.preset(law)
+        gains = VARIANTS["printed"].gains if law == "paper" else {}
         controller = dataclasses.replace(
-            preset.controller, reach_check=self.reach_check, contact_feedforward=self.feedforward
+            preset.controller,
+            gains=dataclasses.replace(preset.controller.gains, **gains),
+            analytic_line_point="centre",
+            analytic_angle_row=True,
+            reach_check=self.reach_check,
+            contact_feedforward=self.feedforward,
         )
         scene = near_wall(
             paint={"push_n": self.push_n}, board={"slope_deg": self.slope_deg}, wall={"friction": self.friction}

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from closed_loop_rigs import wall
 
+from sim.experiments.variants import VARIANTS
 from sim.flight.closed_loop import fly
 from sim.flight.jobs import PressJob
 from sim.flight.options import FlightOptions, pilot_config, unsupervised
@@ -18,12 +19,24 @@ from sim.world.scene import Scene
 REACH_N = 30.4
 
 
-def press(push: float, friction: float, reach_check: bool = True, law: str = "qp", slide_s: float = 0.0) -> Trace:
-    """Press at one place, and optionally slide to the left."""
+def press(
+    push: float,
+    friction: float,
+    reach_check: bool = True,
+    law: str = "qp",
+    slide_s: float = 0.0,
+    printed: bool = False,
+) -> Trace:
+    """Press at one place, and optionally slide to the left; ``printed``: line rows of the paper, with their gains."""
     scene = Scene(wall=wall(friction=friction))
     scene = dataclasses.replace(scene, paint=dataclasses.replace(scene.paint, push_n=push))
     options = FlightOptions(law=law, features="geometric", video=False)
     config = unsupervised(pilot_config(scene, options))  # what the laws do by themselves
+    if printed:
+        config = VARIANTS["printed"].apply(config)
+        config = dataclasses.replace(
+            config, controller=dataclasses.replace(config.controller, touch_ramp=True, contact_feedforward=True)
+        )
     config = dataclasses.replace(config, controller=dataclasses.replace(config.controller, reach_check=reach_check))
     return fly(scene, options, config=config, job=PressJob(hold_s=2.5 if slide_s else 8.0, slide_s=slide_s))
 
@@ -76,11 +89,19 @@ def test_within_reach_the_laws_push_alike(push: float) -> None:
         assert height <= 2e-3 and np.abs(np.degrees(trace.euler[ticks])).max() <= 0.3
 
 
-def test_at_the_reach_clipping_loses_the_wall_and_the_program_does_not() -> None:
+def test_beyond_reach_clipping_leans_on_the_wall_and_the_program_stays_level() -> None:
+    """35 N unchecked; with the angle row of the paper the clipped law tips over."""
+    program, clipped = (press(35.0, 0.3, reach_check=False, law=law) for law in ("qp", "paper"))
+    tilt = [np.degrees(np.abs(trace.euler[:, :2])).max() for trace in (program, clipped)]
+    assert program.claimed and clipped.claimed
+    assert tilt[0] <= 2.0 and tilt[1] >= 1.5 * tilt[0]
+    assert all(trace.push_true[settled(trace)].mean() >= 0.95 * REACH_N for trace in (program, clipped))
+
+
+def test_with_the_printed_rows_clipping_loses_the_wall() -> None:
     """30.2 N unchecked, 0.2 N below the reach: noise clips rotors, and what clipping leaves is no level flight."""
-    program, clipped = (press(30.2, 0.3, reach_check=False, law=law) for law in ("qp", "paper"))
-    assert program.claimed and program.push_true[settled(program)].mean() >= 0.95 * 30.2
-    assert not clipped.claimed and "crash" in clipped.reason
+    printed = press(30.2, 0.3, reach_check=False, law="paper", printed=True)
+    assert not printed.claimed and "crash" in printed.reason
 
 
 @pytest.mark.parametrize(
