@@ -187,14 +187,14 @@ def _(pressed):
         )
         + r"""
 
-    A cross marks a crash. The clipped law loses pitch moment, so the vehicle leans into the wall. Leaning, it presses
-    with nearly the commanded push, as any multicopter would, until it tips over. The program stays level and delivers
-    the push of a level vehicle.
+    A cross marks a failed flight. The clipped law loses pitch moment, so the vehicle leans into the wall. Leaning, it
+    presses with nearly the commanded push, as any multicopter would, until the supervisor ends the flight. The program
+    stays level and delivers the push of a level vehicle.
 
     *In fairness:* a push beyond reach is avoidable. Both laws have a reach check that limits the push reference to 97 %
     of the push that the rotors can hold; it is off here. Limits that no check foresees (a gust, a rotor that weakens)
-    remain. And it is the law with the line rows of the paper: the preset `paper`, with lines at the tip and without the
-    angle row, does not tip over at 35 N. It leans by 3.5 degrees and delivers 30.8 N, the program by 2 at most.
+    remain. The flown law has the line rows of the paper. The preset `paper`, with lines at the tip and without the
+    angle row, leans by 3.5 degrees at most in a hold of 8 s at 35 N (`docs/how_it_works/qp.md`).
 
     ## A sloped edge: the cost of the angle rows
 
@@ -287,7 +287,7 @@ def _(rubbed):
     | the same in contact | millinewtons | selection after the inversion instead of before it |
     | no active limit, as shipped | small | weights, and line errors at the tip |
     | thrust at its floor or ceiling | the law loses attitude, the program gives up push | constraint against clip |
-    | sloped edge | the law rolls with it | priority of the angle row |
+    | sloped edge | the law with printed rows rolls with it | priority of the angle row |
     | friction | negligible | feed-forward, common to both |
     | noise | negligible (notebook 06) | estimation, common to both |
     """

@@ -44,11 +44,11 @@ class AlongTrack:
         self._x, self._p = np.zeros(2), np.diag((UNKNOWN_STD**2, UNKNOWN_STD**2))
         self.known = self.end_seen = False
         self._near_known = self._length_unsure = False
-        self.slip = self.step = 0.0
+        self.slip = self.step = self._unknown = 0.0
         self._way = self._way_variance = self._began = self._began_variance = 0.0
         self.end = self.near = -1
-        self._pass_way = self._pass_variance = 0.0
-        self._trail: list[tuple[float, float]] = []  # way by the odometer and u at every look of the pass [m]
+        #: u [m] and its variance [m^2] before and after every look of the pass.
+        self._trail: list[tuple[float, float, float, float]] = []
 
     @property
     def u(self) -> float:
@@ -70,7 +70,6 @@ class AlongTrack:
         self.step = du
         self._x[0] += du
         self._way += du
-        self._pass_way += du
         self._p[0, 0] += DRIFT_PER_M * abs(du)
         self._way_variance += DRIFT_PER_M * abs(du)
 
@@ -87,23 +86,25 @@ class AlongTrack:
 
     def begin_pass(self) -> None:
         """A way along the stroke begins here: the stroke, or a retouch one way or the other."""
-        self._pass_way, self._pass_variance = 0.0, float(self._p[0, 0])
-        self._trail = [(0.0, self.u)]
+        variance = float(self._p[0, 0])
+        self._trail = [(self.u, variance, self.u, variance)]
 
     def smoothed(self) -> tuple[np.ndarray, np.ndarray]:
         r"""Places of the pass as they were estimated on the way, and as every later correction shows them.
 
-        A correction c belongs to what came before it as the variance grew by the odometer,
+        The backward recursion of Rauch, Tung and Striebel over the looks k, with u and P before a correction (-) and
+        after it,
 
-        .. math:: u_k + \sum_{j > k} \frac{P_0 + q s_k}{P_0 + q s_j} c_j.
+        .. math:: u^s_k = u_k + \frac{P_k}{P^-_{k+1}} (u^s_{k+1} - u^-_{k+1}).
 
         Returns:
-            u before and after [m], (looks,) each.
+            u before and after [m], (n,) each: where a look corrects u, its two values and the smoothed one twice.
         """
-        way, u = np.array(self._trail).T
-        variance = self._pass_variance + DRIFT_PER_M * np.abs(way) + MARGIN_STD**2
-        weighed = (np.diff(u, prepend=u[0]) - np.diff(way, prepend=way[0])) / variance
-        return u, u + variance * (np.cumsum(weighed[::-1])[::-1] - weighed)
+        prior, prior_variance, u, variance = np.array(self._trail).T
+        after = u.copy()
+        for k in range(len(u) - 2, -1, -1):
+            after[k] += variance[k] / prior_variance[k + 1] * (after[k + 1] - prior[k + 1])
+        return np.concatenate((prior, u)), np.concatenate((after, after))
 
     @property
     def moved(self) -> float:
@@ -155,7 +156,7 @@ class AlongTrack:
 
     def look(self, lines: Sequence[PatternLine]) -> str:
         """Correct with the edges in view, once per look; returns what was noticed, or an empty text."""
-        noticed = ""
+        noticed, prior, self._unknown = "", (self.u, float(self._p[0, 0])), 0.0
         ends = [line for line in _ends(lines) if line.weight > (LOST_WEIGHT if self.end_seen else CERTAIN_WEIGHT)]
         expected = self._config.stroke_m + self._config.edge_margin_m - self.u
         end = self._edge(ends, expected, self._end_gate)
@@ -167,7 +168,7 @@ class AlongTrack:
         beside = [line for line in beside if line.weight > (LOST_WEIGHT if self._near_known else MARK_WEIGHT)]
         near, erred = self._near_edge(beside)
         self.near = -1 if near is None else near.track.track_id
-        self._trail.append((self._pass_way, self.u))
+        self._trail.append((prior[0], prior[1] + self._unknown, self.u, float(self._p[0, 0])))
         return noticed or erred
 
     @property
@@ -225,6 +226,8 @@ class AlongTrack:
                 # Both edges are seen, so the board is longer or shorter than the job says: the origin of u moves.
                 self._p += unknown
                 self._began_variance += unknown
+                self._unknown += unknown
+                self._trail = [(u, p + unknown, v, q + unknown) for u, p, v, q in self._trail]
                 self._length_unsure = True
                 noticed = f"the board's edge lies {difference * 1e3:+.0f} mm from where the job expects it"
             elif row is _NEAR and self._length_unsure:
@@ -232,6 +235,7 @@ class AlongTrack:
             else:
                 self._p[0, 0] += unknown
                 self._way_variance += unknown
+                self._unknown += unknown
                 self.slip = max(self.slip, abs(difference))
                 noticed = f"the tip is {-difference * 1e3:+.0f} mm from where the odometer has it"
         if row is _NEAR and self.end == -1:

@@ -241,11 +241,15 @@ class CrossTrack:
 
         Strokes have waves of 3 mm over 0.1 m: a map that is 20 mm off shows no gap where there is one.
         """
-        if self._again:
-            found, farthest_out = self._again[-1]
-            self._again[-1] = found.moved(before, after), farthest_out.moved(before, after)
-        else:
+        if not self._again:
             self.maps[-1] = self.maps[-1].moved(before, after)
+            return
+        found, farthest_out = self._again.pop()
+        if shift := float(after[0] - before[0]):  # of the passes before: what this one shows belongs to them as well
+            to = before[:1] + shift
+            self.maps[-1] = self.maps[-1].moved(before[:1], to)
+            self._again = [(one.moved(before[:1], to), other.moved(before[:1], to)) for one, other in self._again]
+        self._again.append((found.moved(before, after), farthest_out.moved(before, after)))
 
     def last_stroke(self, first_u: float, last_u: float) -> float:
         """Mean v between two places of the stroke before the one that is laid [m]; NaN where it is not known."""

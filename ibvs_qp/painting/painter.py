@@ -65,12 +65,12 @@ LEAST_OVERLAP, MOST_OVERLAP = 0.75, 3.0
 #: again before the gap [m]; the tip turns this far from the beginning of the stroke [m]: friction lets it slide on, by
 #: 11 mm in the datasheet world.
 MOST_RETOUCHES, RETOUCH_SIGMAS, RETOUCH_BEFORE_M, TURN_BEFORE_M = 2, 2.5, 0.1, 0.02
-#: Target overlap of a retouch over the nominal overlap [-]. The tip keeps off the outer edge that the stroke has left:
-#: an edge that it paints anew moves with it and shows no error. At 1.25 retouches in the harsh world drifted outwards
-#: by up to 16 mm, and every following stroke with them; at 2 the overlap exceeded `MOST_OVERLAP` times the nominal one.
+#: Target overlap of a retouch over the nominal overlap [-]: the tip runs half of it inside the outer edge that a stroke
+#: at its place has left. At 2 the overlap exceeded `MOST_OVERLAP` times the nominal one.
 RETOUCH_OVERLAP = 1.5
 #: Most by which the target overlap of a stroke, and of its retouch, exceeds the planned one, over the job's [-]: waves
-#: of both strokes add to it. A retouch that followed a deep first pass, 17 mm, ended at 24 to 26 mm.
+#: of both strokes add to it. A retouch that followed a deep first pass, 17 mm, ended at 24 to 26 mm; it runs outside of
+#: such a pass now.
 EXCESS, RETOUCH_EXCESS = 1.0, 0.75
 
 

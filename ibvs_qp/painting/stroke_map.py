@@ -66,7 +66,7 @@ class StrokeMap:
         return u, np.divide(self._sum, count, out=np.full(count.size, math.nan), where=count > 0.0)
 
     def moved(self, before: np.ndarray, after: np.ndarray) -> StrokeMap:
-        """The same stroke where its places along u turn out to be others.
+        """The same stroke where its places along u turn out to be others; one mean is left in every bin.
 
         Args:
             before: Places as they were when the stroke was laid [m], (n,).
@@ -77,10 +77,13 @@ class StrokeMap:
         painted = np.isfinite(v)
         laid, stroke = u[painted] + np.interp(u[painted], before[order], (after - before)[order]), copy.copy(self)
         if laid.size:
-            along = np.argsort(laid)
-            near = np.abs(u[:, np.newaxis] - laid).min(axis=1) <= BIN_M
-            stroke._count = near.astype(int).tolist()
-            stroke._sum = np.where(near, np.interp(u, laid[along], v[painted][along]), 0.0).tolist()
+            along, place, count = np.argsort(laid), [self._bin(float(place)) for place in laid], [0] * len(u)
+            for index, bin_before in enumerate(np.flatnonzero(painted).tolist()):
+                joined = index > 0 and painted[bin_before - 1]  # a hole stays one
+                first, last = sorted((place[index - 1] if joined else place[index], place[index]))
+                count[max(first, 0) : max(last + 1, 0)] = [1] * len(count[max(first, 0) : max(last + 1, 0)])
+            stroke._count = count
+            stroke._sum = (np.array(count) * np.interp(u, laid[along], v[painted][along])).tolist()
         return stroke
 
     def widened(self, again: StrokeMap) -> StrokeMap:

@@ -39,8 +39,8 @@ CONTROL_RESERVE_M_S2 = 0.5
 #: Mean lag of the plant's motors over the vehicle's, at most [-]: the QP completes at 1.9 (2 seeds of the world
 #: datasheet), a monitor ends 1 of 2 flights at 2.3, and it crashes at 2.6.
 LARGEST_LAG_RATIO = 2.0
-#: Noise of the IMU per sample, at most: accelerometer [m/s^2], gyro [rad/s], attitude [deg]. Jobs complete at 0.95,
-#: 0.095 and 0.4 under both laws (2 seeds each in the world datasheet), and fail at 1.9, 0.19 and 0.8.
+#: Noise of the IMU per sample, at most: accelerometer [m/s^2], gyro [rad/s], attitude [deg]. Between what both laws
+#: completed with, 0.95, 0.095 and 0.4 (2 seeds each in the world datasheet), and what they failed with: 1.9, 0.19, 0.8.
 MOST_ACCEL_NOISE, MOST_GYRO_NOISE, MOST_ATTITUDE_NOISE_DEG = 1.2, 0.12, 0.5
 #: Time of a job in gusts over that of its strokes alone [-]: most of them are painted again in the harsh world.
 AGAIN = 2.0
@@ -227,16 +227,16 @@ def _sensors(scene: Scene, config: PilotConfig) -> Iterator[str]:
 
 
 def _noise(imu: ImuScene) -> Iterator[str]:
-    """Odometer and attitude bear the noise of the IMU."""
+    """Noise with which odometer or attitude fail."""
     root, rate = math.sqrt(imu.rate_hz), ("imu.rate_hz", imu.rate_hz, "Hz")
-    for field, value, unit, most in (
-        ("imu.accel_density", imu.accel_density, "m/s^2/sqrt(Hz)", MOST_ACCEL_NOISE / root),
-        ("imu.gyro_density", imu.gyro_density, "rad/s/sqrt(Hz)", MOST_GYRO_NOISE / root),
-        ("imu.attitude_noise_deg", imu.attitude_noise_deg, "deg", MOST_ATTITUDE_NOISE_DEG),
+    for field, value, unit, most, keys in (
+        ("imu.accel_density", imu.accel_density, "m/s^2/sqrt(Hz)", MOST_ACCEL_NOISE / root, (rate,)),
+        ("imu.gyro_density", imu.gyro_density, "rad/s/sqrt(Hz)", MOST_GYRO_NOISE / root, (rate,)),
+        ("imu.attitude_noise_deg", imu.attitude_noise_deg, "deg", MOST_ATTITUDE_NOISE_DEG, ()),
     ):
         if value > most + ROUNDING:
             reason = "stronger noise disturbs odometer and attitude"
-            yield _problem(field, value, unit, f"allowed is at most {most:.3g} {unit}", reason, rate)
+            yield _problem(field, value, unit, f"allowed is at most {most:.3g} {unit}", reason, *keys)
 
 
 def _oldest_picture(safety: SafetySettings) -> tuple[str, float]:

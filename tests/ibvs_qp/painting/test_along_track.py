@@ -78,7 +78,7 @@ def test_what_an_edge_shows_at_the_end_belongs_to_the_way_before() -> None:
     for _ in range(10):
         along.predict(0.01)
         along.look([upright(3, END_U - along.u, -1)])
-    before, after = along.smoothed()
+    before, after = (places[len(places) // 2 :] for places in along.smoothed())
     known = along.u - 1.0
     assert known == pytest.approx(error, abs=1e-3)
     assert after[0] - before[0] == pytest.approx(0.0, abs=3e-3), "the edge beside the beginning was in view"
@@ -86,7 +86,48 @@ def test_what_an_edge_shows_at_the_end_belongs_to_the_way_before() -> None:
     assert after[89] - before[89] == pytest.approx(known, rel=0.05)
     assert after[-1] == before[-1] == along.u
     along.begin_pass()
-    np.testing.assert_array_equal(along.smoothed(), [[along.u], [along.u]])
+    assert set(np.ravel(along.smoothed())) == {along.u}
+
+
+@pytest.mark.parametrize("scale", [0.98, 1.02])
+@pytest.mark.parametrize("seen_from", [0.0, 0.6])
+def test_places_that_an_edge_has_corrected_stay(scale: float, seen_from: float) -> None:
+    along, true, truth = at_the_margin(), 0.0, [0.0]
+    along.begin_stroke()
+    for _ in range(100):
+        true += 0.01
+        along.predict(0.01 * scale)
+        along.look([upright(3, END_U - true, -1)] if true > seen_from else [])
+        truth.append(true)
+    before, after = along.smoothed()
+    error = np.abs(after[: len(truth)] - truth)
+    assert error.max() < max(0.4 * 0.02 * seen_from, 2e-3) < np.abs(before[: len(truth)] - truth).max()
+    assert error[truth.index(true)] < 1e-3
+
+
+def test_another_origin_moves_the_whole_pass_and_a_jump_only_what_follows() -> None:
+    moved = at_the_margin()
+    moved.begin_stroke()
+    for _ in range(90):
+        moved.predict(0.01)
+        moved.look([])
+    for _ in range(3):
+        moved.look([upright(3, END_U + 0.1 - 0.9, -1)])
+    before, after = moved.smoothed()
+    assert after[0] - before[0] == pytest.approx(moved.u - 0.9, rel=0.02)
+    jumped = at_the_margin()
+    jumped.begin_stroke()
+    for tick in range(90):
+        jumped.predict(0.01)
+        if tick == 60:
+            jumped.doubt(0.03)
+        jumped.look([])
+    for _ in range(20):
+        jumped.look([upright(3, END_U - 0.9 - 0.02, -1)])
+    before, after = jumped.smoothed()
+    looks = len(before) // 2
+    shift = (after - before)[looks:]
+    assert abs(shift[50]) < 3e-3 and shift[70] == pytest.approx(jumped.u - 0.9, abs=3e-3)
 
 
 @pytest.mark.parametrize("shift", [-0.1, 0.1])

@@ -79,6 +79,19 @@ def test_a_moved_map_has_its_waves_and_holes_elsewhere() -> None:
     assert not np.isfinite(StrokeMap(0.6).moved(before, before).places()[1]).any()
 
 
+@pytest.mark.parametrize("hole", [1, 3])
+@pytest.mark.parametrize("shift", [0.0, 1e-4, -1e-4, 0.03])
+def test_a_shift_closes_no_hole_and_paints_nothing_more(hole: int, shift: float) -> None:
+    stroke = StrokeMap(0.6)
+    for k in range(60):
+        if not 30 <= k < 30 + hole:
+            stroke.add(BIN_M * (k + 0.5), 0.05)
+    place = np.zeros(1)
+    painted = np.isfinite(stroke.moved(place, place + shift).places()[1])
+    assert painted.sum() == 60 - hole
+    np.testing.assert_array_equal(painted, np.roll(np.isfinite(stroke.places()[1]), round(shift / BIN_M)))
+
+
 @pytest.mark.parametrize("side", [1, -1])
 def test_a_round_brush_fills_a_dip_from_both_sides_and_widens_no_line(side: int) -> None:
     u, radius = np.arange(0.0, 0.3, 0.005), 0.04
