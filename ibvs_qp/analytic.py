@@ -59,7 +59,7 @@ def _secondary_acceleration(setpoints: Setpoints) -> np.ndarray:
 
 
 def _stacked_lines(lines: list[LineSetpoint], config: ControllerConfig) -> tuple[np.ndarray, np.ndarray]:
-    """L and the commanded image acceleration: every line and, as printed, ONE angle, of the line nearest the centre.
+    """L and the commanded image acceleration: every line, and with `analytic_angle_row` the angle of the central one.
 
     Stacking the angle rows of a horizontal and a vertical line as printed makes their difference command pitch through
     a lever of rho: measured, a vertical edge entering the picture pitched the vehicle by 14 degrees.

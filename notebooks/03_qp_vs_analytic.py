@@ -187,9 +187,9 @@ def _(pressed):
         )
         + r"""
 
-    A cross marks a failed flight. The clipped law loses pitch moment, so the vehicle leans into the wall. Leaning, it
-    presses with nearly the commanded push, as any multicopter would, until the supervisor ends the flight. The program
-    stays level and delivers the push of a level vehicle.
+    The clipped law loses pitch moment, so the vehicle leans into the wall. Leaning, it presses with nearly the
+    commanded push, as any multicopter would, until the supervisor ends the flight. The program stays level and delivers
+    the push of a level vehicle.
 
     *In fairness:* a push beyond reach is avoidable. Both laws have a reach check that limits the push reference to 97 %
     of the push that the rotors can hold; it is off here. Limits that no check foresees (a gust, a rotor that weakens)
@@ -286,7 +286,7 @@ def _(rubbed):
     | no active limit, line rows strictly first, free flight | none | – |
     | the same in contact | millinewtons | selection after the inversion instead of before it |
     | no active limit, as shipped | small | weights, and line errors at the tip |
-    | thrust at its floor or ceiling | the law loses attitude, the program gives up push | constraint against clip |
+    | thrust at a limit | the law with printed rows loses attitude, the program gives up push | constraint against clip |
     | sloped edge | the law with printed rows rolls with it | priority of the angle row |
     | friction | negligible | feed-forward, common to both |
     | noise | negligible (notebook 06) | estimation, common to both |

@@ -499,7 +499,11 @@ class Painter(Navigation):
     ) -> float:
         """Target v [m]: the stroke's place, or beside it where the stroke before lies off its own.
 
-        The overlap is at least a share of the job's, and exceeds the planned one by at most another.
+        Args:
+            share: Least overlap with the stroke before, over the job's overlap [-].
+            aside: Way outwards of the stroke's place [m].
+            farthest: Largest target, unless ``excess`` needs a larger one [m].
+            excess: Largest overlap less the planned one, over the job's overlap [-].
         """
         reach = self._reach_of_last(REACTION_M, 0.5 * self.config.brush_width_m)
         if math.isinf(reach):

@@ -21,7 +21,7 @@ def band_edge(u: np.ndarray, v: np.ndarray, radius: float, side: int) -> np.ndar
     A narrow dip of the line is filled by the brush on both sides of it.
 
     Args:
-        u: Places along the line [m], (n,).
+        u: Places along the line, increasing [m], (n,).
         v: Places across it [m], (n,).
         radius: Of the brush r [m].
         side: +1 for the edge at larger v, -1 for the other one.
@@ -29,9 +29,16 @@ def band_edge(u: np.ndarray, v: np.ndarray, radius: float, side: int) -> np.ndar
     Returns:
         v [m], (n,).
     """
-    ahead = np.square(u[:, np.newaxis] - u)
-    reach = np.where(ahead < radius**2, np.sqrt(np.maximum(radius**2 - ahead, 0.0)) - radius, -math.inf)
-    return side * (side * v + reach).max(axis=1, initial=-math.inf)
+    line = side * v
+    edge = line.copy()
+    for apart in range(1, u.size):
+        way = u[apart:] - u[:-apart]
+        if way.min() >= radius:
+            break
+        lower = np.where(way < radius, radius - np.sqrt(np.maximum(radius**2 - way**2, 0.0)), math.inf)
+        edge[apart:] = np.maximum(edge[apart:], line[:-apart] - lower)
+        edge[:-apart] = np.maximum(edge[:-apart], line[apart:] - lower)
+    return side * edge
 
 
 class StrokeMap:

@@ -553,6 +553,31 @@ def test_a_retouch_leaves_the_outer_edge_where_it_is() -> None:
     assert "retouch" in world.phases() and np.abs(world.paint[1].v - first)[inside].max() < 1e-3
 
 
+def test_a_retouch_runs_outside_of_a_first_pass_that_is_too_deep() -> None:
+    """Where the first pass overlaps by 18 mm, waves of a second pass on it would exceed 24 mm."""
+    swing = {True: 0.012, False: -0.01}
+    world = PaintedWall(short(rows=2, stroke_m=1.5), stuck_across=True)
+    world.wave = lambda row, u: swing[u > 0.9] if row == 2 and u < 1.2 else 0.0
+    world.fly(100.0, until="retouch")
+    first = world.paint[1].v.copy()
+    world.stuck_across = False
+    world.fly(60.0, until="retreat")
+    inside = (world.paint[1].u > 0.1) & (world.paint[1].u < 0.8)
+    assert (world.paint[1].v - first)[inside] == pytest.approx(0.004, abs=1.5e-3)
+
+
+def test_what_the_end_of_a_stroke_shows_moves_its_map() -> None:
+    """The odometer is 16 mm short at the end of a stroke of 1.5 m, and 8 mm at a dip in its middle."""
+    world = PaintedWall(short(rows=2, stroke_m=1.5), stuck_across=True)
+    world.wave = lambda stroke, u: -0.006 if stroke == 1 and 0.7 < u < 0.8 else 0.0
+    world.fly(30.0, until="paint", stroke=1)
+    world.drift = world.to_wall(-1e-3, 0.0)
+    world.fly(60.0, until="climb", stroke=2)
+    u, v = world.painter._cross.maps[0].places()
+    dip = u[v < 0.047]
+    assert 0.5 * (dip.min() + dip.max()) == pytest.approx(0.75, abs=4e-3)
+
+
 def test_a_retouch_keeps_off_the_outer_edge() -> None:
     """An edge that the tip paints anew moves with it and shows no error of its place."""
     world = PaintedWall(short(rows=2, stroke_m=1.5), stuck_across=True)
