@@ -286,7 +286,7 @@ def _(rubbed):
     | no active limit, line rows strictly first, free flight | none | – |
     | the same in contact | millinewtons | selection after the inversion instead of before it |
     | no active limit, as shipped | small | weights, and line errors at the tip |
-    | thrust at a limit | the law with printed rows loses attitude, the program gives up push | constraint against clip |
+    | thrust at a limit | the law with printed rows loses attitude, the program gives up push | constraint, not clip |
     | sloped edge | the law with printed rows rolls with it | priority of the angle row |
     | friction | negligible | feed-forward, common to both |
     | noise | negligible (notebook 06) | estimation, common to both |
