@@ -128,6 +128,21 @@ def test_press_waits_for_the_push() -> None:
     assert world.painter.phase == "paint" and world.painter.row == 1
 
 
+@pytest.mark.parametrize("aside", [(0.012, 0.0), (0.0, 0.012), (0.0, -0.012)])
+def test_a_touch_beside_the_beginning_is_taken_back(aside: tuple[float, float]) -> None:
+    """A sway moves the tip by 12 mm just before it touches, along or across the strokes."""
+    world = started(0.0, 0.0)
+    world.fly(60.0, until="press")
+    moved = np.array(aside)
+    world.tip = world.tip + moved
+    world.odometer = world.odometer + np.array(world.to_wall(*moved))
+    world.stuck = True
+    world.fly(20.0, until="approach")
+    assert world.painter.phase == "approach" and " mm from the beginning" in world.painter.log[-1][2]
+    world.stuck = False
+    assert_started_well(world)
+
+
 def _off_place(world: PaintedWall) -> None:
     world.tip = world.tip + np.array((0.0, 0.03))
     world.odometer = world.odometer + world.to_wall(0.0, 0.03)

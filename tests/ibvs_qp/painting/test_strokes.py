@@ -466,6 +466,18 @@ def test_a_stroke_that_overlaps_too_much_is_not_claimed(swing: float, claimed: b
     assert claimed or re.fullmatch(reason, world.painter.reason), world.painter.reason
 
 
+def test_an_overlap_that_may_exceed_the_most_is_not_claimed(monkeypatch) -> None:
+    """Estimated at 23 mm of 24 mm, with a misfit of 2 mm."""
+    world = PaintedWall(short(rows=2, stroke_m=1.5))
+    world.fly(90.0, until="paint", stroke=2)
+    world.stuck_across = True
+    world.wave = lambda stroke, u: -0.0145 if stroke == 2 and 0.5 < u < 0.7 else 0.0
+    monkeypatch.setattr(type(world.painter._cross), "misfit", 2e-3)
+    world.fly(200.0)
+    reason = r"row 2 may overlap the row before by 2[4-6]\.\d mm, nominal 8\.0 mm"
+    assert world.painter.failed and re.fullmatch(reason, world.painter.reason), world.painter.reason
+
+
 @pytest.mark.parametrize("pattern", ["rows", "columns"])
 @pytest.mark.parametrize("stroke", [2, 3])
 def test_a_gap_is_painted_again_and_the_job_is_claimed(pattern: str, stroke: int) -> None:
@@ -589,7 +601,7 @@ def test_a_retouch_keeps_off_the_outer_edge() -> None:
     while world.painter.phase == "retouch":
         world.step()
         inside.append(world.painter._v_target - world.painter._cross.v)
-    assert np.mean(inside) > 0.003 and np.median(inside) > 0.003
+    assert np.mean(inside) > 0.0015 and np.median(inside) > 0.0015
 
 
 def test_a_stroke_is_painted_again_twice_at_most_and_never_without_overlap() -> None:

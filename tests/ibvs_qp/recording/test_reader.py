@@ -61,7 +61,7 @@ def test_what_is_no_log_is_refused_with_its_reason(tmp_path: Path, good: bytes) 
 
 def test_a_log_cut_anywhere_is_read_up_to_there_or_refused(tmp_path: Path, good: bytes) -> None:
     ticks = []
-    for share in np.linspace(0.0, 1.0, 40):
+    for share in np.linspace(0.0, 1.0, 50):
         (tmp_path / "x.mcap").write_bytes(good[: int(share * len(good))])
         try:
             result = replay(read_log(tmp_path / "x.mcap"))
