@@ -131,7 +131,9 @@ class Model:
         if config.contact_feedforward:
             forward = contact_feedforward(signals, config, body, contact, self.travel, before)
             expected, felt_moment = ca.vertcat(forward.force, forward.moment), forward.felt_moment
-        near = ca.logic_or(contact.touching, contact.distance < config.contact.contact_distance_m)
+        # Only a tip that shall touch: subtracting a drifted force would hold a retreating vehicle at the wall.
+        about = ca.logic_and(self.target.press, contact.distance < config.contact.contact_distance_m)
+        near = ca.logic_or(contact.touching, about)
         external = external_wrench(
             signals,
             config,
