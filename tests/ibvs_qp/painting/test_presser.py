@@ -88,7 +88,7 @@ def test_a_touch_that_never_comes_times_out() -> None:
     world = press(contact_allowed=False)
     world.fly(60.0)
     assert world.painter.failed
-    assert world.painter.reason.startswith("time-out after 15 s in press: contact, tip")
+    assert world.painter.reason.startswith("time-out after 25 s in press: contact, tip")
 
 
 def test_an_abandoned_press_descends_and_is_no_failure() -> None:
