@@ -132,8 +132,8 @@ class Model:
             forward = contact_feedforward(signals, config, body, contact, self.travel, before)
             expected, felt_moment = ca.vertcat(forward.force, forward.moment), forward.felt_moment
         # Only a tip that shall touch: subtracting a drifted force would hold a retreating vehicle at the wall.
-        about = ca.logic_and(self.target.press, contact.distance < config.contact.contact_distance_m)
-        near = ca.logic_or(contact.touching, about)
+        landing = ca.logic_and(self.target.press, contact.distance < config.contact.contact_distance_m)
+        near = ca.logic_or(contact.touching, landing)
         external = external_wrench(
             signals,
             config,

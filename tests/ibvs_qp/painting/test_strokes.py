@@ -552,9 +552,9 @@ def test_the_last_stroke_of_a_filling_job_overlaps_by_its_own_nominal_overlap() 
     assert reach - pilot._touching_target(1.5) == pytest.approx(1.5 * 0.003, abs=1e-3)
 
 
-def test_a_retouch_leaves_the_outer_edge_where_it_is() -> None:
-    """After the gap the first pass lies 4 mm inside its place; the second pass must not paint beyond it."""
-    swing = {True: 0.012, False: -0.004}
+def moved_by_a_retouch(inwards: float) -> np.ndarray:
+    """By how much the outermost line of stroke 2 moves where its first pass lies inwards, after a gap before [m]."""
+    swing = {True: 0.012, False: -inwards}
     world = PaintedWall(short(rows=2, stroke_m=1.5), stuck_across=True)
     world.wave = lambda row, u: swing[u > 0.9] if row == 2 and u < 1.2 else 0.0
     world.fly(100.0, until="retouch")
@@ -562,20 +562,18 @@ def test_a_retouch_leaves_the_outer_edge_where_it_is() -> None:
     world.stuck_across = False
     world.fly(60.0, until="retreat")
     inside = (world.paint[1].u > 0.1) & (world.paint[1].u < 0.8)
-    assert "retouch" in world.phases() and np.abs(world.paint[1].v - first)[inside].max() < 1e-3
+    assert "retouch" in world.phases()
+    return (world.paint[1].v - first)[inside]
+
+
+def test_a_retouch_leaves_the_outer_edge_where_it_is() -> None:
+    """After the gap the first pass lies 4 mm inside its place; the second pass must not paint beyond it."""
+    assert np.abs(moved_by_a_retouch(0.004)).max() < 1e-3
 
 
 def test_a_retouch_runs_outside_of_a_first_pass_that_is_too_deep() -> None:
     """Where the first pass overlaps by 18 mm, waves of a second pass on it would exceed 24 mm."""
-    swing = {True: 0.012, False: -0.01}
-    world = PaintedWall(short(rows=2, stroke_m=1.5), stuck_across=True)
-    world.wave = lambda row, u: swing[u > 0.9] if row == 2 and u < 1.2 else 0.0
-    world.fly(100.0, until="retouch")
-    first = world.paint[1].v.copy()
-    world.stuck_across = False
-    world.fly(60.0, until="retreat")
-    inside = (world.paint[1].u > 0.1) & (world.paint[1].u < 0.8)
-    assert (world.paint[1].v - first)[inside] == pytest.approx(0.006, abs=1.5e-3)
+    assert moved_by_a_retouch(0.01) == pytest.approx(0.006, abs=1.5e-3)
 
 
 def test_what_the_end_of_a_stroke_shows_moves_its_map() -> None:
