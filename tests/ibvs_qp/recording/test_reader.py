@@ -18,7 +18,9 @@ from ibvs_qp.recording.header import digest
 @pytest.fixture(scope="module")
 def good(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     file = tmp_path_factory.mktemp("log") / "a.mcap"
-    record(file, "rotor_loss", "controller", 300)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("ibvs_qp.recording.writer.FLUSH_S", 0.0)  # chunks by ticks, whatever the machine's speed
+        record(file, "rotor_loss", "controller", 300)
     return file.read_bytes()
 
 
@@ -61,7 +63,7 @@ def test_what_is_no_log_is_refused_with_its_reason(tmp_path: Path, good: bytes) 
 
 def test_a_log_cut_anywhere_is_read_up_to_there_or_refused(tmp_path: Path, good: bytes) -> None:
     ticks = []
-    for share in np.linspace(0.0, 1.0, 50):
+    for share in np.linspace(0.0, 1.0, 40):
         (tmp_path / "x.mcap").write_bytes(good[: int(share * len(good))])
         try:
             result = replay(read_log(tmp_path / "x.mcap"))
@@ -69,7 +71,7 @@ def test_a_log_cut_anywhere_is_read_up_to_there_or_refused(tmp_path: Path, good:
             continue
         assert result.same and result.complete == (share == 1.0)
         ticks.append(result.ticks)
-    assert ticks == sorted(ticks) and ticks[-1] == 300 and len(ticks) > 20
+    assert ticks == sorted(ticks) and ticks[-1] == 300 and len(set(ticks)) > 20
 
 
 @pytest.mark.parametrize("places", [15, pytest.param(60, marks=pytest.mark.slow)])
