@@ -7,9 +7,6 @@ from dataclasses import dataclass, field
 from ibvs_qp.config.contact_estimation import ContactEstimationSettings
 from ibvs_qp.config.settings import require_order, setting, validate
 
-#: Least weight of the gust observer by the noise of the rate [-]: 17 rad/s leave a damping of 0.1 without K_sd.
-LEAST_QUIET = 0.56
-
 
 @dataclass(frozen=True, kw_only=True)
 class ContactSettings:
@@ -86,16 +83,6 @@ class ContactSettings:
     )
     full_gain_stiffness_n_m: float = setting(
         1500.0, "up to here force_kfp counts in full, beyond it falls with 1/k", unit="N/m", low=50.0, high=1e5
-    )
-    rate_quiet_m_s: float = setting(
-        0.006, "noise of the estimated rate at which K_sd and K_fp halve", unit="m/s", low=1e-4, high=1.0
-    )
-    gust_bandwidth_rad_s: float = setting(
-        30.0,
-        "observer of gusts along the normal in contact; with 9 rad/s gusts of 2 N leave a third more push error",
-        unit="rad/s",
-        low=0.1,
-        high=50.0,
     )
     plane_bandwidth_rad_s: float = setting(
         10.0,

@@ -3,8 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from ibvs_qp.config.settings import require_order, setting, validate
+
+#: Process noise of the filter of push and disturbance: of the rotors, 1 % with 50 ms, is 0.1 N along the normal; of the
+#: push, by an uncertain stiffness [N/sqrt(s)].
+ROTOR_NOISE, STIFFNESS_NOISE = 0.031, 0.1
+#: Noise of a force sensor that measures none [N^2/Hz]: 0.1 N per sample at 100 Hz.
+LEAST_PUSH_DENSITY = 1e-4
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,12 +80,26 @@ class ContactEstimationSettings:
     assumed_stiffness_n_m: float = setting(
         10_000.0, "stiffness until it is measured: a stiff wall forgives least", unit="N/m", low=100.0, high=1e5
     )
-    stiffness_min_n_m: float = setting(300.0, "softest estimate accepted", unit="N/m", low=10.0, high=1e5)
-    stiffness_max_n_m: float = setting(30_000.0, "stiffest estimate accepted", unit="N/m", low=10.0, high=1e6)
-    stiffness_push_spread_n: float = setting(
-        1.0, "deviation of the push from which a slope is accepted", unit="N", low=0.01, high=100.0
+    stiffness_min_n_m: float = setting(300.0, "softest estimate, clipped there", unit="N/m", low=10.0, high=1e5)
+    stiffness_max_n_m: float = setting(30_000.0, "stiffest estimate, clipped there", unit="N/m", low=10.0, high=1e6)
+
+    calm_noise: float = setting(
+        0.187,
+        "process noise of the force along the normal in calm air",
+        why="least push error of the linear loop in calm air and, below, in gusts of 2 N rms; sensitivity at most 2.2",
+        unit="N/sqrt(s)",
+        low=1e-3,
+        high=100.0,
     )
-    stiffness_time_s: float = setting(3.0, "samples count for this long after a touch", unit="s", low=0.1, high=60.0)
+    gust_noise: float = setting(5.34, "the same in full gusts", unit="N/sqrt(s)", low=1e-3, high=100.0)
+    slow_noise: float = setting(
+        0.128, "the same of the force that the accelerometer does not measure", unit="N/sqrt(s)", low=1e-3, high=100.0
+    )
+
+    def push_noise(self, mass_kg: float, gusts: Any) -> tuple[Any, ...]:
+        """Process noise densities of elastic push, rate and both forces of the push filter, at a weight of gusts."""
+        force = self.calm_noise**2 + self.gust_noise**2 * gusts
+        return STIFFNESS_NOISE**2, (ROTOR_NOISE / mass_kg) ** 2, force, self.slow_noise**2
 
     def __post_init__(self) -> None:
         """Validate."""

@@ -12,7 +12,8 @@ import numpy as np
 
 from ibvs_qp.analysis.contact_loop import ContactLoop
 from ibvs_qp.config.brush import BrushSettings
-from ibvs_qp.config.contact import LEAST_QUIET, ContactSettings
+from ibvs_qp.config.contact import ContactSettings
+from ibvs_qp.config.contact_estimation import LEAST_PUSH_DENSITY
 from ibvs_qp.config.errors import out_of_range
 from ibvs_qp.config.gains import Gains
 from ibvs_qp.config.vehicle import VehicleParams
@@ -23,6 +24,8 @@ LEAST_DAMPING_RATIO = 0.1
 STIFFNESS_SAMPLES = 7
 #: Relative width at which the search for an allowed value stops.
 SEARCH_TOLERANCE = 1e-3
+#: True over estimated stiffness at which the contact's sensitivity is bounded [-].
+STIFFNESS_RATIOS = 0.75, 1.3
 #: A pole with a smaller relative imaginary part does not oscillate.
 REAL_POLE = 1e-6
 #: Gains that a refusal may name, the likeliest cause first.
@@ -44,13 +47,13 @@ class _PressingConfig(Protocol):
     def contact(self) -> ContactSettings: ...
 
     @property
+    def brush(self) -> BrushSettings: ...
+
+    @property
     def tick_s(self) -> float: ...
 
     @property
     def impedance(self) -> bool: ...
-
-    @property
-    def contact_feedforward(self) -> bool: ...
 
 
 def contact_loop(
@@ -58,32 +61,33 @@ def contact_loop(
     stiffness: float,
     damping: float,
     force_delay_s: float,
-    quiet: float = 1.0,
+    vibration_m_s2: float = 0.0,
     gusts: bool = True,
+    believed: float = 1.0,
 ) -> ContactLoop:
     """The linear contact loop of a controller against a wall; arguments as in `contact_mode_damping`."""
-    gains, vehicle, estimation, hold = config.gains, config.vehicle, config.contact.estimation, 0.5 * config.tick_s
+    gains, vehicle, brush = config.gains, config.vehicle, config.brush
+    known = believed * stiffness
     spring, damper = (gains.force_ksp, gains.force_ksd) if config.impedance else (0.0, 0.0)
     return ContactLoop(
         mass=vehicle.mass_kg,
         lag=vehicle.motor_lag_s,
+        tick=config.tick_s,
         lead=gains.push_lead_s,
         command_filter=gains.push_filter_s,
         drag=vehicle.linear_drag_n_s_m,
         stiffness=stiffness,
+        believed=known,
         damping=damping,
-        proportional=quiet * gains.force_kfp * min(1.0, config.contact.full_gain_stiffness_n_m / stiffness),
+        believed_damping=brush.damping_n_s_m,
+        proportional=gains.force_kfp * min(1.0, config.contact.full_gain_stiffness_n_m / known) + spring / known,
         integral=gains.force_kfi,
-        filter_lag=1.0 / (2.0 * math.pi * config.contact.force_filter_hz),
-        spring=spring,
-        damper=quiet * damper,
-        observer=float(gusts and config.contact_feedforward),  # without feed-forward it rests at the wall
-        gust_bandwidth=max(quiet, LEAST_QUIET) * config.contact.gust_bandwidth_rad_s,
-        force_delay=force_delay_s + hold,
-        rate_delay=2.0 * hold,
-        acceleration_filter=estimation.acceleration_filter_s,
-        acceleration_noise=estimation.acceleration_noise,
-        stationary_speed_std=estimation.stationary_speed_std_m_s,
+        damper=damper,
+        noise=config.contact.estimation.push_noise(vehicle.mass_kg, float(gusts)),
+        force_delay=force_delay_s,
+        believed_delay=brush.force_delay_s,
+        push_density=LEAST_PUSH_DENSITY,
+        vibration=math.hypot(config.contact.estimation.acceleration_noise / math.sqrt(config.tick_s), vibration_m_s2),
     )
 
 
@@ -110,8 +114,9 @@ def contact_mode_damping(
     stiffness: float,
     damping: float,
     force_delay_s: float,
-    quiet: float = 1.0,
+    vibration_m_s2: float = 0.0,
     gusts: bool = True,
+    believed: float = 1.0,
 ) -> LoopMargin:
     """Least damping ratio of the contact under a controller; `ContactLoop` derives the loop.
 
@@ -120,10 +125,11 @@ def contact_mode_damping(
         stiffness: Of wall and brush together [N/m].
         damping: Of wall and brush together [N s/m].
         force_delay_s: Mean age of the force sample in use: latency plus half a sample period [s].
-        quiet: Weight of K_sd and K_fp, which vibration reduces, and of the gust observer down to `LEAST_QUIET` [-].
-        gusts: Whether the gust observer learns; it rests in calm air.
+        vibration_m_s2: Of the accelerometer, beyond its noise, standard deviation of a sample [m/s^2].
+        gusts: Whether the filter of the push follows gusts; it is slower in calm air.
+        believed: Estimated over true stiffness [-].
     """
-    loop = contact_loop(config, stiffness, damping, force_delay_s, quiet, gusts)
+    loop = contact_loop(config, stiffness, damping, force_delay_s, vibration_m_s2, gusts, believed)
     ratio, frequency = 1.0, 0.0
     for pole in loop.poles():
         oscillates = abs(pole.imag) > REAL_POLE * abs(pole)
@@ -139,9 +145,27 @@ def contact_mode_damping(
     )
 
 
+def contact_sensitivity(config: _PressingConfig, ratio: float = 1.0) -> float:
+    """Largest sensitivity M_s of the contact over the stiffness range of its brush, in gusts and in calm air [-].
+
+    Args:
+        config: The controller.
+        ratio: True over estimated stiffness [-].
+    """
+    brush = config.brush
+    return max(
+        contact_loop(
+            config, float(k), brush.damping_n_s_m, brush.force_delay_s, gusts=gusts, believed=1.0 / ratio
+        ).sensitivity
+        for k in np.geomspace(brush.stiffness_min_n_m, brush.stiffness_max_n_m, STIFFNESS_SAMPLES)
+        for gusts in (True, False)
+    )
+
+
 def least_margin(config: _PressingConfig, brush: BrushSettings | None = None) -> LoopMargin:
     """Least damped contact over the stiffness range of a brush, in gusts and in calm air."""
-    brush = brush or BrushSettings()
+    brush = brush or config.brush
+    config = dataclasses.replace(config, brush=brush)
     low, high = brush.stiffness_min_n_m, brush.stiffness_max_n_m
     samples = {float(entry) for entry in np.geomspace(low, high, STIFFNESS_SAMPLES)}
     corner = config.contact.full_gain_stiffness_n_m  # the gain begins to fall: possibly the least damped point
@@ -159,7 +183,7 @@ def require_margin(config: _PressingConfig, brush: BrushSettings | None = None, 
 
     Args:
         config: The controller.
-        brush: Wall and brush; the default ones if None.
+        brush: Wall and brush; those of the controller if None.
         place: Prefix of the field's name in messages: "preset.toml: controller.".
 
     Returns:
@@ -168,7 +192,7 @@ def require_margin(config: _PressingConfig, brush: BrushSettings | None = None, 
     Raises:
         ConfigError: Naming the gain (or, where no gain helps, the stiffness or the damping), its value and range.
     """
-    brush = brush or BrushSettings()
+    brush = brush or config.brush
     margin = least_margin(config, brush)
     if margin.least_damping_ratio >= LEAST_DAMPING_RATIO:
         return margin

@@ -53,12 +53,12 @@ class Gains:
     yaw_filter_s: float = _filter("yaw row", 0.0058)
     standoff_kp: float = _gain(2.0, "distance error to approach speed", unit="1/s", high=20.0)
     standoff_kd: float = _gain(5.0, "approach speed error to acceleration", unit="1/s", high=50.0)
-    force_ksp: float = _gain(115.1, "impedance stiffness K_sp", unit="N/m", high=5000.0)
-    force_ksd: float = _gain(57.4, "impedance damping K_sd", unit="N s/m", high=1000.0)
-    force_kfp: float = _gain(0.2153, "force error K_fp, up to contact.full_gain_stiffness_n_m", high=10.0)
-    force_kfi: float = _gain(1.424, "integral of the force error K_fi", unit="1/s", high=50.0)
-    push_lead_s: float = _lead("rate of the distance, in impedance and approach", 0.0575)
-    push_filter_s: float = _filter("push row", 0.0)
+    force_ksp: float = _gain(78.0, "impedance stiffness K_sp", unit="N/m", high=5000.0)
+    force_ksd: float = _gain(63.0, "impedance damping K_sd", unit="N s/m", high=1000.0)
+    force_kfp: float = _gain(0.02, "force error K_fp, up to contact.full_gain_stiffness_n_m", high=10.0)
+    force_kfi: float = _gain(0.0, "integral of the force error K_fi", unit="1/s", high=50.0)
+    push_lead_s: float = _lead("rate of penetration or distance, in impedance and approach", 0.0575)
+    push_filter_s: float = _filter("push row", 0.0135)
 
     def __post_init__(self) -> None:
         """Validate."""

@@ -78,9 +78,20 @@ def contact_state(
     another = both(touch.pressed, either(both(felt, touch.in_contact), stopped_s >= STOPPED_S))
     blind = both(interval > 0.0, touch.pressed, wall.known, wall.since_plane > BLIND_S)
     wall.touch(either(blind, another), both(another, no(blind)))
-    pressing = where(touch.in_contact, interval, 0.0)
-    touched = touch.update(push.push, wall.distance)
-    slope = stiffness(signals, settings, push.push, -wall.distance, pressing, touched)
+    touch.update(push.push, wall.distance)
+    slope = stiffness(
+        signals,
+        settings,
+        dt=tick.dt,
+        push=push.push,
+        push_noise=push.push_noise,
+        acceleration=ca.dot(wall.normal, tick.acceleration) - wall.bias,
+        lever_speed=wall.lever_speed,
+        speed=-wall.rate,
+        variance=wall.variance,
+        touching=touch.in_contact,
+        felt=tick.force_known,
+    )
     wall.store(both(touch.in_contact, wall.distance <= settings.contact_distance_m))
     return {
         "normal": wall.normal,

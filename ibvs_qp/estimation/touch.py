@@ -53,8 +53,8 @@ class TouchDetector:
         self._samples = where(new, where(above, self._samples + 1.0, 0.0), self._samples)
         self.pressed = self._samples >= self._settings.touch_samples
 
-    def update(self, push: ca.SX, distance: ca.SX) -> ca.SX:
-        """Decide on touch and loss by filtered push [N] and distance of the tip [m]; whether a contact begins."""
+    def update(self, push: ca.SX, distance: ca.SX) -> None:
+        """Decide on touch and loss by filtered push [N] and distance of the tip [m]."""
         settings, estimation = self._settings, self._settings.estimation
         touches = both(no(self.in_contact), self.pressed, distance < settings.contact_distance_m)
         bounced = self._since_loss < estimation.bounce_time_s
@@ -80,7 +80,6 @@ class TouchDetector:
         }.items():
             self._signals.remember(f"touch.{name}", value)
         self._ramp_start = start
-        return touches
 
     @property
     def ramp(self) -> ca.SX:

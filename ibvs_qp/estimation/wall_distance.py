@@ -79,6 +79,7 @@ class WallDistance:
         since_plane: Time since the capture of the last accepted plane [s].
         rate_noise: Standard deviation of the rate [m/s].
         variance: Of one sample of the acceleration along the normal [m^2/s^4].
+        lever_speed: Speed of the tip into the wall by the body's rotation [m/s].
     """
 
     def __init__(self, signals: Signals, config: ControllerConfig, tick: Tick, history: MotionHistory) -> None:
@@ -100,7 +101,7 @@ class WallDistance:
         normal = signals.state("wall.normal", 3, (1.0, 0.0, 0.0))
         normal = normal + tick.dt * ca.cross(normal, tick.rate)
         self.normal = normal / ca.norm_2(normal)
-        self._lever_speed = ca.dot(self.normal, ca.cross(tick.rate, self._tip))
+        self.lever_speed = ca.dot(self.normal, ca.cross(tick.rate, self._tip))
         measured = ca.dot(self.normal, tick.acceleration)
         distance, speed, bias = ca.vertsplit(signals.state("wall.state", 3))
         filtered, gain = signals.state("wall.filtered"), 1.0 - ca.exp(-tick.dt / filter_s)
@@ -112,7 +113,7 @@ class WallDistance:
         # The bias is learnt as fast in any vibration.
         self._kalman.noise = (DISTANCE_NOISE, density, density / settings.bias_time_s**2)
         self._state = ca.vertcat(
-            distance - tick.dt * (speed + self._lever_speed), speed + tick.dt * (measured - bias), bias
+            distance - tick.dt * (speed + self.lever_speed), speed + tick.dt * (measured - bias), bias
         )
         self.rate_noise = ca.sqrt(self._kalman.variance(SPEED))
         yaw = signals.state("wall.yaw") + tick.dt * ca.dot(tick.down, tick.rate)
@@ -216,7 +217,7 @@ class WallDistance:
             signals.remember(f"wall.{name}", value)
 
         variance = where(within, deviation**2, settings.outlier_std_m**2)
-        innovation = ca.vertcat(distance, -self._lever_speed) - past[:2]
+        innovation = ca.vertcat(distance, -self.lever_speed) - past[:2]
         at_capture, now = kalman.correct(either(within, counts_little), DISTANCE, innovation[DISTANCE], variance, age)
         # The tip stands: so does the body, but for its rotation.
         slip, speed_variance = innovation[SPEED] - at_capture[SPEED], settings.stationary_speed_std_m_s**2
@@ -226,7 +227,7 @@ class WallDistance:
         # A filter that refuses for long has a wrong speed as well: both from the refused planes.
         interval = ca.fmax(first_age - age, SHORTEST_JUMPS)
         kalman.restart(restart, (FIRST_DISTANCE_STD, JUMP_SPEED_STD, INITIAL_STD[BIAS]))
-        self._set(restart, SPEED, (first_distance - distance) / interval - self._lever_speed)
+        self._set(restart, SPEED, (first_distance - distance) / interval - self.lever_speed)
         return accepted, restart
 
     def touch(self, happens: ca.SX, another: ca.SX) -> None:
@@ -240,7 +241,7 @@ class WallDistance:
         self._kalman.set_entry(happens, DISTANCE, TOUCH_STD)
         self._kalman.set_entry(happens, SPEED, self._settings.stationary_speed_std_m_s)
         self._set(happens, DISTANCE, ca.SX(0.0))
-        self._set(happens, SPEED, -self._lever_speed)
+        self._set(happens, SPEED, -self.lever_speed)
 
     def _set(self, condition: ca.SX, index: int, value: ca.SX) -> None:
         entries = ca.vertsplit(self._state)
@@ -269,7 +270,7 @@ class WallDistance:
     @property
     def rate(self) -> ca.SX:
         """Rate of the distance [m/s]: of the centre of mass, and of the tip that rotates with the body."""
-        return where(self.known, -self._state[SPEED] - self._lever_speed, 0.0)
+        return where(self.known, -self._state[SPEED] - self.lever_speed, 0.0)
 
     @property
     def acceleration(self) -> ca.SX:
@@ -285,7 +286,7 @@ class WallDistance:
     @property
     def speed(self) -> ca.SX:
         """Speed of the centre of mass into the wall [m/s]."""
-        return -self.rate - self._lever_speed
+        return -self.rate - self.lever_speed
 
     @property
     def depth(self) -> ca.SX:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable
 from typing import TypeVar
 
@@ -11,7 +12,9 @@ import numpy as np
 
 from allocation.effectiveness import control_effectiveness
 from ibvs_qp.config import ControllerConfig
+from ibvs_qp.config.contact_estimation import LEAST_PUSH_DENSITY
 from ibvs_qp.config.errors import ConfigError
+from ibvs_qp.estimation.push_disturbance import Normal, PushDisturbance
 from ibvs_qp.frames import GRAVITY, camera_twist_matrix
 from ibvs_qp.model.angular_rate import estimated_rate
 from ibvs_qp.model.attitude import attitude, wall_axes
@@ -59,6 +62,7 @@ class Model:
         travel: Commanded velocity in the wall plane, in B [m/s], (3,).
         contact_weight: Lambda, 0 in free air to 1 in contact.
         tip_stationary: 1 for a tip in contact that is commanded to stay.
+        push_disturbance: Push, rate and disturbing forces along n in contact.
         bias_wrench: h [N, N m], (6,).
         reach: Largest push that the thrust limits allow [N].
         push_reference: Push reference within reach [N].
@@ -134,16 +138,10 @@ class Model:
         # Only a tip that shall touch: subtracting a drifted force would hold a retreating vehicle at the wall.
         landing = ca.logic_and(self.target.press, contact.distance < config.contact.contact_distance_m)
         near = ca.logic_or(contact.touching, landing)
+        normal, along = self.wall.normal, body.acceleration_bias
+        push = self.push_disturbance = self._along_normal()
         external = external_wrench(
-            signals,
-            config,
-            self.effectiveness,
-            body,
-            felt_moment,
-            self.wall.normal,
-            near,
-            contact,
-            self._motors,
+            signals, config, self.effectiveness, body, felt_moment, normal, near, contact, self._motors, push.external
         )
         inertial_push(signals, config, self.effectiveness, body, contact, self._motors)
         carried_weight(signals, config, self.effectiveness, body, self._motors)
@@ -152,12 +150,38 @@ class Model:
         self.output("modelled_force", known / vehicle.mass_kg)
         gyroscopic = -ca.cross(body.rate, ca.sparsify(vehicle.inertia) @ body.rate)
         # The observer takes the accelerometer's bias for a force, and gravity leaks through the attitude's error.
-        normal, along = self.wall.normal, body.acceleration_bias
         bias = contact.bias * normal + along - normal * ca.dot(normal, along)
         unreal = ca.vertcat(vehicle.mass_kg * bias, ca.DM.zeros(3))
         static = ca.vertcat(vehicle.mass_kg * GRAVITY * body.down, gyroscopic) + external - unreal
         self.bias_wrench = static + expected
         return static, cautious_friction(signals, friction, config.contact.assumed_friction)
+
+    def _along_normal(self) -> PushDisturbance:
+        config, body, contact, motors = self.config, self.body, self.contact, self._motors
+        mass, normal = config.vehicle.mass_kg, self.wall.normal
+        filter_rad_s = 2.0 * math.pi * config.contact.force_filter_hz
+        quiet = config.contact.estimation.acceleration_noise / math.sqrt(config.tick_s)
+        return PushDisturbance(
+            self.signals,
+            config,
+            Normal(
+                dt=body.dt,
+                touching=ca.logic_and(motors.ready, contact.touching),
+                felt=body.specific_force_known,
+                thrust=ca.dot(normal, ca.DM(self.effectiveness[:3]) @ motors.thrusts),
+                weight=mass * GRAVITY * ca.dot(normal, body.down),
+                inertial=mass * ca.dot(normal, body.specific_force),
+                push=-ca.dot(normal, body.wrench[:3]),
+                push_density=2.0 * contact.push_noise**2 / filter_rad_s + LEAST_PUSH_DENSITY,
+                vibration=mass * ca.sqrt(contact.acceleration_noise**2 + quiet**2),
+                stiffness=contact.stiffness,
+                stiffness_known=contact.stiffness_known,
+                rate=-contact.rate,
+                rate_std=contact.rate_noise,
+                external=ca.dot(normal, self.signals.state("external_force", 3)),
+                bias=contact.bias,
+            ),
+        )
 
     def _rotor_limits(self) -> None:
         """Thrust window of the step, and the last thrusts and where their last change would lead [N], (n,) each."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ibvs_qp.model.external_wrench import quiet_rate
 from ibvs_qp.model.feedforward import moment_lag
 from ibvs_qp.model.inputs import LEAST_GAIN, clamp
 from ibvs_qp.model.model import Model
@@ -19,11 +18,13 @@ class PushTask(Task):
     r"""Net force along n equals the force law in contact [N], weight lambda.
 
     .. math::
-        F = F_{ref} + K_{sp} e_s + K_{sd} (\dot e_s + T \ddot e_s) + K_{fp} (F_{ref} - f) + K_{fi} \int (F_{ref} - f)
+        F = F_{ref} + \Big(\frac{K_{sp}}{k} + K_{fp}\Big) (F_{ref} - f) - K_{sd} (v + T \dot v)
+            + K_{fi} \int (F_{ref} - f)
 
-    F_ref is the push reference within reach times the ramp after touch, f the measured push, e_s the distance of the
-    tip to the wall, T the lead against the motors' lag; `Model.filtered` follows. (Paper, equation 14, with the sign of
-    the force feedback corrected.)
+    F_ref is the push reference within reach times the ramp after touch, T the lead against the motors' lag; push f and
+    rate v of the penetration are those of `ibvs_qp.estimation.push_disturbance`, whose forces h contains.
+    `Model.filtered` follows. (Paper, equation 14, with the sign of the force feedback corrected; its e_s is the
+    distance of the tip, here from the penetration of the reference.)
     """
 
     weight_settings = ("weights.push",)
@@ -44,12 +45,14 @@ class PushTask(Task):
         """The force law [N]."""
         gains, contact = model.gains, model.contact
         reference = model.push_reference * contact.ramp
-        error = reference - contact.push
+        felt, stiffness = model.push_disturbance, contact.stiffness
+        error = reference - felt.push
         # On stiff walls the loop gain rises with the stiffness; the proportional gain falls with it.
-        softness = ca.fmin(1.0, model.config.contact.full_gain_stiffness_n_m / contact.stiffness)
-        proportional = softness * quiet_rate(contact, model.config.contact) * gains.force_kfp
-        feedback = proportional * error + gains.force_kfi * self._integral(model, reference)
-        target = reference + feedback + self._impedance(model)
+        softness = ca.fmin(1.0, model.config.contact.full_gain_stiffness_n_m / stiffness)
+        target = reference + softness * gains.force_kfp * error + gains.force_kfi * self._integral(model, reference)
+        if model.config.impedance:
+            damped = felt.rate + gains.push_lead_s * felt.acceleration
+            target += gains.force_ksp * error / stiffness - gains.force_ksd * damped
         return model.filtered(target, model.force_along_normal, gains.push_filter_s)
 
     def _integral(self, model: Model, reference: ca.SX) -> ca.SX:
@@ -66,26 +69,9 @@ class PushTask(Task):
         coming = model.contact_weight * reference
         expected = ca.if_else(pressing, expected + late * (coming - expected), 0.0)
         error = signals.remember("push_expected", expected) - contact.push
-        bound = FORCE_INTEGRAL_BOUND / ca.fmax(model.gains.force_kfi, LEAST_GAIN)
+        used = model.gains.force_kfi > LEAST_GAIN
+        bound = used * FORCE_INTEGRAL_BOUND / ca.fmax(model.gains.force_kfi, LEAST_GAIN)
         moving = ca.logic_or(model.integrate, error * old < 0.0)
         step = ca.if_else(moving, model.body.dt, 0.0) * model.contact_weight
         moved = clamp(old + step * error, -bound, bound)
         return signals.remember("force_integral", ca.if_else(pressing, moved, 0.0))
-
-    def _impedance(self, model: Model) -> ca.SX:
-        """Spring and damper between tip and wall [N]; none in direct force control."""
-        config, contact = model.config, model.contact
-        if not config.impedance:
-            return ca.SX(0.0)
-        gains = model.gains
-        damping = quiet_rate(contact, config.contact) * gains.force_ksd * predicted_rate(model)
-        force = gains.force_ksp * contact.distance + damping
-        return ca.if_else(contact.known, force, 0.0)
-
-
-def predicted_rate(model: Model) -> ca.SX:
-    r"""Rate of the distance after the lead, :math:`\dot e_s + T \ddot e_s` [m/s].
-
-    A touch on a stiff wall lasts 80 ms. Damping that comes one motor lag late arrives when the tip already leaves.
-    """
-    return model.contact.rate + model.gains.push_lead_s * model.contact.acceleration

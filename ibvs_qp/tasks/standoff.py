@@ -9,7 +9,6 @@ import casadi as ca
 from ibvs_qp.model.inputs import clamp
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.rows import TaskRow
-from ibvs_qp.tasks.push import predicted_rate
 from ibvs_qp.tasks.task import Task
 
 #: Peak force of a touch while the stiffness is unknown [N]: v = F / sqrt(k m).
@@ -93,7 +92,7 @@ def _approach(model: Model) -> Approach:
     settings = model.config.contact
     retreat = ca.fmax(settings.retreat_speed_m_s, model.target.standoff / settings.retreat_time_s)
     speed = ca.fmin(ca.fmax(gains.standoff_kp * error, -retreat), allowed)
-    speed_error = speed + predicted_rate(model)
+    speed_error = speed + _predicted_rate(model)
     search = model.output("search_force", _search(model, speed_error))
     return Approach(allowed=model.output("approach_speed", allowed), speed_error=speed_error, search=search)
 
@@ -120,3 +119,11 @@ def _search(model: Model, speed_error: ca.SX) -> ca.SX:
     near = ca.logic_and(model.target.press, contact.distance < model.config.contact.contact_distance_m)
     new = ca.if_else(near, ca.if_else(contact.touching, old, moved), 0.0)
     return model.signals.remember("search_force", ca.if_else(contact.known, new, old))
+
+
+def _predicted_rate(model: Model) -> ca.SX:
+    r"""Rate of the distance after the lead, :math:`\dot e_s + T \ddot e_s` [m/s].
+
+    A touch on a stiff wall lasts 80 ms. Damping that comes one motor lag late arrives when the tip already leaves.
+    """
+    return model.contact.rate + model.gains.push_lead_s * model.contact.acceleration

@@ -51,7 +51,8 @@ REFERENCES = {name: variant.against for name, variant in VARIANTS.items()}
 
 
 def with_force_gain(config: PilotConfig, factor: float) -> PilotConfig:
-    """The pilot with the force gains K_fp and K_fi multiplied."""
+    """The pilot with stiffer force feedback: gains of direct control times a factor less one, on top of its own."""
     gains = config.controller.gains
-    gains = dataclasses.replace(gains, force_kfp=factor * gains.force_kfp, force_kfi=factor * gains.force_kfi)
+    more = {name: getattr(gains, name) + (factor - 1.0) * gain for name, gain in VARIANTS["direct"].gains.items()}
+    gains = dataclasses.replace(gains, **more)
     return dataclasses.replace(config, controller=dataclasses.replace(config.controller, gains=gains))

@@ -90,7 +90,7 @@ GROUPS: dict[str, tuple[Knob, ...]] = {
         Knob("line, k_d [1/s]", _GAINS + "line_kd", 1.0, 100.0),
         Knob("line, k_i [1/s³]", _GAINS + "line_ki", 0.0, 10.0, 0.2),
         Knob("force, K_fp [-]", _GAINS + "force_kfp", 0.0, 3.0, 0.05),
-        Knob("force, K_fi [1/s]", _GAINS + "force_kfi", 0.0, 5.0, 0.1),
+        Knob("impedance, K_sp [N/m]", _GAINS + "force_ksp", 0.0, 1000.0, 10.0),
         Knob("impedance, K_sd [N s/m]", _GAINS + "force_ksd", 0.0, 200.0, 5.0),
     ),
 }

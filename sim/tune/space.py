@@ -6,7 +6,7 @@ import dataclasses
 import math
 from dataclasses import dataclass, field
 
-from ibvs_qp.config.contact_margin import require_margin
+from ibvs_qp.config.contact_margin import STIFFNESS_RATIOS, contact_sensitivity, require_margin
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.gain_scaling import gain_factors
 from ibvs_qp.config.motion_margin import LAG_RATIOS, LARGEST_SENSITIVITY, LARGEST_WITH_OTHER_LAG, motion_sensitivity
@@ -39,8 +39,8 @@ GAIN_RANGES = {
     "yaw_filter_s": (0.0, 0.02),
     "force_ksp": (10.0, 300.0),
     "force_ksd": (30.0, 250.0),
-    "force_kfp": (0.05, 1.0),
-    "force_kfi": (0.4, 5.0),
+    "force_kfp": (0.0, 1.0),
+    "push_filter_s": (0.0, 0.03),
 }
 #: The same of the rival's weights: up to a decade to both sides of the first ones, which were set by hand.
 WEIGHT_RANGES = {
@@ -109,10 +109,11 @@ class Subject:
         return dataclasses.replace(self, config=dataclasses.replace(self.config, controller=controller))
 
     def fragility(self) -> float:
-        """Logarithm by which sensitivity peaks exceed their bounds, with the nominal lag and others; 0 if none does.
+        """Logarithm by which sensitivity peaks exceed their bounds; 0 if none does.
 
-        A contact that rings with another stiffness counts as an unstable loop. Neither margin describes a horizon, so
-        the rival has none.
+        The peaks are those of the motion, at the nominal lag and others, and of the contact, at the estimated stiffness
+        and others. A contact that rings counts as an unstable loop. Neither margin describes a horizon, so the rival
+        has none.
         """
         if self.rival:
             return 0.0
@@ -122,6 +123,8 @@ class Subject:
         except ConfigError:
             return UNSTABLE
         peaks = [(max(motion_sensitivity(controller).values()), LARGEST_SENSITIVITY)]
+        peaks += [(contact_sensitivity(controller), LARGEST_SENSITIVITY)]
+        peaks += [(contact_sensitivity(controller, each), LARGEST_WITH_OTHER_LAG) for each in STIFFNESS_RATIOS]
         peaks += [(max(motion_sensitivity(controller, each).values()), LARGEST_WITH_OTHER_LAG) for each in LAG_RATIOS]
         return min(max(max(math.log(peak / bound) for peak, bound in peaks), 0.0), UNSTABLE)
 

@@ -37,13 +37,13 @@ def test_the_same_thrusts_where_no_limit_binds() -> None:
 
 
 def test_clipping_gives_up_lift_and_level_where_the_program_gives_up_push() -> None:
-    """While 20 N are pressed every rotor is limited to 20 N; 0.1 s later the program still carries the weight."""
+    """While 20 N are pressed every rotor is limited to 20 N; 40 ms later the program still carries the weight."""
     lost = {}
     for name, config in (("within", WITHIN), ("clipped", CLIPPED)):
         controller, vehicle = HybridController(config), SmallVehicle(config, distance=0.005)
         reference = Reference(push_force=20.0, standoff=0.02, contact=True, lines=line_references(1))
         before, command = np.zeros(6), None
-        for tick in range(1225):
+        for tick in range(1211):
             limit = {"thrust_max": np.full(6, 20.0)} if tick >= 1200 else {}
             command = controller.step(vehicle.measure(count=1, **limit), reference)
             vehicle.fly(command.thrusts)
@@ -52,5 +52,5 @@ def test_clipping_gives_up_lift_and_level_where_the_program_gives_up_push() -> N
         assert any(limit.name.startswith("thrust_") for limit in command.active_limits)
         assert np.abs(command.unallocated_wrench).max() > 1.0
         lost[name] = np.abs(command.wrench - before)
-    assert lost["within"][2] < 0.5 and lost["within"][4] < 0.15  # the level rows answer the push that falls
-    assert lost["clipped"][2] > 3.5 and lost["clipped"][4] > 0.5
+    assert lost["within"][2] < 1.0 and lost["within"][4] < 0.05  # the level rows answer the push that falls
+    assert lost["clipped"][2] > 3.0 and lost["clipped"][4] > 0.3

@@ -39,11 +39,11 @@ def predicted_damping(law: str, variant: str, gain: float, stiffness: float, del
     Args:
         law: Law at its shipped gains.
         variant: Key of `VARIANTS`.
-        gain: Factor on K_fp and K_fi.
+        gain: Factor of `with_force_gain`.
         stiffness: Stiffness of the wall [N/m].
         delay_s: Latency of the force/torque sensor [s]; half a sample period is added.
     """
-    config = VARIANTS[variant].apply(with_force_gain(ibvs_qp.preset(law), gain)).controller
+    config = with_force_gain(VARIANTS[variant].apply(ibvs_qp.preset(law)), gain).controller
     age = delay_s + 0.5 / ForceTorqueScene().rate_hz
     return contact_mode_damping(config, stiffness, WallScene().damping_n_s_m, age).least_damping_ratio
 

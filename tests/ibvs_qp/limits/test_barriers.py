@@ -124,13 +124,13 @@ def test_view_ends_where_the_picture_ends(mirrored: bool) -> None:
     assert fly(config(vehicle=shifted), reference, 4.0, lines=1).rho < 0.384 - 100.0 / 625.22
 
 
-@pytest.mark.parametrize("wrong", [{"force_kfp": 2.0}, {"force_kfi": 8.0}])
+@pytest.mark.parametrize("wrong", [{"force_kfp": 2.0}, {"force_kfi": 7.0}])
 def test_push_stays_below_its_ceiling_under_gains_that_oscillate(wrong: dict[str, float]) -> None:
     gains, reference = Gains(force_ksd=0.0, **wrong), Reference(push_force=5.0, contact=True)
     with_it, without = (
         fly(config("push", on, gains=gains, touch_ramp=False), reference, 3.0, distance=0.03) for on in (True, False)
     )
-    assert with_it.push <= 1.6 * 5.0 and with_it.share("push_ceiling") > 0.05
+    assert with_it.push <= 1.8 * 5.0 and with_it.share("push_ceiling") > 0.05
     assert without.push > 2.0 * 5.0
 
 

@@ -11,16 +11,13 @@ from symbolic_block import Block
 from allocation import control_effectiveness
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.config.vehicle import VehicleParams
-from ibvs_qp.model.external_wrench import FORCE_BOUND, MOMENT_BOUND, QUIET_PUSH, external_wrench
+from ibvs_qp.model.external_wrench import FORCE_BOUND, MOMENT_BOUND, external_wrench
 from ibvs_qp.model.inputs import Body, Contact
 from ibvs_qp.model.motor_thrust import motor_thrust
 
 VEHICLE = VehicleParams()
 MATRIX = control_effectiveness(VEHICLE.geometry)
 TICK, WEIGHT, STILL = 0.004, VEHICLE.mass_kg * 9.81, np.array([0.0, 0.0, -9.81])
-
-
-GUST_BANDWIDTH = ControllerConfig().contact.gust_bandwidth_rad_s
 
 
 def observer(adapt_in_contact: bool = True, plane_bandwidth: float | None = None) -> Block:
@@ -41,6 +38,7 @@ def observer(adapt_in_contact: bool = True, plane_bandwidth: float | None = None
             contact.touching,
             contact,
             motor_thrust(signals, VEHICLE, body.dt),
+            signals.input("along"),
         )
 
     return Block(build)
@@ -90,67 +88,15 @@ def test_wind_and_contact_are_told_apart() -> None:
     np.testing.assert_allclose(found[3:], 0.0, atol=0.01)
 
 
-def test_a_gust_onto_the_wall_is_told_from_what_the_wall_returns() -> None:
-    """4 N of wind along n while the wall returns 5 N; what the wall returns is no load, however much it changes."""
-    for push in (5.0, 9.0):
-        contact = np.array([-push, 0, 0, 0, 0, 0])
-        found = hover(np.array([4.0, 0, 0, 0, 0, 0]), touching=True, contact=contact)
-        assert wrench(found)[0] == pytest.approx(4.0, abs=0.02)
-
-
-def test_a_noisy_force_sensor_slows_the_observer_in_contact() -> None:
-    """Its noise would become push: with 1 N of filtered noise the bandwidth is a twelfth."""
-    found = []
-    for noise in (0.0, 1.0):
-        block = hover(np.zeros(6), seconds=1.0)
-        block.contact(touching=True, push_noise=noise)
-        gust = np.array([2.0, 0, 0, 0, 0, 0])
-        thrusts = np.linalg.solve(MATRIX, -np.array([0, 0, WEIGHT, 0, 0, 0]))
-        for _ in range(25):
-            block.step.states["gust_power"][:] = 100.0  # amid gusts
-            without_lag(block, thrusts, specific_force=STILL + gust[:3] / VEHICLE.mass_kg)
-        found.append(float(wrench(block)[0]))
-    assert found[0] == pytest.approx(2.0 * (1.0 - np.exp(-0.1 * GUST_BANDWIDTH)), rel=0.02)
-    assert found[1] == pytest.approx(
-        2.0 * (1.0 - np.exp(-0.1 * GUST_BANDWIDTH / (1.0 + 1.0 / QUIET_PUSH**2))), rel=0.05
-    )
-    assert found[1] < 0.25 * found[0]
-
-
-def test_in_calm_air_sensor_noise_is_not_handed_on_and_a_gust_wakes_the_observer() -> None:
-    rng, block = np.random.default_rng(3), observer()
-    block.contact(touching=True)
-    thrusts = np.linalg.solve(MATRIX, -np.array([0, 0, WEIGHT, 0, 0, 0]))
-
-    def fly(gust: float, seconds: float) -> np.ndarray:
-        found = []
-        for _ in range(round(seconds / TICK)):
-            noise = rng.normal(0.0, 0.25)  # 6 kg x 4e-3 m/s^2/sqrt(Hz) at 250 Hz, and the force sensor's
-            force = np.array([(gust + noise) / VEHICLE.mass_kg, 0.0, 0.0])
-            without_lag(block, thrusts, specific_force=STILL + force)
-            found.append(float(wrench(block)[0]))
-        return np.array(found)
-
-    calm = fly(0.0, 6.0)[500:]
-    fixed = 0.25 * np.sqrt(GUST_BANDWIDTH * TICK / 2.0)  # what a first-order filter leaves of white noise
-    assert np.std(calm) < 0.4 * fixed
-    assert fly(1.0, 0.5)[-1] > 0.8  # 1 N that comes at once is learnt within half a second
-
-
-def test_vibration_is_no_gust() -> None:
-    """Vibration of 0.5 m/s^2 is 3 N per sample; known as noise it leaves the observer at rest."""
-
-    def passed_on(known: float) -> float:
-        rng, block, found = np.random.default_rng(4), observer(), []
-        block.contact(touching=True, acceleration_noise=known)
-        thrusts = np.linalg.solve(MATRIX, -np.array([0, 0, WEIGHT, 0, 0, 0]))
-        for _ in range(1500):
-            shake = np.array([rng.normal(0.0, 0.5), 0.0, 0.0])
-            without_lag(block, thrusts, specific_force=STILL + shake)
-            found.append(float(wrench(block)[0]))
-        return float(np.std(found[500:]))
-
-    assert passed_on(0.5) < 0.2 < 0.35 < passed_on(0.0)
+def test_along_the_normal_the_force_in_contact_is_that_of_the_push_filter() -> None:
+    block = hover(np.array([2.0, 3.0, 1.0, 0, 0, 0]), seconds=8.0)
+    before = wrench(block)[:3]
+    block.contact(touching=1.0)
+    block(along=-1.5)
+    np.testing.assert_allclose(wrench(block)[:3], [-1.5, *before[1:]], atol=0.02)
+    block.contact(touching=0.0)
+    block()
+    assert -1.5 < wrench(block)[0] < -1.3  # it goes on from there, at the bandwidth of free flight
 
 
 def test_acceleration_is_not_taken_for_a_load() -> None:

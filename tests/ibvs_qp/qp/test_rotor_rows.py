@@ -94,6 +94,8 @@ def test_a_riccati_regulator_is_a_lead_and_a_filter() -> None:
 
 LINE, LEVEL, PUSH, SPEED = regulator(300.0, 15.0), regulator(900.0, 8.0), regulator(200.0, 20.0), speed_regulator(40.0)
 YAW = regulator_with_lead(LEVEL.lead_s, 4.0)
+#: Stiffness of a wall that is none [N/m].
+SOFT = 1e-8
 AXES = ("roll", "pitch", "yaw", "right", "down", "line", "push")
 
 
@@ -137,6 +139,7 @@ def lag_controller() -> HybridController:
         "weights": weights,
         "barriers": False,
         "contact_feedforward": False,
+        "brush": dataclasses.replace(config.brush, damping_n_s_m=0.0),
     }
     return HybridController(dataclasses.replace(config, **changes))
 
@@ -170,9 +173,12 @@ def test_without_active_limits_the_tick_is_the_regulator(controller: HybridContr
     pack(controller, tick, reference, share=1.0)
     now, last = thrusts_moved(controller, moved)
     inputs = setpoints.step.inputs
-    inputs["contact.distance"][0], inputs["contact.rate"][0] = 0.004 * moved["push"], 0.03 * moved["push"]
-    inputs["contact.acceleration"][0], inputs["contact.rate_noise"][0] = 0.1 * moved["push"], 0.0
-    inputs["contact.touching"][0] = 1.0
+    # A wall so soft that its reaction is none, and sensors so noisy that the filter of the push believes its model.
+    inputs["contact.touching"][0], inputs["contact.stiffness"][0] = 1.0, SOFT
+    inputs["contact.push_noise"][0] = inputs["contact.acceleration_noise"][0] = 1e6
+    begun = [-0.004 * moved["push"] * SOFT, -0.03 * moved["push"], 0.0, 0.0]
+    state(controller, "push_kalman.begun")[:], state(controller, "push_kalman.state")[:] = 1.0, begun
+    state(controller, "push_kalman.covariance")[:] = 0.0
     inertia = np.array([vehicle.mass_kg] * 3 + list(vehicle.inertia_kg_m2))
     per_thrust = control_effectiveness(vehicle.geometry) / inertia[:, None]
     for _ in range(2):  # the bias wrench first; then a rate estimate that the gyro confirms
@@ -181,7 +187,7 @@ def test_without_active_limits_the_tick_is_the_regulator(controller: HybridContr
         state(controller, "angular_rate")[:] = (
             inputs["angular_velocity"] - TICK_S * setpoints.step.outputs["angular_acceleration"]
         )
-    expected = regulated(controller, quaternion, wall, given, gone)
+    expected = regulated(controller, quaternion, wall, given, gone, penetration=(begun[0] / SOFT, begun[1]))
     assert exact_thrusts(controller) == pytest.approx(
         np.linalg.solve(per_thrust, expected - setpoints.bias_wrench / inertia), abs=1e-9
     )
@@ -209,9 +215,17 @@ def thrusts_moved(controller: HybridController, moved: dict[str, float]) -> tupl
 
 
 def regulated(
-    controller: HybridController, quaternion: np.ndarray, wall: Wall, given: np.ndarray, gone: np.ndarray
+    controller: HybridController,
+    quaternion: np.ndarray,
+    wall: Wall,
+    given: np.ndarray,
+    gone: np.ndarray,
+    penetration: tuple[float, float],
 ) -> np.ndarray:
-    """Accelerations that the regulators command, from the states of each axis, (6,)."""
+    """Accelerations that the regulators command, from the states of each axis, (6,).
+
+    Penetration and its rate are those of the tick before; the filter of the push predicts them to this one.
+    """
     setpoints = controller.setpoints
     inputs = setpoints.step.inputs
     rate = inputs["angular_velocity"]
@@ -225,10 +239,11 @@ def regulated(
         SPEED.command(0.0, direction @ velocity, direction @ given[:3], direction @ gone[:3])
         for direction in (wall.right, wall.down)
     )
+    rate_now = penetration[1] + TICK_S * wall.normal @ given[:3]
     normal = -PUSH.command(
-        -inputs["contact.distance"].item(),
-        -inputs["contact.rate"].item(),
-        -inputs["contact.acceleration"].item(),
+        penetration[0] + TICK_S * rate_now,
+        rate_now,
+        wall.normal @ given[:3],
         wall.normal @ gone[:3],
     )
     wanted[:3] = right * wall.right + down * wall.down - normal * wall.normal

@@ -71,7 +71,7 @@ def test_a_push_beyond_reach_is_given_up_and_nothing_else(reach_check: bool) -> 
     delivered, tilt = float(trace.push_true[ticks].mean()), np.degrees(trace.euler[ticks, :2])
     height = float(np.ptp(trace.position[ticks, 2]))
     print(f"35 N: {delivered:.2f} N, height {1e3 * height:.1f} mm, tilt {np.abs(tilt).max():.2f} deg peak")
-    assert trace.claimed and delivered >= 0.95 * REACH_N
+    assert trace.claimed and delivered >= 0.94 * REACH_N
     assert height <= 0.05 and np.sqrt((tilt**2).mean()) <= 1.0 and np.abs(tilt).max() <= 2.0
     assert any("reduced" in text and "reach standing still" in text for text in notes(trace)) is reach_check
 

@@ -44,7 +44,7 @@ def slide(trim_deg: float, law: str = "qp") -> Trace:
 def test_two_degrees_deliver_what_level_flight_cannot(law: str) -> None:
     figures = slide_figures(slide(2.0, law))
     assert figures["force_error_rms_n"] < 0.15
-    assert figures["reach_n"] < 9.0 and figures["push_mean_n"] > 9.9
+    assert figures["reach_n"] < 9.0 and figures["push_mean_n"] > 9.85
     assert figures["tilt_peak_deg"] < 3.5 and figures["stuck_share"] < 0.1
 
 

@@ -81,7 +81,7 @@ def test_the_analytic_law_is_at_its_place_in_every_world(world: str) -> None:
         assert metrics["completed"] or not metrics["claimed"]
     else:
         assert metrics["completed"] and metrics["claimed"], metrics["not_completed"]
-    assert metrics["force_rms_straight_n"] < 0.8  # 1.46 N in harsh with K_fp in full while K_sd is off
+    assert metrics["force_rms_straight_n"] < 0.8
 
 
 @pytest.mark.parametrize("down_m", [-0.005, 0.005])
