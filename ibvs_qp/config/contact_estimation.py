@@ -86,7 +86,7 @@ class ContactEstimationSettings:
     calm_noise: float = setting(
         0.187,
         "process noise of the force along the normal in calm air",
-        why="least push error of the linear loop in calm air and, below, in gusts of 2 N rms; sensitivity at most 2.2",
+        why="least push error of the linear loop in calm air and, below, in gusts of 2 N rms",
         unit="N/sqrt(s)",
         low=1e-3,
         high=100.0,

@@ -11,6 +11,7 @@ import pytest
 from symbolic_block import Block
 
 from ibvs_qp.config import ControllerConfig
+from ibvs_qp.config.contact_margin import contact_loop
 from ibvs_qp.estimation.push_disturbance import FORCE_BOUND, SLOW_BOUND, Normal, PushDisturbance
 
 CONFIG = ControllerConfig()
@@ -179,3 +180,22 @@ def test_the_mass_is_the_vehicles(mass: float) -> None:
     )
     inputs = {"touching": 1.0, "thrust": 3.0, "weight": 2.0, "push": 1.0, "vibration": 1.0, "push_density": 1e3}
     assert block(**{f"in_{name}": value for name, value in inputs.items()})[0] == pytest.approx(4.0 / mass, rel=0.1)
+
+
+@pytest.mark.parametrize("gusts", [False, True])
+def test_the_linear_loop_of_the_margin_has_the_gain_of_this_filter(gusts: bool) -> None:
+    loop = contact_loop(CONFIG, 1500.0, DAMPING, CONFIG.brush.force_delay_s, gusts=gusts)
+    wall = Wall()
+    wall.block.step.inputs["in_push_density"][:] = loop.push_density
+    wall.block.step.inputs["in_vibration"][:] = MASS * loop.vibration
+    for _ in range(4000):
+        wall.block.step.states["gust_power"][:] = 1e9 * gusts
+        wall.tick(5.0)
+    covariance = np.zeros((4, 4))
+    covariance.T[np.triu_indices(4)] = wall.block.step.states["push_kalman.covariance"]
+    covariance += np.tril(covariance, -1).T
+    transition, rows, gain = loop._filter()
+    prior = transition @ covariance @ transition.T + TICK * np.diag(loop.noise)
+    measured = np.diag([loop.push_density / TICK, (MASS * loop.vibration) ** 2])
+    own = prior @ rows.T @ np.linalg.inv(rows @ prior @ rows.T + measured)
+    np.testing.assert_allclose(own, gain, rtol=1e-4, atol=1e-6)

@@ -11,6 +11,8 @@ line_k_integral        rests likewise and while friction holds the tip; bounded 
 velocity_integral_k    rests likewise; bounded by 0.8 m/s^2; fades where a line takes the direction over
 external_force,        know the thrusts that were commanded, not those that were wished: nothing given up enters them
 external_moment
+push_kalman.state      knows the thrusts that were commanded; its forces are bounded by 40 N and 6 N; anew
+                       with each contact
 friction               rises while a tip that shall travel is held, given up or not: it lowers the push, which frees the
                        tip; bounded by 1.2, and sliding corrects it within half a second
 =====================  ==============================================================================================

@@ -16,6 +16,7 @@ from ibvs_qp.analysis.contact_loop import ContactLoop
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.config.contact_margin import (
     LEAST_DAMPING_RATIO,
+    STIFFNESS_RATIOS,
     BrushSettings,
     contact_loop,
     contact_mode_damping,
@@ -157,7 +158,7 @@ def test_without_feedback_it_is_the_damped_oscillator() -> None:
 def test_the_contact_bears_a_wrong_stiffness(law: str) -> None:
     config = ibvs_qp.preset(law).controller
     assert contact_sensitivity(config) <= 2.0
-    for ratio in (0.75, 1.3):  # true over estimated
+    for ratio in STIFFNESS_RATIOS:
         assert contact_sensitivity(config, ratio) <= 2.3
 
 
