@@ -155,8 +155,8 @@ class PushDisturbance:
         signals.remember("gust_begun", ready)
         left = signals.remember("gust_unlearnt", where(begun, left + gain * (force - learnt - left), 0.0))
         squared = ready * ((fast - slow) ** 2 + left**2)
-        noise = CHANGE_NOISE * along.vibration**2 * gain / (2.0 - gain)
-        return gust_weight(signals, "gust", along.dt, squared, noise, CALM_CHANGE)
+        noise = along.vibration**2 * gain / (2.0 - gain) + along.push_density * FAST_CHANGE / 2.0
+        return gust_weight(signals, "gust", along.dt, squared, CHANGE_NOISE * noise, CALM_CHANGE)
 
 
 def gust_weight(signals: Signals, name: str, dt: ca.SX, squared: ca.SX, noise: ca.SX, calm: float) -> ca.SX:

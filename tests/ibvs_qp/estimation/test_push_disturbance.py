@@ -111,6 +111,17 @@ def test_vibration_is_no_gust() -> None:
     assert passed_on(0.5) < 0.15 < 0.5 < passed_on(0.06)
 
 
+def test_noise_of_the_force_sensor_is_no_gust() -> None:
+    """3 N per sample that are known as noise leave the force at rest; unknown they do not."""
+
+    def passed_on(known: float) -> float:
+        wall = Wall(noise=3.0)
+        wall.block.step.inputs["in_push_density"][:] = known**2 * TICK
+        return float(np.std(flown(wall, 2000)[500:, 2]))
+
+    assert passed_on(3.0) < 0.15 < 0.5 < passed_on(0.3)
+
+
 def test_a_spike_of_the_force_sensor_counts_little() -> None:
     wall = Wall(noise=0.2, vibration=0.1)
     flown(wall, 1000)
