@@ -29,8 +29,8 @@ LARGEST_FILE, LARGEST_RECORD = 1 << 34, 1 << 26
 _NEEDED = ("version", "kind", "law", "config", "config_sha256", "safety", "rows")
 #: Errors of content that no recorder wrote.
 _DAMAGE = (
-    ArithmeticError, ConfigError, DecodeError, LookupError, McapError, RecursionError, TypeError, ValueError,
-    struct.error,
+    ArithmeticError, ConfigError, DecodeError, LookupError, McapError, MemoryError, RecursionError, TypeError,
+    ValueError, struct.error,
 )  # fmt: skip
 
 

@@ -7,12 +7,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 from recorded_flights import record
 
 from ibvs_qp.config.files import UnreadableFile
 from ibvs_qp.recording import read_log, replay
 from ibvs_qp.recording.header import digest
+
+#: Place of the length of its records in an uncompressed chunk [bytes].
+LENGTH_OF_RECORDS = 41
 
 
 @pytest.fixture(scope="module")
@@ -72,6 +76,21 @@ def test_a_log_cut_anywhere_is_read_up_to_there_or_refused(tmp_path: Path, good:
         assert result.same and result.complete == (share == 1.0)
         ticks.append(result.ticks)
     assert ticks == sorted(ticks) and ticks[-1] == 300 and len(set(ticks)) > 20
+
+
+def test_a_damaged_length_beyond_the_memory_ends_the_log_there(tmp_path: Path, good: bytes) -> None:
+    file = tmp_path / "x.mcap"
+    file.write_bytes(good)
+    with open(file, "rb") as stream:
+        summary = make_reader(stream).get_summary()
+    assert summary is not None
+    chunk = summary.chunk_indexes[100]
+    assert not chunk.compression
+    place = chunk.chunk_start_offset + LENGTH_OF_RECORDS
+    assert int.from_bytes(good[place : place + 8], "little") == chunk.uncompressed_size
+    file.write_bytes(good[:place] + (2**56).to_bytes(8, "little") + good[place + 8 :])
+    result = replay(read_log(file))
+    assert result.same and not result.complete and 50 < result.ticks < 150
 
 
 @pytest.mark.parametrize("places", [15, pytest.param(60, marks=pytest.mark.slow)])
