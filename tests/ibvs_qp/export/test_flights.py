@@ -14,6 +14,7 @@ from c_flown import CFlown
 from c_library import needs_compiler
 
 import sim.rivals
+from sim.evaluate.figures import FIGURES
 from sim.evaluate.metrics import compute_metrics
 from sim.flight.closed_loop import fly
 from sim.flight.options import FlightOptions
@@ -25,7 +26,7 @@ pytestmark = [pytest.mark.slow, needs_compiler]
 #: Ticks of a flight that may fly by the analytic law where the solver computes with floats.
 LEFT_OUT = 50
 RECORD = Path(__file__).parents[3] / "docs" / "experiments" / "all.parquet"
-FIGURES = ("path_rms_straight_m", "force_rms_straight_n", "tilt_rms_deg")
+NAMES = ("path_rms_straight_m", "force_rms_straight_n", "tilt_rms_deg")
 #: Flights with doubles, which give Python's thrusts, and with floats.
 SEEDS = {False: 2, True: 4}
 
@@ -51,7 +52,8 @@ def test_the_main_job_flies_with_the_library_as_the_record_says(single: bool) ->
         outcomes = figures["outcomes"]
         # OSQP in floats may miss its tolerance once in a flight; the analytic law then flies until it is solved again.
         assert outcomes["hold"] == 0 and outcomes["analytic_fallback"] <= (LEFT_OUT if single else 0)
-    for name in FIGURES:
+    for name in NAMES:
         recorded, flown = record[name].to_numpy(), np.median([figures[name] for _, _, figures in flights])
         print(f"{name}: {flown:.4g}, record {recorded.min():.4g} to {recorded.max():.4g}")
-        assert flown <= recorded.max()  # the gains of the record were softer: less is no fault
+        # The record is of another law; less is no fault, nor is more that does not matter in practice.
+        assert flown <= recorded.max() + FIGURES[name].least[0] / FIGURES[name].scale
