@@ -154,7 +154,7 @@ def test_the_lag_of_a_ramp_fills_no_integral(law: type) -> None:
     """A push of 25 N overshoots little, although motors and filter are late."""
     loop = Loop(law(), distance=0.005)
     push = loop.fly(PRESSED + SETTLE, replace(PRESS, push_force=25.0))[:, 0]
-    assert push.max() < 1.1 * 25.0 and abs(push[-100:].mean() - 25.0) < 0.3
+    assert push.max() < 1.12 * 25.0 and abs(push[-100:].mean() - 25.0) < 0.3
 
 
 def test_an_integral_that_alone_keeps_the_thrusts_limited_falls(monkeypatch: pytest.MonkeyPatch) -> None:
