@@ -91,6 +91,10 @@ def contact_state(
         variance=wall.variance,
         touching=touch.in_contact,
         felt=tick.force_known,
+        seen=wall.accepted,
+        measured_distance=wall.measured,
+        distance=wall.distance,
+        set_anew=either(blind, wall.offset != signals.state("wall.offset")),
     )
     wall.store(both(touch.in_contact, wall.distance <= settings.contact_distance_m))
     return {

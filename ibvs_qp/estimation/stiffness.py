@@ -8,7 +8,7 @@ from typing import NamedTuple
 import casadi as ca
 
 from ibvs_qp.config import ContactSettings
-from ibvs_qp.symbolic.logic import both, either, where
+from ibvs_qp.symbolic.logic import both, either, no, where
 from ibvs_qp.symbolic.signals import Signals
 
 #: Push and penetration count above this frequency [rad/s]: below, the twice integrated accelerometer drifts.
@@ -31,6 +31,8 @@ MEAN = 1.0
 NOISE_SIGMAS = 3.0
 #: The stiffness is measured once the compliance is known to this part.
 KNOWN_PART = 0.5
+#: Planes of the depth camera count for this long from a touch [s]: the distance at the touch drifts.
+TOUCH_S = 3.0
 
 
 class Stiffness(NamedTuple):
@@ -53,6 +55,10 @@ def stiffness(
     variance: ca.SX,
     touching: ca.SX,
     felt: ca.SX,
+    seen: ca.SX,
+    measured_distance: ca.SX,
+    distance: ca.SX,
+    set_anew: ca.SX,
 ) -> Stiffness:
     r"""Compliance c = 1/k by Bayesian least squares of penetration on push, both in one band.
 
@@ -61,7 +67,9 @@ def stiffness(
         c = \frac{\sum x y / r + c_0 / \sigma_0^2}{\sum y^2 / r + 1 / \sigma_0^2}
 
     The distance filter holds a tip in contact at the wall, so the penetration is that of the accelerometer alone; r is
-    its variance by the accelerometer's noise. Only swings of the push beyond its own noise count.
+    its variance by the accelerometer's noise. Only swings of the push beyond its own noise count. In calm air there
+    are none, and a slow touch drifts in the accelerometer; there the planes after the touch tell the penetration
+    (`_seen_penetration`).
 
     Args:
         signals: Registry.
@@ -75,13 +83,21 @@ def stiffness(
         variance: Of one sample of the acceleration [m^2/s^4].
         touching: Whether the tip touches.
         felt: Whether there is an accelerometer.
+        seen: Whether a plane was accepted in this tick.
+        measured_distance: Of the tip, by that plane alone [m].
+        distance: Of the tip by the distance filter [m].
+        set_anew: Whether that distance was set to the felt or another surface's in this tick.
     """
     own = settings.estimation
     names = ("speed", "penetration", "lagged", "push_change", "push_twice", "push_band", "band", "push", "lever")
     tip_speed, penetration, lagged, push_change, push_twice, push_band, band, last_push, last_lever = (
         signals.state(f"stiffness.{name}") for name in names
     )
-    weight, product = signals.state("stiffness.weight"), signals.state("stiffness.product")
+    planes = _seen_penetration(
+        signals, own.distance_std_m, dt, push, touching, seen, measured_distance, distance, set_anew
+    )
+    weight = signals.state("stiffness.weight") + planes.last[0]
+    product = signals.state("stiffness.product") + planes.last[1]
     keep = ca.exp(-BAND * dt)
     tip_speed = keep * (tip_speed + dt * acceleration + lever_speed - last_lever)
     penetration = keep * (penetration + dt * tip_speed)
@@ -109,6 +125,7 @@ def stiffness(
     fade = ca.exp(-where(swings, dt, 0.0) / MEMORY_S)
     weight = signals.remember("stiffness.weight", fade * weight + counts * push_band**2)
     product = signals.remember("stiffness.product", fade * product + counts * push_band * band)
+    weight, product = weight + planes.now[0], product + planes.now[1]
     prior = 1.0 / COMPLIANCE_STD**2
     compliance = (product + prior / own.assumed_stiffness_n_m) / (weight + prior)
     deviation = 1.0 / ca.sqrt(weight + prior)
@@ -119,3 +136,51 @@ def stiffness(
     old = signals.state("stiffness.value", start=own.assumed_stiffness_n_m)
     value = signals.remember("stiffness.value", where(touching, 1.0 / compliance, old))
     return Stiffness(value, signals.remember("stiffness.known", known))
+
+
+class _Planes(NamedTuple):
+    """Weight [N^2/m^2] and product [N/m] of the compliance by the present touch, and by the one that ended just now."""
+
+    now: tuple[ca.SX, ca.SX]
+    last: tuple[ca.SX, ca.SX]
+
+
+def _seen_penetration(
+    signals: Signals,
+    deviation_m: float,
+    dt: ca.SX,
+    push: ca.SX,
+    touching: ca.SX,
+    seen: ca.SX,
+    measured: ca.SX,
+    distance: ca.SX,
+    set_anew: ca.SX,
+) -> _Planes:
+    r"""Penetration by planes since the touch, over the push since then.
+
+    .. math::
+        y_i = d_0 - d_i = c\,(f_i - f_0) + b + e_i
+
+    d_0 and f_0 are those of the touch, d_i a plane's. The distance at the touch is wrong by b, which has the deviation
+    of one plane as every e_i has; it is integrated out, so many planes do not make the touch better known. A distance
+    that was set anew has nothing to do with that of the touch: the planes of this touch count no longer.
+    """
+    names = ("time", "distance", "push", "count", "x", "y", "xx", "xy")
+    time, start, begin, *sums = (signals.state(f"stiffness.touch_{name}") for name in names)
+    touched = both(touching, time <= 0.0)
+    start, begin = where(touched, distance, start), where(touched, push, begin)
+    counts = both(touching, seen, push > begin + PRESSED_N, time < TOUCH_S, no(set_anew))
+    x, y = push - begin, start - measured
+    moved = [
+        where(touched, 0.0, total) + where(counts, step, 0.0)
+        for total, step in zip(sums, (1.0, x, y, x * x, x * y), strict=True)
+    ]
+    time = where(touching, where(set_anew, TOUCH_S, time + dt), 0.0)
+    for name, value in zip(names, (time, start, begin, *moved), strict=True):
+        signals.remember(f"stiffness.touch_{name}", value)
+
+    def told(count: ca.SX, x: ca.SX, y: ca.SX, xx: ca.SX, xy: ca.SX) -> tuple[ca.SX, ca.SX]:
+        share = x / (count + 1.0)
+        return (xx - share * x) / deviation_m**2, (xy - share * y) / deviation_m**2
+
+    return _Planes(told(*moved), tuple(where(touched, each, 0.0) for each in told(*sums)))

@@ -76,6 +76,7 @@ class WallDistance:
         offset: Distance from the felt surface to the seen one [m], 0 while they are one.
         anew: Whether the distance has started from a plane since the last contact: that plane may be another surface's.
         accepted: Whether this tick's plane was accepted.
+        measured: Distance of the tip by this plane alone [m].
         since_plane: Time since the capture of the last accepted plane [s].
         rate_noise: Standard deviation of the rate [m/s].
         variance: Of one sample of the acceleration along the normal [m^2/s^4].
@@ -123,7 +124,7 @@ class WallDistance:
         """Correct with a plane at its capture; those of a camera with mirrored axes are refused for good."""
         signals, kalman = self._signals, self._kalman
         seen, raw = self._seen(plane.values)
-        distance = raw - self.offset
+        self.measured = distance = raw - self.offset
         past, past_normal, past_yaw = self._at(plane.age)
         last_age = signals.state("wall.last_age") + self._tick.elapsed
         signals.remember("wall.last_age", where(plane.new, plane.age, last_age))
