@@ -94,7 +94,9 @@ def contact_state(
         seen=wall.accepted,
         measured_distance=wall.measured,
         distance=wall.distance,
-        set_anew=either(blind, wall.offset != signals.state("wall.offset")),
+        distance_variance=wall.distance_variance,
+        set_anew=either(wall.set_anew, blind, another),
+        softest_n_m=config.brush.stiffness_min_n_m,
     )
     wall.store(both(touch.in_contact, wall.distance <= settings.contact_distance_m))
     return {

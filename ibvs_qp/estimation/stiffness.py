@@ -8,6 +8,7 @@ from typing import NamedTuple
 import casadi as ca
 
 from ibvs_qp.config import ContactSettings
+from ibvs_qp.config.contact_estimation import ContactEstimationSettings
 from ibvs_qp.symbolic.logic import both, either, no, where
 from ibvs_qp.symbolic.signals import Signals
 
@@ -31,8 +32,14 @@ MEAN = 1.0
 NOISE_SIGMAS = 3.0
 #: The stiffness is measured once the compliance is known to this part.
 KNOWN_PART = 0.5
-#: Planes of the depth camera count for this long from a touch [s]: the distance at the touch drifts.
-TOUCH_S = 3.0
+#: A touch begins to count at this push [N]: less may be a sensor that drifted, before the wall.
+BEGIN_N = 1.0
+#: Planes count for this long from then on [s], and so many are needed.
+TOUCH_S, LEAST_PLANES = 3.0, 30
+#: Their scatter is at most this many times that of the depth camera [-]: a plane of another surface spoils the touch.
+MOST_SCATTER = 1.8
+#: And their compliance is at most this many times that of the softest brush [-]: the touch of 1 kN/m errs by a half.
+MOST_COMPLIANCE = 2.0
 
 
 class Stiffness(NamedTuple):
@@ -58,7 +65,9 @@ def stiffness(
     seen: ca.SX,
     measured_distance: ca.SX,
     distance: ca.SX,
+    distance_variance: ca.SX,
     set_anew: ca.SX,
+    softest_n_m: float,
 ) -> Stiffness:
     r"""Compliance c = 1/k by Bayesian least squares of penetration on push, both in one band.
 
@@ -67,9 +76,9 @@ def stiffness(
         c = \frac{\sum x y / r + c_0 / \sigma_0^2}{\sum y^2 / r + 1 / \sigma_0^2}
 
     The distance filter holds a tip in contact at the wall, so the penetration is that of the accelerometer alone; r is
-    its variance by the accelerometer's noise. Only swings of the push beyond its own noise count. In calm air there
-    are none, and a slow touch drifts in the accelerometer; there the planes after the touch tell the penetration
-    (`_seen_penetration`).
+    its variance by the accelerometer's noise. Only swings of the push beyond its own noise count. Calm air has none,
+    and a slow touch is lost in the accelerometer's drift: the compliance by the planes of the last touch (`_planes`) is
+    a second measurement.
 
     Args:
         signals: Registry.
@@ -86,18 +95,16 @@ def stiffness(
         seen: Whether a plane was accepted in this tick.
         measured_distance: Of the tip, by that plane alone [m].
         distance: Of the tip by the distance filter [m].
-        set_anew: Whether that distance was set to the felt or another surface's in this tick.
+        distance_variance: Of that distance [m^2].
+        set_anew: Whether that distance was set in this tick, instead of corrected.
+        softest_n_m: Stiffness of the softest brush [N/m]: more penetration is another surface's plane.
     """
     own = settings.estimation
     names = ("speed", "penetration", "lagged", "push_change", "push_twice", "push_band", "band", "push", "lever")
     tip_speed, penetration, lagged, push_change, push_twice, push_band, band, last_push, last_lever = (
         signals.state(f"stiffness.{name}") for name in names
     )
-    planes = _seen_penetration(
-        signals, own.distance_std_m, dt, push, touching, seen, measured_distance, distance, set_anew
-    )
-    weight = signals.state("stiffness.weight") + planes.last[0]
-    product = signals.state("stiffness.product") + planes.last[1]
+    weight, product = signals.state("stiffness.weight"), signals.state("stiffness.product")
     keep = ca.exp(-BAND * dt)
     tip_speed = keep * (tip_speed + dt * acceleration + lever_speed - last_lever)
     penetration = keep * (penetration + dt * tip_speed)
@@ -125,7 +132,10 @@ def stiffness(
     fade = ca.exp(-where(swings, dt, 0.0) / MEMORY_S)
     weight = signals.remember("stiffness.weight", fade * weight + counts * push_band**2)
     product = signals.remember("stiffness.product", fade * product + counts * push_band * band)
-    weight, product = weight + planes.now[0], product + planes.now[1]
+    by_planes, seen_compliance = _planes(
+        signals, own, dt, push, touching, seen, measured_distance, distance, distance_variance, set_anew, softest_n_m
+    )
+    weight, product = weight + by_planes, product + by_planes * seen_compliance
     prior = 1.0 / COMPLIANCE_STD**2
     compliance = (product + prior / own.assumed_stiffness_n_m) / (weight + prior)
     deviation = 1.0 / ca.sqrt(weight + prior)
@@ -138,49 +148,57 @@ def stiffness(
     return Stiffness(value, signals.remember("stiffness.known", known))
 
 
-class _Planes(NamedTuple):
-    """Weight [N^2/m^2] and product [N/m] of the compliance by the present touch, and by the one that ended just now."""
-
-    now: tuple[ca.SX, ca.SX]
-    last: tuple[ca.SX, ca.SX]
-
-
-def _seen_penetration(
+def _planes(
     signals: Signals,
-    deviation_m: float,
+    own: ContactEstimationSettings,
     dt: ca.SX,
     push: ca.SX,
     touching: ca.SX,
     seen: ca.SX,
-    measured: ca.SX,
+    measured_distance: ca.SX,
     distance: ca.SX,
+    distance_variance: ca.SX,
     set_anew: ca.SX,
-) -> _Planes:
-    r"""Penetration by planes since the touch, over the push since then.
+    softest_n_m: float,
+) -> tuple[ca.SX, ca.SX]:
+    r"""Weight [N^2/m^2] and compliance [m/N] by the planes of the last whole touch; weight zero before one.
 
     .. math::
-        y_i = d_0 - d_i = c\,(f_i - f_0) + b + e_i
+        d_0 - d_i = c\,(f_i - f_0) + b + e_i, \quad b \sim \mathcal N(0, P), \quad e_i \sim \mathcal N(0, \sigma^2)
 
-    d_0 and f_0 are those of the touch, d_i a plane's. The distance at the touch is wrong by b, which has the deviation
-    of one plane as every e_i has; it is integrated out, so many planes do not make the touch better known. A distance
-    that was set anew has nothing to do with that of the touch: the planes of this touch count no longer.
+    d_0 and f_0 are the filtered distance and the push at the touch, d_i and f_i those of a plane. The error b of d_0
+    has the variance P of the distance filter, at least that of one plane, and is integrated out: many planes do not
+    replace a better d_0. The compliance lies on the stiff side by `STIFF_SIDE` deviations and is at least the assumed
+    one. A touch does not count if it ends early, its distance is set anew, its planes scatter, or it seems far softer
+    than the softest brush.
     """
-    names = ("time", "distance", "push", "count", "x", "y", "xx", "xy")
-    time, start, begin, *sums = (signals.state(f"stiffness.touch_{name}") for name in names)
-    touched = both(touching, time <= 0.0)
-    start, begin = where(touched, distance, start), where(touched, push, begin)
-    counts = both(touching, seen, push > begin + PRESSED_N, time < TOUCH_S, no(set_anew))
-    x, y = push - begin, start - measured
-    moved = [
-        where(touched, 0.0, total) + where(counts, step, 0.0)
-        for total, step in zip(sums, (1.0, x, y, x * x, x * y), strict=True)
-    ]
-    time = where(touching, where(set_anew, TOUCH_S, time + dt), 0.0)
-    for name, value in zip(names, (time, start, begin, *moved), strict=True):
-        signals.remember(f"stiffness.touch_{name}", value)
+    names = ("time", "distance", "push", "error", "count", "rise", "depth", "rise_2", "product", "depth_2")
+    time, first_distance, first_push, error, *sums = (signals.state(f"touch_planes.{name}") for name in names)
+    begins = both(touching, time <= 0.0, push > BEGIN_N)
+    first_distance, first_push = where(begins, distance, first_distance), where(begins, push, first_push)
+    variance = own.distance_std_m**2
+    error = where(begins, ca.fmax(distance_variance, variance) / variance, error)
+    rise, depth = push - first_push, first_distance - measured_distance
+    counts = both(touching, seen, time > 0.0, time < TOUCH_S, rise > PRESSED_N)
+    steps = 1.0, rise, depth, rise**2, rise * depth, depth**2
+    sums = [where(begins, 0.0, total) + where(counts, step, 0.0) for total, step in zip(sums, steps, strict=True)]
+    spoilt = both(set_anew, time > 0.0)
+    later = where(either(begins, time > 0.0), where(spoilt, 2.0 * TOUCH_S, time + dt), 0.0)
+    later = where(touching, later, 0.0)
+    for name, value in zip(names, (later, first_distance, first_push, error, *sums), strict=True):
+        signals.remember(f"touch_planes.{name}", value)
 
-    def told(count: ca.SX, x: ca.SX, y: ca.SX, xx: ca.SX, xy: ca.SX) -> tuple[ca.SX, ca.SX]:
-        share = x / (count + 1.0)
-        return (xx - share * x) / deviation_m**2, (xy - share * y) / deviation_m**2
-
-    return _Planes(told(*moved), tuple(where(touched, each, 0.0) for each in told(*sums)))
+    count, rise, depth, rise_2, product, depth_2 = sums
+    share = error / (1.0 + error * count)
+    weight = (rise_2 - share * rise**2) / variance
+    compliance = (product - share * rise * depth) / variance / ca.fmax(weight, 1.0)
+    compliance = ca.fmax(compliance - STIFF_SIDE / ca.sqrt(ca.fmax(weight, 1.0)), 1.0 / own.assumed_stiffness_n_m)
+    mean = 1.0 / ca.fmax(count, 1.0)
+    across = product - mean * rise * depth
+    scatter = depth_2 - mean * depth**2 - across**2 / ca.fmax(rise_2 - mean * rise**2, 1e-6)
+    whole = both(touching, time < TOUCH_S, later >= TOUCH_S, no(spoilt), count >= LEAST_PLANES)
+    valid = both(whole, scatter * mean < MOST_SCATTER**2 * variance, compliance < MOST_COMPLIANCE / softest_n_m)
+    weight = where(valid, weight, signals.state("touch_planes.weight"))
+    compliance = where(valid, compliance, signals.state("touch_planes.compliance"))
+    signals.remember("touch_planes.weight", weight)
+    return weight, signals.remember("touch_planes.compliance", compliance)

@@ -77,6 +77,7 @@ class WallDistance:
         anew: Whether the distance has started from a plane since the last contact: that plane may be another surface's.
         accepted: Whether this tick's plane was accepted.
         measured: Distance of the tip by this plane alone [m].
+        set_anew: Whether the distance was set to this plane's.
         since_plane: Time since the capture of the last accepted plane [s].
         rate_noise: Standard deviation of the rate [m/s].
         variance: Of one sample of the acceleration along the normal [m^2/s^4].
@@ -138,6 +139,7 @@ class WallDistance:
         kalman.set_entry(first, DISTANCE, FIRST_DISTANCE_STD)
         kalman.set_entry(both(first, self._gap), SPEED, GAP_SPEED_STD)
         anew = either(first, restart)
+        self.set_anew = anew
         self._set(anew, DISTANCE, raw)
         self.offset, self.anew = where(anew, 0.0, self.offset), either(self.anew, anew)
         self.accepted = either(first, corrected)
@@ -267,6 +269,11 @@ class WallDistance:
     def distance(self) -> ca.SX:
         """Tip to wall [m], `FAR_AWAY` while unknown."""
         return where(self.known, self._state[DISTANCE], FAR_AWAY)
+
+    @property
+    def distance_variance(self) -> ca.SX:
+        """Of the distance [m^2]."""
+        return self._kalman.variance(DISTANCE)
 
     @property
     def rate(self) -> ca.SX:

@@ -14,13 +14,19 @@ SETTINGS = ContactSettings()
 ASSUMED = SETTINGS.estimation.assumed_stiffness_n_m
 MASS, DAMPING, TICK, LAG = 6.0, 30.0, 0.004, 0.02
 NAMES = ("push", "push_noise", "acceleration", "lever_speed", "speed", "variance", "touching", "felt")
-NAMES += ("seen", "measured_distance", "distance", "set_anew")
+NAMES += ("seen", "measured_distance", "distance", "distance_variance", "set_anew")
 
 
 def estimator() -> Block:
     return Block(
         lambda signals: ca.vertcat(
-            *stiffness(signals, SETTINGS, dt=signals.input("dt"), **{name: signals.input(name) for name in NAMES})
+            *stiffness(
+                signals,
+                SETTINGS,
+                dt=signals.input("dt"),
+                softest_n_m=1000.0,
+                **{name: signals.input(name) for name in NAMES},
+            )
         )
     )
 
@@ -65,24 +71,6 @@ def press(
     return block
 
 
-def calm_press(k_wall: float, seed: int = 0, wrong_m: float = 0.0, seconds: float = 10.0) -> Block:
-    """A slow touch in calm air and planes of 1.2 mm at 30 Hz; the distance at the touch is wrong."""
-    rng, block = np.random.default_rng(seed), estimator()
-    bias = rng.normal(0.0, 0.01)
-    for tick in range(round(seconds / TICK)):
-        push = min(5.0, 5.0 * tick * TICK)
-        seen = tick % 8 == 0
-        block(
-            push=push,
-            touching=push > 0.3,
-            seen=seen,
-            measured_distance=bias - push / k_wall + rng.normal(0.0, SETTINGS.estimation.distance_std_m),
-            distance=bias + wrong_m,
-            variance=0.42**2,
-        )
-    return block
-
-
 def found(block: Block) -> tuple[float, bool]:
     value, known = block.step.outputs["value"]
     return float(value), bool(known)
@@ -99,49 +87,6 @@ def test_stiffness_of_a_press_in_gusts(k_wall: float) -> None:
 def test_in_calm_air_the_touch_tells_and_the_error_is_on_the_stiff_side() -> None:
     values = [found(press(1500.0, seed))[0] for seed in range(6)]
     assert 0.75 * 1500.0 < min(values) and np.median(values) < ASSUMED
-
-
-@pytest.mark.parametrize("k_wall", [500.0, 1500.0])
-def test_in_calm_air_the_planes_tell_a_brush(k_wall: float) -> None:
-    values = [found(calm_press(k_wall, seed)) for seed in range(6)]
-    print(f"{k_wall:.0f} N/m: found {[round(value) for value, _ in values]}")
-    assert all(known and 0.75 * k_wall < value < 2.0 * k_wall for value, known in values)
-
-
-@pytest.mark.parametrize("wrong_m", [-0.002, 0.002])
-def test_a_wrong_distance_at_the_touch_makes_no_stiff_wall_soft(wrong_m: float) -> None:
-    """Integrated out, not averaged away by three hundred planes: a third of the true stiffness is stable still."""
-    values = [found(calm_press(10_000.0, seed, wrong_m)) for seed in range(6)]
-    print(f"{1e3 * wrong_m:+.0f} mm: found {[round(value) for value, _ in values]}")
-    assert all(value > 3_300.0 for value, _ in values)
-
-
-def test_planes_of_another_surface_do_not_count() -> None:
-    block = estimator()
-    for tick in range(1500):
-        push, jumped = min(5.0, 5.0 * tick * TICK), 0.03 * (tick > 500)
-        block(
-            push=push,
-            touching=push > 0.3,
-            seen=1.0,
-            measured_distance=-push / 10_000.0 - jumped,
-            distance=0.0,
-            set_anew=float(tick == 501),
-        )
-    assert found(block)[0] > 5_000.0
-
-
-def test_each_touch_counts_and_planes_in_the_air_do_not() -> None:
-    block, once = calm_press(1500.0, 1, wrong_m=0.001), found(calm_press(1500.0, 1, wrong_m=0.001))
-    for _ in range(2):
-        before = found(block)
-        for _ in range(250):
-            block(push=0.0, touching=0.0, seen=1.0, measured_distance=0.05, distance=0.05)
-        assert found(block) == before
-        for tick in range(1000):
-            push = min(5.0, 5.0 * tick * TICK)
-            block(push=push, touching=push > 0.3, seen=1.0, measured_distance=-push / 1500.0, distance=0.0)
-    assert abs(found(block)[0] - 1500.0) < abs(once[0] - 1500.0)
 
 
 @pytest.mark.parametrize("k_wall", [500.0, 1500.0])
